@@ -1,0 +1,20 @@
+/*
+ * CMUtils.h - text without stdio, so that bare metal needs none.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef CMUTILS_H
+#define CMUTILS_H
+
+#include <stdarg.h>
+
+#include "CmpStd.h"
+
+/*
+ * Formats into `out`, always NUL-terminated and cut to `size` bytes (at least 1). Understands %s, %d (int), %u and %x
+ * (unsigned), %%. Returns the length of the result. From any context.
+ */
+RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list arguments);
+RTS_SIZE CMUtlsnprintf(char *out, RTS_SIZE size, const char *format, ...);
+
+#endif

@@ -1,0 +1,15 @@
+/*
+ * CmpAppSrv.h - the application services (group 2): login, start, stop, reset, status, tasks, download. codesys-v3-protocol 4.6.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Layouts: CmpSrvNumbers.h.
+ */
+#ifndef CMPAPPSRV_H
+#define CMPAPPSRV_H
+
+#include "CmpItf.h"
+
+RTS_RESULT CmpAppSrv_Hook(CMP_HOOK hook);
+
+#endif

@@ -1,0 +1,39 @@
+/*
+ * CmpIecAbi.h - what compiled IEC code sees of the runtime (shared with the host).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Compiled code holds no absolute address and no writable global. Each entry gets one pointer to an IEC_CONTEXT and reaches
+ * everything through it. The layout is the binary interface between plctool's compiler and the runtime: change it only
+ * together with CDL_HEADER_VERSION.
+ */
+#ifndef CMPIECABI_H
+#define CMPIECABI_H
+
+#include "CmpStd.h"
+#include "CompactDownload.h"
+
+/* One per task, so that each task has the time of its own cycle. Read-only to IEC code. */
+typedef struct {
+    RTS_I64 time_ns;                 /* monotonic time at the start of this cycle, from start of the application */
+    RTS_I32 time_ms;                 /* the same in ms, wraps */
+    RTS_UI32 reserved;
+    RTS_UI8 *area[APP_AREA_COUNT];   /* base address of each area; code too */
+    const RTS_PFN *imports;          /* resolved external functions, in the order of their table */
+} IEC_CONTEXT;
+
+/* Entry of a task (all its programs in order), of CodeInit and GlobalExit. */
+typedef void (*IEC_ENTRY)(const IEC_CONTEXT *context);
+
+/* GlobalInit: `init_retains` is 1 when retain variables take their initial values as well (cold start), else 0. The
+ * runtime has zeroed the areas before. */
+typedef void (*IEC_GLOBAL_INIT)(const IEC_CONTEXT *context, RTS_UI32 init_retains);
+
+/*
+ * The external function every image may import as "iecraise" (interface text below): a failed run-time check. `code` is
+ * RTSEXCPT_DIVIDEBYZERO, RTSEXCPT_ARRAYBOUNDS or RTSEXCPT_ACCESS_VIOLATION. Does not return. The address it was called
+ * from names the source line.
+ */
+typedef void (*IEC_RAISE)(RTS_UI32 code);
+
+#endif

@@ -1,0 +1,82 @@
+/*
+ * CmpIecTask.h - the tasks of the application: their cycle and their statistics (shared with the host).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A cycle is: read inputs, IEC code, write outputs, statistics, watchdog (manual 3.4, 3.5). CmpScheduleTimer decides when.
+ */
+#ifndef CMPIECTASK_H
+#define CMPIECTASK_H
+
+#include "CmpIecAbi.h"
+#include "CmpStd.h"
+#ifndef RTS_CFFI
+#include "CmpItf.h"
+#include "SysExcept.h"
+#endif
+
+enum { KIND_CYCLIC = 0, KIND_EVENT = 1, KIND_EXTERNAL = 2, KIND_FREEWHEELING = 3 };
+
+/* Statistics of a task; times in us. Jitter is the largest deviation of a start from its due time. */
+typedef struct {
+    char name[CDL_TASK_NAME_SIZE];
+    RTS_UI32 kind;
+    RTS_UI32 priority;
+    RTS_UI32 interval_us;
+    RTS_UI32 cycles;
+    RTS_UI32 last_us;
+    RTS_UI32 avg_us;
+    RTS_UI32 min_us;
+    RTS_UI32 max_us;
+    RTS_UI32 jitter_us;
+    RTS_UI32 overruns; /* due times missed because the cycle before took too long */
+} IEC_TASK_INFO;
+
+/* Replaces all tasks by the `count` given (0 deletes them); called by the loader from main while no task runs. The records
+ * have been validated; they stay valid until the next call. ERR_NOMEMORY above APP_MAX_TASKS or without a free timer. */
+RTS_RESULT IecTaskCreateAll(const CDL_TASK *tasks, RTS_UI32 count, const IEC_CONTEXT *prototype);
+
+/* Starts and stops the scheduling of all tasks, from main. Stop returns when no task is in its cycle. */
+RTS_RESULT IecTaskStartAll(void);
+void IecTaskStopAll(void);
+
+/* One cycle of a task that is due at `due_ns`, now being `now_ns` (both SysTimeGetNs). Called by the scheduler in the
+ * context of the task. Returns 0 when the task must not be scheduled again (exception), 1 otherwise. */
+int IecTaskCycle(RTS_UI32 task, RTS_I64 due_ns, RTS_I64 now_ns);
+
+RTS_UI32 IecTaskGetCount(void);
+/* ERR_INVALIDID when there is no such task. */
+RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
+
+#ifndef RTS_CFFI
+/* Adds due times that were skipped. Called by the scheduler in the context of the task. */
+void IecTaskAddOverruns(RTS_UI32 task, RTS_UI32 missed);
+
+/* Runs fn(arg), code of the application other than a task (initialisation), from main, watched and caught like a cycle.
+ * Returns as SysExceptTry. */
+int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
+
+/* Counts starts and ends of cycles of all tasks, so that a reader can tell whether one ran meanwhile. *busy: a task is in its
+ * cycle now. From any context. */
+RTS_UI32 IecTaskGetActivity(bool *busy);
+
+/* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
+ * simulator, between cycles. */
+RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **context);
+
+/* IEC code that runs right now, for who supervises it. */
+typedef struct {
+    RTS_UI32 serial;   /* differs from one cycle of the task to its next */
+    RTS_I64 start_ns;
+    RTS_I64 limit_ns;  /* how long it may take */
+    uintptr_t context; /* for SysExceptBreak */
+} IEC_GUARD;
+
+/* Reads guard `index`: one for each task, and one at IecTaskGetCount() for code that IecTaskRunGuarded runs. Returns 0 when
+ * it does not run. From any context. */
+int IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *guard);
+
+RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook);
+#endif
+
+#endif

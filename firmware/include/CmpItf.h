@@ -1,0 +1,110 @@
+/*
+ * CmpItf.h - component manager (CmpMgr): the life of the runtime.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A component is one hook function in the static list of the port (cmp_list.c). The manager calls it with CH_INIT_* in order
+ * of the list, CH_EXIT_* in reverse, CH_COMM_CYCLE in the main loop. Manual 3.1, 3.2. All in the context of main.
+ */
+#ifndef CMPITF_H
+#define CMPITF_H
+
+#include "CmpErrors.h"
+#include "CmpStd.h"
+
+/* Hooks in the order of start-up; manual 3.1.1. Each CH_EXIT_x undoes CH_INIT_x. */
+typedef enum {
+    CH_INIT_SYSTEM,       /* system components (log, memory, time): reset all own state */
+    CH_INIT_SYSTEM2,      /* what needs other system components */
+    CH_INIT,              /* all other components: reset all own state, call nobody */
+    CH_INIT2,             /* all others are initialised; create events */
+    CH_INIT3,             /* register for events, services, external functions */
+    CH_INIT_SYSTEM_TASKS, /* timers and tasks the application needs */
+    CH_INIT_TASKS,        /* boot project, IEC tasks */
+    CH_INIT_COMM,         /* open the communication */
+    CH_INIT_FINISHED,
+    CH_COMM_CYCLE,        /* main loop: never blocks */
+    CH_EXIT_COMM,
+    CH_EXIT_TASKS,
+    CH_EXIT_SYSTEM_TASKS,
+    CH_EXIT3,
+    CH_EXIT2,
+    CH_EXIT,
+    CH_EXIT_SYSTEM2,
+    CH_EXIT_SYSTEM,
+} CMP_HOOK;
+
+/* A component's hook function. An error from a CH_INIT_* hook stops the start-up; others are ignored. */
+typedef RTS_RESULT (*PF_HOOK_FUNCTION)(CMP_HOOK hook);
+
+/* Component numbers, in log entries; the field's numbers where known. */
+enum {
+    CMPID_CmpMgr = 0x0001,
+    CMPID_CmpAppEmbedded = 0x0002,
+    CMPID_CmpIecTask = 0x0003,
+    CMPID_CmpScheduleTimer = 0x0004,
+    CMPID_CmpRetain = 0x0005,
+    CMPID_CmpMonitor2 = 0x0006,
+    CMPID_CmpLog = 0x0007,
+    CMPID_CmpDevice = 0x0008,
+    CMPID_CmpChannelServerEmbedded = 0x0009,
+    CMPID_CmpRouterEmbedded = 0x000A,
+    CMPID_CmpBlkDrvSimpleCom = 0x000B,
+    CMPID_SysFileFlash = 0x000C,
+    CMPID_SysFlash = 0x000D,
+    CMPID_CmpMath = 0x000E,
+    CMPID_SysTimer = 0x000F,
+    CMPID_SysCom = 0x0010,
+    CMPID_SysTime = 0x0011,
+    CMPID_SysTarget = 0x0012,
+    CMPID_SysWatchdog = 0x0013,
+    CMPID_CmpEventMgrEmbedded = 0x0014,
+    CMPID_CmpSrv = 0x0015,
+    CMPID_CmpAppSrv = 0x0016,
+    CMPID_CmpLogSrv = 0x0017,
+    CMPID_CmpNameServiceServer = 0x0018,
+    CMPID_SysSim = 0x0019,
+};
+
+typedef struct {
+    RTS_UI32 id; /* CMPID_* */
+    const char *name;
+    PF_HOOK_FUNCTION hook;
+} CMP_COMPONENT;
+
+/* For the port's list: CMP_DECLARE(CmpLog) declares the hook CmpLog_Hook, CMP_ENTRY(CmpLog) is its CMP_COMPONENT. */
+#define CMP_DECLARE(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
+#define CMP_ENTRY(component) {CMPID_##component, #component, component##_Hook},
+
+/* The port's list, system components first. */
+extern const CMP_COMPONENT cmp_components[];
+extern const RTS_SIZE cmp_component_count;
+
+/* Runs all CH_INIT_* hooks. On an error the ones that ran are undone by their CH_EXIT_* and the error is returned. */
+RTS_RESULT CMInit(void);
+
+/* Runs all CH_EXIT_* hooks in reverse order. */
+RTS_RESULT CMExit(void);
+
+/* Calls one hook of every component; CH_COMM_CYCLE is what a main loop calls. Returns the first error. */
+RTS_RESULT CMCallHook(CMP_HOOK hook);
+
+/* Name of a component, "" when unknown. */
+const char *CMGetComponentName(RTS_UI32 id);
+
+/* ---- external functions: C functions offered to IEC code ---- */
+
+typedef struct {
+    const char *name;     /* lower case */
+    RTS_UI32 signature;   /* CRC-32 of the interface text, as plctool export-itf writes it */
+    RTS_UI32 version;     /* library version, major << 16 | minor */
+    RTS_PFN function;
+} CMP_EXT_FUNCTION;
+
+/* Registers a static table of functions; called in CH_INIT3. ERR_NOMEMORY when CM_MAX_EXT_TABLES is reached. */
+RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count);
+
+/* Finds a function by name; NULL when there is none. Signature and version are compared by the caller. */
+const CMP_EXT_FUNCTION *CMFindExternal(const char *name);
+
+#endif

@@ -1,0 +1,39 @@
+/*
+ * CmpLog.h - the log ring (shared with the host).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Entries carry component, class, error and a text; the oldest is overwritten. Manual 3.9, codesys-v3-protocol 4.10.
+ */
+#ifndef CMPLOG_H
+#define CMPLOG_H
+
+#include "CmpStd.h"
+#include "rts_config.h"
+#ifndef RTS_CFFI
+#include "CmpErrors.h"
+#include "CmpItf.h"
+#endif
+
+enum { LOG_INFO = 1, LOG_WARNING = 2, LOG_ERROR = 4, LOG_EXCEPTION = 8, LOG_DEBUG = 0x10 };
+
+#ifndef RTS_CFFI
+typedef struct {
+    RTS_UI32 handle; /* counts from 1, never reused */
+    RTS_UI32 component;
+    RTS_UI32 log_class;
+    RTS_UI32 error;
+    RTS_I64 time_ns;
+    char text[LOG_TEXT_SIZE];
+} LOG_ENTRY;
+
+/* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. */
+void LogAdd(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...);
+
+/* Copies the first entry with a handle >= `handle`. ERR_END_OF_OBJECT when there is none. */
+RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry);
+
+RTS_RESULT CmpLog_Hook(CMP_HOOK hook);
+#endif
+
+#endif

@@ -1,0 +1,67 @@
+/*
+ * CmpRouterEmbedded.h - layer 3 of a leaf node: takes packets from block drivers, answers to their senders.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A leaf never forwards, has no parent, and sends only answers. codesys-v3-protocol 2. All from main.
+ */
+#ifndef CMPROUTEREMBEDDED_H
+#define CMPROUTEREMBEDDED_H
+
+#include "CmpItf.h"
+#include "CmpSrvNumbers.h"
+
+/* A packet to send, in pieces, so that nobody has to assemble it in a buffer of his own. */
+typedef struct {
+    const RTS_UI8 *data;
+    RTS_UI32 size;
+} BLK_PART;
+
+/* A block driver (layer 2); also the CAN, UDP, TCP and in-process ones. */
+typedef struct BLK_DRV {
+    RTS_UI8 type;           /* BLK_DRV_TYPE_*, in the name service reply */
+    RTS_UI8 point_to_point; /* 1: everything that arrives is for this node, whatever its receiver address */
+    RTS_UI8 address_words;  /* own network address, 1..ROUTER_MAX_ADDRESS */
+    RTS_UI8 address[2 * ROUTER_MAX_ADDRESS];
+    void *instance; /* the driver's own */
+
+    /* Queues one packet made of `count` parts, BLK_MAX_SIZE bytes at most; the parts are copied. ERR_NOBUFFER: no room now,
+     * offer it again in a later cycle. */
+    RTS_RESULT (*send)(const struct BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count);
+} BLK_DRV;
+
+/* Where a packet came from, and so where its answer goes. */
+typedef struct {
+    const BLK_DRV *driver;
+    RTS_UI16 max_packet;   /* bytes, what the sender's path can carry */
+    RTS_UI8 address_words; /* 1..ROUTER_MAX_ADDRESS */
+    RTS_UI8 address[2 * ROUTER_MAX_ADDRESS];
+} ROUTER_PEER;
+
+/* What happened to packets since start. */
+typedef struct {
+    RTS_UI32 handled;
+    RTS_UI32 malformed;   /* header wrong or cut */
+    RTS_UI32 not_for_us;  /* other receiver, relative address, hop count 0 */
+    RTS_UI32 ignored;     /* signals, notifications, services a leaf does not offer */
+} ROUTER_COUNTERS;
+
+/* Called by a block driver for each packet whose check sum was right. `data` may be reused when it returns. */
+void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size);
+
+enum { ROUTER_MAX_PARTS = 2 };
+
+/* Sends `parts` (at most ROUTER_MAX_PARTS) as the payload of one packet. ERR_NOBUFFER: later; ERR_NET_MSGSIZE: too long. */
+RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *parts, RTS_UI32 count);
+
+/* Largest payload of one packet to this peer when both addresses together have `address_words` words. */
+RTS_UI32 RouterGetMaxPayload(const ROUTER_PEER *peer, RTS_UI32 address_words);
+
+/* Same driver, same address. */
+bool RouterIsSamePeer(const ROUTER_PEER *a, const ROUTER_PEER *b);
+
+const ROUTER_COUNTERS *RouterGetCounters(void);
+
+RTS_RESULT CmpRouterEmbedded_Hook(CMP_HOOK hook);
+
+#endif

@@ -1,0 +1,17 @@
+/*
+ * CmpSettings.h - settings: a constant table of the port. Manual 3.8.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The port lists its values in rts_config_port.h: #define SETTINGS_TABLE {"CmpXxx", "Key", 1, NULL}, {"CmpXxx", "Name", 0, "text"},
+ */
+#ifndef CMPSETTINGS_H
+#define CMPSETTINGS_H
+
+#include "CmpStd.h"
+
+/* The value of component's `key`, or `otherwise` when the table has none (of this type). From any context. */
+RTS_I32 SettgGetIntValue(const char *component, const char *key, RTS_I32 otherwise);
+const char *SettgGetStringValue(const char *component, const char *key, const char *otherwise);
+
+#endif

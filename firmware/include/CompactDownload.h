@@ -1,0 +1,176 @@
+/*
+ * CompactDownload.h - the application image on disk, on the wire and in flash (shared with the host).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Layout of manual 2.3.1 and codesys-v3-protocol 5.1..5.4. All little-endian; table entries start at multiples of 4, the
+ * code segment at a multiple of APP_CODE_ALIGN. Where the field's format says nothing (tasks), a typed blob carries it.
+ */
+#ifndef COMPACTDOWNLOAD_H
+#define COMPACTDOWNLOAD_H
+
+#include "CmpStd.h"
+
+enum {
+    CDL_HEADER_TAG = 0x1234ABCD,
+    CDL_HEADER_VERSION = 1,
+    CDL_HEADER_SIZE = 104,
+    CDL_CRC_OFFSET = 100,
+    CDL_BLOB_MAGIC = -1223966498, /* 0xB70BC0DE as a signed enum constant */
+    APP_CODE_ALIGN = 16,
+};
+
+/* Area indices. Code is position independent and holds the constants; the other areas are RAM owned by the runtime. */
+enum {
+    APP_AREA_DATA = 0,
+    APP_AREA_RETAIN = 1,
+    APP_AREA_INPUT = 2,
+    APP_AREA_OUTPUT = 3,
+    APP_AREA_MEMORY = 4,
+    APP_AREA_CODE = 5,
+    APP_AREA_COUNT = 6,
+    APP_AREA_NONE = 0xFFFF,
+};
+
+/* Type flags of an area (5.3). */
+enum {
+    AREA_TYPE_DATA = 0x0001,
+    AREA_TYPE_CONSTANT = 0x0002,
+    AREA_TYPE_INPUT = 0x0004,
+    AREA_TYPE_OUTPUT = 0x0008,
+    AREA_TYPE_MEMORY = 0x0010,
+    AREA_TYPE_RETAIN = 0x0020,
+    AREA_TYPE_CODE = 0x0040,
+    AREA_TYPE_PERSISTENT = 0x0100,
+};
+
+/* Offset and size in bytes from the start of the image; 0/0 when the segment is absent. */
+typedef struct {
+    RTS_UI32 offset;
+    RTS_UI32 size;
+} CDL_SEGMENT;
+
+typedef struct {
+    RTS_UI32 header_tag;
+    RTS_UI32 header_version;
+    RTS_UI32 header_size;
+    RTS_UI32 total_size;
+    RTS_UI32 device_type;
+    RTS_UI32 device_id; /* vendor << 16 | device */
+    RTS_UI32 device_version;
+    RTS_UI32 flags; /* low word DLF_*, high word AF_* */
+    RTS_UI32 compiler_version;
+    RTS_UI32 code_area_size;
+    RTS_UI16 code_area_index;
+    RTS_UI16 code_area_flags;
+    CDL_SEGMENT code;
+    CDL_SEGMENT application_info;
+    CDL_SEGMENT area_table;
+    CDL_SEGMENT function_table;
+    CDL_SEGMENT external_function_table;
+    CDL_SEGMENT iec_function_table;
+    CDL_SEGMENT blob; /* "source code" in the manual */
+    RTS_UI32 crc;     /* CRC-32 (zlib) of the whole image with this word zero */
+} CDL_HEADER;
+
+/* Entry of the area table. */
+typedef struct {
+    RTS_UI32 size; /* bytes */
+    RTS_UI16 index;
+    RTS_UI16 type; /* AREA_TYPE_* */
+} AREA_INFO;
+
+/* Entry of the function table, in the order of CDL_FUNCTION_*; area APP_AREA_NONE when the function is absent. */
+typedef struct {
+    RTS_UI16 dummy;
+    RTS_UI16 area;
+    RTS_UI32 offset;
+} POU_REF;
+
+enum {
+    CDL_FUNCTION_CODE_INIT = 0,
+    CDL_FUNCTION_GLOBAL_INIT = 1,
+    CDL_FUNCTION_GLOBAL_EXIT = 2,
+    CDL_FUNCTION_RELOC = 3,
+    CDL_FUNCTION_DOWNLOAD_CODE = 4,
+    CDL_FUNCTION_TARGET_INFO = 5,
+    CDL_FUNCTION_COUNT = 6,
+};
+
+/* Entry of the external function table, followed by the lower-case name and a NUL, padded to a multiple of 4. `offset` is
+ * the byte offset of the function's slot in the import table (area APP_AREA_NONE: the import table belongs to the loader). */
+typedef struct {
+    RTS_UI32 signature_id; /* CRC of the interface text */
+    RTS_UI32 identifier;
+    RTS_UI32 version; /* library version, major << 16 | minor */
+    RTS_UI32 offset;
+    RTS_UI16 area;
+} EXT_REF_INFO;
+enum { EXT_REF_INFO_SIZE = 18 }; /* on the wire: the name follows at once */
+
+/* Entry of the IEC function table, followed by name, NUL and padding. */
+typedef struct {
+    RTS_UI16 dummy;
+    RTS_UI16 area;
+    RTS_UI32 offset;
+    RTS_UI32 signature_id;
+    RTS_UI32 identifier;
+    RTS_UI32 version;
+} FUNCTION_INFO;
+
+/* Head of every blob; the payload follows, padded to a multiple of 4. */
+typedef struct {
+    RTS_UI32 magic;
+    RTS_UI32 id;   /* CDL_BLOB_* */
+    RTS_UI32 size; /* of the payload in bytes */
+} CDL_BLOB;
+
+enum {
+    CDL_BLOB_TASKS = 1,  /* array of CDL_TASK */
+    CDL_BLOB_RETAIN = 2, /* u32: CRC of the layout of the retain area; without it retain data belong to one image only */
+};
+
+enum { CDL_TASK_NAME_SIZE = 32 };
+
+/* A task. `kind` is KIND_* of CmpIecTask.h. A KIND_EXTERNAL task runs on the external event that has its name. */
+typedef struct {
+    RTS_UI32 interval_us; /* cyclic tasks */
+    RTS_UI32 watchdog_us; /* 0: none */
+    RTS_UI16 watchdog_sensitivity;
+    RTS_UI8 priority; /* 0 highest .. 31 */
+    RTS_UI8 kind;
+    RTS_UI32 entry_offset; /* of the task's code in the code segment */
+    RTS_UI16 event_area;   /* event tasks: the BOOL that triggers; APP_AREA_NONE otherwise */
+    RTS_UI16 reserved;
+    RTS_UI32 event_offset;
+    char name[CDL_TASK_NAME_SIZE]; /* NUL-terminated */
+} CDL_TASK;
+
+/* Download flags (5.4), low word of CDL_HEADER.flags and of the download service. */
+enum {
+    DLF_CONTINUEDOWNLOAD = 1,
+    DLF_USEBOOTAPPFROMDOWNLOAD = 2,
+    DLF_WRITEBOOTAPPLICATION = 4,
+};
+
+/* Device identities that plctool compiles for. Vendor 0 is the open default; a vendor's own id comes from SysTarget. */
+enum {
+    TARGET_TYPE_PROGRAMMABLE = 0x1000,
+    TARGET_ID_X86_64_LINUX = 0x9001,
+    TARGET_ID_AARCH64_LINUX = 0x9002,
+    TARGET_ID_CORTEX_M0 = 0x9003,
+    TARGET_ID_CORTEX_M3 = 0x9004,
+    TARGET_ID_CORTEX_M4F = 0x9005,
+    TARGET_ID_CORTEX_M7 = 0x9006,
+    TARGET_ID_RV32IMAC = 0x9007,
+};
+
+#ifndef RTS_CFFI
+RTS_STATIC_ASSERT(sizeof(CDL_HEADER) == CDL_HEADER_SIZE, cdl_header_is_104_bytes);
+RTS_STATIC_ASSERT(sizeof(AREA_INFO) == 8, area_info_is_8_bytes);
+RTS_STATIC_ASSERT(sizeof(POU_REF) == 8, pou_ref_is_8_bytes);
+RTS_STATIC_ASSERT(sizeof(FUNCTION_INFO) == 20, function_info_is_20_bytes);
+RTS_STATIC_ASSERT(sizeof(CDL_TASK) == 56, cdl_task_is_56_bytes);
+#endif
+
+#endif

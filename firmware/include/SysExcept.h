@@ -1,0 +1,105 @@
+/*
+ * SysExcept.h - exceptions of IEC code: numbers (shared with the host) and the port's way to catch them.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A port turns hardware faults (signals, fault handlers), checked errors (SysExceptRaise) and the watchdog's break
+ * (SysExceptBreak) into one return from SysExceptTry. Numbers: codesys-v3-protocol 5.8.
+ */
+#ifndef SYSEXCEPT_H
+#define SYSEXCEPT_H
+
+#include "CmpStd.h"
+
+enum {
+    RTSEXCPT_NOEXCEPTION = 0x0000,
+    RTSEXCPT_WATCHDOG = 0x0010,
+    RTSEXCPT_HARDWAREWATCHDOG = 0x0011,
+    RTSEXCPT_IO_CONFIG_ERROR = 0x0012,
+    RTSEXCPT_PROGRAMCHECKSUM = 0x0013,
+    RTSEXCPT_FIELDBUS_ERROR = 0x0014,
+    RTSEXCPT_IOUPDATE_ERROR = 0x0015,
+    RTSEXCPT_CYCLE_TIME_EXCEED = 0x0016,
+    RTSEXCPT_ONLCHANGE_PROGRAM_EXCEEDED = 0x0017,
+    RTSEXCPT_UNRESOLVED_EXTREFS = 0x0018,
+    RTSEXCPT_DOWNLOAD_REJECTED = 0x0019,
+    RTSEXCPT_BOOTPROJECT_REJECTED_DUE_RETAIN_ERROR = 0x001A,
+    RTSEXCPT_LOADBOOTPROJECT_FAILED = 0x001B,
+    RTSEXCPT_OUT_OF_MEMORY = 0x001C,
+    RTSEXCPT_RETAIN_MEMORY_ERROR = 0x001D,
+    RTSEXCPT_BOOTPROJECT_CRASH = 0x001E,
+    RTSEXCPT_BOOTPROJECTTARGETMISMATCH = 0x0021,
+    RTSEXCPT_SCHEDULEERROR = 0x0022,
+    RTSEXCPT_FILE_CHECKSUM_ERR = 0x0023,
+    RTSEXCPT_RETAIN_IDENTITY_MISMATCH = 0x0024,
+    RTSEXCPT_IEC_TASK_CONFIG_ERROR = 0x0025,
+    RTSEXCPT_APP_TARGET_MISMATCH = 0x0026,
+    RTSEXCPT_ILLEGAL_INSTRUCTION = 0x0050,
+    RTSEXCPT_ACCESS_VIOLATION = 0x0051,
+    RTSEXCPT_PRIV_INSTRUCTION = 0x0052,
+    RTSEXCPT_IN_PAGE_ERROR = 0x0053,
+    RTSEXCPT_STACK_OVERFLOW = 0x0054,
+    RTSEXCPT_INVALID_DISPOSITION = 0x0055,
+    RTSEXCPT_INVALID_HANDLE = 0x0056,
+    RTSEXCPT_GUARD_PAGE = 0x0057,
+    RTSEXCPT_DOUBLE_FAULT = 0x0058,
+    RTSEXCPT_INVALID_OPCODE = 0x0059,
+    RTSEXCPT_MISALIGNMENT = 0x0100,
+    RTSEXCPT_ARRAYBOUNDS = 0x0101,
+    RTSEXCPT_DIVIDEBYZERO = 0x0102,
+    RTSEXCPT_OVERFLOW = 0x0103,
+    RTSEXCPT_NONCONTINUABLE = 0x0104,
+    RTSEXCPT_PROCESSORLOAD_WATCHDOG = 0x0105,
+    RTSEXCPT_FPU_ERROR = 0x0150,
+    RTSEXCPT_FPU_DENORMAL_OPERAND = 0x0151,
+    RTSEXCPT_FPU_DIVIDEBYZERO = 0x0152,
+    RTSEXCPT_FPU_INEXACT_RESULT = 0x0153,
+    RTSEXCPT_FPU_INVALID_OPERATION = 0x0154,
+    RTSEXCPT_FPU_OVERFLOW = 0x0155,
+    RTSEXCPT_FPU_STACK_CHECK = 0x0156,
+    RTSEXCPT_FPU_UNDERFLOW = 0x0157,
+    RTSEXCPT_BREAKPOINT = 0x0200,
+    RTSEXCPT_MASK = 0x0FFF,
+    RTSEXCPT_LICENSE_INVALID = 0x100D0001,
+    RTSEXCPT_WATCHDOG_OMITTED_CYCLE = 0x1000,
+    RTSEXCPT_VENDOR_EXCEPTION_BASE = 0x2000,
+};
+
+/* What is known about an exception. `code_offset` is the fault address relative to the start of the application's code
+ * segment, 0xFFFFFFFF when it was elsewhere. */
+typedef struct {
+    RTS_UI32 code;        /* RTSEXCPT_*, RTSEXCPT_NOEXCEPTION when the function returned normally */
+    uintptr_t address;    /* program counter at the fault; for checked errors that of the call that raised it */
+} RTS_EXCEPTION;
+
+#ifndef RTS_CFFI
+
+/*
+ * Runs fn(arg) and catches what goes wrong in it. Not nested. Called by CmpIecTask in the context of a task (timer
+ * interrupt or thread) and by CmpAppEmbedded from main for the init code.
+ *
+ * Returns 1 and fills *exception when fn was left by an exception, 0 otherwise. After an exception no lock is held that
+ * was taken within fn, because IEC code takes none.
+ */
+int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
+
+/* Leaves the running SysExceptTry of this context with RTSEXCPT_* `code`. `address`: where the error was seen. Does not
+ * return. Outside a SysExceptTry it is a fatal error of the runtime. */
+void SysExceptRaise(RTS_UI32 code, uintptr_t address);
+
+/*
+ * Breaks into the SysExceptTry that runs in the context of timer task `context` (as SysExceptContext gave it), with
+ * RTSEXCPT_* `code`. Called by the watchdog, from another context. Does nothing when that context is not in IEC code.
+ */
+void SysExceptBreak(uintptr_t context, RTS_UI32 code);
+
+/* Names the calling context (thread, interrupt level) for SysExceptBreak. Never 0; 0 and a context that has ended are names
+ * of nobody. A context that calls this before its first cycle has what catching needs then already. */
+uintptr_t SysExceptContext(void);
+
+/* Gives back what catching took from the process (signal handlers); the next SysExceptTry takes it again. From main,
+ * when no SysExceptTry runs. Empty on bare metal. */
+void SysExceptShutdown(void);
+
+#endif
+#endif

@@ -1,0 +1,53 @@
+/*
+ * SysFileFlash.h - a fixed set of files on SysFlash. Manual 3.10.5.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Where the files lie: FILE_MAP of rts_config_port.h, or computed from the size of the flash. A file is written in sequence;
+ * sectors are erased when the first byte of them is due, no byte is programmed twice. All from main.
+ */
+#ifndef SYSFILEFLASH_H
+#define SYSFILEFLASH_H
+
+#include "CmpErrors.h"
+#include "CmpItf.h"
+#include "CmpStd.h"
+
+/* The files. Commit and retain are record logs (SysFlashLog.h). */
+enum { FILE_SLOT_A = 0, FILE_SLOT_B = 1, FILE_COMMIT = 2, FILE_RETAIN = 3, FILE_COUNT = 4 };
+
+/* Every write position that was closed lies at a multiple of this, which all program sizes divide. */
+enum { FILE_ALIGN = 16 };
+
+/* Where a file lies in flash: both multiples of the sector size. */
+typedef struct {
+    RTS_UI32 offset;
+    RTS_UI32 size;
+} FILE_AREA;
+
+const FILE_AREA *SysFileGetArea(RTS_UI32 file);
+
+/* Opens for writing from the start; erases as it goes. */
+void SysFileCreate(RTS_UI32 file);
+
+/* Opens for writing at `position`, a multiple of FILE_ALIGN, of what is erased already. */
+void SysFileAppend(RTS_UI32 file, RTS_UI32 position);
+
+/* Appends. ERR_DISK_FULL beyond the end of the file, nothing is written then; ERR_DEVICE flash fault. */
+RTS_RESULT SysFileWrite(RTS_UI32 file, const void *data, RTS_UI32 size);
+
+/* Bytes written so far, the position of the next one. */
+RTS_UI32 SysFileGetPos(RTS_UI32 file);
+
+/* Programs what is still buffered, padded with the erased value, and syncs. */
+RTS_RESULT SysFileClose(RTS_UI32 file);
+
+/* Reads what is in flash. ERR_OUT_OF_LIMITS beyond the end of the file. */
+RTS_RESULT SysFileRead(RTS_UI32 file, RTS_UI32 offset, void *data, RTS_UI32 size);
+
+/* Erases [offset, offset + size), multiples of the sector size. */
+RTS_RESULT SysFileErase(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size);
+
+RTS_RESULT SysFileFlash_Hook(CMP_HOOK hook);
+
+#endif

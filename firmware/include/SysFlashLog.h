@@ -1,0 +1,37 @@
+/*
+ * SysFlashLog.h - records that survive a power cut at any point, appended to a file of SysFileFlash.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The file is two halves. Records are appended to one half until it is full; then the other is erased and takes over. A
+ * record counts when its CRC is right, the one with the newest sequence number wins: a cut leaves the old or the new one,
+ * never a mix. Whoever uses it puts all it needs into each record, for the records before may be erased. All from main.
+ */
+#ifndef SYSFLASHLOG_H
+#define SYSFLASHLOG_H
+
+#include "SysFileFlash.h"
+
+typedef struct {
+    RTS_UI32 file;
+    RTS_UI32 half_size;
+    RTS_UI32 start;    /* of the half in use */
+    RTS_UI32 used;     /* bytes of that half that may have been programmed */
+    RTS_UI32 sequence; /* of the newest record, 0 when there is none */
+} FLASH_LOG;
+
+enum { FLASH_LOG_HEAD_SIZE = 20 };
+
+/* Finds the newest record and the place for the next. ERR_DEVICE flash fault. */
+RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file);
+
+/* Reads the newest record with this tag and size into `data`; ERR_NO_OBJECT when there is none, `data` is undefined then. */
+RTS_RESULT FlashLogRead(const FLASH_LOG *log, RTS_UI32 tag, void *data, RTS_UI32 size);
+
+/* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault. */
+RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);
+
+/* The largest record, in bytes of data. */
+RTS_UI32 FlashLogCapacity(const FLASH_LOG *log);
+
+#endif

@@ -1,0 +1,17 @@
+/*
+ * SysTime.h - the clock a port gives.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef SYSTIME_H
+#define SYSTIME_H
+
+#include "CmpStd.h"
+
+/* Monotonic time in ns since start-up, never going back, resolution 1 us or better. From any context, below 1 us. */
+RTS_I64 SysTimeGetNs(void);
+
+/* Milliseconds of the same clock; wraps after 49 days, so compare differences only. */
+RTS_UI32 SysTimeGetMs(void);
+
+#endif

@@ -1,0 +1,130 @@
+/*
+ * rts_config.h - every tunable of the runtime: default, reason and what it costs.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A port overrides a value in its own rts_config_port.h, found by include order (port directory first). Portable code
+ * includes only this file.
+ */
+#ifndef RTS_CONFIG_H
+#define RTS_CONFIG_H
+
+#include "rts_config_port.h"
+
+/* Tasks of an application. Each costs one IEC_CONTEXT, one task record (about 120 bytes on 32-bit targets) and a timer. */
+#ifndef APP_MAX_TASKS
+#define APP_MAX_TASKS 3
+#endif
+
+/* External functions an application may import; one pointer each. */
+#ifndef APP_MAX_IMPORTS
+#define APP_MAX_IMPORTS 32
+#endif
+
+/* RAM of each area in bytes. */
+#ifndef APP_DATA_SIZE
+#define APP_DATA_SIZE 4096
+#endif
+#ifndef APP_RETAIN_SIZE
+#define APP_RETAIN_SIZE 512
+#endif
+#ifndef APP_INPUT_SIZE
+#define APP_INPUT_SIZE 64
+#endif
+#ifndef APP_OUTPUT_SIZE
+#define APP_OUTPUT_SIZE 64
+#endif
+#ifndef APP_MEMORY_SIZE
+#define APP_MEMORY_SIZE 256
+#endif
+
+/* A new application has proven itself after running this long without an exception [us]; before that a restart may roll
+ * back to the one before it. */
+#ifndef APP_PROVE_US
+#define APP_PROVE_US 3000000
+#endif
+
+/* A cycle of a task without watchdog, and initialisation code, is broken out of after this long [us], so that an endless
+ * loop never takes the device away. */
+#ifndef APP_DEFAULT_WATCHDOG_US
+#define APP_DEFAULT_WATCHDOG_US 10000000
+#endif
+
+/* Changed retain variables are saved at most this often [us]: what a power cut may lose against the wear of the flash. The
+ * retain area is in RAM twice, because what was saved last is compared with. */
+#ifndef APP_RETAIN_SAVE_US
+#define APP_RETAIN_SAVE_US 1000000
+#endif
+
+/* Set in the address of an entry of IEC code: 1 on cores that run Thumb code. */
+#ifndef APP_ENTRY_MODE_BIT
+#define APP_ENTRY_MODE_BIT 0
+#endif
+
+/* How IEC code is entered, for ports that hold the import table in a register. */
+#ifndef APP_CALL_ENTRY
+#define APP_CALL_ENTRY(entry, context) (entry)(context)
+#endif
+#ifndef APP_CALL_GLOBAL_INIT
+#define APP_CALL_GLOBAL_INIT(entry, context, init_retains) (entry)(context, init_retains)
+#endif
+
+/* Tables of external functions that components may register; two words each. */
+#ifndef CM_MAX_EXT_TABLES
+#define CM_MAX_EXT_TABLES 4
+#endif
+
+/* Event callbacks that may be registered; five words each. */
+#ifndef EVENT_MAX_CALLBACKS
+#define EVENT_MAX_CALLBACKS 4
+#endif
+
+/* External events that may be registered; two words each. */
+#ifndef SCHED_MAX_EXTERNAL_EVENTS
+#define SCHED_MAX_EXTERNAL_EVENTS 2
+#endif
+
+/* Entries of the CRC tables, 16 or 256: 96 bytes of flash, or 1.5 KiB and about four times as fast. */
+#ifndef CHECKSUM_TABLE_ENTRIES
+#define CHECKSUM_TABLE_ENTRIES 16
+#endif
+
+/* Settings of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. */
+#ifndef SETTINGS_TABLE
+#define SETTINGS_TABLE
+#endif
+
+/* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log lie in flash, if not where
+ * SysFileFlash computes it. No default. */
+
+/* Receive and send buffer of the communication channel, bytes each; the largest L7 message. The field's compact template
+ * uses 2048; larger ones raise the flash rate because there is one reply per message. */
+#ifndef NETSERVER_MESSAGE_SIZE
+#define NETSERVER_MESSAGE_SIZE 2048
+#endif
+
+/* Serial lines the block driver serves; each costs one receive packet (514 bytes), COM_QUEUE_SIZE and about 150 bytes. */
+#ifndef COM_MAX_LINES
+#define COM_MAX_LINES 1
+#endif
+
+/* Queue of outgoing packets per serial line, bytes: one largest packet (514 with its length) and a few small ones. A second
+ * large one is made when the first is on the line. */
+#ifndef COM_QUEUE_SIZE
+#define COM_QUEUE_SIZE 640
+#endif
+
+/* Service groups of layer 7; three words each. */
+#ifndef SRV_MAX_GROUPS
+#define SRV_MAX_GROUPS 8
+#endif
+
+/* Entries of the log ring; each about 100 bytes with its text. */
+#ifndef LOG_MAX_ENTRIES
+#define LOG_MAX_ENTRIES 16
+#endif
+#ifndef LOG_TEXT_SIZE
+#define LOG_TEXT_SIZE 80
+#endif
+
+#endif

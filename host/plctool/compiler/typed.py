@@ -1,0 +1,459 @@
+"""The typed program: what the checker makes of the syntax tree and all that the lowering needs.
+
+Everything is resolved here: names point to `Variable`s, implicit conversions are `Convert` nodes, call arguments are in
+order of declaration with defaults filled in, generic functions are instantiated, constants are folded. The lowering decides
+nothing about the language; it only chooses instructions. Every node says where it came from, for run-time errors and the
+debugger.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from plctool.compiler.types import StructType, Type
+
+
+@dataclass(frozen=True)
+class Pos:
+    """A place in a source file; `line` and `column` count from 1."""
+
+    file: str
+    line: int
+    column: int
+
+
+class Area(Enum):
+    """Memory areas, numbered as in firmware/include/CompactDownload.h (APP_AREA_*)."""
+
+    DATA = 0
+    RETAIN = 1
+    INPUT = 2
+    OUTPUT = 3
+    MEMORY = 4
+    CODE = 5
+
+
+class Storage(Enum):
+    """Where a variable lives."""
+
+    AREA = "area"  # globals and program variables: area base + offset
+    SELF = "self"  # a member of the function block instance: instance pointer + offset
+    LOCAL = "local"  # on the stack: function variables, VAR_TEMP; zeroed or initialised at every call
+    REFERENCE = "reference"  # VAR_IN_OUT and the like: `offset` holds no value, a pointer is passed or stored instead
+
+
+@dataclass(eq=False)
+class Variable:
+    """A declared variable. `initial` is None for all zero.
+
+    `offset`: bytes in the area (AREA) or in the instance (SELF); for REFERENCE in a function block the offset of the stored
+    8-byte pointer in the instance (SELF slot), in a function the parameter itself.
+    """
+
+    name: str
+    type: Type
+    storage: Storage
+    pos: Pos
+    area: Area = Area.DATA
+    offset: int = -1
+    initial: Initial | None = None
+    constant: bool = False
+    bit: int | None = None  # a BOOL at an address such as %IX0.3: the bit in the byte at `offset`
+
+
+# ---- initial values ------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class ScalarInit:
+    """A number (BOOL: 0 or 1; TIME: ms), a float, or a string for STRING."""
+
+    value: int | float | str
+
+
+@dataclass
+class ArrayInit:
+    """Runs of (count, value) in element order; what is missing at the end takes the element type's default."""
+
+    runs: list[tuple[int, Initial | None]]
+
+
+@dataclass
+class StructInit:
+    """Only the members given; the rest take the defaults of the type (`TypedProgram.defaults`)."""
+
+    members: dict[str, Initial]
+
+
+Initial = ScalarInit | ArrayInit | StructInit
+
+
+# ---- places: what can stand left of := ----------------------------------------------------------------------------
+
+
+@dataclass
+class VarPlace:
+    var: Variable
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class MemberPlace:
+    base: Place
+    offset: int
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class IndexPlace:
+    """`base` is an array; one index per dimension, each any integer type. Or a STRING with one 0-based index (type BYTE)."""
+
+    base: Place
+    indices: list[Expr]
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class DerefPlace:
+    """`pointer^`; NULL raises ACCESS_VIOLATION when checks are on."""
+
+    pointer: Expr
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class BitPlace:
+    """`base.bit` of a bit string or integer; type BOOL."""
+
+    base: Place
+    bit: int
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class ValuePlace:
+    """A value that has to be passed by reference (a literal or a result): materialised in a temporary on the stack."""
+
+    value: Expr
+    type: Type
+    pos: Pos
+
+
+Place = VarPlace | MemberPlace | IndexPlace | DerefPlace | BitPlace | ValuePlace
+
+
+# ---- expressions ---------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Const:
+    """int for integers, bits, TIME, enums; bool as 0/1; float for reals; str for STRING (latin-1 characters)."""
+
+    value: int | float | str
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class Load:
+    place: Place
+    type: Type
+    pos: Pos
+
+
+class UnaryOp(Enum):
+    NEG = "-"
+    NOT = "NOT"
+
+
+@dataclass
+class Unary:
+    op: UnaryOp
+    operand: Expr
+    type: Type
+    pos: Pos
+
+
+class BinaryOp(Enum):
+    ADD = "+"
+    SUB = "-"
+    MUL = "*"
+    DIV = "/"
+    MOD = "MOD"
+    AND = "AND"
+    OR = "OR"
+    XOR = "XOR"
+    AND_THEN = "AND_THEN"  # short circuit, BOOL
+    OR_ELSE = "OR_ELSE"
+    EQ = "="
+    NE = "<>"
+    LT = "<"
+    LE = "<="
+    GT = ">"
+    GE = ">="
+
+
+@dataclass
+class Binary:
+    """Both operands have the same base type; for comparisons `type` is BOOL. Strings may only be compared.
+
+    Integers wrap. DIV and MOD by zero raise DIVIDEBYZERO for integers; MIN / -1 wraps, MIN MOD -1 is 0. MOD takes the sign
+    of the dividend.
+    """
+
+    op: BinaryOp
+    left: Expr
+    right: Expr
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class Convert:
+    """A value conversion between scalars.
+
+    integer/bit/time/enum -> integer/bit/time/enum: sign- or zero-extend by the source, truncate to the target; anything ->
+    BOOL: <> 0; real -> integer: round to nearest even, saturate, NaN is 0 (`truncate`: towards zero); integer -> real:
+    nearest. `check` carries the subrange limits to test first.
+    """
+
+    operand: Expr
+    type: Type
+    pos: Pos
+    truncate: bool = False
+    check: tuple[int, int] | None = None
+
+
+class Intrinsic(Enum):
+    """Operations the lowering knows how to emit; everything else is written in ST (stdlib)."""
+
+    ABS = "ABS"
+    SQRT = "SQRT"
+    SHL = "SHL"  # (value, count): counts of the width or more give 0; negative counts give 0
+    SHR = "SHR"
+    ROL = "ROL"  # count modulo the width
+    ROR = "ROR"
+    MUX = "MUX"  # (k, in0, in1, ...): all evaluated; k clamped to the last
+    SELECT = "SEL"  # (g, in0, in1)
+    MIN = "MIN"  # two operands of one scalar type
+    MAX = "MAX"
+    TIME = "TIME"  # () -> TIME of this cycle [ms]
+    LTIME = "LTIME"  # () -> LTIME of this cycle [ns]
+    BITCAST = "BITCAST"  # same size, bits kept (REAL <-> DWORD, LREAL <-> LWORD)
+    STRING_SIZE = "STRING_SIZE"  # (string place load) -> capacity in characters of the actual argument
+
+
+@dataclass
+class IntrinsicCall:
+    intrinsic: Intrinsic
+    args: list[Expr]
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class AddressOf:
+    """ADR(x) / REF(x)."""
+
+    place: Place
+    type: Type
+    pos: Pos
+
+
+@dataclass
+class Call:
+    """A call of a FUNCTION (or an EXTERNAL one). `args` in order of `function.parameters`: an expression for VAR_INPUT, a
+    place for VAR_IN_OUT, a place or None for VAR_OUTPUT. The result is `type`; strings and structs come back in a temporary.
+    """
+
+    function: Pou
+    args: list[Expr | Place | None]
+    type: Type
+    pos: Pos
+
+
+Expr = Const | Load | Unary | Binary | Convert | IntrinsicCall | AddressOf | Call
+
+
+# ---- statements ----------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Assign:
+    """Same type on both sides, except strings, which are cut to the target's length. Arrays and structs are copied."""
+
+    target: Place
+    value: Expr
+    pos: Pos
+
+
+@dataclass
+class CallStatement:
+    call: Call
+    pos: Pos
+
+
+@dataclass
+class FbCall:
+    """`instance(in := e, out => p)`: inputs are assigned, VAR_IN_OUT pointers stored, the body called, outputs copied."""
+
+    block: Pou
+    instance: Place
+    inputs: list[tuple[Variable, Expr]]
+    in_outs: list[tuple[Variable, Place]]
+    outputs: list[tuple[Variable, Place]]
+    pos: Pos
+
+
+@dataclass
+class If:
+    branches: list[tuple[Expr, list[Statement]]]
+    otherwise: list[Statement]
+    pos: Pos
+
+
+@dataclass
+class Case:
+    """Labels are inclusive ranges (low, high) in the selector's type; they do not overlap."""
+
+    selector: Expr
+    branches: list[tuple[list[tuple[int, int]], list[Statement]]]
+    otherwise: list[Statement]
+    pos: Pos
+
+
+@dataclass
+class For:
+    """`stop` and `step` are evaluated once. The loop ends without wrapping, also at the limits of the type; `FOR i := 5 TO 5`
+    runs once. A step of 0 raises DIVIDEBYZERO when it is not a constant (a constant 0 is a compile error)."""
+
+    var: Place
+    start: Expr
+    stop: Expr
+    step: Expr
+    body: list[Statement]
+    pos: Pos
+
+
+@dataclass
+class While:
+    condition: Expr
+    body: list[Statement]
+    pos: Pos
+
+
+@dataclass
+class Repeat:
+    body: list[Statement]
+    until: Expr
+    pos: Pos
+
+
+@dataclass
+class Exit:
+    pos: Pos
+
+
+@dataclass
+class Continue:
+    pos: Pos
+
+
+@dataclass
+class Return:
+    pos: Pos
+
+
+Statement = Assign | CallStatement | FbCall | If | Case | For | While | Repeat | Exit | Continue | Return
+
+
+# ---- program organisation units and the whole -----------------------------------------------------------------------
+
+
+class PouKind(Enum):
+    PROGRAM = "PROGRAM"
+    FUNCTION = "FUNCTION"
+    FUNCTION_BLOCK = "FUNCTION_BLOCK"
+
+
+class Direction(Enum):
+    INPUT = "VAR_INPUT"
+    OUTPUT = "VAR_OUTPUT"
+    IN_OUT = "VAR_IN_OUT"
+
+
+@dataclass
+class Parameter:
+    """`by_reference`: a VAR_IN_OUT, an output of a function, or a read-only string/array/struct input.
+
+    A STRING passed by reference travels as (pointer, u32 capacity), so that STRING_SIZE and cutting work for any length.
+    """
+
+    variable: Variable
+    direction: Direction
+    by_reference: bool = False
+
+
+@dataclass(eq=False)
+class Pou:
+    """A compiled unit. A PROGRAM instance is one Pou each (its variables are AREA variables at fixed offsets); a
+    FUNCTION_BLOCK is compiled once and gets the instance pointer."""
+
+    name: str
+    kind: PouKind
+    pos: Pos
+    parameters: list[Parameter] = field(default_factory=list)
+    locals: list[Variable] = field(default_factory=list)  # Storage.LOCAL, with the result variable of a function
+    result: Variable | None = None
+    instance: StructType | None = None  # function blocks: the layout of an instance
+    body: list[Statement] = field(default_factory=list)
+    external: External | None = None  # implemented in C
+    checks: bool = True  # False in the standard library where it is proven
+    no_init: bool = False  # locals need no zeroing: the body writes each before it reads it (standard library)
+
+
+@dataclass(frozen=True)
+class External:
+    """A C function of the runtime: lower-case name, CRC of its interface text, library version (major<<16 | minor)."""
+
+    name: str
+    signature: int
+    version: int
+
+
+class TaskKind(Enum):
+    """As in CmpIecTask (codesys-v3-protocol 5.5)."""
+
+    CYCLIC = 0
+    EVENT = 1
+    FREEWHEELING = 3
+
+
+@dataclass
+class Task:
+    name: str
+    kind: TaskKind
+    priority: int  # 0 highest .. 31
+    interval_us: int
+    programs: list[Pou]
+    event: Variable | None = None  # TASK(SINGLE := var)
+    watchdog_us: int = 0
+    watchdog_sensitivity: int = 1
+
+
+@dataclass
+class TypedProgram:
+    """A checked program. `globals` holds every AREA variable, program variables included (with dotted names Main.x)."""
+
+    pous: list[Pou]
+    globals: list[Variable]
+    tasks: list[Task]
+    area_sizes: dict[Area, int]
+    defaults: dict[str, StructInit]  # struct and FB type name -> initial values that are not zero
+    programs: dict[str, Pou]  # instance name -> Pou

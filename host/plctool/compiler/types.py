@@ -1,0 +1,240 @@
+"""IEC 61131-3 types and their memory layout.
+
+The layout is the same on every target (natural alignment, little-endian), so offsets in the symbol file, in the image and
+in the monitoring service mean the same everywhere. TIME is a signed 32-bit count of milliseconds, STRING[n] is n+1 bytes,
+NUL-terminated, as in the CODESYS family.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+class Kind(Enum):
+    """What an elementary type is, as far as arithmetic is concerned."""
+
+    BOOL = "bool"
+    INT = "int"  # ANY_INT: arithmetic
+    BIT = "bit"  # ANY_BIT without BOOL: BYTE..LWORD
+    REAL = "real"
+    TIME = "time"  # durations: TIME [ms, i32], LTIME [ns, i64]
+    DATE = "date"  # DATE, TOD, DT and their L variants
+    CHAR = "char"
+
+
+class Type:
+    """Base of all types. `size` and `align` are in bytes."""
+
+    name: str
+
+    @property
+    def size(self) -> int:
+        raise NotImplementedError
+
+    @property
+    def align(self) -> int:
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
+class Elementary(Type):
+    """A scalar. `type_class` is the number monitoring uses (codesys-v3-protocol 4.9, SysInternalLib enum order)."""
+
+    name: str
+    kind: Kind
+    bits: int  # BOOL: 8 in memory, value 0 or 1
+    signed: bool
+    type_class: int
+
+    @property
+    def size(self) -> int:
+        return self.bits // 8
+
+    @property
+    def align(self) -> int:
+        return self.size
+
+
+BOOL = Elementary("BOOL", Kind.BOOL, 8, False, 0)
+BYTE = Elementary("BYTE", Kind.BIT, 8, False, 2)
+WORD = Elementary("WORD", Kind.BIT, 16, False, 3)
+DWORD = Elementary("DWORD", Kind.BIT, 32, False, 4)
+LWORD = Elementary("LWORD", Kind.BIT, 64, False, 5)
+SINT = Elementary("SINT", Kind.INT, 8, True, 6)
+INT = Elementary("INT", Kind.INT, 16, True, 7)
+DINT = Elementary("DINT", Kind.INT, 32, True, 8)
+LINT = Elementary("LINT", Kind.INT, 64, True, 9)
+USINT = Elementary("USINT", Kind.INT, 8, False, 10)
+UINT = Elementary("UINT", Kind.INT, 16, False, 11)
+UDINT = Elementary("UDINT", Kind.INT, 32, False, 12)
+ULINT = Elementary("ULINT", Kind.INT, 64, False, 13)
+REAL = Elementary("REAL", Kind.REAL, 32, True, 14)
+LREAL = Elementary("LREAL", Kind.REAL, 64, True, 15)
+TIME = Elementary("TIME", Kind.TIME, 32, True, 18)
+LTIME = Elementary("LTIME", Kind.TIME, 64, True, 37)
+
+ELEMENTARY: dict[str, Elementary] = {
+    t.name: t
+    for t in (
+        BOOL, BYTE, WORD, DWORD, LWORD, SINT, INT, DINT, LINT, USINT, UINT, UDINT, ULINT, REAL, LREAL, TIME, LTIME,
+    )
+}  # fmt: skip
+
+DEFAULT_STRING_LENGTH = 80
+
+
+@dataclass(frozen=True)
+class StringType(Type):
+    """STRING[length]: `length` characters and a NUL."""
+
+    length: int
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return f"STRING[{self.length}]"
+
+    @property
+    def size(self) -> int:
+        return self.length + 1
+
+    @property
+    def align(self) -> int:
+        return 1
+
+
+@dataclass(eq=False)
+class EnumType(Type):
+    name: str
+    base: Elementary
+    values: dict[str, int]  # in order of declaration, names as declared
+
+    @property
+    def size(self) -> int:
+        return self.base.size
+
+    @property
+    def align(self) -> int:
+        return self.base.align
+
+
+@dataclass(frozen=True)
+class SubrangeType(Type):
+    """`name` is the declared name or 'INT(1..10)'. Values outside low..high raise ARRAYBOUNDS at assignment."""
+
+    name: str
+    base: Elementary
+    low: int
+    high: int
+
+    @property
+    def size(self) -> int:
+        return self.base.size
+
+    @property
+    def align(self) -> int:
+        return self.base.align
+
+
+@dataclass(frozen=True)
+class ArrayType(Type):
+    element: Type
+    bounds: tuple[tuple[int, int], ...]  # inclusive, row-major: the last index runs fastest
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return "ARRAY[" + ",".join(f"{lo}..{hi}" for lo, hi in self.bounds) + f"] OF {self.element}"
+
+    @property
+    def count(self) -> int:
+        n = 1
+        for lo, hi in self.bounds:
+            n *= hi - lo + 1
+        return n
+
+    @property
+    def size(self) -> int:
+        return self.count * self.element.size
+
+    @property
+    def align(self) -> int:
+        return self.element.align
+
+
+@dataclass(frozen=True)
+class PointerType(Type):
+    """POINTER TO / REF_TO / REFERENCE TO; always 8 bytes in memory so that layouts agree on all targets."""
+
+    target: Type
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return f"REF_TO {self.target}"
+
+    @property
+    def size(self) -> int:
+        return 8
+
+    @property
+    def align(self) -> int:
+        return 8
+
+
+@dataclass
+class Field:
+    """A member of a struct or function block; `offset` in bytes is set by `lay_out`."""
+
+    name: str
+    type: Type
+    offset: int = -1
+
+
+@dataclass(eq=False)
+class StructType(Type):
+    """Members in order of declaration. Function block instances are StructTypes as well (see typed.Pou.instance)."""
+
+    name: str
+    fields: list[Field] = field(default_factory=list)
+    _size: int = 0
+    _align: int = 1
+
+    def lay_out(self) -> None:
+        """Gives every field its offset. Call once, when all field types are known and laid out."""
+        offset, align = 0, 1
+        for f in self.fields:
+            offset = align_up(offset, f.type.align)
+            f.offset = offset
+            offset += f.type.size
+            align = max(align, f.type.align)
+        self._align = align
+        self._size = align_up(max(offset, 1), align)
+
+    def member(self, name: str) -> Field | None:
+        key = name.casefold()
+        return next((f for f in self.fields if f.name.casefold() == key), None)
+
+    @property
+    def size(self) -> int:
+        return self._size
+
+    @property
+    def align(self) -> int:
+        return self._align
+
+
+def align_up(value: int, align: int) -> int:
+    """The next multiple of `align` (a power of two or any positive number) at or above `value`."""
+    return (value + align - 1) // align * align
+
+
+def is_scalar(t: Type) -> bool:
+    """Whether values of the type fit a register (everything but strings, arrays and structs)."""
+    return isinstance(t, Elementary | EnumType | SubrangeType | PointerType)
+
+
+def base_of(t: Type) -> Type:
+    """The elementary type behind an enum or subrange; other types are returned as they are."""
+    return t.base if isinstance(t, EnumType | SubrangeType) else t

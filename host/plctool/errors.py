@@ -1,0 +1,42 @@
+"""Errors that are not our bug: one sentence that says what to do, a short code for machines, an exit code for shells."""
+
+from __future__ import annotations
+
+
+class PlcError(Exception):
+    """Base of all errors a user may see. `code` is a short slug; `exit_code` is the command's exit status."""
+
+    exit_code = 1
+
+    def __init__(self, message: str, code: str = "error") -> None:
+        super().__init__(message)
+        self.message = message
+        self.code = code
+
+
+class DeviceError(PlcError):
+    """The device or the program said no. `result` is the device's ERR_* number, 0 when there is none."""
+
+    exit_code = 1
+
+    def __init__(self, message: str, code: str = "device", result: int = 0) -> None:
+        super().__init__(message, code)
+        self.result = result
+
+
+class UsageError(PlcError):
+    """Wrong use or bad input: a missing file, an unknown variable, a program that does not compile."""
+
+    exit_code = 2
+
+    def __init__(self, message: str, code: str = "usage") -> None:
+        super().__init__(message, code)
+
+
+class LinkError(PlcError):
+    """The link could not be opened, was lost or timed out."""
+
+    exit_code = 3
+
+    def __init__(self, message: str, code: str = "link") -> None:
+        super().__init__(message, code)

@@ -1,0 +1,62 @@
+"""A real `plcrt` process on a pseudo terminal, for tests, benchmarks and the demo."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from plctool.errors import UsageError
+
+
+def find_plcrt() -> str:
+    """The path of plcrt: $PLCRT, beside this Python, or on the PATH."""
+    named = os.environ.get("PLCRT")
+    beside = Path(sys.executable).parent / "plcrt"
+    found = named or (str(beside) if beside.exists() else shutil.which("plcrt"))
+    if not found:
+        raise UsageError("plcrt was not found: install the package with 'pip install .' or set PLCRT to its path")
+    return found
+
+
+class Plcrt:
+    """Context manager around one process; `port` is the pseudo terminal it serves."""
+
+    def __init__(self, flash: Path | str, *options: str) -> None:
+        self.flash = Path(flash)
+        self.options = options
+        self.process: subprocess.Popen[str] | None = None
+        self.port = ""
+
+    def start(self) -> None:
+        """Starts the process and waits for the line that names its pseudo terminal."""
+        command = [find_plcrt(), "--flash", str(self.flash), "--serial", "pty", *self.options]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stdout and self.process.stderr
+        line = self.process.stdout.readline()
+        if not line.startswith("serial: "):
+            self.process.kill()
+            raise UsageError(f"plcrt did not start: {self.process.stderr.read().strip() or line.strip()}")
+        self.port = line.removeprefix("serial: ").strip()
+
+    def stop(self, how: signal.Signals = signal.SIGTERM) -> int:
+        """Ends the process; SIGKILL stands for a power cut. Returns the exit status."""
+        if self.process is None:
+            return 0
+        self.process.send_signal(how)
+        status = self.process.wait(timeout=10)
+        for stream in (self.process.stdout, self.process.stderr):
+            if stream:
+                stream.close()
+        self.process = None
+        return status
+
+    def __enter__(self) -> Plcrt:
+        self.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.stop(signal.SIGKILL if exc[0] else signal.SIGTERM)
