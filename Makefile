@@ -1,41 +1,54 @@
 # make demo   the whole story on this machine        make test   all tests
 # make lint   ruff, mypy                             make bench  figures, side by side
+# make size   flash and RAM of the bare-metal runtime, per component
 #
 # Everything is installed into .venv and built in build*/; Debian packages that are missing are installed when you are root.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-BUILD := build
-SANITIZED := build-sanitized
 MESON := $(BIN)/meson
 export PATH := $(abspath $(BIN)):$(PATH)
 
-.PHONY: demo test lint bench build clean
+# The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
+BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f))
+
+.PHONY: demo test lint bench size all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
 
-test: build $(SANITIZED)/build.ninja
-	$(MESON) compile -C $(SANITIZED)
-	$(BIN)/python tests/run_all.py --meson $(MESON) $(BUILD) $(SANITIZED)
+# A make of its own, so that BUILDS sees what bootstrapping has just installed.
+test: $(VENV)/dev
+	$(MAKE) all
+	$(MAKE) --no-print-directory run-tests
+
+run-tests:
+	$(BIN)/python tests/run_all.py --meson $(MESON) $(BUILDS)
+
+all: $(BUILDS:%=%/build.ninja)
+	set -e; for build in $(BUILDS); do $(MESON) compile -C $$build; done
 
 lint: $(VENV)/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	MYPYPATH=host $(BIN)/mypy -p plctool
 
-bench: build
-	PYTHONPATH=host:$(BUILD)/host PLCRT=$(BUILD)/firmware/port/linux/plcrt $(BIN)/python bench/run.py
+bench: build/build.ninja
+	$(MESON) compile -C build
+	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py
 
-build: $(BUILD)/build.ninja
-	$(MESON) compile -C $(BUILD)
+size: build-cm3/build.ninja
+	$(MESON) compile -C build-cm3 size
 
-$(BUILD)/build.ninja: $(VENV)/dev
-	$(MESON) setup $(BUILD)
+build/build.ninja: $(VENV)/dev
+	$(MESON) setup build
 
-$(SANITIZED)/build.ninja: $(VENV)/dev
-	$(MESON) setup $(SANITIZED) -Dhost=false -Db_sanitize=address,undefined -Db_lundef=false
+build-sanitized/build.ninja: $(VENV)/dev
+	$(MESON) setup build-sanitized -Dhost=false -Db_sanitize=address,undefined -Db_lundef=false
+
+build-cm%/build.ninja: $(VENV)/dev
+	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini
 
 # What a user gets: the package with its two commands.
 $(VENV)/installed: $(VENV)/bootstrapped pyproject.toml meson.build $(shell find firmware host examples -type f -not -path '*/__pycache__/*')
@@ -44,6 +57,7 @@ $(VENV)/installed: $(VENV)/bootstrapped pyproject.toml meson.build $(shell find 
 
 # What a developer needs on top.
 $(VENV)/dev: $(VENV)/bootstrapped pyproject.toml
+	./bootstrap.sh --cross
 	$(BIN)/python tests/install_dev.py pyproject.toml
 	touch $@
 
@@ -52,4 +66,4 @@ $(VENV)/bootstrapped: bootstrap.sh
 	touch $@
 
 clean:
-	rm -rf $(BUILD) $(SANITIZED)
+	rm -rf build build-*

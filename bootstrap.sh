@@ -1,30 +1,40 @@
 #!/bin/sh
-# Makes a virtual environment in $1. What Debian has to give (a C compiler, Python's headers and venv) is installed through
-# apt when this runs as root; otherwise it says what to type.
+# bootstrap.sh VENV     makes a virtual environment, with what it needs from Debian: a C compiler, Python's headers and venv
+# bootstrap.sh --cross  installs the Cortex-M cross compiler and QEMU, for the bare-metal tests
+#
+# Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the second that
+# some tests will be left out.
 set -eu
-venv=$1
 python=${PYTHON:-python3}
 
+# install PACKAGE...: false when it cannot be done here
+install() {
+    [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null || return 1
+    apt-get update -qq
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+if [ "$1" = --cross ]; then
+    command -v arm-none-eabi-gcc >/dev/null && command -v qemu-system-arm >/dev/null && exit 0
+    set -- gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm
+    install "$@" || echo "The Cortex-M tests are left out; for them: sudo apt-get install $*" >&2
+    exit 0
+fi
+
+venv=$1
 missing=
 command -v cc >/dev/null || missing="$missing gcc libc6-dev"
-command -v "$python" >/dev/null || missing="$missing python3"
 if command -v "$python" >/dev/null; then
     "$python" -c 'import ensurepip, venv' 2>/dev/null || missing="$missing python3-venv"
     "$python" -c 'import os, sys, sysconfig; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' ||
         missing="$missing python3-dev"
 else
-    missing="$missing python3-venv python3-dev"
+    missing="$missing python3 python3-venv python3-dev"
 fi
-
-if [ -n "$missing" ]; then
-    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
-        apt-get update -qq
-        # shellcheck disable=SC2086 # a list of package names
-        DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $missing
-    else
-        echo "Missing:$missing. Install them, on Debian with: sudo apt-get install$missing" >&2
-        exit 1
-    fi
+# shellcheck disable=SC2086 # a list of package names
+if [ -n "$missing" ] && ! install $missing; then
+    echo "Missing:$missing. Install them, on Debian with: sudo apt-get install$missing" >&2
+    exit 1
 fi
 
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {

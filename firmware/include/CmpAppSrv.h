@@ -1,5 +1,6 @@
 /*
- * CmpAppSrv.h - the application services (group 2): login, start, stop, reset, status, tasks, download. codesys-v3-protocol 4.6.
+ * CmpAppSrv.h - the application services (group 2): login, start, stop, reset, status, tasks, download.
+ * codesys-v3-protocol 4.6.
  *
  * SPDX-License-Identifier: Apache-2.0
  *

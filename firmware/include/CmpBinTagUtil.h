@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The reader is the only code that turns a length from outside into a pointer and a size. Nobody gets a tag without saying
- * which sizes he can take.
+ * The reader is the only code that turns a length from outside into a pointer and a size. Nobody gets a tag without
+ * saying which sizes he can take.
  */
 #ifndef CMPBINTAGUTIL_H
 #define CMPBINTAGUTIL_H
@@ -67,8 +67,8 @@ typedef struct {
 
 void BTagWriterInit(BTAG_WRITER *writer, RTS_UI8 *data, RTS_UI32 capacity);
 
-/* Begins an element (container or data) whose length is not known yet; Close fills it in. One that stayed empty vanishes,
- * because clients cannot read elements of length zero. */
+/* Begins an element (container or data) whose length is not known yet; Close fills it in. One that stayed empty
+ * vanishes, because clients cannot read elements of length zero. */
 void BTagOpen(BTAG_WRITER *writer, RTS_UI32 id, BTAG_ALIGN align);
 void BTagClose(BTAG_WRITER *writer);
 

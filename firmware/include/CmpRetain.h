@@ -20,12 +20,15 @@ RTS_UI32 RetainCapacity(void);
 /* From now on `size` bytes at `area` are kept; `layout` names their layout. Size 0: nothing is kept. */
 void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout);
 
-/* Fills the area with what was saved last for this layout. ERR_NO_OBJECT: there is nothing, the area is as it was;
- * ERR_APP_RETAIN_MISMATCH: what was saved belongs to another layout. */
-RTS_RESULT RetainRestore(void);
+/* Number of the newest record. */
+RTS_UI32 RetainGetSequence(void);
 
-/* Saves the area when it is not what was saved last; no task runs. ERR_DEVICE flash fault. */
-RTS_RESULT RetainSave(void);
+/* Fills the area with what was saved last for this layout, in a record after number `after`, up to `until`. ERR_NO_OBJECT: there is
+ * none, the area is as it was. */
+RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until);
+
+/* Saves the area when it is not what was saved last, or always; no task runs. ERR_DEVICE flash fault. */
+RTS_RESULT RetainSave(bool always);
 
 RTS_RESULT CmpRetain_Hook(CMP_HOOK hook);
 

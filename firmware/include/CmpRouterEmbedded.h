@@ -25,8 +25,8 @@ typedef struct BLK_DRV {
     RTS_UI8 address[2 * ROUTER_MAX_ADDRESS];
     void *instance; /* the driver's own */
 
-    /* Queues one packet made of `count` parts, BLK_MAX_SIZE bytes at most; the parts are copied. ERR_NOBUFFER: no room now,
-     * offer it again in a later cycle. */
+    /* Queues one packet made of `count` parts, BLK_MAX_SIZE bytes at most; the parts are copied. ERR_NOBUFFER: no
+     * room now, offer it again in a later cycle. */
     RTS_RESULT (*send)(const struct BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count);
 } BLK_DRV;
 
@@ -51,7 +51,8 @@ void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
 
 enum { ROUTER_MAX_PARTS = 2 };
 
-/* Sends `parts` (at most ROUTER_MAX_PARTS) as the payload of one packet. ERR_NOBUFFER: later; ERR_NET_MSGSIZE: too long. */
+/* Sends `parts` (at most ROUTER_MAX_PARTS) as the payload of one packet. ERR_NOBUFFER: later; ERR_NET_MSGSIZE: too
+ * long. */
 RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *parts, RTS_UI32 count);
 
 /* Largest payload of one packet to this peer when both addresses together have `address_words` words. */

@@ -25,8 +25,15 @@ enum { FLASH_LOG_HEAD_SIZE = 20 };
 /* Finds the newest record and the place for the next. ERR_DEVICE flash fault. */
 RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file);
 
-/* Reads the newest record with this tag and size into `data`; ERR_NO_OBJECT when there is none, `data` is undefined then. */
-RTS_RESULT FlashLogRead(const FLASH_LOG *log, RTS_UI32 tag, void *data, RTS_UI32 size);
+/* Which records to read: those numbered after `after`, up to and with `until`. Numbers wrap. */
+typedef struct {
+    RTS_UI32 after;
+    RTS_UI32 until;
+} FLASH_LOG_RANGE;
+
+/* Reads the newest record of the range with this tag and size into `data`; ERR_NO_OBJECT when there is none, `data` is as it
+ * was then. */
+RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size);
 
 /* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault. */
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);

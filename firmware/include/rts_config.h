@@ -119,6 +119,12 @@
 #define SRV_MAX_GROUPS 8
 #endif
 
+/* Largest name service reply, bytes on the stack of main while a scan is answered; names that do not fit are cut. The
+ * protocol allows 444. */
+#ifndef NS_REPLY_SIZE
+#define NS_REPLY_SIZE 444
+#endif
+
 /* Entries of the log ring; each about 100 bytes with its text. */
 #ifndef LOG_MAX_ENTRIES
 #define LOG_MAX_ENTRIES 16

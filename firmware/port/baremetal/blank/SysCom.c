@@ -1,0 +1,44 @@
+/*
+ * SysCom.c - serial lines. Contract: SysCom.h.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "SysCom.h"
+
+/* Write here: how many lines there are. */
+RTS_UI32 SysComGetCount(void)
+{
+    return 0;
+}
+
+/* Write here: baud rate and pins, empty both ring buffers, switch the receive interrupt on. That interrupt has to be above
+ * all tasks, else a long cycle loses bytes. */
+RTS_RESULT SysComOpen(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+    return ERR_DEVICE;
+}
+
+/* Write here: switch the line off. */
+void SysComClose(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+}
+
+/* Write here: take what the receive interrupt has put in the ring; never wait. */
+RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UNUSED(index);
+    RTS_UNUSED(data);
+    RTS_UNUSED(size);
+    return 0;
+}
+
+/* Write here: put as much as fits in the ring of the transmit interrupt and start it; never wait. */
+RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UNUSED(index);
+    RTS_UNUSED(data);
+    RTS_UNUSED(size);
+    return 0;
+}

@@ -1,0 +1,47 @@
+/*
+ * SysExcept.c - what goes wrong in application code. Contract: SysExcept.h.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "SysExcept.h"
+
+/*
+ * Write here: remember where to come back to, call fn, and fill *exception when a fault, SysExceptRaise or SysExceptBreak left
+ * it. The fault handlers redirect the interrupted program to that place. All registers that a function must keep
+ * have to be as before: the task that was interrupted below needs its own.
+ */
+int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+{
+    fn(arg);
+    exception->code = RTSEXCPT_NOEXCEPTION;
+    exception->address = 0;
+    return 0;
+}
+
+/* Write here: leave the SysExceptTry of this context. Outside of one: reset, with the reason kept for the log. */
+void SysExceptRaise(RTS_UI32 code, uintptr_t address)
+{
+    RTS_UNUSED(code);
+    RTS_UNUSED(address);
+    for (;;)
+        ;
+}
+
+/* Write here: make the SysExceptTry that runs in `context` leave as soon as that context goes on. We run above it. And let an
+ * interrupt above all tasks call SchedWatchdogCheck every millisecond, else nothing ends an endless loop. */
+void SysExceptBreak(uintptr_t context, RTS_UI32 code)
+{
+    RTS_UNUSED(context);
+    RTS_UNUSED(code);
+}
+
+/* Write here: a number that is not 0 and differs between main and each timer's interrupt. */
+uintptr_t SysExceptContext(void)
+{
+    return 1;
+}
+
+/* Nothing to give back on bare metal. */
+void SysExceptShutdown(void)
+{
+}

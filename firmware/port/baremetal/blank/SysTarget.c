@@ -1,0 +1,33 @@
+/*
+ * SysTarget.c - who this device is. Contract: SysTarget.h.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "SysTarget.h"
+
+#include "CompactDownload.h"
+
+/* Write here: your vendor id in the high half of `id` with the device in the low one (plctool must know that pair as a target),
+ * and the serial number of this very device, from its fuses or its factory sector. */
+const SYS_TARGET *SysTargetGet(void)
+{
+    static const SYS_TARGET target = {
+        .type = TARGET_TYPE_PROGRAMMABLE,
+        .id = TARGET_ID_CORTEX_M3,
+        .version = 0x01000000,
+        .device_name = "Blank",
+        .vendor_name = "Nobody",
+        .node_name = "blank",
+        .serial_number = "0",
+    };
+    return &target;
+}
+
+/* Write here: the chip's random generator, or a pool that is stirred by the times of interrupts. Session ids come from it, so
+ * they can be guessed when it can. */
+RTS_UI32 SysTargetRandom(void)
+{
+    static RTS_UI32 last = 1;
+    last = last * 1664525u + 1013904223u;
+    return last;
+}

@@ -1,0 +1,102 @@
+/*
+ * board.c - MPS2: alarm timer, watchdog, identity.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CortexM.h"
+#include "SysFlash.h"
+#include "SysTarget.h"
+#include "SysTime.h"
+
+#define TIMER0 0x40000000u
+#define TIMER_CTRL REG32(TIMER0 + 0x0)
+#define TIMER_RELOAD REG32(TIMER0 + 0x8)
+#define TIMER_INTCLEAR REG32(TIMER0 + 0xC)
+#define WATCHDOG 0x40008000u
+#define WATCHDOG_LOAD REG32(WATCHDOG + 0x0)
+#define WATCHDOG_CTRL REG32(WATCHDOG + 0x8)
+#define WATCHDOG_INTCLR REG32(WATCHDOG + 0xC)
+#define WATCHDOG_LOCK REG32(WATCHDOG + 0xC00)
+
+enum { TIMER_ENABLE_IRQ = 9, WATCHDOG_INTEN_RESEN = 3, WATCHDOG_KEY = 0x1ACCE551 };
+
+void BoardInit(void)
+{
+    IrqEnable(IRQ_TIMER0, LEVEL_DEVICE);
+    UartInit();
+    FlashInit();
+}
+
+void BoardAlarmSet(RTS_UI32 ns)
+{
+    TIMER_CTRL = 0;
+    TIMER_RELOAD = ns / (1000000000u / BOARD_CLOCK_HZ) + 1;
+    TIMER_CTRL = TIMER_ENABLE_IRQ;
+}
+
+void AlarmIrq(void)
+{
+    TIMER_CTRL = 0;
+    TIMER_INTCLEAR = 1;
+    SysTimerAlarm();
+}
+
+/* The first time-out is an NMI, the second one resets. */
+void BoardWatchdogStart(RTS_UI32 ms)
+{
+    WATCHDOG_LOCK = WATCHDOG_KEY;
+    WATCHDOG_LOAD = ms * (BOARD_CLOCK_HZ / 1000);
+    WATCHDOG_CTRL = WATCHDOG_INTEN_RESEN;
+    WATCHDOG_LOCK = 0;
+}
+
+void BoardWatchdogKick(void)
+{
+    WATCHDOG_LOCK = WATCHDOG_KEY;
+    WATCHDOG_INTCLR = 1;
+    WATCHDOG_LOCK = 0;
+}
+
+/* ---- identity ---- */
+
+enum { SERIAL_NUMBER_SIZE = 16 };
+static char serial_number[SERIAL_NUMBER_SIZE];
+
+/* The number the factory left behind the file area, or a default when nobody did. */
+static const char *read_serial_number(void)
+{
+    extern const char factory_data[];
+    RTS_UI32 length = 0;
+    while (length < SERIAL_NUMBER_SIZE - 1 && factory_data[length] > ' ' && factory_data[length] <= '~') {
+        serial_number[length] = factory_data[length];
+        length++;
+    }
+    serial_number[length] = '\0';
+    return length ? serial_number : "0";
+}
+
+const SYS_TARGET *SysTargetGet(void)
+{
+    static SYS_TARGET target = {
+        .type = TARGET_TYPE_PROGRAMMABLE,
+        .id = BOARD_TARGET_ID,
+        .version = 0x01000000,
+        .device_name = BOARD_DEVICE_NAME,
+        .vendor_name = "Open",
+        .node_name = BOARD_NODE_NAME,
+    };
+    if (target.serial_number == NULL)
+        target.serial_number = read_serial_number();
+    return &target;
+}
+
+/* No random generator here: the time at which the questions come is what varies. */
+RTS_UI32 SysTargetRandom(void)
+{
+    static RTS_UI32 pool = 0x9E3779B9u;
+    pool ^= (RTS_UI32)SysTimeGetNs() + SYST_CVR;
+    pool ^= pool << 13;
+    pool ^= pool >> 17;
+    pool ^= pool << 5;
+    return pool;
+}

@@ -1,0 +1,96 @@
+/*
+ * flash.c - SysFlash on the board's PSRAM, which QEMU keeps in a file, with the rules of NOR flash.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Stricter than the memory: a unit is programmed once after an erase, nothing is written past the area, and the MPU keeps
+ * everybody else from writing at all, as a flash controller would.
+ */
+#include <string.h>
+
+#include "CortexM.h"
+#include "SysFlash.h"
+
+extern RTS_UI8 file_flash[]; /* of the linker script */
+
+enum { SECTOR_SIZE = 4096, PROGRAM_SIZE = 8, ERASED = 0xFF, FLASH_LOG2 = 24 };
+#define FLASH_BASE 0x21000000u
+
+static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
+{
+    if (offset > BOARD_FLASH_SIZE || size > BOARD_FLASH_SIZE - offset)
+        return ERR_DEVICE;
+    memcpy(data, file_flash + offset, size);
+    return ERR_OK;
+}
+
+static int is_erased(const RTS_UI8 *data, RTS_UI32 size)
+{
+    while (size && *data == ERASED)
+        data++, size--;
+    return size == 0;
+}
+
+static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size)
+{
+    if (offset > BOARD_FLASH_SIZE || size > BOARD_FLASH_SIZE - offset)
+        return ERR_DEVICE;
+    if (offset % PROGRAM_SIZE || size % PROGRAM_SIZE || !is_erased(file_flash + offset, size))
+        return ERR_DEVICE;
+    MpuRelease(MPU_BOARD);
+    memcpy(file_flash + offset, data, size);
+    MpuProtect(MPU_BOARD, FLASH_BASE, FLASH_LOG2, MPU_READ_ONLY);
+    return ERR_OK;
+}
+
+static RTS_RESULT flash_erase(RTS_UI32 offset)
+{
+    if (offset >= BOARD_FLASH_SIZE || offset % SECTOR_SIZE)
+        return ERR_DEVICE;
+    MpuRelease(MPU_BOARD);
+    memset(file_flash + offset, ERASED, SECTOR_SIZE);
+    MpuProtect(MPU_BOARD, FLASH_BASE, FLASH_LOG2, MPU_READ_ONLY);
+    return ERR_OK;
+}
+
+/* Every store is in the file at once. */
+static RTS_RESULT flash_sync(void)
+{
+    CpuBarrier();
+    return ERR_OK;
+}
+
+void FlashInit(void)
+{
+    MpuProtect(MPU_BOARD, FLASH_BASE, FLASH_LOG2, MPU_READ_ONLY);
+}
+
+const SYS_FLASH *SysFlashGet(void)
+{
+    static const SYS_FLASH flash = {
+        .size = BOARD_FLASH_SIZE,
+        .sector_size = SECTOR_SIZE,
+        .program_size = PROGRAM_SIZE,
+        .erased = ERASED,
+        .mapped = file_flash,
+        .read = flash_read,
+        .program = flash_program,
+        .erase = flash_erase,
+        .sync = flash_sync,
+    };
+    return &flash;
+}
+
+const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_UNUSED(slot);
+    if (offset % APP_CODE_ALIGN || offset > BOARD_FLASH_SIZE || size > BOARD_FLASH_SIZE - offset)
+        return NULL;
+    SysExceptCodeRange(file_flash + offset, size);
+    return file_flash + offset;
+}
+
+void SysFlashReleaseCode(RTS_UI32 slot)
+{
+    RTS_UNUSED(slot);
+}

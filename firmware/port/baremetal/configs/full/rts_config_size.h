@@ -1,0 +1,25 @@
+/*
+ * rts_config_size.h - sizes of the full configuration: all components, two serial lines, room for large applications.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_SIZE_H
+#define RTS_CONFIG_SIZE_H
+
+#define APP_MAX_TASKS 4
+#define APP_MAX_IMPORTS 64
+#define APP_DATA_SIZE 16384
+#define APP_RETAIN_SIZE 2048
+#define APP_MEMORY_SIZE 1024
+#define RTS_IEC_STACK_SIZE 2048
+#define NETSERVER_MESSAGE_SIZE 2048
+#define CM_MAX_EXT_TABLES 6
+#define COM_MAX_LINES 2
+#define LOG_MAX_ENTRIES 32
+#define CHECKSUM_TABLE_ENTRIES 256
+
+#define BOARD_UART_COUNT 2
+#define BOARD_UART_RX_SIZE 1024
+#define BOARD_UART_TX_SIZE 256
+
+#endif

@@ -1,0 +1,26 @@
+/*
+ * cmp_list.c - the components of the minimal configuration.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpItf.h"
+
+/* System components first; services before the components that register with them. */
+#define COMPONENTS(X)                                                                                                  \
+    X(SysFileFlash)                                                                                                    \
+    X(CmpScheduleTimer)                                                                                                \
+    X(CmpIecTask)                                                                                                      \
+    X(SysWatchdog)                                                                                                     \
+    X(CmpAppEmbedded)                                                                                                  \
+    X(CmpSrv)                                                                                                          \
+    X(CmpDevice)                                                                                                       \
+    X(CmpAppSrv)                                                                                                       \
+    X(CmpRouterEmbedded)                                                                                               \
+    X(CmpNameServiceServer)                                                                                            \
+    X(CmpChannelServerEmbedded)                                                                                        \
+    X(CmpBlkDrvSimpleCom)
+
+COMPONENTS(CMP_DECLARE)
+
+const CMP_COMPONENT cmp_components[] = {COMPONENTS(CMP_ENTRY)};
+const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_components);

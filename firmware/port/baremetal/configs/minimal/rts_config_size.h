@@ -1,0 +1,22 @@
+/*
+ * rts_config_size.h - sizes of the minimal configuration: one serial line, one task, no monitoring, no log.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_SIZE_H
+#define RTS_CONFIG_SIZE_H
+
+#define APP_MAX_TASKS 2
+#define APP_MAX_IMPORTS 16
+#define NETSERVER_MESSAGE_SIZE 512
+#define COM_QUEUE_SIZE 540
+#define LOG_MAX_ENTRIES 1
+#define LOG_TEXT_SIZE 8
+#define SRV_MAX_GROUPS 2
+
+#define BOARD_MAIN_STACK_SIZE 1024
+#define BOARD_UART_COUNT 1
+#define BOARD_UART_RX_SIZE 128
+#define BOARD_UART_TX_SIZE 32
+
+#endif

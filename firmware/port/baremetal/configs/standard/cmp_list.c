@@ -1,0 +1,33 @@
+/*
+ * cmp_list.c - the components of the standard configuration.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpCompilerCalls.h"
+
+/* System components first; services before the components that register with them. */
+#define COMPONENTS(X)                                                                                                  \
+    X(CmpLog)                                                                                                          \
+    X(CmpEventMgrEmbedded)                                                                                             \
+    X(SysFileFlash)                                                                                                    \
+    X(CmpRetain)                                                                                                       \
+    X(CmpScheduleTimer)                                                                                                \
+    X(CmpIecTask)                                                                                                      \
+    X(SysWatchdog)                                                                                                     \
+    X(CmpIntCalls)                                                                                                     \
+    X(CmpRealCalls)                                                                                                    \
+    X(CmpAppEmbedded)                                                                                                  \
+    X(CmpSrv)                                                                                                          \
+    X(CmpDevice)                                                                                                       \
+    X(CmpAppSrv)                                                                                                       \
+    X(CmpLogSrv)                                                                                                       \
+    X(CmpMonitor2)                                                                                                     \
+    X(CmpRouterEmbedded)                                                                                               \
+    X(CmpNameServiceServer)                                                                                            \
+    X(CmpChannelServerEmbedded)                                                                                        \
+    X(CmpBlkDrvSimpleCom)
+
+COMPONENTS(CMP_DECLARE)
+
+const CMP_COMPONENT cmp_components[] = {COMPONENTS(CMP_ENTRY)};
+const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_components);

@@ -1,0 +1,19 @@
+/*
+ * rts_config_size.h - sizes of the standard configuration: three tasks, retain variables, monitoring, log.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_SIZE_H
+#define RTS_CONFIG_SIZE_H
+
+#define APP_MAX_TASKS 3
+#define NETSERVER_MESSAGE_SIZE 1024
+#define LOG_MAX_ENTRIES 8
+#define LOG_TEXT_SIZE 64
+#define SRV_MAX_GROUPS 4
+
+#define BOARD_UART_COUNT 1
+#define BOARD_UART_RX_SIZE 256
+#define BOARD_UART_TX_SIZE 64
+
+#endif

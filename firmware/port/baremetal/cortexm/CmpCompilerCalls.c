@@ -1,0 +1,201 @@
+/*
+ * CmpCompilerCalls.c - what compiled code calls where the processor has no instruction: soft float and 64-bit division.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Names and meanings are those of the GNU compiler runtime, from which they come. Floating point values travel in core registers,
+ * also on cores with an FPU: those are the calls the base procedure call standard has. Three components, so that a
+ * device takes only what its applications need: CmpIntCalls (LINT), CmpRealCalls (REAL), CmpLrealCalls (LREAL). The signature
+ * of each is the CRC-32 of its interface text, e.g. __addsf3(REAL,REAL):REAL.
+ */
+#include "CmpCompilerCalls.h"
+
+#include <math.h>
+
+enum { CALLS_VERSION = 0x00010000 };
+
+/* Of libgcc. Only their addresses are used, so the prototypes are none. */
+void __addsf3(void);
+void __subsf3(void);
+void __mulsf3(void);
+void __divsf3(void);
+void __eqsf2(void);
+void __nesf2(void);
+void __ltsf2(void);
+void __lesf2(void);
+void __gtsf2(void);
+void __gesf2(void);
+void __unordsf2(void);
+void __fixsfsi(void);
+void __fixunssfsi(void);
+void __floatsisf(void);
+void __floatunsisf(void);
+void __adddf3(void);
+void __subdf3(void);
+void __muldf3(void);
+void __divdf3(void);
+void __eqdf2(void);
+void __nedf2(void);
+void __ltdf2(void);
+void __ledf2(void);
+void __gtdf2(void);
+void __gedf2(void);
+void __unorddf2(void);
+void __fixdfsi(void);
+void __fixunsdfsi(void);
+void __floatsidf(void);
+void __floatunsidf(void);
+void __floatdidf(void);
+void __floatundidf(void);
+void __extendsfdf2(void);
+void __truncdfsf2(void);
+
+#define BASE_CALL __attribute__((pcs("aapcs")))
+
+/* ---- LINT ---- */
+
+static RTS_I64 lint_divide(RTS_I64 a, RTS_I64 b)
+{
+    return a / b;
+}
+
+static RTS_I64 lint_modulo(RTS_I64 a, RTS_I64 b)
+{
+    return a % b;
+}
+
+static RTS_UI64 ulint_divide(RTS_UI64 a, RTS_UI64 b)
+{
+    return a / b;
+}
+
+static RTS_UI64 ulint_modulo(RTS_UI64 a, RTS_UI64 b)
+{
+    return a % b;
+}
+
+static const CMP_EXT_FUNCTION int_calls[] = {
+    {"__divdi3", 0x9A2F73C3, CALLS_VERSION, (RTS_PFN)lint_divide},
+    {"__udivdi3", 0x17519471, CALLS_VERSION, (RTS_PFN)ulint_divide},
+    {"__moddi3", 0xE871E96C, CALLS_VERSION, (RTS_PFN)lint_modulo},
+    {"__umoddi3", 0xC208903D, CALLS_VERSION, (RTS_PFN)ulint_modulo},
+};
+
+RTS_RESULT CmpIntCalls_Hook(CMP_HOOK hook)
+{
+    return hook == CH_INIT3 ? CMRegisterExternal(int_calls, RTS_COUNT(int_calls)) : ERR_OK;
+}
+
+/* ---- REAL ---- */
+
+/* The C library goes through LREAL for this, which costs two kilobytes. What does not fit gives 0. */
+static RTS_UI64 real_to_ulint(RTS_UI32 bits)
+{
+    RTS_UI32 exponent = bits >> 23 & 0xFF;
+    RTS_UI64 mantissa = (bits & 0x7FFFFF) | 0x800000;
+
+    if (exponent < 127 || exponent > 127 + 63)
+        return 0;
+    return exponent < 150 ? mantissa >> (150 - exponent) : mantissa << (exponent - 150);
+}
+
+static RTS_I64 real_to_lint(RTS_UI32 bits)
+{
+    RTS_I64 magnitude = (RTS_I64)real_to_ulint(bits);
+
+    return bits >> 31 ? -magnitude : magnitude;
+}
+
+static BASE_CALL RTS_REAL32 lint_to_real(RTS_I64 value)
+{
+    return (RTS_REAL32)value;
+}
+
+static BASE_CALL RTS_REAL32 ulint_to_real(RTS_UI64 value)
+{
+    return (RTS_REAL32)value;
+}
+
+#ifndef __ARM_FP
+static RTS_REAL32 real_sqrt(RTS_REAL32 value)
+{
+    return sqrtf(value);
+}
+#endif
+
+static const CMP_EXT_FUNCTION real_calls[] = {
+    {"__fixsfdi", 0xE0DF499C, CALLS_VERSION, (RTS_PFN)real_to_lint},
+    {"__fixunssfdi", 0x87F7DAF4, CALLS_VERSION, (RTS_PFN)real_to_ulint},
+    {"__floatdisf", 0x6B4A5F99, CALLS_VERSION, (RTS_PFN)lint_to_real},
+    {"__floatundisf", 0x55D576F3, CALLS_VERSION, (RTS_PFN)ulint_to_real},
+#ifndef __ARM_FP
+    {"sqrtf", 0x2AD9491D, CALLS_VERSION, (RTS_PFN)real_sqrt},
+    {"__addsf3", 0x2D9644EB, CALLS_VERSION, (RTS_PFN)__addsf3},
+    {"__subsf3", 0xFA2CCB8D, CALLS_VERSION, (RTS_PFN)__subsf3},
+    {"__mulsf3", 0x8191B62B, CALLS_VERSION, (RTS_PFN)__mulsf3},
+    {"__divsf3", 0xE4C6E0D1, CALLS_VERSION, (RTS_PFN)__divsf3},
+    {"__eqsf2", 0x9723C695, CALLS_VERSION, (RTS_PFN)__eqsf2},
+    {"__nesf2", 0x67E40D7C, CALLS_VERSION, (RTS_PFN)__nesf2},
+    {"__ltsf2", 0x06819C62, CALLS_VERSION, (RTS_PFN)__ltsf2},
+    {"__lesf2", 0x83200C01, CALLS_VERSION, (RTS_PFN)__lesf2},
+    {"__gtsf2", 0x586D17F7, CALLS_VERSION, (RTS_PFN)__gtsf2},
+    {"__gesf2", 0xDDCC8794, CALLS_VERSION, (RTS_PFN)__gesf2},
+    {"__unordsf2", 0xB7ED322C, CALLS_VERSION, (RTS_PFN)__unordsf2},
+    {"__fixsfsi", 0xEC1FC1F1, CALLS_VERSION, (RTS_PFN)__fixsfsi},
+    {"__fixunssfsi", 0x413C64B7, CALLS_VERSION, (RTS_PFN)__fixunssfsi},
+    {"__floatsisf", 0xA7FE8F38, CALLS_VERSION, (RTS_PFN)__floatsisf},
+    {"__floatunsisf", 0x5DDCF0EC, CALLS_VERSION, (RTS_PFN)__floatunsisf},
+#endif
+};
+
+RTS_RESULT CmpRealCalls_Hook(CMP_HOOK hook)
+{
+    return hook == CH_INIT3 ? CMRegisterExternal(real_calls, RTS_COUNT(real_calls)) : ERR_OK;
+}
+
+/* ---- LREAL ---- */
+
+static BASE_CALL RTS_I64 lreal_to_lint(RTS_REAL64 value)
+{
+    return (RTS_I64)value;
+}
+
+static BASE_CALL RTS_UI64 lreal_to_ulint(RTS_REAL64 value)
+{
+    return (RTS_UI64)value;
+}
+
+static BASE_CALL RTS_REAL64 lreal_sqrt(RTS_REAL64 value)
+{
+    return sqrt(value);
+}
+
+static const CMP_EXT_FUNCTION lreal_calls[] = {
+    {"__fixdfdi", 0x0B7A9758, CALLS_VERSION, (RTS_PFN)lreal_to_lint},
+    {"__fixunsdfdi", 0x71038A92, CALLS_VERSION, (RTS_PFN)lreal_to_ulint},
+    {"sqrt", 0x02C20D9E, CALLS_VERSION, (RTS_PFN)lreal_sqrt},
+    {"__adddf3", 0x9824AF08, CALLS_VERSION, (RTS_PFN)__adddf3},
+    {"__subdf3", 0x43D1C65B, CALLS_VERSION, (RTS_PFN)__subdf3},
+    {"__muldf3", 0xB1652F78, CALLS_VERSION, (RTS_PFN)__muldf3},
+    {"__divdf3", 0x10D8E79E, CALLS_VERSION, (RTS_PFN)__divdf3},
+    {"__eqdf2", 0x4A287FAE, CALLS_VERSION, (RTS_PFN)__eqdf2},
+    {"__nedf2", 0xC922DCF4, CALLS_VERSION, (RTS_PFN)__nedf2},
+    {"__ltdf2", 0x9A6B219C, CALLS_VERSION, (RTS_PFN)__ltdf2},
+    {"__ledf2", 0x24B40F1D, CALLS_VERSION, (RTS_PFN)__ledf2},
+    {"__gtdf2", 0xEC375B87, CALLS_VERSION, (RTS_PFN)__gtdf2},
+    {"__gedf2", 0x52E87506, CALLS_VERSION, (RTS_PFN)__gedf2},
+    {"__unorddf2", 0xC5FF7C94, CALLS_VERSION, (RTS_PFN)__unorddf2},
+    {"__fixdfsi", 0xCDB1291B, CALLS_VERSION, (RTS_PFN)__fixdfsi},
+    {"__fixunsdfsi", 0x6BD43228, CALLS_VERSION, (RTS_PFN)__fixunsdfsi},
+    {"__floatsidf", 0x260BA2DF, CALLS_VERSION, (RTS_PFN)__floatsidf},
+    {"__floatunsidf", 0x7B539094, CALLS_VERSION, (RTS_PFN)__floatunsidf},
+    {"__floatdidf", 0x87168571, CALLS_VERSION, (RTS_PFN)__floatdidf},
+    {"__floatundidf", 0xF65394E7, CALLS_VERSION, (RTS_PFN)__floatundidf},
+    {"__extendsfdf2", 0x25FA0353, CALLS_VERSION, (RTS_PFN)__extendsfdf2},
+    {"__truncdfsf2", 0xAFFF5D12, CALLS_VERSION, (RTS_PFN)__truncdfsf2},
+};
+
+RTS_RESULT CmpLrealCalls_Hook(CMP_HOOK hook)
+{
+    return hook == CH_INIT3 ? CMRegisterExternal(lreal_calls, RTS_COUNT(lreal_calls)) : ERR_OK;
+}

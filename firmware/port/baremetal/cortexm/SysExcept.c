@@ -1,0 +1,344 @@
+/*
+ * SysExcept.c - exceptions of application code on Armv7-M.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * SysExceptTry is called in handler mode (a timer's interrupt) or in main, both on the main stack. It enters the function
+ * by SVC in *thread mode on the process stack*, at the priority of the interrupt it came from (CCR.NONBASETHRDENA), and leaves it
+ * by another SVC. So whatever goes wrong in it, the frames of faults and interrupts that need to be trusted lie on the
+ * main stack, and leaving is the same exception return for a normal end, a checked error, a fault, and a broken loop:
+ *
+ *   main stack:    ... interrupt | SysExceptTry | frame of the SVC that entered      <- leaving returns to it
+ *   process stack: slot of this nesting depth, with a guard of the MPU below
+ *
+ * Nested only by pre-emption, last in first out: depth d is interrupted while depth d + 1 runs.
+ */
+#include "SysExcept.h"
+
+#include "CortexM.h"
+#include "rts_config.h"
+
+enum { GUARD_LOG2 = 5, GUARD_SIZE = 1 << GUARD_LOG2 };
+enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_BASIC_FRAME = 0x10, EXC_RETURN_PSP = 4 };
+enum { XPSR_THUMB = 1 << 24 };
+enum { FPCCR_LSPACT = 1 };
+enum { SHCSR_PENDING = 0xF << 12 }; /* UsageFault, MemManage, BusFault, SVCall */
+enum { CONTROL_SPSEL = 2 };
+
+enum {
+    CFSR_IACCVIOL = 1 << 0,
+    CFSR_STACKING = 0x30 | 0x3000, /* MSTKERR, MLSPERR, STKERR, LSPERR */
+    CFSR_MMARVALID = 1 << 7,
+    CFSR_IBUSERR = 1 << 8,
+    CFSR_ILLEGAL = 0xF << 16, /* UNDEFINSTR, INVSTATE, INVPC, NOCP */
+    CFSR_INVSTATE = 1 << 17,
+    CFSR_UNALIGNED = 1 << 24,
+    CFSR_DIVBYZERO = 1 << 25,
+};
+
+/* What an exception entry pushes; the FPU's registers may follow. */
+typedef struct {
+    RTS_UI32 r0, r1, r2, r3, r12, lr, pc, xpsr;
+} FRAME;
+
+typedef struct {
+    FRAME *entered;       /* on the main stack */
+    FRAME *outer_process; /* process stack pointer of the depth below */
+    RTS_UI32 exc_return;
+    uintptr_t context;
+} TRY;
+
+typedef RTS_UI8 IEC_STACK[RTS_IEC_STACK_SIZE];
+RTS_STATIC_ASSERT(RTS_IEC_STACK_SIZE % 32 == 0 && RTS_IEC_STACK_SIZE >= 256, iec_stack_holds_guard_and_frame);
+
+/* At the bottom of RAM, the deepest first: what gets past a guard hits a slot that is idle now, or no memory at all. */
+__attribute__((section(".bss.iec_stack"), aligned(GUARD_SIZE))) static IEC_STACK stacks[APP_MAX_TASKS];
+
+static struct {
+    TRY tries[APP_MAX_TASKS];
+    RTS_UI32 depth;
+    uintptr_t code;
+    RTS_UI32 code_size;
+} state;
+
+static FRAME *process_stack(void)
+{
+    FRAME *pointer;
+    __asm__ volatile("mrs %0, psp" : "=r"(pointer));
+    return pointer;
+}
+
+static void set_process_stack(FRAME *pointer)
+{
+    __asm__ volatile("msr psp, %0" ::"r"(pointer) : "memory");
+}
+
+static uintptr_t stack_slot(RTS_UI32 depth)
+{
+    return (uintptr_t)stacks[APP_MAX_TASKS - 1 - depth];
+}
+
+void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 access)
+{
+    enum { RBAR_VALID = 1 << 4, RASR_ENABLE = 1, RASR_NORMAL_MEMORY = 6 << 16 };
+    if (region >= ((MPU_TYPE >> 8) & 0xFFu))
+        return;
+    MPU_RBAR = base | RBAR_VALID | region;
+    MPU_RASR = access << 24 | RASR_NORMAL_MEMORY | (log2_size - 1) << 1 | RASR_ENABLE;
+    CpuBarrier();
+}
+
+void MpuRelease(RTS_UI32 region)
+{
+    enum { RBAR_VALID = 1 << 4 };
+    if (region >= ((MPU_TYPE >> 8) & 0xFFu))
+        return;
+    MPU_RBAR = RBAR_VALID | region;
+    MPU_RASR = 0;
+    CpuBarrier();
+}
+
+void SysExceptInit(void)
+{
+    enum { MPU_ENABLE_WITH_BACKGROUND = 5 };
+    enum { NULL_AREA_LOG2 = 8 }; /* the vectors, which only the hardware reads */
+    extern RTS_UI8 stack_bottom[];
+    state.depth = 0;
+    state.code_size = 0;
+    MpuProtect(MPU_NULL, 0, NULL_AREA_LOG2, MPU_NO_ACCESS);
+    MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, GUARD_LOG2, MPU_NO_ACCESS);
+    for (RTS_UI32 depth = 0; depth < APP_MAX_TASKS; depth++)
+        MpuProtect(MPU_IEC_STACK + depth, stack_slot(depth), GUARD_LOG2, MPU_NO_ACCESS);
+    if (MPU_TYPE != 0)
+        MPU_CTRL = MPU_ENABLE_WITH_BACKGROUND;
+    CpuBarrier();
+}
+
+void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size)
+{
+    state.code = (uintptr_t)code;
+    state.code_size = size;
+}
+
+/* ---- entering and leaving ---- */
+
+/* The function given to SysExceptTry returned. */
+__attribute__((naked)) static void try_return(void)
+{
+    __asm__ volatile("movs r0, #0\n\tsvc 0");
+}
+
+/* Leaves the running Try with code r0 and address r1. */
+__attribute__((naked, noreturn)) static void try_raise(RTS_UI32 code, uintptr_t address)
+{
+    RTS_UNUSED(code);
+    RTS_UNUSED(address);
+    __asm__ volatile("svc 0");
+}
+
+/* Enters fn(arg) by SVC; comes back with the code in the low and the address in the high word. Whatever fn did to the
+ * registers that a function has to keep, they are as before: the interrupted task below needs its own. */
+__attribute__((naked, noinline)) static RTS_UI64 try_enter(void (*fn)(void *arg), void *arg)
+{
+    RTS_UNUSED(fn);
+    RTS_UNUSED(arg);
+    __asm__ volatile("push {r3-r11, lr}\n\t"
+#ifdef __ARM_FP
+                     "vpush {d8-d15}\n\t"
+#endif
+                     "svc 0\n\t"
+#ifdef __ARM_FP
+                     "vpop {d8-d15}\n\t"
+#endif
+                     "pop {r3-r11, pc}");
+}
+
+/* A context is named by the exception it runs in, plus 1 because main's is 0. */
+static uintptr_t context_of(RTS_UI32 exception_number)
+{
+    return exception_number + 1;
+}
+
+static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
+{
+    TRY *try = &state.tries[state.depth];
+    FRAME *frame = (FRAME *)(stack_slot(state.depth) + RTS_IEC_STACK_SIZE) - 1;
+    *try = (TRY){caller, process_stack(), exc_return, context_of(caller->xpsr & 0x1FFu)};
+    state.depth++;
+    frame->r0 = caller->r1;
+    frame->lr = (RTS_UI32)(uintptr_t)try_return;
+    frame->pc = caller->r0 & ~1u;
+    frame->xpsr = XPSR_THUMB;
+    set_process_stack(frame);
+    return (RTS_UI32)EXC_RETURN_THREAD_PSP;
+}
+
+/* Drops what is on the process stack, saved FPU context included. */
+static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, RTS_UI32 exc_return)
+{
+    TRY *try = &state.tries[--state.depth];
+#ifdef __ARM_FP
+    if (!(exc_return & EXC_RETURN_BASIC_FRAME))
+        FPU_FPCCR &= ~(RTS_UI32)FPCCR_LSPACT;
+#else
+    RTS_UNUSED(exc_return);
+#endif
+    try->entered->r0 = code;
+    try->entered->r1 = address;
+    set_process_stack(try->outer_process);
+    return try->exc_return;
+}
+
+__attribute__((used)) static RTS_UI32 svc_dispatch(FRAME *frame, RTS_UI32 exc_return)
+{
+    if (exc_return & EXC_RETURN_PSP)
+        return leave(frame->r0, frame->r1, exc_return);
+    if (state.depth == APP_MAX_TASKS)
+        ResetNow(RESET_FATAL, frame->pc);
+    return enter(frame, exc_return);
+}
+
+/* Hands the frame that the exception pushed, and EXC_RETURN, to `function`, and returns to where that says. */
+#define DISPATCH(function)                                                                                             \
+    __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\tpush {r4, lr}\n\t"      \
+                     "bl " #function "\n\tpop {r4, lr}\n\tbx r0")
+
+__attribute__((naked)) void SvcHandler(void);
+void SvcHandler(void)
+{
+    DISPATCH(svc_dispatch);
+}
+
+/* ---- faults ---- */
+
+/* The return address on the process stack that is next to its end: the fault's own frame was lost. */
+static uintptr_t find_caller(uintptr_t slot)
+{
+    const RTS_UI32 *end = (const RTS_UI32 *)(slot + RTS_IEC_STACK_SIZE);
+    for (const RTS_UI32 *word = (const RTS_UI32 *)(slot + GUARD_SIZE); word < end; word++)
+        if ((*word & 1u) && *word - state.code < state.code_size)
+            return (*word & ~1u) - 2;
+    return 0;
+}
+
+static RTS_UI32 code_of(RTS_UI32 cfsr, uintptr_t guard)
+{
+    if ((cfsr & CFSR_STACKING) || ((cfsr & CFSR_MMARVALID) && SCB_MMFAR - guard < GUARD_SIZE))
+        return RTSEXCPT_STACK_OVERFLOW;
+    if (cfsr & CFSR_DIVBYZERO)
+        return RTSEXCPT_DIVIDEBYZERO;
+    if (cfsr & CFSR_UNALIGNED)
+        return RTSEXCPT_MISALIGNMENT;
+    if (cfsr & CFSR_ILLEGAL)
+        return RTSEXCPT_ILLEGAL_INSTRUCTION;
+    return cfsr == 0 ? RTSEXCPT_BREAKPOINT : RTSEXCPT_ACCESS_VIOLATION;
+}
+
+/* After a jump to nowhere the caller says more than the program counter. */
+static uintptr_t address_of(RTS_UI32 cfsr, const FRAME *frame, uintptr_t slot)
+{
+    if (cfsr & CFSR_STACKING)
+        return find_caller(slot);
+    if (cfsr & (CFSR_IACCVIOL | CFSR_IBUSERR | CFSR_INVSTATE))
+        return (frame->lr & ~1u) - 2;
+    return frame->pc;
+}
+
+__attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_return)
+{
+    RTS_UI32 cfsr = SCB_CFSR;
+    if (!(exc_return & EXC_RETURN_PSP) || state.depth == 0)
+        ResetNow(RESET_FATAL, cfsr & CFSR_STACKING ? 0 : frame->pc);
+    uintptr_t slot = stack_slot(state.depth - 1);
+    RTS_UI32 code = code_of(cfsr, slot);
+    uintptr_t address = address_of(cfsr, frame, slot);
+    SCB_CFSR = cfsr;
+    SCB_HFSR = SCB_HFSR;
+    /* What could not be stacked stays pending: it belongs to the function that is left now. */
+    SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
+    return leave(code, address, exc_return);
+}
+
+/* A fault on the main stack is one of the runtime; that stack may be at its end, so it is given up. */
+__attribute__((naked)) void FaultHandler(void);
+void FaultHandler(void)
+{
+    __asm__ volatile("tst lr, #4\n\tbne 1f\n\tmrs r0, msp\n\tldr r1, =stack_top\n\tmsr msp, r1\n\tmov r1, lr\n\t"
+                     "b fault_dispatch\n1:");
+    DISPATCH(fault_dispatch);
+}
+
+__attribute__((used)) static RTS_UI32 nmi_dispatch(FRAME *frame, RTS_UI32 exc_return)
+{
+    RTS_UNUSED(exc_return);
+    ResetNow(RESET_WATCHDOG, frame->pc);
+}
+
+/* The watchdog's last warning. */
+__attribute__((naked)) void NmiHandler(void);
+void NmiHandler(void)
+{
+    DISPATCH(nmi_dispatch);
+}
+
+/* ---- for the runtime ---- */
+
+int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+{
+    RTS_UI64 result = try_enter(fn, arg);
+    exception->code = (RTS_UI32)result;
+    exception->address = (uintptr_t)(result >> 32);
+    return exception->code != RTSEXCPT_NOEXCEPTION;
+}
+
+static int in_try(void)
+{
+    RTS_UI32 control;
+    __asm__ volatile("mrs %0, control" : "=r"(control));
+    return (control & CONTROL_SPSEL) != 0;
+}
+
+void SysExceptRaise(RTS_UI32 code, uintptr_t address)
+{
+    if (!in_try())
+        ResetNow(RESET_FATAL, (RTS_UI32)address);
+    try_raise(code, address & ~(uintptr_t)1);
+}
+
+uintptr_t SysExceptContext(void)
+{
+    return in_try() ? state.tries[state.depth - 1].context : context_of(CpuExceptionNumber());
+}
+
+void SysExceptShutdown(void)
+{
+}
+
+/* We run above `context`, so its Try is interrupted, and where it is to go on lies on its process stack. */
+void SysExceptBreak(uintptr_t context, RTS_UI32 code)
+{
+    FRAME *frame = process_stack();
+    for (TRY *try = state.tries + state.depth; try-- > state.tries; frame = try->outer_process) {
+        if (try->context != context)
+            continue;
+        frame->r0 = code;
+        frame->r1 = frame->pc;
+        frame->pc = (RTS_UI32)(uintptr_t)try_raise & ~1u;
+        frame->xpsr = (frame->xpsr & 1u << 9) | XPSR_THUMB;
+        return;
+    }
+}
+
+__attribute__((naked)) void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument)
+{
+    RTS_UNUSED(entry);
+    RTS_UNUSED(context);
+    RTS_UNUSED(argument);
+    __asm__ volatile("push {r9, lr}\n\t"
+                     "mov r12, r0\n\t"
+                     "mov r0, r1\n\t"
+                     "ldr r9, [r0, %0]\n\t"
+                     "mov r1, r2\n\t"
+                     "blx r12\n\t"
+                     "pop {r9, pc}" ::"i"(offsetof(IEC_CONTEXT, imports)));
+}

@@ -1,0 +1,169 @@
+/*
+ * SysTimer.c - timers as interrupts that pre-empt each other.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * One hardware timer of the board is the alarm for the earliest due time. When it fires, each timer that is due gets its own
+ * interrupt line set pending by software, and runs at its own NVIC level: any number of timers from one hardware timer, and
+ * due times that never drift. Rank is by priority, among equals by order of creation.
+ */
+#include "SysTimer.h"
+
+#include "CortexM.h"
+#include "SysTime.h"
+
+enum { ALARM_MAX_NS = 1000000000 };
+
+typedef enum { TIMER_FREE, TIMER_STOPPED, TIMER_WAITING, TIMER_FIRED } TIMER_STATE;
+
+typedef struct {
+    SYS_TIMER_CALLBACK callback;
+    void *param;
+    RTS_I64 interval_ns;
+    RTS_I64 due_ns;
+    RTS_UI32 missed;
+    RTS_UI8 priority;
+    volatile RTS_UI8 state; /* TIMER_STATE */
+} TIMER;
+
+static struct {
+    TIMER timer[SYSTIMER_COUNT];
+    RTS_I64 alarm_ns;
+} state;
+
+void SysTimerInit(void)
+{
+    state.alarm_ns = INT64_MAX;
+    for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
+        state.timer[i].state = TIMER_FREE;
+        IrqEnable(BOARD_TASK_IRQ + i, LEVEL_TIMER + i);
+    }
+}
+
+/* With interrupts masked, or from the alarm itself. */
+static void set_alarm(RTS_I64 at_ns, RTS_I64 now_ns)
+{
+    RTS_I64 delay = at_ns - now_ns;
+    state.alarm_ns = at_ns;
+    BoardAlarmSet(delay < 0 ? 0 : delay > ALARM_MAX_NS ? (RTS_UI32)ALARM_MAX_NS : (RTS_UI32)delay);
+}
+
+void SysTimerAlarm(void)
+{
+    RTS_I64 now = SysTimeGetNs();
+    RTS_I64 next = INT64_MAX;
+    for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
+        TIMER *timer = &state.timer[i];
+        if (timer->state != TIMER_WAITING)
+            continue;
+        if (timer->due_ns <= now) {
+            timer->state = TIMER_FIRED;
+            NVIC_ISPR((BOARD_TASK_IRQ + i) / 32) = 1u << ((BOARD_TASK_IRQ + i) % 32);
+        } else if (timer->due_ns < next) {
+            next = timer->due_ns;
+        }
+    }
+    state.alarm_ns = next;
+    if (next != INT64_MAX)
+        set_alarm(next, now);
+}
+
+/* The timer waits for due_ns from now on. */
+static void wait_until_due(TIMER *timer, RTS_I64 due_ns, RTS_UI32 missed, RTS_I64 now_ns)
+{
+    RTS_UI32 mask = CpuMask();
+    timer->due_ns = due_ns;
+    timer->missed = missed;
+    timer->state = TIMER_WAITING;
+    if (due_ns < state.alarm_ns)
+        set_alarm(due_ns, now_ns);
+    CpuRestore(mask);
+}
+
+/* Every timer's interrupt; the number of the running exception says which. */
+void TimerIrq(void);
+void TimerIrq(void)
+{
+    TIMER *timer = &state.timer[CpuExceptionNumber() - VECTOR_IRQ - BOARD_TASK_IRQ];
+    if (timer->state != TIMER_FIRED)
+        return;
+    timer->callback(timer->param, timer->due_ns, timer->missed);
+
+    RTS_I64 now = SysTimeGetNs();
+    RTS_I64 due = timer->due_ns + timer->interval_ns;
+    RTS_UI32 missed = 0;
+    for (; due <= now; due += timer->interval_ns)
+        missed++;
+    wait_until_due(timer, due, missed, now);
+}
+
+static int outranks(RTS_UI32 one, RTS_UI32 other)
+{
+    RTS_UI8 a = state.timer[one].priority, b = state.timer[other].priority;
+    return a < b || (a == b && one < other);
+}
+
+/* Gives each timer in use the NVIC level of its rank. */
+static void assign_levels(void)
+{
+    for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
+        RTS_UI32 level = LEVEL_TIMER;
+        for (RTS_UI32 k = 0; k < SYSTIMER_COUNT; k++)
+            level += state.timer[k].state != TIMER_FREE && outranks(k, i);
+        NVIC_IPR(BOARD_TASK_IRQ + i) = CpuPriority(level);
+    }
+}
+
+static TIMER *find_timer(RTS_HANDLE handle)
+{
+    return handle < SYSTIMER_COUNT && state.timer[handle].state != TIMER_FREE ? &state.timer[handle] : NULL;
+}
+
+RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
+                          RTS_HANDLE *timer)
+{
+    if (callback == NULL || interval_us == 0 || priority > 31)
+        return ERR_PARAMETER;
+    for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
+        if (state.timer[i].state != TIMER_FREE)
+            continue;
+        state.timer[i] = (TIMER){.callback = callback,
+                                 .param = param,
+                                 .interval_ns = (RTS_I64)interval_us * 1000,
+                                 .priority = (RTS_UI8)priority,
+                                 .state = TIMER_STOPPED};
+        assign_levels();
+        *timer = i;
+        return ERR_OK;
+    }
+    return ERR_NOMEMORY;
+}
+
+RTS_RESULT SysTimerStart(RTS_HANDLE handle)
+{
+    TIMER *timer = find_timer(handle);
+    if (timer == NULL)
+        return ERR_INVALID_HANDLE;
+    RTS_I64 now = SysTimeGetNs();
+    wait_until_due(timer, now, 0, now);
+    return ERR_OK;
+}
+
+/* Called from main, so no timer's interrupt is active: it is enough that none starts again. */
+RTS_RESULT SysTimerStop(RTS_HANDLE handle)
+{
+    TIMER *timer = find_timer(handle);
+    if (timer == NULL)
+        return ERR_INVALID_HANDLE;
+    timer->state = TIMER_STOPPED;
+    return ERR_OK;
+}
+
+RTS_RESULT SysTimerDelete(RTS_HANDLE handle)
+{
+    TIMER *timer = find_timer(handle);
+    if (timer == NULL)
+        return ERR_INVALID_HANDLE;
+    timer->state = TIMER_FREE;
+    return ERR_OK;
+}

@@ -1,0 +1,46 @@
+/*
+ * main.c - the communication loop of a bare-metal controller.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpItf.h"
+#include "CmpLog.h"
+#include "CmpScheduleTimer.h"
+#include "CortexM.h"
+
+/* The communication loop may be kept from running for so long, by tasks that leave it no time. */
+enum { MAIN_WATCHDOG_MS = 20000 };
+
+static void log_reset_cause(void)
+{
+    static const char *const names[] = {"power on", "reset pin", "software", "fault of the runtime", "hardware watchdog"};
+    const RESET_RECORD *record = ResetGet();
+    if (record->cause < RESET_FATAL)
+        LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);
+    else
+        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%x, CFSR 0x%x", names[record->cause],
+               (unsigned)record->pc, (unsigned)record->status);
+}
+
+/* Sleeps until the next interrupt, unless one has brought work since the loop looked. A pending interrupt ends the sleep
+ * although it is masked, so none is missed between the question and the sleep. */
+static void idle(void)
+{
+    RTS_UI32 mask = CpuMask();
+    if (!BoardHasWork())
+        __asm__ volatile("wfi");
+    CpuRestore(mask);
+}
+
+int main(void)
+{
+    BoardWatchdogStart(MAIN_WATCHDOG_MS);
+    if (CMInit() != ERR_OK)
+        ResetNow(RESET_FATAL, 0);
+    log_reset_cause();
+    for (;;) {
+        BoardWatchdogKick();
+        (void)CMCallHook(CH_COMM_CYCLE);
+        idle();
+    }
+}

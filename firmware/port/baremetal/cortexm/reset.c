@@ -1,0 +1,36 @@
+/*
+ * reset.c - why the controller started: kept in RAM that survives a reset and that nobody clears.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A chip with a reset cause register can tell more; a board that wants it overwrites the record in BoardInit.
+ */
+#include "CortexM.h"
+
+enum { RECORD_MAGIC = 0x52535430 };
+enum { AIRCR_SYSRESETREQ = 0x05FA0004 };
+
+__attribute__((section(".noinit"))) static RESET_RECORD kept; /* written before a reset */
+static RESET_RECORD last;                                     /* what this start-up found there */
+
+void ResetInit(void)
+{
+    last = kept;
+    if (last.magic != RECORD_MAGIC)
+        last.cause = RESET_POWER_ON;
+    kept = (RESET_RECORD){.magic = RECORD_MAGIC, .cause = RESET_PIN};
+}
+
+const RESET_RECORD *ResetGet(void)
+{
+    return &last;
+}
+
+void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
+{
+    kept = (RESET_RECORD){.magic = RECORD_MAGIC, .cause = cause, .pc = pc, .status = SCB_CFSR};
+    CpuBarrier();
+    SCB_AIRCR = AIRCR_SYSRESETREQ;
+    for (;;)
+        CpuBarrier();
+}

@@ -1,0 +1,23 @@
+/*
+ * rts_config_cortexm.h - how compiled code is entered on Cortex-M; for a board's rts_config_port.h.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_CORTEXM_H
+#define RTS_CONFIG_CORTEXM_H
+
+#include "CmpIecAbi.h"
+
+/* Calls an entry of compiled code with r9 holding the import table; `argument` is init_retains or 0. */
+void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
+
+#define APP_ENTRY_MODE_BIT 1
+#define APP_CALL_ENTRY(entry, context) IecCall((uintptr_t)(entry), (context), 0)
+#define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((uintptr_t)(entry), (context), (init_retains))
+
+/* Stack of the application code of one task, bytes: a multiple of 32, which are lost to the guard below it. */
+#ifndef RTS_IEC_STACK_SIZE
+#define RTS_IEC_STACK_SIZE 1024
+#endif
+
+#endif

@@ -1,0 +1,244 @@
+/*
+ * SysCom.c - the serial line of the Linux port: a device, or a pseudo terminal for tests and local tools.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A device may go away (USB) and come back: it is opened again. The slave end of a pseudo terminal is held open here, so
+ * clients may come and go.
+ */
+#define _GNU_SOURCE
+#include "SysCom.h"
+
+#include "CmpLog.h"
+#include "SysTime.h"
+#include "port.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+static struct {
+    char path[256]; /* of the device, "" for a pseudo terminal */
+    char pty_name[64];
+    speed_t speed;
+    int line;       /* what is read and written; -1 while the device is away */
+    int slave;      /* of a pseudo terminal */
+    bool configured;
+    bool open;
+    bool full;      /* the line took less than was offered */
+    RTS_UI32 moved;
+    RTS_UI32 tried_ms;
+} state = {.line = -1, .slave = -1};
+
+/* ---- opening ---- */
+
+static const struct {
+    RTS_UI32 baud;
+    speed_t speed;
+} speeds[] = {
+    {9600, B9600},       {19200, B19200},     {38400, B38400},     {57600, B57600},     {115200, B115200},
+    {230400, B230400},   {460800, B460800},   {500000, B500000},   {921600, B921600},   {1000000, B1000000},
+    {1500000, B1500000}, {2000000, B2000000}, {3000000, B3000000}, {4000000, B4000000},
+};
+
+static const speed_t *find_speed(RTS_UI32 baud)
+{
+    for (size_t i = 0; i < RTS_COUNT(speeds); i++) {
+        if (speeds[i].baud == baud) {
+            return &speeds[i].speed;
+        }
+    }
+    return NULL;
+}
+
+bool PortComKnowsBaud(RTS_UI32 baud)
+{
+    return find_speed(baud) != NULL;
+}
+
+/* 8N1, raw, no modem lines. */
+static bool make_raw(int line)
+{
+    struct termios settings;
+    if (tcgetattr(line, &settings) != 0) {
+        return false;
+    }
+    cfmakeraw(&settings);
+    settings.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS);
+    settings.c_cflag |= CLOCAL | CREAD;
+    cfsetspeed(&settings, state.speed);
+    return tcsetattr(line, TCSANOW, &settings) == 0;
+}
+
+static bool open_device(void)
+{
+    state.line = open(state.path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (state.line < 0) {
+        return false;
+    }
+    if (!make_raw(state.line)) {
+        int error = errno;
+        close(state.line);
+        state.line = -1;
+        errno = error;
+        return false;
+    }
+    (void)ioctl(state.line, TIOCEXCL);
+    (void)tcflush(state.line, TCIOFLUSH);
+    return true;
+}
+
+static bool open_pty(void)
+{
+    state.line = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (state.line < 0 || grantpt(state.line) != 0 || unlockpt(state.line) != 0 ||
+        ptsname_r(state.line, state.pty_name, sizeof(state.pty_name)) != 0) {
+        return false;
+    }
+    state.slave = open(state.pty_name, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    return state.slave >= 0 && make_raw(state.slave);
+}
+
+bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
+{
+    bool pty = strcmp(path, "pty") == 0;
+    const speed_t *speed = find_speed(baud);
+    if (speed == NULL || strlen(path) >= sizeof(state.path)) {
+        PortReason(reason, "cannot use %s at %u baud", path, (unsigned)baud);
+        return false;
+    }
+    memset(&state, 0, sizeof(state));
+    state.line = -1;
+    state.slave = -1;
+    state.speed = *speed;
+    memcpy(state.path, pty ? "" : path, pty ? 1 : strlen(path) + 1);
+    if (pty ? !open_pty() : !open_device()) {
+        PortReason(reason, "cannot open serial line %s: %s", path, strerror(errno));
+        PortComClose();
+        return false;
+    }
+    state.configured = true;
+    return true;
+}
+
+void PortComClose(void)
+{
+    if (state.line >= 0) {
+        close(state.line);
+    }
+    if (state.slave >= 0) {
+        close(state.slave);
+    }
+    state.line = -1;
+    state.slave = -1;
+    state.configured = false;
+}
+
+const char *PortComPtyName(void)
+{
+    return state.configured && state.pty_name[0] != '\0' ? state.pty_name : NULL;
+}
+
+/* ---- a device that goes away ---- */
+
+static void lose_device(void)
+{
+    LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is gone", state.path);
+    close(state.line);
+    state.line = -1;
+    state.full = false;
+    state.tried_ms = SysTimeGetMs();
+}
+
+static void look_for_device(void)
+{
+    if (SysTimeGetMs() - state.tried_ms < PORT_REOPEN_MS) {
+        return;
+    }
+    state.tried_ms = SysTimeGetMs();
+    if (open_device()) {
+        LogAdd(CMPID_SysCom, LOG_INFO, ERR_OK, "Serial device %s is back", state.path);
+    }
+}
+
+/* Whether line `index` can be used now. */
+static bool ready(RTS_UI32 index)
+{
+    if (index != 0 || !state.open) {
+        return false;
+    }
+    if (state.line < 0) {
+        look_for_device();
+    }
+    return state.line >= 0;
+}
+
+/* The bytes a read or write moved. Nothing to read and no room are not errors; all else means that the device is gone. */
+static RTS_UI32 moved(ssize_t count)
+{
+    if (count > 0) {
+        state.moved += (RTS_UI32)count;
+        return (RTS_UI32)count;
+    }
+    bool later = count < 0 && (errno == EAGAIN || errno == EINTR);
+    if (!later && state.slave < 0) {
+        lose_device();
+    }
+    return 0;
+}
+
+/* ---- SysCom.h ---- */
+
+RTS_UI32 SysComGetCount(void)
+{
+    return state.configured ? 1 : 0;
+}
+
+RTS_RESULT SysComOpen(RTS_UI32 index)
+{
+    if (index >= SysComGetCount()) {
+        return ERR_DEVICE;
+    }
+    state.open = true;
+    return ERR_OK;
+}
+
+void SysComClose(RTS_UI32 index)
+{
+    if (index == 0) {
+        state.open = false;
+    }
+}
+
+RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
+{
+    return size > 0 && ready(index) ? moved(read(state.line, data, size)) : 0;
+}
+
+RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
+{
+    if (size == 0 || !ready(index)) {
+        return 0;
+    }
+    RTS_UI32 taken = moved(write(state.line, data, size));
+    state.full = taken < size;
+    return taken;
+}
+
+/* ---- for main ---- */
+
+RTS_UI32 PortComMoved(void)
+{
+    return state.moved;
+}
+
+void PortComWait(int timeout_ms)
+{
+    struct pollfd line = {.fd = state.line, .events = state.full ? POLLIN | POLLOUT : POLLIN};
+    (void)poll(&line, 1, timeout_ms);
+}

@@ -1,0 +1,360 @@
+/*
+ * SysExcept.c - exceptions of IEC code on Linux: signals become one return from SysExceptTry.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Shared by the linux and the sim port, so it depends on no other file of a port. It also lives in processes that are not
+ * ours (Python): signal handlers are taken at first use, faults outside SysExceptTry go to whoever had them before, and
+ * SysExceptShutdown gives everything back.
+ *
+ * Leaving a handler by siglongjmp is sound here: IEC code and the C functions it may call hold no lock and own nothing.
+ * The handlers block no signal (SA_NODEFER, empty mask), so no mask has to be saved: sigsetjmp costs a few ns.
+ */
+#define _GNU_SOURCE
+#include "SysExcept.h"
+
+#include <pthread.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <ucontext.h>
+
+enum {
+    MAX_CONTEXTS = 64,                /* threads that run IEC code at the same time */
+    SIGNAL_STACK_SIZE = 32 * 1024,    /* a signal frame with all vector registers takes up to 12 KiB */
+    OVERFLOW_ZONE = 16 * 1024 * 1024, /* a fault this far below the end of a stack is an overflow of it */
+    GUARD_SIZE = 64 * 1024,           /* some C libraries count the guard pages as part of the stack */
+    BREAK_SIGNAL_OFFSET = 5,          /* from SIGRTMIN: clear of what debuggers and libraries use */
+};
+
+/* A thread that runs IEC code. The thread itself writes `jump` and `round`; SysExceptBreak reads them from another. */
+typedef struct {
+    sigjmp_buf *jump;        /* of the running SysExceptTry, NULL outside of it */
+    RTS_UI32 round;          /* counts SysExceptTry, so that a break that comes late does not hit the next one */
+    RTS_UI32 break_round;    /* the round to break */
+    RTS_UI32 break_code;
+    RTS_EXCEPTION exception; /* on the way from the handler to SysExceptTry */
+    uintptr_t stack_end;     /* lowest address of the stack */
+    pthread_t thread;
+    RTS_UI32 generation;
+    int used;
+} CONTEXT;
+
+typedef struct {
+    int number;
+    RTS_UI32 code;
+    int taken;
+    struct sigaction previous;
+} SIGNAL;
+
+static struct {
+    pthread_mutex_t lock;
+    pthread_once_t once;
+    pthread_key_t key; /* its destructor frees the context of a thread that ends */
+    int installed;
+    SIGNAL signal[6];
+    CONTEXT context[MAX_CONTEXTS];
+} state = {
+    .lock = PTHREAD_MUTEX_INITIALIZER,
+    .once = PTHREAD_ONCE_INIT,
+    .signal = {
+        {.number = SIGSEGV, .code = RTSEXCPT_ACCESS_VIOLATION},
+        {.number = SIGBUS, .code = RTSEXCPT_ACCESS_VIOLATION},
+        {.number = SIGFPE, .code = RTSEXCPT_DIVIDEBYZERO},
+        {.number = SIGILL, .code = RTSEXCPT_ILLEGAL_INSTRUCTION},
+        {.number = SIGTRAP, .code = RTSEXCPT_ILLEGAL_INSTRUCTION}, /* what a compiler's trap is on AArch64 */
+        {.number = 0, .code = RTSEXCPT_WATCHDOG},                  /* the break signal, known at run time only */
+    },
+};
+
+static unsigned char signal_stack[MAX_CONTEXTS][SIGNAL_STACK_SIZE] __attribute__((aligned(16)));
+
+/* The static TLS model: reading it in a handler never allocates. */
+static __thread CONTEXT *self __attribute__((tls_model("initial-exec")));
+
+static void fatal(const char *message)
+{
+    fprintf(stderr, "SysExcept: %s\n", message);
+    abort();
+}
+
+/* ---- in the handler ---- */
+
+static uintptr_t program_counter(const void *ucontext)
+{
+    const ucontext_t *at = ucontext;
+#if defined(__x86_64__)
+    return (uintptr_t)at->uc_mcontext.gregs[REG_RIP];
+#elif defined(__aarch64__)
+    return (uintptr_t)at->uc_mcontext.pc;
+#else
+#error "SysExcept.c: say where this architecture keeps the program counter in its ucontext_t."
+#endif
+}
+
+static void leave(CONTEXT *context, RTS_UI32 code, uintptr_t address)
+{
+    sigjmp_buf *jump = context->jump;
+    context->exception.code = code;
+    context->exception.address = address;
+    __atomic_store_n(&context->jump, NULL, __ATOMIC_RELEASE);
+    siglongjmp(*jump, 1);
+}
+
+static SIGNAL *find_signal(int number)
+{
+    SIGNAL *found = state.signal;
+    while (found->number != number) {
+        found++;
+    }
+    return found;
+}
+
+static RTS_UI32 fault_code(const CONTEXT *context, const SIGNAL *signal, const siginfo_t *info)
+{
+    uintptr_t below = context->stack_end + GUARD_SIZE - (uintptr_t)info->si_addr;
+    int overflow = signal->number == SIGSEGV && info->si_addr != NULL && below <= OVERFLOW_ZONE + GUARD_SIZE;
+    return overflow ? (RTS_UI32)RTSEXCPT_STACK_OVERFLOW : signal->code;
+}
+
+/* A fault that is not ours: the previous owner's, or the end of the process with a core dump of the real place. */
+static void chain(const SIGNAL *signal, siginfo_t *info, void *ucontext)
+{
+    const struct sigaction *previous = &signal->previous;
+    if ((previous->sa_flags & SA_SIGINFO) != 0) {
+        previous->sa_sigaction(signal->number, info, ucontext);
+    } else if (previous->sa_handler == SIG_DFL) {
+        sigaction(signal->number, previous, NULL);
+        if (info->si_code <= 0) {
+            raise(signal->number); /* somebody sent it; a real fault comes again by itself */
+        }
+    } else if (previous->sa_handler != SIG_IGN) {
+        previous->sa_handler(signal->number);
+    }
+}
+
+static void on_fault(int number, siginfo_t *info, void *ucontext)
+{
+    CONTEXT *context = self;
+    SIGNAL *signal = find_signal(number);
+    if (context != NULL && context->jump != NULL) {
+        leave(context, fault_code(context, signal, info), program_counter(ucontext));
+    }
+    chain(signal, info, ucontext);
+}
+
+static void on_break(int number, siginfo_t *info, void *ucontext)
+{
+    CONTEXT *context = self;
+    RTS_UNUSED(number);
+    RTS_UNUSED(info);
+    if (context != NULL && context->jump != NULL &&
+        __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round) {
+        leave(context, context->break_code, program_counter(ucontext));
+    }
+}
+
+/* ---- taking and giving back ---- */
+
+static int is_break(const SIGNAL *signal)
+{
+    return signal == &state.signal[RTS_COUNT(state.signal) - 1];
+}
+
+static void install(void)
+{
+    state.signal[RTS_COUNT(state.signal) - 1].number = SIGRTMIN + BREAK_SIGNAL_OFFSET;
+    for (size_t i = 0; i < RTS_COUNT(state.signal); i++) {
+        SIGNAL *signal = &state.signal[i];
+        struct sigaction action = {.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_NODEFER | SA_RESTART};
+        action.sa_sigaction = is_break(signal) ? on_break : on_fault;
+        sigemptyset(&action.sa_mask);
+        if (!signal->taken) {
+            sigaction(signal->number, &action, &signal->previous);
+            signal->taken = 1;
+        }
+    }
+    __atomic_store_n(&state.installed, 1, __ATOMIC_RELEASE);
+}
+
+static void give_back(SIGNAL *signal)
+{
+    struct sigaction now;
+    struct sigaction ignore = {.sa_handler = SIG_IGN};
+    sigaction(signal->number, NULL, &now);
+    if ((now.sa_flags & SA_SIGINFO) == 0 || (now.sa_sigaction != on_fault && now.sa_sigaction != on_break)) {
+        return; /* somebody came after us and may still call us: stay */
+    }
+    if (is_break(signal)) {
+        sigaction(signal->number, &ignore, NULL); /* drops a break on its way, which would now end the process */
+    }
+    sigaction(signal->number, &signal->previous, NULL);
+    signal->taken = 0;
+}
+
+void SysExceptShutdown(void)
+{
+    pthread_mutex_lock(&state.lock);
+    if (state.installed) {
+        for (size_t i = 0; i < RTS_COUNT(state.signal); i++) {
+            give_back(&state.signal[i]);
+        }
+        state.installed = 0;
+    }
+    pthread_mutex_unlock(&state.lock);
+}
+
+/* ---- contexts ---- */
+
+/* At the end of a thread. */
+static void detach(void *param)
+{
+    CONTEXT *context = param;
+    stack_t stack;
+    if (sigaltstack(NULL, &stack) == 0 && stack.ss_sp == signal_stack[context - state.context]) {
+        stack_t none = {.ss_flags = SS_DISABLE};
+        sigaltstack(&none, NULL);
+    }
+    self = NULL;
+    pthread_mutex_lock(&state.lock);
+    context->used = 0;
+    pthread_mutex_unlock(&state.lock);
+}
+
+static void create_key(void)
+{
+    if (pthread_key_create(&state.key, detach) != 0) {
+        fatal("no thread key left in this process");
+    }
+}
+
+static CONTEXT *take_context(void)
+{
+    pthread_mutex_lock(&state.lock);
+    CONTEXT *context = state.context;
+    while (context < state.context + MAX_CONTEXTS && context->used) {
+        context++;
+    }
+    if (context == state.context + MAX_CONTEXTS) {
+        fatal("too many threads run IEC code");
+    }
+    context->used = 1;
+    context->generation++;
+    context->thread = pthread_self();
+    pthread_mutex_unlock(&state.lock);
+    return context;
+}
+
+static uintptr_t own_stack_end(void)
+{
+    pthread_attr_t attributes;
+    void *lowest = NULL;
+    size_t size;
+    if (pthread_getattr_np(pthread_self(), &attributes) == 0) {
+        pthread_attr_getstack(&attributes, &lowest, &size);
+        pthread_attr_destroy(&attributes);
+    }
+    return (uintptr_t)lowest;
+}
+
+/* A stack overflow leaves no room for a handler on the stack itself. */
+static void give_signal_stack(const CONTEXT *context)
+{
+    stack_t stack;
+    if (sigaltstack(NULL, &stack) == 0 && (stack.ss_flags & SS_DISABLE) != 0) {
+        stack.ss_sp = signal_stack[context - state.context];
+        stack.ss_size = SIGNAL_STACK_SIZE;
+        stack.ss_flags = 0;
+        sigaltstack(&stack, NULL);
+    }
+}
+
+static void unblock_signals(void)
+{
+    sigset_t set;
+    sigemptyset(&set);
+    for (size_t i = 0; i < RTS_COUNT(state.signal); i++) {
+        sigaddset(&set, state.signal[i].number);
+    }
+    pthread_sigmask(SIG_UNBLOCK, &set, NULL);
+}
+
+/* Makes the calling thread a context and the handlers ours. */
+static CONTEXT *attach(void)
+{
+    pthread_once(&state.once, create_key);
+    pthread_mutex_lock(&state.lock);
+    install();
+    pthread_mutex_unlock(&state.lock);
+    if (self == NULL) {
+        CONTEXT *context = take_context();
+        context->stack_end = own_stack_end();
+        give_signal_stack(context);
+        pthread_setspecific(state.key, context);
+        self = context;
+    }
+    unblock_signals();
+    return self;
+}
+
+static CONTEXT *own_context(void)
+{
+    CONTEXT *context = self;
+    return context != NULL && __atomic_load_n(&state.installed, __ATOMIC_RELAXED) ? context : attach();
+}
+
+uintptr_t SysExceptContext(void)
+{
+    CONTEXT *context = own_context();
+    return (uintptr_t)context->generation * MAX_CONTEXTS + (uintptr_t)(context - state.context);
+}
+
+/* ---- the interface ---- */
+
+static void begin_round(CONTEXT *context)
+{
+    __atomic_store_n(&context->round, context->round + 1, __ATOMIC_RELEASE);
+}
+
+int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+{
+    sigjmp_buf jump;
+    begin_round(own_context());
+    if (sigsetjmp(jump, 0) != 0) {
+        *exception = self->exception;
+        return 1;
+    }
+    __atomic_store_n(&self->jump, &jump, __ATOMIC_RELEASE);
+    fn(arg);
+    __atomic_store_n(&self->jump, NULL, __ATOMIC_RELEASE);
+    exception->code = RTSEXCPT_NOEXCEPTION;
+    exception->address = 0;
+    return 0;
+}
+
+void SysExceptRaise(RTS_UI32 code, uintptr_t address)
+{
+    CONTEXT *context = self;
+    if (context == NULL || context->jump == NULL) {
+        fatal("an exception was raised outside of IEC code");
+    }
+    leave(context, code, address);
+}
+
+/* At most one signal per round: a thread that does not get the processor would find all of them stacked on top of each
+ * other when it does. */
+void SysExceptBreak(uintptr_t name, RTS_UI32 code)
+{
+    CONTEXT *context = &state.context[name % MAX_CONTEXTS];
+    pthread_mutex_lock(&state.lock);
+    RTS_UI32 round = __atomic_load_n(&context->round, __ATOMIC_ACQUIRE);
+    int inside = __atomic_load_n(&context->jump, __ATOMIC_ACQUIRE) != NULL;
+    int present = context->used && context->generation == name / MAX_CONTEXTS && state.installed;
+    if (present && inside && context->break_round != round) {
+        context->break_code = code;
+        __atomic_store_n(&context->break_round, round, __ATOMIC_RELEASE);
+        pthread_kill(context->thread, SIGRTMIN + BREAK_SIGNAL_OFFSET);
+    }
+    pthread_mutex_unlock(&state.lock);
+}

@@ -1,0 +1,87 @@
+/*
+ * SysTarget.c - who this device is: architecture, host name, a serial number from the machine id.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#define _GNU_SOURCE
+#include "SysTarget.h"
+
+#include "CompactDownload.h"
+#include "port.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+#if defined(__x86_64__)
+#define PORT_TARGET_ID TARGET_ID_X86_64_LINUX
+#elif defined(__aarch64__)
+#define PORT_TARGET_ID TARGET_ID_AARCH64_LINUX
+#else
+#error "SysTarget.c: give this architecture a target id in CompactDownload.h and in plctool."
+#endif
+
+static struct {
+    char node_name[65];
+    char serial_number[17];
+} state;
+
+static const SYS_TARGET target = {
+    .type = TARGET_TYPE_PROGRAMMABLE,
+    .id = PORT_TARGET_ID,
+    .version = 0x01000000,
+    .device_name = "plcrt",
+    .vendor_name = "Open PLC runtime",
+    .node_name = state.node_name,
+    .serial_number = state.serial_number,
+};
+
+const SYS_TARGET *SysTargetGet(void)
+{
+    return &target;
+}
+
+RTS_UI32 SysTargetRandom(void)
+{
+    RTS_UI32 value;
+    if (getrandom(&value, sizeof(value), 0) != sizeof(value)) {
+        abort(); /* documented not to happen for so few bytes; ids that can be guessed are no way out */
+    }
+    return value;
+}
+
+/* FNV-1a: the machine id itself is not to be shown to the network. */
+static RTS_UI64 hash(const char *text)
+{
+    RTS_UI64 value = 0xCBF29CE484222325;
+    for (; *text != '\0'; text++) {
+        value = (value ^ (RTS_UI8)*text) * 0x100000001B3;
+    }
+    return value;
+}
+
+/* The machine id, or the host name on a machine without one. */
+static void read_machine_id(char *text, int size)
+{
+    FILE *file = fopen("/etc/machine-id", "re");
+    if (file == NULL || fgets(text, size, file) == NULL) {
+        snprintf(text, (size_t)size, "%s", state.node_name);
+    }
+    if (file != NULL) {
+        fclose(file);
+    }
+}
+
+RTS_RESULT SysTarget_Hook(CMP_HOOK hook)
+{
+    char id[80];
+    if (hook == CH_INIT_SYSTEM) {
+        memset(&state, 0, sizeof(state));
+        gethostname(state.node_name, sizeof(state.node_name) - 1);
+        read_machine_id(id, sizeof(id));
+        snprintf(state.serial_number, sizeof(state.serial_number), "%016llX", (unsigned long long)hash(id));
+    }
+    return ERR_OK;
+}

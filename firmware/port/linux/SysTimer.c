@@ -1,0 +1,250 @@
+/*
+ * SysTimer.c - periodic timers of the Linux port: one SCHED_FIFO thread each.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A thread lives from SysTimerStart to SysTimerStop, on a stack that was reserved at start-up. It sleeps on a condition
+ * variable with an absolute CLOCK_MONOTONIC time, which wakes as precisely as clock_nanosleep and can be cut short by
+ * SysTimerStop.
+ */
+#define _GNU_SOURCE
+#include "SysTimer.h"
+
+#include "CmpLog.h"
+#include "SysExcept.h"
+#include "SysTime.h"
+#include "port.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <time.h>
+
+enum {
+    MAX_TIMERS = APP_MAX_TASKS + 1, /* and the watchdog */
+    STACK_STEP = PORT_STACK_GUARD + PORT_STACK_SIZE,
+};
+
+typedef struct {
+    SYS_TIMER_CALLBACK callback; /* NULL when the timer is free */
+    void *param;
+    RTS_I64 interval_ns;
+    RTS_I64 start_ns;
+    int priority;
+    int started;
+    pthread_t thread;
+    pthread_mutex_t lock;
+    pthread_cond_t changed;
+    int stop; /* under `lock` */
+} TIMER;
+
+static struct {
+    TIMER timer[MAX_TIMERS];
+    char *stacks;
+    int realtime; /* 0 after the system has refused SCHED_FIFO */
+} state;
+
+/* ---- in the thread ---- */
+
+/* Sleeps until the time has come; 0 when the timer was stopped instead. */
+static int sleep_until(TIMER *timer, RTS_I64 due_ns)
+{
+    RTS_I64 at = PortMonotonicNs(due_ns);
+    struct timespec until = {.tv_sec = (time_t)(at / 1000000000), .tv_nsec = (long)(at % 1000000000)};
+    pthread_mutex_lock(&timer->lock);
+    while (!timer->stop && pthread_cond_timedwait(&timer->changed, &timer->lock, &until) != ETIMEDOUT) {
+    }
+    int go_on = !timer->stop;
+    pthread_mutex_unlock(&timer->lock);
+    return go_on;
+}
+
+/* How many due times, `due_ns` the first, have passed at `now_ns`. */
+static RTS_UI32 count_missed(RTS_I64 due_ns, RTS_I64 now_ns, RTS_I64 interval_ns)
+{
+    return now_ns <= due_ns ? 0 : (RTS_UI32)((now_ns - due_ns - 1) / interval_ns + 1);
+}
+
+static void *run(void *param)
+{
+    TIMER *timer = param;
+    RTS_I64 due_ns = timer->start_ns;
+    RTS_UI32 missed = 0;
+    (void)SysExceptContext(); /* takes what catching exceptions needs now, not in the first cycle */
+    prctl(PR_SET_TIMERSLACK, 1UL); /* matters without SCHED_FIFO only: else 50 us late */
+    while (sleep_until(timer, due_ns)) {
+        timer->callback(timer->param, due_ns, missed);
+        due_ns += timer->interval_ns;
+        missed = count_missed(due_ns, SysTimeGetNs(), timer->interval_ns);
+        due_ns += missed * timer->interval_ns;
+    }
+    return NULL;
+}
+
+/* ---- starting and stopping it ---- */
+
+static TIMER *get_timer(RTS_HANDLE handle)
+{
+    return handle < MAX_TIMERS && state.timer[handle].callback != NULL ? &state.timer[handle] : NULL;
+}
+
+/* The thread leaves SIGTERM and the like to main; what SysExcept needs it unblocks itself. */
+static int create_thread(TIMER *timer, int realtime)
+{
+    pthread_attr_t attributes;
+    struct sched_param parameters = {.sched_priority = timer->priority};
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_attr_init(&attributes);
+    pthread_attr_setstack(&attributes, state.stacks + (timer - state.timer) * STACK_STEP + PORT_STACK_GUARD,
+                          PORT_STACK_SIZE);
+    if (realtime) {
+        pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+        pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
+        pthread_attr_setschedparam(&attributes, &parameters);
+    }
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    int error = pthread_create(&timer->thread, &attributes, run, timer);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    pthread_attr_destroy(&attributes);
+    return error;
+}
+
+RTS_RESULT SysTimerStart(RTS_HANDLE handle)
+{
+    TIMER *timer = get_timer(handle);
+    if (timer == NULL) {
+        return ERR_INVALID_HANDLE;
+    }
+    if (timer->started) {
+        return ERR_INVALID_STATE;
+    }
+    timer->stop = 0;
+    timer->start_ns = SysTimeGetNs();
+    int error = create_thread(timer, state.realtime);
+    if (error == EPERM && state.realtime) {
+        state.realtime = 0;
+        LogAdd(CMPID_SysTimer, LOG_WARNING, ERR_NO_ACCESS_RIGHTS,
+               "No CAP_SYS_NICE: tasks run without real-time priority");
+        error = create_thread(timer, 0);
+    }
+    timer->started = error == 0;
+    return error == 0 ? ERR_OK : ERR_NOMEMORY;
+}
+
+RTS_RESULT SysTimerStop(RTS_HANDLE handle)
+{
+    TIMER *timer = get_timer(handle);
+    if (timer == NULL) {
+        return ERR_INVALID_HANDLE;
+    }
+    if (!timer->started) {
+        return ERR_OK;
+    }
+    pthread_mutex_lock(&timer->lock);
+    timer->stop = 1;
+    pthread_cond_signal(&timer->changed);
+    pthread_mutex_unlock(&timer->lock);
+    pthread_join(timer->thread, NULL);
+    timer->started = 0;
+    return ERR_OK;
+}
+
+/* ---- creating and deleting ---- */
+
+RTS_RESULT PortTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, int fifo_priority,
+                           RTS_HANDLE *timer)
+{
+    RTS_HANDLE i = 0;
+    if (callback == NULL || interval_us == 0) {
+        return ERR_PARAMETER;
+    }
+    while (i < MAX_TIMERS && state.timer[i].callback != NULL) {
+        i++;
+    }
+    if (i == MAX_TIMERS || state.stacks == NULL) {
+        return ERR_NOMEMORY;
+    }
+    state.timer[i].callback = callback;
+    state.timer[i].param = param;
+    state.timer[i].interval_ns = (RTS_I64)interval_us * 1000;
+    state.timer[i].priority = fifo_priority;
+    state.timer[i].started = 0;
+    *timer = i;
+    return ERR_OK;
+}
+
+RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
+                          RTS_HANDLE *timer)
+{
+    if (priority > 31) {
+        return ERR_PARAMETER;
+    }
+    return PortTimerCreate(callback, param, interval_us, PORT_PRIORITY_HIGHEST - (int)priority, timer);
+}
+
+RTS_RESULT SysTimerDelete(RTS_HANDLE handle)
+{
+    RTS_RESULT result = SysTimerStop(handle);
+    if (result == ERR_OK) {
+        state.timer[handle].callback = NULL;
+    }
+    return result;
+}
+
+/* ---- the component ---- */
+
+static void init_timer(TIMER *timer)
+{
+    pthread_condattr_t attributes;
+    pthread_condattr_init(&attributes);
+    pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+    pthread_cond_init(&timer->changed, &attributes);
+    pthread_condattr_destroy(&attributes);
+    pthread_mutex_init(&timer->lock, NULL);
+}
+
+static RTS_RESULT init(void)
+{
+    memset(&state, 0, sizeof(state));
+    state.realtime = 1;
+    char *stacks = mmap(NULL, (size_t)MAX_TIMERS * STACK_STEP, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (stacks == MAP_FAILED) {
+        return ERR_NOMEMORY;
+    }
+    for (size_t i = 0; i < MAX_TIMERS; i++) {
+        init_timer(&state.timer[i]);
+        if (mprotect(stacks + i * STACK_STEP + PORT_STACK_GUARD, PORT_STACK_SIZE, PROT_READ | PROT_WRITE) != 0) {
+            munmap(stacks, (size_t)MAX_TIMERS * STACK_STEP);
+            return ERR_NOMEMORY;
+        }
+    }
+    state.stacks = stacks;
+    return ERR_OK;
+}
+
+static void shut_down(void)
+{
+    for (RTS_HANDLE i = 0; i < MAX_TIMERS; i++) {
+        (void)SysTimerDelete(i);
+    }
+    if (state.stacks != NULL) {
+        munmap(state.stacks, (size_t)MAX_TIMERS * STACK_STEP);
+        state.stacks = NULL;
+    }
+}
+
+RTS_RESULT SysTimer_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT_SYSTEM) {
+        return init();
+    }
+    if (hook == CH_EXIT_SYSTEM) {
+        shut_down();
+    }
+    return ERR_OK;
+}

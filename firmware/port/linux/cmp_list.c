@@ -1,0 +1,34 @@
+/*
+ * cmp_list.c - the components of plcrt, system components first.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpItf.h"
+
+#define COMPONENTS(X) \
+    X(SysTime) \
+    X(CmpLog) \
+    X(SysTarget) \
+    X(SysTimer) \
+    X(SysFileFlash) \
+    X(CmpEventMgrEmbedded) \
+    X(SysWatchdog) \
+    X(CmpMath) \
+    X(CmpRetain) \
+    X(CmpIecTask) \
+    X(CmpScheduleTimer) \
+    X(CmpAppEmbedded) \
+    X(CmpSrv) \
+    X(CmpDevice) \
+    X(CmpAppSrv) \
+    X(CmpMonitor2) \
+    X(CmpLogSrv) \
+    X(CmpBlkDrvSimpleCom) \
+    X(CmpRouterEmbedded) \
+    X(CmpNameServiceServer) \
+    X(CmpChannelServerEmbedded)
+
+COMPONENTS(CMP_DECLARE)
+
+const CMP_COMPONENT cmp_components[] = {COMPONENTS(CMP_ENTRY)};
+const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_components);

@@ -1,0 +1,223 @@
+/*
+ * main.c - plcrt, the runtime as a Linux process.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * SIGTERM and SIGINT end it in order, a second one at once. SIGHUP is ignored: a controller does not stop because
+ * somebody closes the terminal it was started from.
+ */
+#define _GNU_SOURCE
+#include "CmpLog.h"
+#include "CmpScheduleTimer.h"
+#include "SysExcept.h"
+#include "port.h"
+#include "rts_config.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+
+enum { EXIT_RUNTIME = 1, EXIT_USAGE = 2, DEFAULT_BAUD = 115200 };
+
+typedef struct {
+    const char *flash;
+    const char *serial;
+    RTS_UI32 baud;
+} OPTIONS;
+
+static const char usage[] =
+    "usage: plcrt --flash FILE [--serial PATH|pty] [--baud N]\n"
+    "\n"
+    "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
+    "  --serial PATH   serial device to be reached by\n"
+    "  --serial pty    opens a pseudo terminal and prints its name as \"serial: /dev/pts/N\"\n"
+    "  --baud N        speed of the serial device, 115200 if not given\n"
+    "  --version       prints the version\n"
+    "  --help          prints this\n"
+    "\n"
+    "Ends with exit status 0 on SIGTERM or SIGINT; SIGHUP is ignored.\n";
+
+static volatile sig_atomic_t quit;
+
+/* ---- options ---- */
+
+static void refuse(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
+
+static void refuse(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    fprintf(stderr, "plcrt: ");
+    vfprintf(stderr, format, arguments);
+    fprintf(stderr, "\n");
+    va_end(arguments);
+    exit(EXIT_USAGE);
+}
+
+static RTS_UI32 parse_baud(const char *text)
+{
+    char *end;
+    errno = 0;
+    unsigned long baud = strtoul(text, &end, 10);
+    if (errno != 0 || *end != '\0' || baud > UINT32_MAX || !PortComKnowsBaud((RTS_UI32)baud)) {
+        refuse("--baud %s is not a speed of serial devices: give 9600, 19200, 38400, 57600, 115200 or more", text);
+    }
+    return (RTS_UI32)baud;
+}
+
+static void print_and_exit(const char *text)
+{
+    fputs(text, stdout);
+    exit(fflush(stdout) == 0 ? EXIT_SUCCESS : EXIT_RUNTIME);
+}
+
+enum { OPTION_FLASH = 256, OPTION_SERIAL, OPTION_BAUD, OPTION_VERSION, OPTION_HELP, OPTION_CAN, OPTION_UDP, OPTION_TCP };
+
+static const struct option long_options[] = {
+    {"flash", required_argument, NULL, OPTION_FLASH},
+    {"serial", required_argument, NULL, OPTION_SERIAL},
+    {"baud", required_argument, NULL, OPTION_BAUD},
+    {"version", no_argument, NULL, OPTION_VERSION},
+    {"help", no_argument, NULL, OPTION_HELP},
+    {"can", required_argument, NULL, OPTION_CAN},
+    {"udp", optional_argument, NULL, OPTION_UDP},
+    {"tcp", optional_argument, NULL, OPTION_TCP},
+    {NULL, 0, NULL, 0},
+};
+
+static void take_option(OPTIONS *options, int option)
+{
+    switch (option) {
+    case OPTION_FLASH:
+        options->flash = optarg;
+        break;
+    case OPTION_SERIAL:
+        options->serial = optarg;
+        break;
+    case OPTION_BAUD:
+        options->baud = parse_baud(optarg);
+        break;
+    case OPTION_VERSION:
+        print_and_exit("plcrt " PLCRT_VERSION "\n");
+        break;
+    case OPTION_HELP:
+        print_and_exit(usage);
+        break;
+    case OPTION_CAN:
+    case OPTION_UDP:
+    case OPTION_TCP:
+        refuse("CAN, UDP and TCP are not in this version: use --serial");
+    }
+}
+
+static OPTIONS parse_options(int argc, char **argv)
+{
+    OPTIONS options = {.baud = DEFAULT_BAUD};
+    int option;
+    opterr = 0;
+    while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
+        if (option == '?') {
+            refuse("%s is not an option or lacks its value: see plcrt --help", argv[optind - 1]);
+        }
+        take_option(&options, option);
+    }
+    if (optind < argc) {
+        refuse("%s is not an option: see plcrt --help", argv[optind]);
+    }
+    if (options.flash == NULL) {
+        refuse("--flash FILE is missing: name the file that stands for the flash memory");
+    }
+    return options;
+}
+
+/* ---- life ---- */
+
+static void on_end_signal(int number)
+{
+    RTS_UNUSED(number);
+    quit = 1;
+}
+
+static void take_signals(void)
+{
+    struct sigaction end = {.sa_handler = on_end_signal, .sa_flags = (int)SA_RESETHAND};
+    struct sigaction ignore = {.sa_handler = SIG_IGN};
+    sigemptyset(&end.sa_mask);
+    sigemptyset(&ignore.sa_mask);
+    sigaction(SIGTERM, &end, NULL);
+    sigaction(SIGINT, &end, NULL);
+    sigaction(SIGHUP, &ignore, NULL);
+    sigaction(SIGPIPE, &ignore, NULL);
+}
+
+/* The last error in the log is why. */
+static void report_failed_start(RTS_RESULT result)
+{
+    LOG_ENTRY entry;
+    char why[LOG_TEXT_SIZE] = "Start-up failed";
+    for (RTS_UI32 next = 1; LogGetEntry(next, &entry) == ERR_OK; next = entry.handle + 1) {
+        if (entry.log_class == LOG_ERROR) {
+            memcpy(why, entry.text, sizeof(why));
+        }
+    }
+    fprintf(stderr, "plcrt: %s (error 0x%04X)\n", why, (unsigned)result);
+}
+
+/* No page of the runtime is to be fetched from disk in the middle of a cycle. */
+static void lock_memory(void)
+{
+    if (mlockall(MCL_CURRENT) != 0) {
+        LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_MEMORY_LOCK_FAILED, "Memory is not locked: %s", strerror(errno));
+    }
+}
+
+static void main_loop(void)
+{
+    while (!quit) {
+        RTS_UI32 before = PortComMoved();
+        (void)CMCallHook(CH_COMM_CYCLE);
+        if (PortComMoved() == before) {
+            PortComWait(SchedHasBackgroundTasks() ? PORT_BACKGROUND_MS : PORT_IDLE_MS);
+        }
+    }
+}
+
+static int run(void)
+{
+    RTS_RESULT result = CMInit();
+    if (result != ERR_OK) {
+        report_failed_start(result);
+        return EXIT_RUNTIME;
+    }
+    lock_memory();
+    if (PortComPtyName() != NULL) {
+        printf("serial: %s\n", PortComPtyName());
+        (void)fflush(stdout);
+    }
+    main_loop();
+    (void)CMExit();
+    return EXIT_SUCCESS;
+}
+
+int main(int argc, char **argv)
+{
+    OPTIONS options = parse_options(argc, argv);
+    PORT_REASON reason;
+    int status = EXIT_RUNTIME;
+    take_signals();
+    if (PortFlashOpen(options.flash, &reason) &&
+        (options.serial == NULL || PortComOpen(options.serial, options.baud, &reason))) {
+        status = run();
+    } else {
+        fprintf(stderr, "plcrt: %s\n", reason.text);
+    }
+    SysExceptShutdown();
+    PortComClose();
+    PortFlashClose();
+    return status;
+}

@@ -1,0 +1,52 @@
+/*
+ * port.h - what main.c tells the Sys components of the Linux port, and they offer it beyond their Sys headers.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef PORT_H
+#define PORT_H
+
+#include "CmpItf.h"
+#include "SysTimer.h"
+
+/* Where a Port function writes why it failed: one sentence. */
+typedef struct {
+    char text[256];
+} PORT_REASON;
+
+void PortReason(PORT_REASON *reason, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* ---- SysTime ---- */
+
+/* Sets the start of SysTimeGetNs to now. */
+RTS_RESULT SysTime_Hook(CMP_HOOK hook);
+/* The CLOCK_MONOTONIC value of a SysTimeGetNs value. */
+RTS_I64 PortMonotonicNs(RTS_I64 time_ns);
+
+/* ---- SysTimer ---- */
+
+RTS_RESULT SysTimer_Hook(CMP_HOOK hook);
+/* SysTimerCreate with a SCHED_FIFO priority. */
+RTS_RESULT PortTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, int fifo_priority,
+                           RTS_HANDLE *timer);
+
+/* ---- SysFlash ---- */
+
+/* Opens the flash file, or creates it with erased bytes, and locks it. Before CMInit. */
+bool PortFlashOpen(const char *path, PORT_REASON *reason);
+void PortFlashClose(void);
+
+/* ---- SysCom ---- */
+
+bool PortComKnowsBaud(RTS_UI32 baud);
+/* Opens the one serial line: a device, or with path "pty" a new pseudo terminal. Before CMInit. */
+bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason);
+void PortComClose(void);
+/* Name of the pseudo terminal, NULL when the line is none. */
+const char *PortComPtyName(void);
+/* Bytes read and written so far: main sees from it whether there may be more to do. */
+RTS_UI32 PortComMoved(void);
+/* Sleeps until the line has something to read (or takes more after it was full), `timeout_ms` at most. */
+void PortComWait(int timeout_ms);
+
+#endif

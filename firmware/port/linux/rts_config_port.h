@@ -1,0 +1,54 @@
+/*
+ * rts_config_port.h - sizes of the Linux port.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_PORT_H
+#define RTS_CONFIG_PORT_H
+
+/* An application on a PC-class machine may be large; RAM is plenty. */
+#define APP_MAX_TASKS 16
+#define APP_MAX_IMPORTS 128
+#define APP_DATA_SIZE (1024 * 1024)
+#define APP_RETAIN_SIZE (64 * 1024)
+#define APP_INPUT_SIZE 4096
+#define APP_OUTPUT_SIZE 4096
+#define APP_MEMORY_SIZE (64 * 1024)
+#define NETSERVER_MESSAGE_SIZE 16384
+#define LOG_MAX_ENTRIES 256
+#define CHECKSUM_TABLE_ENTRIES 256
+
+/* Less than the patience of plctool with a device that does not answer, and of whoever ends plcrt [us]. */
+#define APP_DEFAULT_WATCHDOG_US 5000000
+
+/* The flash file [bytes]. Geometry of a common serial NOR flash, programmed in the units of an STM32's. */
+#define PORT_FLASH_SIZE (4 * 1024 * 1024)
+#define PORT_FLASH_SECTOR_SIZE 4096
+#define PORT_FLASH_PROGRAM_SIZE 8
+
+/* The largest code segment that can be made executable, per slot [bytes]: a slot is less than half of the flash. */
+#define PORT_CODE_SIZE (PORT_FLASH_SIZE / 2)
+
+/* Stack of a task's thread [bytes]; the thread sanitizer needs 1 MiB. The zone below it has no memory: a function whose local
+ * variables are larger than the zone could jump over it, into the next stack. */
+#ifndef PORT_STACK_SIZE
+#define PORT_STACK_SIZE (256 * 1024)
+#endif
+#define PORT_STACK_GUARD (16 * 1024 * 1024)
+
+/* SCHED_FIFO priority of an IEC priority p is PORT_PRIORITY_HIGHEST - p: 80..49. The watchdog runs above all of them. */
+#define PORT_PRIORITY_HIGHEST 80
+#define PORT_PRIORITY_WATCHDOG 90
+
+/* How often the watchdog thread looks for cycles that do not end [us]: how much longer than its watchdog time an endless loop
+ * may run. Each look costs up to 15 us of a virtual machine's processor. (A cycle that ends too late is found at its end.) */
+#define PORT_WATCHDOG_US 5000
+
+/* Longest sleep of the main loop [ms]: with nothing to do, and while event or freewheeling tasks run in it. */
+#define PORT_IDLE_MS 10
+#define PORT_BACKGROUND_MS 1
+
+/* How often a serial device that went away is tried again [ms]. */
+#define PORT_REOPEN_MS 1000
+
+#endif

@@ -1,0 +1,547 @@
+/*
+ * Sim.c - the simulator: power, virtual clock, timers, device identity, measurements.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#define _GNU_SOURCE
+#include "Sim.h"
+
+#include <setjmp.h>
+#include <string.h>
+#include <time.h>
+
+#include "CmpAppEmbedded.h"
+#include "CmpIecTask.h"
+#include "CmpScheduleTimer.h"
+#include "SimLink.h"
+#include "SysExcept.h"
+#include "SysTarget.h"
+#include "SysTime.h"
+#include "SysTimer.h"
+#include "rts_config.h"
+#include "sim_port.h"
+
+#define NEVER INT64_MAX
+#define NS_PER_US 1000
+#define NS_PER_MS 1000000
+
+/* How often background work runs: often while tasks run in it, else only for what watches the clock. */
+#define COMM_BUSY_NS (10 * (RTS_I64)NS_PER_MS)
+#define COMM_IDLE_NS (1000 * (RTS_I64)NS_PER_MS)
+#define RUN_LIMIT_NS (3600 * 1000 * (RTS_I64)NS_PER_MS)
+
+enum { MAX_TIMERS = APP_MAX_TASKS + 4 };
+
+typedef struct {
+    SYS_TIMER_CALLBACK callback; /* NULL: free */
+    void *param;
+    RTS_I64 interval_ns;
+    RTS_I64 due_ns; /* NEVER while stopped */
+    RTS_UI32 priority;
+    RTS_UI32 missed;
+} TIMER;
+
+static struct {
+    bool on;
+    bool power_lost; /* by a planned cut, until SimStart */
+    bool landing;    /* `jump` is valid */
+    jmp_buf jump;
+    RTS_I64 now_ns;
+    RTS_I64 next_comm_ns;
+    bool real_clock; /* reading the clock costs what it costs on Linux */
+    TIMER timer[MAX_TIMERS];
+} sim;
+
+/* ---- power ---- */
+
+void SimPowerCut(void)
+{
+    sim.power_lost = true;
+    sim.on = false;
+    if (sim.landing)
+        longjmp(sim.jump, 1);
+}
+
+/* Runs fn(arg); a power cut in it ends here. */
+static RTS_RESULT with_landing(RTS_RESULT (*fn)(void *arg), void *arg)
+{
+    RTS_RESULT result;
+
+    if (sim.power_lost)
+        return SIM_POWER_CUT;
+    if (sim.landing)
+        return fn(arg);
+    sim.landing = true;
+    if (setjmp(sim.jump) == 0)
+        result = fn(arg);
+    else
+        result = SIM_POWER_CUT;
+    sim.landing = false;
+    return sim.power_lost ? (RTS_RESULT)SIM_POWER_CUT : result;
+}
+
+static void forget_timers(void)
+{
+    RTS_UI32 i;
+
+    memset(sim.timer, 0, sizeof sim.timer);
+    for (i = 0; i < MAX_TIMERS; i++)
+        sim.timer[i].due_ns = NEVER;
+}
+
+static RTS_RESULT power_on(void *unused)
+{
+    RTS_RESULT result = SimFlashPowerOn();
+
+    RTS_UNUSED(unused);
+    if (result == ERR_OK)
+        result = CMInit();
+    sim.on = result == ERR_OK;
+    return result;
+}
+
+RTS_RESULT SimStart(void)
+{
+    sim.on = false;
+    sim.power_lost = false;
+    sim.now_ns = 0;
+    sim.next_comm_ns = 0;
+    forget_timers();
+    SimComPowerOn();
+    SimLinkReset();
+    SimSuperviseStart();
+    return with_landing(power_on, NULL);
+}
+
+static RTS_RESULT shut_down(void *unused)
+{
+    RTS_UNUSED(unused);
+    return CMExit();
+}
+
+void SimStop(void)
+{
+    if (sim.on)
+        (void)with_landing(shut_down, NULL);
+    sim.on = false;
+    SysExceptShutdown();
+}
+
+typedef struct {
+    void (*fn)(void *arg);
+    void *arg;
+} CALL;
+
+static RTS_RESULT call(void *arg)
+{
+    const CALL *c = arg;
+
+    c->fn(c->arg);
+    return ERR_OK;
+}
+
+RTS_RESULT SimCall(void (*fn)(void *arg), void *arg)
+{
+    CALL c = {fn, arg};
+
+    return with_landing(call, &c);
+}
+
+/* ---- clock ---- */
+
+/* The virtual time, at the price of a real clock. */
+static RTS_I64 read_real_clock(void)
+{
+    struct timespec now = {0, 0};
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_nsec >= 0 ? sim.now_ns : 0;
+}
+
+RTS_I64 SysTimeGetNs(void)
+{
+    return sim.real_clock ? read_real_clock() : sim.now_ns;
+}
+
+RTS_UI32 SysTimeGetMs(void)
+{
+    return (RTS_UI32)(sim.now_ns / NS_PER_MS);
+}
+
+RTS_I64 SimNow(void)
+{
+    return sim.now_ns;
+}
+
+/* ---- timers ---- */
+
+static TIMER *get_timer(RTS_HANDLE handle)
+{
+    return handle < MAX_TIMERS && sim.timer[handle].callback != NULL ? &sim.timer[handle] : NULL;
+}
+
+RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
+                          RTS_HANDLE *timer)
+{
+    RTS_UI32 i;
+
+    if (callback == NULL || interval_us == 0 || priority > 31)
+        return ERR_PARAMETER;
+    for (i = 0; i < MAX_TIMERS; i++) {
+        if (sim.timer[i].callback == NULL) {
+            TIMER created = {callback, param, (RTS_I64)interval_us * NS_PER_US, NEVER, priority, 0};
+            sim.timer[i] = created;
+            *timer = i;
+            return ERR_OK;
+        }
+    }
+    return ERR_NOMEMORY;
+}
+
+RTS_RESULT SysTimerStart(RTS_HANDLE handle)
+{
+    TIMER *timer = get_timer(handle);
+
+    if (timer == NULL)
+        return ERR_INVALID_HANDLE;
+    timer->due_ns = sim.now_ns;
+    timer->missed = 0;
+    return ERR_OK;
+}
+
+RTS_RESULT SysTimerStop(RTS_HANDLE handle)
+{
+    TIMER *timer = get_timer(handle);
+
+    if (timer == NULL)
+        return ERR_INVALID_HANDLE;
+    timer->due_ns = NEVER;
+    return ERR_OK;
+}
+
+RTS_RESULT SysTimerDelete(RTS_HANDLE handle)
+{
+    RTS_RESULT result = SysTimerStop(handle);
+
+    if (result == ERR_OK)
+        sim.timer[handle].callback = NULL;
+    return result;
+}
+
+/* The timer that is due first, of these the one with the highest priority; NULL when none runs. */
+static TIMER *next_timer(void)
+{
+    TIMER *next = NULL;
+    TIMER *timer;
+
+    for (timer = sim.timer; timer < sim.timer + MAX_TIMERS; timer++) {
+        if (timer->due_ns == NEVER)
+            continue;
+        if (next == NULL || timer->due_ns < next->due_ns ||
+            (timer->due_ns == next->due_ns && timer->priority < next->priority))
+            next = timer;
+    }
+    return next;
+}
+
+/* Skips due times that went by while the callback ran. */
+static void set_next_due(TIMER *timer)
+{
+    RTS_I64 late;
+
+    if (timer->due_ns == NEVER)
+        return; /* stopped by what it called */
+    timer->due_ns += timer->interval_ns;
+    late = sim.now_ns - timer->due_ns;
+    timer->missed = 0;
+    if (late > 0) {
+        timer->missed = (RTS_UI32)((late + timer->interval_ns - 1) / timer->interval_ns);
+        timer->due_ns += timer->missed * timer->interval_ns;
+    }
+}
+
+static void run_timer(TIMER *timer)
+{
+    if (timer->due_ns > sim.now_ns)
+        sim.now_ns = timer->due_ns;
+    timer->callback(timer->param, timer->due_ns, timer->missed);
+    set_next_due(timer);
+}
+
+/* ---- the passing of time ---- */
+
+static void run_comm_cycle(void)
+{
+    (void)CMCallHook(CH_COMM_CYCLE);
+    sim.next_comm_ns = sim.now_ns + (SchedHasBackgroundTasks() ? COMM_BUSY_NS : COMM_IDLE_NS);
+}
+
+/* Runs all timers that are due at the same time as `timer`, and the tasks that follow them. */
+static void run_group(TIMER *timer)
+{
+    RTS_I64 due_ns = timer->due_ns;
+
+    for (; timer != NULL && timer->due_ns == due_ns; timer = next_timer())
+        run_timer(timer);
+    if (SchedHasBackgroundTasks())
+        SchedBackgroundCycle();
+}
+
+/* Does what comes next and is due until `end_ns`; false when nothing is. */
+static bool run_next(RTS_I64 end_ns)
+{
+    TIMER *timer = next_timer();
+
+    if (timer != NULL && timer->due_ns <= end_ns && timer->due_ns <= sim.next_comm_ns) {
+        run_group(timer);
+        return true;
+    }
+    if (sim.next_comm_ns > end_ns)
+        return false;
+    if (sim.next_comm_ns > sim.now_ns)
+        sim.now_ns = sim.next_comm_ns;
+    run_comm_cycle();
+    return true;
+}
+
+static RTS_RESULT advance(void *arg)
+{
+    RTS_I64 end_ns = sim.now_ns + *(const RTS_I64 *)arg;
+
+    while (run_next(end_ns))
+        ;
+    if (sim.now_ns < end_ns)
+        sim.now_ns = end_ns;
+    run_comm_cycle();
+    return ERR_OK;
+}
+
+RTS_RESULT SimAdvance(RTS_I64 ns)
+{
+    if (sim.power_lost)
+        return SIM_POWER_CUT;
+    return sim.on ? with_landing(advance, &ns) : (RTS_RESULT)ERR_NOTINITIALIZED;
+}
+
+static RTS_UI32 cycles_of_first_task(void)
+{
+    IEC_TASK_INFO info;
+
+    return IecTaskGetInfo(0, &info) == ERR_OK ? info.cycles : 0;
+}
+
+/* Whether the application runs, as ERR_*. */
+static RTS_RESULT running_state(void)
+{
+    APP_STATUS status;
+
+    AppGetStatus(&status);
+    if ((status.op_state & OS_EXCEPTION) != 0)
+        return ERR_EXCEPTION;
+    return status.state == AS_RUN ? ERR_OK : ERR_INVALID_STATE;
+}
+
+static RTS_RESULT run_cycles(void *arg)
+{
+    RTS_UI32 first = cycles_of_first_task();
+    RTS_UI32 cycles = *(const RTS_UI32 *)arg;
+    RTS_I64 end_ns = sim.now_ns + RUN_LIMIT_NS;
+    RTS_UI32 done = 0;
+    RTS_RESULT result = running_state();
+
+    while (result == ERR_OK && done < cycles) {
+        if (!run_next(end_ns))
+            return ERR_TIMEOUT;
+        if (cycles_of_first_task() - first != done) {
+            done = cycles_of_first_task() - first;
+            end_ns = sim.now_ns + RUN_LIMIT_NS;
+        }
+        result = running_state();
+    }
+    run_comm_cycle();
+    return result;
+}
+
+RTS_RESULT SimRunCycles(RTS_UI32 cycles)
+{
+    if (sim.power_lost)
+        return SIM_POWER_CUT;
+    return sim.on ? with_landing(run_cycles, &cycles) : (RTS_RESULT)ERR_NOTINITIALIZED;
+}
+
+static RTS_RESULT comm_cycle(void *unused)
+{
+    RTS_UNUSED(unused);
+    run_comm_cycle();
+    return ERR_OK;
+}
+
+RTS_RESULT SimCommCycle(void)
+{
+    if (sim.power_lost)
+        return SIM_POWER_CUT;
+    return sim.on ? with_landing(comm_cycle, NULL) : (RTS_RESULT)ERR_NOTINITIALIZED;
+}
+
+/* ---- measurements ---- */
+
+enum { BENCH_BATCHES = 10 };
+
+typedef struct {
+    RTS_UI32 task;
+    RTS_UI32 cycles; /* per batch */
+    RTS_I64 interval_ns;
+    IEC_ENTRY entry;
+    IEC_CONTEXT *context;
+    bool failed;
+} BENCH;
+
+static double real_ns(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec * 1e9 + (double)now.tv_nsec;
+}
+
+static void call_entry(void *arg)
+{
+    BENCH *bench = arg;
+    RTS_UI32 i;
+
+    for (i = 0; i < bench->cycles; i++) {
+        bench->context->time_ns += bench->interval_ns;
+        bench->context->time_ms = (RTS_I32)(RTS_UI32)(bench->context->time_ns / NS_PER_MS);
+        APP_CALL_ENTRY(bench->entry, bench->context);
+    }
+}
+
+static void code_batch(BENCH *bench)
+{
+    RTS_EXCEPTION exception;
+
+    bench->failed = SysExceptTry(call_entry, bench, &exception) != 0;
+    sim.now_ns += bench->interval_ns * bench->cycles;
+}
+
+static void cycle_batch(BENCH *bench)
+{
+    RTS_UI32 i;
+
+    sim.real_clock = true;
+    for (i = 0; i < bench->cycles && !bench->failed; i++) {
+        RTS_I64 now_ns;
+        sim.now_ns += bench->interval_ns;
+        now_ns = SysTimeGetNs();
+        bench->failed = !IecTaskCycle(bench->task, now_ns, now_ns);
+    }
+    sim.real_clock = false;
+}
+
+/* Real time per cycle of the best batch. */
+static double best_of(void (*batch)(BENCH *bench), BENCH *bench)
+{
+    double best = 0;
+    int i;
+
+    for (i = 0; i < BENCH_BATCHES && !bench->failed; i++) {
+        double start_ns = real_ns();
+        double per_cycle;
+        batch(bench);
+        per_cycle = (real_ns() - start_ns) / bench->cycles;
+        if (i == 0 || per_cycle < best)
+            best = per_cycle;
+    }
+    return best;
+}
+
+/* Timers go on from now, with the phase they had. */
+static void shift_timers(RTS_I64 ns)
+{
+    TIMER *timer;
+
+    for (timer = sim.timer; timer < sim.timer + MAX_TIMERS; timer++) {
+        if (timer->due_ns != NEVER)
+            timer->due_ns += ns;
+    }
+}
+
+RTS_RESULT SimBench(RTS_UI32 task, RTS_UI32 cycles, double *code_ns, double *cycle_ns)
+{
+    BENCH bench = {task, cycles / BENCH_BATCHES + 1, NS_PER_MS, NULL, NULL, false};
+    RTS_I64 start_ns = sim.now_ns;
+    IEC_TASK_INFO info;
+    RTS_RESULT result = sim.on ? AppStartApplication() : (RTS_RESULT)ERR_NOTINITIALIZED;
+
+    if (result != ERR_OK)
+        return result;
+    if (IecTaskGetInfo(task, &info) != ERR_OK || IecTaskGetEntry(task, &bench.entry, &bench.context) != ERR_OK)
+        return ERR_INVALIDID;
+    if (info.interval_us != 0)
+        bench.interval_ns = (RTS_I64)info.interval_us * NS_PER_US;
+    *cycle_ns = best_of(cycle_batch, &bench); /* first, because an endless loop is broken out of here */
+    *code_ns = best_of(code_batch, &bench);
+    shift_timers(sim.now_ns - start_ns);
+    return bench.failed ? ERR_EXCEPTION : ERR_OK;
+}
+
+/* ---- the device ---- */
+
+enum { NODE_NAME_SIZE = 32 };
+
+#if defined(__aarch64__)
+#define SIM_TARGET_ID TARGET_ID_AARCH64_LINUX
+#else
+#define SIM_TARGET_ID TARGET_ID_X86_64_LINUX
+#endif
+
+static char node_name[NODE_NAME_SIZE] = "simulator";
+
+static SYS_TARGET target = {
+    TARGET_TYPE_PROGRAMMABLE, SIM_TARGET_ID, 0x01000000, "plctool simulator", "plctool", node_name, "0",
+};
+
+const SYS_TARGET *SysTargetGet(void)
+{
+    return &target;
+}
+
+/* A xorshift generator: what it gives is the same in every process, so that tests repeat. */
+RTS_UI32 SysTargetRandom(void)
+{
+    static RTS_UI32 state = 0x2545F491;
+
+    state ^= state << 13;
+    state ^= state >> 17;
+    state ^= state << 5;
+    return state;
+}
+
+void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version)
+{
+    target.type = type;
+    target.id = id;
+    target.version = version;
+}
+
+void SimSetNodeName(const char *name)
+{
+    strncpy(node_name, name, NODE_NAME_SIZE - 1);
+}
+
+/* ---- what IEC code can call ---- */
+
+/* Lets virtual time pass within a cycle: what a long cycle is on a real device. */
+static void simburn(RTS_UI32 us)
+{
+    sim.now_ns += (RTS_I64)us * NS_PER_US;
+}
+
+static const CMP_EXT_FUNCTION externals[] = {
+    {"simburn", 0x76DDCD81, 0x00010000, (RTS_PFN)simburn}, /* simburn(UDINT) */
+};
+
+RTS_RESULT SysSim_Hook(CMP_HOOK hook)
+{
+    return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;
+}

@@ -1,0 +1,88 @@
+/*
+ * SimCom.c - serial line 0: two queues of bytes.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "Sim.h"
+#include "SysCom.h"
+#include "rts_config.h"
+#include "sim_port.h"
+
+typedef struct {
+    RTS_UI8 data[SIM_COM_SIZE];
+    RTS_UI32 first;
+    RTS_UI32 count;
+} QUEUE;
+
+static struct {
+    QUEUE to_device;
+    QUEUE from_device;
+    bool open;
+} line;
+
+static RTS_UI32 put(QUEUE *queue, const RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < size && queue->count < SIM_COM_SIZE; i++)
+        queue->data[(queue->first + queue->count++) % SIM_COM_SIZE] = data[i];
+    return i;
+}
+
+static RTS_UI32 get(QUEUE *queue, RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < size && queue->count > 0; i++) {
+        data[i] = queue->data[queue->first];
+        queue->first = (queue->first + 1) % SIM_COM_SIZE;
+        queue->count--;
+    }
+    return i;
+}
+
+void SimComPowerOn(void)
+{
+    line.to_device.count = 0;
+    line.from_device.count = 0;
+    line.open = false;
+}
+
+RTS_UI32 SimComPut(const RTS_UI8 *data, RTS_UI32 size)
+{
+    return put(&line.to_device, data, size);
+}
+
+RTS_UI32 SimComGet(RTS_UI8 *data, RTS_UI32 size)
+{
+    return get(&line.from_device, data, size);
+}
+
+RTS_UI32 SysComGetCount(void)
+{
+    return 1;
+}
+
+RTS_RESULT SysComOpen(RTS_UI32 index)
+{
+    if (index != 0)
+        return ERR_DEVICE;
+    line.open = true;
+    return ERR_OK;
+}
+
+void SysComClose(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+    line.open = false;
+}
+
+RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
+{
+    return index == 0 && line.open ? get(&line.to_device, data, size) : 0;
+}
+
+RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
+{
+    return index == 0 && line.open ? put(&line.from_device, data, size) : 0;
+}

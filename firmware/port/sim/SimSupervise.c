@@ -1,0 +1,85 @@
+/*
+ * SimSupervise.c - breaks endless loops.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * In an endless loop virtual time stands still, so the watchdog of the runtime never expires. A thread looks, in real time, whether one
+ * and the same cycle has been running for too long.
+ */
+#define _GNU_SOURCE
+#include <pthread.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "CmpIecTask.h"
+#include "Sim.h"
+#include "SysAtomic.h"
+#include "SysExcept.h"
+#include "rts_config.h"
+#include "sim_port.h"
+
+enum { LOOK_EVERY_MS = 20 };
+
+/* A cycle that was seen running. */
+typedef struct {
+    RTS_UI32 serial;
+    RTS_I64 since_ms;
+} SEEN;
+
+static struct {
+    pid_t process; /* whose thread it is: a fork leaves it behind */
+    RTS_UI32 limit_ms;
+} supervisor = {0, SIM_CYCLE_LIMIT_MS};
+
+static RTS_I64 real_ms(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (RTS_I64)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+static void look(RTS_UI32 index, SEEN *seen)
+{
+    IEC_GUARD guard;
+
+    if (!IecTaskReadGuard(index, &guard) || guard.serial != seen->serial) {
+        seen->serial = guard.serial;
+        seen->since_ms = real_ms();
+    } else if (real_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms)) {
+        SysExceptBreak(guard.context, RTSEXCPT_WATCHDOG);
+    }
+}
+
+static void *supervise(void *unused)
+{
+    SEEN seen[APP_MAX_TASKS + 1] = {{0, 0}};
+    const struct timespec pause = {0, LOOK_EVERY_MS * 1000000L};
+
+    RTS_UNUSED(unused);
+    for (;;) {
+        RTS_UI32 count = IecTaskGetCount();
+        RTS_UI32 i;
+        for (i = 0; i <= count; i++)
+            look(i, &seen[i]);
+        nanosleep(&pause, NULL);
+    }
+    return NULL;
+}
+
+void SimSuperviseStart(void)
+{
+    pthread_t thread;
+
+    if (supervisor.process == getpid())
+        return;
+    if (pthread_create(&thread, NULL, supervise, NULL) == 0) {
+        pthread_detach(thread);
+        supervisor.process = getpid();
+    }
+}
+
+void SimSetCycleLimit(RTS_UI32 ms)
+{
+    SysAtomicStore(&supervisor.limit_ms, ms);
+}

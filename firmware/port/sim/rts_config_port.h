@@ -1,0 +1,37 @@
+/*
+ * rts_config_port.h - sizes of the simulator: as generous as the Linux port, so that it runs the same programs.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_PORT_H
+#define RTS_CONFIG_PORT_H
+
+#define APP_MAX_TASKS 16
+#define APP_MAX_IMPORTS 128
+#define APP_DATA_SIZE (1024 * 1024)
+#define APP_RETAIN_SIZE (64 * 1024)
+#define APP_INPUT_SIZE 4096
+#define APP_OUTPUT_SIZE 4096
+#define APP_MEMORY_SIZE (64 * 1024)
+#define NETSERVER_MESSAGE_SIZE 16384
+#define LOG_MAX_ENTRIES 64
+#define LOG_TEXT_SIZE 160
+#define CM_MAX_EXT_TABLES 8
+#define CHECKSUM_TABLE_ENTRIES 256
+#define EVENT_MAX_CALLBACKS 16
+#define SCHED_MAX_EXTERNAL_EVENTS 4
+#define SETTINGS_TABLE {"SysSim", "Number", 42, NULL}, {"SysSim", "Text", 0, "forty-two"},
+
+/* What SimFlashConfigure starts with: geometry of a common serial NOR flash, programmed in the units of an STM32's [bytes]. */
+#define SIM_FLASH_SIZE (4 * 1024 * 1024)
+#define SIM_FLASH_SECTOR_SIZE 4096
+#define SIM_FLASH_PROGRAM_SIZE 8
+#define SIM_FLASH_ERASED 0xFF
+
+/* Bytes the simulated serial line holds in each direction. */
+#define SIM_COM_SIZE (64 * 1024)
+
+/* A cycle that takes longer than this in real time is broken out of [ms]: virtual time stands still in an endless loop. */
+#define SIM_CYCLE_LIMIT_MS 2000
+
+#endif

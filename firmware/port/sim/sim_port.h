@@ -1,0 +1,24 @@
+/*
+ * sim_port.h - what the files of the simulator share.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef SIM_PORT_H
+#define SIM_PORT_H
+
+#include "CmpItf.h"
+#include "CmpStd.h"
+
+/* Power goes off now: back to the Sim* function that runs the runtime. Returns when there is none. */
+void SimPowerCut(void);
+
+/* Power on: forget what RAM and pins held. */
+RTS_RESULT SimFlashPowerOn(void);
+void SimComPowerOn(void);
+
+/* Starts the thread that breaks endless loops, once per process. */
+void SimSuperviseStart(void);
+
+RTS_RESULT SysSim_Hook(CMP_HOOK hook);
+
+#endif

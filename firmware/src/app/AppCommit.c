@@ -1,0 +1,69 @@
+/*
+ * AppCommit.c - the commit record.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "AppCommit.h"
+
+#include <string.h>
+
+#include "CmpLog.h"
+#include "SysFlashLog.h"
+
+RTS_STATIC_ASSERT(sizeof(COMMIT) == 36, commit_record_is_36_bytes);
+
+enum { COMMIT_TAG = 0x54494D43 };
+
+static struct {
+    FLASH_LOG log;
+    COMMIT commit;
+} record;
+
+static void set_blank(COMMIT *commit)
+{
+    memset(commit, 0, sizeof *commit);
+    commit->active = SLOT_NONE;
+}
+
+RTS_RESULT AppCommitOpen(void)
+{
+    FLASH_LOG_RANGE all = {0, 0};
+    RTS_RESULT result;
+
+    set_blank(&record.commit);
+    result = FlashLogOpen(&record.log, FILE_COMMIT);
+    if (result != ERR_OK)
+        return result;
+    all.until = record.log.sequence;
+    if (FlashLogRead(&record.log, all, COMMIT_TAG, &record.commit, sizeof record.commit) != ERR_OK ||
+        (record.commit.active >= SLOT_COUNT && record.commit.active != SLOT_NONE))
+        set_blank(&record.commit);
+    return ERR_OK;
+}
+
+const COMMIT *AppCommitGet(void)
+{
+    return &record.commit;
+}
+
+RTS_RESULT AppCommitWrite(const COMMIT *commit)
+{
+    RTS_RESULT result = FlashLogAppend(&record.log, COMMIT_TAG, commit, sizeof *commit);
+
+    if (result == ERR_OK)
+        record.commit = *commit;
+    else
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "The commit record cannot be written");
+    return result;
+}
+
+RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state, RTS_UI8 starts)
+{
+    COMMIT commit = record.commit;
+
+    if (commit.slot[slot].state == state && commit.slot[slot].starts == starts)
+        return ERR_OK;
+    commit.slot[slot].state = state;
+    commit.slot[slot].starts = starts;
+    return AppCommitWrite(&commit);
+}

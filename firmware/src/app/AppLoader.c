@@ -1,0 +1,530 @@
+/*
+ * AppLoader.c - checks an application image.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A row of checks, each may rely on the ones before it. Every refusal is a sentence of its own.
+ */
+#include "AppLoader.h"
+
+#include <string.h>
+
+#include "CMUtils.h"
+#include "CmpChecksum.h"
+#include "CmpIecTask.h"
+#include "CmpItf.h"
+#include "CmpLog.h"
+#include "CmpRetain.h"
+#include "SysFileFlash.h"
+#include "SysTarget.h"
+
+typedef struct {
+    APP_IMAGE *image;
+    APP_REFUSAL *refusal;
+    CDL_HEADER header;
+} LOADER;
+
+typedef RTS_RESULT (*CHECK)(LOADER *l);
+
+#define U(value) ((unsigned)(value))
+
+static RTS_RESULT refuse(LOADER *l, RTS_RESULT result, const char *format, ...)
+{
+    va_list arguments;
+
+    va_start(arguments, format);
+    CMUtlvsnprintf(l->refusal->text, sizeof l->refusal->text, format, arguments);
+    va_end(arguments);
+    l->refusal->result = result;
+    return result;
+}
+
+static RTS_RESULT read_image(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 size)
+{
+    RTS_RESULT result = SysFileRead(l->image->file, offset, data, size);
+
+    return result == ERR_OK ? ERR_OK : refuse(l, result, "The flash cannot be read at offset %u of the image.", U(offset));
+}
+
+static RTS_UI32 align4(RTS_UI32 offset)
+{
+    return (offset + 3) & ~(RTS_UI32)3;
+}
+
+/* ---- header, CRC, target ---- */
+
+static RTS_RESULT check_header(LOADER *l)
+{
+    const CDL_HEADER *header = &l->header;
+    RTS_RESULT result;
+
+    if (l->image->size < CDL_HEADER_SIZE)
+        return refuse(l, ERR_SIZE_MISMATCH, "The image has only %u bytes, its header alone needs %u.",
+                      U(l->image->size), U(CDL_HEADER_SIZE));
+    result = read_image(l, 0, &l->header, sizeof l->header);
+    if (result != ERR_OK)
+        return result;
+    if (header->header_tag != CDL_HEADER_TAG)
+        return refuse(l, ERR_TYPE_MISMATCH, "This is not a compact download image: it starts with 0x%x.",
+                      U(header->header_tag));
+    if (header->header_version != CDL_HEADER_VERSION || header->header_size != CDL_HEADER_SIZE)
+        return refuse(l, ERR_VERSION_MISMATCH, "The image has header version %u with %u bytes, this device knows %u with %u.",
+                      U(header->header_version), U(header->header_size), U(CDL_HEADER_VERSION), U(CDL_HEADER_SIZE));
+    if (header->total_size != l->image->size)
+        return refuse(l, ERR_SIZE_MISMATCH, "The image should have %u bytes, %u arrived.", U(header->total_size),
+                      U(l->image->size));
+    return ERR_OK;
+}
+
+static RTS_RESULT check_crc(LOADER *l)
+{
+    CDL_HEADER blank = l->header;
+    RTS_UI32 offset = CDL_HEADER_SIZE;
+    RTS_UI8 part[128];
+    RTS_UI32 crc;
+
+    blank.crc = 0;
+    crc = CRC32Update(0, &blank, sizeof blank);
+    while (offset < l->image->size) {
+        RTS_UI32 count = l->image->size - offset < sizeof part ? l->image->size - offset : (RTS_UI32)sizeof part;
+        RTS_RESULT result = read_image(l, offset, part, count);
+        if (result != ERR_OK)
+            return result;
+        crc = CRC32Update(crc, part, count);
+        offset += count;
+    }
+    if (crc != l->header.crc)
+        return refuse(l, ERR_CRC_FAILED, "The image is damaged: its CRC is 0x%x, it should be 0x%x.", U(crc),
+                      U(l->header.crc));
+    if (crc != l->image->crc)
+        return refuse(l, ERR_CRC_FAILED, "This is another image than announced: its CRC is 0x%x, announced was 0x%x.",
+                      U(crc), U(l->image->crc));
+    return ERR_OK;
+}
+
+static RTS_RESULT check_target(LOADER *l)
+{
+    const SYS_TARGET *target = SysTargetGet();
+
+    if (l->header.device_type != target->type)
+        return refuse(l, ERR_TYPE_MISMATCH, "The image is for device type 0x%x, this device is 0x%x.",
+                      U(l->header.device_type), U(target->type));
+    if (l->header.device_id != target->id)
+        return refuse(l, ERR_ID_MISMATCH, "The image is for device id 0x%x, this device is 0x%x: build it for this target.",
+                      U(l->header.device_id), U(target->id));
+    if (l->header.device_version >> 24 != target->version >> 24)
+        return refuse(l, ERR_VERSION_MISMATCH, "The image is for device version %u.x, this device has %u.x.",
+                      U(l->header.device_version >> 24), U(target->version >> 24));
+    return ERR_OK;
+}
+
+/* ---- segments and areas ---- */
+
+static RTS_RESULT check_segment(LOADER *l, const char *name, const CDL_SEGMENT *segment, RTS_UI32 align)
+{
+    if (segment->size == 0)
+        return ERR_OK;
+    if (segment->offset < CDL_HEADER_SIZE)
+        return refuse(l, ERR_OUT_OF_LIMITS, "The %s segment overlaps the header.", name);
+    if (segment->offset > l->image->size || segment->size > l->image->size - segment->offset)
+        return refuse(l, ERR_OUT_OF_LIMITS, "The %s segment reaches beyond the end of the image.", name);
+    if (segment->offset % align != 0)
+        return refuse(l, ERR_ALIGNMENT, "The %s segment is not aligned to %u bytes.", name, U(align));
+    return ERR_OK;
+}
+
+static RTS_RESULT check_segments(LOADER *l)
+{
+    const CDL_HEADER *h = &l->header;
+    const struct {
+        const char *name;
+        const CDL_SEGMENT *segment;
+        RTS_UI32 align;
+    } segments[] = {
+        {"code", &h->code, APP_CODE_ALIGN},
+        {"application info", &h->application_info, 4},
+        {"area table", &h->area_table, 4},
+        {"function table", &h->function_table, 4},
+        {"external function table", &h->external_function_table, 4},
+        {"IEC function table", &h->iec_function_table, 4},
+        {"blob", &h->blob, 4},
+    };
+    RTS_RESULT result = ERR_OK;
+    RTS_SIZE i;
+
+    for (i = 0; i < RTS_COUNT(segments) && result == ERR_OK; i++)
+        result = check_segment(l, segments[i].name, segments[i].segment, segments[i].align);
+    return result;
+}
+
+static RTS_RESULT check_code(LOADER *l)
+{
+    const CDL_HEADER *h = &l->header;
+
+    if (h->code.size == 0)
+        return refuse(l, ERR_OUT_OF_LIMITS, "The image has no code.");
+    if (h->code_area_index != APP_AREA_CODE || h->code_area_size < h->code.size)
+        return refuse(l, ERR_OUT_OF_LIMITS, "The code of %u bytes is not in area %u, or larger than that area (%u).",
+                      U(h->code.size), U(APP_AREA_CODE), U(h->code_area_size));
+    l->image->code = h->code;
+    l->image->area_size[APP_AREA_CODE] = h->code.size;
+    return ERR_OK;
+}
+
+static RTS_RESULT check_area(LOADER *l, const AREA_INFO *area, RTS_UI32 *seen)
+{
+    static const struct {
+        const char *name;
+        RTS_UI32 limit;
+    } areas[APP_AREA_CODE] = {
+        {"data", APP_DATA_SIZE},     {"retain", APP_RETAIN_SIZE}, {"input", APP_INPUT_SIZE},
+        {"output", APP_OUTPUT_SIZE}, {"memory", APP_MEMORY_SIZE},
+    };
+    RTS_UI32 limit;
+
+    if (area->index >= APP_AREA_COUNT || (*seen >> area->index & 1) != 0)
+        return refuse(l, ERR_OUT_OF_LIMITS, "Area %u is unknown or listed twice.", U(area->index));
+    *seen |= 1u << area->index;
+    if (area->index == APP_AREA_CODE)
+        return ERR_OK;
+    limit = areas[area->index].limit;
+    if (area->index == APP_AREA_RETAIN && RetainCapacity() < limit)
+        limit = RetainCapacity();
+    if (area->size > limit)
+        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", areas[area->index].name,
+                      U(area->size), U(limit));
+    l->image->area_size[area->index] = area->size;
+    return ERR_OK;
+}
+
+static RTS_RESULT check_areas(LOADER *l)
+{
+    const CDL_SEGMENT *table = &l->header.area_table;
+    RTS_UI32 offset;
+    RTS_UI32 seen = 0;
+    AREA_INFO area;
+    RTS_RESULT result = ERR_OK;
+
+    if (table->size % sizeof area != 0)
+        return refuse(l, ERR_SIZE_MISMATCH, "The area table of %u bytes has not only whole entries.", U(table->size));
+    for (offset = 0; offset < table->size && result == ERR_OK; offset += (RTS_UI32)sizeof area) {
+        result = read_image(l, table->offset + offset, &area, sizeof area);
+        if (result == ERR_OK)
+            result = check_area(l, &area, &seen);
+    }
+    return result;
+}
+
+/* ---- functions ---- */
+
+static bool is_code(const LOADER *l, RTS_UI32 area, RTS_UI32 offset)
+{
+    return area == APP_AREA_CODE && offset < l->image->code.size;
+}
+
+static RTS_RESULT check_functions(LOADER *l)
+{
+    POU_REF table[CDL_FUNCTION_COUNT];
+    RTS_UI32 i;
+    RTS_RESULT result;
+
+    if (l->header.function_table.size != sizeof table)
+        return refuse(l, ERR_SIZE_MISMATCH, "The function table has %u bytes, it should have %u.",
+                      U(l->header.function_table.size), U(sizeof table));
+    result = read_image(l, l->header.function_table.offset, table, sizeof table);
+    if (result != ERR_OK)
+        return result;
+    for (i = 0; i < CDL_FUNCTION_COUNT; i++) {
+        l->image->entry[i] = IMAGE_NO_ENTRY;
+        if (table[i].area == APP_AREA_NONE)
+            continue;
+        if (i >= CDL_FUNCTION_RELOC)
+            return refuse(l, ERR_NOT_SUPPORTED, "Entry %u of the function table is used: code for this device needs none.",
+                          U(i));
+        if (!is_code(l, table[i].area, table[i].offset))
+            return refuse(l, ERR_INVALID_REFERENCE, "Entry %u of the function table lies outside the code.", U(i));
+        l->image->entry[i] = table[i].offset;
+    }
+    return ERR_OK;
+}
+
+/*
+ * Reads the NUL-terminated name at `offset` of a table that ends at `end`. *next: where the next entry starts. False when
+ * it is empty, not terminated, too long or not plain text.
+ */
+static bool read_name(LOADER *l, RTS_UI32 offset, RTS_UI32 end, char name[APP_NAME_SIZE], RTS_UI32 *next)
+{
+    RTS_UI32 length;
+
+    for (length = 0; length < APP_NAME_SIZE && offset + length < end; length++) {
+        if (read_image(l, offset + length, &name[length], 1) != ERR_OK)
+            return false;
+        if (name[length] == '\0') {
+            *next = align4(offset + length + 1);
+            return length > 0;
+        }
+        if (name[length] < '!' || name[length] > '~')
+            return false;
+    }
+    return false;
+}
+
+/* What is wrong with an import, as words for the refusal; NULL when nothing is. */
+static const char *find_import(const EXT_REF_INFO *ref, const char *name, RTS_PFN *function, RTS_RESULT *result)
+{
+    const CMP_EXT_FUNCTION *found = CMFindExternal(name);
+
+    if (found == NULL) {
+        *result = ERR_APP_UNRESOLVED_REFERENCE;
+        return "missing";
+    }
+    if (found->signature != ref->signature_id) {
+        *result = ERR_APP_SIGNATURE_MISMATCH;
+        return "other parameters";
+    }
+    if (found->version >> 16 != ref->version >> 16 || found->version < ref->version) {
+        *result = ERR_APP_VERSION_MISMATCH;
+        return "other version";
+    }
+    *function = found->function;
+    return NULL;
+}
+
+/* Adds an import that cannot be resolved to the refusal; the first one decides its result. */
+static void add_unresolved(LOADER *l, const char *name, const char *problem, RTS_RESULT result)
+{
+    APP_REFUSAL *refusal = l->refusal;
+    RTS_SIZE length = strlen(refusal->text);
+
+    if (refusal->result == ERR_OK)
+        refuse(l, result, "Functions this device does not have as the application needs them: %s (%s)", name, problem);
+    else
+        CMUtlsnprintf(refusal->text + length, sizeof refusal->text - length, ", %s (%s)", name, problem);
+    LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "External function %s: %s", name, problem);
+}
+
+static RTS_RESULT check_import(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
+{
+    RTS_UI32 index = l->image->import_count;
+    EXT_REF_INFO ref = {0, 0, 0, 0, 0};
+    char name[APP_NAME_SIZE];
+    const char *problem;
+    RTS_RESULT result = ERR_OK;
+
+    if (index == APP_MAX_IMPORTS)
+        return refuse(l, ERR_NOMEMORY, "The application uses more external functions than this device can link (%u).",
+                      U(APP_MAX_IMPORTS));
+    if (end - *offset < EXT_REF_INFO_SIZE)
+        return refuse(l, ERR_SIZE_MISMATCH, "The external function table ends within entry %u.", U(index));
+    result = read_image(l, *offset, &ref, EXT_REF_INFO_SIZE);
+    if (result != ERR_OK)
+        return result;
+    if (!read_name(l, *offset + EXT_REF_INFO_SIZE, end, name, offset))
+        return refuse(l, ERR_PARAMETER, "The name of external function %u is empty, too long or not terminated.", U(index));
+    if (ref.area != APP_AREA_NONE || ref.offset != index * sizeof(RTS_PFN))
+        return refuse(l, ERR_INVALID_REFERENCE, "External function %s has another place than slot %u of the import table.",
+                      name, U(index));
+    problem = find_import(&ref, name, &l->image->imports[index], &result);
+    if (problem != NULL)
+        add_unresolved(l, name, problem, result);
+    l->image->import_count++;
+    return ERR_OK;
+}
+
+static RTS_RESULT check_imports(LOADER *l)
+{
+    const CDL_SEGMENT *table = &l->header.external_function_table;
+    RTS_UI32 end = table->offset + table->size;
+    RTS_UI32 offset = table->offset;
+
+    while (table->size > 0 && offset < end) {
+        RTS_RESULT result = check_import(l, &offset, end);
+        if (result != ERR_OK)
+            return result;
+    }
+    return l->refusal->result;
+}
+
+static RTS_RESULT check_iec_functions(LOADER *l)
+{
+    const CDL_SEGMENT *table = &l->header.iec_function_table;
+    RTS_UI32 end = table->offset + table->size;
+    RTS_UI32 offset = table->offset;
+    char name[APP_NAME_SIZE];
+    FUNCTION_INFO info;
+
+    while (table->size > 0 && offset < end) {
+        RTS_RESULT result;
+        if (end - offset < sizeof info)
+            return refuse(l, ERR_SIZE_MISMATCH, "The IEC function table ends within an entry.");
+        result = read_image(l, offset, &info, sizeof info);
+        if (result != ERR_OK)
+            return result;
+        if (!read_name(l, offset + (RTS_UI32)sizeof info, end, name, &offset))
+            return refuse(l, ERR_PARAMETER, "A name in the IEC function table is empty, too long or not terminated.");
+        if (!is_code(l, info.area, info.offset))
+            return refuse(l, ERR_INVALID_REFERENCE, "IEC function %s lies outside the code.", name);
+    }
+    return ERR_OK;
+}
+
+/* ---- application info ---- */
+
+/* Finds the end of the string at `offset`; false when it is not terminated before `end`. */
+static bool skip_string(RTS_UI32 file, RTS_UI32 *offset, RTS_UI32 end)
+{
+    char c = 1;
+
+    while (*offset < end && SysFileRead(file, *offset, &c, 1) == ERR_OK) {
+        ++*offset;
+        if (c == '\0') {
+            *offset = align4(*offset);
+            return true;
+        }
+    }
+    return false;
+}
+
+static RTS_RESULT check_info(LOADER *l)
+{
+    const CDL_SEGMENT *info = &l->header.application_info;
+    RTS_UI32 end = info->offset + info->size;
+    RTS_UI32 offset = info->offset;
+    RTS_UI32 i;
+
+    for (i = 0; i < IMAGE_INFO_COUNT && info->size > 0 && offset < end; i++) {
+        if (!skip_string(l->image->file, &offset, end))
+            return refuse(l, ERR_PARAMETER, "Text %u of the application info is not terminated.", U(i));
+    }
+    l->image->info = *info;
+    return ERR_OK;
+}
+
+void AppLoaderReadInfo(const APP_IMAGE *image, RTS_UI32 index, char *text, RTS_SIZE size)
+{
+    RTS_UI32 end = image->info.offset + image->info.size;
+    RTS_UI32 offset = image->info.offset;
+    RTS_SIZE length = 0;
+
+    while (index > 0 && skip_string(image->file, &offset, end))
+        index--;
+    if (index == 0) {
+        while (length + 1 < size && offset < end && SysFileRead(image->file, offset, &text[length], 1) == ERR_OK &&
+               text[length] != '\0') {
+            length++;
+            offset++;
+        }
+    }
+    text[length] = '\0';
+}
+
+/* ---- blobs: tasks, retain layout ---- */
+
+static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
+{
+    const char *name = task->name;
+
+    if (name[0] == '\0' || memchr(name, '\0', sizeof task->name) == NULL)
+        return refuse(l, ERR_PARAMETER, "Task %u has no name, or one that is not terminated.", U(l->image->task_count));
+    if (task->kind > KIND_FREEWHEELING)
+        return refuse(l, ERR_NOT_SUPPORTED, "Task %s has the unknown kind %u.", name, U(task->kind));
+    if (task->priority > 31)
+        return refuse(l, ERR_OUT_OF_LIMITS, "Task %s has priority %u, the lowest is 31.", name, U(task->priority));
+    if (task->kind == KIND_CYCLIC && task->interval_us == 0)
+        return refuse(l, ERR_PARAMETER, "Cyclic task %s has no interval.", name);
+    if (task->entry_offset >= l->image->code.size)
+        return refuse(l, ERR_INVALID_REFERENCE, "The entry of task %s lies outside the code.", name);
+    if (task->kind == KIND_EVENT &&
+        (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
+        return refuse(l, ERR_INVALID_REFERENCE, "The event variable of task %s lies outside its area.", name);
+    return ERR_OK;
+}
+
+static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_RESULT result = ERR_OK;
+
+    if (l->image->task_count != 0)
+        return refuse(l, ERR_DUPLICATE, "The image has two lists of tasks.");
+    if (size % sizeof(CDL_TASK) != 0)
+        return refuse(l, ERR_SIZE_MISMATCH, "The list of tasks has %u bytes and not only whole entries.", U(size));
+    if (size / sizeof(CDL_TASK) > APP_MAX_TASKS)
+        return refuse(l, ERR_NOMEMORY, "The application has %u tasks, this device can run %u.",
+                      U(size / sizeof(CDL_TASK)), U(APP_MAX_TASKS));
+    for (; size > 0 && result == ERR_OK; size -= (RTS_UI32)sizeof(CDL_TASK)) {
+        CDL_TASK *task = &l->image->tasks[l->image->task_count];
+        result = read_image(l, offset, task, sizeof *task);
+        if (result == ERR_OK)
+            result = check_task(l, task);
+        l->image->task_count++;
+        offset += (RTS_UI32)sizeof *task;
+    }
+    return result;
+}
+
+static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
+{
+    if (size != sizeof l->image->retain_layout)
+        return refuse(l, ERR_SIZE_MISMATCH, "The retain layout has %u bytes, it should have 4.", U(size));
+    return read_image(l, offset, &l->image->retain_layout, size);
+}
+
+static RTS_RESULT check_blob(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
+{
+    CDL_BLOB blob;
+    RTS_UI32 payload = *offset + (RTS_UI32)sizeof blob;
+    RTS_RESULT result;
+
+    if (end - *offset < sizeof blob)
+        return refuse(l, ERR_SIZE_MISMATCH, "The blob segment ends within the head of a blob.");
+    result = read_image(l, *offset, &blob, sizeof blob);
+    if (result != ERR_OK)
+        return result;
+    if (blob.magic != (RTS_UI32)CDL_BLOB_MAGIC)
+        return refuse(l, ERR_TYPE_MISMATCH, "There is no blob at offset %u of the image.", U(*offset));
+    if (blob.size > end - payload)
+        return refuse(l, ERR_OUT_OF_LIMITS, "Blob %u reaches beyond the end of its segment.", U(blob.id));
+    *offset = align4(payload + blob.size);
+    if (blob.id == CDL_BLOB_TASKS)
+        return check_tasks(l, payload, blob.size);
+    if (blob.id == CDL_BLOB_RETAIN)
+        return check_retain_layout(l, payload, blob.size);
+    return ERR_OK; /* of a newer tool, and not needed to run */
+}
+
+static RTS_RESULT check_blobs(LOADER *l)
+{
+    const CDL_SEGMENT *blobs = &l->header.blob;
+    RTS_UI32 end = blobs->offset + blobs->size;
+    RTS_UI32 offset = blobs->offset;
+    RTS_RESULT result = ERR_OK;
+
+    l->image->retain_layout = l->image->crc;
+    while (blobs->size > 0 && offset < end && result == ERR_OK)
+        result = check_blob(l, &offset, end);
+    if (result == ERR_OK && l->image->task_count == 0)
+        return refuse(l, ERR_NO_OBJECT, "The application has no task, so nothing would run.");
+    return result;
+}
+
+RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE *image, APP_REFUSAL *refusal)
+{
+    static const CHECK checks[] = {
+        check_header,    check_crc,     check_target,        check_segments, check_code,  check_areas,
+        check_functions, check_imports, check_iec_functions, check_info,     check_blobs,
+    };
+    LOADER l;
+    RTS_RESULT result = ERR_OK;
+    RTS_SIZE i;
+
+    memset(image, 0, sizeof *image);
+    memset(refusal, 0, sizeof *refusal);
+    image->file = file;
+    image->size = size;
+    image->crc = crc;
+    l.image = image;
+    l.refusal = refusal;
+    for (i = 0; i < RTS_COUNT(checks) && result == ERR_OK; i++)
+        result = checks[i](&l);
+    return result;
+}

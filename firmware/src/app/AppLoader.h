@@ -1,0 +1,41 @@
+/*
+ * AppLoader.h - checks an application image and finds out what the runtime has to know about it.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The loader trusts nothing it reads. It has no state and touches nothing that runs. From main only.
+ */
+#ifndef APPLOADER_H
+#define APPLOADER_H
+
+#include "CmpAppEmbedded.h"
+#include "CompactDownload.h"
+#include "rts_config.h"
+
+#define IMAGE_NO_ENTRY 0xFFFFFFFFu
+enum { IMAGE_INFO_COUNT = 5 };
+
+/* An image that has passed all checks. */
+typedef struct {
+    RTS_UI32 file; /* FILE_SLOT_* */
+    RTS_UI32 size;
+    RTS_UI32 crc;
+    CDL_SEGMENT code;
+    CDL_SEGMENT info;
+    RTS_UI32 area_size[APP_AREA_COUNT];
+    RTS_UI32 entry[CDL_FUNCTION_COUNT]; /* offset in the code segment or IMAGE_NO_ENTRY */
+    RTS_UI32 retain_layout;
+    RTS_UI32 task_count;
+    RTS_UI32 import_count;
+    CDL_TASK tasks[APP_MAX_TASKS];
+    RTS_PFN imports[APP_MAX_IMPORTS];
+} APP_IMAGE;
+
+/* Checks the image of `size` bytes in `file`, whose header names `crc`. On an error *image is undefined and *refusal says
+ * why. */
+RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE *image, APP_REFUSAL *refusal);
+
+/* Copies string `index` of the application info segment, cut to `size`; "" when there is none. */
+void AppLoaderReadInfo(const APP_IMAGE *image, RTS_UI32 index, char *text, RTS_SIZE size);
+
+#endif

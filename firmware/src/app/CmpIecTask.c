@@ -1,0 +1,317 @@
+/*
+ * CmpIecTask.c - the cycle of a task, its statistics and its watchdog.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A task record is written by the context the task runs in; main, monitoring and the supervisor read it. Times are kept in ns
+ * and 32 bits, which saturate at 4.29 s: no division in a cycle.
+ */
+#include "CmpIecTask.h"
+
+#include <string.h>
+
+#include "CmpAppEmbedded.h"
+#include "CmpScheduleTimer.h"
+#include "SysAtomic.h"
+#include "SysTime.h"
+#include "rts_config.h"
+
+/* IEC code that may be running. `phase` is odd while it does, and the other fields hold still then. */
+typedef struct {
+    RTS_UI32 phase;
+    RTS_I64 start_ns;
+    RTS_I64 limit_ns;
+    uintptr_t context;
+} GUARD;
+
+typedef struct {
+    IEC_CONTEXT context;
+    IEC_ENTRY entry;
+    const CDL_TASK *record;
+    GUARD guard;
+    RTS_I64 watchdog_ns; /* 0: none */
+    RTS_UI32 sensitivity;
+    RTS_UI32 exceeded;   /* cycles in a row longer than watchdog_ns */
+    RTS_UI32 ms_rest;    /* ns of context.time_ns beyond context.time_ms */
+    RTS_UI32 cycles;
+    RTS_UI32 last_ns;
+    RTS_UI32 min_ns;
+    RTS_UI32 max_ns;
+    RTS_UI32 jitter_ns;
+    RTS_UI32 overruns;
+    RTS_UI64 sum_ns;
+} TASK;
+
+static struct {
+    RTS_UI32 running; /* cycles may start */
+    RTS_UI32 count;
+    bool time_started;
+    RTS_I64 time_zero; /* SysTimeGetNs at which the time of the application is 0 */
+    GUARD init_guard;
+    TASK list[APP_MAX_TASKS];
+} tasks;
+
+enum { NS_PER_MS = 1000000, NS_PER_US = 1000 };
+
+/* ---- the external function for checks in compiled code ---- */
+
+/* The call lies before the return address; that of Thumb code has its mode bit set. */
+static void iecraise(RTS_UI32 code)
+{
+    uintptr_t address = (uintptr_t)__builtin_return_address(0) & ~(uintptr_t)APP_ENTRY_MODE_BIT;
+
+    SysExceptRaise(code, address - 1);
+}
+
+static const CMP_EXT_FUNCTION externals[] = {
+    {"iecraise", 0x703B892E, 0x00010000, (RTS_PFN)iecraise}, /* iecraise(UDINT) */
+};
+
+/* ---- guards ---- */
+
+static void guard_begin(GUARD *guard, RTS_I64 now_ns)
+{
+    guard->start_ns = now_ns;
+    guard->context = SysExceptContext();
+    SysAtomicStore(&guard->phase, guard->phase + 1);
+}
+
+static void guard_end(GUARD *guard)
+{
+    SysAtomicStore(&guard->phase, guard->phase + 1);
+}
+
+int IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
+{
+    const GUARD *guard = index < tasks.count ? &tasks.list[index].guard : &tasks.init_guard;
+
+    out->serial = SysAtomicLoad(&guard->phase);
+    if ((out->serial & 1) == 0)
+        return 0;
+    out->start_ns = guard->start_ns;
+    out->limit_ns = guard->limit_ns;
+    out->context = guard->context;
+    SysAtomicFence();
+    return SysAtomicLoad(&guard->phase) == out->serial;
+}
+
+RTS_UI32 IecTaskGetActivity(bool *busy)
+{
+    RTS_UI32 sum = 0;
+    RTS_UI32 i;
+
+    *busy = false;
+    SysAtomicFence();
+    for (i = 0; i < tasks.count; i++) {
+        RTS_UI32 phase = SysAtomicLoad(&tasks.list[i].guard.phase);
+        sum += phase;
+        *busy = *busy || (phase & 1) != 0;
+    }
+    SysAtomicFence();
+    return sum;
+}
+
+int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+{
+    int failed;
+
+    guard_begin(&tasks.init_guard, SysTimeGetNs());
+    failed = SysExceptTry(fn, arg, exception);
+    guard_end(&tasks.init_guard);
+    return failed;
+}
+
+/* ---- the cycle ---- */
+
+static RTS_UI32 saturate(RTS_I64 ns)
+{
+    if (ns < 0)
+        return 0;
+    return ns > (RTS_I64)0xFFFFFFFF ? 0xFFFFFFFFu : (RTS_UI32)ns;
+}
+
+/* Sets the time of the cycle. Milliseconds are counted on, since dividing 64 bits is slow on small cores. */
+static void set_time(TASK *task, RTS_I64 time_ns)
+{
+    IEC_CONTEXT *context = &task->context;
+    RTS_I64 sum = time_ns - context->time_ns + task->ms_rest;
+    RTS_UI32 ms;
+
+    context->time_ns = time_ns;
+    if (sum >= 0 && sum <= (RTS_I64)0xFFFFFFFF) {
+        ms = (RTS_UI32)context->time_ms + (RTS_UI32)sum / NS_PER_MS;
+        task->ms_rest = (RTS_UI32)sum % NS_PER_MS;
+    } else {
+        ms = (RTS_UI32)(time_ns / NS_PER_MS);
+        task->ms_rest = (RTS_UI32)(time_ns % NS_PER_MS);
+    }
+    context->time_ms = (RTS_I32)ms;
+}
+
+static void run_entry(void *arg)
+{
+    TASK *task = arg;
+
+    APP_CALL_ENTRY(task->entry, &task->context);
+}
+
+static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
+{
+    RTS_UI32 elapsed = saturate(elapsed_ns);
+    RTS_UI32 late = saturate(late_ns);
+
+    task->last_ns = elapsed;
+    task->sum_ns += elapsed;
+    if (elapsed < task->min_ns)
+        task->min_ns = elapsed;
+    if (elapsed > task->max_ns)
+        task->max_ns = elapsed;
+    if (late > task->jitter_ns)
+        task->jitter_ns = late;
+    SysAtomicStore(&task->cycles, task->cycles + 1);
+}
+
+/* Both rules of manual 3.4: too many cycles in a row that are too long, or one that is far too long. */
+static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
+{
+    if (task->watchdog_ns == 0)
+        return false;
+    if (elapsed_ns <= task->watchdog_ns) {
+        task->exceeded = 0;
+        return false;
+    }
+    task->exceeded++;
+    return task->exceeded >= task->sensitivity || elapsed_ns > task->guard.limit_ns;
+}
+
+int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns, RTS_I64 now_ns)
+{
+    TASK *task = &tasks.list[index];
+    RTS_EXCEPTION exception;
+    RTS_I64 elapsed;
+
+    if (!SysAtomicLoad(&tasks.running))
+        return 0;
+    set_time(task, now_ns - tasks.time_zero);
+    guard_begin(&task->guard, now_ns);
+    if (SysExceptTry(run_entry, task, &exception)) {
+        SysAtomicStore(&tasks.running, 0);
+        guard_end(&task->guard);
+        AppHandleException((RTS_I32)index, exception.code, exception.address);
+        return 0;
+    }
+    elapsed = SysTimeGetNs() - now_ns;
+    guard_end(&task->guard);
+    account(task, now_ns - due_ns, elapsed);
+    if (watchdog_expired(task, elapsed)) {
+        SysAtomicStore(&tasks.running, 0);
+        AppHandleException((RTS_I32)index, RTSEXCPT_WATCHDOG, 0);
+        return 0;
+    }
+    return 1;
+}
+
+void IecTaskAddOverruns(RTS_UI32 task, RTS_UI32 missed)
+{
+    tasks.list[task].overruns += missed;
+}
+
+/* ---- all tasks ---- */
+
+static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *prototype)
+{
+    RTS_UI32 phase = task->guard.phase;
+    uintptr_t entry = (uintptr_t)prototype->area[APP_AREA_CODE] + record->entry_offset;
+
+    memset(task, 0, sizeof *task);
+    task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
+    task->context = *prototype;
+    task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
+    task->record = record;
+    task->min_ns = 0xFFFFFFFFu;
+    task->watchdog_ns = (RTS_I64)record->watchdog_us * NS_PER_US;
+    task->sensitivity = record->watchdog_sensitivity > 1 ? record->watchdog_sensitivity : 1;
+    task->guard.limit_ns = task->watchdog_ns * (RTS_I64)task->sensitivity;
+    if (task->watchdog_ns == 0)
+        task->guard.limit_ns = (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
+}
+
+RTS_RESULT IecTaskCreateAll(const CDL_TASK *records, RTS_UI32 count, const IEC_CONTEXT *prototype)
+{
+    RTS_UI32 i;
+
+    if (count > APP_MAX_TASKS)
+        return ERR_NOMEMORY;
+    for (i = 0; i < count; i++)
+        create(&tasks.list[i], &records[i], prototype);
+    tasks.count = count;
+    tasks.time_started = false;
+    return SchedCreateTasks(records, count, count > 0 ? prototype->area : NULL);
+}
+
+RTS_RESULT IecTaskStartAll(void)
+{
+    if (!tasks.time_started)
+        tasks.time_zero = SysTimeGetNs();
+    tasks.time_started = true;
+    SysAtomicStore(&tasks.running, 1);
+    return SchedStart();
+}
+
+void IecTaskStopAll(void)
+{
+    SysAtomicStore(&tasks.running, 0);
+    SchedStop();
+}
+
+RTS_UI32 IecTaskGetCount(void)
+{
+    return tasks.count;
+}
+
+RTS_RESULT IecTaskGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
+{
+    const TASK *task;
+    RTS_UI64 sum_ns;
+
+    if (index >= tasks.count)
+        return ERR_INVALIDID;
+    task = &tasks.list[index];
+    memset(info, 0, sizeof *info);
+    memcpy(info->name, task->record->name, sizeof info->name);
+    info->kind = task->record->kind;
+    info->priority = task->record->priority;
+    info->interval_us = task->record->interval_us;
+    do { /* again when a cycle ended meanwhile: a 64-bit number may have been read in two halves */
+        info->cycles = SysAtomicLoad(&task->cycles);
+        sum_ns = task->sum_ns;
+        SysAtomicFence();
+    } while (SysAtomicLoad(&task->cycles) != info->cycles);
+    if (info->cycles == 0)
+        return ERR_OK;
+    info->last_us = task->last_ns / NS_PER_US;
+    info->avg_us = (RTS_UI32)(sum_ns / info->cycles / NS_PER_US);
+    info->min_us = task->min_ns / NS_PER_US;
+    info->max_us = task->max_ns / NS_PER_US;
+    info->jitter_us = task->jitter_ns / NS_PER_US;
+    info->overruns = task->overruns;
+    return ERR_OK;
+}
+
+RTS_RESULT IecTaskGetEntry(RTS_UI32 index, IEC_ENTRY *entry, IEC_CONTEXT **context)
+{
+    if (index >= tasks.count)
+        return ERR_INVALIDID;
+    *entry = tasks.list[index].entry;
+    *context = &tasks.list[index].context;
+    return ERR_OK;
+}
+
+RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT) {
+        memset(&tasks, 0, sizeof tasks);
+        tasks.init_guard.limit_ns = (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
+    }
+    return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;
+}

@@ -1,0 +1,386 @@
+/*
+ * CmpAppSrv.c - the application services (group 2): login, start, stop, reset, status, tasks, download.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpAppSrv.h"
+
+#include <string.h>
+
+#include "CmpAppEmbedded.h"
+#include "CmpBytes.h"
+#include "CmpIecTask.h"
+#include "CmpSrv.h"
+#include "SysExcept.h"
+
+/* The download under way; it outlives channels so that a broken transfer can continue. */
+static struct {
+    RTS_UI32 total;
+    RTS_UI32 crc;
+    bool active;
+} transfer;
+
+/* ---- login ---- */
+
+static RTS_RESULT write_login_reply(BTAG_WRITER *reply, RTS_RESULT result, RTS_UI32 session, const APP_STATUS *status)
+{
+    RTS_UI32 id = status->state == AS_NONE ? 0 : status->image_crc;
+
+    BTagOpen(reply, TAG_APP_DESCRIPTOR, BTAG_ALIGN_0);
+    BTagOpen(reply, TAG_APP_OPTION, BTAG_ALIGN_2);
+    BTagAppend16(reply, result);
+    BTagAppend32(reply, session);
+    for (int guid = 0; guid < 2; guid++) { /* code, data */
+        BTagAppend32(reply, id);
+        BTagAppendZeros(reply, 12);
+    }
+    BTagClose(reply);
+    BTagClose(reply);
+    return ERR_OK;
+}
+
+static RTS_RESULT login_app(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    APP_STATUS status;
+    BTAG name;
+    RTS_RESULT result = BTagFind(&request->tags, TAG_APP_LOGIN_NAME, 1, APP_NAME_SIZE, &name);
+
+    if (result != ERR_OK)
+        return result;
+    AppGetStatus(&status);
+    if (status.state == AS_NONE)
+        return write_login_reply(reply, ERR_APP_NOT_EXIST, 0, &status);
+    return write_login_reply(reply, ERR_OK, SrvCreateAppSession(), &status);
+}
+
+static RTS_RESULT create_app(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    APP_STATUS status;
+    BTAG_READER descriptor;
+    BTAG name;
+    RTS_RESULT result = BTagFindContainer(&request->tags, TAG_APP_DESCRIPTOR, &descriptor);
+
+    if (result == ERR_OK)
+        result = BTagFind(&descriptor, TAG_APP_OPTION, 1, APP_NAME_SIZE, &name);
+    if (result != ERR_OK)
+        return result;
+    AppGetStatus(&status);
+    return write_login_reply(reply, ERR_OK, SrvCreateAppSession(), &status);
+}
+
+static RTS_RESULT check_app_session(RTS_UI32 session)
+{
+    return session != 0 && session == SrvGetAppSession() ? ERR_OK : ERR_APP_INVALID_SESSIONID;
+}
+
+static RTS_RESULT logout_app(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UI32 session = 0;
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_APP_LOGOUT, &session);
+
+    if (result != ERR_OK)
+        return result;
+    result = check_app_session(session);
+    if (result == ERR_OK)
+        SrvEndAppSession();
+    BTagWrite16(reply, TAG_APP_LOGOUT, result);
+    return ERR_OK;
+}
+
+/* ---- start, stop, reset ---- */
+
+/* Finds the descriptor and the application session in it; *verdict says whether that is the right one. */
+static RTS_RESULT read_descriptor(const SRV_REQUEST *request, BTAG_READER *descriptor, RTS_RESULT *verdict)
+{
+    RTS_UI32 session = 0;
+    RTS_RESULT result = BTagFindContainer(&request->tags, TAG_APP_DESCRIPTOR, descriptor);
+
+    if (result == ERR_OK)
+        result = BTagFindUnsigned(descriptor, TAG_APP_SESSION, &session);
+    *verdict = check_app_session(session);
+    return result;
+}
+
+static RTS_RESULT control(SRV_REQUEST *request, BTAG_WRITER *reply, RTS_RESULT (*action)(void))
+{
+    BTAG_READER descriptor;
+    RTS_RESULT verdict;
+    RTS_RESULT result = read_descriptor(request, &descriptor, &verdict);
+
+    if (result == ERR_OK)
+        BTagWrite16(reply, TAG_SERVICE_RESULT, verdict == ERR_OK ? action() : verdict);
+    return result;
+}
+
+static RTS_RESULT start(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    return control(request, reply, AppStartApplication);
+}
+
+static RTS_RESULT stop(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    return control(request, reply, AppStopApplication);
+}
+
+static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    BTAG_READER descriptor;
+    RTS_RESULT verdict;
+    RTS_UI32 option = 0;
+    RTS_RESULT result = read_descriptor(request, &descriptor, &verdict);
+
+    if (result == ERR_OK)
+        result = BTagFindUnsigned(&descriptor, TAG_APP_OPTION, &option);
+    if (result != ERR_OK)
+        return result;
+    if (verdict == ERR_OK)
+        verdict = option <= RESET_OPTION_ORIGIN ? AppReset(option) : ERR_NOT_SUPPORTED;
+    BTagWrite16(reply, TAG_SERVICE_RESULT, verdict);
+    return ERR_OK;
+}
+
+/* ---- what is there ---- */
+
+static void write_exception(BTAG_WRITER *reply, const APP_EXCEPTION *exception)
+{
+    if (exception->code != RTSEXCPT_NOEXCEPTION && exception->code_offset != 0xFFFFFFFF) {
+        BTagOpen(reply, TAG_APP_EXECUTION_POSITION, BTAG_ALIGN_2);
+        BTagAppend16(reply, APP_AREA_CODE);
+        BTagAppend32(reply, exception->code_offset);
+        BTagClose(reply);
+    }
+    BTagOpen(reply, TAG_APP_LAST_EXCEPTION, BTAG_ALIGN_0);
+    BTagAppend32(reply, exception->code);
+    BTagAppend32(reply, exception->code_offset);
+    BTagAppend32(reply, (RTS_UI32)exception->task);
+    BTagClose(reply);
+}
+
+static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    APP_STATUS status;
+
+    RTS_UNUSED(request);
+    AppGetStatus(&status);
+    BTagOpen(reply, TAG_APP_STATUS, BTAG_ALIGN_0);
+    BTagOpen(reply, TAG_APP_STATE, BTAG_ALIGN_2);
+    BTagAppend16(reply, ERR_OK);
+    BTagAppend32(reply, status.state);
+    BTagAppend32(reply, status.op_state);
+    BTagClose(reply);
+    write_exception(reply, &status.exception);
+    BTagOpen(reply, TAG_APP_IMAGE, BTAG_ALIGN_0);
+    BTagAppend32(reply, status.image_crc);
+    BTagAppend32(reply, status.image_size);
+    BTagClose(reply);
+    BTagClose(reply);
+    return ERR_OK;
+}
+
+static RTS_RESULT read_application_list(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    APP_STATUS status;
+    BTAG range;
+    RTS_UI32 first = 0;
+    RTS_UI32 max = 1;
+    RTS_RESULT result = BTagFind(&request->tags, TAG_APP_LIST_RANGE, 8, 9, &range);
+
+    if (result == ERR_OK) {
+        first = BytesGet32(range.data);
+        max = BytesGet32(range.data + 4);
+    } else if (result != ERR_L7_TAG_MISSING) {
+        return result;
+    }
+    AppGetStatus(&status);
+    BTagOpen(reply, TAG_APP_LIST, BTAG_ALIGN_0);
+    BTagWrite32(reply, TAG_APP_LIST_START, first);
+    if (status.state != AS_NONE && first == 0 && max > 0)
+        BTagWriteText(reply, TAG_APP_LIST_NAME, "Application", APP_NAME_SIZE);
+    BTagClose(reply);
+    return ERR_OK;
+}
+
+static RTS_RESULT read_application_info(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    /* Tags in the order of AppGetInfo. */
+    static const RTS_UI8 tags[] = {TAG_APP_INFO_PROJECT, TAG_APP_INFO_AUTHOR, TAG_APP_INFO_VERSION,
+                                   TAG_APP_INFO_DESCRIPTION, TAG_APP_INFO_PROFILE};
+    enum { MAX_TEXT = 255 };
+    APP_STATUS status;
+
+    RTS_UNUSED(request);
+    AppGetStatus(&status);
+    if (status.state == AS_NONE)
+        return ERR_APP_NOT_LOADED;
+    for (RTS_UI32 i = 0; i < RTS_COUNT(tags); i++)
+        BTagWriteText(reply, tags[i], AppGetInfo(i), MAX_TEXT);
+    return ERR_OK;
+}
+
+static void write_task(BTAG_WRITER *reply, const IEC_TASK_INFO *info)
+{
+    const RTS_UI32 words[TASK_INFO_WORDS] = {
+        info->kind,   info->priority, info->interval_us, info->cycles,    info->last_us,
+        info->avg_us, info->min_us,   info->max_us,      info->jitter_us, info->overruns,
+    };
+    RTS_UI32 length = 0;
+
+    while (length < sizeof(info->name) - 1 && info->name[length] != '\0')
+        length++;
+    BTagOpen(reply, TAG_TASK_INFO, BTAG_ALIGN_0);
+    for (RTS_UI32 i = 0; i < TASK_INFO_WORDS; i++)
+        BTagAppend32(reply, words[i]);
+    BTagAppend(reply, info->name, length);
+    BTagAppendZeros(reply, 1);
+    BTagPad(reply);
+    BTagClose(reply);
+}
+
+static RTS_RESULT read_task_info(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    IEC_TASK_INFO info;
+
+    RTS_UNUSED(request);
+    for (RTS_UI32 i = 0; i < IecTaskGetCount(); i++)
+        if (IecTaskGetInfo(i, &info) == ERR_OK)
+            write_task(reply, &info);
+    return ERR_OK;
+}
+
+/* ---- download ---- */
+
+typedef struct {
+    RTS_UI32 flags;
+    RTS_UI32 offset;
+    RTS_UI32 total;
+    RTS_UI32 crc;
+    const RTS_UI8 *data;
+    RTS_UI32 size;
+} DOWNLOAD_BLOCK;
+
+static RTS_RESULT read_block(const SRV_REQUEST *request, DOWNLOAD_BLOCK *block)
+{
+    BTAG tag;
+    RTS_RESULT result = BTagFind(&request->tags, TAG_CDL_POSITION, CDL_POSITION_SIZE, CDL_POSITION_SIZE, &tag);
+
+    if (result != ERR_OK)
+        return result;
+    block->flags = BytesGet32(tag.data);
+    block->offset = BytesGet32(tag.data + 4);
+    block->total = BytesGet32(tag.data + 8);
+    block->crc = BytesGet32(tag.data + 12);
+    result = BTagFind(&request->tags, TAG_CDL_DATA, 1, request->tags.size, &tag);
+    block->data = result == ERR_OK ? tag.data : NULL;
+    block->size = result == ERR_OK ? tag.size : 0;
+    return result == ERR_L7_TAG_MISSING ? ERR_OK : result;
+}
+
+static bool is_installed(const DOWNLOAD_BLOCK *block)
+{
+    APP_STATUS status;
+
+    AppGetStatus(&status);
+    return status.state != AS_NONE && status.image_crc == block->crc && status.image_size == block->total;
+}
+
+static bool is_under_way(const DOWNLOAD_BLOCK *block)
+{
+    return transfer.active && transfer.total == block->total && transfer.crc == block->crc;
+}
+
+static RTS_UI32 bytes_received(const DOWNLOAD_BLOCK *block)
+{
+    if (is_under_way(block))
+        return AppDownloadOffset();
+    return is_installed(block) ? block->total : 0;
+}
+
+static RTS_RESULT begin(const DOWNLOAD_BLOCK *block)
+{
+    RTS_RESULT result = AppDownloadBegin(block->total, block->crc);
+
+    transfer.active = result == ERR_OK;
+    transfer.total = block->total;
+    transfer.crc = block->crc;
+    return result;
+}
+
+/* Writes what of the block is new. Parts that are there already are a repetition after a lost reply. */
+static RTS_RESULT write_new_part(const DOWNLOAD_BLOCK *block)
+{
+    RTS_UI32 next = AppDownloadOffset();
+
+    if (block->offset > next)
+        return ERR_INVALID_SEQUENCE;
+    RTS_UI32 known = next - block->offset;
+    if (known >= block->size)
+        return ERR_OK;
+    RTS_RESULT result = AppDownloadWrite(next, block->data + known, block->size - known);
+    if (result != ERR_OK) {
+        AppDownloadAbort();
+        transfer.active = false;
+    }
+    return result;
+}
+
+static RTS_RESULT take_block(const DOWNLOAD_BLOCK *block)
+{
+    RTS_RESULT result = ERR_OK;
+
+    if (block->offset > block->total || block->size > block->total - block->offset)
+        return ERR_OUT_OF_LIMITS;
+    if (block->offset == 0 && (block->flags & DLF_CONTINUEDOWNLOAD) == 0)
+        result = begin(block);
+    if (result != ERR_OK)
+        return result;
+    if (!is_under_way(block))
+        return is_installed(block) ? ERR_OK : ERR_INVALID_SEQUENCE;
+    return write_new_part(block);
+}
+
+static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    enum { REASON_OVERHEAD = 8 }; /* head of the element, NUL, padding; the smallest message has room for more */
+    DOWNLOAD_BLOCK block;
+    APP_REFUSAL refusal;
+    RTS_RESULT result = read_block(request, &block);
+
+    if (result != ERR_OK)
+        return result;
+    refusal.text[0] = '\0';
+    if (block.size != 0)
+        result = take_block(&block);
+    RTS_UI32 next = bytes_received(&block);
+    if (result == ERR_OK && is_under_way(&block) && next == block.total) {
+        transfer.active = false;
+        result = AppDownloadEnd(&refusal);
+    }
+    BTagWrite16(reply, TAG_SERVICE_RESULT, result);
+    BTagWrite32(reply, TAG_CDL_NEXT, next);
+    if (result != ERR_OK && refusal.text[0] != '\0')
+        BTagWriteText(reply, TAG_CDL_REASON, refusal.text, BTagGetRoom(reply) - REASON_OVERHEAD);
+    return ERR_OK;
+}
+
+static const SRV_SERVICE services[] = {
+    {SRV_APP_LOGIN, SRV_NEEDS_LOGIN, login_app},
+    {SRV_APP_LOGOUT, SRV_NEEDS_LOGIN, logout_app},
+    {SRV_APP_CREATE, SRV_NEEDS_LOGIN, create_app},
+    {SRV_APP_START, SRV_NEEDS_LOGIN, start},
+    {SRV_APP_STOP, SRV_NEEDS_LOGIN, stop},
+    {SRV_APP_RESET, SRV_NEEDS_LOGIN, reset},
+    {SRV_APP_READ_STATUS, SRV_OPEN, read_status},
+    {SRV_APP_READ_APPLICATION_LIST, SRV_OPEN, read_application_list},
+    {SRV_APP_READ_APPLICATION_INFO, SRV_OPEN, read_application_info},
+    {SRV_APP_DOWNLOAD_COMPACT, SRV_NEEDS_LOGIN, download_compact},
+    {SRV_APP_READ_TASK_INFO, SRV_OPEN, read_task_info},
+};
+
+RTS_RESULT CmpAppSrv_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT)
+        memset(&transfer, 0, sizeof(transfer));
+    if (hook == CH_INIT3)
+        return SrvRegisterGroup(SG_APPLICATION, services, RTS_COUNT(services));
+    return ERR_OK;
+}

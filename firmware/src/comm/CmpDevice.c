@@ -1,0 +1,154 @@
+/*
+ * CmpDevice.c - the device services (group 1): identity, login, echo.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * There is no user management: a login is a statement of intent, it keeps programs that only look from changing
+ * anything.
+ */
+#include "CmpDevice.h"
+
+#include <string.h>
+
+#include "CmpBytes.h"
+#include "CmpChannelServerEmbedded.h"
+#include "CmpSrv.h"
+#include "SysTarget.h"
+
+/* u32 byte length with NUL, UTF-16LE, padding. */
+static void write_wide_text(BTAG_WRITER *reply, RTS_UI32 id, const char *text, RTS_UI32 max)
+{
+    RTS_UI32 length = 0;
+
+    while (length < max && text[length] != '\0')
+        length++;
+    BTagOpen(reply, id, BTAG_ALIGN_0);
+    BTagAppend32(reply, 2 * (length + 1));
+    for (RTS_UI32 i = 0; i < length; i++)
+        BTagAppend16(reply, (RTS_UI8)text[i]);
+    BTagAppend16(reply, 0);
+    BTagPad(reply);
+    BTagClose(reply);
+}
+
+/* u16 length, ASCII, padding. */
+static void write_serial_number(BTAG_WRITER *reply, const char *text)
+{
+    RTS_UI32 length = 0;
+
+    while (length < NS_MAX_SERIAL && text[length] != '\0')
+        length++;
+    BTagOpen(reply, TAG_DEV_SERIAL_NUMBER, BTAG_ALIGN_2);
+    BTagAppend16(reply, length);
+    BTagAppend(reply, text, length);
+    BTagAppendZeros(reply, 1);
+    BTagPad(reply);
+    BTagClose(reply);
+}
+
+static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    const SYS_TARGET *target = SysTargetGet();
+    RTS_RESULT match = ERR_OK;
+    BTAG expected;
+
+    RTS_RESULT result = BTagFind(&request->tags, TAG_DEV_IDENT, 12, request->tags.size, &expected);
+    if (result == ERR_OK) {
+        if (BytesGet32(expected.data) != target->type || BytesGet32(expected.data + 4) != target->id)
+            match = ERR_TYPE_MISMATCH;
+    } else if (result != ERR_L7_TAG_MISSING) {
+        return result;
+    }
+    BTagWrite16(reply, TAG_DEV_RESULT, match);
+    BTagOpen(reply, TAG_DEV_IDENT, BTAG_ALIGN_0);
+    BTagAppend32(reply, target->type);
+    BTagAppend32(reply, target->id);
+    BTagAppend32(reply, target->version);
+    BTagClose(reply);
+    BTagWrite32(reply, TAG_DEV_RTS_VERSION, RTS_VERSION);
+    write_wide_text(reply, TAG_DEV_DEVICE_NAME, target->device_name, NS_MAX_TYPE_NAMES);
+    write_wide_text(reply, TAG_DEV_VENDOR_NAME, target->vendor_name, NS_MAX_TYPE_NAMES);
+    write_wide_text(reply, TAG_DEV_NODE_NAME, target->node_name, NS_MAX_NODE_NAME);
+    BTagWrite16(reply, TAG_DEV_MAX_CHANNELS, CHANNEL_MAX_CHANNELS);
+    write_serial_number(reply, target->serial_number);
+    request->reply_session = L7_SESSION_EMPTY;
+    return ERR_OK;
+}
+
+static RTS_RESULT session_create(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UNUSED(request);
+    BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvCreateSession());
+    BTagWrite32(reply, TAG_DEV_AUTH_TYPE, DEV_CRYPT_XOR);
+    return ERR_OK;
+}
+
+/* User and password are not looked at, so that clients with odd encodings of "nobody" can log in too. */
+static RTS_RESULT login(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UI32 crypt = 0;
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_DEV_CRYPT_TYPE, &crypt);
+
+    if (result != ERR_OK)
+        return result;
+    BTagOpen(reply, TAG_DEV_LOGIN_REPLY, BTAG_ALIGN_0);
+    if (crypt & DEV_CRYPT_XOR) {
+        BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_OK);
+        BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvLogin(request->session));
+        BTagWrite32(reply, TAG_DEV_SETTINGS, DEV_SETTING_MONITOR2);
+    } else {
+        BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_NOT_SUPPORTED);
+    }
+    BTagClose(reply);
+    return ERR_OK;
+}
+
+static RTS_RESULT logout(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UI32 session = 0;
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_DEV_LOGOUT_SESSION, &session);
+
+    if (result == ERR_OK)
+        BTagWrite16(reply, TAG_DEV_LOGOUT_REPLY, SrvLogout(session));
+    return result;
+}
+
+static RTS_RESULT echo(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    enum { ECHO_OVERHEAD = 24 }; /* headers of the three elements, result and length */
+    RTS_UI32 wanted = 0;
+    BTAG data = {0, NULL, 0};
+
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_DEV_ECHO_REPLY_LENGTH, &wanted);
+    if (result != ERR_OK)
+        return result == ERR_L7_TAG_MISSING ? ERR_OK : result;
+    result = BTagFind(&request->tags, TAG_DEV_ECHO_DATA, 0, request->tags.size, &data);
+    if (result == ERR_L7_TAG_MISSING)
+        data.size = 0;
+    else if (result != ERR_OK)
+        return result;
+    RTS_UI32 room = BTagGetRoom(reply);
+    room = room > ECHO_OVERHEAD ? room - ECHO_OVERHEAD : 0;
+    RTS_UI32 size = wanted < room ? wanted : room;
+    RTS_UI32 copied = data.size < size ? data.size : size;
+    BTagWrite16(reply, TAG_SERVICE_RESULT, ERR_OK);
+    BTagWrite32(reply, TAG_DEV_ECHO_REPLY_LENGTH, size);
+    BTagOpen(reply, TAG_DEV_ECHO_DATA, BTAG_ALIGN_0);
+    BTagAppend(reply, data.data, copied);
+    BTagAppendZeros(reply, size - copied);
+    BTagClose(reply);
+    return ERR_OK;
+}
+
+static const SRV_SERVICE services[] = {
+    {SRV_DEV_GET_TARGET_IDENT, SRV_OPEN, get_target_ident},
+    {SRV_DEV_LOGIN, SRV_OPEN, login},
+    {SRV_DEV_LOGOUT, SRV_OPEN, logout},
+    {SRV_DEV_ECHO, SRV_OPEN, echo},
+    {SRV_DEV_SESSION_CREATE, SRV_OPEN, session_create},
+};
+
+RTS_RESULT CmpDevice_Hook(CMP_HOOK hook)
+{
+    return hook == CH_INIT3 ? SrvRegisterGroup(SG_DEVICE, services, RTS_COUNT(services)) : ERR_OK;
+}

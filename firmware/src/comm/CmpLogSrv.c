@@ -1,0 +1,64 @@
+/*
+ * CmpLogSrv.c - the log services (group 5).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpLogSrv.h"
+
+#include "CmpLog.h"
+#include "CmpSrv.h"
+
+enum { COMPONENT_NAME_MAX = 31 };
+
+static void write_entry(BTAG_WRITER *reply, const LOG_ENTRY *entry)
+{
+    RTS_UI64 time_ns = (RTS_UI64)entry->time_ns;
+
+    BTagOpen(reply, TAG_LOG_RECORD, BTAG_ALIGN_0);
+    BTagWrite32(reply, TAG_LOG_HANDLE, entry->handle);
+    BTagOpen(reply, TAG_LOG_TIME_NS, BTAG_ALIGN_0);
+    BTagAppend32(reply, (RTS_UI32)time_ns);
+    BTagAppend32(reply, (RTS_UI32)(time_ns >> 32));
+    BTagClose(reply);
+    BTagOpen(reply, TAG_LOG_ENTRY, BTAG_ALIGN_0);
+    BTagAppend32(reply, entry->component);
+    BTagAppend32(reply, entry->log_class);
+    BTagAppend32(reply, entry->error);
+    BTagAppend32(reply, 0);
+    BTagClose(reply);
+    BTagWriteText(reply, TAG_LOG_TEXT, entry->text, LOG_TEXT_SIZE - 1);
+    BTagWriteText(reply, TAG_LOG_COMPONENT_NAME, CMGetComponentName(entry->component), COMPONENT_NAME_MAX);
+    BTagClose(reply);
+}
+
+static RTS_RESULT get_entries(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    LOG_ENTRY entry;
+    RTS_UI32 handle = 0;
+    RTS_UI32 count = LOG_MAX_ENTRIES;
+    RTS_RESULT result = BTagFindOptional(&request->tags, TAG_LOG_START_HANDLE, &handle);
+
+    if (result == ERR_OK)
+        result = BTagFindOptional(&request->tags, TAG_LOG_COUNT, &count);
+    if (result != ERR_OK)
+        return result;
+    for (; count > 0 && LogGetEntry(handle, &entry) == ERR_OK; count--) {
+        BTAG_WRITER before = *reply;
+        write_entry(reply, &entry);
+        if (reply->overflow) { /* the client asks again from here */
+            *reply = before;
+            break;
+        }
+        handle = entry.handle + 1;
+    }
+    return ERR_OK;
+}
+
+static const SRV_SERVICE services[] = {
+    {SRV_LOG_GET_ENTRIES, SRV_OPEN, get_entries},
+};
+
+RTS_RESULT CmpLogSrv_Hook(CMP_HOOK hook)
+{
+    return hook == CH_INIT3 ? SrvRegisterGroup(SG_LOG, services, RTS_COUNT(services)) : ERR_OK;
+}

@@ -1,0 +1,195 @@
+/*
+ * CmpSrv.c - layer 7: headers, sessions, dispatch to the services.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpSrv.h"
+
+#include <string.h>
+
+#include "CmpBytes.h"
+#include "SysTarget.h"
+#include "rts_config.h"
+
+/* The validation bit, set in every session id we give. */
+#define SESSION_VALID 0x80000000u
+
+typedef struct {
+    const SRV_SERVICE *services;
+    RTS_SIZE count;
+    RTS_UI16 group;
+} SRV_GROUP;
+
+static struct {
+    SRV_GROUP groups[SRV_MAX_GROUPS];
+    RTS_SIZE group_count;
+    RTS_UI32 session; /* 0: none */
+    RTS_UI32 app_session;
+    bool logged_in;
+} srv;
+
+/* ---- session ---- */
+
+RTS_UI32 SrvCreateSession(void)
+{
+    SrvEndSession();
+    srv.session = SysTargetRandom() | SESSION_VALID;
+    return srv.session;
+}
+
+RTS_UI32 SrvLogin(RTS_UI32 id)
+{
+    if (srv.session == 0 || id != srv.session)
+        SrvCreateSession();
+    srv.logged_in = true;
+    return srv.session;
+}
+
+RTS_RESULT SrvLogout(RTS_UI32 id)
+{
+    if (srv.session == 0 || id != srv.session)
+        return ERR_INVALID_SESSION_ID;
+    SrvEndSession();
+    return ERR_OK;
+}
+
+bool SrvIsLoggedIn(void)
+{
+    return srv.logged_in;
+}
+
+void SrvEndSession(void)
+{
+    srv.session = 0;
+    srv.app_session = 0;
+    srv.logged_in = false;
+}
+
+RTS_UI32 SrvCreateAppSession(void)
+{
+    srv.app_session = SysTargetRandom() | 1;
+    return srv.app_session;
+}
+
+RTS_UI32 SrvGetAppSession(void)
+{
+    return srv.app_session;
+}
+
+void SrvEndAppSession(void)
+{
+    srv.app_session = 0;
+}
+
+/* ---- dispatch ---- */
+
+RTS_RESULT SrvRegisterGroup(RTS_UI16 group, const SRV_SERVICE *services, RTS_SIZE count)
+{
+    if (srv.group_count >= SRV_MAX_GROUPS)
+        return ERR_NOMEMORY;
+    srv.groups[srv.group_count].group = group;
+    srv.groups[srv.group_count].services = services;
+    srv.groups[srv.group_count].count = count;
+    srv.group_count++;
+    return ERR_OK;
+}
+
+static const SRV_GROUP *find_group(RTS_UI16 group)
+{
+    for (RTS_SIZE i = 0; i < srv.group_count; i++)
+        if (srv.groups[i].group == group)
+            return &srv.groups[i];
+    return NULL;
+}
+
+static const SRV_SERVICE *find_service(const SRV_GROUP *group, RTS_UI16 service)
+{
+    for (RTS_SIZE i = 0; i < group->count; i++)
+        if (group->services[i].service == service)
+            return &group->services[i];
+    return NULL;
+}
+
+static RTS_RESULT check_access(const SRV_SERVICE *service, RTS_UI32 session)
+{
+    if (service->access == SRV_OPEN)
+        return ERR_OK;
+    if (srv.session == 0 || session != srv.session)
+        return ERR_INVALID_SESSION_ID;
+    return srv.logged_in ? ERR_OK : ERR_NO_ACCESS_RIGHTS;
+}
+
+static RTS_RESULT dispatch(RTS_UI16 group_id, RTS_UI16 service_id, SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    const SRV_GROUP *group = find_group(group_id);
+
+    if (group == NULL)
+        return ERR_L7_UNKNOWNCMDGROUP;
+    const SRV_SERVICE *service = find_service(group, service_id);
+    if (service == NULL)
+        return ERR_L7_UNKNOWNCMD;
+    RTS_RESULT result = check_access(service, request->session);
+    if (result == ERR_OK)
+        result = service->handler(request, reply);
+    if (result == ERR_OK && !BTagIsComplete(reply))
+        result = ERR_BUFFERSIZE;
+    return result;
+}
+
+/* Offset of the content; 0 when the header is wrong. */
+static RTS_UI32 check_header(const RTS_UI8 *message, RTS_UI32 size)
+{
+    if (size < L7_HEADER_PREFIX + L7_HEADER_LENGTH_SHORT || BytesGet16(message) != L7_PROTOCOL)
+        return 0;
+    RTS_UI32 length = BytesGet16(message + 2);
+    if (length < L7_HEADER_LENGTH_SHORT || length > L7_HEADER_LENGTH_MAX || L7_HEADER_PREFIX + length > size)
+        return 0;
+    return L7_HEADER_PREFIX + length;
+}
+
+static void put_header(RTS_UI8 *reply, RTS_UI32 header, const RTS_UI8 *message, RTS_UI32 session, RTS_UI32 content)
+{
+    memset(reply, 0, header);
+    BytesPut16(reply, L7_PROTOCOL);
+    BytesPut16(reply + 2, header - L7_HEADER_PREFIX);
+    BytesPut16(reply + 4, BytesGet16(message + 4) | L7_REPLY);
+    BytesPut16(reply + 6, BytesGet16(message + 6));
+    BytesPut32(reply + 8, session);
+    BytesPut32(reply + 12, content);
+}
+
+RTS_UI32 SrvHandleMessage(const RTS_UI8 *message, RTS_UI32 size, RTS_UI8 *reply, RTS_UI32 capacity)
+{
+    enum { ERROR_CONTENT = 8 };
+    RTS_UI32 start = check_header(message, size);
+    RTS_UI32 header = L7_HEADER_PREFIX + L7_HEADER_LENGTH;
+    SRV_REQUEST request;
+    BTAG_WRITER writer;
+    RTS_RESULT result = ERR_L7_INCOMPLETE;
+
+    if (start == L7_HEADER_PREFIX + L7_HEADER_LENGTH_SHORT)
+        header = start;
+    if (start == 0 || capacity < header + ERROR_CONTENT)
+        return 0;
+    request.session = BytesGet32(message + 8);
+    request.reply_session = request.session;
+    RTS_UI32 content = BytesGet32(message + 12);
+    BTagWriterInit(&writer, reply + header, capacity - header);
+    if (content <= size - start) {
+        BTagReaderInit(&request.tags, message + start, content);
+        result = dispatch(BytesGet16(message + 4), BytesGet16(message + 6), &request, &writer);
+    }
+    if (result != ERR_OK) {
+        BTagWriterInit(&writer, reply + header, capacity - header);
+        BTagWrite16(&writer, TAG_ERROR, result);
+    }
+    put_header(reply, header, message, request.reply_session, writer.size);
+    return header + writer.size;
+}
+
+RTS_RESULT CmpSrv_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT)
+        memset(&srv, 0, sizeof(srv));
+    return ERR_OK;
+}

@@ -1,0 +1,83 @@
+/*
+ * comm_client.h - a client in C for the tests of the communication; it talks through SimLink.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Each layer can be used alone, so that tests can send what no proper client would.
+ */
+#ifndef COMM_CLIENT_H
+#define COMM_CLIENT_H
+
+#include "CmpBinTagUtil.h"
+#include "CmpSrvNumbers.h"
+#include "rts_config.h"
+
+typedef struct {
+    RTS_UI16 address;  /* one word */
+    RTS_UI16 channel;
+    RTS_UI32 limit;    /* granted buffer */
+    RTS_UI32 sent;     /* number of the last block sent */
+    RTS_UI32 received; /* number of the last block received in order */
+    RTS_UI32 session;
+    RTS_UI32 app_session;
+} CLIENT;
+
+/* ---- layer 3 ---- */
+
+/* Makes a packet from this client to the device; returns its size. */
+RTS_UI32 client_packet(const CLIENT *client, RTS_UI8 service, const RTS_UI8 *payload, RTS_UI32 size, RTS_UI8 *packet);
+/* Sends a channel package. */
+void client_send_package(const CLIENT *client, const RTS_UI8 *package, RTS_UI32 size);
+/* Takes the next packet for this client and returns the size of its payload (copied to `payload`, room for 512), 0
+ * when there is none. *service may be NULL. */
+RTS_UI32 client_take(const CLIENT *client, RTS_UI8 *service, RTS_UI8 *payload);
+
+/* ---- layer 4 ---- */
+
+void client_init(CLIENT *client, RTS_UI16 address);
+/* Fills in version and CRC of a meta package. */
+void client_seal(RTS_UI8 *package, RTS_UI32 size);
+void client_send_open(const CLIENT *client, RTS_UI32 request_id, RTS_UI32 buffer);
+/* Takes the open response; returns its result, -1 when there is none. */
+int client_take_open(CLIENT *client);
+/* Both; request id 7, buffer NETSERVER_MESSAGE_SIZE. */
+bool client_open(CLIENT *client);
+void client_send_close(const CLIENT *client);
+/* Sends one block; flags as on the wire, first ones with length and crc of the message. */
+void client_send_block(const CLIENT *client, RTS_UI32 number, RTS_UI8 flags, const RTS_UI8 *message, RTS_UI32 length,
+                       RTS_UI32 offset, RTS_UI32 size);
+void client_send_ack(const CLIENT *client, RTS_UI32 ack, RTS_UI8 flags);
+/* Sends a whole message in blocks that fill their packets. */
+void client_send_message(CLIENT *client, const RTS_UI8 *message, RTS_UI32 size);
+/* Takes the blocks of a whole message and checks it; returns its size, 0 when it is not complete. */
+RTS_UI32 client_take_message(CLIENT *client, RTS_UI8 *message);
+
+/* ---- layer 7 ---- */
+
+RTS_UI32 client_message(const CLIENT *client, RTS_UI16 group, RTS_UI16 service, const RTS_UI8 *content, RTS_UI32 size,
+                        RTS_UI8 *message);
+
+typedef struct {
+    RTS_UI8 message[NETSERVER_MESSAGE_SIZE];
+    RTS_UI32 size; /* 0: no reply */
+    BTAG_READER tags;
+    RTS_UI32 session;
+} REPLY;
+
+/* Sends a request and takes its reply; false when there was none or not the right one. */
+bool client_request(CLIENT *client, RTS_UI16 group, RTS_UI16 service, const RTS_UI8 *content, RTS_UI32 size,
+                    REPLY *reply);
+/* The same with the content of a writer. */
+bool client_call(CLIENT *client, RTS_UI16 group, RTS_UI16 service, const BTAG_WRITER *content, REPLY *reply);
+
+/* The integer in tag `id` of the reply; 0xFFFFFFFF when there is none. */
+RTS_UI32 reply_number(const REPLY *reply, RTS_UI32 id);
+/* TAG_ERROR; ERR_OK when there is none. */
+RTS_UI32 reply_error(const REPLY *reply);
+
+/* Opens, logs in, logs in to the application. */
+bool client_login(CLIENT *client);
+bool client_login_app(CLIENT *client);
+bool client_connect(CLIENT *client);
+
+#endif

@@ -1,0 +1,248 @@
+/*
+ * comm_fakes.c - what the communication needs from the rest of the runtime.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "comm_fakes.h"
+
+#include <string.h>
+
+#include "CmpAppSrv.h"
+#include "CmpBlkDrvSimpleCom.h"
+#include "CmpChannelServerEmbedded.h"
+#include "CmpDevice.h"
+#include "CmpLogSrv.h"
+#include "CmpMonitor2.h"
+#include "CmpNameServiceServer.h"
+#include "CmpRouterEmbedded.h"
+#include "CmpSrv.h"
+#include "SimLink.h"
+#include "SysCom.h"
+#include "SysExcept.h"
+#include "SysTime.h"
+
+FAKES fakes;
+
+/* ---- system ---- */
+
+RTS_UI32 SysTimeGetMs(void)
+{
+    return fakes.now_ms;
+}
+
+const SYS_TARGET *SysTargetGet(void)
+{
+    return &fakes.target;
+}
+
+RTS_UI32 SysTargetRandom(void)
+{
+    fakes.random = fakes.random * 1664525u + 1013904223u;
+    return fakes.random ^ fakes.random >> 16;
+}
+
+RTS_UI32 SysComGetCount(void)
+{
+    return 1;
+}
+
+RTS_RESULT SysComOpen(RTS_UI32 index)
+{
+    return index == 0 ? ERR_OK : ERR_DEVICE;
+}
+
+void SysComClose(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+}
+
+RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 there = fakes.line_in_size - fakes.line_in_read;
+
+    RTS_UNUSED(index);
+    if (size > there)
+        size = there;
+    memcpy(data, fakes.line_in + fakes.line_in_read, size);
+    fakes.line_in_read += size;
+    return size;
+}
+
+RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 room = FAKE_LINE_SIZE - fakes.line_out_size;
+
+    RTS_UNUSED(index);
+    if (size > fakes.line_write_limit)
+        size = fakes.line_write_limit;
+    if (size > room)
+        size = room;
+    memcpy(fakes.line_out + fakes.line_out_size, data, size);
+    fakes.line_out_size += size;
+    return size;
+}
+
+const char *CMGetComponentName(RTS_UI32 id)
+{
+    return id == CMPID_CmpAppEmbedded ? "CmpAppEmbedded" : "";
+}
+
+RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry)
+{
+    for (RTS_UI32 i = 0; i < fakes.log_count; i++) {
+        if (fakes.log[i].handle >= handle) {
+            *entry = fakes.log[i];
+            return ERR_OK;
+        }
+    }
+    return ERR_END_OF_OBJECT;
+}
+
+/* ---- application ---- */
+
+RTS_UI8 *fakes_area(RTS_UI32 index)
+{
+    return (RTS_UI8 *)fakes.area[index];
+}
+
+RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size)
+{
+    if (index >= APP_AREA_COUNT || offset > fakes.area_size[index] || size > fakes.area_size[index] - offset)
+        return NULL;
+    return fakes_area(index) + offset;
+}
+
+RTS_UI32 AppGetAreaSize(RTS_UI32 index)
+{
+    return index < APP_AREA_COUNT ? fakes.area_size[index] : 0;
+}
+
+void AppGetStatus(APP_STATUS *status)
+{
+    *status = fakes.status;
+}
+
+const char *AppGetInfo(RTS_UI32 index)
+{
+    static const char *const texts[] = {"project", "author", "1.2.3", "", "profile"};
+
+    return texts[index];
+}
+
+RTS_RESULT AppStartApplication(void)
+{
+    fakes.starts++;
+    return fakes.control_result;
+}
+
+RTS_RESULT AppStopApplication(void)
+{
+    fakes.stops++;
+    return fakes.control_result;
+}
+
+RTS_RESULT AppReset(RTS_UI32 option)
+{
+    fakes.resets++;
+    fakes.reset_option = option;
+    return fakes.control_result;
+}
+
+RTS_UI32 IecTaskGetCount(void)
+{
+    return fakes.task_count;
+}
+
+RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info)
+{
+    *info = fakes.tasks[task];
+    return ERR_OK;
+}
+
+RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
+{
+    RTS_UNUSED(image_crc);
+    if (total_size > FAKE_IMAGE_SIZE)
+        return ERR_NOMEMORY;
+    fakes.download_begins++;
+    fakes.download_total = total_size;
+    fakes.download_offset = 0;
+    return ERR_OK;
+}
+
+RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
+{
+    if (offset != fakes.download_offset || size > fakes.download_total - offset)
+        return ERR_INVALID_SEQUENCE;
+    if (fakes.write_result != ERR_OK)
+        return fakes.write_result;
+    fakes.download_writes++;
+    memcpy(fakes.image + offset, data, size);
+    fakes.download_offset += size;
+    return ERR_OK;
+}
+
+RTS_UI32 AppDownloadOffset(void)
+{
+    return fakes.download_offset;
+}
+
+RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
+{
+    fakes.download_ends++;
+    fakes.download_offset = 0;
+    refusal->result = fakes.end_result;
+    strcpy(refusal->text, fakes.end_result == ERR_OK ? "" : fakes.end_text);
+    if (fakes.end_result == ERR_OK) {
+        fakes.status.image_size = fakes.download_total;
+        fakes.status.state = AS_STOP;
+    }
+    return fakes.end_result;
+}
+
+void AppDownloadAbort(void)
+{
+    fakes.download_aborts++;
+    fakes.download_offset = 0;
+}
+
+/* ---- start ---- */
+
+void fakes_hook(CMP_HOOK hook)
+{
+    static const PF_HOOK_FUNCTION hooks[] = {
+        CmpSrv_Hook, CmpDevice_Hook, CmpAppSrv_Hook, CmpMonitor2_Hook, CmpLogSrv_Hook,
+        CmpChannelServerEmbedded_Hook, CmpNameServiceServer_Hook, CmpRouterEmbedded_Hook, CmpBlkDrvSimpleCom_Hook,
+    };
+    const RTS_UI32 count = RTS_COUNT(hooks);
+
+    for (RTS_UI32 i = 0; i < count; i++)
+        (void)hooks[hook >= CH_EXIT_COMM ? count - 1 - i : i](hook);
+}
+
+void fakes_start(void)
+{
+    static const SYS_TARGET target = {0x1000, 0x00010002, 0x030E0514, "Device", "Vendor", "Node7", "SN-42"};
+
+    memset(&fakes, 0, sizeof(fakes));
+    fakes.target = target;
+    fakes.end_text = "This image is for another device.";
+    fakes.now_ms = 0xFFFFF000u; /* about to wrap: time compares must cope */
+    fakes.random = 12345;
+    fakes.line_write_limit = FAKE_LINE_SIZE;
+    fakes.status.state = AS_STOP;
+    fakes.status.op_state = OS_PROGRAM_LOADED | OS_BOOTPROJECT_VALID;
+    fakes.status.image_crc = FAKE_IMAGE_CRC;
+    fakes.status.image_size = 3000;
+    for (RTS_UI32 i = 0; i < APP_AREA_COUNT; i++)
+        fakes.area_size[i] = FAKE_AREA_SIZE;
+    SimLinkReset();
+    for (int hook = CH_INIT_SYSTEM; hook <= CH_INIT_FINISHED; hook++)
+        fakes_hook((CMP_HOOK)hook);
+}
+
+void fakes_cycle(RTS_UI32 ms)
+{
+    fakes.now_ms += ms;
+    fakes_hook(CH_COMM_CYCLE);
+}

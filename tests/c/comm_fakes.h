@@ -1,0 +1,70 @@
+/*
+ * comm_fakes.h - what the communication needs from the rest of the runtime, faked so that tests can see and steer it.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef COMM_FAKES_H
+#define COMM_FAKES_H
+
+#include "CmpAppEmbedded.h"
+#include "CmpIecTask.h"
+#include "CmpItf.h"
+#include "CmpLog.h"
+#include "SysTarget.h"
+
+enum { FAKE_LINE_SIZE = 16384, FAKE_AREA_SIZE = 1024, FAKE_IMAGE_SIZE = 16384, FAKE_LOG_SIZE = 40, FAKE_TASKS = 3 };
+enum { FAKE_IMAGE_CRC = 0x1C2D3E4F };
+
+typedef struct {
+    RTS_UI32 now_ms;
+    RTS_UI32 random;
+    SYS_TARGET target;
+
+    RTS_UI8 line_in[FAKE_LINE_SIZE]; /* what the serial line will deliver */
+    RTS_UI32 line_in_size;
+    RTS_UI32 line_in_read;
+    RTS_UI8 line_out[FAKE_LINE_SIZE]; /* what has been sent */
+    RTS_UI32 line_out_size;
+    RTS_UI32 line_write_limit; /* bytes one call of SysComWrite takes */
+
+    APP_STATUS status;
+    RTS_UI64 area[APP_AREA_COUNT][FAKE_AREA_SIZE / 8];
+    RTS_UI32 area_size[APP_AREA_COUNT];
+    RTS_RESULT control_result;
+    RTS_UI32 starts;
+    RTS_UI32 stops;
+    RTS_UI32 resets;
+    RTS_UI32 reset_option;
+
+    RTS_UI8 image[FAKE_IMAGE_SIZE];
+    RTS_UI32 download_total;
+    RTS_UI32 download_offset;
+    RTS_UI32 download_begins;
+    RTS_UI32 download_writes;
+    RTS_UI32 download_aborts;
+    RTS_UI32 download_ends;
+    RTS_RESULT write_result;
+    RTS_RESULT end_result;
+    const char *end_text;
+
+    LOG_ENTRY log[FAKE_LOG_SIZE];
+    RTS_UI32 log_count;
+    IEC_TASK_INFO tasks[FAKE_TASKS];
+    RTS_UI32 task_count;
+} FAKES;
+
+extern FAKES fakes;
+
+/* Everything as after power-on: an application is loaded and stopped, the communication is open. */
+void fakes_start(void);
+
+/* One main loop round `ms` later. */
+void fakes_cycle(RTS_UI32 ms);
+
+/* A hook of all communication components, in the order of a port's list (exit hooks in reverse). */
+void fakes_hook(CMP_HOOK hook);
+
+/* Bytes of an area. */
+RTS_UI8 *fakes_area(RTS_UI32 index);
+
+#endif

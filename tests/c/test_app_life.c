@@ -1,0 +1,515 @@
+/*
+ * test_app_life.c - download, start, stop, reset, boot project, rollback.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpEventMgr.h"
+#include "CmpLog.h"
+#include "SysFileFlash.h"
+#include "app_image.h"
+#include "test.h"
+
+static void start_blank(void)
+{
+    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+}
+
+static void start_with_counter(RTS_UI32 step)
+{
+    APP_BYTES image;
+
+    start_blank();
+    build_counter(&image, step);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+}
+
+static bool log_has(const char *text)
+{
+    LOG_ENTRY entry = {0};
+
+    while (LogGetEntry(entry.handle + 1, &entry) == ERR_OK) {
+        if (strstr(entry.text, text) != NULL)
+            return true;
+    }
+    return false;
+}
+
+static void a_blank_device_has_no_application(void)
+{
+    APP_STATUS status;
+
+    start_blank();
+    AppGetStatus(&status);
+    CHECK(status.state == AS_NONE);
+    CHECK(status.op_state == 0);
+    CHECK(AppStartApplication() == ERR_APP_NOT_LOADED);
+    CHECK(AppStopApplication() == ERR_APP_NOT_LOADED);
+    CHECK(AppReset(RESET_OPTION_WARM) == ERR_APP_NOT_LOADED);
+    CHECK(AppReset(RESET_OPTION_COLD) == ERR_APP_NOT_LOADED);
+    CHECK(AppReset(3) == ERR_PARAMETER);
+    CHECK(AppGetAreaAddress(APP_AREA_DATA, 0, 0) == NULL);
+    CHECK(AppGetAreaSize(APP_AREA_DATA) == 0);
+    CHECK(AppGetInfo(0)[0] == '\0');
+    CHECK(IecTaskGetCount() == 0);
+}
+
+static void a_download_leaves_the_application_stopped_and_initialised(void)
+{
+    APP_STATUS status;
+    APP_BYTES image;
+
+    start_blank();
+    build_counter(&image, 3);
+    CHECK(download(&image) == ERR_OK);
+    AppGetStatus(&status);
+    CHECK(status.state == AS_STOP);
+    CHECK(status.op_state == (OS_PROGRAM_LOADED | OS_BOOTPROJECT_VALID));
+    CHECK(status.image_crc == image_crc(&image));
+    CHECK(status.image_size == image.size);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 3);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 300);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
+}
+
+static void the_first_cycle_runs_at_the_start_and_then_one_per_interval(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 1);
+    CHECK(SimAdvance(ms(10) - 1) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 1);
+    CHECK(SimAdvance(1) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 2);
+    CHECK(SimAdvance(ms(990)) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 101);
+}
+
+static void stop_ends_the_cycles_and_zeroes_the_outputs(void)
+{
+    start_with_counter(5);
+    CHECK(SimAdvance(ms(20)) == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 5);
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 0);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 15);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 20);
+}
+
+static void warm_reset_keeps_retain_and_clears_the_rest(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 106);
+}
+
+static void cold_reset_clears_retain_too(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 100);
+}
+
+static void origin_reset_deletes_the_application_and_its_boot_project(void)
+{
+    APP_STATUS status;
+
+    start_with_counter(1);
+    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    AppGetStatus(&status);
+    CHECK(status.state == AS_NONE);
+    CHECK(status.op_state == 0);
+    CHECK(status.image_crc == 0);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_NONE);
+    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+}
+
+static void the_boot_project_runs_after_power_on(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(SimAdvance(ms(30)) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 4);
+}
+
+static void a_second_download_replaces_the_first(void)
+{
+    APP_BYTES second;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    build_counter(&second, 7);
+    CHECK(download(&second) == ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 7);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 700);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 7);
+}
+
+static void the_old_application_runs_on_while_a_new_one_arrives(void)
+{
+    APP_BYTES second;
+    APP_STATUS status;
+
+    start_with_counter(1);
+    build_counter(&second, 7);
+    CHECK(AppDownloadBegin(second.size, image_crc(&second)) == ERR_OK);
+    CHECK(AppDownloadWrite(0, second.bytes, 100) == ERR_OK);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    AppGetStatus(&status);
+    CHECK(status.state == AS_RUN);
+    CHECK((status.op_state & OS_DOWNLOAD) != 0);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 11);
+    CHECK(AppDownloadOffset() == 100);
+    AppDownloadAbort();
+    CHECK(AppDownloadOffset() == 0);
+    CHECK(AppDownloadWrite(100, second.bytes + 100, 100) == ERR_INVALID_SEQUENCE);
+}
+
+static void download_calls_out_of_order_are_refused(void)
+{
+    APP_BYTES image;
+    APP_REFUSAL refusal;
+
+    start_with_counter(1);
+    build_counter(&image, 2);
+    CHECK(AppDownloadEnd(&refusal) == ERR_INVALID_SEQUENCE);
+    CHECK(refusal.text[0] != '\0');
+    CHECK(AppDownloadWrite(0, image.bytes, 8) == ERR_INVALID_SEQUENCE);
+    CHECK(AppDownloadBegin(1000000, 0) == ERR_NOMEMORY);
+    CHECK(AppDownloadBegin(image.size, image_crc(&image)) == ERR_OK);
+    CHECK(AppDownloadWrite(8, image.bytes, 8) == ERR_INVALID_SEQUENCE);
+    CHECK(AppDownloadWrite(0, image.bytes, image.size + 1) == ERR_OUT_OF_LIMITS);
+    CHECK(AppDownloadEnd(&refusal) == ERR_SIZE_MISMATCH);
+    CHECK(AppDownloadWrite(0, image.bytes, image.size) == ERR_OK);
+    CHECK(AppDownloadEnd(&refusal) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+}
+
+static void begin_again_starts_anew(void)
+{
+    APP_BYTES image;
+
+    start_with_counter(1);
+    build_counter(&image, 2);
+    CHECK(AppDownloadBegin(image.size, image_crc(&image)) == ERR_OK);
+    CHECK(AppDownloadWrite(0, image.bytes, 300) == ERR_OK);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void the_application_info_can_be_read(void)
+{
+    start_with_counter(1);
+    CHECK(strcmp(AppGetInfo(0), "Project") == 0);
+    CHECK(strcmp(AppGetInfo(1), "Author") == 0);
+    CHECK(strcmp(AppGetInfo(2), "1.2.3") == 0);
+    CHECK(strcmp(AppGetInfo(3), "Description") == 0);
+    CHECK(strcmp(AppGetInfo(4), "Profile") == 0);
+    CHECK(AppGetInfo(5)[0] == '\0');
+}
+
+static void info_longer_than_its_buffer_is_cut(void)
+{
+    char text[200];
+    APP_SPEC spec;
+    APP_BYTES image;
+
+    memset(text, 'x', sizeof text);
+    text[sizeof text - 1] = '\0';
+    start_blank();
+    spec_counter(&spec, 1);
+    spec.info[0] = text;
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(strlen(AppGetInfo(0)) == APP_NAME_SIZE - 1);
+    CHECK(strcmp(AppGetInfo(1), "Author") == 0);
+}
+
+static void area_addresses_are_checked_to_the_byte(void)
+{
+    start_with_counter(1);
+    CHECK(AppGetAreaSize(APP_AREA_RETAIN) == 16);
+    CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 0, 16) != NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 16, 0) != NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 0, 17) == NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 15, 2) == NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 17, 0) == NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 0xFFFFFFFF, 1) == NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 1, 0xFFFFFFFF) == NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_MEMORY, 0, 1) == NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_COUNT, 0, 0) == NULL);
+    CHECK(AppGetAreaAddress(0xFFFF, 0, 0) == NULL);
+    CHECK(AppGetAreaAddress(APP_AREA_CODE, 0, 1) != NULL);
+}
+
+static RTS_UI32 seen_events[16];
+static RTS_UI32 seen_count;
+
+static void note_event(const EVENT_PARAM *param)
+{
+    if (seen_count < RTS_COUNT(seen_events))
+        seen_events[seen_count++] = param->event;
+}
+
+static void start_stop_reset_and_download_are_announced(void)
+{
+    static const RTS_UI32 events[] = {EVT_PrepareStart, EVT_StartDone,       EVT_PrepareStop, EVT_StopDone,
+                                      EVT_PrepareReset, EVT_PrepareDownload, EVT_ResetDone,   EVT_DownloadDone};
+    static const RTS_UI32 expected[] = {EVT_PrepareDownload, EVT_DownloadDone, EVT_PrepareStart, EVT_StartDone,
+                                        EVT_PrepareStop,     EVT_StopDone,     EVT_PrepareReset, EVT_ResetDone};
+    APP_BYTES image;
+    RTS_SIZE i;
+
+    start_blank();
+    build_counter(&image, 1);
+    seen_count = 0;
+    for (i = 0; i < RTS_COUNT(events); i++)
+        CHECK(EventRegisterCallback(CMPID_CmpAppEmbedded, events[i], note_event, NULL) == ERR_OK);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK); /* runs already: nothing happens */
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
+    CHECK(seen_count == RTS_COUNT(expected));
+    CHECK(memcmp(seen_events, expected, sizeof expected) == 0);
+}
+
+/* ---- rollback ---- */
+
+/* An application whose task divides by zero in its first cycle. */
+static void build_dying(APP_BYTES *image)
+{
+    APP_SPEC spec;
+
+    spec_counter(&spec, 9);
+    spec.tasks[0].entry_offset = here(&spec);
+    emit_divide_by_zero(&spec);
+    build_image(image, &spec);
+}
+
+static void an_application_that_dies_before_it_proved_itself_is_rolled_back(void)
+{
+    APP_BYTES image;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    build_dying(&image);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(10)) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK(log_has("back to the one before"));
+    CHECK(SimStart() == ERR_OK); /* and it stays so */
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK(!log_has("back to the one before"));
+}
+
+static void an_application_that_never_proves_itself_is_rolled_back_after_two_starts(void)
+{
+    APP_BYTES image;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    build_counter(&image, 2);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK); /* first start */
+    CHECK(SimAdvance(ms(2900)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK); /* power was lost: second start */
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+    CHECK(SimAdvance(ms(2900)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+}
+
+static void an_application_that_ran_long_enough_is_not_rolled_back(void)
+{
+    APP_BYTES image;
+    int i;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    build_counter(&image, 2);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(4100)) == ERR_OK);
+    for (i = 0; i < 5; i++) {
+        CHECK(SimStart() == ERR_OK);
+        CHECK(app_state() == AS_RUN);
+        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+    }
+}
+
+static void stopping_in_good_order_is_not_dying(void)
+{
+    APP_BYTES image;
+    int i;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    build_counter(&image, 2);
+    CHECK(download(&image) == ERR_OK);
+    for (i = 0; i < 5; i++) {
+        CHECK(AppStartApplication() == ERR_OK);
+        CHECK(SimAdvance(ms(100)) == ERR_OK);
+        CHECK(AppStopApplication() == ERR_OK);
+        SimStop();
+        CHECK(SimStart() == ERR_OK);
+        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+    }
+}
+
+static void a_first_application_that_died_stays_loaded_but_stopped(void)
+{
+    APP_BYTES image;
+
+    start_blank();
+    build_dying(&image);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 9);
+    CHECK(log_has("not started"));
+}
+
+static void a_proven_application_that_had_an_exception_starts_again(void)
+{
+    APP_SPEC spec;
+    APP_BYTES image;
+    CDL_TASK *task;
+
+    start_blank();
+    spec_counter(&spec, 1);
+    task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
+    task->event_area = APP_AREA_DATA;
+    task->event_offset = 32;
+    emit_divide_by_zero(&spec);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(4100)) == ERR_OK);
+    *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
+    CHECK(SimAdvance(ms(20)) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+}
+
+static void a_damaged_boot_project_gives_way_to_the_other_slot(void)
+{
+    APP_BYTES first;
+    APP_BYTES second;
+
+    start_with_counter(1);
+    build_counter(&first, 1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    build_counter(&second, 2);
+    CHECK(download(&second) == ERR_OK); /* slot B */
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    SimFlashData()[SysFileGetArea(FILE_SLOT_B)->offset + 200] ^= 1;
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK(log_has("Boot project refused: The image is damaged"));
+}
+
+static void a_device_without_any_good_image_still_starts(void)
+{
+    start_with_counter(1);
+    SimFlashData()[200] ^= 1;
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_NONE);
+    start_with_counter(1);
+    CHECK(app_state() == AS_RUN);
+}
+
+static void many_downloads_wrap_the_commit_log(void)
+{
+    APP_BYTES image;
+    RTS_UI32 i;
+
+    start_blank();
+    for (i = 1; i <= 200; i++) {
+        build_counter(&image, i);
+        CHECK(download(&image) == ERR_OK);
+        CHECK(AppStartApplication() == ERR_OK);
+        CHECK(SimAdvance(ms(4100)) == ERR_OK);
+        if (i % 7 == 0)
+            CHECK(SimStart() == ERR_OK);
+        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == i);
+        CHECK(app_state() == AS_RUN);
+    }
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void shutdown_is_orderly_and_can_be_repeated(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    SimStop();
+    SimStop();
+    CHECK(SimAdvance(1) == ERR_NOTINITIALIZED);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+}
+
+int main(void)
+{
+    NEEDS_X86_64;
+    RUN(a_blank_device_has_no_application);
+    RUN(a_download_leaves_the_application_stopped_and_initialised);
+    RUN(the_first_cycle_runs_at_the_start_and_then_one_per_interval);
+    RUN(stop_ends_the_cycles_and_zeroes_the_outputs);
+    RUN(warm_reset_keeps_retain_and_clears_the_rest);
+    RUN(cold_reset_clears_retain_too);
+    RUN(origin_reset_deletes_the_application_and_its_boot_project);
+    RUN(the_boot_project_runs_after_power_on);
+    RUN(a_second_download_replaces_the_first);
+    RUN(the_old_application_runs_on_while_a_new_one_arrives);
+    RUN(download_calls_out_of_order_are_refused);
+    RUN(begin_again_starts_anew);
+    RUN(the_application_info_can_be_read);
+    RUN(info_longer_than_its_buffer_is_cut);
+    RUN(area_addresses_are_checked_to_the_byte);
+    RUN(start_stop_reset_and_download_are_announced);
+    RUN(an_application_that_dies_before_it_proved_itself_is_rolled_back);
+    RUN(an_application_that_never_proves_itself_is_rolled_back_after_two_starts);
+    RUN(an_application_that_ran_long_enough_is_not_rolled_back);
+    RUN(stopping_in_good_order_is_not_dying);
+    RUN(a_first_application_that_died_stays_loaded_but_stopped);
+    RUN(a_proven_application_that_had_an_exception_starts_again);
+    RUN(a_damaged_boot_project_gives_way_to_the_other_slot);
+    RUN(a_device_without_any_good_image_still_starts);
+    RUN(many_downloads_wrap_the_commit_log);
+    RUN(shutdown_is_orderly_and_can_be_repeated);
+    return test_result();
+}

@@ -1,0 +1,301 @@
+/*
+ * test_app_powercut.c - power is cut at every flash operation of a download and of what follows it.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A device runs application 1 (proven). Then application 2 is downloaded, started, proves itself, saves its retain variables, is
+ * stopped and started again. Each run of this story is cut at another operation. After it the device must run 1 or 2, never
+ * nothing and never a mix, and must accept application 3.
+ */
+#include "app_image.h"
+#include "test.h"
+
+typedef struct {
+    RTS_UI32 program_size;
+    RTS_UI8 erased;
+    RTS_UI32 sector_size;
+} GEOMETRY;
+
+static APP_BYTES images[4]; /* [step]; 0 unused */
+static RTS_UI32 cuts;       /* that were tried in all */
+
+static void prepare(const GEOMETRY *g)
+{
+    CHECK(SimFlashConfigure(32 * 1024, g->sector_size, g->program_size, g->erased) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(download(&images[1]) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(6000)) == ERR_OK);
+    SimStop();
+    CHECK(SimFlashSave() == ERR_OK);
+}
+
+static RTS_RESULT story_result;
+
+static RTS_RESULT try_story(void)
+{
+    RTS_RESULT result = download(&images[2]);
+
+    if (result == ERR_OK)
+        result = AppStartApplication();
+    if (result == ERR_OK)
+        result = SimAdvance(ms(8000));
+    if (result == ERR_OK)
+        result = AppStopApplication();
+    if (result == ERR_OK)
+        result = AppStartApplication();
+    return result == ERR_OK ? SimAdvance(ms(2500)) : result;
+}
+
+static void story(void *unused)
+{
+    RTS_UNUSED(unused);
+    story_result = try_story();
+}
+
+static RTS_UI32 count_operations(void)
+{
+    RTS_UI32 before;
+
+    CHECK(SimFlashRestore() == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    before = SimFlashOps();
+    CHECK(SimCall(story, NULL) == ERR_OK);
+    CHECK(story_result == ERR_OK);
+    return SimFlashOps() - before;
+}
+
+/* One of the applications runs, whole: code, initial values and retain variables are those of the same. */
+static RTS_UI32 check_whole(void)
+{
+    RTS_UI32 step = read_u32(APP_AREA_DATA, STEP_OFFSET);
+    RTS_UI32 retain = read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET);
+    APP_STATUS status;
+
+    AppGetStatus(&status);
+    CHECK(status.state == AS_RUN);
+    CHECK(step == 1 || step == 2);
+    if (step != 1 && step != 2)
+        return 0;
+    CHECK(status.image_crc == image_crc(&images[step]));
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET) == retain);
+    CHECK(retain >= 100 * step);
+    CHECK(retain % step == 0);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 11 * step);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == retain + 11 * step);
+    return step;
+}
+
+static void check_can_be_flashed_again(void)
+{
+    CHECK(download(&images[3]) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 3);
+}
+
+/* Returns which application runs afterwards. */
+static RTS_UI32 cut_once(RTS_UI32 operation, RTS_UI32 mode)
+{
+    RTS_UI32 step;
+    int failures = test_failures;
+
+    cuts++;
+    CHECK(SimFlashRestore() == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    SimFlashCut(operation, mode);
+    CHECK(SimCall(story, NULL) == SIM_POWER_CUT);
+    CHECK(SimStart() == ERR_OK);
+    step = check_whole();
+    check_can_be_flashed_again();
+    CHECK(SimFlashViolations() == 0);
+    if (test_failures != failures)
+        fprintf(stderr, "^ operation %u, mode %u: %s\n", (unsigned)operation, (unsigned)mode, SimFlashViolation());
+    return step;
+}
+
+static void sweep(const GEOMETRY *g)
+{
+    RTS_UI32 operations;
+    RTS_UI32 mode;
+
+    prepare(g);
+    operations = count_operations();
+    for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
+        RTS_UI32 last = 1;
+        RTS_UI32 changes = 0;
+        RTS_UI32 k;
+        for (k = 1; k <= operations; k++) {
+            RTS_UI32 step = cut_once(k, mode);
+            changes += step != last;
+            last = step;
+        }
+        CHECK(changes == 1); /* one operation commits: before it the old, after it the new */
+        CHECK(last == 2);
+    }
+    printf("     program size %2u, erased 0x%02X, sector %4u: %u operations\n", (unsigned)g->program_size, g->erased,
+           (unsigned)g->sector_size, (unsigned)operations);
+}
+
+static void every_cut_leaves_the_old_or_the_new_application(void)
+{
+    static const GEOMETRY geometries[] = {
+        {1, 0xFF, 512}, {1, 0x00, 512}, {8, 0xFF, 512}, {8, 0x00, 512}, {16, 0xFF, 1024}, {2, 0x00, 256},
+    };
+    RTS_SIZE i;
+
+    for (i = 0; i < RTS_COUNT(geometries); i++)
+        sweep(&geometries[i]);
+    printf("     %u cuts\n", (unsigned)cuts);
+}
+
+/* Power fails again while the device recovers from the first cut, at each operation of the recovery. */
+static void a_second_cut_during_recovery_changes_nothing(void)
+{
+    static const GEOMETRY g = {8, 0xFF, 512};
+    RTS_UI32 operations;
+    RTS_UI32 first;
+    RTS_UI32 second;
+
+    prepare(&g);
+    operations = count_operations();
+    for (first = 1; first <= operations; first++) {
+        for (second = 1; second <= 6; second++) {
+            CHECK(SimFlashRestore() == ERR_OK);
+            CHECK(SimStart() == ERR_OK);
+            SimFlashCut(first, SIM_CUT_TORN);
+            CHECK(SimCall(story, NULL) == SIM_POWER_CUT);
+            if (SimStart() == ERR_OK) {
+                SimFlashCut(second, SIM_CUT_TORN);
+                (void)SimAdvance(ms(2000));
+            }
+            CHECK(SimStart() == ERR_OK);
+            (void)check_whole();
+            CHECK(SimFlashViolations() == 0);
+        }
+    }
+}
+
+/* A fault is no power cut: the operation fails and the device goes on. The old application must run on, or the new one. */
+static void a_flash_fault_at_any_operation_of_a_download_is_survived(void)
+{
+    static const GEOMETRY g = {8, 0xFF, 512};
+    RTS_UI32 operations;
+    RTS_UI32 k;
+
+    prepare(&g);
+    operations = count_operations();
+    for (k = 1; k <= operations; k++) {
+        RTS_RESULT result;
+        CHECK(SimFlashRestore() == ERR_OK);
+        CHECK(SimStart() == ERR_OK);
+        SimFlashCut(k, SIM_FAULT);
+        CHECK(SimCall(story, NULL) == ERR_OK);
+        result = story_result;
+        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == (result == ERR_OK ? 2 : 1));
+        CHECK(app_state() == AS_RUN);
+        CHECK(SimFlashViolations() == 0);
+        CHECK(SimStart() == ERR_OK);
+        CHECK(app_state() == AS_RUN);
+        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == (result == ERR_OK ? 2 : 1));
+        check_can_be_flashed_again();
+    }
+}
+
+/* The first program on a blank device: afterwards nothing or the application, and the device can be used. */
+static void the_first_download_can_be_cut_anywhere(void)
+{
+    RTS_UI32 mode;
+    RTS_UI32 k;
+
+    for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
+        for (k = 1; k < 1000; k++) {
+            CHECK(SimFlashConfigure(32 * 1024, 512, 8, 0xFF) == ERR_OK);
+            CHECK(SimStart() == ERR_OK);
+            SimFlashCut(k, mode);
+            if (SimCall(story, NULL) == ERR_OK)
+                break;
+            CHECK(SimStart() == ERR_OK);
+            CHECK(app_state() == AS_NONE || read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+            check_can_be_flashed_again();
+            CHECK(SimFlashViolations() == 0);
+        }
+        CHECK(k > 20 && k < 1000);
+    }
+}
+
+/* Cuts in the deletion: the application is there, or it is gone, and does not come back. */
+static void origin_reset(void *unused)
+{
+    RTS_UNUSED(unused);
+    story_result = AppReset(RESET_OPTION_ORIGIN);
+}
+
+static void an_origin_reset_can_be_cut_anywhere(void)
+{
+    static const GEOMETRY g = {1, 0xFF, 512};
+    RTS_UI32 mode;
+    RTS_UI32 k;
+
+    prepare(&g);
+    for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
+        for (k = 1; k < 100; k++) {
+            CHECK(SimFlashRestore() == ERR_OK);
+            CHECK(SimStart() == ERR_OK);
+            SimFlashCut(k, mode);
+            if (SimCall(origin_reset, NULL) == ERR_OK)
+                break;
+            CHECK(SimStart() == ERR_OK);
+            if (app_state() != AS_NONE)
+                CHECK(check_whole() == 1);
+        }
+        CHECK(k > 1 && k < 100);
+        CHECK(SimStart() == ERR_OK);
+        CHECK(app_state() == AS_NONE);
+    }
+}
+
+/* Many stories one after the other on the same flash, cut at places that move on: the logs wrap in every state. */
+static void cuts_go_on_for_ever(void)
+{
+    static const GEOMETRY g = {8, 0x00, 256};
+    RTS_UI32 round;
+
+    prepare(&g);
+    CHECK(SimFlashRestore() == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    for (round = 0; round < 1500; round++) {
+        RTS_UI32 next = round % 3 + 1;
+        RTS_UI32 step;
+        SimFlashCut(round * 7 % 41 + 1, round % 3);
+        if (download(&images[next]) == ERR_OK && AppStartApplication() == ERR_OK)
+            (void)SimAdvance(ms(4000 + round % 7 * 500));
+        CHECK(SimStart() == ERR_OK);
+        step = read_u32(APP_AREA_DATA, STEP_OFFSET);
+        CHECK(step >= 1 && step <= 3);
+        CHECK(app_state() == AS_RUN);
+        CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET));
+        if (SimFlashViolations() != 0)
+            break;
+    }
+    CHECK(SimFlashViolations() == 0);
+}
+
+int main(void)
+{
+    RTS_UI32 step;
+
+    NEEDS_X86_64;
+    for (step = 1; step <= 3; step++)
+        build_counter(&images[step], step);
+    RUN(every_cut_leaves_the_old_or_the_new_application);
+    RUN(a_second_cut_during_recovery_changes_nothing);
+    RUN(a_flash_fault_at_any_operation_of_a_download_is_survived);
+    RUN(the_first_download_can_be_cut_anywhere);
+    RUN(an_origin_reset_can_be_cut_anywhere);
+    RUN(cuts_go_on_for_ever);
+    return test_result();
+}

@@ -1,0 +1,365 @@
+/*
+ * test_app_retain.c - retain variables over power cuts, resets and downloads.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpLog.h"
+#include "SysFileFlash.h"
+#include "app_image.h"
+#include "test.h"
+
+static APP_SPEC spec;
+static APP_BYTES image;
+
+static void start_blank(void)
+{
+    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+}
+
+static void load(void)
+{
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+}
+
+static void start_with_counter(RTS_UI32 step)
+{
+    start_blank();
+    spec_counter(&spec, step);
+    load();
+}
+
+static RTS_UI32 retain_value(void)
+{
+    RTS_UI32 a = read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET);
+
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET) == a);
+    return a;
+}
+
+static bool log_has(const char *text)
+{
+    LOG_ENTRY entry = {0};
+
+    while (LogGetEntry(entry.handle + 1, &entry) == ERR_OK) {
+        if (strstr(entry.text, text) != NULL)
+            return true;
+    }
+    return false;
+}
+
+static void a_power_cut_loses_at_most_a_second(void)
+{
+    RTS_UI32 before;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(7350)) == ERR_OK);
+    before = retain_value();
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() <= before);
+    CHECK(retain_value() >= before - 101);
+    CHECK(retain_value() > 100);
+}
+
+static void stop_saves_at_once(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(330)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() == 134);
+}
+
+static void shutdown_saves(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(330)) == ERR_OK);
+    SimStop();
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() == 134);
+}
+
+static void an_exception_saves(void)
+{
+    CDL_TASK *task;
+
+    start_blank();
+    spec_counter(&spec, 1);
+    task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
+    task->event_area = APP_AREA_DATA;
+    task->event_offset = 32;
+    emit_divide_by_zero(&spec);
+    load();
+    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
+    CHECK(SimAdvance(ms(9)) == ERR_OK);
+    CHECK(app_exception() != RTSEXCPT_NOEXCEPTION);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() == 634);
+}
+
+static void unchanged_variables_are_not_saved_again(void)
+{
+    RTS_UI32 operations;
+
+    start_blank();
+    spec_counter(&spec, 1);
+    spec.tasks[0].interval_us = 3600000000u; /* runs once at the start */
+    load();
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    operations = SimFlashOps();
+    CHECK(SimAdvance(ms(3000000)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(SimFlashOps() == operations);
+}
+
+static void changing_variables_are_saved_once_per_second(void)
+{
+    RTS_UI32 operations;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    operations = SimFlashOps();
+    CHECK(SimAdvance(ms(10000)) == ERR_OK);
+    CHECK(SimFlashOps() - operations >= 9 * 2); /* a record is two to four programs */
+    CHECK(SimFlashOps() - operations <= 10 * 4 + 8); /* and at most one change of the half */
+}
+
+static void an_application_without_retain_variables_saves_nothing(void)
+{
+    RTS_UI32 operations;
+
+    start_blank();
+    spec_init(&spec);
+    spec.areas[APP_AREA_RETAIN] = 0;
+    add_task(&spec, "Main", KIND_CYCLIC, 1000, here(&spec));
+    emit_ret(&spec);
+    load();
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    operations = SimFlashOps();
+    CHECK(SimAdvance(ms(10000)) == ERR_OK);
+    CHECK(SimFlashOps() == operations);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+}
+
+static void values_go_on_over_many_power_cuts(void)
+{
+    RTS_UI32 before = 100;
+    int i;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(4100)) == ERR_OK);
+    for (i = 0; i < 300; i++) {
+        CHECK(retain_value() >= before);
+        before = retain_value();
+        CHECK(SimAdvance(ms(1010)) == ERR_OK);
+        CHECK(SimStart() == ERR_OK);
+    }
+    CHECK(before > 300 * 95);
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void a_download_gives_initial_values(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    load();
+    CHECK(retain_value() == 100);
+    CHECK(SimStart() == ERR_OK); /* also when power is lost right after it */
+    CHECK(retain_value() == 100);
+}
+
+static void a_cold_reset_gives_initial_values_for_good(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() == 100);
+}
+
+static void another_layout_is_not_restored(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    spec_counter(&spec, 2);
+    spec.retain_layout++;
+    load();
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() > 1000);
+    CHECK(!log_has("initial values"));
+}
+
+static void download_image(void *arg)
+{
+    RTS_UNUSED(arg);
+    (void)download(&image);
+}
+
+/* Power fails after the commit of image 2, before its initial values are saved: only those of image 1 are there. They are of
+ * the same layout, but not of this application. */
+static void values_of_the_application_before_are_not_taken_over(void)
+{
+    enum { OPERATIONS_OF_A_SAVE = 4 };
+    RTS_UI32 operations;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(SimFlashSave() == ERR_OK);
+    spec_counter(&spec, 2);
+    build_image(&image, &spec);
+    operations = SimFlashOps();
+    CHECK(SimCall(download_image, NULL) == ERR_OK);
+    operations = SimFlashOps() - operations;
+    CHECK(SimFlashRestore() == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
+    SimFlashCut(operations - OPERATIONS_OF_A_SAVE + 1, SIM_CUT_BEFORE);
+    CHECK(SimCall(download_image, NULL) == SIM_POWER_CUT);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+    CHECK(retain_value() == 200);
+}
+
+/* Application 2, of the same layout, runs for a moment, saves, and dies: application 1 goes on with what it had itself. */
+static void a_rollback_brings_back_the_values_of_its_application(void)
+{
+    CDL_TASK *task;
+    int i;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(retain_value() == 601);
+    spec_counter(&spec, 2);
+    task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
+    task->event_area = APP_AREA_DATA;
+    task->event_offset = 32;
+    emit_divide_by_zero(&spec);
+    load();
+    CHECK(SimAdvance(ms(2500)) == ERR_OK);
+    *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
+    CHECK(SimAdvance(ms(10)) == ERR_OK);
+    for (i = 0; i < 3; i++) {
+        CHECK(SimStart() == ERR_OK);
+        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+        CHECK(retain_value() == 601);
+    }
+    CHECK(SimAdvance(ms(2000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() > 700);
+}
+
+/* The retain log is gone, the commit record is not: saving starts anew and works. */
+static void a_lost_log_costs_its_values_only(void)
+{
+    const FILE_AREA *area = SysFileGetArea(FILE_RETAIN);
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    load(); /* the records of this download are numbered from six or so */
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    memset(SimFlashData() + area->offset, 0x55, area->size);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() == 100);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() > 500);
+}
+
+static void damaged_values_give_way_to_initial_ones(void)
+{
+    const FILE_AREA *area = SysFileGetArea(FILE_RETAIN);
+    RTS_UI32 i;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    for (i = 0; i < area->size; i += 4) {
+        RTS_UI32 word;
+        memcpy(&word, SimFlashData() + area->offset + i, sizeof word);
+        if (word == RETAIN_LAYOUT)
+            SimFlashData()[area->offset + i + 8] ^= 1; /* the CRC of the record */
+    }
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() == 100);
+    CHECK(SimAdvance(ms(2000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() > 200);
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void without_a_layout_only_the_same_image_gets_its_values_back(void)
+{
+    start_blank();
+    spec_counter(&spec, 1);
+    spec.retain_layout = 0;
+    load();
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() > 400);
+}
+
+static void a_flash_fault_does_not_stop_the_application(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    SimFlashCut(1, SIM_FAULT);
+    CHECK(SimAdvance(ms(10000)) == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(log_has("cannot be saved"));
+    CHECK(SimStart() == ERR_OK);
+    CHECK(retain_value() > 1300); /* and it was saved again afterwards */
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void a_large_retain_area_is_saved_whole(void)
+{
+    RTS_UI32 size = APP_RETAIN_SIZE;
+    RTS_UI8 *area;
+    RTS_UI32 i;
+
+    CHECK(SimFlashConfigure(1024 * 1024, 4096, 16, 0) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    spec_counter(&spec, 1);
+    spec.areas[APP_AREA_RETAIN] = size;
+    load();
+    area = AppGetAreaAddress(APP_AREA_RETAIN, 0, size);
+    for (i = 16; i < size; i++)
+        area[i] = (RTS_UI8)(i * 7 >> 3);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    area = AppGetAreaAddress(APP_AREA_RETAIN, 0, size);
+    for (i = 16; i < size && area[i] == (RTS_UI8)(i * 7 >> 3); i++)
+        ;
+    CHECK(i == size);
+    CHECK(SimFlashViolations() == 0);
+}
+
+int main(void)
+{
+    NEEDS_X86_64;
+    RUN(a_power_cut_loses_at_most_a_second);
+    RUN(stop_saves_at_once);
+    RUN(shutdown_saves);
+    RUN(an_exception_saves);
+    RUN(unchanged_variables_are_not_saved_again);
+    RUN(changing_variables_are_saved_once_per_second);
+    RUN(an_application_without_retain_variables_saves_nothing);
+    RUN(values_go_on_over_many_power_cuts);
+    RUN(a_download_gives_initial_values);
+    RUN(a_cold_reset_gives_initial_values_for_good);
+    RUN(another_layout_is_not_restored);
+    RUN(values_of_the_application_before_are_not_taken_over);
+    RUN(a_rollback_brings_back_the_values_of_its_application);
+    RUN(a_lost_log_costs_its_values_only);
+    RUN(damaged_values_give_way_to_initial_ones);
+    RUN(without_a_layout_only_the_same_image_gets_its_values_back);
+    RUN(a_flash_fault_does_not_stop_the_application);
+    RUN(a_large_retain_area_is_saved_whole);
+    return test_result();
+}

@@ -1,0 +1,580 @@
+/*
+ * test_comm_monitor.c - CmpMonitor2: which programs are recognised, bounds, errors, atomic copies.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include <string.h>
+
+#include "CmpBytes.h"
+#include "CmpSrv.h"
+#include "comm_client.h"
+#include "comm_fakes.h"
+#include "test.h"
+
+static CLIENT client;
+static REPLY reply;
+static RTS_UI8 content[NETSERVER_MESSAGE_SIZE];
+static BTAG_WRITER writer;
+
+static void setup(void)
+{
+    fakes_start();
+    CHECK(client_connect(&client));
+    for (RTS_UI32 area = 0; area < APP_AREA_COUNT; area++)
+        for (RTS_UI32 i = 0; i < FAKE_AREA_SIZE; i++)
+            fakes_area(area)[i] = (RTS_UI8)(i + 16 * area);
+}
+
+static void begin_request(void)
+{
+    BTagWriterInit(&writer, content, sizeof(content) - 20);
+    BTagOpen(&writer, TAG_MON2_APPLICATION, BTAG_ALIGN_0);
+    BTagAppend32(&writer, client.app_session);
+    BTagAppend32(&writer, FAKE_IMAGE_CRC);
+    BTagAppendZeros(&writer, 12);
+    BTagClose(&writer);
+}
+
+/* ---- reading ---- */
+
+static void begin_read(void)
+{
+    begin_request();
+    BTagOpen(&writer, TAG_MON2_READ_LIST, BTAG_ALIGN_0);
+}
+
+/* A variable with all the tags a programming system sends. */
+static void add_program(RTS_UI32 id, RTS_UI32 size, const RTS_UI8 *code, RTS_UI32 code_size)
+{
+    BTagOpen(&writer, TAG_MON2_READ_VAR, BTAG_ALIGN_0);
+    BTagWrite16(&writer, TAG_MON2_VAR_ID, id);
+    BTagWrite32(&writer, TAG_MON2_VAR_SIZE, size);
+    BTagWrite32(&writer, TAG_MON2_VAR_TYPE_CLASS, 7);
+    BTagWrite16(&writer, TAG_MON2_VAR_CODE_SIZE, code_size);
+    BTagOpen(&writer, TAG_MON2_VAR_CODE, BTAG_ALIGN_0);
+    BTagAppend(&writer, code, code_size);
+    BTagPad(&writer);
+    BTagClose(&writer);
+    BTagClose(&writer);
+}
+
+static void add_read(RTS_UI32 id, RTS_UI32 size, RTS_UI8 area, RTS_UI32 offset)
+{
+    RTS_UI8 code[] = {MON2_OP_LD32, 0, 0, 0, 0, MON2_OP_RAO, area};
+
+    BytesPut32(code + 1, offset);
+    add_program(id, size, code, sizeof(code));
+}
+
+static const RTS_UI8 *values;
+static RTS_UI32 values_size;
+
+static bool send_read(void)
+{
+    BTAG tag;
+
+    BTagClose(&writer);
+    values_size = 0;
+    if (!client_call(&client, SG_MONITORING2, SRV_MON2_READ, &writer, &reply))
+        return false;
+    if (BTagFind(&reply.tags, TAG_MON2_VALUES, 1, NETSERVER_MESSAGE_SIZE, &tag) == ERR_OK) {
+        values = tag.data;
+        values_size = tag.size;
+    }
+    return true;
+}
+
+/* Takes the next value if it has this id and size. */
+static const RTS_UI8 *take_value(RTS_UI32 id, RTS_UI32 size)
+{
+    const RTS_UI8 *value = values + 6;
+
+    if (values_size < 6 || BytesGet16(values) != id || BytesGet32(values + 2) != size || size > values_size - 6)
+        return NULL;
+    values += 6 + size;
+    values_size -= 6 + size;
+    return value;
+}
+
+static bool take_failure(RTS_UI32 id, RTS_UI8 error)
+{
+    const RTS_UI8 *value = take_value(id | MON2_ID_FAILED, 1);
+
+    return value != NULL && *value == error;
+}
+
+/* Reads one variable by program and returns its error (0: it was read). */
+static RTS_UI32 read_error(const RTS_UI8 *code, RTS_UI32 code_size, RTS_UI32 size)
+{
+    begin_read();
+    add_program(5, size, code, code_size);
+    CHECK(send_read());
+    CHECK(reply_error(&reply) == ERR_OK);
+    if (take_value(5, size) != NULL)
+        return 0;
+    CHECK(values_size == 7 && BytesGet16(values) == (5 | MON2_ID_FAILED) && BytesGet32(values + 2) == 1);
+    return values[6];
+}
+
+#define READ_ERROR(code, size) read_error((const RTS_UI8 *)(code), sizeof(code) - 1, size)
+
+static void variables_of_all_sizes_are_read(void)
+{
+    const RTS_UI8 *value;
+
+    setup();
+    begin_read();
+    add_read(1, 1, APP_AREA_DATA, 3);
+    add_read(2, 2, APP_AREA_RETAIN, 4);
+    add_read(3, 4, APP_AREA_INPUT, 8);
+    add_read(4, 8, APP_AREA_OUTPUT, 16);
+    add_read(5, 13, APP_AREA_MEMORY, 5);
+    add_read(6, 4, APP_AREA_CODE, 1);
+    CHECK(send_read());
+    CHECK((value = take_value(1, 1)) != NULL && value[0] == 3);
+    CHECK((value = take_value(2, 2)) != NULL && memcmp(value, fakes_area(APP_AREA_RETAIN) + 4, 2) == 0);
+    CHECK((value = take_value(3, 4)) != NULL && memcmp(value, fakes_area(APP_AREA_INPUT) + 8, 4) == 0);
+    CHECK((value = take_value(4, 8)) != NULL && memcmp(value, fakes_area(APP_AREA_OUTPUT) + 16, 8) == 0);
+    CHECK((value = take_value(5, 13)) != NULL && memcmp(value, fakes_area(APP_AREA_MEMORY) + 5, 13) == 0);
+    CHECK((value = take_value(6, 4)) != NULL && memcmp(value, fakes_area(APP_AREA_CODE) + 1, 4) == 0);
+    CHECK(values_size == 0);
+}
+
+static void every_alignment_and_size_is_read_right(void)
+{
+    setup();
+    for (RTS_UI32 offset = 0; offset < 8; offset++) {
+        for (RTS_UI32 size = 1; size <= 9; size++) {
+            begin_read();
+            add_read(1, size, APP_AREA_DATA, offset);
+            CHECK(send_read());
+            const RTS_UI8 *value = take_value(1, size);
+            CHECK(value != NULL && memcmp(value, fakes_area(APP_AREA_DATA) + offset, size) == 0);
+        }
+    }
+}
+
+static void recognised_read_programs(void)
+{
+    setup();
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00", 2) == 0);
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01", 2) == 0);
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01\x00\x00", 2) == 0);
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x00\x00", 2) == 0);
+    CHECK(READ_ERROR("\x03\x10\x00\x00\x00\x06\x00", 2) == 0);
+    CHECK(READ_ERROR("\x03\x10\x00\x00\x00\x06\x00\x01", 2) == 0);
+}
+
+static void every_other_program_is_refused(void)
+{
+    setup();
+    CHECK(READ_ERROR("\x02\x10\x00\x06", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x02\x10\x00\x07\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x1C\x10\x00\x06\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x09\x04", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR); /* Der */
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01\x18", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR); /* Call after Halt */
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01\x01", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x03\x10\x00\x00\x00\x06", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x18\x00\x00\x00\x00\x00\x01", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+}
+
+static void single_bytes_of_a_program_cannot_be_changed_unnoticed(void)
+{
+    RTS_UI8 code[] = {MON2_OP_LD16, 0x10, 0x00, MON2_OP_RAO, 0x00, MON2_OP_HALT};
+
+    setup();
+    for (RTS_UI32 i = 0; i < sizeof(code); i++) {
+        RTS_UI8 right = code[i];
+        for (RTS_UI32 byte = 0; byte < 256; byte++) {
+            code[i] = (RTS_UI8)byte;
+            RTS_UI32 error = read_error(code, sizeof(code), 2);
+            bool legal = i == 1 || i == 2 || i == 4 /* the address */ || byte == right || (i == 5 && byte == 0);
+            CHECK((error == MONITORING_ERR_UNSUPPORTED_OPERATOR) == !legal);
+        }
+        code[i] = right;
+    }
+}
+
+static void bounds_of_the_area_are_kept(void)
+{
+    setup();
+    begin_read();
+    add_read(1, 1, APP_AREA_DATA, FAKE_AREA_SIZE - 1);
+    add_read(2, 2, APP_AREA_DATA, FAKE_AREA_SIZE - 1);
+    add_read(3, 1, APP_AREA_DATA, FAKE_AREA_SIZE);
+    add_read(4, 0xFFFFFFFF, APP_AREA_DATA, 1);
+    add_read(5, 2, APP_AREA_DATA, 0xFFFFFFFF);
+    CHECK(send_read());
+    CHECK(take_value(1, 1) != NULL);
+    for (RTS_UI32 id = 2; id <= 5; id++)
+        CHECK(take_failure(id, MONITORING_ERR_INVALID_INDEX));
+}
+
+static void unknown_areas_and_size_zero_are_refused(void)
+{
+    setup();
+    fakes.area_size[APP_AREA_RETAIN] = 0;
+    begin_read();
+    add_read(1, 1, APP_AREA_COUNT, 0);
+    add_read(2, 1, 0xFF, 0);
+    add_read(3, 1, APP_AREA_RETAIN, 0);
+    add_read(4, 0, APP_AREA_DATA, 0);
+    CHECK(send_read());
+    CHECK(take_failure(1, MONITORING_ERR_INVALID_AREA));
+    CHECK(take_failure(2, MONITORING_ERR_INVALID_AREA));
+    CHECK(take_failure(3, MONITORING_ERR_INVALID_AREA));
+    CHECK(take_failure(4, MONITORING_ERR_SIZE_0));
+}
+
+static void compact_form_reads_150_variables_at_once(void)
+{
+    enum { COUNT = 150 };
+    RTS_UI8 message[2048];
+    RTS_UI32 size;
+    RTS_UI8 *place = content;
+
+    setup();
+    begin_request();
+    place = content + writer.size;
+    BytesPut16(place, 0x0181);
+    BytesPut16(place + 2, (COUNT * 13 & 0x7F) | 0x80 | COUNT * 13 >> 7 << 8);
+    place += 4;
+    for (RTS_UI32 i = 0; i < COUNT; i++, place += 13) {
+        memcpy(place, "\x82\x01\x0A\x02\x01\x04\x05\x05\x02\x00\x00\x06\x00", 13);
+        BytesPut16(place + 9, 4 * i);
+    }
+    size = (RTS_UI32)(place - content);
+    CHECK(size + 20 <= sizeof(message));
+    CHECK(client_request(&client, SG_MONITORING2, SRV_MON2_READ, content, size, &reply));
+    CHECK(reply.size <= 2048);
+    BTAG tag;
+    CHECK(BTagFind(&reply.tags, TAG_MON2_VALUES, 10 * COUNT, 10 * COUNT, &tag) == ERR_OK);
+    values = tag.data;
+    values_size = tag.size;
+    for (RTS_UI32 i = 0; i < COUNT; i++) {
+        const RTS_UI8 *value = take_value(i, 4);
+        CHECK(value != NULL && memcmp(value, fakes_area(APP_AREA_DATA) + 4 * i, 4) == 0);
+    }
+}
+
+static void what_does_not_fit_fails_alone(void)
+{
+    RTS_UI32 large = FAKE_AREA_SIZE;
+
+    fakes_start();
+    client_init(&client, 1);
+    client_send_open(&client, 1, 700);
+    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK(client_login(&client) && client_login_app(&client));
+    begin_read();
+    add_read(1, 600, APP_AREA_DATA, 0);
+    add_read(2, large, APP_AREA_DATA, 0);
+    add_read(3, 4, APP_AREA_DATA, 0);
+    for (RTS_UI32 id = 4; id < 12; id++)
+        add_read(id, 4, APP_AREA_DATA, 0);
+    CHECK(send_read());
+    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK(reply.size <= 700);
+    CHECK(take_failure(1, MONITORING_ERR_BUFFERSIZE_EXCEEDED) || values_size > 600);
+}
+
+static void large_value_leaves_room_for_the_answers_after_it(void)
+{
+    RTS_UI32 failures = 0;
+
+    fakes_start();
+    client_init(&client, 1);
+    client_send_open(&client, 1, 700);
+    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK(client_login(&client) && client_login_app(&client));
+    for (RTS_UI32 size = 560; size < 700; size++) {
+        begin_read();
+        add_read(1, size, APP_AREA_DATA, 0);
+        for (RTS_UI32 id = 2; id < 9; id++)
+            add_read(id, 8, APP_AREA_DATA, 0);
+        CHECK(send_read());
+        CHECK(reply_error(&reply) == ERR_OK && reply.size <= 700);
+        if (take_value(1, size) == NULL)
+            CHECK(take_failure(1, MONITORING_ERR_BUFFERSIZE_EXCEEDED));
+        for (RTS_UI32 id = 2; id < 9; id++) {
+            if (take_value(id, 8) != NULL)
+                continue;
+            CHECK(take_failure(id, MONITORING_ERR_BUFFERSIZE_EXCEEDED));
+            failures++;
+        }
+        CHECK(values_size == 0);
+    }
+    CHECK(failures > 0);
+}
+
+static void empty_list_is_an_empty_reply(void)
+{
+    setup();
+    begin_request();
+    BTagAppend(&writer, "\x81\x01\x00", 3);
+    CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_READ, &writer, &reply));
+    CHECK(reply.size == 20);
+}
+
+static void malformed_variables_fail_the_request(void)
+{
+    static const RTS_UI8 code[] = {MON2_OP_LD16, 0, 0, MON2_OP_RAO, 0};
+
+    setup();
+    begin_read();
+    BTagOpen(&writer, TAG_MON2_READ_VAR, BTAG_ALIGN_0);
+    BTagWrite32(&writer, TAG_MON2_VAR_SIZE, 4);
+    BTagClose(&writer);
+    CHECK(send_read());
+    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    begin_read();
+    add_program(MON2_ID_FAILED, 1, code, sizeof(code));
+    CHECK(send_read());
+    CHECK(reply_error(&reply) == ERR_PARAMETER);
+    begin_read();
+    BTagOpen(&writer, TAG_MON2_READ_VAR, BTAG_ALIGN_0);
+    BTagWrite32(&writer, TAG_MON2_VAR_SIZE, 4);
+    BTagWrite16(&writer, TAG_MON2_VAR_CODE_SIZE, 6);
+    BTagOpen(&writer, TAG_MON2_VAR_CODE, BTAG_ALIGN_0);
+    BTagAppend(&writer, code, sizeof(code));
+    BTagClose(&writer);
+    BTagClose(&writer);
+    CHECK(send_read());
+    CHECK(reply_error(&reply) == ERR_PARAMETER);
+    begin_request();
+    BTagAppend(&writer, "\x81\x01\x05\x82\x01\x09", 6);
+    CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_READ, &writer, &reply));
+    CHECK(reply_error(&reply) == ERR_BTAG_BUFFEROVERRUN);
+    begin_request();
+    CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_READ, &writer, &reply));
+    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+}
+
+/* ---- which application ---- */
+
+static RTS_UI32 error_for(RTS_UI32 session, RTS_UI32 data_id)
+{
+    BTagWriterInit(&writer, content, sizeof(content) - 20);
+    BTagOpen(&writer, TAG_MON2_APPLICATION, BTAG_ALIGN_0);
+    BTagAppend32(&writer, session);
+    BTagAppend32(&writer, data_id);
+    BTagAppendZeros(&writer, 12);
+    BTagClose(&writer);
+    BTagOpen(&writer, TAG_MON2_READ_LIST, BTAG_ALIGN_0);
+    add_read(1, 1, APP_AREA_DATA, 0);
+    CHECK(send_read());
+    CHECK(reply_error(&reply) == ERR_OK);
+    return values_size != 0 ? ERR_OK : reply_number(&reply, TAG_MON2_ERROR);
+}
+
+static void application_header_is_checked(void)
+{
+    setup();
+    CHECK(error_for(client.app_session, FAKE_IMAGE_CRC) == ERR_OK);
+    CHECK(error_for(client.app_session ^ 2, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
+    CHECK(error_for(0, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
+    CHECK(error_for(client.app_session, FAKE_IMAGE_CRC + 1) == ERR_APP_INVALID_DATAID);
+    SrvEndAppSession();
+    CHECK(error_for(0, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
+    fakes.status.state = AS_NONE;
+    CHECK(error_for(client.app_session, FAKE_IMAGE_CRC) == ERR_APP_NOT_LOADED);
+}
+
+/* ---- writing ---- */
+
+static void begin_write(void)
+{
+    begin_request();
+    BTagOpen(&writer, TAG_MON2_WRITE_LIST, BTAG_ALIGN_0);
+}
+
+static void add_write_program(RTS_UI32 size, const RTS_UI8 *value, const RTS_UI8 *code, RTS_UI32 code_size)
+{
+    BTagAppend16(&writer, 0);
+    BTagAppend32(&writer, size);
+    BTagAppend(&writer, value, size);
+    BTagAppend16(&writer, code_size);
+    BTagAppend(&writer, code, code_size);
+}
+
+static void add_write(RTS_UI32 size, const void *value, RTS_UI8 area, RTS_UI32 offset)
+{
+    RTS_UI8 code[] = {MON2_OP_LD16, 0, 0, MON2_OP_RAO, area};
+
+    BytesPut16(code + 1, offset);
+    add_write_program(size, value, code, sizeof(code));
+}
+
+/* Sends; returns TAG_ERROR, or TAG_MON2_ERROR, or ERR_OK when the reply is empty. */
+static RTS_UI32 send_write(void)
+{
+    BTagClose(&writer);
+    CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_WRITE, &writer, &reply));
+    if (reply.size == 20)
+        return ERR_OK;
+    return reply_error(&reply) != ERR_OK ? reply_error(&reply) : reply_number(&reply, TAG_MON2_ERROR);
+}
+
+static RTS_UI32 write_program(const RTS_UI8 *code, RTS_UI32 code_size)
+{
+    begin_write();
+    add_write_program(2, (const RTS_UI8 *)"\xAA\xBB", code, code_size);
+    return send_write();
+}
+
+#define WRITE_PROGRAM(code) write_program((const RTS_UI8 *)(code), sizeof(code) - 1)
+
+static void variables_of_all_sizes_and_alignments_are_written(void)
+{
+    static const RTS_UI8 value[] = {0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6, 0xA7, 0xA8, 0xA9};
+
+    for (RTS_UI32 offset = 8; offset < 16; offset++) {
+        for (RTS_UI32 size = 1; size <= sizeof(value); size++) {
+            setup();
+            begin_write();
+            add_write(size, value, APP_AREA_DATA, offset);
+            CHECK(send_write() == ERR_OK);
+            CHECK(memcmp(fakes_area(APP_AREA_DATA) + offset, value, size) == 0);
+            CHECK(fakes_area(APP_AREA_DATA)[offset - 1] == offset - 1);
+            CHECK(fakes_area(APP_AREA_DATA)[offset + size] == offset + size);
+        }
+    }
+}
+
+static void several_variables_are_written_by_one_request(void)
+{
+    setup();
+    begin_write();
+    add_write(1, "\xA1", APP_AREA_RETAIN, 1);
+    add_write(2, "\xA2\xA3", APP_AREA_INPUT, 2);
+    add_write(4, "\xA4\xA5\xA6\xA7", APP_AREA_OUTPUT, 4);
+    add_write(3, "\xA8\xA9\xAA", APP_AREA_MEMORY, 0);
+    BTagPad(&writer);
+    CHECK(send_write() == ERR_OK);
+    CHECK(fakes_area(APP_AREA_RETAIN)[1] == 0xA1);
+    CHECK(memcmp(fakes_area(APP_AREA_INPUT) + 2, "\xA2\xA3", 2) == 0);
+    CHECK(memcmp(fakes_area(APP_AREA_OUTPUT) + 4, "\xA4\xA5\xA6\xA7", 4) == 0);
+    CHECK(memcmp(fakes_area(APP_AREA_MEMORY), "\xA8\xA9\xAA", 3) == 0);
+}
+
+static void program_of_the_programming_system_is_recognised(void)
+{
+    setup();
+    CHECK(WRITE_PROGRAM("\x15\x0C\x00\x02\x10\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00\x17\x04\x09\x04"
+                        "\x17\x08\x09\x04\x04") == ERR_OK);
+    CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x10, "\xAA\xBB", 2) == 0);
+    CHECK(WRITE_PROGRAM("\x15\x0C\x00\x03\x20\x00\x00\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00"
+                        "\x17\x04\x09\x04\x17\x08\x09\x04\x04\x01") == ERR_OK);
+    CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x20, "\xAA\xBB", 2) == 0);
+}
+
+static void every_other_write_program_is_refused(void)
+{
+    RTS_UI8 code[] = {0x15, 0x0C, 0x00, 0x02, 0x10, 0x00, 0x06, 0x00, 0x17, 0x0C, 0x09, 0x04, 0x1B, 0x06,
+                      0x00, 0x01, 0x00, 0x00, 0x17, 0x04, 0x09, 0x04, 0x17, 0x08, 0x09, 0x04, 0x04};
+
+    setup();
+    for (RTS_UI32 i = 0; i < sizeof(code); i++) {
+        if (i == 4 || i == 5 || i == 7) /* the address */
+            continue;
+        for (RTS_UI32 bit = 0; bit < 8; bit++) {
+            code[i] ^= (RTS_UI8)(1u << bit);
+            CHECK(write_program(code, sizeof(code)) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+            code[i] ^= (RTS_UI8)(1u << bit);
+        }
+    }
+    for (RTS_UI32 size = 0; size < sizeof(code); size++)
+        CHECK(write_program(code, size) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x10, "\x10\x11", 2) == 0);
+    CHECK(write_program(code, sizeof(code)) == ERR_OK);
+}
+
+static void code_cannot_be_written(void)
+{
+    setup();
+    begin_write();
+    add_write(1, "\xEE", APP_AREA_CODE, 0);
+    CHECK(send_write() == MONITORING_ERR_OPERATION_DENIED);
+    CHECK(fakes_area(APP_AREA_CODE)[0] == 0x50);
+}
+
+static void one_bad_entry_leaves_everything_unwritten(void)
+{
+    setup();
+    begin_write();
+    add_write(1, "\xA1", APP_AREA_DATA, 1);
+    add_write(1, "\xA2", APP_AREA_DATA, 2);
+    add_write(4, "\xA3\xA4\xA5\xA6", APP_AREA_DATA, FAKE_AREA_SIZE - 3);
+    add_write(1, "\xA7", APP_AREA_DATA, 3);
+    CHECK(send_write() == MONITORING_ERR_INVALID_INDEX);
+    CHECK(reply_number(&reply, TAG_MON2_ERROR_INDEX) == 2);
+    CHECK(memcmp(fakes_area(APP_AREA_DATA), "\0\1\2\3", 4) == 0);
+}
+
+static void size_zero_is_refused(void)
+{
+    setup();
+    begin_write();
+    add_write(0, "", APP_AREA_DATA, 1);
+    CHECK(send_write() == MONITORING_ERR_SIZE_0);
+}
+
+static void cut_entries_are_refused_and_nothing_is_written(void)
+{
+    RTS_UI8 entry[16] = {0, 0, 2, 0, 0, 0, 0xAA, 0xBB, 5, 0, MON2_OP_LD16, 0x10, 0, MON2_OP_RAO, 0};
+
+    setup();
+    for (RTS_UI32 size = 1; size < 15; size++) {
+        begin_write();
+        BTagAppend(&writer, entry, size);
+        /* Up to three zeros are padding. */
+        CHECK(send_write() == (size < 3 ? ERR_OK : ERR_L7_INCOMPLETE));
+    }
+    BytesPut32(entry + 2, 0xFFFFFFFF);
+    begin_write();
+    BTagAppend(&writer, entry, sizeof(entry));
+    CHECK(send_write() == ERR_L7_INCOMPLETE);
+    BytesPut32(entry + 2, 9);
+    begin_write();
+    BTagAppend(&writer, entry, sizeof(entry));
+    CHECK(send_write() == ERR_L7_INCOMPLETE);
+    CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x10, "\x10\x11", 2) == 0);
+}
+
+static void writing_needs_the_right_application(void)
+{
+    setup();
+    client.app_session ^= 2;
+    begin_write();
+    add_write(1, "\xA1", APP_AREA_DATA, 1);
+    CHECK(send_write() == ERR_APP_INVALID_SESSIONID);
+    CHECK(fakes_area(APP_AREA_DATA)[1] == 1);
+}
+
+int main(void)
+{
+    RUN(variables_of_all_sizes_are_read);
+    RUN(every_alignment_and_size_is_read_right);
+    RUN(recognised_read_programs);
+    RUN(every_other_program_is_refused);
+    RUN(single_bytes_of_a_program_cannot_be_changed_unnoticed);
+    RUN(bounds_of_the_area_are_kept);
+    RUN(unknown_areas_and_size_zero_are_refused);
+    RUN(compact_form_reads_150_variables_at_once);
+    RUN(what_does_not_fit_fails_alone);
+    RUN(large_value_leaves_room_for_the_answers_after_it);
+    RUN(empty_list_is_an_empty_reply);
+    RUN(malformed_variables_fail_the_request);
+    RUN(application_header_is_checked);
+    RUN(variables_of_all_sizes_and_alignments_are_written);
+    RUN(several_variables_are_written_by_one_request);
+    RUN(program_of_the_programming_system_is_recognised);
+    RUN(every_other_write_program_is_refused);
+    RUN(code_cannot_be_written);
+    RUN(one_bad_entry_leaves_everything_unwritten);
+    RUN(size_zero_is_refused);
+    RUN(cut_entries_are_refused_and_nothing_is_written);
+    RUN(writing_needs_the_right_application);
+    return test_result();
+}

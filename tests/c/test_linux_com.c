@@ -1,0 +1,223 @@
+/*
+ * test_linux_com.c - SysCom: a pseudo terminal, and a device that goes away.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#define _GNU_SOURCE
+#include "SysCom.h"
+
+#include "SysTime.h"
+#include "port.h"
+#include "rts_config.h"
+#include "test.h"
+
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <termios.h>
+#include <time.h>
+#include <unistd.h>
+
+/* All values a byte can have: a line that is not raw would change or swallow some. */
+static RTS_UI8 every_byte[256];
+
+static void sleep_1ms(void)
+{
+    struct timespec time = {.tv_nsec = 1000000};
+    nanosleep(&time, NULL);
+}
+
+/* Reads from the runtime's side until there are `size` bytes, 10 s at most. */
+static RTS_UI32 read_com(RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 count = 0;
+    RTS_I64 deadline = SysTimeGetNs() + 10000000000;
+    while (count < size && SysTimeGetNs() < deadline) {
+        count += SysComRead(0, data + count, size - count);
+        PortComWait(1);
+    }
+    return count;
+}
+
+/* The same from the client's side. */
+static RTS_UI32 read_client(int client, RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 count = 0;
+    RTS_I64 deadline = SysTimeGetNs() + 10000000000;
+    while (count < size && SysTimeGetNs() < deadline) {
+        ssize_t now = read(client, data + count, size - count);
+        count += now > 0 ? (RTS_UI32)now : 0;
+        sleep_1ms();
+    }
+    return count;
+}
+
+static void check_round_trip(int client)
+{
+    RTS_UI8 back[256] = {0};
+    CHECK(write(client, every_byte, sizeof(every_byte)) == sizeof(every_byte));
+    CHECK(read_com(back, sizeof(back)) == sizeof(back));
+    CHECK(memcmp(back, every_byte, sizeof(back)) == 0);
+    memset(back, 0, sizeof(back));
+    CHECK(SysComWrite(0, every_byte, sizeof(every_byte)) == sizeof(every_byte));
+    CHECK(read_client(client, back, sizeof(back)) == sizeof(back));
+    CHECK(memcmp(back, every_byte, sizeof(back)) == 0);
+}
+
+static void open_com(const char *path)
+{
+    PORT_REASON reason = {""};
+    CHECK(PortComOpen(path, 115200, &reason));
+    CHECK(SysComGetCount() == 1);
+    CHECK(SysComOpen(0) == ERR_OK);
+}
+
+static void close_com(void)
+{
+    SysComClose(0);
+    PortComClose();
+    CHECK(SysComGetCount() == 0);
+}
+
+static int open_client(const char *path)
+{
+    int client = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK);
+    CHECK(client >= 0);
+    return client;
+}
+
+static void bytes_go_through_a_pty_unchanged(void)
+{
+    open_com("pty");
+    int client = open_client(PortComPtyName());
+    check_round_trip(client);
+    close(client);
+    close_com();
+}
+
+static void clients_of_a_pty_come_and_go(void)
+{
+    RTS_UI8 byte;
+    open_com("pty");
+    for (int i = 0; i < 3; i++) {
+        int client = open_client(PortComPtyName());
+        check_round_trip(client);
+        close(client);
+        CHECK(SysComRead(0, &byte, 1) == 0);
+    }
+    close_com();
+}
+
+static void nobody_listening_never_blocks(void)
+{
+    RTS_UI32 sent = 0;
+    RTS_UI32 taken;
+    open_com("pty");
+    do {
+        taken = SysComWrite(0, every_byte, sizeof(every_byte));
+        sent += taken;
+    } while (taken > 0 && sent < 10000000);
+    CHECK(taken == 0);
+    PortComWait(1);
+    int client = open_client(PortComPtyName());
+    tcflush(client, TCIFLUSH);
+    check_round_trip(client);
+    close(client);
+    close_com();
+}
+
+static void a_moved_byte_is_counted(void)
+{
+    open_com("pty");
+    int client = open_client(PortComPtyName());
+    RTS_UI32 before = PortComMoved();
+    RTS_UI8 byte;
+    CHECK(SysComRead(0, &byte, 1) == 0);
+    CHECK(PortComMoved() == before);
+    check_round_trip(client);
+    CHECK(PortComMoved() == before + 2 * sizeof(every_byte));
+    close(client);
+    close_com();
+}
+
+/* A pseudo terminal whose slave stands for a serial device, under a name of its own. Returns the other end. */
+static int plug_in(const char *name)
+{
+    int end = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
+    CHECK(end >= 0 && grantpt(end) == 0 && unlockpt(end) == 0);
+    unlink(name);
+    CHECK(symlink(ptsname(end), name) == 0);
+    return end;
+}
+
+static void a_device_that_goes_away_is_taken_up_again(void)
+{
+    char folder[] = "/tmp/test_linux_com.XXXXXX";
+    char name[64];
+    RTS_UI8 byte;
+    CHECK(mkdtemp(folder) != NULL);
+    snprintf(name, sizeof(name), "%s/ttyX", folder);
+    int end = plug_in(name);
+    open_com(name);
+    CHECK(PortComPtyName() == NULL);
+    check_round_trip(end);
+    close(end);
+    CHECK(SysComRead(0, &byte, 1) == 0);
+    CHECK(SysComWrite(0, &byte, 1) == 0);
+    end = plug_in(name);
+    RTS_I64 deadline = SysTimeGetNs() + 10000000000;
+    while (SysComWrite(0, (const RTS_UI8 *)"!", 1) == 0 && SysTimeGetNs() < deadline) {
+        sleep_1ms();
+    }
+    CHECK(read_client(end, &byte, 1) == 1 && byte == '!');
+    check_round_trip(end);
+    close(end);
+    close_com();
+    unlink(name);
+    rmdir(folder);
+}
+
+static void what_cannot_be_opened_is_said(void)
+{
+    PORT_REASON reason = {""};
+    CHECK(!PortComOpen("/dev/does-not-exist", 115200, &reason));
+    CHECK(strstr(reason.text, "/dev/does-not-exist") != NULL);
+    CHECK(!PortComOpen("/dev/null", 115200, &reason));
+    CHECK(!PortComOpen("pty", 12345, &reason));
+    CHECK(SysComGetCount() == 0);
+    CHECK(SysComOpen(0) == ERR_DEVICE);
+}
+
+static void common_speeds_are_known(void)
+{
+    CHECK(PortComKnowsBaud(9600) && PortComKnowsBaud(115200) && PortComKnowsBaud(921600));
+    CHECK(!PortComKnowsBaud(0) && !PortComKnowsBaud(115201));
+}
+
+static void a_line_that_does_not_exist_gives_nothing(void)
+{
+    RTS_UI8 byte = 0;
+    open_com("pty");
+    CHECK(SysComOpen(1) == ERR_DEVICE);
+    CHECK(SysComRead(1, &byte, 1) == 0);
+    CHECK(SysComWrite(1, &byte, 1) == 0);
+    close_com();
+    CHECK(SysComRead(0, &byte, 1) == 0);
+}
+
+int main(void)
+{
+    for (int i = 0; i < 256; i++) {
+        every_byte[i] = (RTS_UI8)i;
+    }
+    CHECK(SysTime_Hook(CH_INIT_SYSTEM) == ERR_OK);
+    RUN(bytes_go_through_a_pty_unchanged);
+    RUN(clients_of_a_pty_come_and_go);
+    RUN(nobody_listening_never_blocks);
+    RUN(a_moved_byte_is_counted);
+    RUN(a_device_that_goes_away_is_taken_up_again);
+    RUN(what_cannot_be_opened_is_said);
+    RUN(common_speeds_are_known);
+    RUN(a_line_that_does_not_exist_gives_nothing);
+    return test_result();
+}

@@ -1,0 +1,389 @@
+/*
+ * test_linux_except.c - SysExcept: every way IEC code can go wrong ends in one return from SysExceptTry.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#define _GNU_SOURCE
+#include "SysExcept.h"
+#include "test.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static int *volatile null_pointer;
+static volatile int sink;
+
+static void do_nothing(void *arg)
+{
+    RTS_UNUSED(arg);
+}
+
+static void count_up(void *arg)
+{
+    ++*(int *)arg;
+}
+
+/* A sanitizer would report it before it happens. */
+static void read_null(void *arg) __attribute__((no_sanitize("undefined")));
+
+static void read_null(void *arg)
+{
+    RTS_UNUSED(arg);
+    sink = *null_pointer;
+}
+
+static void divide_by_zero(void *arg)
+{
+    RTS_UNUSED(arg);
+#if defined(__x86_64__)
+    __asm__ volatile("xorl %%ecx, %%ecx\n\tmovl $1, %%eax\n\tcltd\n\tidivl %%ecx" ::: "eax", "ecx", "edx", "cc");
+#else
+    raise(SIGFPE); /* the hardware does not trap */
+#endif
+}
+
+static void run_illegal_instruction(void *arg)
+{
+    RTS_UNUSED(arg);
+    __builtin_trap();
+}
+
+static int (*volatile recurse_again)(int depth);
+
+static int recurse(int depth)
+{
+    volatile char frame[256];
+    frame[0] = (char)depth;
+    return depth < 0 ? 0 : recurse_again(depth + 1) + frame[0];
+}
+
+static void overflow_stack(void *arg)
+{
+    RTS_UNUSED(arg);
+    recurse_again = recurse;
+    sink = recurse(0);
+}
+
+static void raise_bounds(void *arg)
+{
+    RTS_UNUSED(arg);
+    SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0x1234);
+}
+
+static void loop_forever(void *arg)
+{
+    RTS_UNUSED(arg);
+    for (;;) {
+        sink++;
+    }
+}
+
+static RTS_UI32 code_of(void (*fn)(void *))
+{
+    RTS_EXCEPTION exception = {0xDEAD, 0};
+    int left = SysExceptTry(fn, NULL, &exception);
+    CHECK(left == (exception.code != RTSEXCPT_NOEXCEPTION));
+    return exception.code;
+}
+
+static void a_normal_return_is_no_exception(void)
+{
+    int calls = 0;
+    RTS_EXCEPTION exception = {1, 1};
+    CHECK(SysExceptTry(count_up, &calls, &exception) == 0);
+    CHECK(calls == 1);
+    CHECK(exception.code == RTSEXCPT_NOEXCEPTION && exception.address == 0);
+}
+
+static void reading_null_is_an_access_violation_at_its_instruction(void)
+{
+    RTS_EXCEPTION exception;
+    CHECK(SysExceptTry(read_null, NULL, &exception) == 1);
+    CHECK(exception.code == RTSEXCPT_ACCESS_VIOLATION);
+    CHECK(exception.address - (uintptr_t)read_null < 128);
+}
+
+static void dividing_by_zero_is_caught(void)
+{
+    CHECK(code_of(divide_by_zero) == RTSEXCPT_DIVIDEBYZERO);
+}
+
+static void an_illegal_instruction_is_caught(void)
+{
+    CHECK(code_of(run_illegal_instruction) == RTSEXCPT_ILLEGAL_INSTRUCTION);
+}
+
+static void raise_gives_its_code_and_address(void)
+{
+    RTS_EXCEPTION exception;
+    CHECK(SysExceptTry(raise_bounds, NULL, &exception) == 1);
+    CHECK(exception.code == RTSEXCPT_ARRAYBOUNDS);
+    CHECK(exception.address == 0x1234);
+}
+
+static void a_stack_overflow_of_main_is_caught_twice(void)
+{
+    CHECK(code_of(overflow_stack) == RTSEXCPT_STACK_OVERFLOW);
+    CHECK(code_of(overflow_stack) == RTSEXCPT_STACK_OVERFLOW);
+    CHECK(code_of(read_null) == RTSEXCPT_ACCESS_VIOLATION);
+}
+
+static void *overflow_in_thread(void *arg)
+{
+    *(RTS_UI32 *)arg = code_of(overflow_stack);
+    return NULL;
+}
+
+static void a_stack_overflow_of_a_thread_is_caught(void)
+{
+    pthread_t thread;
+    RTS_UI32 code = 0;
+    pthread_create(&thread, NULL, overflow_in_thread, &code);
+    pthread_join(thread, NULL);
+    CHECK(code == RTSEXCPT_STACK_OVERFLOW);
+}
+
+/* ---- the watchdog's break ---- */
+
+typedef struct {
+    uintptr_t context;
+    int done;
+} VICTIM;
+
+/* Breaks the victim again and again until it says that it is done. */
+static void *breaker(void *arg)
+{
+    VICTIM *victim = arg;
+    while (!__atomic_load_n(&victim->done, __ATOMIC_ACQUIRE)) {
+        SysExceptBreak(victim->context, RTSEXCPT_WATCHDOG);
+        sched_yield();
+    }
+    return NULL;
+}
+
+static void an_endless_loop_is_broken(void)
+{
+    pthread_t thread;
+    VICTIM victim = {SysExceptContext(), 0};
+    pthread_create(&thread, NULL, breaker, &victim);
+    RTS_EXCEPTION exception;
+    CHECK(SysExceptTry(loop_forever, NULL, &exception) == 1);
+    __atomic_store_n(&victim.done, 1, __ATOMIC_RELEASE);
+    pthread_join(thread, NULL);
+    CHECK(exception.code == RTSEXCPT_WATCHDOG);
+}
+
+static void breaks_at_any_moment_do_no_harm(void)
+{
+    pthread_t thread;
+    VICTIM victim = {SysExceptContext(), 0};
+    int calls = 0;
+    pthread_create(&thread, NULL, breaker, &victim);
+    for (int i = 0; i < 200000; i++) {
+        RTS_EXCEPTION exception;
+        int left = SysExceptTry(count_up, &calls, &exception);
+        CHECK(exception.code == (left ? (RTS_UI32)RTSEXCPT_WATCHDOG : (RTS_UI32)RTSEXCPT_NOEXCEPTION));
+    }
+    __atomic_store_n(&victim.done, 1, __ATOMIC_RELEASE);
+    pthread_join(thread, NULL);
+    CHECK(calls > 0);
+    CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
+}
+
+static void a_break_outside_of_try_does_nothing(void)
+{
+    SysExceptBreak(SysExceptContext(), RTSEXCPT_WATCHDOG);
+    CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
+}
+
+static void mask_all(int how)
+{
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(how, &all, NULL);
+}
+
+static void break_itself_with_signals_held(void *arg)
+{
+    RTS_UNUSED(arg);
+    mask_all(SIG_BLOCK);
+    SysExceptBreak(SysExceptContext(), RTSEXCPT_WATCHDOG);
+}
+
+static void let_signals_come(void *arg)
+{
+    RTS_UNUSED(arg);
+    mask_all(SIG_UNBLOCK);
+}
+
+static void a_break_that_comes_late_does_not_hit_the_next_try(void)
+{
+    CHECK(code_of(break_itself_with_signals_held) == RTSEXCPT_NOEXCEPTION);
+    CHECK(code_of(let_signals_come) == RTSEXCPT_NOEXCEPTION);
+}
+
+static void *give_context(void *arg)
+{
+    *(uintptr_t *)arg = SysExceptContext();
+    return NULL;
+}
+
+static void a_break_of_a_thread_that_ended_does_nothing(void)
+{
+    pthread_t thread;
+    uintptr_t gone = 0;
+    pthread_create(&thread, NULL, give_context, &gone);
+    pthread_join(thread, NULL);
+    CHECK(gone != 0);
+    CHECK(gone != SysExceptContext());
+    SysExceptBreak(gone, RTSEXCPT_WATCHDOG);
+    SysExceptBreak(0, RTSEXCPT_WATCHDOG);
+}
+
+/* ---- many of them ---- */
+
+static void *fault_often(void *arg)
+{
+    for (int i = 0; i < 2000; i++) {
+        CHECK(code_of(read_null) == RTSEXCPT_ACCESS_VIOLATION);
+        CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
+    }
+    return arg;
+}
+
+static void threads_do_not_disturb_each_other(void)
+{
+    pthread_t threads[8];
+    for (size_t i = 0; i < RTS_COUNT(threads); i++) {
+        pthread_create(&threads[i], NULL, fault_often, NULL);
+    }
+    for (size_t i = 0; i < RTS_COUNT(threads); i++) {
+        pthread_join(threads[i], NULL);
+    }
+}
+
+static void threads_that_end_leave_room_for_others(void)
+{
+    for (int i = 0; i < 200; i++) {
+        a_break_of_a_thread_that_ended_does_nothing();
+    }
+}
+
+static void a_hundred_thousand_tries_work(void)
+{
+    int calls = 0;
+    RTS_EXCEPTION exception;
+    for (int i = 0; i < 100000; i++) {
+        CHECK(SysExceptTry(count_up, &calls, &exception) == 0);
+    }
+    CHECK(calls == 100000);
+}
+
+/* ---- living in a process of somebody else ---- */
+
+/* Exit status of a child that runs `fn`, or 1000 + the signal that ended it. */
+static int run_child(void (*fn)(void))
+{
+    int status;
+    fflush(stdout);
+    pid_t child = fork();
+    if (child == 0) {
+        struct rlimit none = {0, 0};
+        setrlimit(RLIMIT_CORE, &none);
+        SysExceptShutdown();
+        signal(SIGSEGV, SIG_DFL);
+        signal(SIGBUS, SIG_DFL);
+        fn();
+        _exit(0);
+    }
+    waitpid(child, &status, 0);
+    return WIFSIGNALED(status) ? 1000 + WTERMSIG(status) : WEXITSTATUS(status);
+}
+
+static void exit_42(int number)
+{
+    RTS_UNUSED(number);
+    _exit(42);
+}
+
+static void fault_outside(void)
+{
+    (void)code_of(do_nothing);
+    read_null(NULL);
+}
+
+static void fault_outside_with_handler(void)
+{
+    signal(SIGSEGV, exit_42);
+    fault_outside();
+}
+
+static void be_sent_a_fault(void)
+{
+    (void)code_of(do_nothing);
+    kill(getpid(), SIGBUS);
+}
+
+static void raise_outside(void)
+{
+    fclose(stderr);
+    SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0);
+}
+
+static void a_fault_outside_of_try_ends_the_process_as_ever(void)
+{
+    CHECK(run_child(fault_outside) == 1000 + SIGSEGV);
+    CHECK(run_child(be_sent_a_fault) == 1000 + SIGBUS);
+}
+
+static void a_fault_outside_of_try_goes_to_the_handler_before(void)
+{
+    CHECK(run_child(fault_outside_with_handler) == 42);
+}
+
+static void raise_outside_of_try_is_fatal(void)
+{
+    CHECK(run_child(raise_outside) == 1000 + SIGABRT);
+}
+
+static void shutdown_gives_the_handlers_back(void)
+{
+    struct sigaction now;
+    SysExceptShutdown();
+    signal(SIGSEGV, exit_42);
+    CHECK(code_of(read_null) == RTSEXCPT_ACCESS_VIOLATION);
+    SysExceptShutdown();
+    sigaction(SIGSEGV, NULL, &now);
+    CHECK(now.sa_handler == exit_42);
+    signal(SIGSEGV, SIG_DFL);
+    CHECK(code_of(read_null) == RTSEXCPT_ACCESS_VIOLATION);
+}
+
+int main(void)
+{
+    RUN(a_normal_return_is_no_exception);
+    RUN(reading_null_is_an_access_violation_at_its_instruction);
+    RUN(dividing_by_zero_is_caught);
+    RUN(an_illegal_instruction_is_caught);
+    RUN(raise_gives_its_code_and_address);
+    RUN(a_stack_overflow_of_main_is_caught_twice);
+    RUN(a_stack_overflow_of_a_thread_is_caught);
+    RUN(an_endless_loop_is_broken);
+    RUN(breaks_at_any_moment_do_no_harm);
+    RUN(a_break_outside_of_try_does_nothing);
+    RUN(a_break_that_comes_late_does_not_hit_the_next_try);
+    RUN(a_break_of_a_thread_that_ended_does_nothing);
+    RUN(threads_do_not_disturb_each_other);
+    RUN(threads_that_end_leave_room_for_others);
+    RUN(a_hundred_thousand_tries_work);
+    RUN(a_fault_outside_of_try_ends_the_process_as_ever);
+    RUN(a_fault_outside_of_try_goes_to_the_handler_before);
+    RUN(raise_outside_of_try_is_fatal);
+    RUN(shutdown_gives_the_handlers_back);
+    return test_result();
+}

@@ -1,0 +1,385 @@
+/*
+ * test_task_cycle.c - the cycle of a task: its time, statistics and watchdog.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Tasks are driven by hand here: the clock of the simulator stands still while IecTaskCycle gets the times a test wants. How long a
+ * cycle takes is what "simburn" burns.
+ */
+#include "CmpLog.h"
+#include "CmpScheduleTimer.h"
+#include "app_image.h"
+#include "test.h"
+
+enum { SIMBURN_SIGNATURE = 0x76DDCD81 };
+
+static APP_SPEC spec;
+static APP_BYTES image;
+
+/* An application with one task that burns `burn_us` per cycle, counts, and stores its time. */
+static CDL_TASK *begin(RTS_UI32 interval_us, RTS_UI32 burn_us)
+{
+    CDL_TASK *task;
+
+    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    spec_init(&spec);
+    add_import(&spec, "simburn", SIMBURN_SIGNATURE, 0x00010000);
+    task = add_task(&spec, "Main", KIND_CYCLIC, interval_us, here(&spec));
+    emit_store_time_ms(&spec, APP_AREA_DATA, 8);
+    emit_add(&spec, APP_AREA_DATA, 0, 1);
+    emit_call(&spec, 0, burn_us);
+    emit_ret(&spec);
+    return task;
+}
+
+static void load(void)
+{
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+}
+
+static IEC_TASK_INFO info_of(RTS_UI32 task)
+{
+    IEC_TASK_INFO info;
+
+    memset(&info, 0xEE, sizeof info);
+    CHECK(IecTaskGetInfo(task, &info) == ERR_OK);
+    return info;
+}
+
+static void a_task_that_never_ran_has_empty_statistics(void)
+{
+    CDL_TASK *task = begin(2000, 0);
+    IEC_TASK_INFO info;
+
+    task->priority = 7;
+    load();
+    info = info_of(0);
+    CHECK(strcmp(info.name, "Main") == 0);
+    CHECK(info.kind == KIND_CYCLIC);
+    CHECK(info.priority == 7);
+    CHECK(info.interval_us == 2000);
+    CHECK(info.cycles == 0);
+    CHECK(info.last_us == 0 && info.avg_us == 0 && info.min_us == 0 && info.max_us == 0);
+    CHECK(info.jitter_us == 0 && info.overruns == 0);
+    CHECK(IecTaskGetInfo(1, &info) == ERR_INVALIDID);
+    CHECK(IecTaskGetInfo(0xFFFFFFFF, &info) == ERR_INVALIDID);
+}
+
+static void statistics_count_what_cycles_take(void)
+{
+    IEC_TASK_INFO info;
+    static const RTS_UI32 burns[] = {100, 300, 200};
+    RTS_UI32 i;
+
+    for (i = 0; i < 3; i++) {
+        RTS_UI32 k;
+        begin(1000, burns[i]);
+        load();
+        for (k = 0; k < 10; k++)
+            CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
+        info = info_of(0);
+        CHECK(info.cycles == 10);
+        CHECK(info.last_us == burns[i] && info.min_us == burns[i] && info.max_us == burns[i]);
+        CHECK(info.avg_us == burns[i]);
+    }
+}
+
+/* Two tasks would do; one that burns more each time shows minimum, maximum and average apart. */
+static void minimum_maximum_and_average_differ(void)
+{
+    IEC_TASK_INFO info;
+    RTS_I64 now;
+
+    begin(1000, 100);
+    load();
+    now = SimNow();
+    CHECK(IecTaskCycle(0, now, now) == 1);                 /* 100 us */
+    CHECK(IecTaskCycle(0, now, SimNow() - 400000) == 1);   /* looks like 500 us */
+    CHECK(IecTaskCycle(0, now, SimNow() - 50000) == 1);    /* 150 us */
+    info = info_of(0);
+    CHECK(info.cycles == 3);
+    CHECK(info.min_us == 100);
+    CHECK(info.max_us == 500);
+    CHECK(info.last_us == 150);
+    CHECK(info.avg_us == 250);
+}
+
+static void times_beyond_four_seconds_saturate(void)
+{
+    IEC_TASK_INFO info;
+
+    begin(1000, 0);
+    load();
+    CHECK(IecTaskCycle(0, 0, SimNow() - 9000000000) == 1);
+    info = info_of(0);
+    CHECK(info.max_us == 4294967);
+}
+
+static void jitter_is_the_largest_delay_of_a_start(void)
+{
+    begin(1000, 0);
+    load();
+    CHECK(IecTaskCycle(0, 0, 7000) == 1);
+    CHECK(IecTaskCycle(0, 1000000, 1020000) == 1);
+    CHECK(IecTaskCycle(0, 2000000, 2003000) == 1);
+    CHECK(info_of(0).jitter_us == 20);
+    CHECK(IecTaskCycle(0, 3000000, 2999000) == 1); /* early does not count */
+    CHECK(info_of(0).jitter_us == 20);
+}
+
+static void missed_due_times_are_counted_as_overruns(void)
+{
+    IEC_TASK_INFO info;
+
+    begin(1000, 2500);
+    load();
+    CHECK(SimAdvance(ms(12)) == ERR_OK); /* runs at 0, 3, 6, 9, 12 ms */
+    info = info_of(0);
+    CHECK(info.cycles == 5);
+    CHECK(info.overruns == 8);
+    CHECK(info.jitter_us == 0);
+}
+
+static void a_cycle_that_ends_when_the_next_is_due_misses_nothing(void)
+{
+    begin(1000, 1000);
+    load();
+    CHECK(SimAdvance(ms(9)) == ERR_OK);
+    CHECK(info_of(0).overruns == 0);
+    CHECK(info_of(0).cycles == 10);
+}
+
+static void a_lower_task_that_waits_has_jitter(void)
+{
+    begin(10000, 3000);
+    add_task(&spec, "Low", KIND_CYCLIC, 10000, spec.tasks[0].entry_offset)->priority = 20;
+    load();
+    CHECK(SimAdvance(ms(10)) == ERR_OK);
+    CHECK(info_of(0).jitter_us == 0);
+    CHECK(info_of(1).jitter_us == 3000);
+    CHECK(info_of(1).overruns == 0);
+}
+
+static void the_time_of_the_application_starts_at_zero(void)
+{
+    begin(10000, 0);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(SimAdvance(ms(777)) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, 8) == 0);
+    CHECK(SimAdvance(ms(20)) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, 8) == 20);
+}
+
+static void the_time_goes_on_over_stop_and_start(void)
+{
+    begin(10000, 0);
+    load();
+    CHECK(SimAdvance(ms(20)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, 8) == 120);
+    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, 8) == 0);
+}
+
+/* Milliseconds are counted on from cycle to cycle; they must be those of the division, whatever the steps are. */
+static void milliseconds_follow_the_nanoseconds(void)
+{
+    static const RTS_I64 steps[] = {1, 999999, 1000000, 1234567, 10000000, 4294967295, 4294967296, 4300000000, 86400000000000};
+    RTS_I64 zero;
+    RTS_I64 now;
+    RTS_UI32 i;
+    RTS_UI32 k;
+
+    begin(1000, 0);
+    load();
+    zero = now = SimNow();
+    for (i = 0; i < RTS_COUNT(steps); i++) {
+        for (k = 0; k < 50; k++) {
+            now += steps[i];
+            CHECK(IecTaskCycle(0, now, now) == 1);
+            CHECK(read_u32(APP_AREA_DATA, 8) == (RTS_UI32)((now - zero) / 1000000));
+        }
+    }
+}
+
+/* ---- watchdog, manual 3.4 ---- */
+
+/* How many cycles of `burn_us` run before the watchdog trips; 0 when it does not within 100. */
+static RTS_UI32 cycles_until_trip(RTS_UI32 watchdog_us, RTS_UI16 sensitivity, RTS_UI32 burn_us)
+{
+    CDL_TASK *task = begin(100000, burn_us);
+    RTS_UI32 i;
+
+    task->watchdog_us = watchdog_us;
+    task->watchdog_sensitivity = sensitivity;
+    load();
+    for (i = 1; i <= 100; i++) {
+        if (!IecTaskCycle(0, SimNow(), SimNow())) {
+            CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+            return i;
+        }
+    }
+    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    return 0;
+}
+
+static void consecutive_overruns_trip_in_the_cycle_of_the_sensitivity(void)
+{
+    CHECK(cycles_until_trip(1000, 0, 1001) == 1);
+    CHECK(cycles_until_trip(1000, 1, 1001) == 1);
+    CHECK(cycles_until_trip(1000, 2, 1001) == 2);
+    CHECK(cycles_until_trip(1000, 3, 1001) == 3);
+    CHECK(cycles_until_trip(1000, 10, 1001) == 10);
+}
+
+static void a_single_cycle_longer_than_time_times_sensitivity_trips_at_once(void)
+{
+    CHECK(cycles_until_trip(10000, 5, 50000) == 5);
+    CHECK(cycles_until_trip(10000, 5, 50001) == 1);
+}
+
+static void cycles_within_the_time_never_trip(void)
+{
+    CHECK(cycles_until_trip(1000, 1, 1000) == 0);
+    CHECK(cycles_until_trip(1000, 0, 999) == 0);
+}
+
+static void without_a_watchdog_nothing_trips(void)
+{
+    CHECK(cycles_until_trip(0, 1, 60000000) == 0);
+}
+
+static void one_good_cycle_starts_the_count_anew(void)
+{
+    CDL_TASK *task = begin(100000, 1500);
+    int i;
+
+    task->watchdog_us = 1000;
+    task->watchdog_sensitivity = 3;
+    load();
+    for (i = 0; i < 20; i++) {
+        RTS_I64 now = SimNow();
+        CHECK(IecTaskCycle(0, now, now) == 1);
+        CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
+        CHECK(IecTaskCycle(0, SimNow(), SimNow() + 1000000) == 1); /* looks like 500 us */
+    }
+}
+
+static void the_watchdog_stops_the_application_with_its_outputs_at_zero(void)
+{
+    CDL_TASK *task = begin(10000, 2000);
+    LOG_ENTRY entry = {0};
+
+    task->watchdog_us = 1000;
+    load();
+    AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] = 1;
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+    CHECK(AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] == 0);
+    CHECK(read_u32(APP_AREA_DATA, 0) == 1);
+    while (LogGetEntry(entry.handle + 1, &entry) == ERR_OK && entry.log_class != LOG_EXCEPTION)
+        ;
+    CHECK(strcmp(entry.text, "Main: watchdog expired") == 0);
+}
+
+static void reset_gives_the_watchdog_its_count_back(void)
+{
+    CDL_TASK *task = begin(100000, 1500);
+
+    task->watchdog_us = 1000;
+    task->watchdog_sensitivity = 3;
+    load();
+    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
+    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
+    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
+    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
+    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 0);
+}
+
+static void the_supervisor_sees_the_limits_of_running_code_only(void)
+{
+    CDL_TASK *task = begin(100000, 0);
+    IEC_GUARD guard;
+    bool busy;
+
+    task->watchdog_us = 3000;
+    task->watchdog_sensitivity = 4;
+    load();
+    CHECK(!IecTaskReadGuard(0, &guard));
+    CHECK(!IecTaskReadGuard(1, &guard));
+    CHECK(IecTaskGetActivity(&busy) == 0);
+    CHECK(!busy);
+    CHECK(IecTaskCycle(0, 0, 0) == 1);
+    CHECK(IecTaskGetActivity(&busy) == 2);
+    SchedWatchdogCheck(ms(1000000)); /* nothing runs: nothing happens */
+    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+}
+
+static void no_cycle_starts_while_the_application_is_stopped(void)
+{
+    begin(1000, 0);
+    load();
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(IecTaskCycle(0, 0, 0) == 0);
+    CHECK(read_u32(APP_AREA_DATA, 0) == 0);
+}
+
+static void the_bench_measures_real_time_and_keeps_the_schedule(void)
+{
+    double code_ns = -1;
+    double cycle_ns = -1;
+    RTS_UI32 before;
+
+    begin(10000, 0);
+    load();
+    CHECK(SimAdvance(ms(25)) == ERR_OK);
+    CHECK(SimBench(0, 1000, &code_ns, &cycle_ns) == ERR_OK);
+    CHECK(code_ns > 0);
+    CHECK(cycle_ns > 0);
+    before = info_of(0).cycles;
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(info_of(0).cycles == before + 10);
+    CHECK(info_of(0).overruns == 0);
+    CHECK(SimBench(1, 1000, &code_ns, &cycle_ns) == ERR_INVALIDID);
+}
+
+int main(void)
+{
+    NEEDS_X86_64;
+    RUN(a_task_that_never_ran_has_empty_statistics);
+    RUN(statistics_count_what_cycles_take);
+    RUN(minimum_maximum_and_average_differ);
+    RUN(times_beyond_four_seconds_saturate);
+    RUN(jitter_is_the_largest_delay_of_a_start);
+    RUN(missed_due_times_are_counted_as_overruns);
+    RUN(a_cycle_that_ends_when_the_next_is_due_misses_nothing);
+    RUN(a_lower_task_that_waits_has_jitter);
+    RUN(the_time_of_the_application_starts_at_zero);
+    RUN(the_time_goes_on_over_stop_and_start);
+    RUN(milliseconds_follow_the_nanoseconds);
+    RUN(consecutive_overruns_trip_in_the_cycle_of_the_sensitivity);
+    RUN(a_single_cycle_longer_than_time_times_sensitivity_trips_at_once);
+    RUN(cycles_within_the_time_never_trip);
+    RUN(without_a_watchdog_nothing_trips);
+    RUN(one_good_cycle_starts_the_count_anew);
+    RUN(the_watchdog_stops_the_application_with_its_outputs_at_zero);
+    RUN(reset_gives_the_watchdog_its_count_back);
+    RUN(the_supervisor_sees_the_limits_of_running_code_only);
+    RUN(no_cycle_starts_while_the_application_is_stopped);
+    RUN(the_bench_measures_real_time_and_keeps_the_schedule);
+    return test_result();
+}

@@ -1,0 +1,310 @@
+/*
+ * test_task_schedule.c - when tasks run: cyclic by priority, event, external event, freewheeling.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpScheduleTimer.h"
+#include "app_image.h"
+#include "test.h"
+
+static APP_SPEC spec;
+static APP_BYTES image;
+
+enum { ORDER_OFFSET = 16, SEEN_OFFSET = 32, EVENT_OFFSET = 60 };
+
+static void begin(void)
+{
+    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    spec_init(&spec);
+}
+
+/* A task that counts at data[4 * index]. */
+static CDL_TASK *add_counting_task(const char *name, RTS_UI8 kind, RTS_UI32 interval_us)
+{
+    RTS_UI32 entry = here(&spec);
+    CDL_TASK *task = add_task(&spec, name, kind, interval_us, entry);
+
+    emit_add(&spec, APP_AREA_DATA, 4 * (spec.task_count - 1), 1);
+    emit_ret(&spec);
+    return task;
+}
+
+static void load(void)
+{
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+}
+
+static RTS_UI32 count_of(RTS_UI32 task)
+{
+    return read_u32(APP_AREA_DATA, 4 * task);
+}
+
+static void set_event(RTS_UI8 value)
+{
+    *AppGetAreaAddress(APP_AREA_DATA, EVENT_OFFSET, 1) = value;
+}
+
+static void every_cyclic_task_has_its_own_interval(void)
+{
+    begin();
+    add_counting_task("A", KIND_CYCLIC, 1000);
+    add_counting_task("B", KIND_CYCLIC, 3000);
+    add_counting_task("C", KIND_CYCLIC, 1000000);
+    load();
+    CHECK(SimAdvance(ms(3000)) == ERR_OK);
+    CHECK(count_of(0) == 3001);
+    CHECK(count_of(1) == 1001);
+    CHECK(count_of(2) == 4);
+}
+
+/* Each task stores how often the other ran: who comes first sees one less. */
+static void of_tasks_that_are_due_the_highest_priority_runs_first(void)
+{
+    begin();
+    add_task(&spec, "Low", KIND_CYCLIC, 1000, here(&spec))->priority = 20;
+    emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 1); /* order += 1 */
+    emit_ret(&spec);
+    add_task(&spec, "High", KIND_CYCLIC, 1000, here(&spec))->priority = 3;
+    emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, 10); /* order := 10 */
+    emit_ret(&spec);
+    load();
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == 11);
+}
+
+static CDL_TASK *add_event_task(void)
+{
+    CDL_TASK *task = add_counting_task("Event", KIND_EVENT, 0);
+
+    task->event_area = APP_AREA_DATA;
+    task->event_offset = EVENT_OFFSET;
+    return task;
+}
+
+static void an_event_task_runs_once_per_rising_edge(void)
+{
+    begin();
+    add_event_task();
+    load();
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK(count_of(0) == 0);
+    set_event(1);
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK(count_of(0) == 1);
+    set_event(0);
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK(count_of(0) == 1);
+    set_event(1);
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK(count_of(0) == 2);
+}
+
+static void an_event_that_is_true_at_the_start_is_no_edge(void)
+{
+    begin();
+    add_event_task();
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    set_event(1);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK(count_of(0) == 0);
+}
+
+static void a_pulse_that_is_over_before_anybody_looks_is_no_edge(void)
+{
+    begin();
+    add_event_task();
+    add_task(&spec, "Set", KIND_CYCLIC, 1000, here(&spec));
+    emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 1);
+    emit_ret(&spec);
+    add_task(&spec, "Clear", KIND_CYCLIC, 1000, here(&spec))->priority = 3; /* before Set, in each cycle */
+    emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 0);
+    emit_ret(&spec);
+    load();
+    CHECK(SimAdvance(ms(9)) == ERR_OK);
+    CHECK(count_of(0) == 1); /* the first edge: since then it was cleared and set again between two looks */
+}
+
+static void an_edge_of_one_interval_is_not_missed(void)
+{
+    begin();
+    add_event_task();
+    add_task(&spec, "Set", KIND_CYCLIC, 2000, here(&spec))->priority = 3;
+    emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 1);
+    emit_ret(&spec);
+    add_task(&spec, "Clear", KIND_CYCLIC, 3000, here(&spec));
+    emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 0);
+    emit_ret(&spec);
+    load();
+    CHECK(SimAdvance(ms(11)) == ERR_OK); /* set at 0 2 4 6 8 10, cleared after it at 0 3 6 9: edges at 2 4 8 10 */
+    CHECK(count_of(0) == 4);
+}
+
+static void freewheeling_tasks_run_again_and_again(void)
+{
+    begin();
+    add_counting_task("Free", KIND_FREEWHEELING, 0);
+    load();
+    CHECK(SimAdvance(ms(1000)) == ERR_OK);
+    CHECK(count_of(0) >= 100);
+    CHECK(AppStopApplication() == ERR_OK);
+    set_event(0);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(count_of(0) >= 100);
+}
+
+static void tasks_in_the_background_run_by_priority(void)
+{
+    begin();
+    add_task(&spec, "Low", KIND_FREEWHEELING, 0, here(&spec))->priority = 20;
+    emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 1);
+    emit_ret(&spec);
+    add_task(&spec, "High", KIND_FREEWHEELING, 0, here(&spec))->priority = 3;
+    emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, 10);
+    emit_ret(&spec);
+    add_task(&spec, "Middle", KIND_FREEWHEELING, 0, here(&spec))->priority = 10;
+    emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 100);
+    emit_ret(&spec);
+    load();
+    CHECK(SimCommCycle() == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == 111);
+}
+
+static void an_external_event_runs_its_task_once_per_post(void)
+{
+    RTS_RESULT result = ERR_FAILED;
+    RTS_HANDLE event;
+
+    begin();
+    add_counting_task("Pulse", KIND_EXTERNAL, 0);
+    event = SchedRegisterExternalEvent("Pulse", &result);
+    CHECK(result == ERR_OK);
+    CHECK(SchedPostExternalEvent(event) == ERR_OK); /* before the start: does not count */
+    load();
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(count_of(0) == 0);
+    CHECK(SchedPostExternalEvent(event) == ERR_OK);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(count_of(0) == 1);
+    CHECK(SchedPostExternalEvent(event) == ERR_OK);
+    CHECK(SchedPostExternalEvent(event) == ERR_OK);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(count_of(0) == 3);
+    CHECK(SchedUnregisterExternalEvent(event) == ERR_OK);
+    CHECK(SchedPostExternalEvent(event) == ERR_INVALID_HANDLE);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(count_of(0) == 3);
+}
+
+static void external_events_are_limited_and_unique(void)
+{
+    static const char *const names[SCHED_MAX_EXTERNAL_EVENTS] = {"a", "b", "c", "d"};
+    RTS_RESULT result = ERR_OK;
+    RTS_HANDLE event;
+    int i;
+
+    begin();
+    for (i = 0; i < SCHED_MAX_EXTERNAL_EVENTS; i++)
+        event = SchedRegisterExternalEvent(names[i], NULL);
+    CHECK(SchedRegisterExternalEvent("a", &result) == (RTS_HANDLE)RTS_INVALID_HANDLE);
+    CHECK(result == ERR_DUPLICATE);
+    CHECK(SchedRegisterExternalEvent("e", &result) == (RTS_HANDLE)RTS_INVALID_HANDLE);
+    CHECK(result == ERR_NOMEMORY);
+    CHECK(SchedUnregisterExternalEvent(event) == ERR_OK);
+    CHECK(SchedUnregisterExternalEvent(event) == ERR_INVALID_HANDLE);
+    CHECK(SchedUnregisterExternalEvent(99) == ERR_INVALID_HANDLE);
+    CHECK(SchedPostExternalEvent((RTS_HANDLE)RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
+    CHECK(SchedRegisterExternalEvent("e", &result) != (RTS_HANDLE)RTS_INVALID_HANDLE);
+    CHECK(result == ERR_OK);
+}
+
+static void as_many_tasks_as_the_device_can_run(void)
+{
+    char name[] = "Task_";
+    RTS_UI32 i;
+
+    begin();
+    spec.areas[APP_AREA_DATA] = 4 * APP_MAX_TASKS;
+    for (i = 0; i < APP_MAX_TASKS; i++) {
+        name[4] = (char)('a' + i);
+        add_counting_task(name, KIND_CYCLIC, 1000 * (i + 1));
+    }
+    load();
+    CHECK(SimAdvance(ms(720)) == ERR_OK);
+    for (i = 0; i < APP_MAX_TASKS; i++)
+        CHECK(count_of(i) == 720 / (i + 1) + 1);
+}
+
+static void downloads_free_the_timers_of_the_tasks_before(void)
+{
+    RTS_UI32 i;
+
+    begin();
+    for (i = 0; i < APP_MAX_TASKS; i++)
+        add_task(&spec, "Task", KIND_CYCLIC, 1000, 0);
+    emit_ret(&spec);
+    for (i = 0; i < 10; i++)
+        load();
+    CHECK(IecTaskGetCount() == APP_MAX_TASKS);
+}
+
+static void run_cycles_counts_cycles_of_the_first_task(void)
+{
+    begin();
+    add_counting_task("A", KIND_CYCLIC, 7000);
+    add_counting_task("B", KIND_CYCLIC, 1000);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(SimRunCycles(1) == ERR_INVALID_STATE);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimRunCycles(1) == ERR_OK);
+    CHECK(SimNow() == 0);
+    CHECK(SimRunCycles(100) == ERR_OK);
+    CHECK(count_of(0) == 101);
+    CHECK(SimNow() == ms(700));
+    CHECK(count_of(1) == 701);
+    CHECK(SimRunCycles(0) == ERR_OK);
+    CHECK(SimNow() == ms(700));
+}
+
+static void run_cycles_gives_up_on_a_task_that_never_runs(void)
+{
+    begin();
+    add_event_task();
+    load();
+    CHECK(SimRunCycles(1) == ERR_TIMEOUT);
+}
+
+static void run_cycles_works_for_freewheeling_tasks(void)
+{
+    begin();
+    add_counting_task("Free", KIND_FREEWHEELING, 0);
+    load();
+    CHECK(SimRunCycles(50) == ERR_OK);
+    CHECK(count_of(0) >= 50);
+}
+
+int main(void)
+{
+    NEEDS_X86_64;
+    RUN(every_cyclic_task_has_its_own_interval);
+    RUN(of_tasks_that_are_due_the_highest_priority_runs_first);
+    RUN(an_event_task_runs_once_per_rising_edge);
+    RUN(an_event_that_is_true_at_the_start_is_no_edge);
+    RUN(a_pulse_that_is_over_before_anybody_looks_is_no_edge);
+    RUN(an_edge_of_one_interval_is_not_missed);
+    RUN(freewheeling_tasks_run_again_and_again);
+    RUN(tasks_in_the_background_run_by_priority);
+    RUN(an_external_event_runs_its_task_once_per_post);
+    RUN(external_events_are_limited_and_unique);
+    RUN(as_many_tasks_as_the_device_can_run);
+    RUN(downloads_free_the_timers_of_the_tasks_before);
+    RUN(run_cycles_counts_cycles_of_the_first_task);
+    RUN(run_cycles_gives_up_on_a_task_that_never_runs);
+    RUN(run_cycles_works_for_freewheeling_tasks);
+    return test_result();
+}

@@ -1,0 +1,138 @@
+/*
+ * fuzz_srv.c - any layer-7 message of a client that is logged in: the reply is well-formed, memory outside the areas
+ * is safe.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Input: a message without its first 4 bytes. When bit 7 of the group is set the session and the application session
+ * are repaired wherever they are expected.
+ */
+#include <string.h>
+
+#include "CmpBytes.h"
+#include "CmpSrv.h"
+#include "comm_fakes.h"
+#include "comm_client.h"
+#include "fuzz.h"
+
+enum { HEAD = 16 }; /* group, service, session, content length, customer id */
+
+static size_t seed(uint8_t *data, uint8_t group, uint8_t service, const char *content, size_t size)
+{
+    memset(data, 0, HEAD);
+    data[0] = group;
+    data[1] = 0x80; /* repair */
+    data[2] = service;
+    memcpy(data + HEAD, content, size);
+    return HEAD + size;
+}
+
+#define SEED(group, service, content) seed(data, group, service, content, sizeof(content) - 1)
+#define APP "\x01\x14" "SSSS" "\x4F\x3E\x2D\x1C" "\0\0\0\0\0\0\0\0\0\0\0\0"
+#define POSITION "\x02\x10" "\0\0\0\0" "\0\0\0\0" "\x20\0\0\0" "\x01\x02\x03\x04"
+
+size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
+{
+    (void)capacity;
+    switch (index) {
+    case 0:
+        return SEED(1, 1, "\x01\x0C\0\x10\0\0\x02\0\x01\0\0\0\0\0");
+    case 1:
+        return SEED(1, 2, "\x22\x02\x01\x00\x81\x01\x04\x10\x02\x00\x00");
+    case 2:
+        return SEED(1, 3, "\x01\x04" "SSSS");
+    case 3:
+        return SEED(1, 5, "\x52\x04\x10\0\0\0\x53\x03" "abc");
+    case 4:
+        return SEED(1, 10, "\x46\x84\x80\x00\x03\0\0\0");
+    case 5:
+        return SEED(2, 1, "\x01\x0B" "Application");
+    case 6:
+        return SEED(2, 3, "\x81\x01\x90\x00\x10\x0E" "Application\0\0");
+    case 7:
+        return SEED(2, 0x10, "\x81\x01\x06\x11\x04" "SSSS");
+    case 8:
+        return SEED(2, 0x12, "\x81\x01\x0C\x11\x04" "SSSS" "\x10\x04\x01\0\0\0");
+    case 9:
+        return SEED(2, 0x14, "\x81\x01\x06\x11\x04" "SSSS");
+    case 10:
+        return SEED(2, 0x18, "\x01\x08\0\0\0\0\xFF\xFF\xFF\x7F");
+    case 11:
+        return SEED(2, 0x29, "");
+    case 12:
+        return SEED(2, 0x30, POSITION "\x03\x10" "0123456789abcdef");
+    case 13:
+        return SEED(2, 0x70, "");
+    case 14:
+        return SEED(0x1B, 1, APP "\x81\x01\x1E" "\x82\x01\x0A\x02\x01\x04\x05\x05\x02\x10\x00\x06\x00"
+                                 "\x82\x01\x0E\x01\x01\x07\x02\x01\x08\x05\x07\x03\x10\x00\x00\x00\x06\x01");
+    case 15:
+        return SEED(0x1B, 2, APP "\x03\x0E" "\0\0\x01\0\0\0\x55\x05\x00\x02\x10\x00\x06\x00");
+    case 16:
+        return SEED(0x1B, 2, APP "\x03\x25" "\0\0\x02\0\0\0\x55\xAA\x1B\x00"
+                                 "\x15\x0C\x00\x02\x10\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00"
+                                 "\x17\x04\x09\x04\x17\x08\x09\x04\x04");
+    case 17:
+        return SEED(5, 1, "\x02\x04\x01\0\0\0\x04\x04\x10\0\0\0");
+    default:
+        return 0;
+    }
+}
+
+/* Puts the sessions where the first inputs have "SSSS" or the header its zero. */
+static void repair(uint8_t *message, size_t size, RTS_UI32 session, RTS_UI32 app_session)
+{
+    message[5] &= 0x7F;
+    BytesPut32(message + 8, session);
+    BytesPut32(message + 12, (RTS_UI32)(size - 20));
+    for (size_t i = 20; i + 4 <= size; i++)
+        if (memcmp(message + i, "SSSS", 4) == 0)
+            BytesPut32(message + i, app_session);
+}
+
+/* The content can be walked to its end, containers included. */
+static void check_content(const BTAG_READER *level)
+{
+    BTAG_READER reader = *level;
+    BTAG_READER inner;
+    BTAG tag;
+    RTS_RESULT result;
+
+    while ((result = BTagReadNext(&reader, &tag)) == ERR_OK) {
+        FUZZ_CHECK(tag.size != 0);
+        if (BTagReadContainer(&reader, &tag, &inner) == ERR_OK)
+            check_content(&inner);
+    }
+    FUZZ_CHECK(result == ERR_END_OF_OBJECT);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static uint8_t message[4096];
+    static uint8_t reply[NETSERVER_MESSAGE_SIZE];
+    BTAG_READER content;
+
+    if (size < HEAD || size > sizeof(message) - 4)
+        return 0;
+    fakes_start();
+    fakes.task_count = FAKE_TASKS;
+    fakes.log_count = 5;
+    RTS_UI32 session = SrvLogin(0);
+    RTS_UI32 app_session = SrvCreateAppSession();
+    memcpy(message, "\x55\xCD\x10\x00", 4);
+    memcpy(message + 4, data, size);
+    if (message[5] & 0x80)
+        repair(message, size + 4, session, app_session);
+    uint8_t *copy = malloc(size + 4);
+    FUZZ_CHECK(copy != NULL);
+    memcpy(copy, message, size + 4);
+    RTS_UI32 capacity = CHANNEL_MIN_MESSAGE + data[size - 1];
+    RTS_UI32 got = SrvHandleMessage(copy, (RTS_UI32)size + 4, reply, capacity);
+    free(copy);
+    FUZZ_CHECK(got >= 20 && got <= capacity);
+    FUZZ_CHECK(BytesGet32(reply + 12) == got - 20);
+    BTagReaderInit(&content, reply + 20, got - 20);
+    check_content(&content);
+    FUZZ_CHECK(fakes.download_offset <= FAKE_IMAGE_SIZE);
+    return 0;
+}

@@ -1,0 +1,179 @@
+"""Flash and RAM of each component of the firmware, from the map files of the linker, held against a budget.
+
+    size.py BUDGET.toml CONFIG=FILE.map ...             prints the table; exit status 1 when a budget is exceeded
+    size.py --update BUDGET.toml CONFIG=FILE.map ...    makes the present figures the budget of the components
+
+Flash counts what is stored there, initial values of variables included. RAM counts variables and the main stack; what belongs to the
+application alone (its areas, the stacks of its tasks) is printed apart and has no budget: the device's maker chooses it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+FLASH_SECTIONS = {".vectors", ".text", ".ARM.exidx", ".data"}
+RAM_SECTIONS = {".data", ".bss", ".noinit", ".stack"}
+APPLICATION_SECTION = ".iec_stack"
+SLACK = 1.02  # the budget of a component is what it takes now, and two per cent
+ROUND = 16
+
+_OUTPUT = re.compile(r"^(\.\S+)(?:\s+0x[0-9a-f]+\s+0x([0-9a-f]+))?")
+_NAME = re.compile(r"^ (\.\S+|COMMON)")
+_PLACED = re.compile(r"\s0x[0-9a-f]+\s+0x([0-9a-f]+) (\S.*)$")
+_FILL = re.compile(r"^ \*fill\*\s+0x[0-9a-f]+\s+0x([0-9a-f]+)")
+_OWNER = re.compile(r"(cmp_list|[A-Za-z0-9]+)\.c\.o(?:bj)?$")
+_LIBRARY = re.compile(r"(lib\w+)\.a\(")
+
+
+@dataclass
+class Usage:
+    """Bytes of one component."""
+
+    flash: int = 0
+    ram: int = 0
+    application: int = 0
+
+
+@dataclass
+class Budget:
+    """The budget file: names of variables that are the application's, and limits in bytes."""
+
+    application: set[str]
+    total: dict[str, dict[str, int]]
+    component: dict[str, dict[str, list[int]]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One input section: where it went, what it is called, whose it is, bytes."""
+
+    output: str
+    name: str
+    owner: str
+    size: int
+
+
+def pieces(map_text: str) -> Iterator[Piece]:
+    """The input sections that were linked, and the gaps between them."""
+    _, _, body = map_text.partition("Linker script and memory map")
+    output = name = ""
+    for line in body.splitlines():
+        if match := _OUTPUT.match(line):
+            output = match[1]
+            if output == ".stack":
+                yield Piece(output, "", "main stack", int(match[2], 16))
+        elif match := _FILL.match(line):
+            if output != ".stack":
+                yield Piece(output, "", "alignment", int(match[1], 16))
+        else:
+            if match := _NAME.match(line):
+                name = match[1]
+            if match := _PLACED.search(line):
+                yield Piece(output, name, _owner(match[2]), int(match[1], 16))
+
+
+def _owner(path: str) -> str:
+    """The component an object file belongs to: the name of its source file, or of its library."""
+    match = _LIBRARY.search(path) or _OWNER.search(path)
+    return match[1] if match else "start-up"
+
+
+def measure(map_file: Path, application: set[str]) -> dict[str, Usage]:
+    """Usage by component, from one map file."""
+    usage: dict[str, Usage] = defaultdict(Usage)
+    for piece in pieces(map_file.read_text()):
+        mine = usage[piece.owner]
+        if piece.output in FLASH_SECTIONS:
+            mine.flash += piece.size
+        if piece.output == APPLICATION_SECTION or piece.name in application:
+            mine.application += piece.size
+        elif piece.output in RAM_SECTIONS:
+            mine.ram += piece.size
+    return {name: u for name, u in usage.items() if u.flash or u.ram or u.application}
+
+
+def total(usage: dict[str, Usage]) -> Usage:
+    """The sum over all components."""
+    return Usage(*(sum(getattr(u, name) for u in usage.values()) for name in ("flash", "ram", "application")))
+
+
+def exceeded(config: str, usage: dict[str, Usage], budget: Budget) -> list[str]:
+    """A sentence for each limit that is exceeded."""
+    found = []
+    all_together = total(usage)
+    for what, limit in budget.total.get(config, {}).items():
+        if (used := getattr(all_together, what)) > limit:
+            found.append(f"{config}: {what} is {used} bytes, the goal is {limit}.")
+    for name, (flash, ram) in budget.component.get(config, {}).items():
+        used_by = usage.get(name, Usage())
+        for what, used, limit in (("flash", used_by.flash, flash), ("ram", used_by.ram, ram)):
+            if used > limit:
+                found.append(f"{config}: {name} takes {used} bytes of {what}, its budget is {limit}.")
+    for name in usage.keys() - budget.component.get(config, usage).keys():
+        found.append(f"{config}: {name} has no budget; run size.py --update when it is meant to be there.")
+    return found
+
+
+def print_table(measured: dict[str, dict[str, Usage]]) -> None:
+    """Components by size, one pair of columns for each configuration."""
+    configs = list(measured)
+    names = {name for usage in measured.values() for name in usage}
+    order = sorted(names, key=lambda n: -max(u[n].flash + u[n].ram for u in measured.values() if n in u))
+    print(f"{'bytes':<28}" + "".join(f"{config:>20}" for config in configs))
+    print(f"{'':<28}" + f"{'flash':>12}{'RAM':>8}" * len(configs))
+    for name in order:
+        row = (measured[config].get(name) for config in configs)
+        print(f"{name:<28}" + "".join(f"{u.flash:>12}{u.ram:>8}" if u else f"{'-':>12}{'-':>8}" for u in row))
+    sums = [total(measured[config]) for config in configs]
+    print(f"{'total':<28}" + "".join(f"{u.flash:>12}{u.ram:>8}" for u in sums))
+    print(f"{'RAM of the application':<28}" + "".join(f"{u.application:>20}" for u in sums))
+
+
+def read_budget(path: Path) -> Budget:
+    """The budget file; see firmware/size-budget.toml."""
+    data = tomllib.loads(path.read_text())
+    return Budget(set(data["application"]), data["total"], data.get("component", {}))
+
+
+def with_slack(size: int) -> int:
+    """The budget for what takes `size` bytes now."""
+    return -(-int(size * SLACK) // ROUND) * ROUND
+
+
+def update(path: Path, measured: dict[str, dict[str, Usage]]) -> None:
+    """Replaces the component tables at the end of the file; what stands before them is kept as it is."""
+    head = path.read_text().split("[component.", 1)[0].rstrip()
+    tables = []
+    for config, usage in measured.items():
+        lines = [f'"{name}" = [{with_slack(u.flash)}, {with_slack(u.ram)}]' for name, u in sorted(usage.items())]
+        tables.append(f"[component.{config}]\n" + "\n".join(lines))
+    path.write_text(head + "\n\n" + "\n\n".join(tables) + "\n")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--update", action="store_true", help="make the present figures the budget")
+    parser.add_argument("budget", type=Path)
+    parser.add_argument("maps", nargs="+", metavar="CONFIG=FILE.map")
+    args = parser.parse_args()
+    budget = read_budget(args.budget)
+    maps = (text.split("=", 1) for text in args.maps)
+    measured = {config: measure(Path(file), budget.application) for config, file in maps}
+    if args.update:
+        update(args.budget, measured)
+        budget = read_budget(args.budget)
+    print_table(measured)
+    complaints = [text for config, usage in measured.items() for text in exceeded(config, usage, budget)]
+    print("\n".join(complaints))
+    return 1 if complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
