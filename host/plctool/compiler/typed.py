@@ -1,9 +1,9 @@
 """The typed program: what the checker makes of the syntax tree and all that the lowering needs.
 
 Everything is resolved here: names point to `Variable`s, implicit conversions are `Convert` nodes, call arguments are in
-order of declaration with defaults filled in, generic functions are instantiated, constants are folded. The lowering decides
-nothing about the language; it only chooses instructions. Every node says where it came from, for run-time errors and the
-debugger.
+order of declaration with defaults filled in, generic functions are instantiated, constants are folded. The lowering
+decides nothing about the language; it only chooses instructions. Every node says where it came from, for run-time
+errors and the debugger.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class Storage(Enum):
 class Variable:
     """A declared variable. `initial` is None for all zero.
 
-    `offset`: bytes in the area (AREA) or in the instance (SELF); for REFERENCE in a function block the offset of the stored
-    8-byte pointer in the instance (SELF slot), in a function the parameter itself.
+    `offset`: bytes in the area (AREA) or in the instance (SELF); for REFERENCE in a function block the offset of the
+    stored 8-byte pointer in the instance (SELF slot), in a function the parameter itself.
     """
 
     name: str
@@ -109,7 +109,8 @@ class MemberPlace:
 
 @dataclass
 class IndexPlace:
-    """`base` is an array; one index per dimension, each any integer type. Or a STRING with one 0-based index (type BYTE)."""
+    """`base` is an array; one index per dimension, each any integer type. Or a STRING with one 0-based index (type
+    BYTE)."""
 
     base: Place
     indices: list[Expr]
@@ -203,8 +204,8 @@ class BinaryOp(Enum):
 class Binary:
     """Both operands have the same base type; for comparisons `type` is BOOL. Strings may only be compared.
 
-    Integers wrap. DIV and MOD by zero raise DIVIDEBYZERO for integers; MIN / -1 wraps, MIN MOD -1 is 0. MOD takes the sign
-    of the dividend.
+    Integers wrap. DIV and MOD by zero raise DIVIDEBYZERO for integers; MIN / -1 wraps, MIN MOD -1 is 0. MOD takes the
+    sign of the dividend.
     """
 
     op: BinaryOp
@@ -218,9 +219,9 @@ class Binary:
 class Convert:
     """A value conversion between scalars.
 
-    integer/bit/time/enum -> integer/bit/time/enum: sign- or zero-extend by the source, truncate to the target; anything ->
-    BOOL: <> 0; real -> integer: round to nearest even, saturate, NaN is 0 (`truncate`: towards zero); integer -> real:
-    nearest. `check` carries the subrange limits to test first.
+    integer/bit/time/enum -> integer/bit/time/enum: sign- or zero-extend by the source, truncate to the target; anything
+    -> BOOL: <> 0; real -> integer: round to nearest even, saturate, NaN is 0 (`truncate`: towards zero); integer ->
+    real: nearest. `check` carries the subrange limits to test first.
     """
 
     operand: Expr
@@ -268,8 +269,9 @@ class AddressOf:
 
 @dataclass
 class Call:
-    """A call of a FUNCTION (or an EXTERNAL one). `args` in order of `function.parameters`: an expression for VAR_INPUT, a
-    place for VAR_IN_OUT, a place or None for VAR_OUTPUT. The result is `type`; strings and structs come back in a temporary.
+    """A call of a FUNCTION (or an EXTERNAL one). `args` in order of `function.parameters`: an expression for VAR_INPUT,
+    a place for VAR_IN_OUT, a place or None for VAR_OUTPUT. The result is `type`; strings and structs come back in a
+    temporary.
     """
 
     function: Pou
@@ -301,7 +303,8 @@ class CallStatement:
 
 @dataclass
 class FbCall:
-    """`instance(in := e, out => p)`: inputs are assigned, VAR_IN_OUT pointers stored, the body called, outputs copied."""
+    """`instance(in := e, out => p)`: inputs are assigned, VAR_IN_OUT pointers stored, the body called, outputs
+    copied."""
 
     block: Pou
     instance: Place
@@ -330,8 +333,8 @@ class Case:
 
 @dataclass
 class For:
-    """`stop` and `step` are evaluated once. The loop ends without wrapping, also at the limits of the type; `FOR i := 5 TO 5`
-    runs once. A step of 0 raises DIVIDEBYZERO when it is not a constant (a constant 0 is a compile error)."""
+    """`stop` and `step` are evaluated once. The loop ends without wrapping, also at the limits of the type; `FOR i := 5
+    TO 5` runs once. A step of 0 raises DIVIDEBYZERO when it is not a constant (a constant 0 is a compile error)."""
 
     var: Place
     start: Expr
@@ -392,7 +395,8 @@ class Direction(Enum):
 class Parameter:
     """`by_reference`: a VAR_IN_OUT, an output of a function, or a read-only string/array/struct input.
 
-    A STRING passed by reference travels as (pointer, u32 capacity), so that STRING_SIZE and cutting work for any length.
+    A STRING passed by reference travels as (pointer, u32 capacity), so that STRING_SIZE and cutting work for any
+    length.
     """
 
     variable: Variable
@@ -457,3 +461,6 @@ class TypedProgram:
     area_sizes: dict[Area, int]
     defaults: dict[str, StructInit]  # struct and FB type name -> initial values that are not zero
     programs: dict[str, Pou]  # instance name -> Pou
+    aliases: dict[str, str] = field(
+        default_factory=dict
+    )  # other names of globals -> name in `globals`: `x` for `GVL.x`

@@ -1,0 +1,149 @@
+"""`make bench`: what the runtime and the compiled code cost, each figure beside its yardstick, all in one run.
+
+Absolute times depend on the machine and its load; the ratios are what counts.
+"""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import plctool
+from plctool.compiler import BuildResult, compile_sources
+from plctool.sim import Simulator
+from plctool.testing.line import BITS_PER_BYTE, SerialLine
+from plctool.testing.plcrt import Plcrt
+
+ROOT = Path(__file__).parents[1]
+BAUD = 115200
+CYCLES = 1000  # of the control task before its state is compared with that of the C twin
+CALLS = 900_000
+
+EMPTY = "PROGRAM Main VAR x : INT; END_VAR END_PROGRAM"
+
+
+def line(what: str, figure: str, beside: str = "") -> None:
+    print(f"  {what:<52}{figure:>14}  {beside}", flush=True)
+
+
+def build(text: str) -> BuildResult:
+    """Compiles a program given as text."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bench.st"
+        path.write_text(text)
+        return compile_sources([path])
+
+
+# ---- serial --------------------------------------------------------------------------------------------------------
+
+
+def large_program(statements: int) -> str:
+    """A program whose image is large: every statement is its own code."""
+    body = "\n".join(f"a[{i % 50}] := a[{(i * 7) % 50}] * {i * 7919 + 13} + a[{(i * 3) % 50}];" for i in range(statements))
+    return f"PROGRAM Main VAR a : ARRAY[0..49] OF DINT; END_VAR\n{body}\nEND_PROGRAM"
+
+
+def flash_share(image: bytes) -> tuple[float, float]:
+    """Seconds to flash an image over a paced line, and the share of the line's byte rate that carried image bytes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bench.cdl"
+        path.write_bytes(image)
+        with (
+            Plcrt(Path(folder) / "flash") as runtime,
+            SerialLine(runtime.port, BAUD) as serial,
+            plctool.connect(f"serial:{serial.path}", baud=BAUD) as plc,
+        ):
+            begin = time.monotonic()
+            plc.flash(path)
+            seconds = time.monotonic() - begin
+    return seconds, len(image) * BITS_PER_BYTE / BAUD / seconds
+
+
+def bench_serial() -> None:
+    print(f"\nFlashing over a serial line of {BAUD} baud (share of the line's byte rate that carries image bytes)")
+    for name, result in (
+        ("examples/tanks", compile_sources([ROOT / "examples/tanks"])),
+        ("a large program", build(large_program(4000))),
+    ):
+        seconds, share = flash_share(result.image)
+        line(f"{name}, {len(result.image)} bytes, to running", f"{seconds:.2f} s", f"{share:.1%} of the line")
+
+
+# ---- cycles --------------------------------------------------------------------------------------------------------
+
+
+def best_bench(result: BuildResult) -> list[tuple[str, float, float]]:
+    """Task name, ns of its code, ns of a whole cycle; the best of three."""
+    runs = []
+    for _ in range(3):
+        with Simulator(result.image, result.symbols) as plc:
+            plc.run_cycles(CYCLES)
+            runs.append([plc.bench(task, CALLS) for task in range(len(result.symbols.tasks))])
+    return [
+        (name, min(r[i][0] for r in runs), min(r[i][1] for r in runs)) for i, name in enumerate(result.symbols.tasks)
+    ]
+
+
+def bench_empty_task() -> None:
+    print("\nOne cycle of an empty task")
+    (_, code, cycle), = best_bench(build(EMPTY))
+    line("call of the compiled code", f"{code:.1f} ns")
+    line("complete cycle: clock, code, statistics, watchdog", f"{cycle:.1f} ns", f"the runtime adds {cycle - code:.1f} ns")
+
+
+def checksum(plc: Simulator) -> int:
+    """As tanks_checksum() in the C twin."""
+    bits = [int.from_bytes(struct.pack("<f", plc.read(f"Plant.level{i}")), "little") for i in (1, 2)]
+    return (bits[0] * 31 + bits[1]) % (1 << 32)
+
+
+def run_twin(optimisation: str) -> tuple[int, float, float]:
+    """Checksum, ns per control cycle, ns per plant cycle of the C twin."""
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder) / "tanks"
+        sources = [ROOT / "bench/tanks_main.c", ROOT / "examples/tanks/c/tanks.c"]
+        flags = ["-std=c99", "-ffp-contract=off", optimisation, f"-I{ROOT / 'examples/tanks/c'}"]
+        subprocess.run(["cc", *flags, "-o", program, *sources, "-lm"], check=True)
+        outs = [subprocess.run([program, str(CYCLES), str(CALLS)], check=True, capture_output=True, text=True) for _ in range(3)]
+    runs = [out.stdout.split() for out in outs]
+    return int(runs[0][0]), min(float(r[1]) for r in runs), min(float(r[2]) for r in runs)
+
+
+def bench_tanks() -> None:
+    print("\nexamples/tanks, ns per cycle of each task, beside the same program in C")
+    twins = {level: run_twin(level) for level in ("-O2", "-O3")}
+    for checks in ("all", "none"):
+        result = compile_sources([ROOT / "examples/tanks"], checks=checks)
+        with Simulator(result.image, result.symbols) as plc:
+            plc.run_cycles(CYCLES)
+            same = {level: checksum(plc) == twin[0] for level, twin in twins.items()}
+        for i, (name, code, _) in enumerate(best_bench(result)):
+            beside = ", ".join(
+                f"gcc {level} {twin[1 + i]:.1f} ns: {code / twin[1 + i]:.2f} of it{'' if same[level] else ' (OTHER RESULT)'}"
+                for level, twin in twins.items()
+            )
+            line(f"{name}, checks {checks}", f"{code:.1f} ns", beside)
+
+
+def bench_day() -> None:
+    print("\nA day of PLC time with a 10 ms task, in the simulator")
+    text = "PROGRAM Main VAR n : UDINT; t : TON; END_VAR n := n + 1; t(IN := NOT t.Q, PT := T#1s); END_PROGRAM"
+    result = build(text)
+    with Simulator(result.image, result.symbols) as plc:
+        begin = time.monotonic()
+        plc.run_for(seconds=86400)
+        line(f"{plc.read('Main.n')} cycles", f"{time.monotonic() - begin:.2f} s")
+
+
+def main() -> None:
+    bench_empty_task()
+    bench_tanks()
+    bench_day()
+    bench_serial()
+
+
+if __name__ == "__main__":
+    main()

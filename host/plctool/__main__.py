@@ -1,0 +1,9 @@
+"""`python -m plctool` is `plctool`."""
+
+from __future__ import annotations
+
+import sys
+
+from plctool.cli import main
+
+sys.exit(main())

@@ -1,0 +1,1 @@
+"""The compiler: IEC 61131-3 Structured Text in, an application image and its symbols out."""

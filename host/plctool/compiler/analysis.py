@@ -1,0 +1,134 @@
+"""Questions about the typed program that decide between two correct ways of lowering."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from plctool.compiler.typed import (
+    AddressOf,
+    Assign,
+    Binary,
+    BitPlace,
+    Call,
+    CallStatement,
+    Case,
+    Convert,
+    DerefPlace,
+    Direction,
+    FbCall,
+    For,
+    If,
+    IndexPlace,
+    IntrinsicCall,
+    Load,
+    MemberPlace,
+    Place,
+    Pou,
+    Repeat,
+    Storage,
+    Unary,
+    ValuePlace,
+    Variable,
+    VarPlace,
+    While,
+)  # fmt: skip
+
+_NODES = (
+    VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, Load, Unary, Binary, Convert, IntrinsicCall, AddressOf,
+    Call, Assign, CallStatement, FbCall, If, Case, For, While, Repeat,
+)  # fmt: skip
+
+
+def walk(root: object) -> Iterator[object]:
+    """Every node of statements or expressions below `root` (a node, or lists and tuples of them)."""
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, list | tuple):
+            stack.extend(node)
+        elif isinstance(node, _NODES):
+            yield node
+            stack.extend(vars(node).values())
+
+
+def root_of(place: Place) -> Variable | None:
+    """The variable a place is part of; None when it is reached through a pointer or is a value."""
+    while not isinstance(place, VarPlace):
+        if isinstance(place, DerefPlace | ValuePlace):
+            return None
+        place = place.base
+    return None if place.var.storage is Storage.REFERENCE else place.var
+
+
+def written_places(node: object) -> Iterator[Place]:
+    """Places that `node` itself writes, or hands out by reference so that others may."""
+    if isinstance(node, Assign):
+        yield node.target
+    elif isinstance(node, For):
+        yield node.var
+    elif isinstance(node, AddressOf):
+        yield node.place
+    elif isinstance(node, FbCall):
+        yield node.instance
+        for _, place in node.in_outs + node.outputs:
+            yield place
+    elif isinstance(node, Call):
+        for parameter, argument in zip(node.function.parameters, node.args, strict=True):
+            if parameter.direction is not Direction.INPUT and argument is not None:
+                yield argument  # type: ignore[misc]
+
+
+class Effects:
+    """Remembers answers about POUs."""
+
+    def __init__(self) -> None:
+        self._local: dict[Pou, bool] = {}
+        self._addressed: dict[Pou, set[Variable]] = {}
+
+    def is_local(self, pou: Pou) -> bool:
+        """Whether a call touches nothing but the callee's own variables and its arguments."""
+        known = self._local.get(pou)
+        if known is None:
+            self._local[pou] = False  # the answer within a recursion
+            known = pou.external is None and all(self._is_local_node(node) for node in walk(pou.body))
+            self._local[pou] = known
+        return known
+
+    def _is_local_node(self, node: object) -> bool:
+        if isinstance(node, VarPlace):
+            return node.var.storage in (Storage.LOCAL, Storage.REFERENCE)
+        if isinstance(node, Call):
+            return self.is_local(node.function)
+        if isinstance(node, FbCall):
+            return self.is_local(node.block)
+        return not isinstance(node, DerefPlace)
+
+    def owns_loop_variable(self, loop: For, pou: Pou) -> Variable | None:
+        """The FOR variable when nothing but the loop itself can write it while the loop runs."""
+        if not isinstance(loop.var, VarPlace) or loop.var.var.storage is Storage.REFERENCE:
+            return None
+        var = loop.var.var
+        if var in self._addressed_in(pou):
+            return None
+        for node in walk(loop.body):
+            for place in written_places(node):
+                root = root_of(place)
+                if root is var or (root is None and var.storage is not Storage.LOCAL):
+                    return None
+            if var.storage is not Storage.LOCAL and not self._leaves_alone(node):
+                return None
+        return var
+
+    def _leaves_alone(self, node: object) -> bool:
+        if isinstance(node, Call):
+            return self.is_local(node.function)
+        return not isinstance(node, FbCall)
+
+    def _addressed_in(self, pou: Pou) -> set[Variable]:
+        """Variables whose address the POU takes."""
+        known = self._addressed.get(pou)
+        if known is None:
+            places = [node.place for node in walk(pou.body) if isinstance(node, AddressOf)]
+            known = {root for place in places if (root := root_of(place)) is not None}
+            self._addressed[pou] = known
+        return known

@@ -1,0 +1,395 @@
+"""The syntax tree: what was written, before names and types mean anything. `pos` is a character offset in the source.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum, auto
+
+from plctool.compiler.source import Source
+
+# ---- expressions ---------------------------------------------------------------------------------------------------
+
+
+class LiteralKind(Enum):
+    """What sort of constant was written."""
+
+    INT = auto()
+    REAL = auto()
+    BOOL = auto()
+    TIME = auto()  # value in ns
+    STRING = auto()
+    NULL = auto()
+    BAD = auto()  # already reported
+
+
+@dataclass(slots=True, eq=False)
+class Literal:
+    """A constant. `type_name` is the prefix of a typed literal (`INT#5`), for durations TIME or LTIME."""
+
+    pos: int
+    kind: LiteralKind
+    value: int | float | str
+    type_name: str | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Name:
+    pos: int
+    name: str
+
+
+@dataclass(slots=True, eq=False)
+class EnumValue:
+    """`Color#Red`"""
+
+    pos: int
+    type_name: str
+    name: str
+
+
+@dataclass(slots=True, eq=False)
+class DirectAddress:
+    """`%IX0.3`, `%QW2`, or `%I*` for an address still open."""
+
+    pos: int
+    text: str
+
+
+@dataclass(slots=True, eq=False)
+class Member:
+    """`base.name`; `name_pos` is where the name stands."""
+
+    pos: int
+    base: Expr
+    name: str
+    name_pos: int
+
+
+@dataclass(slots=True, eq=False)
+class BitAccess:
+    """`base.3`, `base.%X3`; `width` is X, B, W, D or L."""
+
+    pos: int
+    base: Expr
+    width: str
+    index: int
+
+
+@dataclass(slots=True, eq=False)
+class Index:
+    pos: int
+    base: Expr
+    indices: list[Expr]
+
+
+@dataclass(slots=True, eq=False)
+class Deref:
+    """`base^`"""
+
+    pos: int
+    base: Expr
+
+
+@dataclass(slots=True, eq=False)
+class Argument:
+    """`value`, `name := value` or `name => target` (`output`; `NOT name => target` when `negated`)."""
+
+    pos: int
+    name: str | None
+    value: Expr | None
+    output: bool = False
+    negated: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class Call:
+    pos: int
+    callee: Expr
+    args: list[Argument]
+
+
+@dataclass(slots=True, eq=False)
+class Unary:
+    """`op` is NOT, - or +."""
+
+    pos: int
+    op: str
+    operand: Expr
+
+
+@dataclass(slots=True, eq=False)
+class Binary:
+    """`op` in capitals; `&` is AND. `pos` is that of the operator."""
+
+    pos: int
+    op: str
+    left: Expr
+    right: Expr
+
+
+Expr = Literal | Name | EnumValue | DirectAddress | Member | BitAccess | Index | Deref | Call | Unary | Binary
+
+# ---- initial values ------------------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True, eq=False)
+class Repeat:
+    """`count(value)` in an array initialiser; without values the elements keep their default."""
+
+    pos: int
+    count: Expr
+    values: list[Init]
+
+
+@dataclass(slots=True, eq=False)
+class ArrayInit:
+    """`[a, b, 3(c)]`"""
+
+    pos: int
+    items: list[Init | Repeat]
+
+
+@dataclass(slots=True, eq=False)
+class StructInit:
+    """`(member := value, ...)`"""
+
+    pos: int
+    members: list[tuple[int, str, Init]]
+
+
+Init = Expr | ArrayInit | StructInit
+
+# ---- types ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True, eq=False)
+class NamedType:
+    """A type by its name; `length` for STRING[length]."""
+
+    pos: int
+    name: str
+    length: Expr | None = None
+
+
+@dataclass(slots=True, eq=False)
+class SubrangeSpec:
+    """`INT (low .. high)`"""
+
+    pos: int
+    base: str
+    low: Expr
+    high: Expr
+
+
+@dataclass(slots=True, eq=False)
+class EnumSpec:
+    """`(a, b := 3)` or `INT (a, b := 3)`. With a base and in a variable declaration it may mean `TON(PT := T#1s)`."""
+
+    pos: int
+    base: str | None
+    values: list[tuple[int, str, Init | None]]
+
+
+@dataclass(slots=True, eq=False)
+class ArraySpec:
+    pos: int
+    bounds: list[tuple[Expr, Expr]]
+    element: TypeSpec
+
+
+@dataclass(slots=True, eq=False)
+class PointerSpec:
+    """`keyword` is POINTER, REFERENCE or REF_TO."""
+
+    pos: int
+    keyword: str
+    target: TypeSpec
+
+
+@dataclass(slots=True, eq=False)
+class StructSpec:
+    pos: int
+    fields: list[VarDecl]
+    union: bool = False
+
+
+TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | StructSpec
+
+# ---- declarations --------------------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True, eq=False)
+class VarDecl:
+    """One declaration line: `names AT location : type := init`."""
+
+    pos: int
+    names: list[tuple[int, str]]
+    location: DirectAddress | None
+    type: TypeSpec
+    init: Init | None
+    attributes: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
+class VarBlock:
+    """`VAR_INPUT RETAIN ... END_VAR`; `keyword` and `qualifiers` in capitals."""
+
+    pos: int
+    keyword: str
+    qualifiers: set[str]
+    decls: list[VarDecl]
+
+
+@dataclass(slots=True, eq=False)
+class TypeDecl:
+    pos: int
+    name: str
+    spec: TypeSpec
+    init: Init | None
+    source: Source
+
+
+@dataclass(slots=True, eq=False)
+class PouDecl:
+    """PROGRAM, FUNCTION or FUNCTION_BLOCK (`keyword`). `attributes` by lower-case name."""
+
+    pos: int
+    keyword: str
+    name: str
+    result: TypeSpec | None
+    blocks: list[VarBlock]
+    body: list[Stmt]
+    attributes: dict[str, str]
+    source: Source
+
+
+@dataclass(slots=True, eq=False)
+class GlobalBlock:
+    block: VarBlock
+    source: Source
+
+
+@dataclass(slots=True, eq=False)
+class TaskDecl:
+    """`TASK name(INTERVAL := ..., ...)`"""
+
+    pos: int
+    name: str
+    properties: list[tuple[int, str, Init]]
+
+
+@dataclass(slots=True, eq=False)
+class ProgramInstance:
+    """`PROGRAM name WITH task : type(args)`"""
+
+    pos: int
+    name: str
+    task: tuple[int, str] | None
+    type_pos: int
+    type_name: str
+    args: list[Argument]
+    qualifiers: set[str]
+
+
+@dataclass(slots=True, eq=False)
+class ConfigurationDecl:
+    """A CONFIGURATION with what its resources hold, in order."""
+
+    pos: int
+    name: str
+    globals: list[VarBlock]
+    tasks: list[TaskDecl]
+    programs: list[ProgramInstance]
+    source: Source
+
+
+Declaration = TypeDecl | PouDecl | GlobalBlock | ConfigurationDecl
+
+# ---- statements ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True, eq=False)
+class Assign:
+    """`targets[0] := targets[1] := ... := value`; `op` is :=, S=, R= or REF=. `pos` is that of the operator."""
+
+    pos: int
+    targets: list[Expr]
+    op: str
+    value: Expr
+
+
+@dataclass(slots=True, eq=False)
+class ExprStmt:
+    """A call, or an expression that should have been one."""
+
+    pos: int
+    value: Expr
+
+
+@dataclass(slots=True, eq=False)
+class If:
+    pos: int
+    branches: list[tuple[Expr, list[Stmt]]]
+    otherwise: list[Stmt]
+
+
+@dataclass(slots=True, eq=False)
+class CaseLabel:
+    """`low` or `low .. high`"""
+
+    pos: int
+    low: Expr
+    high: Expr | None
+
+
+@dataclass(slots=True, eq=False)
+class Case:
+    pos: int
+    selector: Expr
+    branches: list[tuple[list[CaseLabel], list[Stmt]]]
+    otherwise: list[Stmt]
+
+
+@dataclass(slots=True, eq=False)
+class For:
+    pos: int
+    var: Expr
+    start: Expr
+    stop: Expr
+    step: Expr | None
+    body: list[Stmt]
+
+
+@dataclass(slots=True, eq=False)
+class While:
+    pos: int
+    condition: Expr
+    body: list[Stmt]
+
+
+@dataclass(slots=True, eq=False)
+class RepeatUntil:
+    pos: int
+    body: list[Stmt]
+    until: Expr
+
+
+@dataclass(slots=True, eq=False)
+class Exit:
+    pos: int
+
+
+@dataclass(slots=True, eq=False)
+class Continue:
+    pos: int
+
+
+@dataclass(slots=True, eq=False)
+class Return:
+    pos: int
+
+
+Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return

@@ -1,0 +1,113 @@
+"""From the typed program to the image and its symbols."""
+
+from __future__ import annotations
+
+import time
+from bisect import bisect_right
+from dataclasses import dataclass, field
+
+from plctool.compiler.diagnostics import Diagnostic
+from plctool.compiler.emit import emit_object
+from plctool.compiler.link import Linked, link
+from plctool.compiler.lower import GLOBAL_INIT, Lowered, lower
+from plctool.compiler.lower_unit import Options
+from plctool.compiler.targets import Machine, Target
+from plctool.compiler.typed import Area, Task, TypedProgram
+from plctool.core import lib
+from plctool.image import ApplicationInfo, ExternalFunction, Image, ImageTask, build_image
+from plctool.symbols import CodeUnit, Symbol, SymbolTable, layout_signature
+
+
+@dataclass(frozen=True)
+class BuildResult:
+    """An image and its symbols. `sizes`: bytes of code made from each POU's source, inlined copies included."""
+
+    image: bytes
+    symbols: SymbolTable
+    warnings: list[Diagnostic] = field(default_factory=list)
+    sizes: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def crc(self) -> int:
+        return self.symbols.image_crc
+
+
+def build_program(program: TypedProgram, options: Options, info: ApplicationInfo | None = None) -> BuildResult:
+    """Compiles a checked program. Raises UsageError when the target cannot run it."""
+    target = options.target
+    lowered = lower(program, options)
+    data = emit_object(lowered.text, target, options.opt_level)
+    linked = link(data, target, [*lowered.tasks, GLOBAL_INIT], len(lowered.imports))
+    info = info or ApplicationInfo(date=int(time.time()))
+    symbols = _symbols(program, lowered, linked, target, info.project)
+    retained = [s for s in symbols.variables.values() if s.area == Area.RETAIN.value]
+    image = Image(
+        device_id=int(getattr(lib, target.device_id)),
+        code=linked.code,
+        areas={area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE},
+        functions={int(lib.CDL_FUNCTION_GLOBAL_INIT): _entry(linked, GLOBAL_INIT, target)},
+        externals=[
+            ExternalFunction(e.name, e.signature, e.version, slot * target.pointer_size)
+            for slot, e in enumerate(lowered.imports + linked.imports)
+        ],
+        tasks=[
+            _task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)
+        ],
+        info=info,
+        retain_layout=layout_signature(retained) if retained else None,
+    )
+    built = build_image(image)
+    symbols.image_crc = int.from_bytes(built[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+    return BuildResult(built, symbols, [], code_sizes(symbols, len(linked.code)))
+
+
+def _entry(linked: Linked, name: str, target: Target) -> int:
+    """What the runtime adds to the address of the code to call a function; odd in Thumb code."""
+    return linked.symbols[name].offset | (target.machine in (Machine.THUMB, Machine.THUMB_V6M))
+
+
+def _task(task: Task, entry: int) -> ImageTask:
+    event = (task.event.area.value, task.event.offset) if task.event else None
+    return ImageTask(
+        task.name,
+        task.kind.value,
+        task.priority,
+        task.interval_us,
+        entry,
+        task.watchdog_us,
+        task.watchdog_sensitivity,
+        event,
+    )
+
+
+def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, project: str) -> SymbolTable:
+    variables = {v.name: Symbol(v.name, v.area.value, v.offset, v.type) for v in program.globals}
+    units = []
+    for name, pou in lowered.pous.items():
+        symbol = linked.symbols.get(name)
+        offset, size = (symbol.offset, symbol.size) if symbol else (0, 0)
+        units.append(CodeUnit(pou.name, offset, size, pou.pos.file, pou.pos.line))
+    units.sort(key=lambda u: (u.offset, u.name))
+    files: dict[str, int] = {}
+    lines = []
+    for line in linked.lines:
+        index = files.setdefault(line.file, len(files)) if line.file else -1
+        lines.append((line.address, index, line.line))
+    return SymbolTable(0, target.name, project, [t.name for t in program.tasks], variables, units, lines, list(files))
+
+
+def code_sizes(symbols: SymbolTable, code_size: int) -> dict[str, int]:
+    """Bytes of code by the POU whose source they come from, largest first."""
+    starts: dict[str, list[tuple[int, str]]] = {}
+    for unit in symbols.pous:
+        starts.setdefault(unit.file, []).append((unit.line, unit.name))
+    for units in starts.values():
+        units.sort()
+    sizes: dict[str, int] = {}
+    ends = [*(line[0] for line in symbols.lines[1:]), code_size]
+    for (offset, index, number), end in zip(symbols.lines, ends, strict=False):
+        units = starts.get(symbols.files[index], []) if index >= 0 else []
+        at = bisect_right(units, (number, "\U0010ffff")) - 1
+        if at >= 0 and number:
+            sizes[units[at][1]] = sizes.get(units[at][1], 0) + end - offset
+    return dict(sorted(sizes.items(), key=lambda item: -item[1]))

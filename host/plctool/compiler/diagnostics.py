@@ -1,0 +1,86 @@
+"""What the compiler has to say about a program.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Literal
+
+from plctool.compiler.source import Source
+from plctool.compiler.typed import Pos
+
+Severity = Literal["error", "warning"]
+
+MAX_ERRORS = 20  # what follows is seldom news
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One finding. `line` and `column` count from 1; `code` is a short slug for machines, `message` one sentence."""
+
+    file: str
+    line: int
+    column: int
+    severity: Severity
+    code: str
+    message: str
+
+
+class TooManyErrors(Exception):
+    """The error limit is reached: checking stops here."""
+
+
+class Diagnostics:
+    """Collects findings, each only once, and stops the check after `MAX_ERRORS` errors. There are no warnings about the
+    files in `quiet`."""
+
+    def __init__(self, quiet: Iterable[str] = ()) -> None:
+        self._quiet = frozenset(quiet)
+        self._found: dict[Diagnostic, None] = {}
+        self.errors = 0
+
+    def error(self, pos: Pos, code: str, message: str) -> None:
+        """Records an error; raises TooManyErrors when it is one too many."""
+        self._add(Diagnostic(pos.file, pos.line, pos.column, "error", code, message))
+
+    def warning(self, pos: Pos, code: str, message: str) -> None:
+        """Records a warning."""
+        if pos.file in self._quiet:
+            return
+        self._add(Diagnostic(pos.file, pos.line, pos.column, "warning", code, message))
+
+    def _add(self, diagnostic: Diagnostic) -> None:
+        if diagnostic in self._found:
+            return
+        self._found[diagnostic] = None
+        if diagnostic.severity == "error":
+            self.errors += 1
+            if self.errors >= MAX_ERRORS:
+                raise TooManyErrors
+
+    def sorted(self) -> list[Diagnostic]:
+        """All findings by file and place."""
+        return sorted(self._found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
+
+
+def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
+    """`file.st:12:7: error: message`, and below it the source line with a caret when the file is among `sources`."""
+    d = diagnostic
+    head = f"{d.file}:{d.line}:{d.column}: {d.severity}: {d.message}"
+    source = next((s for s in sources if s.path == d.file), None)
+    if source is None:
+        return head
+    line = source.line_text(d.line)
+    indent = "".join("\t" if c == "\t" else " " for c in line[: d.column - 1])
+    return f"{head}\n{line}\n{indent}^"
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """`; did you mean X?` for the candidate most like `name`, else nothing."""
+    by_key = {c.casefold(): c for c in candidates}
+    close = get_close_matches(name.casefold(), list(by_key), n=1, cutoff=0.7)
+    return f"; did you mean {by_key[close[0]]}?" if close else ""

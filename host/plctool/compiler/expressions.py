@@ -1,0 +1,637 @@
+"""Expressions: names become places, operators get their types, constants are folded.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from plctool.compiler import ast, constants
+from plctool.compiler.conversions import (
+    BITS,
+    NUMBERS,
+    SIGNED,
+    common_number,
+    common_type,
+    convert,
+    elementary,
+    error_value,
+    literal_type,
+    settle,
+)  # fmt: skip
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.scope import Scope
+from plctool.compiler.symbols import (
+    ERROR,
+    NULL_TYPE,
+    UNTYPED_INT,
+    UNTYPED_REAL,
+    GlobalSymbol,
+    Namespace,
+    PouSymbol,
+    Role,
+    TypeSymbol,
+    VarSymbol,
+)  # fmt: skip
+from plctool.compiler.typed import (
+    Binary,
+    BinaryOp,
+    BitPlace,
+    Const,
+    DerefPlace,
+    Expr,
+    IndexPlace,
+    Load,
+    MemberPlace,
+    Place,
+    Pos,
+    Storage,
+    Unary,
+    UnaryOp,
+    ValuePlace,
+    VarPlace,
+)  # fmt: skip
+from plctool.compiler.types import (
+    BOOL,
+    BYTE,
+    DINT,
+    ELEMENTARY,
+    LREAL,
+    LTIME,
+    REAL,
+    TIME,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Kind,
+    PointerType,
+    StringType,
+    StructType,
+    Type,
+    base_of,
+)  # fmt: skip
+
+MAX_DEPTH = 400  # levels of nesting in one expression or of statements; the lowering recurses over them too
+
+_OPERATORS = {op.value: op for op in BinaryOp}
+_COMPARISONS = {BinaryOp.EQ, BinaryOp.NE, BinaryOp.LT, BinaryOp.LE, BinaryOp.GT, BinaryOp.GE}
+_LOGIC = {BinaryOp.AND, BinaryOp.OR, BinaryOp.XOR}
+_LAZY = {BinaryOp.AND_THEN, BinaryOp.OR_ELSE}
+_UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
+
+
+def is_untyped(e: Expr) -> bool:
+    """Whether the expression is a constant that takes the type its surroundings need."""
+    return e.type is UNTYPED_INT or e.type is UNTYPED_REAL
+
+
+def place_of(e: Expr) -> Place:
+    """The place a value was loaded from, or a temporary one."""
+    return e.place if isinstance(e, Load) else ValuePlace(e, e.type, e.pos)
+
+
+class Expressions:
+    """Checks the expressions of one scope."""
+
+    def __init__(self, scope: Scope) -> None:
+        self.scope = scope
+        self.world = scope.world
+        self.coerce = scope.world.coerce
+        self.pos: Callable[[int], Pos] = scope.source.pos
+        self._depth = 0
+
+    # ---- entry points ----
+
+    def expr(self, node: ast.Expr, expected: Type | None = None) -> Expr:
+        """The typed expression; `expected` is the type the surroundings would like. Untyped constants stay untyped."""
+        return self._handlers[type(node)](self, node, expected)
+
+    def value(self, node: ast.Expr, target: Type) -> Expr:
+        """The expression as a value of `target`."""
+        return self.coerce(self.expr(node, target), target)
+
+    def settled(self, node: ast.Expr) -> Expr:
+        """The expression with the type it has by itself."""
+        return settle(self.expr(node))
+
+    def condition(self, node: ast.Expr) -> Expr:
+        """The expression as a BOOL."""
+        e = self.expr(node, BOOL)
+        if e.type is BOOL:
+            return e
+        return self.coerce(e, BOOL)
+
+    def constant(self, node: ast.Expr, expected: Type | None = None) -> Const | None:
+        """The value of a constant expression; anything else is reported."""
+        e = self.expr(node, expected)
+        if e.type is ERROR:
+            return None
+        if isinstance(e, Const):
+            return e
+        self.error(node.pos, "constant", "a constant is needed here")
+        return None
+
+    def integer(self, node: ast.Expr) -> int | None:
+        """The value of a constant integer expression."""
+        e = self.constant(node)
+        if e is None:
+            return None
+        base = elementary(e.type)
+        if isinstance(e.value, int) and base is not None and base.kind in NUMBERS:
+            return e.value
+        self.error(node.pos, "type", "an integer constant is needed here")
+        return None
+
+    def place(self, node: ast.Expr, use: str) -> Place | None:
+        """The variable (or part of one) an expression names; `use` says what for."""
+        e = self.expr(node)
+        if e.type is ERROR:
+            return None
+        if isinstance(e, Load) and not isinstance(e.place, ValuePlace):
+            return e.place
+        self.error(node.pos, "place", f"{use} needs a variable")
+        return None
+
+    def error(self, offset: int, code: str, message: str) -> Expr:
+        """Reports an error; the value that stands for the expression."""
+        self.scope.error(offset, code, message)
+        return error_value(self.pos(offset))
+
+    # ---- literals and names ----
+
+    def _literal(self, node: ast.Literal, expected: Type | None) -> Expr:
+        pos, value, kind = self.pos(node.pos), node.value, node.kind
+        if kind is ast.LiteralKind.INT and node.type_name is None:
+            assert isinstance(value, int)
+            if literal_type(value) is None:
+                return self.error(node.pos, "range", f"{value} fits no integer type")
+            return Const(value, UNTYPED_INT, pos)
+        if kind is ast.LiteralKind.REAL and node.type_name is None:
+            return Const(value, UNTYPED_REAL, pos)
+        if kind is ast.LiteralKind.BOOL:
+            return Const(value, BOOL, pos)
+        if kind is ast.LiteralKind.STRING:
+            assert isinstance(value, str)
+            return Const(value, StringType(len(value)), pos)
+        if kind is ast.LiteralKind.TIME:
+            return self._duration(node, pos)
+        if kind is ast.LiteralKind.NULL:
+            return Const(0, NULL_TYPE, pos)
+        if kind is ast.LiteralKind.BAD:
+            return error_value(pos)
+        return self._typed_literal(node, pos)
+
+    def _duration(self, node: ast.Literal, pos: Pos) -> Expr:
+        assert isinstance(node.value, int)
+        target, value = LTIME, node.value
+        if node.type_name == "TIME":
+            target, value = TIME, constants.divide(value, 1_000_000)
+        if not constants.fits(value, target):
+            return self.error(node.pos, "range", f"this duration is too long for {target}")
+        return Const(value, target, pos)
+
+    def _typed_literal(self, node: ast.Literal, pos: Pos) -> Expr:
+        assert node.type_name is not None
+        target: Type | None = ELEMENTARY.get(node.type_name)
+        if target is None:
+            target = self.world.declarations.named_type(node.pos, node.type_name, self.scope)
+        untyped = UNTYPED_INT if node.kind is ast.LiteralKind.INT else UNTYPED_REAL
+        return self.coerce(Const(node.value, untyped, pos), target)
+
+    def _name(self, node: ast.Name, expected: Type | None) -> Expr:
+        symbol = self.scope.lookup(node.name)
+        if isinstance(symbol, GlobalSymbol):
+            symbol = self.world.declarations.global_variable(symbol)
+        if isinstance(symbol, VarSymbol):
+            return self.variable(symbol, self.pos(node.pos))
+        if symbol is None:
+            value = self.world.enum_value(node.name, self.scope, node.pos, expected)
+            if value is not None:
+                return value
+            return self._unknown(node)
+        return self.error(node.pos, "name", f"{node.name} is {describe(symbol)}, not a value")
+
+    def _unknown(self, node: ast.Name) -> Expr:
+        names = [*(s for s in self.scope.names), *self.world.visible_names()]
+        hint = did_you_mean(node.name, {self._written(n) for n in names} - {""})
+        return self.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")
+
+    def _written(self, key: str) -> str:
+        symbol = self.scope.names.get(key)
+        return symbol.name if isinstance(symbol, VarSymbol | GlobalSymbol) else key
+
+    def variable(self, symbol: VarSymbol, pos: Pos) -> Expr:
+        """A variable as a value: of constants their value."""
+        symbol.used = True
+        if symbol.value is not None:
+            return Const(symbol.value.value, symbol.type, pos)
+        variable = symbol.variable
+        if variable is None:
+            return error_value(pos)
+        if variable.bit is not None:
+            return Load(BitPlace(VarPlace(variable, BYTE, pos), variable.bit, BOOL, pos), BOOL, pos)
+        return Load(VarPlace(variable, symbol.type, pos), symbol.type, pos)
+
+    def _enum_value(self, node: ast.EnumValue, expected: Type | None) -> Expr:
+        t = self.world.declarations.named_type(node.pos, node.type_name, self.scope)
+        if t is ERROR:
+            return error_value(self.pos(node.pos))
+        if not isinstance(t, EnumType):
+            return self.error(node.pos, "type", f"{node.type_name} is not an enumeration")
+        return self._value_of(t, node.name, node.pos, node.pos)
+
+    def _value_of(self, t: EnumType, name: str, offset: int, name_offset: int) -> Expr:
+        key = name.casefold()
+        for value_name, value in t.values.items():
+            if value_name.casefold() == key:
+                return Const(value, t, self.pos(offset))
+        return self.error(name_offset, "unknown", f"{t} has no value {name}{did_you_mean(name, t.values)}")
+
+    def _direct(self, node: ast.DirectAddress, expected: Type | None) -> Expr:
+        symbol = self.world.declarations.direct_variable(node, self.scope)
+        return error_value(self.pos(node.pos)) if symbol is None else self.variable(symbol, self.pos(node.pos))
+
+    # ---- parts of variables ----
+
+    def _member(self, node: ast.Member, expected: Type | None) -> Expr:
+        if isinstance(node.base, ast.Name):
+            symbol = self.scope.lookup(node.base.name)
+            if isinstance(symbol, Namespace):
+                return self._namespace_member(symbol, node)
+            if isinstance(symbol, TypeSymbol):
+                t = self.world.declarations.resolve_symbol(symbol)
+                if isinstance(t, EnumType):
+                    return self._value_of(t, node.name, node.pos, node.name_pos)
+                return self.error(node.base.pos, "name", f"{node.base.name} is a type, not a variable")
+        base = self.expr(node.base)
+        if base.type is ERROR:
+            return base
+        return self.member(base, node)
+
+    def _namespace_member(self, namespace: Namespace, node: ast.Member) -> Expr:
+        symbol = namespace.members.get(node.name.casefold())
+        if symbol is None:
+            hint = did_you_mean(node.name, (m.name for m in namespace.members.values()))
+            return self.error(node.name_pos, "unknown", f"{namespace.what} {namespace.name} has no {node.name}{hint}")
+        if isinstance(symbol, GlobalSymbol):
+            symbol = self.world.declarations.global_variable(symbol)
+        return self.variable(symbol, self.pos(node.pos))
+
+    def member(self, base: Expr, node: ast.Member) -> Expr:
+        """`base.name` of a struct or function block instance."""
+        t, name = base.type, node.name
+        if not isinstance(t, StructType):
+            hint = "; write ^. to follow the pointer" if isinstance(t, PointerType) else ""
+            return self.error(node.name_pos, "type", f"{t} has no members{hint}")
+        block = self.world.blocks.get(t)
+        if block is not None:
+            return self._block_member(base, block.members, node)
+        field = t.member(name)
+        if field is None:
+            hint = did_you_mean(name, (f.name for f in t.fields))
+            return self.error(node.name_pos, "unknown", f"{t} has no member {name}{hint}")
+        return load(MemberPlace(place_of(base), field.offset, field.type, self.pos(node.pos)))
+
+    def _block_member(self, base: Expr, members: dict[str, VarSymbol], node: ast.Member) -> Expr:
+        symbol = members.get(node.name.casefold())
+        if symbol is None:
+            names = (m.name for m in members.values() if m.role in (Role.INPUT, Role.OUTPUT))
+            hint = did_you_mean(node.name, names)
+            return self.error(node.name_pos, "unknown", f"{base.type} has no variable {node.name}{hint}")
+        if symbol.role is Role.IN_OUT:
+            return self.error(node.name_pos, "access", f"{symbol.name} is a VAR_IN_OUT; it can only be given in a call")
+        variable = symbol.variable
+        if variable is None or variable.storage is Storage.AREA:  # a constant, VAR_STAT, VAR_EXTERNAL
+            return self.variable(symbol, self.pos(node.pos))
+        return load(MemberPlace(place_of(base), variable.offset, symbol.type, self.pos(node.pos)))
+
+    def _bit(self, node: ast.BitAccess, expected: Type | None) -> Expr:
+        base = self.expr(node.base)
+        t = elementary(base.type)
+        if base.type is ERROR:
+            return base
+        if node.width != "X":
+            return self.error(
+                node.pos, "unsupported", f"%{node.width} parts are not supported yet; use bits, SHR and AND"
+            )
+        if t is None or t.kind not in NUMBERS or is_untyped(base):
+            return self.error(node.pos, "type", f"{base.type} has no bits")
+        if node.index >= t.bits:
+            return self.error(node.pos, "range", f"{base.type} has the bits 0..{t.bits - 1}")
+        if isinstance(base, Const) and isinstance(base.value, int):
+            return Const(base.value >> node.index & 1, BOOL, self.pos(node.pos))
+        return load(BitPlace(place_of(base), node.index, BOOL, self.pos(node.pos)))
+
+    def _index(self, node: ast.Index, expected: Type | None) -> Expr:
+        base = self.expr(node.base)
+        indices = node.indices
+        while indices and base.type is not ERROR:
+            t = base.type
+            if isinstance(t, StringType):
+                base, indices = self._character(base, indices), []
+            elif isinstance(t, ArrayType):
+                count = len(t.bounds)
+                if len(indices) < count:
+                    return self.error(node.pos, "type", f"{t} needs {count} indices, not {len(indices)}")
+                base, indices = self._element(base, t, indices[:count], node.pos), indices[count:]
+            elif base is not None and len(indices) < len(node.indices):
+                return self.error(node.pos, "type", f"there are {len(indices)} indices too many")
+            else:
+                return self.error(node.pos, "type", f"{t} is not an array")
+        return base
+
+    def _element(self, base: Expr, t: ArrayType, nodes: list[ast.Expr], offset: int) -> Expr:
+        values = [self.subscript(n) for n in nodes]
+        for e, node, (low, high) in zip(values, nodes, t.bounds, strict=True):
+            if isinstance(e, Const) and isinstance(e.value, int) and e.type is not ERROR and not low <= e.value <= high:
+                return self.error(node.pos, "range", f"the index {e.value} is outside {low}..{high}")
+        if any(e.type is ERROR for e in values):
+            return error_value(self.pos(offset))
+        return load(IndexPlace(place_of(base), values, t.element, self.pos(offset)))
+
+    def _character(self, base: Expr, nodes: list[ast.Expr]) -> Expr:
+        if len(nodes) > 1:
+            return self.error(nodes[1].pos, "type", f"{base.type} has one index")
+        index = self.subscript(nodes[0])
+        if index.type is ERROR:
+            return index
+        return load(IndexPlace(place_of(base), [index], BYTE, self.pos(nodes[0].pos)))
+
+    def subscript(self, node: ast.Expr) -> Expr:
+        """An array index: any integer type."""
+        e = self.expr(node, DINT)
+        if e.type is UNTYPED_INT:
+            assert isinstance(e, Const) and isinstance(e.value, int)
+            return Const(e.value, DINT if constants.fits(e.value, DINT) else literal_type(e.value) or DINT, e.pos)
+        base = elementary(e.type)
+        if base is None or base.kind not in NUMBERS:
+            return e if e.type is ERROR else self.error(node.pos, "type", f"an index is an integer, not {e.type}")
+        return e if e.type is base else convert(e, base)
+
+    def _deref(self, node: ast.Deref, expected: Type | None) -> Expr:
+        pointer = self.expr(node.base)
+        if pointer.type is ERROR:
+            return pointer
+        if not isinstance(pointer.type, PointerType) or pointer.type is NULL_TYPE:
+            return self.error(node.pos, "type", f"{pointer.type} is not a pointer")
+        return load(DerefPlace(pointer, pointer.type.target, self.pos(node.pos)))
+
+    # ---- operators ----
+
+    def _unary(self, node: ast.Unary, expected: Type | None) -> Expr:
+        self._deeper(node.pos)
+        e = self.expr(node.operand, expected)
+        self._depth -= 1
+        base = elementary(e.type)
+        if e.type is ERROR:
+            return e
+        if node.op == "NOT":
+            if base is None or not (base is BOOL or base.kind in NUMBERS):
+                return self.error(node.pos, "type", f"NOT needs a BOOL or a bit string, not {e.type}")
+            e = self._untyped_bits(e, expected) if is_untyped(e) else convert(e, base)
+            return self._fold_unary(UnaryOp.NOT, e, node.pos)
+        if base is None or base.kind not in (Kind.INT, Kind.BIT, Kind.REAL, Kind.TIME):
+            return self.error(node.pos, "type", f"{node.op} needs a number, not {e.type}")
+        if node.op == "+":
+            return e
+        if not base.signed and base.bits < 64 and not isinstance(e, Const):
+            base = SIGNED[base.bits * 2]
+        return self._fold_unary(UnaryOp.NEG, convert(e, base), node.pos)
+
+    def _untyped_bits(self, e: Expr, expected: Type | None) -> Expr:
+        base = elementary(expected) if expected is not None else None
+        if base is not None and (base.kind in NUMBERS or base is BOOL):
+            return self.coerce(e, base)
+        return settle(e)
+
+    def _fold_unary(self, op: UnaryOp, e: Expr, offset: int) -> Expr:
+        pos = self.pos(offset)
+        if isinstance(e, Const):
+            fold = constants.negate if op is UnaryOp.NEG else constants.invert
+            return Const(fold(e.value, e.type), e.type, pos)
+        return Unary(op, e, e.type, pos)
+
+    def _binary(self, node: ast.Binary, expected: Type | None) -> Expr:
+        self._deeper(node.pos)
+        arithmetic = node.op in ("+", "-", "*", "/", "MOD", "AND", "OR", "XOR")
+        wanted = expected if arithmetic else None
+        left = self.expr(node.left, wanted)
+        right = self.expr(node.right, wanted)
+        self._depth -= 1
+        if node.op == "**":
+            return self.power(left, right, node.pos, expected)
+        return self.operate(_OPERATORS[node.op], left, right, node.pos, expected)
+
+    def _deeper(self, offset: int) -> None:
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise NestingError(offset)
+
+    def operate(self, op: BinaryOp, left: Expr, right: Expr, offset: int, expected: Type | None = None) -> Expr:
+        """`left op right` with implicit conversions, folded when both are constant."""
+        if left.type is ERROR or right.type is ERROR:
+            return error_value(self.pos(offset))
+        if op in _COMPARISONS:
+            return self._compare(op, left, right, offset)
+        if op in _LAZY:
+            return self._build(op, self.coerce(left, BOOL), self.coerce(right, BOOL), BOOL, offset)
+        left, right = self._match_literals(left, right, expected)
+        if op in _LOGIC:
+            t = self._logic_type(left.type, right.type)
+        else:
+            duration = self._duration_arithmetic(op, left, right, offset)
+            if duration is not None:
+                return duration
+            t = self._number_type(left.type, right.type)
+            if t is not None and op is BinaryOp.MOD and t.kind is Kind.REAL:
+                t = None
+        if t is None:
+            return self.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
+        if t in _UNTYPED:
+            return self._build(op, left, right, t, offset)
+        return self._build(op, self._as_operand(left, t), self._as_operand(right, t), t, offset)
+
+    def _as_operand(self, e: Expr, t: Type) -> Expr:
+        """The operand in the common type. Half of an integer type's values may change sign: that is how dialects mix
+        them."""
+        source = elementary(e.type)
+        if (
+            isinstance(t, Elementary)
+            and source is not None
+            and source.kind in NUMBERS
+            and t.kind in NUMBERS
+            and source.bits == t.bits
+        ):
+            return convert(e, t)
+        return self.coerce(e, t)
+
+    def _match_literals(self, left: Expr, right: Expr, expected: Type | None) -> tuple[Expr, Expr]:
+        """Gives an untyped constant the type of the other operand when it fits there."""
+        if is_untyped(left) and not is_untyped(right):
+            return self._literal_for(left, right.type, expected), right
+        if is_untyped(right) and not is_untyped(left):
+            return left, self._literal_for(right, left.type, expected)
+        return left, right
+
+    def _literal_for(self, e: Expr, other: Type, expected: Type | None) -> Expr:
+        t = elementary(other)
+        assert isinstance(e, Const) and not isinstance(e.value, str)
+        if t is None or t.kind is Kind.TIME:
+            return settle(e)
+        if t.kind is Kind.REAL:
+            return self.coerce(e, t)
+        if isinstance(e.value, float):
+            if expected is REAL or expected is LREAL:
+                return self.coerce(e, expected)
+            return self.coerce(e, REAL if t.bits <= 16 else LREAL)
+        if constants.fits(e.value, t):
+            return Const(e.value, t, e.pos)
+        if t.kind is Kind.BIT and e.value >= 0:
+            return self.coerce(e, constants.smallest(e.value, tuple(BITS.values())) or t)
+        return settle(e)
+
+    def _number_type(self, a: Type, b: Type) -> Elementary | None:
+        x, y = elementary(a), elementary(b)
+        groups = (Kind.INT, Kind.BIT, Kind.REAL)
+        if x is None or y is None or x.kind not in groups or y.kind not in groups:
+            return None
+        if a in _UNTYPED and b in _UNTYPED:
+            return x if x is y else UNTYPED_REAL
+        return common_number(x, y)
+
+    def _logic_type(self, a: Type, b: Type) -> Elementary | None:
+        x, y = elementary(a), elementary(b)
+        if x is None or y is None:
+            return None
+        if x is BOOL and y is BOOL:
+            return BOOL
+        if x.kind in NUMBERS and y.kind in NUMBERS:
+            if Kind.BIT in (x.kind, y.kind) and x.kind is not y.kind:
+                return BITS[max(x.bits, y.bits)]
+            return common_number(x, y)
+        return None
+
+    def _duration_arithmetic(self, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr | None:
+        """Durations: + and - with durations, * and / with numbers. None when neither operand is one."""
+        x, y = elementary(left.type), elementary(right.type)
+        if x is None or y is None or Kind.TIME not in (x.kind, y.kind):
+            return None
+        if x.kind is y.kind and op in (BinaryOp.ADD, BinaryOp.SUB):
+            t = x if x is y else LTIME
+            return self._build(op, self.coerce(left, t), self.coerce(right, t), t, offset)
+        if y.kind is Kind.TIME and op is BinaryOp.MUL:
+            left, right, x, y = right, left, y, x
+        if x.kind is Kind.TIME and op in (BinaryOp.MUL, BinaryOp.DIV) and y.kind in (Kind.INT, Kind.BIT, Kind.REAL):
+            number = SIGNED[x.bits]
+            if y.kind is Kind.REAL:
+                product = self._build(
+                    op, convert(convert(left, number), LREAL), self.coerce(right, LREAL), LREAL, offset
+                )
+                return convert(convert(product, number), x)
+            if y.bits > x.bits or (y.bits == x.bits and not y.signed):
+                right = convert(right, number)
+            return self._build(op, left, convert(convert(right, number), x), x, offset)
+        return self.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
+
+    def _compare(self, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
+        left, right = self._match_literals(left, right, None)
+        if is_untyped(left):
+            t: Type | None = left.type if left.type is right.type else UNTYPED_REAL
+        else:
+            t = common_type(left.type, right.type)
+        if isinstance(t, StructType | ArrayType) or (
+            isinstance(t, PointerType) and op not in (BinaryOp.EQ, BinaryOp.NE)
+        ):
+            t = None
+        if t is None:
+            return self.error(offset, "type", f"{op.value} cannot compare {left.type} with {right.type}")
+        if isinstance(t, StringType) or t in _UNTYPED:
+            return self._build(op, left, right, BOOL, offset)
+        t = base_of(t)
+        return self._build(op, self._as_operand(left, t), self._as_operand(right, t), BOOL, offset)
+
+    def _build(self, op: BinaryOp, left: Expr, right: Expr, t: Type, offset: int) -> Expr:
+        pos = self.pos(offset)
+        if left.type is ERROR or right.type is ERROR:
+            return error_value(pos)
+        if isinstance(right, Const) and op in (BinaryOp.DIV, BinaryOp.MOD) and right.value == 0:
+            return self.error(offset, "division-by-zero", "division by zero")
+        if isinstance(left, Const) and isinstance(right, Const):
+            try:
+                return Const(constants.binary(op, left.value, right.value, t), t, pos)
+            except constants.ConstantError as error:
+                return self.error(offset, "constant", str(error))
+        return Binary(op, left, right, t, pos)
+
+    def power(self, base: Expr, exponent: Expr, offset: int, expected: Type | None) -> Expr:
+        """`base ** exponent`: folded, or a call of EXPT."""
+        if base.type is ERROR or exponent.type is ERROR:
+            return error_value(self.pos(offset))
+        if (
+            isinstance(base, Const)
+            and isinstance(exponent, Const)
+            and not isinstance(base.value, str)
+            and not isinstance(exponent.value, str)
+        ):
+            try:
+                value = constants.power(base.value, exponent.value)
+            except constants.ConstantError as error:
+                return self.error(offset, "constant", str(error))
+            t = UNTYPED_INT if isinstance(value, int) else UNTYPED_REAL
+            return Const(value, t, self.pos(offset))
+        return self.call_by_name("EXPT", [base, exponent], offset, expected)
+
+    # ---- what the classes built on this one provide ----
+
+    def call_by_name(self, name: str, args: list[Expr], offset: int, expected: Type | None) -> Expr:
+        """A call of a library function with checked arguments."""
+        raise NotImplementedError
+
+    def call(self, node: ast.Call, expected: Type | None) -> Expr:
+        """A call as a value."""
+        raise NotImplementedError
+
+    def _call(self, node: ast.Call, expected: Type | None) -> Expr:
+        self._deeper(node.pos)
+        e = self.call(node, expected)
+        self._depth -= 1
+        return e
+
+    _handlers: ClassVar[dict[type, Callable[[Any, Any, Type | None], Expr]]] = {
+        ast.Literal: _literal,
+        ast.Name: _name,
+        ast.EnumValue: _enum_value,
+        ast.DirectAddress: _direct,
+        ast.Member: _member,
+        ast.BitAccess: _bit,
+        ast.Index: _index,
+        ast.Deref: _deref,
+        ast.Call: _call,
+        ast.Unary: _unary,
+        ast.Binary: _binary,
+    }
+
+
+class NestingError(Exception):
+    """Something is nested too deeply; the argument is the offset."""
+
+    def __init__(self, offset: int) -> None:
+        super().__init__(offset)
+        self.offset = offset
+
+
+def load(place: Place) -> Load:
+    """The value of a place."""
+    return Load(place, place.type, place.pos)
+
+
+def describe(symbol: object) -> str:
+    """What a name that is not a variable stands for."""
+    if isinstance(symbol, PouSymbol):
+        article = {"FUNCTION": "a function", "FUNCTION_BLOCK": "a function block type", "PROGRAM": "a program"}
+        return article[symbol.keyword]
+    if isinstance(symbol, Namespace):
+        return f"a {symbol.what}"
+    return "a type"

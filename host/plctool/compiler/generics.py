@@ -1,0 +1,55 @@
+"""Generic types: parameters of type ANY_... take every type of a group.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from plctool.compiler.types import BOOL, Elementary, EnumType, Kind, StringType, SubrangeType, Type, base_of
+
+
+def _of_kind(*kinds: Kind) -> Callable[[Type], bool]:
+    def accepts(t: Type) -> bool:
+        base = base_of(t)
+        return isinstance(base, Elementary) and base.kind in kinds
+
+    return accepts
+
+
+def _elementary(t: Type) -> bool:
+    return isinstance(t, Elementary | StringType | EnumType | SubrangeType)
+
+
+def _signed(t: Type) -> bool:
+    base = base_of(t)
+    return isinstance(base, Elementary) and base.kind is Kind.INT and base.signed
+
+
+def _unsigned(t: Type) -> bool:
+    base = base_of(t)
+    return isinstance(base, Elementary) and base.kind is Kind.INT and not base.signed
+
+
+def _string(t: Type) -> bool:
+    return isinstance(t, StringType)
+
+
+GENERIC: dict[str, Callable[[Type], bool]] = {
+    "ANY": lambda t: True,
+    "ANY_DERIVED": lambda t: not _elementary(t),
+    "ANY_ELEMENTARY": _elementary,
+    "ANY_MAGNITUDE": _of_kind(Kind.INT, Kind.REAL, Kind.TIME, Kind.BIT),
+    "ANY_NUM": _of_kind(Kind.INT, Kind.REAL, Kind.BIT),
+    "ANY_REAL": _of_kind(Kind.REAL),
+    "ANY_INT": _of_kind(Kind.INT, Kind.BIT),
+    "ANY_SIGNED": _signed,
+    "ANY_UNSIGNED": _unsigned,
+    "ANY_BIT": lambda t: base_of(t) is BOOL or _of_kind(Kind.BIT, Kind.INT)(t),
+    "ANY_DURATION": _of_kind(Kind.TIME),
+    "ANY_DATE": _of_kind(Kind.DATE),
+    "ANY_STRING": _string,
+    "ANY_CHARS": _string,
+}
+"""Group name -> whether a type belongs to it. Bit strings count as unsigned integers, as existing dialects have it."""

@@ -1,0 +1,199 @@
+"""A small builder of LLVM IR in text form: fast to write, and every attribute and metadata node is ours to choose.
+
+Blocks are written in the order in which they are begun. Instructions after a terminator go to a fresh block that nothing
+reaches, so the lowering never has to ask whether code is dead; LLVM removes it.
+"""
+
+from __future__ import annotations
+
+import struct
+
+
+class Module:
+    """Collects functions, constants, declarations and metadata of one LLVM module."""
+
+    def __init__(self, triple: str) -> None:
+        self._triple = triple
+        self._globals: list[str] = []
+        self._functions: list[str] = []
+        self._attributes: dict[str, int] = {}
+        self._metadata: list[str] = []
+        self._metadata_ids: dict[str, int] = {}
+        self._named_metadata: list[str] = []
+        self._literals: dict[bytes, str] = {}
+        self._kept: list[str] = []
+
+    def metadata(self, text: str) -> int:
+        """The number of the metadata node `text`, e.g. '!{i64 8}'; equal nodes exist once."""
+        number = self._metadata_ids.get(text)
+        if number is None:
+            number = len(self._metadata)
+            self._metadata_ids[text] = number
+            self._metadata.append(text)
+        return number
+
+    def distinct_metadata(self, text: str) -> int:
+        """A node of its own, e.g. a DISubprogram."""
+        self._metadata.append("distinct " + text)
+        return len(self._metadata) - 1
+
+    def named_metadata(self, name: str, nodes: list[int]) -> None:
+        self._named_metadata.append(f"!{name} = !{{{', '.join(f'!{n}' for n in nodes)}}}")
+
+    def attributes(self, text: str) -> str:
+        """Reference to an attribute group, e.g. '#3'."""
+        return f"#{self._attributes.setdefault(text, len(self._attributes))}"
+
+    def constant(self, data: bytes, align: int = 1) -> str:
+        """A read-only constant in the image; equal byte strings of alignment 1 exist once. Returns '@name'."""
+        if align == 1 and data in self._literals:
+            return self._literals[data]
+        name = f"@const.{len(self._globals)}"
+        if align == 1:
+            self._literals[data] = name
+        self._globals.append(
+            f"{name} = internal unnamed_addr constant [{len(data)} x i8] {bytes_literal(data)}, align {align}"
+        )
+        return name
+
+    def named_constant(self, name: str, data: bytes, align: int) -> None:
+        """A constant that keeps its symbol in the object file."""
+        self._globals.append(f"@{name} = internal constant [{len(data)} x i8] {bytes_literal(data)}, align {align}")
+        self.keep(name)
+
+    def keep(self, name: str) -> None:
+        """Protects an internal symbol from removal by the optimiser."""
+        self._kept.append(name)
+
+    def add(self, function_text: str) -> None:
+        self._functions.append(function_text)
+
+    def text(self) -> str:
+        """The module in LLVM's assembly language."""
+        parts = [f'target triple = "{self._triple}"']
+        parts += self._globals
+        if self._kept:
+            kept = ", ".join(f"ptr @{name}" for name in self._kept)
+            parts.append(
+                f'@llvm.compiler.used = appending global [{len(self._kept)} x ptr] [{kept}], section "llvm.metadata"'
+            )
+        parts += self._functions
+        parts += [f"attributes #{number} = {{ {text} }}" for text, number in self._attributes.items()]
+        parts += self._named_metadata
+        parts += [f"!{number} = {text}" for number, text in enumerate(self._metadata)]
+        parts.append("")
+        return "\n".join(parts)
+
+
+class Function:
+    """The body of one function while it is written."""
+
+    def __init__(self, head: str = "") -> None:
+        """`head`: the define line up to and without the opening brace, e.g. 'define void @f(ptr %ctx) #0'."""
+        self.head = head
+        self._allocas: list[str] = []
+        self._prologue: list[str] = []
+        self._lines: list[str] = []
+        self._count = 0
+        self._dead = False
+        self.block = "entry"
+        self.debug = ""  # e.g. ', !dbg !7', added to every instruction
+
+    # ---- instructions ----
+
+    def value(self, text: str) -> str:
+        """Writes an instruction that gives a value; returns its name."""
+        if self._dead:
+            self.begin(self.label("dead"))
+        self._count += 1
+        name = f"%v{self._count}"
+        self._lines.append(f"  {name} = {text}{self.debug}")
+        return name
+
+    def do(self, text: str) -> None:
+        """Writes an instruction without a value."""
+        if self._dead:
+            self.begin(self.label("dead"))
+        self._lines.append(f"  {text}{self.debug}")
+
+    def prologue(self, text: str) -> str:
+        """Writes an instruction in front of all others of the function; returns its name."""
+        self._count += 1
+        name = f"%v{self._count}"
+        self._prologue.append(f"  {name} = {text}{self.debug}")
+        return name
+
+    def alloca(self, size: int, align: int) -> str:
+        """Memory on the stack for the whole call, contents undefined. Returns the pointer."""
+        self._count += 1
+        name = f"%m{self._count}"
+        self._allocas.append(f"  {name} = alloca [{size} x i8], align {align}")
+        return name
+
+    def slot(self, llvm_type: str) -> str:
+        """A scalar on the stack, which LLVM turns into registers. Returns the pointer."""
+        self._count += 1
+        name = f"%s{self._count}"
+        self._allocas.append(f"  {name} = alloca {llvm_type}")
+        return name
+
+    # ---- blocks ----
+
+    def label(self, hint: str) -> str:
+        self._count += 1
+        return f"{hint}{self._count}"
+
+    def begin(self, label: str) -> None:
+        """Starts the block `label`, falling through to it when the block before is still open."""
+        if not self._dead:
+            self._lines.append(f"  br label %{label}{self.debug}")
+        self._lines.append(f"{label}:")
+        self.block = label
+        self._dead = False
+
+    def terminate(self, text: str) -> None:
+        self.do(text)
+        self._dead = True
+
+    def branch(self, label: str) -> None:
+        self.terminate(f"br label %{label}")
+
+    def branch_if(self, condition: str, then: str, otherwise: str) -> None:
+        self.terminate(f"br i1 {condition}, label %{then}, label %{otherwise}")
+
+    def begin_detached(self, label: str) -> None:
+        """Starts a block behind a terminator, reached only by branches written earlier."""
+        assert self._dead, "the block before is open"
+        self.begin(label)
+
+    def text(self) -> str:
+        """The finished function; the last block must have been terminated."""
+        return "\n".join([self.head + " {", "entry:", *self._allocas, *self._prologue, *self._lines, "}"])
+
+
+def bytes_literal(data: bytes) -> str:
+    """An LLVM c"..." literal."""
+    if not any(data):
+        return "zeroinitializer"
+    return f'c"{escape(data)}"'
+
+
+def escape(data: bytes) -> str:
+    """The inside of a quoted string of LLVM's assembly language."""
+    return "".join(chr(b) if 32 <= b < 127 and b not in b'"\\' else f"\\{b:02X}" for b in data)
+
+
+def float_literal(value: float, bits: int) -> str:
+    """A REAL (32) or LREAL (64) constant, exact; values that a REAL cannot hold are rounded to the nearest."""
+    if bits == 32:
+        value = round_to_single(value)
+    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+
+
+def round_to_single(value: float) -> float:
+    """`value` as a REAL holds it; too large values become infinite."""
+    try:
+        result: float = struct.unpack("<f", struct.pack("<f", value))[0]
+    except OverflowError:
+        return float("inf") if value > 0 else float("-inf")
+    return result

@@ -1,0 +1,164 @@
+"""From text to tokens. Keywords are case-insensitive; comments nest; pragmas are put aside as attributes.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+_TOKEN = re.compile(
+    r"""\s*(?:
+    (?P<WORD>[A-Za-z_]\w*+(?!\#))
+  | (?P<PUNCT>:=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*&)\[\]:;,.<>=^])
+  | (?P<NUMBER>\d[\d_]*(?:\#\w+|(?:\.\d[\d_]*)?(?:[eE][+-]?\d+)?))
+  | (?P<SKIP>//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/)
+  | (?P<DATE>(?:[lL]?(?:D|DATE|TOD|TIME_OF_DAY|DT|DATE_AND_TIME|d|date|tod|time_of_day|dt|date_and_time))\#[\d:._-]+)
+  | (?P<STRING>(?:(?:STRING|string)\#)?'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*")
+  | (?P<TYPED>[A-Za-z_]\w*\#(?:[+-]?\d[\d_]*(?:\.[\d_]+)?[eE][+-]?\d+|[+-]?\w+(?:\.\w+)*(?:\#\w+)?)?)
+  | (?P<DIRECT>%(?:[IQMiqm](?:\*|[XBWDLxbwdl]?\d+(?:\.\d+)*)|[XBWDLxbwdl]\d+))
+  | (?P<PRAGMA>\{[^{}]*\})
+  | (?P<NESTED>\(\*|/\*)
+  | (?P<BAD>\S)
+  | (?P<END>\Z)
+  )""",
+    re.VERBOSE | re.ASCII,
+)
+
+_PUNCTUATION = {
+    ";": "_SEMI", ":": "_COLON", ",": "_COMMA", ".": "_DOT", "..": "_DOTDOT", ":=": "_ASSIGN", "=>": "_ARROW",
+    "(": "_LPAR", ")": "_RPAR", "[": "_LSQB", "]": "_RSQB", "^": "_CARET",
+    "=": "EQ", "+": "SIGN", "-": "SIGN", "*": "OP", "/": "OP", "&": "OP", "**": "OP",
+    "<": "OP", ">": "OP", "<=": "OP", ">=": "OP", "<>": "OP",
+}  # fmt: skip
+
+KEYWORDS = {
+    **dict.fromkeys(("AND", "OR", "XOR", "MOD", "AND_THEN", "OR_ELSE"), "OP"),
+    **dict.fromkeys(("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "QUALIFIER"),
+    **dict.fromkeys(("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_STAT", "VAR_EXTERNAL"), "VAR"),
+    "VAR_GLOBAL": "GLOBAL",
+    **{k: k for k in (
+        "TYPE", "STRUCT", "UNION", "ARRAY", "POINTER", "REFERENCE", "REF_TO", "FUNCTION", "FUNCTION_BLOCK", "PROGRAM",
+        "CONFIGURATION", "RESOURCE", "TASK", "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN",
+        "TRUE",
+        "FALSE", "NULL", "NOT",
+    )},
+    **{k: "_" + k for k in (
+        "END_TYPE", "END_STRUCT", "END_UNION", "OVERLAP", "OF", "TO", "END_VAR", "AT", "END_FUNCTION",
+        "END_FUNCTION_BLOCK",
+        "END_PROGRAM", "END_CONFIGURATION", "ON", "END_RESOURCE", "WITH", "THEN", "ELSIF", "ELSE", "END_IF", "END_CASE",
+        "BY", "DO", "END_FOR", "END_WHILE", "UNTIL", "END_REPEAT",
+    )},
+}  # fmt: skip
+
+SOFT = frozenset((
+    "QUALIFIER", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP", "UNION",
+))  # fmt: skip
+"""Terminals that are names where the grammar has no use for them."""
+
+_OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a parenthesis in place of an operand
+
+_ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
+_OPEN_PARENTHESIS = re.compile(r"\s*\(")
+_COMMENT_MARK = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
+
+Report = Callable[[int, str, str], None]  # offset, code, message
+
+
+class Token:
+    """A token; `pos` is the offset of its first character. Duck-typed to what lark's LALR driver reads of its own."""
+
+    __slots__ = ("pos", "text", "type")
+
+    def __init__(self, type_: str, text: str, pos: int) -> None:
+        self.type = type_
+        self.text = text
+        self.pos = pos
+
+    @property
+    def end(self) -> int:
+        """The offset behind the last character."""
+        return self.pos + len(self.text)
+
+
+class Lexer:
+    """Iterates over the tokens of a text; `attributes` collects the pragmas by the offset of the token they precede."""
+
+    def __init__(self, text: str, report: Report, start: int = 0, end: int | None = None) -> None:
+        self.text = text
+        self.attributes: dict[int, dict[str, str]] = {}
+        self._report = report
+        self._start = start
+        self._end = len(text) if end is None else end
+        self._pending: dict[str, str] = {}
+
+    def __iter__(self) -> Iterator[Token]:
+        """All tokens, last one of type $END."""
+        at = self._start
+        while True:
+            for match in _TOKEN.finditer(self.text, at, self._end):
+                kind = match.lastgroup
+                assert kind is not None
+                word, pos = match[kind], match.start(kind)
+                if kind == "WORD":
+                    token = Token(KEYWORDS.get(word.upper(), "IDENT"), word, pos)
+                elif kind == "PUNCT":
+                    token = Token(_PUNCTUATION[word], word, pos)
+                elif kind == "SKIP":
+                    continue
+                elif kind == "NESTED":
+                    at = self._skip_comment(word, match.end())
+                    break
+                elif kind == "PRAGMA":
+                    self._pragma(word)
+                    continue
+                elif kind == "BAD":
+                    if not self._bad(word, pos):
+                        at = self._end_of_line(pos)
+                        break
+                    continue
+                else:
+                    token = Token({"END": "$END", "DATE": "TYPED"}.get(kind, kind), word, pos)
+                if self._pending:
+                    self.attributes[pos] = self._pending
+                    self._pending = {}
+                yield token
+                if kind == "END":
+                    return
+
+    def _skip_comment(self, mark: str, at: int) -> int:
+        """The end of a comment that holds comments, or of the text."""
+        start, depth = at - 2, 1
+        for match in _COMMENT_MARK[mark].finditer(self.text, at, self._end):
+            depth += 1 if match.group() == mark else -1
+            if depth == 0:
+                return match.end()
+        self._report(start, "comment", "this comment is not closed")
+        return self._end
+
+    def _pragma(self, text: str) -> None:
+        match = _ATTRIBUTE.fullmatch(text)
+        if match:
+            self._pending[match.group(1).lower()] = match.group(2) or ""
+
+    def _bad(self, character: str, pos: int) -> bool:
+        """Reports a character that starts no token; False when the rest of the line is to be skipped."""
+        if character in "'\"":
+            self._report(pos, "string", "this string is not closed before the end of the line")
+            return False
+        if character == "{":
+            self._report(pos, "pragma", "this pragma is not closed")
+            return False
+        shown = character if character.isprintable() else f"character {ord(character)}"
+        self._report(pos, "character", f"{shown} has no place in a program")
+        return True
+
+    def _end_of_line(self, pos: int) -> int:
+        end = self.text.find("\n", pos, self._end)
+        return self._end if end < 0 else end
+
+
+def is_operator_function(token: Token, text: str) -> bool:
+    """Whether AND, OR, XOR or MOD at the place of an operand starts a call such as `AND(a, b)`."""
+    return token.text.upper() in _OPERATOR_FUNCTIONS and _OPEN_PARENTHESIS.match(text, token.end) is not None

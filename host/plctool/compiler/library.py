@@ -1,0 +1,83 @@
+"""The standard library: which name is defined where. A unit is parsed when a program first uses it.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from plctool.compiler import ast
+from plctool.compiler.lexer import Report
+from plctool.compiler.parser import parse
+from plctool.compiler.source import Source
+
+_FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
+_OPENING = re.compile(
+    r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
+)
+_STRUCT = re.compile(r"\bSTRUCT\b.*?\bEND_STRUCT\b", re.DOTALL)
+_DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Where a name is defined: the part of a source from `start` to `end`."""
+
+    name: str
+    source: Source
+    start: int
+    end: int
+
+
+class Library:
+    """An index over library sources. Openings and endings of units stand at the beginning of a line there."""
+
+    def __init__(self, sources: Sequence[Source]) -> None:
+        self.sources = list(sources)
+        self._entries: dict[str, Entry] = {}
+        self._overloads: dict[str, list[str]] = {}
+        for source in sources:
+            self._index(source)
+
+    def _index(self, source: Source) -> None:
+        text, at = source.text, 0
+        while match := _OPENING.search(text, at):
+            keyword = match["pou"] or match["types"] or match["globals"]
+            closing = re.compile(rf"^END_{keyword.replace('VAR_GLOBAL', 'VAR')}\b", re.MULTILINE).search(
+                text, match.end()
+            )
+            end = closing.end() if closing else len(text)
+            names = (
+                [match["name"]] if match["name"] else _DECLARED_NAME.findall(_STRUCT.sub("", text[match.end() : end]))
+            )
+            for name in names:
+                self._entries[name.casefold()] = Entry(name, source, at, end)
+                base, separator, suffix = name.rpartition("__")
+                if separator and base and suffix:
+                    self._overloads.setdefault(base.casefold(), []).append(name)
+            at = end
+
+    def overloads(self, key: str) -> list[str]:
+        """`SIN` is defined as SIN__REAL and SIN__LREAL: their names."""
+        return self._overloads.get(key, [])
+
+    def names(self) -> list[str]:
+        """Everything there is, for suggestions."""
+        return [e.name for e in self._entries.values() if "__" not in e.name] + [k.upper() for k in self._overloads]
+
+    def parse(self, key: str, report: Report) -> list[ast.Declaration]:
+        """The declarations of the unit that defines the name; none when there is no such unit."""
+        entry = self._entries.get(key)
+        return parse(entry.source, report, entry.start, entry.end) if entry else []
+
+
+@cache
+def standard_library() -> Library:
+    """The library that comes with the tool."""
+    paths = sorted(_FOLDER.glob("*.st"))
+    return Library([Source(f"stdlib/{p.name}", p.read_text("latin-1")) for p in paths])

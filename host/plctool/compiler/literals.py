@@ -1,0 +1,136 @@
+"""From the text of a literal to its value.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+
+from plctool.compiler.ast import LiteralKind
+from plctool.compiler.types import ELEMENTARY
+
+Value = int | float | str
+
+MAX_DIGITS = 400  # longer numbers fit no type; Python would take quadratic time over them
+
+_REAL_TYPES = {"REAL", "LREAL"}
+_TIME_TYPES = {"T": "TIME", "TIME": "TIME", "LT": "LTIME", "LTIME": "LTIME"}
+_DATE_TYPES = {"D", "DATE", "LD", "LDATE", "TOD", "TIME_OF_DAY", "LTOD", "LTIME_OF_DAY", "DT", "DATE_AND_TIME", "LDT",
+               "LDATE_AND_TIME"}  # fmt: skip
+_BASES = {"2": 2, "8": 8, "16": 16}
+
+_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
+       "us": 1_000, "ns": 1}  # fmt: skip
+_UNITS = list(_NS)
+_TIME_PART = re.compile(r"(\d+(?:\.\d+)?)(d|h|ms|us|ns|m|s)", re.IGNORECASE | re.ASCII)
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?\Z", re.ASCII)
+_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_NOT_ENUMS = {*ELEMENTARY, *_TIME_TYPES, *_DATE_TYPES, "STRING"}
+_UNDERSCORES = re.compile(r"__|_\Z|\A_|_\.|\._")
+_ESCAPES = {"$": "$", "'": "'", '"': '"', "L": "\n", "N": "\n", "P": "\f", "R": "\r", "T": "\t"}
+_ESCAPE = re.compile(r"\$([0-9A-Fa-f]{2}|[$'\"LNPRTlnprt]|.|\Z)", re.DOTALL)
+
+
+class LiteralError(Exception):
+    """The text is no literal; the message says why in one sentence."""
+
+
+def unsigned(text: str) -> tuple[LiteralKind, Value]:
+    """`12`, `1_000`, `16#FF`, `1.5e3`."""
+    if not text:
+        raise LiteralError("the value behind # is missing")
+    if len(text) > MAX_DIGITS:
+        raise LiteralError("this number is too long")
+    if _UNDERSCORES.search(text):
+        raise LiteralError(f"{text} has an underscore that is not between two digits")
+    text = text.replace("_", "")
+    base, hash_sign, digits = text.partition("#")
+    if hash_sign:
+        return LiteralKind.INT, _based(base, digits)
+    if not _NUMBER.match(text):
+        raise LiteralError(f"{text} is not a number")
+    if text.isdigit():
+        return LiteralKind.INT, int(text)
+    value = float(text)
+    if math.isinf(value):
+        raise LiteralError(f"{text} is too large for LREAL")
+    return LiteralKind.REAL, value
+
+
+def _based(base: str, digits: str) -> int:
+    radix = _BASES.get(base)
+    if radix is None:
+        raise LiteralError(f"the base of a number is 2, 8 or 16, not {base}")
+    try:
+        return int(digits, radix)
+    except ValueError:
+        raise LiteralError(f"{digits} is not a number of base {base}") from None
+
+
+def typed(text: str) -> tuple[LiteralKind, Value, str]:
+    """`INT#5`, `DWORD#16#FF`, `REAL#-1.5e3`, `BOOL#1`, `T#1h30m`: kind, value and type name. None of these:
+    LiteralError."""
+    prefix, _, rest = text.partition("#")
+    name = prefix.upper()
+    if name in _TIME_TYPES:
+        return LiteralKind.TIME, duration(rest), _TIME_TYPES[name]
+    if name in _DATE_TYPES:
+        raise LiteralError(f"dates such as {text} are not supported yet")
+    if name == "BOOL" and rest.upper() in ("TRUE", "FALSE", "1", "0"):
+        return LiteralKind.BOOL, int(rest.upper() in ("TRUE", "1")), name
+    sign, digits = (-1, rest[1:]) if rest.startswith("-") else (1, rest.removeprefix("+"))
+    kind, value = unsigned(digits)
+    assert not isinstance(value, str)
+    if name in _REAL_TYPES:
+        return LiteralKind.REAL, sign * float(value), name
+    return kind, sign * value, name
+
+
+def duration(text: str) -> int:
+    """`1d2h3m4s5ms`, `-1.5s`: nanoseconds. Units come in falling order; only the last may have a fraction."""
+    sign, body = (-1, text[1:]) if text.startswith("-") else (1, text.removeprefix("+"))
+    body = body.replace("_", "")
+    if len(body) > MAX_DIGITS:
+        raise LiteralError("this duration is too long")
+    at, last_unit, fraction, total = 0, -1, False, Decimal(0)
+    while at < len(body):
+        part = _TIME_PART.match(body, at)
+        if part is None:
+            raise LiteralError(f"{text} is not a duration such as 1h30m or 2.5s")
+        number, unit = part.group(1), _UNITS.index(part.group(2).lower())
+        if unit <= last_unit:
+            raise LiteralError(f"the units of {text} are not in the order d, h, m, s, ms, us, ns")
+        if fraction:
+            raise LiteralError(f"only the last unit of {text} may have a fraction")
+        last_unit, fraction, at = unit, "." in number, part.end()
+        total += Decimal(number) * _NS[_UNITS[unit]]
+    if last_unit < 0:
+        raise LiteralError("a duration needs a number and a unit, such as T#10ms")
+    return sign * int(total)
+
+
+def string(text: str) -> str:
+    """The characters of a quoted text with its $ escapes resolved."""
+
+    def replace(match: re.Match[str]) -> str:
+        code = match.group(1)
+        if len(code) == 2:
+            return chr(int(code, 16))
+        if code.upper() in _ESCAPES:
+            return _ESCAPES[code.upper()]
+        raise LiteralError(f"${code} is not an escape; write $$ for a dollar sign")
+
+    value = _ESCAPE.sub(replace, text[1:-1]) if "$" in text else text[1:-1]
+    for character in value:
+        if ord(character) > 255:
+            raise LiteralError(f"{character} is not a latin-1 character, so it does not fit a STRING")
+    return value
+
+
+def is_enum_value(prefix: str, rest: str) -> bool:
+    """Whether `prefix#rest` names a value of an enumeration."""
+    name = prefix.upper()
+    return name not in _NOT_ENUMS and _NAME.fullmatch(rest) is not None

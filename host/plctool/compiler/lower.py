@@ -1,0 +1,107 @@
+"""From the typed program to LLVM IR: one module with an external function per task and one for initialisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from plctool.compiler.analysis import Effects
+from plctool.compiler.ir import Function
+from plctool.compiler.lower_frame import Ref, string_capacity
+from plctool.compiler.lower_helpers import MEMORY_FUNCTIONS, memory_functions, string_helper
+from plctool.compiler.lower_init import Initialising
+from plctool.compiler.lower_stmt import Body, parameter_list
+from plctool.compiler.lower_unit import Options, Unit, value_type
+from plctool.compiler.typed import Area, External, Pou, PouKind, Task, TypedProgram, Variable
+from plctool.compiler.types import is_scalar
+
+GLOBAL_INIT = "global_init"
+
+
+@dataclass(frozen=True)
+class Lowered:
+    """LLVM IR and what is needed to make an image of it. `tasks`: entry symbols in the order of the program's tasks;
+    `pous`: symbol of every POU that is part of it; `imports`: in the order of their slots."""
+
+    text: str
+    tasks: list[str]
+    pous: dict[str, Pou]
+    imports: list[External]
+
+
+def lower(program: TypedProgram, options: Options) -> Lowered:
+    """Lowers what the tasks of a checked program reach."""
+    unit = Unit(options, program.area_sizes, program.defaults)
+    tasks = [_task_entry(unit, number, task) for number, task in enumerate(program.tasks)]
+    _global_init(unit, program.globals)
+    effects = Effects()
+    done = 0
+    while done < len(unit.pous):
+        pou = list(unit.pous)[done]
+        _pou(unit, pou, effects)
+        done += 1
+    _struct_initialisers(unit)
+    for name in sorted(unit.helpers):
+        unit.module.add(string_helper(name, unit.target, unit.plain))
+    unit.module.add(memory_functions(unit.target, unit.plain))
+    for name in MEMORY_FUNCTIONS:
+        unit.module.keep(name)
+    return Lowered(unit.module.text(), tasks, {name: pou for pou, name in unit.pous.items()}, unit.imports)
+
+
+def _task_entry(unit: Unit, number: int, task: Task) -> str:
+    """Calls the programs of a task in order."""
+    name = f"task.{number}"
+    fn = Function(f"define void @{name}(ptr noalias nonnull readonly %ctx) {unit.plain}")
+    for pou in task.programs:
+        fn.do(f"call void @{unit.symbol(pou)}(ptr %ctx)")
+    fn.terminate("ret void")
+    unit.module.add(fn.text())
+    return name
+
+
+def _pou(unit: Unit, pou: Pou, effects: Effects) -> None:
+    result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
+    attributes = unit.plain
+    if pou.kind is PouKind.PROGRAM or unit.options.debug:
+        attributes = unit.noinline
+    elif not pou.checks:
+        attributes = unit.hinted
+    fn = Function()
+    body = Body(unit, fn, pou, effects)
+    scope = body.open_scope(pou.name, pou.pos)
+    fn.head = f"define internal {result} @{unit.symbol(pou)}({parameter_list(pou)}) {attributes} !dbg !{scope}"
+    body.write()
+    unit.module.add(fn.text())
+
+
+def _global_init(unit: Unit, variables: list[Variable]) -> None:
+    fn = Function(f"define void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains) {unit.plain}")
+    frame = Initialising(unit, fn, None)
+    _initialise_area(frame, variables, (Area.DATA, Area.OUTPUT, Area.MEMORY, Area.INPUT))
+    if any(v.area is Area.RETAIN for v in variables):
+        retains, end = fn.label("retains"), fn.label("end")
+        fn.branch_if(fn.value("icmp ne i32 %init_retains, 0"), retains, end)
+        fn.begin(retains)
+        _initialise_area(frame, variables, (Area.RETAIN,))
+        fn.begin(end)
+    fn.terminate("ret void")
+    unit.module.add(fn.text())
+
+
+def _initialise_area(frame: Initialising, variables: list[Variable], areas: tuple[Area, ...]) -> None:
+    for var in variables:
+        if var.area in areas:
+            ref = Ref(frame.area_base(var.area), var.offset, var.type, direct=True, capacity=string_capacity(var.type))
+            frame.initialise(ref, var.initial)
+
+
+def _struct_initialisers(unit: Unit) -> None:
+    done = 0
+    while done < len(unit.structs):
+        name, struct = list(unit.structs.items())[done]
+        fn = Function(f"define internal void @{name}(ptr nonnull %self) {unit.plain}")
+        frame = Initialising(unit, fn, None)
+        frame.initialise_members(Ref("%self", 0, struct, direct=True), struct, None)
+        fn.terminate("ret void")
+        unit.module.add(fn.text())
+        done += 1

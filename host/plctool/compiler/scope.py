@@ -1,0 +1,52 @@
+"""Where a piece of program stands: which names it sees, in which source it is written.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from plctool.compiler.source import Source
+from plctool.compiler.symbols import Symbol
+from plctool.compiler.typed import Pos, Pou, Statement
+from plctool.compiler.types import Type
+
+if TYPE_CHECKING:
+    from plctool.compiler.world import World
+
+
+@dataclass(eq=False)
+class Scope:
+    """The surroundings of declarations and statements.
+
+    `names` are the local ones by case-folded name; `bindings` the types generic parameters stand for in this instance;
+    `prologue` what has to be done before the body: initial values that are not constant.
+    """
+
+    world: World
+    source: Source
+    library: bool = False
+    names: dict[str, Symbol] = field(default_factory=dict)
+    bindings: dict[str, Type] = field(default_factory=dict)
+    pou: Pou | None = None
+    prologue: list[Statement] = field(default_factory=list)
+
+    def lookup(self, name: str) -> Symbol | None:
+        """What a name stands for here."""
+        key = name.casefold()
+        symbol = self.names.get(key)
+        return symbol if symbol is not None else self.world.lookup(key, library=self.library)
+
+    def pos(self, offset: int) -> Pos:
+        """Line and column of an offset in this source."""
+        return self.source.pos(offset)
+
+    def error(self, offset: int, code: str, message: str) -> None:
+        """Reports an error at an offset."""
+        self.world.diagnostics.error(self.source.pos(offset), code, message)
+
+    def warning(self, offset: int, code: str, message: str) -> None:
+        """Reports a warning at an offset."""
+        self.world.diagnostics.warning(self.source.pos(offset), code, message)

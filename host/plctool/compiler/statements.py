@@ -1,0 +1,376 @@
+"""Statements: assignments, calls of function blocks, control structures.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from plctool.compiler import ast, constants
+from plctool.compiler.calls import Calls
+from plctool.compiler.conversions import NUMBERS, elementary, same_type
+from plctool.compiler.expressions import MAX_DEPTH, NestingError, is_untyped, load, place_of
+from plctool.compiler.symbols import ERROR, BlockInfo, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.typed import (
+    Assign,
+    BitPlace,
+    Call,
+    CallStatement,
+    Case,
+    Const,
+    Continue,
+    Direction,
+    Exit,
+    Expr,
+    FbCall,
+    For,
+    If,
+    MemberPlace,
+    Place,
+    Pos,
+    Repeat,
+    Return,
+    Statement,
+    Unary,
+    UnaryOp,
+    Variable,
+    While,
+)  # fmt: skip
+from plctool.compiler.types import BOOL, EnumType, StringType, StructType, Type
+
+
+@dataclass
+class _FbArguments:
+    """What a call of a function block hands over."""
+
+    inputs: list[tuple[Variable, Expr]] = field(default_factory=list)
+    in_outs: list[tuple[Variable, Place]] = field(default_factory=list)
+    outputs: list[tuple[Variable, Place]] = field(default_factory=list)
+    after: list[Statement] = field(default_factory=list)  # outputs that need a conversion
+
+
+class Statements(Calls):
+    """Checks a body."""
+
+    _loops = 0
+    _nesting = 0
+
+    def body(self, nodes: list[ast.Stmt]) -> list[Statement]:
+        """The typed statements; what cannot be reached is reported once."""
+        self._nesting += 1
+        if self._nesting > MAX_DEPTH and nodes:
+            raise NestingError(nodes[0].pos)
+        result: list[Statement] = []
+        ended = False
+        for node in nodes:
+            if ended:
+                self.scope.warning(node.pos, "unreachable", "this statement is never reached")
+                ended = False
+            result += self._statements[type(node)](self, node)
+            if isinstance(node, ast.Return | ast.Exit | ast.Continue):
+                ended = True
+        self._nesting -= 1
+        return result
+
+    # ---- assignments ----
+
+    def _assign(self, node: ast.Assign) -> list[Statement]:
+        if node.op == "REF=":
+            self.error(node.pos, "unsupported", "REF= is not supported yet; use a REF_TO variable and REF()")
+            return []
+        if node.op != ":=":
+            return self._set_or_reset(node)
+        if isinstance(node.value, ast.Call) and self._has_enable(node.value):
+            return self._enabled_assignment(node, node.value)
+        result: list[Statement] = []
+        source: ast.Expr = node.value
+        for target in reversed(node.targets):
+            statement = self._assign_one(target, source, self.pos(node.pos))
+            if statement is not None:
+                result.append(statement)
+            source = target
+        return result
+
+    def _assign_one(self, target: ast.Expr, source: ast.Expr, pos: Pos) -> Statement | None:
+        place = self.target(target, "the left side of :=", "be assigned to")
+        if place is None:
+            self.expr(source)
+            return None
+        value = self.coerce(self.expr(source, place.type), place.type)
+        if value.type is ERROR:
+            return None
+        block = self.world.blocks.get(place.type) if isinstance(place.type, StructType) else None
+        if block is not None:
+            self.error(target.pos, "type", f"an instance of the function block {place.type} cannot be assigned")
+            return None
+        return Assign(place, value, pos)
+
+    def _set_or_reset(self, node: ast.Assign) -> list[Statement]:
+        """`x S= condition` sets x and never resets it."""
+        place = self.target(node.targets[0], f"the left side of {node.op}", "be assigned to")
+        condition = self.condition(node.value)
+        if place is None or condition.type is ERROR:
+            return []
+        if place.type is not BOOL:
+            self.error(node.targets[0].pos, "type", f"{node.op} needs a BOOL variable, not {place.type}")
+            return []
+        pos = self.pos(node.pos)
+        change = Assign(place, Const(int(node.op == "S="), BOOL, pos), pos)
+        return [If([(condition, [change])], [], pos)]
+
+    # ---- calls ----
+
+    @staticmethod
+    def _has_enable(node: ast.Call) -> bool:
+        return any(a.name is not None and a.name.upper() in ("EN", "ENO") for a in node.args)
+
+    def _call_statement(self, node: ast.ExprStmt) -> list[Statement]:
+        call = node.value
+        if not isinstance(call, ast.Call):
+            e = self.expr(call)
+            if e.type is not ERROR:
+                self.error(node.pos, "statement", "this is a value, not a statement; write an assignment or a call")
+            return []
+        instance = self._instance(call)
+        if instance is not None:
+            return self._enabled(call, lambda plain: self._fb_call(plain, instance))
+        return self._enabled(call, self._function_statement)
+
+    def _function_statement(self, call: ast.Call) -> list[Statement]:
+        e = self.call(call, None)
+        if isinstance(e, Call):
+            return [CallStatement(e, e.pos)]
+        if e.type is not ERROR:
+            self.scope.warning(call.pos, "unused", "the result of this call is not used")
+        return []
+
+    def _enabled(self, call: ast.Call, make: Callable[[ast.Call], list[Statement]]) -> list[Statement]:
+        """A call with EN and ENO: not executed unless EN is TRUE; ENO tells."""
+        if not self._has_enable(call):
+            return make(call)
+        args, enable = self.split_enable(call)
+        statements = make(ast.Call(call.pos, call.callee, args))
+        pos = self.pos(call.pos)
+        done: list[Statement] = []
+        skipped: list[Statement] = []
+        if enable.eno is not None:
+            target = self.target(enable.eno, "ENO", "take ENO")
+            if target is None:
+                return []
+            if target.type is not BOOL:
+                self.error(enable.eno.pos, "type", f"ENO needs a BOOL variable, not {target.type}")
+                return []
+            done = [Assign(target, Const(1, BOOL, pos), pos)]
+            skipped = [Assign(target, Const(0, BOOL, pos), pos)]
+        if enable.en is None:
+            return statements + done
+        condition = self.condition(enable.en)
+        return [] if condition.type is ERROR else [If([(condition, statements + done)], skipped, pos)]
+
+    def _enabled_assignment(self, node: ast.Assign, call: ast.Call) -> list[Statement]:
+        return self._enabled(call, lambda plain: self._assign(ast.Assign(node.pos, node.targets, ":=", plain)))
+
+    def _instance(self, call: ast.Call) -> Expr | None:
+        """The instance a call statement is about; None when it calls a function."""
+        callee = call.callee
+        if isinstance(callee, ast.Name):
+            symbol = self.scope.lookup(callee.name)
+            if not isinstance(symbol, VarSymbol | GlobalSymbol) or (
+                isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT
+            ):  # fmt: skip
+                return None
+        e = self.expr(callee)
+        return e if (isinstance(e.type, StructType) and e.type in self.world.blocks) or e.type is ERROR else None
+
+    def _fb_call(self, call: ast.Call, instance: Expr) -> list[Statement]:
+        if not isinstance(instance.type, StructType):
+            for argument in call.args:
+                if argument.value is not None:
+                    self.expr(argument.value)
+            return []
+        block = self.world.blocks[instance.type]
+        names = [(p.variable.name, p.direction) for p in block.pou.parameters]
+        bound = self.bind(call.args, names, block.type.name, call.pos)
+        if bound is None:
+            return []
+        place, pos = place_of(instance), self.pos(call.pos)
+        handed = self._fb_arguments(block, bound, call, place)
+        if handed is None:
+            return []
+        self.world.add_call(self.scope.pou, block.pou, pos)
+        statement = FbCall(block.pou, place, handed.inputs, handed.in_outs, handed.outputs, pos)
+        return [statement, *handed.after]
+
+    def _fb_arguments(
+        self, block: BlockInfo, bound: dict[int, ast.Argument], call: ast.Call, instance: Place
+    ) -> _FbArguments | None:
+        handed, ok = _FbArguments(), True
+        for i, parameter in enumerate(block.pou.parameters):
+            variable, argument = parameter.variable, bound.get(i)
+            if parameter.direction is Direction.IN_OUT:
+                place = self._fb_in_out(variable, argument, block, call)
+                ok = ok and place is not None
+                if place is not None:
+                    handed.in_outs.append((variable, place))
+            elif argument is None or argument.value is None:
+                continue
+            elif parameter.direction is Direction.INPUT:
+                e = self.coerce(self.expr(argument.value, variable.type), variable.type)
+                ok = ok and e.type is not ERROR
+                handed.inputs.append((variable, e))
+            else:
+                ok = self._fb_output(variable, argument, instance, handed) and ok
+        return handed if ok else None
+
+    def _fb_in_out(
+        self, variable: Variable, argument: ast.Argument | None, block: BlockInfo, call: ast.Call
+    ) -> Place | None:
+        if argument is None or argument.value is None:
+            self.error(call.pos, "arguments", f"the VAR_IN_OUT {variable.name} of {block.type} is missing")
+            return None
+        place = self.reference(argument.value, variable.type, variable.name, output=False)
+        if place is None or not isinstance(place.type, StringType) or not isinstance(variable.type, StringType):
+            return place
+        if place.type.length < variable.type.length:
+            self.error(
+                argument.pos, "type", f"the VAR_IN_OUT {variable.name} is {variable.type}, {place.type} is too short"
+            )  # fmt: skip
+            return None
+        return place
+
+    def _fb_output(self, variable: Variable, argument: ast.Argument, instance: Place, handed: _FbArguments) -> bool:
+        """`q => target`; with another type or NOT it is an assignment after the call."""
+        assert argument.value is not None
+        what = f"the output {variable.name}"
+        target = self.target(argument.value, what, f"take {what}")
+        if target is None:
+            return False
+        if same_type(target.type, variable.type) and not argument.negated and not isinstance(target, BitPlace):
+            handed.outputs.append((variable, target))
+            return True
+        pos = self.pos(argument.pos)
+        value: Expr = load(MemberPlace(instance, variable.offset, variable.type, pos))
+        if argument.negated:
+            value = Unary(UnaryOp.NOT, self.coerce(value, BOOL), BOOL, pos)
+        value = self.coerce(value, target.type)
+        handed.after.append(Assign(target, value, pos))
+        return value.type is not ERROR
+
+    # ---- control structures ----
+
+    def _if(self, node: ast.If) -> list[Statement]:
+        branches = [(self.condition(condition), self.body(body)) for condition, body in node.branches]
+        return [If(branches, self.body(node.otherwise), self.pos(node.pos))]
+
+    def _case(self, node: ast.Case) -> list[Statement]:
+        selector = self.settled(node.selector)
+        base = elementary(selector.type)
+        if selector.type is not ERROR and (base is None or base.kind not in NUMBERS):
+            selector = self.error(
+                node.selector.pos, "type", f"CASE needs an integer or an enumeration, not {selector.type}"
+            )
+        seen: list[tuple[int, int, int]] = []
+        branches = []
+        for labels, body in node.branches:
+            ranges = [r for label in labels if (r := self._label(label, selector.type, seen)) is not None]
+            branches.append((ranges, self.body(body)))
+        otherwise = self.body(node.otherwise)
+        if selector.type is ERROR:
+            return []
+        return [Case(selector, branches, otherwise, self.pos(node.pos))]
+
+    def _label(self, label: ast.CaseLabel, t: Type, seen: list[tuple[int, int, int]]) -> tuple[int, int] | None:
+        low = self._label_value(label.low, t)
+        high = low if label.high is None else self._label_value(label.high, t)
+        if low is None or high is None:
+            return None
+        if low > high:
+            self.error(label.pos, "range", f"the range {low}..{high} is empty")
+            return None
+        for other_low, other_high, line in seen:
+            if low <= other_high and other_low <= high:
+                value = constants.describe(max(low, other_low), t)
+                self.error(label.pos, "duplicate", f"{value} is a label in line {line} already")
+                return None
+        seen.append((low, high, self.pos(label.pos).line))
+        return low, high
+
+    def _label_value(self, node: ast.Expr, t: Type) -> int | None:
+        e = self.constant(node, t)
+        if e is None:
+            return None
+        if not is_untyped(e) and isinstance(t, EnumType) and e.type is not t and isinstance(e.type, EnumType):
+            self.error(node.pos, "type", f"this is a value of {e.type}, CASE is about {t}")
+            return None
+        if isinstance(t, EnumType) and is_untyped(e) and isinstance(e.value, int):
+            return e.value
+        target = elementary(t)
+        value = self.coerce(e, target) if target is not None else e
+        return (
+            value.value
+            if value.type is not ERROR and isinstance(value, Const) and isinstance(value.value, int)
+            else None
+        )
+
+    def _for(self, node: ast.For) -> list[Statement]:
+        place = self.target(node.var, "the FOR loop", "be the variable of a FOR loop")
+        t = None if place is None else elementary(place.type)
+        if place is not None and (t is None or t.kind not in NUMBERS or isinstance(place.type, EnumType)):
+            self.error(node.var.pos, "type", f"a FOR loop counts with an integer, not with {place.type}")
+            place = None
+        target = t if place is not None and t is not None else ERROR
+        pos = self.pos(node.pos)
+        start, stop = self.value(node.start, target), self.value(node.stop, target)
+        step: Expr = Const(1, target, pos) if node.step is None else self.value(node.step, target)
+        if isinstance(step, Const) and step.value == 0 and step.type is not ERROR:
+            self.error(
+                node.pos if node.step is None else node.step.pos, "range", "a FOR loop with a step of zero never ends"
+            )
+            place = None
+        body = self._loop_body(node.body)
+        if place is None or ERROR in (start.type, stop.type, step.type):
+            return []
+        return [For(place, start, stop, step, body, pos)]
+
+    def _loop_body(self, nodes: list[ast.Stmt]) -> list[Statement]:
+        self._loops += 1
+        body = self.body(nodes)
+        self._loops -= 1
+        return body
+
+    def _while(self, node: ast.While) -> list[Statement]:
+        condition = self.condition(node.condition)
+        return [While(condition, self._loop_body(node.body), self.pos(node.pos))]
+
+    def _repeat(self, node: ast.RepeatUntil) -> list[Statement]:
+        body = self._loop_body(node.body)
+        return [Repeat(body, self.condition(node.until), self.pos(node.pos))]
+
+    def _exit(self, node: ast.Exit) -> list[Statement]:
+        if not self._loops:
+            self.error(node.pos, "statement", "EXIT stands outside of a loop")
+        return [Exit(self.pos(node.pos))]
+
+    def _continue(self, node: ast.Continue) -> list[Statement]:
+        if not self._loops:
+            self.error(node.pos, "statement", "CONTINUE stands outside of a loop")
+        return [Continue(self.pos(node.pos))]
+
+    def _return(self, node: ast.Return) -> list[Statement]:
+        return [Return(self.pos(node.pos))]
+
+    _statements: ClassVar[dict[type, Callable[[Any, Any], list[Statement]]]] = {
+        ast.Assign: _assign,
+        ast.ExprStmt: _call_statement,
+        ast.If: _if,
+        ast.Case: _case,
+        ast.For: _for,
+        ast.While: _while,
+        ast.RepeatUntil: _repeat,
+        ast.Exit: _exit,
+        ast.Continue: _continue,
+        ast.Return: _return,
+    }

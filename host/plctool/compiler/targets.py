@@ -1,0 +1,88 @@
+"""The processors plctool compiles for. A target is one entry of this table; nothing else depends on a target's name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from plctool.errors import UsageError
+
+
+class Machine(Enum):
+    """Instruction sets, as far as the linker has to tell them apart."""
+
+    X86_64 = "x86_64"
+    AARCH64 = "aarch64"
+    THUMB = "thumb"
+    THUMB_V6M = "thumb-v6m"
+    RISCV32 = "riscv32"
+
+
+@dataclass(frozen=True)
+class Target:
+    """What the compiler has to know about a processor.
+
+    `device_id` names a TARGET_ID_* of CompactDownload.h. `stubs`: undefined compiler calls (soft float, 64-bit division) go
+    through the import table, whose base is in a reserved register. `unaligned`: loads and stores of any size work at any
+    address. `vectors`: 16-byte vector compares are cheap.
+    """
+
+    name: str
+    triple: str
+    cpu: str
+    features: str
+    machine: Machine
+    device_id: str
+    pointer_size: int
+    stubs: bool
+    unaligned: bool
+    vectors: bool = False
+    abi: str = ""
+    external_convention: str = (
+        ""  # LLVM calling convention of C functions that take or return floats; "" is the default
+    )
+
+
+TARGETS: dict[str, Target] = {
+    t.name: t
+    for t in (
+        Target(
+            "x86_64-linux", "x86_64-unknown-linux-gnu", "x86-64", "", Machine.X86_64, "TARGET_ID_X86_64_LINUX",
+            pointer_size=8, stubs=False, unaligned=True, vectors=True,
+        ),
+        Target(
+            "aarch64-linux", "aarch64-unknown-linux-gnu", "generic", "", Machine.AARCH64, "TARGET_ID_AARCH64_LINUX",
+            pointer_size=8, stubs=False, unaligned=True,
+        ),
+        Target(
+            "cortex-m0", "thumbv6m-none-unknown", "cortex-m0", "+reserve-r9", Machine.THUMB_V6M, "TARGET_ID_CORTEX_M0",
+            pointer_size=4, stubs=True, unaligned=False,
+        ),
+        Target(
+            "cortex-m3", "thumbv7m-none-unknown", "cortex-m3", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M3",
+            pointer_size=4, stubs=True, unaligned=True,
+        ),
+        Target(
+            "cortex-m4f", "thumbv7em-none-unknown", "cortex-m4", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M4F",
+            pointer_size=4, stubs=True, unaligned=True, external_convention="arm_aapcs_vfpcc",
+        ),
+        Target(
+            "cortex-m7", "thumbv7em-none-unknown", "cortex-m7", "+reserve-r9,-fp64", Machine.THUMB, "TARGET_ID_CORTEX_M7",
+            pointer_size=4, stubs=True, unaligned=True, external_convention="arm_aapcs_vfpcc",
+        ),
+        Target(
+            "rv32imac", "riscv32-unknown-unknown", "generic-rv32", "+m,+a,+c,-relax,+reserve-x27", Machine.RISCV32,
+            "TARGET_ID_RV32IMAC", pointer_size=4, stubs=True, unaligned=False, abi="ilp32",
+        ),
+    )
+}  # fmt: skip
+
+DEFAULT_TARGET = "x86_64-linux"
+
+
+def find_target(name: str) -> Target:
+    """The table entry of `name`. Raises UsageError listing the known names."""
+    target = TARGETS.get(name)
+    if target is None:
+        raise UsageError(f"There is no target '{name}'; choose one of {', '.join(TARGETS)}.", "unknown-target")
+    return target

@@ -1,0 +1,386 @@
+"""Program organisation units: signatures of functions, layouts of function blocks, instances of programs.
+
+Bodies are checked later (World.check_bodies), when everything they may refer to is known.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from typing import TYPE_CHECKING
+
+from plctool.compiler import ast
+from plctool.compiler.generics import GENERIC
+from plctool.compiler.scope import Scope
+from plctool.compiler.symbols import ERROR, BlockInfo, FunctionInfo, GlobalSymbol, PouSymbol, Role, VarSymbol
+from plctool.compiler.typed import (
+    Direction,
+    External,
+    Initial,
+    Parameter,
+    Pou,
+    PouKind,
+    Storage,
+    StructInit,
+    Variable,
+)  # fmt: skip
+from plctool.compiler.types import (
+    ArrayType,
+    Field,
+    PointerType,
+    StringType,
+    StructType,
+    Type,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from plctool.compiler.declarations import Allocation
+    from plctool.compiler.world import World
+
+LIBRARY_STRING = StringType(255)  # STRING without a length, as parameter or result of a library function
+
+_DIRECTIONS = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VAR_IN_OUT": Direction.IN_OUT}
+_ROLES = {
+    "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,
+    "VAR_TEMP": Role.TEMP,
+    "VAR_STAT": Role.LOCAL,
+}  # fmt: skip
+_KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
+_VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")
+_RETAIN = {"RETAIN", "PERSISTENT"}
+
+
+class Units:
+    """Declares POUs when they are first referred to."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._functions: dict[tuple[PouSymbol, tuple[tuple[str, Type], ...]], FunctionInfo] = {}
+        self._blocks: dict[PouSymbol, BlockInfo] = {}
+        self._busy: set[PouSymbol] = set()
+
+    # ---- what all units share ----
+
+    def _scope(self, symbol: PouSymbol, pou: Pou, bindings: dict[str, Type] | None = None) -> Scope:
+        scope = self.world.scope(symbol.decl.source, library=symbol.library)
+        scope.pou = pou
+        scope.bindings = bindings or {}
+        return scope
+
+    def _pou(self, symbol: PouSymbol, name: str) -> Pou:
+        decl = symbol.decl
+        checks = "no_checks" not in decl.attributes
+        pou = Pou(name, _KINDS[decl.keyword], decl.source.pos(decl.pos), checks=checks)
+        pou.no_init = "no_init" in decl.attributes
+        return pou
+
+    def _constants(self, decl: ast.PouDecl, scope: Scope) -> None:
+        """VAR CONSTANT comes first, wherever it stands: array bounds and initial values may use it."""
+        for block in decl.blocks:
+            if "CONSTANT" not in block.qualifiers or block.keyword == "VAR_EXTERNAL":
+                continue
+            role = _ROLES[block.keyword]
+            for line in block.decls:
+                t, init = self.world.declarations.declared_type(line, scope)
+                for offset, name in line.names:
+                    symbol = self.world.declarations.constant_symbol(offset, name, t, init, scope, decl.name, role)
+                    symbol.given = line.init is not None
+                    self.world.declarations.add(scope, symbol, offset)
+
+    def _externals(self, block: ast.VarBlock, scope: Scope) -> None:
+        """VAR_EXTERNAL only repeats what is declared elsewhere."""
+        for line in block.decls:
+            t, _ = self.world.declarations.declared_type(line, scope)
+            for offset, name in line.names:
+                found = self.world.lookup(name.casefold(), library=scope.library)
+                if not isinstance(found, GlobalSymbol):
+                    scope.error(offset, "unknown", f"there is no VAR_GLOBAL {name}")
+                    continue
+                symbol = self.world.declarations.global_variable(found)
+                if ERROR not in (t, symbol.type) and t != symbol.type:
+                    scope.error(offset, "type", f"the VAR_GLOBAL {name} is of type {symbol.type}, not {t}")
+                scope.names[name.casefold()] = symbol
+
+    def _statics(self, block: ast.VarBlock, decl: ast.PouDecl, scope: Scope) -> None:
+        for line in block.decls:
+            t, init = self.world.declarations.declared_type(line, scope)
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
+                if t is not ERROR:
+                    full_name = f"{decl.name}.{name}"
+                    symbol.variable = self.world.declarations.shared_variable(full_name, t, init, scope, offset)
+                self.world.declarations.add(scope, symbol, offset)
+
+    def _stack_variables(self, block: ast.VarBlock, pou: Pou, scope: Scope) -> None:
+        """VAR of a function, VAR_TEMP: they live during the call."""
+        declarations = self.world.declarations
+        for line in block.decls:
+            spec = ast.VarDecl(line.pos, line.names, None, line.type, None)
+            dynamic = line.init is not None and not isinstance(line.init, ast.Literal | ast.ArrayInit | ast.StructInit)
+            t, init = declarations.declared_type(spec if dynamic else line, scope)
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, _ROLES[block.keyword])
+                if self._is_instance(t):
+                    scope.error(
+                        offset,
+                        "type",
+                        f"{name} keeps its values between calls, so it needs a FUNCTION_BLOCK or PROGRAM",
+                    )
+                elif t is not ERROR:
+                    variable = Variable(name, t, Storage.LOCAL, symbol.pos, initial=init)
+                    if dynamic and not declarations.runtime_initial(line, variable, scope):
+                        variable.initial = declarations.declared_type(line, scope)[1]
+                    pou.locals.append(variable)
+                    symbol.variable = variable
+                declarations.add(scope, symbol, offset)
+
+    def _is_instance(self, t: Type) -> bool:
+        while isinstance(t, ArrayType):
+            t = t.element
+        return isinstance(t, StructType) and t in self.world.blocks
+
+    def _reject_location(self, line: ast.VarDecl, scope: Scope) -> None:
+        if line.location is not None:
+            scope.error(line.location.pos, "location", "only variables of a PROGRAM and global ones have an address")
+
+    # ---- functions ----
+
+    def function(self, symbol: PouSymbol, bindings: dict[str, Type] | None = None) -> FunctionInfo | None:
+        """A function ready to be called; `bindings` for a generic one. None while it is being declared."""
+        key = (symbol, tuple(sorted((bindings or {}).items(), key=lambda item: item[0])))
+        info = self._functions.get(key)
+        if info is not None:
+            return info
+        if symbol in self._busy:
+            return None
+        self._busy.add(symbol)
+        try:
+            info = self._declare_function(symbol, bindings or {})
+        finally:
+            self._busy.discard(symbol)
+        self._functions[key] = info
+        return info
+
+    def is_generic(self, symbol: PouSymbol) -> bool:
+        """Whether parameters of the function are of a type ANY_..."""
+        return any(
+            isinstance(line.type, ast.NamedType) and line.type.name.upper() in GENERIC
+            for block in symbol.decl.blocks
+            if block.keyword in _DIRECTIONS
+            for line in block.decls
+        )
+
+    def _declare_function(self, symbol: PouSymbol, bindings: dict[str, Type]) -> FunctionInfo:
+        decl = symbol.decl
+        name = f"{decl.name}({','.join(t.name for t in bindings.values())})" if bindings else decl.name
+        pou = self._pou(symbol, name)
+        scope = self._scope(symbol, pou, bindings)
+        info = FunctionInfo(pou, [], None, decl.attributes)
+        if decl.result is not None:
+            self._declare_result(info, decl, decl.result, scope)
+        self._constants(decl, scope)
+        for block in decl.blocks:
+            if "CONSTANT" in block.qualifiers and block.keyword not in _DIRECTIONS:
+                continue
+            if block.keyword in _DIRECTIONS:
+                self._parameters(block, info, scope)
+            elif block.keyword == "VAR_EXTERNAL":
+                self._externals(block, scope)
+            elif block.keyword == "VAR_STAT":
+                self._statics(block, decl, scope)
+            else:
+                for line in block.decls:
+                    self._reject_location(line, scope)
+                self._stack_variables(block, pou, scope)
+        external = decl.attributes.get("external")
+        if external is not None:
+            pou.external = self._external(external, info, scope)
+        else:
+            self.world.add_body(scope, decl, pou, symbol.library)
+        return info
+
+    def _declare_result(self, info: FunctionInfo, decl: ast.PouDecl, spec: ast.TypeSpec, scope: Scope) -> None:
+        t, default = self._parameter_type(spec, scope)
+        if self._is_instance(t):
+            scope.error(spec.pos, "type", f"a function cannot return the function block {t}")
+            t = ERROR
+        info.result = t
+        symbol = VarSymbol(decl.name, scope.pos(decl.pos), t, Role.RESULT, used=True)
+        if t is not ERROR:
+            info.pou.result = symbol.variable = Variable(decl.name, t, Storage.LOCAL, symbol.pos, initial=default)
+            info.pou.locals.append(symbol.variable)
+        scope.names[decl.name.casefold()] = symbol
+
+    def _parameter_type(self, spec: ast.TypeSpec, scope: Scope) -> tuple[Type, Initial | None]:
+        if scope.library and isinstance(spec, ast.NamedType) and spec.name.upper() == "STRING" and spec.length is None:
+            return LIBRARY_STRING, None
+        return self.world.declarations.type_of(spec, scope)
+
+    def _parameters(self, block: ast.VarBlock, info: FunctionInfo, scope: Scope) -> None:
+        direction, declarations = _DIRECTIONS[block.keyword], self.world.declarations
+        for line in block.decls:
+            self._reject_location(line, scope)
+            if scope.library and line.init is None:
+                t, default = self._parameter_type(line.type, scope)
+            else:
+                t, default = declarations.declared_type(line, scope)
+            by_reference = direction is not Direction.INPUT or self._passes_reference(line, info.attributes, t)
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, _ROLES[block.keyword], default=default)
+                symbol.given, symbol.by_reference, symbol.used = line.init is not None, by_reference, True
+                if not declarations.add(scope, symbol, offset):
+                    continue
+                if direction is not Direction.IN_OUT and self._is_instance(t):
+                    scope.error(offset, "type", f"pass the function block {name} as VAR_IN_OUT")
+                    symbol.type = ERROR
+                storage = Storage.REFERENCE if by_reference else Storage.LOCAL
+                symbol.variable = Variable(name, t, storage, symbol.pos)
+                info.parameters.append((symbol, direction))
+                info.pou.parameters.append(Parameter(symbol.variable, direction, by_reference))
+
+    def _passes_reference(self, line: ast.VarDecl, attributes: dict[str, str], t: Type) -> bool:
+        """A read-only string, array or struct input, which the library passes without a copy."""
+        wanted = "by_reference" in line.attributes or "by_reference" in attributes
+        return wanted and isinstance(t, StringType | ArrayType | StructType)
+
+    def _external(self, name: str, info: FunctionInfo, scope: Scope) -> External:
+        """The C function: its interface text is `name(TYPE,&TYPE):RESULT`."""
+        version = _VERSION.fullmatch(info.attributes.get("version", "1.0"))
+        if version is None:
+            scope.world.diagnostics.error(info.pou.pos, "attribute", "the attribute version is written '1.0'")
+            return External(name, 0, 0)
+        major, minor = (int(part) for part in version.groups())
+        types = (("&" if p.by_reference else "") + _interface_name(s.type) for (s, _), p in zip(
+            info.parameters, info.pou.parameters, strict=True
+        ))  # fmt: skip
+        result = "" if info.result is None else ":" + _interface_name(info.result)
+        text = f"{name.lower()}({','.join(types)}){result}"
+        return External(name.lower(), zlib.crc32(text.encode("latin-1", "replace")), major << 16 | minor)
+
+    # ---- function blocks ----
+
+    def block(self, symbol: PouSymbol) -> BlockInfo | None:
+        """A function block ready to be instantiated; None when it contains itself."""
+        info = self._blocks.get(symbol)
+        if info is not None:
+            return info
+        if symbol in self._busy:
+            return None
+        self._busy.add(symbol)
+        try:
+            info = self._declare_block(symbol)
+        finally:
+            self._busy.discard(symbol)
+        self._blocks[symbol] = info
+        return info
+
+    def _declare_block(self, symbol: PouSymbol) -> BlockInfo:
+        decl = symbol.decl
+        hidden = symbol.library and self.world.is_user_name(decl.name)
+        pou = self._pou(symbol, f"Standard.{decl.name}" if hidden else decl.name)
+        scope = self._scope(symbol, pou)
+        layout = StructType(pou.name)
+        info = BlockInfo(pou, layout, {})
+        pou.instance = layout
+        defaults: dict[str, Initial] = {}
+        self._constants(decl, scope)
+        for block in decl.blocks:
+            if "CONSTANT" in block.qualifiers:
+                continue
+            if block.keyword == "VAR_EXTERNAL":
+                self._externals(block, scope)
+            elif block.keyword == "VAR_STAT":
+                self._statics(block, decl, scope)
+            elif block.keyword == "VAR_TEMP":
+                self._stack_variables(block, pou, scope)
+            else:
+                self._members(block, info, defaults, scope)
+        layout.fields = [f for f in layout.fields if f.type is not ERROR]
+        layout.lay_out()
+        for field in layout.fields:
+            variable = info.members[field.name.casefold()].variable
+            assert variable is not None
+            variable.offset = field.offset
+        if defaults:
+            self.world.defaults[layout.name] = StructInit(defaults)
+        info.members |= {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
+        self.world.blocks[layout] = info
+        self.world.add_body(scope, decl, pou, symbol.library)
+        return info
+
+    def _members(self, block: ast.VarBlock, info: BlockInfo, defaults: dict[str, Initial], scope: Scope) -> None:
+        role, direction = _ROLES[block.keyword], _DIRECTIONS.get(block.keyword)
+        info.retain = info.retain or bool(block.qualifiers & _RETAIN)
+        for line in block.decls:
+            self._reject_location(line, scope)
+            t, default = self.world.declarations.declared_type(line, scope)
+            info.retain = info.retain or (role is not Role.IN_OUT and self.world.declarations.is_retain(t))
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
+                symbol.given, symbol.used = line.init is not None, direction is not None
+                if not self.world.declarations.add(scope, symbol, offset):
+                    continue
+                info.members[name.casefold()] = symbol
+                if t is ERROR:
+                    continue
+                reference = role is Role.IN_OUT
+                storage = Storage.REFERENCE if reference else Storage.SELF
+                symbol.variable = Variable(name, t, storage, symbol.pos, initial=None if reference else default)
+                info.type.fields.append(Field(name, PointerType(t) if reference else t))
+                if default is not None and not reference:
+                    defaults[name] = default
+                if direction is not None:
+                    info.pou.parameters.append(Parameter(symbol.variable, direction, reference))
+
+    # ---- programs ----
+
+    def program(self, symbol: PouSymbol, name: str, allocation: Allocation) -> tuple[Pou, Scope]:
+        """An instance of a program with its variables placed; its body is queued for checking."""
+        decl = symbol.decl
+        pou = self._pou(symbol, name)
+        scope = self._scope(symbol, pou)
+        self._constants(decl, scope)
+        for block in decl.blocks:
+            if "CONSTANT" in block.qualifiers:
+                continue
+            if block.keyword == "VAR_EXTERNAL":
+                self._externals(block, scope)
+            elif block.keyword == "VAR_STAT":
+                self._statics(block, decl, scope)
+            elif block.keyword == "VAR_TEMP":
+                self._stack_variables(block, pou, scope)
+            elif block.keyword == "VAR_IN_OUT":
+                scope.error(
+                    block.pos, "unsupported", "a PROGRAM has no VAR_IN_OUT; use VAR_EXTERNAL or a global variable"
+                )
+            else:
+                self._program_variables(block, pou, scope, allocation)
+        self.world.add_body(scope, decl, pou, symbol.library)
+        return pou, scope
+
+    def _program_variables(self, block: ast.VarBlock, pou: Pou, scope: Scope, allocation: Allocation) -> None:
+        declarations = self.world.declarations
+        direction = _DIRECTIONS.get(block.keyword)
+        for line in block.decls:
+            t, init = declarations.declared_type(line, scope)
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, _ROLES[block.keyword], default=init)
+                symbol.used = direction is not None or line.location is not None
+                if not declarations.add(scope, symbol, offset) or t is ERROR:
+                    continue
+                symbol.variable = declarations.area_variable(
+                    f"{pou.name}.{name}", t, init, line.location, block.qualifiers, scope, offset
+                )
+                if symbol.variable is None:
+                    continue
+                allocation.add(symbol.variable)
+                if direction is not None:
+                    pou.parameters.append(Parameter(symbol.variable, direction))
+
+
+def _interface_name(t: Type) -> str:
+    if isinstance(t, StringType):
+        return "STRING"
+    return t.name.upper()

@@ -1,0 +1,302 @@
+"""Everything the check of one program shares: names, types, units, diagnoses.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+
+from plctool.compiler import ast
+from plctool.compiler.conversions import Coercion
+from plctool.compiler.declarations import Allocation, Declarations
+from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.expressions import Expressions, NestingError
+from plctool.compiler.generics import GENERIC
+from plctool.compiler.library import Library
+from plctool.compiler.scope import Scope
+from plctool.compiler.source import Source
+from plctool.compiler.statements import Statements
+from plctool.compiler.symbols import (
+    BlockInfo,
+    GlobalSymbol,
+    Namespace,
+    PouSymbol,
+    Role,
+    Symbol,
+    TypeSymbol,
+    VarSymbol,
+)  # fmt: skip
+from plctool.compiler.typed import Const, Expr, Pos, Pou, StructInit, Variable
+from plctool.compiler.types import ELEMENTARY, EnumType, StructType, Type
+from plctool.compiler.units import Units
+
+_RESERVED = {*ELEMENTARY, "STRING", "WSTRING", *GENERIC}
+
+
+class World:
+    """The names of the program in front of those of the library; each is declared when it is first needed."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        self.diagnostics = Diagnostics(s.path for s in library.sources)
+        self.coerce = Coercion(self.diagnostics)
+        self.declarations = Declarations(self)
+        self.units = Units(self)
+        self.allocation = Allocation()
+        self.blocks: dict[StructType, BlockInfo] = {}
+        self.defaults: dict[str, StructInit] = {}
+        self.shared: dict[tuple[str, int], Variable] = {}
+        self.configurations: list[ast.ConfigurationDecl] = []
+        self.pous: list[Pou] = []
+        self._names: dict[str, Symbol] = {}
+        self._library_names: dict[str, Symbol | None] = {}
+        self._ambiguous: dict[str, list[GlobalSymbol]] = {}
+        self._instances: dict[str, Namespace] = {}
+        self._enum_values: dict[str, list[TypeSymbol]] = {}
+        self._bodies: deque[tuple[Scope, ast.PouDecl, Pou]] = deque()
+        self._library_bodies: deque[tuple[Scope, ast.PouDecl, Pou]] = deque()
+        self._calls: dict[Pou, dict[Pou, Pos]] = {}
+
+    def scope(self, source: Source, *, library: bool = False) -> Scope:
+        """An empty scope in a source."""
+        return Scope(self, source, library)
+
+    def expressions(self, scope: Scope) -> Expressions:
+        """Checks expressions in a scope."""
+        return Statements(scope)
+
+    # ---- names ----
+
+    def register(self, declarations: Iterable[ast.Declaration], *, library: bool = False) -> None:
+        """Makes the names of declarations known."""
+        for decl in declarations:
+            if isinstance(decl, ast.PouDecl):
+                self._add(PouSymbol(decl, library), decl.name, decl.pos, decl.source, library=library)
+            elif isinstance(decl, ast.TypeDecl):
+                symbol = TypeSymbol(decl, library)
+                self._add(symbol, decl.name, decl.pos, decl.source, library=library)
+                if isinstance(decl.spec, ast.EnumSpec):
+                    for _, name, _ in decl.spec.values:
+                        self._enum_values.setdefault(name.casefold(), []).append(symbol)
+            elif isinstance(decl, ast.ConfigurationDecl):
+                self.configurations.append(decl)
+                for block in decl.globals:
+                    self._add_globals(block, decl.source, prefix="", library=library)
+
+    def register_globals(self, declarations: Sequence[ast.Declaration], source: Source) -> None:
+        """The VAR_GLOBAL of a file are known as `x` and as `<file>.x`. A file with nothing else is a named list: there
+        `<file>.x` is the full name."""
+        blocks = [d.block for d in declarations if isinstance(d, ast.GlobalBlock)]
+        if not blocks:
+            return
+        alone = all(isinstance(d, ast.GlobalBlock) for d in declarations)
+        namespace = Namespace(source.stem, "list of globals", {})
+        for block in blocks:
+            for symbol in self._add_globals(block, source, prefix=f"{source.stem}." if alone else ""):
+                namespace.members.setdefault(symbol.name.casefold(), symbol)
+        self._names.setdefault(source.stem.casefold(), namespace)
+
+    def _add_globals(
+        self, block: ast.VarBlock, source: Source, *, prefix: str, library: bool = False
+    ) -> list[GlobalSymbol]:
+        added = []
+        for line in block.decls:
+            for offset, name in line.names:
+                symbol = GlobalSymbol(name, prefix + name, offset, line, block.qualifiers, source)
+                key = name.casefold()
+                other = self._names.get(key)
+                if isinstance(other, GlobalSymbol) and other.full_name.casefold() != symbol.full_name.casefold():
+                    self._ambiguous.setdefault(key, [other]).append(symbol)
+                else:
+                    self._add(symbol, name, offset, source, library=library)
+                added.append(symbol)
+        return added
+
+    def _add(self, symbol: Symbol, name: str, offset: int, source: Source, *, library: bool) -> None:
+        key = name.casefold()
+        if library:
+            self._library_names[key] = symbol
+            return
+        if isinstance(symbol, TypeSymbol | PouSymbol) and name.upper() in _RESERVED:
+            self.diagnostics.error(source.pos(offset), "duplicate", f"{name} is the name of an elementary type")
+            return
+        other = self._names.get(key)
+        if other is not None and not isinstance(other, Namespace):
+            pos = source.pos(offset)
+            first = self._declared_at(other)
+            where = f"in line {first.line}" if first.file == pos.file else f"in {first.file}"
+            self.diagnostics.error(pos, "duplicate", f"{name} is declared already {where}")
+            return
+        self._names[key] = symbol
+
+    def _declared_at(self, symbol: Symbol) -> Pos:
+        if isinstance(symbol, PouSymbol | TypeSymbol):
+            return symbol.decl.source.pos(symbol.decl.pos)
+        if isinstance(symbol, GlobalSymbol):
+            return symbol.source.pos(symbol.pos)
+        assert isinstance(symbol, VarSymbol)
+        return symbol.pos
+
+    def lookup(self, key: str, *, library: bool) -> Symbol | None:
+        """A global name: the program's own before the library's; inside the library the other way round."""
+        if library:
+            return self._library_symbol(key) or self._names.get(key)
+        symbol = self._names.get(key)
+        if (
+            symbol is None
+            or isinstance(symbol, Namespace)
+            or (isinstance(symbol, PouSymbol) and symbol.keyword == "PROGRAM")
+        ):
+            symbol = self._instances.get(key, symbol)
+        return symbol or self._library_symbol(key)
+
+    def _library_symbol(self, key: str) -> Symbol | None:
+        if key not in self._library_names:
+            self._library_names[key] = None
+            self.register(self.library.parse(key, self._library_error), library=True)
+        return self._library_names[key]
+
+    def _library_error(self, offset: int, code: str, message: str) -> None:
+        raise AssertionError(f"the library does not parse: {message}")
+
+    def is_user_name(self, name: str) -> bool:
+        """Whether the program itself declares a global name."""
+        return name.casefold() in self._names
+
+    def add_instance(self, name: str, scope: Scope) -> None:
+        """Makes the variables of a program instance known as `Main.x`."""
+        members = {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
+        self._instances[name.casefold()] = Namespace(name, "program", dict(members))
+
+    def enum_value(self, name: str, scope: Scope, offset: int, expected: Type | None) -> Expr | None:
+        """The value of an enumeration by its bare name; None when there is none of that name."""
+        symbols = self._enum_values.get(name.casefold())
+        if not symbols:
+            return None
+        types = [t for s in symbols if isinstance(t := self.declarations.resolve_symbol(s), EnumType)]
+        if len(types) > 1 and expected in types:
+            types = [t for t in types if t is expected]
+        if len(types) > 1:
+            listed = " or ".join(f"{t}#{name}" for t in types)
+            scope.error(offset, "ambiguous", f"{name} is a value of several enumerations; write {listed}")
+        for t in types:
+            for value_name, value in t.values.items():
+                if value_name.casefold() == name.casefold():
+                    return Const(value, t, scope.pos(offset))
+        return None
+
+    def visible_names(self) -> list[str]:
+        """Names of globals, functions and enumeration values, for suggestions."""
+        return [*(self._written(k, s) for k, s in self._names.items()), *self._enum_values, *self.library.names()]
+
+    def type_names(self) -> list[str]:
+        """Names of types and function blocks, for suggestions."""
+        own = [s.decl.name for s in self._names.values() if isinstance(s, TypeSymbol | PouSymbol)]
+        return own + self.library.names()
+
+    def function_names(self) -> list[str]:
+        """Names of functions, for suggestions."""
+        own = [s.decl.name for s in self._names.values() if isinstance(s, PouSymbol) and s.keyword == "FUNCTION"]
+        return own + self.library.names()
+
+    @staticmethod
+    def _written(key: str, symbol: Symbol) -> str:
+        if isinstance(symbol, PouSymbol | TypeSymbol):
+            return symbol.decl.name
+        return symbol.name
+
+    # ---- units ----
+
+    def add_body(self, scope: Scope, decl: ast.PouDecl, pou: Pou, library: bool) -> None:
+        """Queues a body for checking."""
+        (self._library_bodies if library else self._bodies).append((scope, decl, pou))
+
+    def add_call(self, caller: Pou | None, callee: Pou, pos: Pos) -> None:
+        """Notes who calls whom."""
+        if caller is not None:
+            self._calls.setdefault(caller, {}).setdefault(callee, pos)
+
+    def declare_all(self) -> None:
+        """Declares what the program itself has, used or not, so that all of it is checked."""
+        for symbol in list(self._names.values()):
+            if isinstance(symbol, TypeSymbol):
+                self.declarations.resolve_symbol(symbol)
+            elif isinstance(symbol, GlobalSymbol):
+                self.declarations.global_variable(symbol)
+            elif isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+                self.units.block(symbol)
+            elif isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION" and not self.units.is_generic(symbol):
+                self.units.function(symbol)
+        for symbols in self._ambiguous.values():
+            for symbol in symbols:
+                self.declarations.global_variable(symbol)
+
+    def program_symbols(self) -> list[PouSymbol]:
+        """The PROGRAM declarations in order."""
+        return [s for s in self._names.values() if isinstance(s, PouSymbol) and s.keyword == "PROGRAM"]
+
+    def lookup_program(self, name: str) -> PouSymbol | None:
+        """The PROGRAM of that name."""
+        return next((p for p in self.program_symbols() if p.decl.name.casefold() == name.casefold()), None)
+
+    def aliases(self) -> dict[str, str]:
+        """Other names of globals: `x` for `GVL.x` and the other way round, where they are unambiguous."""
+        found: dict[str, str] = {}
+        for namespace in self._names.values():
+            if isinstance(namespace, Namespace):
+                for symbol in namespace.members.values():
+                    assert isinstance(symbol, GlobalSymbol)
+                    for other in (symbol.name, f"{namespace.name}.{symbol.name}"):
+                        if other != symbol.full_name and symbol.name.casefold() not in self._ambiguous:
+                            found[other] = symbol.full_name
+        return found
+
+    def check_bodies(self) -> None:
+        """Checks all bodies, then those of the library they need."""
+        while self._bodies or self._library_bodies:
+            scope, decl, pou = (self._bodies or self._library_bodies).popleft()
+            try:
+                body = Statements(scope).body(decl.body)
+                pou.body = [*scope.prologue, *body]
+            except NestingError as error:
+                scope.error(error.offset, "nesting", "this is nested too deeply; split it")
+            self.pous.append(pou)
+            if not scope.library:
+                self._report_unused(scope)
+        self._report_recursion()
+
+    def _report_unused(self, scope: Scope) -> None:
+        for symbol in scope.names.values():
+            if isinstance(symbol, VarSymbol) and not symbol.used and symbol.role in (Role.LOCAL, Role.TEMP):
+                self.diagnostics.warning(symbol.pos, "unused", f"{symbol.name} is never used")
+
+    def _report_recursion(self) -> None:
+        """A call that leads back to its caller: the stack of a controller is bounded."""
+        done: set[Pou] = set()
+        for start in list(self._calls):
+            path: list[Pou] = []
+            stack: list[tuple[Pou, Iterable[Pou]]] = [(start, iter(self._calls.get(start, {})))]
+            while stack:
+                pou, callees = stack[-1]
+                if pou not in path:
+                    path.append(pou)
+                following = next(iter(callees), None)
+                if following is None:
+                    done.add(pou)
+                    path.pop()
+                    stack.pop()
+                elif following in path:
+                    self._recursion(path[path.index(following) :], following, self._calls[pou][following])
+                elif following not in done:
+                    stack.append((following, iter(self._calls.get(following, {}))))
+
+    def _recursion(self, cycle: list[Pou], pou: Pou, pos: Pos) -> None:
+        if len(cycle) == 1:
+            message = f"{pou.name} calls itself"
+        else:
+            message = f"{pou.name} calls itself through {' and '.join(p.name for p in cycle[1:])}"
+        self.diagnostics.error(
+            pos, "recursion", f"{message}, which the stack of a controller does not allow; use a loop"
+        )

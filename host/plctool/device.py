@@ -1,0 +1,285 @@
+"""A controller on a link: flash, start, stop, watch. `with plctool.connect("serial:/dev/ttyS0") as plc: ...`"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, overload
+
+from plctool.core import lib
+from plctool.errors import DeviceError, LinkError, UsageError
+from plctool.image import parse_image
+from plctool.link import services
+from plctool.link.connection import Connection
+from plctool.link.names import Node
+from plctool.link.serial import DEFAULT_BAUD, SerialTransport
+from plctool.link.services import AppState, AreaRange, Identity, LogEntry, TaskInfo
+from plctool.link.session import Session
+from plctool.link.transport import BlockTransport
+from plctool.symbols import Symbol, SymbolTable, find_symbols, load_symbols
+
+RESET_OPTIONS = {
+    "warm": lib.RESET_OPTION_WARM,
+    "cold": lib.RESET_OPTION_COLD,
+    "origin": lib.RESET_OPTION_ORIGIN,
+}
+# Failed checks are raised by a call: what is known of the place is the address after it.
+_RAISED_BY_CALL = (lib.RTSEXCPT_DIVIDEBYZERO, lib.RTSEXCPT_ARRAYBOUNDS, lib.RTSEXCPT_ACCESS_VIOLATION)
+_SCAN_SECONDS = 1.5
+
+
+@dataclass(frozen=True)
+class ExceptionInfo:
+    """What stopped the program. `task` is None for initialisation code; the place is None without symbols."""
+
+    code: int
+    name: str
+    task: str | None
+    pou: str | None = None
+    file: str | None = None
+    line: int | None = None
+
+    def __str__(self) -> str:
+        task = f" in task {self.task}" if self.task else ""
+        place = f", {self.pou}, {self.file}:{self.line}" if self.file else ""
+        return f"{self.name}{task}{place}"
+
+
+@dataclass(frozen=True)
+class PlcStatus:
+    """`state` is "run", "stop", "exception" or "none"; `image_crc` is 0 without application."""
+
+    state: AppState
+    image_crc: int
+    image_size: int
+    exception: ExceptionInfo | None
+
+
+@dataclass(frozen=True)
+class FlashResult:
+    """`skipped`: the device had this very image already. `seconds` is the time the transfer took."""
+
+    bytes: int
+    seconds: float
+    skipped: bool
+    state: AppState
+
+
+def connect(link: str, baud: int = DEFAULT_BAUD, symbols: Path | str | None = None) -> Plc:
+    """Opens a link to a controller, such as "serial:/dev/ttyS0" or "serial:socket://host:port".
+
+    `symbols` names a symbol file when it is neither in the cache nor beside the image. Raises LinkError when the link
+    cannot be opened; whether a controller answers shows with the first call.
+    """
+    return Plc(Connection(open_transport(link, baud)), Path(symbols) if symbols else None)
+
+
+def scan(link: str, baud: int = DEFAULT_BAUD, seconds: float = _SCAN_SECONDS) -> list[Node]:
+    """The controllers that answer on a link within `seconds`. Raises LinkError when there are none."""
+    with Connection(open_transport(link, baud)) as connection:
+        nodes = connection.scan(seconds)
+        if not nodes:
+            raise LinkError(f"No device answers on {connection.transport.name}; check cable, baud rate and power.", "no-answer")
+        return nodes
+
+
+def open_transport(link: str, baud: int = DEFAULT_BAUD) -> BlockTransport:
+    """The block transport a link names."""
+    kind, separator, address = link.partition(":")
+    if separator and kind == "serial" and address:
+        return SerialTransport(address, baud)
+    if separator and kind in ("can", "udp", "tcp"):
+        raise UsageError(f"Links over {kind} are not in this version; use a serial line (--port).", "no-such-link")
+    raise UsageError(f"'{link}' is not a link; write for example serial:/dev/ttyS0.", "no-such-link")
+
+
+class Plc:
+    """One controller. Channel and login are made at the first call and renewed by themselves."""
+
+    def __init__(self, connection: Connection, symbols: Path | None = None) -> None:
+        self._connection = connection
+        self._session = Session(connection)
+        self._symbol_file = symbols
+        self._beside: Path | None = None  # the image flashed last
+        self._table: SymbolTable | None = None
+
+    def __enter__(self) -> Plc:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._connection.close()
+
+    # ---- the device ----
+
+    def identity(self) -> Identity:
+        """Name, vendor, target and versions of the controller."""
+        return services.read_identity(self._session)
+
+    def info(self) -> dict[str, str]:
+        """Project, author, version and so on, of the application."""
+        return services.read_application_info(self._session)
+
+    def log(self, after: int = 0) -> list[LogEntry]:
+        """The log entries with a handle above `after` that the controller still has, oldest first."""
+        return services.read_log(self._session, after)
+
+    # ---- the application ----
+
+    def flash(
+        self,
+        image: Path | str | bytes,
+        *,
+        start: bool = True,
+        force: bool = False,
+        unchecked: bool = False,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> FlashResult:
+        """Replaces the application and starts it. The old one runs until the new one has arrived and passed all checks.
+
+        `force`: also when the controller has this very image already. `unchecked`: without a look at the image here;
+        the controller checks it anyway. `progress` gets the bytes that have arrived and their total.
+        """
+        data = self._load(image)
+        if not unchecked:
+            parse_image(data)
+        crc = int.from_bytes(data[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+        status = services.read_status(self._session)
+        known = (status.image_crc, status.image_size) == (crc, len(data)) and status.exception is None
+        skipped = known and not force and not unchecked
+        begin = self._connection.transport.now()
+        if not skipped:
+            afresh = known or unchecked
+            services.download(self._session, data, afresh, lambda done: progress(done, len(data)))
+            self._verify(crc)
+        seconds = self._connection.transport.now() - begin
+        if start and not (skipped and status.state is AppState.RUN):
+            services.start(self._session)
+        return FlashResult(len(data), seconds, skipped, services.read_status(self._session).state)
+
+    def _load(self, image: Path | str | bytes) -> bytes:
+        if isinstance(image, bytes):
+            return image
+        path = Path(image)
+        self._beside = path
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            raise UsageError(f"The image {path} cannot be read: {error.strerror}.", "no-image") from None
+
+    def _verify(self, crc: int) -> None:
+        found = services.read_status(self._session).image_crc
+        if found != crc:
+            raise DeviceError(f"The device has image {found:08X} instead of {crc:08X}; flash again.", "verify")
+
+    def start(self) -> None:
+        services.start(self._session)
+
+    def stop(self) -> None:
+        services.stop(self._session)
+
+    def reset(self, option: str = "warm") -> None:
+        """`warm` keeps retain variables, `cold` initialises all, `origin` deletes the application. Stopped afterwards."""
+        if option not in RESET_OPTIONS:
+            raise UsageError(f"There is no reset '{option}'; choose one of {', '.join(RESET_OPTIONS)}.", "bad-reset")
+        services.reset(self._session, RESET_OPTIONS[option])
+
+    def status(self) -> PlcStatus:
+        status = services.read_status(self._session)
+        exception = self._explain(status) if status.exception else None
+        return PlcStatus(status.state, status.image_crc, status.image_size, exception)
+
+    def _explain(self, status: services.Status) -> ExceptionInfo:
+        """Adds the names and places that the symbols know."""
+        assert status.exception
+        try:
+            table = self._symbols_of(status.image_crc)
+        except UsageError:
+            table = None
+        task = next((t.name for i, t in enumerate(self.tasks()) if i == status.exception.task), None)
+        return explain_exception(status.exception, task, table)
+
+    def tasks(self) -> list[TaskInfo]:
+        """Statistics of the tasks."""
+        return services.read_tasks(self._session)
+
+    # ---- variables ----
+
+    def symbols(self) -> SymbolTable:
+        """The symbols of the application on the controller. Raises UsageError when they cannot be found."""
+        application = self._session.recover(self._session.application)
+        return self._symbols_of(application.image_crc)
+
+    def _symbols_of(self, image_crc: int) -> SymbolTable:
+        if self._table is None or self._table.image_crc != image_crc:
+            self._table = self._find_symbols(image_crc)
+        return self._table
+
+    def _find_symbols(self, image_crc: int) -> SymbolTable:
+        if self._symbol_file is None:
+            return find_symbols(image_crc, self._beside)
+        table = load_symbols(self._symbol_file)
+        if table.image_crc != image_crc:
+            raise UsageError(
+                f"{self._symbol_file} belongs to another image than the one on the device (CRC {image_crc:08X}); "
+                "name its own symbol file.",
+                "wrong-symbols",
+            )
+        return table
+
+    @overload
+    def read(self, name: str, /) -> Any: ...
+    @overload
+    def read(self, name: str, other: str, /, *more: str) -> dict[str, Any]: ...
+    def read(self, *names: str) -> Any:
+        """The value of one variable, or the values of several by the names given."""
+        values = self.read_all(names)
+        return values if len(names) > 1 else values[names[0]]
+
+    def read_all(self, names: Sequence[str]) -> dict[str, Any]:
+        """Values by name. Structs and arrays come as dicts and lists, TIME as text."""
+        table = self.symbols()
+        symbols = [table.resolve(name) for name in names]
+        contents = services.read_memory(self._session, table.image_crc, [_range(symbol) for symbol in symbols])
+        return {name: s.decode(data) for name, s, data in zip(names, symbols, contents, strict=True)}
+
+    def write(self, values: Mapping[str, Any]) -> None:
+        """Sets variables, all in one go between two cycles if they fit a message; texts such as 'T#80ms' are understood."""
+        table = self.symbols()
+        entries = []
+        for name, value in values.items():
+            symbol = table.resolve(name)
+            if symbol.area == lib.APP_AREA_CODE:
+                raise UsageError(f"{symbol.name} is a constant and cannot be written.", "constant")
+            entries.append((_range(symbol), symbol.encode(value)))
+        services.write_memory(self._session, table.image_crc, entries)
+
+    def watch(
+        self, names: Sequence[str], interval: float = 0.5, count: int | None = None
+    ) -> Iterator[tuple[float, dict[str, Any]]]:
+        """Reads again and again: yields seconds since the first reading, and the values. Endless without `count`."""
+        begin = time.monotonic()
+        for n in itertools.count() if count is None else range(count):
+            time.sleep(max(0.0, begin + n * interval - time.monotonic()))
+            yield time.monotonic() - begin, self.read_all(names)
+
+
+def explain_exception(
+    exception: services.AppException, task: str | None, table: SymbolTable | None
+) -> ExceptionInfo:
+    """The exception with the source line that `table` knows for it."""
+    place = None
+    if table and exception.code_offset is not None:
+        place = table.address_to_line(exception.code_offset - (exception.code in _RAISED_BY_CALL))
+    if place is None:
+        return ExceptionInfo(exception.code, exception.name, task)
+    return ExceptionInfo(exception.code, exception.name, task, place.pou, place.file, place.line)
+
+
+def _range(symbol: Symbol) -> AreaRange:
+    return AreaRange(symbol.area, symbol.offset, symbol.size)

@@ -1,0 +1,408 @@
+"""The application image (.cdl): building it, and taking it apart without trusting it.
+
+All layouts are the structs of firmware/include/CompactDownload.h, reached through cffi.
+"""
+
+from __future__ import annotations
+
+import time
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from plctool.core import ffi, lib
+from plctool.errors import UsageError
+
+NO_AREA = int(lib.APP_AREA_NONE)
+DEVICE_VERSION = 0x01000000
+COMPILER_VERSION = 0x00010000
+
+AREA_NAMES = ("data", "retain", "input", "output", "memory", "code")
+_AREA_TYPES = (
+    lib.AREA_TYPE_DATA,
+    lib.AREA_TYPE_RETAIN,
+    lib.AREA_TYPE_INPUT,
+    lib.AREA_TYPE_OUTPUT,
+    lib.AREA_TYPE_MEMORY,
+    lib.AREA_TYPE_CODE | lib.AREA_TYPE_CONSTANT,
+)
+_SEGMENTS = (
+    "application_info", "area_table", "function_table", "external_function_table", "iec_function_table", "blob", "code",
+)  # fmt: skip
+_MAX_NAME = 255
+_BLOB_MAGIC = lib.CDL_BLOB_MAGIC & 0xFFFFFFFF
+
+
+@dataclass(frozen=True)
+class ApplicationInfo:
+    """Texts for people; `date` in seconds since 1970 (UTC), 0 when unknown."""
+
+    project: str = ""
+    author: str = ""
+    version: str = ""
+    description: str = ""
+    profile: str = ""
+    date: int = 0
+
+
+@dataclass(frozen=True)
+class ExternalFunction:
+    """A function of the runtime that the application calls; `offset`: of its slot in the import table [bytes]."""
+
+    name: str
+    signature: int
+    version: int
+    offset: int
+
+
+@dataclass(frozen=True)
+class ImageTask:
+    """`kind`: KIND_*; `entry`: code offset to call (with the Thumb bit on Arm); `event`: (area, offset) of the BOOL."""
+
+    name: str
+    kind: int
+    priority: int
+    interval_us: int
+    entry: int
+    watchdog_us: int = 0
+    watchdog_sensitivity: int = 1
+    event: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class Image:
+    """An application. `areas`: bytes of RAM by area index. `functions`: CDL_FUNCTION_* -> code offset to call.
+    `retain_layout`: a number that changes when the layout of the retain area does, None when there is none."""
+
+    device_id: int
+    code: bytes
+    areas: dict[int, int]
+    functions: dict[int, int]
+    externals: list[ExternalFunction]
+    tasks: list[ImageTask]
+    info: ApplicationInfo = field(default_factory=ApplicationInfo)
+    device_type: int = int(lib.TARGET_TYPE_PROGRAMMABLE)
+    device_version: int = DEVICE_VERSION
+    compiler_version: int = COMPILER_VERSION
+    flags: int = 0
+    retain_layout: int | None = None
+    crc: int = 0  # set by `parse_image`
+
+
+def _pack(kind: str, values: dict[str, Any], size: int | None = None) -> bytes:
+    struct = ffi.new(f"{kind} *")
+    for name, value in values.items():
+        setattr(struct, name, value)
+    return bytes(ffi.buffer(struct))[:size]
+
+
+def _padded(data: bytes, align: int = 4) -> bytes:
+    return data + bytes(-len(data) % align)
+
+
+def _text(text: str) -> bytes:
+    return _padded(text.encode("ascii", "replace") + b"\0")
+
+
+# ---- building ------------------------------------------------------------------------------------------------------
+
+
+def build_image(image: Image) -> bytes:
+    """The bytes of the file, with their CRC."""
+    segments = {
+        "application_info": _info_segment(image.info),
+        "area_table": b"".join(_area_entries(image)),
+        "function_table": b"".join(_function_entries(image)),
+        "external_function_table": b"".join(_external_entries(image)),
+        "iec_function_table": b"",
+        "blob": b"".join(_blobs(image)),
+        "code": image.code,
+    }
+    header = ffi.new("CDL_HEADER *")
+    body = bytearray(int(lib.CDL_HEADER_SIZE))
+    for name in _SEGMENTS:
+        data = segments[name]
+        if not data:
+            continue
+        align = int(lib.APP_CODE_ALIGN) if name == "code" else 4
+        body += bytes(-len(body) % align)
+        segment = getattr(header, name)
+        segment.offset, segment.size = len(body), len(data)
+        body += data
+    header.header_tag = lib.CDL_HEADER_TAG
+    header.header_version = lib.CDL_HEADER_VERSION
+    header.header_size = lib.CDL_HEADER_SIZE
+    header.total_size = len(body)
+    header.device_type, header.device_id, header.device_version = (
+        image.device_type,
+        image.device_id,
+        image.device_version,
+    )
+    header.flags, header.compiler_version = image.flags, image.compiler_version
+    header.code_area_size = len(image.code)
+    header.code_area_index, header.code_area_flags = lib.APP_AREA_CODE, _AREA_TYPES[lib.APP_AREA_CODE]
+    body[: lib.CDL_HEADER_SIZE] = bytes(ffi.buffer(header))
+    header.crc = zlib.crc32(body)
+    body[: lib.CDL_HEADER_SIZE] = bytes(ffi.buffer(header))
+    return bytes(body)
+
+
+def _info_segment(info: ApplicationInfo) -> bytes:
+    texts = (info.project, info.author, info.version, info.description, info.profile)
+    return b"".join(map(_text, texts)) + info.date.to_bytes(4, "little")
+
+
+def _area_entries(image: Image) -> Iterator[bytes]:
+    for index, kind in enumerate(_AREA_TYPES):
+        size = len(image.code) if index == lib.APP_AREA_CODE else image.areas.get(index, 0)
+        if size:
+            yield _pack("AREA_INFO", {"size": size, "index": index, "type": kind})
+
+
+def _function_entries(image: Image) -> Iterator[bytes]:
+    for number in range(lib.CDL_FUNCTION_COUNT):
+        offset = image.functions.get(number)
+        area = NO_AREA if offset is None else lib.APP_AREA_CODE
+        yield _pack("POU_REF", {"area": area, "offset": offset or 0})
+
+
+def _external_entries(image: Image) -> Iterator[bytes]:
+    for number, external in enumerate(image.externals):
+        values = {
+            "signature_id": external.signature,
+            "identifier": number,
+            "version": external.version,
+            "offset": external.offset,
+            "area": NO_AREA,
+        }
+        head = _pack("EXT_REF_INFO", values, int(lib.EXT_REF_INFO_SIZE))
+        yield _padded(head + external.name.encode("ascii") + b"\0")
+
+
+def _blobs(image: Image) -> Iterator[bytes]:
+    yield _blob(lib.CDL_BLOB_TASKS, b"".join(map(_task_entry, image.tasks)))
+    if image.retain_layout is not None:
+        yield _blob(lib.CDL_BLOB_RETAIN, image.retain_layout.to_bytes(4, "little"))
+
+
+def _blob(number: int, payload: bytes) -> bytes:
+    return _pack("CDL_BLOB", {"magic": _BLOB_MAGIC, "id": number, "size": len(payload)}) + _padded(payload)
+
+
+def _task_entry(task: ImageTask) -> bytes:
+    area, offset = task.event or (NO_AREA, 0)
+    name = task.name.encode("ascii", "replace")[: lib.CDL_TASK_NAME_SIZE - 1]
+    return _pack(
+        "CDL_TASK",
+        {
+            "interval_us": task.interval_us,
+            "watchdog_us": task.watchdog_us,
+            "watchdog_sensitivity": task.watchdog_sensitivity,
+            "priority": task.priority,
+            "kind": task.kind,
+            "entry_offset": task.entry,
+            "event_area": area,
+            "event_offset": offset,
+            "name": name,
+        },
+    )
+
+
+# ---- taking apart --------------------------------------------------------------------------------------------------
+
+
+def _refuse(reason: str) -> UsageError:
+    return UsageError(f"This is not a valid application image: {reason}; build it again.", "bad-image")
+
+
+def parse_image(data: bytes) -> Image:
+    """The contents of an image. Raises UsageError saying what is wrong with it."""
+    header = _parse_header(data)
+    segments = {name: _segment(data, header, name) for name in _SEGMENTS}
+    code = segments["code"]
+    if not code:
+        raise _refuse("it has no code")
+    areas = {}
+    for entry in _entries("AREA_INFO", segments["area_table"], "area table"):
+        if entry.index >= lib.APP_AREA_COUNT or entry.index in areas:
+            raise _refuse(f"its area table names area {entry.index}, which does not exist or is there already")
+        areas[int(entry.index)] = int(entry.size)
+    areas.pop(int(lib.APP_AREA_CODE), None)
+    blobs = _parse_blobs(segments["blob"])
+    retain = blobs.get(int(lib.CDL_BLOB_RETAIN))
+    return Image(
+        device_id=int(header.device_id),
+        code=code,
+        areas=areas,
+        functions=_parse_functions(segments["function_table"], len(code)),
+        externals=list(_parse_externals(segments["external_function_table"])),
+        tasks=list(_parse_tasks(blobs.get(int(lib.CDL_BLOB_TASKS), b""), len(code))),
+        info=_parse_info(segments["application_info"]),
+        device_type=int(header.device_type),
+        device_version=int(header.device_version),
+        compiler_version=int(header.compiler_version),
+        flags=int(header.flags),
+        retain_layout=None if retain is None else int.from_bytes(retain, "little"),
+        crc=int(header.crc),
+    )
+
+
+def _parse_header(data: bytes) -> Any:
+    size = int(lib.CDL_HEADER_SIZE)
+    if len(data) < size:
+        raise _refuse(f"it has {len(data)} bytes, a header alone has {size}")
+    header = ffi.new("CDL_HEADER *")
+    ffi.buffer(header)[:] = data[:size]
+    if header.header_tag != lib.CDL_HEADER_TAG:
+        raise _refuse("it does not begin with the tag of an image")
+    if header.header_version != lib.CDL_HEADER_VERSION or header.header_size < size:
+        raise _refuse(f"its header version {header.header_version} is unknown")
+    if header.total_size != len(data):
+        raise _refuse(f"it has {len(data)} bytes, its header says {header.total_size}")
+    crc = zlib.crc32(data[lib.CDL_CRC_OFFSET + 4 :], zlib.crc32(bytes(4), zlib.crc32(data[: lib.CDL_CRC_OFFSET])))
+    if crc != header.crc:
+        raise _refuse("its checksum does not match its contents")
+    return header
+
+
+def _segment(data: bytes, header: Any, name: str) -> bytes:
+    segment = getattr(header, name)
+    if not segment.size:
+        return b""
+    if segment.offset < header.header_size or segment.offset + segment.size > len(data):
+        raise _refuse(f"its {name.replace('_', ' ')} lies outside of it")
+    return data[segment.offset : segment.offset + segment.size]
+
+
+def _entries(kind: str, data: bytes, title: str) -> Iterator[Any]:
+    size = ffi.sizeof(kind)
+    if len(data) % size:
+        raise _refuse(f"its {title} is cut off")
+    for at in range(0, len(data), size):
+        entry = ffi.new(f"{kind} *")
+        ffi.buffer(entry)[:] = data[at : at + size]
+        yield entry
+
+
+def _parse_functions(data: bytes, code_size: int) -> dict[int, int]:
+    functions = {}
+    for number, entry in enumerate(_entries("POU_REF", data, "function table")):
+        if entry.area == NO_AREA:
+            continue
+        if entry.area != lib.APP_AREA_CODE or entry.offset >= code_size:
+            raise _refuse(f"entry {number} of its function table lies outside the code")
+        functions[number] = int(entry.offset)
+    return functions
+
+
+def _parse_externals(data: bytes) -> Iterator[ExternalFunction]:
+    size, at = int(lib.EXT_REF_INFO_SIZE), 0
+    while at < len(data):
+        end = data.find(b"\0", at + size, at + size + _MAX_NAME)
+        if end < 0:
+            raise _refuse("its external function table is cut off")
+        entry = ffi.new("EXT_REF_INFO *")
+        ffi.buffer(entry)[:size] = data[at : at + size]
+        name = data[at + size : end].decode("ascii", "replace")
+        yield ExternalFunction(name, int(entry.signature_id), int(entry.version), int(entry.offset))
+        at = end + 1 + -(end + 1) % 4
+
+
+def _parse_blobs(data: bytes) -> dict[int, bytes]:
+    """Payloads by id."""
+    blobs, at, head = {}, 0, ffi.sizeof("CDL_BLOB")
+    while at < len(data):
+        blob = ffi.new("CDL_BLOB *")
+        if at + head > len(data):
+            raise _refuse("its blob is cut off")
+        ffi.buffer(blob)[:] = data[at : at + head]
+        payload = data[at + head : at + head + blob.size]
+        if blob.magic != _BLOB_MAGIC or len(payload) != blob.size:
+            raise _refuse("its blob is damaged")
+        blobs[int(blob.id)] = payload
+        at += head + len(payload) + -len(payload) % 4
+    return blobs
+
+
+def _parse_tasks(payload: bytes, code_size: int) -> Iterator[ImageTask]:
+    for task in _entries("CDL_TASK", payload, "task list"):
+        name = bytes(ffi.buffer(task.name)).split(b"\0")[0].decode("ascii", "replace")
+        if task.entry_offset >= code_size:
+            raise _refuse(f"the entry of task {name} lies outside the code")
+        event = None if task.event_area == NO_AREA else (int(task.event_area), int(task.event_offset))
+        yield ImageTask(
+            name, int(task.kind), int(task.priority), int(task.interval_us), int(task.entry_offset), int(task.watchdog_us),
+            int(task.watchdog_sensitivity), event,
+        )  # fmt: skip
+
+
+def _parse_info(data: bytes) -> ApplicationInfo:
+    texts: list[str] = []
+    at = 0
+    while len(texts) < 5 and (end := data.find(b"\0", at)) >= 0:
+        texts.append(data[at:end].decode("ascii", "replace"))
+        at = end + 1 + -(end + 1) % 4
+    project, author, version, description, profile = texts + [""] * (5 - len(texts))
+    date = int.from_bytes(data[at : at + 4], "little")
+    return ApplicationInfo(project, author, version, description, profile, date)
+
+
+# ---- for people ----------------------------------------------------------------------------------------------------
+
+
+def target_name(device_id: int) -> str:
+    """The name of the target with this TARGET_ID_*, or the number in hex."""
+    from plctool.compiler.targets import TARGETS
+
+    for target in TARGETS.values():
+        if getattr(lib, target.device_id) == device_id:
+            return target.name
+    return f"0x{device_id:08X}"
+
+
+def describe_image(data: bytes) -> dict[str, Any]:
+    """What `plctool info` shows, ready for JSON. Raises UsageError for what is not an image."""
+    image = parse_image(data)
+    kinds = {
+        int(getattr(lib, name)): name.removeprefix("KIND_").lower() for name in dir(lib) if name.startswith("KIND_")
+    }
+    functions = {0: "code_init", 1: "global_init", 2: "global_exit", 3: "reloc", 4: "download_code", 5: "target_info"}
+    info = image.info
+    return {
+        "size": len(data),
+        "crc": f"{image.crc:08X}",
+        "target": target_name(image.device_id),
+        "device_type": image.device_type,
+        "device_id": image.device_id,
+        "device_version": image.device_version,
+        "compiler_version": image.compiler_version,
+        "code_size": len(image.code),
+        "info": {
+            "project": info.project,
+            "author": info.author,
+            "version": info.version,
+            "description": info.description,
+            "profile": info.profile,
+            "date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(info.date)) if info.date else "",
+        },
+        "areas": [{"name": AREA_NAMES[index], "size": size} for index, size in sorted(image.areas.items())],
+        "functions": [
+            {"name": functions[number], "offset": offset} for number, offset in sorted(image.functions.items())
+        ],
+        "externals": [
+            {"name": e.name, "signature": f"{e.signature:08X}", "version": f"{e.version >> 16}.{e.version & 0xFFFF}"}
+            for e in image.externals
+        ],
+        "tasks": [
+            {
+                "name": t.name,
+                "kind": kinds.get(t.kind, str(t.kind)),
+                "priority": t.priority,
+                "interval_us": t.interval_us,
+                "watchdog_us": t.watchdog_us,
+                "entry": t.entry,
+            }
+            for t in image.tasks
+        ],
+    }

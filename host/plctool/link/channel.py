@@ -1,0 +1,439 @@
+"""The client end of a channel (codesys-v3-protocol 3): whole messages over a line that loses and damages packets.
+
+No I/O and no clock in here. Whoever drives a channel hands in received packages and the time, sends what `next_package`
+gives, and calls again when a package arrives or `deadline` is reached. Times are seconds, rates bytes per second.
+
+The device takes blocks in order only and asks once for the first one it misses; the reply acknowledges the request.
+So the client sends all it has and goes back when asked. When nothing is heard, and now and then on a bad line, it
+polls: an empty block with a number that the device has already makes it say what it has, and send a lost reply again.
+Blocks are handed out at the rate of the line, so that little is thrown away after a loss, and their size follows the
+error rate, because on a bad line most long blocks arrive damaged. Up to two requests may be under way, so that the line
+does not idle while the device works.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from plctool.core import error_name, lib
+from plctool.errors import LinkError
+
+_META = struct.Struct("<BBHI")
+_OPEN_REQUEST = struct.Struct("<IIBBH")
+_OPEN_RESPONSE = struct.Struct("<IHHI")  # the rest is of no interest to us, and missing in version 1.0
+_CLOSE = struct.Struct("<HH")
+_CHANNEL = struct.Struct("<BBH")  # how every channel package starts
+_DATA = struct.Struct("<BBHII")
+_FIRST = struct.Struct("<II")
+_ACK = struct.Struct("<BBHI")
+
+WANTED_BUFFER = 0x4000  # longest message we would like to send or get, bytes
+MAX_REQUESTS = 2  # requests under way at the same time
+_OPEN_RETRY = 0.3  # first repetition of a lost request to open [s]
+_LONGEST_RETRY = 1.0
+_NO_PROGRESS = 4  # times the patience: how long a device may be heard without anything getting on
+_SHORTEST_TIMEOUT = 0.1
+_FIRST_TIMEOUT = 0.4  # until a round trip has been measured
+_AHEAD, _AHEAD_BAD = 0.05, 0.005  # how far ahead of the line blocks are handed to it, on a good and a bad line [s]
+_POLL_EVERY = 4  # blocks, on a bad line
+_WINDOW = 2 * _POLL_EVERY  # most blocks under way on a bad line
+_MAX_SENDS = 40  # of one block
+_MIN_PAYLOAD = 64
+_LOSS_COST = 3  # blocks that have to be sent again for each that is lost
+_RATE_MEMORY = 8192  # bytes over which the error rate of the line is averaged
+
+
+class ChannelLost(LinkError):
+    """The channel is gone but the line may be well: a new one can be opened."""
+
+
+class State(Enum):
+    CLOSED = auto()
+    OPENING = auto()
+    OPEN = auto()
+
+
+@dataclass
+class Line:
+    """What a channel has to know of the line below it."""
+
+    max_package: int  # longest layer 4 package, bytes
+    overhead: int  # bytes the line carries for each package besides it
+    byte_rate: float  # math.inf when unknown
+
+
+@dataclass
+class _Block:
+    package: bytes
+    number: int
+    sends: int = 0
+    gone_at: float = 0.0  # when its last byte leaves the line
+
+
+class RoundTrip:
+    """Smoothed time from the end of a request to its reply, and its variation, as TCP does it (RFC 6298)."""
+
+    def __init__(self, floor: float) -> None:
+        self.shortest = 0.0
+        self._floor = floor  # shortest time-out
+        self._smoothed = _FIRST_TIMEOUT
+        self._variation = 0.0
+        self._measured = False
+        self._backoff = 1
+
+    def sample(self, seconds: float) -> None:
+        """Takes a measured round trip; only of what was sent once."""
+        seconds = max(seconds, 0.0)
+        if self._measured:
+            self._variation += (abs(seconds - self._smoothed) - self._variation) / 4
+            self._smoothed += (seconds - self._smoothed) / 8
+            self.shortest = min(self.shortest, seconds)
+        else:
+            self._smoothed, self._variation, self.shortest = seconds, seconds / 2, seconds
+        self._measured = True
+
+    def back_off(self) -> None:
+        """Doubles the time-out until `progress`."""
+        self._backoff *= 2
+
+    def progress(self) -> None:
+        self._backoff = 1
+
+    @property
+    def timeout(self) -> float:
+        plain = max(self._smoothed + 4 * self._variation, self._floor)
+        return min(plain * self._backoff, max(plain, _LONGEST_RETRY))
+
+
+class ErrorRate:
+    """Damage per byte of the line as the channel sees it, and the block size that suits it."""
+
+    def __init__(self) -> None:
+        self._bytes = float(_RATE_MEMORY)
+        self._losses = 0.0
+
+    def count(self, size: int, lost: bool) -> None:
+        keep = 1 - size / _RATE_MEMORY
+        self._bytes = self._bytes * keep + size
+        self._losses = self._losses * keep + lost
+
+    @property
+    def is_bad(self) -> bool:
+        """Whether there have been losses lately."""
+        return self._losses > 0.5
+
+    def best_payload(self, overhead: int, longest: int) -> int:
+        """Payload with the least cost per byte, overhead/n + cost*n: smallest at n = sqrt(overhead/cost)."""
+        cost = _LOSS_COST * self._losses / self._bytes
+        if cost * longest * longest <= overhead:
+            return longest
+        return max(_MIN_PAYLOAD, int(math.sqrt(overhead / cost)))
+
+
+class Channel:
+    """State machine of one channel: `open`, then `send` up to MAX_REQUESTS messages and take their `replies`."""
+
+    def __init__(self, line: Line, address_words: int, request_id: int) -> None:
+        self.state = State.CLOSED
+        self.buffer_size = 0  # longest message the device takes, bytes
+        self.outstanding = 0  # requests without reply
+        self.replies: deque[bytes] = deque()
+        self._line = line
+        self._address_words = address_words
+        self._request_id = request_id
+        self._id = 0
+        self._opens = 0
+        self._round_trip = RoundTrip(max(_SHORTEST_TIMEOUT, 2 * line.max_package / line.byte_rate))
+        self._error_rate = ErrorRate()
+        self._line_free = 0.0  # when the line will have carried all that was sent
+        self._timer = math.inf
+        self._heard = self._progress = 0.0  # when the device was last heard, and when something got on
+        self._control: deque[bytes] = deque()
+        # Sending.
+        self._outbox: deque[bytes] = deque()  # messages that are not completely cut into blocks
+        self._cut = 0  # bytes of the first of them that are
+        self._flight: deque[_Block] = deque()  # blocks without acknowledgement
+        self._next = 0  # index in _flight of the next block to send
+        self._newest = _Block(b"", 0)
+        self._unanswered = 0  # requests that are completely sent
+        self._unpolled = 0  # blocks since the last poll
+        self._silent = False  # nothing was sent since a poll: what the answer does not have is lost
+        # Receiving.
+        self._received = 0  # highest block number received in order
+        self._incoming = bytearray()
+        self._expected: tuple[int, int] | None = None  # length and CRC of the message that is coming in
+        self._asked_at = -math.inf  # when a missing block was last asked for
+
+    # ---- commands ----
+
+    def open(self, now: float) -> None:
+        self.state = State.OPENING
+        self._timer = self._heard = self._progress = now
+
+    def send(self, message: bytes, now: float) -> None:
+        """Takes a request to be sent."""
+        assert self.state is State.OPEN and self.outstanding < MAX_REQUESTS
+        if len(message) > self.buffer_size:
+            raise LinkError(f"A request of {len(message)} bytes is too long for the device.", "too-long")
+        self._outbox.append(message)
+        self.outstanding += 1
+        self._heard = self._progress = now
+
+    def close(self) -> None:
+        """Says good-bye; nothing answers."""
+        if self.state is State.OPEN:
+            self._control.append(_meta(lib.CHANNEL_PKG_CLOSE_REQ, _CLOSE.pack(self._id, lib.ERR_OK)))
+        self._shut()
+
+    def _shut(self) -> None:
+        self.state, self._timer = State.CLOSED, math.inf
+
+    # ---- output ----
+
+    def deadline(self) -> float:
+        """When `next_package` has to be asked again even if nothing arrives."""
+        return min(self._timer, self._ready_at()) if self._has_block() else self._timer
+
+    def give_up_at(self, patience: float) -> float:
+        """When to give up: after `patience` seconds of silence, or much longer without progress."""
+        return min(self._heard + patience, self._progress + _NO_PROGRESS * patience)
+
+    def next_package(self, now: float) -> bytes | None:
+        """The next package to send now; None when there is none until something arrives or `deadline` is reached."""
+        if now >= self._timer:
+            self._on_timeout(now)
+        if self._control:
+            package = self._control.popleft()
+            self._departure(package, now)
+            return package
+        if not self._has_block() or now < self._ready_at():
+            return None
+        block = self._next_block()
+        block.sends += 1
+        block.gone_at = self._departure(block.package, now)
+        self._heard = now  # only from now on silence means something
+        if block.sends == 1:
+            self._progress = now
+        self._timer = block.gone_at + self._round_trip.timeout
+        self._silent = False
+        self._unpolled += 1
+        if self._unpolled >= _POLL_EVERY and self._error_rate.is_bad:
+            self._poll()
+        return block.package
+
+    def _departure(self, package: bytes, now: float) -> float:
+        """When the line will have carried the package that is sent now."""
+        self._line_free = max(self._line_free, now) + (len(package) + self._line.overhead) / self._line.byte_rate
+        return self._line_free
+
+    def _ready_at(self) -> float:
+        """When the line will soon have carried all it was given: time to hand out the next block."""
+        return self._line_free - (_AHEAD_BAD if self._error_rate.is_bad else _AHEAD)
+
+    def _has_block(self) -> bool:
+        """Whether there is a block that may be sent."""
+        open_window = self._next < _WINDOW or not self._error_rate.is_bad
+        return self.state is State.OPEN and open_window and bool(self._next < len(self._flight) or self._outbox)
+
+    def _next_block(self) -> _Block:
+        """The next block to be sent for the first time or again."""
+        if self._next == len(self._flight):
+            self._flight.append(self._cut_block())
+        self._next += 1
+        block = self._flight[self._next - 1]
+        if block.sends >= _MAX_SENDS:
+            raise ChannelLost("The line is too bad: blocks do not arrive in many tries; check the cable.", "bad-line")
+        return block
+
+    def _cut_block(self) -> _Block:
+        """Cuts the next block off the oldest message, as long as suits the line."""
+        message = self._outbox[0]
+        number = self._newest.number + 1
+        first = self._cut == 0
+        flags = lib.CHANNEL_FLAG_TO_SERVER | (lib.CHANNEL_FLAG_FIRST if first else 0)
+        head = _DATA.pack(lib.CHANNEL_PKG_DATA, flags, self._id, number, self._received)
+        if first:
+            head += _FIRST.pack(len(message), zlib.crc32(message))
+        size = self._error_rate.best_payload(self._line.overhead + len(head), self._line.max_package - len(head))
+        self._newest = _Block(head + message[self._cut : self._cut + size], number)
+        self._cut += size
+        if self._cut >= len(message):
+            self._outbox.popleft()
+            self._unanswered += 1
+            self._cut = 0
+        return self._newest
+
+    # ---- time-outs ----
+
+    def _on_timeout(self, now: float) -> None:
+        if self.state is State.OPENING:
+            body = _OPEN_REQUEST.pack(self._request_id, WANTED_BUFFER, self._address_words, 0, 0)
+            self._control.append(_meta(lib.CHANNEL_PKG_OPEN_REQ, body))
+            self._opens += 1
+            self._timer = now + min(_OPEN_RETRY * self._opens, _LONGEST_RETRY)
+            return
+        self._round_trip.back_off()
+        self._timer = now + self._round_trip.timeout
+        if self._expected:
+            self._ask_missing(now)
+        else:
+            self._poll()
+            self._silent = True
+
+    def _poll(self) -> None:
+        """Makes the device say what it has, with a block it has already."""
+        known = self._flight[0].number - 1 if self._flight else self._newest.number
+        flags = lib.CHANNEL_FLAG_TO_SERVER
+        self._control.append(_DATA.pack(lib.CHANNEL_PKG_DATA, flags, self._id, known, self._received))
+        self._unpolled = 0
+
+    def _ask_missing(self, now: float) -> None:
+        self._asked_at = now
+        self._acknowledge(lib.CHANNEL_FLAG_MISSING)
+
+    def _acknowledge(self, flags: int = 0) -> None:
+        flags |= lib.CHANNEL_FLAG_TO_SERVER
+        self._control.append(_ACK.pack(lib.CHANNEL_PKG_ACK, flags, self._id, self._received))
+
+    # ---- input ----
+
+    def receive(self, package: bytes, now: float) -> None:
+        """Takes a layer 4 package; ignores what is malformed or not ours. Raises LinkError when the device says no."""
+        if len(package) < _CHANNEL.size:
+            return
+        self._heard = now
+        kind, flags, channel_id = _CHANNEL.unpack_from(package)
+        if kind in (lib.CHANNEL_PKG_OPEN_RESP, lib.CHANNEL_PKG_CLOSE):
+            self._receive_meta(kind, package, now)
+        elif self.state is not State.OPEN or channel_id != self._id:
+            return
+        elif kind == lib.CHANNEL_PKG_DATA and len(package) >= _DATA.size:
+            self._receive_data(package, now)
+        elif kind == lib.CHANNEL_PKG_ACK and len(package) >= _ACK.size:
+            number = _ACK.unpack_from(package)[3]
+            self._receive_ack(number, now)
+            if flags & lib.CHANNEL_FLAG_MISSING or self._silent:
+                self._receive_missing(number, now)
+            self._silent = False
+
+    def _receive_meta(self, kind: int, package: bytes, now: float) -> None:
+        body = _meta_body(package)
+        if kind == lib.CHANNEL_PKG_OPEN_RESP and self.state is State.OPENING and len(body) >= _OPEN_RESPONSE.size:
+            self._receive_opened(body, now)
+        elif kind == lib.CHANNEL_PKG_CLOSE and self.state is State.OPEN and len(body) >= _CLOSE.size:
+            channel_id, error = _CLOSE.unpack_from(body)
+            if channel_id == self._id:
+                self._shut()
+                raise ChannelLost(f"The device closed the connection ({error_name(error)}); try again.", "closed")
+
+    def _receive_opened(self, body: bytes, now: float) -> None:
+        request_id, result, channel_id, granted = _OPEN_RESPONSE.unpack_from(body)
+        if request_id != self._request_id:
+            return
+        if result != lib.CHANNEL_OPEN_OK:
+            self._shut()
+            raise LinkError("The device is busy with another tool; close that one or wait a few seconds.", "busy")
+        if self._opens == 1:
+            self._round_trip.sample(now - self._line_free)
+        self._id, self.buffer_size = channel_id, min(granted, WANTED_BUFFER)
+        self.state, self._timer = State.OPEN, math.inf
+
+    def _receive_ack(self, number: int, now: float) -> None:
+        """Everything up to block `number` has arrived."""
+        if not self._flight or not self._flight[0].number <= number <= self._flight[-1].number:
+            return
+        while self._flight and self._flight[0].number <= number:
+            block = self._flight.popleft()
+            self._next = max(0, self._next - 1)
+            self._error_rate.count(len(block.package) + self._line.overhead, lost=False)
+        if block.sends == 1:
+            self._round_trip.sample(now - block.gone_at)
+        self._round_trip.progress()
+        self._progress = now
+        self._timer = max(self._line_free, now) + self._round_trip.timeout
+
+    def _receive_missing(self, number: int, now: float) -> None:
+        """The device has everything up to `number`, and the next block was lost: starts again from there."""
+        if not self._next or self._flight[0].number != number + 1:
+            return
+        lost = self._flight[0]
+        if lost.sends > 1 and now - lost.gone_at < self._round_trip.shortest:
+            return  # asked for before the repetition can have arrived
+        self._error_rate.count(len(lost.package) + self._line.overhead, lost=True)
+        self._next = self._unpolled = 0
+
+    def _receive_data(self, package: bytes, now: float) -> None:
+        _, flags, _, number, acknowledged = _DATA.unpack_from(package)
+        first = bool(flags & lib.CHANNEL_FLAG_FIRST)
+        self._receive_ack(acknowledged, now)
+        if number <= self._received:
+            self._acknowledge()  # our acknowledgement was lost
+        elif number > self._received + 1 and not (first and self._unanswered == MAX_REQUESTS):
+            if now - self._asked_at >= self._round_trip.timeout:
+                self._ask_missing(now)
+        elif self._unanswered and self._take(package[_DATA.size :], first):
+            if number > self._received + 1:
+                self._answered()  # the reply before this one was lost for good
+            self._received = number
+            self._asked_at = -math.inf
+            self._progress = now
+            self._timer = max(self._line_free, now) + self._round_trip.timeout
+            self._finish_reply()
+
+    def _take(self, content: bytes, first: bool) -> bool:
+        """Adds a block to the reply; False when it does not fit there."""
+        if first:
+            if len(content) < _FIRST.size:
+                return False
+            length, crc = _FIRST.unpack_from(content)
+            if length > WANTED_BUFFER:
+                return False
+            self._expected = length, crc
+            self._incoming.clear()
+            content = content[_FIRST.size :]
+        elif not self._expected:
+            return False
+        self._incoming += content
+        return True
+
+    def _finish_reply(self) -> None:
+        """Delivers the reply when it is complete. A request under way acknowledges it, otherwise we do at once."""
+        assert self._expected
+        length, crc = self._expected
+        if len(self._incoming) < length:
+            return
+        self._expected = None
+        reply = bytes(self._incoming)
+        if len(reply) != length or zlib.crc32(reply) != crc:
+            raise ChannelLost("An answer arrived damaged; try again.", "checksum")
+        self.replies.append(reply)
+        self._answered()
+        self._round_trip.progress()
+        if not self.outstanding:
+            self._timer = math.inf
+            self._acknowledge()
+
+    def _answered(self) -> None:
+        """The oldest request is done with."""
+        self.outstanding -= 1
+        self._unanswered -= 1
+
+
+def _meta(kind: int, body: bytes) -> bytes:
+    """A meta package; its CRC covers all of it with the CRC field zero."""
+    crc = zlib.crc32(_META.pack(kind, 0, lib.CHANNEL_VERSION, 0) + body)
+    return _META.pack(kind, 0, lib.CHANNEL_VERSION, crc) + body
+
+
+def _meta_body(package: bytes) -> bytes:
+    """What follows the head of a meta package; nothing when the package is damaged."""
+    if len(package) < _META.size:
+        return b""
+    kind, flags, version, crc = _META.unpack_from(package)
+    body = package[_META.size :]
+    return body if zlib.crc32(_META.pack(kind, flags, version, 0) + body) == crc else b""

@@ -1,0 +1,152 @@
+"""A device reached over a block transport: name service, one channel, whole messages. The only I/O loop of the link."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+
+from plctool.core import lib
+from plctool.errors import LinkError
+from plctool.link import names, router
+from plctool.link.channel import MAX_REQUESTS, Channel, ChannelLost, Line, State
+from plctool.link.transport import BlockTransport
+
+PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
+_OPEN_PATIENCE = 5.0
+_ASK_EVERY = 0.4  # a lost name request is repeated after [s]
+_SCAN_TIME = 1.5
+
+
+class Connection:
+    """The way to one device. `open` finds it and opens a channel, `exchange` sends a request and returns the reply."""
+
+    def __init__(self, transport: BlockTransport) -> None:
+        self.transport = transport
+        self._peer: bytes | None = None
+        self._channel: Channel | None = None
+
+    def __enter__(self) -> Connection:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    @property
+    def is_open(self) -> bool:
+        return self._channel is not None
+
+    @property
+    def buffer_size(self) -> int:
+        """Longest message the device takes, in bytes; 0 while no channel is open."""
+        return self._channel.buffer_size if self._channel else 0
+
+    def open(self) -> None:
+        """Opens a new channel, after a name request on the first time. Raises LinkError when nobody answers."""
+        if self._peer is None:
+            found = self.scan(_OPEN_PATIENCE, enough=1)
+            if not found:
+                raise self._error("No device answers on {}; check cable, baud rate and power.", "no-answer")
+            self._peer = found[0].address
+        header = router.header_size(self._peer, self.transport.local_address)
+        line = Line(lib.BLK_MAX_SIZE - header, header + self.transport.packet_overhead, self.transport.byte_rate)
+        words = (len(self._peer) + len(self.transport.local_address)) // 2
+        channel = Channel(line, words, secrets.randbits(32))
+        channel.open(self.transport.now())
+        self._run(channel, lambda: channel.state is State.OPEN, _OPEN_PATIENCE)
+        self._channel = channel
+
+    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
+        """Sends a request and returns the reply. `patience`: seconds of silence that are borne.
+
+        Raises ChannelLost when the channel is gone; `open` gives a new one.
+        """
+        (reply,) = self.stream([message], patience)
+        return reply
+
+    def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]:
+        """Sends requests, the next one already while the device works on the one before, and yields the replies.
+
+        On a bad line there may be fewer replies than requests, but never none to the last one.
+        """
+        if self._channel is None:
+            raise ChannelLost("There is no connection to the device.", "closed")
+        channel, requests = self._channel, iter(messages)
+        try:
+            while True:
+                while channel.outstanding < MAX_REQUESTS and (message := next(requests, None)) is not None:
+                    channel.send(message, self.transport.now())
+                if not channel.outstanding:
+                    return
+                self._run(channel, lambda: bool(channel.replies), patience)
+                while channel.replies:
+                    yield channel.replies.popleft()
+        finally:
+            if channel.outstanding:  # left on the way: whatever is still to come is of no use
+                self._drop_channel()
+
+    def scan(self, seconds: float = _SCAN_TIME, enough: int = 0) -> list[names.Node]:
+        """Devices that answer a broadcast name request within `seconds`; stops early when `enough` have answered."""
+        request_id = secrets.randbits(32)
+        found: dict[bytes, names.Node] = {}
+        now = self.transport.now()
+        end, ask_at = now + seconds, now
+        while now < end and not (enough and len(found) >= enough):
+            if now >= ask_at:
+                self._send(lib.ROUTER_SVC_NAME_REQUEST, router.BROADCAST, names.encode_request(request_id))
+                ask_at = now + _ASK_EVERY
+            packet = self._receive(min(ask_at, end) - now)
+            if packet and packet.service == lib.ROUTER_SVC_NAME_RESPONSE:
+                node = names.decode_reply(packet.payload, request_id, packet.sender)
+                if node:
+                    found[node.address] = node
+            now = self.transport.now()
+        return list(found.values())
+
+    def close(self) -> None:
+        """Closes channel and transport; never raises."""
+        self._drop_channel()
+        self.transport.close()
+
+    def _drop_channel(self) -> None:
+        channel, self._channel = self._channel, None
+        if channel:
+            channel.close()
+            with suppress(LinkError):  # the device notices by itself
+                while self._send_next(channel):
+                    pass
+
+    def _run(self, channel: Channel, done: Callable[[], bool], patience: float) -> None:
+        """Moves packages until `done`. Raises ChannelLost after `patience` seconds of silence."""
+        while not done():
+            sent = self._send_next(channel)
+            now = self.transport.now()
+            give_up = channel.give_up_at(patience)
+            if now >= give_up:
+                raise self._error("The device on {} does not answer any more; check the line.", "timeout")
+            packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
+            if packet and packet.service == lib.ROUTER_SVC_CHANNEL and packet.sender == self._peer:
+                channel.receive(packet.payload, self.transport.now())
+        while self._send_next(channel):
+            pass  # the acknowledgement of the reply
+
+    def _send_next(self, channel: Channel) -> bool:
+        """Sends one package if there is one to be sent now."""
+        package = channel.next_package(self.transport.now())
+        if package is None:
+            return False
+        assert self._peer is not None
+        self._send(lib.ROUTER_SVC_CHANNEL, self._peer, package)
+        return True
+
+    def _error(self, message: str, code: str) -> ChannelLost:
+        return ChannelLost(message.format(self.transport.name), code)
+
+    def _send(self, service: int, receiver: bytes, payload: bytes) -> None:
+        self.transport.send(router.encode(router.Packet(service, receiver, self.transport.local_address, payload)))
+
+    def _receive(self, timeout: float) -> router.Packet | None:
+        """The next packet for us, None when none came in time."""
+        data = self.transport.receive(timeout)
+        packet = router.decode(data) if data is not None else None
+        return packet if packet and packet.receiver in (router.BROADCAST, self.transport.local_address) else None

@@ -1,0 +1,88 @@
+"""Block transport over a serial line: any port or URL that pyserial opens."""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import time
+from collections import deque
+from typing import Any
+
+from plctool.errors import LinkError
+from plctool.link import simplecom
+
+DEFAULT_BAUD = 115200
+_BITS_PER_BYTE = 10  # 8N1
+_POLL = 0.01  # longest single wait for a byte [s]
+_WRITE_TIMEOUT = 5.0
+_LOCAL_ADDRESS = b"\x00\x02"
+_ESCAPE_SHARE = 256  # one byte in so many is escaped, on average
+
+
+class SerialTransport:
+    """Packets in serial frames. Opening fails with a LinkError that says what to do."""
+
+    def __init__(self, url: str, baud: int = DEFAULT_BAUD) -> None:
+        self.name = url
+        self.local_address = _LOCAL_ADDRESS
+        self.packet_overhead = simplecom.FRAME_OVERHEAD
+        self.byte_rate = baud / _BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if _is_real_line(url) else math.inf
+        self._decoder = simplecom.Decoder()
+        self._packets: deque[bytes] = deque()
+        self._port = _open(url, baud)
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def send(self, packet: bytes) -> None:
+        try:
+            self._port.write(simplecom.encode(packet))
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def receive(self, timeout: float) -> bytes | None:
+        end = time.monotonic() + timeout
+        while not self._packets:
+            try:
+                waiting = self._port.in_waiting
+                if not waiting and time.monotonic() >= end:
+                    return None
+                data = self._port.read(waiting or 1)
+            except OSError as error:
+                raise self._lost(error) from error
+            self._packets.extend(self._decoder.feed(data))
+        return self._packets.popleft()
+
+    def close(self) -> None:
+        self._port.close()
+
+    def _lost(self, error: OSError) -> LinkError:
+        return LinkError(f"The serial line {self.name} was lost ({error}); check the cable and try again.", "link-lost")
+
+
+def _is_real_line(url: str) -> bool:
+    """Whether bytes take the time the baud rate says: not over networks and pseudo terminals."""
+    return "://" not in url and not os.path.realpath(url).startswith("/dev/pts/")
+
+
+def _open(url: str, baud: int) -> Any:
+    import serial  # slow to import, and only needed here
+
+    try:
+        return serial.serial_for_url(url, baudrate=baud, timeout=_POLL, write_timeout=_WRITE_TIMEOUT, exclusive=True)
+    except ValueError as error:
+        raise LinkError(f"Cannot open {url}: {error}.", "open") from error
+    except OSError as error:
+        raise LinkError(f"Cannot open {url}: {_advice(error)}", "open") from error
+
+
+def _advice(error: OSError) -> str:
+    """What is wrong with the port and what to do about it, as the end of a sentence."""
+    advice = {
+        errno.ENOENT: "there is no such port; check the name and that the adapter is plugged in.",
+        errno.EACCES: "permission denied; add yourself to the port's group (often dialout) and log in again.",
+        errno.EBUSY: "another program uses it; close that one first.",
+        errno.EAGAIN: "another program uses it; close that one first.",
+    }
+    return advice.get(error.errno or 0, f"{error}.")

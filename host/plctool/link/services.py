@@ -1,0 +1,453 @@
+"""The services of a device as typed functions (codesys-v3-protocol 4.4 .. 4.10 and CmpSrvNumbers.h).
+
+Every function takes a `Session`; requests that were lost with their channel are repeated unless said otherwise.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+
+from plctool.core import exception_name, lib
+from plctool.errors import DeviceError
+from plctool.link import bintag, l7
+from plctool.link.channel import ChannelLost
+from plctool.link.names import version_text
+from plctool.link.session import Session
+
+_SLOW = 30.0  # patience for what may erase flash or run initialisation code [s]
+_DOWNLOAD_TRIES = 4  # without any progress
+_NO_OFFSET = 0xFFFFFFFF
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who the device is. `target_id` is vendor << 16 | device."""
+
+    device_name: str
+    vendor_name: str
+    node_name: str
+    serial_number: str
+    target_type: int
+    target_id: int
+    version: str
+    runtime_version: str
+
+
+class AppState(StrEnum):
+    NONE = "none"
+    RUN = "run"
+    STOP = "stop"
+    EXCEPTION = "exception"
+
+
+@dataclass(frozen=True)
+class AppException:
+    """The last exception. `code_offset` is None when it was outside the application's code, `task` an index or -1."""
+
+    code: int
+    code_offset: int | None
+    task: int
+
+    @property
+    def name(self) -> str:
+        return exception_name(self.code)
+
+
+@dataclass(frozen=True)
+class Status:
+    """What the application does. `image_crc` is 0 without application."""
+
+    state: AppState
+    image_crc: int
+    image_size: int
+    exception: AppException | None
+    operating_state: int
+
+
+@dataclass(frozen=True)
+class TaskInfo:
+    """Statistics of a task; `kind` is KIND_* of CmpIecTask.h, times in us."""
+
+    name: str
+    kind: int
+    priority: int
+    interval_us: int
+    cycles: int
+    last_us: int
+    avg_us: int
+    min_us: int
+    max_us: int
+    jitter_us: int
+    overruns: int
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """One line of the device's log. `time_ns` counts from the start of the runtime, `log_class` is LOG_*."""
+
+    handle: int
+    time_ns: int
+    component: str
+    log_class: int
+    error: int
+    text: str
+
+
+@dataclass(frozen=True)
+class AreaRange:
+    """`size` bytes of memory area `area` (APP_AREA_*) from `offset` on."""
+
+    area: int
+    offset: int
+    size: int
+
+
+# ---- device ----------------------------------------------------------------------------------------------------------
+
+
+def read_identity(session: Session) -> Identity:
+    tags = session.recover(lambda: session.call(lib.SG_DEVICE, lib.SRV_DEV_GET_TARGET_IDENT))
+    target_type, target_id, version = struct.unpack_from("<3I", tags.bytes(lib.TAG_DEV_IDENT, 12))
+    serial = tags.find(lib.TAG_DEV_SERIAL_NUMBER) or b"\0\0"
+    return Identity(
+        device_name=_wide_text(tags.bytes(lib.TAG_DEV_DEVICE_NAME, 4)),
+        vendor_name=_wide_text(tags.bytes(lib.TAG_DEV_VENDOR_NAME, 4)),
+        node_name=_wide_text(tags.bytes(lib.TAG_DEV_NODE_NAME, 4)),
+        serial_number=serial[2 : 2 + int.from_bytes(serial[:2], "little")].decode("ascii", "replace"),
+        target_type=target_type,
+        target_id=target_id,
+        version=version_text(version),
+        runtime_version=version_text(tags.u32(lib.TAG_DEV_RTS_VERSION)),
+    )
+
+
+def _wide_text(content: bytes) -> str:
+    """A string as group 1 has them: byte length with NUL, UTF-16."""
+    size = int.from_bytes(content[:4], "little")
+    return content[4 : 4 + size].decode("utf-16-le", "replace").split("\0", 1)[0]
+
+
+def echo(session: Session, data: bytes) -> bytes:
+    """What the device sends back for `data`; equal when the line is well. `data` must fit a message."""
+    tags = [
+        bintag.u32(lib.TAG_DEV_ECHO_LENGTH, len(data)),
+        bintag.u32(lib.TAG_DEV_ECHO_REPLY_LENGTH, len(data)),
+        bintag.raw(lib.TAG_DEV_ECHO_DATA, data),
+    ]
+    return session.recover(lambda: session.call(lib.SG_DEVICE, lib.SRV_DEV_ECHO, tags)).bytes(lib.TAG_DEV_ECHO_DATA)
+
+
+# ---- application -----------------------------------------------------------------------------------------------------
+
+
+def read_status(session: Session) -> Status:
+    tags = session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_STATUS))
+    status = tags.container(lib.TAG_APP_STATUS)
+    result, state, operating = struct.unpack_from("<HII", status.bytes(lib.TAG_APP_STATE, 10))
+    l7.check_result(result, "status")
+    code, offset, task = struct.unpack_from("<IIi", status.bytes(lib.TAG_APP_LAST_EXCEPTION, 12))
+    crc, size = struct.unpack_from("<II", status.bytes(lib.TAG_APP_IMAGE, 8))
+    exception = None
+    if code != lib.RTSEXCPT_NOEXCEPTION:
+        exception = AppException(code, None if offset == _NO_OFFSET else offset, task)
+    return Status(_app_state(state, operating), crc, size, exception, operating)
+
+
+def _app_state(state: int, operating: int) -> AppState:
+    if operating & lib.OS_EXCEPTION:
+        return AppState.EXCEPTION
+    return {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}.get(state, AppState.STOP)
+
+
+def start(session: Session) -> None:
+    _control(session, lib.SRV_APP_START, "start")
+
+
+def stop(session: Session) -> None:
+    _control(session, lib.SRV_APP_STOP, "stop")
+
+
+def reset(session: Session, option: int) -> None:
+    """`option` is RESET_OPTION_*; origin deletes the application."""
+    _control(session, lib.SRV_APP_RESET, "reset", bintag.u32(lib.TAG_APP_OPTION, option))
+    session.forget_application()
+
+
+def _control(session: Session, service: int, action: str, *options: bintag.Tag) -> None:
+    def request() -> bintag.Tags:
+        number = bintag.u32(lib.TAG_APP_SESSION, session.application().session)
+        descriptor = bintag.container(lib.TAG_APP_DESCRIPTOR, number, *options)
+        return session.call(lib.SG_APPLICATION, service, [descriptor], _SLOW)
+
+    l7.check_result(session.recover(request).u16(lib.TAG_SERVICE_RESULT), action)
+
+
+def read_application_info(session: Session) -> dict[str, str]:
+    """Project, version, author, description and profile, as far as they are given."""
+    tags = session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_APPLICATION_INFO))
+    fields = {
+        "project": lib.TAG_APP_INFO_PROJECT,
+        "version": lib.TAG_APP_INFO_VERSION,
+        "author": lib.TAG_APP_INFO_AUTHOR,
+        "description": lib.TAG_APP_INFO_DESCRIPTION,
+        "profile": lib.TAG_APP_INFO_PROFILE,
+    }
+    return {name: text for name, tag in fields.items() if (text := tags.text(tag))}
+
+
+def read_tasks(session: Session) -> list[TaskInfo]:
+    tags = session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_TASK_INFO))
+    numbers = struct.Struct(f"<{lib.TASK_INFO_WORDS}I")
+    tasks = []
+    for tag, content in tags:
+        if tag == lib.TAG_TASK_INFO and isinstance(content, bytes) and len(content) >= numbers.size:
+            name = content[numbers.size :].split(b"\0", 1)[0].decode(errors="replace")
+            tasks.append(TaskInfo(name, *numbers.unpack_from(content)))
+    return tasks
+
+
+# ---- download --------------------------------------------------------------------------------------------------------
+
+_BLOCK_OVERHEAD = 64  # layer 7 header and tags around the data of a block, bytes
+_BLOCK_ALIGN = 64  # flash is written best in whole program units
+
+
+def download(
+    session: Session, image: bytes, afresh: bool = False, progress: Callable[[int], None] = lambda done: None
+) -> None:
+    """Sends an image; the device checks it and makes it its application, stopped.
+
+    Continues a transfer of the same image that was broken off, also by itself after the channel was lost; `afresh`
+    begins at the first byte in any case. `progress` is called with the bytes that have arrived. Raises DeviceError with
+    the device's reason when it refuses the image; its old application is untouched then.
+    """
+    transfer = _Transfer(session, image, progress)
+    tries = 0
+    while True:
+        arrived = transfer.arrived
+        try:
+            start_at = 0 if afresh else transfer.ask()
+            afresh = False
+            if start_at < len(image):
+                transfer.run(start_at)
+            session.forget_application()
+            return
+        except ChannelLost:
+            tries = tries + 1 if transfer.arrived <= arrived else 0
+            if tries == _DOWNLOAD_TRIES:
+                raise
+
+
+class _Transfer:
+    """One image on its way. `arrived` is the number of bytes the device has confirmed."""
+
+    def __init__(self, session: Session, image: bytes, progress: Callable[[int], None]) -> None:
+        self.arrived = 0
+        self._session = session
+        self._image = image
+        self._crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+        self._progress = progress
+
+    def ask(self) -> int:
+        """How much of this image the device has; all of it when it is the application already."""
+        position = self._position(lib.DLF_CONTINUEDOWNLOAD, 0)
+        tags = self._session.call(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, [position])
+        self._take(tags)
+        return self.arrived
+
+    def run(self, start_at: int) -> None:
+        """Sends everything from `start_at` on and waits for the verdict."""
+        self._session.ensure()
+        request = self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, b"")
+        for reply in self._session.connection.stream(self._messages(start_at), _SLOW):
+            self._take(l7.decode_reply(reply, request))
+        if self.arrived != len(self._image):
+            raise DeviceError(f"The device took {self.arrived} of {len(self._image)} bytes; try again.", "incomplete")
+
+    def _messages(self, start_at: int) -> Iterator[bytes]:
+        block = (self._session.connection.buffer_size - _BLOCK_OVERHEAD) // _BLOCK_ALIGN * _BLOCK_ALIGN
+        for offset in range(start_at, len(self._image), block):
+            position = self._position(lib.DLF_CONTINUEDOWNLOAD if offset else 0, offset)
+            data = bintag.raw(lib.TAG_CDL_DATA, self._image[offset : offset + block])
+            content = bintag.encode([position, data])
+            yield l7.encode(self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, content))
+
+    def _position(self, flags: int, offset: int) -> bintag.Tag:
+        return bintag.u32(lib.TAG_CDL_POSITION, flags, offset, len(self._image), self._crc)
+
+    def _take(self, tags: bintag.Tags) -> None:
+        l7.check_result(tags.u16(lib.TAG_SERVICE_RESULT), "download", tags.text(lib.TAG_CDL_REASON))
+        self.arrived = tags.u32(lib.TAG_CDL_NEXT)
+        self._progress(self.arrived)
+
+
+# ---- monitoring ------------------------------------------------------------------------------------------------------
+
+_VALUE_HEAD = struct.Struct("<HI")  # id and size before each value
+_MESSAGE_OVERHEAD = 96  # layer 7 header, application tag and list heads, bytes
+
+
+def read_memory(session: Session, image_crc: int, ranges: Sequence[AreaRange]) -> list[bytes]:
+    """The bytes of every range of the application with this CRC, as many in one request as fit.
+
+    Raises DeviceError when one cannot be read, or when the device has another application.
+    """
+    session.recover(session.application)
+    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
+    longest = room - _VALUE_HEAD.size
+    pieces = [
+        AreaRange(r.area, at, min(longest, r.offset + r.size - at))
+        for r in ranges
+        for at in range(r.offset, r.offset + r.size, longest)
+    ]
+    values: list[bytes] = []
+    while len(values) < len(pieces):
+        batch = _fitting(pieces[len(values) :], room)
+        values += session.recover(partial(_read_batch, session, image_crc, batch))
+    joined, at = b"".join(values), 0
+    result = []
+    for r in ranges:
+        result.append(joined[at : at + r.size])
+        at += r.size
+    return result
+
+
+def _fitting(pieces: Sequence[AreaRange], room: int) -> Sequence[AreaRange]:
+    """As many pieces as fit a request and its reply; at least one."""
+    request = reply = count = 0
+    for piece in pieces:
+        request += len(_read_variable(piece))
+        reply += _VALUE_HEAD.size + piece.size
+        if count and max(request, reply) > room:
+            break
+        count += 1
+    return pieces[:count]
+
+
+def _read_variable(piece: AreaRange) -> bytes:
+    variable = [
+        bintag.raw(lib.TAG_MON2_VAR_SIZE, _short(piece.size)),
+        bintag.raw(lib.TAG_MON2_VAR_CODE, _address_code(piece.area, piece.offset)),
+    ]
+    return bintag.encode([bintag.Tag(lib.TAG_MON2_READ_VAR, bintag.encode(variable, aligned=False))], aligned=False)
+
+
+def _short(value: int) -> bytes:
+    return value.to_bytes(1 if value < 0x100 else 2 if value < 0x10000 else 4, "little")
+
+
+def _address_code(area: int, offset: int) -> bytes:
+    """Byte code that leaves the address of a variable: load the offset, make it relative to the area."""
+    if offset < 0x10000:
+        return struct.pack("<BHBB", lib.MON2_OP_LD16, offset, lib.MON2_OP_RAO, area)
+    return struct.pack("<BIBB", lib.MON2_OP_LD32, offset, lib.MON2_OP_RAO, area)
+
+
+def _read_batch(session: Session, image_crc: int, batch: Sequence[AreaRange]) -> list[bytes]:
+    variables = b"".join(map(_read_variable, batch))
+    tags = session.call(
+        lib.SG_MONITORING2,
+        lib.SRV_MON2_READ,
+        [_application_tag(session, image_crc), bintag.Tag(lib.TAG_MON2_READ_LIST, variables)],
+    )
+    _check_monitoring(session, tags, "read")
+    content, at = tags.bytes(lib.TAG_MON2_VALUES), 0
+    values = []
+    for index, piece in enumerate(batch):
+        if at + _VALUE_HEAD.size > len(content):
+            break
+        value_id, size = _VALUE_HEAD.unpack_from(content, at)
+        value = content[at + _VALUE_HEAD.size : at + _VALUE_HEAD.size + size]
+        at += _VALUE_HEAD.size + size
+        if value_id == index | lib.MON2_ID_FAILED and value:
+            raise _monitoring_error("read", value[0])
+        if value_id != index or len(value) != piece.size:
+            break
+        values.append(value)
+    if len(values) != len(batch):
+        raise bintag.malformed("values are missing")
+    return values
+
+
+def write_memory(session: Session, image_crc: int, values: Sequence[tuple[AreaRange, bytes]]) -> None:
+    """Writes all values, in one request if they fit, to the application with this CRC.
+
+    Not repeated when it is unknown whether they were written.
+    """
+    session.recover(session.application)
+    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
+    message = b""
+    for index, (where, value) in enumerate(values):
+        code = _address_code(where.area, where.offset)
+        entry = _VALUE_HEAD.pack(index, len(value)) + value + struct.pack("<H", len(code)) + code
+        if message and len(message) + len(entry) > room:
+            _write_batch(session, image_crc, message)
+            message = b""
+        message += entry
+    if message:
+        _write_batch(session, image_crc, message)
+
+
+def _write_batch(session: Session, image_crc: int, entries: bytes) -> None:
+    def request() -> bintag.Tags:
+        tags = [_application_tag(session, image_crc), bintag.raw(lib.TAG_MON2_WRITE_LIST, entries)]
+        return session.call(lib.SG_MONITORING2, lib.SRV_MON2_WRITE, tags)
+
+    _check_monitoring(session, session.recover(request, repeatable=False), "write")
+
+
+def _application_tag(session: Session, image_crc: int) -> bintag.Tag:
+    application = session.application()
+    if application.image_crc != image_crc:
+        raise _application_changed(session)
+    return bintag.raw(lib.TAG_MON2_APPLICATION, struct.pack("<I", application.session) + application.data_guid)
+
+
+def _application_changed(session: Session) -> DeviceError:
+    session.forget_application()
+    return DeviceError("Another application was loaded meanwhile; try again with its symbols.", "app-changed")
+
+
+def _check_monitoring(session: Session, tags: bintag.Tags, action: str) -> None:
+    if tags.find(lib.TAG_MON2_ERROR) is None:
+        return
+    error = tags.u32(lib.TAG_MON2_ERROR)
+    if error == lib.ERR_APP_INVALID_DATAID:
+        raise _application_changed(session)
+    if error > lib.MONITORING_ERR_UNKNOWN:
+        l7.check_result(error, action)
+    raise _monitoring_error(action, error)
+
+
+def _monitoring_error(action: str, error: int) -> DeviceError:
+    name = l7.monitoring_error_name(error)
+    return DeviceError(f"The device refused: {action}: {name}", l7.slug(name), error)
+
+
+# ---- log -------------------------------------------------------------------------------------------------------------
+
+
+def read_log(session: Session, after: int = 0) -> list[LogEntry]:
+    """The entries that the device still has with a handle above `after`, oldest first."""
+    entries: list[LogEntry] = []
+    while batch := session.recover(partial(_read_log_batch, session, after + 1)):
+        entries += batch
+        after = batch[-1].handle
+    return entries
+
+
+def _read_log_batch(session: Session, start_handle: int) -> list[LogEntry]:
+    tags = session.call(lib.SG_LOG, lib.SRV_LOG_GET_ENTRIES, [bintag.u32(lib.TAG_LOG_START_HANDLE, start_handle)])
+    entries = []
+    for record in tags.containers(lib.TAG_LOG_RECORD):
+        _, log_class, error, _ = struct.unpack_from("<4I", record.bytes(lib.TAG_LOG_ENTRY, 16))
+        handle = record.u32(lib.TAG_LOG_HANDLE)
+        if handle >= start_handle:
+            time_ns = int.from_bytes(record.bytes(lib.TAG_LOG_TIME_NS, 8)[:8], "little", signed=True)
+            component = record.text(lib.TAG_LOG_COMPONENT_NAME)
+            entries.append(LogEntry(handle, time_ns, component, log_class, error, record.text(lib.TAG_LOG_TEXT)))
+    return entries

@@ -1,0 +1,109 @@
+"""A login on a device, renewed by itself when the channel was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from plctool.core import lib
+from plctool.errors import DeviceError
+from plctool.link import bintag, l7
+from plctool.link.channel import ChannelLost
+from plctool.link.connection import PATIENCE, Connection
+
+_T = TypeVar("_T")
+_TRIES = 3
+_APPLICATION = "Application"
+_GUID_SIZE = 16
+
+
+@dataclass(frozen=True)
+class Application:
+    """The login to the application: the session number and the identity of its data."""
+
+    session: int
+    data_guid: bytes
+
+    @property
+    def image_crc(self) -> int:
+        return int.from_bytes(self.data_guid[:4], "little")
+
+
+class Session:
+    """Calls services of one device. Channel and logins are made when first needed."""
+
+    def __init__(self, connection: Connection) -> None:
+        self.connection = connection
+        self._id: int | None = None
+        self._application: Application | None = None
+
+    def call(
+        self, group: int, service: int, tags: Iterable[bintag.Tag] = (), patience: float = PATIENCE
+    ) -> bintag.Tags:
+        """One request and its reply. Raises ChannelLost when the channel is gone, DeviceError when refused."""
+        return self._exchange(self.message(group, service, bintag.encode(tags)), patience)
+
+    def message(self, group: int, service: int, content: bytes) -> l7.Message:
+        """A request with the id of the session, which is created when there is none."""
+        self.ensure()
+        assert self._id is not None
+        return l7.Message(group, service, self._id, content)
+
+    def ensure(self) -> None:
+        """Opens a channel and logs in, unless that is done."""
+        if self.connection.is_open and self._id is not None:
+            return
+        self._id = self._application = None
+        if not self.connection.is_open:
+            self.connection.open()
+        self._id = self._login()
+
+    def application(self) -> Application:
+        """The login to the application on the device. Raises DeviceError when there is none."""
+        self.ensure()
+        if self._application is None:
+            tags = self.call(lib.SG_APPLICATION, lib.SRV_APP_LOGIN, [bintag.text(lib.TAG_APP_LOGIN_NAME, _APPLICATION)])
+            content = tags.container(lib.TAG_APP_DESCRIPTOR).bytes(lib.TAG_APP_OPTION, lib.APP_LOGIN_REPLY_SIZE)
+            result = int.from_bytes(content[:2], "little")
+            if result == lib.ERR_APP_NOT_EXIST:
+                raise DeviceError("There is no application on the device; flash one first.", "app-not-exist", result)
+            l7.check_result(result, "login to the application")
+            guid = content[lib.APP_LOGIN_REPLY_SIZE - _GUID_SIZE : lib.APP_LOGIN_REPLY_SIZE]
+            self._application = Application(int.from_bytes(content[2:6], "little"), guid)
+        return self._application
+
+    def forget_application(self) -> None:
+        """To be called when the application on the device may have become another one."""
+        self._application = None
+
+    def recover(self, action: Callable[[], _T], repeatable: bool = True) -> _T:
+        """Runs `action`, and again on a new channel when the channel was lost.
+
+        What is not `repeatable` is repeated only when the device had closed the channel, so did not take the request.
+        """
+        for left in reversed(range(_TRIES)):
+            ready = False
+            try:
+                self.ensure()
+                ready = True
+                return action()
+            except ChannelLost as error:
+                unknown = ready and not repeatable and error.code != "closed"
+                if unknown or not left or error.code == "no-answer":
+                    raise
+        raise AssertionError("the last try returns or raises")
+
+    def _exchange(self, request: l7.Message, patience: float = PATIENCE) -> bintag.Tags:
+        return l7.decode_reply(self.connection.exchange(l7.encode(request), patience), request)
+
+    def _login(self) -> int:
+        """Anonymous login: there is no user management. Returns the session id."""
+        tags = [
+            bintag.u32(lib.TAG_DEV_CRYPT_TYPE, lib.DEV_CRYPT_XOR),
+            bintag.container(lib.TAG_DEV_CREDENTIALS, bintag.u16(lib.TAG_DEV_USER, 0)),
+        ]
+        request = l7.Message(lib.SG_DEVICE, lib.SRV_DEV_LOGIN, lib.L7_SESSION_INITIAL, bintag.encode(tags))
+        reply = self._exchange(request).container(lib.TAG_DEV_LOGIN_REPLY)
+        l7.check_result(reply.u16(lib.TAG_DEV_LOGIN_RESULT), "login")
+        return reply.u32(lib.TAG_DEV_SESSION_ID)

@@ -1,0 +1,26 @@
+"""What a link gives to the layers above: whole packets, a clock, and a few figures of the line."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class BlockTransport(Protocol):
+    """A block driver: sends and receives router packets, unreliably, and never delivers a damaged one on purpose."""
+
+    name: str  # for messages: the port or address the user named
+    local_address: bytes  # router address of this end
+    packet_overhead: int  # bytes the line carries for a packet besides the packet itself
+    byte_rate: float  # bytes the line carries per second; math.inf when it is not known or no matter
+
+    def send(self, packet: bytes) -> None:
+        """Queues a packet; raises LinkError when the line is gone."""
+
+    def receive(self, timeout: float) -> bytes | None:
+        """The next packet, None after `timeout` seconds without one; raises LinkError when the line is gone."""
+
+    def now(self) -> float:
+        """Monotonic time in seconds; virtual for virtual lines."""
+
+    def close(self) -> None:
+        """Frees the line. Harmless when repeated."""

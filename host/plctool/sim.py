@@ -1,0 +1,179 @@
+"""The runtime in this process, on a virtual clock: for `plctool run` and for unit tests with pytest.
+
+It is the same C core that runs on a controller, with the simulator port: a day of PLC time takes seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from plctool.core import error_name, ffi, lib
+from plctool.errors import DeviceError, UsageError
+from plctool.link.services import AppException, AppState, Status, TaskInfo
+from plctool.symbols import Symbol, SymbolTable, find_symbols
+
+_FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
+_SECTOR = 4096
+_PROGRAM_UNIT = 8
+
+
+class Simulator:
+    """One controller with a program in it, started. There can be only one at a time in a process.
+
+    Use it as a context manager. Raises UsageError for an image that is refused, DeviceError when the program fails.
+    """
+
+    _running: Simulator | None = None
+
+    def __init__(self, image: bytes, symbols: SymbolTable | None = None, *, start: bool = True) -> None:
+        if Simulator._running is not None:
+            raise UsageError("There is a simulator already; close it first, one process has one controller.", "busy")
+        self.symbols = symbols
+        _check(lib.SimFlashConfigure(_FLASH_SIZE, _SECTOR, _PROGRAM_UNIT, 0xFF), "The simulated flash cannot be made")
+        _check(lib.SimStart(), "The simulator does not start")
+        Simulator._running = self
+        try:
+            self.download(image)
+            if start:
+                self.start()
+        except BaseException:
+            self.close()
+            raise
+
+    @classmethod
+    def from_file(cls, path: Path | str, *, start: bool = True) -> Simulator:
+        """The program in `app.cdl` with its symbols (`app.sym` beside it)."""
+        file = Path(path)
+        try:
+            image = file.read_bytes()
+        except OSError as error:
+            raise UsageError(f"The image {file} cannot be read: {error.strerror}.", "no-image") from None
+        crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+        return cls(image, find_symbols(crc, file), start=start)
+
+    def __enter__(self) -> Simulator:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Shuts the runtime down; another Simulator may be made then."""
+        if Simulator._running is self:
+            lib.SimStop()
+            Simulator._running = None
+
+    # ---- the program ----
+
+    def download(self, image: bytes) -> None:
+        """Replaces the program, stopped. Raises DeviceError with the reason when it is refused; the old one runs on then."""
+        crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+        _check(lib.AppDownloadBegin(len(image), crc), "The image is refused")
+        _check(lib.AppDownloadWrite(0, image, len(image)), "The image cannot be stored")
+        refusal = ffi.new("APP_REFUSAL *")
+        result = lib.AppDownloadEnd(refusal)
+        if result != lib.ERR_OK:
+            text = ffi.string(refusal.text).decode("latin-1")
+            raise DeviceError(f"The image is refused: {text} ({error_name(result)}).", "refused", result)
+
+    def start(self) -> None:
+        """Starts the program; the first cycle of each task is due at once."""
+        _check(lib.AppStartApplication(), "The program does not start")
+
+    def stop(self) -> None:
+        _check(lib.AppStopApplication(), "The program does not stop")
+
+    def reset(self, option: int) -> None:
+        """`option`: lib.RESET_OPTION_WARM, _COLD or _ORIGIN."""
+        _check(lib.AppReset(option), "The reset failed")
+
+    def restart(self) -> None:
+        """Power off and on again: what is in flash survives."""
+        lib.SimStop()
+        _check(lib.SimStart(), "The simulator does not start")
+
+    def status(self) -> Status:
+        c = ffi.new("APP_STATUS *")
+        lib.AppGetStatus(c)
+        states = {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}
+        state = states.get(c.state, AppState.EXCEPTION if c.op_state & lib.OS_EXCEPTION else AppState.STOP)
+        exception = None
+        if c.exception.code != lib.RTSEXCPT_NOEXCEPTION:
+            offset = None if c.exception.code_offset == 0xFFFFFFFF else c.exception.code_offset
+            exception = AppException(c.exception.code, offset, c.exception.task)
+        return Status(state, c.image_crc, c.image_size, exception, c.op_state)
+
+    def tasks(self) -> list[TaskInfo]:
+        """Statistics of the tasks; the times are real, measured on this machine."""
+        infos = []
+        for index in range(lib.IecTaskGetCount()):
+            c = ffi.new("IEC_TASK_INFO *")
+            _check(lib.IecTaskGetInfo(index, c), "The task has no statistics")
+            name = ffi.string(c.name).decode("latin-1")
+            infos.append(
+                TaskInfo(
+                    name, c.kind, c.priority, c.interval_us, c.cycles, c.last_us, c.avg_us, c.min_us, c.max_us, c.jitter_us,
+                    c.overruns,
+                )
+            )  # fmt: skip
+        return infos
+
+    # ---- time ----
+
+    @property
+    def now_ns(self) -> int:
+        """Virtual time since power on [ns]."""
+        return int(lib.SimNow())
+
+    def run_cycles(self, count: int) -> None:
+        """Runs until the first task has made `count` more cycles, or the program stopped with an exception."""
+        if count > 0:
+            result = lib.SimRunCycles(count)
+            if result not in (lib.ERR_OK, lib.ERR_EXCEPTION):
+                _check(result, "The program does not run")
+
+    def run_for(self, ms: float = 0, *, seconds: float = 0) -> None:
+        """Lets virtual time pass."""
+        _check(lib.SimAdvance(round(ms * 1e6 + seconds * 1e9)), "Time does not advance")
+
+    def bench(self, task: int, cycles: int) -> tuple[float, float]:
+        """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""
+        code, cycle = ffi.new("double *"), ffi.new("double *")
+        _check(lib.SimBench(task, cycles, code, cycle), "The benchmark failed")
+        return code[0], cycle[0]
+
+    # ---- variables ----
+
+    def read(self, name: str) -> Any:
+        """The value of a variable, a member or an element; structs and arrays come as dicts and lists."""
+        symbol = self._resolve(name)
+        return symbol.decode(bytes(ffi.buffer(self._address(symbol), symbol.size)))
+
+    def read_all(self, names: Iterable[str]) -> dict[str, Any]:
+        return {name: self.read(name) for name in names}
+
+    def write(self, name: str, value: Any) -> None:
+        """Sets a variable; `value` as Python value or as text such as 'T#80ms'. Bits of a word can be set too."""
+        symbol = self._resolve(name)
+        if symbol.area == lib.APP_AREA_CODE:
+            raise UsageError(f"{symbol.name} is a constant and cannot be written.", "constant")
+        memory = ffi.buffer(self._address(symbol), symbol.size)
+        memory[:] = symbol.encode(value)
+
+    def _resolve(self, name: str) -> Symbol:
+        if self.symbols is None:
+            raise UsageError("The program was loaded without symbols; variables cannot be named.", "no-symbols")
+        return self.symbols.resolve(name)
+
+    def _address(self, symbol: Symbol) -> Any:
+        address = lib.AppGetAreaAddress(symbol.area, symbol.offset, symbol.size)
+        if address == ffi.NULL:
+            raise DeviceError(f"{symbol.name} is not in the memory of the program; the symbols do not belong to it.", "wrong-symbols")
+        return address
+
+
+def _check(result: int, what: str) -> None:
+    if result != lib.ERR_OK:
+        raise DeviceError(f"{what} ({error_name(result)}).", error_name(result), result)

@@ -1,0 +1,179 @@
+"""Every target: the same program links to position independent code, undefined compiler calls become imports or errors."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from back_support import POS, ProgramBuilder, binary, build, const, load, place
+
+from plctool.compiler.compiler_calls import COMPILER_CALLS
+from plctool.compiler.emit import emit_object
+from plctool.compiler.link import link
+from plctool.compiler.relocations import OutOfReach, stub
+from plctool.compiler.targets import TARGETS, Machine, Target, find_target
+from plctool.compiler.typed import (
+    Area,
+    Assign,
+    BinaryOp,
+    Case,
+    Convert,
+    Expr,
+    For,
+    IndexPlace,
+    Pou,
+    PouKind,
+    ScalarInit,
+    Statement,
+    TypedProgram,
+    Variable,
+)
+from plctool.compiler.types import DINT, INT, LINT, LREAL, REAL, ArrayType, StringType
+from plctool.core import lib
+from plctool.errors import UsageError
+from plctool.image import parse_image
+
+ALL = list(TARGETS.values())
+
+
+def everything() -> TypedProgram:
+    """Uses single and double arithmetic, 64-bit division, strings, a switch, large copies and run-time checks."""
+    p = ProgramBuilder()
+    x, y = p.variable("x", REAL, ScalarInit(1.5)), p.variable("y", LREAL)
+    n, wide, i = p.variable("n", DINT), p.variable("wide", LINT), p.variable("i", INT)
+    a, b = p.variable("a", ArrayType(INT, ((0, 499),))), p.variable("b", ArrayType(INT, ((0, 499),)))
+    s, t = p.variable("s", StringType(80), ScalarInit("hello")), p.variable("t", StringType(20))
+    kept = p.variable("kept", DINT, ScalarInit(7), Area.RETAIN)
+
+    def assign(v: Variable, value: Expr) -> Assign:
+        return Assign(place(v), value, POS)
+
+    branches: list[tuple[list[tuple[int, int]], list[Statement]]] = [
+        ([(k, k)], [assign(n, const(k * k * 977, DINT))]) for k in range(12)
+    ]
+    return p.program(
+        assign(x, binary(BinaryOp.DIV, binary(BinaryOp.ADD, load(x), const(0.1, REAL)), const(3.0, REAL))),
+        assign(y, binary(BinaryOp.MUL, Convert(load(x), LREAL, POS), const(0.7, LREAL))),
+        assign(n, Convert(load(x), DINT, POS)),
+        assign(n, Convert(load(y), DINT, POS)),
+        assign(wide, binary(BinaryOp.DIV, load(wide), Convert(load(n), LINT, POS))),
+        Case(load(i), branches, [], POS),
+        assign(a, load(b)),
+        For(place(i), const(0), const(499), const(1), [Assign(IndexPlace(place(a), [load(i)], INT, POS), load(i), POS)], POS),
+        Assign(IndexPlace(place(b), [load(i)], INT, POS), const(1), POS),
+        assign(t, load(s)),
+        assign(kept, binary(BinaryOp.ADD, load(kept), const(1, DINT))),
+    )
+
+
+@pytest.mark.parametrize("level", [0, 2])
+@pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
+def test_a_program_with_everything_links(target: Target, level: int) -> None:
+    built = build(everything(), target.name, level)
+    image = parse_image(built.image)
+    assert image.device_id == getattr(lib, target.device_id)
+    size = target.pointer_size
+    assert [e.offset for e in image.externals] == [size * i for i in range(len(image.externals))]
+    calls = {e.name for e in image.externals} - {"iecraise"}
+    assert bool(calls) == target.stubs
+    assert all(COMPILER_CALLS[name].signature == e.signature for e in image.externals if (name := e.name) in calls)
+    thumb = target.machine in (Machine.THUMB, Machine.THUMB_V6M)
+    entries = [t.entry for t in image.tasks] + list(image.functions.values())
+    assert all(entry % 2 == int(thumb) for entry in entries)
+    assert built.symbols.address_to_line(entries[0]) is None or built.symbols.pous[0].name == "Main"
+    assert built.sizes["Main"] > 100
+
+
+@pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
+def test_builds_are_reproducible(target: Target) -> None:
+    assert build(everything(), target.name).image == build(everything(), target.name).image
+
+
+def test_single_precision_needs_no_calls_with_an_fpu() -> None:
+    """No literal becomes double and no conversion is a library call."""
+    p = ProgramBuilder()
+    x, n = p.variable("x", REAL), p.variable("n", DINT)
+    program = p.program(
+        Assign(place(x), binary(BinaryOp.MUL, load(x), const(0.1, REAL)), POS), Assign(place(n), Convert(load(x), DINT, POS), POS)
+    )
+    for name in ("cortex-m4f", "cortex-m7", "x86_64-linux", "aarch64-linux"):
+        assert parse_image(build(program, name).image).externals == []
+
+
+def test_an_unknown_target_is_refused_with_the_names_of_the_others() -> None:
+    with pytest.raises(UsageError, match="cortex-m3"):
+        find_target("z80")
+
+
+# ---- the linker alone ----
+
+
+def ir(body: str, target: Target) -> str:
+    return f'target triple = "{target.triple}"\n{body}'
+
+
+@pytest.mark.parametrize("name", ["x86_64-linux", "cortex-m3"])
+def test_an_undefined_function_is_named(name: str) -> None:
+    target = find_target(name)
+    text = ir("declare void @mystery()\ndefine void @entry() {\n call void @mystery()\n ret void\n}", target)
+    with pytest.raises(UsageError, match="mystery"):
+        link(emit_object(text, target, 2), target, ["entry"], 0)
+
+
+@pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
+def test_writable_data_are_refused(target: Target) -> None:
+    text = ir("@state = internal global i32 5\ndefine i32 @entry() {\n %o = atomicrmw add ptr @state, i32 1 monotonic\n ret i32 %o\n}", target)
+    with pytest.raises(UsageError, match=r"\.data|__atomic|__sync"):
+        link(emit_object(text, target, 2), target, ["entry"], 0)
+
+
+def test_absolute_addresses_are_refused() -> None:
+    target = find_target("x86_64-linux")
+    text = ir(
+        "@table = internal constant [2 x ptr] [ptr @entry, ptr @other]\n"
+        "define ptr @entry(i64 %i) {\n %p = getelementptr ptr, ptr @table, i64 %i\n %f = load ptr, ptr %p\n ret ptr %f\n}\n"
+        "define void @other() {\n ret void\n}",
+        target,
+    )
+    with pytest.raises(UsageError, match=r"position independent|writable"):
+        link(emit_object(text, target, 2), target, ["entry"], 0)
+
+
+def test_sections_nobody_reaches_are_left_out() -> None:
+    target = find_target("x86_64-linux")
+    text = ir(
+        'define void @entry() {\n ret void\n}\ndefine void @far() section ".text.far" {\n ret void\n}\n', target
+    )
+    linked = link(emit_object(text, target, 2), target, ["entry"], 0)
+    assert "far" not in linked.symbols
+
+
+@pytest.mark.parametrize("slot", [0, 1, 31, 32, 60])
+def test_stubs_jump_through_their_slot(slot: int) -> None:
+    """Each stub, run by hand."""
+    ldr, imm, bx, _ = struct.unpack("<HHHH", stub(Machine.THUMB, slot))
+    assert (ldr, imm >> 12, imm & 0xFFF, bx) == (0xF8D9, 12, 4 * slot, 0x4760)
+    code = struct.unpack("<8H", stub(Machine.THUMB_V6M, slot))
+    assert code[0] == 0xB410 and code[1] == 0x464C and code[5] == 0xBC10 and code[6] == 0x4760
+    assert (code[2] & 0xFF) + 4 * (code[3] >> 6 & 31) == 4 * slot
+    lw, jr = struct.unpack("<II", stub(Machine.RISCV32, slot))
+    assert (lw >> 20, lw >> 15 & 31, lw >> 7 & 31, jr >> 15 & 31, jr & 0x7F) == (4 * slot, 27, 6, 6, 0x67)
+
+
+def test_a_stub_out_of_reach_is_an_error() -> None:
+    with pytest.raises(OutOfReach):
+        stub(Machine.THUMB_V6M, 64)
+
+
+def test_constants_are_reached_at_any_distance_from_the_code() -> None:
+    """Many functions between the first one and its constants."""
+    p = ProgramBuilder()
+    y = p.variable("y", StringType(40))
+    statements: list[Statement] = [
+        Assign(place(y), const(f"text number {k} that is long enough", StringType(33)), POS) for k in range(300)
+    ]
+    pous = [Pou(f"P{k}", PouKind.PROGRAM, POS, body=statements[k : k + 1]) for k in range(300)]
+    program = p.program()
+    program.tasks[0].programs[:] = pous
+    for target in ALL:
+        assert len(parse_image(build(program, target.name).image).code) > 300 * 33

@@ -1,0 +1,195 @@
+"""Compiles and runs every program of tests/st; tests/st/README.md explains the comments they carry."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from plctool.compiler import check_sources, compile_sources
+from plctool.compiler.diagnostics import Diagnostic
+from plctool.compiler.literals import string, typed, unsigned
+from plctool.compiler.types import REAL
+from plctool.sim import Simulator
+from plctool.symbols import SymbolTable
+from plctool.values import decode, encode
+
+FOLDER = Path(__file__).parents[1] / "st"
+PROGRAMS = sorted(FOLDER.glob("*.st"))
+
+Value = bool | int | float | str
+
+DIRECTIVE = re.compile(r"^\(\* (run|options|set|expect|expect-exception|expect-error|expect-warning): (.*) \*\)$")
+VALUE = re.compile(r"'(?:[^'$]|\$.)*'|\S+")
+SKIP = "-"
+MAX_REAL = 3.4e38
+
+
+@dataclass
+class Script:
+    """What the comments of a program ask for. Lists hold one text per cycle."""
+
+    cycles: int = 0
+    time_ms: int = 0
+    options: dict[str, str] = field(default_factory=dict)
+    sets: dict[str, list[str]] = field(default_factory=dict)
+    expected: list[tuple[str, list[str]]] = field(default_factory=list)
+    exception: tuple[str, int] | None = None
+    diagnostics: list[tuple[str, int, int, list[str]]] = field(default_factory=list)
+
+
+def directives(path: Path) -> Iterator[tuple[str, str]]:
+    for line in path.read_text("latin-1").splitlines():
+        if match := DIRECTIVE.match(line):
+            yield match[1], match[2]
+        elif not line.startswith("(*"):
+            return
+
+
+def read_script(path: Path) -> Script:
+    script = Script()
+    for kind, text in directives(path):
+        if kind in ("set", "expect"):
+            name, values = text.split(" = ", 1)
+            listed = VALUE.findall(values)
+            if kind == "set":
+                script.sets[name] = listed
+            else:
+                script.expected.append((name, listed))
+        elif kind == "run":
+            key, value = text.split("=", 1)
+            if key == "cycles":
+                script.cycles = int(value)
+            else:
+                script.time_ms = int(parse_value(value)) // 1_000_000
+        elif kind == "options":
+            script.options = dict(part.split("=", 1) for part in text.split())
+        elif kind == "expect-exception":
+            name, _, line = text.split()
+            script.exception = (name, int(line))
+        else:
+            place, *words = text.split()
+            line, column = place.split(":")
+            script.diagnostics.append((kind.removeprefix("expect-"), int(line), int(column), words))
+    lists = [*script.sets.values(), *(values for _, values in script.expected)]
+    script.cycles = max(script.cycles, *map(len, lists), 1) if lists else max(script.cycles, 1)
+    return script
+
+
+def parse_value(text: str) -> Value:
+    """The value of a literal of ST; durations in ns."""
+    if text in ("TRUE", "FALSE"):
+        return text == "TRUE"
+    if text.startswith("'"):
+        return string(text)
+    if "#" in text and not text[0].isdigit():
+        return typed(text)[1]
+    sign, digits = (-1, text[1:]) if text.startswith("-") else (1, text)
+    number = unsigned(digits)[1]
+    assert not isinstance(number, str)
+    return sign * number
+
+
+def equal(actual: Value, expected: str) -> bool:
+    """Whether a value read is the one in the comment. Durations are read as text, REALs with the fewest digits."""
+    value = parse_value(expected)
+    if expected.upper().startswith(("T#", "TIME#", "LTIME#")):
+        return isinstance(actual, str) and typed(actual)[1] == value
+    if isinstance(value, float):
+        single = decode(REAL, encode(REAL, value)) if abs(value) < MAX_REAL else value
+        return isinstance(actual, float) and actual in (value, single)
+    return type(actual) is type(value) and actual == value
+
+
+def run_cycle(plc: Simulator, script: Script, cycle: int) -> None:
+    for name, values in script.sets.items():
+        text = values[min(cycle, len(values) - 1)]
+        if text != SKIP and (cycle < len(values)):
+            plc.write(name, parse_value(text))
+    plc.run_cycles(1)
+
+
+def differences(plc: Simulator, expected: dict[str, str], cycle: int) -> list[str]:
+    actual = {name: plc.read(name) for name, text in expected.items() if text != SKIP}
+    return [
+        f"cycle {cycle}: {name} is {value!r}, not {expected[name]}"
+        for name, value in actual.items()
+        if not equal(value, expected[name])
+    ]
+
+
+def exception_of(plc: Simulator, symbols: SymbolTable) -> tuple[str, int] | None:
+    """Name and source line of the exception that stopped the program."""
+    exception = plc.status().exception
+    if exception is None:
+        return None
+    assert exception.code_offset is not None
+    place = symbols.address_to_line(exception.code_offset - 1)
+    return exception.name, place.line if place else 0
+
+
+def run_program(path: Path, script: Script) -> list[str]:
+    """Runs the program; what is not as expected."""
+    per_cycle = {name: values for name, values in script.expected if len(values) > 1}
+    at_end = {name: values[0] for name, values in script.expected if len(values) == 1}
+    wrong = []
+    result = compile_sources([path], **script.options)
+    with Simulator(result.image, result.symbols) as plc:
+        if script.time_ms:
+            plc.run_for(script.time_ms)
+        for cycle in range(0 if script.time_ms else script.cycles):
+            run_cycle(plc, script, cycle)
+            now = {name: values[cycle] for name, values in per_cycle.items() if cycle < len(values)}
+            wrong += differences(plc, now, cycle + 1)
+        wrong += differences(plc, at_end, script.cycles)
+        seen = exception_of(plc, result.symbols)
+    if seen != script.exception:
+        wrong.append(f"exception is {seen}, not {script.exception}")
+    return wrong
+
+
+def check_diagnostics(found: list[Diagnostic], script: Script) -> list[str]:
+    """Compares what the compiler said with the comments."""
+    wrong = []
+    by_place: dict[tuple[str, int, int], list[str]] = defaultdict(list)
+    for d in found:
+        by_place[d.severity, d.line, d.column].append(d.message)
+    for severity, line, column, words in script.diagnostics:
+        messages = by_place.pop((severity, line, column), [])
+        if not any(all(word in message for word in words) for message in messages):
+            wrong.append(f"no {severity} at {line}:{column} with {' '.join(words)}; there: {messages}")
+    wrong += [
+        f"unexpected: {k[1]}:{k[2]}: {m}" for k, messages in by_place.items() if k[0] == "error" for m in messages
+    ]
+    return wrong
+
+
+@pytest.mark.parametrize("path", PROGRAMS, ids=lambda p: p.stem)
+def test_program(path: Path) -> None:
+    script = read_script(path)
+    if any(severity == "error" for severity, *_ in script.diagnostics):
+        wrong = check_diagnostics(check_sources([path]), script)
+    else:
+        wrong = check_diagnostics(check_sources([path]), script) + run_program(path, script)
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_comment_that_looks_like_a_directive_is_one() -> None:
+    """A misspelt directive would make a test that cannot fail."""
+    head = re.compile(r"^\(\*\s*(run|options|set|expect)")
+    misspelt = [
+        f"{path.name}: {line}"
+        for path in PROGRAMS
+        for line in path.read_text("latin-1").splitlines()
+        if head.match(line) and not DIRECTIVE.match(line)
+    ]
+    assert not misspelt
+
+
+def test_every_program_expects_something() -> None:
+    empty = [p.name for p in PROGRAMS if not any(kind.startswith("expect") for kind, _ in directives(p))]
+    assert not empty

@@ -1,0 +1,110 @@
+"""A real `plcrt` process and the real `plctool` command, in a folder of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from plctool.testing.plcrt import Plcrt
+
+PATIENCE = 30.0  # of `eventually`, seconds; machines under load are slow
+
+
+@dataclass
+class Done:
+    """What a command left: its exit status, and its JSON document or its texts."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.out)
+
+
+@dataclass
+class Tool:
+    """Runs plctool in `folder`."""
+
+    folder: Path
+
+    def __call__(self, *args: str, timeout: float = 120) -> Done:
+        env = os.environ | {"XDG_CACHE_HOME": str(self.folder / "cache")}
+        command = [sys.executable, "-m", "plctool", *args]
+        done = subprocess.run(command, cwd=self.folder, env=env, capture_output=True, text=True, timeout=timeout, check=False)
+        return Done(done.returncode, done.stdout, done.stderr)
+
+    def ok(self, *args: str, timeout: float = 120) -> Any:
+        """The JSON document of a command that has to succeed."""
+        done = self(*args, "--json", timeout=timeout)
+        assert done.status == 0, f"plctool {' '.join(args)}: exit {done.status}\n{done.out}\n{done.err}"
+        return done.json
+
+    def build(self, name: str, text: str, *options: str) -> Path:
+        """Compiles a program; the path of its image."""
+        source = self.folder / f"{name}.st"
+        source.write_text(text)
+        self.ok("build", str(source), "-o", f"{name}.cdl", *options)
+        return self.folder / f"{name}.cdl"
+
+
+@pytest.fixture
+def tool(tmp_path: Path) -> Tool:
+    return Tool(tmp_path)
+
+
+@pytest.fixture
+def plcrt(tmp_path: Path) -> Iterator[Plcrt]:
+    with Plcrt(tmp_path / "plc.flash") as running:
+        yield running
+
+
+@pytest.fixture
+def eventually() -> Callable[[Callable[[], Any]], Any]:
+    """Asks until the answer is true, and returns it; fails after PATIENCE."""
+
+    def ask(question: Callable[[], Any]) -> Any:
+        end = time.monotonic() + PATIENCE
+        while True:
+            answer = question()
+            if answer:
+                return answer
+            assert time.monotonic() < end, "did not happen in time"
+            time.sleep(0.05)
+
+    return ask
+
+
+COUNTER = """
+PROGRAM Main
+VAR
+    count : DINT;
+    step : DINT := 1;
+    kept : DINT := 7;
+    name : STRING := 'first';
+    elapsed : TIME;
+END_VAR
+VAR RETAIN
+    total : DINT;
+END_VAR
+    count := count + step;
+    total := total + step;
+    elapsed := elapsed + T#10ms;
+END_PROGRAM
+"""
+
+
+@pytest.fixture
+def counter(tool: Tool) -> Path:
+    """The image of a program that counts."""
+    return tool.build("counter", COUNTER)

@@ -1,0 +1,224 @@
+"""plcrt as a process: its options, its signals, its files, and what it costs when nothing happens."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import select
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from plctool.link import simplecom
+from plctool.link.connection import Connection
+from plctool.link.serial import SerialTransport
+from plctool.link.services import read_identity, read_status
+from plctool.link.session import Session
+from plctool.testing.plcrt import Plcrt, find_plcrt
+
+IDLE_SHARE = 0.05  # of one processor; 0.005 is usual, but machines under load count otherwise
+
+
+def run_plcrt(*options: str) -> subprocess.CompletedProcess[str]:
+    """plcrt with options that make it end by itself."""
+    return subprocess.run([find_plcrt(), *options], capture_output=True, text=True, timeout=20, check=False)
+
+
+def device_name(port: str) -> str:
+    """Opens the port as a client of its own, asks, and leaves."""
+    with Connection(SerialTransport(port)) as connection:
+        return read_identity(Session(connection)).device_name
+
+
+def processor_ns(pid: int) -> int:
+    """Processor time of all threads so far, exactly: the clock ticks of /proc/PID/stat are too coarse."""
+    threads = Path(f"/proc/{pid}/task").iterdir()
+    return sum(int((thread / "schedstat").read_text().split()[0]) for thread in threads)
+
+
+@pytest.mark.parametrize(
+    ("options", "advice"),
+    [
+        ([], "--flash FILE"),
+        (["--flash"], "--help"),
+        (["--flash", "f", "--nonsense"], "--nonsense"),
+        (["--flash", "f", "extra"], "extra"),
+        (["--flash", "f", "--baud", "115201"], "115200"),
+        (["--flash", "f", "--baud", "fast"], "--baud fast"),
+        (["--flash", "f", "--can", "can0"], "--serial"),
+        (["--flash", "f", "--udp"], "--serial"),
+        (["--flash", "f", "--tcp=127.0.0.1:11740"], "--serial"),
+    ],
+)
+def test_wrong_use_is_said_in_one_sentence_and_exits_2(tmp_path, monkeypatch, options, advice):
+    monkeypatch.chdir(tmp_path)
+    done = run_plcrt(*options)
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.startswith("plcrt: ") and done.stderr.count("\n") == 1
+    assert advice in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("option", "text"), [("--help", "usage: plcrt --flash FILE"), ("--version", "plcrt ")])
+def test_help_and_version_exit_0(option, text):
+    done = run_plcrt(option)
+    assert done.returncode == 0 and done.stderr == ""
+    assert done.stdout.startswith(text)
+
+
+@pytest.mark.parametrize("serial", ["/dev/does-not-exist", "/dev/null", "/"])
+def test_a_serial_line_that_cannot_be_opened_exits_1_and_is_named(tmp_path, serial):
+    done = run_plcrt("--flash", str(tmp_path / "flash"), "--serial", serial)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1 and serial in done.stderr
+
+
+def test_a_flash_file_in_a_folder_that_does_not_exist_exits_1(tmp_path):
+    done = run_plcrt("--flash", str(tmp_path / "no" / "flash"))
+    assert done.returncode == 1 and "no/flash" in done.stderr
+
+
+def test_a_file_that_is_no_flash_is_not_touched(tmp_path):
+    film = tmp_path / "film"
+    film.write_bytes(b"x" * (5 * 1024 * 1024))
+    done = run_plcrt("--flash", str(film))
+    assert done.returncode == 1 and "not a flash file" in done.stderr
+    assert film.read_bytes().strip(b"x") == b"" and film.stat().st_size == 5 * 1024 * 1024
+
+
+def test_the_device_answers_on_the_terminal_it_names(plcrt):
+    assert plcrt.port.startswith("/dev/pts/")
+    assert device_name(plcrt.port) == "plcrt"
+
+
+def test_clients_come_and_go(plcrt):
+    for _ in range(5):
+        assert device_name(plcrt.port) == "plcrt"
+
+
+def test_garbage_on_the_line_does_no_harm(plcrt):
+    noise = random.Random(1).randbytes(100_000).replace(b"x", b"#<")
+    with open(plcrt.port, "wb", buffering=0) as line:
+        line.write(noise)
+    assert device_name(plcrt.port) == "plcrt"
+
+
+def test_replies_that_nobody_reads_do_not_block_it(plcrt, eventually):
+    """Name requests without end from a client that never reads: the terminal fills up."""
+    transport = SerialTransport(plcrt.port)
+    connection = Connection(transport)
+    for _ in range(2000):
+        connection.scan(0)
+    transport.close()
+    assert device_name(plcrt.port) == "plcrt"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_it_ends_in_order_when_asked_to(plcrt, number):
+    assert plcrt.stop(number) == 0
+
+
+def test_it_does_not_stop_when_its_terminal_closes(plcrt):
+    plcrt.process.send_signal(signal.SIGHUP)
+    assert device_name(plcrt.port) == "plcrt"
+    assert plcrt.stop() == 0
+
+
+def test_it_goes_on_when_nobody_reads_its_output(tmp_path):
+    """Standard output is a pipe whose other end is closed already."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
+    with subprocess.Popen(command, stdout=writer) as process:
+        os.close(writer)
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.3)
+        process.terminate()
+        assert process.wait(20) == 0
+
+
+def test_two_do_not_share_a_flash_file(plcrt):
+    done = run_plcrt("--flash", str(plcrt.flash))
+    assert done.returncode == 1 and "in use by another plcrt" in done.stderr
+    assert device_name(plcrt.port) == "plcrt"
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_the_flash_file_is_free_when_it_has_ended(plcrt, how):
+    plcrt.stop(how)
+    plcrt.start()
+    assert device_name(plcrt.port) == "plcrt"
+
+
+def test_it_starts_again_after_being_killed_at_any_moment_of_its_start(tmp_path):
+    chance = random.Random(2)
+    flash = tmp_path / "flash"
+    command = [find_plcrt(), "--flash", str(flash), "--serial", "pty"]
+    for _ in range(20):
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+            time.sleep(chance.random() * 0.02)
+            process.kill()
+    with Plcrt(flash) as running, Connection(SerialTransport(running.port)) as connection:
+        assert read_status(Session(connection)).state.value == "none"
+
+
+def test_it_needs_next_to_no_processor_time_when_idle(plcrt):
+    device_name(plcrt.port)
+    before, started = processor_ns(plcrt.process.pid), time.monotonic_ns()
+    time.sleep(2)
+    share = (processor_ns(plcrt.process.pid) - before) / (time.monotonic_ns() - started)
+    assert share < IDLE_SHARE
+
+
+def test_it_runs_without_any_line(tmp_path):
+    command = [find_plcrt(), "--flash", str(tmp_path / "flash")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.3)
+        process.terminate()
+        assert process.wait(20) == 0
+        assert process.stdout.read() == ""
+
+
+class Wire:
+    """The other end of a serial line, as a transport."""
+
+    name = "wire"
+    local_address = b"\x00\x02"
+    packet_overhead = simplecom.FRAME_OVERHEAD
+    byte_rate = math.inf
+
+    def __init__(self, fd: int) -> None:
+        self.fd = fd
+        self.decoder = simplecom.Decoder()
+        self.packets: list[bytes] = []
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def send(self, packet: bytes) -> None:
+        os.write(self.fd, simplecom.encode(packet))
+
+    def receive(self, timeout: float) -> bytes | None:
+        if not self.packets and select.select([self.fd], [], [], timeout)[0]:
+            self.packets += self.decoder.feed(os.read(self.fd, 4096))
+        return self.packets.pop(0) if self.packets else None
+
+    def close(self) -> None:
+        os.close(self.fd)
+
+
+def test_it_serves_a_serial_device_by_its_path(tmp_path):
+    ours, theirs = os.openpty()
+    command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", os.ttyname(theirs), "--baud", "9600"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        with Connection(Wire(ours)) as connection:
+            assert read_identity(Session(connection)).device_name == "plcrt"
+        os.close(theirs)
+        process.terminate()
+        assert process.wait(20) == 0
+        assert process.stdout.read() == ""
