@@ -12,7 +12,8 @@ import time
 from pathlib import Path
 
 import plctool
-from plctool.compiler import BuildResult, compile_sources
+from plctool.compiler import compile_sources
+from plctool.compiler.build import BuildResult
 from plctool.sim import Simulator
 from plctool.testing.line import BITS_PER_BYTE, SerialLine
 from plctool.testing.plcrt import Plcrt

@@ -13,6 +13,7 @@
 #include "CmpErrors.h"
 #include "CmpIecAbi.h"
 #include "CmpStd.h"
+#include "rts_config.h"
 #ifndef RTS_CFFI
 #include "CmpItf.h"
 #endif
@@ -62,9 +63,9 @@ typedef struct {
     APP_EXCEPTION exception;
 } APP_STATUS;
 
-enum { APP_REFUSAL_SIZE = 256 };
+enum { APP_REFUSAL_SIZE = 64 + 6 * APP_MAX_IMPORTS };
 
-/* Why a download was refused: `text` is a sentence, cut to fit. */
+/* Why a download was refused: `text` is a sentence, cut to fit. It grows with the functions that may be missing. */
 typedef struct {
     RTS_RESULT result;
     char text[APP_REFUSAL_SIZE];

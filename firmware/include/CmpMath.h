@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * External functions by their C names: zlib CRC-32 of the interface text (the signature), and the text. The standard library
- * (host/plctool/stdlib/math.st) declares them under these names; tests/c/test_math.c recomputes the CRCs.
+ * External functions by their C names: zlib CRC-32 of the interface text (the signature), and the text. The standard
+ * library (host/plctool/stdlib/math.st) declares them under these names; tests/c/test_math.c recomputes the CRCs.
  *
  *   0xB90BD8A4  sin(LREAL):LREAL           0xE84B70A8  sinf(REAL):REAL
  *   0xAC9E7EFF  cos(LREAL):LREAL           0xA7C062F5  cosf(REAL):REAL
@@ -18,8 +18,8 @@
  *   0x62B830F9  atan2(LREAL,LREAL):LREAL   0x8B5C7723  atan2f(REAL,REAL):REAL
  *   0x0909C5B0  pow(LREAL,LREAL):LREAL     0x4F59F748  powf(REAL,REAL):REAL       EXPT
  *
- * All are pure: no lock, no allocation, the same from any task, so the watchdog may break into them. Arguments outside a
- * function's domain give NaN or infinity as IEEE 754 says, never an exception. Library version 1.0.
+ * All are pure: no lock, no allocation, the same from any task, so the watchdog may break into them. Arguments
+ * outside a function's domain give NaN or infinity as IEEE 754 says, never an exception. Library version 1.0.
  */
 #ifndef CMPMATH_H
 #define CMPMATH_H

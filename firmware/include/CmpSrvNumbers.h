@@ -61,6 +61,7 @@ enum {
  * - In-order blocks of a request are not acknowledged one by one: the reply carries the acknowledgement.
  * - A repeated block is acknowledged again; when the reply has been sent completely and not been acknowledged, a
  *   repeated block also makes the server send the reply again. By itself it repeats the reply after 1, 2, 4 and 8 s.
+ *   An empty block with a number that has arrived is a question for both.
  * - An ACK + CHANNEL_FLAG_MISSING from the client makes the server send again from there, at most every 100 ms.
  * - A complete new request acknowledges the reply before it. So a client may send the next request before it has the
  *   reply (two in flight, used by the download); a reply that is lost then is not sent again: the client takes the

@@ -3,7 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Called by CmpBlkDrvSimpleCom from main. Nothing blocks: a port buffers received bytes (interrupt driven) and bytes to send.
+ * Called by CmpBlkDrvSimpleCom from main. Nothing blocks: a port buffers received bytes (interrupt driven) and bytes
+ * to send.
  */
 #ifndef SYSCOM_H
 #define SYSCOM_H

@@ -93,8 +93,8 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address);
  */
 void SysExceptBreak(uintptr_t context, RTS_UI32 code);
 
-/* Names the calling context (thread, interrupt level) for SysExceptBreak. Never 0; 0 and a context that has ended are names
- * of nobody. A context that calls this before its first cycle has what catching needs then already. */
+/* Names the calling context (thread, interrupt level) for SysExceptBreak. Never 0; 0 and a context that has ended are
+ * names of nobody. A context that calls this before its first cycle has what catching needs then already. */
 uintptr_t SysExceptContext(void);
 
 /* Gives back what catching took from the process (signal handlers); the next SysExceptTry takes it again. From main,

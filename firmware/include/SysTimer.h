@@ -13,9 +13,9 @@
 #include "CmpStd.h"
 
 /*
- * Called once per period, in the timer's own context. `due_ns`: when it should have been called (SysTimeGetNs), start +
- * n * interval exactly. When a callback takes longer than its period, the missed due times are skipped and their number is
- * in `missed`.
+ * Called once per period, in the timer's own context. `due_ns`: when it should have been called (SysTimeGetNs), start
+ * + n * interval exactly. When a callback takes longer than its period, the missed due times are skipped and their
+ * number is in `missed`.
  */
 typedef void (*SYS_TIMER_CALLBACK)(void *param, RTS_I64 due_ns, RTS_UI32 missed);
 

@@ -20,7 +20,7 @@ from plctool.testing.plcrt import Plcrt
 SHOWN = ("Control.setpoint", "Plant.level1", "Plant.level2", "Control.pump", "Control.alarm_low")
 SETTLED_PERCENT = 1.5
 SETTLE_LIMIT_S = 40.0
-BAR_WIDTH = 40
+BAR_WIDTH = 30
 
 
 def examples() -> Path:
@@ -69,7 +69,7 @@ def show_levels(story: Story, plc: Plc, until: Callable[[dict[str, float], float
         values = plc.read(*SHOWN)
         seconds = time.monotonic() - begin
         level, setpoint = values["Plant.level2"], values["Control.setpoint"]
-        story.say(f"{seconds:5.1f} s  level {level:5.1f} %  [green]{bar(level, setpoint)}[/]  set point {setpoint:.0f} %")
+        story.say(f"{seconds:5.1f} s  level {level:5.1f} %  [green]{bar(level, setpoint)}[/]  wanted {setpoint:.0f} %")
         if until(values, seconds):
             return
         time.sleep(0.5)
@@ -102,6 +102,7 @@ def refuse_damaged(story: Story, plc: Plc, image: Path, folder: Path) -> None:
         story.say(f"[yellow]refused:[/] {error}")
     else:
         raise DeviceError("the damaged image was accepted", "demo")
+    show_levels(story, plc, lambda values, seconds: seconds > 1)
     more = plc.tasks()[0].cycles - cycles
     if plc.status().state != "run" or more <= 0:
         raise DeviceError("the old program does not run any more", "demo")

@@ -82,7 +82,9 @@ def scan(link: str, baud: int = DEFAULT_BAUD, seconds: float = _SCAN_SECONDS) ->
     with Connection(open_transport(link, baud)) as connection:
         nodes = connection.scan(seconds)
         if not nodes:
-            raise LinkError(f"No device answers on {connection.transport.name}; check cable, baud rate and power.", "no-answer")
+            raise LinkError(
+                f"No device answers on {connection.transport.name}; check cable, baud rate and power.", "no-answer"
+            )
         return nodes
 
 
@@ -150,11 +152,11 @@ class Plc:
             parse_image(data)
         crc = int.from_bytes(data[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
         status = services.read_status(self._session)
-        known = (status.image_crc, status.image_size) == (crc, len(data)) and status.exception is None
-        skipped = known and not force and not unchecked
+        is_there = (status.image_crc, status.image_size) == (crc, len(data))
+        skipped = is_there and status.exception is None and not force and not unchecked
         begin = self._connection.transport.now()
         if not skipped:
-            afresh = known or unchecked
+            afresh = is_there or unchecked
             services.download(self._session, data, afresh, lambda done: progress(done, len(data)))
             self._verify(crc)
         seconds = self._connection.transport.now() - begin
@@ -184,7 +186,7 @@ class Plc:
         services.stop(self._session)
 
     def reset(self, option: str = "warm") -> None:
-        """`warm` keeps retain variables, `cold` initialises all, `origin` deletes the application. Stopped afterwards."""
+        """Stops it; `warm` keeps retain variables, `cold` initialises them too, `origin` deletes the application."""
         if option not in RESET_OPTIONS:
             raise UsageError(f"There is no reset '{option}'; choose one of {', '.join(RESET_OPTIONS)}.", "bad-reset")
         services.reset(self._session, RESET_OPTIONS[option])
@@ -249,7 +251,7 @@ class Plc:
         return {name: s.decode(data) for name, s, data in zip(names, symbols, contents, strict=True)}
 
     def write(self, values: Mapping[str, Any]) -> None:
-        """Sets variables, all in one go between two cycles if they fit a message; texts such as 'T#80ms' are understood."""
+        """Sets variables, by one message if they fit; texts such as 'T#80ms' are understood."""
         table = self.symbols()
         entries = []
         for name, value in values.items():
@@ -269,9 +271,7 @@ class Plc:
             yield time.monotonic() - begin, self.read_all(names)
 
 
-def explain_exception(
-    exception: services.AppException, task: str | None, table: SymbolTable | None
-) -> ExceptionInfo:
+def explain_exception(exception: services.AppException, task: str | None, table: SymbolTable | None) -> ExceptionInfo:
     """The exception with the source line that `table` knows for it."""
     place = None
     if table and exception.code_offset is not None:

@@ -332,8 +332,8 @@ def _parse_tasks(payload: bytes, code_size: int) -> Iterator[ImageTask]:
             raise _refuse(f"the entry of task {name} lies outside the code")
         event = None if task.event_area == NO_AREA else (int(task.event_area), int(task.event_offset))
         yield ImageTask(
-            name, int(task.kind), int(task.priority), int(task.interval_us), int(task.entry_offset), int(task.watchdog_us),
-            int(task.watchdog_sensitivity), event,
+            name, int(task.kind), int(task.priority), int(task.interval_us), int(task.entry_offset),
+            int(task.watchdog_us), int(task.watchdog_sensitivity), event,
         )  # fmt: skip
 
 

@@ -160,7 +160,7 @@ class Simulator:
         if symbol.area == lib.APP_AREA_CODE:
             raise UsageError(f"{symbol.name} is a constant and cannot be written.", "constant")
         memory = ffi.buffer(self._address(symbol), symbol.size)
-        memory[:] = symbol.encode(value)
+        memory[:] = symbol.encode(value, bytes(memory))
 
     def _resolve(self, name: str) -> Symbol:
         if self.symbols is None:

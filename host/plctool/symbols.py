@@ -31,6 +31,7 @@ from plctool.compiler.types import (
     base_of,
 )
 from plctool.errors import UsageError
+from plctool.files import write_atomically
 from plctool.values import decode, encode, parse_value
 
 FORMAT = 1
@@ -200,6 +201,8 @@ class SymbolTable:
         for name, symbol in self.variables.items():
             _describe(symbol.type, types)
             variables[name] = {"area": symbol.area, "offset": symbol.offset, "type": symbol.type.name}
+            if symbol.bit is not None:
+                variables[name]["bit"] = symbol.bit
         document = {
             "format": FORMAT,
             "image_crc": self.image_crc,
@@ -230,7 +233,10 @@ class SymbolTable:
                 document["target"],
                 document["project"],
                 document["tasks"],
-                {n: Symbol(n, v["area"], v["offset"], types.get(v["type"])) for n, v in document["variables"].items()},
+                {
+                    n: Symbol(n, v["area"], v["offset"], types.get(v["type"]), v.get("bit"))
+                    for n, v in document["variables"].items()
+                },
                 [CodeUnit(**unit) for unit in document["pous"]],
                 [(offset, file, line) for offset, file, line in document["lines"]],
                 document["files"],
@@ -241,12 +247,12 @@ class SymbolTable:
     def save(self, path: Path) -> None:
         """Writes the file, and a copy into the cache from where `find_symbols` gets it."""
         text = self.to_json()
-        path.write_text(text, encoding="utf-8")
+        write_atomically(path, text.encode())
         copy = cache_path(self.image_crc)
         try:
             copy.parent.mkdir(parents=True, exist_ok=True)
-            copy.write_text(text, encoding="utf-8")
-        except OSError:
+            write_atomically(copy, text.encode())
+        except (OSError, UsageError):
             return  # the cache only saves naming the file
 
 

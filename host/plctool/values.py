@@ -98,7 +98,8 @@ def format_time(value: int, t: Type) -> str:
 
 
 def parse_time(text: str, t: Type = ELEMENTARY["TIME"]) -> int:
-    """A duration such as 'T#1.5s', 'LTIME#20us' or '80ms', in the unit of `t`: ms for TIME, ns for LTIME. Raises UsageError."""
+    """A duration such as 'T#1.5s', 'LTIME#20us' or '80ms', in the unit of `t`: ms for TIME, ns for LTIME. Raises
+    UsageError."""
     body = re.sub(r"(?i)^l?t(ime)?#", "", text.strip()).replace("_", "").lower()
     sign = -1 if body.startswith("-") else 1
     parts = body.removeprefix("-")

@@ -12,6 +12,9 @@
 #include "CmpSrvNumbers.h"
 #include "rts_config.h"
 
+/* Tests send messages of several blocks. (The fuzz targets run with any size.) */
+enum { TESTS_NEED_MESSAGE_SIZE = 2048 };
+
 typedef struct {
     RTS_UI16 address;  /* one word */
     RTS_UI16 channel;

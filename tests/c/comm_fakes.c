@@ -16,6 +16,7 @@
 #include "CmpNameServiceServer.h"
 #include "CmpRouterEmbedded.h"
 #include "CmpSrv.h"
+#include "Sim.h"
 #include "SimLink.h"
 #include "SysCom.h"
 #include "SysExcept.h"
@@ -48,7 +49,7 @@ RTS_UI32 SysComGetCount(void)
 
 RTS_RESULT SysComOpen(RTS_UI32 index)
 {
-    return index == 0 ? ERR_OK : ERR_DEVICE;
+    return index == 0 ? fakes.line_open_result : ERR_DEVICE;
 }
 
 void SysComClose(RTS_UI32 index)
@@ -87,6 +88,15 @@ const char *CMGetComponentName(RTS_UI32 id)
     return id == CMPID_CmpAppEmbedded ? "CmpAppEmbedded" : "";
 }
 
+void LogAdd(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...)
+{
+    RTS_UNUSED(component);
+    RTS_UNUSED(log_class);
+    RTS_UNUSED(error);
+    RTS_UNUSED(format);
+    fakes.log_added++;
+}
+
 RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry)
 {
     for (RTS_UI32 i = 0; i < fakes.log_count; i++) {
@@ -96,6 +106,13 @@ RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry)
         }
     }
     return ERR_END_OF_OBJECT;
+}
+
+/* Without the simulator there is no power to cut. */
+RTS_RESULT SimCall(void (*fn)(void *arg), void *arg)
+{
+    fn(arg);
+    return ERR_OK;
 }
 
 /* ---- application ---- */
@@ -217,10 +234,10 @@ void fakes_hook(CMP_HOOK hook)
     const RTS_UI32 count = RTS_COUNT(hooks);
 
     for (RTS_UI32 i = 0; i < count; i++)
-        (void)hooks[hook >= CH_EXIT_COMM ? count - 1 - i : i](hook);
+        fakes.hook_errors += hooks[hook >= CH_EXIT_COMM ? count - 1 - i : i](hook) != ERR_OK;
 }
 
-void fakes_start(void)
+void fakes_init(void)
 {
     static const SYS_TARGET target = {0x1000, 0x00010002, 0x030E0514, "Device", "Vendor", "Node7", "SN-42"};
 
@@ -237,8 +254,18 @@ void fakes_start(void)
     for (RTS_UI32 i = 0; i < APP_AREA_COUNT; i++)
         fakes.area_size[i] = FAKE_AREA_SIZE;
     SimLinkReset();
+}
+
+void fakes_run_init_hooks(void)
+{
     for (int hook = CH_INIT_SYSTEM; hook <= CH_INIT_FINISHED; hook++)
         fakes_hook((CMP_HOOK)hook);
+}
+
+void fakes_start(void)
+{
+    fakes_init();
+    fakes_run_init_hooks();
 }
 
 void fakes_cycle(RTS_UI32 ms)

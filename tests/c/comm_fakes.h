@@ -19,6 +19,7 @@ typedef struct {
     RTS_UI32 now_ms;
     RTS_UI32 random;
     SYS_TARGET target;
+    RTS_UI32 hook_errors;
 
     RTS_UI8 line_in[FAKE_LINE_SIZE]; /* what the serial line will deliver */
     RTS_UI32 line_in_size;
@@ -26,6 +27,8 @@ typedef struct {
     RTS_UI8 line_out[FAKE_LINE_SIZE]; /* what has been sent */
     RTS_UI32 line_out_size;
     RTS_UI32 line_write_limit; /* bytes one call of SysComWrite takes */
+    RTS_RESULT line_open_result;
+    RTS_UI32 log_added;
 
     APP_STATUS status;
     RTS_UI64 area[APP_AREA_COUNT][FAKE_AREA_SIZE / 8];
@@ -57,6 +60,9 @@ extern FAKES fakes;
 
 /* Everything as after power-on: an application is loaded and stopped, the communication is open. */
 void fakes_start(void);
+/* Its two halves. */
+void fakes_init(void);
+void fakes_run_init_hooks(void);
 
 /* One main loop round `ms` later. */
 void fakes_cycle(RTS_UI32 ms);

@@ -180,13 +180,12 @@ static void a_second_cut_during_recovery_changes_nothing(void)
 }
 
 /* A fault is no power cut: the operation fails and the device goes on. The old application must run on, or the new one. */
-static void a_flash_fault_at_any_operation_of_a_download_is_survived(void)
+static void fault_at_any_operation(const GEOMETRY *g)
 {
-    static const GEOMETRY g = {8, 0xFF, 512};
     RTS_UI32 operations;
     RTS_UI32 k;
 
-    prepare(&g);
+    prepare(g);
     operations = count_operations();
     for (k = 1; k <= operations; k++) {
         RTS_RESULT result;
@@ -203,6 +202,15 @@ static void a_flash_fault_at_any_operation_of_a_download_is_survived(void)
         CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == (result == ERR_OK ? 2 : 1));
         check_can_be_flashed_again();
     }
+}
+
+static void a_flash_fault_at_any_operation_of_a_download_is_survived(void)
+{
+    static const GEOMETRY geometries[] = {{1, 0x00, 512}, {8, 0xFF, 512}, {16, 0xFF, 512}};
+    RTS_SIZE i;
+
+    for (i = 0; i < RTS_COUNT(geometries); i++)
+        fault_at_any_operation(&geometries[i]);
 }
 
 /* The first program on a blank device: afterwards nothing or the application, and the device can be used. */

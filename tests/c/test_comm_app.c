@@ -12,6 +12,8 @@
 #include "comm_fakes.h"
 #include "test.h"
 
+RTS_STATIC_ASSERT(NETSERVER_MESSAGE_SIZE >= TESTS_NEED_MESSAGE_SIZE, tests_have_room);
+
 static CLIENT client;
 static REPLY reply;
 static RTS_UI8 content[NETSERVER_MESSAGE_SIZE];
@@ -117,6 +119,17 @@ static void captured_create_request_gives_a_session(void)
     CHECK(take_login_reply(&option));
     CHECK(BytesGet16(option.data) == ERR_OK);
     CHECK(BytesGet32(option.data + 2) != 0);
+}
+
+static void create_without_a_name_is_an_error(void)
+{
+    setup();
+    put_descriptor(1, NULL);
+    CHECK(call(SRV_APP_CREATE));
+    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    begin_content();
+    CHECK(call(SRV_APP_CREATE));
+    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
 }
 
 static void logout_ends_the_application_session_only(void)
@@ -612,6 +625,7 @@ static void restart_forgets_the_transfer(void)
     CHECK(put(0, 300, &next) == ERR_OK);
     setup();
     CHECK(ask(&next) == ERR_OK && next == 0);
+    CHECK(download(DLF_CONTINUEDOWNLOAD, 0, TOTAL, CRC, 10, &next) == ERR_INVALID_SEQUENCE);
 }
 
 int main(void)
@@ -620,6 +634,7 @@ int main(void)
     RUN(login_without_application_says_so);
     RUN(names_are_bounded);
     RUN(captured_create_request_gives_a_session);
+    RUN(create_without_a_name_is_an_error);
     RUN(logout_ends_the_application_session_only);
     RUN(start_and_stop_reach_the_application);
     RUN(refusal_of_the_application_is_the_result);

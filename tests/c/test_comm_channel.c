@@ -16,6 +16,8 @@
 
 enum { FIRST = CHANNEL_FLAG_TO_SERVER | CHANNEL_FLAG_FIRST, NEXT = CHANNEL_FLAG_TO_SERVER };
 
+RTS_STATIC_ASSERT(NETSERVER_MESSAGE_SIZE >= TESTS_NEED_MESSAGE_SIZE, tests_have_room);
+
 static CLIENT client;
 static RTS_UI8 message[NETSERVER_MESSAGE_SIZE + 512];
 static RTS_UI8 reply[NETSERVER_MESSAGE_SIZE];
@@ -730,6 +732,15 @@ static void new_request_acknowledges_the_reply_before(void)
     CHECK(take(CHANNEL_PKG_KEEPALIVE) && is_silent());
 }
 
+static void acknowledgement_in_a_block_is_one(void)
+{
+    setup();
+    CHECK(works(&client));
+    client_send_block(&client, ++client.sent, FIRST, message, 600, 0, 300);
+    fakes_cycle(1000);
+    CHECK(take(CHANNEL_PKG_KEEPALIVE) && is_silent());
+}
+
 static void acknowledgement_travels_with_the_reply(void)
 {
     setup();
@@ -918,6 +929,7 @@ int main(void)
     RUN(nonsense_acknowledgements_change_nothing);
     RUN(repeated_request_brings_the_lost_reply_again);
     RUN(new_request_acknowledges_the_reply_before);
+    RUN(acknowledgement_in_a_block_is_one);
     RUN(acknowledgement_travels_with_the_reply);
     RUN(full_driver_delays_blocks_and_loses_none);
     RUN(keepalives_are_sent_when_there_is_nothing_else);

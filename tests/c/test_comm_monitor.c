@@ -11,6 +11,8 @@
 #include "comm_fakes.h"
 #include "test.h"
 
+RTS_STATIC_ASSERT(NETSERVER_MESSAGE_SIZE >= TESTS_NEED_MESSAGE_SIZE, tests_have_room);
+
 static CLIENT client;
 static REPLY reply;
 static RTS_UI8 content[NETSERVER_MESSAGE_SIZE];

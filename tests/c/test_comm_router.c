@@ -212,8 +212,9 @@ static void address_service_is_ignored_so_nobody_becomes_parent(void)
 static void announced_block_length_limits_the_answer(void)
 {
     setup();
-    /* Name request with BlkLenMax 2, 96 bytes: our reply has 106. 15 means 512. */
+    /* Name request with BlkLenMax 2, 96 bytes: our reply has 106. 3 means 128, 15 means 512. */
     CHECK(ask("\xC5\x6B\x42\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16) == 0);
+    CHECK(ask("\xC5\x6B\x43\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16) == 1);
     CHECK(ask("\xC5\x6B\x4F\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16) == 1);
 }
 

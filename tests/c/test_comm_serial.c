@@ -334,6 +334,17 @@ static void babbling_line_does_not_hold_the_cycle(void)
     CHECK(fakes.line_in_read < FAKE_LINE_SIZE);
 }
 
+static void line_that_cannot_be_opened_is_logged_and_left_alone(void)
+{
+    fakes_init();
+    fakes.line_open_result = ERR_DEVICE;
+    fakes_run_init_hooks();
+    CHECK(fakes.log_added == 1 && fakes.hook_errors == 0);
+    put_question();
+    fakes_cycle(1);
+    CHECK(fakes.line_in_read == 0 && answers() == 0);
+}
+
 static void closing_the_line_sends_what_is_queued(void)
 {
     fakes_start();
@@ -383,6 +394,7 @@ int main(void)
     RUN(port_that_takes_a_byte_at_a_time_gets_the_same_bytes);
     RUN(full_queue_loses_whole_packets_only);
     RUN(babbling_line_does_not_hold_the_cycle);
+    RUN(line_that_cannot_be_opened_is_logged_and_left_alone);
     RUN(closing_the_line_sends_what_is_queued);
     RUN(restart_forgets_half_a_frame_and_the_counters);
     return test_result();

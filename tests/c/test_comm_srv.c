@@ -13,6 +13,8 @@
 #include "comm_fakes.h"
 #include "test.h"
 
+RTS_STATIC_ASSERT(NETSERVER_MESSAGE_SIZE >= TESTS_NEED_MESSAGE_SIZE, tests_have_room);
+
 static CLIENT client;
 static REPLY reply;
 
@@ -312,6 +314,15 @@ static void session_ids_differ(void)
     }
 }
 
+static void components_start_and_end_without_error(void)
+{
+    fakes_start();
+    fakes_cycle(1);
+    for (int hook = CH_EXIT_COMM; hook <= CH_EXIT_SYSTEM; hook++)
+        fakes_hook((CMP_HOOK)hook);
+    CHECK(fakes.hook_errors == 0);
+}
+
 static void a_full_group_table_is_an_error(void)
 {
     RTS_RESULT result = ERR_OK;
@@ -540,6 +551,7 @@ int main(void)
     RUN(logout_ends_the_session);
     RUN(session_does_not_survive_its_channel);
     RUN(session_ids_differ);
+    RUN(components_start_and_end_without_error);
     RUN(a_full_group_table_is_an_error);
     RUN(identity_is_told_in_the_layout_of_the_field);
     RUN(empty_names_are_empty);

@@ -68,7 +68,11 @@ def assign(target: Variable | Place, value: Expr) -> Assign:
 
 
 def function(
-    name: str, result: Variable | None, parameters: list[Parameter], *body: Statement, locals_: list[Variable] | None = None
+    name: str,
+    result: Variable | None,
+    parameters: list[Parameter],
+    *body: Statement,
+    locals_: list[Variable] | None = None,
 ) -> Pou:
     variables = ([result] if result else []) + (locals_ or [])
     return Pou(name, PouKind.FUNCTION, POS, parameters, variables, result, body=list(body))
@@ -123,7 +127,8 @@ def test_in_out_and_output_reach_the_caller() -> None:
     p = ProgramBuilder()
     x, y = p.variable("x", INT), p.variable("y", INT)
     run = p.run(
-        CallStatement(Call(f, [place(x), place(y)], INT, POS), POS), CallStatement(Call(f, [place(x), None], INT, POS), POS)
+        CallStatement(Call(f, [place(x), place(y)], INT, POS), POS),
+        CallStatement(Call(f, [place(x), None], INT, POS), POS),
     )
     run["x"] = 5
     run.cycle()
@@ -134,7 +139,9 @@ def test_array_input_written_in_the_function_is_a_copy() -> None:
     t = ArrayType(INT, ((0, 3),))
     a, r = local("a", t), local("F", INT)
     first = IndexPlace(place(a), [const(0)], INT, POS)
-    f = function("F", r, inputs(a), assign(first, const(9)), assign(r, load(IndexPlace(place(a), [const(3)], INT, POS))))
+    f = function(
+        "F", r, inputs(a), assign(first, const(9)), assign(r, load(IndexPlace(place(a), [const(3)], INT, POS)))
+    )
     p = ProgramBuilder()
     x, y = p.variable("x", t), p.variable("y", INT)
     run = p.run(assign(y, Call(f, [load(x)], INT, POS)))
@@ -237,9 +244,13 @@ def counter(checks: bool = True) -> tuple[Pou, StructType]:
     t = StructType("Counter", [Field("step", INT), Field("n", DINT), Field("limit", DINT), Field("at", INT)])
     t.fields[2] = Field("limit", LREAL)  # eight bytes hold the pointer
     t.lay_out()
-    step, n, at = (Variable(f, t.member(f).type, Storage.SELF, POS, offset=t.member(f).offset) for f in ("step", "n", "at"))  # type: ignore[union-attr]
+    step, n, at = (
+        Variable(f, t.member(f).type, Storage.SELF, POS, offset=t.member(f).offset) for f in ("step", "n", "at")
+    )  # type: ignore[union-attr]
     limit = Variable("limit", DINT, Storage.REFERENCE, POS, offset=t.fields[2].offset)
-    block = Pou("Counter", PouKind.FUNCTION_BLOCK, POS, inputs(step) + [Parameter(limit, Direction.IN_OUT, True)], instance=t)
+    block = Pou(
+        "Counter", PouKind.FUNCTION_BLOCK, POS, inputs(step) + [Parameter(limit, Direction.IN_OUT, True)], instance=t
+    )
     block.body = [
         If([(binary(BinaryOp.LT, load(n), load(limit)), [assign(n, add(load(n), const(1, DINT)))])], [], POS),
         assign(limit, add(load(limit), const(0, DINT))),
@@ -383,7 +394,11 @@ def exclaim() -> Pou:
     """Exclaim(s) is s with its first character replaced, built in the result."""
     s, r = reference("s", STRING), Variable("Exclaim", STRING, Storage.LOCAL, POS)
     return function(
-        "Exclaim", r, inputs(s), assign(r, load(s)), assign(IndexPlace(place(r), [const(0)], BYTE, POS), const(33, BYTE))
+        "Exclaim",
+        r,
+        inputs(s),
+        assign(r, load(s)),
+        assign(IndexPlace(place(r), [const(0)], BYTE, POS), const(33, BYTE)),
     )
 
 
@@ -440,7 +455,9 @@ def test_initial_values_of_all_kinds() -> None:
     p.variable("plain", s)
     p.variable("given", s, StructInit({"B": ScalarInit(2.5)}))
     p.variable("many", ArrayType(s, ((0, 9),)), ArrayInit([(1, StructInit({"d": ScalarInit(9)}))]))
-    p.variable("grid", ArrayType(ArrayType(INT, ((0, 2),)), ((0, 1),)), ArrayInit([(2, ArrayInit([(3, ScalarInit(4))]))]))
+    p.variable(
+        "grid", ArrayType(ArrayType(INT, ((0, 2),)), ((0, 1),)), ArrayInit([(2, ArrayInit([(3, ScalarInit(4))]))])
+    )
     run = p.run()
     default = {"a": 3, "b": 0.0, "c": "abc", "d": 0}
     assert (run["n"], run["x"], run["text"], run["cut"]) == (-5, 0.1, "hello", "he")

@@ -128,13 +128,16 @@ def for_model(start: int, stop: int, step: int, low: int, high: int) -> tuple[li
 
 @functools.cache
 def for_loop(t: Elementary, step: int | None, modified: bool, level: int) -> Running:
-    """n counts, total sums up a hash of the values; `step` None: from a variable. `modified`: the body assigns k := k."""
+    """n counts, total sums up a hash of the values; `step` None: from a variable. `modified`: the body assigns k := k.
+    """
     p = ProgramBuilder()
     k, start, stop, by = (p.variable(name, t) for name in ("k", "start", "stop", "by"))
     n, total = p.variable("n", DINT), p.variable("total", LINT)
     body: list[Statement] = [
         increment(n),
-        assign(total, binary(BinaryOp.ADD, binary(BinaryOp.MUL, load(total), const(3, LINT)), Convert(load(k), LINT, POS))),
+        assign(
+            total, binary(BinaryOp.ADD, binary(BinaryOp.MUL, load(total), const(3, LINT)), Convert(load(k), LINT, POS))
+        ),
     ]
     if modified:
         body.append(assign(k, load(k)))
@@ -342,7 +345,9 @@ def test_a_bit_as_in_out_argument_is_written_back() -> None:
     p = ProgramBuilder()
     w = p.variable("w", DWORD)
     flag = Variable("flag", BOOL, Storage.REFERENCE, POS)
-    toggle = Pou("Toggle", PouKind.FUNCTION, POS, [Parameter(flag, Direction.IN_OUT, True)], body=[assign(flag, const(1, BOOL))])
+    toggle = Pou(
+        "Toggle", PouKind.FUNCTION, POS, [Parameter(flag, Direction.IN_OUT, True)], body=[assign(flag, const(1, BOOL))]
+    )
     run = p.run(CallStatement(Call(toggle, [BitPlace(place(w), 5, BOOL, POS)], INT, POS), POS))
     run.cycle()
     assert run["w"] == 32

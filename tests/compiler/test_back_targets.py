@@ -1,4 +1,5 @@
-"""Every target: the same program links to position independent code, undefined compiler calls become imports or errors."""
+"""Every target: the same program links to position independent code, undefined compiler calls become imports or errors.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +60,14 @@ def everything() -> TypedProgram:
         assign(wide, binary(BinaryOp.DIV, load(wide), Convert(load(n), LINT, POS))),
         Case(load(i), branches, [], POS),
         assign(a, load(b)),
-        For(place(i), const(0), const(499), const(1), [Assign(IndexPlace(place(a), [load(i)], INT, POS), load(i), POS)], POS),
+        For(
+            place(i),
+            const(0),
+            const(499),
+            const(1),
+            [Assign(IndexPlace(place(a), [load(i)], INT, POS), load(i), POS)],
+            POS,
+        ),
         Assign(IndexPlace(place(b), [load(i)], INT, POS), const(1), POS),
         assign(t, load(s)),
         assign(kept, binary(BinaryOp.ADD, load(kept), const(1, DINT))),
@@ -94,7 +102,8 @@ def test_single_precision_needs_no_calls_with_an_fpu() -> None:
     p = ProgramBuilder()
     x, n = p.variable("x", REAL), p.variable("n", DINT)
     program = p.program(
-        Assign(place(x), binary(BinaryOp.MUL, load(x), const(0.1, REAL)), POS), Assign(place(n), Convert(load(x), DINT, POS), POS)
+        Assign(place(x), binary(BinaryOp.MUL, load(x), const(0.1, REAL)), POS),
+        Assign(place(n), Convert(load(x), DINT, POS), POS),
     )
     for name in ("cortex-m4f", "cortex-m7", "x86_64-linux", "aarch64-linux"):
         assert parse_image(build(program, name).image).externals == []
@@ -122,7 +131,10 @@ def test_an_undefined_function_is_named(name: str) -> None:
 
 @pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
 def test_writable_data_are_refused(target: Target) -> None:
-    text = ir("@state = internal global i32 5\ndefine i32 @entry() {\n %o = atomicrmw add ptr @state, i32 1 monotonic\n ret i32 %o\n}", target)
+    text = ir(
+        "@state = internal global i32 5\ndefine i32 @entry() {\n %o = atomicrmw add ptr @state, i32 1 monotonic\n ret i32 %o\n}",
+        target,
+    )
     with pytest.raises(UsageError, match=r"\.data|__atomic|__sync"):
         link(emit_object(text, target, 2), target, ["entry"], 0)
 
@@ -141,9 +153,7 @@ def test_absolute_addresses_are_refused() -> None:
 
 def test_sections_nobody_reaches_are_left_out() -> None:
     target = find_target("x86_64-linux")
-    text = ir(
-        'define void @entry() {\n ret void\n}\ndefine void @far() section ".text.far" {\n ret void\n}\n', target
-    )
+    text = ir('define void @entry() {\n ret void\n}\ndefine void @far() section ".text.far" {\n ret void\n}\n', target)
     linked = link(emit_object(text, target, 2), target, ["entry"], 0)
     assert "far" not in linked.symbols
 

@@ -60,7 +60,8 @@ offsets = st.integers(0, 99)
         areas=st.dictionaries(st.integers(0, 4), st.integers(1, 2**32 - 1)),
         functions=st.dictionaries(st.integers(0, 5), offsets),
         externals=st.lists(
-            st.builds(ExternalFunction, names, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.integers(0, 999))
+            st.builds(ExternalFunction, names, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.integers(0,
+            999))
         ),
         tasks=st.lists(
             st.builds(

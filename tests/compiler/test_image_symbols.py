@@ -56,7 +56,8 @@ def point() -> StructType:
 POINT = point()
 COLOUR = EnumType("Colour", INT, {"Red": 0, "Green": 5, "Blue": 6})
 BLOCK = StructType(
-    "Block", [Field("q", BOOL), Field("arr", ArrayType(POINT, ((2, 4),))), Field("grid", ArrayType(INT, ((0, 1), (-1, 1))))]
+    "Block",
+    [Field("q", BOOL), Field("arr", ArrayType(POINT, ((2, 4),))), Field("grid", ArrayType(INT, ((0, 1), (-1, 1))))],
 )
 BLOCK.lay_out()
 
@@ -73,7 +74,11 @@ def table() -> SymbolTable:
         "total": (0, 136, TIME),
     }
     symbols = {name: Symbol(name, *place) for name, place in variables.items()}
-    units = [CodeUnit("Main", 16, 100, "a.st", 10), CodeUnit("Fb", 0, 0, "a.st", 2), CodeUnit("Other", 116, 20, "b.st", 1)]
+    units = [
+        CodeUnit("Main", 16, 100, "a.st", 10),
+        CodeUnit("Fb", 0, 0, "a.st", 2),
+        CodeUnit("Other", 116, 20, "b.st", 1),
+    ]
     lines = [(0, -1, 0), (16, 0, 11), (20, 0, 4), (24, 0, 0), (40, 0, 12), (116, 1, 3), (136, -1, 0)]
     return SymbolTable(0xCAFE, "x86_64-linux", "demo", ["task"], symbols, units, lines, ["a.st", "b.st"])
 
@@ -293,8 +298,8 @@ def test_what_is_no_duration_is_refused(text: str) -> None:
 @pytest.mark.parametrize(
     ("t", "text", "value"),
     [
-        (BOOL, "true", True), (BOOL, "0", False), (INT, "16#7F", 127), (INT, "-2#101", -5), (INT, "INT#5", 5),
-        (DINT, "1_000", 1000), (REAL, "1e3", 1000.0), (COLOUR, "green", 5), (COLOUR, "Colour#Blue", 6), (COLOUR, "6", 6),
+        (BOOL, "true", True), (BOOL, "0", False), (INT, "16#7F", 127), (INT, "-2#101", -5), (INT, "INT#5", 5), (DINT,
+        "1_000", 1000), (REAL, "1e3", 1000.0), (COLOUR, "green", 5), (COLOUR, "Colour#Blue", 6), (COLOUR, "6", 6),
         (StringType(9), "'a b'", "a b"), (StringType(9), "it's", "it's"),
     ],
 )  # fmt: skip
@@ -305,8 +310,8 @@ def test_typed_values(t: Type, text: str, value: object) -> None:
 @pytest.mark.parametrize(
     ("t", "value"),
     [
-        (BOOL, "maybe"), (BOOL, 2), (INT, "1.5"), (INT, 40000), (INT, "x"), (USINT, -1), (COLOUR, "Pink"), (REAL, "one"),
-        (StringType(2), "abc"), (StringType(9), "\u20ac"), (SubrangeType("S", INT, 1, 10), 11), (POINT, 5),
+        (BOOL, "maybe"), (BOOL, 2), (INT, "1.5"), (INT, 40000), (INT, "x"), (USINT, -1), (COLOUR, "Pink"), (REAL,
+        "one"), (StringType(2), "abc"), (StringType(9), "\u20ac"), (SubrangeType("S", INT, 1, 10), 11), (POINT, 5),
         (ArrayType(INT, ((0, 2),)), [1, 2]), (PointerType(INT), 5), (INT, 1.5),
     ],
 )  # fmt: skip

@@ -172,9 +172,9 @@ def check_diagnostics(found: list[Diagnostic], script: Script) -> list[str]:
 def test_program(path: Path) -> None:
     script = read_script(path)
     if any(severity == "error" for severity, *_ in script.diagnostics):
-        wrong = check_diagnostics(check_sources([path]), script)
+        wrong = check_diagnostics(check_sources([path]).diagnostics, script)
     else:
-        wrong = check_diagnostics(check_sources([path]), script) + run_program(path, script)
+        wrong = check_diagnostics(check_sources([path]).diagnostics, script) + run_program(path, script)
     assert not wrong, "\n".join(wrong)
 
 

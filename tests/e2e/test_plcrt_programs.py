@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 import random
 import signal
 import time
@@ -39,7 +38,6 @@ END_CONFIGURATION
 """
 
 NULL_WRITE = program("p : POINTER TO DINT; n : DINT;", "n := n + 1; p^ := n;")
-DIVISION = program("a : DINT := 1; b : DINT;", "a := a / b;")
 LARGE_FRAME = """
 FUNCTION Far : DINT
 VAR_INPUT
@@ -58,14 +56,9 @@ END_FUNCTION
     ("text", "name"),
     [
         (NULL_WRITE, "ACCESS_VIOLATION"),
-        pytest.param(
-            DIVISION,
-            "DIVIDEBYZERO",
-            marks=pytest.mark.skipif(platform.machine() != "x86_64", reason="only x86 traps a division by zero"),
-        ),
         (LARGE_FRAME, "STACK_OVERFLOW"),
     ],
-    ids=["null", "division", "stack"],
+    ids=["null", "stack"],
 )
 def test_what_no_check_stops_the_processor_does(tool, plcrt, eventually, text, name):
     image = tool.build("fault", text, "--checks", "none")
@@ -88,7 +81,7 @@ def test_an_endless_loop_does_not_keep_plcrt_from_ending(tool, plcrt, eventually
 def test_a_killed_controller_runs_its_program_again_with_its_retain_variables(tool, plcrt, counter, eventually):
     tool.ok("flash", "--port", plcrt.port, str(counter))
     saved = eventually(lambda: read(tool, plcrt, "Main.total"))
-    eventually(lambda: read(tool, plcrt, "Main.total") > saved + 300)  # saved at least once a second since
+    eventually(lambda: read(tool, plcrt, "Main.total") > saved + 150)  # it is saved once a second
     plcrt.stop(signal.SIGKILL)
     plcrt.start()
     assert status(tool, plcrt)["state"] == "run"

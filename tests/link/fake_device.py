@@ -1,7 +1,7 @@
 """A device in Python behind a line on a virtual clock: fast, repeatable, and as bad as a test wants it.
 
-The channel server follows the rules written down in CmpSrvNumbers.h, independently of the client's code. Nothing sleeps:
-`FakeLine.receive` moves the clock to the next event.
+The channel server follows the rules written down in CmpSrvNumbers.h, independently of the client's code. Nothing
+sleeps: `FakeLine.receive` moves the clock to the next event.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def damage(seed: int, rate: float) -> Damage:
 
 
 class FakeLine:
-    """A block transport whose other end is a `FakeDevice`. Every wire byte takes its time; latency is added to frames."""
+    """A block transport whose other end is a `FakeDevice`. Every byte takes its time; latency is added to frames."""
 
     def __init__(
         self,
@@ -285,7 +285,8 @@ def name_reply(request_id: int) -> bytes:
     head = struct.pack(
         "<HHIHBBHHHHIIIIBBBBII",
         lib.NS_IDENTIFICATION, lib.NS_VERSION_0400, request_id, 1, 1, 0, 0, *map(len, names),
-        lib.TARGET_TYPE_PROGRAMMABLE, lib.TARGET_ID_CORTEX_M3, 0x01020304, 0, len(SERIAL), 0, lib.BLK_DRV_TYPE_COM, 0, 0, 0,
+        lib.TARGET_TYPE_PROGRAMMABLE, lib.TARGET_ID_CORTEX_M3, 0x01020304, 0, len(SERIAL), 0, lib.BLK_DRV_TYPE_COM,
+        0, 0, 0,
     )  # fmt: skip
     return head + b"".join(name.encode("utf-16-le") + b"\0\0" for name in names) + SERIAL.encode() + b"\0"
 
@@ -360,7 +361,8 @@ class FakePlc:
         ]
 
     def _echo(self, tags: bintag.Tags) -> list[bintag.Tag]:
-        return [bintag.u16(lib.TAG_SERVICE_RESULT, 0), bintag.raw(lib.TAG_DEV_ECHO_DATA, tags.bytes(lib.TAG_DEV_ECHO_DATA))]
+        data = tags.bytes(lib.TAG_DEV_ECHO_DATA)
+        return [bintag.u16(lib.TAG_SERVICE_RESULT, 0), bintag.raw(lib.TAG_DEV_ECHO_DATA, data)]
 
     def _identity(self, tags: bintag.Tags) -> list[bintag.Tag]:
         def wide(tag: int, text: str) -> bintag.Tag:

@@ -32,7 +32,10 @@ def test_trees_survive_encoding(tags: list[bintag.Tag], aligned: bool) -> None:
     assert as_tree(bintag.decode(bintag.encode(tags, aligned))) == as_tree(tags)
 
 
-@given(st.lists(st.builds(bintag.Tag, DATA_IDS, st.binary(min_size=1, max_size=20), st.sampled_from([0, 2])), max_size=8))
+FLAT_TAGS = st.builds(bintag.Tag, DATA_IDS, st.binary(min_size=1, max_size=20), st.sampled_from([0, 2]))
+
+
+@given(st.lists(FLAT_TAGS, max_size=8))
 def test_contents_are_aligned(tags: list[bintag.Tag]) -> None:
     encoded, at = bintag.encode(tags), 0
     for tag in tags:

@@ -19,12 +19,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 FLASH_SECTIONS = {".vectors", ".text", ".ARM.exidx", ".data"}
-RAM_SECTIONS = {".data", ".bss", ".noinit", ".stack"}
+STACK_SECTION = ".stack"
+RAM_SECTIONS = {".data", ".bss", ".noinit", STACK_SECTION}
 APPLICATION_SECTION = ".iec_stack"
 SLACK = 1.02  # the budget of a component is what it takes now, and two per cent
 ROUND = 16
 
-_OUTPUT = re.compile(r"^(\.\S+)(?:\s+0x[0-9a-f]+\s+0x([0-9a-f]+))?")
+_OUTPUT = re.compile(r"^(\.\S+)")
 _NAME = re.compile(r"^ (\.\S+|COMMON)")
 _PLACED = re.compile(r"\s0x[0-9a-f]+\s+0x([0-9a-f]+) (\S.*)$")
 _FILL = re.compile(r"^ \*fill\*\s+0x[0-9a-f]+\s+0x([0-9a-f]+)")
@@ -67,16 +68,14 @@ def pieces(map_text: str) -> Iterator[Piece]:
     for line in body.splitlines():
         if match := _OUTPUT.match(line):
             output = match[1]
-            if output == ".stack":
-                yield Piece(output, "", "main stack", int(match[2], 16))
         elif match := _FILL.match(line):
-            if output != ".stack":
-                yield Piece(output, "", "alignment", int(match[1], 16))
+            yield Piece(output, "", "alignment", int(match[1], 16))
         else:
             if match := _NAME.match(line):
                 name = match[1]
             if match := _PLACED.search(line):
-                yield Piece(output, name, _owner(match[2]), int(match[1], 16))
+                owner = "main stack" if output == STACK_SECTION else _owner(match[2])
+                yield Piece(output, name, owner, int(match[1], 16))
 
 
 def _owner(path: str) -> str:

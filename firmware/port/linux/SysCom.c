@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A device may go away (USB) and come back: it is opened again. The slave end of a pseudo terminal is held open here, so
- * clients may come and go.
+ * A device may go away (USB) and come back: it is opened again. The slave end of a pseudo terminal is held open here,
+ * so clients may come and go.
  */
 #define _GNU_SOURCE
 #include "SysCom.h"
@@ -178,7 +178,8 @@ static bool ready(RTS_UI32 index)
     return state.line >= 0;
 }
 
-/* The bytes a read or write moved. Nothing to read and no room are not errors; all else means that the device is gone. */
+/* The bytes a read or write moved. Nothing to read and no room are not errors; all else means that the device is
+ * gone. */
 static RTS_UI32 moved(ssize_t count)
 {
     if (count > 0) {

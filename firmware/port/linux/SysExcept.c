@@ -3,9 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Shared by the linux and the sim port, so it depends on no other file of a port. It also lives in processes that are not
- * ours (Python): signal handlers are taken at first use, faults outside SysExceptTry go to whoever had them before, and
- * SysExceptShutdown gives everything back.
+ * Shared by the linux and the sim port, so it depends on no other file of a port. It also lives in processes that are
+ * not ours (Python): signal handlers are taken at first use, faults outside SysExceptTry go to whoever had them
+ * before, and SysExceptShutdown gives everything back.
  *
  * Leaving a handler by siglongjmp is sound here: IEC code and the C functions it may call hold no lock and own nothing.
  * The handlers block no signal (SA_NODEFER, empty mask), so no mask has to be saved: sigsetjmp costs a few ns.

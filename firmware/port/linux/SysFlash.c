@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Reading is a shared mapping of the file, writing goes through the file, so what was programmed is in the page cache at
- * once and survives the end of the process; sync makes it survive a power cut.
+ * Reading is a shared mapping of the file, writing goes through the file, so what was programmed is in the page cache
+ * at once and survives the end of the process; sync makes it survive a power cut.
  */
 #define _GNU_SOURCE
 #include "SysFlash.h"
@@ -150,7 +150,8 @@ static bool prepare_file(int file, const char *path, PORT_REASON *reason)
         return false;
     }
     if (fstat(file, &info) != 0 || !S_ISREG(info.st_mode) || info.st_size > PORT_FLASH_SIZE) {
-        PortReason(reason, "%s is not a flash file of plcrt (at most %d bytes): name another file", path, PORT_FLASH_SIZE);
+        PortReason(reason, "%s is not a flash file of plcrt (at most %d bytes): name another file", path,
+                   PORT_FLASH_SIZE);
         return false;
     }
     if (!fill_erased(file, info.st_size)) {

@@ -212,7 +212,8 @@ static RTS_RESULT init(void)
 {
     memset(&state, 0, sizeof(state));
     state.realtime = 1;
-    char *stacks = mmap(NULL, (size_t)MAX_TIMERS * STACK_STEP, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    char *stacks = mmap(NULL, (size_t)MAX_TIMERS * STACK_STEP, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE,
+                        -1, 0);
     if (stacks == MAP_FAILED) {
         return ERR_NOMEMORY;
     }

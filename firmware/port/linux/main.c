@@ -76,7 +76,16 @@ static void print_and_exit(const char *text)
     exit(fflush(stdout) == 0 ? EXIT_SUCCESS : EXIT_RUNTIME);
 }
 
-enum { OPTION_FLASH = 256, OPTION_SERIAL, OPTION_BAUD, OPTION_VERSION, OPTION_HELP, OPTION_CAN, OPTION_UDP, OPTION_TCP };
+enum {
+    OPTION_FLASH = 256,
+    OPTION_SERIAL,
+    OPTION_BAUD,
+    OPTION_VERSION,
+    OPTION_HELP,
+    OPTION_CAN,
+    OPTION_UDP,
+    OPTION_TCP,
+};
 
 static const struct option long_options[] = {
     {"flash", required_argument, NULL, OPTION_FLASH},

@@ -29,19 +29,20 @@
 /* The largest code segment that can be made executable, per slot [bytes]: a slot is less than half of the flash. */
 #define PORT_CODE_SIZE (PORT_FLASH_SIZE / 2)
 
-/* Stack of a task's thread [bytes]; the thread sanitizer needs 1 MiB. The zone below it has no memory: a function whose local
- * variables are larger than the zone could jump over it, into the next stack. */
+/* Stack of a task's thread [bytes]; the thread sanitizer needs 1 MiB. The zone below it has no memory: a function
+ * whose local variables are larger than the zone could jump over it, into the next stack. */
 #ifndef PORT_STACK_SIZE
 #define PORT_STACK_SIZE (256 * 1024)
 #endif
 #define PORT_STACK_GUARD (16 * 1024 * 1024)
 
-/* SCHED_FIFO priority of an IEC priority p is PORT_PRIORITY_HIGHEST - p: 80..49. The watchdog runs above all of them. */
+/* SCHED_FIFO priority of an IEC priority p is PORT_PRIORITY_HIGHEST - p: 80..49. The watchdog is above all of them. */
 #define PORT_PRIORITY_HIGHEST 80
 #define PORT_PRIORITY_WATCHDOG 90
 
-/* How often the watchdog thread looks for cycles that do not end [us]: how much longer than its watchdog time an endless loop
- * may run. Each look costs up to 15 us of a virtual machine's processor. (A cycle that ends too late is found at its end.) */
+/* How often the watchdog thread looks for cycles that do not end [us]: how much longer than its watchdog time an
+ * endless loop may run. Each look costs up to 15 us of a virtual machine's processor. (A cycle that ends too late is
+ * found at its end.) */
 #define PORT_WATCHDOG_US 5000
 
 /* Longest sleep of the main loop [ms]: with nothing to do, and while event or freewheeling tasks run in it. */

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "CmpRouterEmbedded.h"
+#include "Sim.h"
 
 typedef struct {
     RTS_UI32 size;
@@ -40,12 +41,18 @@ static RTS_RESULT sim_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI3
 
 static const BLK_DRV driver = {BLK_DRV_TYPE_DIRECT, 1, 1, {0, 1}, NULL, sim_send};
 
+static void receive(void *arg)
+{
+    const BLK_PART *packet = arg;
+
+    RouterHandleData(&driver, packet->data, packet->size);
+}
+
 RTS_RESULT SimLinkSend(const RTS_UI8 *packet, RTS_UI32 size)
 {
-    if (size > BLK_MAX_SIZE)
-        return ERR_NET_MSGSIZE;
-    RouterHandleData(&driver, packet, size);
-    return ERR_OK;
+    BLK_PART part = {packet, size};
+
+    return size > BLK_MAX_SIZE ? ERR_NET_MSGSIZE : SimCall(receive, &part);
 }
 
 RTS_UI32 SimLinkReceive(RTS_UI8 *packet, RTS_UI32 capacity)

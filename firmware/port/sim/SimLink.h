@@ -14,7 +14,8 @@
 /* Answers that wait at most; enough for the largest message. More stay in the runtime until its next CH_COMM_CYCLE. */
 enum { SIM_LINK_PACKETS = 64 };
 
-/* Hands one router packet to the runtime. ERR_NET_MSGSIZE when it is longer than BLK_MAX_SIZE. */
+/* Hands one router packet to the runtime. ERR_NET_MSGSIZE when it is longer than BLK_MAX_SIZE, SIM_POWER_CUT when a
+ * planned power cut hit the runtime while it handled the packet. */
 RTS_RESULT SimLinkSend(const RTS_UI8 *packet, RTS_UI32 size);
 
 /* Takes one packet the runtime sent; returns its size, 0 when there is none. One longer than `capacity` is lost. */

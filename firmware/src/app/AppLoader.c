@@ -78,13 +78,14 @@ static RTS_RESULT check_header(LOADER *l)
 
 static RTS_RESULT check_crc(LOADER *l)
 {
-    CDL_HEADER blank = l->header;
+    RTS_UI32 expected = l->header.crc;
     RTS_UI32 offset = CDL_HEADER_SIZE;
-    RTS_UI8 part[128];
+    RTS_UI8 part[64];
     RTS_UI32 crc;
 
-    blank.crc = 0;
-    crc = CRC32Update(0, &blank, sizeof blank);
+    l->header.crc = 0;
+    crc = CRC32Update(0, &l->header, sizeof l->header);
+    l->header.crc = expected;
     while (offset < l->image->size) {
         RTS_UI32 count = l->image->size - offset < sizeof part ? l->image->size - offset : (RTS_UI32)sizeof part;
         RTS_RESULT result = read_image(l, offset, part, count);
@@ -93,9 +94,9 @@ static RTS_RESULT check_crc(LOADER *l)
         crc = CRC32Update(crc, part, count);
         offset += count;
     }
-    if (crc != l->header.crc)
+    if (crc != expected)
         return refuse(l, ERR_CRC_FAILED, "The image is damaged: its CRC is 0x%x, it should be 0x%x.", U(crc),
-                      U(l->header.crc));
+                      U(expected));
     if (crc != l->image->crc)
         return refuse(l, ERR_CRC_FAILED, "This is another image than announced: its CRC is 0x%x, announced was 0x%x.",
                       U(crc), U(l->image->crc));

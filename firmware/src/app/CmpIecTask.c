@@ -74,6 +74,7 @@ static void guard_begin(GUARD *guard, RTS_I64 now_ns)
     guard->start_ns = now_ns;
     guard->context = SysExceptContext();
     SysAtomicStore(&guard->phase, guard->phase + 1);
+    SysAtomicFence(); /* whoever sees a write of the cycle sees that it runs */
 }
 
 static void guard_end(GUARD *guard)
@@ -101,13 +102,12 @@ RTS_UI32 IecTaskGetActivity(bool *busy)
     RTS_UI32 i;
 
     *busy = false;
-    SysAtomicFence();
+    SysAtomicFence(); /* a copy taken before is complete */
     for (i = 0; i < tasks.count; i++) {
         RTS_UI32 phase = SysAtomicLoad(&tasks.list[i].guard.phase);
         sum += phase;
         *busy = *busy || (phase & 1) != 0;
     }
-    SysAtomicFence();
     return sum;
 }
 

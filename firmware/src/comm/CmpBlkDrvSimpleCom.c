@@ -12,6 +12,7 @@
 
 #include "CmpBytes.h"
 #include "CmpChecksum.h"
+#include "CmpLog.h"
 #include "SysCom.h"
 #include "rts_config.h"
 
@@ -289,7 +290,10 @@ static void open_lines(void)
         line->driver.address[1] = (RTS_UI8)(i + 1); /* the line's number, as the field counts COM ports */
         line->driver.instance = line;
         line->driver.send = com_send;
-        line->open = SysComOpen(i) == ERR_OK;
+        RTS_RESULT result = SysComOpen(i);
+        line->open = result == ERR_OK;
+        if (!line->open)
+            LogAdd(CMPID_CmpBlkDrvSimpleCom, LOG_ERROR, result, "Serial line %u cannot be opened", (unsigned)i);
     }
 }
 

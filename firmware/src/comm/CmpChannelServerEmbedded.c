@@ -151,9 +151,6 @@ static void send_keepalive(void)
 static void forget_channel(void)
 {
     channel.id = 0;
-    rx.active = false;
-    tx.next = tx.last + 1;
-    tx.acked = tx.last;
     SrvEndSession();
 }
 
@@ -229,6 +226,7 @@ static void open_channel(const ROUTER_PEER *peer, const OPEN_REQUEST *request)
     channel.fresh = true;
     rx.block = 0;
     rx.gap = 0;
+    rx.active = false;
     tx.first = 1;
     tx.last = 0;
     tx.next = 1;
@@ -252,7 +250,6 @@ static void handle_open(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 s
     if (!is_repetition(peer, &request))
         open_channel(peer, &request);
     channel.last_received = now_ms;
-    channel.last_sent = now_ms;
     channel.open_due = true;
 }
 

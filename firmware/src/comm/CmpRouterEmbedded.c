@@ -72,19 +72,15 @@ static RTS_UI16 max_packet(RTS_UI8 flags)
 
 static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *payload, RTS_UI32 size)
 {
-    counters.handled++;
-    switch (service) {
-    case ROUTER_SVC_CHANNEL:
+    if (service == ROUTER_SVC_CHANNEL) {
+        counters.handled++;
         ChannelHandlePackage(peer, payload, size, SysTimeGetMs());
-        break;
-    case ROUTER_SVC_NAME_REQUEST:
+    } else if (service == ROUTER_SVC_NAME_REQUEST) {
+        counters.handled++;
         NSHandleRequest(peer, payload, size);
-        break;
-    default:
+    } else {
         /* Address requests are for parents; a notification would make anybody our parent. */
-        counters.handled--;
         counters.ignored++;
-        break;
     }
 }
 

@@ -216,9 +216,9 @@ RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI
     position = log->start + log->used;
     log->used += record_length(size); /* also when it fails: nothing is programmed twice */
     result = write_record(log->file, position, &head, data);
-    if (result == ERR_OK && !data_is_valid(log->file, position, &head))
-        result = ERR_DEVICE;
-    return result;
+    if (data_is_valid(log->file, position, &head))
+        return ERR_OK; /* whatever failed: from now on this record is the newest */
+    return result != ERR_OK ? result : (RTS_RESULT)ERR_DEVICE;
 }
 
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log)

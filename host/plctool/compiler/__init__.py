@@ -1,1 +1,92 @@
-"""The compiler: IEC 61131-3 Structured Text in, an application image and its symbols out."""
+"""The compiler: IEC 61131-3 Structured Text in, an application image and its symbols out.
+
+The parts are imported when they are first needed: `plctool.compiler.types` alone must not cost the start-up of LLVM.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from plctool.errors import UsageError
+
+if TYPE_CHECKING:
+    from plctool.compiler.build import BuildResult
+    from plctool.compiler.diagnostics import Diagnostic
+    from plctool.compiler.front import CheckResult
+    from plctool.compiler.source import Source
+
+DEFAULT_TARGET = "x86_64-linux"
+
+
+class CompileError(UsageError):
+    """The program has errors. The message holds all diagnoses as people read them; `diagnostics` is for machines."""
+
+    def __init__(self, diagnostics: Sequence[Diagnostic], sources: Sequence[Source]) -> None:
+        from plctool.compiler.diagnostics import render
+
+        super().__init__("\n".join(render(d, sources) for d in diagnostics), "compile")
+        self.diagnostics = list(diagnostics)
+
+
+def load_sources(paths: Sequence[Path | str]) -> list[Source]:
+    """The `.st` files named, and all that are in the folders named. Raises UsageError when there is nothing to read."""
+    from plctool.compiler.source import Source
+
+    files: dict[Path, None] = {}
+    for path in map(Path, paths):
+        if path.is_dir():
+            found = sorted(path.rglob("*.st"))
+            if not found:
+                raise UsageError(f"There is no .st file in {path}.", "no-source")
+            files.update(dict.fromkeys(found))
+        else:
+            files[path] = None
+    try:
+        return [Source(str(file), file.read_text("utf-8-sig", errors="replace")) for file in files]
+    except OSError as error:
+        raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
+
+
+def check_sources(paths: Sequence[Path | str]) -> CheckResult:
+    """Every diagnosis of a program, without building it."""
+    from plctool.compiler.front import check_sources
+
+    return check_sources(load_sources(paths))
+
+
+def compile_sources(
+    paths: Sequence[Path | str],
+    *,
+    target: str = DEFAULT_TARGET,
+    level: int = 2,
+    checks: str = "all",
+    debug: bool = False,
+) -> BuildResult:
+    """Compiles a program. `level`: optimisation 0..3; `checks`: all, none, or names of run-time checks.
+
+    Raises CompileError when the program has errors, UsageError for options that make no sense.
+    """
+    from plctool.compiler.build import build_program
+    from plctool.compiler.diagnostics import render
+    from plctool.compiler.front import check_sources
+    from plctool.compiler.lower_unit import Options, parse_checks
+    from plctool.compiler.targets import find_target
+    from plctool.image import ApplicationInfo
+
+    options = Options(find_target(target), level, parse_checks(checks), debug)
+    sources = load_sources(paths)
+    checked = check_sources(sources)
+    if checked.program is None:
+        raise CompileError(checked.diagnostics, sources)
+    warnings = checked.diagnostics
+    # No time of build: the same sources give the same image, so that its symbols are found again anywhere.
+    info = ApplicationInfo(project=Path(paths[0]).stem, date=int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
+    return replace(
+        build_program(checked.program, options, info),
+        warnings=warnings,
+        rendered_warnings=[render(d, sources) for d in warnings],
+    )

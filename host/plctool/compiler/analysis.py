@@ -34,8 +34,8 @@ from plctool.compiler.typed import (
 )  # fmt: skip
 
 _NODES = (
-    VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, Load, Unary, Binary, Convert, IntrinsicCall, AddressOf,
-    Call, Assign, CallStatement, FbCall, If, Case, For, While, Repeat,
+    VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, Load, Unary, Binary, Convert, IntrinsicCall,
+    AddressOf, Call, Assign, CallStatement, FbCall, If, Case, For, While, Repeat,
 )  # fmt: skip
 
 

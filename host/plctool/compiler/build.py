@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from bisect import bisect_right
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.emit import emit_object
@@ -14,8 +14,10 @@ from plctool.compiler.lower_unit import Options
 from plctool.compiler.targets import Machine, Target
 from plctool.compiler.typed import Area, Task, TypedProgram
 from plctool.core import lib
+from plctool.files import write_atomically
+from plctool.files import write_atomically
 from plctool.image import ApplicationInfo, ExternalFunction, Image, ImageTask, build_image
-from plctool.symbols import CodeUnit, Symbol, SymbolTable, layout_signature
+from plctool.symbols import CodeUnit, Symbol, SymbolTable, layout_signature, symbol_path, symbol_path
 
 
 @dataclass(frozen=True)
@@ -24,12 +26,23 @@ class BuildResult:
 
     image: bytes
     symbols: SymbolTable
-    warnings: list[Diagnostic] = field(default_factory=list)
     sizes: dict[str, int] = field(default_factory=dict)
+    warnings: list[Diagnostic] = field(default_factory=list)
+    rendered_warnings: list[str] = field(default_factory=list)
 
     @property
     def crc(self) -> int:
         return self.symbols.image_crc
+
+    def write(self, path: Path) -> None:
+        """Writes the image to `path` and the symbol file beside it. Raises UsageError when that is not possible."""
+        self.symbols.save(symbol_path(path))
+        write_atomically(path, self.image)
+
+    def write(self, path: Path) -> None:
+        """Writes the image and, beside it, its symbols; each file appears complete or not at all."""
+        self.symbols.save(symbol_path(path))
+        write_atomically(path, self.image)
 
 
 def build_program(program: TypedProgram, options: Options, info: ApplicationInfo | None = None) -> BuildResult:
@@ -38,7 +51,7 @@ def build_program(program: TypedProgram, options: Options, info: ApplicationInfo
     lowered = lower(program, options)
     data = emit_object(lowered.text, target, options.opt_level)
     linked = link(data, target, [*lowered.tasks, GLOBAL_INIT], len(lowered.imports))
-    info = info or ApplicationInfo(date=int(time.time()))
+    info = info or ApplicationInfo()
     symbols = _symbols(program, lowered, linked, target, info.project)
     retained = [s for s in symbols.variables.values() if s.area == Area.RETAIN.value]
     image = Image(
@@ -58,7 +71,7 @@ def build_program(program: TypedProgram, options: Options, info: ApplicationInfo
     )
     built = build_image(image)
     symbols.image_crc = int.from_bytes(built[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
-    return BuildResult(built, symbols, [], code_sizes(symbols, len(linked.code)))
+    return BuildResult(built, symbols, code_sizes(symbols, len(linked.code)))
 
 
 def _entry(linked: Linked, name: str, target: Target) -> int:
@@ -81,7 +94,7 @@ def _task(task: Task, entry: int) -> ImageTask:
 
 
 def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, project: str) -> SymbolTable:
-    variables = {v.name: Symbol(v.name, v.area.value, v.offset, v.type) for v in program.globals}
+    variables = {v.name: Symbol(v.name, v.area.value, v.offset, v.type, v.bit) for v in program.globals}
     units = []
     for name, pou in lowered.pous.items():
         symbol = linked.symbols.get(name)

@@ -28,7 +28,18 @@ from plctool.compiler.conversions import (
 )  # fmt: skip
 from plctool.compiler.expressions import Expressions, is_untyped
 from plctool.compiler.symbols import ERROR, UNTYPED_INT, PouSymbol, TypeSymbol
-from plctool.compiler.typed import BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, Load, UnaryOp, ValuePlace
+from plctool.compiler.typed import (
+    Binary,
+    BinaryOp,
+    Const,
+    DerefPlace,
+    Expr,
+    Intrinsic,
+    IntrinsicCall,
+    Load,
+    UnaryOp,
+    ValuePlace,
+)
 from plctool.compiler.types import (
     BOOL,
     DINT,
@@ -42,6 +53,7 @@ from plctool.compiler.types import (
     Elementary,
     EnumType,
     Kind,
+    ReferenceType,
     StringType,
     SubrangeType,
     Type,
@@ -66,7 +78,7 @@ class Builtins(Expressions):
 
     def built_in(self, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
         """The call of a built-in function; None when there is none of that name."""
-        if name in ("SIZEOF", "ADR", "REF"):
+        if name in ("SIZEOF", "ADR", "REF", "__ISVALIDREF"):
             return self._of_variable(name, node)
         handler = self._functions.get(name)
         if handler is not None:
@@ -160,6 +172,8 @@ class Builtins(Expressions):
 
     def _intrinsic(self, intrinsic: Intrinsic, args: list[Expr], t: Type, node: ast.Call) -> Expr:
         pos = self.pos(node.pos)
+        if any(a.type is ERROR for a in args):
+            return error_value(pos)
         if all(isinstance(a, Const) for a in args):
             value = fold(intrinsic, [a.value for a in args if isinstance(a, Const)], t)
             if value is not None:
@@ -194,6 +208,8 @@ class Builtins(Expressions):
         if not self._count(name, args, node, 2, 2):
             return error_value(self.pos(node.pos))
         value = self._untyped_bits(args[0], expected) if is_untyped(args[0]) else args[0]
+        if value.type is ERROR:
+            return value
         base = elementary(value.type)
         if base is None or base.kind not in NUMBERS:
             return self.error(node.pos, "type", f"{name} needs a bit string, not {value.type}")
@@ -296,6 +312,8 @@ class Builtins(Expressions):
         if len(node.args) != 1 or node.args[0].value is None:
             return self.error(node.pos, "arguments", f"{name} takes 1 argument, not {len(node.args)}")
         argument = node.args[0].value
+        if name == "__ISVALIDREF":
+            return self._is_valid(argument)
         if name != "SIZEOF":
             return self.address_of(argument)
         if isinstance(argument, ast.Name):
@@ -306,6 +324,14 @@ class Builtins(Expressions):
                 return error_value(self.pos(node.pos)) if t is ERROR else self._size(t, node)
         e = settle(self.expr(argument))
         return e if e.type is ERROR else self._size(e.type, node)
+
+    def _is_valid(self, node: ast.Expr) -> Expr:
+        """Whether a reference refers to something."""
+        e, pos = self.expr(node), self.pos(node.pos)
+        pointer = e.place.pointer if isinstance(e, Load) and isinstance(e.place, DerefPlace) else None
+        if pointer is None or not isinstance(pointer.type, ReferenceType):
+            return e if e.type is ERROR else self.error(node.pos, "type", f"{e.type} is not a REFERENCE TO")
+        return Binary(BinaryOp.NE, pointer, Const(0, pointer.type, pos), BOOL, pos)
 
     def _size(self, t: Type, node: ast.Call) -> Expr:
         return Const(t.size, UNTYPED_INT, self.pos(node.pos))

@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from plctool.compiler import ast
 from plctool.compiler.builtin import Builtins
@@ -19,8 +19,10 @@ from plctool.compiler.typed import (
     BitPlace,
     Call,
     Const,
+    DerefPlace,
     Direction,
     Expr,
+    Load,
     Parameter,
     Place,
     ScalarInit,
@@ -30,6 +32,7 @@ from plctool.compiler.types import (
     LREAL,
     REAL,
     PointerType,
+    ReferenceType,
     StringType,
     StructType,
     SubrangeType,
@@ -58,10 +61,12 @@ class Calls(Builtins):
             return self._call_of_place(node)
         name = callee.name
         symbol = self.scope.lookup(name)
-        if isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT:
+        if isinstance(symbol, GlobalSymbol):
+            symbol = self.world.declarations.global_variable(symbol)
+        if isinstance(symbol, VarSymbol):
+            if symbol.type in self.world.blocks or symbol.type is ERROR:
+                return self._call_of_place(node)
             symbol = self.world.lookup(name.casefold(), library=self.scope.library)
-        if isinstance(symbol, GlobalSymbol | VarSymbol):
-            return self._call_of_place(node)
         if (
             isinstance(symbol, PouSymbol)
             and symbol.keyword == "FUNCTION"
@@ -246,13 +251,26 @@ class Calls(Builtins):
                 return None
             if direction is not Direction.INPUT:
                 return self.reference(actual.value, t, symbol.name, output=direction is Direction.OUTPUT)
-            e = self.coerce(self.expr(actual.value, t), t)
+            e = self.input(actual.value, t, symbol.name)
         else:
             assert actual is not None
             e = self.coerce(actual, t)
         if e.type is ERROR:
             return None
         return place_of(e) if parameter.by_reference else e
+
+    def input(self, node: ast.Expr, t: Type, name: str) -> Expr:
+        """The value of an input; a REFERENCE TO gets the address."""
+        if not isinstance(t, ReferenceType):
+            return self.coerce(self.expr(node, t), t)
+        place = self.reference(node, t.target, name, output=False)
+        return error_value(self.pos(node.pos)) if place is None else self.refer(place, t)
+
+    def refer(self, place: Place, t: ReferenceType) -> Expr:
+        """What a reference to a place holds."""
+        if isinstance(place, DerefPlace) and isinstance(place.pointer, Load):
+            return replace(place.pointer, type=t)
+        return AddressOf(place, t, place.pos)
 
     def reference(self, node: ast.Expr, t: Type, name: str, *, output: bool) -> Place | None:
         """A variable handed over by reference. Strings may have any length."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from plctool.compiler import ast, constants
 from plctool.compiler.conversions import elementary
 from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.expressions import Expressions, is_untyped
+from plctool.compiler.expressions import Expressions, NestingError, is_untyped
 from plctool.compiler.generics import GENERIC
 from plctool.compiler.scope import Scope
 from plctool.compiler.symbols import ERROR, GlobalSymbol, PouSymbol, Role, TypeSymbol, VarSymbol
@@ -39,6 +39,7 @@ from plctool.compiler.types import (
     Field,
     Kind,
     PointerType,
+    ReferenceType,
     StringType,
     StructType,
     SubrangeType,
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
 
 MAX_SIZE = 0x7FFF_FFFF  # of an area; offsets are signed 32-bit numbers on the targets
 MAX_STRING = 0xFFFF
+MAX_TYPE_DEPTH = 50  # levels of arrays of structs of arrays ...
 MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
 _ADDRESS = re.compile(r"%([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?")
 _AREAS = {"I": Area.INPUT, "Q": Area.OUTPUT, "M": Area.MEMORY}
@@ -85,17 +87,30 @@ class Declarations:
 
     def __init__(self, world: World) -> None:
         self.world = world
+        self._depth = 0
         self._direct: dict[str, VarSymbol] = {}
 
     # ---- types ----
 
     def type_of(self, spec: ast.TypeSpec, scope: Scope, name: str | None = None) -> tuple[Type, Initial | None]:
         """The type, and what variables of it start with. `name`: of the declared type, if it is one."""
+        self._depth += 1
+        if self._depth > MAX_TYPE_DEPTH:
+            raise NestingError(scope.pos(spec.pos))
+        try:
+            return self._type_of(spec, scope, name)
+        finally:
+            self._depth -= 1
+
+    def _type_of(self, spec: ast.TypeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
         if isinstance(spec, ast.NamedType):
             return self._named(spec, scope)
         if isinstance(spec, ast.ArraySpec):
             return self._array(spec, scope)
         if isinstance(spec, ast.EnumSpec):
+            if (spec.base or "").upper() == "STRING" and len(spec.values) == 1:  # STRING(LENGTH)
+                offset, length, _ = spec.values[0]
+                return self._string(ast.Name(offset, length), scope), None
             return self._enum(spec, scope, name)
         if isinstance(spec, ast.SubrangeSpec):
             return self._subrange(spec, scope, name)
@@ -249,11 +264,10 @@ class Declarations:
         return t, ScalarInit(low) if low else None
 
     def _pointer(self, spec: ast.PointerSpec, scope: Scope) -> Type:
-        if spec.keyword == "REFERENCE":
-            scope.error(spec.pos, "unsupported", "REFERENCE TO is not supported yet; use REF_TO and ^")
-            return ERROR
         target, _ = self.type_of(spec.target, scope)
-        return ERROR if target is ERROR else PointerType(target)
+        if target is ERROR:
+            return ERROR
+        return ReferenceType(target) if spec.keyword == "REFERENCE" else PointerType(target)
 
     def _struct(self, spec: ast.StructSpec, scope: Scope, name: str) -> tuple[Type, Initial | None]:
         if spec.union:
@@ -297,8 +311,6 @@ class Declarations:
             if isinstance(symbol, PouSymbol | TypeSymbol) and init is None:  # t : TON(PT := T#1s)
                 members = [(offset, name, value) for offset, name, value in spec.values if value is not None]
                 init, spec = ast.StructInit(spec.pos, members), ast.NamedType(spec.pos, base)
-            elif base.upper() == "STRING" and len(spec.values) == 1:  # STRING(LENGTH)
-                spec = ast.NamedType(spec.pos, base, ast.Name(spec.values[0][0], spec.values[0][1]))
         t, default = self.type_of(spec, scope)
         if init is None or t is ERROR:
             return t, default

@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Literal
@@ -16,6 +16,7 @@ from plctool.compiler.typed import Pos
 Severity = Literal["error", "warning"]
 
 MAX_ERRORS = 20  # what follows is seldom news
+MAX_MESSAGE = 300  # characters; names may be of any length
 
 
 @dataclass(frozen=True)
@@ -45,19 +46,26 @@ class Diagnostics:
 
     def error(self, pos: Pos, code: str, message: str) -> None:
         """Records an error; raises TooManyErrors when it is one too many."""
-        self._add(Diagnostic(pos.file, pos.line, pos.column, "error", code, message))
+        self._add(pos, "error", code, message)
 
     def warning(self, pos: Pos, code: str, message: str) -> None:
         """Records a warning."""
         if pos.file in self._quiet:
             return
-        self._add(Diagnostic(pos.file, pos.line, pos.column, "warning", code, message))
+        self._add(pos, "warning", code, message)
 
-    def _add(self, diagnostic: Diagnostic) -> None:
+    def at(self, source: Source) -> Callable[[int, str, str], None]:
+        """Reports errors by their offset in a source."""
+        return lambda offset, code, message: self.error(source.pos(offset), code, message)
+
+    def _add(self, pos: Pos, severity: Severity, code: str, message: str) -> None:
+        if len(message) > MAX_MESSAGE:
+            message = message[: MAX_MESSAGE - 3] + "..."
+        diagnostic = Diagnostic(pos.file, pos.line, pos.column, severity, code, message)
         if diagnostic in self._found:
             return
         self._found[diagnostic] = None
-        if diagnostic.severity == "error":
+        if severity == "error":
             self.errors += 1
             if self.errors >= MAX_ERRORS:
                 raise TooManyErrors

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 from plctool.compiler import ast, constants
 from plctool.compiler.conversions import (
     BITS,
+    NS_PER_MS,
     NUMBERS,
     SIGNED,
     common_number,
@@ -57,16 +58,20 @@ from plctool.compiler.types import (
     BOOL,
     BYTE,
     DINT,
+    DWORD,
     ELEMENTARY,
     LREAL,
     LTIME,
+    LWORD,
     REAL,
     TIME,
+    WORD,
     ArrayType,
     Elementary,
     EnumType,
     Kind,
     PointerType,
+    ReferenceType,
     StringType,
     StructType,
     Type,
@@ -79,6 +84,7 @@ _OPERATORS = {op.value: op for op in BinaryOp}
 _COMPARISONS = {BinaryOp.EQ, BinaryOp.NE, BinaryOp.LT, BinaryOp.LE, BinaryOp.GT, BinaryOp.GE}
 _LOGIC = {BinaryOp.AND, BinaryOp.OR, BinaryOp.XOR}
 _LAZY = {BinaryOp.AND_THEN, BinaryOp.OR_ELSE}
+_PARTS = {"B": BYTE, "W": WORD, "D": DWORD, "L": LWORD}
 _UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
 
 
@@ -187,7 +193,9 @@ class Expressions:
         assert isinstance(node.value, int)
         target, value = LTIME, node.value
         if node.type_name == "TIME":
-            target, value = TIME, constants.divide(value, 1_000_000)
+            target, value = TIME, constants.divide(value, NS_PER_MS)
+            if value * NS_PER_MS != node.value:
+                self.scope.warning(node.pos, "precision", "TIME counts milliseconds; write LTIME#... for less")
         if not constants.fits(value, target):
             return self.error(node.pos, "range", f"this duration is too long for {target}")
         return Const(value, target, pos)
@@ -232,7 +240,7 @@ class Expressions:
             return error_value(pos)
         if variable.bit is not None:
             return Load(BitPlace(VarPlace(variable, BYTE, pos), variable.bit, BOOL, pos), BOOL, pos)
-        return Load(VarPlace(variable, symbol.type, pos), symbol.type, pos)
+        return load(VarPlace(variable, symbol.type, pos))
 
     def _enum_value(self, node: ast.EnumValue, expected: Type | None) -> Expr:
         t = self.world.declarations.named_type(node.pos, node.type_name, self.scope)
@@ -312,34 +320,43 @@ class Expressions:
         t = elementary(base.type)
         if base.type is ERROR:
             return base
-        if node.width != "X":
-            return self.error(
-                node.pos, "unsupported", f"%{node.width} parts are not supported yet; use bits, SHR and AND"
-            )
         if t is None or t.kind not in NUMBERS or is_untyped(base):
             return self.error(node.pos, "type", f"{base.type} has no bits")
+        if node.width != "X":
+            return self._part(base, t, node)
         if node.index >= t.bits:
             return self.error(node.pos, "range", f"{base.type} has the bits 0..{t.bits - 1}")
         if isinstance(base, Const) and isinstance(base.value, int):
             return Const(base.value >> node.index & 1, BOOL, self.pos(node.pos))
         return load(BitPlace(place_of(base), node.index, BOOL, self.pos(node.pos)))
 
+    def _part(self, base: Expr, t: Elementary, node: ast.BitAccess) -> Expr:
+        """`base.%B1`: a byte, word ... of a larger number."""
+        part = _PARTS[node.width]
+        if part.bits >= t.bits or (node.index + 1) * part.bits > t.bits:
+            return self.error(node.pos, "range", f"{base.type} has no part %{node.width}{node.index}")
+        if isinstance(base, Const) and isinstance(base.value, int):
+            return convert(Const(base.value >> node.index * part.bits, t, base.pos), part)
+        return load(MemberPlace(place_of(base), node.index * part.size, part, self.pos(node.pos)))
+
     def _index(self, node: ast.Index, expected: Type | None) -> Expr:
+        self._deeper(node.pos)
         base = self.expr(node.base)
         indices = node.indices
         while indices and base.type is not ERROR:
             t = base.type
             if isinstance(t, StringType):
                 base, indices = self._character(base, indices), []
-            elif isinstance(t, ArrayType):
-                count = len(t.bounds)
-                if len(indices) < count:
-                    return self.error(node.pos, "type", f"{t} needs {count} indices, not {len(indices)}")
-                base, indices = self._element(base, t, indices[:count], node.pos), indices[count:]
-            elif base is not None and len(indices) < len(node.indices):
-                return self.error(node.pos, "type", f"there are {len(indices)} indices too many")
-            else:
-                return self.error(node.pos, "type", f"{t} is not an array")
+                continue
+            if not isinstance(t, ArrayType):
+                more = len(indices) < len(node.indices)
+                message = f"there are {len(indices)} indices too many" if more else f"{t} is not an array"
+                return self.error(node.pos, "type", message)
+            count = len(t.bounds)
+            if len(indices) < count:
+                return self.error(node.pos, "type", f"{t} needs {count} indices, not {len(indices)}")
+            base, indices = self._element(base, t, indices[:count], node.pos), indices[count:]
+        self._depth -= 1
         return base
 
     def _element(self, base: Expr, t: ArrayType, nodes: list[ast.Expr], offset: int) -> Expr:
@@ -408,6 +425,8 @@ class Expressions:
 
     def _fold_unary(self, op: UnaryOp, e: Expr, offset: int) -> Expr:
         pos = self.pos(offset)
+        if e.type is ERROR:
+            return e
         if isinstance(e, Const):
             fold = constants.negate if op is UnaryOp.NEG else constants.invert
             return Const(fold(e.value, e.type), e.type, pos)
@@ -427,7 +446,7 @@ class Expressions:
     def _deeper(self, offset: int) -> None:
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise NestingError(offset)
+            raise NestingError(self.pos(offset))
 
     def operate(self, op: BinaryOp, left: Expr, right: Expr, offset: int, expected: Type | None = None) -> Expr:
         """`left op right` with implicit conversions, folded when both are constant."""
@@ -615,15 +634,17 @@ class Expressions:
 
 
 class NestingError(Exception):
-    """Something is nested too deeply; the argument is the offset."""
+    """Something at `pos` is nested too deeply."""
 
-    def __init__(self, offset: int) -> None:
-        super().__init__(offset)
-        self.offset = offset
+    def __init__(self, pos: Pos) -> None:
+        super().__init__(pos)
+        self.pos = pos
 
 
 def load(place: Place) -> Load:
-    """The value of a place."""
+    """The value of a place; of a reference, the value it refers to."""
+    if isinstance(place.type, ReferenceType):
+        place = DerefPlace(Load(place, place.type, place.pos), place.type.target, place.pos)
     return Load(place, place.type, place.pos)
 
 

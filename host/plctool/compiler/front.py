@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from plctool.compiler import ast
 from plctool.compiler.configuration import configure
-from plctool.compiler.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
+from plctool.compiler.diagnostics import Diagnostic, TooManyErrors, render
+from plctool.compiler.expressions import NestingError
 from plctool.compiler.library import Library, standard_library
 from plctool.compiler.parser import parse
 from plctool.compiler.source import Source
@@ -49,16 +49,27 @@ def check_sources(
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     world = World(chosen)
     with _limits():
-        try:
-            program = _check(world, sources)
-        except TooManyErrors:
-            program = None
+        program = _guarded(world, sources)
     diagnostics = world.diagnostics
     return CheckResult(None if diagnostics.errors else program, diagnostics.sorted())
 
 
+def _guarded(world: World, sources: Sequence[Source]) -> TypedProgram | None:
+    """The check, with an end to errors and to nesting."""
+    try:
+        try:
+            return _check(world, sources)
+        except NestingError as error:
+            world.nested_too_deeply(error)
+        except RecursionError:
+            world.diagnostics.error(sources[0].pos(0), "nesting", "something in the program is nested too deeply")
+    except TooManyErrors:
+        pass
+    return None
+
+
 def _check(world: World, sources: Sequence[Source]) -> TypedProgram | None:
-    parsed = [(source, _parse(source, world.diagnostics)) for source in sources]
+    parsed = [(source, parse(source, world.diagnostics.at(source))) for source in sources]
     if world.diagnostics.errors:
         return None
     for source, declarations in parsed:
@@ -80,10 +91,6 @@ def _check(world: World, sources: Sequence[Source]) -> TypedProgram | None:
         programs=application.programs,
         aliases=world.aliases(),
     )
-
-
-def _parse(source: Source, diagnostics: Diagnostics) -> list[ast.Declaration]:
-    return parse(source, lambda offset, code, message: diagnostics.error(source.pos(offset), code, message))
 
 
 def _check_sizes(world: World, sources: Sequence[Source]) -> None:

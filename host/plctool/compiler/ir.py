@@ -1,7 +1,7 @@
 """A small builder of LLVM IR in text form: fast to write, and every attribute and metadata node is ours to choose.
 
-Blocks are written in the order in which they are begun. Instructions after a terminator go to a fresh block that nothing
-reaches, so the lowering never has to ask whether code is dead; LLVM removes it.
+Blocks are written in the order in which they are begun. Instructions after a terminator go to a fresh block that
+nothing reaches, so the lowering never has to ask whether code is dead; LLVM removes it.
 """
 
 from __future__ import annotations

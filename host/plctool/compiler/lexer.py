@@ -114,10 +114,11 @@ class Lexer:
                     self._pragma(word)
                     continue
                 elif kind == "BAD":
-                    if not self._bad(word, pos):
-                        at = self._end_of_line(pos)
-                        break
-                    continue
+                    if self._bad(word, pos):
+                        continue
+                    at = self._end_of_line(pos)
+                    yield Token("STRING", "''", pos)
+                    break
                 else:
                     token = Token({"END": "$END", "DATE": "TYPED"}.get(kind, kind), word, pos)
                 if self._pending:
@@ -149,7 +150,7 @@ class Lexer:
             return False
         if character == "{":
             self._report(pos, "pragma", "this pragma is not closed")
-            return False
+            return True
         shown = character if character.isprintable() else f"character {ord(character)}"
         self._report(pos, "character", f"{shown} has no place in a program")
         return True

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from plctool.compiler import ast
-from plctool.compiler.lexer import Report
+from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.parser import parse
 from plctool.compiler.source import Source
 
@@ -70,10 +70,10 @@ class Library:
         """Everything there is, for suggestions."""
         return [e.name for e in self._entries.values() if "__" not in e.name] + [k.upper() for k in self._overloads]
 
-    def parse(self, key: str, report: Report) -> list[ast.Declaration]:
+    def parse(self, key: str, diagnostics: Diagnostics) -> list[ast.Declaration]:
         """The declarations of the unit that defines the name; none when there is no such unit."""
         entry = self._entries.get(key)
-        return parse(entry.source, report, entry.start, entry.end) if entry else []
+        return parse(entry.source, diagnostics.at(entry.source), entry.start, entry.end) if entry else []
 
 
 @cache

@@ -365,6 +365,7 @@ class Expressions(Strings):
         arguments = [] if pou.external else ["ptr %ctx"]
         if result is not None:
             arguments.append(f"ptr {self.address(result)}")
+            arguments += [f"i32 {self._result_capacity(pou, result)}"] if pou.cuts_result else []
         for parameter, argument in zip(pou.parameters, e.args, strict=True):
             operands = self._argument(pou, parameter, argument, write_back)
             types = parameter_types(pou, parameter)
@@ -373,6 +374,14 @@ class Expressions(Strings):
         for temporary, place in write_back:
             self.store(place, self.load(temporary))
         return value
+
+    def _result_capacity(self, pou: Pou, result: Ref) -> str:
+        """How much of a string result there is room for: at most what the function declares."""
+        assert pou.result is not None
+        declared = string_capacity(pou.result.type)
+        if result.capacity.isdigit():
+            return str(min(int(declared), int(result.capacity)))
+        return self.fn.value(f"call i32 @llvm.umin.i32(i32 {declared}, i32 {result.capacity})")
 
     def _call_instruction(self, pou: Pou, arguments: list[str]) -> str:
         unit, fn = self.unit, self.fn

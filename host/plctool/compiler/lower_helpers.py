@@ -1,8 +1,8 @@
 """Functions in LLVM IR that every image may need: string loops, and the memory functions LLVM calls by name.
 
-PTR stands for the integer type of an address, START for the index at which a byte loop takes over from the 16-byte loop in
-front of it (0 when the target has none). No loop leaves the capacity; bytes behind a NUL are frozen, as they may never have
-been written.
+PTR stands for the integer type of an address, START for the index at which a byte loop takes over from the 16-byte loop
+in front of it (0 when the target has none). No loop leaves the capacity; bytes behind a NUL are frozen, as they may
+never have been written.
 """
 
 from __future__ import annotations
@@ -279,15 +279,146 @@ def string_helper(name: str, target: Target, attributes: str) -> str:
         body = body.replace("WIDE  br label %loop\n", wide).replace("START", start)
     else:
         body = body.replace("WIDE", "").replace("START", "0, %entry")
-    return _finish(body, target, attributes)
+    return finish(body, target, attributes)
 
 
 def memory_functions(target: Target, attributes: str) -> str:
     """memcpy, memset and memmove, each in a section of its own so that the linker takes only what is called."""
     word = 16 if target.vectors else target.pointer_size if target.unaligned else 1
-    return _finish(_MEMORY.replace("VECTOR", f"<{word} x i8>").replace("WORD", str(word)), target, attributes)
+    return finish(_MEMORY.replace("VECTOR", f"<{word} x i8>").replace("WORD", str(word)), target, attributes)
 
 
-def _finish(body: str, target: Target, attributes: str) -> str:
+def finish(body: str, target: Target, attributes: str) -> str:
     body = body.replace("PTR", f"i{8 * target.pointer_size}").replace("ATTRIBUTES", attributes)
     return re.sub(r"= zext i32 (\S+) to i32", r"= add i32 \1, 0", body)  # there is no cast to the same type
+
+
+# ---- the two loops all string functions of the standard library are made of -----------------------------------------
+
+_WIDE_SPAN = """define internal i32 @NAME(PARAMETERS) ATTRIBUTES {
+entry:
+  %left = sub i32 %p0.capacity, %p1
+  %count = call i32 @llvm.umin.i32(i32 %p2, i32 %left)
+  %stop = add i32 %p1, %count
+  %room = add i32 %left, 1
+  %chunks = and i32 %room, -16
+  %from = zext i32 %p1 to PTR
+  %base = getelementptr i8, ptr %p0, PTR %from
+  br label %wide
+wide:
+  %w = phi i32 [ 0, %entry ], [ %w.next, %skip ]
+  %enough = icmp uge i32 %w, %count
+  br i1 %enough, label %full, label %more
+full:
+  ret i32 %stop
+more:
+  %end = icmp eq i32 %w, %chunks
+  br i1 %end, label %loop, label %chunk
+chunk:
+  %x = zext i32 %w to PTR
+  %a = getelementptr i8, ptr %base, PTR %x
+  %l = load <16 x i8>, ptr %a, align 1
+  %v = freeze <16 x i8> %l
+  %m = icmp eq <16 x i8> %v, zeroinitializer
+  %b = bitcast <16 x i1> %m to i16
+  %any = icmp ne i16 %b, 0
+  br i1 %any, label %found, label %skip
+found:
+  %k = call i16 @llvm.cttz.i16(i16 %b, i1 true)
+  %k.wide = zext i16 %k to i32
+  %at = add i32 %w, %k.wide
+  %n = call i32 @llvm.umin.i32(i32 %at, i32 %count)
+  %r = add i32 %p1, %n
+  ret i32 %r
+skip:
+  %w.next = add i32 %w, 16
+  br label %wide
+loop:
+  %i = phi i32 [ %w, %more ], [ %i.next, %next ]
+  %inside = icmp ult i32 %i, %count
+  br i1 %inside, label %test, label %done
+test:
+  %ix = zext i32 %i to PTR
+  %p = getelementptr i8, ptr %base, PTR %ix
+  %c.l = load i8, ptr %p, align 1
+  %c = freeze i8 %c.l
+  %z = icmp eq i8 %c, 0
+  br i1 %z, label %done, label %next
+next:
+  %i.next = add i32 %i, 1
+  br label %loop
+done:
+  %q = add i32 %p1, %i
+  ret i32 %q
+}
+"""
+
+_WIDE_PART = """define internal i32 @NAME(PARAMETERS) ATTRIBUTES {
+entry:
+  %to.left = sub i32 %p0.capacity, %p1
+  %from.left = sub i32 %p2.capacity, %p3
+  %left = call i32 @llvm.umin.i32(i32 %to.left, i32 %from.left)
+  %count = call i32 @llvm.umin.i32(i32 %p4, i32 %left)
+  %room = add i32 %left, 1
+  %chunks = and i32 %room, -16
+  %to.x = zext i32 %p1 to PTR
+  %to = getelementptr i8, ptr %p0, PTR %to.x
+  %from.x = zext i32 %p3 to PTR
+  %from = getelementptr i8, ptr %p2, PTR %from.x
+  br label %wide
+wide:
+  %w = phi i32 [ 0, %entry ], [ %w.next, %skip ]
+  %end = icmp eq i32 %w, %chunks
+  br i1 %end, label %loop, label %chunk
+chunk:
+  %x = zext i32 %w to PTR
+  %a = getelementptr i8, ptr %from, PTR %x
+  %l = load <16 x i8>, ptr %a, align 1
+  %v = freeze <16 x i8> %l
+  %d = getelementptr i8, ptr %to, PTR %x
+  store <16 x i8> %v, ptr %d, align 1
+  %m = icmp eq <16 x i8> %v, zeroinitializer
+  %b = bitcast <16 x i1> %m to i16
+  %b.wide = zext i16 %b to i32
+  %b.end = or i32 %b.wide, 65536
+  %k = call i32 @llvm.cttz.i32(i32 %b.end, i1 true)
+  %at = add i32 %w, %k
+  %w.next = add i32 %w, 16
+  %n = call i32 @llvm.umin.i32(i32 %at, i32 %count)
+  %on = icmp uge i32 %n, %w.next
+  br i1 %on, label %skip, label %done
+skip:
+  br label %wide
+loop:
+  %i = phi i32 [ %w, %wide ], [ %i.next, %next ]
+  %inside = icmp ult i32 %i, %count
+  br i1 %inside, label %test, label %done
+test:
+  %ix = zext i32 %i to PTR
+  %p = getelementptr i8, ptr %from, PTR %ix
+  %c.l = load i8, ptr %p, align 1
+  %c = freeze i8 %c.l
+  %z = icmp eq i8 %c, 0
+  br i1 %z, label %done, label %next
+next:
+  %dp = getelementptr i8, ptr %to, PTR %ix
+  store i8 %c, ptr %dp, align 1
+  %i.next = add i32 %i, 1
+  br label %loop
+done:
+  %length = phi i32 [ %n, %chunk ], [ %i, %loop ], [ %i, %test ]
+  %length.x = zext i32 %length to PTR
+  %last = getelementptr i8, ptr %to, PTR %length.x
+  store i8 0, ptr %last, align 1
+  %r = add i32 %p1, %length
+  ret i32 %r
+}
+"""
+
+_LIBRARY = {"SPAN__": _WIDE_SPAN, "COPY__": _WIDE_PART}
+
+
+def library_function(name: str, target: Target) -> str | None:
+    """A faster body for a function of stdlib/strings.st with the same meaning, or None: NAME, PARAMETERS and ATTRIBUTES
+    are to be replaced."""
+    return _LIBRARY.get(name) if target.vectors else None

@@ -1,7 +1,8 @@
 """Initial values: of local variables at every call, of everything else in GlobalInit.
 
-Memory is zeroed before, so only what is not zero is written. A struct or function block type with defaults gets one function
-that writes them; arrays are filled by loops; runs of different numbers are copied from a constant in the image.
+Memory is zeroed before, so only what is not zero is written. A struct or function block type with defaults gets one
+function that writes them; arrays are filled by loops; runs of different numbers are copied from a constant in the
+image.
 """
 
 from __future__ import annotations

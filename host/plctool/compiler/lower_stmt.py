@@ -103,7 +103,9 @@ class Body(Initialising):
 
     def _may_write_directly(self, target: Place, call: Call) -> bool:
         """Whether the callee may build its result in the target: it fits, and nobody sees it half done."""
-        if call.function.external or target.type != call.type or not self.effects.is_local(call.function):
+        pou = call.function
+        fits = target.type == call.type or (pou.cuts_result and isinstance(target.type, StringType))
+        if pou.external or not fits or not self.effects.is_local(pou):
             return False
         root = root_of(target)
         return root is not None and all(
@@ -269,9 +271,8 @@ class Body(Initialising):
         if pou.kind is PouKind.FUNCTION:
             self._take_parameters(pou)
         if pou.result is not None and result_in_memory(pou):
-            self.locals[pou.result] = Ref(
-                "%result", 0, pou.result.type, direct=True, capacity=string_capacity(pou.result.type)
-            )
+            capacity = "%result.capacity" if pou.cuts_result else string_capacity(pou.result.type)
+            self.locals[pou.result] = Ref("%result", 0, pou.result.type, direct=True, capacity=capacity)
         for var in pou.locals:
             if var not in self.locals:
                 self.locals[var] = self._stack_memory(var)
@@ -316,6 +317,7 @@ def parameter_list(pou: Pou) -> str:
         words.append("ptr nonnull %self")
     if result_in_memory(pou):
         words.append("ptr noalias nonnull %result")
+        words += ["i32 %result.capacity"] if pou.cuts_result else []
     if pou.kind is PouKind.FUNCTION:
         for number, parameter in enumerate(pou.parameters):
             names = (f"%p{number}", f"%p{number}.capacity")

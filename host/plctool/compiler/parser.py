@@ -1,442 +1,137 @@
-"""From tokens to the syntax tree: lark's LALR tables, a tree builder, and recovery from syntax errors.
+"""From tokens to the syntax tree: an LALR(1) parser that recovers from errors.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
-from importlib.resources import files
-from typing import Any, cast
+from typing import Any
 
-from lark import Lark, Transformer, v_args
-from lark.exceptions import UnexpectedToken
-from lark.lexer import Lexer as LarkLexer
-from lark.parsers.lalr_parser_state import ParserState
-
-from plctool.compiler import ast, literals
+from plctool.compiler import ast
+from plctool.compiler.builder import Builder
 from plctool.compiler.lexer import SOFT, Lexer, Report, Token, is_operator_function
 from plctool.compiler.source import Source
 from plctool.compiler.syntax_errors import Recovery
-
-_PRECEDENCE = {
-    "**": 7, "*": 6, "/": 6, "MOD": 6, "+": 5, "-": 5, "<": 4, ">": 4, "<=": 4, ">=": 4, "=": 3, "<>": 3,
-    "AND": 2, "&": 2, "AND_THEN": 2, "XOR": 1, "OR": 0, "OR_ELSE": 0,
-}  # fmt: skip
-
-
-class _NoLexer(LarkLexer):
-    """The tokens come from our lexer, fed one by one."""
-
-    def __init__(self, _conf: object) -> None:
-        pass
-
-    def lex(self, _state: object, _parser: object = None) -> Any:
-        return iter(())
-
-
-def _chain(operands: list[ast.Expr], operators: list[Token]) -> ast.Expr:
-    """Sorts out `a op b op c` by precedence, left-associative."""
-    values, pending = [operands[0]], list[tuple[int, str, int]]()
-
-    def reduce() -> None:
-        _, op, pos = pending.pop()
-        right = values.pop()
-        values[-1] = ast.Binary(pos, op, values[-1], right)
-
-    for token, operand in zip(operators, operands[1:], strict=True):
-        op = token.text.upper()
-        precedence = _PRECEDENCE[op]
-        while pending and pending[-1][0] >= precedence:
-            reduce()
-        pending.append((precedence, "AND" if op == "&" else op, token.pos))
-        values.append(operand)
-    while pending:
-        reduce()
-    return values[0]
-
-
-def _listed(children: list[Any]) -> list[Any]:
-    return [c for c in children if c is not None]
-
-
-@v_args(inline=True)
-class _Builder(Transformer[Token, Any]):
-    """One method per grammar rule. What an optional part left out is None; so is what error recovery put in."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.source = Source("", "")
-        self.attributes: dict[int, dict[str, str]] = {}
-        self.report: Report = lambda pos, code, message: None
-
-    # ---- types ----
-
-    def start(self, *units: Any) -> list[Any]:
-        flat: list[Any] = []
-        for unit in units:
-            if isinstance(unit, list):
-                flat += unit
-            elif unit is not None and not isinstance(unit, Token):
-                flat.append(unit)
-        return flat
-
-    def types(self, _type: Token, *decls: Any) -> list[Any]:
-        return [d for d in decls if d is not None]
-
-    def type_decl(self, name: Token, spec: ast.TypeSpec, init: ast.Init | None) -> ast.TypeDecl:
-        return ast.TypeDecl(name.pos, name.text, spec, init, self.source)
-
-    def named_type(self, name: tuple[int, str]) -> ast.NamedType:
-        return ast.NamedType(*name)
-
-    def sized_type(self, name: Token, length: ast.Expr) -> ast.NamedType:
-        return ast.NamedType(name.pos, name.text, length)
-
-    def sized_by_number(self, name: Token, length: Token) -> ast.NamedType:
-        return ast.NamedType(name.pos, name.text, self.number(length))
-
-    def subrange(self, base: Token, low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
-        return ast.SubrangeSpec(base.pos, base.text, low, high)
-
-    def enum(self, values: list[tuple[int, str, ast.Init | None]]) -> ast.EnumSpec:
-        return ast.EnumSpec(values[0][0] if values else 0, None, values)
-
-    def enum_with_base(self, values: list[tuple[int, str, ast.Init | None]], base: Token) -> ast.EnumSpec:
-        return ast.EnumSpec(base.pos, base.text, values)
-
-    def enum_of_base(self, base: Token, values: list[tuple[int, str, ast.Init | None]]) -> ast.EnumSpec:
-        return ast.EnumSpec(base.pos, base.text, values)
-
-    def enum_values(self, *values: Any) -> list[Any]:
-        return [v for v in values if v is not None]
-
-    def enum_value(self, name: Token, value: ast.Init | None) -> tuple[int, str, ast.Init | None]:
-        return name.pos, name.text, value
-
-    @v_args(inline=False)
-    def array(self, children: list[Any]) -> ast.ArraySpec:
-        return ast.ArraySpec(children[0].pos, _listed(children[1:-1]), children[-1])
-
-    def bounds(self, low: ast.Expr, high: ast.Expr) -> tuple[ast.Expr, ast.Expr]:
-        return low, high
-
-    def pointer(self, keyword: Token, target: ast.TypeSpec) -> ast.PointerSpec:
-        return ast.PointerSpec(keyword.pos, keyword.text.upper(), target)
-
-    def struct(self, keyword: Token, *fields: ast.VarDecl | None) -> ast.StructSpec:
-        return ast.StructSpec(keyword.pos, [f for f in fields if f is not None], keyword.type == "UNION")
-
-    def name(self, first: Token, *rest: Token) -> tuple[int, str]:
-        return first.pos, ".".join((first.text, *(t.text for t in rest)))
-
-    # ---- variables ----
-
-    def var_block(self, keyword: Token, *items: Any) -> ast.VarBlock:
-        qualifiers = {t.text.upper() for t in items if isinstance(t, Token)}
-        decls = [d for d in items if isinstance(d, ast.VarDecl)]
-        return ast.VarBlock(keyword.pos, keyword.text.upper(), qualifiers, decls)
-
-    def var_decl(
-        self, names: list[Token], location: Token | None, spec: ast.TypeSpec, init: ast.Init | None
-    ) -> ast.VarDecl:
-        pos = names[0].pos
-        address = ast.DirectAddress(location.pos, location.text) if location else None
-        attributes = self.attributes.get(pos, {})
-        return ast.VarDecl(pos, [(t.pos, t.text) for t in names], address, spec, init, attributes)
-
-    def var_names(self, *names: Token) -> list[Token]:
-        return list(names)
-
-    @v_args(inline=False)
-    def array_init(self, items: list[Any]) -> ast.ArrayInit:
-        items = _listed(items)
-        return ast.ArrayInit(items[0].pos, items)
-
-    def repeat(self, count: Token, *values: Any) -> ast.Repeat:
-        return ast.Repeat(count.pos, self.number(count), _listed(list(values)))
-
-    @v_args(inline=False)
-    def struct_init(self, members: list[Any]) -> ast.StructInit:
-        members = _listed(members)
-        return ast.StructInit(members[0][0], members)
-
-    def member_init(self, name: Token, value: ast.Init) -> tuple[int, str, ast.Init]:
-        return name.pos, name.text, value
-
-    # ---- units ----
-
-    def global_block(self, keyword: Token, *items: Any) -> ast.GlobalBlock:
-        return ast.GlobalBlock(self.var_block(keyword, *items), self.source)
-
-    def var_blocks(self, *blocks: Any) -> list[Any]:
-        return [b for b in blocks if b is not None]
-
-    def _pou(self, keyword: Token, name: Token, result: ast.TypeSpec | None, blocks: Any, body: Any) -> ast.PouDecl:
-        attributes = self.attributes.get(keyword.pos, {})
-        return ast.PouDecl(
-            name.pos, keyword.text.upper(), name.text, result, blocks, body, attributes, self.source
-        )  # fmt: skip
-
-    def function(self, keyword: Token, name: Token, result: ast.TypeSpec | None, blocks: Any, body: Any) -> Any:
-        return self._pou(keyword, name, result, blocks, body)
-
-    def function_block(self, keyword: Token, name: Token, blocks: Any, body: Any) -> Any:
-        return self._pou(keyword, name, None, blocks, body)
-
-    program = function_block
-
-    def configuration(self, keyword: Token, name: Token, *items: Any) -> ast.ConfigurationDecl:
-        decl = ast.ConfigurationDecl(name.pos, name.text, [], [], [], self.source)
-        self._configure(decl, items)
-        return decl
-
-    def _configure(self, decl: ast.ConfigurationDecl, items: Any) -> None:
-        for item in items:
-            if isinstance(item, ast.VarBlock):
-                decl.globals.append(item)
-            elif isinstance(item, ast.TaskDecl):
-                decl.tasks.append(item)
-            elif isinstance(item, ast.ProgramInstance):
-                decl.programs.append(item)
-            elif isinstance(item, list):
-                self._configure(decl, item)
-
-    def config_globals(self, keyword: Token, *items: Any) -> ast.VarBlock:
-        return self.var_block(keyword, *items)
-
-    def resource(self, _keyword: Token, _name: Token, _type: Token, *items: Any) -> list[Any]:
-        return list(items)
-
-    def task(self, _keyword: Token, name: Token, *properties: Any) -> ast.TaskDecl:
-        return ast.TaskDecl(name.pos, name.text, _listed(list(properties)))
-
-    @v_args(inline=False)
-    def instance(self, children: list[Any]) -> ast.ProgramInstance:
-        qualifiers = {t.text.upper() for t in children if isinstance(t, Token) and t.type == "QUALIFIER"}
-        rest = [c for c in children[1:] if not (isinstance(c, Token) and c.type == "QUALIFIER")]
-        name, task, type_name, args = rest
-        return ast.ProgramInstance(
-            name.pos,
-            name.text,
-            (task.pos, task.text) if task else None,
-            type_name.pos,
-            type_name.text,
-            args or [],
-            qualifiers,
-        )
-
-    # ---- statements ----
-
-    @v_args(inline=False)
-    def stmts(self, children: list[Any]) -> list[Any]:
-        return [c for c in children if c is not None]
-
-    def empty(self) -> None:
-        return None
-
-    @v_args(inline=False)
-    def assign(self, children: list[Any]) -> ast.Assign:
-        target, value = children
-        if type(value) is tuple:
-            return ast.Assign(target.pos, [target, *value[0]], ":=", value[1])
-        return ast.Assign(target.pos, [target], ":=", value)
-
-    def chained(self, target: ast.Expr, value: Any) -> tuple[list[ast.Expr], ast.Expr]:
-        if type(value) is tuple:
-            return [target, *value[0]], value[1]
-        return [target], value
-
-    def assign_with(self, target: ast.Expr, op: Token, _equals: Token, value: ast.Expr) -> ast.Assign | None:
-        name = op.text.upper()
-        if name not in ("S", "R", "REF"):
-            self.report(op.pos, "syntax", f"{op.text} has no place here; an assignment is written :=, S= or R=")
-            return None
-        return ast.Assign(op.pos, [target], name + "=", value)
-
-    def expr_stmt(self, value: ast.Expr) -> ast.ExprStmt:
-        return ast.ExprStmt(value.pos, value)
-
-    @v_args(inline=False)
-    def if_(self, children: list[Any]) -> ast.If:
-        keyword, condition, body, *elsifs, otherwise = children
-        return ast.If(keyword.pos, [(condition, body), *elsifs], otherwise or [])
-
-    def elsif(self, condition: ast.Expr, body: list[ast.Stmt]) -> tuple[ast.Expr, list[ast.Stmt]]:
-        return condition, body
-
-    @v_args(inline=False)
-    def case(self, children: list[Any]) -> ast.Case:
-        keyword, selector, *items, otherwise = children
-        branches: list[tuple[list[ast.CaseLabel], list[ast.Stmt]]] = []
-        for item in items:
-            if type(item) is list:
-                branches.append((item, []))
-            elif item is not None:
-                if not branches:
-                    self.report(item.pos, "syntax", "this statement stands before the first label of the CASE")
-                    continue
-                branches[-1][1].append(item)
-        return ast.Case(keyword.pos, selector, branches, otherwise or [])
-
-    @v_args(inline=False)
-    def case_labels(self, labels: list[ast.CaseLabel]) -> list[ast.CaseLabel]:
-        return _listed(labels)
-
-    def case_label(self, low: ast.Expr, high: ast.Expr | None) -> ast.CaseLabel:
-        return ast.CaseLabel(low.pos, low, high)
-
-    def for_(self, keyword: Token, var: Any, start: Any, stop: Any, step: Any, body: Any) -> ast.For:
-        return ast.For(keyword.pos, var, start, stop, step, body)
-
-    def while_(self, keyword: Token, condition: ast.Expr, body: list[ast.Stmt]) -> ast.While:
-        return ast.While(keyword.pos, condition, body)
-
-    def repeat_until(self, keyword: Token, body: list[ast.Stmt], until: ast.Expr) -> ast.RepeatUntil:
-        return ast.RepeatUntil(keyword.pos, body, until)
-
-    def exit(self, keyword: Token) -> ast.Exit:
-        return ast.Exit(keyword.pos)
-
-    def continue_(self, keyword: Token) -> ast.Continue:
-        return ast.Continue(keyword.pos)
-
-    def return_(self, keyword: Token) -> ast.Return:
-        return ast.Return(keyword.pos)
-
-    # ---- expressions ----
-
-    @v_args(inline=False)
-    def binary(self, children: list[Any]) -> ast.Expr:
-        if len(children) == 3:
-            op = children[1].text.upper()
-            return ast.Binary(children[1].pos, "AND" if op == "&" else op, children[0], children[2])
-        return _chain(children[::2], children[1::2])
-
-    def unary(self, op: Token, operand: ast.Expr) -> ast.Expr:
-        return ast.Unary(op.pos, op.text.upper(), operand)
-
-    def parenthesised(self, value: ast.Expr) -> ast.Expr:
-        return value
-
-    def number(self, token: Token) -> ast.Literal:
-        if len(token.text) < 19 and token.text.isdigit():
-            return ast.Literal(token.pos, ast.LiteralKind.INT, int(token.text))
-        try:
-            return ast.Literal(token.pos, *literals.unsigned(token.text))
-        except literals.LiteralError as error:
-            return self._bad(token, error)
-
-    def typed(self, token: Token) -> ast.Expr:
-        prefix, _, rest = token.text.partition("#")
-        if literals.is_enum_value(prefix, rest):
-            return ast.EnumValue(token.pos, prefix, rest)
-        try:
-            kind, value, name = literals.typed(token.text)
-            return ast.Literal(token.pos, kind, value, name)
-        except literals.LiteralError as error:
-            return self._bad(token, error)
-
-    def string(self, token: Token) -> ast.Literal:
-        if token.text.startswith('"'):
-            return self._bad(token, literals.LiteralError("WSTRING constants are not supported yet; write 'text'"))
-        try:
-            text = token.text[token.text.index("'") :]
-            return ast.Literal(token.pos, ast.LiteralKind.STRING, literals.string(text), "STRING")
-        except literals.LiteralError as error:
-            return self._bad(token, error)
-
-    def word(self, token: Token) -> ast.Literal:
-        if token.type == "NULL":
-            return ast.Literal(token.pos, ast.LiteralKind.NULL, 0)
-        return ast.Literal(token.pos, ast.LiteralKind.BOOL, int(token.type == "TRUE"))
-
-    def _bad(self, token: Token, error: literals.LiteralError) -> ast.Literal:
-        self.report(token.pos, "literal", str(error))
-        return ast.Literal(token.pos, ast.LiteralKind.BAD, 0)
-
-    @v_args(inline=False)
-    def name_expr(self, children: list[Token]) -> ast.Name:
-        token = children[0]
-        return ast.Name(token.pos, token.text)
-
-    def direct(self, token: Token) -> ast.DirectAddress:
-        return ast.DirectAddress(token.pos, token.text.upper())
-
-    @v_args(inline=False)
-    def member(self, children: list[Any]) -> ast.Member:
-        base, name = children
-        return ast.Member(base.pos, base, name.text, name.pos)
-
-    def bit(self, base: ast.Expr, token: Token) -> ast.Expr:
-        text = token.text.lstrip("%").upper()
-        width = text[0] if text[0] in "XBWDL" else "X"
-        digits = text.removeprefix(width)
-        if not digits.isdigit() or len(digits) > 4:
-            return self._bad(token, literals.LiteralError(f"{token.text} is not the number of a bit"))
-        return ast.BitAccess(token.pos, base, width, int(digits))
-
-    def index(self, base: ast.Expr, *indices: ast.Expr) -> ast.Index:
-        return ast.Index(base.pos, base, list(indices))
-
-    def deref(self, base: ast.Expr) -> ast.Deref:
-        return ast.Deref(base.pos, base)
-
-    @v_args(inline=False)
-    def call(self, children: list[Any]) -> ast.Call:
-        return ast.Call(children[0].pos, children[0], children[1])
-
-    @v_args(inline=False)
-    def args(self, children: list[Any]) -> list[Any]:
-        return [c for c in children if c is not None]
-
-    def positional(self, value: ast.Expr) -> ast.Argument:
-        return ast.Argument(value.pos, None, value)
-
-    def input(self, name: Token, value: ast.Expr) -> ast.Argument:
-        return ast.Argument(name.pos, name.text, value)
-
-    def output(self, name: Token, target: ast.Expr | None = None) -> ast.Argument:
-        return ast.Argument(name.pos, name.text, target, output=True)
-
-    def output_negated(self, _not: Token, name: Token, target: ast.Expr | None = None) -> ast.Argument:
-        return ast.Argument(name.pos, name.text, target, output=True, negated=True)
-
-
-for _rule in ("if", "for", "while", "continue", "return"):
-    setattr(_Builder, _rule, getattr(_Builder, _rule + "_"))
+from plctool.compiler.tables import END, Rule, Tables, load_tables
+
+Reducer = Callable[[list[Any]], Any]
+
+
+class Parser:
+    """The state of one parse. `states` and `values` are the stacks; they are repaired by `Recovery`."""
+
+    def __init__(self, tables: Tables, reducers: list[Reducer | None]) -> None:
+        self.tables = tables
+        self.states = [tables.start]
+        self.values: list[Any] = []
+        self._reducers = reducers
+
+    def feed(self, token: Token) -> bool:
+        """Takes a token; False when it does not fit. The stacks then are as if it had not been there, but for
+        reductions that were due."""
+        states, values, actions = self.states, self.values, self.tables.actions
+        kind = token.type
+        while True:
+            action = actions[states[-1]].get(kind)
+            if action is None:
+                return False
+            if action >= 0:
+                states.append(action)
+                values.append(token)
+                return True
+            self.reduce(-1 - action)
+            if kind == END and states[-1] == self.tables.end:
+                return True
+
+    def reduce(self, number: int) -> None:
+        """Replaces the symbols of a rule by what it stands for."""
+        states, values = self.states, self.values
+        rule, reducer = self.tables.rules[number], self._reducers[number]
+        size = rule.size
+        if reducer is None:
+            del states[-1]
+        elif size:
+            children = values[-size:]
+            del states[-size:], values[-size:]
+            values.append(reducer(children))
+        else:
+            values.append(reducer([]))
+        states.append(self.tables.gotos[states[-1]][rule.origin])
+
+
+def _reducer(rule: Rule, builder: Builder) -> Reducer | None:
+    """The function that makes the value of a rule from its children; None when the only child is the value."""
+    parts = rule.parts
+    plain = not any(spliced or index < 0 for index, spliced in parts)
+    if rule.is_list:
+        return _list_reducer(rule)
+    if rule.transparent and plain and len(parts) == 1:
+        index = parts[0][0]
+        return None if rule.size == 1 else lambda children: children[index]
+    callback = getattr(builder, rule.callback)
+    if plain and len(parts) == rule.size:
+        return lambda children: callback(*children)
+    if plain and len(parts) == 1:
+        first = parts[0][0]
+        return lambda children: callback(children[first])
+    if plain and len(parts) == 2:
+        left, right = parts[0][0], parts[1][0]
+        return lambda children: callback(children[left], children[right])
+    return lambda children: callback(*_gather(children, parts))
+
+
+def _list_reducer(rule: Rule) -> Reducer:
+    """A helper rule makes a list; one that continues a list adds to it."""
+    parts = rule.parts
+    if parts and parts[0] == (0, True):
+        more = parts[1:]
+
+        def extend(children: list[Any]) -> list[Any]:
+            found: list[Any] = children[0]
+            found += _gather(children, more)
+            return found
+
+        return extend
+    return lambda children: _gather(children, parts)
+
+
+def _gather(children: list[Any], parts: tuple[tuple[int, bool], ...]) -> list[Any]:
+    found: list[Any] = []
+    for index, spliced in parts:
+        if spliced:
+            found += children[index]
+        else:
+            found.append(children[index] if index >= 0 else None)
+    return found
 
 
 @cache
-def _machine() -> tuple[Lark, _Builder]:
-    grammar = files("plctool.compiler").joinpath("grammar.lark").read_text("utf-8")
-    builder = _Builder()
-    lark = Lark(grammar, parser="lalr", lexer=_NoLexer, transformer=builder, maybe_placeholders=True)
-    return lark, builder
+def _machine() -> tuple[Tables, Builder, list[Reducer | None]]:
+    tables, builder = load_tables(), Builder()
+    return tables, builder, [_reducer(rule, builder) for rule in tables.rules]
 
 
 def parse(source: Source, report: Report, start: int = 0, end: int | None = None) -> list[ast.Declaration]:
     """The declarations of a text (of the part from offset `start` to `end`). Errors go to `report`."""
-    lark, builder = _machine()
-    lexer = Lexer(source.text, report, start, end)
+    tables, builder, reducers = _machine()
+    parser = Parser(tables, reducers)
+    recovery = Recovery(parser, source, report)
+    lexer = Lexer(source.text, recovery.report_token, start, end)
     builder.source, builder.attributes, builder.report = source, lexer.attributes, report
-    state = cast("ParserState[int]", lark.parse_interactive("").parser_state)
-    states, stack = state.parse_conf.states, state.state_stack
-    recovery = Recovery(state, source, report)
-    feed = cast("Any", state.feed_token)
-    result: list[ast.Declaration] | None = None
+    actions, states, feed = tables.actions, parser.states, parser.feed
     for token in lexer:
         kind = token.type
-        if kind not in states[stack[-1]] and (
+        if kind not in actions[states[-1]] and (
             kind in SOFT or (kind == "OP" and is_operator_function(token, source.text))
         ):
-            token.type = kind = "IDENT"
+            token.type = "IDENT"
         if recovery.skipping and not recovery.resume(token):
             continue
-        try:
-            result = feed(token, kind == "$END")
-        except UnexpectedToken:
-            result = recovery.handle(token)
-        else:
+        if feed(token):
             recovery.accept(token)
-    return result or []
+        else:
+            recovery.handle(token)
+    result = parser.values[0] if len(parser.values) == 1 else []
+    return result if isinstance(result, list) else []

@@ -1,7 +1,7 @@
 """How each instruction set encodes a distance: the PC-relative relocations LLVM emits for position independent code.
 
-All offsets are in the linked block. A relocation writes "target + addend - place", as the ELF supplement of the processor
-defines it; what is not in these tables is not position independent and is refused by the linker.
+All offsets are in the linked block. A relocation writes "target + addend - place", as the ELF supplement of the
+processor defines it; what is not in these tables is not position independent and is refused by the linker.
 """
 
 from __future__ import annotations
@@ -170,7 +170,15 @@ APPLY: dict[Machine, dict[int, Apply]] = {
         286: _low12,
         299: _low12,
     },
-    Machine.RISCV32: {19: _riscv_call, 23: _riscv_high, 24: _riscv_low, 25: _riscv_low_store, 35: _riscv_add, 39: _riscv_subtract, 57: _relative32},
+    Machine.RISCV32: {
+        19: _riscv_call,
+        23: _riscv_high,
+        24: _riscv_low,
+        25: _riscv_low_store,
+        35: _riscv_add,
+        39: _riscv_subtract,
+        57: _relative32,
+    },
 }
 
 AARCH64_ADRP = 275

@@ -22,12 +22,14 @@ from plctool.compiler.typed import (
     Case,
     Const,
     Continue,
+    DerefPlace,
     Direction,
     Exit,
     Expr,
     FbCall,
     For,
     If,
+    Load,
     MemberPlace,
     Place,
     Pos,
@@ -39,7 +41,7 @@ from plctool.compiler.typed import (
     Variable,
     While,
 )  # fmt: skip
-from plctool.compiler.types import BOOL, EnumType, StringType, StructType, Type
+from plctool.compiler.types import BOOL, EnumType, ReferenceType, StringType, StructType, Type
 
 
 @dataclass
@@ -52,6 +54,34 @@ class _FbArguments:
     after: list[Statement] = field(default_factory=list)  # outputs that need a conversion
 
 
+class _Labels:
+    """The labels of a CASE so far, with their lines."""
+
+    def __init__(self) -> None:
+        self._values: dict[int, int] = {}
+        self._ranges: list[tuple[int, int, int]] = []
+
+    def overlap(self, low: int, high: int) -> tuple[int, int] | None:
+        """A value between `low` and `high` that is taken already, and the line where."""
+        if low == high and low in self._values:
+            return low, self._values[low]
+        if low < high:
+            for value, line in self._values.items():
+                if low <= value <= high:
+                    return value, line
+        for other_low, other_high, line in self._ranges:
+            if low <= other_high and other_low <= high:
+                return max(low, other_low), line
+        return None
+
+    def add(self, low: int, high: int, line: int) -> None:
+        """Notes a label."""
+        if low == high:
+            self._values[low] = line
+        else:
+            self._ranges.append((low, high, line))
+
+
 class Statements(Calls):
     """Checks a body."""
 
@@ -62,7 +92,7 @@ class Statements(Calls):
         """The typed statements; what cannot be reached is reported once."""
         self._nesting += 1
         if self._nesting > MAX_DEPTH and nodes:
-            raise NestingError(nodes[0].pos)
+            raise NestingError(self.pos(nodes[0].pos))
         result: list[Statement] = []
         ended = False
         for node in nodes:
@@ -79,8 +109,7 @@ class Statements(Calls):
 
     def _assign(self, node: ast.Assign) -> list[Statement]:
         if node.op == "REF=":
-            self.error(node.pos, "unsupported", "REF= is not supported yet; use a REF_TO variable and REF()")
-            return []
+            return self._assign_reference(node)
         if node.op != ":=":
             return self._set_or_reset(node)
         if isinstance(node.value, ast.Call) and self._has_enable(node.value):
@@ -107,6 +136,20 @@ class Statements(Calls):
             self.error(target.pos, "type", f"an instance of the function block {place.type} cannot be assigned")
             return None
         return Assign(place, value, pos)
+
+    def _assign_reference(self, node: ast.Assign) -> list[Statement]:
+        """`r REF= x` lets r refer to x; `r REF= NULL` to nothing."""
+        target, pos = node.targets[0], self.pos(node.pos)
+        place = self.target(target, "the left side of REF=", "be assigned to")
+        pointer = place.pointer if isinstance(place, DerefPlace) else None
+        if not isinstance(pointer, Load) or not isinstance(pointer.type, ReferenceType):
+            if place is not None:
+                self.error(target.pos, "type", f"the left side of REF= is a REFERENCE TO, not {place.type}")
+            return []
+        if isinstance(node.value, ast.Literal) and node.value.kind is ast.LiteralKind.NULL:
+            return [Assign(pointer.place, Const(0, pointer.type, pos), pos)]
+        value = self.input(node.value, pointer.type, "reference")
+        return [] if value.type is ERROR else [Assign(pointer.place, value, pos)]
 
     def _set_or_reset(self, node: ast.Assign) -> list[Statement]:
         """`x S= condition` sets x and never resets it."""
@@ -218,7 +261,7 @@ class Statements(Calls):
             elif argument is None or argument.value is None:
                 continue
             elif parameter.direction is Direction.INPUT:
-                e = self.coerce(self.expr(argument.value, variable.type), variable.type)
+                e = self.input(argument.value, variable.type, variable.name)
                 ok = ok and e.type is not ERROR
                 handed.inputs.append((variable, e))
             else:
@@ -272,7 +315,7 @@ class Statements(Calls):
             selector = self.error(
                 node.selector.pos, "type", f"CASE needs an integer or an enumeration, not {selector.type}"
             )
-        seen: list[tuple[int, int, int]] = []
+        seen = _Labels()
         branches = []
         for labels, body in node.branches:
             ranges = [r for label in labels if (r := self._label(label, selector.type, seen)) is not None]
@@ -282,7 +325,7 @@ class Statements(Calls):
             return []
         return [Case(selector, branches, otherwise, self.pos(node.pos))]
 
-    def _label(self, label: ast.CaseLabel, t: Type, seen: list[tuple[int, int, int]]) -> tuple[int, int] | None:
+    def _label(self, label: ast.CaseLabel, t: Type, seen: _Labels) -> tuple[int, int] | None:
         low = self._label_value(label.low, t)
         high = low if label.high is None else self._label_value(label.high, t)
         if low is None or high is None:
@@ -290,12 +333,12 @@ class Statements(Calls):
         if low > high:
             self.error(label.pos, "range", f"the range {low}..{high} is empty")
             return None
-        for other_low, other_high, line in seen:
-            if low <= other_high and other_low <= high:
-                value = constants.describe(max(low, other_low), t)
-                self.error(label.pos, "duplicate", f"{value} is a label in line {line} already")
-                return None
-        seen.append((low, high, self.pos(label.pos).line))
+        other = seen.overlap(low, high)
+        if other is not None:
+            value, line = other
+            self.error(label.pos, "duplicate", f"{constants.describe(value, t)} is a label in line {line} already")
+            return None
+        seen.add(low, high, self.pos(label.pos).line)
         return low, high
 
     def _label_value(self, node: ast.Expr, t: Type) -> int | None:

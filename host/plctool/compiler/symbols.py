@@ -11,7 +11,7 @@ from enum import Enum
 from plctool.compiler import ast
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Const, Direction, Initial, Pos, Pou, Variable
-from plctool.compiler.types import Elementary, EnumType, Kind, PointerType, StructType, Type
+from plctool.compiler.types import Elementary, Kind, PointerType, StructType, Type
 
 
 class _ErrorType(Type):
@@ -65,7 +65,6 @@ class VarSymbol:
     given: bool = False  # has an initial value of its own
     by_reference: bool = False
     used: bool = False
-    retain: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -136,8 +135,3 @@ class BlockInfo:
     type: StructType
     members: dict[str, VarSymbol] = field(default_factory=dict)
     retain: bool = False  # instances live in the retain area as a whole
-
-
-def is_enum(t: Type) -> bool:
-    """Whether the type is an enumeration."""
-    return isinstance(t, EnumType)

@@ -22,9 +22,9 @@ class Machine(Enum):
 class Target:
     """What the compiler has to know about a processor.
 
-    `device_id` names a TARGET_ID_* of CompactDownload.h. `stubs`: undefined compiler calls (soft float, 64-bit division) go
-    through the import table, whose base is in a reserved register. `unaligned`: loads and stores of any size work at any
-    address. `vectors`: 16-byte vector compares are cheap.
+    `device_id` names a TARGET_ID_* of CompactDownload.h. `stubs`: undefined compiler calls (soft float, 64-bit
+    division) go through the import table, whose base is in a reserved register. `unaligned`: loads and stores of any
+    size work at any address. `vectors`: 16-byte vector compares are cheap.
     """
 
     name: str

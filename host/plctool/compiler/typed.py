@@ -419,6 +419,7 @@ class Pou:
     body: list[Statement] = field(default_factory=list)
     external: External | None = None  # implemented in C
     checks: bool = True  # False in the standard library where it is proven
+    cuts_result: bool = False  # the body keeps within STRING_SIZE of its string result, whatever that is
     no_init: bool = False  # locals need no zeroing: the body writes each before it reads it (standard library)
 
 

@@ -166,7 +166,7 @@ class ArrayType(Type):
 
 @dataclass(frozen=True)
 class PointerType(Type):
-    """POINTER TO / REF_TO / REFERENCE TO; always 8 bytes in memory so that layouts agree on all targets."""
+    """POINTER TO / REF_TO; always 8 bytes in memory so that layouts agree on all targets."""
 
     target: Type
 
@@ -181,6 +181,15 @@ class PointerType(Type):
     @property
     def align(self) -> int:
         return 8
+
+
+@dataclass(frozen=True)
+class ReferenceType(PointerType):
+    """REFERENCE TO: a pointer that is followed wherever it is used; the typed program holds it as a DerefPlace."""
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return f"REFERENCE TO {self.target}"
 
 
 @dataclass

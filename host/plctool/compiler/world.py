@@ -155,11 +155,8 @@ class World:
     def _library_symbol(self, key: str) -> Symbol | None:
         if key not in self._library_names:
             self._library_names[key] = None
-            self.register(self.library.parse(key, self._library_error), library=True)
+            self.register(self.library.parse(key, self.diagnostics), library=True)
         return self._library_names[key]
-
-    def _library_error(self, offset: int, code: str, message: str) -> None:
-        raise AssertionError(f"the library does not parse: {message}")
 
     def is_user_name(self, name: str) -> bool:
         """Whether the program itself declares a global name."""
@@ -261,11 +258,15 @@ class World:
                 body = Statements(scope).body(decl.body)
                 pou.body = [*scope.prologue, *body]
             except NestingError as error:
-                scope.error(error.offset, "nesting", "this is nested too deeply; split it")
+                self.nested_too_deeply(error)
             self.pous.append(pou)
             if not scope.library:
                 self._report_unused(scope)
         self._report_recursion()
+
+    def nested_too_deeply(self, error: NestingError) -> None:
+        """Reports what goes beyond MAX_DEPTH."""
+        self.diagnostics.error(error.pos, "nesting", "this is nested too deeply; split it")
 
     def _report_unused(self, scope: Scope) -> None:
         for symbol in scope.names.values():

@@ -36,13 +36,13 @@ WANTED_BUFFER = 0x4000  # longest message we would like to send or get, bytes
 MAX_REQUESTS = 2  # requests under way at the same time
 _OPEN_RETRY = 0.3  # first repetition of a lost request to open [s]
 _LONGEST_RETRY = 1.0
-_NO_PROGRESS = 4  # times the patience: how long a device may be heard without anything getting on
+_NO_PROGRESS = 2  # times the patience: how long a device may be heard without anything getting on
 _SHORTEST_TIMEOUT = 0.1
 _FIRST_TIMEOUT = 0.4  # until a round trip has been measured
 _AHEAD, _AHEAD_BAD = 0.05, 0.005  # how far ahead of the line blocks are handed to it, on a good and a bad line [s]
 _POLL_EVERY = 4  # blocks, on a bad line
 _WINDOW = 2 * _POLL_EVERY  # most blocks under way on a bad line
-_MAX_SENDS = 40  # of one block
+_MAX_LOSSES = 40  # of one block
 _MIN_PAYLOAD = 64
 _LOSS_COST = 3  # blocks that have to be sent again for each that is lost
 _RATE_MEMORY = 8192  # bytes over which the error rate of the line is averaged
@@ -69,8 +69,13 @@ class Line:
 
 @dataclass
 class _Block:
-    package: bytes
+    """A piece of `message` from `offset` on, in its package."""
+
     number: int
+    message: bytes = b""
+    offset: int = 0
+    package: bytes = b""
+    is_last: bool = False  # of the message
     sends: int = 0
     gone_at: float = 0.0  # when its last byte leaves the line
 
@@ -159,10 +164,12 @@ class Channel:
         self._cut = 0  # bytes of the first of them that are
         self._flight: deque[_Block] = deque()  # blocks without acknowledgement
         self._next = 0  # index in _flight of the next block to send
-        self._newest = _Block(b"", 0)
+        self._newest = _Block(0)
+        self._losses = 0  # of the oldest block in flight
         self._unanswered = 0  # requests that are completely sent
         self._unpolled = 0  # blocks since the last poll
-        self._silent = False  # nothing was sent since a poll: what the answer does not have is lost
+        self._polls: deque[int] = deque()  # newest block sent before each poll that has not been answered
+        self._quiet = False  # no block was sent since the last poll
         # Receiving.
         self._received = 0  # highest block number received in order
         self._incoming = bytearray()
@@ -213,14 +220,15 @@ class Channel:
             return package
         if not self._has_block() or now < self._ready_at():
             return None
-        block = self._next_block()
+        if self._next == len(self._flight):
+            self._flight.append(self._cut_block())
+        block = self._flight[self._next]
+        self._next += 1
         block.sends += 1
         block.gone_at = self._departure(block.package, now)
-        self._heard = now  # only from now on silence means something
-        if block.sends == 1:
-            self._progress = now
+        self._heard = self._progress = now  # only from now on silence means something
         self._timer = block.gone_at + self._round_trip.timeout
-        self._silent = False
+        self._quiet = False
         self._unpolled += 1
         if self._unpolled >= _POLL_EVERY and self._error_rate.is_bad:
             self._poll()
@@ -240,16 +248,6 @@ class Channel:
         open_window = self._next < _WINDOW or not self._error_rate.is_bad
         return self.state is State.OPEN and open_window and bool(self._next < len(self._flight) or self._outbox)
 
-    def _next_block(self) -> _Block:
-        """The next block to be sent for the first time or again."""
-        if self._next == len(self._flight):
-            self._flight.append(self._cut_block())
-        self._next += 1
-        block = self._flight[self._next - 1]
-        if block.sends >= _MAX_SENDS:
-            raise ChannelLost("The line is too bad: blocks do not arrive in many tries; check the cable.", "bad-line")
-        return block
-
     def _cut_block(self) -> _Block:
         """Cuts the next block off the oldest message, as long as suits the line."""
         message = self._outbox[0]
@@ -260,9 +258,11 @@ class Channel:
         if first:
             head += _FIRST.pack(len(message), zlib.crc32(message))
         size = self._error_rate.best_payload(self._line.overhead + len(head), self._line.max_package - len(head))
-        self._newest = _Block(head + message[self._cut : self._cut + size], number)
-        self._cut += size
-        if self._cut >= len(message):
+        end = min(self._cut + size, len(message))
+        package = head + message[self._cut : end]
+        self._newest = _Block(number, message, self._cut, package, is_last=end == len(message))
+        self._cut = end
+        if self._newest.is_last:
             self._outbox.popleft()
             self._unanswered += 1
             self._cut = 0
@@ -283,13 +283,14 @@ class Channel:
             self._ask_missing(now)
         else:
             self._poll()
-            self._silent = True
+            self._quiet = True
 
     def _poll(self) -> None:
         """Makes the device say what it has, with a block it has already."""
         known = self._flight[0].number - 1 if self._flight else self._newest.number
         flags = lib.CHANNEL_FLAG_TO_SERVER
         self._control.append(_DATA.pack(lib.CHANNEL_PKG_DATA, flags, self._id, known, self._received))
+        self._polls.append(known + self._next)
         self._unpolled = 0
 
     def _ask_missing(self, now: float) -> None:
@@ -317,9 +318,10 @@ class Channel:
         elif kind == lib.CHANNEL_PKG_ACK and len(package) >= _ACK.size:
             number = _ACK.unpack_from(package)[3]
             self._receive_ack(number, now)
-            if flags & lib.CHANNEL_FLAG_MISSING or self._silent:
-                self._receive_missing(number, now)
-            self._silent = False
+            if flags & lib.CHANNEL_FLAG_MISSING:
+                self._go_back(number, now, anew=True)
+            else:
+                self._receive_poll_answer(number, now)
 
     def _receive_meta(self, kind: int, package: bytes, now: float) -> None:
         body = _meta_body(package)
@@ -353,19 +355,47 @@ class Channel:
             self._error_rate.count(len(block.package) + self._line.overhead, lost=False)
         if block.sends == 1:
             self._round_trip.sample(now - block.gone_at)
+        self._losses = 0
         self._round_trip.progress()
         self._progress = now
         self._timer = max(self._line_free, now) + self._round_trip.timeout
 
-    def _receive_missing(self, number: int, now: float) -> None:
-        """The device has everything up to `number`, and the next block was lost: starts again from there."""
-        if not self._next or self._flight[0].number != number + 1:
+    def _receive_poll_answer(self, number: int, now: float) -> None:
+        """What was sent before the oldest poll without answer and is not in this one is lost."""
+        if self._quiet and self._polls and number < self._polls[0]:
+            self._go_back(number, now, anew=False)
+        while self._polls and self._polls[0] <= number:
+            self._polls.popleft()
+
+    def _go_back(self, number: int, now: float, anew: bool) -> None:
+        """The device has everything up to `number` and the next block was lost: starts again from there.
+
+        `anew`: what is in flight may be cut anew, because the device drops all of it that is still to come. That holds
+        when it has said that the block is missing and no second copy of it is under way.
+        """
+        if not self._flight or self._flight[0].number != number + 1:
             return
         lost = self._flight[0]
-        if lost.sends > 1 and now - lost.gone_at < self._round_trip.shortest:
-            return  # asked for before the repetition can have arrived
+        if now - lost.gone_at < self._round_trip.shortest:
+            return  # said before this copy can have arrived
+        self._losses += 1
+        if self._losses > _MAX_LOSSES:
+            raise ChannelLost("The line is too bad: blocks do not arrive in many tries; check the cable.", "bad-line")
         self._error_rate.count(len(lost.package) + self._line.overhead, lost=True)
         self._next = self._unpolled = 0
+        self._polls.clear()
+        if anew and lost.sends == 1:
+            self._put_back()
+
+    def _put_back(self) -> None:
+        """Puts everything in flight back to the messages that are not cut yet."""
+        for block in reversed(self._flight):
+            if block.is_last:
+                self._outbox.appendleft(block.message)
+                self._unanswered -= 1
+        self._cut = self._flight[0].offset
+        self._newest = _Block(self._flight[0].number - 1)
+        self._flight.clear()
 
     def _receive_data(self, package: bytes, now: float) -> None:
         _, flags, _, number, acknowledged = _DATA.unpack_from(package)

@@ -13,7 +13,12 @@ _HEADER = struct.Struct("<HHHHIIHH")
 _SHORT_LENGTH, _LONGEST_LENGTH = 12, 64
 _LENGTH_BASE = 4  # the header length field counts from here
 
-HEADER_SIZE = _HEADER.size
+_ADVICE = {
+    lib.ERR_INVALID_STATE: "it stopped with an exception, reset it first",
+    lib.ERR_APP_NOT_LOADED: "there is no application, flash one first",
+    lib.ERR_NOMEMORY: "it is too large for the device",
+    lib.ERR_BUFFERSIZE: "it is too large for the device",
+}
 
 
 @dataclass(frozen=True)
@@ -61,11 +66,11 @@ def decode_reply(data: bytes, request: Message) -> bintag.Tags:
 
 
 def check_result(result: int, action: str, reason: str = "") -> None:
-    """Raises DeviceError unless `result` is ERR_OK. `action` is what was asked for, `reason` the device's own words."""
+    """Raises DeviceError unless `result` is ERR_OK. `action`: what was asked for; `reason`: the device's own words."""
     if result != lib.ERR_OK:
         name = error_name(result)
-        why = f"{reason} ({name})" if reason else name
-        raise DeviceError(f"The device refused: {action}: {why}", slug(name), result)
+        why = reason or _ADVICE.get(result, "")
+        raise DeviceError(f"The device refused the {action}: {f'{why} ({name})' if why else name}.", slug(name), result)
 
 
 def monitoring_error_name(error: int) -> str:

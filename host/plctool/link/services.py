@@ -19,6 +19,7 @@ from plctool.link.names import version_text
 from plctool.link.session import Session
 
 _SLOW = 30.0  # patience for what may erase flash or run initialisation code [s]
+_TRANSFER_PATIENCE = 10.0  # longer than flash takes to erase a sector [s]
 _DOWNLOAD_TRIES = 4  # without any progress
 _NO_OFFSET = 0xFFFFFFFF
 
@@ -263,7 +264,7 @@ class _Transfer:
         """Sends everything from `start_at` on and waits for the verdict."""
         self._session.ensure()
         request = self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, b"")
-        for reply in self._session.connection.stream(self._messages(start_at), _SLOW):
+        for reply in self._session.connection.stream(self._messages(start_at), _TRANSFER_PATIENCE):
             self._take(l7.decode_reply(reply, request))
         if self.arrived != len(self._image):
             raise DeviceError(f"The device took {self.arrived} of {len(self._image)} bytes; try again.", "incomplete")
@@ -425,7 +426,7 @@ def _check_monitoring(session: Session, tags: bintag.Tags, action: str) -> None:
 
 def _monitoring_error(action: str, error: int) -> DeviceError:
     name = l7.monitoring_error_name(error)
-    return DeviceError(f"The device refused: {action}: {name}", l7.slug(name), error)
+    return DeviceError(f"The device refused the {action}: {name}.", l7.slug(name), error)
 
 
 # ---- log -------------------------------------------------------------------------------------------------------------

@@ -221,10 +221,15 @@ static uintptr_t find_caller(uintptr_t slot)
     return 0;
 }
 
-static RTS_UI32 code_of(RTS_UI32 cfsr, uintptr_t guard)
+/* The frame could not be pushed, was pushed below the slot, or the guard was hit by the last push that had no room. */
+static int is_overflow(RTS_UI32 cfsr, const FRAME *frame, uintptr_t slot)
 {
-    if ((cfsr & CFSR_STACKING) || ((cfsr & CFSR_MMARVALID) && SCB_MMFAR - guard < GUARD_SIZE))
-        return RTSEXCPT_STACK_OVERFLOW;
+    return (cfsr & CFSR_STACKING) || (uintptr_t)frame < slot + GUARD_SIZE ||
+           ((cfsr & CFSR_MMARVALID) && SCB_MMFAR - slot < GUARD_SIZE);
+}
+
+static RTS_UI32 code_of(RTS_UI32 cfsr)
+{
     if (cfsr & CFSR_DIVBYZERO)
         return RTSEXCPT_DIVIDEBYZERO;
     if (cfsr & CFSR_UNALIGNED)
@@ -250,7 +255,7 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     if (!(exc_return & EXC_RETURN_PSP) || state.depth == 0)
         ResetNow(RESET_FATAL, cfsr & CFSR_STACKING ? 0 : frame->pc);
     uintptr_t slot = stack_slot(state.depth - 1);
-    RTS_UI32 code = code_of(cfsr, slot);
+    RTS_UI32 code = is_overflow(cfsr, frame, slot) ? RTSEXCPT_STACK_OVERFLOW : code_of(cfsr);
     uintptr_t address = address_of(cfsr, frame, slot);
     SCB_CFSR = cfsr;
     SCB_HFSR = SCB_HFSR;

@@ -14,6 +14,9 @@ enum { STACK_PAINT = 0x5A };
 /* Of the linker script. */
 extern RTS_UI8 data_start[], data_end[], data_load[], bss_start[], bss_end[], stack_bottom[], stack_top[];
 
+/* Of main, and of everything that interrupts it but application code; a guard of 32 bytes is at its end. */
+__attribute__((section(".bss.main_stack"), aligned(32), used)) static RTS_UI8 main_stack[RTS_MAIN_STACK_SIZE];
+
 int main(void);
 void ResetHandler(void);
 void NmiHandler(void);

@@ -18,6 +18,10 @@
 #define WATCHDOG_INTCLR REG32(WATCHDOG + 0xC)
 #define WATCHDOG_LOCK REG32(WATCHDOG + 0xC00)
 
+/* What lies below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
+enum { MPU_BELOW_RAM = MPU_BOARD + 1, BELOW_RAM_LOG2 = 16 };
+#define RAM_BASE 0x20000000u
+
 enum { TIMER_ENABLE_IRQ = 9, WATCHDOG_INTEN_RESEN = 3, WATCHDOG_KEY = 0x1ACCE551 };
 
 void BoardInit(void)
@@ -25,6 +29,7 @@ void BoardInit(void)
     IrqEnable(IRQ_TIMER0, LEVEL_DEVICE);
     UartInit();
     FlashInit();
+    MpuProtect(MPU_BELOW_RAM, RAM_BASE - (1u << BELOW_RAM_LOG2), BELOW_RAM_LOG2, MPU_NO_ACCESS);
 }
 
 void BoardAlarmSet(RTS_UI32 ns)

@@ -7,7 +7,7 @@
 #include "SysCom.h"
 
 enum { UART_BAUD = 115200 };
-enum { STATE_TX_FULL = 1, STATE_RX_FULL = 2 };
+enum { STATE_TX_FULL = 1 };
 enum { CTRL_ALL = 0xF }; /* transmit, receive, and their interrupts */
 enum { INT_TX = 1, INT_RX = 2 };
 
@@ -38,52 +38,49 @@ static RTS_UI16 used(const RING *ring)
     return (RTS_UI16)(ring->head - ring->tail);
 }
 
+/* The hardware holds one byte: the next one is the next interrupt. */
 static void receive(RTS_UI32 index)
 {
     LINE *line = &lines[index];
     uarts[index]->intclear = INT_RX;
-    while (uarts[index]->state & STATE_RX_FULL) {
-        RTS_UI8 byte = (RTS_UI8)uarts[index]->data;
-        if (used(&line->rx) == BOARD_UART_RX_SIZE)
-            continue; /* lost; the frame's checksum tells */
-        line->rx_data[line->rx.head % BOARD_UART_RX_SIZE] = byte;
-        line->rx.head++;
-    }
+    RTS_UI8 byte = (RTS_UI8)uarts[index]->data;
+    work = 1;
+    if (used(&line->rx) == BOARD_UART_RX_SIZE)
+        return; /* lost; the frame's check sum tells */
+    line->rx_data[line->rx.head % BOARD_UART_RX_SIZE] = byte;
+    line->rx.head++;
 }
 
 static void transmit(RTS_UI32 index)
 {
     LINE *line = &lines[index];
     uarts[index]->intclear = INT_TX;
-    while (used(&line->tx) && !(uarts[index]->state & STATE_TX_FULL)) {
-        uarts[index]->data = line->tx_data[line->tx.tail % BOARD_UART_TX_SIZE];
-        line->tx.tail++;
-    }
+    if (used(&line->tx) == 0 || (uarts[index]->state & STATE_TX_FULL))
+        return;
+    uarts[index]->data = line->tx_data[line->tx.tail % BOARD_UART_TX_SIZE];
+    line->tx.tail++;
+    work = 1;
 }
 
 void Uart0RxIrq(void)
 {
     receive(0);
-    work = 1;
 }
 
 void Uart0TxIrq(void)
 {
     transmit(0);
-    work = 1;
 }
 
 #if BOARD_UART_COUNT > 1
 void Uart1RxIrq(void)
 {
     receive(1);
-    work = 1;
 }
 
 void Uart1TxIrq(void)
 {
     transmit(1);
-    work = 1;
 }
 #endif
 

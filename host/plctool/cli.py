@@ -1,0 +1,464 @@
+"""The command line: reads arguments, calls `plctool.ops`, prints. Imports are late, so that every start is quick."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from plctool import output
+from plctool.errors import PlcError, UsageError
+
+if TYPE_CHECKING:
+    from plctool.device import Plc
+
+EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
+EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 130, 141
+DEFAULT_INTERVAL = 0.5
+BENCH_CYCLES = 10000
+LATER = {
+    "force": "use write, which a program may overwrite",
+    "unforce": "there is nothing to unforce",
+    "test": "use pytest with plctool.Simulator",
+}
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports wrong arguments as UsageError, like everything else that is wrong."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message[:1].upper()}{message[1:]}; see '{self.prog} --help'.", "usage")
+
+
+# ---- arguments -------------------------------------------------------------------------------------------------------
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="plctool", description="Compile IEC 61131-3 Structured Text and run it on small controllers.")
+    parser.add_argument("--version", action="store_true", help="print the version and end")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
+
+    def command(name: str, action: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=text, description=text[:1].upper() + text[1:] + ".")
+        sub.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+        sub.set_defaults(action=action)
+        return sub
+
+    _add_file_commands(command)
+    _add_device_commands(command)
+    command("demo", _demo, "show the whole story on this machine")
+    return parser
+
+
+def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
+    build = command("build", _build, "compile a program to an image")
+    _add_sources(build)
+    build.add_argument("-o", "--output", type=Path, default=Path("app.cdl"), metavar="IMAGE", help="default: app.cdl")
+    build.add_argument("--target", default="x86_64-linux", metavar="NAME", help="processor; default: x86_64-linux")
+    build.add_argument("-O", dest="level", type=int, choices=range(4), default=2, help="optimisation; default: 2")
+    build.add_argument("--checks", default="all", metavar="all|none|LIST", help="run-time checks; default: all")
+    build.add_argument("--debug", action="store_true", help="keep the code close to its source")
+
+    check = command("check", _check, "print every diagnosis of a program")
+    _add_sources(check)
+
+    info = command("info", _info, "describe an image")
+    info.add_argument("image", type=Path)
+
+    run = command("run", _run, "run an image in this process, on a virtual clock")
+    run.add_argument("image", type=Path)
+    length = run.add_mutually_exclusive_group()
+    length.add_argument("--cycles", type=_count, metavar="N", help="cycles of the first task; default: 1")
+    length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="virtual time instead")
+    run.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="before the first cycle")
+    run.add_argument("--get", action="append", default=[], metavar="NAME", help="after the last cycle")
+
+    bench = command("bench", _bench, "measure the time of a cycle on this machine")
+    bench.add_argument("image", type=Path)
+    bench.add_argument("--cycles", type=_count, default=BENCH_CYCLES, metavar="N", help=f"default: {BENCH_CYCLES}")
+
+
+def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
+    flash = command("flash", _flash, "bring an image onto a device and start it")
+    flash.add_argument("image", type=Path)
+    flash.add_argument("--no-start", action="store_true", help="leave the program stopped")
+    flash.add_argument("--force", action="store_true", help="also when the device has this image already")
+    _add_link(flash)
+
+    _add_link(command("scan", _scan, "list the devices that answer"))
+    _add_link(command("status", _status, "tell what the program on a device does"))
+    _add_link(command("start", _start, "start the program"))
+    _add_link(command("stop", _stop, "stop the program"))
+    reset = command("reset", _reset, "reset the program; it is stopped afterwards")
+    reset.add_argument("option", choices=["warm", "cold", "origin"], help="origin deletes the program")
+    _add_link(reset)
+    _add_link(command("tasks", _tasks, "show the times of the tasks"))
+    _add_link(command("log", _log, "print the log of a device"))
+
+    read = command("read", _read, "print values of variables")
+    read.add_argument("names", nargs="+", metavar="NAME")
+    _add_link(read, symbols=True)
+    write = command("write", _write, "set variables")
+    write.add_argument("values", nargs="+", metavar="NAME=VALUE")
+    _add_link(write, symbols=True)
+    watch = command("watch", _watch, "print values of variables again and again")
+    watch.add_argument("names", nargs="+", metavar="NAME")
+    watch.add_argument("--interval", type=_seconds, default=DEFAULT_INTERVAL, metavar="S", help="seconds; default: 0.5")
+    watch.add_argument("--count", type=_count, metavar="N", help="readings; default: until Ctrl-C")
+    _add_link(watch, symbols=True)
+
+
+def _add_sources(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("sources", nargs="+", type=Path, metavar="FILE.st|DIR")
+
+
+def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
+    link = parser.add_argument_group("link")
+    link.add_argument("--port", metavar="PORT", help="serial port or pyserial URL, for example /dev/ttyS0")
+    link.add_argument("--baud", type=_count, default=115200, metavar="N", help="default: 115200")
+    for kind, metavar in (("can", "INTERFACE:CHANNEL"), ("udp", "HOST[:PORT]"), ("tcp", "HOST[:PORT]")):
+        link.add_argument(f"--{kind}", metavar=metavar, help="not in this version")
+    link.add_argument("--node", type=int, metavar="N", help="not in this version")
+    if symbols:
+        parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="when they are not found by themselves")
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    with suppress(ValueError):
+        if 0 <= (seconds := float(text)) < 1e6:
+            return seconds
+    raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds")
+
+
+def _duration_ms(text: str) -> int:
+    from plctool.values import parse_time
+
+    milliseconds = parse_time(text)
+    if milliseconds < 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is in the past")
+    return milliseconds
+
+
+def _pairs(texts: Sequence[str]) -> dict[str, str]:
+    """NAME=VALUE arguments."""
+    pairs = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip():
+            raise UsageError(f"'{text}' is not NAME=VALUE; write for example Main.speed=5.", "usage")
+        pairs[name.strip()] = value
+    return pairs
+
+
+# ---- commands on files -----------------------------------------------------------------------------------------------
+
+
+def _build(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    document, warnings = ops.build(args.sources, args.output, args.target, args.level, args.checks, args.debug)
+    if not args.json:
+        for warning in warnings:
+            print(warning, file=sys.stderr)
+    return _show(args, document, lambda d: f"{d['image']}: {d['size']} bytes, CRC {d['crc']}")
+
+
+def _check(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    document, texts = ops.check(args.sources)
+    _show(args, document, lambda d: "\n".join(texts))
+    return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
+
+
+def _info(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    return _show(args, ops.info(args.image), output.info_text)
+
+
+def _run(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    document = ops.run(args.image, args.cycles, args.time, _pairs(args.set), args.get)
+    return _show(
+        args,
+        document,
+        lambda d: f"{output.values_text(d['values'])}\n{d['cycles']} cycles, {d['time_ms']:g} ms".lstrip(),
+    )
+
+
+def _bench(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    return _show(args, ops.bench(args.image, args.cycles), lambda d: output.table(d["tasks"], d["tasks"][0]))
+
+
+def _demo(args: argparse.Namespace) -> int:
+    from plctool import demo
+
+    return demo.main()
+
+
+# ---- commands on devices ---------------------------------------------------------------------------------------------
+
+
+def _link(args: argparse.Namespace) -> str:
+    """The link the arguments name."""
+    for kind in ("can", "udp", "tcp"):
+        if getattr(args, kind):
+            raise UsageError(f"--{kind} is not in this version; use a serial line (--port).", "no-such-link")
+    if not args.port:
+        raise UsageError("Say where the device is: --port /dev/ttyS0, for example.", "no-link")
+    return f"serial:{args.port}"
+
+
+def _connect(args: argparse.Namespace) -> Plc:
+    from plctool.device import connect
+
+    return connect(_link(args), args.baud, getattr(args, "symbols", None))
+
+
+def _flash(args: argparse.Namespace) -> int:
+    with _connect(args) as plc, _Progress(not args.json) as progress:
+        result = plc.flash(args.image, start=not args.no_start, force=args.force, progress=progress.show)
+    document = {
+        "bytes": result.bytes,
+        "seconds": round(result.seconds, 3),
+        "skipped": result.skipped,
+        "state": str(result.state),
+    }
+
+    def text(d: dict[str, Any]) -> str:
+        done = "already on the device" if d["skipped"] else f"{d['bytes']} bytes in {d['seconds']:.2f} s"
+        return f"{done}; state: {d['state']}"
+
+    return _show(args, document, text)
+
+
+class _Progress:
+    """A progress bar on a terminal, silence elsewhere."""
+
+    def __init__(self, wanted: bool) -> None:
+        self._bar: Any = None
+        self._task: Any = None
+        if wanted and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, DownloadColumn, Progress, TimeRemainingColumn, TransferSpeedColumn
+
+            columns = (BarColumn(), DownloadColumn(), TransferSpeedColumn(), TimeRemainingColumn())
+            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._task = self._bar.add_task("flash", total=None)
+
+    def __enter__(self) -> _Progress:
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if self._bar:
+            self._bar.stop()
+
+    def show(self, done: int, total: int) -> None:
+        if self._bar:
+            self._bar.update(self._task, completed=done, total=total)
+
+
+def _scan(args: argparse.Namespace) -> int:
+    from plctool.device import scan
+    from plctool.image import target_name
+
+    devices = [
+        {
+            "address": node.address_text,
+            "node_name": node.node_name,
+            "device_name": node.device_name,
+            "vendor_name": node.vendor_name,
+            "target": target_name(node.target_id),
+            "version": node.version,
+            "serial_number": node.serial_number,
+        }
+        for node in scan(_link(args), args.baud)
+    ]
+    return _show(args, {"devices": devices}, lambda d: output.table(d["devices"], devices[0]))
+
+
+def _status(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    with _connect(args) as plc:
+        return _show(args, ops.status(plc), output.status_text)
+
+
+def _start(args: argparse.Namespace) -> int:
+    return _control(args, lambda plc: plc.start())
+
+
+def _stop(args: argparse.Namespace) -> int:
+    return _control(args, lambda plc: plc.stop())
+
+
+def _reset(args: argparse.Namespace) -> int:
+    return _control(args, lambda plc: plc.reset(args.option))
+
+
+def _control(args: argparse.Namespace, action: Callable[[Plc], None]) -> int:
+    """Does something and tells the state it leads to."""
+    from plctool import ops
+
+    with _connect(args) as plc:
+        action(plc)
+        return _show(args, ops.status(plc), output.status_text)
+
+
+def _tasks(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    columns = ("name", "cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns")
+    with _connect(args) as plc:
+        return _show(args, ops.tasks(plc), lambda d: output.table(d["tasks"], columns))
+
+
+def _log(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    with _connect(args) as plc:
+        return _show(args, ops.log(plc), output.log_text)
+
+
+def _read(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    with _connect(args) as plc:
+        return _show(args, ops.read(plc, args.names), lambda d: output.values_text(d["values"]))
+
+
+def _write(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    with _connect(args) as plc:
+        return _show(args, ops.write(plc, _pairs(args.values)), lambda d: output.values_text(d["values"]))
+
+
+def _watch(args: argparse.Namespace) -> int:
+    if args.json:
+        return _watch_json(args)
+    if sys.stdout.isatty():
+        return _watch_live(args)
+    with _connect(args) as plc:
+        for seconds, values in plc.watch(args.names, args.interval, args.count):
+            text = "  ".join(f"{name} = {output.value_text(value)}" for name, value in values.items())
+            print(f"{seconds:8.3f} s  {text}", flush=True)
+    return EXIT_OK
+
+
+def _watch_json(args: argparse.Namespace) -> int:
+    """All samples as one document, when the count is reached or at Ctrl-C."""
+    samples = []
+    with _connect(args) as plc, suppress(KeyboardInterrupt):
+        for seconds, values in plc.watch(args.names, args.interval, args.count):
+            samples.append({"time_s": round(seconds, 6), "values": values})
+    return _show(args, {"samples": samples}, lambda d: "")
+
+
+def _watch_live(args: argparse.Namespace) -> int:
+    from rich.live import Live
+    from rich.table import Table
+
+    with _connect(args) as plc, Live(auto_refresh=False) as live:
+        for seconds, values in plc.watch(args.names, args.interval, args.count):
+            table = Table("variable", "value", caption=f"{seconds:.1f} s, Ctrl-C ends")
+            for name, value in values.items():
+                table.add_row(name, output.value_text(value))
+            live.update(table, refresh=True)
+    return EXIT_OK
+
+
+# ---- the frame -------------------------------------------------------------------------------------------------------
+
+
+def _show(args: argparse.Namespace, document: dict[str, Any], text: Callable[[dict[str, Any]], str]) -> int:
+    """Prints a result for machines or for people."""
+    shown = output.as_json(document) if args.json else text(document)
+    if shown:
+        print(shown)
+    return EXIT_OK
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("plctool")
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+def _command(arguments: Sequence[str]) -> int:
+    if arguments and arguments[0] in LATER:
+        raise UsageError(f"'{arguments[0]}' is not in this version of plctool; {LATER[arguments[0]]}.", "not-yet")
+    args = _parser().parse_args(arguments)
+    if args.version:
+        print(f"plctool {_version()}")
+        return EXIT_OK
+    if "action" not in args:
+        raise UsageError("Say what to do; 'plctool --help' lists the commands.", "usage")
+    return int(args.action(args))
+
+
+def _report(error: PlcError, as_json: bool) -> int:
+    if as_json:
+        document: dict[str, Any] = {"error": {"code": error.code, "message": error.message}}
+        if diagnostics := getattr(error, "diagnostics", None):
+            document["diagnostics"] = [vars(d) for d in diagnostics]
+        print(output.as_json(document))
+    else:
+        prefix = "" if hasattr(error, "diagnostics") else "plctool: "  # diagnoses begin with their place
+        print(f"{prefix}{error.message}", file=sys.stderr)
+    return error.exit_code
+
+
+def _internal_error(error: Exception, as_json: bool) -> int:
+    if os.environ.get("PLCTOOL_DEBUG"):
+        traceback.print_exc()
+    name = type(error).__name__
+    bug = PlcError(f"Internal error ({name}: {error}); set PLCTOOL_DEBUG=1 to see where, and report it.", "internal")
+    return _report(bug, as_json)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; returns the exit status of the process."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    as_json = "--json" in words
+    try:
+        status = _run_reported(words, as_json)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        # Whoever read our output has gone; nothing may be written any more, also not at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_BROKEN_PIPE
+
+
+def _run_reported(words: Sequence[str], as_json: bool) -> int:
+    try:
+        return _command(words)
+    except PlcError as error:
+        return _report(error, as_json)
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        return _internal_error(error, as_json)

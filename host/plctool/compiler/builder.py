@@ -1,0 +1,366 @@
+"""Builds the syntax tree: one method for each rule of grammar.lark.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from plctool.compiler import ast, literals
+from plctool.compiler.lexer import Report, Token
+from plctool.compiler.source import Source
+
+_PRECEDENCE = {
+    "**": 7, "*": 6, "/": 6, "MOD": 6, "+": 5, "-": 5, "<": 4, ">": 4, "<=": 4, ">=": 4, "=": 3, "<>": 3,
+    "AND": 2, "&": 2, "AND_THEN": 2, "XOR": 1, "OR": 0, "OR_ELSE": 0,
+}  # fmt: skip
+
+
+def _chain(operands: Sequence[ast.Expr], operators: Sequence[Token]) -> ast.Expr:
+    """Sorts out `a op b op c` by precedence, left-associative."""
+    values, pending = [operands[0]], list[tuple[int, str, int]]()
+
+    def reduce() -> None:
+        _, op, pos = pending.pop()
+        right = values.pop()
+        values[-1] = ast.Binary(pos, op, values[-1], right)
+
+    for token, operand in zip(operators, operands[1:], strict=True):
+        op = token.text.upper()
+        precedence = _PRECEDENCE[op]
+        while pending and pending[-1][0] >= precedence:
+            reduce()
+        pending.append((precedence, "AND" if op == "&" else op, token.pos))
+        values.append(operand)
+    while pending:
+        reduce()
+    return values[0]
+
+
+def _listed(children: tuple[Any, ...]) -> list[Any]:
+    return [c for c in children if c is not None]
+
+
+class Builder:
+    """One method per grammar rule. What an optional part left out is None; so is what error recovery put in."""
+
+    def __init__(self) -> None:
+        self.source = Source("", "")
+        self.attributes: dict[int, dict[str, str]] = {}
+        self.report: Report = lambda pos, code, message: None
+
+    # ---- types ----
+
+    def start(self, *units: Any) -> list[Any]:
+        flat: list[Any] = []
+        for unit in units:
+            if isinstance(unit, list):
+                flat += unit
+            elif unit is not None:
+                flat.append(unit)
+        return flat
+
+    def types(self, _type: Token, *decls: Any) -> list[Any]:
+        return [d for d in decls if d is not None]
+
+    def type_decl(self, name: Token, spec: ast.TypeSpec, init: ast.Init | None) -> ast.TypeDecl:
+        return ast.TypeDecl(name.pos, name.text, spec, init, self.source)
+
+    def named_type(self, name: tuple[int, str]) -> ast.NamedType:
+        return ast.NamedType(*name)
+
+    def sized_type(self, name: Token, length: ast.Expr) -> ast.NamedType:
+        return ast.NamedType(name.pos, name.text, length)
+
+    def sized_by_number(self, name: Token, length: Token) -> ast.NamedType:
+        return ast.NamedType(name.pos, name.text, self.number(length))
+
+    def subrange(self, base: Token, low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
+        return ast.SubrangeSpec(base.pos, base.text, low, high)
+
+    def enum(self, values: list[tuple[int, str, ast.Init | None]]) -> ast.EnumSpec:
+        return ast.EnumSpec(values[0][0] if values else 0, None, values)
+
+    def enum_with_base(self, values: list[tuple[int, str, ast.Init | None]], base: Token) -> ast.EnumSpec:
+        return ast.EnumSpec(base.pos, base.text, values)
+
+    def enum_of_base(self, base: Token, values: list[tuple[int, str, ast.Init | None]]) -> ast.EnumSpec:
+        return ast.EnumSpec(base.pos, base.text, values)
+
+    def enum_values(self, *values: Any) -> list[Any]:
+        return [v for v in values if v is not None]
+
+    def enum_value(self, name: Token, value: ast.Init | None) -> tuple[int, str, ast.Init | None]:
+        return name.pos, name.text, value
+
+    def array(self, keyword: Token, *rest: Any) -> ast.ArraySpec:
+        *bounds, element = rest
+        return ast.ArraySpec(keyword.pos, bounds, element)
+
+    def bounds(self, low: ast.Expr, high: ast.Expr) -> tuple[ast.Expr, ast.Expr]:
+        return low, high
+
+    def pointer(self, keyword: Token, target: ast.TypeSpec) -> ast.PointerSpec:
+        return ast.PointerSpec(keyword.pos, keyword.text.upper(), target)
+
+    def struct(self, keyword: Token, *fields: ast.VarDecl | None) -> ast.StructSpec:
+        return ast.StructSpec(keyword.pos, [f for f in fields if f is not None], keyword.type == "UNION")
+
+    def name(self, first: Token, *rest: Token) -> tuple[int, str]:
+        return first.pos, ".".join((first.text, *(t.text for t in rest)))
+
+    # ---- variables ----
+
+    def var_block(self, keyword: Token, *items: Any) -> ast.VarBlock:
+        qualifiers = {t.text.upper() for t in items if isinstance(t, Token)}
+        decls = [d for d in items if isinstance(d, ast.VarDecl)]
+        return ast.VarBlock(keyword.pos, keyword.text.upper(), qualifiers, decls)
+
+    def var_decl(
+        self, names: list[Token], location: Token | None, spec: ast.TypeSpec, init: ast.Init | None
+    ) -> ast.VarDecl:
+        pos = names[0].pos
+        address = ast.DirectAddress(location.pos, location.text) if location else None
+        attributes = self.attributes.get(pos, {})
+        return ast.VarDecl(pos, [(t.pos, t.text) for t in names], address, spec, init, attributes)
+
+    def var_names(self, *names: Token) -> list[Token]:
+        return list(names)
+
+    def array_init(self, *items: Any) -> ast.ArrayInit:
+        return ast.ArrayInit(items[0].pos, list(items))
+
+    def repeat(self, count: Token, *values: Any) -> ast.Repeat:
+        return ast.Repeat(count.pos, self.number(count), _listed(values))
+
+    def struct_init(self, *members: tuple[int, str, ast.Init]) -> ast.StructInit:
+        return ast.StructInit(members[0][0], list(members))
+
+    def member_init(self, name: Token, value: ast.Init) -> tuple[int, str, ast.Init]:
+        return name.pos, name.text, value
+
+    # ---- units ----
+
+    def global_block(self, keyword: Token, *items: Any) -> ast.GlobalBlock:
+        return ast.GlobalBlock(self.var_block(keyword, *items), self.source)
+
+    def var_blocks(self, *blocks: Any) -> list[Any]:
+        return [b for b in blocks if b is not None]
+
+    def _pou(self, keyword: Token, name: Token, result: ast.TypeSpec | None, blocks: Any, body: Any) -> ast.PouDecl:
+        attributes = self.attributes.get(keyword.pos, {})
+        return ast.PouDecl(
+            name.pos, keyword.text.upper(), name.text, result, blocks, body, attributes, self.source
+        )  # fmt: skip
+
+    def function(self, keyword: Token, name: Token, result: ast.TypeSpec | None, blocks: Any, body: Any) -> Any:
+        return self._pou(keyword, name, result, blocks, body)
+
+    def function_block(self, keyword: Token, name: Token, blocks: Any, body: Any) -> Any:
+        return self._pou(keyword, name, None, blocks, body)
+
+    program = function_block
+
+    def configuration(self, keyword: Token, name: Token, *items: Any) -> ast.ConfigurationDecl:
+        decl = ast.ConfigurationDecl(name.pos, name.text, [], [], [], self.source)
+        self._configure(decl, items)
+        return decl
+
+    def _configure(self, decl: ast.ConfigurationDecl, items: Any) -> None:
+        for item in items:
+            if isinstance(item, ast.VarBlock):
+                decl.globals.append(item)
+            elif isinstance(item, ast.TaskDecl):
+                decl.tasks.append(item)
+            elif isinstance(item, ast.ProgramInstance):
+                decl.programs.append(item)
+            elif isinstance(item, list):
+                self._configure(decl, item)
+
+    def config_globals(self, keyword: Token, *items: Any) -> ast.VarBlock:
+        return self.var_block(keyword, *items)
+
+    def resource(self, _keyword: Token, _name: Token, _type: Token, *items: Any) -> list[Any]:
+        return list(items)
+
+    def task(self, _keyword: Token, name: Token, *properties: Any) -> ast.TaskDecl:
+        return ast.TaskDecl(name.pos, name.text, _listed(properties))
+
+    def instance(
+        self, _keyword: Token, qualifier: Token | None, name: Token, task: Token | None, type_name: Token, args: Any
+    ) -> ast.ProgramInstance:
+        qualifiers = {qualifier.text.upper()} if qualifier else set[str]()
+        return ast.ProgramInstance(
+            name.pos,
+            name.text,
+            (task.pos, task.text) if task else None,
+            type_name.pos,
+            type_name.text,
+            args or [],
+            qualifiers,
+        )
+
+    # ---- statements ----
+
+    def stmts(self, *children: Any) -> list[Any]:
+        return [c for c in children if c is not None]
+
+    def empty(self) -> None:
+        return None
+
+    def assign(self, target: ast.Expr, value: Any) -> ast.Assign:
+        if type(value) is tuple:
+            return ast.Assign(target.pos, [target, *value[0]], ":=", value[1])
+        return ast.Assign(target.pos, [target], ":=", value)
+
+    def chained(self, target: ast.Expr, value: Any) -> tuple[list[ast.Expr], ast.Expr]:
+        if type(value) is tuple:
+            return [target, *value[0]], value[1]
+        return [target], value
+
+    def assign_with(self, target: ast.Expr, op: Token, _equals: Token, value: ast.Expr) -> ast.Assign | None:
+        name = op.text.upper()
+        if name not in ("S", "R", "REF"):
+            self.report(op.pos, "syntax", f"{op.text} has no place here; an assignment is written :=, S= or R=")
+            return None
+        return ast.Assign(op.pos, [target], name + "=", value)
+
+    def expr_stmt(self, value: ast.Expr) -> ast.ExprStmt:
+        return ast.ExprStmt(value.pos, value)
+
+    def if_stmt(self, keyword: Token, condition: ast.Expr, body: list[ast.Stmt], *rest: Any) -> ast.If:
+        *elsifs, otherwise = rest
+        return ast.If(keyword.pos, [(condition, body), *elsifs], otherwise or [])
+
+    def elsif(self, condition: ast.Expr, body: list[ast.Stmt]) -> tuple[ast.Expr, list[ast.Stmt]]:
+        return condition, body
+
+    def case_stmt(self, keyword: Token, selector: ast.Expr, *rest: Any) -> ast.Case:
+        *items, otherwise = rest
+        branches: list[tuple[list[ast.CaseLabel], list[ast.Stmt]]] = []
+        for item in items:
+            if type(item) is list:
+                branches.append((item, []))
+            elif item is not None:
+                if not branches:
+                    self.report(item.pos, "syntax", "this statement stands before the first label of the CASE")
+                    continue
+                branches[-1][1].append(item)
+        return ast.Case(keyword.pos, selector, branches, otherwise or [])
+
+    def case_labels(self, *labels: ast.CaseLabel) -> list[ast.CaseLabel]:
+        return _listed(labels)
+
+    def case_label(self, low: ast.Expr, high: ast.Expr | None) -> ast.CaseLabel:
+        return ast.CaseLabel(low.pos, low, high)
+
+    def for_stmt(self, keyword: Token, var: Any, start: Any, stop: Any, step: Any, body: Any) -> ast.For:
+        return ast.For(keyword.pos, var, start, stop, step, body)
+
+    def while_stmt(self, keyword: Token, condition: ast.Expr, body: list[ast.Stmt]) -> ast.While:
+        return ast.While(keyword.pos, condition, body)
+
+    def repeat_stmt(self, keyword: Token, body: list[ast.Stmt], until: ast.Expr) -> ast.RepeatUntil:
+        return ast.RepeatUntil(keyword.pos, body, until)
+
+    def exit_stmt(self, keyword: Token) -> ast.Exit:
+        return ast.Exit(keyword.pos)
+
+    def continue_stmt(self, keyword: Token) -> ast.Continue:
+        return ast.Continue(keyword.pos)
+
+    def return_stmt(self, keyword: Token) -> ast.Return:
+        return ast.Return(keyword.pos)
+
+    # ---- expressions ----
+
+    def binary(self, *children: Any) -> ast.Expr:
+        if len(children) == 3:
+            op = children[1].text.upper()
+            return ast.Binary(children[1].pos, "AND" if op == "&" else op, children[0], children[2])
+        return _chain(children[::2], children[1::2])
+
+    def unary(self, op: Token, operand: ast.Expr) -> ast.Expr:
+        return ast.Unary(op.pos, op.text.upper(), operand)
+
+    def parenthesised(self, value: ast.Expr) -> ast.Expr:
+        return value
+
+    def number(self, token: Token) -> ast.Literal:
+        if len(token.text) < 19 and token.text.isdigit():
+            return ast.Literal(token.pos, ast.LiteralKind.INT, int(token.text))
+        try:
+            return ast.Literal(token.pos, *literals.unsigned(token.text))
+        except literals.LiteralError as error:
+            return self._bad(token, error)
+
+    def typed(self, token: Token) -> ast.Expr:
+        prefix, _, rest = token.text.partition("#")
+        if literals.is_enum_value(prefix, rest):
+            return ast.EnumValue(token.pos, prefix, rest)
+        try:
+            kind, value, name = literals.typed(token.text)
+            return ast.Literal(token.pos, kind, value, name)
+        except literals.LiteralError as error:
+            return self._bad(token, error)
+
+    def string(self, token: Token) -> ast.Literal:
+        if token.text.startswith('"'):
+            return self._bad(token, literals.LiteralError("WSTRING constants are not supported yet; write 'text'"))
+        try:
+            text = token.text[token.text.index("'") :]
+            return ast.Literal(token.pos, ast.LiteralKind.STRING, literals.string(text), "STRING")
+        except literals.LiteralError as error:
+            return self._bad(token, error)
+
+    def word(self, token: Token) -> ast.Literal:
+        if token.type == "NULL":
+            return ast.Literal(token.pos, ast.LiteralKind.NULL, 0)
+        return ast.Literal(token.pos, ast.LiteralKind.BOOL, int(token.type == "TRUE"))
+
+    def _bad(self, token: Token, error: literals.LiteralError) -> ast.Literal:
+        self.report(token.pos, "literal", str(error))
+        return ast.Literal(token.pos, ast.LiteralKind.BAD, 0)
+
+    def name_expr(self, token: Token) -> ast.Name:
+        return ast.Name(token.pos, token.text)
+
+    def direct(self, token: Token) -> ast.DirectAddress:
+        return ast.DirectAddress(token.pos, token.text.upper())
+
+    def member(self, base: ast.Expr, name: Token) -> ast.Member:
+        return ast.Member(base.pos, base, name.text, name.pos)
+
+    def bit(self, base: ast.Expr, token: Token) -> ast.Expr:
+        text = token.text.lstrip("%").upper()
+        width = text[0] if text[0] in "XBWDL" else "X"
+        digits = text.removeprefix(width)
+        if not digits.isdigit() or len(digits) > 4:
+            return self._bad(token, literals.LiteralError(f"{token.text} is not the number of a bit"))
+        return ast.BitAccess(token.pos, base, width, int(digits))
+
+    def index(self, base: ast.Expr, *indices: ast.Expr) -> ast.Index:
+        return ast.Index(base.pos, base, list(indices))
+
+    def deref(self, base: ast.Expr) -> ast.Deref:
+        return ast.Deref(base.pos, base)
+
+    def call(self, callee: ast.Expr, args: list[ast.Argument]) -> ast.Call:
+        return ast.Call(callee.pos, callee, args)
+
+    def args(self, *children: Any) -> list[Any]:
+        return [c for c in children if c is not None]
+
+    def positional(self, value: ast.Expr) -> ast.Argument:
+        return ast.Argument(value.pos, None, value)
+
+    def input(self, name: Token, value: ast.Expr) -> ast.Argument:
+        return ast.Argument(name.pos, name.text, value)
+
+    def output(self, name: Token, target: ast.Expr | None = None) -> ast.Argument:
+        return ast.Argument(name.pos, name.text, target, output=True)
+
+    def output_negated(self, _not: Token, name: Token, target: ast.Expr | None = None) -> ast.Argument:
+        return ast.Argument(name.pos, name.text, target, output=True, negated=True)

@@ -1,0 +1,28 @@
+"""Reading and writing files, with errors that say what to do."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from plctool.errors import UsageError
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """The file has the old or the new content, whatever happens on the way."""
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
+            file.write(data)
+        os.chmod(file.name, 0o644)
+        os.replace(file.name, path)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror}.", "cannot-write") from None
+
+
+def read_image(path: Path) -> bytes:
+    """The bytes of an image file."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"The image {path} cannot be read: {error.strerror}.", "no-image") from None

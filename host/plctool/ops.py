@@ -1,0 +1,205 @@
+"""What the commands do, as functions that return the document `--json` prints."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from plctool.errors import DeviceError, UsageError
+
+if TYPE_CHECKING:
+    from plctool.compiler.diagnostics import Diagnostic
+    from plctool.device import ExceptionInfo, Plc, PlcStatus
+    from plctool.sim import Simulator
+
+Document = dict[str, Any]
+
+_CODE_OFFSET = re.compile(r"at code offset 0x([0-9a-f]+)$")
+
+
+# ---- files -----------------------------------------------------------------------------------------------------------
+
+
+def build(
+    paths: Sequence[Path], output: Path, target: str, level: int, checks: str, debug: bool
+) -> tuple[Document, list[str]]:
+    """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as people read them.
+
+    Raises CompileError when the program has errors. Files appear complete or not at all.
+    """
+    from plctool.compiler import compile_sources
+    from plctool.symbols import symbol_path
+
+    result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug)
+    result.write(output)
+    document = {
+        "image": str(output),
+        "symbols": str(symbol_path(output)),
+        "crc": f"{result.crc:08X}",
+        "size": len(result.image),
+        "target": target,
+        "warnings": [diagnostic_document(w) for w in result.warnings],
+    }
+    return document, result.rendered_warnings
+
+
+def check(paths: Sequence[Path]) -> tuple[Document, list[str]]:
+    """Every diagnosis of a program; the texts are as people read them."""
+    from plctool.compiler import load_sources
+    from plctool.compiler.diagnostics import render
+    from plctool.compiler.front import check_sources
+
+    sources = load_sources(paths)
+    result = check_sources(sources)
+    texts = [render(d, sources) for d in result.diagnostics]
+    return {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}, texts
+
+
+def diagnostic_document(diagnostic: Diagnostic) -> Document:
+    return vars(diagnostic)
+
+
+def info(path: Path) -> Document:
+    """Header, tables and POUs of an image."""
+    from plctool.image import describe_image
+    from plctool.symbols import find_symbols
+
+    data = read_image(path)
+    document = describe_image(data)
+    try:
+        table = find_symbols(int(document["crc"], 16), path)
+    except UsageError:
+        return document
+    document["pous"] = [{"name": u.name, "size": u.size, "file": u.file, "line": u.line} for u in table.pous]
+    return document
+
+
+def read_image(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"The image {path} cannot be read: {error.strerror}.", "no-image") from None
+
+
+# ---- in this process -------------------------------------------------------------------------------------------------
+
+
+def run(path: Path, cycles: int | None, time_ms: int | None, sets: Mapping[str, str], gets: Sequence[str]) -> Document:
+    """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`.
+
+    Raises DeviceError when the program stops with an exception.
+    """
+    from plctool.sim import Simulator
+
+    with Simulator.from_file(path) as plc:
+        for name in gets:
+            plc.read(name)  # a wrong name is told before the run
+        for name, text in sets.items():
+            plc.write(name, _parsed(plc, name, text))
+        if time_ms is None:
+            plc.run_cycles(1 if cycles is None else cycles)
+        else:
+            plc.run_for(time_ms)
+        _raise_exception(plc)
+        tasks = plc.tasks()
+        return {
+            "values": plc.read_all(gets),
+            "cycles": tasks[0].cycles if tasks else 0,
+            "time_ms": plc.now_ns / 1e6,
+        }
+
+
+def _parsed(plc: Simulator, name: str, text: str) -> Any:
+    assert plc.symbols
+    return plc.symbols.resolve(name).parse(text)
+
+
+def _raise_exception(plc: Simulator) -> None:
+    from plctool.device import explain_exception
+
+    exception = plc.status().exception
+    if exception is None:
+        return
+    tasks = plc.tasks()
+    task = tasks[exception.task].name if 0 <= exception.task < len(tasks) else None
+    raise DeviceError(f"The program stopped: {explain_exception(exception, task, plc.symbols)}.", "exception")
+
+
+def bench(path: Path, cycles: int) -> Document:
+    """Real time per cycle of each task."""
+    from plctool.sim import Simulator
+
+    with Simulator.from_file(path) as plc:
+        tasks = []
+        for index, task in enumerate(plc.tasks()):
+            code_ns, cycle_ns = plc.bench(index, cycles)
+            tasks.append(
+                {
+                    "name": task.name,
+                    "ns_per_cycle": round(code_ns, 2),
+                    "runtime_ns": round(max(0.0, cycle_ns - code_ns), 2),
+                }
+            )
+        return {"tasks": tasks}
+
+
+# ---- on a device -----------------------------------------------------------------------------------------------------
+
+
+def status(plc: Plc) -> Document:
+    return status_document(plc.status())
+
+
+def status_document(status: PlcStatus) -> Document:
+    from plctool.link.services import AppState
+
+    return {
+        "state": str(status.state),
+        "image_crc": None if status.state is AppState.NONE else f"{status.image_crc:08X}",
+        "exception": None if status.exception is None else _exception_document(status.exception),
+    }
+
+
+def _exception_document(exception: ExceptionInfo) -> Document:
+    return vars(exception)
+
+
+def tasks(plc: Plc) -> Document:
+    return {"tasks": [vars(task) for task in plc.tasks()]}
+
+
+def read(plc: Plc, names: Sequence[str]) -> Document:
+    return {"values": plc.read_all(names)}
+
+
+def write(plc: Plc, texts: Mapping[str, str]) -> Document:
+    """Writes values as typed and reads them back."""
+    table = plc.symbols()
+    plc.write({name: table.resolve(name).parse(text) for name, text in texts.items()})
+    return {"values": plc.read_all(list(texts))}
+
+
+def log(plc: Plc) -> Document:
+    """The log; the exception that holds the program at present comes with its source line."""
+    from plctool.core import lib
+
+    names = {lib.LOG_INFO: "info", lib.LOG_WARNING: "warning", lib.LOG_ERROR: "error", lib.LOG_EXCEPTION: "exception",
+             lib.LOG_DEBUG: "debug"}  # fmt: skip
+    entries: list[Document] = [
+        {
+            "handle": entry.handle,
+            "time_s": entry.time_ns / 1e9,
+            "component": entry.component,
+            "class": names.get(entry.log_class, f"0x{entry.log_class:X}"),
+            "error": entry.error,
+            "text": entry.text,
+        }
+        for entry in plc.log()
+    ]
+    exception = plc.status().exception
+    last = next((e for e in reversed(entries) if e["class"] == "exception"), None)
+    if exception and exception.file and last and _CODE_OFFSET.search(last["text"]):
+        last.update(pou=exception.pou, file=exception.file, line=exception.line)
+    return {"entries": entries}

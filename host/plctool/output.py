@@ -1,0 +1,74 @@
+"""How documents look to people: short lines and aligned columns, no decoration that gets in the way of other tools."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+
+def as_json(document: Any) -> str:
+    """One line of JSON."""
+    return json.dumps(document, allow_nan=False)
+
+
+def value_text(value: Any) -> str:
+    """A value of a variable as ST writes it, as far as that is short."""
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(value_text, value)) + "]"
+    if isinstance(value, dict):
+        return "(" + ", ".join(f"{name} := {value_text(v)}" for name, v in value.items()) + ")"
+    return str(value)
+
+
+def values_text(values: dict[str, Any]) -> str:
+    return "\n".join(f"{name} = {value_text(value)}" for name, value in values.items())
+
+
+def table(rows: Sequence[dict[str, Any]], columns: Iterable[str]) -> str:
+    """Rows under their column names; numbers stand right."""
+    names = list(columns)
+    cells = [names, *([str(row[name]) for name in names] for row in rows)]
+    widths = [max(len(line[i]) for line in cells) for i in range(len(names))]
+    right = [bool(rows) and isinstance(rows[0][name], int | float) for name in names]
+    lines = [
+        "  ".join(
+            cell.rjust(width) if r else cell.ljust(width) for cell, width, r in zip(line, widths, right, strict=True)
+        )
+        for line in cells
+    ]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def place_text(place: dict[str, Any]) -> str:
+    """`, Main, main.st:12` for what has a source line, else nothing."""
+    return f", {place['pou']}, {place['file']}:{place['line']}" if place.get("file") else ""
+
+
+def status_text(document: dict[str, Any]) -> str:
+    lines = [f"state: {document['state']}"]
+    if document["image_crc"]:
+        lines.append(f"image: {document['image_crc']}")
+    if exception := document["exception"]:
+        task = f" in task {exception['task']}" if exception["task"] else ""
+        lines.append(f"exception: {exception['name']}{task}{place_text(exception)}")
+    return "\n".join(lines)
+
+
+def log_text(document: dict[str, Any]) -> str:
+    return "\n".join(
+        f"{e['time_s']:12.6f} s  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}"
+        for e in document["entries"]
+    )
+
+
+def info_text(document: dict[str, Any]) -> str:
+    """Header first, then one section for each table that is not empty."""
+    lines = [f"{name}: {value}" for name, value in document.items() if not isinstance(value, list | dict)]
+    lines += [f"{name}: {text}" for name, text in document["info"].items() if text]
+    for name, rows in document.items():
+        if isinstance(rows, list) and rows:
+            lines += ["", f"{name}:", table(rows, rows[0])]
+    return "\n".join(lines)

@@ -1,0 +1,193 @@
+/*
+ * test_flash_file.c - SysFileFlash: files on flash, written in sequence.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include <string.h>
+
+#include "Sim.h"
+#include "SysFileFlash.h"
+#include "SysFlash.h"
+#include "test.h"
+
+typedef struct {
+    RTS_UI32 program_size;
+    RTS_UI8 erased;
+} GEOMETRY;
+
+static const GEOMETRY geometries[] = {{1, 0xFF}, {2, 0x00}, {4, 0xFF}, {8, 0x00}, {16, 0xFF}};
+
+static RTS_UI8 pattern[8192];
+
+static void start(GEOMETRY g)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < sizeof pattern; i++)
+        pattern[i] = (RTS_UI8)(i * 13 + i / 256);
+    CHECK(SimFlashConfigure(64 * 1024, 512, g.program_size, g.erased) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+}
+
+static bool holds_pattern(RTS_UI32 file, RTS_UI32 size)
+{
+    static RTS_UI8 data[sizeof pattern];
+
+    return SysFileRead(file, 0, data, size) == ERR_OK && memcmp(data, pattern, size) == 0;
+}
+
+static void files_lie_side_by_side_on_sector_borders(void)
+{
+    RTS_UI32 end = 0;
+    RTS_UI32 i;
+
+    start(geometries[0]);
+    for (i = 0; i < FILE_COUNT; i++) {
+        const FILE_AREA *area = SysFileGetArea(i);
+        CHECK(area->offset == end);
+        CHECK(area->size > 0 && area->size % 512 == 0);
+        end = area->offset + area->size;
+    }
+    CHECK(end <= 64 * 1024);
+    CHECK(SysFileGetArea(FILE_SLOT_A)->size == SysFileGetArea(FILE_SLOT_B)->size);
+    CHECK(SysFileGetArea(FILE_SLOT_A)->size > 20 * 1024);
+    CHECK(SysFileGetArea(FILE_COMMIT)->size == 2 * 512);
+}
+
+static void a_flash_that_is_too_small_stops_the_start_up(void)
+{
+    CHECK(SimFlashConfigure(1024, 256, 1, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_NOMEMORY);
+    CHECK(SimAdvance(1) == ERR_NOTINITIALIZED);
+    CHECK(SimFlashConfigure(2048, 256, 1, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK); /* 2 commit, 2 retain, 2 x 2 slots */
+    CHECK(SysFileGetArea(FILE_SLOT_B)->size == 512);
+}
+
+/* Blocks of all sizes, in a pattern that has nothing to do with units and sectors. */
+static void what_is_written_in_pieces_can_be_read(void)
+{
+    static const RTS_UI32 blocks[] = {1, 2, 3, 5, 7, 8, 13, 16, 17, 31, 64, 100, 511, 512, 513, 1000};
+    RTS_SIZE g;
+    RTS_SIZE b;
+
+    for (g = 0; g < RTS_COUNT(geometries); g++) {
+        for (b = 0; b < RTS_COUNT(blocks); b++) {
+            RTS_UI32 done = 0;
+            start(geometries[g]);
+            SysFileCreate(FILE_SLOT_B);
+            while (done < sizeof pattern) {
+                RTS_UI32 size = (RTS_UI32)sizeof pattern - done < blocks[b] ? (RTS_UI32)sizeof pattern - done : blocks[b];
+                CHECK(SysFileWrite(FILE_SLOT_B, pattern + done, size) == ERR_OK);
+                done += size;
+                CHECK(SysFileGetPos(FILE_SLOT_B) == done);
+            }
+            CHECK(SysFileClose(FILE_SLOT_B) == ERR_OK);
+            CHECK(holds_pattern(FILE_SLOT_B, sizeof pattern));
+            CHECK(SimFlashViolations() == 0);
+        }
+    }
+}
+
+static void an_odd_end_is_padded_with_the_erased_value(void)
+{
+    RTS_UI8 data[16];
+    RTS_SIZE g;
+
+    for (g = 0; g < RTS_COUNT(geometries); g++) {
+        start(geometries[g]);
+        SysFileCreate(FILE_SLOT_A);
+        CHECK(SysFileWrite(FILE_SLOT_A, pattern, 17) == ERR_OK);
+        CHECK(SysFileClose(FILE_SLOT_A) == ERR_OK);
+        CHECK(holds_pattern(FILE_SLOT_A, 17));
+        CHECK(SysFileRead(FILE_SLOT_A, 17, data, 15) == ERR_OK);
+        CHECK(data[0] == geometries[g].erased && data[14] == geometries[g].erased);
+        CHECK(SimFlashViolations() == 0);
+    }
+}
+
+static void sectors_are_erased_when_their_first_byte_is_due(void)
+{
+    start((GEOMETRY){1, 0xFF});
+    SysFileCreate(FILE_SLOT_A);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 512) == ERR_OK);
+    CHECK(SimFlashOps() == 2); /* one erase, one program */
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 1) == ERR_OK);
+    CHECK(SimFlashOps() == 4);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 511) == ERR_OK);
+    CHECK(SimFlashOps() == 5);
+}
+
+static void a_second_writing_replaces_the_first(void)
+{
+    start((GEOMETRY){8, 0xFF});
+    SysFileCreate(FILE_SLOT_A);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern + 1, 2000) == ERR_OK);
+    SysFileCreate(FILE_SLOT_A);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 1000) == ERR_OK);
+    CHECK(SysFileClose(FILE_SLOT_A) == ERR_OK);
+    CHECK(holds_pattern(FILE_SLOT_A, 1000));
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void a_file_ends_where_its_area_ends(void)
+{
+    RTS_UI32 size;
+    RTS_UI32 i;
+
+    start((GEOMETRY){8, 0xFF});
+    size = SysFileGetArea(FILE_COMMIT)->size;
+    SysFileCreate(FILE_COMMIT);
+    CHECK(SysFileWrite(FILE_COMMIT, pattern, size + 1) == ERR_DISK_FULL);
+    CHECK(SysFileGetPos(FILE_COMMIT) == 0);
+    for (i = 0; i < size; i += 64)
+        CHECK(SysFileWrite(FILE_COMMIT, pattern, 64) == ERR_OK);
+    CHECK(SysFileWrite(FILE_COMMIT, pattern, 1) == ERR_DISK_FULL);
+    CHECK(SysFileClose(FILE_COMMIT) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void reading_stays_within_the_file(void)
+{
+    RTS_UI32 size;
+    RTS_UI8 data[8];
+
+    start((GEOMETRY){8, 0xFF});
+    size = SysFileGetArea(FILE_SLOT_A)->size;
+    CHECK(SysFileRead(FILE_SLOT_A, size - 8, data, 8) == ERR_OK);
+    CHECK(SysFileRead(FILE_SLOT_A, size - 7, data, 8) == ERR_OUT_OF_LIMITS);
+    CHECK(SysFileRead(FILE_SLOT_A, 0xFFFFFFFF, data, 1) == ERR_OUT_OF_LIMITS);
+    CHECK(SysFileRead(FILE_SLOT_A, 1, data, 0xFFFFFFFF) == ERR_OUT_OF_LIMITS);
+}
+
+static void faults_are_reported(void)
+{
+    start((GEOMETRY){8, 0xFF});
+    SysFileCreate(FILE_SLOT_A);
+    SimFlashCut(1, SIM_FAULT);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 8) == ERR_DEVICE);
+    SysFileCreate(FILE_SLOT_A);
+    SimFlashCut(2, SIM_FAULT);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 8) == ERR_DEVICE);
+    SysFileCreate(FILE_SLOT_A);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 1) == ERR_OK);
+    SimFlashCut(2, SIM_FAULT);
+    CHECK(SysFileClose(FILE_SLOT_A) == ERR_DEVICE);
+    SimFlashCut(1, SIM_FAULT);
+    CHECK(SysFileErase(FILE_SLOT_A, 0, 1024) == ERR_DEVICE);
+    CHECK(SysFileErase(FILE_SLOT_A, 0, 1024) == ERR_OK);
+}
+
+int main(void)
+{
+    RUN(files_lie_side_by_side_on_sector_borders);
+    RUN(a_flash_that_is_too_small_stops_the_start_up);
+    RUN(what_is_written_in_pieces_can_be_read);
+    RUN(an_odd_end_is_padded_with_the_erased_value);
+    RUN(sectors_are_erased_when_their_first_byte_is_due);
+    RUN(a_second_writing_replaces_the_first);
+    RUN(a_file_ends_where_its_area_ends);
+    RUN(reading_stays_within_the_file);
+    RUN(faults_are_reported);
+    return test_result();
+}

@@ -1,0 +1,233 @@
+/*
+ * test_flash_sim.c - the flash simulator itself is as strict as it says.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include <string.h>
+
+#include "Sim.h"
+#include "SysFlash.h"
+#include "test.h"
+
+static const RTS_UI8 ones[64] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+
+static const SYS_FLASH *blank(RTS_UI32 program_size, RTS_UI8 erased)
+{
+    CHECK(SimFlashConfigure(16 * 1024, 256, program_size, erased) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+    return SysFlashGet();
+}
+
+static void only_possible_geometries_are_accepted(void)
+{
+    CHECK(SimFlashConfigure(0, 256, 1, 0xFF) == ERR_PARAMETER);
+    CHECK(SimFlashConfigure(1000, 256, 1, 0xFF) == ERR_PARAMETER);
+    CHECK(SimFlashConfigure(1024, 300, 1, 0xFF) == ERR_PARAMETER);
+    CHECK(SimFlashConfigure(1024, 256, 3, 0xFF) == ERR_PARAMETER);
+    CHECK(SimFlashConfigure(1024, 256, 32, 0xFF) == ERR_PARAMETER);
+    CHECK(SimFlashConfigure(1024, 256, 1, 0x55) == ERR_PARAMETER);
+    CHECK(SimFlashConfigure(1024, 256, 16, 0x00) == ERR_OK);
+    CHECK(SimFlashData()[0] == 0 && SimFlashData()[1023] == 0);
+    CHECK(SimFlashSize() == 1024);
+}
+
+static void a_byte_is_programmed_once(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+    RTS_UI8 value = 0xFF;
+
+    CHECK(flash->program(100, ones, 4) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+    CHECK(flash->program(103, ones, 1) == ERR_OK);
+    CHECK(SimFlashViolations() == 1);
+    CHECK(strcmp(SimFlashViolation(), "programmed twice at offset 103") == 0);
+    CHECK(flash->program(200, &value, 1) == ERR_OK); /* also when nothing changes */
+    CHECK(flash->program(200, &value, 1) == ERR_OK);
+    CHECK(SimFlashViolations() == 2);
+    CHECK(flash->erase(0) == ERR_OK);
+    CHECK(flash->program(103, ones, 1) == ERR_OK);
+    CHECK(SimFlashViolations() == 2);
+}
+
+static void programming_only_changes_bits_away_from_erased(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+    RTS_UI8 a = 0xF0;
+    RTS_UI8 b = 0x3C;
+
+    CHECK(flash->program(0, &a, 1) == ERR_OK);
+    CHECK(flash->program(0, &b, 1) == ERR_OK);
+    CHECK(SimFlashData()[0] == 0x30);
+    flash = blank(1, 0x00);
+    CHECK(flash->program(0, &a, 1) == ERR_OK);
+    CHECK(flash->program(0, &b, 1) == ERR_OK);
+    CHECK(SimFlashData()[0] == 0xFC);
+}
+
+static void misaligned_and_outside_operations_are_refused(void)
+{
+    const SYS_FLASH *flash = blank(8, 0xFF);
+    RTS_UI8 data[16];
+
+    CHECK(flash->program(4, ones, 8) == ERR_DEVICE);
+    CHECK(flash->program(8, ones, 4) == ERR_DEVICE);
+    CHECK(flash->program(16 * 1024, ones, 8) == ERR_DEVICE);
+    CHECK(flash->program(16 * 1024 - 8, ones, 16) == ERR_DEVICE);
+    CHECK(flash->program(0xFFFFFFF8, ones, 16) == ERR_DEVICE);
+    CHECK(flash->program(0, ones, 0) == ERR_DEVICE);
+    CHECK(flash->erase(128) == ERR_DEVICE);
+    CHECK(flash->erase(16 * 1024) == ERR_DEVICE);
+    CHECK(flash->read(16 * 1024 - 8, data, 9) == ERR_DEVICE);
+    CHECK(SimFlashViolations() == 9);
+    CHECK(SimFlashOps() == 0);
+}
+
+static void an_erase_takes_one_sector(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    CHECK(flash->program(255, ones, 3) == ERR_OK);
+    CHECK(flash->erase(256) == ERR_OK);
+    CHECK(SimFlashData()[255] == 1);
+    CHECK(SimFlashData()[256] == 0xFF);
+    CHECK(SimFlashOps() == 2);
+}
+
+static void program_16(void *unused)
+{
+    RTS_UNUSED(unused);
+    (void)SysFlashGet()->program(0, ones, 16);
+    (void)SysFlashGet()->program(16, ones, 16);
+    (void)SysFlashGet()->erase(0);
+}
+
+static RTS_UI32 programmed_bytes(void)
+{
+    RTS_UI32 count = 0;
+    RTS_UI32 i;
+
+    for (i = 0; i < 256; i++)
+        count += SimFlashData()[i] == 1;
+    return count;
+}
+
+static void a_cut_hits_the_operation_it_was_planned_for(void)
+{
+    static const RTS_UI32 expected[3][4] = {{0, 16, 32, 0}, {16, 32, 0, 0}, {8, 24, 0, 0}};
+    RTS_UI32 mode;
+    RTS_UI32 k;
+
+    for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
+        for (k = 1; k <= 3; k++) {
+            (void)blank(1, 0xFF);
+            SimFlashCut(k, mode);
+            CHECK(SimCall(program_16, NULL) == SIM_POWER_CUT);
+            CHECK(programmed_bytes() == expected[mode][k - 1]);
+            CHECK(SimCall(program_16, NULL) == SIM_POWER_CUT);
+            CHECK(SimAdvance(1) == SIM_POWER_CUT);
+            CHECK(SimCommCycle() == SIM_POWER_CUT);
+            CHECK(SimRunCycles(1) == SIM_POWER_CUT);
+            CHECK(SimStart() == ERR_OK);
+            CHECK(SimAdvance(1) == ERR_OK);
+        }
+    }
+}
+
+static void a_torn_erase_takes_half_a_sector(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    CHECK(flash->program(0, ones, 1) == ERR_OK);
+    CHECK(flash->program(255, ones, 1) == ERR_OK);
+    SimFlashCut(1, SIM_CUT_TORN);
+    CHECK(flash->erase(0) == ERR_DEVICE);
+    CHECK(SimFlashData()[0] == 0xFF);
+    CHECK(SimFlashData()[255] == 1);
+}
+
+static void a_half_programmed_unit_is_used_up(void)
+{
+    const SYS_FLASH *flash = blank(8, 0xFF);
+
+    SimFlashCut(1, SIM_FAULT);
+    CHECK(flash->program(0, ones, 8) == ERR_DEVICE);
+    CHECK(programmed_bytes() == 4);
+    CHECK(flash->program(8, ones, 8) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+    CHECK(flash->program(0, ones, 8) == ERR_OK);
+    CHECK(SimFlashViolations() == 1);
+}
+
+static void outside_of_a_call_a_cut_leaves_the_flash_dead_until_power_on(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    SimFlashCut(1, SIM_CUT_AFTER);
+    CHECK(flash->program(0, ones, 4) == ERR_DEVICE);
+    CHECK(flash->program(4, ones, 4) == ERR_DEVICE);
+    CHECK(flash->erase(0) == ERR_DEVICE);
+    CHECK(flash->sync() == ERR_DEVICE);
+    CHECK(SimFlashData()[3] == 1);
+    CHECK(SimFlashData()[4] == 0xFF);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(flash->program(4, ones, 4) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void content_is_kept_and_brought_back_with_what_was_programmed(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    CHECK(flash->program(0, ones, 4) == ERR_OK);
+    CHECK(SimFlashSave() == ERR_OK);
+    CHECK(flash->erase(0) == ERR_OK);
+    CHECK(flash->program(8, ones, 4) == ERR_OK);
+    CHECK(SimFlashRestore() == ERR_OK);
+    CHECK(SimFlashData()[0] == 1);
+    CHECK(SimFlashData()[8] == 0xFF);
+    CHECK(flash->program(8, ones, 4) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+    CHECK(flash->program(0, ones, 4) == ERR_OK);
+    CHECK(SimFlashViolations() == 1);
+    CHECK(SimFlashConfigure(1024, 256, 1, 0xFF) == ERR_OK);
+    CHECK(SimFlashRestore() == ERR_NO_OBJECT);
+}
+
+static void code_is_mapped_per_slot_and_aligned(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+    const RTS_UI8 *a;
+    const RTS_UI8 *b;
+
+    CHECK(flash->program(0x20, ones, 16) == ERR_OK);
+    a = SysFlashMapCode(0, 0x20, 64);
+    b = SysFlashMapCode(1, 0x20, 64);
+    CHECK(a != NULL && b != NULL && a != b);
+    CHECK((uintptr_t)a % 16 == 0);
+    CHECK(memcmp(a, ones, 16) == 0 && memcmp(b, ones, 16) == 0);
+    SysFlashReleaseCode(0);
+    SysFlashReleaseCode(0);
+    CHECK(b[0] == 1);
+    CHECK(SysFlashMapCode(2, 0, 16) == NULL);
+    CHECK(SysFlashMapCode(0, 0, 0) == NULL);
+    CHECK(SysFlashMapCode(0, 16 * 1024 - 8, 16) == NULL);
+    SysFlashReleaseCode(1);
+    SysFlashReleaseCode(2);
+}
+
+int main(void)
+{
+    RUN(only_possible_geometries_are_accepted);
+    RUN(a_byte_is_programmed_once);
+    RUN(programming_only_changes_bits_away_from_erased);
+    RUN(misaligned_and_outside_operations_are_refused);
+    RUN(an_erase_takes_one_sector);
+    RUN(a_cut_hits_the_operation_it_was_planned_for);
+    RUN(a_torn_erase_takes_half_a_sector);
+    RUN(a_half_programmed_unit_is_used_up);
+    RUN(outside_of_a_call_a_cut_leaves_the_flash_dead_until_power_on);
+    RUN(content_is_kept_and_brought_back_with_what_was_programmed);
+    RUN(code_is_mapped_per_slot_and_aligned);
+    return test_result();
+}

@@ -1,0 +1,164 @@
+"""The client against the real runtime in this process, by packets and over a simulated serial line, good and bad."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+
+import pytest
+from fake_device import damage
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from plctool.core import ffi, lib
+from plctool.errors import DeviceError, LinkError
+from plctool.link import services, simplecom
+from plctool.link.connection import Connection
+from plctool.link.session import Session
+from plctool.link.sim import SimTransport
+from plctool.link.transport import BlockTransport
+from plctool.testing.line import BITS_PER_BYTE, Damage
+
+TICK_NS = 500_000
+
+
+class SimSerial:
+    """The simulator's serial line at 115200 baud on virtual time, with bytes that get damaged on the way."""
+
+    name = "simulated serial line"
+    local_address = b"\x00\x02"
+    packet_overhead = simplecom.FRAME_OVERHEAD
+    byte_rate = 115200 / BITS_PER_BYTE
+
+    def __init__(self, to_device: Damage | None = None, to_client: Damage | None = None) -> None:
+        self._out, self._in = bytearray(), bytearray()
+        self._credit = 0.0
+        self._to_device, self._to_client = to_device or Damage(), to_client or Damage()
+        self._decoder = simplecom.Decoder()
+        self._packets: list[bytes] = []
+
+    def now(self) -> float:
+        return float(lib.SimNow()) / 1e9
+
+    def send(self, packet: bytes) -> None:
+        self._out += simplecom.encode(packet)
+
+    def receive(self, timeout: float) -> bytes | None:
+        end = self.now() + timeout
+        while not self._packets:
+            if self.now() >= end:
+                return None
+            self._tick()
+        return self._packets.pop(0)
+
+    def _tick(self) -> None:
+        """What the line carries in a tick, both ways."""
+        assert lib.SimAdvance(TICK_NS) == lib.ERR_OK
+        self._credit += self.byte_rate * TICK_NS / 1e9
+        count = int(self._credit)
+        self._credit -= count
+        data = self._to_device.apply(bytes(self._out[:count]))
+        del self._out[:count]
+        assert lib.SimComPut(data, len(data)) == len(data)
+        buffer = ffi.new("RTS_UI8[]", 4096)
+        self._in += bytes(ffi.buffer(buffer, lib.SimComGet(buffer, 4096)))
+        self._packets += self._decoder.feed(self._to_client.apply(bytes(self._in[:count])))
+        del self._in[:count]
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture(autouse=True)
+def runtime() -> Iterator[None]:
+    power_on()
+    yield
+    lib.SimStop()
+
+
+def power_on() -> None:
+    """A controller fresh from the factory."""
+    lib.SimStop()
+    assert lib.SimFlashConfigure(1 << 20, 4096, 8, 0xFF) == lib.ERR_OK
+    assert lib.SimStart() == lib.ERR_OK
+
+
+@pytest.fixture(params=[SimTransport, SimSerial], ids=["packets", "serial"])
+def session(request: pytest.FixtureRequest) -> Session:
+    transport: BlockTransport = request.param()
+    return Session(Connection(transport))
+
+
+def test_the_runtime_is_found_and_names_itself(session: Session) -> None:
+    (node,) = session.connection.scan(0.3)
+    identity = services.read_identity(session)
+    assert (node.node_name, node.device_name) == (identity.node_name, identity.device_name)
+    assert node.target_type == lib.TARGET_TYPE_PROGRAMMABLE
+
+
+def test_an_empty_runtime_says_so_everywhere(session: Session) -> None:
+    status = services.read_status(session)
+    assert (status.state, status.image_crc, status.exception) == ("none", 0, None)
+    assert services.read_tasks(session) == []
+    for service in (services.start, services.stop, services.read_application_info):
+        with pytest.raises(DeviceError):
+            service(session)
+
+
+@pytest.mark.parametrize("size", [1, 455, 456, 457, 1000, 16000])
+def test_echoes_of_all_sizes_come_back(session: Session, size: int) -> None:
+    data = random.Random(size).randbytes(size)
+    assert services.echo(session, data) == data
+
+
+def test_the_log_can_be_read(session: Session) -> None:
+    assert any("boot project" in entry.text for entry in services.read_log(session))
+
+
+def test_what_is_no_image_is_refused_with_a_reason(session: Session) -> None:
+    with pytest.raises(DeviceError, match=r"download: .+ \(ERR_"):
+        services.download(session, random.Random(1).randbytes(5000))
+    assert services.read_status(session).state == "none"
+
+
+def test_a_session_survives_long_silence(session: Session) -> None:
+    services.echo(session, b"before")
+    assert lib.SimAdvance(40 * 10**9) == lib.ERR_OK
+    assert services.echo(session, b"after") == b"after"
+
+
+def test_a_session_survives_a_restart_of_the_runtime(session: Session) -> None:
+    services.echo(session, b"before")
+    lib.SimStop()
+    assert lib.SimStart() == lib.ERR_OK
+    assert services.echo(session, b"after") == b"after"
+
+
+def test_a_second_client_is_told_that_the_device_is_busy() -> None:
+    first, second = Session(Connection(SimTransport())), Session(Connection(SimSerial()))
+    services.echo(first, b"mine")
+    with pytest.raises(LinkError, match="busy"):
+        services.echo(second, b"mine?")
+    first.connection.close()
+    assert services.echo(second, b"mine") == b"mine"
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from([0.0003, 0.001]))
+def test_over_bad_lines_everything_arrives_intact(seed: int, rate: float) -> None:
+    power_on()
+    session = Session(Connection(SimSerial(damage(seed, rate), damage(seed + 1, rate))))
+    rng = random.Random(seed)
+    for size in (10, 3000, 100, 9000):
+        data = rng.randbytes(size)
+        assert services.echo(session, data) == data
+
+
+def test_large_messages_use_nine_tenths_of_the_line_both_ways() -> None:
+    session = Session(Connection(SimSerial()))
+    session.ensure()
+    begin, size = session.connection.transport.now(), session.connection.buffer_size - 128
+    for _ in range(4):
+        services.echo(session, bytes(size))
+    seconds = session.connection.transport.now() - begin
+    assert 4 * 2 * size / seconds / session.connection.transport.byte_rate > 0.9

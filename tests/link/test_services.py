@@ -1,0 +1,419 @@
+"""Services against a device in Python: what is asked, what is answered, what happens when the line fails on the way."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from fake_device import (
+    DEVICE_NAME,
+    NODE_NAME,
+    SERIAL,
+    VENDOR_NAME,
+    FakeDevice,
+    FakeLine,
+    FakePlc,
+    damage,
+    image_crc,
+    make_image,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from plctool.core import lib
+from plctool.errors import DeviceError, LinkError
+from plctool.link import l7, services
+from plctool.link.connection import Connection
+from plctool.link.services import AppException, AppState, AreaRange
+from plctool.link.session import Session
+
+
+class Bench:
+    """A session with a fake controller that has an application, and everything around it."""
+
+    def __init__(self, buffer_size: int = 16384, **line: object) -> None:
+        self.plc = FakePlc()
+        self.plc.image, self.plc.state = make_image(1000), lib.AS_RUN
+        self.device = FakeDevice(self.plc.handle, buffer_size)
+        self.line = FakeLine(self.device, **line)  # type: ignore[arg-type]
+        self.session = Session(Connection(self.line))
+
+    @property
+    def crc(self) -> int:
+        return self.plc.crc
+
+
+# ---- layer 7 ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_message_has_the_bytes_of_the_capture() -> None:
+    message = l7.Message(1, 7, 0x8EEF560B, b"")
+    assert l7.encode(message) == bytes.fromhex("55CD1000010007000B56EF8E0000000000000000")
+    assert l7.decode(l7.encode(message)) == message
+
+
+def test_short_headers_are_understood() -> None:
+    assert l7.decode(bytes.fromhex("55CD0C0081000700 0B56EF8E 01000000 AA".replace(" ", ""))) == l7.Message(
+        0x81, 7, 0x8EEF560B, b"\xaa"
+    )
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        bytes(20),
+        bytes.fromhex("55CD1000010007000B56EF8E0100000000000000"),  # content missing
+        bytes.fromhex("55CDFF00010007000B56EF8E0000000000000000"),  # header longer than the message
+        bytes.fromhex("55CD0400010007000B56EF8E0000000000000000"),  # header too short
+    ],
+)
+def test_broken_headers_are_link_errors(data: bytes) -> None:
+    with pytest.raises(LinkError):
+        l7.decode(data)
+
+
+def test_the_answer_to_something_else_is_a_link_error() -> None:
+    request = l7.Message(1, 2, 0, b"")
+    with pytest.raises(LinkError, match="another request"):
+        l7.decode_reply(l7.encode(l7.Message(0x81, 3, 0, b"")), request)
+
+
+def test_a_service_error_becomes_a_device_error_with_its_name() -> None:
+    bench = Bench()
+    with pytest.raises(DeviceError, match="ERR_L7_UNKNOWNCMD") as caught:
+        bench.session.call(9, 9)
+    assert caught.value.code == "l7-unknowncmd"
+    assert caught.value.result == lib.ERR_L7_UNKNOWNCMD
+
+
+@settings(max_examples=50)
+@given(st.binary(max_size=60))
+def test_random_answers_are_errors_of_ours(content: bytes) -> None:
+    bench = Bench()
+    bench.session.ensure()
+    bench.device.handler = lambda message: l7.encode(
+        l7.Message(struct.unpack_from("<H", message, 4)[0] | lib.L7_REPLY, message[6], 0, content)
+    )
+    with pytest.raises((LinkError, DeviceError)):
+        services.read_status(bench.session)
+
+
+# ---- device and application ------------------------------------------------------------------------------------------
+
+
+def test_a_scan_finds_the_device() -> None:
+    (node,) = Connection(FakeLine(FakeDevice())).scan(0.5)
+    assert (node.node_name, node.device_name, node.vendor_name) == (NODE_NAME, DEVICE_NAME, VENDOR_NAME)
+    assert (node.serial_number, node.version, node.address_text) == (SERIAL, "1.2.3.4", "0001")
+    assert node.target_id == lib.TARGET_ID_CORTEX_M3
+
+
+def test_identity() -> None:
+    identity = services.read_identity(Bench().session)
+    assert (identity.device_name, identity.node_name, identity.vendor_name) == (DEVICE_NAME, NODE_NAME, VENDOR_NAME)
+    assert (identity.serial_number, identity.version, identity.runtime_version) == (SERIAL, "1.2.3.4", "0.1.0.0")
+
+
+@pytest.mark.parametrize("size", [1, 500, 2000])
+def test_echo(size: int) -> None:
+    data = bytes(range(256)) * 8
+    assert services.echo(Bench().session, data[:size]) == data[:size]
+
+
+def test_status_without_application() -> None:
+    bench = Bench()
+    bench.plc.image, bench.plc.state = b"", lib.AS_NONE
+    status = services.read_status(bench.session)
+    assert (status.state, status.image_crc, status.exception) == (AppState.NONE, 0, None)
+
+
+def test_status_of_a_running_application() -> None:
+    bench = Bench()
+    status = services.read_status(bench.session)
+    assert (status.state, status.image_crc, status.image_size) == (AppState.RUN, bench.crc, 1000)
+
+
+def test_status_after_an_exception() -> None:
+    bench = Bench()
+    bench.plc.state, bench.plc.operating = lib.AS_STOP, lib.OS_EXCEPTION
+    bench.plc.exception = (lib.RTSEXCPT_DIVIDEBYZERO, 0x40, 1)
+    status = services.read_status(bench.session)
+    assert status.state is AppState.EXCEPTION
+    assert status.exception == AppException(lib.RTSEXCPT_DIVIDEBYZERO, 0x40, 1)
+    assert status.exception.name == "DIVIDEBYZERO"
+
+
+def test_stop_start_and_reset() -> None:
+    bench = Bench()
+    services.stop(bench.session)
+    assert bench.plc.state == lib.AS_STOP
+    services.start(bench.session)
+    assert bench.plc.state == lib.AS_RUN
+    services.reset(bench.session, lib.RESET_OPTION_ORIGIN)
+    assert bench.plc.state == lib.AS_NONE
+
+
+def test_start_without_application_says_what_to_do() -> None:
+    bench = Bench()
+    bench.plc.image = b""
+    with pytest.raises(DeviceError, match="flash one first"):
+        services.start(bench.session)
+
+
+def test_a_refused_start_names_the_reason() -> None:
+    bench = Bench()
+    bench.plc.operating = lib.OS_EXCEPTION
+    with pytest.raises(DeviceError, match=r"refused the start: .*reset it first \(ERR_INVALID_STATE\)"):
+        services.start(bench.session)
+
+
+def test_tasks() -> None:
+    bench = Bench()
+    bench.plc.tasks = [([0, 1, 20000, 100, 7, 8, 5, 30, 12, 3], "Main"), ([3, 9, 0, 5, 1, 1, 1, 1, 0, 0], "Slow")]
+    main, slow = services.read_tasks(bench.session)
+    assert (main.name, main.interval_us, main.cycles, main.max_us, main.overruns) == ("Main", 20000, 100, 30, 3)
+    assert (slow.name, slow.kind, slow.priority) == ("Slow", 3, 9)
+
+
+def test_application_info() -> None:
+    assert services.read_application_info(Bench().session) == {"project": "demo", "version": "1.2"}
+
+
+def test_the_log_is_read_to_its_end_in_several_requests() -> None:
+    bench = Bench()
+    bench.plc.log = [(n, n * 10**9, lib.LOG_INFO, "CmpApp", f"entry {n}") for n in range(1, 9)]
+    entries = services.read_log(bench.session)
+    assert [e.handle for e in entries] == list(range(1, 9))
+    assert (entries[2].text, entries[2].component, entries[2].time_ns) == ("entry 3", "CmpApp", 3 * 10**9)
+    assert [e.handle for e in services.read_log(bench.session, after=6)] == [7, 8]
+
+
+# ---- monitoring ------------------------------------------------------------------------------------------------------
+
+
+def test_values_are_read_from_their_places() -> None:
+    bench = Bench()
+    bench.plc.memory[0][10:14] = b"\x01\x02\x03\x04"
+    bench.plc.memory[3][66000] = 9
+    values = services.read_memory(
+        bench.session, bench.crc, [AreaRange(0, 10, 4), AreaRange(3, 66000, 1), AreaRange(0, 12, 1)]
+    )
+    assert values == [b"\x01\x02\x03\x04", b"\x09", b"\x03"]
+
+
+def test_many_values_take_few_requests() -> None:
+    bench = Bench(buffer_size=2048)
+    for n in range(1000):
+        bench.plc.memory[0][n] = n & 0xFF
+    values = services.read_memory(bench.session, bench.crc, [AreaRange(0, n, 1) for n in range(1000)])
+    assert values == [bytes([n & 0xFF]) for n in range(1000)]
+    assert bench.plc.requests.count((lib.SG_MONITORING2, lib.SRV_MON2_READ)) <= 8
+
+
+def test_values_longer_than_a_message_are_read_in_pieces() -> None:
+    bench = Bench(buffer_size=512)
+    bench.plc.memory[0][:3000] = bytes(n % 251 for n in range(3000))
+    first, second = services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 2500), AreaRange(0, 2500, 500)])
+    assert first + second == bytes(bench.plc.memory[0][:3000])
+
+
+@given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 69000), st.integers(1, 1000)), max_size=30))
+@settings(max_examples=30)
+def test_any_ranges_read_what_is_in_memory(ranges: list[tuple[int, int, int]]) -> None:
+    bench = Bench(buffer_size=600)
+    for area, memory in bench.plc.memory.items():
+        memory[:] = bytes((n * 7 + area) & 0xFF for n in range(256)) * (len(memory) // 256) + bytes(len(memory) % 256)
+    values = services.read_memory(bench.session, bench.crc, [AreaRange(*r) for r in ranges])
+    assert values == [bytes(bench.plc.memory[a][o : o + s]) for a, o, s in ranges]
+
+
+def test_a_value_outside_memory_is_a_device_error() -> None:
+    bench = Bench()
+    with pytest.raises(DeviceError, match="MONITORING_ERR_INVALID_INDEX"):
+        services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1), AreaRange(0, 70000, 4)])
+
+
+def test_values_are_written_to_their_places() -> None:
+    bench = Bench()
+    values = [(AreaRange(0, 10, 2), b"\xaa\xbb"), (AreaRange(4, 66000, 1), b"c")]
+    services.write_memory(bench.session, bench.crc, values)
+    assert bench.plc.memory[0][10:12] == b"\xaa\xbb"
+    assert bench.plc.memory[4][66000] == ord("c")
+
+
+def test_more_values_than_a_message_holds_are_all_written() -> None:
+    bench = Bench(buffer_size=512)
+    services.write_memory(bench.session, bench.crc, [(AreaRange(0, n, 1), bytes([n & 0xFF])) for n in range(300)])
+    assert bench.plc.memory[0][:300] == bytes(n & 0xFF for n in range(300))
+
+
+def test_nothing_is_read_from_another_application_than_meant() -> None:
+    bench = Bench()
+    with pytest.raises(DeviceError, match="Another application") as caught:
+        services.read_memory(bench.session, bench.crc ^ 1, [AreaRange(0, 0, 1)])
+    assert caught.value.code == "app-changed"
+
+
+def test_an_application_that_changes_meanwhile_is_noticed() -> None:
+    bench = Bench()
+    services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
+    old = bench.crc
+    bench.plc.image = make_image(1000, seed=2)
+    with pytest.raises(DeviceError, match="Another application"):
+        services.read_memory(bench.session, old, [AreaRange(0, 0, 1)])
+    services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
+
+
+# ---- lost channels ---------------------------------------------------------------------------------------------------
+
+
+def test_a_lost_channel_is_opened_again_without_anybody_noticing() -> None:
+    bench = Bench()
+    services.read_status(bench.session)
+    bench.device.restart()
+    assert services.read_status(bench.session).state is AppState.RUN
+    bench.device.restart()
+    assert services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)]) == [b"\0"]
+
+
+def test_a_write_that_the_device_did_not_take_is_repeated() -> None:
+    bench = Bench()
+    services.read_status(bench.session)
+    bench.device.restart()
+    services.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 1), b"x")])
+    assert bench.plc.writes == 1
+
+
+def test_a_write_whose_answer_is_lost_is_not_repeated() -> None:
+    bench = Bench()
+    services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
+    handle = bench.plc.handle
+
+    def answer_and_die(message: bytes) -> bytes:
+        bench.line.cut = True
+        return handle(message)
+
+    bench.device.handler = answer_and_die
+    with pytest.raises(LinkError):
+        services.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 1), b"x")])
+    assert bench.plc.writes == 1
+
+
+# ---- download --------------------------------------------------------------------------------------------------------
+
+
+def test_an_image_arrives_and_progress_is_told() -> None:
+    bench, image, seen = Bench(buffer_size=2048), make_image(20_000, 5), list[int]()
+    services.download(bench.session, image, progress=seen.append)
+    assert bench.plc.image == image
+    assert seen == sorted(seen)
+    assert seen[-1] == len(image)
+    assert len(seen) > 8
+
+
+@pytest.mark.parametrize("size", [104, 1984, 1985, 3968, 3969])
+def test_images_of_any_size_arrive(size: int) -> None:
+    bench, image = Bench(buffer_size=2048), make_image(size, 5)
+    services.download(bench.session, image)
+    assert bench.plc.image == image
+
+
+def test_a_refused_image_is_a_device_error_with_the_reason() -> None:
+    bench = Bench()
+    bench.plc.refuse = "function 'sin' is missing"
+    with pytest.raises(DeviceError, match="function 'sin' is missing") as caught:
+        services.download(bench.session, make_image(5000, 5))
+    assert caught.value.code == "app-unresolved-reference"
+    assert services.read_status(bench.session).image_crc == bench.crc
+
+
+def test_an_image_that_is_there_already_is_not_sent_again_unless_asked() -> None:
+    bench = Bench()
+    sent = bench.line.sent_bytes
+    services.download(bench.session, bench.plc.image)
+    assert bench.line.sent_bytes - sent < 500
+    services.download(bench.session, bench.plc.image, afresh=True)
+    assert bench.line.sent_bytes - sent > 1000
+
+
+def test_a_broken_transfer_continues_where_it_was() -> None:
+    bench, image = Bench(buffer_size=2048), make_image(40_000, 5)
+
+    def die_once(done: int) -> None:
+        if done > 20_000:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        services.download(bench.session, image, progress=die_once)
+    sent = bench.line.sent_bytes
+    services.download(Session(Connection(bench.line)), image)
+    assert bench.plc.image == image
+    assert bench.line.sent_bytes - sent < 25_000
+
+
+def test_a_channel_lost_on_the_way_is_no_reason_to_begin_again() -> None:
+    bench, image, restarts = Bench(buffer_size=2048), make_image(40_000, 5), [10_000, 30_000]
+
+    def restart(done: int) -> None:
+        if restarts and done > restarts[0]:
+            restarts.pop(0)
+            bench.device.restart()
+
+    services.download(bench.session, image, progress=restart)
+    assert bench.plc.image == image
+    assert not restarts
+    assert bench.line.sent_bytes < 60_000
+
+
+def test_a_line_that_comes_back_is_waited_for_and_one_that_does_not_is_an_error() -> None:
+    bench, image, outages = Bench(buffer_size=2048), make_image(40_000, 5), [20_000]
+
+    def cut(done: int) -> None:
+        if outages and done > outages[0]:
+            outages.pop()
+            bench.line.cut = True
+            bench.line.after(15.0, lambda: setattr(bench.line, "cut", False))
+
+    services.download(bench.session, image, progress=cut)
+    assert bench.plc.image == image
+    assert not outages
+
+    bench = Bench(buffer_size=2048)
+    with pytest.raises(LinkError):
+        services.download(bench.session, image, progress=lambda done: setattr(bench.line, "cut", done > 20_000))
+
+
+def test_a_lost_verdict_is_asked_for_again() -> None:
+    bench, image = Bench(buffer_size=2048), make_image(10_000, 5)
+    handle = bench.plc.handle
+
+    def restart_at_the_end(message: bytes) -> bytes:
+        reply = handle(message)
+        if bench.plc.image == image and not bench.plc.requests.count((0, 0)):
+            bench.plc.requests.append((0, 0))
+            bench.device.restart()
+        return reply
+
+    bench.device.handler = restart_at_the_end
+    services.download(bench.session, image)
+    assert bench.plc.image == image
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from([2048, 16384]))
+def test_what_arrives_over_a_bad_line_is_what_was_sent(seed: int, buffer_size: int) -> None:
+    bench = Bench(buffer_size, to_device=damage(seed, 0.001), to_client=damage(seed + 1, 0.001))
+    image = make_image(30_000, seed)
+    services.download(bench.session, image)
+    assert bench.plc.image == image
+    assert services.read_status(bench.session).image_crc == image_crc(image)
+
+
+def test_a_download_uses_92_percent_of_the_line() -> None:
+    bench, image = Bench(), make_image(200_000, 5)
+    bench.device.work_time = 0.02
+    services.read_status(bench.session)
+    begin = bench.line.now()
+    services.download(bench.session, image)
+    assert len(image) / (bench.line.now() - begin) / bench.line.rate > 0.92

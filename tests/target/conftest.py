@@ -1,0 +1,84 @@
+"""Boards for the tests. Environment: FIRMWARE_DIR (where firmware-*.elf are), QEMU_MACHINE, PLCTOOL_BUILD."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path.append(str(HERE))
+sys.path.append(str(ROOT / os.environ.get("PLCTOOL_BUILD", "build") / "host"))
+
+if shutil.which("qemu-system-arm") is None or "FIRMWARE_DIR" not in os.environ:
+    pytest.skip("needs qemu-system-arm and a cross build: meson test -C build-cm3", allow_module_level=True)
+pytest.importorskip("_plccore", reason="needs plctool's extension module: make build, or name its folder in PLCTOOL_BUILD")
+
+from programs import Built, compile_text  # noqa: E402
+from qemu import Board  # noqa: E402
+
+from plctool.device import Plc  # noqa: E402
+from plctool.link.connection import Connection  # noqa: E402
+
+MACHINE = os.environ["QEMU_MACHINE"]
+TARGET = {"mps2-an385": "cortex-m3", "mps2-an386": "cortex-m4f"}[MACHINE]
+PATIENCE = 20.0  # of `eventually` [s]; machines under load are slow
+
+
+@pytest.fixture
+def make_board(tmp_path: Path) -> Iterator[Callable[..., Board]]:
+    """Makes boards that are off: `make_board("full")`. They are switched off at the end."""
+    boards: list[Board] = []
+
+    def make(config: str = "standard") -> Board:
+        folder = tmp_path / f"board{len(boards)}"
+        folder.mkdir()
+        boards.append(Board(MACHINE, Path(os.environ["FIRMWARE_DIR"]) / f"firmware-{config}.elf", folder))
+        return boards[-1]
+
+    yield make
+    for board in boards:
+        board.power_off()
+
+
+@pytest.fixture
+def board(make_board: Callable[..., Board]) -> Board:
+    """A board with the standard configuration, on."""
+    board = make_board()
+    board.power_on()
+    return board
+
+
+@pytest.fixture
+def plc(board: Board) -> Iterator[Plc]:
+    """plctool on the board's serial line."""
+    with Plc(Connection(board.line())) as plc:
+        yield plc
+
+
+@pytest.fixture
+def build(tmp_path: Path) -> Callable[[str], Built]:
+    """Compiles Structured Text for the board's processor."""
+    return cache(lambda text: compile_text(text, TARGET, tmp_path))
+
+
+@pytest.fixture
+def eventually() -> Callable[[Callable[[], Any]], Any]:
+    """Asks until the answer is true, and returns it; fails after PATIENCE."""
+
+    def ask(question: Callable[[], Any]) -> Any:
+        end = time.monotonic() + PATIENCE
+        while not (answer := question()):
+            assert time.monotonic() < end, "did not happen in time"
+            time.sleep(0.01)
+        return answer
+
+    return ask

@@ -1,0 +1,82 @@
+"""Programs for the tests, compiled for a board."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from plctool.compiler.build import build_program
+from plctool.compiler.front import check_sources
+from plctool.compiler.lower_unit import ALL_CHECKS, Options
+from plctool.compiler.source import Source
+from plctool.compiler.targets import find_target
+from plctool.symbols import SymbolTable, symbol_path
+
+
+@dataclass(frozen=True)
+class Built:
+    """An image, its file with the symbol file beside it, and the symbols."""
+
+    image: bytes
+    path: Path
+    symbols: SymbolTable
+
+
+def compile_text(text: str, target: str, folder: Path, checks: bool = True) -> Built:
+    """Compiles `text`; the files go to `folder`."""
+    result = check_sources([Source("app.st", text)])
+    assert result.program, result.diagnostics
+    options = Options(find_target(target), checks=ALL_CHECKS if checks else frozenset())
+    built = build_program(result.program, options)
+    path = folder / f"{zlib.crc32(text.encode()):08x}.cdl"
+    path.write_bytes(built.image)
+    built.symbols.save(symbol_path(path))
+    return Built(built.image, path, built.symbols)
+
+
+def program(variables: str, body: str, interval: str = "T#1ms") -> str:
+    """One PROGRAM Main in one cyclic task Fast."""
+    return f"""
+PROGRAM Main
+{variables}
+{body}
+END_PROGRAM
+CONFIGURATION Config
+    RESOURCE Res ON PLC
+        TASK Fast(INTERVAL := {interval}, PRIORITY := 1);
+        PROGRAM Main WITH Fast : Main;
+    END_RESOURCE
+END_CONFIGURATION
+"""
+
+
+COUNTER = program("VAR n : DINT; END_VAR VAR RETAIN kept : DINT; END_VAR", "n := n + 1; kept := kept + 1;")
+
+TWO_TASKS = """
+PROGRAM Count
+VAR
+    n : DINT;
+END_VAR
+n := n + 1;
+END_PROGRAM
+PROGRAM Long
+VAR
+    n : DINT;
+    i : DINT;
+    x : DINT;
+END_VAR
+FOR i := 1 TO 100000 DO
+    x := x XOR (x * 5 + i);
+END_FOR
+n := n + 1;
+END_PROGRAM
+CONFIGURATION Config
+    RESOURCE Res ON PLC
+        TASK FastTask(INTERVAL := T#1ms, PRIORITY := 1);
+        TASK SlowTask(INTERVAL := T#10ms, PRIORITY := 5);
+        PROGRAM Fast WITH FastTask : Count;
+        PROGRAM Slow WITH SlowTask : Long;
+    END_RESOURCE
+END_CONFIGURATION
+"""

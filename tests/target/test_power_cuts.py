@@ -1,0 +1,123 @@
+"""Power cuts while a program is replaced: the device starts, runs the old program or the new one, and can be flashed again.
+
+POWER_CUTS=all cuts after every store into the flash; otherwise a selection is tried that is another one in every part of the
+transfer.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from programs import COUNTER, TWO_TASKS
+
+from plctool.device import Plc
+from plctool.errors import PlcError
+from plctool.link.connection import Connection
+from plctool.link.services import AppState
+
+HERE = Path(__file__).parent
+FLASH_BASE, FLASH_END = 0x21000000, 0x21080000
+CUT = 3  # exit status of a QEMU that was cut
+SELECTION = 24
+
+
+@pytest.fixture(scope="session")
+def cutter(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The plugin that cuts."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("needs a C compiler for QEMU's plugin")
+    plugin = tmp_path_factory.mktemp("plugin") / "cut.so"
+    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", plugin, HERE / "cut.c"], check=True)
+    return plugin
+
+
+@pytest.fixture
+def prepared(make_board, build, eventually):
+    """A board with the old program, proven, and off; and its flash."""
+    board = make_board()
+    with board, Plc(Connection(board.line())) as plc:
+        plc.flash(build(COUNTER).path)
+        eventually(lambda: plc.read("Main.n") > 3500)
+    return board, board.flash_file.read_bytes()
+
+
+def replace_program(board, image: Path) -> None:
+    """Flashes over the running program; the line may go dead on the way."""
+    try:
+        with Plc(Connection(board.line())) as plc:
+            plc.flash(image)
+            time.sleep(0.05)
+    except PlcError:
+        pass
+
+
+def check_survivor(board, old, new) -> str:
+    """What runs after the cut: "old" or "new". The new program can be flashed afterwards."""
+    with Plc(Connection(board.line())) as plc:
+        status = plc.status()
+        assert status.state is AppState.RUN
+        names = {old.symbols.image_crc: "old", new.symbols.image_crc: "new"}
+        assert status.image_crc in names
+        plc.flash(new.path)
+        assert plc.status().image_crc == new.symbols.image_crc
+        assert plc.status().state is AppState.RUN
+    return names[status.image_crc]
+
+
+def test_cut_after_a_store_leaves_old_or_new(prepared, build, cutter, tmp_path):
+    board, flash = prepared
+    old, new = build(COUNTER), build(TWO_TASKS)
+    plugin = f"file={cutter},lo={FLASH_BASE:#x},hi={FLASH_END:#x}"
+    count_file = tmp_path / "count"
+    board.power_on(plugin=f"{plugin},n=0,out={count_file}")
+    replace_program(board, new.path)
+    board.power_off()
+    stores = int(count_file.read_text())
+    print("stores", stores)
+    assert stores > 500
+
+    step = 1 if os.environ.get("POWER_CUTS") == "all" else stores / SELECTION
+    seen = []
+    for n in sorted({int(1 + step * i) for i in range(int(stores / step))}):
+        board.flash_file.write_bytes(flash)
+        board.power_on(plugin=f"{plugin},n={n}")
+        replace_program(board, new.path)
+        if board.is_on:
+            board.power_off()
+        board.power_on()
+        seen.append(check_survivor(board, old, new))
+        board.power_off()
+    assert seen[0] == "old"
+    assert "new" in seen
+    assert seen == sorted(seen, reverse=True), "once it is the new one it stays the new one"
+
+
+def test_pulling_the_plug_again_and_again(prepared, build):
+    """Cuts at times that depend on the host; the flash is carried on from one to the next."""
+    board, _ = prepared
+    old, new = build(COUNTER), build(TWO_TASKS)
+    for i in range(6):
+        board.power_on()
+        process = board._process
+        assert process
+        line = Plc(Connection(board.line()))
+        try:
+            line.flash((new if i % 2 == 0 else old).path, force=True, progress=lambda done, total, i=i: cut(process, done, total, i))
+        except PlcError:
+            pass
+        line.close()
+        board.power_off()
+    board.power_on()
+    check_survivor(board, old, new)
+
+
+def cut(process: subprocess.Popen[bytes], done: int, total: int, number: int) -> None:
+    """Kills QEMU when a part of the image has arrived that grows from cut to cut."""
+    if done * 6 >= total * number:
+        process.kill()
