@@ -56,7 +56,7 @@ def bar(value: float, mark: float) -> str:
 
 def flash(story: Story, plc: Plc, image: Path) -> None:
     columns = (TextColumn("   {task.description}"), BarColumn(BAR_WIDTH), TextColumn("{task.completed} bytes"), TimeElapsedColumn())
-    with Progress(*columns, console=story.console) as progress:
+    with Progress(*columns, console=story.console, disable=story.console.record) as progress:
         task = progress.add_task("flash", total=image.stat().st_size)
         result = plc.flash(image, progress=lambda done, total: progress.update(task, completed=done, total=total))
     story.say(f"{result.bytes} bytes in {result.seconds:.2f} s; state: {plc.status().state}")

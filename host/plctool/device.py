@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
@@ -19,7 +21,7 @@ from plctool.link.serial import DEFAULT_BAUD, SerialTransport
 from plctool.link.services import AppState, AreaRange, Identity, LogEntry, TaskInfo
 from plctool.link.session import Session
 from plctool.link.transport import BlockTransport
-from plctool.symbols import Symbol, SymbolTable, find_symbols, load_symbols
+from plctool.symbols import Symbol, SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
 
 RESET_OPTIONS = {
     "warm": lib.RESET_OPTION_WARM,
@@ -105,7 +107,6 @@ class Plc:
         self._connection = connection
         self._session = Session(connection)
         self._symbol_file = symbols
-        self._beside: Path | None = None  # the image flashed last
         self._table: SymbolTable | None = None
 
     def __enter__(self) -> Plc:
@@ -153,6 +154,8 @@ class Plc:
         crc = int.from_bytes(data[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
         status = services.read_status(self._session)
         is_there = (status.image_crc, status.image_size) == (crc, len(data))
+        if not isinstance(image, bytes):
+            _keep_symbols(Path(image), crc)
         skipped = is_there and status.exception is None and not force and not unchecked
         begin = self._connection.transport.now()
         if not skipped:
@@ -168,7 +171,6 @@ class Plc:
         if isinstance(image, bytes):
             return image
         path = Path(image)
-        self._beside = path
         try:
             return path.read_bytes()
         except OSError as error:
@@ -224,7 +226,7 @@ class Plc:
 
     def _find_symbols(self, image_crc: int) -> SymbolTable:
         if self._symbol_file is None:
-            return find_symbols(image_crc, self._beside)
+            return find_symbols(image_crc)
         table = load_symbols(self._symbol_file)
         if table.image_crc != image_crc:
             raise UsageError(
@@ -279,6 +281,15 @@ def explain_exception(exception: services.AppException, task: str | None, table:
     if place is None:
         return ExceptionInfo(exception.code, exception.name, task)
     return ExceptionInfo(exception.code, exception.name, task, place.pou, place.file, place.line)
+
+
+def _keep_symbols(image: Path, crc: int) -> None:
+    """Puts the symbols beside an image where they are found later, also from another folder."""
+    source, kept = symbol_path(image), cache_path(crc)
+    with suppress(OSError, UsageError):
+        if load_symbols(source).image_crc == crc:
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, kept)
 
 
 def _range(symbol: Symbol) -> AreaRange:

@@ -197,6 +197,21 @@ static void an_endless_initialisation_is_broken(void)
     CHECK(app_exception() == RTSEXCPT_WATCHDOG);
 }
 
+static void of_two_exceptions_the_first_counts(void)
+{
+    begin_bad_task();
+    emit_divide_by_zero(&spec);
+    run_bad_task();
+    AppHandleException(0, RTSEXCPT_ACCESS_VIOLATION, 0);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    AppHandleException(0, RTSEXCPT_ACCESS_VIOLATION, 0); /* as a task of the next run would */
+    AppHandleException(1, RTSEXCPT_DIVIDEBYZERO, 0);
+    check_exception(RTSEXCPT_ACCESS_VIOLATION, 0xFFFFFFFF, 0);
+    CHECK(last_log_is("Main: access violation"));
+}
+
 static RTS_UI32 exceptions_seen;
 
 static void count_exception(const EVENT_PARAM *param)
@@ -237,6 +252,7 @@ int main(void)
     RUN(an_application_with_an_exception_can_be_replaced);
     RUN(initialisation_may_fail_too);
     RUN(an_endless_initialisation_is_broken);
+    RUN(of_two_exceptions_the_first_counts);
     RUN(the_exception_is_posted_once);
     RUN(every_exception_has_words);
     return test_result();

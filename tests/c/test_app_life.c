@@ -295,6 +295,86 @@ static void start_stop_reset_and_download_are_announced(void)
     CHECK(memcmp(seen_events, expected, sizeof expected) == 0);
 }
 
+/* GlobalExit counts in the memory of the test, since its own is initialised right after it. */
+static RTS_UI32 exits;
+
+static void count_exit(RTS_UI32 step)
+{
+    exits += step;
+}
+
+static const CMP_EXT_FUNCTION exit_counter[] = {{"countexit", 1, 0x00010000, (RTS_PFN)count_exit}};
+
+static void start_with_exit(APP_BYTES *image)
+{
+    APP_SPEC spec;
+
+    start_blank();
+    CHECK(CMRegisterExternal(exit_counter, 1) == ERR_OK);
+    spec_counter(&spec, 1);
+    add_import(&spec, "countexit", 1, 0x00010000);
+    spec.function[CDL_FUNCTION_GLOBAL_EXIT] = (RTS_I32)here(&spec);
+    emit_call(&spec, 0, 1);
+    emit_ret(&spec);
+    build_image(image, &spec);
+    CHECK(download(image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    exits = 0;
+}
+
+static void global_exit_runs_before_the_application_goes(void)
+{
+    APP_BYTES image;
+
+    start_with_exit(&image);
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(exits == 0);
+    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
+    CHECK(exits == 1);
+    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
+    CHECK(exits == 2);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(exits == 3);
+    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    CHECK(exits == 4);
+    start_with_exit(&image);
+    SimStop();
+    CHECK(exits == 1);
+}
+
+static void global_exit_does_not_run_after_an_exception(void)
+{
+    APP_BYTES image;
+
+    start_with_exit(&image);
+    AppHandleException(0, RTSEXCPT_WATCHDOG, 0);
+    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
+    CHECK(exits == 0);
+}
+
+static void reset_of_a_running_application_stops_it_first(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    seen_count = 0;
+    CHECK(EventRegisterCallback(CMPID_CmpAppEmbedded, EVT_StopDone, note_event, NULL) == ERR_OK);
+    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
+    CHECK(seen_count == 1);
+}
+
+static void power_on_of_a_proven_application_writes_no_flash(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    SimStop();
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(SimFlashOps() == 0);
+    CHECK(AppStopApplication() == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimFlashOps() == 0);
+}
+
 /* ---- rollback ---- */
 
 /* An application whose task divides by zero in its first cycle. */
@@ -400,6 +480,27 @@ static void a_first_application_that_died_stays_loaded_but_stopped(void)
     CHECK(log_has("not started"));
 }
 
+static void a_first_application_that_never_proves_itself_is_started_ten_times(void)
+{
+    APP_BYTES image;
+    int i;
+
+    start_blank();
+    build_counter(&image, 1);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    for (i = 1; i < 10; i++) {
+        CHECK(SimStart() == ERR_OK);
+        CHECK(app_state() == AS_RUN);
+    }
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(AppStartApplication() == ERR_OK); /* by hand it can be started, and then prove itself */
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+}
+
 static void a_proven_application_that_had_an_exception_starts_again(void)
 {
     APP_SPEC spec;
@@ -501,11 +602,16 @@ int main(void)
     RUN(info_longer_than_its_buffer_is_cut);
     RUN(area_addresses_are_checked_to_the_byte);
     RUN(start_stop_reset_and_download_are_announced);
+    RUN(global_exit_runs_before_the_application_goes);
+    RUN(global_exit_does_not_run_after_an_exception);
+    RUN(reset_of_a_running_application_stops_it_first);
+    RUN(power_on_of_a_proven_application_writes_no_flash);
     RUN(an_application_that_dies_before_it_proved_itself_is_rolled_back);
     RUN(an_application_that_never_proves_itself_is_rolled_back_after_two_starts);
     RUN(an_application_that_ran_long_enough_is_not_rolled_back);
     RUN(stopping_in_good_order_is_not_dying);
     RUN(a_first_application_that_died_stays_loaded_but_stopped);
+    RUN(a_first_application_that_never_proves_itself_is_started_ten_times);
     RUN(a_proven_application_that_had_an_exception_starts_again);
     RUN(a_damaged_boot_project_gives_way_to_the_other_slot);
     RUN(a_device_without_any_good_image_still_starts);

@@ -1,12 +1,11 @@
 /*
- * test_core_event.c - events and settings.
+ * test_core_event.c - events between components.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
 #include <string.h>
 
 #include "CmpEventMgr.h"
-#include "CmpSettings.h"
 #include "rts_config.h"
 #include "test.h"
 
@@ -93,17 +92,6 @@ static void callbacks_are_limited(void)
     CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "x") == ERR_OK);
 }
 
-static void settings_come_from_the_table_of_the_port(void)
-{
-    CHECK(SettgGetIntValue("SysSim", "Number", 1) == 42);
-    CHECK(SettgGetIntValue("SysSim", "Text", 1) == 1);
-    CHECK(SettgGetIntValue("SysSim", "Nothing", 1) == 1);
-    CHECK(SettgGetIntValue("Nobody", "Number", -5) == -5);
-    CHECK(strcmp(SettgGetStringValue("SysSim", "Text", ""), "forty-two") == 0);
-    CHECK(strcmp(SettgGetStringValue("SysSim", "Number", "none"), "none") == 0);
-    CHECK(SettgGetStringValue("SysSim", "Nothing", NULL) == NULL);
-}
-
 int main(void)
 {
     RUN(callbacks_run_in_the_order_of_registration);
@@ -111,6 +99,5 @@ int main(void)
     RUN(what_was_unregistered_is_not_called);
     RUN(a_callback_may_unregister_itself);
     RUN(callbacks_are_limited);
-    RUN(settings_come_from_the_table_of_the_port);
     return test_result();
 }

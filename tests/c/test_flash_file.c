@@ -62,6 +62,8 @@ static void a_flash_that_is_too_small_stops_the_start_up(void)
     CHECK(SimFlashConfigure(2048, 256, 1, 0xFF) == ERR_OK);
     CHECK(SimStart() == ERR_OK); /* 2 commit, 2 retain, 2 x 2 slots */
     CHECK(SysFileGetArea(FILE_SLOT_B)->size == 512);
+    CHECK(SimFlashConfigure(2048, 8, 1, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_PARAMETER); /* sectors smaller than what files are aligned to */
 }
 
 /* Blocks of all sizes, in a pattern that has nothing to do with units and sectors. */

@@ -6,8 +6,13 @@
  * Tasks are driven by hand here: the clock of the simulator stands still while IecTaskCycle gets the times a test wants. How long a
  * cycle takes is what "simburn" burns.
  */
+#define _GNU_SOURCE
+#include <pthread.h>
+#include <time.h>
+
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
+#include "SysAtomic.h"
 #include "app_image.h"
 #include "test.h"
 
@@ -329,6 +334,90 @@ static void the_supervisor_sees_the_limits_of_running_code_only(void)
     CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
 }
 
+static RTS_I64 look_ns;
+static RTS_UI32 looked;
+static bool break_expected;
+
+static void *look(void *unused)
+{
+    RTS_UNUSED(unused);
+    SchedWatchdogCheck(look_ns);
+    SysAtomicStore(&looked, 1);
+    return NULL;
+}
+
+/* The cycle waits here until a supervisor in another thread has looked, at a time `us` after its start; and, when it is to be
+ * broken, for that (10 s at most). */
+static void supervise(RTS_UI32 us)
+{
+    time_t start = time(NULL);
+    pthread_t thread;
+
+    look_ns = SimNow() + (RTS_I64)us * 1000;
+    SysAtomicStore(&looked, 0);
+    CHECK(pthread_create(&thread, NULL, look, NULL) == 0);
+    CHECK(pthread_detach(thread) == 0);
+    while ((SysAtomicLoad(&looked) == 0 || break_expected) && time(NULL) - start < 10)
+        ;
+}
+
+static const CMP_EXT_FUNCTION supervisor[] = {{"supervise", 1, 0x00010000, (RTS_PFN)supervise}};
+
+/* An application with one task that lets the supervisor look `us` after its start. */
+static CDL_TASK *begin_supervised(RTS_UI32 us, bool expect_break)
+{
+    CDL_TASK *task;
+
+    break_expected = expect_break;
+    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(CMRegisterExternal(supervisor, 1) == ERR_OK);
+    spec_init(&spec);
+    add_import(&spec, "supervise", 1, 0x00010000);
+    task = add_task(&spec, "Main", KIND_CYCLIC, 1000, here(&spec));
+    emit_call(&spec, 0, us);
+    emit_add(&spec, APP_AREA_DATA, 0, 1);
+    emit_ret(&spec);
+    return task;
+}
+
+static void the_supervisor_breaks_a_cycle_beyond_time_times_sensitivity(void)
+{
+    static const RTS_UI32 us[] = {12000, 12001};
+    RTS_UI32 i;
+
+    for (i = 0; i < 2; i++) {
+        CDL_TASK *task = begin_supervised(us[i], i == 1);
+        task->watchdog_us = 3000;
+        task->watchdog_sensitivity = 4;
+        load();
+        CHECK(SimAdvance(0) == ERR_OK);
+        CHECK(app_exception() == (i == 0 ? RTSEXCPT_NOEXCEPTION : RTSEXCPT_WATCHDOG));
+        CHECK(read_u32(APP_AREA_DATA, 0) == 1 - i);
+    }
+}
+
+static void the_supervisor_breaks_a_task_without_watchdog_after_the_default(void)
+{
+    begin_supervised(APP_DEFAULT_WATCHDOG_US, false);
+    load();
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    begin_supervised(APP_DEFAULT_WATCHDOG_US + 1, true);
+    load();
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+}
+
+static void the_supervisor_breaks_initialisation_code_too(void)
+{
+    begin_supervised(APP_DEFAULT_WATCHDOG_US + 1, true);
+    spec.function[CDL_FUNCTION_CODE_INIT] = 0;
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+}
+
 static void no_cycle_starts_while_the_application_is_stopped(void)
 {
     begin(1000, 0);
@@ -379,6 +468,9 @@ int main(void)
     RUN(the_watchdog_stops_the_application_with_its_outputs_at_zero);
     RUN(reset_gives_the_watchdog_its_count_back);
     RUN(the_supervisor_sees_the_limits_of_running_code_only);
+    RUN(the_supervisor_breaks_a_cycle_beyond_time_times_sensitivity);
+    RUN(the_supervisor_breaks_a_task_without_watchdog_after_the_default);
+    RUN(the_supervisor_breaks_initialisation_code_too);
     RUN(no_cycle_starts_while_the_application_is_stopped);
     RUN(the_bench_measures_real_time_and_keeps_the_schedule);
     return test_result();

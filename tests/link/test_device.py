@@ -13,7 +13,7 @@ from plctool.core import lib
 from plctool.device import Plc, open_transport
 from plctool.errors import DeviceError, LinkError, UsageError
 from plctool.link.connection import Connection
-from plctool.symbols import SymbolTable, symbol_path
+from plctool.symbols import SymbolTable, cache_path, symbol_path
 
 
 class Controller:
@@ -157,13 +157,14 @@ def test_what_cannot_be_written_is_a_usage_error_and_nothing_is_written(
     assert running.fake.writes == 0
 
 
-def test_symbols_come_from_the_cache_when_no_file_is_near(running: Controller, tmp_path: Path) -> None:
-    running.symbols.save(tmp_path / "elsewhere.sym")
+def test_symbols_are_kept_at_flash_and_found_again(running: Controller, tmp_path: Path) -> None:
+    symbol_path(running.image).unlink()
     plc = Plc(Connection(FakeLine(running.device)))
     assert plc.read("Main.count") == 0
 
 
 def test_without_symbols_nothing_is_read(running: Controller) -> None:
+    cache_path(running.symbols.image_crc).unlink()
     plc = Plc(Connection(FakeLine(running.device)))
     with pytest.raises(UsageError, match="no symbols"):
         plc.read("Main.count")
@@ -237,6 +238,7 @@ def test_an_exception_comes_with_task_and_source_line(running: Controller, code:
 
 
 def test_an_exception_without_symbols_has_no_place(running: Controller) -> None:
+    cache_path(running.symbols.image_crc).unlink()
     fail(running, lib.RTSEXCPT_DIVIDEBYZERO, 0x20)
     exception = Plc(Connection(FakeLine(running.device))).status().exception
     assert exception is not None

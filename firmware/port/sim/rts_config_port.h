@@ -20,7 +20,6 @@
 #define CHECKSUM_TABLE_ENTRIES 256
 #define EVENT_MAX_CALLBACKS 16
 #define SCHED_MAX_EXTERNAL_EVENTS 4
-#define SETTINGS_TABLE {"SysSim", "Number", 42, NULL}, {"SysSim", "Text", 0, "forty-two"},
 
 /* What SimFlashConfigure starts with: geometry of a common serial NOR flash, programmed in the units of an STM32's [bytes]. */
 #define SIM_FLASH_SIZE (4 * 1024 * 1024)

@@ -15,9 +15,8 @@ from plctool.compiler.targets import Machine, Target
 from plctool.compiler.typed import Area, Task, TypedProgram
 from plctool.core import lib
 from plctool.files import write_atomically
-from plctool.files import write_atomically
 from plctool.image import ApplicationInfo, ExternalFunction, Image, ImageTask, build_image
-from plctool.symbols import CodeUnit, Symbol, SymbolTable, layout_signature, symbol_path, symbol_path
+from plctool.symbols import CodeUnit, Symbol, SymbolTable, layout_signature, symbol_path
 
 
 @dataclass(frozen=True)
@@ -36,11 +35,6 @@ class BuildResult:
 
     def write(self, path: Path) -> None:
         """Writes the image to `path` and the symbol file beside it. Raises UsageError when that is not possible."""
-        self.symbols.save(symbol_path(path))
-        write_atomically(path, self.image)
-
-    def write(self, path: Path) -> None:
-        """Writes the image and, beside it, its symbols; each file appears complete or not at all."""
         self.symbols.save(symbol_path(path))
         write_atomically(path, self.image)
 

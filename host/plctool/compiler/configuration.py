@@ -13,7 +13,19 @@ from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.scope import Scope
 from plctool.compiler.statements import Statements
 from plctool.compiler.symbols import ERROR, PouSymbol
-from plctool.compiler.typed import Assign, Load, Pou, Task, TaskKind, Variable, VarPlace
+from plctool.compiler.typed import (
+    Assign,
+    Direction,
+    Load,
+    Parameter,
+    Pou,
+    PouKind,
+    Statement,
+    Task,
+    TaskKind,
+    Variable,
+    VarPlace,
+)
 from plctool.compiler.types import BOOL, LTIME, TIME
 from plctool.compiler.world import World
 
@@ -50,7 +62,7 @@ class _Builder:
         self._world = world
         self._application = application
         self._used: set[PouSymbol] = set()
-        self._connections: list[tuple[ast.ProgramInstance, Pou, Scope, Scope]] = []
+        self._connections: list[tuple[ast.ProgramInstance, Pou, Task]] = []
 
     # ---- without CONFIGURATION ----
 
@@ -66,21 +78,21 @@ class _Builder:
                 f"several programs: name one {DEFAULT_PROGRAM}, or write a CONFIGURATION that says what runs",
             )  # fmt: skip
             return
-        pou = self._instance(chosen[0], chosen[0].decl.name)[0]
+        pou = self._instance(chosen[0], chosen[0].decl.name, set())
         self._application.tasks.append(Task(DEFAULT_TASK, TaskKind.CYCLIC, 1, DEFAULT_INTERVAL_US, [pou]))
 
     def check_others(self) -> None:
         """Programs without an instance: their variables go nowhere."""
         for symbol in self._world.program_symbols():
             if symbol not in self._used:
-                self._world.units.program(symbol, symbol.decl.name, Allocation())
+                self._world.units.program(symbol, symbol.decl.name, Allocation(), set())
 
-    def _instance(self, symbol: PouSymbol, name: str) -> tuple[Pou, Scope]:
+    def _instance(self, symbol: PouSymbol, name: str, qualifiers: set[str]) -> Pou:
         self._used.add(symbol)
-        pou, scope = self._world.units.program(symbol, name, self._world.allocation)
+        pou, scope = self._world.units.program(symbol, name, self._world.allocation, qualifiers)
         self._application.programs[name] = pou
         self._world.add_instance(name, scope)
-        return pou, scope
+        return pou
 
     # ---- with CONFIGURATION ----
 
@@ -104,8 +116,9 @@ class _Builder:
                     self._application.tasks.append(background)
                 task = background
             self._program(instance, task, scope)
-        for instance, pou, outer, inner in self._connections:
-            self._connect(instance, pou, outer, inner)
+        for instance, pou, task in self._connections:
+            self._connect(instance, pou, task, scope)
+        self._connections.clear()
 
     def _task_of(self, instance: ast.ProgramInstance, tasks: dict[str, Task], scope: Scope) -> Task | None:
         if instance.task is None:
@@ -126,28 +139,52 @@ class _Builder:
         if instance.name.casefold() in (n.casefold() for n in self._application.programs):
             scope.error(instance.pos, "duplicate", f"there is a program instance {instance.name} already")
             return
-        pou, inner = self._instance(symbol, instance.name)
+        pou = self._instance(symbol, instance.name, instance.qualifiers)
         task.programs.append(pou)
         if instance.args:
-            self._connections.append((instance, pou, scope, inner))
+            self._connections.append((instance, pou, task))
 
-    def _connect(self, instance: ast.ProgramInstance, pou: Pou, outer: Scope, inner: Scope) -> None:
-        """`PROGRAM p : Type(input := x)`: assigned before each run."""
-        checker = Statements(outer)
-        inputs = {p.variable.name.rpartition(".")[2].casefold(): p.variable for p in pou.parameters}
+    def _connect(self, instance: ast.ProgramInstance, pou: Pou, task: Task, scope: Scope) -> None:
+        """`PROGRAM p WITH t : Type(input := x, output => y)`: small programs before and behind do the assignments."""
+        checker = Statements(scope)
+        before: list[Statement] = []
+        behind: list[Statement] = []
         for argument in instance.args:
-            if argument.output or argument.name is None or argument.value is None:
-                outer.error(
-                    argument.pos, "unsupported", "only name := value is supported here; read outputs as inst.name"
-                )
+            parameter = self._parameter(argument, pou, instance, scope)
+            if parameter is None or argument.value is None:
                 continue
-            variable = inputs.get(argument.name.casefold())
-            if variable is None:
-                outer.error(argument.pos, "unknown", f"{instance.type_name} has no input {argument.name}")
+            variable, pos = parameter.variable, scope.pos(argument.pos)
+            place = VarPlace(variable, variable.type, pos)
+            if not argument.output:
+                value = checker.value(argument.value, variable.type)
+                before.append(Assign(place, value, pos))
                 continue
-            value = checker.value(argument.value, variable.type)
-            if value.type is not ERROR:
-                inner.prologue.append(Assign(VarPlace(variable, variable.type, value.pos), value, value.pos))
+            target = checker.target(argument.value, "an output", "take an output")
+            if target is not None:
+                value = checker.coerce(Load(place, variable.type, pos), target.type)
+                behind.append(Assign(target, value, pos))
+        at = task.programs.index(pou)
+        task.programs[at : at + 1] = [
+            *([Pou(f"{pou.name}.inputs", PouKind.PROGRAM, pou.pos, body=before)] if before else []),
+            pou,
+            *([Pou(f"{pou.name}.outputs", PouKind.PROGRAM, pou.pos, body=behind)] if behind else []),
+        ]
+        self._world.pous += [p for p in task.programs[at : at + 3] if p.name.startswith(f"{pou.name}.")]
+
+    def _parameter(
+        self, argument: ast.Argument, pou: Pou, instance: ast.ProgramInstance, scope: Scope
+    ) -> Parameter | None:
+        if argument.name is None:
+            scope.error(argument.pos, "arguments", "write name := value or name => variable")
+            return None
+        direction = Direction.OUTPUT if argument.output else Direction.INPUT
+        names = {p.variable.name.rpartition(".")[2]: p for p in pou.parameters if p.direction is direction}
+        found = next((p for n, p in names.items() if n.casefold() == argument.name.casefold()), None)
+        if found is None:
+            what = "output" if argument.output else "input"
+            hint = did_you_mean(argument.name, names)
+            scope.error(argument.pos, "unknown", f"{instance.type_name} has no {what} {argument.name}{hint}")
+        return found
 
     # ---- tasks ----
 

@@ -79,11 +79,12 @@ class Recovery:
         self._not_yet(token)
         self._accepted = 0
         self._reduce()
-        if not self._stray_end(token):
-            while self._insert(token) or self._close(token):
-                if self._parser.feed(token):
-                    return
-            self._say(token.pos, self._unexpected(token))
+        if self._stray_end(token):
+            return
+        while self._insert(token) or self._close(token):
+            if self._parser.feed(token):
+                return
+        self._say(token.pos, self._unexpected(token))
         self._skip(token)
 
     def report_token(self, offset: int, code: str, message: str) -> None:
@@ -99,11 +100,13 @@ class Recovery:
 
     def resume(self, token: Token) -> bool:
         """While skipping: whether to go on with `token`. A semicolon ends what is skipped and belongs to it."""
-        if token.type == "_SEMI":
-            self._drop(None)
-        elif token.type in _SYNC and self._drop(token.type):
+        if token.type != "_SEMI" and token.type not in _SYNC:
+            return False
+        if self._shift(self._parser.states, token.type) is not None:
+            self.skipping = False
+            self._accepted = _APART
             return True
-        return False
+        return self._drop(None if token.type == "_SEMI" else token.type) and token.type != "_SEMI"
 
     # ---- repairs ----
 
@@ -190,7 +193,7 @@ class Recovery:
                 self._quiet = True
 
     def _stray_end(self, token: Token) -> bool:
-        """An END_... that closes nothing that is open: it stands for the right one, or for nothing."""
+        """An END_... that closes nothing that is open: it stands for the right one, or is left out."""
         needed = _PARTS.get(token.type)
         if needed is not None and not any(t.type in needed for t in self._openers()):
             self._say(token.pos, f"{token.text} without {_a(needed[0])}")
@@ -207,9 +210,8 @@ class Recovery:
         line = self._source.pos(opener.pos).line
         end = _CLOSERS[opener.type]
         self._say(token.pos, f"expected {end} for the {opener.text.upper()} in line {line}, not {token.text}")
-        if self._shift(self._parser.states, "_" + end) is not None:
-            token.type = "_" + end
-        return True
+        token.type = "_" + end
+        return self._parser.feed(token)
 
     def _report_open(self, token: Token, opener: Token | None) -> None:
         assert opener is not None
@@ -235,6 +237,7 @@ class Recovery:
                 states[:] = after
                 values[depth - 1 :] = [None]
                 self.skipping = False
+                self._accepted = _APART
                 return True
         return False
 

@@ -337,8 +337,9 @@ class Units:
 
     # ---- programs ----
 
-    def program(self, symbol: PouSymbol, name: str, allocation: Allocation) -> tuple[Pou, Scope]:
-        """An instance of a program with its variables placed; its body is queued for checking."""
+    def program(self, symbol: PouSymbol, name: str, allocation: Allocation, qualifiers: set[str]) -> tuple[Pou, Scope]:
+        """An instance of a program with its variables placed; its body is queued for checking. `qualifiers` of the
+        instance, such as RETAIN, are for all variables that have none."""
         decl = symbol.decl
         pou = self._pou(symbol, name)
         scope = self._scope(symbol, pou)
@@ -357,11 +358,13 @@ class Units:
                     block.pos, "unsupported", "a PROGRAM has no VAR_IN_OUT; use VAR_EXTERNAL or a global variable"
                 )
             else:
-                self._program_variables(block, pou, scope, allocation)
+                self._program_variables(block, pou, scope, allocation, block.qualifiers or qualifiers)
         self.world.add_body(scope, decl, pou, symbol.library)
         return pou, scope
 
-    def _program_variables(self, block: ast.VarBlock, pou: Pou, scope: Scope, allocation: Allocation) -> None:
+    def _program_variables(
+        self, block: ast.VarBlock, pou: Pou, scope: Scope, allocation: Allocation, qualifiers: set[str]
+    ) -> None:
         declarations = self.world.declarations
         direction = _DIRECTIONS.get(block.keyword)
         for line in block.decls:
@@ -372,7 +375,7 @@ class Units:
                 if not declarations.add(scope, symbol, offset) or t is ERROR:
                     continue
                 symbol.variable = declarations.area_variable(
-                    f"{pou.name}.{name}", t, init, line.location, block.qualifiers, scope, offset
+                    f"{pou.name}.{name}", t, init, line.location, qualifiers, scope, offset
                 )
                 if symbol.variable is None:
                     continue

@@ -50,7 +50,11 @@ void __floatundidf(void);
 void __extendsfdf2(void);
 void __truncdfsf2(void);
 
+#ifdef __arm__
 #define BASE_CALL __attribute__((pcs("aapcs")))
+#else
+#define BASE_CALL
+#endif
 
 /* ---- LINT ---- */
 

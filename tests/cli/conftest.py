@@ -1,0 +1,84 @@
+"""The command line in this process, with a fake controller on its serial port where a test wants one."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "link"))
+
+from fake_device import FakeDevice, FakeLine, FakePlc
+from small_app import make_application
+
+from plctool import cli, device
+from plctool.link.transport import BlockTransport
+from plctool.symbols import symbol_path
+
+
+@dataclass
+class Done:
+    """What a command left."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """The one document on stdout."""
+        return json.loads(self.out)
+
+
+Tool = Callable[..., Done]
+
+
+@pytest.fixture(autouse=True)
+def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Commands run in a folder of their own, with a cache of their own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def tool(capsys: pytest.CaptureFixture[str]) -> Tool:
+    """Runs plctool with the given words."""
+
+    def run(*words: str) -> Done:
+        capsys.readouterr()
+        status = cli.main(words)
+        captured = capsys.readouterr()
+        return Done(status, captured.out, captured.err)
+
+    return run
+
+
+@pytest.fixture
+def plc(monkeypatch: pytest.MonkeyPatch) -> FakePlc:
+    """A fake controller without application on every port."""
+    fake = FakePlc()
+    fake.image = b""
+    controller = FakeDevice(fake.handle)
+
+    def open_transport(link: str, baud: int) -> BlockTransport:
+        assert link == "serial:/dev/fake"
+        return FakeLine(controller, baud=baud)
+
+    monkeypatch.setattr(device, "open_transport", open_transport)
+    return fake
+
+
+@pytest.fixture
+def image(scratch: Path) -> Path:
+    """An image made by hand and its symbols."""
+    data, symbols = make_application()
+    path = scratch / "small.cdl"
+    path.write_bytes(data)
+    symbol_path(path).write_text(symbols.to_json())
+    return path

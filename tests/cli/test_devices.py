@@ -1,0 +1,286 @@
+"""Commands on a controller: their JSON shapes, their texts, their exit statuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_device import FakePlc
+
+from plctool import cli
+from plctool.core import lib
+
+PORT = ("--port", "/dev/fake")
+
+
+@pytest.fixture
+def running(tool: Any, plc: FakePlc, image: Path) -> FakePlc:
+    """The controller with the small application."""
+    assert tool("flash", *PORT, str(image)).status == 0
+    plc.tasks = [([0, 1, 10_000, 5, 7, 8, 6, 9, 3, 2], "Main")]
+    return plc
+
+
+# ---- flash -----------------------------------------------------------------------------------------------------------
+
+
+def test_flash_tells_bytes_seconds_and_whether_it_was_needed(tool: Any, plc: FakePlc, image: Path) -> None:
+    document = tool("flash", *PORT, str(image), "--json").json
+    assert document["bytes"] == image.stat().st_size
+    assert document["seconds"] > 0
+    assert (document["skipped"], document["state"]) == (False, "run")
+    assert tool("flash", *PORT, str(image), "--json").json["skipped"] is True
+    assert tool("flash", *PORT, str(image), "--force", "--json").json["skipped"] is False
+
+
+def test_flash_without_start(tool: Any, plc: FakePlc, image: Path) -> None:
+    assert tool("flash", *PORT, "--no-start", str(image), "--json").json["state"] == "stop"
+
+
+def test_flash_says_what_it_did_to_people(tool: Any, plc: FakePlc, image: Path) -> None:
+    done = tool("flash", *PORT, str(image))
+    assert done.status == 0
+    assert f"{image.stat().st_size} bytes" in done.out
+    assert "state: run" in done.out
+    assert "already" in tool("flash", *PORT, str(image)).out
+
+
+def test_a_refused_image_exits_1_with_the_reason(tool: Any, plc: FakePlc, image: Path) -> None:
+    plc.refuse = "the function 'sin' is missing"
+    done = tool("flash", *PORT, str(image), "--json")
+    assert done.status == 1
+    assert done.json["error"]["code"] == "app-unresolved-reference"
+    assert "'sin'" in done.json["error"]["message"]
+
+
+def test_what_is_no_image_exits_2(tool: Any, plc: FakePlc, scratch: Path) -> None:
+    (scratch / "bad.cdl").write_bytes(b"no image")
+    done = tool("flash", *PORT, "bad.cdl")
+    assert (done.status, done.out) == (2, "")
+    assert done.err.startswith("plctool: ")
+    assert done.err.count("\n") == 1
+
+
+# ---- state -----------------------------------------------------------------------------------------------------------
+
+
+def test_status_without_application(tool: Any, plc: FakePlc) -> None:
+    assert tool("status", *PORT, "--json").json == {"state": "none", "image_crc": None, "exception": None}
+    assert tool("status", *PORT).out == "state: none\n"
+
+
+def test_status_of_a_running_program_has_the_crc_that_build_told(tool: Any, running: FakePlc) -> None:
+    document = tool("status", *PORT, "--json").json
+    assert document == {"state": "run", "image_crc": f"{running.crc:08X}", "exception": None}
+
+
+def test_status_after_an_exception_names_task_pou_file_and_line(tool: Any, running: FakePlc) -> None:
+    running.state, running.operating = lib.AS_STOP, lib.OS_EXCEPTION
+    running.exception = (lib.RTSEXCPT_DIVIDEBYZERO, 0x21, 0)
+    document = tool("status", *PORT, "--json").json
+    assert document["state"] == "exception"
+    what = {"code": lib.RTSEXCPT_DIVIDEBYZERO, "name": "DIVIDEBYZERO", "task": "Main"}
+    assert document["exception"] == what | {"pou": "Main", "file": "main.st", "line": 8}
+    assert "DIVIDEBYZERO in task Main, Main, main.st:8" in tool("status", *PORT).out
+
+
+def test_start_stop_and_reset_tell_the_state_they_lead_to(tool: Any, running: FakePlc) -> None:
+    assert tool("stop", *PORT, "--json").json["state"] == "stop"
+    assert tool("start", *PORT, "--json").json["state"] == "run"
+    assert tool("reset", "cold", *PORT, "--json").json["state"] == "stop"
+    assert tool("reset", "origin", *PORT, "--json").json["state"] == "none"
+
+
+def test_start_of_nothing_exits_1_and_says_what_to_do(tool: Any, plc: FakePlc) -> None:
+    done = tool("start", *PORT)
+    assert (done.status, done.out) == (1, "")
+    assert "flash one first" in done.err
+
+
+def test_tasks_have_their_times(tool: Any, running: FakePlc) -> None:
+    (task,) = tool("tasks", *PORT, "--json").json["tasks"]
+    assert task["name"] == "Main"
+    assert [task[key] for key in ("cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns")] == [
+        5, 7, 8, 6, 9, 3, 2,
+    ]  # fmt: skip
+    heading, row = tool("tasks", *PORT).out.splitlines()
+    assert heading.split()[:2] == ["name", "cycles"]
+    assert row.split()[:2] == ["Main", "5"]
+
+
+def test_tasks_of_an_empty_device_are_none(tool: Any, plc: FakePlc) -> None:
+    assert tool("tasks", *PORT, "--json").json == {"tasks": []}
+    assert tool("tasks", *PORT).status == 0
+
+
+def test_log_entries_come_with_class_component_and_place(tool: Any, running: FakePlc) -> None:
+    running.log = [
+        (1, 1_500_000_000, lib.LOG_INFO, "CmpApp", "started"),
+        (2, 2_000_000_000, lib.LOG_EXCEPTION, "CmpApp", "Main: DIVIDEBYZERO at code offset 0x21"),
+    ]
+    running.state, running.operating = lib.AS_STOP, lib.OS_EXCEPTION
+    running.exception = (lib.RTSEXCPT_DIVIDEBYZERO, 0x21, 0)
+    first, second = tool("log", *PORT, "--json").json["entries"]
+    assert (first["time_s"], first["class"], first["component"], first["text"]) == (1.5, "info", "CmpApp", "started")
+    assert (second["class"], second["pou"], second["file"], second["line"]) == ("exception", "Main", "main.st", 8)
+    assert "main.st:8" in tool("log", *PORT).out
+
+
+def test_scan_lists_the_devices(tool: Any, plc: FakePlc) -> None:
+    (found,) = tool("scan", *PORT, "--json").json["devices"]
+    assert found["node_name"] == "press-3"
+    assert (found["device_name"], found["target"], found["address"]) == ("Fake controller", "cortex-m3", "0001")
+    assert "press-3" in tool("scan", *PORT).out
+
+
+# ---- variables -------------------------------------------------------------------------------------------------------
+
+
+def test_read_gives_values_by_the_names_asked_for(tool: Any, running: FakePlc) -> None:
+    running.memory[0][:5] = (168).to_bytes(4, "little") + b"\1"
+    running.memory[0][12:16] = (80).to_bytes(4, "little")
+    running.memory[0][16:20] = b"abc\0"
+    done = tool("read", *PORT, "Main.count", "Main.ok", "Main.name", "Main.pause", "--json")
+    assert done.json == {"values": {"Main.count": 168, "Main.ok": True, "Main.name": "abc", "Main.pause": "T#80ms"}}
+    assert tool("read", *PORT, "Main.count", "Main.ok").out == "Main.count = 168\nMain.ok = TRUE\n"
+
+
+def test_read_of_an_unknown_name_exits_2_with_a_suggestion(tool: Any, running: FakePlc) -> None:
+    done = tool("read", *PORT, "Main.coutn", "--json")
+    assert done.status == 2
+    assert "Main.count" in done.json["error"]["message"]
+
+
+def test_read_without_application_exits_1(tool: Any, plc: FakePlc) -> None:
+    assert tool("read", *PORT, "Main.count", "--json").status == 1
+
+
+def test_read_with_the_symbols_of_another_image_exits_2(tool: Any, running: FakePlc, image: Path) -> None:
+    running.image = running.image[:-1] + b"\0"
+    running.image = running.image[:100] + b"\1\2\3\4" + running.image[104:]
+    done = tool("read", *PORT, "--symbols", str(image.with_suffix(".sym")), "Main.count", "--json")
+    assert done.status == 2
+    assert done.json["error"]["code"] == "wrong-symbols"
+
+
+def test_write_understands_texts_and_shows_the_values_after(tool: Any, running: FakePlc) -> None:
+    done = tool("write", *PORT, "Main.count=16#2A", "Main.pause=T#1s", "Main.name=a=b", "Main.ok=TRUE", "--json")
+    assert done.json == {"values": {"Main.count": 42, "Main.pause": "T#1s", "Main.name": "a=b", "Main.ok": True}}
+    assert running.memory[0][0] == 42
+
+
+@pytest.mark.parametrize("words", [("Main.count",), ("=5",), ("Main.count=many",), ("Main.nothing=1",)])
+def test_write_of_nonsense_exits_2_and_writes_nothing(
+    tool: Any, running: FakePlc, image: Path, words: tuple[str, ...]
+) -> None:
+    done = tool("write", *PORT, "Main.ok=1", *words)
+    assert (done.status, running.writes) == (2, 0)
+
+
+@pytest.fixture
+def watched(running: FakePlc) -> tuple[str, ...]:
+    return ("watch", *PORT, "Main.count", "--interval", "0")
+
+
+def test_watch_collects_samples(tool: Any, watched: tuple[str, ...]) -> None:
+    samples = tool(*watched, "--count", "3", "--json").json["samples"]
+    assert [sample["values"] for sample in samples] == [{"Main.count": 0}] * 3
+    assert all(sample["time_s"] >= 0 for sample in samples)
+
+
+def test_watch_prints_a_line_a_reading_where_there_is_no_terminal(tool: Any, watched: tuple[str, ...]) -> None:
+    lines = tool(*watched, "--count", "2").out.splitlines()
+    assert len(lines) == 2
+    assert all(line.endswith("Main.count = 0") for line in lines)
+
+
+def test_watch_as_json_gives_its_document_at_ctrl_c(
+    tool: Any, watched: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    naps = iter([None, None])
+
+    def sleep(seconds: float) -> None:
+        if next(naps, KeyboardInterrupt) is KeyboardInterrupt:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("plctool.device.time.sleep", sleep)
+    done = tool(*watched, "--json")
+    assert done.status == 0
+    assert len(done.json["samples"]) == 2
+
+
+def test_ctrl_c_exits_130_without_a_word(tool: Any, watched: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(seconds: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("plctool.device.time.sleep", interrupt)
+    done = tool(*watched)
+    assert (done.status, done.out, done.err) == (130, "", "")
+
+
+# ---- links -----------------------------------------------------------------------------------------------------------
+
+DEVICE_COMMANDS = [
+    ("flash", "small.cdl"), ("scan",), ("status",), ("start",), ("stop",), ("reset", "warm"), ("tasks",), ("log",),
+    ("read", "Main.count"), ("write", "Main.count=1"), ("watch", "Main.count"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", DEVICE_COMMANDS, ids=lambda c: c[0])
+def test_every_device_command_without_a_link_exits_2(tool: Any, image: Path, command: tuple[str, ...]) -> None:
+    done = tool(*command, "--json")
+    assert done.status == 2
+    assert "--port" in done.json["error"]["message"]
+
+
+@pytest.mark.parametrize("command", DEVICE_COMMANDS, ids=lambda c: c[0])
+def test_every_device_command_on_a_missing_port_exits_3(tool: Any, image: Path, command: tuple[str, ...]) -> None:
+    done = tool(*command, "--port", "/dev/no-such-port", "--json")
+    assert done.status == 3
+    assert done.json["error"]["code"] == "open"
+    people = tool(*command, "--port", "/dev/no-such-port")
+    assert (people.status, people.out) == (3, "")
+    assert people.err.count("\n") == 1
+    assert "no such port" in people.err
+
+
+@pytest.mark.parametrize("link", [("--can", "socketcan:can0"), ("--udp", "localhost"), ("--tcp", "localhost:11740")])
+def test_links_of_later_versions_exit_2(tool: Any, link: tuple[str, str]) -> None:
+    done = tool("status", *link, "--json")
+    assert done.status == 2
+    assert f"{link[0]} is not in this version" in done.json["error"]["message"]
+
+
+def test_a_silent_device_exits_3(tool: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fake_device import FakeDevice, FakeLine
+
+    from plctool import device
+
+    line = FakeLine(FakeDevice())
+    line.cut = True
+    monkeypatch.setattr(device, "open_transport", lambda link, baud: line)
+    done = tool("status", *PORT, "--json")
+    assert done.status == 3
+    assert done.json["error"]["code"] == "no-answer"
+
+
+# ---- bugs ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_bug_is_one_sentence_with_a_hint(tool: Any, plc: FakePlc, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("PLCTOOL_DEBUG", raising=False)
+    monkeypatch.setattr(cli, "_link", lambda args: 1 / 0)
+    done = tool("status", *PORT)
+    assert (done.status, done.out) == (1, "")
+    assert "Internal error" in done.err
+    assert "PLCTOOL_DEBUG=1" in done.err
+    assert "Traceback" not in done.err
+    assert json.loads(tool("status", *PORT, "--json").out)["error"]["code"] == "internal"
+
+
+def test_a_bug_shows_its_traceback_on_demand(tool: Any, plc: FakePlc, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PLCTOOL_DEBUG", "1")
+    monkeypatch.setattr(cli, "_link", lambda args: 1 / 0)
+    assert "ZeroDivisionError" in tool("status", *PORT).err

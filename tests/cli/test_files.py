@@ -1,0 +1,299 @@
+"""Commands on files, and the frame around all commands."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from plctool import output
+from plctool.symbols import load_symbols
+
+COUNTER = """PROGRAM Main
+VAR
+    n : INT;
+    step : INT := 1;
+    pause : TIME;
+    text : STRING := 'start';
+    list : ARRAY[1..3] OF INT := [1, 2, 3];
+END_VAR
+n := n + step;
+pause := pause + T#20ms;
+IF n < 0 THEN
+    text := 'negative';
+    list[1] := n;
+END_IF;
+END_PROGRAM
+"""
+BROKEN = """PROGRAM Main
+VAR
+    n : INT;
+END_VAR
+n := nonsense + 1;
+n := more;
+END_PROGRAM
+"""
+
+
+@pytest.fixture
+def counter(tool: Any, scratch: Path) -> Path:
+    (scratch / "counter.st").write_text(COUNTER)
+    assert tool("build", "counter.st", "-o", "counter.cdl").status == 0
+    return scratch / "counter.cdl"
+
+
+# ---- build, check, info ----------------------------------------------------------------------------------------------
+
+
+def test_build_writes_image_and_symbols(tool: Any, scratch: Path) -> None:
+    (scratch / "counter.st").write_text(COUNTER)
+    document = tool("build", "counter.st", "-o", "out.cdl", "--json").json
+    data = (scratch / "out.cdl").read_bytes()
+    assert document["image"] == "out.cdl"
+    assert document["size"] == len(data)
+    assert document["crc"] == f"{int.from_bytes(data[100:104], 'little'):08X}"
+    assert document["warnings"] == []
+    assert load_symbols(scratch / "out.sym").image_crc == int(document["crc"], 16)
+
+
+def test_build_writes_app_cdl_when_nothing_else_is_said(tool: Any, scratch: Path) -> None:
+    (scratch / "counter.st").write_text(COUNTER)
+    assert tool("build", "counter.st").out.startswith("app.cdl: ")
+    assert (scratch / "app.cdl").exists()
+    assert (scratch / "app.sym").exists()
+
+
+def test_build_takes_folders(tool: Any, scratch: Path) -> None:
+    (scratch / "src").mkdir()
+    (scratch / "src" / "counter.st").write_text(COUNTER)
+    assert tool("build", "src", "-o", "out.cdl", "--json").status == 0
+
+
+def test_build_for_another_target(tool: Any, scratch: Path) -> None:
+    (scratch / "counter.st").write_text(COUNTER)
+    tool("build", "counter.st", "-o", "m3.cdl", "--target", "cortex-m3", "-O1", "--checks", "none", "--debug")
+    assert tool("info", "m3.cdl", "--json").json["target"] == "cortex-m3"
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("--target", "z80"), ("--checks", "spelling"), ("-O7",), ("nothing.st",), ("-o", "no/such/folder/x.cdl")],
+)
+def test_build_with_wrong_options_exits_2(tool: Any, scratch: Path, options: tuple[str, ...]) -> None:
+    (scratch / "counter.st").write_text(COUNTER)
+    done = tool("build", "counter.st", *options, "--json")
+    assert done.status == 2
+    assert done.json["error"]["message"].count("\n") == 0
+
+
+def test_build_of_a_wrong_program_exits_2_shows_where_and_leaves_no_image(tool: Any, scratch: Path) -> None:
+    (scratch / "broken.st").write_text(BROKEN)
+    done = tool("build", "broken.st")
+    assert (done.status, done.out) == (2, "")
+    assert done.err.startswith("broken.st:5:6: error: ")
+    assert "n := nonsense + 1;\n     ^" in done.err
+    assert "broken.st:6:6: error: " in done.err
+    assert not (scratch / "app.cdl").exists()
+
+
+def test_build_of_a_wrong_program_as_json_has_error_and_diagnostics(tool: Any, scratch: Path) -> None:
+    (scratch / "broken.st").write_text(BROKEN)
+    done = tool("build", "broken.st", "--json")
+    assert done.status == 2
+    assert done.json["error"]["code"] == "compile"
+    assert [d["line"] for d in done.json["diagnostics"]] == [5, 6]
+
+
+def test_check_lists_every_diagnosis(tool: Any, scratch: Path) -> None:
+    (scratch / "broken.st").write_text(BROKEN)
+    done = tool("check", "broken.st", "--json")
+    assert done.status == 2
+    first = done.json["diagnostics"][0]
+    assert set(first) == {"file", "line", "column", "severity", "code", "message"}
+    assert (first["file"], first["line"], first["column"], first["severity"]) == ("broken.st", 5, 6, "error")
+    people = tool("check", "broken.st")
+    assert people.out.startswith("broken.st:5:6: error: ")
+
+
+def test_check_of_a_good_program_says_nothing(tool: Any, scratch: Path) -> None:
+    (scratch / "counter.st").write_text(COUNTER)
+    assert tool("check", "counter.st", "--json").json == {"diagnostics": []}
+    done = tool("check", "counter.st")
+    assert (done.status, done.out, done.err) == (0, "", "")
+    assert not (scratch / "app.cdl").exists()
+
+
+def test_info_describes_the_image(tool: Any, counter: Path) -> None:
+    document = tool("info", str(counter), "--json").json
+    assert document["size"] == counter.stat().st_size
+    assert [task["name"] for task in document["tasks"]]
+    assert any(pou["name"] == "Main" for pou in document["pous"])
+    text = tool("info", str(counter)).out
+    assert document["crc"] in text
+    assert "tasks:" in text
+
+
+def test_info_without_symbols_has_no_pous(tool: Any, image: Path) -> None:
+    image.with_suffix(".sym").unlink()
+    assert "pous" not in tool("info", str(image), "--json").json
+
+
+@pytest.mark.parametrize("content", [b"", b"text", bytes(104)])
+def test_info_of_what_is_no_image_exits_2(tool: Any, scratch: Path, content: bytes) -> None:
+    (scratch / "bad.cdl").write_bytes(content)
+    assert tool("info", "bad.cdl", "--json").status == 2
+
+
+# ---- run, bench ------------------------------------------------------------------------------------------------------
+
+
+def test_run_counts_cycles_of_the_first_task(tool: Any, counter: Path) -> None:
+    done = tool("run", str(counter), "--cycles", "100", "--get", "Main.n", "--json")
+    assert done.json["values"] == {"Main.n": 100}
+    assert done.json["cycles"] == 100
+
+
+def test_run_takes_virtual_time(tool: Any, counter: Path) -> None:
+    document = tool("run", str(counter), "--time", "T#10s", "--get", "Main.n", "--json").json
+    assert document["time_ms"] == 10_000
+    assert document["values"]["Main.n"] == document["cycles"] > 100
+
+
+def test_run_sets_variables_first(tool: Any, counter: Path) -> None:
+    words = ("--set", "Main.step=7", "--set", "Main.pause=T#1s", "--set", "Main.text=a b")
+    gets = ("--get", "Main.n", "--get", "Main.pause", "--get", "Main.text", "--get", "Main.list")
+    values = tool("run", str(counter), *words, *gets, "--json").json["values"]
+    assert values == {"Main.n": 7, "Main.pause": "T#1s20ms", "Main.text": "a b", "Main.list": [1, 2, 3]}
+
+
+def test_run_shows_values_to_people(tool: Any, counter: Path) -> None:
+    lines = tool("run", str(counter), "--cycles", "3", "--get", "Main.n").out.splitlines()
+    assert lines[0] == "Main.n = 3"
+    assert lines[1].startswith("3 cycles, ")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--get", "Main.x"),
+        ("--set", "Main.n"),
+        ("--set", "Main.n=x"),
+        ("--cycles", "0"),
+        ("--cycles", "x"),
+        ("--time", "soon"),
+        ("--time", "T#1s", "--cycles", "5"),
+    ],
+)
+def test_run_of_nonsense_exits_2(tool: Any, counter: Path, words: tuple[str, ...]) -> None:
+    assert tool("run", str(counter), *words, "--json").status == 2
+
+
+def test_run_of_a_program_that_fails_exits_1_and_names_the_line(tool: Any, scratch: Path) -> None:
+    (scratch / "zero.st").write_text("PROGRAM Main\nVAR\n  a, b : INT;\nEND_VAR\na := 1;\na := a / b;\nEND_PROGRAM\n")
+    tool("build", "zero.st", "-o", "zero.cdl")
+    done = tool("run", "zero.cdl", "--cycles", "5", "--json")
+    assert done.status == 1
+    assert done.json["error"]["code"] == "exception"
+    assert "DIVIDEBYZERO" in done.json["error"]["message"]
+    assert "zero.st:6" in done.json["error"]["message"]
+
+
+def test_run_of_a_missing_image_exits_2(tool: Any) -> None:
+    assert tool("run", "nothing.cdl", "--json").status == 2
+
+
+def test_bench_measures_each_task(tool: Any, counter: Path) -> None:
+    (task,) = tool("bench", str(counter), "--cycles", "1000", "--json").json["tasks"]
+    assert task["name"]
+    assert 0 < task["ns_per_cycle"] < 1e6
+    assert 0 <= task["runtime_ns"] < 1e6
+
+
+# ---- the frame -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("words", [(), ("nonsense",), ("read",), ("status", "--nonsense"), ("reset", "hot")])
+def test_wrong_words_exit_2_with_one_sentence(tool: Any, words: tuple[str, ...]) -> None:
+    done = tool(*words)
+    assert (done.status, done.out) == (2, "")
+    assert done.err.startswith("plctool: ")
+    assert done.err.count("\n") == 1
+    assert tool(*words, "--json").json["error"]["code"] == "usage"
+
+
+@pytest.mark.parametrize("command", ["force", "unforce", "test"])
+def test_commands_of_later_versions_say_so(tool: Any, command: str) -> None:
+    done = tool(command, "Main.n=1", "--port", "/dev/x", "--json")
+    assert done.status == 2
+    assert "not in this version" in done.json["error"]["message"]
+
+
+def test_help_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    from plctool import cli
+
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["--help"])
+    assert caught.value.code == 0
+    text = capsys.readouterr().out
+    for command in ("build", "check", "info", "flash", "scan", "status", "start", "stop", "reset", "tasks", "read",
+                    "write", "watch", "log", "run", "bench", "demo"):  # fmt: skip
+        assert f"    {command} " in text
+
+
+def plctool(*words: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "plctool", *words], capture_output=True, text=True, check=False, **options
+    )
+
+
+def test_the_version_is_printed_at_once() -> None:
+    best = 10.0
+    for _ in range(5):
+        begin = time.monotonic()
+        done = plctool("--version")
+        best = min(best, time.monotonic() - begin)
+        assert done.returncode == 0
+        assert done.stdout.startswith("plctool ")
+    assert best < 0.3
+
+
+def test_starting_does_not_import_what_is_slow() -> None:
+    code = "import sys, plctool.cli; plctool.cli.main(['--version']); print([m for m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    for module in ("llvmlite", "lark", "rich", "elftools", "serial", "_plccore"):
+        assert f"'{module}'" not in done.stdout
+
+
+def test_a_reader_that_goes_away_is_no_error(image: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "plctool", "info", str(image)]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert done.stderr == ""
+    assert done.returncode == 141
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (True, "TRUE"),
+        (-5, "-5"),
+        (1.5, "1.5"),
+        ("T#80ms", "T#80ms"),
+        ([1, [True]], "[1, [TRUE]]"),
+        ({"a": 1, "b": "x"}, "(a := 1, b := x)"),
+    ],
+)
+def test_values_look_like_st(value: Any, text: str) -> None:
+    assert output.value_text(value) == text
+
+
+def test_tables_align_numbers_right() -> None:
+    rows = [{"name": "a", "n": 5}, {"name": "long", "n": 1234}]
+    assert output.table(rows, ["name", "n"]) == "name     n\na        5\nlong  1234"

@@ -1,0 +1,102 @@
+"""Every command and every Python example in README and docs is run, in the order in which a reader would type them.
+
+`sh` blocks run in a folder of their own with the repository's examples in it. `plcrt` goes on in the background, as it does for the
+reader in another terminal, and the port it prints takes the place of the one in the text. `make` and `pip` are not run
+here: they are what runs this test (see WITHOUT_RUNNING).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from plctool.testing.plcrt import find_plcrt
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+SHOWN_PORT = "/dev/pts/4"
+
+# Commands that set up what this test runs in, or run it.
+WITHOUT_RUNNING = ("make ", "python3 -m venv", "venv/bin/", "sudo apt-get", "git clone", "cd ", "meson ", "ninja ", "qemu-")
+
+
+class Reader:
+    """Somebody who types what a document says."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.runtime: subprocess.Popen[str] | None = None
+        self.port = SHOWN_PORT
+        self.env = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
+        os.symlink(ROOT / "examples", folder / "examples")
+
+    def type(self, line: str) -> None:
+        if line.startswith(WITHOUT_RUNNING):
+            return
+        words = shlex.split(line.replace(SHOWN_PORT, self.port))
+        if words[0] == "plcrt":
+            self.start_runtime(words[1:])
+            return
+        assert words[0] == "plctool", f"this test does not know how to run: {line}"
+        done = subprocess.run(
+            [sys.executable, "-m", "plctool", *words[1:]], cwd=self.folder, env=self.env, capture_output=True, text=True,
+            timeout=180, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{line}\nexit {done.returncode}\n{done.stdout}{done.stderr}"
+
+    def start_runtime(self, options: list[str]) -> None:
+        self.stop_runtime()
+        self.runtime = subprocess.Popen([find_plcrt(), *options], cwd=self.folder, stdout=subprocess.PIPE, text=True)
+        assert self.runtime.stdout
+        self.port = self.runtime.stdout.readline().removeprefix("serial: ").strip()
+
+    def stop_runtime(self) -> None:
+        if self.runtime:
+            self.runtime.send_signal(signal.SIGTERM)
+            assert self.runtime.wait(timeout=10) == 0
+            assert self.runtime.stdout
+            self.runtime.stdout.close()
+            self.runtime = None
+
+    def run_python(self, code: str) -> None:
+        """A module with test functions goes to pytest, anything else to Python."""
+        path = self.folder / "test_example.py"
+        path.write_text(code.replace(SHOWN_PORT, self.port))
+        how = ["-m", "pytest", "-q", "-p", "no:cacheprovider", str(path)] if "def test_" in code else [str(path)]
+        done = subprocess.run(
+            [sys.executable, *how], cwd=self.folder, env=self.env, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert done.returncode == 0, f"{code}\n{done.stdout}{done.stderr}"
+
+
+@pytest.fixture
+def reader(tmp_path: Path) -> Iterator[Reader]:
+    typing = Reader(tmp_path)
+    yield typing
+    typing.stop_runtime()
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_what_the_document_says_works(document: Path, reader: Reader) -> None:
+    for language, text in BLOCK.findall(document.read_text()):
+        if language == "python":
+            reader.run_python(text)
+            continue
+        for line in text.replace("\\\n", " ").splitlines():
+            if line.strip():
+                reader.type(line.strip())
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(document: Path) -> None:
+    for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", document.read_text()):
+        assert (document.parent / link).exists(), link

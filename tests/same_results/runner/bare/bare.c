@@ -1,0 +1,188 @@
+/*
+ * bare.c - what the simulator's clock needs on a bare processor: RAM as flash, checked errors, entry of compiled code.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * There are no interrupts and no supervisor: an endless loop is broken by the time limit of the test. A fault that is
+ * not a checked error is one of the test: it ends the runner.
+ */
+#include <setjmp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "CmpIecAbi.h"
+#include "Sim.h"
+#include "SimLink.h"
+#include "SysExcept.h"
+#include "SysFlash.h"
+#include "rts_config.h"
+#include "sim_port.h"
+
+/* ---- flash ---- */
+
+static RTS_UI64 cells[SIM_FLASH_SIZE / sizeof(RTS_UI64)] __attribute__((aligned(16)));
+#define CELLS ((RTS_UI8 *)cells)
+
+static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
+{
+    memcpy(data, CELLS + offset, size);
+    return ERR_OK;
+}
+
+static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size)
+{
+    memcpy(CELLS + offset, data, size);
+    return ERR_OK;
+}
+
+static RTS_RESULT flash_erase(RTS_UI32 offset)
+{
+    memset(CELLS + offset, SIM_FLASH_ERASED, SIM_FLASH_SECTOR_SIZE);
+    return ERR_OK;
+}
+
+static RTS_RESULT flash_sync(void)
+{
+    return ERR_OK;
+}
+
+const SYS_FLASH *SysFlashGet(void)
+{
+    static const SYS_FLASH flash = {
+        SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED, CELLS,
+        flash_read,     flash_program,         flash_erase,            flash_sync,
+    };
+
+    return &flash;
+}
+
+const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_UNUSED(slot);
+    __builtin___clear_cache((char *)CELLS + offset, (char *)CELLS + offset + size);
+    return CELLS + offset;
+}
+
+void SysFlashReleaseCode(RTS_UI32 slot)
+{
+    RTS_UNUSED(slot);
+}
+
+RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 program_size, RTS_UI8 erased)
+{
+    RTS_UNUSED(size);
+    RTS_UNUSED(sector_size);
+    RTS_UNUSED(program_size);
+    memset(cells, erased, sizeof cells);
+    return ERR_OK;
+}
+
+RTS_RESULT SimFlashPowerOn(void)
+{
+    return ERR_OK;
+}
+
+/* ---- what a board without lines and threads leaves out ---- */
+
+void SimComPowerOn(void)
+{
+}
+
+void SimLinkReset(void)
+{
+}
+
+void SimSuperviseStart(void)
+{
+}
+
+int clock_gettime(clockid_t clock, struct timespec *now)
+{
+    RTS_UNUSED(clock);
+    memset(now, 0, sizeof *now);
+    return 0;
+}
+
+/* ---- checked errors ---- */
+
+static struct {
+    bool running;
+    jmp_buf landing;
+    RTS_EXCEPTION raised;
+} try;
+
+int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+{
+    memset(&try.raised, 0, sizeof try.raised);
+    if (setjmp(try.landing) == 0) {
+        try.running = true;
+        fn(arg);
+    }
+    try.running = false;
+    *exception = try.raised;
+    return exception->code != RTSEXCPT_NOEXCEPTION;
+}
+
+void SysExceptRaise(RTS_UI32 code, uintptr_t address)
+{
+    if (!try.running)
+        abort();
+    try.raised.code = code;
+    try.raised.address = address;
+    longjmp(try.landing, 1);
+}
+
+void SysExceptBreak(uintptr_t context, RTS_UI32 code)
+{
+    RTS_UNUSED(context);
+    RTS_UNUSED(code);
+}
+
+uintptr_t SysExceptContext(void)
+{
+    return 1;
+}
+
+void SysExceptShutdown(void)
+{
+}
+
+/* ---- entry of compiled code: the import table in r9 or s11 ---- */
+
+__attribute__((naked)) void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument)
+{
+    RTS_UNUSED(entry);
+    RTS_UNUSED(context);
+    RTS_UNUSED(argument);
+#if defined(__arm__)
+    __asm__ volatile("push {r4, lr}\n\t"
+                     "mov r4, r9\n\t"
+                     "push {r3, r4}\n\t"
+                     "mov r3, r0\n\t"
+                     "mov r0, r1\n\t"
+                     "ldr r4, [r0, %0]\n\t"
+                     "mov r9, r4\n\t"
+                     "mov r1, r2\n\t"
+                     "blx r3\n\t"
+                     "pop {r3, r4}\n\t"
+                     "mov r9, r4\n\t"
+                     "pop {r4, pc}" ::"i"(offsetof(IEC_CONTEXT, imports)));
+#elif defined(__riscv)
+    __asm__ volatile("addi sp, sp, -16\n\t"
+                     "sw ra, 12(sp)\n\t"
+                     "sw s11, 8(sp)\n\t"
+                     "mv t0, a0\n\t"
+                     "mv a0, a1\n\t"
+                     "lw s11, %0(a0)\n\t"
+                     "mv a1, a2\n\t"
+                     "jalr t0\n\t"
+                     "lw s11, 8(sp)\n\t"
+                     "lw ra, 12(sp)\n\t"
+                     "addi sp, sp, 16\n\t"
+                     "ret" ::"i"(offsetof(IEC_CONTEXT, imports)));
+#else
+#error "bare.c: say how this processor enters compiled code."
+#endif
+}
