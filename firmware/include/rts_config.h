@@ -52,8 +52,8 @@
 
 /* Changed retain variables are saved at most this often [us]: what a power cut may lose against the wear of the flash. A
  * save takes the size of the area and 20 bytes, rounded up to 16, of one half of the retain log; a half is erased when it
- * is full. So 500 bytes that change all the time, saved every second in two halves of 8 KiB, erase each sector once in 31 s
- * (100 000 erases: 36 days); every 60 s it is six years. The retain area is in RAM twice, because what was saved last is
+ * is full. So 500 bytes that change all the time, saved every second in two halves of 8 KiB, erase each sector once in 30 s
+ * (100 000 erases: 35 days); every 60 s it is almost six years. The retain area is in RAM twice, because what was saved last is
  * compared with. */
 #ifndef APP_RETAIN_SAVE_US
 #define APP_RETAIN_SAVE_US 1000000
