@@ -7,7 +7,7 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -195,7 +195,7 @@ def _run(args: argparse.Namespace) -> int:
     return _show(
         args,
         document,
-        lambda d: f"{output.values_text(d['values'])}\n{d['cycles']} cycles, {d['time_ms']:g} ms".lstrip(),
+        lambda d: f"{output.values_text(d['values'])}\n{d['cycles']} cycles, {d['time_ms']:.10g} ms".lstrip(),
     )
 
 
@@ -208,7 +208,13 @@ def _bench(args: argparse.Namespace) -> int:
 def _demo(args: argparse.Namespace) -> int:
     from plctool import demo
 
-    return demo.main()
+    if not args.json:
+        return demo.main()
+    with redirect_stdout(sys.stderr):
+        status = demo.main()
+    if status != EXIT_OK:
+        raise PlcError("The demo failed; its story on stderr says where.", "demo")
+    return _show(args, {"passed": True}, lambda d: "")
 
 
 # ---- commands on devices ---------------------------------------------------------------------------------------------

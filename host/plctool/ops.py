@@ -62,7 +62,7 @@ def diagnostic_document(diagnostic: Diagnostic) -> Document:
 
 
 def info(path: Path) -> Document:
-    """Header, tables and POUs of an image."""
+    """Header, tables and POUs of an image; with its symbols also the bytes of code that each POU made."""
     from plctool.image import describe_image
     from plctool.symbols import find_symbols
 
@@ -72,7 +72,13 @@ def info(path: Path) -> Document:
         table = find_symbols(int(document["crc"], 16), path)
     except UsageError:
         return document
-    document["pous"] = [{"name": u.name, "size": u.size, "file": u.file, "line": u.line} for u in table.pous]
+    from plctool.compiler.build import code_sizes
+
+    units = {unit.name: unit for unit in table.pous}
+    document["pous"] = [
+        {"name": name, "size": size, "file": units[name].file, "line": units[name].line}
+        for name, size in code_sizes(table, document["code_size"]).items()
+    ]
     return document
 
 

@@ -135,8 +135,8 @@ class Simulator:
                 _check(result, "The program does not run")
 
     def run_for(self, ms: float = 0, *, seconds: float = 0) -> None:
-        """Lets virtual time pass."""
-        _check(lib.SimAdvance(round(ms * 1e6 + seconds * 1e9)), "Time does not advance")
+        """Lets virtual time pass: ten times 10 ms are ten cycles of a 10 ms task."""
+        _check(lib.SimRunFor(round(ms * 1e6 + seconds * 1e9)), "Time does not advance")
 
     def bench(self, task: int, cycles: int) -> tuple[float, float]:
         """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""

@@ -214,6 +214,23 @@ def test_bench_measures_each_task(tool: Any, counter: Path) -> None:
     assert 0 <= task["runtime_ns"] < 1e6
 
 
+# ---- demo ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("status", "document"), [(0, {"passed": True}), (1, None)])
+def test_demo_as_json_is_one_document(
+    tool: Any, monkeypatch: pytest.MonkeyPatch, status: int, document: dict[str, bool] | None
+) -> None:
+    def story() -> int:
+        print("once upon a time")
+        return status
+
+    monkeypatch.setattr("plctool.demo.main", story)
+    done = tool("demo", "--json")
+    assert done.status == status
+    assert done.json == document if document else "error" in done.json
+
+
 # ---- the frame -------------------------------------------------------------------------------------------------------
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import random
 import struct
 import zlib
+from contextlib import suppress
 
 import pytest
 from fake_device import FakeDevice, FakeLine, damage
@@ -322,6 +324,27 @@ def test_packages_of_strangers_and_nonsense_are_ignored() -> None:
     for package in (b"", b"\x01", too_far, b"\x01\x01\x99\x99" + bytes(8), b"\x84" + bytes(40)):
         device._send_package(package)
     assert connection.exchange(b"ab") == b"ba"
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32), st.integers(1, 2000))
+def test_a_device_that_talks_nonsense_gives_a_link_error_or_the_right_answer(seed: int, size: int) -> None:
+    """Its packages are changed before they get their frame CRC, so all of the nonsense reaches the channel."""
+    rng = random.Random(seed)
+    device = FakeDevice(reverse)
+    send = device._send
+
+    def mutate(service: int, payload: bytes) -> None:
+        changed = bytearray(payload)
+        if rng.random() < 0.3 and changed:
+            changed[rng.randrange(min(24, len(changed)))] = rng.randrange(256)
+        send(service, bytes(changed[: rng.randrange(len(changed) + 1)] if rng.random() < 0.1 else changed))
+
+    connection = connect(FakeLine(device))
+    device._send = mutate  # type: ignore[method-assign]
+    message = pattern(size)
+    with suppress(LinkError):
+        assert connection.exchange(message) == message[::-1]
 
 
 def test_closing_tells_the_device() -> None:

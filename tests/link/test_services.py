@@ -312,7 +312,7 @@ def test_an_image_arrives_and_progress_is_told() -> None:
     assert len(seen) > 8
 
 
-@pytest.mark.parametrize("size", [104, 1984, 1985, 3968, 3969])
+@pytest.mark.parametrize("size", [104, 1888, 1889, 3776, 3777])
 def test_images_of_any_size_arrive(size: int) -> None:
     bench, image = Bench(buffer_size=2048), make_image(size, 5)
     services.download(bench.session, image)

@@ -287,16 +287,16 @@ static void run_group(TIMER *timer)
         SchedBackgroundCycle();
 }
 
-/* Does what comes next and is due until `end_ns`; false when nothing is. */
+/* Does what comes next and is due before `end_ns`; false when nothing is. */
 static bool run_next(RTS_I64 end_ns)
 {
     TIMER *timer = next_timer();
 
-    if (timer != NULL && timer->due_ns <= end_ns && timer->due_ns <= sim.next_comm_ns) {
+    if (timer != NULL && timer->due_ns < end_ns && timer->due_ns <= sim.next_comm_ns) {
         run_group(timer);
         return true;
     }
-    if (sim.next_comm_ns > end_ns)
+    if (sim.next_comm_ns >= end_ns)
         return false;
     if (sim.next_comm_ns > sim.now_ns)
         sim.now_ns = sim.next_comm_ns;
@@ -304,23 +304,41 @@ static bool run_next(RTS_I64 end_ns)
     return true;
 }
 
+/* How far time shall go, and before when something must be due to run on the way. */
+typedef struct {
+    RTS_I64 end_ns;
+    RTS_I64 limit_ns;
+} PASSAGE;
+
 static RTS_RESULT advance(void *arg)
 {
-    RTS_I64 end_ns = sim.now_ns + *(const RTS_I64 *)arg;
+    const PASSAGE *passage = arg;
 
-    while (run_next(end_ns))
+    while (run_next(passage->limit_ns))
         ;
-    if (sim.now_ns < end_ns)
-        sim.now_ns = end_ns;
+    if (sim.now_ns < passage->end_ns)
+        sim.now_ns = passage->end_ns;
     run_comm_cycle();
     return ERR_OK;
 }
 
-RTS_RESULT SimAdvance(RTS_I64 ns)
+static RTS_RESULT pass(RTS_I64 end_ns, RTS_I64 limit_ns)
 {
+    PASSAGE passage = {end_ns, limit_ns};
+
     if (sim.power_lost)
         return SIM_POWER_CUT;
-    return sim.on ? with_landing(advance, &ns) : (RTS_RESULT)ERR_NOTINITIALIZED;
+    return sim.on ? with_landing(advance, &passage) : (RTS_RESULT)ERR_NOTINITIALIZED;
+}
+
+RTS_RESULT SimAdvance(RTS_I64 ns)
+{
+    return pass(sim.now_ns + ns, sim.now_ns + ns + 1);
+}
+
+RTS_RESULT SimRunFor(RTS_I64 ns)
+{
+    return pass(sim.now_ns + ns, sim.now_ns + ns);
 }
 
 static RTS_UI32 cycles_of_first_task(void)

@@ -34,6 +34,9 @@ void SimStop(void);
  */
 RTS_RESULT SimAdvance(RTS_I64 ns);
 
+/* The same, but what is due at the very end does not run yet: ten times 10 ms are ten cycles of a 10 ms task. */
+RTS_RESULT SimRunFor(RTS_I64 ns);
+
 /* Lets time pass until the first task of the application has run `cycles` more cycles. ERR_INVALID_STATE when the application does not
  * run, ERR_EXCEPTION when it stopped on the way, ERR_TIMEOUT when the task did not run for an hour of virtual time. */
 RTS_RESULT SimRunCycles(RTS_UI32 cycles);

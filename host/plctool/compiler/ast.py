@@ -70,12 +70,13 @@ class Member:
 
 @dataclass(slots=True, eq=False)
 class BitAccess:
-    """`base.3`, `base.%X3`; `width` is X, B, W, D or L."""
+    """`base.3`, `base.%X3`; `width` is X, B, W, D or L; `index_pos` is where the number stands."""
 
     pos: int
     base: Expr
     width: str
     index: int
+    index_pos: int
 
 
 @dataclass(slots=True, eq=False)
@@ -306,7 +307,20 @@ class ConfigurationDecl:
     source: Source
 
 
-Declaration = TypeDecl | PouDecl | GlobalBlock | ConfigurationDecl
+@dataclass(slots=True, eq=False)
+class TestDecl:
+    """A TEST, or what its file has to do before and behind each TEST. `keyword`: TEST, SETUP or TEARDOWN. The calls in
+    the body may be those of unit_tests.py: ASSERT_EQ, MOCK ..."""
+
+    pos: int
+    keyword: str
+    name: str
+    blocks: list[VarBlock]
+    body: list[Stmt]
+    source: Source
+
+
+Declaration = TypeDecl | PouDecl | GlobalBlock | ConfigurationDecl | TestDecl
 
 # ---- statements ----------------------------------------------------------------------------------------------------
 

@@ -202,6 +202,29 @@ class Builder:
             qualifiers,
         )
 
+    # ---- unit tests ----
+
+    def test(self, keyword: Token, name: Token, blocks: Any, body: Any) -> ast.TestDecl:
+        text = self.string(name)
+        return ast.TestDecl(keyword.pos, "TEST", str(text.value), blocks, body, self.source)
+
+    def setup(self, keyword: Token, blocks: Any, body: Any) -> ast.TestDecl:
+        return ast.TestDecl(keyword.pos, keyword.type, keyword.text, blocks, body, self.source)
+
+    def mock(self, keyword: Token, instance: ast.Expr) -> ast.ExprStmt:
+        return self._statement_call(keyword, ast.Argument(instance.pos, None, instance))
+
+    def mock_function(self, keyword: Token, name: Token, returns: Token, value: ast.Expr) -> ast.ExprStmt:
+        if returns.text.upper() != "RETURNS":
+            self.report(returns.pos, "syntax", f"expected RETURNS before the value, found {returns.text}")
+        function = ast.Argument(name.pos, None, self.name_expr(name))
+        return self._statement_call(keyword, function, ast.Argument(value.pos, None, value))
+
+    def _statement_call(self, keyword: Token, *args: ast.Argument) -> ast.ExprStmt:
+        """A statement that begins with a keyword, as a call of that name."""
+        callee = ast.Name(keyword.pos, keyword.type)
+        return ast.ExprStmt(keyword.pos, ast.Call(keyword.pos, callee, list(args)))
+
     # ---- statements ----
 
     def stmts(self, *children: Any) -> list[Any]:
@@ -339,7 +362,7 @@ class Builder:
         digits = text.removeprefix(width)
         if not digits.isdigit() or len(digits) > 4:
             return self._bad(token, literals.LiteralError(f"{token.text} is not the number of a bit"))
-        return ast.BitAccess(token.pos, base, width, int(digits))
+        return ast.BitAccess(base.pos, base, width, int(digits), token.pos)
 
     def index(self, base: ast.Expr, *indices: ast.Expr) -> ast.Index:
         return ast.Index(base.pos, base, list(indices))

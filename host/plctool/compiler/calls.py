@@ -13,7 +13,7 @@ from plctool.compiler.conversions import common_type, elementary, error_value, s
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.expressions import is_untyped, place_of
 from plctool.compiler.generics import GENERIC
-from plctool.compiler.symbols import ERROR, FunctionInfo, GlobalSymbol, PouSymbol, Role, VarSymbol
+from plctool.compiler.symbols import ERROR, FunctionInfo, GlobalSymbol, Namespace, PouSymbol, Role, VarSymbol
 from plctool.compiler.typed import (
     AddressOf,
     BitPlace,
@@ -61,6 +61,7 @@ class Calls(Builtins):
             return self._call_of_place(node)
         name = callee.name
         symbol = self.scope.lookup(name)
+        shadow: VarSymbol | None = None  # a variable of this name, which cannot be called
         if isinstance(symbol, GlobalSymbol):
             symbol = self.world.declarations.global_variable(symbol)
         if isinstance(symbol, VarSymbol):
@@ -82,15 +83,15 @@ class Calls(Builtins):
         overload = self._overload(name, node, expected)
         if overload is not None:
             return overload
-        if symbol is not None:
-            return self.error(callee.pos, "call", self._not_callable(symbol, name))
+        if symbol is not None or shadow is not None:
+            return self.error(callee.pos, "call", self._not_callable(symbol or shadow, name))
         names = self.world.function_names()
         return self.error(callee.pos, "unknown", f"unknown function {name}{did_you_mean(name, names)}")
 
     def _not_callable(self, symbol: object, name: str) -> str:
         if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
             return f"{name} is a function block type; declare an instance of it and call that"
-        if isinstance(symbol, PouSymbol):
+        if isinstance(symbol, PouSymbol) or (isinstance(symbol, Namespace) and symbol.what == "program"):
             return f"the program {name} is run by a task and cannot be called"
         return f"{name} is not a function"
 

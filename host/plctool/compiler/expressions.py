@@ -211,6 +211,10 @@ class Expressions:
     def _name(self, node: ast.Name, expected: Type | None) -> Expr:
         symbol = self.scope.lookup(node.name)
         if isinstance(symbol, GlobalSymbol):
+            choices = self.world.same_named(node.name)
+            if choices:
+                listed = " or ".join(s.full_name for s in choices)
+                return self.error(node.pos, "ambiguous", f"{node.name} is in several lists; write {listed}")
             symbol = self.world.declarations.global_variable(symbol)
         if isinstance(symbol, VarSymbol):
             return self.variable(symbol, self.pos(node.pos))
@@ -321,11 +325,11 @@ class Expressions:
         if base.type is ERROR:
             return base
         if t is None or t.kind not in NUMBERS or is_untyped(base):
-            return self.error(node.pos, "type", f"{base.type} has no bits")
+            return self.error(node.index_pos, "type", f"{base.type} has no bits")
         if node.width != "X":
             return self._part(base, t, node)
         if node.index >= t.bits:
-            return self.error(node.pos, "range", f"{base.type} has the bits 0..{t.bits - 1}")
+            return self.error(node.index_pos, "range", f"{base.type} has the bits 0..{t.bits - 1}")
         if isinstance(base, Const) and isinstance(base.value, int):
             return Const(base.value >> node.index & 1, BOOL, self.pos(node.pos))
         return load(BitPlace(place_of(base), node.index, BOOL, self.pos(node.pos)))
@@ -334,7 +338,7 @@ class Expressions:
         """`base.%B1`: a byte, word ... of a larger number."""
         part = _PARTS[node.width]
         if part.bits >= t.bits or (node.index + 1) * part.bits > t.bits:
-            return self.error(node.pos, "range", f"{base.type} has no part %{node.width}{node.index}")
+            return self.error(node.index_pos, "range", f"{base.type} has no part %{node.width}{node.index}")
         if isinstance(base, Const) and isinstance(base.value, int):
             return convert(Const(base.value >> node.index * part.bits, t, base.pos), part)
         return load(MemberPlace(place_of(base), node.index * part.size, part, self.pos(node.pos)))

@@ -42,18 +42,19 @@ KEYWORDS = {
         "TYPE", "STRUCT", "UNION", "ARRAY", "POINTER", "REFERENCE", "REF_TO", "FUNCTION", "FUNCTION_BLOCK", "PROGRAM",
         "CONFIGURATION", "RESOURCE", "TASK", "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN",
         "TRUE",
-        "FALSE", "NULL", "NOT",
+        "FALSE", "NULL", "NOT", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
     )},
     **{k: "_" + k for k in (
         "END_TYPE", "END_STRUCT", "END_UNION", "OVERLAP", "OF", "TO", "END_VAR", "AT", "END_FUNCTION",
         "END_FUNCTION_BLOCK",
         "END_PROGRAM", "END_CONFIGURATION", "ON", "END_RESOURCE", "WITH", "THEN", "ELSIF", "ELSE", "END_IF", "END_CASE",
-        "BY", "DO", "END_FOR", "END_WHILE", "UNTIL", "END_REPEAT",
+        "BY", "DO", "END_FOR", "END_WHILE", "UNTIL", "END_REPEAT", "END_TEST", "END_SETUP", "END_TEARDOWN",
     )},
 }  # fmt: skip
 
 SOFT = frozenset((
     "QUALIFIER", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP", "UNION",
+    "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
 ))  # fmt: skip
 """Terminals that are names where the grammar has no use for them."""
 
@@ -61,6 +62,7 @@ _OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a p
 
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
+_NAME = re.compile(r"\s+[A-Za-z_]")
 _COMMENT_MARK = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
 Report = Callable[[int, str, str], None]  # offset, code, message
@@ -158,6 +160,11 @@ class Lexer:
     def _end_of_line(self, pos: int) -> int:
         end = self.text.find("\n", pos, self._end)
         return self._end if end < 0 else end
+
+
+def is_mock(token: Token, text: str) -> bool:
+    """Whether MOCK or MOCK_FUNCTION starts a statement such as `MOCK pump.valve;`: no other name is followed by a name."""
+    return _NAME.match(text, token.end) is not None
 
 
 def is_operator_function(token: Token, text: str) -> bool:

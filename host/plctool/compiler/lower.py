@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from plctool.compiler.analysis import Effects
 from plctool.compiler.ir import Function
 from plctool.compiler.lower_frame import Ref, string_capacity
-from plctool.compiler.lower_helpers import MEMORY_FUNCTIONS, finish, library_function, memory_functions, string_helper
+from plctool.compiler.lower_helpers import MEMORY_FUNCTIONS, memory_functions, string_helper
 from plctool.compiler.lower_init import Initialising
 from plctool.compiler.lower_stmt import Body, parameter_list
 from plctool.compiler.lower_unit import Options, Unit, value_type
@@ -66,11 +66,6 @@ def _pou(unit: Unit, pou: Pou, effects: Effects) -> None:
         attributes = unit.noinline
     elif not pou.checks:
         attributes = unit.hinted
-    template = library_function(pou.name, unit.target) if pou.no_init else None
-    if template is not None:
-        text = template.replace("NAME", unit.symbol(pou)).replace("PARAMETERS", parameter_list(pou))
-        unit.module.add(finish(text, unit.target, attributes))
-        return
     fn = Function()
     body = Body(unit, fn, pou, effects)
     scope = body.open_scope(pou.name, pou.pos)

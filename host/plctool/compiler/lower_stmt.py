@@ -25,6 +25,7 @@ from plctool.compiler.typed import (
     FbCall,
     For,
     If,
+    Load,
     Place,
     Pou,
     PouKind,
@@ -104,13 +105,13 @@ class Body(Initialising):
     def _may_write_directly(self, target: Place, call: Call) -> bool:
         """Whether the callee may build its result in the target: it fits, and nobody sees it half done."""
         pou = call.function
-        fits = target.type == call.type or (pou.cuts_result and isinstance(target.type, StringType))
-        if pou.external or not fits or not self.effects.is_local(pou):
+        if pou.external or not _fits(call, target) or not self.effects.is_local(pou):
             return False
         root = root_of(target)
+        arguments = call.args[1:] if pou.in_place and _is_whole(call.args[0], root) and _is_whole(target, root) else call.args
         return root is not None and all(
             node.var is not root and node.var.storage is not Storage.REFERENCE
-            for node in walk(call.args)
+            for node in walk(arguments)
             if isinstance(node, VarPlace)
         )
 
@@ -310,13 +311,27 @@ class Body(Initialising):
                 self.copy(ref, Ref(name, 0, var.type), var.type.size)
 
 
+def _fits(call: Call, target: Place) -> bool:
+    """Whether the callee stays within the memory of the target."""
+    result, t = call.type, target.type
+    if isinstance(result, StringType) and isinstance(t, StringType):
+        return call.function.cuts_result or result.length <= t.length
+    return result == t
+
+
+def _is_whole(argument: Expr | Place | None, variable: Variable | None) -> bool:
+    """Whether an argument is just that variable."""
+    place = argument.place if isinstance(argument, Load) else argument
+    return isinstance(place, VarPlace) and place.var is variable
+
+
 def parameter_list(pou: Pou) -> str:
     """The parameters of the define line."""
     words = ["ptr noalias nonnull readonly %ctx"]
     if pou.kind is PouKind.FUNCTION_BLOCK:
         words.append("ptr nonnull %self")
     if result_in_memory(pou):
-        words.append("ptr noalias nonnull %result")
+        words.append(f"ptr {'' if pou.in_place else 'noalias '}nonnull %result")
         words += ["i32 %result.capacity"] if pou.cuts_result else []
     if pou.kind is PouKind.FUNCTION:
         for number, parameter in enumerate(pou.parameters):

@@ -13,7 +13,9 @@ from plctool.compiler.lower_frame import Ref
 from plctool.compiler.typed import BinaryOp
 from plctool.compiler.types import DINT, StringType
 
-_INLINE_COPY = 128  # bytes; LLVM copies this much with a few wide moves on targets with unaligned access
+_INLINE_COPY = 128  # bytes that LLVM copies with a few vector moves
+_SHORT_COPY = 16  # bytes that it copies without vectors, but with unaligned words
+_TINY_COPY = 4
 _INLINE_COMPARE = 16
 
 
@@ -24,13 +26,16 @@ class Strings(Arithmetic):
         """target := source, cut to the target's capacity."""
         if target.capacity.isdigit() and source.capacity.isdigit():
             length = min(int(target.capacity), int(source.capacity))
-            if length < (_INLINE_COPY if self.unit.target.unaligned else 8):
+            target_machine = self.unit.target
+            inline = _INLINE_COPY if target_machine.vectors else _SHORT_COPY if target_machine.unaligned else _TINY_COPY
+            if length <= inline:
                 self.copy(target, source, length)
                 self._terminate(target, length)
                 return
-        self.fn.do(
-            f"call void {self.unit.helper('str.copy')}(ptr {self.address(target)}, i32 {target.capacity}, "
-            f"ptr {self.address(source)}, i32 {source.capacity})"
+        name, capacity = self.unit.helper("str.copy"), source.capacity
+        self.fn.value(
+            f"call i32 @{name}(ptr null, ptr {self.address(target)}, i32 {target.capacity}, i32 0, "
+            f"ptr {self.address(source)}, i32 {capacity}, i32 0, i32 {capacity})"
         )
 
     def copy_literal(self, target: Ref, text: bytes) -> None:
@@ -55,7 +60,7 @@ class Strings(Arithmetic):
     def compare_strings(self, op: BinaryOp, left: Ref, right: Ref) -> str:
         """The i1 of a comparison, byte by byte, unsigned."""
         order = self.fn.value(
-            f"call i32 {self.unit.helper('str.compare')}(ptr {self.address(left)}, i32 {left.capacity}, "
+            f"call i32 @{self.unit.helper('str.compare')}(ptr {self.address(left)}, i32 {left.capacity}, "
             f"ptr {self.address(right)}, i32 {right.capacity})"
         )
         return self.compare(op, order, "0", DINT)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from plctool.compiler.ir import Module, escape
+from plctool.compiler.lower_helpers import LIBRARY_FUNCTIONS
 from plctool.compiler.targets import Target
 from plctool.compiler.typed import Area, External, Pos, Pou, StructInit
 from plctool.compiler.types import BOOL, Elementary, Kind, PointerType, StructType, Type, base_of
@@ -114,6 +115,8 @@ class Unit:
 
     def symbol(self, pou: Pou) -> str:
         """The symbol of a POU; puts it in the queue."""
+        if pou.no_init and pou.name in LIBRARY_FUNCTIONS:
+            return self.helper(LIBRARY_FUNCTIONS[pou.name])
         name = self.pous.get(pou)
         if name is None:
             name = self.unique(f"st.{pou.name}")
@@ -149,9 +152,9 @@ class Unit:
         return slot
 
     def helper(self, name: str) -> str:
-        """Reference to a function of `lower_string`, which is then put in the module."""
+        """The symbol of a function of `lower_helpers`, which is then put in the module."""
         self.helpers.add(name)
-        return f"@{name}"
+        return name
 
     # ---- context layout ----
 

@@ -11,12 +11,14 @@ from typing import Any
 
 from plctool.compiler import ast
 from plctool.compiler.builder import Builder
-from plctool.compiler.lexer import SOFT, Lexer, Report, Token, is_operator_function
+from plctool.compiler.lexer import SOFT, Lexer, Report, Token, is_mock, is_operator_function
 from plctool.compiler.source import Source
 from plctool.compiler.syntax_errors import Recovery
 from plctool.compiler.tables import END, Rule, Tables, load_tables
 
 Reducer = Callable[[list[Any]], Any]
+
+_MOCKS = ("MOCK", "MOCK_FUNCTION")
 
 
 class Parser:
@@ -126,6 +128,8 @@ def parse(source: Source, report: Report, start: int = 0, end: int | None = None
         if kind not in actions[states[-1]] and (
             kind in SOFT or (kind == "OP" and is_operator_function(token, source.text))
         ):
+            token.type = "IDENT"
+        elif kind in _MOCKS and not is_mock(token, source.text):
             token.type = "IDENT"
         if recovery.skipping and not recovery.resume(token):
             continue

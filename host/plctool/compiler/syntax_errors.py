@@ -23,10 +23,10 @@ _CLOSERS = {
     "VAR": "END_VAR",
     "GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE", "FUNCTION": "END_FUNCTION",
     "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM", "RESOURCE": "END_RESOURCE",
-    "CONFIGURATION": "END_CONFIGURATION",
+    "CONFIGURATION": "END_CONFIGURATION", "TEST": "END_TEST", "SETUP": "END_SETUP", "TEARDOWN": "END_TEARDOWN",
 }  # fmt: skip
 _ENDS = {"_" + end for end in _CLOSERS.values()}
-_UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "GLOBAL", "CONFIGURATION"}
+_UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "GLOBAL", "CONFIGURATION", "TEST", "SETUP", "TEARDOWN"}
 _STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
 _SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL", END}
 _ITEMS = ("stmt", "var_decl", "type_decl", "config_item", "unit")  # what can be left out as a whole
@@ -43,6 +43,7 @@ _INSERTIONS = {
     "_ASSIGN": (":=", "expected :="),
     "_COMMA": (",", "expected ,"),
 }
+_VALUES = {"IDENT", "NUMBER", "TYPED", "STRING", "TRUE", "FALSE"}
 _WORDS = {
     "_SEMI": ";", "_COLON": ":", "_COMMA": ",", "_ASSIGN": ":=", "_LPAR": "(", "_RPAR": ")", "_LSQB": "[", "_RSQB": "]",
     "_DOTDOT": "..", "_THEN": "THEN", "_DO": "DO", "_OF": "OF", "_TO": "TO", "_UNTIL": "UNTIL", "_ON": "ON",
@@ -72,6 +73,7 @@ class Recovery:
         self._last: tuple[Token, ...] = ()
         self._accepted = _APART  # tokens since the last error
         self._quiet = False
+        self._dropped: list[str] = []  # openings that were thrown away, whose ends are still to come
 
     def handle(self, token: Token) -> None:
         """Reports that `token` does not fit, and repairs what can be repaired."""
@@ -120,6 +122,8 @@ class Recovery:
         if self._keyword_as_name(token):
             return True
         for kind, (text, message) in _INSERTIONS.items():
+            if kind == "_ASSIGN" and token.type not in _VALUES:
+                continue
             if self._shift(stack, kind, token.type) is not None:
                 self._say(self._gap(token), message.format(item=self._item_words(stack)))
                 self._parser.feed(Token(kind, text, self._gap(token)))
@@ -204,6 +208,9 @@ class Recovery:
             return False
         opener = self._open()
         name = token.text.upper().removeprefix("END_")
+        if name in self._dropped:
+            self._dropped.remove(name)
+            return True
         if opener is None or (opener.type in _BLOCKS) is not (name in _BLOCKS):
             self._say(token.pos, f"{token.text} without {_a(name)}")
             return True
@@ -234,6 +241,7 @@ class Recovery:
                 continue
             after = [*states[:depth], self._tables.gotos[states[depth - 1]][item]]
             if before is None or self._shift(after, before) is not None:
+                self._dropped += [v.type for v in values[depth - 1 :] if isinstance(v, Token) and v.type in _CLOSERS]
                 states[:] = after
                 values[depth - 1 :] = [None]
                 self.skipping = False

@@ -420,6 +420,7 @@ class Pou:
     external: External | None = None  # implemented in C
     checks: bool = True  # False in the standard library where it is proven
     cuts_result: bool = False  # the body keeps within STRING_SIZE of its string result, whatever that is
+    in_place: bool = False  # the result may be the very variable that is the first argument
     no_init: bool = False  # locals need no zeroing: the body writes each before it reads it (standard library)
 
 

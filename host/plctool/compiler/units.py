@@ -75,6 +75,7 @@ class Units:
         pou = Pou(name, _KINDS[decl.keyword], decl.source.pos(decl.pos), checks=checks)
         pou.no_init = "no_init" in decl.attributes
         pou.cuts_result = "cuts_result" in decl.attributes
+        pou.in_place = "in_place" in decl.attributes
         return pou
 
     def _constants(self, decl: ast.PouDecl, scope: Scope) -> None:

@@ -35,6 +35,11 @@ from plctool.compiler.units import Units
 _RESERVED = {*ELEMENTARY, "STRING", "WSTRING", *GENERIC}
 
 
+def _enum_names(symbol: TypeSymbol) -> list[str]:
+    spec = symbol.decl.spec
+    return [name for _, name, _ in spec.values] if isinstance(spec, ast.EnumSpec) else []
+
+
 class World:
     """The names of the program in front of those of the library; each is declared when it is first needed."""
 
@@ -77,9 +82,8 @@ class World:
             elif isinstance(decl, ast.TypeDecl):
                 symbol = TypeSymbol(decl, library)
                 self._add(symbol, decl.name, decl.pos, decl.source, library=library)
-                if isinstance(decl.spec, ast.EnumSpec):
-                    for _, name, _ in decl.spec.values:
-                        self._enum_values.setdefault(name.casefold(), []).append(symbol)
+                for name in _enum_names(symbol):
+                    self._enum_values.setdefault(name.casefold(), []).append(symbol)
             elif isinstance(decl, ast.ConfigurationDecl):
                 self.configurations.append(decl)
                 for block in decl.globals:
@@ -158,6 +162,10 @@ class World:
             self.register(self.library.parse(key, self.diagnostics), library=True)
         return self._library_names[key]
 
+    def same_named(self, name: str) -> list[GlobalSymbol]:
+        """The globals of that name when there are several."""
+        return self._ambiguous.get(name.casefold(), [])
+
     def is_user_name(self, name: str) -> bool:
         """Whether the program itself declares a global name."""
         return name.casefold() in self._names
@@ -186,7 +194,8 @@ class World:
 
     def visible_names(self) -> list[str]:
         """Names of globals, functions and enumeration values, for suggestions."""
-        return [*(self._written(k, s) for k, s in self._names.items()), *self._enum_values, *self.library.names()]
+        values = [name for s in self._names.values() if isinstance(s, TypeSymbol) for name in _enum_names(s)]
+        return [*(self._written(k, s) for k, s in self._names.items()), *values, *self.library.names()]
 
     def type_names(self) -> list[str]:
         """Names of types and function blocks, for suggestions."""

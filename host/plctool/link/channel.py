@@ -81,7 +81,7 @@ class _Block:
 
 
 class RoundTrip:
-    """Smoothed time from the end of a request to its reply, and its variation, as TCP does it (RFC 6298)."""
+    """Smoothed time from a block to its acknowledgement, and its variation, as TCP does it (RFC 6298)."""
 
     def __init__(self, floor: float) -> None:
         self.shortest = 0.0
@@ -175,6 +175,13 @@ class Channel:
         self._incoming = bytearray()
         self._expected: tuple[int, int] | None = None  # length and CRC of the message that is coming in
         self._asked_at = -math.inf  # when a missing block was last asked for
+
+    @property
+    def best_size(self) -> int:
+        """Longest message that fills its blocks: a short last block costs as much as a full one."""
+        first = self._line.max_package - _DATA.size - _FIRST.size
+        more = max(0, self.buffer_size - first) // (self._line.max_package - _DATA.size)
+        return min(self.buffer_size, first + more * (self._line.max_package - _DATA.size))
 
     # ---- commands ----
 

@@ -41,6 +41,11 @@ class Connection:
         """Longest message the device takes, in bytes; 0 while no channel is open."""
         return self._channel.buffer_size if self._channel else 0
 
+    @property
+    def best_size(self) -> int:
+        """Length of message that carries most for its cost, in bytes; 0 while no channel is open."""
+        return self._channel.best_size if self._channel else 0
+
     def open(self) -> None:
         """Opens a new channel, after a name request on the first time. Raises LinkError when nobody answers."""
         if self._peer is None:
@@ -53,7 +58,11 @@ class Connection:
         words = (len(self._peer) + len(self.transport.local_address)) // 2
         channel = Channel(line, words, secrets.randbits(32))
         channel.open(self.transport.now())
-        self._run(channel, lambda: channel.state is State.OPEN, _OPEN_PATIENCE)
+        try:
+            self._run(channel, lambda: channel.state is State.OPEN, _OPEN_PATIENCE)
+        except ChannelLost:
+            self._peer = None  # there may be another device by now
+            raise
         self._channel = channel
 
     def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:

@@ -213,8 +213,8 @@ def read_tasks(session: Session) -> list[TaskInfo]:
 
 # ---- download --------------------------------------------------------------------------------------------------------
 
-_BLOCK_OVERHEAD = 64  # layer 7 header and tags around the data of a block, bytes
-_BLOCK_ALIGN = 64  # flash is written best in whole program units
+_BLOCK_OVERHEAD = 44  # layer 7 header and tags around the data of a block, bytes
+_BLOCK_ALIGN = 16  # flash is written best in whole program units
 
 
 def download(
@@ -270,7 +270,7 @@ class _Transfer:
             raise DeviceError(f"The device took {self.arrived} of {len(self._image)} bytes; try again.", "incomplete")
 
     def _messages(self, start_at: int) -> Iterator[bytes]:
-        block = (self._session.connection.buffer_size - _BLOCK_OVERHEAD) // _BLOCK_ALIGN * _BLOCK_ALIGN
+        block = (self._session.connection.best_size - _BLOCK_OVERHEAD) // _BLOCK_ALIGN * _BLOCK_ALIGN
         for offset in range(start_at, len(self._image), block):
             position = self._position(lib.DLF_CONTINUEDOWNLOAD if offset else 0, offset)
             data = bintag.raw(lib.TAG_CDL_DATA, self._image[offset : offset + block])

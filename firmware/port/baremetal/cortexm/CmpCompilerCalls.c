@@ -14,6 +14,28 @@
 
 enum { CALLS_VERSION = 0x00010000 };
 
+#ifdef __ARM_ARCH_6M__
+/* There libgcc has the names of the run-time ABI only. */
+#define __addsf3 __aeabi_fadd
+#define __subsf3 __aeabi_fsub
+#define __mulsf3 __aeabi_fmul
+#define __divsf3 __aeabi_fdiv
+#define __unordsf2 __aeabi_fcmpun
+#define __fixsfsi __aeabi_f2iz
+#define __floatsisf __aeabi_i2f
+#define __floatunsisf __aeabi_ui2f
+#define __adddf3 __aeabi_dadd
+#define __subdf3 __aeabi_dsub
+#define __muldf3 __aeabi_dmul
+#define __divdf3 __aeabi_ddiv
+#define __unorddf2 __aeabi_dcmpun
+#define __fixdfsi __aeabi_d2iz
+#define __floatsidf __aeabi_i2d
+#define __floatunsidf __aeabi_ui2d
+#define __extendsfdf2 __aeabi_f2d
+#define __truncdfsf2 __aeabi_d2f
+#endif
+
 /* Of libgcc. Only their addresses are used, so the prototypes are none. */
 void __addsf3(void);
 void __subsf3(void);
@@ -78,7 +100,59 @@ static RTS_UI64 ulint_modulo(RTS_UI64 a, RTS_UI64 b)
     return a % b;
 }
 
+#ifdef __ARM_ARCH_6M__
+static RTS_I32 dint_divide(RTS_I32 a, RTS_I32 b)
+{
+    return a / b;
+}
+
+static RTS_I32 dint_modulo(RTS_I32 a, RTS_I32 b)
+{
+    return a % b;
+}
+
+static RTS_UI32 udint_divide(RTS_UI32 a, RTS_UI32 b)
+{
+    return a / b;
+}
+
+static RTS_UI32 udint_modulo(RTS_UI32 a, RTS_UI32 b)
+{
+    return a % b;
+}
+
+static RTS_UI64 lint_multiply(RTS_UI64 a, RTS_UI64 b)
+{
+    return a * b;
+}
+
+static RTS_UI64 lint_shift_left(RTS_UI64 a, RTS_UI32 count)
+{
+    return a << count;
+}
+
+static RTS_UI64 ulint_shift_right(RTS_UI64 a, RTS_UI32 count)
+{
+    return a >> count;
+}
+
+static RTS_I64 lint_shift_right(RTS_I64 a, RTS_UI32 count)
+{
+    return a >> count;
+}
+#endif
+
 static const CMP_EXT_FUNCTION int_calls[] = {
+#ifdef __ARM_ARCH_6M__
+    {"__divsi3", 0xDAB9671E, CALLS_VERSION, (RTS_PFN)dint_divide},
+    {"__udivsi3", 0x42186644, CALLS_VERSION, (RTS_PFN)udint_divide},
+    {"__modsi3", 0xA8E7FDB1, CALLS_VERSION, (RTS_PFN)dint_modulo},
+    {"__umodsi3", 0x97416208, CALLS_VERSION, (RTS_PFN)udint_modulo},
+    {"__muldi3", 0xFF782539, CALLS_VERSION, (RTS_PFN)lint_multiply},
+    {"__ashldi3", 0xC854631C, CALLS_VERSION, (RTS_PFN)lint_shift_left},
+    {"__ashrdi3", 0x316A835E, CALLS_VERSION, (RTS_PFN)lint_shift_right},
+    {"__lshrdi3", 0xAAFC8B3F, CALLS_VERSION, (RTS_PFN)ulint_shift_right},
+#endif
     {"__divdi3", 0x9A2F73C3, CALLS_VERSION, (RTS_PFN)lint_divide},
     {"__udivdi3", 0x17519471, CALLS_VERSION, (RTS_PFN)ulint_divide},
     {"__moddi3", 0xE871E96C, CALLS_VERSION, (RTS_PFN)lint_modulo},

@@ -1,0 +1,104 @@
+"""Runners: the runtime on a virtual clock for other processors, compiled here and run in QEMU."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent / "runner"
+FIRMWARE = ROOT / "firmware"
+TIMEOUT = 120.0  # of one batch [s]; it takes a few on a quiet machine
+
+_WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1"]
+_PORTABLE = [*(FIRMWARE / "src").glob("app/*.c"), *(FIRMWARE / "src").glob("core/*.c"), *(FIRMWARE / "src").glob("sys/*.c")]
+_BARE_SOURCES = [
+    *_PORTABLE,
+    FIRMWARE / "port/sim/Sim.c",
+    FIRMWARE / "port/baremetal/cortexm/CmpCompilerCalls.c",
+    HERE / "runner.c",
+    *(HERE / "bare").glob("*.c"),
+]
+_LINUX_SOURCES = [
+    *_PORTABLE,
+    *(FIRMWARE / "src").glob("comm/*.c"),
+    *(FIRMWARE / "port/sim").glob("*.c"),
+    FIRMWARE / "port/linux/SysExcept.c",
+    HERE / "runner.c",
+]
+# Picolibc keeps the clock to itself unless told that there is one.
+_BARE_FLAGS = [
+    "--specs=picolibc.specs", "--oslib=semihost", "--crt0=hosted", "-Wl,--gc-sections",
+    "-D_POSIX_TIMERS", "-D_POSIX_MONOTONIC_CLOCK", f"-I{HERE / 'bare'}", f"-I{FIRMWARE / 'port/baremetal/cortexm'}",
+    "-Wl,--defsym=__stack_size=64K",
+]  # fmt: skip
+
+
+def _memory(flash: int, ram: int) -> list[str]:
+    """Linker symbols: 4 MiB for the program and 4 MiB of RAM."""
+    return [f"-Wl,--defsym=__flash={flash},--defsym=__flash_size=4M,--defsym=__ram={ram},--defsym=__ram_size=4M"]
+
+
+@dataclass(frozen=True)
+class Runner:
+    """How to compile the runner for a target and how to run it."""
+
+    target: str
+    compiler: str
+    flags: tuple[str, ...]
+    command: tuple[str, ...]  # the program's path follows
+    bare: bool = True
+
+    def missing(self) -> str | None:
+        """The tool that is not installed; None when all are."""
+        return next((tool for tool in (self.compiler, self.command[0]) if shutil.which(tool) is None), None)
+
+    def compile(self, folder: Path) -> Path:
+        """The program of the runner, in `folder`."""
+        program = folder / f"runner-{self.target}"
+        include = [f"-I{FIRMWARE / name}" for name in ("include", "port/sim", "src/app")]
+        flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *_WARNINGS, *include]
+        sources = _BARE_SOURCES if self.bare else _LINUX_SOURCES
+        subprocess.run([self.compiler, *flags, "-o", program, *sources, "-lm"], check=True)
+        return program
+
+    def run(self, batch: bytes, folder: Path) -> bytes:
+        """The results of a batch, see runner.c."""
+        folder.mkdir(exist_ok=True)
+        (folder / "batch").write_bytes(batch)
+        done = subprocess.run(
+            [*self.command, self.compile(folder)], cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
+        )
+        if done.returncode:
+            raise RuntimeError(f"the runner for {self.target} failed: {done.stdout}{done.stderr}")
+        return (folder / "results").read_bytes()
+
+
+def _cortex_m(target: str, flags: tuple[str, ...], machine: str) -> Runner:
+    qemu = (
+        "qemu-system-arm", "-M", machine, "-display", "none", "-monitor", "none", "-serial", "null",
+        "-semihosting-config", "enable=on,target=native", "-kernel",
+    )  # fmt: skip
+    return Runner(target, "arm-none-eabi-gcc", ("-mthumb", *flags, *_memory(0, 0x20000000)), qemu)
+
+
+RUNNERS = {
+    runner.target: runner
+    for runner in (
+        # There is no board with a Cortex-M0 and enough memory in QEMU; a Cortex-M3 runs its code.
+        _cortex_m("cortex-m0", ("-mcpu=cortex-m0",), "mps2-an385"),
+        _cortex_m("cortex-m3", ("-mcpu=cortex-m3",), "mps2-an385"),
+        _cortex_m("cortex-m4f", ("-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"), "mps2-an386"),
+        _cortex_m("cortex-m7", ("-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"), "mps2-an500"),
+        Runner(
+            "rv32imac",
+            "riscv64-unknown-elf-gcc",
+            ("-march=rv32imac", "-mabi=ilp32", *_memory(0x80000000, 0x80400000)),
+            ("qemu-system-riscv32", "-M", "virt", "-bios", "none", "-display", "none", "-monitor", "none",
+             "-serial", "null", "-semihosting-config", "enable=on,target=native", "-kernel"),
+        ),
+        Runner("aarch64-linux", "aarch64-linux-gnu-gcc", ("-static", "-pthread"), ("qemu-aarch64",), bare=False),
+    )
+}  # fmt: skip
