@@ -1,6 +1,6 @@
 #!/bin/sh
 # bootstrap.sh VENV     makes a virtual environment, with what it needs from Debian: a C compiler, Python's headers and venv
-# bootstrap.sh --cross  installs the Cortex-M cross compiler and QEMU, for the bare-metal tests
+# bootstrap.sh --cross  installs cross compilers and QEMU, for the tests on Cortex-M, RISC-V and AArch64
 #
 # Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the second that
 # some tests will be left out.
@@ -15,9 +15,14 @@ install() {
 }
 
 if [ "$1" = --cross ]; then
-    command -v arm-none-eabi-gcc >/dev/null && command -v qemu-system-arm >/dev/null && exit 0
-    set -- gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm
-    install "$@" || echo "The Cortex-M tests are left out; for them: sudo apt-get install $*" >&2
+    set --
+    command -v arm-none-eabi-gcc >/dev/null || set -- "$@" gcc-arm-none-eabi picolibc-arm-none-eabi
+    command -v qemu-system-arm >/dev/null || set -- "$@" qemu-system-arm
+    command -v riscv64-unknown-elf-gcc >/dev/null || set -- "$@" gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf
+    command -v qemu-system-riscv32 >/dev/null || set -- "$@" qemu-system-misc
+    command -v aarch64-linux-gnu-gcc >/dev/null || set -- "$@" gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+    command -v qemu-aarch64 >/dev/null || set -- "$@" qemu-user
+    [ $# = 0 ] || install "$@" || echo "Tests on other processors are left out; for them: sudo apt-get install $*" >&2
     exit 0
 fi
 

@@ -170,8 +170,14 @@ def test_result_that_is_not_used_is_fine_for_a_call_with_effects() -> None:
         ("b := Split(x := 1, low := i, count := k);", "20: low is given with =>"),
         ("b := Split(x := 1);", "6: the argument count of Split is missing"),
         ("b := Split(x := 1, count := 5);", "29: the VAR_IN_OUT count needs a variable"),
-        ("b := Split(x := 1, count := d);", "29: the VAR_IN_OUT count is INT and needs a variable of this type, not DINT"),
-        ("b := Split(x := 1, count := by.1);", "29: a single bit has no address, so it cannot be given to the VAR_IN_OUT count"),
+        (
+            "b := Split(x := 1, count := d);",
+            "29: the VAR_IN_OUT count is INT and needs a variable of this type, not DINT",
+        ),
+        (
+            "b := Split(x := 1, count := by.1);",
+            "29: a single bit has no address, so it cannot be given to the VAR_IN_OUT count",
+        ),
         ("i := Add3(1.5, 1);", "11: 1.5 does not fit INT; write REAL_TO_INT(1.5)"),
         ("i := Add3(r, 1);", "11: REAL does not fit INT by itself; write REAL_TO_INT(...)"),
         ("i := Add4(1);", "6: unknown function Add4; did you mean Add3?"),
@@ -196,7 +202,9 @@ def test_variable_may_have_the_name_of_a_function() -> None:
 
 
 def test_own_function_hides_the_built_in_one() -> None:
-    body = body_of("v : INT;", "v := MAX(1, 2);", "FUNCTION MAX : INT VAR_INPUT a, b : INT; END_VAR MAX := a; END_FUNCTION\n")
+    body = body_of(
+        "v : INT;", "v := MAX(1, 2);", "FUNCTION MAX : INT VAR_INPUT a, b : INT; END_VAR MAX := a; END_FUNCTION\n"
+    )
     assert isinstance(body[0], Assign)
     assert isinstance(body[0].value, Call)
 
@@ -242,7 +250,9 @@ def test_generic_function_is_made_for_the_types_of_its_arguments(statement: str,
 
 
 def test_generic_function_is_made_once_per_type() -> None:
-    p = program(main(VARIABLES, "i := CLAMP(0, i, 1); j := CLAMP(1, j, 2); d := CLAMP(0, d, 1);", FUNCTIONS), library=LIBRARY)
+    p = program(
+        main(VARIABLES, "i := CLAMP(0, i, 1); j := CLAMP(1, j, 2); d := CLAMP(0, d, 1);", FUNCTIONS), library=LIBRARY
+    )
     assert sorted(pou.name for pou in p.pous if "CLAMP" in pou.name) == ["CLAMP(DINT)", "CLAMP(INT)"]
 
 
@@ -262,9 +272,15 @@ def test_generic_function_refuses_other_types(statement: str, words: str) -> Non
 
 @pytest.mark.parametrize(
     ("statement", "name"),
-    [("r := WAVE(r);", "WAVE__REAL"), ("lr := WAVE(lr);", "WAVE__LREAL"), ("lr := WAVE(d);", "WAVE__LREAL"),
-     ("r := WAVE(i);", "WAVE__REAL"), ("r := WAVE(1.5);", "WAVE__REAL"), ("lr := WAVE(X := 1.5);", "WAVE__LREAL")],
-)  # fmt: skip
+    [
+        ("r := WAVE(r);", "WAVE__REAL"),
+        ("lr := WAVE(lr);", "WAVE__LREAL"),
+        ("lr := WAVE(d);", "WAVE__LREAL"),
+        ("r := WAVE(i);", "WAVE__REAL"),
+        ("r := WAVE(1.5);", "WAVE__REAL"),
+        ("lr := WAVE(X := 1.5);", "WAVE__LREAL"),
+    ],
+)
 def test_overload_is_chosen_by_the_argument(statement: str, name: str) -> None:
     assert call(statement).function.name == name
 
@@ -389,7 +405,9 @@ def test_type_of_a_library_block_may_be_hidden_by_an_own_one() -> None:
 # ---- EN and ENO ----
 
 
-@pytest.mark.parametrize("text", ["i := Add3(EN := b, a := 1, b := 2, ENO => b2);", "c(EN := b, TOTAL := d, ENO => b2);"])
+@pytest.mark.parametrize(
+    "text", ["i := Add3(EN := b, a := 1, b := 2, ENO => b2);", "c(EN := b, TOTAL := d, ENO => b2);"]
+)
 def test_call_with_en_is_done_only_when_it_is_true(text: str) -> None:
     (guard,) = statements(text)
     assert isinstance(guard, If)

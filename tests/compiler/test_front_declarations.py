@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 from front_support import check, findings, main, messages, program, variable
 
-from plctool.compiler.typed import ArrayInit, Area, Const, ScalarInit, Storage, StructInit, TypedProgram
+from plctool.compiler.typed import Area, ArrayInit, Const, ScalarInit, Storage, StructInit, TypedProgram
 from plctool.compiler.types import ArrayType, EnumType, StringType, StructType, SubrangeType
 
 COLOR = "TYPE Color : (Red, Green := 5, Blue); END_TYPE\n"
+FUNCTION = "FUNCTION F : INT VAR_INPUT a : INT; END_VAR VAR b : INT := {}; END_VAR F := a + b; END_FUNCTION\n"
 POINT = "TYPE Point : STRUCT x : INT := 1; y : INT; name : STRING[10]; END_STRUCT END_TYPE\n"
 
 
@@ -78,8 +79,11 @@ def test_string_without_length_holds_80_characters() -> None:
 
 
 def test_declarations_may_come_in_any_order() -> None:
-    program(main("v : Outer;") + "TYPE Outer : ARRAY[0..N] OF Inner; END_TYPE\nVAR_GLOBAL CONSTANT N : INT := M; M : INT := 2;"
-            " END_VAR\nTYPE Inner : STRUCT a : INT; END_STRUCT END_TYPE")  # fmt: skip
+    program(
+        main("v : Outer;")
+        + "TYPE Outer : ARRAY[0..N] OF Inner; END_TYPE\nVAR_GLOBAL CONSTANT N : INT := M; M : INT := 2;"
+        " END_VAR\nTYPE Inner : STRUCT a : INT; END_STRUCT END_TYPE"
+    )
 
 
 @pytest.mark.parametrize(
@@ -141,12 +145,15 @@ def test_wrong_type_is_explained(text: str, place: str, words: str) -> None:
         ),
         (
             "ARRAY[0..1] OF ARRAY[0..1] OF INT := [[1, 2], [3]]",
-            ArrayInit([
-                (1, ArrayInit([(1, ScalarInit(1)), (1, ScalarInit(2))])), (1, ArrayInit([(1, ScalarInit(3))])),
-            ]),
+            ArrayInit(
+                [
+                    (1, ArrayInit([(1, ScalarInit(1)), (1, ScalarInit(2))])),
+                    (1, ArrayInit([(1, ScalarInit(3))])),
+                ]
+            ),
         ),
     ],
-)  # fmt: skip
+)
 def test_initial_value_is_calculated(declared: str, value: object) -> None:
     assert initial(declared) == value
 
@@ -274,20 +281,31 @@ def test_address_in_a_function_block_is_an_error() -> None:
 
 
 def test_variables_of_a_function_live_on_the_stack() -> None:
-    text = main("v : INT;", "v := F(1);", "FUNCTION F : INT VAR_INPUT a : INT; END_VAR VAR b : INT := 3; END_VAR F := a + b; END_FUNCTION\n")
+    text = main(
+        "v : INT;",
+        "v := F(1);",
+        FUNCTION.format("3"),
+    )
     f = next(pou for pou in program(text).pous if pou.name == "F")
     assert [(v.name, v.storage) for v in f.locals] == [("F", Storage.LOCAL), ("b", Storage.LOCAL)]
     assert f.locals[1].initial == ScalarInit(3)
 
 
 def test_initial_value_of_a_local_variable_may_be_calculated() -> None:
-    text = main("v : INT;", "v := F(1);", "FUNCTION F : INT VAR_INPUT a : INT; END_VAR VAR b : INT := a + 1; END_VAR F := b; END_FUNCTION\n")
+    text = main(
+        "v : INT;",
+        "v := F(1);",
+        FUNCTION.format("a + 1"),
+    )
     f = next(pou for pou in program(text).pous if pou.name == "F")
     assert len(f.body) == 2
 
 
 def test_function_block_variables_are_members_of_the_instance() -> None:
-    text = "FUNCTION_BLOCK F VAR_INPUT a : BYTE; END_VAR VAR_IN_OUT b : INT; END_VAR VAR c : INT; END_VAR VAR_TEMP d : INT; END_VAR END_FUNCTION_BLOCK\n"
+    text = (
+        "FUNCTION_BLOCK F VAR_INPUT a : BYTE; END_VAR VAR_IN_OUT b : INT; END_VAR VAR c : INT; END_VAR\n"
+        "VAR_TEMP d : INT; END_VAR END_FUNCTION_BLOCK\n"
+    )
     f = next(pou for pou in program(main("v : F;", before=text)).pous if pou.name == "F")
     assert f.instance is not None
     assert [(x.name, x.offset, x.type.size) for x in f.instance.fields] == [("a", 0, 1), ("b", 8, 8), ("c", 16, 2)]
@@ -296,14 +314,19 @@ def test_function_block_variables_are_members_of_the_instance() -> None:
 
 
 def test_constant_array_of_a_function_block_exists_once() -> None:
-    text = "FUNCTION_BLOCK F VAR CONSTANT t : ARRAY[0..1] OF INT := [4, 5]; END_VAR VAR x : INT; END_VAR x := t[x]; END_FUNCTION_BLOCK\n"
+    text = (
+        "FUNCTION_BLOCK F VAR CONSTANT t : ARRAY[0..1] OF INT := [4, 5]; END_VAR VAR x : INT; END_VAR x := t[x];\n"
+        "END_FUNCTION_BLOCK\n"
+    )
     p = program(main("a, b : F;", before=text))
     assert [v.name for v in p.globals] == ["F.t", "Main.a", "Main.b"]
     assert variable(p, "F.t").constant
 
 
 def test_scalar_constants_take_no_memory() -> None:
-    p = program("PROGRAM Main VAR CONSTANT N : INT := 5; S : STRING := 'x'; END_VAR VAR v : INT := N; END_VAR END_PROGRAM")
+    p = program(
+        "PROGRAM Main VAR CONSTANT N : INT := 5; S : STRING := 'x'; END_VAR VAR v : INT := N; END_VAR END_PROGRAM"
+    )
     assert [v.name for v in p.globals] == ["Main.v"]
 
 
@@ -361,7 +384,10 @@ def test_unused_variable_is_a_warning(kind: str) -> None:
 
 
 def test_inputs_outputs_and_addresses_are_not_called_unused() -> None:
-    text = "PROGRAM Main VAR_INPUT a : INT; END_VAR VAR_OUTPUT b : INT; END_VAR VAR c AT %QX0.0 : BOOL; END_VAR END_PROGRAM"
+    text = (
+        "PROGRAM Main VAR_INPUT a : INT; END_VAR VAR_OUTPUT b : INT; END_VAR VAR c AT %QX0.0 : BOOL; END_VAR\n"
+        "END_PROGRAM"
+    )
     assert check(text).diagnostics == []
 
 

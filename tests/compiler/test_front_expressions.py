@@ -14,12 +14,12 @@ from plctool.compiler import typed
 from plctool.compiler.typed import Binary, BinaryOp, BitPlace, Const, Convert, Expr, IndexPlace, Load, MemberPlace
 
 VARIABLES = """b, b2 : BOOL; by : BYTE; w : WORD; dw : DWORD; lw : LWORD; si : SINT; i : INT; di : DINT; li : LINT;
-us : USINT; u : UINT; ud : UDINT; ul : ULINT; r : REAL; lr : LREAL; t : TIME; lt : LTIME; s : STRING[20]; s2 : STRING[30];
-e : Color; m : Mode; sub : INT(1..10); a : ARRAY[1..3, 0..1] OF INT; aa : ARRAY[0..1] OF ARRAY[0..1] OF DINT; p : Point;
+us : USINT; u : UINT; ud : UDINT; ul : ULINT; r : REAL; lr : LREAL; t : TIME; lt : LTIME; s : STRING[20];
+s2 : STRING[30]; e : Color; m : Mode; sub : INT(1..10); a : ARRAY[1..3, 0..1] OF INT; p : Point; aa : ARRAY[0..1] OF A2;
 ptr : POINTER TO INT; ref : REFERENCE TO INT; pp : REF_TO Point; tm : TON; idx : SINT;"""
 BEFORE = (
     "TYPE Color : (Red, Green, Blue); Mode : (Off, On, Red); "
-    "Point : STRUCT x, y : INT; z : ARRAY[0..2] OF REAL; END_STRUCT; END_TYPE\n"
+    "Point : STRUCT x, y : INT; z : ARRAY[0..2] OF REAL; END_STRUCT; A2 : ARRAY[0..1] OF DINT; END_TYPE\n"
 )
 LINE = 9  # of the first statement
 
@@ -47,12 +47,38 @@ def condition(expression: str) -> Expr:
 @pytest.mark.parametrize(
     ("target", "source"),
     [
-        ("i", "si"), ("di", "i"), ("li", "di"), ("u", "us"), ("ud", "u"), ("ul", "ud"), ("i", "us"), ("di", "u"), ("li", "ud"),
-        ("w", "by"), ("dw", "w"), ("lw", "dw"), ("by", "b"), ("r", "i"), ("r", "us"), ("lr", "di"), ("lr", "ud"), ("lr", "r"),
-        ("u", "w"), ("w", "u"), ("i", "w"), ("w", "i"), ("di", "by"), ("i", "e"), ("di", "e"), ("i", "sub"), ("di", "sub"),
-        ("lt", "t"), ("s", "s2"), ("dw", "ud"),
+        ("i", "si"),
+        ("di", "i"),
+        ("li", "di"),
+        ("u", "us"),
+        ("ud", "u"),
+        ("ul", "ud"),
+        ("i", "us"),
+        ("di", "u"),
+        ("li", "ud"),
+        ("w", "by"),
+        ("dw", "w"),
+        ("lw", "dw"),
+        ("by", "b"),
+        ("r", "i"),
+        ("r", "us"),
+        ("lr", "di"),
+        ("lr", "ud"),
+        ("lr", "r"),
+        ("u", "w"),
+        ("w", "u"),
+        ("i", "w"),
+        ("w", "i"),
+        ("di", "by"),
+        ("i", "e"),
+        ("di", "e"),
+        ("i", "sub"),
+        ("di", "sub"),
+        ("lt", "t"),
+        ("s", "s2"),
+        ("dw", "ud"),
     ],
-)  # fmt: skip
+)
 def test_widening_is_implicit_and_silent(target: str, source: str) -> None:
     assert faults(f"{target} := {source};") == []
     assert faults(f"{target} := {source};", "warning") == []
@@ -61,11 +87,20 @@ def test_widening_is_implicit_and_silent(target: str, source: str) -> None:
 @pytest.mark.parametrize(
     ("target", "source", "code"),
     [
-        ("i", "di", "narrowing"), ("si", "i", "narrowing"), ("u", "i", "narrowing"), ("i", "u", "narrowing"),
-        ("ud", "i", "narrowing"), ("by", "w", "narrowing"), ("i", "dw", "narrowing"), ("w", "li", "narrowing"),
-        ("r", "lr", "narrowing"), ("r", "di", "precision"), ("lr", "li", "precision"), ("e", "i", "enum"),
+        ("i", "di", "narrowing"),
+        ("si", "i", "narrowing"),
+        ("u", "i", "narrowing"),
+        ("i", "u", "narrowing"),
+        ("ud", "i", "narrowing"),
+        ("by", "w", "narrowing"),
+        ("i", "dw", "narrowing"),
+        ("w", "li", "narrowing"),
+        ("r", "lr", "narrowing"),
+        ("r", "di", "precision"),
+        ("lr", "li", "precision"),
+        ("e", "i", "enum"),
     ],
-)  # fmt: skip
+)
 def test_what_may_lose_something_is_a_warning(target: str, source: str, code: str) -> None:
     text = main(VARIABLES, f"{target} := {source};", BEFORE)
     assert findings(text) == []
@@ -76,12 +111,25 @@ def test_what_may_lose_something_is_a_warning(target: str, source: str, code: st
 @pytest.mark.parametrize(
     ("target", "source", "words"),
     [
-        ("i", "r", "REAL_TO_INT"), ("di", "lr", "LREAL_TO_DINT"), ("b", "i", "INT_TO_BOOL"), ("i", "b", "BOOL_TO_INT"),
-        ("t", "di", "DINT_TO_TIME"), ("di", "t", "TIME_TO_DINT"), ("t", "lt", "LTIME_TO_TIME"), ("r", "w", "WORD_TO_REAL"),
-        ("r", "t", "TIME_TO_REAL"), ("i", "s", "STRING"), ("s", "i", "INT"), ("e", "m", "Mode does not fit Color"),
-        ("a", "i", "ARRAY"), ("p", "a", "Point"), ("i", "tm", "TON"), ("ptr", "i", "REF_TO"), ("i", "ptr", "REF_TO"),
+        ("i", "r", "REAL_TO_INT"),
+        ("di", "lr", "LREAL_TO_DINT"),
+        ("b", "i", "INT_TO_BOOL"),
+        ("i", "b", "BOOL_TO_INT"),
+        ("t", "di", "DINT_TO_TIME"),
+        ("di", "t", "TIME_TO_DINT"),
+        ("t", "lt", "LTIME_TO_TIME"),
+        ("r", "w", "WORD_TO_REAL"),
+        ("r", "t", "TIME_TO_REAL"),
+        ("i", "s", "STRING"),
+        ("s", "i", "INT"),
+        ("e", "m", "Mode does not fit Color"),
+        ("a", "i", "ARRAY"),
+        ("p", "a", "Point"),
+        ("i", "tm", "TON"),
+        ("ptr", "i", "REF_TO"),
+        ("i", "ptr", "REF_TO"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_names_both_types_or_the_conversion(target: str, source: str, words: str) -> None:
     (message,) = faults(f"{target} := {source};")
     assert message.startswith(f"{len(target) + 5}: ")
@@ -91,12 +139,29 @@ def test_what_does_not_fit_names_both_types_or_the_conversion(target: str, sourc
 @pytest.mark.parametrize(
     ("target", "literal", "expected"),
     [
-        ("r", "1", 1.0), ("by", "16#FF", 255), ("b", "1", 1), ("i", "-32768", -32768), ("ul", "18446744073709551615", 2**64 - 1),
-        ("lr", "0.1", 0.1), ("si", "2 ** 6", 64), ("t", "T#1s * 2", 2000), ("lt", "T#1s", 10**9), ("e", "Color#Blue", 2),
-        ("e", "Green", 1), ("e", "Red", 0), ("m", "Red", 2), ("i", "Color.Blue", 2), ("sub", "7", 7), ("dw", "DWORD#5", 5),
-        ("r", "INT#3", 3.0), ("di", "SINT#-1", -1), ("w", "NOT 16#00FF", 0xFF00), ("by", "NOT BYTE#1", 254), ("ptr", "NULL", 0),
+        ("r", "1", 1.0),
+        ("by", "16#FF", 255),
+        ("b", "1", 1),
+        ("i", "-32768", -32768),
+        ("ul", "18446744073709551615", 2**64 - 1),
+        ("lr", "0.1", 0.1),
+        ("si", "2 ** 6", 64),
+        ("t", "T#1s * 2", 2000),
+        ("lt", "T#1s", 10**9),
+        ("e", "Color#Blue", 2),
+        ("e", "Green", 1),
+        ("e", "Red", 0),
+        ("m", "Red", 2),
+        ("i", "Color.Blue", 2),
+        ("sub", "7", 7),
+        ("dw", "DWORD#5", 5),
+        ("r", "INT#3", 3.0),
+        ("di", "SINT#-1", -1),
+        ("w", "NOT 16#00FF", 0xFF00),
+        ("by", "NOT BYTE#1", 254),
+        ("ptr", "NULL", 0),
     ],
-)  # fmt: skip
+)
 def test_constant_takes_the_type_that_is_needed(target: str, literal: str, expected: float) -> None:
     e = value(target, literal)
     assert isinstance(e, Const)
@@ -154,15 +219,34 @@ def test_bare_enumeration_value_of_several_types_is_ambiguous_without_context() 
 @pytest.mark.parametrize(
     ("left", "op", "right", "result"),
     [
-        ("si", "+", "i", "INT"), ("i", "*", "di", "DINT"), ("i", "+", "u", "DINT"), ("us", "-", "si", "INT"),
-        ("ud", "+", "i", "LINT"), ("r", "*", "i", "REAL"), ("r", "+", "lr", "LREAL"), ("di", "/", "lr", "LREAL"),
-        ("by", "AND", "w", "WORD"), ("i", "AND", "w", "WORD"), ("by", "+", "i", "INT"), ("dw", "+", "1", "DWORD"),
-        ("w", "OR", "16#FF", "WORD"), ("i", "+", "100000", "DINT"), ("i", "MOD", "3", "INT"), ("i", "*", "1.5", "REAL"),
-        ("t", "+", "t", "TIME"), ("t", "*", "i", "TIME"), ("i", "*", "t", "TIME"), ("t", "/", "2", "TIME"),
-        ("t", "*", "1.5", "TIME"), ("t", "-", "lt", "LTIME"), ("lt", "/", "li", "LTIME"), ("sub", "+", "1", "INT"),
-        ("i", "XOR", "di", "DINT"), ("b", "XOR", "b2", "BOOL"),
+        ("si", "+", "i", "INT"),
+        ("i", "*", "di", "DINT"),
+        ("i", "+", "u", "DINT"),
+        ("us", "-", "si", "INT"),
+        ("ud", "+", "i", "LINT"),
+        ("r", "*", "i", "REAL"),
+        ("r", "+", "lr", "LREAL"),
+        ("di", "/", "lr", "LREAL"),
+        ("by", "AND", "w", "WORD"),
+        ("i", "AND", "w", "WORD"),
+        ("by", "+", "i", "INT"),
+        ("dw", "+", "1", "DWORD"),
+        ("w", "OR", "16#FF", "WORD"),
+        ("i", "+", "100000", "DINT"),
+        ("i", "MOD", "3", "INT"),
+        ("i", "*", "1.5", "REAL"),
+        ("t", "+", "t", "TIME"),
+        ("t", "*", "i", "TIME"),
+        ("i", "*", "t", "TIME"),
+        ("t", "/", "2", "TIME"),
+        ("t", "*", "1.5", "TIME"),
+        ("t", "-", "lt", "LTIME"),
+        ("lt", "/", "li", "LTIME"),
+        ("sub", "+", "1", "INT"),
+        ("i", "XOR", "di", "DINT"),
+        ("b", "XOR", "b2", "BOOL"),
     ],
-)  # fmt: skip
+)
 def test_operands_meet_in_the_common_type(left: str, op: str, right: str, result: str) -> None:
     # the result is seen as the type an array index, a comparison or the like would get: by a message
     (message,) = faults(f"p := {left} {op} {right};")
@@ -184,9 +268,30 @@ def test_product_that_is_widened_too_late_is_a_warning() -> None:
 
 @pytest.mark.parametrize(
     "expression",
-    ["i < di", "u = i", "r > 1", "t >= T#1s", "s = 'abc'", "s < s2", "e = Green", "e <> Color#Red", "b = b2", "b = 1", "w = u",
-     "i > 100000", "ptr = NULL", "e = 1", "lt > t", "0 < i", "1 < 2", "1.5 > 1", "'a' < 'b'", "b > FALSE", "sub = i"],
-)  # fmt: skip
+    [
+        "i < di",
+        "u = i",
+        "r > 1",
+        "t >= T#1s",
+        "s = 'abc'",
+        "s < s2",
+        "e = Green",
+        "e <> Color#Red",
+        "b = b2",
+        "b = 1",
+        "w = u",
+        "i > 100000",
+        "ptr = NULL",
+        "e = 1",
+        "lt > t",
+        "0 < i",
+        "1 < 2",
+        "1.5 > 1",
+        "'a' < 'b'",
+        "b > FALSE",
+        "sub = i",
+    ],
+)
 def test_comparison_is_a_bool(expression: str) -> None:
     assert str(condition(expression).type) == "BOOL"
 
@@ -194,14 +299,25 @@ def test_comparison_is_a_bool(expression: str) -> None:
 @pytest.mark.parametrize(
     ("expression", "place", "words"),
     [
-        ("b + b2", 8, "+ cannot combine BOOL and BOOL"), ("r AND r", 8, "AND cannot combine REAL and REAL"),
-        ("t > 5", 8, "cannot compare TIME with INT"), ("s = 5", 8, "STRING[20] with INT"), ("e = m", 8, "Color with Mode"),
-        ("a = a", 8, "cannot compare"), ("p = p", 8, "cannot compare"), ("tm = tm", 9, "cannot compare"),
-        ("b AND i", 8, "BOOL and INT"), ("s + s", 8, "cannot combine"), ("NOT r", 6, "NOT needs"), ("-s", 6, "needs a number"),
-        ("r MOD r", 8, "MOD cannot combine"), ("t * t", 8, "TIME and TIME"), ("t + 5", 8, "TIME and INT"),
-        ("ptr < ptr", 10, "cannot compare"), ("b = i", 8, "BOOL with INT"),
+        ("b + b2", 8, "+ cannot combine BOOL and BOOL"),
+        ("r AND r", 8, "AND cannot combine REAL and REAL"),
+        ("t > 5", 8, "cannot compare TIME with INT"),
+        ("s = 5", 8, "STRING[20] with INT"),
+        ("e = m", 8, "Color with Mode"),
+        ("a = a", 8, "cannot compare"),
+        ("p = p", 8, "cannot compare"),
+        ("tm = tm", 9, "cannot compare"),
+        ("b AND i", 8, "BOOL and INT"),
+        ("s + s", 8, "cannot combine"),
+        ("NOT r", 6, "NOT needs"),
+        ("-s", 6, "needs a number"),
+        ("r MOD r", 8, "MOD cannot combine"),
+        ("t * t", 8, "TIME and TIME"),
+        ("t + 5", 8, "TIME and INT"),
+        ("ptr < ptr", 10, "cannot compare"),
+        ("b = i", 8, "BOOL with INT"),
     ],
-)  # fmt: skip
+)
 def test_operands_that_do_not_go_together_are_an_error_at_the_operator(expression: str, place: int, words: str) -> None:
     (message,) = faults(f"b := {expression};")
     assert message.startswith(f"{place}: "), message
@@ -287,13 +403,24 @@ def test_bit_at_an_address_is_a_bit_of_its_byte() -> None:
 @pytest.mark.parametrize(
     ("statement", "place", "words"),
     [
-        ("i := a[4, 0];", 8, "4 is outside 1..3"), ("i := a[1];", 6, "needs 2 indices"), ("i := a[1, 0, 0];", 6, "too many"),
-        ("i := i[1];", 6, "not an array"), ("i := a[r, 0];", 8, "an index is an integer"), ("i := p.zz;", 8, "no member zz"),
-        ("i := i.x;", 8, "has no members"), ("i := pp.x;", 9, "^."), ("b := w.16;", 8, "0..15"), ("b := r.1;", 8, "has no bits"),
-        ("i := i^;", 6, "not a pointer"), ("by := w.%B2;", 9, "no part"), ("b := tm.QQ;", 9, "no variable QQ"),
-        ("b := tm.START2;", 9, "no variable"), ("i := %IX;", 6, "no place"), ("b := %IX0.8;", 6, "not an address"),
+        ("i := a[4, 0];", 8, "4 is outside 1..3"),
+        ("i := a[1];", 6, "needs 2 indices"),
+        ("i := a[1, 0, 0];", 6, "too many"),
+        ("i := i[1];", 6, "not an array"),
+        ("i := a[r, 0];", 8, "an index is an integer"),
+        ("i := p.zz;", 8, "no member zz"),
+        ("i := i.x;", 8, "has no members"),
+        ("i := pp.x;", 9, "^."),
+        ("b := w.16;", 8, "0..15"),
+        ("b := r.1;", 8, "has no bits"),
+        ("i := i^;", 6, "not a pointer"),
+        ("by := w.%B2;", 9, "no part"),
+        ("b := tm.QQ;", 9, "no variable QQ"),
+        ("b := tm.START2;", 9, "no variable"),
+        ("i := %IX;", 6, "no place"),
+        ("b := %IX0.8;", 6, "not an address"),
     ],
-)  # fmt: skip
+)
 def test_wrong_place_is_explained(statement: str, place: int, words: str) -> None:
     message = faults(statement)[0]
     assert message.startswith(f"{place}: "), message
@@ -313,14 +440,12 @@ OPERATIONS = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
     "*": lambda a, b: a * b,
-    "/": lambda a, b: int(math.trunc(a / b)) if abs(a) < 2**50 else (abs(a) // abs(b)) * (1 if a * b >= 0 else -1),
+    "/": lambda a, b: abs(a) // abs(b) * (1 if a * b >= 0 else -1),
     "MOD": lambda a, b: int(math.fmod(a, b)),
 }
 
 
-@given(
-    st.sampled_from(list(OPERATIONS)), st.integers(-(2**31), 2**31 - 1), st.integers(-(2**31), 2**31 - 1)
-)  # fmt: skip
+@given(st.sampled_from(list(OPERATIONS)), st.integers(-(2**31), 2**31 - 1), st.integers(-(2**31), 2**31 - 1))
 def test_integer_constants_are_folded_as_python_calculates(op: str, a: int, b: int) -> None:
     assume(b != 0 or op in "+-*")
     expected = OPERATIONS[op](a, b)
@@ -355,18 +480,51 @@ def test_comparisons_are_folded(op: str, a: int, b: int) -> None:
 @pytest.mark.parametrize(
     ("expression", "declared", "expected"),
     [
-        ("-7 / 2", "INT", -3), ("-7 MOD 2", "INT", -1), ("7 MOD -2", "INT", 1), ("2 ** 10", "INT", 1024), ("2.0 ** 0.5", "LREAL", 2**0.5),
-        ("REAL_TO_DINT(2.5)", "DINT", 2), ("REAL_TO_DINT(3.5)", "DINT", 4), ("TRUNC(-2.7)", "DINT", -2), ("LREAL_TO_SINT(1e9)", "SINT", 127),
-        ("INT_TO_BYTE(-1)", "BYTE", 255), ("DINT_TO_INT(70000)", "INT", 4464), ("INT_TO_BOOL(5)", "BOOL", 1), ("BOOL_TO_INT(TRUE)", "INT", 1),
-        ("TIME_TO_DINT(T#1.5s)", "DINT", 1500), ("DINT_TO_TIME(20)", "TIME", 20), ("TIME_TO_LTIME(T#1ms)", "LTIME", 10**6),
-        ("LTIME_TO_TIME(LTIME#1500us)", "TIME", 1), ("TO_INT(3.6)", "INT", 4), ("DWORD_TO_REAL(16#FFFFFFFF)", "REAL", 2.0**32),
-        ("ABS(-5)", "INT", 5), ("SQRT(2.25)", "REAL", 1.5), ("MIN(4, 2, 3)", "INT", 2), ("MAX(1, 2.5)", "LREAL", 2.5),
-        ("SEL(TRUE, 1, 2)", "INT", 2), ("MUX(1, 5, 6, 7)", "INT", 6), ("SHL(BYTE#1, 7)", "BYTE", 128), ("SHR(BYTE#128, 9)", "BYTE", 0),
-        ("ROL(BYTE#16#81, 1)", "BYTE", 3), ("ROR(WORD#1, 1)", "WORD", 0x8000), ("SIZEOF(LREAL)", "INT", 8), ("NOT TRUE", "BOOL", 0),
-        ("ADD(1, 2, 3)", "INT", 6), ("MUL(2, 3)", "INT", 6), ("SUB(5, 3)", "INT", 2), ("DIV(7, 2)", "INT", 3), ("MOD(7, 4)", "INT", 3),
-        ("GT(3, 2, 1)", "BOOL", 1), ("LE(1, 1, 0)", "BOOL", 0), ("EQ(2, 2)", "BOOL", 1), ("NE(1, 2)", "BOOL", 1), ("AND(TRUE, FALSE)", "BOOL", 0),
-        ("XOR(WORD#5, 1)", "WORD", 4), ("NOT(FALSE)", "BOOL", 1), ("MOVE(5)", "INT", 5),
+        ("-7 / 2", "INT", -3),
+        ("-7 MOD 2", "INT", -1),
+        ("7 MOD -2", "INT", 1),
+        ("2 ** 10", "INT", 1024),
+        ("2.0 ** 0.5", "LREAL", 2**0.5),
+        ("REAL_TO_DINT(2.5)", "DINT", 2),
+        ("REAL_TO_DINT(3.5)", "DINT", 4),
+        ("TRUNC(-2.7)", "DINT", -2),
+        ("LREAL_TO_SINT(1e9)", "SINT", 127),
+        ("INT_TO_BYTE(-1)", "BYTE", 255),
+        ("DINT_TO_INT(70000)", "INT", 4464),
+        ("INT_TO_BOOL(5)", "BOOL", 1),
+        ("BOOL_TO_INT(TRUE)", "INT", 1),
+        ("TIME_TO_DINT(T#1.5s)", "DINT", 1500),
+        ("DINT_TO_TIME(20)", "TIME", 20),
+        ("TIME_TO_LTIME(T#1ms)", "LTIME", 10**6),
+        ("LTIME_TO_TIME(LTIME#1500us)", "TIME", 1),
+        ("TO_INT(3.6)", "INT", 4),
+        ("DWORD_TO_REAL(16#FFFFFFFF)", "REAL", 2.0**32),
+        ("ABS(-5)", "INT", 5),
+        ("SQRT(2.25)", "REAL", 1.5),
+        ("MIN(4, 2, 3)", "INT", 2),
+        ("MAX(1, 2.5)", "LREAL", 2.5),
+        ("SEL(TRUE, 1, 2)", "INT", 2),
+        ("MUX(1, 5, 6, 7)", "INT", 6),
+        ("SHL(BYTE#1, 7)", "BYTE", 128),
+        ("SHR(BYTE#128, 9)", "BYTE", 0),
+        ("ROL(BYTE#16#81, 1)", "BYTE", 3),
+        ("ROR(WORD#1, 1)", "WORD", 0x8000),
+        ("SIZEOF(LREAL)", "INT", 8),
+        ("NOT TRUE", "BOOL", 0),
+        ("ADD(1, 2, 3)", "INT", 6),
+        ("MUL(2, 3)", "INT", 6),
+        ("SUB(5, 3)", "INT", 2),
+        ("DIV(7, 2)", "INT", 3),
+        ("MOD(7, 4)", "INT", 3),
+        ("GT(3, 2, 1)", "BOOL", 1),
+        ("LE(1, 1, 0)", "BOOL", 0),
+        ("EQ(2, 2)", "BOOL", 1),
+        ("NE(1, 2)", "BOOL", 1),
+        ("AND(TRUE, FALSE)", "BOOL", 0),
+        ("XOR(WORD#5, 1)", "WORD", 4),
+        ("NOT(FALSE)", "BOOL", 1),
+        ("MOVE(5)", "INT", 5),
     ],
-)  # fmt: skip
+)
 def test_functions_of_constants_are_folded(expression: str, declared: str, expected: float) -> None:
     assert folded(expression, declared).value == expected

@@ -74,7 +74,12 @@ def test_duration_counts_milliseconds(text: str, milliseconds: int) -> None:
 
 @pytest.mark.parametrize(
     ("text", "nanoseconds"),
-    [("LTIME#1us", 1000), ("LT#1s5us7ns", 1_000_005_007), ("LTIME#-0.5us", -500), ("LTIME#200d", 17_280_000_000_000_000)],
+    [
+        ("LTIME#1us", 1000),
+        ("LT#1s5us7ns", 1_000_005_007),
+        ("LTIME#-0.5us", -500),
+        ("LTIME#200d", 17_280_000_000_000_000),
+    ],
 )
 def test_long_duration_counts_nanoseconds(text: str, nanoseconds: int) -> None:
     assert folded(text, "LTIME").value == nanoseconds

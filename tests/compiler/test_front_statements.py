@@ -122,10 +122,12 @@ def test_wrong_statement_is_explained(text: str, message: str) -> None:
         ("RETURN; i := 1;", "9: this statement is never reached"),
         ("WHILE b DO EXIT; i := 1; j := 2; END_WHILE;", "18: this statement is never reached"),
         ("ABS(i);", "1: the result of this call is not used"),
-        ("s := '1234567890123456789012345678901234567890123456789012345678901234567890123456789012345';",
-         "6: this text has 85 characters, STRING[80] holds 80"),
+        (
+            "s := '1234567890123456789012345678901234567890123456789012345678901234567890123456789012345';",
+            "6: this text has 85 characters, STRING[80] holds 80",
+        ),
     ],
-)  # fmt: skip
+)
 def test_suspicious_statement_is_a_warning(text: str, message: str) -> None:
     assert faults(text, "warning") == [message]
 

@@ -143,12 +143,18 @@ def test_syntax_error_is_one_clear_sentence(text: str, message: str) -> None:
     [
         ("PROGRAM p\nVAR\n x : INT\n y : INT;\nEND_VAR\nEND_PROGRAM", "3:9: expected ; after the declaration"),
         ("PROGRAM p\nVAR\n x : INT;\n\nx := 5;\nx := 4;\nEND_PROGRAM", "5:1: END_VAR missing for the VAR in line 2"),
-        ("PROGRAM p\nVAR x : INT;\nIF x = 1 THEN x := 2; END_IF;\nEND_PROGRAM", "3:1: END_VAR missing for the VAR in line 2"),
+        (
+            "PROGRAM p\nVAR x : INT;\nIF x = 1 THEN x := 2; END_IF;\nEND_PROGRAM",
+            "3:1: END_VAR missing for the VAR in line 2",
+        ),
         ("PROGRAM p\nVAR if : INT; END_VAR\nEND_PROGRAM", "2:5: if is a keyword and cannot be a name"),
         ("PROGRAM p\nVAR x INT; END_VAR\nEND_PROGRAM", "2:6: expected :"),
         ("PROGRAM p\nx := 1;", "2:8: END_PROGRAM missing for the PROGRAM in line 1"),
         ("FUNCTION f : INT\nf := 1;\nPROGRAM p\nEND_PROGRAM", "3:1: END_FUNCTION missing for the FUNCTION in line 1"),
-        ("FUNCTION_BLOCK f\nEND_FUNCTION", "2:1: expected END_FUNCTION_BLOCK for the FUNCTION_BLOCK in line 1, not END_FUNCTION"),
+        (
+            "FUNCTION_BLOCK f\nEND_FUNCTION",
+            "2:1: expected END_FUNCTION_BLOCK for the FUNCTION_BLOCK in line 1, not END_FUNCTION",
+        ),
         ("TYPE s : STRUCT x : INT; END_TYPE", "1:26: END_STRUCT missing for the STRUCT in line 1"),
         ("FUNCTION_BLOCK a EXTENDS b\nEND_FUNCTION_BLOCK", "1:18: EXTENDS is not supported yet"),
         ("PROGRAM\nEND_PROGRAM", "2:1: expected a name, found END_PROGRAM"),

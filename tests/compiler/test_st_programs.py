@@ -137,7 +137,8 @@ def run_program(path: Path, script: Script) -> list[str]:
     per_cycle = {name: values for name, values in script.expected if len(values) > 1}
     at_end = {name: values[0] for name, values in script.expected if len(values) == 1}
     wrong = []
-    result = compile_sources([path], **script.options)
+    level, checks = int(script.options.get("level", 2)), script.options.get("checks", "all")
+    result = compile_sources([path], level=level, checks=checks)
     with Simulator(result.image, result.symbols) as plc:
         if script.time_ms:
             plc.run_for(script.time_ms)

@@ -7,15 +7,16 @@ from plctool.core import lib
 from plctool.image import ApplicationInfo, Image, ImageTask, build_image
 from plctool.symbols import CodeUnit, Symbol, SymbolTable
 
+RETURN = b"\xc3"
 DATA, CODE = int(lib.APP_AREA_DATA), int(lib.APP_AREA_CODE)
 
 
-def make_application(version: str = "1") -> tuple[bytes, SymbolTable]:
-    """An image that the tool accepts (its code is never run) and the symbols that belong to it."""
+def make_application(version: str = "1", code_size: int = 64) -> tuple[bytes, SymbolTable]:
+    """An image whose code does nothing (on x86-64), and the symbols that belong to it."""
     image = build_image(
         Image(
             device_id=int(lib.TARGET_ID_X86_64_LINUX),
-            code=b"\xc3" * 64,
+            code=RETURN * code_size,
             areas={DATA: 256},
             functions={int(lib.CDL_FUNCTION_GLOBAL_INIT): 0},
             externals=[],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import random
 from collections.abc import Iterator
 
@@ -9,6 +10,7 @@ import pytest
 from fake_device import damage
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_app import RETURN, make_application
 
 from plctool.core import ffi, lib
 from plctool.errors import DeviceError, LinkError
@@ -152,6 +154,21 @@ def test_over_bad_lines_everything_arrives_intact(seed: int, rate: float) -> Non
     for size in (10, 3000, 100, 9000):
         data = rng.randbytes(size)
         assert services.echo(session, data) == data
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the application's code is for x86-64")
+@settings(max_examples=5, deadline=None)
+@given(st.integers(0, 2**32))
+def test_what_runs_after_a_download_over_a_bad_line_is_what_was_sent(seed: int) -> None:
+    power_on()
+    image, symbols = make_application(code_size=20_000)
+    session = Session(Connection(SimSerial(damage(seed, 0.001), damage(seed + 1, 0.001))))
+    services.download(session, image)
+    services.start(session)
+    status = services.read_status(session)
+    assert (status.state, status.image_crc) == ("run", symbols.image_crc)
+    code = lib.AppGetAreaAddress(lib.APP_AREA_CODE, 0, 20_000)
+    assert bytes(ffi.buffer(code, 20_000)) == RETURN * 20_000
 
 
 def test_large_messages_use_nine_tenths_of_the_line_both_ways() -> None:

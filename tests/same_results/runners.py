@@ -7,6 +7,8 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent / "runner"
 FIRMWARE = ROOT / "firmware"
@@ -51,9 +53,11 @@ class Runner:
     command: tuple[str, ...]  # the program's path follows
     bare: bool = True
 
-    def missing(self) -> str | None:
-        """The tool that is not installed; None when all are."""
-        return next((tool for tool in (self.compiler, self.command[0]) if shutil.which(tool) is None), None)
+    def skip_without_tools(self) -> None:
+        """Skips the test when the cross compiler or QEMU is not installed."""
+        missing = [tool for tool in (self.compiler, self.command[0]) if shutil.which(tool) is None]
+        if missing:
+            pytest.skip(f"needs {' and '.join(missing)}: ./bootstrap.sh --cross")
 
     def compile(self, folder: Path) -> Path:
         """The program of the runner, in `folder`."""

@@ -20,7 +20,7 @@ sys.path.append(str(ROOT / os.environ.get("PLCTOOL_BUILD", "build") / "host"))
 
 if shutil.which("qemu-system-arm") is None or "FIRMWARE_DIR" not in os.environ:
     pytest.skip("needs qemu-system-arm and a cross build: meson test -C build-cm3", allow_module_level=True)
-pytest.importorskip("_plccore", reason="needs plctool's extension module: make build, or name its folder in PLCTOOL_BUILD")
+pytest.importorskip("_plccore", reason="needs plctool's extension module, found through PLCTOOL_BUILD")
 
 from programs import Built, compile_text  # noqa: E402
 from qemu import Board  # noqa: E402

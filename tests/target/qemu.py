@@ -84,8 +84,8 @@ def _connect(path: Path) -> socket.socket:
 class Board:
     """One board with its firmware. Context manager: power is on inside.
 
-    Time counts instructions. While the processor sleeps it follows the host's clock, so that the board is as fast as its
-    client, and a busy host makes timers late.
+    Time counts instructions. While the processor sleeps it follows the host's clock, so that the board is as fast as
+    its client, and a busy host makes timers late.
     """
 
     def __init__(self, machine: str, firmware: Path, folder: Path) -> None:
@@ -111,7 +111,7 @@ class Board:
     def power_on(self, *, exact: bool = False, plugin: str = "") -> None:
         """Starts QEMU and waits until its serial line can be opened.
 
-        `exact`: sleep takes no time on the host, so timers are never late, but time runs away from a client that is slow.
+        `exact`: sleep takes no time on the host, so timers are never late, but time runs away from a slow client.
         """
         for name in ("uart", "qmp"):
             (self.folder / name).unlink(missing_ok=True)
@@ -119,7 +119,8 @@ class Board:
             "qemu-system-arm", "-M", f"{self.machine},memory-backend=nv",
             "-object", f"memory-backend-file,id=nv,size=16M,mem-path={self.flash_file},share=on",
             "-display", "none", "-monitor", "none", "-kernel", str(self.firmware),
-            "-icount", f"shift=3,sleep={'off' if exact else 'on'}", "-serial", "unix:uart,server,nowait", "-qmp", "unix:qmp,server,nowait",
+            "-icount", f"shift=3,sleep={'off' if exact else 'on'}",
+            "-serial", "unix:uart,server,nowait", "-qmp", "unix:qmp,server,nowait",
             *(["-plugin", plugin] if plugin else []),
         ]  # fmt: skip
         with (self.folder / "qemu.log").open("ab") as log:
@@ -152,19 +153,26 @@ class Board:
         """The reset pin: RAM is kept."""
         self._qmp("system_reset")
 
+    def read_memory(self, address: int, size: int) -> bytes:
+        """RAM, without stopping the processor."""
+        file = self.folder / "memory"
+        self._qmp("pmemsave", val=address, size=size, filename=str(file))
+        return file.read_bytes()
+
     def line(self) -> UnixSerial:
         """The serial line, from the client's end."""
         return UnixSerial(self.folder / "uart")
 
-    def _qmp(self, command: str) -> dict[str, Any]:
+    def _qmp(self, command: str, **arguments: Any) -> None:
         with _connect(self.folder / "qmp") as qmp:
             stream = qmp.makefile("rw")
-            answers: list[dict[str, Any]] = [json.loads(stream.readline())]
-            for execute in ("qmp_capabilities", command):
-                stream.write(json.dumps({"execute": execute}) + "\n")
+            stream.readline()  # the greeting
+            for message in ({"execute": "qmp_capabilities"}, {"execute": command, "arguments": arguments}):
+                stream.write(json.dumps(message) + "\n")
                 stream.flush()
-                answers.append(json.loads(stream.readline()))
-            return answers[-1]
+                while "return" not in (answer := json.loads(stream.readline())):
+                    if "error" in answer:
+                        raise RuntimeError(f"QEMU: {answer['error']['desc']}")
 
     def __enter__(self) -> Board:
         self.power_on()

@@ -3,8 +3,9 @@
     size.py BUDGET.toml CONFIG=FILE.map ...             prints the table; exit status 1 when a budget is exceeded
     size.py --update BUDGET.toml CONFIG=FILE.map ...    makes the present figures the budget of the components
 
-Flash counts what is stored there, initial values of variables included. RAM counts variables and the main stack; what belongs to the
-application alone (its areas, the stacks of its tasks) is printed apart and has no budget: the device's maker chooses it.
+Flash counts what is stored there, initial values of variables included. RAM counts variables and the main stack; what
+belongs to the application alone (its areas, the stacks of its tasks) is printed apart and has no budget: the device's
+maker chooses it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ RAM_SECTIONS = {".data", ".bss", ".noinit", STACK_SECTION}
 APPLICATION_SECTION = ".iec_stack"
 SLACK = 1.02  # the budget of a component is what it takes now, and two per cent
 ROUND = 16
+TOTAL = "total"
 
 _OUTPUT = re.compile(r"^(\.\S+)")
 _NAME = re.compile(r"^ (\.\S+|COMMON)")
@@ -44,11 +46,12 @@ class Usage:
 
 @dataclass
 class Budget:
-    """The budget file: names of variables that are the application's, and limits in bytes."""
+    """The budget file: names of variables that are the application's, goals for the totals, limits of the components
+    and of their total as [flash, RAM]; all in bytes, by configuration."""
 
     application: set[str]
-    total: dict[str, dict[str, int]]
-    component: dict[str, dict[str, list[int]]] = field(default_factory=dict)
+    goal: dict[str, dict[str, int]]
+    limit: dict[str, dict[str, list[int]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -106,18 +109,24 @@ def total(usage: dict[str, Usage]) -> Usage:
 def exceeded(config: str, usage: dict[str, Usage], budget: Budget) -> list[str]:
     """A sentence for each limit that is exceeded."""
     found = []
-    all_together = total(usage)
-    for what, limit in budget.total.get(config, {}).items():
-        if (used := getattr(all_together, what)) > limit:
-            found.append(f"{config}: {what} is {used} bytes, the goal is {limit}.")
-    for name, (flash, ram) in budget.component.get(config, {}).items():
-        used_by = usage.get(name, Usage())
-        for what, used, limit in (("flash", used_by.flash, flash), ("ram", used_by.ram, ram)):
-            if used > limit:
-                found.append(f"{config}: {name} takes {used} bytes of {what}, its budget is {limit}.")
-    for name in usage.keys() - budget.component.get(config, usage).keys():
-        found.append(f"{config}: {name} has no budget; run size.py --update when it is meant to be there.")
+    limits = budget.limit.get(config, {})
+    for name, used in [*sorted(usage.items()), (TOTAL, total(usage))]:
+        flash, ram = limits.get(name, (0, 0))
+        for what, size, limit in (("flash", used.flash, flash), ("RAM", used.ram, ram)):
+            if size > limit:
+                found.append(f"{config}: {name} takes {size} bytes of {what}, its budget is {limit}.")
     return found
+
+
+def missed_goals(config: str, usage: dict[str, Usage], budget: Budget) -> list[str]:
+    """A sentence for each goal that is not reached yet."""
+    used = total(usage)
+    sizes = {"flash": used.flash, "ram": used.ram}
+    return [
+        f"{config}: {sizes[what] - goal} bytes of {what} above the goal of {goal}."
+        for what, goal in budget.goal.get(config, {}).items()
+        if sizes[what] > goal
+    ]
 
 
 def print_table(measured: dict[str, dict[str, Usage]]) -> None:
@@ -131,14 +140,14 @@ def print_table(measured: dict[str, dict[str, Usage]]) -> None:
         row = (measured[config].get(name) for config in configs)
         print(f"{name:<28}" + "".join(f"{u.flash:>12}{u.ram:>8}" if u else f"{'-':>12}{'-':>8}" for u in row))
     sums = [total(measured[config]) for config in configs]
-    print(f"{'total':<28}" + "".join(f"{u.flash:>12}{u.ram:>8}" for u in sums))
+    print(f"{TOTAL:<28}" + "".join(f"{u.flash:>12}{u.ram:>8}" for u in sums))
     print(f"{'RAM of the application':<28}" + "".join(f"{u.application:>20}" for u in sums))
 
 
 def read_budget(path: Path) -> Budget:
     """The budget file; see firmware/size-budget.toml."""
     data = tomllib.loads(path.read_text())
-    return Budget(set(data["application"]), data["total"], data.get("component", {}))
+    return Budget(set(data["application"]), data["goal"], data.get("limit", {}))
 
 
 def with_slack(size: int) -> int:
@@ -147,12 +156,13 @@ def with_slack(size: int) -> int:
 
 
 def update(path: Path, measured: dict[str, dict[str, Usage]]) -> None:
-    """Replaces the component tables at the end of the file; what stands before them is kept as it is."""
-    head = path.read_text().split("[component.", 1)[0].rstrip()
+    """Replaces the limits at the end of the file; what stands before them is kept as it is."""
+    head = path.read_text().split("[limit.", 1)[0].rstrip()
     tables = []
     for config, usage in measured.items():
-        lines = [f'"{name}" = [{with_slack(u.flash)}, {with_slack(u.ram)}]' for name, u in sorted(usage.items())]
-        tables.append(f"[component.{config}]\n" + "\n".join(lines))
+        entries = [*sorted(usage.items()), (TOTAL, total(usage))]
+        lines = [f'"{name}" = [{with_slack(u.flash)}, {with_slack(u.ram)}]' for name, u in entries]
+        tables.append(f"[limit.{config}]\n" + "\n".join(lines))
     path.write_text(head + "\n\n" + "\n\n".join(tables) + "\n")
 
 
@@ -170,7 +180,8 @@ def main() -> int:
         budget = read_budget(args.budget)
     print_table(measured)
     complaints = [text for config, usage in measured.items() for text in exceeded(config, usage, budget)]
-    print("\n".join(complaints))
+    goals = [text for config, usage in measured.items() for text in missed_goals(config, usage, budget)]
+    print("", *goals, *complaints, sep="\n")
     return 1 if complaints else 0
 
 

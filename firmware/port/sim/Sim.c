@@ -559,6 +559,11 @@ static const CMP_EXT_FUNCTION externals[] = {
     {"simburn", 0x76DDCD81, 0x00010000, (RTS_PFN)simburn}, /* simburn(UDINT) */
 };
 
+int SimHasExternal(const char *name)
+{
+    return sim.on && CMFindExternal(name) != NULL;
+}
+
 RTS_RESULT SysSim_Hook(CMP_HOOK hook)
 {
     return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;

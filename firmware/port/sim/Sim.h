@@ -56,6 +56,9 @@ void SimSetCycleLimit(RTS_UI32 ms);
 void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version);
 void SimSetNodeName(const char *name); /* at most 31 characters are kept */
 
+/* Whether IEC code can call a C function of this name (lower case). While power is off nothing can be called. */
+int SimHasExternal(const char *name);
+
 /*
  * Real time one call of a task takes [ns], both the best of several batches: its code alone, called back to back with the
  * time of the task advancing by its interval; and a complete IecTaskCycle with the clock readings around it. Starts the

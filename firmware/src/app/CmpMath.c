@@ -9,6 +9,12 @@
 
 enum { VERSION = 0x00010000 };
 
+/* Some C libraries have a powf that is several units of the last place off. */
+static float real_power(float base, float exponent)
+{
+    return (float)pow((double)base, (double)exponent);
+}
+
 /* The signatures are those of the interface texts in CmpMath.h. */
 static const CMP_EXT_FUNCTION functions[] = {
     {"sin", 0xB90BD8A4, VERSION, (RTS_PFN)sin},
@@ -32,7 +38,7 @@ static const CMP_EXT_FUNCTION functions[] = {
     {"logf", 0x87F66D24, VERSION, (RTS_PFN)logf},
     {"log10f", 0x8E014356, VERSION, (RTS_PFN)log10f},
     {"atan2f", 0x8B5C7723, VERSION, (RTS_PFN)atan2f},
-    {"powf", 0x4F59F748, VERSION, (RTS_PFN)powf},
+    {"powf", 0x4F59F748, VERSION, (RTS_PFN)real_power},
 };
 
 RTS_RESULT CmpMath_Hook(CMP_HOOK hook)

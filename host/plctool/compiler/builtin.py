@@ -26,7 +26,7 @@ from plctool.compiler.conversions import (
     settle,
     time_to_ltime,
 )  # fmt: skip
-from plctool.compiler.expressions import Expressions, is_untyped
+from plctool.compiler.expressions import Expressions, is_untyped, load
 from plctool.compiler.symbols import ERROR, UNTYPED_INT, PouSymbol, TypeSymbol
 from plctool.compiler.typed import (
     Binary,
@@ -39,6 +39,7 @@ from plctool.compiler.typed import (
     Load,
     UnaryOp,
     ValuePlace,
+    VarPlace,
 )
 from plctool.compiler.types import (
     BOOL,
@@ -294,6 +295,9 @@ class Builtins(Expressions):
     def _time(self, name: str, args: list[Expr], node: ast.Call, expected: Type | None) -> Expr:
         if not self._count(name, args, node, 0, 0):
             return error_value(self.pos(node.pos))
+        if self.world.clock is not None:
+            variable = self.world.clock[name]
+            return load(VarPlace(variable, variable.type, self.pos(node.pos)))
         return IntrinsicCall(Intrinsic[name], [], ELEMENTARY[name], self.pos(node.pos))
 
     def _string_size(self, name: str, args: list[Expr], node: ast.Call, expected: Type | None) -> Expr:

@@ -67,18 +67,15 @@ class Calls(Builtins):
         if isinstance(symbol, VarSymbol):
             if symbol.type in self.world.blocks or symbol.type is ERROR:
                 return self._call_of_place(node)
-            symbol = self.world.lookup(name.casefold(), library=self.scope.library)
-        if (
-            isinstance(symbol, PouSymbol)
-            and symbol.keyword == "FUNCTION"
-            and (not symbol.library or self.scope.library)
-        ):
+            shadow, symbol = symbol, self.world.lookup(name.casefold(), library=self.scope.library)
+        is_function = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION"
+        if isinstance(symbol, PouSymbol) and is_function and (not symbol.library or self.scope.library):
             return self._call_function(symbol, node, expected)
         if symbol is None or isinstance(symbol, PouSymbol):
             built_in = self.built_in(name.upper(), node, expected)
             if built_in is not None:
                 return built_in
-        if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION":
+        if isinstance(symbol, PouSymbol) and is_function:
             return self._call_function(symbol, node, expected)
         overload = self._overload(name, node, expected)
         if overload is not None:

@@ -25,6 +25,7 @@ __extendsfdf2(REAL):LREAL __truncdfsf2(LREAL):REAL sqrtf(REAL):REAL sqrt(LREAL):
 __divsi3(DINT,DINT):DINT __udivsi3(UDINT,UDINT):UDINT __modsi3(DINT,DINT):DINT __umodsi3(UDINT,UDINT):UDINT
 __divdi3(LINT,LINT):LINT __udivdi3(ULINT,ULINT):ULINT __moddi3(LINT,LINT):LINT __umoddi3(ULINT,ULINT):ULINT
 __muldi3(LINT,LINT):LINT __ashldi3(LINT,DINT):LINT __ashrdi3(LINT,DINT):LINT __lshrdi3(LINT,DINT):LINT
+__clzsi2(UDINT):DINT __clzdi2(ULINT):DINT
 """
 
 COMPILER_CALLS: dict[str, External] = {

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from plctool.compiler.configuration import configure
 from plctool.compiler.diagnostics import Diagnostic, TooManyErrors, render
@@ -19,6 +20,9 @@ from plctool.compiler.parser import parse
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Area, TypedProgram
 from plctool.compiler.world import World
+
+if TYPE_CHECKING:
+    from plctool.compiler.unit_tests import TestSuite
 
 __all__ = ["CheckResult", "Diagnostic", "Source", "check_sources", "render"]
 
@@ -31,6 +35,7 @@ class CheckResult:
 
     program: TypedProgram | None
     diagnostics: list[Diagnostic]
+    has_tests: bool = False  # there are TEST blocks, whether they were looked at or not
 
     @property
     def ok(self) -> bool:
@@ -39,26 +44,31 @@ class CheckResult:
 
 
 def check_sources(
-    sources: Sequence[Source], *, library: bool = True, library_sources: Sequence[Source] = ()
+    sources: Sequence[Source],
+    *,
+    library: bool = True,
+    library_sources: Sequence[Source] = (),
+    tests: TestSuite | None = None,
 ) -> CheckResult:
     """Checks the files of a program together.
 
-    `library`: whether the standard library is there; `library_sources`: other library texts in place of it. Whatever
+    `library`: whether the standard library is there; `library_sources`: other library texts in place of it. `tests`:
+    takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over. Whatever
     the texts hold, the answer is a program or diagnoses, never an exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     world = World(chosen)
     with _limits():
-        program = _guarded(world, sources)
+        program = _guarded(world, sources, tests)
     diagnostics = world.diagnostics
-    return CheckResult(None if diagnostics.errors else program, diagnostics.sorted())
+    return CheckResult(None if diagnostics.errors else program, diagnostics.sorted(), bool(world.tests))
 
 
-def _guarded(world: World, sources: Sequence[Source]) -> TypedProgram | None:
+def _guarded(world: World, sources: Sequence[Source], tests: TestSuite | None) -> TypedProgram | None:
     """The check, with an end to errors and to nesting."""
     try:
         try:
-            return _check(world, sources)
+            return _check(world, sources, tests)
         except NestingError as error:
             world.nested_too_deeply(error)
         except RecursionError:
@@ -68,19 +78,25 @@ def _guarded(world: World, sources: Sequence[Source]) -> TypedProgram | None:
     return None
 
 
-def _check(world: World, sources: Sequence[Source]) -> TypedProgram | None:
+def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> TypedProgram | None:
     parsed = [(source, parse(source, world.diagnostics.at(source))) for source in sources]
     if world.diagnostics.errors:
         return None
+    if tests is not None:
+        parsed = tests.prepare(parsed, world)
     for source, declarations in parsed:
         world.register(declarations)
         world.register_globals(declarations, source)
     world.declare_all()
-    application = configure(world)
+    if tests is None:
+        application = configure(world)
+    else:
+        application = tests.configure(world)
+        tests.add(world)
     world.check_bodies()
     allocation = world.allocation
     _check_sizes(world, sources)
-    if not application.tasks and not world.diagnostics.errors and sources:
+    if not application.tasks and not world.tests and not world.diagnostics.errors and sources:
         world.diagnostics.warning(sources[0].pos(0), "no-program", "there is no PROGRAM, so nothing would run")
     return TypedProgram(
         pous=world.pous,

@@ -6,13 +6,13 @@ Integers wrap, nothing here has undefined behaviour for any operand, and no conv
 from __future__ import annotations
 
 from plctool.compiler.ir import float_literal
-from plctool.compiler.lower_frame import DIVIDE_BY_ZERO, Frame
+from plctool.compiler.lower_frame import DIVIDE_BY_ZERO, Frame, zero
 from plctool.compiler.lower_unit import Check, value_type
 from plctool.compiler.typed import BinaryOp, Const, Intrinsic, Pos, UnaryOp
-from plctool.compiler.types import Elementary, Kind, PointerType, Type, base_of
+from plctool.compiler.types import BOOL, Elementary, Kind, PointerType, Type, base_of
 
-_LOGIC = {BinaryOp.AND: "and", BinaryOp.OR: "or", BinaryOp.XOR: "xor"}
-_INTEGER = {BinaryOp.ADD: "add", BinaryOp.SUB: "sub", BinaryOp.MUL: "mul", **_LOGIC}
+LOGIC = {BinaryOp.AND: "and", BinaryOp.OR: "or", BinaryOp.XOR: "xor"}
+_INTEGER = {BinaryOp.ADD: "add", BinaryOp.SUB: "sub", BinaryOp.MUL: "mul", **LOGIC}
 _REAL = {BinaryOp.ADD: "fadd", BinaryOp.SUB: "fsub", BinaryOp.MUL: "fmul", BinaryOp.DIV: "fdiv"}
 _COMPARE = {
     BinaryOp.EQ: ("eq", "oeq"),
@@ -30,17 +30,19 @@ def is_real(t: Type) -> bool:
     return isinstance(base, Elementary) and base.kind is Kind.REAL
 
 
+def is_bool(t: Type) -> bool:
+    return base_of(t) is BOOL
+
+
 def is_signed(t: Type) -> bool:
     base = base_of(t)
     return isinstance(base, Elementary) and base.signed
 
 
 def bits_of(t: Type) -> int:
-    """The width of a scalar's value; 1 for BOOL."""
+    """The width of a scalar's value."""
     base = base_of(t)
-    if isinstance(base, Elementary):
-        return 1 if base.kind is Kind.BOOL else base.bits
-    return 64
+    return base.bits if isinstance(base, Elementary) else 64
 
 
 def constant(value: int | float | str, t: Type) -> str:
@@ -48,8 +50,6 @@ def constant(value: int | float | str, t: Type) -> str:
     text = value_type(t)
     if text in ("float", "double"):
         return float_literal(float(value), bits_of(t))
-    if text == "i1":
-        return "true" if value else "false"
     if text == "ptr":
         return f"inttoptr (i64 {int(value)} to ptr)" if int(value) else "null"
     return str(int(value))
@@ -62,6 +62,8 @@ class Arithmetic(Frame):
         """The i1 of a comparison of two values of `t`."""
         integer, real = _COMPARE[op]
         text = value_type(t)
+        if is_bool(t):
+            left, right = self.lowest_bit(left), self.lowest_bit(right)
         if text in ("float", "double"):
             return self.fn.value(f"fcmp {real} {text} {left}, {right}")
         if op not in (BinaryOp.EQ, BinaryOp.NE):
@@ -123,7 +125,7 @@ class Arithmetic(Frame):
     def unary(self, op: UnaryOp, operand: str, t: Type) -> str:
         text = value_type(t)
         if op is UnaryOp.NOT:
-            return self.fn.value(f"xor {text} {operand}, {'true' if text == 'i1' else '-1'}")
+            return self.fn.value(f"xor {text} {operand}, {1 if is_bool(t) else -1}")
         if text in ("float", "double"):
             return self.fn.value(f"fneg {text} {operand}")
         return self.fn.value(f"sub {text} 0, {operand}")
@@ -133,12 +135,13 @@ class Arithmetic(Frame):
     def convert(self, value: str, source: Type, target: Type, *, truncate: bool = False) -> str:
         """A scalar conversion as typed.Convert defines it."""
         old, new = value_type(source), value_type(target)
+        fn = self.fn
+        if is_bool(target):
+            return value if is_bool(source) else fn.value(f"zext i1 {self.is_not_zero(value, source)} to i8")
+        if is_bool(source):
+            value = self.lowest_bit(value)
         if old == new:
             return value
-        fn = self.fn
-        if new == "i1":
-            compare = "fcmp une" if old in ("float", "double") else "icmp ne"
-            return fn.value(f"{compare} {old} {value}, {'0.0' if 'f' in compare else 'null' if old == 'ptr' else '0'}")
         if old == "ptr" or new == "ptr":
             word = "ptrtoint" if old == "ptr" else "inttoptr"
         elif is_real(source) and is_real(target):
@@ -152,6 +155,15 @@ class Arithmetic(Frame):
         else:
             word = "sext" if is_signed(source) else "zext"
         return fn.value(f"{word} {old} {value} to {new}")
+
+    def lowest_bit(self, value: str) -> str:
+        """A BOOL as 0 or 1."""
+        return value if value in ("0", "1") else self.fn.value(f"and i8 {value}, 1")
+
+    def is_not_zero(self, value: str, t: Type) -> str:
+        """The i1 of a conversion to BOOL."""
+        text = value_type(t)
+        return self.fn.value(f"{'fcmp une' if is_real(t) else 'icmp ne'} {text} {value}, {zero(t)}")
 
     def _to_integer(self, value: str, source: Type, target: Type, truncate: bool) -> str:
         text, integer = value_type(source), value_type(target)
@@ -219,7 +231,9 @@ class Arithmetic(Frame):
     def extreme(self, op: Intrinsic, left: str, right: str, t: Type) -> str:
         """MIN, MAX of two scalars."""
         text = value_type(t)
-        if text in ("float", "double", "i1"):
+        if is_bool(t):
+            return self.binary(BinaryOp.AND if op is Intrinsic.MIN else BinaryOp.OR, left, right, t)
+        if text in ("float", "double"):
             first = self.compare(BinaryOp.LT if op is Intrinsic.MIN else BinaryOp.GT, left, right, t)
             return self.select(first, left, right, t)
         word = ("s" if is_signed(t) else "u") + op.value.lower()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plctool.compiler.lower_arith import COMPARISONS, bits_of, constant, is_signed, known_integer
+from plctool.compiler.lower_arith import COMPARISONS, LOGIC, bits_of, constant, is_bool, is_signed, known_integer
 from plctool.compiler.lower_frame import (
     ACCESS_VIOLATION,
     ARRAY_BOUNDS,
@@ -15,7 +15,7 @@ from plctool.compiler.lower_frame import (
     string_capacity,
 )
 from plctool.compiler.lower_string import Strings
-from plctool.compiler.lower_unit import Check, memory_type, value_type
+from plctool.compiler.lower_unit import Check, value_type
 from plctool.compiler.ranges import type_range, value_range
 from plctool.compiler.typed import (
     Binary,
@@ -44,6 +44,7 @@ from plctool.compiler.typed import (
 )
 from plctool.compiler.types import BYTE, UDINT, ArrayType, StringType, StructType, Type, is_scalar
 
+_SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 PLACES = (VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace)
 
 
@@ -59,7 +60,7 @@ def parameter_types(pou: Pou, parameter: Parameter) -> list[str]:
 
 def _extended(t: Type) -> str:
     """A scalar parameter or result of a C function."""
-    text = memory_type(t)
+    text = value_type(t)
     if text in ("i8", "i16"):
         return f"{text} {'signext' if is_signed(t) else 'zeroext'}"
     return text
@@ -203,6 +204,8 @@ class Expressions(Strings):
         if isinstance(e, Load):
             return self._load(e)
         if isinstance(e, Binary):
+            if e.op in COMPARISONS or e.op in _SHORT_CIRCUIT:
+                return self.fn.value(f"zext i1 {self.condition(e)} to i8")
             return self._binary(e)
         if isinstance(e, Convert):
             return self._convert(e)
@@ -221,14 +224,24 @@ class Expressions(Strings):
                 return self.fn.value(f"load {value_type(e.type)}, ptr {shadow}")
         return self.load(self.ref(e.place))
 
-    def _binary(self, e: Binary) -> str:
-        if e.op in (BinaryOp.AND_THEN, BinaryOp.OR_ELSE):
-            return self._short_circuit(e)
-        operands = e.left.type
-        if e.op in COMPARISONS:
-            if isinstance(operands, StringType):
+    def condition(self, e: Expr) -> str:
+        """The i1 that holds the value of a BOOL expression."""
+        if isinstance(e, Binary):
+            if e.op in _SHORT_CIRCUIT:
+                return self._short_circuit(e)
+            if e.op not in COMPARISONS:
+                left, right = self.condition(e.left), self.condition(e.right)
+                return self.fn.value(f"{LOGIC[e.op]} i1 {left}, {right}")
+            if isinstance(e.left.type, StringType):
                 return self._compare_strings(e)
-            return self.compare(e.op, self.value(e.left), self.value(e.right), operands)
+            return self.compare(e.op, self.value(e.left), self.value(e.right), e.left.type)
+        if isinstance(e, Unary):
+            return self.fn.value(f"xor i1 {self.condition(e.operand)}, true")
+        if isinstance(e, Convert) and not is_bool(e.operand.type):
+            return self.is_not_zero(self.value(e.operand), e.operand.type)
+        return self.fn.value(f"trunc i8 {self.value(e)} to i1")
+
+    def _binary(self, e: Binary) -> str:
         left, right = self.value(e.left), self.value(e.right)
         if e.op in (BinaryOp.DIV, BinaryOp.MOD) and value_type(e.type) not in ("float", "double"):
             return self.divide(e.op, left, right, e.type, e.pos, known_integer(e.right))
@@ -236,14 +249,14 @@ class Expressions(Strings):
 
     def _short_circuit(self, e: Binary) -> str:
         fn = self.fn
-        left = self.value(e.left)
+        left = self.condition(e.left)
         more, end, first = fn.label("more"), fn.label("end"), fn.block
         if e.op is BinaryOp.AND_THEN:
             fn.branch_if(left, more, end)
         else:
             fn.branch_if(left, end, more)
         fn.begin(more)
-        right = self.value(e.right)
+        right = self.condition(e.right)
         last = fn.block
         fn.begin(end)
         skipped = "false" if e.op is BinaryOp.AND_THEN else "true"
@@ -295,14 +308,15 @@ class Expressions(Strings):
             return self.context_load(TIME_NS_OFFSET, "i64")
         if op is Intrinsic.STRING_SIZE:
             return self.convert(self.aggregate(e.args[0]).capacity, UDINT, t)
-        values = [self.value(arg) for arg in e.args]
         first = e.args[0].type
+        if op is Intrinsic.SELECT:
+            choice, no, yes = self.condition(e.args[0]), self.value(e.args[1]), self.value(e.args[2])
+            return self.select(choice, yes, no, t)
+        values = [self.value(arg) for arg in e.args]
         if op in (Intrinsic.SHL, Intrinsic.SHR):
             return self.shift(op, values[0], t, values[1], e.args[1].type, known_integer(e.args[1]))
         if op in (Intrinsic.ROL, Intrinsic.ROR):
             return self.rotate(op, values[0], t, values[1], e.args[1].type)
-        if op is Intrinsic.SELECT:
-            return self.select(values[0], values[2], values[1], t)
         if op is Intrinsic.MUX:
             return self._choose(values[0], first, values[1:], value_type(t))
         if op in (Intrinsic.MIN, Intrinsic.MAX):
@@ -341,7 +355,7 @@ class Expressions(Strings):
 
     def _selected(self, e: IntrinsicCall) -> Ref:
         """SEL and MUX choose an address."""
-        choice = self.value(e.args[0])
+        choice = self.condition(e.args[0]) if e.intrinsic is Intrinsic.SELECT else self.value(e.args[0])
         refs = [self.aggregate(arg) for arg in e.args[1:]]
         pointers = [self.address(ref) for ref in refs]
         capacities = [ref.capacity for ref in refs]
@@ -404,7 +418,7 @@ class Expressions(Strings):
             value = fn.value(
                 f"call {convention}{' '.join(reversed(words))} {target}({', '.join(arguments)}){attributes}"
             )
-            return fn.value(f"trunc i8 {value} to i1") if text == "i1" else value
+            return value
         return fn.value(f"call {text} {target}({', '.join(arguments)})")
 
     def _argument(
@@ -417,7 +431,7 @@ class Expressions(Strings):
         elif not isinstance(argument, PLACES):
             if is_scalar(t) and not parameter.by_reference:
                 value = self.value(argument)
-                return [self.fn.value(f"zext i1 {value} to i8")] if pou.external and value_type(t) == "i1" else [value]
+                return [self.lowest_bit(value)] if pou.external and is_bool(t) else [value]
             ref = self._materialised(argument)
         else:
             ref = self.ref(argument)

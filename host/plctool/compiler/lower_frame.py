@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from plctool.compiler.ir import Function
-from plctool.compiler.lower_unit import RAISE, Check, Unit, memory_type, value_type
+from plctool.compiler.lower_unit import RAISE, Check, Unit, value_type
 from plctool.compiler.typed import Area, Pos, Pou, Variable
 from plctool.compiler.types import Elementary, StringType, Type, base_of, is_scalar
 from plctool.core import ffi, lib
@@ -155,26 +155,23 @@ class Frame:
     def load(self, ref: Ref) -> str:
         """The scalar at `ref`."""
         fn = self.fn
-        text = memory_type(ref.type)
+        text = value_type(ref.type)
         value = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.type.align}{ref.tag}")
         if ref.loose:
             return fn.value(f"freeze {text} {value}")
         if ref.bit >= 0:
-            shifted = fn.value(f"lshr {text} {value}, {ref.bit}") if ref.bit else value
-            return fn.value(f"trunc {text} {shifted} to i1")
-        if value_type(ref.type) == "i1":
-            return fn.value(f"trunc i8 {value} to i1")
+            shifted = fn.value(f"lshr {text} {value}, {ref.bit}")
+            bit = shifted if text == "i8" else fn.value(f"trunc {text} {shifted} to i8")
+            return fn.value(f"and i8 {bit}, 1")
         return value
 
     def store(self, ref: Ref, value: str) -> None:
         """Stores a scalar."""
         fn = self.fn
-        text = memory_type(ref.type)
+        text = value_type(ref.type)
         address = self.address(ref)
         if ref.bit >= 0:
             value = self._with_bit(ref, text, value)
-        elif value_type(ref.type) == "i1":
-            value = str(int(value == "true")) if value in ("true", "false") else fn.value(f"zext i1 {value} to i8")
         fn.do(f"store {text} {value}, ptr {address}, align {ref.type.align}{ref.tag}")
         if text == "ptr" and self.unit.target.pointer_size == 4:  # pointers take 8 bytes in memory on every target
             upper = self.address(replace(ref, offset=ref.offset + 4))
@@ -186,12 +183,14 @@ class Frame:
         assert isinstance(base, Elementary)
         mask = 1 << ref.bit
         old = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.type.align}{ref.tag}")
-        if value == "true":
+        if value == "1":
             return fn.value(f"or {text} {old}, {mask}")
         cleared = fn.value(f"and {text} {old}, {~mask}")
-        if value == "false":
+        if value == "0":
             return cleared
-        wide = fn.value(f"zext i1 {value} to {text}")
+        wide = fn.value(f"and i8 {value}, 1")
+        if text != "i8":
+            wide = fn.value(f"zext i8 {wide} to {text}")
         return fn.value(f"or disjoint {text} {cleared}, {fn.value(f'shl {text} {wide}, {ref.bit}')}")
 
     def copy(self, target: Ref, source: Ref, size: int) -> None:
@@ -220,7 +219,7 @@ class Frame:
     def temporary(self, t: Type) -> Ref:
         """Memory for a value of `t` until the next statement; contents undefined."""
         if is_scalar(t):
-            return Ref(self.fn.slot(memory_type(t)), 0, t, direct=True)
+            return Ref(self.fn.slot(value_type(t)), 0, t, direct=True)
         key = (t.size, t.align)
         free = self._free.setdefault(key, [])
         pointer = free.pop() if free else self.fn.alloca(*key)
@@ -239,8 +238,6 @@ def zero(t: Type) -> str:
     text = value_type(t)
     if text == "ptr":
         return "null"
-    if text == "i1":
-        return "false"
     return "0.0" if text in ("float", "double") else "0"
 
 

@@ -10,7 +10,7 @@ from plctool.compiler.lower_arith import is_signed, known_integer
 from plctool.compiler.lower_expr import parameter_types, result_in_memory
 from plctool.compiler.lower_frame import DIVIDE_BY_ZERO, Ref, string_capacity
 from plctool.compiler.lower_init import Initialising
-from plctool.compiler.lower_unit import Check, Unit, memory_type, value_type
+from plctool.compiler.lower_unit import Check, Unit, value_type
 from plctool.compiler.ranges import type_range, value_range
 from plctool.compiler.typed import (
     Assign,
@@ -165,7 +165,7 @@ class Body(Initialising):
         for condition, body in s.branches:
             self.at(condition.pos)
             then, otherwise = fn.label("then"), fn.label("else")
-            fn.branch_if(self.value(condition), then, otherwise)
+            fn.branch_if(self.condition(condition), then, otherwise)
             fn.begin(then)
             self.statements(body)
             fn.branch(end)
@@ -207,7 +207,7 @@ class Body(Initialising):
         again, body, end = fn.label("while"), fn.label("do"), fn.label("endwhile")
         fn.begin(again)
         self.at(s.condition.pos)
-        fn.branch_if(self.value(s.condition), body, end)
+        fn.branch_if(self.condition(s.condition), body, end)
         fn.begin(body)
         self._loop_body(s.body, again, end)
         fn.branch(again)
@@ -220,7 +220,7 @@ class Body(Initialising):
         self._loop_body(s.body, test, end)
         fn.begin(test)
         self.at(s.until.pos)
-        fn.branch_if(self.value(s.until), end, again)
+        fn.branch_if(self.condition(s.until), end, again)
         fn.begin_detached(end)
 
     def _loop_body(self, body: list[Statement], on_continue: str, on_exit: str) -> None:
@@ -291,7 +291,7 @@ class Body(Initialising):
     def _stack_memory(self, var: Variable) -> Ref:
         t = var.type
         if is_scalar(t):
-            return Ref(self.fn.slot(memory_type(t)), 0, t, direct=True)
+            return Ref(self.fn.slot(value_type(t)), 0, t, direct=True)
         return Ref(self.fn.alloca(t.size, t.align), 0, t, direct=True, capacity=string_capacity(t))
 
     def _take_parameters(self, pou: Pou) -> None:

@@ -13,7 +13,7 @@ from plctool.compiler.ir import Module, escape
 from plctool.compiler.lower_helpers import LIBRARY_FUNCTIONS
 from plctool.compiler.targets import Target
 from plctool.compiler.typed import Area, External, Pos, Pou, StructInit
-from plctool.compiler.types import BOOL, Elementary, Kind, PointerType, StructType, Type, base_of
+from plctool.compiler.types import Elementary, Kind, PointerType, StructType, Type, base_of
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
 
@@ -62,22 +62,14 @@ RAISE = External("iecraise", interface_signature("iecraise(UDINT)"), 0x00010000)
 
 
 def value_type(t: Type) -> str:
-    """The LLVM type of a scalar in a register."""
+    """The LLVM type of a scalar. A BOOL is an i8 whose lowest bit counts, so that it goes to and from memory as it is."""
     base = base_of(t)
     if isinstance(base, PointerType):
         return "ptr"
     assert isinstance(base, Elementary), t
-    if base is BOOL:
-        return "i1"
     if base.kind is Kind.REAL:
         return "float" if base.bits == 32 else "double"
     return f"i{base.bits}"
-
-
-def memory_type(t: Type) -> str:
-    """The LLVM type of a scalar in memory; only BOOL differs."""
-    text = value_type(t)
-    return "i8" if text == "i1" else text
 
 
 class Unit:

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 from plctool.compiler import ast
 from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.source import Source
 from plctool.core import lib
 
 MOCKED, CALLS = "__mocked", "__calls"
@@ -61,7 +62,7 @@ def raising() -> ast.PouDecl:
     """The function that raises an exception by its number."""
     code = ast.VarDecl(0, [(0, "code")], None, ast.NamedType(0, "UDINT"), None)
     block = ast.VarBlock(0, "VAR_INPUT", set(), [code])
-    return ast.PouDecl(0, "FUNCTION", _RAISE, None, [block], [], {"external": "iecraise"}, ast.Source("", ""))
+    return ast.PouDecl(0, "FUNCTION", _RAISE, None, [block], [], {"external": "iecraise"}, Source("", ""))
 
 
 def _mocked(tests: Iterable[ast.TestDecl]) -> tuple[bool, set[str]]:

@@ -84,8 +84,9 @@ class TestSuite:
     def prepare(
         self, parsed: list[tuple[Source, list[ast.Declaration]]], world: World
     ) -> list[tuple[Source, list[ast.Declaration]]]:
-        """Adds to the syntax tree what MOCK needs."""
+        """Sets the hidden variables up, and adds to the syntax tree what MOCK needs."""
         tests = [d for _, declarations in parsed for d in declarations if isinstance(d, ast.TestDecl)]
+        self._bench = Bench(world)
         world.register([mocks.raising()])
         return [(s, mocks.with_mocks(declarations, tests, world.diagnostics)) for s, declarations in parsed]
 
@@ -99,8 +100,8 @@ class TestSuite:
         return application
 
     def _task(self, world: World) -> Task:
-        self._bench = Bench(world)
-        pos = Pos("", 0, 0)
+        assert self._bench is not None
+        pos = next((t.source.pos(t.pos) for t in world.tests), Pos("", 1, 1))
         runner = Pou("Tests", PouKind.PROGRAM, pos)
         runner.body = [Case(load(self._bench.place(NUMBER, pos)), self._branches, [], pos)]
         return Task("Tests", TaskKind.CYCLIC, 1, 10_000, [runner])
@@ -172,13 +173,16 @@ class TestSuite:
         for name in {name.casefold() for b in decl.blocks for line in b.decls for _, name in line.names}:
             if isinstance(scope.names.get(name), VarSymbol):
                 del scope.names[name]  # hides one of SETUP
-        world.units.constants(_as_program(decl, pou), scope)
-        for block in decl.blocks:
+        blocks = sorted(decl.blocks, key=lambda b: "CONSTANT" not in b.qualifiers)  # bounds may need constants
+        for block in blocks:
             if block.keyword not in ("VAR", "VAR_TEMP", "VAR_EXTERNAL"):
                 scope.error(block.pos, "unsupported", f"a {decl.keyword} has VAR, not {block.keyword}")
-            elif "CONSTANT" not in block.qualifiers and block.keyword != "VAR_EXTERNAL":
+            elif block.keyword != "VAR_EXTERNAL":  # globals are known anyway
                 for line in block.decls:
-                    self._line(line, scope, shared)
+                    if "CONSTANT" in block.qualifiers:
+                        _constant(line, scope, pou.name)
+                    else:
+                        self._line(line, scope, shared)
 
     def _line(self, line: ast.VarDecl, scope: Scope, shared: _File | None) -> None:
         world, pou = scope.world, scope.pou
@@ -218,8 +222,12 @@ def _as_block(program: PouSymbol) -> PouSymbol:
     return PouSymbol(replace(decl, keyword="FUNCTION_BLOCK", blocks=blocks), library=False)
 
 
-def _as_program(decl: ast.TestDecl, pou: Pou) -> ast.PouDecl:
-    return ast.PouDecl(decl.pos, "PROGRAM", pou.name, None, decl.blocks, decl.body, {}, decl.source)
+def _constant(line: ast.VarDecl, scope: Scope, owner: str) -> None:
+    declarations = scope.world.declarations
+    t, init = declarations.declared_type(line, scope)
+    for offset, name in line.names:
+        symbol = declarations.constant_symbol(offset, name, t, init, scope, owner, Role.LOCAL)
+        declarations.add(scope, symbol, offset)
 
 
 def _call(pou: Pou) -> Statement:

@@ -54,6 +54,8 @@ class World:
         self.defaults: dict[str, StructInit] = {}
         self.shared: dict[tuple[str, int], Variable] = {}
         self.configurations: list[ast.ConfigurationDecl] = []
+        self.tests: list[ast.TestDecl] = []
+        self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
         self.pous: list[Pou] = []
         self._names: dict[str, Symbol] = {}
         self._library_names: dict[str, Symbol | None] = {}
@@ -84,6 +86,8 @@ class World:
                 self._add(symbol, decl.name, decl.pos, decl.source, library=library)
                 for name in _enum_names(symbol):
                     self._enum_values.setdefault(name.casefold(), []).append(symbol)
+            elif isinstance(decl, ast.TestDecl):
+                self.tests.append(decl)
             elif isinstance(decl, ast.ConfigurationDecl):
                 self.configurations.append(decl)
                 for block in decl.globals:
@@ -95,7 +99,7 @@ class World:
         blocks = [d.block for d in declarations if isinstance(d, ast.GlobalBlock)]
         if not blocks:
             return
-        alone = all(isinstance(d, ast.GlobalBlock) for d in declarations)
+        alone = all(isinstance(d, ast.GlobalBlock | ast.TestDecl) for d in declarations)
         namespace = Namespace(source.stem, "list of globals", {})
         for block in blocks:
             for symbol in self._add_globals(block, source, prefix=f"{source.stem}." if alone else ""):
@@ -270,14 +274,15 @@ class World:
                 self.nested_too_deeply(error)
             self.pous.append(pou)
             if not scope.library:
-                self._report_unused(scope)
+                self.report_unused(scope)
         self._report_recursion()
 
     def nested_too_deeply(self, error: NestingError) -> None:
         """Reports what goes beyond MAX_DEPTH."""
         self.diagnostics.error(error.pos, "nesting", "this is nested too deeply; split it")
 
-    def _report_unused(self, scope: Scope) -> None:
+    def report_unused(self, scope: Scope) -> None:
+        """Warns of variables nobody uses."""
         for symbol in scope.names.values():
             if isinstance(symbol, VarSymbol) and not symbol.used and symbol.role in (Role.LOCAL, Role.TEMP):
                 self.diagnostics.warning(symbol.pos, "unused", f"{symbol.name} is never used")

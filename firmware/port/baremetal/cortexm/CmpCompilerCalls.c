@@ -101,6 +101,16 @@ static RTS_UI64 ulint_modulo(RTS_UI64 a, RTS_UI64 b)
 }
 
 #ifdef __ARM_ARCH_6M__
+static RTS_I32 udint_leading_zeros(RTS_UI32 value)
+{
+    return value != 0 ? __builtin_clz(value) : 32;
+}
+
+static RTS_I32 ulint_leading_zeros(RTS_UI64 value)
+{
+    return value != 0 ? __builtin_clzll(value) : 64;
+}
+
 static RTS_I32 dint_divide(RTS_I32 a, RTS_I32 b)
 {
     return a / b;
@@ -152,6 +162,8 @@ static const CMP_EXT_FUNCTION int_calls[] = {
     {"__ashldi3", 0xC854631C, CALLS_VERSION, (RTS_PFN)lint_shift_left},
     {"__ashrdi3", 0x316A835E, CALLS_VERSION, (RTS_PFN)lint_shift_right},
     {"__lshrdi3", 0xAAFC8B3F, CALLS_VERSION, (RTS_PFN)ulint_shift_right},
+    {"__clzsi2", 0x9281B3F4, CALLS_VERSION, (RTS_PFN)udint_leading_zeros},
+    {"__clzdi2", 0x5E356355, CALLS_VERSION, (RTS_PFN)ulint_leading_zeros},
 #endif
     {"__divdi3", 0x9A2F73C3, CALLS_VERSION, (RTS_PFN)lint_divide},
     {"__udivdi3", 0x17519471, CALLS_VERSION, (RTS_PFN)ulint_divide},

@@ -22,7 +22,7 @@ void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
 
 /* The main stack, bytes, a multiple of 32. The check of a new application's image is what needs most of it. */
 #ifndef RTS_MAIN_STACK_SIZE
-#define RTS_MAIN_STACK_SIZE 2048
+#define RTS_MAIN_STACK_SIZE 2560
 #endif
 
 #endif

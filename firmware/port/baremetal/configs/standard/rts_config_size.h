@@ -7,7 +7,7 @@
 #define RTS_CONFIG_SIZE_H
 
 #define APP_MAX_TASKS 3
-#define NETSERVER_MESSAGE_SIZE 1024
+#define NETSERVER_MESSAGE_SIZE 944 /* two full blocks */
 #define LOG_MAX_ENTRIES 8
 #define LOG_TEXT_SIZE 64
 #define SRV_MAX_GROUPS 4
