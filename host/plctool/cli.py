@@ -24,7 +24,6 @@ BENCH_CYCLES = 10000
 LATER = {
     "force": "use write, which a program may overwrite",
     "unforce": "there is nothing to unforce",
-    "test": "use pytest with plctool.Simulator",
 }
 
 
@@ -77,6 +76,17 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="virtual time instead")
     run.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="before the first cycle")
     run.add_argument("--get", action="append", default=[], metavar="NAME", help="after the last cycle")
+
+    test = command("test", _test, "run the unit tests of a program in this process, on a virtual clock")
+    _add_sources(test)
+    test.add_argument("--filter", default="*", metavar="PATTERN", help="only tests of such a name, with * and ?")
+    test.add_argument("--junit", type=Path, metavar="FILE", help="write a report in JUnit's format as well")
+    test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
+
+    export = command("export-itf", _export_itf, "write the C header and frame for functions implemented in C")
+    _add_sources(export)
+    export.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
+    export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
 
     bench = command("bench", _bench, "measure the time of a cycle on this machine")
     bench.add_argument("image", type=Path)
@@ -197,6 +207,28 @@ def _run(args: argparse.Namespace) -> int:
         document,
         lambda d: f"{output.values_text(d['values'])}\n{d['cycles']} cycles, {d['time_ms']:.10g} ms".lstrip(),
     )
+
+
+def _test(args: argparse.Namespace) -> int:
+    from plctool import st_tests
+    from plctool.files import write_atomically
+
+    report = st_tests.run_tests(args.sources, pattern=args.filter, level=args.level)
+    if args.junit:
+        write_atomically(args.junit, st_tests.junit_xml(report))
+    colour = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+    _show(args, report.document(), lambda d: st_tests.report_text(report, colour=colour))
+    return EXIT_FAILED if report.failed else EXIT_OK
+
+
+def _export_itf(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    def text(d: dict[str, Any]) -> str:
+        kept = "" if d["source_written"] else " (kept as it is; --force replaces it)"
+        return f"{output.table(d['functions'], d['functions'][0])}\n{d['header']}\n{d['source']}{kept}"
+
+    return _show(args, ops.export_interface(args.sources, args.output, args.force), text)
 
 
 def _bench(args: argparse.Namespace) -> int:

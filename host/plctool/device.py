@@ -28,8 +28,6 @@ RESET_OPTIONS = {
     "cold": lib.RESET_OPTION_COLD,
     "origin": lib.RESET_OPTION_ORIGIN,
 }
-# Failed checks are raised by a call: what is known of the place is the address after it.
-_RAISED_BY_CALL = (lib.RTSEXCPT_DIVIDEBYZERO, lib.RTSEXCPT_ARRAYBOUNDS, lib.RTSEXCPT_ACCESS_VIOLATION)
 _SCAN_SECONDS = 1.5
 
 
@@ -253,15 +251,25 @@ class Plc:
         return {name: s.decode(data) for name, s, data in zip(names, symbols, contents, strict=True)}
 
     def write(self, values: Mapping[str, Any]) -> None:
-        """Sets variables, by one message if they fit; texts such as 'T#80ms' are understood."""
+        """Sets variables, by one message if they fit; texts such as 'T#80ms' are understood.
+
+        A single bit is written with the rest of its byte as it was just before: what the program changes in that byte
+        between the two messages is lost.
+        """
         table = self.symbols()
-        entries = []
-        for name, value in values.items():
-            symbol = table.resolve(name)
+        named = [(table.resolve(name), value) for name, value in values.items()]
+        for symbol, _ in named:
             if symbol.area == lib.APP_AREA_CODE:
                 raise UsageError(f"{symbol.name} is a constant and cannot be written.", "constant")
-            entries.append((_range(symbol), symbol.encode(value)))
-        services.write_memory(self._session, table.image_crc, entries)
+        around_bits = list({_range(symbol) for symbol, _ in named if symbol.bit is not None})
+        contents = dict(
+            zip(around_bits, services.read_memory(self._session, table.image_crc, around_bits), strict=True)
+            if around_bits
+            else ()
+        )
+        for symbol, value in named:
+            contents[_range(symbol)] = symbol.encode(value, contents.get(_range(symbol)))
+        services.write_memory(self._session, table.image_crc, list(contents.items()))
 
     def watch(
         self, names: Sequence[str], interval: float = 0.5, count: int | None = None
@@ -277,7 +285,7 @@ def explain_exception(exception: services.AppException, task: str | None, table:
     """The exception with the source line that `table` knows for it."""
     place = None
     if table and exception.code_offset is not None:
-        place = table.address_to_line(exception.code_offset - (exception.code in _RAISED_BY_CALL))
+        place = table.address_to_line(exception.code_offset)
     if place is None:
         return ExceptionInfo(exception.code, exception.name, task)
     return ExceptionInfo(exception.code, exception.name, task, place.pou, place.file, place.line)

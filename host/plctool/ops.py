@@ -47,14 +47,49 @@ def build(
 
 def check(paths: Sequence[Path]) -> tuple[Document, list[str]]:
     """Every diagnosis of a program; the texts are as people read them."""
-    from plctool.compiler import load_sources
+    from plctool.compiler import check_with_tests, load_sources
     from plctool.compiler.diagnostics import render
-    from plctool.compiler.front import check_sources
 
     sources = load_sources(paths)
-    result = check_sources(sources)
+    result = check_with_tests(sources)
     texts = [render(d, sources) for d in result.diagnostics]
     return {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}, texts
+
+
+def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:
+    """Writes the C header of the functions that are implemented in C, and a frame for them unless there is one.
+
+    Raises CompileError when the sources have errors, UsageError when no function is implemented in C.
+    """
+    from plctool.compiler import CompileError, load_sources
+    from plctool.compiler.export_itf import export_interface as export
+    from plctool.compiler.front import check_sources
+    from plctool.files import write_atomically
+
+    sources = load_sources(paths)
+    program = check_sources(sources)
+    if program.program is None:
+        raise CompileError(program.diagnostics, sources)
+    functions = program.program.externals
+    if not functions:
+        raise UsageError(
+            "No function is implemented in C; mark those that are by {attribute 'external' := 'name'}.", "no-external"
+        )
+    interface = export(paths[0].resolve().stem, functions)
+    header, source = folder / interface.header_name, folder / interface.source_name
+    write_atomically(header, interface.header.encode("latin-1", "replace"))
+    written = force or not source.exists()
+    if written:
+        write_atomically(source, interface.source.encode("latin-1", "replace"))
+    return {
+        "header": str(header),
+        "source": str(source),
+        "source_written": written,
+        "functions": [
+            {"interface": text, "signature": f"{signature:08X}", "version": f"{version >> 16}.{version & 0xFFFF}"}
+            for text, signature, version in interface.functions
+        ],
+    }
 
 
 def diagnostic_document(diagnostic: Diagnostic) -> Document:

@@ -95,8 +95,8 @@ class SourceLine:
 
 @dataclass
 class SymbolTable:
-    """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry holds up to the
-    next one."""
+    """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry holds up to
+    the next one."""
 
     image_crc: int
     target: str
@@ -113,8 +113,8 @@ class SymbolTable:
     # ---- variables ----
 
     def resolve(self, path: str) -> Symbol:
-        """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5'. Upper and lower case
-        are the same. Raises UsageError with a suggestion."""
+        """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5'. Upper and lower
+        case are the same. Raises UsageError with a suggestion."""
         text = path.strip()
         at = len(text)
         while at > 0:
@@ -172,8 +172,7 @@ class SymbolTable:
     # ---- code ----
 
     def address_to_line(self, code_offset: int) -> SourceLine | None:
-        """The source line of a code offset; None when it is not the program's own code. For a checked error, whose address
-        is that after the call, pass the offset minus 1."""
+        """The source line of a code offset; None when it is not the program's own code."""
         unit = next((u for u in self.pous if u.offset <= code_offset < u.offset + u.size), None)
         i = bisect_right(self.lines, (code_offset, 1 << 30, 0)) - 1
         first = unit.offset if unit else code_offset
@@ -295,7 +294,7 @@ def find_symbols(image_crc: int, beside: Path | None = None) -> SymbolTable:
             "wrong-symbols",
         )
     raise UsageError(
-        f"There are no symbols for the image that runs (CRC {image_crc:08X}); name the .sym file that was built with it.",
+        f"There are no symbols for the image that runs (CRC {image_crc:08X}); name its .sym file.",
         "no-symbols",
     )
 

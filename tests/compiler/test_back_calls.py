@@ -249,7 +249,7 @@ def counter(checks: bool = True) -> tuple[Pou, StructType]:
     )  # type: ignore[union-attr]
     limit = Variable("limit", DINT, Storage.REFERENCE, POS, offset=t.fields[2].offset)
     block = Pou(
-        "Counter", PouKind.FUNCTION_BLOCK, POS, inputs(step) + [Parameter(limit, Direction.IN_OUT, True)], instance=t
+        "Counter", PouKind.FUNCTION_BLOCK, POS, [*inputs(step), Parameter(limit, Direction.IN_OUT, True)], instance=t
     )
     block.body = [
         If([(binary(BinaryOp.LT, load(n), load(limit)), [assign(n, add(load(n), const(1, DINT)))])], [], POS),

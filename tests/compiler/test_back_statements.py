@@ -128,8 +128,7 @@ def for_model(start: int, stop: int, step: int, low: int, high: int) -> tuple[li
 
 @functools.cache
 def for_loop(t: Elementary, step: int | None, modified: bool, level: int) -> Running:
-    """n counts, total sums up a hash of the values; `step` None: from a variable. `modified`: the body assigns k := k.
-    """
+    """n counts, total is a hash of the values; `step` None: from a variable. `modified`: the body assigns k := k."""
     p = ProgramBuilder()
     k, start, stop, by = (p.variable(name, t) for name in ("k", "start", "stop", "by"))
     n, total = p.variable("n", DINT), p.variable("total", LINT)

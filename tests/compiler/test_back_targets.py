@@ -1,12 +1,11 @@
-"""Every target: the same program links to position independent code, undefined compiler calls become imports or errors.
-"""
+"""Every target: the same program links to position independent code; compiler calls become imports or errors."""
 
 from __future__ import annotations
 
 import struct
 
 import pytest
-from back_support import POS, ProgramBuilder, binary, build, const, load, place
+from back_support import POS, ProgramBuilder, Running, binary, build, const, load, place
 
 from plctool.compiler.compiler_calls import COMPILER_CALLS
 from plctool.compiler.emit import emit_object
@@ -17,6 +16,7 @@ from plctool.compiler.typed import (
     Area,
     Assign,
     BinaryOp,
+    Call,
     Case,
     Convert,
     Expr,
@@ -26,6 +26,7 @@ from plctool.compiler.typed import (
     PouKind,
     ScalarInit,
     Statement,
+    Storage,
     TypedProgram,
     Variable,
 )
@@ -114,6 +115,34 @@ def test_an_unknown_target_is_refused_with_the_names_of_the_others() -> None:
         find_target("z80")
 
 
+@pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
+def test_a_large_program_is_compiled_in_parts(target: Target, monkeypatch: pytest.MonkeyPatch) -> None:
+    p = ProgramBuilder()
+    x, n = p.variable("x", REAL, ScalarInit(2.0)), p.variable("n", DINT)
+    small = Pou("Small", PouKind.FUNCTION, POS, result=Variable("Small", DINT, Storage.LOCAL, POS))
+    assert small.result is not None
+    small.locals.append(small.result)
+    small.body.append(Assign(place(small.result), Convert(load(x), DINT, POS), POS))
+    call = Call(small, [], DINT, POS)
+    sums: list[Statement] = [Assign(place(n), binary(BinaryOp.ADD, load(n), call), POS)]
+    program = p.program()
+    program.tasks[0].programs[:] = [Pou(f"P{k}", PouKind.PROGRAM, POS, body=sums * 5) for k in range(9)]
+    monkeypatch.setattr("plctool.compiler.lower._WHOLE", 2000)
+    built = build(program, target.name)
+    assert {unit.name for unit in built.symbols.pous} == {"Small", *(f"P{k}" for k in range(9))}
+    if target.name == "x86_64-linux":
+        run = Running(built)
+        run.cycle()
+        assert run["n"] == 90
+
+
+def test_parts_are_the_same_without_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("plctool.compiler.lower._WHOLE", 2000)
+    image = build(everything()).image
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    assert build(everything()).image == image
+
+
 # ---- the linker alone ----
 
 
@@ -126,35 +155,34 @@ def test_an_undefined_function_is_named(name: str) -> None:
     target = find_target(name)
     text = ir("declare void @mystery()\ndefine void @entry() {\n call void @mystery()\n ret void\n}", target)
     with pytest.raises(UsageError, match="mystery"):
-        link(emit_object(text, target, 2), target, ["entry"], 0)
+        link([emit_object(text, target, 2)], target, ["entry"], 0)
 
 
 @pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
 def test_writable_data_are_refused(target: Target) -> None:
-    text = ir(
-        "@state = internal global i32 5\ndefine i32 @entry() {\n %o = atomicrmw add ptr @state, i32 1 monotonic\n ret i32 %o\n}",
-        target,
-    )
+    entry = "define i32 @entry() {\n %o = atomicrmw add ptr @state, i32 1 monotonic\n ret i32 %o\n}"
+    text = ir(f"@state = internal global i32 5\n{entry}", target)
     with pytest.raises(UsageError, match=r"\.data|__atomic|__sync"):
-        link(emit_object(text, target, 2), target, ["entry"], 0)
+        link([emit_object(text, target, 2)], target, ["entry"], 0)
 
 
 def test_absolute_addresses_are_refused() -> None:
     target = find_target("x86_64-linux")
     text = ir(
         "@table = internal constant [2 x ptr] [ptr @entry, ptr @other]\n"
-        "define ptr @entry(i64 %i) {\n %p = getelementptr ptr, ptr @table, i64 %i\n %f = load ptr, ptr %p\n ret ptr %f\n}\n"
+        "define ptr @entry(i64 %i) {\n"
+        " %p = getelementptr ptr, ptr @table, i64 %i\n %f = load ptr, ptr %p\n ret ptr %f\n}\n"
         "define void @other() {\n ret void\n}",
         target,
     )
     with pytest.raises(UsageError, match=r"position independent|writable"):
-        link(emit_object(text, target, 2), target, ["entry"], 0)
+        link([emit_object(text, target, 2)], target, ["entry"], 0)
 
 
 def test_sections_nobody_reaches_are_left_out() -> None:
     target = find_target("x86_64-linux")
     text = ir('define void @entry() {\n ret void\n}\ndefine void @far() section ".text.far" {\n ret void\n}\n', target)
-    linked = link(emit_object(text, target, 2), target, ["entry"], 0)
+    linked = link([emit_object(text, target, 2)], target, ["entry"], 0)
     assert "far" not in linked.symbols
 
 

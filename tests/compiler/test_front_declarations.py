@@ -118,6 +118,15 @@ def test_wrong_type_is_explained(text: str, place: str, words: str) -> None:
     assert words in found[0]
 
 
+def test_variable_may_have_the_name_of_its_type() -> None:
+    before = COLOR + "VAR_GLOBAL point : Point; END_VAR\n" + POINT
+    p = program(
+        main("color : Color; ton : TON; x : INT;", "color := Color.Green; ton(IN := TRUE); x := point.y;", before)
+    )
+    assert str(variable(p, "Main.ton").type) == "TON"
+    assert str(variable(p, "point").type) == "Point"
+
+
 # ---- initial values ----
 
 

@@ -103,6 +103,7 @@ def test_return_ends_a_unit() -> None:
         ("LIMIT := 6;", "1: LIMIT is a constant and cannot be assigned to"),
         ("i + 1 := 6;", "3: expected := or ;, found +"),
         ("ABS(i) := 6;", "1: the left side of := needs a variable"),
+        ("MAX(i, j).1 := b;", "1: the left side of := needs a variable"),
         ("i S= b;", "1: S= needs a BOOL variable, not INT"),
         ("b S= i;", "6: INT does not fit BOOL by itself; write INT_TO_BOOL(...)"),
         ("i X= b;", "3: X has no place here; an assignment is written :=, S= or R="),

@@ -128,7 +128,7 @@ def exception_of(plc: Simulator, symbols: SymbolTable) -> tuple[str, int] | None
     if exception is None:
         return None
     assert exception.code_offset is not None
-    place = symbols.address_to_line(exception.code_offset - 1)
+    place = symbols.address_to_line(exception.code_offset)
     return exception.name, place.line if place else 0
 
 

@@ -308,6 +308,8 @@ def real(draw: st.DrawFn, known: Declarations, name: str, depth: int) -> Term:
         return Term(f"SQRT(ABS({a.text}))", name, rounded(math.sqrt(abs(x)), name))
     b = real(draw, known, name, depth - 1)
     y = float(b.value)
+    if op == "/" and y == 0 and "v" not in b.text:  # a division by the constant 0 is a compile error
+        op = "*"
     value = {"+": lambda: x + y, "-": lambda: x - y, "*": lambda: x * y, "/": lambda: divided(x, y)}[op]()
     return Term(f"({a.text} {op} {b.text})", name, rounded(value, name))
 

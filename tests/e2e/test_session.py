@@ -143,3 +143,16 @@ def test_programs_nobody_knows_beforehand_compute_the_right_value(tool, plcrt, e
     tool.ok("flash", "--port", plcrt.port, str(image))
     assert eventually(lambda: tool.ok("read", "--port", plcrt.port, "Main.done")["values"]["Main.done"]), text
     assert tool.ok("read", "--port", plcrt.port, "Main.x")["values"]["Main.x"] == expected, text
+
+
+def test_bits_at_addresses_and_of_words_are_written_alone(tool, plcrt, eventually):
+    text = """
+    PROGRAM Main
+    VAR a AT %MX4.0 : BOOL; b AT %MX4.3 : BOOL; all AT %MB4 : BYTE := 16#F0; word : WORD := 16#0101; same : BYTE; END_VAR
+    same := all;
+    END_PROGRAM
+    """
+    tool.ok("flash", "--port", plcrt.port, str(tool.build("bits", text)))
+    tool.ok("write", "--port", plcrt.port, "Main.a=TRUE", "Main.b=TRUE", "Main.word.1=TRUE", "Main.word.8=FALSE")
+    values = tool.ok("read", "--port", plcrt.port, "Main.a", "Main.b", "Main.word", "Main.all")["values"]
+    assert values == {"Main.a": True, "Main.b": True, "Main.word": 3, "Main.all": 0xF9}

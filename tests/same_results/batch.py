@@ -101,7 +101,7 @@ class Recorder(Simulator):
 
 def line_of(built: BuildResult, code_offset: int | None) -> int:
     """The source line of an exception, 0 when it is not known."""
-    place = built.symbols.address_to_line(code_offset - 1) if code_offset is not None else None
+    place = built.symbols.address_to_line(code_offset) if code_offset is not None else None
     return place.line if place else 0
 
 

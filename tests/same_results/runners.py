@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent / "runner"
@@ -15,12 +14,15 @@ FIRMWARE = ROOT / "firmware"
 TIMEOUT = 120.0  # of one batch [s]; it takes a few on a quiet machine
 
 _WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1"]
-_PORTABLE = [*(FIRMWARE / "src").glob("app/*.c"), *(FIRMWARE / "src").glob("core/*.c"), *(FIRMWARE / "src").glob("sys/*.c")]
+_PORTABLE = [
+    *(FIRMWARE / "src").glob("app/*.c"),
+    *(FIRMWARE / "src").glob("core/*.c"),
+    *(FIRMWARE / "src").glob("sys/*.c"),
+]
 _BARE_SOURCES = [
     *_PORTABLE,
     FIRMWARE / "port/sim/Sim.c",
     FIRMWARE / "port/baremetal/cortexm/CmpCompilerCalls.c",
-    HERE / "runner.c",
     *(HERE / "bare").glob("*.c"),
 ]
 _LINUX_SOURCES = [
@@ -28,7 +30,6 @@ _LINUX_SOURCES = [
     *(FIRMWARE / "src").glob("comm/*.c"),
     *(FIRMWARE / "port/sim").glob("*.c"),
     FIRMWARE / "port/linux/SysExcept.c",
-    HERE / "runner.c",
 ]
 # Picolibc keeps the clock to itself unless told that there is one.
 _BARE_FLAGS = [
@@ -53,18 +54,30 @@ class Runner:
     command: tuple[str, ...]  # the program's path follows
     bare: bool = True
 
+    def missing(self) -> list[str]:
+        """The tools that are not installed."""
+        return [tool for tool in (self.compiler, self.command[0]) if shutil.which(tool) is None]
+
     def skip_without_tools(self) -> None:
         """Skips the test when the cross compiler or QEMU is not installed."""
-        missing = [tool for tool in (self.compiler, self.command[0]) if shutil.which(tool) is None]
-        if missing:
+        if missing := self.missing():
+            import pytest
+
             pytest.skip(f"needs {' and '.join(missing)}: ./bootstrap.sh --cross")
 
-    def compile(self, folder: Path) -> Path:
-        """The program of the runner, in `folder`."""
-        program = folder / f"runner-{self.target}"
+    def compile(self, folder: Path, main: Path = HERE / "runner.c", *extra: str) -> Path:
+        """A program of the runtime with `main`, in `folder`; `extra`: more flags."""
+        program = folder / f"{main.stem}-{self.target}"
         include = [f"-I{FIRMWARE / name}" for name in ("include", "port/sim", "src/app")]
-        flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *_WARNINGS, *include]
+        flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *_WARNINGS, *include, *extra]
         sources = _BARE_SOURCES if self.bare else _LINUX_SOURCES
+        subprocess.run([self.compiler, *flags, "-o", program, main, *sources, "-lm"], check=True)
+        return program
+
+    def compile_alone(self, folder: Path, sources: Sequence[Path], *extra: str) -> Path:
+        """A program without the runtime."""
+        program = folder / f"{sources[0].stem}-{self.target}"
+        flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *extra]
         subprocess.run([self.compiler, *flags, "-o", program, *sources, "-lm"], check=True)
         return program
 

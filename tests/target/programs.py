@@ -6,11 +6,7 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from plctool.compiler.build import build_program
-from plctool.compiler.front import check_sources
-from plctool.compiler.lower_unit import ALL_CHECKS, Options
-from plctool.compiler.source import Source
-from plctool.compiler.targets import find_target
+from plctool.compiler import compile_sources
 from plctool.symbols import SymbolTable, symbol_path
 
 
@@ -23,13 +19,12 @@ class Built:
     symbols: SymbolTable
 
 
-def compile_text(text: str, target: str, folder: Path, checks: bool = True) -> Built:
+def compile_text(text: str, target: str, folder: Path, checks: str = "all") -> Built:
     """Compiles `text`; the files go to `folder`."""
-    result = check_sources([Source("app.st", text)])
-    assert result.program, result.diagnostics
-    options = Options(find_target(target), checks=ALL_CHECKS if checks else frozenset())
-    built = build_program(result.program, options)
-    path = folder / f"{zlib.crc32(text.encode()):08x}.cdl"
+    source = folder / f"{zlib.crc32(text.encode()):08x}.st"
+    source.write_text(text)
+    built = compile_sources([source], target=target, checks=checks)
+    path = source.with_suffix(".cdl")
     path.write_bytes(built.image)
     built.symbols.save(symbol_path(path))
     return Built(built.image, path, built.symbols)

@@ -1,7 +1,7 @@
 """Power cuts while a program is replaced: the device starts, runs the old program or the new one, and takes another.
 
-POWER_CUTS=all cuts after every store into the flash; otherwise a selection is tried: some from every part of the transfer,
-and all of the last ones, which commit.
+POWER_CUTS=all cuts after every store into the flash; otherwise a selection is tried: some from every part of the
+transfer, and all of the last ones, which commit.
 """
 
 from __future__ import annotations

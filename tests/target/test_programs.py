@@ -100,7 +100,7 @@ def test_unchecked_access_is_caught_by_the_processor(plc, tmp_path, eventually):
     from conftest import TARGET
 
     text = program("VAR p : POINTER TO DINT; n : DINT; END_VAR", "n := n + 1; IF n > 5 THEN p^ := n; END_IF")
-    plc.flash(compile_text(text, TARGET, tmp_path, checks=False).path)
+    plc.flash(compile_text(text, TARGET, tmp_path, checks="none").path)
     eventually(lambda: plc.status().state is AppState.EXCEPTION)
     assert plc.status().exception.name == "ACCESS_VIOLATION"
 
@@ -147,3 +147,12 @@ def test_a_second_program_takes_the_place_of_the_first(plc, build, eventually):
     plc.flash(build(TWO_TASKS).path)
     eventually(lambda: plc.read("Fast.n") > 3)
     assert [task.name for task in plc.tasks()] == ["FastTask", "SlowTask"]
+
+
+def test_code_runs_from_ram_where_the_board_prefers_it(make_board, build, eventually):
+    board = make_board("full")
+    with board, Plc(Connection(board.line())) as plc:
+        plc.flash(build(COUNTER).path)
+        eventually(lambda: plc.read("Main.n") > 20)
+        plc.flash(build(TWO_TASKS).path)
+        eventually(lambda: plc.read("Slow.n") > 2)

@@ -52,10 +52,23 @@ def load_sources(paths: Sequence[Path | str]) -> list[Source]:
 
 
 def check_sources(paths: Sequence[Path | str]) -> CheckResult:
-    """Every diagnosis of a program, without building it."""
+    """Every diagnosis of a program and its unit tests, without building it."""
+    return check_with_tests(load_sources(paths))
+
+
+def check_with_tests(sources: Sequence[Source]) -> CheckResult:
+    """Checks a program as it is built, and once more as its unit tests see it."""
     from plctool.compiler.front import check_sources
 
-    return check_sources(load_sources(paths))
+    result = check_sources(sources)
+    if not result.has_tests:
+        return result
+    from plctool.compiler.unit_tests import TestSuite
+
+    tests = check_sources(sources, tests=TestSuite())
+    found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
+    found_sorted = sorted(found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
+    return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)
 
 
 def compile_sources(

@@ -251,11 +251,22 @@ class TypeDecl:
     spec: TypeSpec
     init: Init | None
     source: Source
+    namespace: Namespace | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Namespace:
+    """Where a declaration stands: the dotted name of its NAMESPACE, "" for none, and what it is USING."""
+
+    name: str = ""
+    using: list[tuple[int, str]] = field(default_factory=list)
+    internal: bool = False
 
 
 @dataclass(slots=True, eq=False)
 class PouDecl:
-    """PROGRAM, FUNCTION or FUNCTION_BLOCK (`keyword`). `attributes` by lower-case name."""
+    """PROGRAM, FUNCTION, FUNCTION_BLOCK or INTERFACE (`keyword`), and what such a unit holds: METHOD, ACTION, the GET and
+    SET of a PROPERTY. A CLASS is a FUNCTION_BLOCK with that among its `modifiers`. `attributes` by lower-case name."""
 
     pos: int
     keyword: str
@@ -265,12 +276,23 @@ class PouDecl:
     body: list[Stmt]
     attributes: dict[str, str]
     source: Source
+    modifiers: set[str] = field(default_factory=set)  # PUBLIC, FINAL ... in capitals
+    bases: list[tuple[int, str]] = field(default_factory=list)  # EXTENDS
+    interfaces: list[tuple[int, str]] = field(default_factory=list)  # IMPLEMENTS
+    members: list[PouDecl] = field(default_factory=list)
+    namespace: Namespace | None = None
+
+    @property
+    def full_name(self) -> str:
+        """With the namespace in front."""
+        return f"{self.namespace.name}.{self.name}" if self.namespace and self.namespace.name else self.name
 
 
 @dataclass(slots=True, eq=False)
 class GlobalBlock:
     block: VarBlock
     source: Source
+    namespace: Namespace | None = None
 
 
 @dataclass(slots=True, eq=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from plctool.compiler.diagnostics import Diagnostic
-from plctool.compiler.emit import emit_object
+from plctool.compiler.emit import emit_objects
 from plctool.compiler.link import Linked, link
 from plctool.compiler.lower import GLOBAL_INIT, Lowered, lower
 from plctool.compiler.lower_unit import Options
@@ -43,8 +43,8 @@ def build_program(program: TypedProgram, options: Options, info: ApplicationInfo
     """Compiles a checked program. Raises UsageError when the target cannot run it."""
     target = options.target
     lowered = lower(program, options)
-    data = emit_object(lowered.text, target, options.opt_level)
-    linked = link(data, target, [*lowered.tasks, GLOBAL_INIT], len(lowered.imports))
+    objects = emit_objects(lowered.texts, target, options.opt_level)
+    linked = link(objects, target, [*lowered.tasks, GLOBAL_INIT], len(lowered.imports))
     info = info or ApplicationInfo()
     symbols = _symbols(program, lowered, linked, target, info.project)
     retained = [s for s in symbols.variables.values() if s.area == Area.RETAIN.value]

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from plctool.compiler import ast, literals
+from plctool.compiler.builder_units import Arrangement
 from plctool.compiler.lexer import Report, Token
 from plctool.compiler.source import Source
 
@@ -50,17 +51,12 @@ class Builder:
         self.source = Source("", "")
         self.attributes: dict[int, dict[str, str]] = {}
         self.report: Report = lambda pos, code, message: None
+        self.units = Arrangement(self)
 
     # ---- types ----
 
     def start(self, *units: Any) -> list[Any]:
-        flat: list[Any] = []
-        for unit in units:
-            if isinstance(unit, list):
-                flat += unit
-            elif unit is not None:
-                flat.append(unit)
-        return flat
+        return self.units.arrange(units)
 
     def types(self, _type: Token, *decls: Any) -> list[Any]:
         return [d for d in decls if d is not None]
@@ -149,19 +145,63 @@ class Builder:
     def var_blocks(self, *blocks: Any) -> list[Any]:
         return [b for b in blocks if b is not None]
 
-    def _pou(self, keyword: Token, name: Token, result: ast.TypeSpec | None, blocks: Any, body: Any) -> ast.PouDecl:
+    def pou(self, keyword: Token, head: list[Any], result: Any, blocks: Any, body: Any) -> ast.PouDecl:
+        """`head`: modifiers and name."""
+        *modifiers, name = head
         attributes = self.attributes.get(keyword.pos, {})
-        return ast.PouDecl(
-            name.pos, keyword.text.upper(), name.text, result, blocks, body, attributes, self.source
-        )  # fmt: skip
+        decl = ast.PouDecl(name.pos, keyword.text.upper(), name.text, result, blocks, body or [], attributes, self.source)
+        decl.modifiers = {t.text.upper() for t in modifiers if t is not None}
+        return decl
 
-    def function(self, keyword: Token, name: Token, result: ast.TypeSpec | None, blocks: Any, body: Any) -> Any:
-        return self._pou(keyword, name, result, blocks, body)
+    def function(self, keyword: Token, *rest: Any) -> Any:
+        *head, result, blocks, body = rest
+        return self.pou(keyword, head, result, blocks, body)
 
-    def function_block(self, keyword: Token, name: Token, blocks: Any, body: Any) -> Any:
-        return self._pou(keyword, name, None, blocks, body)
+    def function_block(self, keyword: Token, *rest: Any) -> Any:
+        *head, bases, interfaces, parts, body, members = rest
+        decl = self.pou(keyword, head, None, [], body)
+        self.units.complete(decl, bases, interfaces, [*(parts or []), *(members or [])])
+        return decl
 
-    program = function_block
+    def program(self, keyword: Token, *rest: Any) -> Any:
+        return self.function_block(keyword, *rest[:-3], None, None, *rest[-3:])
+
+    # ---- methods, classes, namespaces ----
+
+    def class_block(self, keyword: Token, *rest: Any) -> Any:
+        *head, bases, interfaces, parts = rest
+        decl = self.pou(keyword, head, None, [], [])
+        decl.keyword = "FUNCTION_BLOCK"
+        decl.modifiers.add("CLASS")
+        self.units.complete(decl, bases, interfaces, parts or [])
+        return decl
+
+    def interface(self, keyword: Token, *rest: Any) -> Any:
+        *head, bases, members = rest
+        decl = self.pou(keyword, head, None, [], [])
+        self.units.complete(decl, bases, None, members or [])
+        return decl
+
+    parts = members = names = var_blocks
+
+    def method(self, keyword: Token, *rest: Any) -> Any:
+        return self.function(keyword, *rest)
+
+    def property(self, keyword: Token, *rest: Any) -> list[ast.PouDecl]:
+        return self.units.property(keyword, rest)
+
+    def accessor(self, keyword: Token, *rest: Any) -> tuple[Token, list[Any], Any, Any]:
+        *modifiers, blocks, body = rest
+        return keyword, modifiers, blocks, body
+
+    def action(self, keyword: Token, name: Token, body: Any) -> Any:
+        return self.pou(keyword, [name], None, [], body)
+
+    def namespace(self, keyword: Token, *rest: Any) -> list[Any]:
+        return self.units.namespace(rest)
+
+    def using(self, keyword: Token, names: Any) -> ast.Namespace:
+        return ast.Namespace("", names or [])
 
     def configuration(self, keyword: Token, name: Token, *items: Any) -> ast.ConfigurationDecl:
         decl = ast.ConfigurationDecl(name.pos, name.text, [], [], [], self.source)

@@ -239,7 +239,7 @@ class Builtins(Expressions):
     def _choose(
         self, intrinsic: Intrinsic, name: str, selector: Expr, values: list[Expr], node: ast.Call, expected: Type | None
     ) -> Expr:
-        t = self._common_value_type(name, values, node, expected)
+        t = self.common_of(values, name, node.pos, expected)
         if t is ERROR or selector.type is ERROR:
             return error_value(self.pos(node.pos))
         return self._intrinsic(intrinsic, [selector, *(self.coerce(v, t) for v in values)], t, node)
@@ -247,7 +247,7 @@ class Builtins(Expressions):
     def _extreme(self, name: str, args: list[Expr], node: ast.Call, expected: Type | None) -> Expr:
         if not self._count(name, args, node, 2):
             return error_value(self.pos(node.pos))
-        t = self._common_value_type(name, args, node, expected)
+        t = self.common_of(args, name, node.pos, expected)
         if t is ERROR:
             return error_value(self.pos(node.pos))
         if not is_scalar(t):
@@ -257,14 +257,13 @@ class Builtins(Expressions):
             result = self._intrinsic(Intrinsic[name], [result, self.coerce(argument, t)], t, node)
         return result
 
-    def _common_value_type(self, name: str, values: list[Expr], node: ast.Call, expected: Type | None) -> Type:
-        """The type all of the values are brought to; ERROR after a diagnosis."""
+    def common_of(self, values: list[Expr], name: str, offset: int, expected: Type | None) -> Type:
+        """The type all arguments of `name` are brought to; ERROR after a diagnosis."""
         typed = [v.type for v in values if not is_untyped(v)]
         if not typed:
             base = elementary(expected) if expected is not None else None
-            typed = [base] if base is not None and base.kind in (Kind.INT, Kind.BIT, Kind.REAL) else [
-                settle(v, expected).type for v in values
-            ]  # fmt: skip
+            is_number = base is not None and base.kind in (Kind.INT, Kind.BIT, Kind.REAL)
+            typed = [base] if base is not None and is_number else [settle(v, expected).type for v in values]
         result: Type | None = typed[0]
         for t in typed[1:]:
             result = None if result is None else common_type(result, t)
@@ -273,9 +272,9 @@ class Builtins(Expressions):
                 result = self.literal_common(v, result, expected)
         if result is None:
             listed = " and ".join(dict.fromkeys(str(t) for t in typed))
-            self.error(node.pos, "type", f"{name} cannot combine {listed}")
+            self.error(offset, "type", f"{name} cannot combine {listed}")
             return ERROR
-        return result
+        return result.base if isinstance(result, SubrangeType) else result
 
     def literal_common(self, literal: Expr, t: Type, expected: Type | None) -> Type | None:
         """The common type of an untyped constant and a type: the type itself when the constant fits."""
@@ -351,7 +350,7 @@ class Builtins(Expressions):
             return ELEMENTARY[name]
         if name == "STRING":
             return StringType(255)
-        symbol = self.scope.lookup(name)
+        symbol = self.world.unit(name.casefold(), library=self.scope.library)
         if isinstance(symbol, TypeSymbol):
             t = self.world.declarations.resolve_symbol(symbol)
             return t if isinstance(t, EnumType | SubrangeType) else None

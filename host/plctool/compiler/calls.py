@@ -39,6 +39,7 @@ from plctool.compiler.types import (
     Type,
     is_scalar,
 )  # fmt: skip
+from plctool.compiler.units import LIBRARY_STRING
 
 Actual = ast.Argument | Expr | None  # as written, or checked already
 
@@ -67,7 +68,7 @@ class Calls(Builtins):
         if isinstance(symbol, VarSymbol):
             if symbol.type in self.world.blocks or symbol.type is ERROR:
                 return self._call_of_place(node)
-            shadow, symbol = symbol, self.world.lookup(name.casefold(), library=self.scope.library)
+            shadow, symbol = symbol, self.world.unit(name.casefold(), library=self.scope.library)
         is_function = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION"
         if isinstance(symbol, PouSymbol) and is_function and (not symbol.library or self.scope.library):
             return self._call_function(symbol, node, expected)
@@ -197,7 +198,7 @@ class Calls(Builtins):
 
     def call_by_name(self, name: str, args: list[Expr], offset: int, expected: Type | None) -> Expr:
         """A call of a library function with checked arguments."""
-        symbol = self.world.lookup(name.casefold(), library=True)
+        symbol = self.world.unit(name.casefold(), library=True)
         if not isinstance(symbol, PouSymbol):
             symbol = self._best_overload(name, args, expected)
         if symbol is None:
@@ -340,26 +341,14 @@ class Calls(Builtins):
         return self._typed_call(info, values, offset)
 
     def _common(self, members: list[Expr], group: str, name: str, offset: int, expected: Type | None) -> Type | None:
-        """The common type of arguments, which has to belong to the group."""
-        typed = [e.type for e in members if not is_untyped(e)]
+        """The common type of arguments, which has to belong to the group; None after a diagnosis."""
         accepts = GENERIC[group]
-        if not typed:
-            if expected is not None and accepts(expected) and elementary(expected) is not None:
-                return elementary(expected)
-            typed = [settle(e, expected).type for e in members]
-        result: Type | None = typed[0]
-        for t in typed[1:]:
-            result = None if result is None else common_type(result, t)
-        for e in members:
-            if result is not None and is_untyped(e):
-                result = self.literal_common(e, result, expected)
-        if result is None:
-            listed = " and ".join(dict.fromkeys(str(t) for t in typed))
-            self.error(offset, "type", f"{name} cannot combine {listed}")
+        result = self.common_of(members, name, offset, expected if expected is not None and accepts(expected) else None)
+        if result is ERROR:
             return None
         if isinstance(result, StringType):
-            result = StringType(255)
-        if group in ("ANY_REAL",) and not accepts(result) and elementary(result) is not None:
+            result = LIBRARY_STRING
+        if group == "ANY_REAL" and not accepts(result) and elementary(result) is not None:
             result = LREAL if is_large(result) else REAL
         if not accepts(result):
             self.error(offset, "type", f"{name} takes {group}, not {result}")
@@ -401,7 +390,7 @@ class Calls(Builtins):
             candidates += ["REAL", "LREAL"] if prefer_real else ["LREAL", "REAL"]
         for candidate in candidates:
             if candidate in suffixes:
-                symbol = self.world.lookup(suffixes[candidate].casefold(), library=True)
+                symbol = self.world.unit(suffixes[candidate].casefold(), library=True)
                 return symbol if isinstance(symbol, PouSymbol) else None
         return None
 

@@ -1,4 +1,4 @@
-"""Functions LLVM calls on targets without the instruction (soft float, 64-bit division), reached through the import table.
+"""Functions LLVM calls where the processor has no instruction (soft float, 64-bit division), reached as imports.
 
 Names and meanings are those of the GNU compiler runtime, which libgcc and compiler-rt share.
 """

@@ -143,7 +143,8 @@ class Declarations:
         return self._declared(spec, scope)
 
     def _declared(self, spec: ast.NamedType, scope: Scope) -> tuple[Type, Initial | None]:
-        symbol = scope.lookup(spec.name)
+        key = spec.name.casefold()
+        symbol = scope.programs.get(key) or self.world.unit(key, library=scope.library)
         if isinstance(symbol, TypeSymbol):
             if symbol.busy:
                 scope.error(spec.pos, "recursion", f"the type {symbol.decl.name} contains itself")
@@ -156,7 +157,7 @@ class Declarations:
             return (ERROR, None) if info is None else (info.type, self.struct_default(info.type))
         if spec.name.upper() in GENERIC:
             scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
-        elif symbol is None:
+        elif symbol is None and scope.lookup(spec.name) is None:
             hint = did_you_mean(spec.name, [*ELEMENTARY, "STRING", *self.world.type_names()])
             scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
         else:
@@ -307,7 +308,8 @@ class Declarations:
         spec, init = decl.type, decl.init
         if isinstance(spec, ast.EnumSpec) and spec.base is not None:
             base = spec.base
-            symbol = scope.lookup(base)
+            key = base.casefold()
+            symbol = scope.programs.get(key) or self.world.unit(key, library=scope.library)
             if isinstance(symbol, PouSymbol | TypeSymbol) and init is None:  # t : TON(PT := T#1s)
                 members = [(offset, name, value) for offset, name, value in spec.values if value is not None]
                 init, spec = ast.StructInit(spec.pos, members), ast.NamedType(spec.pos, base)
@@ -315,7 +317,7 @@ class Declarations:
         if init is None or t is ERROR:
             return t, default
         given = self.initial(init, t, scope)
-        if given is None or (default is None and given == ScalarInit(0)):
+        if given is None or (default is None and given == ScalarInit(0) and str(given.value) != "-0.0"):
             return t, default if given is None else None
         return t, given
 

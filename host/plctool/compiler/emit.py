@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 
 import llvmlite.binding as llvm
@@ -40,6 +41,44 @@ def emit_object(text: str, target: Target, opt_level: int) -> bytes:
     module, machine = optimised(text, target, opt_level)
     data: bytes = machine.emit_object(module)
     return data
+
+
+def emit_objects(texts: list[str], target: Target, opt_level: int) -> list[bytes]:
+    """The objects of several modules, side by side in processes of their own where the system can fork; the result is
+    the same either way."""
+    if len(texts) == 1 or not hasattr(os, "fork") or (os.cpu_count() or 1) < 2:
+        return [emit_object(text, target, opt_level) for text in texts]
+    _initialise()
+    children = [_Child(text, target, opt_level) for text in texts[1:]]
+    objects = [emit_object(texts[0], target, opt_level)]
+    for text, child in zip(texts[1:], children, strict=True):
+        objects.append(child.result() or emit_object(text, target, opt_level))
+    return objects
+
+
+class _Child:
+    """A process that emits one object. A process, because llvmlite lets only one thread at a time into LLVM."""
+
+    def __init__(self, text: str, target: Target, opt_level: int) -> None:
+        read, write = os.pipe()
+        self._pid = os.fork()
+        if self._pid == 0:
+            status = 1
+            try:
+                with open(write, "wb") as pipe:
+                    pipe.write(emit_object(text, target, opt_level))
+                status = 0
+            finally:
+                os._exit(status)
+        os.close(write)
+        self._read = read
+
+    def result(self) -> bytes:
+        """The object; empty when the process failed, which it then also does here, with a message."""
+        with open(self._read, "rb") as pipe:
+            data = pipe.read()
+        _, status = os.waitpid(self._pid, 0)
+        return data if status == 0 else b""
 
 
 def emit_assembly(text: str, target: Target, opt_level: int) -> str:

@@ -98,6 +98,13 @@ def place_of(e: Expr) -> Place:
     return e.place if isinstance(e, Load) else ValuePlace(e, e.type, e.pos)
 
 
+def is_temporary(place: Place) -> bool:
+    """Whether a place is (part of) a value that nobody else sees."""
+    while not isinstance(place, VarPlace | DerefPlace | ValuePlace):
+        place = place.base
+    return isinstance(place, ValuePlace)
+
+
 class Expressions:
     """Checks the expressions of one scope."""
 
@@ -155,7 +162,7 @@ class Expressions:
         e = self.expr(node)
         if e.type is ERROR:
             return None
-        if isinstance(e, Load) and not isinstance(e.place, ValuePlace):
+        if isinstance(e, Load) and not is_temporary(e.place):
             return e.place
         self.error(node.pos, "place", f"{use} needs a variable")
         return None
@@ -280,6 +287,8 @@ class Expressions:
         base = self.expr(node.base)
         if base.type is ERROR:
             return base
+        if isinstance(base.type, EnumType) and isinstance(node.base, ast.Name):
+            return self._value_of(base.type, node.name, node.pos, node.name_pos)  # color : Color; Color.Red
         return self.member(base, node)
 
     def _namespace_member(self, namespace: Namespace, node: ast.Member) -> Expr:

@@ -106,6 +106,7 @@ def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> 
         defaults=world.defaults,
         programs=application.programs,
         aliases=world.aliases(),
+        externals=world.external_functions(),
     )
 
 

@@ -6,7 +6,11 @@ nothing reaches, so the lowering never has to ask whether code is dead; LLVM rem
 
 from __future__ import annotations
 
+import re
 import struct
+
+_CALLED = re.compile(r"call [^@\n]*@([\w.]+)\(")
+_COPIED = 8000  # characters; about what LLVM would still inline
 
 
 class Module:
@@ -15,7 +19,8 @@ class Module:
     def __init__(self, triple: str) -> None:
         self._triple = triple
         self._globals: list[str] = []
-        self._functions: list[str] = []
+        self._functions: dict[str, str] = {}
+        self._helpers: list[str] = []
         self._attributes: dict[str, int] = {}
         self._metadata: list[str] = []
         self._metadata_ids: dict[str, int] = {}
@@ -56,20 +61,56 @@ class Module:
         )
         return name
 
-    def named_constant(self, name: str, data: bytes, align: int) -> None:
-        """A constant that keeps its symbol in the object file."""
-        self._globals.append(f"@{name} = internal constant [{len(data)} x i8] {bytes_literal(data)}, align {align}")
-        self.keep(name)
-
     def keep(self, name: str) -> None:
         """Protects an internal symbol from removal by the optimiser."""
         self._kept.append(name)
 
-    def add(self, function_text: str) -> None:
-        self._functions.append(function_text)
+    def add(self, name: str, definition: str) -> None:
+        """A function that exists once in the program."""
+        self._functions[name] = definition
 
-    def text(self) -> str:
-        """The module in LLVM's assembly language."""
+    def add_helper(self, definition: str) -> None:
+        """A small internal function, or several, of which every part of the module has its own copy."""
+        self._helpers.append(definition)
+
+    def texts(self, limit: int) -> list[str]:
+        """The module in LLVM's assembly language. When it is longer than `limit` characters, in an even number of parts
+        that can be compiled side by side; small functions of other parts are there as well, to be inlined."""
+        total = sum(map(len, self._functions.values()))
+        if total <= limit:
+            return [self._text(list(self._functions.values()))]
+        part_size = total // (2 * (1 + total // (4 * limit)))
+        parts: list[list[str]] = []
+        size = part_size
+        for name, definition in self._functions.items():
+            if size >= part_size:
+                parts.append([])
+                size = 0
+            parts[-1].append(name)
+            size += len(definition)
+        return [self._text(self._part(names)) for names in parts]
+
+    def _part(self, own: list[str]) -> list[str]:
+        """The functions of one part, and what they call in the others: a copy when it is small, else a declaration."""
+        texts, seen, todo = [], set(own), list(own)
+        while todo:
+            name = todo.pop()
+            text = self._functions[name]
+            if name in own:
+                texts.append(text.replace("define internal ", "define hidden ", 1))
+            elif len(text) <= _COPIED:
+                texts.append(text.replace("define internal ", "define available_externally hidden ", 1))
+            else:
+                head = text.partition(" {\n")[0].partition(" !dbg ")[0]
+                texts.append(head.replace("define internal ", "declare hidden ", 1))
+                continue
+            for called in _CALLED.findall(text):
+                if called in self._functions and called not in seen:
+                    seen.add(called)
+                    todo.append(called)
+        return texts
+
+    def _text(self, functions: list[str]) -> str:
         parts = [f'target triple = "{self._triple}"']
         parts += self._globals
         if self._kept:
@@ -77,7 +118,8 @@ class Module:
             parts.append(
                 f'@llvm.compiler.used = appending global [{len(self._kept)} x ptr] [{kept}], section "llvm.metadata"'
             )
-        parts += self._functions
+        parts += functions
+        parts += self._helpers
         parts += [f"attributes #{number} = {{ {text} }}" for text, number in self._attributes.items()]
         parts += self._named_metadata
         parts += [f"!{number} = {text}" for number, text in enumerate(self._metadata)]

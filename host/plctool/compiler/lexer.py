@@ -37,28 +37,37 @@ KEYWORDS = {
     **dict.fromkeys(("AND", "OR", "XOR", "MOD", "AND_THEN", "OR_ELSE"), "OP"),
     **dict.fromkeys(("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "QUALIFIER"),
     **dict.fromkeys(("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_STAT", "VAR_EXTERNAL"), "VAR"),
+    "VAR_INST": "VAR",
+    **dict.fromkeys(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "FINAL", "ABSTRACT", "OVERRIDE"), "MODIFIER"),
     "VAR_GLOBAL": "GLOBAL",
     **{k: k for k in (
         "TYPE", "STRUCT", "UNION", "ARRAY", "POINTER", "REFERENCE", "REF_TO", "FUNCTION", "FUNCTION_BLOCK", "PROGRAM",
         "CONFIGURATION", "RESOURCE", "TASK", "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN",
         "TRUE",
         "FALSE", "NULL", "NOT", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
+        "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET", "ACTION", "NAMESPACE", "USING",
     )},
     **{k: "_" + k for k in (
         "END_TYPE", "END_STRUCT", "END_UNION", "OVERLAP", "OF", "TO", "END_VAR", "AT", "END_FUNCTION",
         "END_FUNCTION_BLOCK",
         "END_PROGRAM", "END_CONFIGURATION", "ON", "END_RESOURCE", "WITH", "THEN", "ELSIF", "ELSE", "END_IF", "END_CASE",
         "BY", "DO", "END_FOR", "END_WHILE", "UNTIL", "END_REPEAT", "END_TEST", "END_SETUP", "END_TEARDOWN",
+        "EXTENDS", "IMPLEMENTS", "END_CLASS", "END_INTERFACE", "END_METHOD", "END_PROPERTY", "END_GET", "END_SET",
+        "END_ACTION", "END_NAMESPACE",
     )},
 }  # fmt: skip
 
 SOFT = frozenset((
     "QUALIFIER", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP", "UNION",
-    "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
+    "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION", "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET",
+    "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS",
 ))  # fmt: skip
 """Terminals that are names where the grammar has no use for them."""
 
 _OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a parenthesis in place of an operand
+
+OPENING = frozenset(("MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING"))
+"""Terminals that are names where no name follows."""
 
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
@@ -162,8 +171,9 @@ class Lexer:
         return self._end if end < 0 else end
 
 
-def is_mock(token: Token, text: str) -> bool:
-    """Whether MOCK or MOCK_FUNCTION starts a statement such as `MOCK pump.valve;`: no other name is followed by a name."""
+def is_followed_by_name(token: Token, text: str) -> bool:
+    """Whether MOCK, METHOD ... start something, as in `MOCK pump.valve;`: another name follows, as it never does behind a
+    variable of that name."""
     return _NAME.match(text, token.end) is not None
 
 

@@ -51,16 +51,20 @@ class _Reader:
 
 
 def read_line_table(data: bytes) -> list[Line]:
-    """The entries of a relocated .debug_line section, sorted by address, one per change of file or line."""
+    """The entries of a relocated .debug_line section, in its order."""
     rows: list[Line] = []
     at = 0
     while at < len(data):
         length = struct.unpack_from("<I", data, at)[0]
         rows += _read_unit(data[at + 4 : at + 4 + length])
         at += 4 + length
-    rows.sort(key=lambda row: row.address)
+    return rows
+
+
+def in_order(rows: list[Line]) -> list[Line]:
+    """Sorted by address, one entry per change of file or line."""
     kept: list[Line] = []
-    for row in rows:
+    for row in sorted(rows, key=lambda row: (row.address, row.file != "")):  # the end of one piece before the next
         if kept and kept[-1].address == row.address:
             kept.pop()
         if not kept or (kept[-1].file, kept[-1].line) != (row.file, row.line):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from elftools.elf.elffile import ELFFile
 
 from plctool.compiler.compiler_calls import COMPILER_CALLS
-from plctool.compiler.line_table import Line, read_line_table
+from plctool.compiler.line_table import Line, in_order, read_line_table
 from plctool.compiler.relocations import (
     AARCH64_ADRP,
     AARCH64_LOW12,
@@ -49,13 +49,23 @@ class LinkedSymbol:
 
 @dataclass(frozen=True)
 class Linked:
-    """`code`: the block. `lines`: sorted by address, an address being an offset in the block. `imports`: the compiler calls
-    that got a stub, in the order of their slots, starting with `first_slot`."""
+    """`code`: the block. `lines`: sorted by address, an address being an offset in the block. `imports`: the compiler
+    calls that got a stub, in the order of their slots, starting with `first_slot`."""
 
     code: bytes
     symbols: dict[str, LinkedSymbol]
     lines: list[Line]
     imports: list[External]
+
+
+@dataclass(frozen=True)
+class _ElfSymbol:
+    name: str
+    section: int  # index in `_Linker`; 0 when undefined
+    value: int
+    size: int
+    kind: int
+    is_global: bool
 
 
 @dataclass
@@ -64,37 +74,34 @@ class _Section:
     data: bytes
     flags: int
     align: int
-    relocations: list[tuple[int, int, int, int]]  # offset, kind, symbol, addend
+    relocations: list[tuple[int, int, _ElfSymbol, int]]  # offset, kind, symbol, addend
     offset: int = -1  # in the block; -1 when it is not part of it
 
 
-@dataclass(frozen=True)
-class _ElfSymbol:
-    name: str
-    section: int  # 0 when undefined
-    value: int
-    size: int
-    kind: int
-
-
-def link(data: bytes, target: Target, roots: Sequence[str], first_slot: int) -> Linked:
-    """Links one object. `roots`: symbols that have to be in the block. `first_slot`: the first free import slot.
+def link(objects: Sequence[bytes], target: Target, roots: Sequence[str], first_slot: int) -> Linked:
+    """Links the objects of one program. `roots`: symbols that have to be in the block. `first_slot`: the first free
+    import slot.
 
     Raises UsageError naming what cannot be linked.
     """
-    return _Linker(data, target, first_slot).run(roots)
+    return _Linker(objects, target, first_slot).run(roots)
 
 
 class _Linker:
-    def __init__(self, data: bytes, target: Target, first_slot: int) -> None:
+    def __init__(self, objects: Sequence[bytes], target: Target, first_slot: int) -> None:
         self._target = target
         self._first_slot = first_slot
-        self._sections, self._symbols = _read_elf(data, target)
+        self._sections: list[_Section] = []
+        self._symbols: list[_ElfSymbol] = []
+        for data in objects:
+            sections, symbols = _read_elf(data, target, len(self._sections))
+            self._sections += sections
+            self._symbols += symbols
+        self._defined = {s.name: s for s in self._symbols if s.section and s.is_global}
         self._stubs: dict[str, int] = {}  # offset in the block, by name, in the order of slots
 
     def run(self, roots: Sequence[str]) -> Linked:
-        by_name = {s.name: s for s in self._symbols if s.section}
-        used = self._reach({by_name[name].section for name in roots})
+        used = self._reach({self._defined[name].section for name in roots})
         code = self._lay_out(used)
         self._add_stubs(code, used)
         for index in used:
@@ -113,7 +120,7 @@ class _Linker:
         while todo:
             section = self._sections[todo.pop()]
             for _, _, symbol, _ in section.relocations:
-                index = self._symbols[symbol].section
+                index = self._resolved(symbol).section
                 if index and index not in found:
                     found.add(index)
                     todo.append(index)
@@ -138,14 +145,8 @@ class _Linker:
 
     def _add_stubs(self, code: bytearray, used: list[int]) -> None:
         """A jump through the import table for every compiler call."""
-        names = sorted(
-            {
-                self._symbols[r[2]].name
-                for i in used
-                for r in self._sections[i].relocations
-                if not self._symbols[r[2]].section
-            }
-        )
+        wanted = (self._resolved(symbol) for i in used for _, _, symbol, _ in self._sections[i].relocations)
+        names = sorted({symbol.name for symbol in wanted if not symbol.section})
         unknown = [name for name in names if not self._target.stubs or name not in COMPILER_CALLS]
         if unknown:
             raise UsageError(
@@ -157,7 +158,12 @@ class _Linker:
             self._stubs[name] = len(code)
             code += stub(self._target.machine, slot)
 
+    def _resolved(self, symbol: _ElfSymbol) -> _ElfSymbol:
+        """The definition, which may be in another object, or the symbol itself when there is none."""
+        return symbol if symbol.section else self._defined.get(symbol.name, symbol)
+
     def _address(self, symbol: _ElfSymbol) -> int:
+        symbol = self._resolved(symbol)
         if not symbol.section:
             return self._stubs[symbol.name]
         value = symbol.value & ~1 if symbol.kind == _FUNCTION and self._target.machine in _THUMBS else symbol.value
@@ -166,15 +172,15 @@ class _Linker:
     def _apply(self, code: bytearray, section: _Section) -> None:
         table = APPLY[self._target.machine]
         high = {
-            section.offset + offset: self._address(self._symbols[symbol]) + addend
+            section.offset + offset: self._address(symbol) + addend
             for offset, kind, symbol, addend in section.relocations
             if kind == RISCV_HIGH and self._target.machine is Machine.RISCV32
         }
         self._check_pages(section)
-        for offset, kind, number, addend in section.relocations:
+        for offset, kind, symbol, addend in section.relocations:
             if self._target.machine is Machine.RISCV32 and kind == _RELAX_HINT:
                 continue
-            symbol = self._symbols[number]
+            symbol = self._resolved(symbol)
             target = self._address(symbol)
             paired = high[target] if self._target.machine is Machine.RISCV32 and kind in RISCV_LOW else 0
             function = symbol.kind == _FUNCTION or not symbol.section
@@ -201,48 +207,49 @@ class _Linker:
         for _, kind, symbol, addend in section.relocations:
             if kind in AARCH64_LOW12 and (symbol, addend) not in pages:
                 raise UsageError(
-                    f"A reference to '{self._symbols[symbol].name}' shares its page address with another one; "
+                    f"A reference to '{symbol.name}' shares its page address with another one; "
                     "please report this as a bug of plctool.",
                     "link",
                 )
 
     def _lines(self) -> list[Line]:
-        """The line table of the sections in the block."""
-        section = next((s for s in self._sections if s.name == ".debug_line"), None)
-        if section is None:
-            return []
-        data = bytearray(section.data)
+        """The line tables of the sections in the block."""
+        rows: list[Line] = []
         width = 8 if self._target.pointer_size == 8 else 4
-        for offset, kind, number, addend in section.relocations:
-            if kind != LINE_ADDRESS[self._target.machine]:
+        for section in self._sections:
+            if section.name != ".debug_line":
                 continue
-            symbol = self._symbols[number]
-            address = self._address(symbol) + addend if self._sections[symbol.section].offset >= 0 else -1
-            data[offset : offset + width] = (address & ((1 << 8 * width) - 1)).to_bytes(width, "little")
-        return [line for line in read_line_table(bytes(data)) if line.address < 1 << 31]
+            data = bytearray(section.data)
+            for offset, kind, symbol, addend in section.relocations:
+                if kind == LINE_ADDRESS[self._target.machine]:
+                    inside = self._sections[symbol.section].offset >= 0
+                    address = self._address(symbol) + addend if inside else -1
+                    data[offset : offset + width] = (address & ((1 << 8 * width) - 1)).to_bytes(width, "little")
+            rows += (line for line in read_line_table(bytes(data)) if line.address < 1 << 31)
+        return in_order(rows)
 
 
-def _read_elf(data: bytes, target: Target) -> tuple[list[_Section], list[_ElfSymbol]]:
+def _read_elf(data: bytes, target: Target, base: int) -> tuple[list[_Section], list[_ElfSymbol]]:
+    """`base`: index of the first section; symbols refer to sections by index."""
     elf = ELFFile(io.BytesIO(data))
-    sections, symbols = [], []
+    wide = target.pointer_size == 8
+    sections: list[_Section] = []
+    symbols: list[_ElfSymbol] = []
     for s in elf.iter_sections():
         body = b"" if s["sh_type"] == "SHT_NOBITS" or s.name.startswith(_DROPPED) else s.data()
         sections.append(_Section(s.name, body, s["sh_flags"], max(s["sh_addralign"], 1), []))
     for s in elf.iter_sections():
         if s["sh_type"] == "SHT_SYMTAB":
-            symbols = _read_symbols(
-                s.data(), elf.get_section(s["sh_link"]).data(), len(sections), target.pointer_size == 8
-            )
+            symbols = _read_symbols(s.data(), elf.get_section(s["sh_link"]).data(), len(sections), base, wide)
     for s in elf.iter_sections():
         owner = sections[s["sh_info"]] if s["sh_type"] in ("SHT_REL", "SHT_RELA") else None
         if owner is not None and owner.data and (owner.flags & _ALLOCATED or owner.name == ".debug_line"):
-            owner.relocations = _read_relocations(
-                s.data(), s["sh_type"] == "SHT_RELA", target.pointer_size == 8, owner.data
-            )
+            entries = _read_relocations(s.data(), s["sh_type"] == "SHT_RELA", wide, owner.data)
+            owner.relocations = [(offset, kind, symbols[number], addend) for offset, kind, number, addend in entries]
     return sections, symbols
 
 
-def _read_symbols(data: bytes, names: bytes, section_count: int, wide: bool) -> list[_ElfSymbol]:
+def _read_symbols(data: bytes, names: bytes, section_count: int, base: int, wide: bool) -> list[_ElfSymbol]:
     symbols = []
     for fields in struct.iter_unpack("<IBBHQQ" if wide else "<IIIBBH", data):
         if wide:
@@ -250,7 +257,8 @@ def _read_symbols(data: bytes, names: bytes, section_count: int, wide: bool) -> 
         else:
             name, value, size, info, _, section = fields
         text = names[name : names.index(0, name)].decode()
-        symbols.append(_ElfSymbol(text, section if section < section_count else 0, value, size, info & 15))
+        index = base + section if 0 < section < section_count else 0
+        symbols.append(_ElfSymbol(text, index, value, size, info & 15, info >> 4 == 1))
     return symbols
 
 

@@ -15,14 +15,16 @@ from plctool.compiler.typed import Area, External, Pou, PouKind, Task, TypedProg
 from plctool.compiler.types import is_scalar
 
 GLOBAL_INIT = "global_init"
+_WHOLE = 1_200_000  # characters of IR (about 5000 lines of ST) up to which a program is optimised as one
 
 
 @dataclass(frozen=True)
 class Lowered:
-    """LLVM IR and what is needed to make an image of it. `tasks`: entry symbols in the order of the program's tasks;
-    `pous`: symbol of every POU that is part of it; `imports`: in the order of their slots."""
+    """LLVM IR, in parts to be compiled each by itself, and what an image of it needs. `tasks`: entry symbols
+    in the order of the program's tasks; `pous`: by symbol, all that are part of it; `imports`: in the order of their
+    slots."""
 
-    text: str
+    texts: list[str]
     tasks: list[str]
     pous: dict[str, Pou]
     imports: list[External]
@@ -41,11 +43,11 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
         done += 1
     _struct_initialisers(unit)
     for name in sorted(unit.helpers):
-        unit.module.add(string_helper(name, unit.target, unit.plain))
-    unit.module.add(memory_functions(unit.target, unit.plain))
+        unit.module.add_helper(string_helper(name, unit.target, unit.plain))
+    unit.module.add_helper(memory_functions(unit.target, unit.compact))
     for name in MEMORY_FUNCTIONS:
         unit.module.keep(name)
-    return Lowered(unit.module.text(), tasks, {name: pou for pou, name in unit.pous.items()}, unit.imports)
+    return Lowered(unit.module.texts(_WHOLE), tasks, {name: pou for pou, name in unit.pous.items()}, unit.imports)
 
 
 def _task_entry(unit: Unit, number: int, task: Task) -> str:
@@ -55,7 +57,7 @@ def _task_entry(unit: Unit, number: int, task: Task) -> str:
     for pou in task.programs:
         fn.do(f"call void @{unit.symbol(pou)}(ptr %ctx)")
     fn.terminate("ret void")
-    unit.module.add(fn.text())
+    unit.module.add(name, fn.text())
     return name
 
 
@@ -71,7 +73,7 @@ def _pou(unit: Unit, pou: Pou, effects: Effects) -> None:
     scope = body.open_scope(pou.name, pou.pos)
     fn.head = f"define internal {result} @{unit.symbol(pou)}({parameter_list(pou)}) {attributes} !dbg !{scope}"
     body.write()
-    unit.module.add(fn.text())
+    unit.module.add(unit.symbol(pou), fn.text())
 
 
 def _global_init(unit: Unit, variables: list[Variable]) -> None:
@@ -85,7 +87,7 @@ def _global_init(unit: Unit, variables: list[Variable]) -> None:
         _initialise_area(frame, variables, (Area.RETAIN,))
         fn.begin(end)
     fn.terminate("ret void")
-    unit.module.add(fn.text())
+    unit.module.add(GLOBAL_INIT, fn.text())
 
 
 def _initialise_area(frame: Initialising, variables: list[Variable], areas: tuple[Area, ...]) -> None:
@@ -103,5 +105,5 @@ def _struct_initialisers(unit: Unit) -> None:
         frame = Initialising(unit, fn, None)
         frame.initialise_members(Ref("%self", 0, struct, direct=True), struct, None)
         fn.terminate("ret void")
-        unit.module.add(fn.text())
+        unit.module.add(name, fn.text())
         done += 1

@@ -1,4 +1,4 @@
-"""Instructions for operators, conversions and intrinsics on scalars. Operands are already values; nothing here recurses.
+"""Instructions for operators, conversions and intrinsics on scalars. Operands are values; nothing here recurses.
 
 Integers wrap, nothing here has undefined behaviour for any operand, and no conversion needs a library call.
 """
@@ -174,8 +174,8 @@ class Arithmetic(Frame):
         return self.fn.value(f"call {integer} @llvm.{word}.sat.{integer}.{suffix}({text} {value})")
 
     def _round_to_even(self, value: str, text: str) -> str:
-        """Adding and taking away 2^23 (2^52) with the sign of the value leaves no room for a fraction; larger values have
-        none. LLVM's own rounding would be a library call on most targets."""
+        """Adding and taking away 2^23 (2^52) with the sign of the value leaves no room for a fraction; larger values
+        have none. LLVM's own rounding would be a library call on most targets."""
         fn = self.fn
         suffix, magic = ("f32", 2.0**23) if text == "float" else ("f64", 2.0**52)
         literal = float_literal(magic, 64)

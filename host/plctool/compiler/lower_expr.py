@@ -415,10 +415,8 @@ class Expressions(Strings):
         text = value_type(t)
         if pou.external:
             words = _extended(t).split()
-            value = fn.value(
-                f"call {convention}{' '.join(reversed(words))} {target}({', '.join(arguments)}){attributes}"
-            )
-            return value
+            text = " ".join(reversed(words))
+            return fn.value(f"call {convention}{text} {target}({', '.join(arguments)}){attributes}")
         return fn.value(f"call {text} {target}({', '.join(arguments)})")
 
     def _argument(

@@ -144,8 +144,7 @@ class Frame:
         return known
 
     def element(self, ref: Ref, index: str, t: Type, *, counted: bool) -> Ref:
-        """Element `index` (pointer-sized integer) of the array of `t` at `ref`. `counted`: index is known to be within.
-        """
+        """Element `index` (pointer-sized integer) of the array of `t` at `ref`. `counted`: it is known to be within."""
         flags = "inbounds nuw " if counted and ref.offset >= 0 else ""
         pointer = self.fn.value(
             f"getelementptr {flags}[{t.size} x i8], ptr {self.address(ref)}, {self._pointer_int} {index}"

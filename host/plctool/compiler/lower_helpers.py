@@ -1,8 +1,8 @@
 """Functions in LLVM IR that images need: the loops all string functions are made of, and what LLVM calls by name.
 
-Templates. Strings are walked in chunks of CHUNK bytes (a vector, or an integer) as long as a whole chunk lies within the
-capacity, then byte by byte. PTR stands for the integer type of an address, START for the index at which the byte loop
-takes over (0 when the target has no chunks). Bytes behind a NUL are frozen, as they may never have been written.
+Templates. Strings are walked in chunks of CHUNK bytes (a vector, or an integer) as long as a whole chunk lies within
+the capacity, then byte by byte. PTR stands for the integer type of an address, START for the index at which the byte
+loop takes over (0 when the target has no chunks). Bytes behind a NUL are frozen, as they may never have been written.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ def _load(name: str, address: str) -> str:
 @dataclass(frozen=True)
 class _Walk:
     """A function that walks a string. `head`: up to the loops, sets %room; `chunk`: handles the chunk at %x and goes to
-    %skip, %loop or out; `rest`: the byte loop and the end. `extra`: what the chunk block adds to the phi marked EXTRA."""
+    %skip, %loop or out; `rest`: the byte loop and the end. `extra`: what the chunk block adds to the phi marked
+    EXTRA."""
 
     head: str
     chunk: str
@@ -113,11 +114,12 @@ done:
 """,
 )
 
-# COPY__ of stdlib/strings.st: copies at most COUNT characters of a string from START on to another one at POS, ends that
-# there and returns its new length. With POS and START 0 it is the assignment of strings. Both may be the same string when
-# POS is not above START.
+# COPY__ of stdlib/strings.st: copies at most COUNT characters of a string from START on to another one at POS, ends
+# that there and returns its new length. With POS and START 0 it is the assignment of strings. Both may be the same
+# string when POS is not above START.
 _COPY = _Walk(
-    head="""define internal i32 @str.copy(ptr %ctx, ptr %d, i32 %dcap, i32 %pos, ptr %s, i32 %scap, i32 %start, i32 %want) ATTRIBUTES {
+    head="""define internal i32 @str.copy(ptr %ctx, ptr %d, i32 %dcap, i32 %pos,
+                              ptr %s, i32 %scap, i32 %start, i32 %want) ATTRIBUTES {
 entry:
   %d.left = sub i32 %dcap, %pos
   %s.left = sub i32 %scap, %start

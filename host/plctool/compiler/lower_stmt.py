@@ -108,7 +108,9 @@ class Body(Initialising):
         if pou.external or not _fits(call, target) or not self.effects.is_local(pou):
             return False
         root = root_of(target)
-        arguments = call.args[1:] if pou.in_place and _is_whole(call.args[0], root) and _is_whole(target, root) else call.args
+        arguments = (
+            call.args[1:] if pou.in_place and _is_whole(call.args[0], root) and _is_whole(target, root) else call.args
+        )
         return root is not None and all(
             node.var is not root and node.var.storage is not Storage.REFERENCE
             for node in walk(arguments)
@@ -230,8 +232,8 @@ class Body(Initialising):
         self.release_temporaries()
 
     def _for(self, s: For) -> None:
-        """The test in front of the increment keeps the variable from wrapping; it ends at the first value behind `stop`, or
-        at the limit of its type."""
+        """The test in front of the increment keeps the variable from wrapping; it ends at the first value behind
+        `stop`, or at the limit of its type."""
         fn = self.fn
         start, stop, step = self.value(s.start), self.value(s.stop), self.value(s.step)
         known_step = known_integer(s.step)

@@ -1,4 +1,4 @@
-"""Strings: copying with cutting, comparing, and the small functions in LLVM IR that do it for lengths known at run time.
+"""Strings: copying with cutting, comparing.
 
 A STRING is a run of bytes up to a NUL or the capacity, whichever comes first: no memory content makes these functions
 read or write outside of it. Bytes behind the NUL have no meaning and may be overwritten.

@@ -62,7 +62,7 @@ RAISE = External("iecraise", interface_signature("iecraise(UDINT)"), 0x00010000)
 
 
 def value_type(t: Type) -> str:
-    """The LLVM type of a scalar. A BOOL is an i8 whose lowest bit counts, so that it goes to and from memory as it is."""
+    """The LLVM type of a scalar. A BOOL is an i8 whose lowest bit counts: it goes to and from memory as it is."""
     base = base_of(t)
     if isinstance(base, PointerType):
         return "ptr"
@@ -97,10 +97,13 @@ class Unit:
         tree = module.metadata('!{!"st"}')
         self._tag_root = module.metadata(f'!{{!"any", !{tree}, i64 0}}')
         self._tags: dict[object, str] = {}
+        self.compact = module.attributes('minsize optsize nounwind "no-builtins"')
         self.plain = module.attributes('nounwind "no-builtins"')
         self.noinline = module.attributes('noinline nounwind "no-builtins"')
         self.hinted = module.attributes('inlinehint nounwind "no-builtins"')
-        self.raising = module.attributes("cold noreturn nounwind nomerge memory(read)")
+        # LLVM's fast instruction selection (level 0) takes a call that only reads memory for dead.
+        reads = " memory(read)" if options.opt_level > 0 else ""
+        self.raising = module.attributes(f"cold noreturn nounwind nomerge{reads}")
         self.external_call = module.attributes("nounwind")
 
     # ---- what is referred to ----

@@ -127,6 +127,6 @@ def _function(decl: ast.PouDecl, *, mocked: bool) -> ast.PouDecl:
         attributes = {name: text for name, text in attributes.items() if name != "external"}
         body = [ast.ExprStmt(pos, ast.Call(pos, ast.Name(pos, _RAISE), [ast.Argument(pos, None, code)]))]
     if mocked:
-        give = [_assign(pos, decl.name, ast.Name(pos, value_of(decl.name))), ast.Return(pos)]
-        body = [ast.If(pos, [(ast.Name(pos, switch_of(decl.name)), list[ast.Stmt](give))], []), *body]
+        give: list[ast.Stmt] = [_assign(pos, decl.name, ast.Name(pos, value_of(decl.name))), ast.Return(pos)]
+        body = [ast.If(pos, [(ast.Name(pos, switch_of(decl.name)), give)], []), *body]
     return replace(decl, body=body, attributes=attributes)

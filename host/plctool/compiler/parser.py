@@ -11,14 +11,12 @@ from typing import Any
 
 from plctool.compiler import ast
 from plctool.compiler.builder import Builder
-from plctool.compiler.lexer import SOFT, Lexer, Report, Token, is_mock, is_operator_function
+from plctool.compiler.lexer import OPENING, SOFT, Lexer, Report, Token, is_followed_by_name, is_operator_function
 from plctool.compiler.source import Source
 from plctool.compiler.syntax_errors import Recovery
 from plctool.compiler.tables import END, Rule, Tables, load_tables
 
 Reducer = Callable[[list[Any]], Any]
-
-_MOCKS = ("MOCK", "MOCK_FUNCTION")
 
 
 class Parser:
@@ -125,11 +123,10 @@ def parse(source: Source, report: Report, start: int = 0, end: int | None = None
     actions, states, feed = tables.actions, parser.states, parser.feed
     for token in lexer:
         kind = token.type
-        if kind not in actions[states[-1]] and (
-            kind in SOFT or (kind == "OP" and is_operator_function(token, source.text))
-        ):
-            token.type = "IDENT"
-        elif kind in _MOCKS and not is_mock(token, source.text):
+        if kind not in actions[states[-1]]:
+            if kind in SOFT or (kind == "OP" and is_operator_function(token, source.text)):
+                token.type = "IDENT"
+        elif kind in OPENING and not is_followed_by_name(token, source.text):
             token.type = "IDENT"
         if recovery.skipping and not recovery.resume(token):
             continue

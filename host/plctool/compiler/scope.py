@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from plctool.compiler.source import Source
-from plctool.compiler.symbols import Symbol
+from plctool.compiler.symbols import PouSymbol, Symbol
 from plctool.compiler.typed import Pos, Pou, Statement
 from plctool.compiler.types import Type
 
@@ -22,7 +22,8 @@ class Scope:
     """The surroundings of declarations and statements.
 
     `names` are the local ones by case-folded name; `bindings` the types generic parameters stand for in this instance;
-    `prologue` what has to be done before the body: initial values that are not constant.
+    `prologue` what has to be done before the body: initial values that are not constant; `programs` the PROGRAMs that
+    can be instantiated here, as function blocks: in unit tests.
     """
 
     world: World
@@ -32,6 +33,7 @@ class Scope:
     bindings: dict[str, Type] = field(default_factory=dict)
     pou: Pou | None = None
     prologue: list[Statement] = field(default_factory=list)
+    programs: dict[str, PouSymbol] = field(default_factory=dict)
 
     def lookup(self, name: str) -> Symbol | None:
         """What a name stands for here."""

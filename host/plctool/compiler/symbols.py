@@ -114,7 +114,8 @@ class Namespace:
     members: dict[str, GlobalSymbol | VarSymbol]
 
 
-Symbol = VarSymbol | GlobalSymbol | TypeSymbol | PouSymbol | Namespace
+Unit = TypeSymbol | PouSymbol
+Symbol = VarSymbol | GlobalSymbol | Unit | Namespace
 
 
 @dataclass(slots=True, eq=False)

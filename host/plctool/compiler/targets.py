@@ -67,8 +67,8 @@ TARGETS: dict[str, Target] = {
             pointer_size=4, stubs=True, unaligned=True, external_convention="arm_aapcs_vfpcc",
         ),
         Target(
-            "cortex-m7", "thumbv7em-none-unknown", "cortex-m7", "+reserve-r9,-fp64", Machine.THUMB, "TARGET_ID_CORTEX_M7",
-            pointer_size=4, stubs=True, unaligned=True, external_convention="arm_aapcs_vfpcc",
+            "cortex-m7", "thumbv7em-none-unknown", "cortex-m7", "+reserve-r9,-fp64", Machine.THUMB,
+            "TARGET_ID_CORTEX_M7", pointer_size=4, stubs=True, unaligned=True, external_convention="arm_aapcs_vfpcc",
         ),
         Target(
             "rv32imac", "riscv32-unknown-unknown", "generic-rv32", "+m,+a,+c,-relax,+reserve-x27", Machine.RISCV32,

@@ -466,3 +466,4 @@ class TypedProgram:
     aliases: dict[str, str] = field(
         default_factory=dict
     )  # other names of globals -> name in `globals`: `x` for `GVL.x`
+    externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not

@@ -1,7 +1,8 @@
 """Unit tests in ST: TEST blocks become a program that runs one of them at a time.
 
-The program is like any other; only its tasks are replaced by one, which looks at a hidden variable for the number of the
-test. All that the host has to do for a test is a cold start, writing the number, one cycle, and reading what came out:
+The program is like any other; only its tasks are replaced by one, which finds the number of the test in a hidden
+variable. All that the host has to do for a test is a cold start, writing the number, one cycle, and reading what came
+out:
 
 - The variables of a test live on the stack, those of SETUP in the data area, so all are fresh at every start. A PROGRAM
   is instantiated as a function block; a variable with an address (AT) is a plain member of it then.
@@ -161,14 +162,14 @@ class TestSuite:
     def _begin(self, world: World, decl: ast.TestDecl, file: _File, name: str) -> tuple[Scope, TestStatements]:
         scope = world.scope(decl.source)
         scope.pou = Pou(name, PouKind.PROGRAM, decl.source.pos(decl.pos))
-        scope.names.update(self._programs)
+        scope.programs = self._programs
         scope.names.update(file.names)
         assert self._bench is not None
         return scope, TestStatements(scope, self._bench)
 
     def _declare(self, decl: ast.TestDecl, scope: Scope, shared: _File | None) -> None:
         """The variables: of SETUP (`shared`) in the data area, others on the stack."""
-        world, pou = scope.world, scope.pou
+        pou = scope.pou
         assert pou is not None
         for name in {name.casefold() for b in decl.blocks for line in b.decls for _, name in line.names}:
             if isinstance(scope.names.get(name), VarSymbol):
@@ -216,7 +217,7 @@ class TestSuite:
 
 
 def _as_block(program: PouSymbol) -> PouSymbol:
-    """A PROGRAM as a type that can be instantiated. Addresses are dropped: each instance has its own inputs and outputs."""
+    """A PROGRAM as a type with instances. Addresses are dropped: each instance has its own inputs and outputs."""
     decl = program.decl
     blocks = [replace(b, decls=[replace(line, location=None) for line in b.decls]) for b in decl.blocks]
     return PouSymbol(replace(decl, keyword="FUNCTION_BLOCK", blocks=blocks), library=False)

@@ -254,11 +254,7 @@ class Units:
             scope.world.diagnostics.error(info.pou.pos, "attribute", "the attribute version is written '1.0'")
             return External(name, 0, 0)
         major, minor = (int(part) for part in version.groups())
-        types = (("&" if p.by_reference else "") + _interface_name(s.type) for (s, _), p in zip(
-            info.parameters, info.pou.parameters, strict=True
-        ))  # fmt: skip
-        result = "" if info.result is None else ":" + _interface_name(info.result)
-        text = f"{name.lower()}({','.join(types)}){result}"
+        text = interface_text(name.lower(), info.pou)
         return External(name.lower(), zlib.crc32(text.encode("latin-1", "replace")), major << 16 | minor)
 
     # ---- function blocks ----
@@ -383,6 +379,13 @@ class Units:
                 allocation.add(symbol.variable)
                 if direction is not None:
                     pou.parameters.append(Parameter(symbol.variable, direction))
+
+
+def interface_text(name: str, pou: Pou) -> str:
+    """What the signature of a C function is made of: `name(TYPE,&TYPE):RESULT`."""
+    types = (("&" if p.by_reference else "") + _interface_name(p.variable.type) for p in pou.parameters)
+    result = "" if pou.result is None else ":" + _interface_name(pou.result.type)
+    return f"{name}({','.join(types)}){result}"
 
 
 def _interface_name(t: Type) -> str:

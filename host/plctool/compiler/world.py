@@ -26,6 +26,7 @@ from plctool.compiler.symbols import (
     Role,
     Symbol,
     TypeSymbol,
+    Unit,
     VarSymbol,
 )  # fmt: skip
 from plctool.compiler.typed import Const, Expr, Pos, Pou, StructInit, Variable
@@ -57,8 +58,10 @@ class World:
         self.tests: list[ast.TestDecl] = []
         self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
         self.pous: list[Pou] = []
-        self._names: dict[str, Symbol] = {}
-        self._library_names: dict[str, Symbol | None] = {}
+        self._units: dict[str, Unit] = {}
+        self._globals: dict[str, GlobalSymbol] = {}
+        self._lists: dict[str, Namespace] = {}
+        self._library_names: dict[str, Unit | GlobalSymbol | None] = {}
         self._ambiguous: dict[str, list[GlobalSymbol]] = {}
         self._instances: dict[str, Namespace] = {}
         self._enum_values: dict[str, list[TypeSymbol]] = {}
@@ -80,14 +83,16 @@ class World:
         """Makes the names of declarations known."""
         for decl in declarations:
             if isinstance(decl, ast.PouDecl):
-                self._add(PouSymbol(decl, library), decl.name, decl.pos, decl.source, library=library)
+                self._add(PouSymbol(decl, library), library=library)
             elif isinstance(decl, ast.TypeDecl):
                 symbol = TypeSymbol(decl, library)
-                self._add(symbol, decl.name, decl.pos, decl.source, library=library)
+                self._add(symbol, library=library)
                 for name in _enum_names(symbol):
                     self._enum_values.setdefault(name.casefold(), []).append(symbol)
             elif isinstance(decl, ast.TestDecl):
                 self.tests.append(decl)
+            elif isinstance(decl, ast.GlobalBlock) and library:
+                self._add_globals(decl.block, decl.source, prefix="", library=True)
             elif isinstance(decl, ast.ConfigurationDecl):
                 self.configurations.append(decl)
                 for block in decl.globals:
@@ -104,7 +109,7 @@ class World:
         for block in blocks:
             for symbol in self._add_globals(block, source, prefix=f"{source.stem}." if alone else ""):
                 namespace.members.setdefault(symbol.name.casefold(), symbol)
-        self._names.setdefault(source.stem.casefold(), namespace)
+        self._lists.setdefault(source.stem.casefold(), namespace)
 
     def _add_globals(
         self, block: ast.VarBlock, source: Source, *, prefix: str, library: bool = False
@@ -114,53 +119,58 @@ class World:
             for offset, name in line.names:
                 symbol = GlobalSymbol(name, prefix + name, offset, line, block.qualifiers, source)
                 key = name.casefold()
-                other = self._names.get(key)
-                if isinstance(other, GlobalSymbol) and other.full_name.casefold() != symbol.full_name.casefold():
+                other = self._globals.get(key)
+                if library:
+                    self._library_names[key] = symbol
+                elif other is None:
+                    self._globals[key] = symbol
+                elif other.full_name.casefold() != symbol.full_name.casefold():
                     self._ambiguous.setdefault(key, [other]).append(symbol)
                 else:
-                    self._add(symbol, name, offset, source, library=library)
+                    self._duplicate(name, source.pos(offset), other.source.pos(other.pos))
                 added.append(symbol)
         return added
 
-    def _add(self, symbol: Symbol, name: str, offset: int, source: Source, *, library: bool) -> None:
-        key = name.casefold()
+    def _add(self, symbol: Unit, *, library: bool) -> None:
+        decl = symbol.decl
+        key = decl.name.casefold()
         if library:
             self._library_names[key] = symbol
             return
-        if isinstance(symbol, TypeSymbol | PouSymbol) and name.upper() in _RESERVED:
-            self.diagnostics.error(source.pos(offset), "duplicate", f"{name} is the name of an elementary type")
+        pos = decl.source.pos(decl.pos)
+        if decl.name.upper() in _RESERVED:
+            self.diagnostics.error(pos, "duplicate", f"{decl.name} is the name of an elementary type")
             return
-        other = self._names.get(key)
-        if other is not None and not isinstance(other, Namespace):
-            pos = source.pos(offset)
-            first = self._declared_at(other)
-            where = f"in line {first.line}" if first.file == pos.file else f"in {first.file}"
-            self.diagnostics.error(pos, "duplicate", f"{name} is declared already {where}")
-            return
-        self._names[key] = symbol
+        other = self._units.setdefault(key, symbol)
+        if other is not symbol:
+            self._duplicate(decl.name, pos, other.decl.source.pos(other.decl.pos))
 
-    def _declared_at(self, symbol: Symbol) -> Pos:
-        if isinstance(symbol, PouSymbol | TypeSymbol):
-            return symbol.decl.source.pos(symbol.decl.pos)
-        if isinstance(symbol, GlobalSymbol):
-            return symbol.source.pos(symbol.pos)
-        assert isinstance(symbol, VarSymbol)
-        return symbol.pos
+    def _duplicate(self, name: str, pos: Pos, first: Pos) -> None:
+        where = f"in line {first.line}" if first.file == pos.file else f"in {first.file}"
+        self.diagnostics.error(pos, "duplicate", f"{name} is declared already {where}")
 
     def lookup(self, key: str, *, library: bool) -> Symbol | None:
-        """A global name: the program's own before the library's; inside the library the other way round."""
-        if library:
-            return self._library_symbol(key) or self._names.get(key)
-        symbol = self._names.get(key)
-        if (
-            symbol is None
-            or isinstance(symbol, Namespace)
-            or (isinstance(symbol, PouSymbol) and symbol.keyword == "PROGRAM")
-        ):
-            symbol = self._instances.get(key, symbol)
-        return symbol or self._library_symbol(key)
+        """A global name: the program's own before the library's; inside the library the other way round. Variables come
+        before types, so that `motor : Motor` hides nothing that is needed (see `unit`)."""
+        if library and (symbol := self._library_symbol(key)) is not None:
+            return symbol
+        return (
+            self._globals.get(key)
+            or self._instances.get(key)
+            or self._units.get(key)
+            or self._lists.get(key)
+            or self._library_symbol(key)
+        )
 
-    def _library_symbol(self, key: str) -> Symbol | None:
+    def unit(self, key: str, *, library: bool) -> Unit | None:
+        """A type, function, function block or program by its name."""
+        own = self._units.get(key)
+        if own is not None and not library:
+            return own
+        other = self._library_symbol(key)
+        return own if other is None or isinstance(other, GlobalSymbol) else other
+
+    def _library_symbol(self, key: str) -> Unit | GlobalSymbol | None:
         if key not in self._library_names:
             self._library_names[key] = None
             self.register(self.library.parse(key, self.diagnostics), library=True)
@@ -172,7 +182,7 @@ class World:
 
     def is_user_name(self, name: str) -> bool:
         """Whether the program itself declares a global name."""
-        return name.casefold() in self._names
+        return name.casefold() in self._units
 
     def add_instance(self, name: str, scope: Scope) -> None:
         """Makes the variables of a program instance known as `Main.x`."""
@@ -198,24 +208,20 @@ class World:
 
     def visible_names(self) -> list[str]:
         """Names of globals, functions and enumeration values, for suggestions."""
-        values = [name for s in self._names.values() if isinstance(s, TypeSymbol) for name in _enum_names(s)]
-        return [*(self._written(k, s) for k, s in self._names.items()), *values, *self.library.names()]
+        values = [name for s in self._units.values() if isinstance(s, TypeSymbol) for name in _enum_names(s)]
+        units = [s.decl.name for s in self._units.values()]
+        named = [s.name for s in self._globals.values()]
+        named += [s.name for s in (*self._lists.values(), *self._instances.values())]
+        return units + named + values + self.library.names()
 
     def type_names(self) -> list[str]:
         """Names of types and function blocks, for suggestions."""
-        own = [s.decl.name for s in self._names.values() if isinstance(s, TypeSymbol | PouSymbol)]
-        return own + self.library.names()
+        return [s.decl.name for s in self._units.values()] + self.library.names()
 
     def function_names(self) -> list[str]:
         """Names of functions, for suggestions."""
-        own = [s.decl.name for s in self._names.values() if isinstance(s, PouSymbol) and s.keyword == "FUNCTION"]
+        own = [s.decl.name for s in self._units.values() if isinstance(s, PouSymbol) and s.keyword == "FUNCTION"]
         return own + self.library.names()
-
-    @staticmethod
-    def _written(key: str, symbol: Symbol) -> str:
-        if isinstance(symbol, PouSymbol | TypeSymbol):
-            return symbol.decl.name
-        return symbol.name
 
     # ---- units ----
 
@@ -230,22 +236,25 @@ class World:
 
     def declare_all(self) -> None:
         """Declares what the program itself has, used or not, so that all of it is checked."""
-        for symbol in list(self._names.values()):
+        for symbol in list(self._units.values()):
             if isinstance(symbol, TypeSymbol):
                 self.declarations.resolve_symbol(symbol)
-            elif isinstance(symbol, GlobalSymbol):
-                self.declarations.global_variable(symbol)
-            elif isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+            elif symbol.keyword == "FUNCTION_BLOCK":
                 self.units.block(symbol)
-            elif isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION" and not self.units.is_generic(symbol):
+            elif symbol.keyword == "FUNCTION" and not self.units.is_generic(symbol):
                 self.units.function(symbol)
-        for symbols in self._ambiguous.values():
-            for symbol in symbols:
-                self.declarations.global_variable(symbol)
+        for variable in (*self._globals.values(), *(v for same in self._ambiguous.values() for v in same)):
+            self.declarations.global_variable(variable)
+
+    def external_functions(self) -> list[Pou]:
+        """The functions the program declares that are implemented in C, in order."""
+        functions = [s for s in self._names.values() if isinstance(s, PouSymbol) and s.keyword == "FUNCTION"]
+        declared = [self.units.function(s) for s in functions if not self.units.is_generic(s)]
+        return [info.pou for info in declared if info is not None and info.pou.external is not None]
 
     def program_symbols(self) -> list[PouSymbol]:
         """The PROGRAM declarations in order."""
-        return [s for s in self._names.values() if isinstance(s, PouSymbol) and s.keyword == "PROGRAM"]
+        return [s for s in self._units.values() if isinstance(s, PouSymbol) and s.keyword == "PROGRAM"]
 
     def lookup_program(self, name: str) -> PouSymbol | None:
         """The PROGRAM of that name."""
@@ -254,13 +263,12 @@ class World:
     def aliases(self) -> dict[str, str]:
         """Other names of globals: `x` for `GVL.x` and the other way round, where they are unambiguous."""
         found: dict[str, str] = {}
-        for namespace in self._names.values():
-            if isinstance(namespace, Namespace):
-                for symbol in namespace.members.values():
-                    assert isinstance(symbol, GlobalSymbol)
-                    for other in (symbol.name, f"{namespace.name}.{symbol.name}"):
-                        if other != symbol.full_name and symbol.name.casefold() not in self._ambiguous:
-                            found[other] = symbol.full_name
+        for namespace in self._lists.values():
+            for symbol in namespace.members.values():
+                assert isinstance(symbol, GlobalSymbol)
+                for other in (symbol.name, f"{namespace.name}.{symbol.name}"):
+                    if other != symbol.full_name and symbol.name.casefold() not in self._ambiguous:
+                        found[other] = symbol.full_name
         return found
 
     def check_bodies(self) -> None:

@@ -20,6 +20,11 @@ void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
 #define RTS_IEC_STACK_SIZE 1024
 #endif
 
+/* With CodeInRam.c: RAM for the code of an application, bytes for each of the two slots. */
+#ifndef RTS_CODE_RAM_SIZE
+#define RTS_CODE_RAM_SIZE 8192
+#endif
+
 /* The main stack, bytes, a multiple of 32. The check of a new application's image is what needs most of it. */
 #ifndef RTS_MAIN_STACK_SIZE
 #define RTS_MAIN_STACK_SIZE 2560

@@ -86,17 +86,3 @@ const SYS_FLASH *SysFlashGet(void)
     };
     return &flash;
 }
-
-const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
-{
-    RTS_UNUSED(slot);
-    if (offset % APP_CODE_ALIGN || offset > BOARD_FLASH_SIZE || size > BOARD_FLASH_SIZE - offset)
-        return NULL;
-    SysExceptCodeRange(file_flash + offset, size);
-    return file_flash + offset;
-}
-
-void SysFlashReleaseCode(RTS_UI32 slot)
-{
-    RTS_UNUSED(slot);
-}

@@ -1,0 +1,190 @@
+"""The benchmark programs beside their C twins: time per cycle on this machine, instructions and flash on Cortex-M.
+
+A program is a pair X.st and X.c. The twin has `void scan_init(void)`, `void scan(void)` and `uint32_t chk`, and reads
+`int64_t now_ms`; both must hold the same `chk` after CYCLES cycles of 1 ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path += [str(ROOT / "tests/same_results"), str(ROOT / "bench/programs")]
+
+import logic  # noqa: E402
+from runners import RUNNERS, Runner  # noqa: E402
+
+from plctool.compiler import load_sources  # noqa: E402
+from plctool.compiler.build import BuildResult, build_program  # noqa: E402
+from plctool.compiler.front import check_sources  # noqa: E402
+from plctool.compiler.lower_unit import Options, parse_checks  # noqa: E402
+from plctool.compiler.targets import find_target  # noqa: E402
+from plctool.compiler.typed import TypedProgram  # noqa: E402
+from plctool.core import lib  # noqa: E402
+from plctool.image import parse_image  # noqa: E402
+from plctool.sim import Simulator  # noqa: E402
+from plctool.symbols import Symbol  # noqa: E402
+
+CYCLES = 1000  # before the checksums are compared
+GUEST_CYCLES = 200  # fewer, because soft float takes 50 000 instructions in each
+CALLS = 30_000  # of a program or twin, for its time on this machine
+HOST = "x86_64-linux"
+GUESTS = ("cortex-m3", "cortex-m4f")
+CHECKS = ("all", "none")
+C_FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-strict-aliasing")
+SHARED = ROOT.parent / "shared/bench"
+
+
+@dataclass
+class Program:
+    """A benchmark and its twin."""
+
+    st: Path
+    twin: Path
+
+    @cached_property
+    def typed(self) -> TypedProgram:
+        checked = check_sources(load_sources([self.st]))
+        assert checked.program, checked.diagnostics
+        return checked.program
+
+    def build(self, target: str, checks: str) -> BuildResult:
+        return build_program(self.typed, Options(find_target(target), checks=parse_checks(checks)))
+
+
+def checksum(built: BuildResult) -> Symbol:
+    """The variable `chk` of the only program."""
+    return next(s for name, s in built.symbols.variables.items() if name.lower().endswith(".chk"))
+
+
+# ---- this machine --------------------------------------------------------------------------------------------------
+
+
+def host_program(built: BuildResult) -> tuple[int, float]:
+    """Checksum and ns per cycle."""
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(CYCLES)
+        value = plc.read(checksum(built).name)
+        return value, min(plc.bench(0, CALLS)[0] for _ in range(3))
+
+
+def host_twin(twin: Path, optimisation: str, folder: Path) -> tuple[int, float]:
+    """Checksum and ns per cycle."""
+    program = folder / "twin"
+    sources = [ROOT / "bench/twin_main.c", twin]
+    subprocess.run(["cc", *C_FLAGS, optimisation, f"-DCYCLES={CYCLES}", "-o", program, *sources, "-lm"], check=True)
+    out = subprocess.run([program, str(CALLS)], check=True, capture_output=True, text=True).stdout.split()
+    return int(out[0]), float(out[1])
+
+
+def bench_host(programs: list[Program], folder: Path) -> None:
+    print("\nBenchmark programs on this machine: ns per cycle, and the ratio to their C twins")
+    print(f"  {'':<12}{'checks':<8}{'plctool':>10}{'gcc -O2':>10}{'gcc -O3':>10}{'to -O2':>8}{'to -O3':>8}")
+    for program in programs:
+        twins = [host_twin(program.twin, level, folder) for level in ("-O2", "-O3")]
+        for checks in CHECKS:
+            value, ns = host_program(program.build(HOST, checks))
+            same = "" if all(value == twin[0] for twin in twins) else "  OTHER CHECKSUM"
+            times = "".join(f"{twin[1]:>10.0f}" for twin in twins)
+            ratios = "".join(f"{ns / twin[1]:>8.2f}" for twin in twins)
+            print(f"  {program.st.stem:<12}{checks:<8}{ns:>10.0f}{times}{ratios}{same}", flush=True)
+
+
+# ---- Cortex-M ------------------------------------------------------------------------------------------------------
+
+
+def run_guest(runner: Runner, program: Path, folder: Path) -> tuple[int, int]:
+    """Checksum and instructions per cycle that a guest program prints."""
+    command = [*runner.command[:-1], "-icount", "shift=0", runner.command[-1], program]
+    # What a guest prints comes out on QEMU's standard error.
+    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120)
+    if done.returncode:
+        raise RuntimeError(f"{program.name} failed: {done.stdout}")
+    value, instructions = done.stdout.split()
+    return int(value), int(instructions)
+
+
+def guest_twin(runner: Runner, twin: Path, optimisation: str, folder: Path) -> tuple[int, int]:
+    flags = (*C_FLAGS, optimisation, f"-DCYCLES={GUEST_CYCLES}")
+    return run_guest(runner, runner.compile_alone(folder, [ROOT / "bench/guest/twin.c", twin], *flags), folder)
+
+
+def guest_program(runner: Runner, guest: Path, built: BuildResult, folder: Path) -> tuple[int, int]:
+    chk = checksum(built)
+    target = getattr(lib, find_target(runner.target).device_id)
+    (folder / "job").write_bytes(struct.pack("<4I", target, chk.area, chk.offset, len(built.image)) + built.image)
+    return run_guest(runner, guest, folder)
+
+
+def twin_flash(runner: Runner, twin: Path, optimisation: str, folder: Path) -> int:
+    """Bytes of code and constants of the twin alone, without what it takes from libraries."""
+    target = folder / "twin.o"
+    flags = [flag for flag in runner.flags if not flag.startswith("-Wl,")]
+    subprocess.run([runner.compiler, *flags, *C_FLAGS, optimisation, "-c", "-o", target, twin], check=True)
+    size = shutil.which("arm-none-eabi-size") or "size"
+    return int(subprocess.run([size, target], check=True, capture_output=True, text=True).stdout.split("\n")[1].split()[0])
+
+
+def bench_guest(target: str, programs: list[Program], folder: Path) -> None:
+    runner = RUNNERS[target]
+    missing = runner.missing()
+    if missing:
+        print(f"\nBenchmark programs on {target}: left out, {' and '.join(missing)} not found")
+        return
+    print(f"\nBenchmark programs on {target} in QEMU: instructions per cycle and bytes of code, beside arm-none-eabi-gcc")
+    print(f"  {'':<12}{'checks':<8}{'plctool':>10}{'gcc -O2':>10}{'ratio':>8}{'bytes':>10}{'gcc -Os':>10}{'gcc -O2':>10}")
+    guest = runner.compile(
+        folder, ROOT / "bench/guest/iec.c", f"-DCYCLES={GUEST_CYCLES}", f"-I{ROOT / 'bench/guest'}"
+    )
+    for program in programs:
+        twin_value, twin = guest_twin(runner, program.twin, "-O2", folder)
+        sizes = "".join(f"{twin_flash(runner, program.twin, level, folder):>10}" for level in ("-Os", "-O2"))
+        for checks in CHECKS:
+            built = program.build(target, checks)
+            value, instructions = guest_program(runner, guest, built, folder)
+            same = "" if value == twin_value else "  OTHER CHECKSUM"
+            code = len(parse_image(built.image).code)
+            figures = f"{instructions:>10}{twin:>10}{instructions / twin:>8.2f}{code:>10}{sizes}"
+            print(f"  {program.st.stem:<12}{checks:<8}{figures}{same}", flush=True)
+
+
+# ---- all of it -----------------------------------------------------------------------------------------------------
+
+
+def pairs(folder: Path) -> Iterator[Program]:
+    """Programs with their twins below a folder."""
+    twins = {path.stem: path for path in folder.rglob("*.c")}
+    for st in sorted(folder.rglob("*.st")):
+        if st.stem in twins:
+            yield Program(st, twins[st.stem])
+
+
+def find_programs(more: Path, folder: Path) -> list[Program]:
+    """Ours, one of which is generated into `folder`, and those of `more` if it is there."""
+    for suffix, text in zip((".st", ".c"), logic.texts(), strict=True):
+        (folder / f"logic{suffix}").write_text(text)
+    return [*pairs(ROOT / "bench/programs"), *pairs(folder), *(pairs(more) if more.is_dir() else [])]
+
+
+def main(more: Path = SHARED) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        programs = find_programs(more, folder)
+        bench_host(programs, folder)
+        for target in GUESTS:
+            bench_guest(target, programs, folder)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--programs", type=Path, default=SHARED, help="folder with more pairs X.st and X.c")
+    main(parser.parse_args().programs)

@@ -1,0 +1,26 @@
+/*
+ * CodeInRam.c - application code is copied to RAM: for a flash that cannot be mapped, is slow, or stops while it is erased.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CortexM.h"
+#include "SysFlash.h"
+
+enum { SLOT_COUNT = 2 };
+
+static RTS_UI8 code_ram[SLOT_COUNT][RTS_CODE_RAM_SIZE] __attribute__((aligned(16)));
+RTS_STATIC_ASSERT(RTS_CODE_RAM_SIZE % APP_CODE_ALIGN == 0, each_slot_is_aligned);
+
+const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
+{
+    if (slot >= SLOT_COUNT || size > RTS_CODE_RAM_SIZE || SysFlashGet()->read(offset, code_ram[slot], size) != ERR_OK)
+        return NULL;
+    CpuBarrier(); /* the first fetch sees the new code */
+    SysExceptCodeRange(code_ram[slot], size);
+    return code_ram[slot];
+}
+
+void SysFlashReleaseCode(RTS_UI32 slot)
+{
+    RTS_UNUSED(slot);
+}
