@@ -11,6 +11,8 @@ import tempfile
 import time
 from pathlib import Path
 
+import targets
+
 import plctool
 from plctool.compiler import compile_sources
 from plctool.compiler.build import BuildResult
@@ -142,6 +144,7 @@ def bench_day() -> None:
 def main() -> None:
     bench_empty_task()
     bench_tanks()
+    targets.main()
     bench_day()
     bench_serial()
 

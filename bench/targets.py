@@ -41,7 +41,7 @@ HOST = "x86_64-linux"
 GUESTS = ("cortex-m3", "cortex-m4f")
 CHECKS = ("all", "none")
 C_FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-strict-aliasing")
-SHARED = ROOT.parent / "shared/bench"
+SHARED = ROOT.parent / "shared/bench"  # more programs, when this folder lies beside the checkout
 
 
 @dataclass
@@ -104,7 +104,7 @@ def bench_host(programs: list[Program], folder: Path) -> None:
 
 def run_guest(runner: Runner, program: Path, folder: Path) -> tuple[int, int]:
     """Checksum and instructions per cycle that a guest program prints."""
-    command = [*runner.command[:-1], "-icount", "shift=0", runner.command[-1], program]
+    command: list[str | Path] = [*runner.command[:-1], "-icount", "shift=0", runner.command[-1], program]
     # What a guest prints comes out on QEMU's standard error.
     done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120)
     if done.returncode:
@@ -131,7 +131,9 @@ def twin_flash(runner: Runner, twin: Path, optimisation: str, folder: Path) -> i
     flags = [flag for flag in runner.flags if not flag.startswith("-Wl,")]
     subprocess.run([runner.compiler, *flags, *C_FLAGS, optimisation, "-c", "-o", target, twin], check=True)
     size = shutil.which("arm-none-eabi-size") or "size"
-    return int(subprocess.run([size, target], check=True, capture_output=True, text=True).stdout.split("\n")[1].split()[0])
+    return int(
+        subprocess.run([size, target], check=True, capture_output=True, text=True).stdout.split("\n")[1].split()[0]
+    )
 
 
 def bench_guest(target: str, programs: list[Program], folder: Path) -> None:
@@ -140,11 +142,13 @@ def bench_guest(target: str, programs: list[Program], folder: Path) -> None:
     if missing:
         print(f"\nBenchmark programs on {target}: left out, {' and '.join(missing)} not found")
         return
-    print(f"\nBenchmark programs on {target} in QEMU: instructions per cycle and bytes of code, beside arm-none-eabi-gcc")
-    print(f"  {'':<12}{'checks':<8}{'plctool':>10}{'gcc -O2':>10}{'ratio':>8}{'bytes':>10}{'gcc -Os':>10}{'gcc -O2':>10}")
-    guest = runner.compile(
-        folder, ROOT / "bench/guest/iec.c", f"-DCYCLES={GUEST_CYCLES}", f"-I{ROOT / 'bench/guest'}"
+    print(
+        f"\nBenchmark programs on {target} in QEMU: instructions per cycle and bytes of code, beside arm-none-eabi-gcc"
     )
+    print(
+        f"  {'':<12}{'checks':<8}{'plctool':>10}{'gcc -O2':>10}{'ratio':>8}{'bytes':>10}{'gcc -Os':>10}{'gcc -O2':>10}"
+    )
+    guest = runner.compile(folder, ROOT / "bench/guest/iec.c", f"-DCYCLES={GUEST_CYCLES}", f"-I{ROOT / 'bench/guest'}")
     for program in programs:
         twin_value, twin = guest_twin(runner, program.twin, "-O2", folder)
         sizes = "".join(f"{twin_flash(runner, program.twin, level, folder):>10}" for level in ("-Os", "-O2"))
@@ -175,7 +179,11 @@ def find_programs(more: Path, folder: Path) -> list[Program]:
     return [*pairs(ROOT / "bench/programs"), *pairs(folder), *(pairs(more) if more.is_dir() else [])]
 
 
-def main(more: Path = SHARED) -> None:
+def main() -> None:
+    """`--programs DIR` on the command line names a folder with more pairs."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--programs", type=Path, default=SHARED, help="folder with more pairs X.st and X.c")
+    more = parser.parse_args().programs
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         programs = find_programs(more, folder)
@@ -185,6 +193,4 @@ def main(more: Path = SHARED) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--programs", type=Path, default=SHARED, help="folder with more pairs X.st and X.c")
-    main(parser.parse_args().programs)
+    main()

@@ -83,10 +83,11 @@ def texts() -> tuple[str, str]:
         results="\n".join(f"IF {name} THEN packed := packed XOR 16#{bits:08X}; END_IF;" for name, bits in picked),
     )
     qualified = {name: f"v.{name}" for name in inputs + outputs}
+    c_networks = [(own, _qualify(text.format(**c_operators), qualified)) for own, text in expressions]
     c = _C.format(
         variables=", ".join(inputs + outputs),
         inputs="\n    ".join(f"v.i{k} = v.noise >> {k} & 1;" for k in range(INPUTS)),
-        networks="\n    ".join(f"v.{own} = {_qualify(text.format(**c_operators), qualified)};" for own, text in expressions),
+        networks="\n    ".join(f"v.{own} = {text};" for own, text in c_networks),
         results="\n    ".join(f"if (v.{name}) packed ^= 0x{bits:08X}u;" for name, bits in picked),
     )
     return st, c

@@ -73,26 +73,26 @@ static void an_image_shorter_than_its_header(void)
 {
     begin_image();
     image.size = 103;
-    check_refused(ERR_SIZE_MISMATCH, "only 103 bytes");
+    check_refused(ERR_SIZE_MISMATCH, "Image of 103 bytes");
     image.size = 0;
-    check_refused(ERR_SIZE_MISMATCH, "only 0 bytes");
+    check_refused(ERR_SIZE_MISMATCH, "Image of 0 bytes");
 }
 
 static void something_else_than_an_image(void)
 {
     begin_image();
     header.header_tag = 0x464C457F;
-    check_header_refused(ERR_TYPE_MISMATCH, "not a compact download image: it starts with 0x464c457f");
+    check_header_refused(ERR_TYPE_MISMATCH, "Not a compact download image: it starts with 0x464c457f");
 }
 
 static void another_header_version(void)
 {
     begin_image();
     header.header_version = 2;
-    check_header_refused(ERR_VERSION_MISMATCH, "header version 2 with 104 bytes");
+    check_header_refused(ERR_VERSION_MISMATCH, "Header version 2 of 104 bytes");
     header.header_version = 1;
     header.header_size = 112;
-    check_header_refused(ERR_VERSION_MISMATCH, "header version 1 with 112 bytes");
+    check_header_refused(ERR_VERSION_MISMATCH, "Header version 1 of 112 bytes");
 }
 
 static void another_total_size(void)
@@ -115,7 +115,7 @@ static void another_image_than_announced(void)
     CHECK(AppDownloadBegin(image.size, image_crc(&image) + 1) == ERR_OK);
     CHECK(AppDownloadWrite(0, image.bytes, image.size) == ERR_OK);
     CHECK(AppDownloadEnd(&refusal) == ERR_CRC_FAILED);
-    CHECK(strstr(refusal.text, "another image than announced") != NULL);
+    CHECK(strstr(refusal.text, "not the announced one") != NULL);
 }
 
 /* ---- target ---- */
@@ -155,13 +155,13 @@ typedef struct {
 static void every_segment_lies_behind_the_header_and_within_the_image(void)
 {
     const SEGMENT_CASE cases[] = {
-        {&header.code, "code", 16},
-        {&header.application_info, "application info", 4},
-        {&header.area_table, "area table", 4},
-        {&header.function_table, "function table", 4},
-        {&header.external_function_table, "external function table", 4},
+        {&header.code, "Code", 16},
+        {&header.application_info, "Application info", 4},
+        {&header.area_table, "Area table", 4},
+        {&header.function_table, "Function table", 4},
+        {&header.external_function_table, "External function table", 4},
         {&header.iec_function_table, "IEC function table", 4},
-        {&header.blob, "blob", 4},
+        {&header.blob, "Blob", 4},
     };
     char text[100];
     RTS_SIZE i;
@@ -171,9 +171,9 @@ static void every_segment_lies_behind_the_header_and_within_the_image(void)
         begin_image();
         segment->size = 16;
         segment->offset = CDL_HEADER_SIZE - 4;
-        snprintf(text, sizeof text, "The %s segment overlaps the header", cases[i].name);
+        snprintf(text, sizeof text, "%s segment overlaps the header", cases[i].name);
         check_header_refused(ERR_OUT_OF_LIMITS, text);
-        snprintf(text, sizeof text, "The %s segment reaches beyond the end", cases[i].name);
+        snprintf(text, sizeof text, "%s segment ends beyond", cases[i].name);
         segment->offset = image.size - 15;
         check_header_refused(ERR_OUT_OF_LIMITS, text);
         segment->offset = 0xFFFFFFF0;
@@ -183,7 +183,7 @@ static void every_segment_lies_behind_the_header_and_within_the_image(void)
         check_header_refused(ERR_OUT_OF_LIMITS, text);
         segment->offset = 112 + cases[i].align / 2;
         segment->size = 16;
-        snprintf(text, sizeof text, "The %s segment is not aligned to %u bytes", cases[i].name, (unsigned)cases[i].align);
+        snprintf(text, sizeof text, "%s segment is not aligned to %u bytes", cases[i].name, (unsigned)cases[i].align);
         check_header_refused(ERR_ALIGNMENT, text);
     }
 }
@@ -202,7 +202,7 @@ static void code_in_another_area_or_larger_than_it(void)
     check_header_refused(ERR_OUT_OF_LIMITS, "not in area 5");
     header.code_area_index = APP_AREA_CODE;
     header.code_area_size = header.code.size - 1;
-    check_header_refused(ERR_OUT_OF_LIMITS, "larger than that area");
+    check_header_refused(ERR_OUT_OF_LIMITS, "above its 103 bytes");
 }
 
 /* ---- areas ---- */
@@ -247,7 +247,7 @@ static void an_area_table_with_half_an_entry(void)
 {
     begin_image();
     header.area_table.size -= 4;
-    check_header_refused(ERR_SIZE_MISMATCH, "not only whole entries");
+    check_header_refused(ERR_SIZE_MISMATCH, "part of an entry");
 }
 
 static void an_unknown_or_repeated_area(void)
@@ -275,19 +275,19 @@ static void a_function_table_of_another_size(void)
 {
     begin_image();
     header.function_table.size -= 8;
-    check_header_refused(ERR_SIZE_MISMATCH, "function table has 40 bytes, it should have 48");
+    check_header_refused(ERR_SIZE_MISMATCH, "Function table has 40 bytes, not 48");
     header.function_table.size = 0;
-    check_header_refused(ERR_SIZE_MISMATCH, "function table has 0 bytes");
+    check_header_refused(ERR_SIZE_MISMATCH, "Function table has 0 bytes");
 }
 
 static void a_function_outside_the_code(void)
 {
     begin();
     spec.function[CDL_FUNCTION_CODE_INIT] = (RTS_I32)spec.code_size;
-    check_spec_refused(ERR_INVALID_REFERENCE, "Entry 0 of the function table lies outside the code");
+    check_spec_refused(ERR_INVALID_REFERENCE, "Function 0 lies outside the code");
     spec.function[CDL_FUNCTION_CODE_INIT] = SPEC_NO_ENTRY;
     spec.function[CDL_FUNCTION_GLOBAL_EXIT] = 0x7FFFFFFF;
-    check_spec_refused(ERR_INVALID_REFERENCE, "Entry 2 of the function table lies outside the code");
+    check_spec_refused(ERR_INVALID_REFERENCE, "Function 2 lies outside the code");
 }
 
 static void functions_that_position_independent_code_does_not_need(void)
@@ -297,7 +297,7 @@ static void functions_that_position_independent_code_does_not_need(void)
     for (i = CDL_FUNCTION_RELOC; i < CDL_FUNCTION_COUNT; i++) {
         begin();
         spec.function[i] = 0;
-        check_spec_refused(ERR_NOT_SUPPORTED, "code for this device needs none");
+        check_spec_refused(ERR_NOT_SUPPORTED, "is not supported");
     }
 }
 
@@ -372,7 +372,7 @@ static void as_many_functions_as_the_device_can_link_but_not_one_more(void)
     begin();
     for (i = 0; i <= APP_MAX_IMPORTS; i++)
         add_import(&spec, "simburn", SIMBURN_SIGNATURE, 0x00010000);
-    check_spec_refused(ERR_NOMEMORY, "more external functions than this device can link (128)");
+    check_spec_refused(ERR_NOMEMORY, "More than the 128 external functions");
 }
 
 static void begin_with_import(void)
@@ -391,13 +391,13 @@ static void an_external_function_without_a_good_name(void)
     name = header.external_function_table.offset + EXT_REF_INFO_SIZE;
     image.bytes[name] = '\0';
     image_fix_crc(&image);
-    check_refused(ERR_PARAMETER, "The name of external function 0");
+    check_refused(ERR_PARAMETER, "Name of external function 0");
     image.bytes[name] = ' ';
     image_fix_crc(&image);
-    check_refused(ERR_PARAMETER, "The name of external function 0");
+    check_refused(ERR_PARAMETER, "Name of external function 0");
     begin_with_import();
     header.external_function_table.size = EXT_REF_INFO_SIZE + 7; /* without the NUL */
-    check_header_refused(ERR_PARAMETER, "The name of external function 0");
+    check_header_refused(ERR_PARAMETER, "Name of external function 0");
 }
 
 static void a_name_longer_than_any_function_has(void)
@@ -428,11 +428,11 @@ static void an_external_function_with_another_slot(void)
     begin_with_import();
     image.bytes[header.external_function_table.offset + 12] = 8;
     image_fix_crc(&image);
-    check_refused(ERR_INVALID_REFERENCE, "simburn has another place than slot 0");
+    check_refused(ERR_INVALID_REFERENCE, "simburn is not in import slot 0");
     begin_with_import();
     image.bytes[header.external_function_table.offset + 16] = 0;
     image_fix_crc(&image);
-    check_refused(ERR_INVALID_REFERENCE, "simburn has another place than slot 0");
+    check_refused(ERR_INVALID_REFERENCE, "simburn is not in import slot 0");
 }
 
 /* ---- IEC functions ---- */
@@ -460,10 +460,10 @@ static void iec_functions_are_checked_too(void)
     begin_with_iec_function(spec.code_size, "fn", 3);
     check_refused(ERR_INVALID_REFERENCE, "IEC function fn lies outside the code");
     begin_with_iec_function(0, "fn", 2);
-    check_refused(ERR_PARAMETER, "A name in the IEC function table");
+    check_refused(ERR_PARAMETER, "Name in the IEC function table");
     begin_with_iec_function(0, "fn", 3);
     header.iec_function_table.size = 19;
-    check_header_refused(ERR_SIZE_MISMATCH, "The IEC function table ends within an entry");
+    check_header_refused(ERR_SIZE_MISMATCH, "IEC function table ends within an entry");
 }
 
 /* ---- application info ---- */
@@ -472,9 +472,9 @@ static void info_that_is_not_terminated(void)
 {
     begin_image();
     header.application_info.size = 7; /* "Project" without its NUL */
-    check_header_refused(ERR_PARAMETER, "Text 0 of the application info is not terminated");
+    check_header_refused(ERR_PARAMETER, "Application info 0 is not terminated");
     header.application_info.size = 8 + 3;
-    check_header_refused(ERR_PARAMETER, "Text 1 of the application info is not terminated");
+    check_header_refused(ERR_PARAMETER, "Application info 1 is not terminated");
 }
 
 static void info_may_be_short_or_absent(void)
@@ -521,7 +521,7 @@ static void a_task_without_a_good_name(void)
     spec.tasks[0].name[0] = '\0';
     check_spec_refused(ERR_PARAMETER, "Task 0 has no name");
     memset(spec.tasks[0].name, 'x', sizeof spec.tasks[0].name);
-    check_spec_refused(ERR_PARAMETER, "not terminated");
+    check_spec_refused(ERR_PARAMETER, "Task 0 has no name");
 }
 
 static void a_task_with_wrong_values(void)
@@ -537,7 +537,7 @@ static void a_task_with_wrong_values(void)
     check_spec_refused(ERR_PARAMETER, "Cyclic task Main has no interval");
     spec.tasks[0].interval_us = 1;
     spec.tasks[0].entry_offset = spec.code_size;
-    check_spec_refused(ERR_INVALID_REFERENCE, "The entry of task Main lies outside the code");
+    check_spec_refused(ERR_INVALID_REFERENCE, "Task Main lies outside the code");
 }
 
 static void an_event_variable_outside_its_area(void)
@@ -556,7 +556,7 @@ static void an_event_variable_outside_its_area(void)
     for (i = 0; i < RTS_COUNT(cases); i++) {
         spec.tasks[0].event_area = cases[i].area;
         spec.tasks[0].event_offset = cases[i].offset;
-        check_spec_refused(ERR_INVALID_REFERENCE, "The event variable of task Main lies outside its area");
+        check_spec_refused(ERR_INVALID_REFERENCE, "Event of task Main lies outside its area");
     }
     spec.tasks[0].event_area = APP_AREA_DATA;
     spec.tasks[0].event_offset = 63;
@@ -568,9 +568,9 @@ static void blobs_that_are_not_whole(void)
 {
     begin_image();
     header.blob.size = 11;
-    check_header_refused(ERR_SIZE_MISMATCH, "ends within the head of a blob");
+    check_header_refused(ERR_SIZE_MISMATCH, "Blob segment ends within a head");
     header.blob.size = 12;
-    check_header_refused(ERR_OUT_OF_LIMITS, "Blob 1 reaches beyond the end of its segment");
+    check_header_refused(ERR_OUT_OF_LIMITS, "Blob 1 ends beyond its segment");
     begin_image();
     image.bytes[header.blob.offset] ^= 1;
     image_fix_crc(&image);
@@ -578,11 +578,11 @@ static void blobs_that_are_not_whole(void)
     begin_image();
     memset(image.bytes + header.blob.offset + 8, 0xFF, 4); /* its size */
     image_fix_crc(&image);
-    check_refused(ERR_OUT_OF_LIMITS, "Blob 1 reaches beyond the end of its segment");
+    check_refused(ERR_OUT_OF_LIMITS, "Blob 1 ends beyond its segment");
     begin_image();
     image.bytes[header.blob.offset + 8]--;
     image_fix_crc(&image);
-    check_refused(ERR_SIZE_MISMATCH, "The list of tasks has 55 bytes");
+    check_refused(ERR_SIZE_MISMATCH, "Task list of 55 bytes");
 }
 
 static void a_retain_layout_of_another_size(void)
@@ -590,7 +590,7 @@ static void a_retain_layout_of_another_size(void)
     begin_image();
     image.bytes[header.blob.offset + 12 + sizeof(CDL_TASK) + 8] = 3;
     image_fix_crc(&image);
-    check_refused(ERR_SIZE_MISMATCH, "The retain layout has 3 bytes");
+    check_refused(ERR_SIZE_MISMATCH, "Retain layout has 3 bytes");
 }
 
 static void two_lists_of_tasks(void)

@@ -98,7 +98,6 @@ def test_declarations_may_come_in_any_order() -> None:
         (main("v : STRING[0];"), "3:12", "1..65535"),
         (main("v : INT[5];"), "3:5", "only a STRING has a length"),
         (main("v : Main;"), "3:5", "not a type"),
-        (main("v : DATE;"), "3:5", "not supported yet"),
         (main("v : ANY_NUM;"), "3:5", "parameters of functions"),
         (main("v : ARRAY[0..2147483647] OF LREAL;"), "3:5", "too large"),
         ("TYPE T : STRUCT a : T; END_STRUCT END_TYPE", "1:21", "contains itself"),

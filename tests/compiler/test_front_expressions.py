@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from front_support import body_of, findings, folded, main, messages
@@ -436,7 +438,7 @@ def test_bit_of_a_constant_is_folded() -> None:
 
 # ---- folding ----
 
-OPERATIONS = {
+OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
     "*": lambda a, b: a * b,

@@ -21,9 +21,8 @@ from plctool.sim import Simulator
 
 Value = bool | int | float | str
 
-PROGRAM = settings(
-    max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
-)
+SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
+PROGRAM = settings(max_examples=12, deadline=None, suppress_health_check=SLOW, report_multiple_bugs=False)
 EXPRESSIONS = 30  # per program
 DEPTH = 4
 

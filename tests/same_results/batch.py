@@ -95,7 +95,9 @@ class Recorder(Simulator):
         exception = self.status().exception
         sizes = [lib.AppGetAreaSize(area.value) for area in AREAS]
         areas = (bytes(ffi.buffer(lib.AppGetAreaAddress(a.value, 0, n), n)) for a, n in zip(AREAS, sizes, strict=True))
-        seen = exception and (exception.code, line_of(self.recording.built, exception.code_offset), exception.task)
+        seen = None
+        if exception:
+            seen = (exception.code, line_of(self.recording.built, exception.code_offset), exception.task)
         self.recording.states.append(State(seen, tuple(areas)))
 
 

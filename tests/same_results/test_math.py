@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import mpmath
+import mpmath  # type: ignore[import-untyped]
 import pytest
 from batch import AREAS, REFERENCE, Recorder, Recording, State, run_batch
 from runners import RUNNERS

@@ -30,7 +30,8 @@ def record(path: Path, script: Script, typed: TypedProgram) -> Recording:
     """Runs a program as its comments say."""
     options = script.options
     recording = Recording(path.stem, typed, int(options.get("level", "2")), options.get("checks", "all"))
-    with Recorder(recording) as plc:
+    plc = Recorder(recording)
+    with plc:
         if script.time_ms:
             plc.run_ms(script.time_ms)
         for cycle in range(0 if script.time_ms else script.cycles):

@@ -43,7 +43,7 @@ static RTS_RESULT read_image(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 si
 {
     RTS_RESULT result = SysFileRead(l->image->file, offset, data, size);
 
-    return result == ERR_OK ? ERR_OK : refuse(l, result, "The flash cannot be read at offset %u of the image.", U(offset));
+    return result == ERR_OK ? ERR_OK : refuse(l, result, "Flash cannot be read at offset %u.", U(offset));
 }
 
 static RTS_UI32 align4(RTS_UI32 offset)
@@ -59,16 +59,16 @@ static RTS_RESULT check_header(LOADER *l)
     RTS_RESULT result;
 
     if (l->image->size < CDL_HEADER_SIZE)
-        return refuse(l, ERR_SIZE_MISMATCH, "The image has only %u bytes, its header alone needs %u.",
+        return refuse(l, ERR_SIZE_MISMATCH, "Image of %u bytes is shorter than its header of %u.",
                       U(l->image->size), U(CDL_HEADER_SIZE));
     result = read_image(l, 0, &l->header, sizeof l->header);
     if (result != ERR_OK)
         return result;
     if (header->header_tag != CDL_HEADER_TAG)
-        return refuse(l, ERR_TYPE_MISMATCH, "This is not a compact download image: it starts with 0x%x.",
+        return refuse(l, ERR_TYPE_MISMATCH, "Not a compact download image: it starts with 0x%x.",
                       U(header->header_tag));
     if (header->header_version != CDL_HEADER_VERSION || header->header_size != CDL_HEADER_SIZE)
-        return refuse(l, ERR_VERSION_MISMATCH, "The image has header version %u with %u bytes, this device knows %u with %u.",
+        return refuse(l, ERR_VERSION_MISMATCH, "Header version %u of %u bytes, this device knows %u of %u.",
                       U(header->header_version), U(header->header_size), U(CDL_HEADER_VERSION), U(CDL_HEADER_SIZE));
     if (header->total_size != l->image->size)
         return refuse(l, ERR_SIZE_MISMATCH, "The image should have %u bytes, %u arrived.", U(header->total_size),
@@ -98,7 +98,7 @@ static RTS_RESULT check_crc(LOADER *l)
         return refuse(l, ERR_CRC_FAILED, "The image is damaged: its CRC is 0x%x, it should be 0x%x.", U(crc),
                       U(expected));
     if (crc != l->image->crc)
-        return refuse(l, ERR_CRC_FAILED, "This is another image than announced: its CRC is 0x%x, announced was 0x%x.",
+        return refuse(l, ERR_CRC_FAILED, "CRC 0x%x is not the announced one, 0x%x.",
                       U(crc), U(l->image->crc));
     return ERR_OK;
 }
@@ -126,11 +126,11 @@ static RTS_RESULT check_segment(LOADER *l, const char *name, const CDL_SEGMENT *
     if (segment->size == 0)
         return ERR_OK;
     if (segment->offset < CDL_HEADER_SIZE)
-        return refuse(l, ERR_OUT_OF_LIMITS, "The %s segment overlaps the header.", name);
+        return refuse(l, ERR_OUT_OF_LIMITS, "%s segment overlaps the header.", name);
     if (segment->offset > l->image->size || segment->size > l->image->size - segment->offset)
-        return refuse(l, ERR_OUT_OF_LIMITS, "The %s segment reaches beyond the end of the image.", name);
+        return refuse(l, ERR_OUT_OF_LIMITS, "%s segment ends beyond the image.", name);
     if (segment->offset % align != 0)
-        return refuse(l, ERR_ALIGNMENT, "The %s segment is not aligned to %u bytes.", name, U(align));
+        return refuse(l, ERR_ALIGNMENT, "%s segment is not aligned to %u bytes.", name, U(align));
     return ERR_OK;
 }
 
@@ -142,13 +142,13 @@ static RTS_RESULT check_segments(LOADER *l)
         const CDL_SEGMENT *segment;
         RTS_UI32 align;
     } segments[] = {
-        {"code", &h->code, APP_CODE_ALIGN},
-        {"application info", &h->application_info, 4},
-        {"area table", &h->area_table, 4},
-        {"function table", &h->function_table, 4},
-        {"external function table", &h->external_function_table, 4},
+        {"Code", &h->code, APP_CODE_ALIGN},
+        {"Application info", &h->application_info, 4},
+        {"Area table", &h->area_table, 4},
+        {"Function table", &h->function_table, 4},
+        {"External function table", &h->external_function_table, 4},
         {"IEC function table", &h->iec_function_table, 4},
-        {"blob", &h->blob, 4},
+        {"Blob", &h->blob, 4},
     };
     RTS_RESULT result = ERR_OK;
     RTS_SIZE i;
@@ -165,7 +165,7 @@ static RTS_RESULT check_code(LOADER *l)
     if (h->code.size == 0)
         return refuse(l, ERR_OUT_OF_LIMITS, "The image has no code.");
     if (h->code_area_index != APP_AREA_CODE || h->code_area_size < h->code.size)
-        return refuse(l, ERR_OUT_OF_LIMITS, "The code of %u bytes is not in area %u, or larger than that area (%u).",
+        return refuse(l, ERR_OUT_OF_LIMITS, "Code of %u bytes is not in area %u, or above its %u bytes.",
                       U(h->code.size), U(APP_AREA_CODE), U(h->code_area_size));
     l->image->code = h->code;
     l->image->area_size[APP_AREA_CODE] = h->code.size;
@@ -207,7 +207,7 @@ static RTS_RESULT check_areas(LOADER *l)
     RTS_RESULT result = ERR_OK;
 
     if (table->size % sizeof area != 0)
-        return refuse(l, ERR_SIZE_MISMATCH, "The area table of %u bytes has not only whole entries.", U(table->size));
+        return refuse(l, ERR_SIZE_MISMATCH, "Area table of %u bytes has a part of an entry.", U(table->size));
     for (offset = 0; offset < table->size && result == ERR_OK; offset += (RTS_UI32)sizeof area) {
         result = read_image(l, table->offset + offset, &area, sizeof area);
         if (result == ERR_OK)
@@ -230,7 +230,7 @@ static RTS_RESULT check_functions(LOADER *l)
     RTS_RESULT result;
 
     if (l->header.function_table.size != sizeof table)
-        return refuse(l, ERR_SIZE_MISMATCH, "The function table has %u bytes, it should have %u.",
+        return refuse(l, ERR_SIZE_MISMATCH, "Function table has %u bytes, not %u.",
                       U(l->header.function_table.size), U(sizeof table));
     result = read_image(l, l->header.function_table.offset, table, sizeof table);
     if (result != ERR_OK)
@@ -240,10 +240,10 @@ static RTS_RESULT check_functions(LOADER *l)
         if (table[i].area == APP_AREA_NONE)
             continue;
         if (i >= CDL_FUNCTION_RELOC)
-            return refuse(l, ERR_NOT_SUPPORTED, "Entry %u of the function table is used: code for this device needs none.",
+            return refuse(l, ERR_NOT_SUPPORTED, "Function %u is not supported.",
                           U(i));
         if (!is_code(l, table[i].area, table[i].offset))
-            return refuse(l, ERR_INVALID_REFERENCE, "Entry %u of the function table lies outside the code.", U(i));
+            return refuse(l, ERR_INVALID_REFERENCE, "Function %u lies outside the code.", U(i));
         l->image->entry[i] = table[i].offset;
     }
     return ERR_OK;
@@ -298,7 +298,7 @@ static void add_unresolved(LOADER *l, const char *name, const char *problem, RTS
     RTS_SIZE length = strlen(refusal->text);
 
     if (refusal->result == ERR_OK)
-        refuse(l, result, "Functions this device does not have as the application needs them: %s (%s)", name, problem);
+        refuse(l, result, "External functions this device lacks: %s (%s)", name, problem);
     else
         CMUtlsnprintf(refusal->text + length, sizeof refusal->text - length, ", %s (%s)", name, problem);
     LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "External function %s: %s", name, problem);
@@ -313,17 +313,17 @@ static RTS_RESULT check_import(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
     RTS_RESULT result = ERR_OK;
 
     if (index == APP_MAX_IMPORTS)
-        return refuse(l, ERR_NOMEMORY, "The application uses more external functions than this device can link (%u).",
+        return refuse(l, ERR_NOMEMORY, "More than the %u external functions this device can link.",
                       U(APP_MAX_IMPORTS));
     if (end - *offset < EXT_REF_INFO_SIZE)
-        return refuse(l, ERR_SIZE_MISMATCH, "The external function table ends within entry %u.", U(index));
+        return refuse(l, ERR_SIZE_MISMATCH, "External function table ends within entry %u.", U(index));
     result = read_image(l, *offset, &ref, EXT_REF_INFO_SIZE);
     if (result != ERR_OK)
         return result;
     if (!read_name(l, *offset + EXT_REF_INFO_SIZE, end, name, offset))
-        return refuse(l, ERR_PARAMETER, "The name of external function %u is empty, too long or not terminated.", U(index));
+        return refuse(l, ERR_PARAMETER, "Name of external function %u is empty, too long or not terminated.", U(index));
     if (ref.area != APP_AREA_NONE || ref.offset != index * sizeof(RTS_PFN))
-        return refuse(l, ERR_INVALID_REFERENCE, "External function %s has another place than slot %u of the import table.",
+        return refuse(l, ERR_INVALID_REFERENCE, "External function %s is not in import slot %u.",
                       name, U(index));
     problem = find_import(&ref, name, &l->image->imports[index], &result);
     if (problem != NULL)
@@ -357,12 +357,12 @@ static RTS_RESULT check_iec_functions(LOADER *l)
     while (table->size > 0 && offset < end) {
         RTS_RESULT result;
         if (end - offset < sizeof info)
-            return refuse(l, ERR_SIZE_MISMATCH, "The IEC function table ends within an entry.");
+            return refuse(l, ERR_SIZE_MISMATCH, "IEC function table ends within an entry.");
         result = read_image(l, offset, &info, sizeof info);
         if (result != ERR_OK)
             return result;
         if (!read_name(l, offset + (RTS_UI32)sizeof info, end, name, &offset))
-            return refuse(l, ERR_PARAMETER, "A name in the IEC function table is empty, too long or not terminated.");
+            return refuse(l, ERR_PARAMETER, "Name in the IEC function table is bad.");
         if (!is_code(l, info.area, info.offset))
             return refuse(l, ERR_INVALID_REFERENCE, "IEC function %s lies outside the code.", name);
     }
@@ -395,7 +395,7 @@ static RTS_RESULT check_info(LOADER *l)
 
     for (i = 0; i < IMAGE_INFO_COUNT && info->size > 0 && offset < end; i++) {
         if (!skip_string(l->image->file, &offset, end))
-            return refuse(l, ERR_PARAMETER, "Text %u of the application info is not terminated.", U(i));
+            return refuse(l, ERR_PARAMETER, "Application info %u is not terminated.", U(i));
     }
     l->image->info = *info;
     return ERR_OK;
@@ -426,18 +426,18 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
     const char *name = task->name;
 
     if (name[0] == '\0' || memchr(name, '\0', sizeof task->name) == NULL)
-        return refuse(l, ERR_PARAMETER, "Task %u has no name, or one that is not terminated.", U(l->image->task_count));
+        return refuse(l, ERR_PARAMETER, "Task %u has no name.", U(l->image->task_count));
     if (task->kind > KIND_FREEWHEELING)
         return refuse(l, ERR_NOT_SUPPORTED, "Task %s has the unknown kind %u.", name, U(task->kind));
     if (task->priority > 31)
-        return refuse(l, ERR_OUT_OF_LIMITS, "Task %s has priority %u, the lowest is 31.", name, U(task->priority));
+        return refuse(l, ERR_OUT_OF_LIMITS, "Task %s has priority %u, above 31.", name, U(task->priority));
     if (task->kind == KIND_CYCLIC && task->interval_us == 0)
         return refuse(l, ERR_PARAMETER, "Cyclic task %s has no interval.", name);
     if (task->entry_offset >= l->image->code.size)
-        return refuse(l, ERR_INVALID_REFERENCE, "The entry of task %s lies outside the code.", name);
+        return refuse(l, ERR_INVALID_REFERENCE, "Task %s lies outside the code.", name);
     if (task->kind == KIND_EVENT &&
         (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
-        return refuse(l, ERR_INVALID_REFERENCE, "The event variable of task %s lies outside its area.", name);
+        return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s lies outside its area.", name);
     return ERR_OK;
 }
 
@@ -448,7 +448,7 @@ static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
     if (l->image->task_count != 0)
         return refuse(l, ERR_DUPLICATE, "The image has two lists of tasks.");
     if (size % sizeof(CDL_TASK) != 0)
-        return refuse(l, ERR_SIZE_MISMATCH, "The list of tasks has %u bytes and not only whole entries.", U(size));
+        return refuse(l, ERR_SIZE_MISMATCH, "Task list of %u bytes has a part of an entry.", U(size));
     if (size / sizeof(CDL_TASK) > APP_MAX_TASKS)
         return refuse(l, ERR_NOMEMORY, "The application has %u tasks, this device can run %u.",
                       U(size / sizeof(CDL_TASK)), U(APP_MAX_TASKS));
@@ -466,7 +466,7 @@ static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
 static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
 {
     if (size != sizeof l->image->retain_layout)
-        return refuse(l, ERR_SIZE_MISMATCH, "The retain layout has %u bytes, it should have 4.", U(size));
+        return refuse(l, ERR_SIZE_MISMATCH, "Retain layout has %u bytes, not 4.", U(size));
     return read_image(l, offset, &l->image->retain_layout, size);
 }
 
@@ -477,14 +477,14 @@ static RTS_RESULT check_blob(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
     RTS_RESULT result;
 
     if (end - *offset < sizeof blob)
-        return refuse(l, ERR_SIZE_MISMATCH, "The blob segment ends within the head of a blob.");
+        return refuse(l, ERR_SIZE_MISMATCH, "Blob segment ends within a head.");
     result = read_image(l, *offset, &blob, sizeof blob);
     if (result != ERR_OK)
         return result;
     if (blob.magic != (RTS_UI32)CDL_BLOB_MAGIC)
-        return refuse(l, ERR_TYPE_MISMATCH, "There is no blob at offset %u of the image.", U(*offset));
+        return refuse(l, ERR_TYPE_MISMATCH, "There is no blob at offset %u.", U(*offset));
     if (blob.size > end - payload)
-        return refuse(l, ERR_OUT_OF_LIMITS, "Blob %u reaches beyond the end of its segment.", U(blob.id));
+        return refuse(l, ERR_OUT_OF_LIMITS, "Blob %u ends beyond its segment.", U(blob.id));
     *offset = align4(payload + blob.size);
     if (blob.id == CDL_BLOB_TASKS)
         return check_tasks(l, payload, blob.size);

@@ -21,11 +21,13 @@ static struct {
     RTS_UI8 *area;
     RTS_UI32 size;
     RTS_UI32 layout;
-    bool saved_valid;      /* `saved` is what flash holds for this layout */
+    bool saved_valid;      /* `saved_area` is what flash holds for this layout */
     bool failed;           /* the last save failed, and was logged */
     RTS_I64 last_check_ns; /* when the area was last found saved, or was saved */
-    RTS_UI8 saved[APP_RETAIN_SIZE];
 } retain;
+
+/* What flash holds; it is sized by the application's retain area, as that is. */
+static RTS_UI8 saved_area[APP_RETAIN_SIZE];
 
 #define SAVE_NS ((RTS_I64)APP_RETAIN_SAVE_US * 1000)
 
@@ -60,20 +62,20 @@ RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until)
     result = FlashLogRead(&retain.log, range, retain.layout, retain.area, retain.size);
     if (result != ERR_OK)
         return result;
-    memcpy(retain.saved, retain.area, retain.size);
+    memcpy(saved_area, retain.area, retain.size);
     retain.saved_valid = true;
     return ERR_OK;
 }
 
 static bool is_saved(void)
 {
-    return retain.saved_valid && memcmp(retain.saved, retain.area, retain.size) == 0;
+    return retain.saved_valid && memcmp(saved_area, retain.area, retain.size) == 0;
 }
 
 static void copy(void)
 {
     retain.saved_valid = false;
-    memcpy(retain.saved, retain.area, retain.size);
+    memcpy(saved_area, retain.area, retain.size);
 }
 
 /* Copies the area; true when no task ran a cycle meanwhile. */
@@ -90,7 +92,7 @@ static bool copy_between_cycles(void)
 
 static RTS_RESULT save_copy(void)
 {
-    RTS_RESULT result = FlashLogAppend(&retain.log, retain.layout, retain.saved, retain.size);
+    RTS_RESULT result = FlashLogAppend(&retain.log, retain.layout, saved_area, retain.size);
 
     if (result != ERR_OK && !retain.failed)
         LogAdd(CMPID_CmpRetain, LOG_ERROR, result, "Retain variables cannot be saved");

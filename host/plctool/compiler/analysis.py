@@ -25,6 +25,7 @@ from plctool.compiler.typed import (
     Place,
     Pou,
     Repeat,
+    SelfPlace,
     Storage,
     Unary,
     ValuePlace,
@@ -34,7 +35,7 @@ from plctool.compiler.typed import (
 )  # fmt: skip
 
 _NODES = (
-    VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, Load, Unary, Binary, Convert, IntrinsicCall,
+    VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, SelfPlace, Load, Unary, Binary, Convert, IntrinsicCall,
     AddressOf, Call, Assign, CallStatement, FbCall, If, Case, For, While, Repeat,
 )  # fmt: skip
 
@@ -54,7 +55,7 @@ def walk(root: object) -> Iterator[object]:
 def root_of(place: Place) -> Variable | None:
     """The variable a place is part of; None when it is reached through a pointer or is a value."""
     while not isinstance(place, VarPlace):
-        if isinstance(place, DerefPlace | ValuePlace):
+        if isinstance(place, DerefPlace | ValuePlace | SelfPlace):
             return None
         place = place.base
     return None if place.var.storage is Storage.REFERENCE else place.var
@@ -73,6 +74,8 @@ def written_places(node: object) -> Iterator[Place]:
         for _, place in node.in_outs + node.outputs:
             yield place
     elif isinstance(node, Call):
+        if node.instance is not None:
+            yield node.instance
         for parameter, argument in zip(node.function.parameters, node.args, strict=True):
             if parameter.direction is not Direction.INPUT and argument is not None:
                 yield argument  # type: ignore[misc]
@@ -98,10 +101,10 @@ class Effects:
         if isinstance(node, VarPlace):
             return node.var.storage in (Storage.LOCAL, Storage.REFERENCE)
         if isinstance(node, Call):
-            return self.is_local(node.function)
+            return node.dispatch is None and self.is_local(node.function)
         if isinstance(node, FbCall):
-            return self.is_local(node.block)
-        return not isinstance(node, DerefPlace)
+            return node.dispatch is None and self.is_local(node.block)
+        return not isinstance(node, DerefPlace | SelfPlace)
 
     def owns_loop_variable(self, loop: For, pou: Pou) -> Variable | None:
         """The FOR variable when nothing but the loop itself can write it while the loop runs."""
@@ -121,7 +124,7 @@ class Effects:
 
     def _leaves_alone(self, node: object) -> bool:
         if isinstance(node, Call):
-            return self.is_local(node.function)
+            return node.dispatch is None and self.is_local(node.function)
         return not isinstance(node, FbCall)
 
     def _addressed_in(self, pou: Pou) -> set[Variable]:

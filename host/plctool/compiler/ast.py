@@ -20,14 +20,16 @@ class LiteralKind(Enum):
     REAL = auto()
     BOOL = auto()
     TIME = auto()  # value in ns
+    DATE = auto()  # value in ns since 1970 or midnight
     STRING = auto()
+    WSTRING = auto()
     NULL = auto()
     BAD = auto()  # already reported
 
 
 @dataclass(slots=True, eq=False)
 class Literal:
-    """A constant. `type_name` is the prefix of a typed literal (`INT#5`), for durations TIME or LTIME."""
+    """A constant. `type_name` is the prefix of a typed literal (`INT#5`), for durations and dates the type."""
 
     pos: int
     kind: LiteralKind

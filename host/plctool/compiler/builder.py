@@ -149,7 +149,9 @@ class Builder:
         """`head`: modifiers and name."""
         *modifiers, name = head
         attributes = self.attributes.get(keyword.pos, {})
-        decl = ast.PouDecl(name.pos, keyword.text.upper(), name.text, result, blocks, body or [], attributes, self.source)
+        decl = ast.PouDecl(
+            name.pos, keyword.text.upper(), name.text, result, blocks, body or [], attributes, self.source
+        )
         decl.modifiers = {t.text.upper() for t in modifiers if t is not None}
         return decl
 
@@ -370,11 +372,17 @@ class Builder:
             return self._bad(token, error)
 
     def string(self, token: Token) -> ast.Literal:
-        if token.text.startswith('"'):
-            return self._bad(token, literals.LiteralError("WSTRING constants are not supported yet; write 'text'"))
+        prefix, hash_sign, rest = token.text.partition("#")
+        typed = bool(hash_sign) and prefix[:1] not in "'\""
+        text = rest if typed else token.text
+        wide = text.startswith('"')
+        name = prefix.upper() if typed else "WSTRING" if wide else "STRING"
         try:
-            text = token.text[token.text.index("'") :]
-            return ast.Literal(token.pos, ast.LiteralKind.STRING, literals.string(text), "STRING")
+            if wide is not (name[0] == "W"):
+                right = "'...'" if wide else '"..."'
+                raise literals.LiteralError(f"a {name} is written {name}#{right}")
+            kind = ast.LiteralKind.WSTRING if wide else ast.LiteralKind.STRING
+            return ast.Literal(token.pos, kind, literals.string(text), name)
         except literals.LiteralError as error:
             return self._bad(token, error)
 

@@ -11,9 +11,8 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, ClassVar
 
-from plctool.compiler import ast, constants
+from plctool.compiler import ast, constants, dates
 from plctool.compiler.conversions import (
-    NS_PER_MS,
     NUMBERS,
     SIGNED,
     UNSIGNED,
@@ -22,9 +21,7 @@ from plctool.compiler.conversions import (
     elementary,
     error_value,
     literal_type,
-    scaled,
     settle,
-    time_to_ltime,
 )  # fmt: skip
 from plctool.compiler.expressions import Expressions, is_untyped, load
 from plctool.compiler.symbols import ERROR, UNTYPED_INT, PouSymbol, TypeSymbol
@@ -168,6 +165,14 @@ class Builtins(Expressions):
 
     def _move(self, name: str, args: list[Expr], node: ast.Call, expected: Type | None) -> Expr:
         return args[0] if self._count(name, args, node, 1, 1) else error_value(self.pos(node.pos))
+
+    def _dated(self, name: str, args: list[Expr], node: ast.Call, expected: Type | None) -> Expr:
+        """`ADD_DT_TIME(a, b)` and its kin."""
+        if not self._count(name, args, node, 2, 2):
+            return error_value(self.pos(node.pos))
+        op, first, second = dates.FUNCTIONS[name]
+        right = args[1] if second is None else self.coerce(args[1], second)
+        return self.operate(op, self.coerce(args[0], first), right, node.pos, expected)
 
     # ---- intrinsics ----
 
@@ -348,8 +353,8 @@ class Builtins(Expressions):
     def _conversion_type(self, name: str) -> Type | None:
         if name in ELEMENTARY:
             return ELEMENTARY[name]
-        if name == "STRING":
-            return StringType(255)
+        if name in ("STRING", "WSTRING"):
+            return StringType(255, name == "WSTRING")
         symbol = self.world.unit(name.casefold(), library=self.scope.library)
         if isinstance(symbol, TypeSymbol):
             t = self.world.declarations.resolve_symbol(symbol)
@@ -382,12 +387,17 @@ class Builtins(Expressions):
     def _text_conversion(self, e: Expr, source: Type | None, target: Type, node: ast.Call) -> Expr:
         """Conversions from and to text are functions of the library."""
         if isinstance(e.type, StringType) and isinstance(target, StringType):
-            return e
+            if e.type.wide is target.wide:
+                return e
+            return self.call_by_name(f"{e.type.keyword}_TO_{target.keyword}", [e], node.pos, None)
         base = elementary(e.type if isinstance(target, StringType) else target)
         if base is None:
             return self.error(node.pos, "type", f"there is no conversion from {e.type} to {target}")
         if isinstance(target, StringType):
-            return self.call_by_name(f"{base}_TO_STRING", [convert(e, base)], node.pos, None)
+            text = self.call_by_name(f"{base}_TO_STRING", [convert(e, base)], node.pos, None)
+            return self.call_by_name("STRING_TO_WSTRING", [text], node.pos, None) if target.wide else text
+        if isinstance(e.type, StringType) and e.type.wide:
+            e = self.call_by_name("WSTRING_TO_STRING", [e], node.pos, None)
         return convert(self.call_by_name(f"STRING_TO_{base}", [e], node.pos, None), target)
 
     def convert_explicitly(self, e: Expr, target: Type, offset: int, *, truncate: bool = False) -> Expr | None:
@@ -405,8 +415,8 @@ class Builtins(Expressions):
             e = convert(e, source)
         if source is to:
             return e
-        if {source, to} == {TIME, LTIME}:
-            return time_to_ltime(e) if to is LTIME else convert(scaled(e, BinaryOp.DIV, NS_PER_MS), TIME)
+        if source in dates.UNIT_NS and to in dates.UNIT_NS:
+            return dates.convert_date(e, to)
         if to is BOOL:
             return convert(e, BOOL)
         if to.kind is Kind.REAL and source.kind is not Kind.REAL:
@@ -447,6 +457,7 @@ class Builtins(Expressions):
         **dict.fromkeys(_PAIRS, _pair),
         **dict.fromkeys(_CHAINS, _chain),
         **dict.fromkeys(_SHIFTS, _shift),
+        **dict.fromkeys(dates.FUNCTIONS, _dated),
         "NOT": _not,
         "MOVE": _move,
         "ABS": _abs,

@@ -26,6 +26,7 @@ from plctool.compiler.typed import (
     Parameter,
     Place,
     ScalarInit,
+    SelfPlace,
     ValuePlace,
 )  # fmt: skip
 from plctool.compiler.types import (
@@ -77,6 +78,8 @@ class Calls(Builtins):
             if built_in is not None:
                 return built_in
         if isinstance(symbol, PouSymbol) and is_function:
+            if self.world.library.overloads(name.casefold()):
+                return self._call_text_function(symbol, node)
             return self._call_function(symbol, node, expected)
         overload = self._overload(name, node, expected)
         if overload is not None:
@@ -166,6 +169,29 @@ class Calls(Builtins):
             )
         return self.call_symbol(symbol, args, node.pos, expected)
 
+    def _call_text_function(self, symbol: PouSymbol, node: ast.Call) -> Expr:
+        """A string function of the library, which exists for STRING and for WSTRING."""
+        args, _ = self.split_enable(node)
+        values = [self.expr(a.value) for a in args if a.value is not None]
+        if len(values) < len(args) or any(v.type is ERROR for v in values):
+            return error_value(self.pos(node.pos))
+        if any(isinstance(v.type, StringType) and v.type.wide or v.type is WCHAR for v in values):
+            wide = self.world.unit(f"{symbol.decl.name}__wstring".casefold(), library=True)
+            assert isinstance(wide, PouSymbol)
+            symbol = wide
+        if "extensible" in symbol.decl.attributes and len(args) > 2 and all(a.name is None for a in args):
+            result = values[0]
+            for value in values[1:]:
+                result = self.call_checked(symbol, [result, value], node.pos, None)
+            return result
+        info = self.world.units.function(symbol)
+        assert info is not None
+        bound = self.bind(args, [(s.name, d) for s, d in info.parameters], symbol.decl.name.split("__")[0], node.pos)
+        if bound is None:
+            return error_value(self.pos(node.pos))
+        value_of = {id(a): v for a, v in zip(args, values, strict=True)}
+        return self._typed_call(info, {i: value_of[id(a)] for i, a in bound.items()}, node.pos)
+
     def call_symbol(self, symbol: PouSymbol, args: list[ast.Argument], offset: int, expected: Type | None) -> Expr:
         """A call of a declared function."""
         if "extensible" in symbol.decl.attributes and len(args) > 2 and all(a.name is None for a in args):
@@ -205,8 +231,9 @@ class Calls(Builtins):
             return self.error(offset, "unknown", f"the library has no function {name}")
         return self.call_checked(symbol, args, offset, expected)
 
-    def _typed_call(self, info: FunctionInfo, actuals: dict[int, Actual], offset: int) -> Expr:
-        """The call node: arguments in order of the parameters, defaults filled in."""
+    def _typed_call(self, info: FunctionInfo, actuals: dict[int, Actual], offset: int, *, noted: bool = True) -> Expr:
+        """The call node: arguments in order of the parameters, defaults filled in. `noted`: a call that leads back is
+        recursion."""
         pos, name, ok = self.pos(offset), info.pou.name, True
         args: list[Expr | Place | None] = []
         formal = any(isinstance(a, ast.Argument) and a.name is not None for a in actuals.values())
@@ -224,7 +251,8 @@ class Calls(Builtins):
             args.append(argument)
         if not ok or (info.result is ERROR):
             return error_value(pos)
-        self.world.add_call(self.scope.pou, info.pou, pos)
+        if noted:
+            self.world.add_call(self.scope.pou, info.pou, pos)
         return Call(info.pou, args, info.result if info.result is not None else _NOTHING, pos)
 
     def _default(self, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
@@ -284,6 +312,8 @@ class Calls(Builtins):
             return place
         if t is ERROR or place.type is ERROR:
             return None
+        if isinstance(place.type, StructType) and not output and place.type.conforms(t):
+            return place
         if not same_type(place.type, t) and not (
             isinstance(place.type, SubrangeType) and place.type.base is t and not output
         ):
@@ -347,7 +377,7 @@ class Calls(Builtins):
         if result is ERROR:
             return None
         if isinstance(result, StringType):
-            result = LIBRARY_STRING
+            result = WIDE_LIBRARY_STRING if result.wide else LIBRARY_STRING
         if group == "ANY_REAL" and not accepts(result) and elementary(result) is not None:
             result = LREAL if is_large(result) else REAL
         if not accepts(result):
@@ -443,7 +473,10 @@ class Calls(Builtins):
                     return f"{node.name} is an output of {node.base.name}"
                 return self._symbol_read_only(member)
         base = self.expr(node.base)
+        own = base.place if isinstance(base, AddressOf | Load) and isinstance(base.place, SelfPlace) else None
         block = self.world.blocks.get(base.type) if isinstance(base.type, StructType) else None
+        if own is not None:
+            return None
         if block is not None:
             member = block.members.get(node.name.casefold())
             if member is not None and member.role is not Role.INPUT:

@@ -10,31 +10,41 @@ from dataclasses import replace
 from plctool.compiler import constants
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
-from plctool.compiler.typed import Binary, BinaryOp, Const, Convert, Expr, Pos
+from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Const, Convert, Expr, Load, Pos
 from plctool.compiler.types import (
     BOOL,
     BYTE,
+    CHAR,
+    DATE,
     DINT,
+    DT,
     DWORD,
     INT,
+    LDATE,
+    LDT,
     LINT,
     LREAL,
     LTIME,
+    LTOD,
     LWORD,
     REAL,
     SINT,
     TIME,
+    TOD,
     UDINT,
     UINT,
     ULINT,
     USINT,
+    WCHAR,
     WORD,
     ArrayType,
     Elementary,
     EnumType,
+    InterfaceType,
     Kind,
     PointerType,
     StringType,
+    StructType,
     SubrangeType,
     Type,
     base_of,
@@ -45,6 +55,7 @@ NS_PER_MS = 1_000_000
 SIGNED = {8: SINT, 16: INT, 32: DINT, 64: LINT}
 UNSIGNED = {8: USINT, 16: UINT, 32: UDINT, 64: ULINT}
 BITS = {8: BYTE, 16: WORD, 32: DWORD, 64: LWORD}
+_LONGER = {(DATE, LDATE): 1_000_000_000, (TOD, LTOD): NS_PER_MS, (DT, LDT): 1_000_000_000}  # and their factor
 _LITERAL_TYPES = (INT, DINT, UDINT, LINT, ULINT)
 NUMBERS = (Kind.INT, Kind.BIT)
 
@@ -115,6 +126,17 @@ def literal_type(value: int) -> Elementary | None:
     return constants.smallest(value, _LITERAL_TYPES)
 
 
+_EXAMPLES = {Kind.DATE: "a literal such as DT#2024-02-29-12:30:15, or ULINT_TO_{}(...)", Kind.CHAR: "{}#'A'"}
+
+
+def character(e: Expr, target: Type) -> Expr | None:
+    """A text constant of one character as a CHAR or WCHAR; None when it is none."""
+    if not isinstance(e, Const) or not isinstance(e.value, str) or len(e.value) != 1 or target not in (CHAR, WCHAR):
+        return None
+    assert isinstance(e.type, StringType)
+    return Const(ord(e.value), target, e.pos) if e.type.wide is (target is WCHAR) else None
+
+
 class Coercion:
     """Implicit conversions with their diagnoses."""
 
@@ -140,7 +162,8 @@ class Coercion:
             return self._pointer(e, target)
         from_, to = elementary(source), elementary(target)
         if from_ is None or to is None:
-            return e if same_type(source, target) else self._mismatch(e, target)
+            single = character(e, target)
+            return single or (e if same_type(source, target) else self._mismatch(e, target))
         if from_ is to:
             return Const(e.value, target, e.pos) if isinstance(e, Const) else convert(e, target)
         return self._scalar(e, from_, to)
@@ -189,6 +212,8 @@ class Coercion:
             return self._error(
                 e.pos, "type", f"{value} is not a duration; write {'T' if to is TIME else 'LTIME'}#{value}{unit}"
             )
+        if to.kind in (Kind.DATE, Kind.CHAR):
+            return self._error(e.pos, "type", f"{value} is not a {to}; write {_EXAMPLES[to.kind].format(to)}")
         if not constants.fits(value, to):
             low, high = constants.limits(to)
             return self._error(e.pos, "range", f"{value} does not fit {target} ({low}..{high})")
@@ -224,6 +249,11 @@ class Coercion:
         return convert(e, target)
 
     def _string(self, e: Expr, target: StringType) -> Expr:
+        assert isinstance(e.type, StringType)
+        if e.type.wide is not target.wide:
+            hint = '; write "..."' if target.wide else "; write '...'" if isinstance(e, Const) else ""
+            hint = hint if isinstance(e, Const) else f"; write {e.type.keyword}_TO_{target.keyword}(...)"
+            return self._error(e.pos, "type", f"{e.type} does not fit {target}{hint}")
         if isinstance(e, Const) and isinstance(e.value, str) and len(e.value) > target.length:
             self._warn(e.pos, "truncated", f"this text has {len(e.value)} characters, {target} holds {target.length}")
             return Const(e.value[: target.length], target, e.pos)
@@ -232,9 +262,27 @@ class Coercion:
     def _pointer(self, e: Expr, target: Type) -> Expr:
         if e.type is NULL_TYPE and isinstance(target, PointerType):
             return Const(0, target, e.pos)
+        if isinstance(target, InterfaceType):
+            return self._to_interface(e, target)
+        if isinstance(e.type, PointerType) and isinstance(target, PointerType) and e.type is not NULL_TYPE:
+            inner = e.type.target
+            if isinstance(inner, StructType) and not isinstance(e.type, InterfaceType) and inner.conforms(target.target):
+                return replace(e, type=target)
         if isinstance(e.type, PointerType) and isinstance(target, PointerType) and same_type(e.type, target):
             return replace(e, type=target)
         return self._mismatch(e, target)
+
+    def _to_interface(self, e: Expr, target: InterfaceType) -> Expr:
+        """The address of an instance, or what another interface variable holds."""
+        source = e.type.target if isinstance(e.type, PointerType) else e.type
+        if not isinstance(source, StructType) or (isinstance(e.type, PointerType) and not isinstance(e.type, InterfaceType)):
+            return self._mismatch(e, target)
+        if not source.conforms(target.target):
+            what = "extend" if isinstance(e.type, InterfaceType) else "implement"
+            return self._error(e.pos, "type", f"{source} does not {what} {target}")
+        if isinstance(e.type, InterfaceType):
+            return replace(e, type=target)
+        return AddressOf(e.place, target, e.pos) if isinstance(e, Load) else self._mismatch(e, target)
 
     def _scalar(self, e: Expr, source: Elementary, target: Elementary) -> Expr:
         if target is BOOL:
@@ -249,6 +297,8 @@ class Coercion:
             return self._to_real(e, source, target)
         if source is TIME and target is LTIME:
             return time_to_ltime(e)
+        if (source, target) in _LONGER:
+            return scaled(convert(e, target), BinaryOp.MUL, _LONGER[source, target])
         return self._needs(e, source, target)
 
     def _integer(self, e: Expr, source: Elementary, target: Elementary) -> Expr:
@@ -315,9 +365,10 @@ def common_type(a: Type, b: Type) -> Type | None:
     if a == b:
         return a
     if isinstance(a, StringType) and isinstance(b, StringType):
-        return a if a.length >= b.length else b
+        return None if a.wide is not b.wide else a if a.length >= b.length else b
     if isinstance(a, PointerType) and isinstance(b, PointerType):
-        return b if a is NULL_TYPE else a if b is NULL_TYPE or same_type(a, b) else None
+        both = isinstance(a, InterfaceType) and isinstance(b, InterfaceType)
+        return b if a is NULL_TYPE else a if b is NULL_TYPE or both or same_type(a, b) else None
     if isinstance(a, EnumType) and isinstance(b, EnumType):
         return None
     x, y = elementary(a), elementary(b)
@@ -327,6 +378,8 @@ def common_type(a: Type, b: Type) -> Type | None:
         return x
     if {x, y} == {TIME, LTIME}:
         return LTIME
+    if (x, y) in _LONGER or (y, x) in _LONGER:
+        return y if (x, y) in _LONGER else x
     if x.kind in (Kind.INT, Kind.BIT, Kind.REAL) and y.kind in (Kind.INT, Kind.BIT, Kind.REAL):
         return common_number(x, y)
     if x is BOOL and y.kind is Kind.BIT:

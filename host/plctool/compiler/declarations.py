@@ -10,6 +10,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from plctool.compiler import ast, constants
+from plctool.compiler.analysis import walk
+from plctool.compiler.classes import search_path
 from plctool.compiler.conversions import elementary
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.expressions import Expressions, NestingError, is_untyped
@@ -21,6 +23,7 @@ from plctool.compiler.typed import (
     ArrayInit,
     Assign,
     Const,
+    Expr,
     Initial,
     ScalarInit,
     Storage,
@@ -58,11 +61,7 @@ MAX_TYPE_DEPTH = 50  # levels of arrays of structs of arrays ...
 MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
 _ADDRESS = re.compile(r"%([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?")
 _AREAS = {"I": Area.INPUT, "Q": Area.OUTPUT, "M": Area.MEMORY}
-_LATER = {
-    "CHAR", "WCHAR", "WSTRING", "DATE", "LDATE", "TOD", "TIME_OF_DAY", "LTOD", "LTIME_OF_DAY", "DT", "DATE_AND_TIME",
-    "LDT",
-    "LDATE_AND_TIME",
-}  # fmt: skip
+_STRINGS = ("STRING", "WSTRING")
 _WIDTHS = {"X": 0, "": 0, "B": 8, "W": 16, "D": 32, "L": 64}
 
 
@@ -108,9 +107,10 @@ class Declarations:
         if isinstance(spec, ast.ArraySpec):
             return self._array(spec, scope)
         if isinstance(spec, ast.EnumSpec):
-            if (spec.base or "").upper() == "STRING" and len(spec.values) == 1:  # STRING(LENGTH)
+            base = (spec.base or "").upper()
+            if base in _STRINGS and len(spec.values) == 1:  # STRING(LENGTH)
                 offset, length, _ = spec.values[0]
-                return self._string(ast.Name(offset, length), scope), None
+                return self._string(ast.Name(offset, length), scope, wide=base == "WSTRING"), None
             return self._enum(spec, scope, name)
         if isinstance(spec, ast.SubrangeSpec):
             return self._subrange(spec, scope, name)
@@ -127,13 +127,11 @@ class Declarations:
 
     def _named(self, spec: ast.NamedType, scope: Scope) -> tuple[Type, Initial | None]:
         upper = spec.name.upper()
-        if upper in _LATER:
-            scope.error(spec.pos, "unsupported", f"{upper} is not supported yet")
-            return ERROR, None
-        if upper == "STRING":
-            return (
-                StringType(DEFAULT_STRING_LENGTH) if spec.length is None else self._string(spec.length, scope)
-            ), None
+        if upper in _STRINGS:
+            wide = upper == "WSTRING"
+            if spec.length is None:
+                return StringType(DEFAULT_STRING_LENGTH, wide), None
+            return self._string(spec.length, scope, wide=wide), None
         if spec.length is not None:
             scope.error(spec.pos, "type", f"only a STRING has a length, not {spec.name}")
             return ERROR, None
@@ -143,8 +141,7 @@ class Declarations:
         return self._declared(spec, scope)
 
     def _declared(self, spec: ast.NamedType, scope: Scope) -> tuple[Type, Initial | None]:
-        key = spec.name.casefold()
-        symbol = scope.programs.get(key) or self.world.unit(key, library=scope.library)
+        symbol = scope.unit(spec.name)
         if isinstance(symbol, TypeSymbol):
             if symbol.busy:
                 scope.error(spec.pos, "recursion", f"the type {symbol.decl.name} contains itself")
@@ -155,10 +152,12 @@ class Declarations:
             if info is None:
                 scope.error(spec.pos, "recursion", f"the function block {spec.name} contains itself")
             return (ERROR, None) if info is None else (info.type, self.struct_default(info.type))
+        if isinstance(symbol, PouSymbol) and symbol.keyword == "INTERFACE":
+            return self.world.classes.interface(symbol), None
         if spec.name.upper() in GENERIC:
             scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
         elif symbol is None and scope.lookup(spec.name) is None:
-            hint = did_you_mean(spec.name, [*ELEMENTARY, "STRING", *self.world.type_names()])
+            hint = did_you_mean(spec.name, [*ELEMENTARY, *_STRINGS, *self.world.type_names()])
             scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
         else:
             scope.error(spec.pos, "type", f"{spec.name} is not a type")
@@ -170,6 +169,7 @@ class Declarations:
             return symbol.type
         decl = symbol.decl
         scope = self.world.scope(decl.source, library=symbol.library)
+        scope.path = search_path(decl.namespace)
         if symbol.busy:
             return ERROR
         symbol.busy = True
@@ -181,14 +181,14 @@ class Declarations:
         symbol.busy = False
         return symbol.type
 
-    def _string(self, length: ast.Expr, scope: Scope) -> Type:
+    def _string(self, length: ast.Expr, scope: Scope, *, wide: bool) -> Type:
         n = self.checker(scope).integer(length)
         if n is None:
             return ERROR
         if not 1 <= n <= MAX_STRING:
             scope.error(length.pos, "range", f"the length of a STRING is 1..{MAX_STRING}, not {n}")
             return ERROR
-        return StringType(n)
+        return StringType(n, wide)
 
     def checker(self, scope: Scope) -> Expressions:
         """Checks expressions in a scope."""
@@ -265,7 +265,11 @@ class Declarations:
         return t, ScalarInit(low) if low else None
 
     def _pointer(self, spec: ast.PointerSpec, scope: Scope) -> Type:
-        target, _ = self.type_of(spec.target, scope)
+        symbol = scope.unit(spec.target.name) if isinstance(spec.target, ast.NamedType) else None
+        if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+            target: Type = self.world.units.layout(symbol) or ERROR  # the block itself may hold the pointer
+        else:
+            target, _ = self.type_of(spec.target, scope)
         if target is ERROR:
             return ERROR
         return ReferenceType(target) if spec.keyword == "REFERENCE" else PointerType(target)
@@ -277,6 +281,7 @@ class Declarations:
         t, defaults, seen = StructType(name), dict[str, Initial](), set[str]()
         for decl in spec.fields:
             field_type, default = self.declared_type(decl, scope)
+            self.world.classes.require_instances(field_type, scope, decl.pos)
             if decl.location is not None:
                 scope.error(decl.location.pos, "location", "a member of a STRUCT has no address")
             for offset, field_name in decl.names:
@@ -308,8 +313,7 @@ class Declarations:
         spec, init = decl.type, decl.init
         if isinstance(spec, ast.EnumSpec) and spec.base is not None:
             base = spec.base
-            key = base.casefold()
-            symbol = scope.programs.get(key) or self.world.unit(key, library=scope.library)
+            symbol = scope.unit(base)
             if isinstance(symbol, PouSymbol | TypeSymbol) and init is None:  # t : TON(PT := T#1s)
                 members = [(offset, name, value) for offset, name, value in spec.values if value is not None]
                 init, spec = ast.StructInit(spec.pos, members), ast.NamedType(spec.pos, base)
@@ -404,8 +408,11 @@ class Declarations:
             return None
         block = self.world.blocks.get(t)
         members: dict[str, Initial] = {}
+        arguments: dict[str, Expr] = {}
         for offset, name, value in node.members:
             field = t.member(name)
+            if field is None and self._initialiser_argument(name, value, t, arguments, scope):
+                continue
             if field is None or (block is not None and block.members[name.casefold()].role is Role.IN_OUT):
                 hint = did_you_mean(name, (f.name for f in t.fields))
                 scope.error(offset, "unknown", f"{t} has no member {name} to initialise{hint}")
@@ -415,7 +422,23 @@ class Declarations:
             given = self.initial(value, field.type, scope)
             if given is not None:
                 members[field.name] = given
-        return StructInit(members)
+        return StructInit(members, arguments)
+
+    def _initialiser_argument(
+        self, name: str, node: ast.Init, t: StructType, arguments: dict[str, Expr], scope: Scope
+    ) -> bool:
+        """`fb : MyFB(id := 3)` for an input of FB_Init; False when there is no such input."""
+        if isinstance(node, ast.ArrayInit | ast.StructInit):
+            return False
+        for member in reversed(self.world.classes.initialisers(t)):
+            for symbol, _ in self.world.classes.signature(member).parameters:
+                if symbol.name.casefold() == name.casefold():
+                    e = self.checker(scope).value(node, symbol.type)
+                    if any(isinstance(n, VarPlace) and n.var.storage is not Storage.AREA for n in walk(e)):
+                        scope.error(node.pos, "constant", "this needs constants and global variables")
+                    arguments[name.casefold()] = e
+                    return True
+        return False
 
     # ---- variables ----
 
@@ -471,6 +494,7 @@ class Declarations:
             return VarSymbol(symbol.name, scope.pos(symbol.pos), ERROR, Role.GLOBAL)
         symbol.busy = True
         t, init = self.declared_type(symbol.decl, scope)
+        self.world.classes.require_instances(t, scope, symbol.pos)
         owner = symbol.full_name.rpartition(".")[0]
         if "CONSTANT" in symbol.qualifiers:
             result = self.constant_symbol(symbol.pos, symbol.name, t, init, scope, owner, Role.GLOBAL)

@@ -8,18 +8,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-from plctool.compiler import ast, constants
+from plctool.compiler import ast, constants, dates
 from plctool.compiler.conversions import (
     BITS,
     NS_PER_MS,
     NUMBERS,
     SIGNED,
+    character,
     common_number,
     common_type,
     convert,
     elementary,
     error_value,
     literal_type,
+    scaled,
     settle,
 )  # fmt: skip
 from plctool.compiler.diagnostics import did_you_mean
@@ -30,6 +32,7 @@ from plctool.compiler.symbols import (
     UNTYPED_INT,
     UNTYPED_REAL,
     GlobalSymbol,
+    MemberSymbol,
     Namespace,
     PouSymbol,
     Role,
@@ -37,6 +40,7 @@ from plctool.compiler.symbols import (
     VarSymbol,
 )  # fmt: skip
 from plctool.compiler.typed import (
+    AddressOf,
     Binary,
     BinaryOp,
     BitPlace,
@@ -48,6 +52,7 @@ from plctool.compiler.typed import (
     MemberPlace,
     Place,
     Pos,
+    SelfPlace,
     Storage,
     Unary,
     UnaryOp,
@@ -58,6 +63,7 @@ from plctool.compiler.types import (
     BOOL,
     BYTE,
     DINT,
+    DT,
     DWORD,
     ELEMENTARY,
     LREAL,
@@ -65,10 +71,12 @@ from plctool.compiler.types import (
     LWORD,
     REAL,
     TIME,
+    TOD,
     WORD,
     ArrayType,
     Elementary,
     EnumType,
+    InterfaceType,
     Kind,
     PointerType,
     ReferenceType,
@@ -100,7 +108,7 @@ def place_of(e: Expr) -> Place:
 
 def is_temporary(place: Place) -> bool:
     """Whether a place is (part of) a value that nobody else sees."""
-    while not isinstance(place, VarPlace | DerefPlace | ValuePlace):
+    while not isinstance(place, VarPlace | DerefPlace | ValuePlace | SelfPlace):
         place = place.base
     return isinstance(place, ValuePlace)
 
@@ -185,16 +193,37 @@ class Expressions:
             return Const(value, UNTYPED_REAL, pos)
         if kind is ast.LiteralKind.BOOL:
             return Const(value, BOOL, pos)
-        if kind is ast.LiteralKind.STRING:
-            assert isinstance(value, str)
-            return Const(value, StringType(len(value)), pos)
+        if kind in (ast.LiteralKind.STRING, ast.LiteralKind.WSTRING):
+            return self._text(node, pos)
         if kind is ast.LiteralKind.TIME:
             return self._duration(node, pos)
+        if kind is ast.LiteralKind.DATE:
+            return self._date(node, pos)
         if kind is ast.LiteralKind.NULL:
             return Const(0, NULL_TYPE, pos)
         if kind is ast.LiteralKind.BAD:
             return error_value(pos)
         return self._typed_literal(node, pos)
+
+    def _text(self, node: ast.Literal, pos: Pos) -> Expr:
+        assert isinstance(node.value, str)
+        text = Const(node.value, StringType(len(node.value), node.kind is ast.LiteralKind.WSTRING), pos)
+        if node.type_name not in ("CHAR", "WCHAR"):
+            return text
+        single = character(text, ELEMENTARY[node.type_name])
+        return single or self.error(node.pos, "literal", f"a {node.type_name} is one character, not {len(node.value)}")
+
+    def _date(self, node: ast.Literal, pos: Pos) -> Expr:
+        assert isinstance(node.value, int) and node.type_name is not None
+        target = ELEMENTARY[node.type_name]
+        value, rest = divmod(node.value, dates.UNIT_NS[target])
+        if rest:
+            smallest = "milliseconds" if target is TOD else "seconds"
+            self.scope.warning(node.pos, "precision", f"{target} counts {smallest}; write L{target}#... for less")
+        if not constants.fits(value, target):
+            last = "2106-02-07" if target.bits == 32 else "2554-07-21"
+            return self.error(node.pos, "range", f"this is too late for {target}, which ends on {last}")
+        return Const(value, target, pos)
 
     def _duration(self, node: ast.Literal, pos: Pos) -> Expr:
         assert isinstance(node.value, int)
@@ -225,6 +254,9 @@ class Expressions:
             symbol = self.world.declarations.global_variable(symbol)
         if isinstance(symbol, VarSymbol):
             return self.variable(symbol, self.pos(node.pos))
+        own = self.own_name(node, symbol)
+        if own is not None:
+            return own
         if symbol is None:
             value = self.world.enum_value(node.name, self.scope, node.pos, expected)
             if value is not None:
@@ -284,6 +316,9 @@ class Expressions:
                 if isinstance(t, EnumType):
                     return self._value_of(t, node.name, node.pos, node.name_pos)
                 return self.error(node.base.pos, "name", f"{node.base.name} is a type, not a variable")
+        named = self.qualified(node)
+        if named is not None:
+            return named
         base = self.expr(node.base)
         if base.type is ERROR:
             return base
@@ -302,6 +337,11 @@ class Expressions:
 
     def member(self, base: Expr, node: ast.Member) -> Expr:
         """`base.name` of a struct or function block instance."""
+        member = self.member_of(base, node)
+        if member is not None:
+            return member
+        if isinstance(base, AddressOf) and isinstance(base.place, SelfPlace):  # THIS.x
+            base = load(base.place)
         t, name = base.type, node.name
         if not isinstance(t, StructType):
             hint = "; write ^. to follow the pointer" if isinstance(t, PointerType) else ""
@@ -387,7 +427,8 @@ class Expressions:
         index = self.subscript(nodes[0])
         if index.type is ERROR:
             return index
-        return load(IndexPlace(place_of(base), [index], BYTE, self.pos(nodes[0].pos)))
+        wide = isinstance(base.type, StringType) and base.type.wide
+        return load(IndexPlace(place_of(base), [index], WORD if wide else BYTE, self.pos(nodes[0].pos)))
 
     def subscript(self, node: ast.Expr) -> Expr:
         """An array index: any integer type."""
@@ -404,7 +445,9 @@ class Expressions:
         pointer = self.expr(node.base)
         if pointer.type is ERROR:
             return pointer
-        if not isinstance(pointer.type, PointerType) or pointer.type is NULL_TYPE:
+        if isinstance(pointer, AddressOf):
+            return load(pointer.place)
+        if not isinstance(pointer.type, PointerType) or isinstance(pointer.type, InterfaceType) or pointer.type is NULL_TYPE:
             return self.error(node.pos, "type", f"{pointer.type} is not a pointer")
         return load(DerefPlace(pointer, pointer.type.target, self.pos(node.pos)))
 
@@ -473,7 +516,9 @@ class Expressions:
         if op in _LOGIC:
             t = self._logic_type(left.type, right.type)
         else:
-            duration = self._duration_arithmetic(op, left, right, offset)
+            duration = self._date_arithmetic(op, left, right, offset, expected)
+            if duration is None:
+                duration = self._duration_arithmetic(op, left, right, offset)
             if duration is not None:
                 return duration
             t = self._number_type(left.type, right.type)
@@ -545,6 +590,38 @@ class Expressions:
             return common_number(x, y)
         return None
 
+    def _date_arithmetic(
+        self, op: BinaryOp, left: Expr, right: Expr, offset: int, expected: Type | None
+    ) -> Expr | None:
+        """Dates: + and - a duration, and the difference of two of a kind. None when neither operand is one."""
+        x, y = elementary(left.type), elementary(right.type)
+        if x is None or y is None or Kind.DATE not in (x.kind, y.kind):
+            return None
+        if op is BinaryOp.ADD and x.kind is Kind.TIME:
+            left, right, x, y = right, left, y, x
+        if op is BinaryOp.SUB and dates.same_meaning(x, y):
+            t = common_type(x, y)
+            assert isinstance(t, Elementary)
+            difference = self._build(op, self.coerce(left, t), self.coerce(right, t), t, offset)
+            result = LTIME if t.bits == 64 or expected is LTIME else TIME
+            amount = convert(convert(difference, SIGNED[t.bits]), result)
+            factor = dates.UNIT_NS[t] // dates.UNIT_NS[result]
+            return amount if factor == 1 else scaled(amount, BinaryOp.MUL, factor)
+        if y.kind is Kind.TIME and x.kind is Kind.DATE and op in (BinaryOp.ADD, BinaryOp.SUB):
+            if dates.same_meaning(x, TOD):
+                return self._move_clock(op, left, right, x, offset)
+            if dates.same_meaning(x, DT):
+                return self._build(op, left, dates.rescale(right, x), x, offset)
+        return self.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
+
+    def _move_clock(self, op: BinaryOp, left: Expr, right: Expr, t: Elementary, offset: int) -> Expr:
+        """A time of day plus or minus a duration: it stays within the day."""
+        number, day = SIGNED[t.bits], dates.day(t)
+        moved = scaled(right, BinaryOp.MOD, dates.day(right.type))
+        moved = convert(dates.rescale(moved, LTIME if t.bits == 64 else TIME), number)
+        total = self._build(op, convert(left, number), moved, number, offset)
+        return convert(scaled(scaled(total, BinaryOp.ADD, day), BinaryOp.MOD, day), t)
+
     def _duration_arithmetic(self, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr | None:
         """Durations: + and - with durations, * and / with numbers. None when neither operand is one."""
         x, y = elementary(left.type), elementary(right.type)
@@ -569,6 +646,7 @@ class Expressions:
 
     def _compare(self, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
         left, right = self._match_literals(left, right, None)
+        left, right = character(left, right.type) or left, character(right, left.type) or right
         if is_untyped(left):
             t: Type | None = left.type if left.type is right.type else UNTYPED_REAL
         else:
@@ -625,9 +703,25 @@ class Expressions:
         """A call as a value."""
         raise NotImplementedError
 
+    def own_name(self, node: ast.Name, symbol: object) -> Expr | None:
+        """THIS, SUPER or a property by its bare name."""
+        raise NotImplementedError
+
+    def member_of(self, base: Expr, node: ast.Member) -> Expr | None:
+        """A property of an instance."""
+        raise NotImplementedError
+
+    def qualified(self, node: ast.Member) -> Expr | None:
+        """What is in a namespace."""
+        raise NotImplementedError
+
+    def followed(self, e: Expr) -> Expr:
+        """The result of a call, or what it refers to."""
+        raise NotImplementedError
+
     def _call(self, node: ast.Call, expected: Type | None) -> Expr:
         self._deeper(node.pos)
-        e = self.call(node, expected)
+        e = self.followed(self.call(node, expected))
         self._depth -= 1
         return e
 
@@ -664,8 +758,10 @@ def load(place: Place) -> Load:
 def describe(symbol: object) -> str:
     """What a name that is not a variable stands for."""
     if isinstance(symbol, PouSymbol):
-        article = {"FUNCTION": "a function", "FUNCTION_BLOCK": "a function block type", "PROGRAM": "a program"}
-        return article[symbol.keyword]
+        article = {"FUNCTION": "a function", "FUNCTION_BLOCK": "a function block type", "INTERFACE": "an interface"}
+        return article.get(symbol.keyword, "a program")
+    if isinstance(symbol, MemberSymbol):
+        return "a method"
     if isinstance(symbol, Namespace):
         return f"a {symbol.what}"
     return "a type"

@@ -105,6 +105,7 @@ def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> 
         area_sizes={area: allocation.sizes.get(area, 0) for area in Area},
         defaults=world.defaults,
         programs=application.programs,
+        startup=world.startup,
         aliases=world.aliases(),
         externals=world.external_functions(),
     )

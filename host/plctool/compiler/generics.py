@@ -50,6 +50,7 @@ GENERIC: dict[str, Callable[[Type], bool]] = {
     "ANY_DURATION": _of_kind(Kind.TIME),
     "ANY_DATE": _of_kind(Kind.DATE),
     "ANY_STRING": _string,
-    "ANY_CHARS": _string,
+    "ANY_CHARS": lambda t: _string(t) or _of_kind(Kind.CHAR)(t),
+    "ANY_CHAR": _of_kind(Kind.CHAR),
 }
 """Group name -> whether a type belongs to it. Bit strings count as unsigned integers, as existing dialects have it."""

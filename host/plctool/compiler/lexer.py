@@ -14,8 +14,8 @@ _TOKEN = re.compile(
   | (?P<PUNCT>:=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*&)\[\]:;,.<>=^])
   | (?P<NUMBER>\d[\d_]*(?:\#\w+|(?:\.\d[\d_]*)?(?:[eE][+-]?\d+)?))
   | (?P<SKIP>//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/)
-  | (?P<DATE>(?:[lL]?(?:D|DATE|TOD|TIME_OF_DAY|DT|DATE_AND_TIME|d|date|tod|time_of_day|dt|date_and_time))\#[\d:._-]+)
-  | (?P<STRING>(?:(?:STRING|string)\#)?'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*")
+  | (?P<DATE>(?i:L?(?:DATE_AND_TIME|DATE|DT|D|TIME_OF_DAY|TOD))\#[\d:._-]+)
+  | (?P<STRING>(?i:(?:W?STRING|W?CHAR)\#)?(?:'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*"))
   | (?P<TYPED>[A-Za-z_]\w*\#(?:[+-]?\d[\d_]*(?:\.[\d_]+)?[eE][+-]?\d+|[+-]?\w+(?:\.\w+)*(?:\#\w+)?)?)
   | (?P<DIRECT>%(?:[IQMiqm](?:\*|[XBWDLxbwdl]?\d+(?:\.\d+)*)|[XBWDLxbwdl]\d+))
   | (?P<PRAGMA>\{[^{}]*\})
@@ -72,6 +72,7 @@ OPENING = frozenset(("MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "M
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAME = re.compile(r"\s+[A-Za-z_]")
+_QUOTE = re.compile(r"\s*['\"]")
 _COMMENT_MARK = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
 Report = Callable[[int, str, str], None]  # offset, code, message
@@ -175,6 +176,11 @@ def is_followed_by_name(token: Token, text: str) -> bool:
     """Whether MOCK, METHOD ... start something, as in `MOCK pump.valve;`: another name follows, as it never does behind a
     variable of that name."""
     return _NAME.match(text, token.end) is not None
+
+
+def begins_test(token: Token, text: str) -> bool:
+    """Whether TEST begins one, wherever it stands: then the text before it is not finished."""
+    return token.type == "TEST" and _QUOTE.match(text, token.end) is not None
 
 
 def is_operator_function(token: Token, text: str) -> bool:

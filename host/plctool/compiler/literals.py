@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import datetime
 import math
 import re
 from decimal import Decimal
@@ -18,8 +19,13 @@ MAX_DIGITS = 400  # longer numbers fit no type; Python would take quadratic time
 
 _REAL_TYPES = {"REAL", "LREAL"}
 _TIME_TYPES = {"T": "TIME", "TIME": "TIME", "LT": "LTIME", "LTIME": "LTIME"}
-_DATE_TYPES = {"D", "DATE", "LD", "LDATE", "TOD", "TIME_OF_DAY", "LTOD", "LTIME_OF_DAY", "DT", "DATE_AND_TIME", "LDT",
-               "LDATE_AND_TIME"}  # fmt: skip
+_DATE_TYPES = {
+    "D": "DATE", "DATE": "DATE", "LD": "LDATE", "LDATE": "LDATE", "TOD": "TOD", "TIME_OF_DAY": "TOD", "LTOD": "LTOD",
+    "LTIME_OF_DAY": "LTOD", "DT": "DT", "DATE_AND_TIME": "DT", "LDT": "LDT", "LDATE_AND_TIME": "LDT",
+}  # fmt: skip
+_CALENDAR = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})", re.ASCII)
+_CLOCK = re.compile(r"(\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:\.(\d{1,9}))?)?", re.ASCII)
+_EPOCH = datetime.date(1970, 1, 1)
 _BASES = {"2": 2, "8": 8, "16": 16}
 
 _NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
@@ -28,10 +34,11 @@ _UNITS = list(_NS)
 _TIME_PART = re.compile(r"(\d+(?:\.\d+)?)(d|h|ms|us|ns|m|s)", re.IGNORECASE | re.ASCII)
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?\Z", re.ASCII)
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
-_NOT_ENUMS = {*ELEMENTARY, *_TIME_TYPES, *_DATE_TYPES, "STRING"}
+_NOT_ENUMS = {*ELEMENTARY, *_TIME_TYPES, *_DATE_TYPES, "STRING", "WSTRING"}
 _UNDERSCORES = re.compile(r"__|_\Z|\A_|_\.|\._")
 _ESCAPES = {"$": "$", "'": "'", '"': '"', "L": "\n", "N": "\n", "P": "\f", "R": "\r", "T": "\t"}
 _ESCAPE = re.compile(r"\$([0-9A-Fa-f]{2}|[$'\"LNPRTlnprt]|.|\Z)", re.DOTALL)
+_WIDE_ESCAPE = re.compile(r"\$([0-9A-Fa-f]{4}|[$'\"LNPRTlnprt]|.|\Z)", re.DOTALL)
 
 
 class LiteralError(Exception):
@@ -78,7 +85,7 @@ def typed(text: str) -> tuple[LiteralKind, Value, str]:
     if name in _TIME_TYPES:
         return LiteralKind.TIME, duration(rest), _TIME_TYPES[name]
     if name in _DATE_TYPES:
-        raise LiteralError(f"dates such as {text} are not supported yet")
+        return LiteralKind.DATE, date(name, rest), _DATE_TYPES[name]
     if name == "BOOL" and rest.upper() in ("TRUE", "FALSE", "1", "0"):
         return LiteralKind.BOOL, int(rest.upper() in ("TRUE", "1")), name
     sign, digits = (-1, rest[1:]) if rest.startswith("-") else (1, rest.removeprefix("+"))
@@ -112,18 +119,56 @@ def duration(text: str) -> int:
     return sign * int(total)
 
 
+def date(name: str, text: str) -> int:
+    """`2024-02-29`, `12:30:15.5`, `2024-02-29-12:30:15.5` for a type such as D, TOD, LDT: nanoseconds since 1970 or
+    midnight."""
+    kind = _DATE_TYPES[name].removeprefix("L")
+    day, _, clock = text.replace("_", "").rpartition("-") if kind == "DT" else (text, "", text)
+    total = 0
+    if kind != "TOD":
+        match = _CALENDAR.fullmatch(day)
+        if match is None:
+            form = "2024-02-29-12:30:15" if kind == "DT" else "2024-02-29"
+            raise LiteralError(f"a date is written {name}#{form}, not {name}#{text}")
+        try:
+            days = (datetime.date(*(int(part) for part in match.groups())) - _EPOCH).days
+        except ValueError:
+            raise LiteralError(f"there is no day {day}") from None
+        if days < 0:
+            raise LiteralError("dates begin with 1970-01-01")
+        total = days * _NS["d"]
+    return total if kind == "DATE" else total + _clock(name, clock)
+
+
+def _clock(name: str, text: str) -> int:
+    match = _CLOCK.fullmatch(text)
+    if match is None:
+        raise LiteralError(f"the time of {name}#... is written 12:30:15 or 12:30:15.5, not {text}")
+    hours, minutes, seconds, fraction = match.groups()
+    if int(hours) > 23 or int(minutes) > 59 or int(seconds or 0) > 59:
+        raise LiteralError(f"there is no time {text}; the last of a day is 23:59:59.999")
+    total = int(hours) * _NS["h"] + int(minutes) * _NS["m"] + int(seconds or 0) * _NS["s"]
+    return total + int((fraction or "").ljust(9, "0"))
+
+
 def string(text: str) -> str:
-    """The characters of a quoted text with its $ escapes resolved."""
+    """The characters of a quoted text with its $ escapes resolved: of a WSTRING as UTF-16 code units when the quotes are
+    double."""
+    wide = text.startswith('"')
 
     def replace(match: re.Match[str]) -> str:
         code = match.group(1)
-        if len(code) == 2:
+        if len(code) in (2, 4):
             return chr(int(code, 16))
         if code.upper() in _ESCAPES:
             return _ESCAPES[code.upper()]
         raise LiteralError(f"${code} is not an escape; write $$ for a dollar sign")
 
-    value = _ESCAPE.sub(replace, text[1:-1]) if "$" in text else text[1:-1]
+    escape = _WIDE_ESCAPE if wide else _ESCAPE
+    value = escape.sub(replace, text[1:-1]) if "$" in text else text[1:-1]
+    if wide:
+        units = value.encode("utf-16-le", "surrogatepass")
+        return "".join(chr(units[i] | units[i + 1] << 8) for i in range(0, len(units), 2))
     for character in value:
         if ord(character) > 255:
             raise LiteralError(f"{character} is not a latin-1 character, so it does not fit a STRING")

@@ -42,7 +42,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.types import BYTE, UDINT, ArrayType, StringType, StructType, Type, is_scalar
+from plctool.compiler.types import UDINT, ArrayType, StringType, StructType, Type, is_scalar
 
 _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 PLACES = (VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace)
@@ -102,7 +102,7 @@ class Expressions(Strings):
         if var.storage is Storage.AREA:
             tag = ""
             if var.area in TAGGED_AREAS:
-                tag = self.unit.tag("globals" if is_scalar(t) else var)
+                tag = self.unit.tag("globals" if is_scalar(t) else (var.area, var.offset))
             return Ref(self.area_base(var.area), var.offset, t, tag, True, string_capacity(t))
         if var.storage is Storage.SELF:
             assert self.pou is not None and self.pou.instance is not None
@@ -176,7 +176,7 @@ class Expressions(Strings):
         else:
             index = self._resize(index, expr.type, 8 * self.unit.target.pointer_size)
         trusted = self.pou is not None and self.pou.no_init
-        return replace(self.element(base, index, BYTE, counted=inside), loose=not trusted)
+        return replace(self.element(base, index, place.type, counted=inside), loose=not trusted)
 
     def widen(self, value: str, bits: int) -> str:
         """A non-negative integer as a pointer-sized one."""
@@ -267,7 +267,7 @@ class Expressions(Strings):
             for literal, other in ((e.right, e.left), (e.left, e.right)):
                 if isinstance(literal, Const) and not isinstance(other, Const):
                     ref = self.aggregate(other)
-                    equal = self.equals_literal(ref, str(literal.value).encode("latin-1"))
+                    equal = self.equals_literal(ref, str(literal.value))
                     if equal is None:
                         return self.compare_strings(e.op, ref, self.aggregate(literal))
                     return equal if e.op is BinaryOp.EQ else self.fn.value(f"xor i1 {equal}, true")
@@ -341,7 +341,7 @@ class Expressions(Strings):
     def aggregate(self, e: Expr) -> Ref:
         """Where the value of a string, array or struct expression lies; valid until the end of the statement."""
         if isinstance(e, Const):
-            return self.literal(str(e.value).encode("latin-1"))
+            return self.literal(str(e.value), wide=isinstance(e.type, StringType) and e.type.wide)
         if isinstance(e, Load):
             return self.ref(e.place)
         if isinstance(e, Convert):

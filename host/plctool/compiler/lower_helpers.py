@@ -221,7 +221,7 @@ done:
 _STRINGS = {"str.span": _SPAN, "str.copy": _COPY, "str.compare": _COMPARE}
 
 # Functions of stdlib/strings.st that have a faster body here, with the same meaning.
-LIBRARY_FUNCTIONS = {"SPAN__": "str.span", "COPY__": "str.copy"}
+LIBRARY_FUNCTIONS = {"SPAN__": "str.span", "COPY__": "str.copy", "WSPAN__": "str.wspan", "WCOPY__": "str.wcopy"}
 
 _MEMORY = """define internal ptr @memcpy(ptr %d, ptr %s, PTR %n) ATTRIBUTES section ".text.memcpy" {
 entry:
@@ -319,9 +319,12 @@ MEMORY_FUNCTIONS = ("memcpy", "memset", "memmove")
 
 def string_helper(name: str, target: Target, attributes: str) -> str:
     """The definition of one of the str.* functions for a target."""
-    walk, chunk = _STRINGS[name], _chunk(target)
+    wide = name.startswith("str.w")
+    walk, chunk = _STRINGS[name.replace("str.w", "str.")], 0 if wide else _chunk(target)
     if not chunk:
         text = walk.head + "  br label %loop\n" + walk.rest
+        if wide:
+            text = re.sub(r"\bi8\b", "i16", text).replace("align 1", "align 2").replace("@str.", "@str.w", 1)
         return _finish(text.replace("START", "0, %entry").replace("EXTRA", ""), target, attributes)
     text = walk.head + _CHUNKS + walk.chunk + walk.rest
     integer, vector = f"i{8 * chunk}", target.vectors

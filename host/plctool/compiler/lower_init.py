@@ -14,6 +14,7 @@ from plctool.compiler.ir import round_to_single
 from plctool.compiler.lower_arith import constant
 from plctool.compiler.lower_expr import Expressions
 from plctool.compiler.lower_frame import Ref
+from plctool.compiler.lower_string import encode_text
 from plctool.compiler.lower_unit import Unit
 from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, StructInit
 from plctool.compiler.types import ArrayType, Elementary, Field, Kind, StringType, StructType, Type, base_of, is_scalar
@@ -25,7 +26,7 @@ _CONSTANT_FROM = 4  # different scalars that are worth a constant
 def encode_scalar(value: int | float | str, t: Type) -> bytes:
     """A scalar or string constant as it lies in memory."""
     if isinstance(t, StringType):
-        text = str(value).encode("latin-1")[: t.length]
+        text = encode_text(str(value)[: t.length], t)
         return text + bytes(t.size - len(text))
     base = base_of(t)
     if isinstance(base, Elementary) and base.kind is Kind.REAL:
@@ -83,7 +84,7 @@ class Initialising(Expressions):
     def _initialise_scalar(self, ref: Ref, initial: ScalarInit) -> None:
         if isinstance(ref.type, StringType):
             if initial.value:
-                self.copy_literal(ref, str(initial.value).encode("latin-1"))
+                self.copy_literal(ref, str(initial.value))
         elif any(encode_scalar(initial.value, ref.type)):
             self.store(ref, constant(initial.value, ref.type))
 

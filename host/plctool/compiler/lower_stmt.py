@@ -98,7 +98,7 @@ class Body(Initialising):
         if not isinstance(target.type, StringType):
             self.copy(target, self.aggregate(value), target.type.size)
         elif isinstance(value, Const):
-            self.copy_literal(target, str(value.value).encode("latin-1"))
+            self.copy_literal(target, str(value.value))
         else:
             self.copy_string(target, self.aggregate(value))
 

@@ -28,52 +28,57 @@ class Strings(Arithmetic):
             length = min(int(target.capacity), int(source.capacity))
             target_machine = self.unit.target
             inline = _INLINE_COPY if target_machine.vectors else _SHORT_COPY if target_machine.unaligned else _TINY_COPY
-            if length <= inline:
-                self.copy(target, source, length)
+            if length * _unit(target) <= inline:
+                self.copy(target, source, length * _unit(target))
                 self._terminate(target, length)
                 return
-        name, capacity = self.unit.helper("str.copy"), source.capacity
+        name, capacity = self.unit.helper(_helper("copy", target)), source.capacity
         self.fn.value(
             f"call i32 @{name}(ptr null, ptr {self.address(target)}, i32 {target.capacity}, i32 0, "
             f"ptr {self.address(source)}, i32 {capacity}, i32 0, i32 {capacity})"
         )
 
-    def copy_literal(self, target: Ref, text: bytes) -> None:
+    def copy_literal(self, target: Ref, text: str) -> None:
         """target := constant, cut to the target's capacity."""
+        wide = _unit(target) == 2
         if not target.capacity.isdigit():
-            self.copy_string(target, self.literal(text))
+            self.copy_string(target, self.literal(text, wide=wide))
             return
         text = text[: int(target.capacity)]
         if text:
-            self.copy(target, replace(self.literal(text), direct=target.direct), len(text))
+            source = replace(self.literal(text, wide=wide), direct=target.direct)
+            self.copy(target, source, len(text) * _unit(target))
         self._terminate(target, len(text))
 
-    def literal(self, text: bytes) -> Ref:
+    def literal(self, text: str, *, wide: bool) -> Ref:
         """A constant string in the image."""
-        pointer = self.unit.module.constant(text + b"\0")
-        return Ref(pointer, 0, StringType(len(text)), direct=True, capacity=str(len(text)))
+        t = StringType(len(text), wide)
+        pointer = self.unit.module.constant(encode_text(text + "\0", t), t.align)
+        return Ref(pointer, 0, t, direct=True, capacity=str(len(text)))
 
     def _terminate(self, target: Ref, length: int) -> None:
-        end = self.address(replace(target, offset=target.offset + length))
-        self.fn.do(f"store i8 0, ptr {end}, align 1")
+        unit = _unit(target)
+        end = self.address(replace(target, offset=target.offset + length * unit))
+        self.fn.do(f"store i{8 * unit} 0, ptr {end}, align {unit}")
 
     def compare_strings(self, op: BinaryOp, left: Ref, right: Ref) -> str:
         """The i1 of a comparison, byte by byte, unsigned."""
         order = self.fn.value(
-            f"call i32 @{self.unit.helper('str.compare')}(ptr {self.address(left)}, i32 {left.capacity}, "
+            f"call i32 @{self.unit.helper(_helper('compare', left))}(ptr {self.address(left)}, i32 {left.capacity}, "
             f"ptr {self.address(right)}, i32 {right.capacity})"
         )
         return self.compare(op, order, "0", DINT)
 
-    def equals_literal(self, ref: Ref, text: bytes) -> str | None:
+    def equals_literal(self, ref: Ref, text: str) -> str | None:
         """The i1 of a comparison with a short constant, without a loop; None when that is not possible."""
-        size = len(text) + 1
+        assert isinstance(ref.type, StringType)
+        data, at = encode_text(text + "\0", ref.type), 0
+        size = len(data)
         if not ref.capacity.isdigit() or size > _INLINE_COMPARE:
             return None
         if int(ref.capacity) < len(text):
             return "false"
-        fn, data, at = self.fn, text + b"\0", 0
-        parts = []
+        fn, parts = self.fn, []
         while at < size:
             width = max(w for w in (1, 2, 4, 8) if w <= min(size - at, self.unit.target.pointer_size))
             pointer = self.address(replace(ref, offset=ref.offset + at))
@@ -85,3 +90,18 @@ class Strings(Arithmetic):
         for part in parts[1:]:
             result = fn.value(f"and i1 {result}, {part}")
         return result
+
+
+def encode_text(text: str, t: StringType) -> bytes:
+    """The characters as they lie in memory."""
+    return text.encode("utf-16-le", "surrogatepass") if t.wide else text.encode("latin-1")
+
+
+def _unit(ref: Ref) -> int:
+    """Bytes of a character."""
+    assert isinstance(ref.type, StringType)
+    return ref.type.unit
+
+
+def _helper(name: str, ref: Ref) -> str:
+    return f"str.{'w' if _unit(ref) == 2 else ''}{name}"

@@ -34,16 +34,26 @@ def value_of(function: str) -> str:
 
 
 def with_mocks(
-    declarations: list[ast.Declaration], tests: Iterable[ast.TestDecl], diagnostics: Diagnostics
+    parsed: list[tuple[Source, list[ast.Declaration]]], diagnostics: Diagnostics
+) -> list[tuple[Source, list[ast.Declaration]]]:
+    """The declarations of each file with what the tests need to replace parts of them."""
+    everything = [decl for _, declarations in parsed for decl in declarations]
+    blocks, functions = _mocked(d for d in everything if isinstance(d, ast.TestDecl))
+    own = {d.name.casefold() for d in everything if isinstance(d, ast.PouDecl) and d.keyword == "FUNCTION_BLOCK"}
+    if not blocks:
+        own.clear()
+    return [(source, _with_mocks(declarations, own, functions, diagnostics)) for source, declarations in parsed]
+
+
+def _with_mocks(
+    declarations: list[ast.Declaration], blocks: set[str], functions: set[str], diagnostics: Diagnostics
 ) -> list[ast.Declaration]:
-    """The declarations of a file with what the tests need to replace parts of it."""
-    blocks, functions = _mocked(tests)
     result: list[ast.Declaration] = []
     for decl in declarations:
         if not isinstance(decl, ast.PouDecl):
             result.append(decl)
-        elif decl.keyword == "FUNCTION_BLOCK" and blocks and "external" not in decl.attributes:
-            result.append(_block(decl))
+        elif decl.keyword == "FUNCTION_BLOCK" and blocks and "CLASS" not in decl.modifiers:
+            result.append(_block(decl, derived=any(name.casefold() in blocks for _, name in decl.bases)))
         elif decl.keyword == "FUNCTION" and (decl.name.casefold() in functions or _is_elsewhere(decl)):
             mocked = decl.name.casefold() in functions
             if mocked and decl.result is None:
@@ -96,12 +106,14 @@ def _is_elsewhere(decl: ast.PouDecl) -> bool:
     return name is not None and not lib.SimHasExternal(name.lower().encode("latin-1", "replace"))
 
 
-def _block(decl: ast.PouDecl) -> ast.PouDecl:
+def _block(decl: ast.PouDecl, *, derived: bool) -> ast.PouDecl:
+    """`derived`: the members come from a block of the program that it EXTENDS."""
     pos = decl.pos
     members = ast.VarBlock(pos, "VAR", set(), [_variable(pos, MOCKED, "BOOL"), _variable(pos, CALLS, "UDINT")])
     count = ast.Binary(pos, "+", ast.Name(pos, CALLS), ast.Literal(pos, ast.LiteralKind.INT, 1))
     skip = ast.If(pos, [(ast.Name(pos, MOCKED), [_assign(pos, CALLS, count), ast.Return(pos)])], [])
-    return replace(decl, blocks=[*decl.blocks, members], body=[skip, *decl.body])
+    blocks = decl.blocks if derived else [*decl.blocks, members]
+    return replace(decl, blocks=blocks, body=[skip, *decl.body])
 
 
 def _variable(pos: int, name: str, type_name: str) -> ast.VarDecl:

@@ -11,7 +11,16 @@ from typing import Any
 
 from plctool.compiler import ast
 from plctool.compiler.builder import Builder
-from plctool.compiler.lexer import OPENING, SOFT, Lexer, Report, Token, is_followed_by_name, is_operator_function
+from plctool.compiler.lexer import (
+    OPENING,
+    SOFT,
+    Lexer,
+    Report,
+    Token,
+    begins_test,
+    is_followed_by_name,
+    is_operator_function,
+)
 from plctool.compiler.source import Source
 from plctool.compiler.syntax_errors import Recovery
 from plctool.compiler.tables import END, Rule, Tables, load_tables
@@ -125,7 +134,7 @@ def parse(source: Source, report: Report, start: int = 0, end: int | None = None
         kind = token.type
         if kind not in actions[states[-1]]:
             if kind in SOFT or (kind == "OP" and is_operator_function(token, source.text)):
-                token.type = "IDENT"
+                token.type = "TEST" if begins_test(token, source.text) else "IDENT"
         elif kind in OPENING and not is_followed_by_name(token, source.text):
             token.type = "IDENT"
         if recovery.skipping and not recovery.resume(token):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from plctool.compiler.source import Source
-from plctool.compiler.symbols import PouSymbol, Symbol
+from plctool.compiler.symbols import ClassInfo, PouSymbol, Symbol, Unit
 from plctool.compiler.typed import Pos, Pou, Statement
 from plctool.compiler.types import Type
 
@@ -23,7 +23,8 @@ class Scope:
 
     `names` are the local ones by case-folded name; `bindings` the types generic parameters stand for in this instance;
     `prologue` what has to be done before the body: initial values that are not constant; `programs` the PROGRAMs that
-    can be instantiated here, as function blocks: in unit tests.
+    can be instantiated here, as function blocks: in unit tests; `outer` what a method sees of the unit `cls` around it;
+    `path` the namespaces to look into, case-folded, innermost first.
     """
 
     world: World
@@ -34,12 +35,30 @@ class Scope:
     pou: Pou | None = None
     prologue: list[Statement] = field(default_factory=list)
     programs: dict[str, PouSymbol] = field(default_factory=dict)
+    outer: dict[str, Symbol] = field(default_factory=dict)
+    cls: ClassInfo | None = None
+    path: tuple[str, ...] = ()
 
     def lookup(self, name: str) -> Symbol | None:
         """What a name stands for here."""
         key = name.casefold()
-        symbol = self.names.get(key)
-        return symbol if symbol is not None else self.world.lookup(key, library=self.library)
+        symbol = self.names.get(key) or self.outer.get(key)
+        if symbol is not None:
+            return symbol
+        for space in self.path:
+            symbol = self.world.lookup(f"{space}.{key}", library=self.library)
+            if symbol is not None:
+                return symbol
+        return self.world.lookup(key, library=self.library)
+
+    def unit(self, name: str) -> Unit | None:
+        """A type, function, function block or program, whatever variables have its name."""
+        key = name.casefold()
+        if key in self.programs:
+            return self.programs[key]
+        spaces = (f"{space}.{key}" for space in self.path)
+        found = (self.world.unit(k, library=self.library) for k in (*spaces, key))
+        return next((symbol for symbol in found if symbol is not None), None)
 
     def pos(self, offset: int) -> Pos:
         """Line and column of an offset in this source."""

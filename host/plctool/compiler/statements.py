@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from plctool.compiler import ast, constants
-from plctool.compiler.calls import Calls
 from plctool.compiler.conversions import NUMBERS, elementary, same_type
 from plctool.compiler.expressions import MAX_DEPTH, NestingError, is_untyped, load, place_of
+from plctool.compiler.methods import ObjectCalls
 from plctool.compiler.symbols import ERROR, BlockInfo, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.typed import (
     Assign,
@@ -82,7 +82,7 @@ class _Labels:
             self._ranges.append((low, high, line))
 
 
-class Statements(Calls):
+class Statements(ObjectCalls):
     """Checks a body."""
 
     _loops = 0
@@ -124,6 +124,9 @@ class Statements(Calls):
         return result
 
     def _assign_one(self, target: ast.Expr, source: ast.Expr, pos: Pos) -> Statement | None:
+        bound = self.assigned_property(target)
+        if bound is not None:
+            return self.assign_property(bound, target, source, pos)
         place = self.target(target, "the left side of :=", "be assigned to")
         if place is None:
             self.expr(source)
@@ -219,8 +222,12 @@ class Statements(Calls):
     def _instance(self, call: ast.Call) -> Expr | None:
         """The instance a call statement is about; None when it calls a function."""
         callee = call.callee
+        if self.bound_member(callee) is not None:
+            return None
         if isinstance(callee, ast.Name):
             symbol = self.scope.lookup(callee.name)
+            if symbol is None and callee.name.upper() == "SUPER" and self.scope.cls is not None:
+                return self.expr(ast.Deref(callee.pos, callee))
             if not isinstance(symbol, VarSymbol | GlobalSymbol) or (
                 isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT
             ):  # fmt: skip
@@ -235,6 +242,9 @@ class Statements(Calls):
                     self.expr(argument.value)
             return []
         block = self.world.blocks[instance.type]
+        if block.cls is not None and "CLASS" in block.cls.symbol.decl.modifiers:
+            self.error(call.pos, "call", f"{block.type} is a CLASS and has no body; call one of its methods")
+            return []
         names = [(p.variable.name, p.direction) for p in block.pou.parameters]
         bound = self.bind(call.args, names, block.type.name, call.pos)
         if bound is None:
@@ -243,8 +253,10 @@ class Statements(Calls):
         handed = self._fb_arguments(block, bound, call, place)
         if handed is None:
             return []
-        self.world.add_call(self.scope.pou, block.pou, pos)
+        if not isinstance(place, DerefPlace):
+            self.world.add_call(self.scope.pou, block.pou, pos)
         statement = FbCall(block.pou, place, handed.inputs, handed.in_outs, handed.outputs, pos)
+        statement.dispatch = self.body_dispatch(block, place)
         return [statement, *handed.after]
 
     def _fb_arguments(

@@ -91,17 +91,23 @@ class TypeSymbol:
     default: Initial | None = None
     busy: bool = False
 
+    @property
+    def full_name(self) -> str:
+        """With the namespace in front."""
+        space = self.decl.namespace
+        return f"{space.name}.{self.decl.name}" if space is not None and space.name else self.decl.name
+
 
 @dataclass(slots=True, eq=False)
 class PouSymbol:
-    """A declared FUNCTION, FUNCTION_BLOCK or PROGRAM."""
+    """A declared FUNCTION, FUNCTION_BLOCK, INTERFACE or PROGRAM."""
 
     decl: ast.PouDecl
     library: bool
 
     @property
     def keyword(self) -> str:
-        """FUNCTION, FUNCTION_BLOCK or PROGRAM."""
+        """FUNCTION, FUNCTION_BLOCK, INTERFACE or PROGRAM."""
         return self.decl.keyword
 
 
@@ -112,10 +118,18 @@ class Namespace:
     name: str
     what: str
     members: dict[str, GlobalSymbol | VarSymbol]
+    cls: ClassInfo | None = None  # of a program: its actions and methods
+
+
+@dataclass(slots=True, eq=False)
+class MemberSymbol:
+    """A method, action or property by its bare name, inside the unit that has it."""
+
+    name: str
 
 
 Unit = TypeSymbol | PouSymbol
-Symbol = VarSymbol | GlobalSymbol | Unit | Namespace
+Symbol = VarSymbol | GlobalSymbol | Unit | Namespace | MemberSymbol
 
 
 @dataclass(slots=True, eq=False)
@@ -136,3 +150,84 @@ class BlockInfo:
     type: StructType
     members: dict[str, VarSymbol] = field(default_factory=dict)
     retain: bool = False  # instances live in the retain area as a whole
+    cls: ClassInfo | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Member:
+    """A method, action, or the GET or SET of a property. `info` once somebody needed its signature."""
+
+    decl: ast.PouDecl
+    owner: ClassInfo
+    info: FunctionInfo | None = None
+
+    @property
+    def name(self) -> str:
+        """As written: `Type.member`."""
+        return f"{self.owner.name}.{self.decl.name}"
+
+    @property
+    def is_property(self) -> bool:
+        """Whether it reads or writes a property."""
+        return self.decl.keyword in ("GET", "SET")
+
+    @property
+    def abstract(self) -> bool:
+        """Whether it has no body."""
+        return "ABSTRACT" in self.decl.modifiers or self.owner.is_interface
+
+
+@dataclass(slots=True, eq=False)
+class ClassInfo:
+    """What a FUNCTION_BLOCK, INTERFACE or PROGRAM has besides variables. `members` are its own; `names` what they see of
+    the unit around them. `number` identifies the class in its instances; 0 when none has to be told from others."""
+
+    symbol: PouSymbol
+    name: str
+    type: StructType | None = None  # None: a program, whose variables are global
+    block: BlockInfo | None = None
+    base: ClassInfo | None = None
+    interfaces: list[ClassInfo] = field(default_factory=list)
+    members: dict[str, Member] = field(default_factory=dict)
+    names: dict[str, Symbol] = field(default_factory=dict)
+    instance_variables: dict[str, dict[str, VarSymbol]] = field(default_factory=dict)  # VAR_INST, by member
+    number: int = 0
+
+    @property
+    def is_interface(self) -> bool:
+        """Whether there are no instances of it, only of what implements it."""
+        return self.symbol.keyword == "INTERFACE"
+
+    @property
+    def abstract(self) -> bool:
+        """Whether only derived blocks have instances."""
+        return "ABSTRACT" in self.symbol.decl.modifiers or self.is_interface
+
+    def all_interfaces(self) -> list[ClassInfo]:
+        """Those named, those that they extend, those of the base."""
+        found: dict[ClassInfo, None] = {}
+        for interface in self.interfaces:
+            found[interface] = None
+            found.update(dict.fromkeys(interface.all_interfaces()))
+        if self.base is not None:
+            found.update(dict.fromkeys(self.base.all_interfaces()))
+        return list(found)
+
+    def find(self, key: str) -> Member | None:
+        """A member, own or inherited: `name`, or `name.get` and `name.set` of a property."""
+        cls: ClassInfo | None = self
+        while cls is not None:
+            if key in cls.members:
+                return cls.members[key]
+            cls = cls.base
+        return next((i.members[key] for i in self.all_interfaces() if key in i.members), None)
+
+    def derives(self, other: ClassInfo) -> bool:
+        """Whether it is `other` or derived from it."""
+        return self is other or (self.base is not None and self.base.derives(other))
+
+    def member_names(self) -> list[str]:
+        """Names of all members, for suggestions."""
+        bases = [self.base] if self.base is not None else []
+        inherited = [name for c in (*bases, *self.interfaces) for name in c.member_names()]
+        return [m.decl.name for m in self.members.values()] + inherited

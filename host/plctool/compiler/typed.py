@@ -81,9 +81,11 @@ class ArrayInit:
 
 @dataclass
 class StructInit:
-    """Only the members given; the rest take the defaults of the type (`TypedProgram.defaults`)."""
+    """Only the members given; the rest take the defaults of the type (`TypedProgram.defaults`). `arguments`: what the
+    FB_Init of an instance gets besides."""
 
     members: dict[str, Initial]
+    arguments: dict[str, Expr] = field(default_factory=dict)
 
 
 Initial = ScalarInit | ArrayInit | StructInit
@@ -146,7 +148,17 @@ class ValuePlace:
     pos: Pos
 
 
-Place = VarPlace | MemberPlace | IndexPlace | DerefPlace | BitPlace | ValuePlace
+@dataclass
+class SelfPlace:
+    """The instance a method or function block body runs on: THIS^. `exact`: SUPER^, which calls what its own type
+    declares."""
+
+    type: Type
+    pos: Pos
+    exact: bool = False
+
+
+Place = VarPlace | MemberPlace | IndexPlace | DerefPlace | BitPlace | ValuePlace | SelfPlace
 
 
 # ---- expressions ---------------------------------------------------------------------------------------------------
@@ -267,9 +279,18 @@ class AddressOf:
     pos: Pos
 
 
+@dataclass(eq=False)
+class Dispatch:
+    """What a call runs, by the class number that the instance carries in its first four bytes; `targets` is complete
+    when the check is done, and holds only classes that have instances. `function` has the signature."""
+
+    function: Pou
+    targets: dict[int, Pou] = field(default_factory=dict)
+
+
 @dataclass
 class Call:
-    """A call of a FUNCTION (or an EXTERNAL one). `args` in order of `function.parameters`: an expression for VAR_INPUT,
+    """A call of a FUNCTION (or an EXTERNAL one), or of a method of `instance`. `args` in order of `function.parameters`: an expression for VAR_INPUT,
     a place for VAR_IN_OUT, a place or None for VAR_OUTPUT. The result is `type`; strings and structs come back in a
     temporary.
     """
@@ -278,6 +299,8 @@ class Call:
     args: list[Expr | Place | None]
     type: Type
     pos: Pos
+    instance: Place | None = None
+    dispatch: Dispatch | None = None  # when the type of the instance is not known; `function` is its signature then
 
 
 Expr = Const | Load | Unary | Binary | Convert | IntrinsicCall | AddressOf | Call
@@ -312,6 +335,7 @@ class FbCall:
     in_outs: list[tuple[Variable, Place]]
     outputs: list[tuple[Variable, Place]]
     pos: Pos
+    dispatch: Dispatch | None = None  # when the type of the instance is not known
 
 
 @dataclass
@@ -383,6 +407,7 @@ class PouKind(Enum):
     PROGRAM = "PROGRAM"
     FUNCTION = "FUNCTION"
     FUNCTION_BLOCK = "FUNCTION_BLOCK"
+    METHOD = "METHOD"  # a function that gets an instance
 
 
 class Direction(Enum):
@@ -466,4 +491,5 @@ class TypedProgram:
     aliases: dict[str, str] = field(
         default_factory=dict
     )  # other names of globals -> name in `globals`: `x` for `GVL.x`
+    startup: Pou | None = None  # (init_retains : BOOL): what is called when the variables have their initial values
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not

@@ -76,34 +76,58 @@ REAL = Elementary("REAL", Kind.REAL, 32, True, 14)
 LREAL = Elementary("LREAL", Kind.REAL, 64, True, 15)
 TIME = Elementary("TIME", Kind.TIME, 32, True, 18)
 LTIME = Elementary("LTIME", Kind.TIME, 64, True, 37)
+DATE = Elementary("DATE", Kind.DATE, 32, False, 19)  # s since 1970-01-01, a multiple of a day
+TOD = Elementary("TOD", Kind.DATE, 32, False, 21)  # ms since midnight
+DT = Elementary("DT", Kind.DATE, 32, False, 20)  # s since 1970-01-01
+LDATE = Elementary("LDATE", Kind.DATE, 64, False, 19)  # ns, as the other L types
+LTOD = Elementary("LTOD", Kind.DATE, 64, False, 21)
+LDT = Elementary("LDT", Kind.DATE, 64, False, 20)
+CHAR = Elementary("CHAR", Kind.CHAR, 8, False, 2)  # a character of a STRING
+WCHAR = Elementary("WCHAR", Kind.CHAR, 16, False, 3)  # a UTF-16 code unit
 
 ELEMENTARY: dict[str, Elementary] = {
     t.name: t
     for t in (
         BOOL, BYTE, WORD, DWORD, LWORD, SINT, INT, DINT, LINT, USINT, UINT, UDINT, ULINT, REAL, LREAL, TIME, LTIME,
+        DATE, TOD, DT, LDATE, LTOD, LDT, CHAR, WCHAR,
     )
+} | {
+    "TIME_OF_DAY": TOD, "LTIME_OF_DAY": LTOD, "DATE_AND_TIME": DT, "LDATE_AND_TIME": LDT,
+    "__XWORD": LWORD, "__UXINT": ULINT, "__XINT": LINT,
 }  # fmt: skip
+"""By name, in capitals; a type may have several names. The last three are integers as wide as a pointer in memory."""
 
 DEFAULT_STRING_LENGTH = 80
 
 
 @dataclass(frozen=True)
 class StringType(Type):
-    """STRING[length]: `length` characters and a NUL."""
+    """STRING[length]: `length` characters and a NUL. `wide`: WSTRING[length], UTF-16 in two bytes per character."""
 
     length: int
+    wide: bool = False
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        return f"STRING[{self.length}]"
+        return f"{self.keyword}[{self.length}]"
+
+    @property
+    def keyword(self) -> str:
+        """STRING or WSTRING."""
+        return "WSTRING" if self.wide else "STRING"
+
+    @property
+    def unit(self) -> int:
+        """Bytes of a character."""
+        return 2 if self.wide else 1
 
     @property
     def size(self) -> int:
-        return self.length + 1
+        return (self.length + 1) * self.unit
 
     @property
     def align(self) -> int:
-        return 1
+        return self.unit
 
 
 @dataclass(eq=False)
@@ -165,8 +189,17 @@ class ArrayType(Type):
 
 
 @dataclass(frozen=True)
+class OpenArrayType(ArrayType):
+    """ARRAY[*] of a VAR_IN_OUT: the bounds come with each call, in variables beside it; `bounds` are empty ranges."""
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return "ARRAY[" + ",".join("*" for _ in self.bounds) + f"] OF {self.element}"
+
+
+@dataclass(frozen=True)
 class PointerType(Type):
-    """POINTER TO / REF_TO; always 8 bytes in memory so that layouts agree on all targets."""
+    """REF_TO; always 8 bytes in memory so that layouts agree on all targets."""
 
     target: Type
 
@@ -184,6 +217,24 @@ class PointerType(Type):
 
 
 @dataclass(frozen=True)
+class RawPointerType(PointerType):
+    """POINTER TO: a REF_TO that takes any address and can be computed with, in bytes."""
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return f"POINTER TO {self.target}"
+
+
+@dataclass(frozen=True)
+class InterfaceType(PointerType):
+    """A variable of an INTERFACE: the address of an instance that implements it, or NULL. `target` has no members; it
+    stands for whatever implements the interface."""
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return self.target.name
+
+
 class ReferenceType(PointerType):
     """REFERENCE TO: a pointer that is followed wherever it is used; the typed program holds it as a DerefPlace."""
 
@@ -203,23 +254,38 @@ class Field:
 
 @dataclass(eq=False)
 class StructType(Type):
-    """Members in order of declaration. Function block instances are StructTypes as well (see typed.Pou.instance)."""
+    """Members in order of declaration. Function block instances are StructTypes as well (see typed.Pou.instance).
+    The members of a `union` share their memory. `base`: of a derived function block, whose members come first.
+    `interfaces`: all that a block or interface names itself, and what those extend."""
 
     name: str
     fields: list[Field] = field(default_factory=list)
+    union: bool = False
     _size: int = 0
     _align: int = 1
+    base: StructType | None = None
+    interfaces: list[StructType] = field(default_factory=list)
+
+    @property
+    def root(self) -> StructType:
+        """The block it is derived from in the end; itself for most."""
+        return self if self.base is None else self.base.root
+
+    def conforms(self, other: Type) -> bool:
+        """Whether an instance can stand where `other` is wanted: the type itself, a base of it or an interface."""
+        if other is self or other in self.interfaces:
+            return True
+        return self.base is not None and self.base.conforms(other)
 
     def lay_out(self) -> None:
         """Gives every field its offset. Call once, when all field types are known and laid out."""
-        offset, align = 0, 1
+        end, align = 0, 1
         for f in self.fields:
-            offset = align_up(offset, f.type.align)
-            f.offset = offset
-            offset += f.type.size
+            f.offset = 0 if self.union else align_up(end, f.type.align)
+            end = max(end, f.offset + f.type.size)
             align = max(align, f.type.align)
         self._align = align
-        self._size = align_up(max(offset, 1), align)
+        self._size = align_up(max(end, 1), align)
 
     def member(self, name: str) -> Field | None:
         key = name.casefold()

@@ -86,10 +86,9 @@ class TestSuite:
         self, parsed: list[tuple[Source, list[ast.Declaration]]], world: World
     ) -> list[tuple[Source, list[ast.Declaration]]]:
         """Sets the hidden variables up, and adds to the syntax tree what MOCK needs."""
-        tests = [d for _, declarations in parsed for d in declarations if isinstance(d, ast.TestDecl)]
         self._bench = Bench(world)
         world.register([mocks.raising()])
-        return [(s, mocks.with_mocks(declarations, tests, world.diagnostics)) for s, declarations in parsed]
+        return mocks.with_mocks(parsed, world.diagnostics)
 
     def configure(self, world: World) -> Application:
         """The programs as the CONFIGURATION has them, so that their names are known; no task runs them. Without a

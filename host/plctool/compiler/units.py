@@ -40,12 +40,13 @@ if TYPE_CHECKING:
     from plctool.compiler.world import World
 
 LIBRARY_STRING = StringType(255)  # STRING without a length, as parameter or result of a library function
+WIDE_LIBRARY_STRING = StringType(255, wide=True)
 
 _DIRECTIONS = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VAR_IN_OUT": Direction.IN_OUT}
 _ROLES = {
     "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,
     "VAR_TEMP": Role.TEMP,
-    "VAR_STAT": Role.LOCAL,
+    "VAR_STAT": Role.LOCAL, "VAR_INST": Role.LOCAL,
 }  # fmt: skip
 _KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
 _VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")
@@ -59,12 +60,13 @@ class Units:
         self.world = world
         self._functions: dict[tuple[PouSymbol, tuple[tuple[str, Type], ...]], FunctionInfo] = {}
         self._blocks: dict[PouSymbol, BlockInfo] = {}
+        self._layouts: dict[PouSymbol, StructType] = {}
         self._busy: set[PouSymbol] = set()
 
     # ---- what all units share ----
 
     def _scope(self, symbol: PouSymbol, pou: Pou, bindings: dict[str, Type] | None = None) -> Scope:
-        scope = self.world.scope(symbol.decl.source, library=symbol.library)
+        scope = self.world.classes.scope_of(symbol)
         scope.pou = pou
         scope.bindings = bindings or {}
         return scope
@@ -111,7 +113,8 @@ class Units:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
                 if t is not ERROR:
-                    full_name = f"{decl.name}.{name}"
+                    owner = scope.pou.name if scope.pou is not None and decl.keyword == "METHOD" else decl.name
+                    full_name = f"{owner}.{name}"
                     symbol.variable = self.world.declarations.shared_variable(full_name, t, init, scope, offset)
                 self.world.declarations.add(scope, symbol, offset)
 
@@ -176,15 +179,25 @@ class Units:
 
     def _declare_function(self, symbol: PouSymbol, bindings: dict[str, Type]) -> FunctionInfo:
         decl = symbol.decl
-        name = f"{decl.name}({','.join(t.name for t in bindings.values())})" if bindings else decl.name
+        name = f"{decl.full_name}({','.join(t.name for t in bindings.values())})" if bindings else decl.full_name
         pou = self._pou(symbol, name)
         scope = self._scope(symbol, pou, bindings)
         info = FunctionInfo(pou, [], None, decl.attributes)
+        self.signature(info, decl, scope)
+        external = decl.attributes.get("external")
+        if external is not None:
+            pou.external = self._external(external, info, scope)
+        else:
+            self.world.add_body(scope, decl, pou, symbol.library)
+        return info
+
+    def signature(self, info: FunctionInfo, decl: ast.PouDecl, scope: Scope) -> None:
+        """Declares result, parameters and variables of a function or method."""
         if decl.result is not None:
             self._declare_result(info, decl, decl.result, scope)
         self._constants(decl, scope)
         for block in decl.blocks:
-            if "CONSTANT" in block.qualifiers and block.keyword not in _DIRECTIONS:
+            if block.keyword == "VAR_INST" or ("CONSTANT" in block.qualifiers and block.keyword not in _DIRECTIONS):
                 continue
             if block.keyword in _DIRECTIONS:
                 self._parameters(block, info, scope)
@@ -195,13 +208,7 @@ class Units:
             else:
                 for line in block.decls:
                     self._reject_location(line, scope)
-                self._stack_variables(block, pou, scope)
-        external = decl.attributes.get("external")
-        if external is not None:
-            pou.external = self._external(external, info, scope)
-        else:
-            self.world.add_body(scope, decl, pou, symbol.library)
-        return info
+                self._stack_variables(block, info.pou, scope)
 
     def _declare_result(self, info: FunctionInfo, decl: ast.PouDecl, spec: ast.TypeSpec, scope: Scope) -> None:
         t, default = self._parameter_type(spec, scope)
@@ -277,12 +284,14 @@ class Units:
     def _declare_block(self, symbol: PouSymbol) -> BlockInfo:
         decl = symbol.decl
         hidden = symbol.library and self.world.is_user_name(decl.name)
-        pou = self._pou(symbol, f"Standard.{decl.name}" if hidden else decl.name)
+        pou = self._pou(symbol, f"Standard.{decl.name}" if hidden else decl.full_name)
         scope = self._scope(symbol, pou)
         layout = StructType(pou.name)
         info = BlockInfo(pou, layout, {})
         pou.instance = layout
         defaults: dict[str, Initial] = {}
+        self._layouts[symbol] = layout
+        self.world.classes.begin_block(symbol, info, scope, defaults)
         self._constants(decl, scope)
         for block in decl.blocks:
             if "CONSTANT" in block.qualifiers:
@@ -295,18 +304,26 @@ class Units:
                 self._stack_variables(block, pou, scope)
             else:
                 self._members(block, info, defaults, scope)
+        self.world.classes.instance_variables(info, defaults, scope)
         layout.fields = [f for f in layout.fields if f.type is not ERROR]
         layout.lay_out()
         for field in layout.fields:
-            variable = info.members[field.name.casefold()].variable
-            assert variable is not None
-            variable.offset = field.offset
+            symbol_of = info.members.get(field.name.casefold())
+            if symbol_of is not None and symbol_of.variable is not None:
+                symbol_of.variable.offset = field.offset
         if defaults:
             self.world.defaults[layout.name] = StructInit(defaults)
         info.members |= {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
         self.world.blocks[layout] = info
+        self.world.classes.end_block(info)
         self.world.add_body(scope, decl, pou, symbol.library)
         return info
+
+    def layout(self, symbol: PouSymbol) -> StructType | None:
+        """The type of instances, also while the block is being declared: what points to it may be part of it."""
+        if symbol not in self._layouts:
+            self.block(symbol)
+        return self._layouts.get(symbol)
 
     def _members(self, block: ast.VarBlock, info: BlockInfo, defaults: dict[str, Initial], scope: Scope) -> None:
         role, direction = _ROLES[block.keyword], _DIRECTIONS.get(block.keyword)
@@ -314,6 +331,8 @@ class Units:
         for line in block.decls:
             self._reject_location(line, scope)
             t, default = self.world.declarations.declared_type(line, scope)
+            if role is not Role.IN_OUT:
+                self.world.classes.require_instances(t, scope, line.pos)
             info.retain = info.retain or (role is not Role.IN_OUT and self.world.declarations.is_retain(t))
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
@@ -356,6 +375,7 @@ class Units:
                 )
             else:
                 self._program_variables(block, pou, scope, allocation, block.qualifiers or qualifiers)
+        self.world.classes.program(symbol, scope)
         self.world.add_body(scope, decl, pou, symbol.library)
         return pou, scope
 
@@ -366,6 +386,7 @@ class Units:
         direction = _DIRECTIONS.get(block.keyword)
         for line in block.decls:
             t, init = declarations.declared_type(line, scope)
+            self.world.classes.require_instances(t, scope, line.pos)
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, _ROLES[block.keyword], default=init)
                 symbol.used = direction is not None or line.location is not None

@@ -9,6 +9,8 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 
 from plctool.compiler import ast
+from plctool.compiler.classes import Classes
+from plctool.compiler.construction import construct
 from plctool.compiler.conversions import Coercion
 from plctool.compiler.declarations import Allocation, Declarations
 from plctool.compiler.diagnostics import Diagnostics
@@ -41,6 +43,12 @@ def _enum_names(symbol: TypeSymbol) -> list[str]:
     return [name for _, name, _ in spec.values] if isinstance(spec, ast.EnumSpec) else []
 
 
+def enclosing(full_name: str) -> list[str]:
+    """The namespaces a dotted name lies in: `a.b` and `a` for `a.b.c`."""
+    parts = full_name.split(".")
+    return [".".join(parts[:n]) for n in range(len(parts) - 1, 0, -1)]
+
+
 class World:
     """The names of the program in front of those of the library; each is declared when it is first needed."""
 
@@ -50,6 +58,9 @@ class World:
         self.coerce = Coercion(self.diagnostics)
         self.declarations = Declarations(self)
         self.units = Units(self)
+        self.classes = Classes(self)
+        self.namespaces: set[str] = set()
+        self.startup: Pou | None = None  # calls FB_Init
         self.allocation = Allocation()
         self.blocks: dict[StructType, BlockInfo] = {}
         self.defaults: dict[str, StructInit] = {}
@@ -83,10 +94,10 @@ class World:
         """Makes the names of declarations known."""
         for decl in declarations:
             if isinstance(decl, ast.PouDecl):
-                self._add(PouSymbol(decl, library), library=library)
+                self._add(PouSymbol(decl, library), library=library, full_name=decl.full_name)
             elif isinstance(decl, ast.TypeDecl):
                 symbol = TypeSymbol(decl, library)
-                self._add(symbol, library=library)
+                self._add(symbol, library=library, full_name=symbol.full_name)
                 for name in _enum_names(symbol):
                     self._enum_values.setdefault(name.casefold(), []).append(symbol)
             elif isinstance(decl, ast.TestDecl):
@@ -131,9 +142,11 @@ class World:
                 added.append(symbol)
         return added
 
-    def _add(self, symbol: Unit, *, library: bool) -> None:
+    def _add(self, symbol: Unit, *, library: bool, full_name: str) -> None:
         decl = symbol.decl
-        key = decl.name.casefold()
+        key = full_name.casefold()
+        if decl.namespace is not None:
+            self.namespaces.update(space for space in enclosing(key))
         if library:
             self._library_names[key] = symbol
             return
@@ -187,7 +200,7 @@ class World:
     def add_instance(self, name: str, scope: Scope) -> None:
         """Makes the variables of a program instance known as `Main.x`."""
         members = {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
-        self._instances[name.casefold()] = Namespace(name, "program", dict(members))
+        self._instances[name.casefold()] = Namespace(name, "program", dict(members), scope.cls)
 
     def enum_value(self, name: str, scope: Scope, offset: int, expected: Type | None) -> Expr | None:
         """The value of an enumeration by its bare name; None when there is none of that name."""
@@ -246,9 +259,13 @@ class World:
         for variable in (*self._globals.values(), *(v for same in self._ambiguous.values() for v in same)):
             self.declarations.global_variable(variable)
 
+    def pou_symbols(self) -> list[PouSymbol]:
+        """All POUs and interfaces the program itself declares."""
+        return [s for s in self._units.values() if isinstance(s, PouSymbol)]
+
     def external_functions(self) -> list[Pou]:
         """The functions the program declares that are implemented in C, in order."""
-        functions = [s for s in self._names.values() if isinstance(s, PouSymbol) and s.keyword == "FUNCTION"]
+        functions = [s for s in self._units.values() if isinstance(s, PouSymbol) and s.keyword == "FUNCTION"]
         declared = [self.units.function(s) for s in functions if not self.units.is_generic(s)]
         return [info.pou for info in declared if info is not None and info.pou.external is not None]
 
@@ -273,6 +290,8 @@ class World:
 
     def check_bodies(self) -> None:
         """Checks all bodies, then those of the library they need."""
+        self.classes.declare_all()
+        checked: list[Scope] = []
         while self._bodies or self._library_bodies:
             scope, decl, pou = (self._bodies or self._library_bodies).popleft()
             try:
@@ -282,7 +301,11 @@ class World:
                 self.nested_too_deeply(error)
             self.pous.append(pou)
             if not scope.library:
-                self.report_unused(scope)
+                checked.append(scope)
+        for scope in checked:
+            self.report_unused(scope)
+        construct(self)
+        self.classes.finish(v for vs in (self.allocation.variables, *(p.locals for p in self.pous)) for v in vs)
         self._report_recursion()
 
     def nested_too_deeply(self, error: NestingError) -> None:

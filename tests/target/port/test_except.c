@@ -120,6 +120,16 @@ static void overflow_the_stack_with_large_frames(void *arg)
     sink = large[zero];
 }
 
+/* Lands on the stack below, which is idle, and ends at that one's guard. */
+static void overflow_past_the_guard(void *arg)
+{
+    volatile RTS_UI32 large[(RTS_IEC_STACK_SIZE + 256) / sizeof(RTS_UI32)];
+    RTS_UNUSED(arg);
+    large[zero] = 0;
+    recurse(large);
+    sink = large[zero];
+}
+
 static void overflow_the_stack_with_fpu(void *arg)
 {
 #ifdef __ARM_FP
@@ -168,6 +178,7 @@ static const FAILURE failures[] = {
     {raise_with_everything_clobbered, RTSEXCPT_ILLEGAL_INSTRUCTION},
     {overflow_the_stack, RTSEXCPT_STACK_OVERFLOW},
     {overflow_the_stack_with_large_frames, RTSEXCPT_STACK_OVERFLOW},
+    {overflow_past_the_guard, RTSEXCPT_STACK_OVERFLOW},
     {overflow_the_stack_with_fpu, RTSEXCPT_STACK_OVERFLOW},
 };
 
@@ -221,6 +232,19 @@ static void address_of_a_stack_overflow_names_a_function_on_the_stack(void)
     SysExceptTry(overflow_the_stack, NULL, &exception);
     CHECK(is_within(exception.address, (void (*)(void *))recurse));
     SysExceptCodeRange(NULL, 0);
+}
+
+/* Only the frame of the fault may reach below it, on a stack that is idle. */
+static void overflow_stops_at_the_guard(void)
+{
+    enum { RAM_START = 0x20000000, FRAME = 104, BELOW = FRAME + 64 };
+    RTS_EXCEPTION exception;
+    volatile RTS_UI8 *below = (volatile RTS_UI8 *)(RAM_START + (APP_MAX_TASKS - 1) * RTS_IEC_STACK_SIZE - BELOW);
+    for (int i = 0; i < BELOW - FRAME; i++)
+        below[i] = (RTS_UI8)i;
+    SysExceptTry(overflow_the_stack, NULL, &exception);
+    for (int i = 0; i < BELOW - FRAME; i++)
+        CHECK_EQUAL(below[i], i);
 }
 
 static void no_room_for_the_leaving_frame_is_a_stack_overflow(void)
@@ -487,6 +511,7 @@ int main(void)
     TEST_RUN(every_failure_in_main_is_caught_with_its_code);
     TEST_RUN(address_names_the_function_that_failed);
     TEST_RUN(address_of_a_stack_overflow_names_a_function_on_the_stack);
+    TEST_RUN(overflow_stops_at_the_guard);
     TEST_RUN(no_room_for_the_leaving_frame_is_a_stack_overflow);
     TEST_RUN(many_failures_cost_no_stack);
     TEST_RUN(every_failure_in_a_timer_is_caught_with_its_code);

@@ -19,9 +19,8 @@
 #include "rts_config.h"
 
 enum { GUARD_LOG2 = 5, GUARD_SIZE = 1 << GUARD_LOG2 };
-enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_BASIC_FRAME = 0x10, EXC_RETURN_PSP = 4 };
+enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_PSP = 4 };
 enum { XPSR_THUMB = 1 << 24 };
-enum { FPCCR_LSPACT = 1 };
 enum { SHCSR_PENDING = 0xF << 12 }; /* UsageFault, MemManage, BusFault, SVCall */
 enum { CONTROL_SPSEL = 2 };
 
@@ -55,8 +54,8 @@ RTS_STATIC_ASSERT(RTS_IEC_STACK_SIZE % 32 == 0 && RTS_IEC_STACK_SIZE >= 256, iec
 __attribute__((section(".bss.iec_stack"), aligned(GUARD_SIZE))) static IEC_STACK stacks[APP_MAX_TASKS];
 
 static struct {
+    TRY *top; /* behind the innermost that runs */
     TRY tries[APP_MAX_TASKS];
-    RTS_UI32 depth;
     uintptr_t code;
     RTS_UI32 code_size;
 } state;
@@ -73,9 +72,10 @@ static void set_process_stack(FRAME *pointer)
     __asm__ volatile("msr psp, %0" ::"r"(pointer) : "memory");
 }
 
-static uintptr_t stack_slot(RTS_UI32 depth)
+/* Where the stack of a depth ends. */
+static uintptr_t stack_slot(const TRY *try)
 {
-    return (uintptr_t)stacks[APP_MAX_TASKS - 1 - depth];
+    return (uintptr_t)stacks[APP_MAX_TASKS - 1 - (try - state.tries)];
 }
 
 void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 access)
@@ -103,12 +103,12 @@ void SysExceptInit(void)
     enum { MPU_ENABLE_WITH_BACKGROUND = 5 };
     enum { NULL_AREA_LOG2 = 8 }; /* the vectors, which only the hardware reads */
     extern RTS_UI8 stack_bottom[];
-    state.depth = 0;
+    state.top = state.tries;
     state.code_size = 0;
     MpuProtect(MPU_NULL, 0, NULL_AREA_LOG2, MPU_NO_ACCESS);
     MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, GUARD_LOG2, MPU_NO_ACCESS);
-    for (RTS_UI32 depth = 0; depth < APP_MAX_TASKS; depth++)
-        MpuProtect(MPU_IEC_STACK + depth, stack_slot(depth), GUARD_LOG2, MPU_NO_ACCESS);
+    for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++)
+        MpuProtect(MPU_IEC_STACK + i, (uintptr_t)stacks[i], GUARD_LOG2, MPU_NO_ACCESS);
     if (MPU_TYPE != 0)
         MPU_CTRL = MPU_ENABLE_WITH_BACKGROUND;
     CpuBarrier();
@@ -122,10 +122,10 @@ void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size)
 
 /* ---- entering and leaving ---- */
 
-/* The function given to SysExceptTry returned. */
+/* The function given to SysExceptTry returned. A store that is still on its way and fails is to fail before we leave. */
 __attribute__((naked)) static void try_return(void)
 {
-    __asm__ volatile("movs r0, #0\n\tsvc 0");
+    __asm__ volatile("dsb\n\tisb\n\tmovs r0, #0\n\tsvc 0");
 }
 
 /* Leaves the running Try with code r0 and address r1. */
@@ -161,10 +161,15 @@ static uintptr_t context_of(RTS_UI32 exception_number)
 
 static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 {
-    TRY *try = &state.tries[state.depth];
-    FRAME *frame = (FRAME *)(stack_slot(state.depth) + RTS_IEC_STACK_SIZE) - 1;
-    *try = (TRY){caller, process_stack(), exc_return, context_of(caller->xpsr & 0x1FFu)};
-    state.depth++;
+    TRY *try = state.top;
+    if (try == state.tries + APP_MAX_TASKS)
+        ResetNow(RESET_FATAL, caller->pc);
+    FRAME *frame = (FRAME *)(stack_slot(try) + RTS_IEC_STACK_SIZE) - 1;
+    state.top = try + 1;
+    try->entered = caller;
+    try->outer_process = process_stack();
+    try->exc_return = exc_return;
+    try->context = context_of(caller->xpsr & 0x1FFu);
     frame->r0 = caller->r1;
     frame->lr = (RTS_UI32)(uintptr_t)try_return;
     frame->pc = caller->r0 & ~1u;
@@ -173,16 +178,11 @@ static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
     return (RTS_UI32)EXC_RETURN_THREAD_PSP;
 }
 
-/* Drops what is on the process stack, saved FPU context included. */
-static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, RTS_UI32 exc_return)
+/* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return, because
+ * try_enter used the FPU, so that the frame returned to has one too. */
+static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address)
 {
-    TRY *try = &state.tries[--state.depth];
-#ifdef __ARM_FP
-    if (!(exc_return & EXC_RETURN_BASIC_FRAME))
-        FPU_FPCCR &= ~(RTS_UI32)FPCCR_LSPACT;
-#else
-    RTS_UNUSED(exc_return);
-#endif
+    TRY *try = --state.top;
     try->entered->r0 = code;
     try->entered->r1 = address;
     set_process_stack(try->outer_process);
@@ -191,11 +191,7 @@ static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, RTS_UI32 exc_return)
 
 __attribute__((used)) static RTS_UI32 svc_dispatch(FRAME *frame, RTS_UI32 exc_return)
 {
-    if (exc_return & EXC_RETURN_PSP)
-        return leave(frame->r0, frame->r1, exc_return);
-    if (state.depth == APP_MAX_TASKS)
-        ResetNow(RESET_FATAL, frame->pc);
-    return enter(frame, exc_return);
+    return exc_return & EXC_RETURN_PSP ? leave(frame->r0, frame->r1) : enter(frame, exc_return);
 }
 
 /* Hands the frame that the exception pushed, and EXC_RETURN, to `function`, and returns to where that says. */
@@ -252,16 +248,16 @@ static uintptr_t address_of(RTS_UI32 cfsr, const FRAME *frame, uintptr_t slot)
 __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_return)
 {
     RTS_UI32 cfsr = SCB_CFSR;
-    if (!(exc_return & EXC_RETURN_PSP) || state.depth == 0)
+    if (!(exc_return & EXC_RETURN_PSP) || state.top == state.tries)
         ResetNow(RESET_FATAL, cfsr & CFSR_STACKING ? 0 : frame->pc);
-    uintptr_t slot = stack_slot(state.depth - 1);
+    uintptr_t slot = stack_slot(state.top - 1);
     RTS_UI32 code = is_overflow(cfsr, frame, slot) ? RTSEXCPT_STACK_OVERFLOW : code_of(cfsr);
     uintptr_t address = address_of(cfsr, frame, slot);
     SCB_CFSR = cfsr;
     SCB_HFSR = SCB_HFSR;
     /* What could not be stacked stays pending: it belongs to the function that is left now. */
     SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
-    return leave(code, address, exc_return);
+    return leave(code, address);
 }
 
 /* A fault on the main stack is one of the runtime; that stack may be at its end, so it is given up. */
@@ -312,7 +308,7 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address)
 
 uintptr_t SysExceptContext(void)
 {
-    return in_try() ? state.tries[state.depth - 1].context : context_of(CpuExceptionNumber());
+    return in_try() ? state.top[-1].context : context_of(CpuExceptionNumber());
 }
 
 void SysExceptShutdown(void)
@@ -323,7 +319,7 @@ void SysExceptShutdown(void)
 void SysExceptBreak(uintptr_t context, RTS_UI32 code)
 {
     FRAME *frame = process_stack();
-    for (TRY *try = state.tries + state.depth; try-- > state.tries; frame = try->outer_process) {
+    for (TRY *try = state.top; try-- > state.tries; frame = try->outer_process) {
         if (try->context != context)
             continue;
         frame->r0 = code;

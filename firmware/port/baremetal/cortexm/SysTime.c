@@ -7,20 +7,22 @@
 
 #include "CortexM.h"
 
-enum { TICKS_PER_MS = BOARD_CLOCK_HZ / 1000 };
-enum { NS_PER_TICK_Q24 = (RTS_UI32)((1000000000ULL << 24) / BOARD_CLOCK_HZ) };
+enum { NS_PER_MS = 1000000, TICKS_PER_MS = BOARD_CLOCK_HZ / 1000 };
 enum { SYST_ENABLE_IRQ_CORECLOCK = 7, ICSR_PENDSTSET = 1 << 26 };
 
 RTS_STATIC_ASSERT(BOARD_CLOCK_HZ % 1000 == 0, a_millisecond_is_a_whole_number_of_ticks);
 RTS_STATIC_ASSERT(BOARD_CLOCK_HZ >= 4000000, ns_per_tick_fits);
 
-static volatile RTS_UI32 ms_low, ms_high;
-static void (*on_tick)(RTS_I64 now_ns);
+/* The time at the last tick that was counted. In two halves, because the tick may come while it is read. */
+static struct {
+    volatile RTS_UI32 ns_low, ns_high, ms;
+    void (*on_tick)(RTS_I64 now_ns);
+} counted;
 
 void ClockInit(void)
 {
-    ms_low = ms_high = 0;
-    on_tick = NULL;
+    counted.ns_low = counted.ns_high = counted.ms = 0;
+    counted.on_tick = NULL;
     SYST_RVR = TICKS_PER_MS - 1;
     SYST_CVR = 0;
     SYST_CSR = SYST_ENABLE_IRQ_CORECLOCK;
@@ -29,41 +31,47 @@ void ClockInit(void)
 void SysTickHandler(void);
 void SysTickHandler(void)
 {
-    if (++ms_low == 0)
-        ms_high++;
-    if (on_tick != NULL)
-        on_tick((RTS_I64)((((RTS_UI64)ms_high << 32) | ms_low) * 1000000u));
+    RTS_UI32 low = counted.ns_low + NS_PER_MS;
+    counted.ns_high += low < NS_PER_MS;
+    counted.ns_low = low;
+    counted.ms++;
+    if (counted.on_tick != NULL)
+        counted.on_tick((RTS_I64)(((RTS_UI64)counted.ns_high << 32) | low));
 }
 
 void ClockSetCallback(void (*callback)(RTS_I64 now_ns))
 {
-    on_tick = callback;
+    counted.on_tick = callback;
 }
 
-/* Milliseconds, and in *ticks the clock ticks since. Consistent in every context: a wrap that the handler has not counted yet
- * (because we run above it) is seen as pending before and after the counter was read. */
-static RTS_UI64 read_clock(RTS_UI32 *ticks)
+/* The time `count` says has passed since the last tick; the interrupt comes when it reaches 0. */
+static inline RTS_UI32 since_tick(RTS_UI32 count)
 {
-    RTS_UI32 low, high, pending, count;
-    do {
-        high = ms_high;
-        low = ms_low;
-        pending = SCB_ICSR & ICSR_PENDSTSET;
-        count = SYST_CVR;
-    } while (low != ms_low || pending != (SCB_ICSR & ICSR_PENDSTSET));
-    *ticks = count == 0 ? 0 : TICKS_PER_MS - count; /* the interrupt comes when the counter reaches 0 */
-    return (((RTS_UI64)high << 32) | low) + (pending != 0);
+    RTS_UI32 ticks = count == 0 ? 0 : TICKS_PER_MS - count;
+#if 1000000000 % BOARD_CLOCK_HZ == 0
+    return ticks * (1000000000 / BOARD_CLOCK_HZ);
+#else
+    return (RTS_UI32)(((RTS_UI64)ticks * (RTS_UI32)((1000000000ULL << 24) / BOARD_CLOCK_HZ)) >> 24);
+#endif
 }
 
+/* Four of these are in each task cycle. In a context above the tick it may be pending and not counted. */
 RTS_I64 SysTimeGetNs(void)
 {
-    RTS_UI32 ticks;
-    RTS_UI64 ms = read_clock(&ticks);
-    return (RTS_I64)(ms * 1000000u + (((RTS_UI64)ticks * NS_PER_TICK_Q24) >> 24));
+    RTS_UI32 low, high, count;
+    do {
+        low = counted.ns_low;
+        high = counted.ns_high;
+        count = SYST_CVR;
+    } while (low != counted.ns_low);
+    RTS_I64 tick = (RTS_I64)(((RTS_UI64)high << 32) | low);
+    if (SCB_ICSR & ICSR_PENDSTSET)
+        return tick + NS_PER_MS + since_tick(SYST_CVR);
+    return tick + since_tick(count);
 }
 
 RTS_UI32 SysTimeGetMs(void)
 {
-    RTS_UI32 ticks;
-    return (RTS_UI32)read_clock(&ticks);
+    RTS_UI32 ms = counted.ms;
+    return ms + ((SCB_ICSR & ICSR_PENDSTSET) != 0 && ms == counted.ms);
 }

@@ -1,0 +1,151 @@
+"""FB_Init: every instance gets its call when the application starts, members before the instance that holds them.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from plctool.compiler.symbols import Member
+from plctool.compiler.typed import (
+    ArrayInit,
+    Call,
+    CallStatement,
+    Const,
+    Expr,
+    For,
+    IndexPlace,
+    Initial,
+    Load,
+    MemberPlace,
+    Parameter,
+    Place,
+    Pos,
+    Pou,
+    PouKind,
+    Direction,
+    ScalarInit,
+    Statement,
+    Storage,
+    StructInit,
+    Variable,
+    VarPlace,
+)
+from plctool.compiler.types import BOOL, DINT, ArrayType, StringType, StructType, Type
+
+if TYPE_CHECKING:
+    from plctool.compiler.world import World
+
+INIT_RETAINS, COPY_CODE = "binitretains", "bincopycode"  # what every FB_Init is told
+_LOOP_FROM = 4  # equal elements that are worth a loop
+
+
+def construct(world: World) -> None:
+    """Makes the start-up routine `world.startup` of all global instances, and lets units begin with the FB_Init of
+    instances among their own variables."""
+    start = Pou("FB_Init", PouKind.FUNCTION, Pos("", 1, 1))
+    flag = Variable("init_retains", BOOL, Storage.LOCAL, start.pos)
+    start.parameters.append(Parameter(flag, Direction.INPUT))
+    builder = _Construction(world, start, Load(VarPlace(flag, BOOL, start.pos), BOOL, start.pos))
+    for variable in world.allocation.variables:
+        start.body += builder.variable(variable)
+    if start.body:
+        world.startup = start
+        world.pous.append(start)
+    for pou in world.pous:
+        if pou.kind is PouKind.PROGRAM or pou.kind is PouKind.FUNCTION_BLOCK:
+            local = _Construction(world, pou, Const(1, BOOL, pou.pos))
+            pou.body = [s for v in list(pou.locals) for s in local.variable(v)] + pou.body
+
+
+class _Construction:
+    def __init__(self, world: World, pou: Pou, init_retains: Expr) -> None:
+        self._world = world
+        self._pou = pou
+        self._init_retains = init_retains
+        self._needed: dict[StructType, bool] = {}
+
+    def variable(self, variable: Variable) -> list[Statement]:
+        """The calls for a variable and all instances in it."""
+        if not self._needs(variable.type):
+            return []
+        return self._place(VarPlace(variable, variable.type, variable.pos), variable.initial, variable.pos)
+
+    def _needs(self, t: Type) -> bool:
+        while isinstance(t, ArrayType):
+            t = t.element
+        if not isinstance(t, StructType):
+            return False
+        known = self._needed.get(t)
+        if known is None:
+            known = bool(self._world.classes.initialisers(t)) or any(self._needs(f.type) for f in t.fields)
+            self._needed[t] = known
+        return known
+
+    def _place(self, place: Place, initial: Initial | None, pos: Pos) -> list[Statement]:
+        t = place.type
+        if not self._needs(t):
+            return []
+        if isinstance(t, ArrayType):
+            return self._array(place, t, initial, pos)
+        assert isinstance(t, StructType)
+        values: dict[str, Initial] = {}
+        arguments: Mapping[str, Expr] = {}
+        for source in (self._world.defaults.get(t.name), initial):
+            if isinstance(source, StructInit):
+                values.update((name.casefold(), value) for name, value in source.members.items())
+                arguments = source.arguments
+        statements: list[Statement] = []
+        for f in t.fields:
+            statements += self._place(MemberPlace(place, f.offset, f.type, pos), values.get(f.name.casefold()), pos)
+        for member in self._world.classes.initialisers(t):
+            statements.append(self._call(member, place, arguments, pos))
+        return statements
+
+    def _array(self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos) -> list[Statement]:
+        flat = ArrayType(t.element, ((0, t.count - 1),))
+        base = MemberPlace(place, 0, flat, pos)
+        runs = list(initial.runs) if isinstance(initial, ArrayInit) else []
+        runs.append((t.count - sum(count for count, _ in runs), None))
+        statements: list[Statement] = []
+        first = 0
+        for count, value in runs:
+            if count >= _LOOP_FROM:
+                counter = Variable(f"element {len(self._pou.locals)}", DINT, Storage.LOCAL, pos)
+                self._pou.locals.append(counter)
+                index = VarPlace(counter, DINT, pos)
+                element = IndexPlace(base, [Load(index, DINT, pos)], t.element, pos)
+                low, high, one = (Const(n, DINT, pos) for n in (first, first + count - 1, 1))
+                statements.append(For(index, low, high, one, self._place(element, value, pos), pos))
+            else:
+                for n in range(first, first + count):
+                    element = IndexPlace(base, [Const(n, DINT, pos)], t.element, pos)
+                    statements += self._place(element, value, pos)
+            first += count
+        return statements
+
+    def _call(self, member: Member, place: Place, arguments: Mapping[str, Expr], pos: Pos) -> Statement:
+        info = self._world.classes.signature(member)
+        args: list[Expr | Place | None] = []
+        for symbol, direction in info.parameters:
+            key = symbol.name.casefold()
+            if key == INIT_RETAINS:
+                args.append(self._init_retains)
+            elif key == COPY_CODE:
+                args.append(Const(0, BOOL, pos))
+            elif key in arguments:
+                args.append(arguments[key])
+            elif isinstance(symbol.default, ScalarInit):
+                args.append(Const(symbol.default.value, symbol.type, pos))
+            elif symbol.given:
+                args.append(Const("" if isinstance(symbol.type, StringType) else 0, symbol.type, pos))
+            elif direction is Direction.INPUT:
+                message = f"{member.name} needs {symbol.name}; write {member.owner.name}({symbol.name} := ...)"
+                self._world.diagnostics.error(pos, "arguments", message)
+                args.append(Const(0, symbol.type, pos))
+            else:
+                args.append(None)
+        result = info.result if info.result is not None else BOOL
+        return CallStatement(Call(info.pou, args, result, pos, instance=place), pos)

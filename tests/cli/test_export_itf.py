@@ -1,0 +1,243 @@
+"""`plctool export-itf`: what it writes compiles without a warning, and is what images ask for."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import _plccore
+import pytest
+from conftest import Tool
+
+from plctool.core import lib
+from plctool.sim import Simulator
+from plctool.symbols import find_symbols
+
+ROOT = Path(__file__).parents[2]
+CC = shutil.which("gcc") or shutil.which("cc")
+FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", f"-I{ROOT / 'firmware/include'}"]
+
+LIBRARY = """
+TYPE
+    Unit : (Celsius, Kelvin := 10, Fahrenheit);
+    Digit : INT (0..9);
+    Point : STRUCT
+        x, y : REAL;
+        name : STRING[10];
+        unit : Unit;
+        next : POINTER TO INT;
+        grid : ARRAY[0..2, 1..4] OF INT;
+        default : Digit;
+    END_STRUCT;
+    Path : STRUCT
+        points : ARRAY[1..3] OF Point;
+        count : USINT;
+    END_STRUCT;
+END_TYPE
+
+{attribute 'external' := 'Sensor_Scale'}
+{attribute 'version' := '2.3'}
+FUNCTION SensorScale : REAL
+VAR_INPUT raw : INT; factor : REAL; on : BOOL; unit : Unit; digit : Digit; t : TIME; w : LWORD; END_VAR
+END_FUNCTION
+
+{attribute 'external' := 'sensor_label'}
+FUNCTION SensorLabel : STRING[20]
+VAR_INPUT channel : USINT; label : STRING; END_VAR
+VAR_IN_OUT path : Path; text : STRING[30]; END_VAR
+VAR_OUTPUT length : UINT; valid : BOOL; END_VAR
+END_FUNCTION
+
+{attribute 'external' := 'sensor_reset'}
+FUNCTION SensorReset
+END_FUNCTION
+
+{attribute 'external' := 'sensor_sum'}
+FUNCTION SensorSum : LREAL
+VAR_INPUT values : ARRAY[0..3] OF LREAL; int : POINTER TO INT; p : Point; END_VAR
+END_FUNCTION
+
+{attribute 'external' := 'sensor_best'}
+FUNCTION SensorBest : POINTER TO INT
+VAR_INPUT int : POINTER TO INT; END_VAR
+END_FUNCTION
+"""
+
+needs_compiler = pytest.mark.skipif(CC is None, reason="there is no C compiler")
+
+
+def export(tool: Tool, text: str = LIBRARY) -> None:
+    Path("sensors.st").write_text(text, "utf-8")
+    done = tool("export-itf", "sensors.st")
+    assert done.status == 0, done.err
+
+
+def compile_c(*words: str) -> None:
+    assert CC is not None
+    subprocess.run([CC, *FLAGS, *words], check=True, timeout=60)
+
+
+@needs_compiler
+def test_header_and_frame_compile_without_a_warning(tool: Tool) -> None:
+    export(tool)
+    compile_c("-c", "sensors.c", "-o", "sensors.o")
+
+
+@needs_compiler
+@pytest.mark.parametrize("library", ["1st library.st", "int.st", "ä.st"])
+def test_any_file_name_will_do(tool: Tool, library: str) -> None:
+    Path(library).write_text(LIBRARY, "utf-8")
+    document = tool("export-itf", library, "--json").json
+    compile_c("-c", document["source"], "-o", "library.o")
+
+
+def test_the_table_has_what_images_ask_for(tool: Tool) -> None:
+    export(tool)
+    calls = "SensorReset(); r := SensorScale(raw := 1, unit := Unit.Kelvin); q := SensorBest(p);"
+    program = f"PROGRAM Main VAR r : REAL; p, q : POINTER TO INT; END_VAR {calls} END_PROGRAM"
+    Path("main.st").write_text(program, "utf-8")
+    assert tool("build", "main.st", "sensors.st").status == 0
+    wanted = {e["name"]: (e["signature"], e["version"]) for e in tool("info", "app.cdl", "--json").json["externals"]}
+    entry = re.compile(r'\{"(\w+)", 0x(\w+), 0x(\w+), \(RTS_PFN\)\1\}')
+    offered = {n: (s, int(v, 16)) for n, s, v in entry.findall(Path("sensorsItf.h").read_text("utf-8"))}
+    assert set(wanted) - {"iecraise"} == {"sensor_reset", "sensor_scale", "sensor_best"}
+    for name in set(wanted) - {"iecraise"}:
+        signature, version = wanted[name]
+        assert int(str(signature), 16) == int(offered[name][0], 16)
+        assert str(version) in (f"{offered[name][1] >> 16}.{offered[name][1] & 0xFFFF}", str(offered[name][1]))
+
+
+IMPLEMENTATION = """
+#include <string.h>
+#include "boardItf.h"
+
+RTS_I32 board_sum(const RTS_I16 *values, RTS_I8 sign)
+{
+    return sign * (values[0] + values[1] + values[2]);
+}
+
+void board_text(char *result, const char *name, RTS_UI32 name_capacity, RTS_UI16 *length, RTS_UI8 *long_name)
+{
+    *length = (RTS_UI16)strlen(name);
+    *long_name = *length > 3;
+    strcpy(result, *length <= name_capacity ? "fits" : "full");
+}
+
+RTS_REAL64 board_move(Place *place, RTS_REAL32 by, RTS_UI8 up)
+{
+    place->steps++;
+    place->height += up ? by : -by;
+    return place->height;
+}
+
+static const CMP_EXT_FUNCTION functions[] = {
+    BOARD_EXT_FUNCTIONS
+};
+
+RTS_RESULT board_register(void);
+RTS_RESULT board_register(void)
+{
+    return CMRegisterExternal(functions, RTS_COUNT(functions));
+}
+"""
+
+BOARD = """
+TYPE Place : STRUCT steps : USINT; height : LREAL; END_STRUCT; END_TYPE
+{attribute 'external' := 'board_sum'}
+FUNCTION BoardSum : DINT
+VAR_INPUT values : ARRAY[1..3] OF INT; sign : SINT; END_VAR
+END_FUNCTION
+{attribute 'external' := 'board_text'}
+FUNCTION BoardText : STRING[10]
+VAR_INPUT name : STRING; END_VAR
+VAR_OUTPUT length : UINT; long_name : BOOL; END_VAR
+END_FUNCTION
+{attribute 'external' := 'board_move'}
+FUNCTION BoardMove : LREAL
+VAR_IN_OUT place : Place; END_VAR
+VAR_INPUT by : REAL; up : BOOL; END_VAR
+END_FUNCTION
+"""
+
+USER = """
+PROGRAM Main
+VAR
+    sum : DINT; text : STRING; length : UINT; is_long : BOOL; height : LREAL;
+    place : Place := (height := 1.5);
+    values : ARRAY[1..3] OF INT := [1000, -1, 32767];
+END_VAR
+sum := BoardSum(values, -1);
+text := BoardText(name := 'Anna', length => length, long_name => is_long);
+height := BoardMove(place, 0.25, TRUE);
+END_PROGRAM
+"""
+
+
+@needs_compiler
+def test_compiled_code_calls_the_implementation(tool: Tool) -> None:
+    """The C side in a shared object, registered with the simulator, called by an image."""
+    Path("board.st").write_text(BOARD, "utf-8")
+    Path("main.st").write_text(USER, "utf-8")
+    Path("board.c").write_text(IMPLEMENTATION, "utf-8")
+    document = tool("export-itf", "board.st", "--json").json
+    assert document["source_written"] is False
+    assert Path("board.c").read_text("utf-8") == IMPLEMENTATION
+    compile_c("-shared", "-fPIC", "board.c", "-o", "board.so")
+    ctypes.CDLL(_plccore.__file__, ctypes.RTLD_GLOBAL)
+    register = ctypes.CDLL(str(Path("board.so").resolve())).board_register
+    assert tool("build", "main.st", "board.st").status == 0
+    image = Path("app.cdl").read_bytes()
+    small = Path("small.st")
+    small.write_text("PROGRAM Main END_PROGRAM", "utf-8")
+    assert tool("build", "small.st", "-o", "small.cdl").status == 0
+    with Simulator(Path("small.cdl").read_bytes()) as plc:
+        assert register() == lib.ERR_OK
+        plc.download(image)
+        plc.symbols = find_symbols(int.from_bytes(image[lib.CDL_CRC_OFFSET :][:4], "little"), Path("app.cdl"))
+        plc.start()
+        plc.run_cycles(2)
+        names = ["Main.sum", "Main.text", "Main.length", "Main.is_long", "Main.height", "Main.place.steps"]
+        assert list(plc.read_all(names).values()) == [-33766, "fits", 4, True, 2.0, 2]
+
+
+def test_an_implementation_is_replaced_on_demand_only(tool: Tool) -> None:
+    export(tool)
+    Path("sensors.c").write_text("mine", "utf-8")
+    done = tool("export-itf", "sensors.st")
+    assert "kept as it is" in done.out
+    assert Path("sensors.c").read_text("utf-8") == "mine"
+    assert tool("export-itf", "sensors.st", "--force").status == 0
+    assert Path("sensors.c").read_text("utf-8") != "mine"
+
+
+def test_files_go_where_they_are_wanted(tool: Tool) -> None:
+    Path("sensors.st").write_text(LIBRARY, "utf-8")
+    Path("out").mkdir()
+    assert tool("export-itf", "sensors.st", "-o", "out").status == 0
+    assert {p.name for p in Path("out").iterdir()} == {"sensorsItf.h", "sensors.c"}
+
+
+def test_the_document_lists_the_functions(tool: Tool) -> None:
+    Path("sensors.st").write_text(LIBRARY, "utf-8")
+    functions = tool("export-itf", "sensors.st", "--json").json["functions"]
+    assert functions[0]["interface"].startswith("sensor_scale(INT,REAL,BOOL,UNIT,DIGIT,TIME,LWORD):REAL")
+    assert functions[0]["version"] == "2.3"
+    assert len(functions[0]["signature"]) == 8
+
+
+def test_a_library_without_c_functions_is_told(tool: Tool) -> None:
+    Path("a.st").write_text("FUNCTION F : INT\nEND_FUNCTION", "utf-8")
+    done = tool("export-itf", "a.st")
+    assert done.status == 2
+    assert "{attribute 'external'" in done.err
+
+
+@pytest.mark.parametrize("name", ["int", "1st", "a-b"])
+def test_names_that_c_cannot_have_are_told(tool: Tool, name: str) -> None:
+    Path("a.st").write_text(f"{{attribute 'external' := '{name}'}}\nFUNCTION F : INT\nEND_FUNCTION", "utf-8")
+    done = tool("export-itf", "a.st")
+    assert done.status == 2
+    assert f"'{name}' cannot be the name of a function in C" in done.err
