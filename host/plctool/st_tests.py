@@ -18,8 +18,8 @@ from plctool.compiler.front import check_sources
 from plctool.compiler.lower_init import encode_scalar
 from plctool.compiler.lower_unit import Options
 from plctool.compiler.targets import DEFAULT_TARGET, TARGETS, find_target
-from plctool.compiler.test_statements import FAILED, NUMBER, Assertion, Operand
 from plctool.compiler.types import Elementary, Kind, Type, base_of
+from plctool.compiler.unit_test_statements import FAILED, NUMBER, Assertion, Operand
 from plctool.compiler.unit_tests import TestCase, TestSuite
 from plctool.core import lib
 from plctool.device import explain_exception

@@ -335,7 +335,7 @@ def _element(symbol: Symbol, text: str, name: str) -> Symbol:
     if isinstance(t, StringType) and len(indices) == 1:
         if not 0 <= indices[0] <= t.length:
             raise UsageError(f"{symbol.name} has the characters 0 to {t.length - 1}, not {indices[0]}.", "no-part")
-        return Symbol(name, symbol.area, symbol.offset + indices[0], ELEMENTARY["BYTE"])
+        return Symbol(name, symbol.area, symbol.offset + indices[0] * t.unit, ELEMENTARY["WORD" if t.wide else "BYTE"])
     if not isinstance(t, ArrayType) or len(indices) != len(t.bounds):
         raise UsageError(f"{symbol.name} is a {t} and cannot be indexed with [{text}].", "no-part")
     flat = 0
@@ -363,7 +363,7 @@ def _describe(t: Type, types: dict[str, Any]) -> None:
     entry: dict[str, Any] = {}
     types[t.name] = entry
     if isinstance(t, StringType):
-        entry.update(kind="string", length=t.length)
+        entry.update(kind="string", length=t.length, wide=t.wide)
     elif isinstance(t, EnumType):
         entry.update(kind="enum", base=t.base.name, values=t.values)
     elif isinstance(t, SubrangeType):
@@ -376,7 +376,7 @@ def _describe(t: Type, types: dict[str, Any]) -> None:
         _describe(t.target, types)
     else:
         assert isinstance(t, StructType)
-        entry.update(kind="struct", fields=[[f.name, f.type.name] for f in t.fields])
+        entry.update(kind="struct", fields=[[f.name, f.type.name] for f in t.fields], union=t.union)
         for f in t.fields:
             _describe(f.type, types)
 
@@ -408,7 +408,7 @@ class _Types:
     def _make(self, name: str, entry: dict[str, Any]) -> Type:
         kind = entry["kind"]
         if kind == "string":
-            return StringType(entry["length"])
+            return StringType(entry["length"], entry["wide"])
         if kind == "enum":
             return EnumType(name, ELEMENTARY[entry["base"]], entry["values"])
         if kind == "subrange":
@@ -417,7 +417,7 @@ class _Types:
             return ArrayType(self.get(entry["element"]), tuple((low, high) for low, high in entry["bounds"]))
         if kind == "pointer":
             return self._pointer(entry)
-        struct = StructType(name)
+        struct = StructType(name, union=entry["union"])
         self._made[name] = struct  # references may lead back to it
         struct.fields = [Field(n, self.get(t)) for n, t in entry["fields"]]
         struct.lay_out()

@@ -5,6 +5,7 @@ TIME is shown as 'T#1s500ms', enums by name, REAL with the fewest digits that re
 
 from __future__ import annotations
 
+import datetime
 import math
 import re
 import struct
@@ -27,6 +28,11 @@ from plctool.errors import UsageError
 
 _UNITS_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
              "us": 1_000, "ns": 1}  # fmt: skip
+_DATE_UNITS_NS = {"DATE": 1_000_000_000, "DT": 1_000_000_000, "TOD": 1_000_000}
+_EPOCH = datetime.date(1970, 1, 1)
+_DAY = r"(?P<y>\d{4})-(?P<mo>\d{1,2})-(?P<d>\d{1,2})"
+_CLOCK = r"(?P<h>\d{1,2}):(?P<mi>\d{1,2})(?::(?P<s>\d{1,2})(?:\.(?P<f>\d{1,9}))?)?"
+_DATE_FORMS = {"DATE": re.compile(_DAY), "TOD": re.compile(_CLOCK), "DT": re.compile(f"{_DAY}-{_CLOCK}")}
 _PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)")
 _TYPED = re.compile(r"^(?P<type>[A-Za-z]\w*)#(?P<rest>.+)$")
 
@@ -47,7 +53,7 @@ def decode(t: Type, data: bytes) -> Any:
     if isinstance(t, StructType):
         return {f.name: decode(f.type, data[f.offset : f.offset + f.type.size]) for f in t.fields}
     if isinstance(t, StringType):
-        return data[: t.length].split(b"\0")[0].decode("latin-1")
+        return _decode_text(t, data)
     if isinstance(t, PointerType):
         return int.from_bytes(data[:8], "little")
     base = base_of(t)
@@ -59,7 +65,18 @@ def decode(t: Type, data: bytes) -> Any:
         return next((name for name, value in t.values.items() if value == number), number)
     if base.kind is Kind.BOOL:
         return bool(number & 1)
+    if base.kind is Kind.DATE:
+        return format_date(number, base)
+    if base.kind is Kind.CHAR:
+        return chr(number) if number else ""
     return format_time(number, base) if base.kind is Kind.TIME else number
+
+
+def _decode_text(t: StringType, data: bytes) -> str:
+    if not t.wide:
+        return data[: t.length].split(b"\0")[0].decode("latin-1")
+    end = next((i for i in range(0, 2 * t.length, 2) if data[i : i + 2] in (b"\0\0", b"")), 2 * t.length)
+    return data[:end].decode("utf-16-le", "replace")
 
 
 def _nest(items: list[Any], counts: list[int]) -> list[Any]:
@@ -94,6 +111,23 @@ def format_time(value: int, t: Type) -> str:
     return prefix + sign + (text or ("0ns" if wide else "0ms"))
 
 
+def format_date(value: int, t: Type) -> str:
+    """'D#2024-02-29', 'TOD#12:30:15.500', 'DT#2024-02-29-12:30:15'; LDATE#, LTOD#, LDT# for the types that count ns."""
+    name = base_of(t).name
+    kind = name.removeprefix("L")
+    nanoseconds = value * _DATE_UNITS_NS.get(name, 1)
+    days, in_day = divmod(nanoseconds, _UNITS_NS["d"])
+    seconds, fraction = divmod(in_day, _UNITS_NS["s"])
+    clock = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
+    if fraction:
+        digits = f"{fraction:09}"
+        clock += "." + (digits[:3] if digits.endswith("000000") else digits[:6] if digits.endswith("000") else digits)
+    if kind == "TOD":
+        return f"{name}#{clock}"
+    day = (_EPOCH + datetime.timedelta(days)).isoformat()
+    return f"D#{day}" if name == "DATE" else f"{name}#{day}" + (f"-{clock}" if kind == "DT" else "")
+
+
 # ---- text -> value -------------------------------------------------------------------------------------------------
 
 
@@ -108,6 +142,28 @@ def parse_time(text: str, t: Type = ELEMENTARY["TIME"]) -> int:
         raise _bad(text, t, "write a duration such as T#1s500ms")
     nanoseconds = sum(_scaled(m.group(1), _UNITS_NS[m.group(2)]) for m in matches)
     return sign * (nanoseconds if base_of(t).size == 8 else nanoseconds // 1_000_000)
+
+
+def parse_date(text: str, t: Type) -> int:
+    """A date or time of day such as 'D#2024-02-29', '12:30:15.5' or 'LDT#2024-02-29-12:30:15', in the unit of `t`. Raises
+    UsageError."""
+    name = base_of(t).name
+    kind = name.removeprefix("L")
+    body = text.strip().rpartition("#")[2].replace("_", "")
+    match = _DATE_FORMS[kind].fullmatch(body)
+    example = {"DATE": "D#2024-02-29", "TOD": "TOD#12:30:15", "DT": "DT#2024-02-29-12:30:15"}[kind]
+    if match is None:
+        raise _bad(text, t, f"write {example}")
+    part = match.groupdict(default="0")
+    try:
+        day = datetime.date(int(part["y"]), int(part["mo"]), int(part["d"])) if kind != "TOD" else _EPOCH
+        clock = datetime.time(int(part["h"]), int(part["mi"]), int(part["s"])) if kind != "DATE" else datetime.time()
+    except ValueError:
+        raise _bad(text, t, f"there is no such day or time; write {example}") from None
+    seconds = (clock.hour * 60 + clock.minute) * 60 + clock.second
+    total = (day - _EPOCH).days * _UNITS_NS["d"] + seconds * _UNITS_NS["s"]
+    total += int(part["f"].ljust(9, "0")) if kind != "DATE" else 0
+    return total // _DATE_UNITS_NS.get(name, 1)
 
 
 def _scaled(number: str, unit: int) -> int:
@@ -128,6 +184,10 @@ def parse_value(t: Type, text: str) -> Any:
         return _parse_enum(t, text)
     if base.kind is Kind.TIME:
         return parse_time(text, base)
+    if base.kind is Kind.DATE:
+        return parse_date(text, base)
+    if base.kind is Kind.CHAR:
+        return _parse_character(base, text)
     typed = _TYPED.match(text)
     if typed and typed["type"].upper() in ELEMENTARY:
         text = typed["rest"]
@@ -139,6 +199,15 @@ def parse_value(t: Type, text: str) -> Any:
         except ValueError:
             raise _bad(text, t, "write a number such as 1.5 or -2e3") from None
     return _parse_integer(t, text)
+
+
+def _parse_character(t: Type, text: str) -> int:
+    text = text.rpartition("#")[2] if len(text) > 2 else text
+    if len(text) == 3 and text[0] == text[-1] and text[0] in "'\"":
+        text = text[1]
+    if len(text) != 1:
+        raise _bad(text, t, "write one character")
+    return ord(text)
 
 
 def _parse_bool(t: Type, text: str) -> bool:
@@ -215,10 +284,10 @@ def _encode_struct(t: StructType, value: Any) -> bytes:
 
 def _encode_string(t: StringType, value: Any) -> bytes:
     try:
-        data = str(value).encode("latin-1")
+        data = str(value).encode("utf-16-le" if t.wide else "latin-1")
     except UnicodeEncodeError:
         raise _bad(value, t, "use only characters of Latin-1") from None
-    if len(data) > t.length or b"\0" in data:
+    if len(data) > t.length * t.unit or "\0" in str(value):
         raise _bad(value, t, f"it holds at most {t.length} characters, none of them NUL")
     return data + bytes(t.size - len(data))
 

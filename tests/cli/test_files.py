@@ -243,7 +243,7 @@ def test_wrong_words_exit_2_with_one_sentence(tool: Any, words: tuple[str, ...])
     assert tool(*words, "--json").json["error"]["code"] == "usage"
 
 
-@pytest.mark.parametrize("command", ["force", "unforce", "test"])
+@pytest.mark.parametrize("command", ["force", "unforce"])
 def test_commands_of_later_versions_say_so(tool: Any, command: str) -> None:
     done = tool(command, "Main.n=1", "--port", "/dev/x", "--json")
     assert done.status == 2

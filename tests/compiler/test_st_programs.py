@@ -13,10 +13,10 @@ import pytest
 from plctool.compiler import check_sources, compile_sources
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.literals import string, typed, unsigned
-from plctool.compiler.types import REAL
+from plctool.compiler.types import ELEMENTARY, REAL
 from plctool.sim import Simulator
 from plctool.symbols import SymbolTable
-from plctool.values import decode, encode
+from plctool.values import decode, encode, format_date, parse_date
 
 FOLDER = Path(__file__).parents[1] / "st"
 PROGRAMS = sorted(FOLDER.glob("*.st"))
@@ -24,7 +24,8 @@ PROGRAMS = sorted(FOLDER.glob("*.st"))
 Value = bool | int | float | str
 
 DIRECTIVE = re.compile(r"^\(\* (run|options|set|expect|expect-exception|expect-error|expect-warning): (.*) \*\)$")
-VALUE = re.compile(r"'(?:[^'$]|\$.)*'|\S+")
+VALUE = re.compile(r"""'(?:[^'$]|\$.)*'|"(?:[^"$]|\$.)*"|\S+""")
+DATES = {"D": "DATE", "DATE": "DATE", "TOD": "TOD", "DT": "DT", "LDATE": "LDATE", "LTOD": "LTOD", "LDT": "LDT"}
 SKIP = "-"
 MAX_REAL = 3.4e38
 
@@ -84,8 +85,10 @@ def parse_value(text: str) -> Value:
     """The value of a literal of ST; durations in ns."""
     if text in ("TRUE", "FALSE"):
         return text == "TRUE"
-    if text.startswith("'"):
+    if text.startswith(("'", '"')):
         return string(text)
+    if (prefix := text.partition("#")[0]) in DATES:
+        return format_date(parse_date(text, ELEMENTARY[DATES[prefix]]), ELEMENTARY[DATES[prefix]])
     if "#" in text and not text[0].isdigit():
         return typed(text)[1]
     sign, digits = (-1, text[1:]) if text.startswith("-") else (1, text)

@@ -499,11 +499,10 @@ def test_real_texts_are_as_short_as_possible_and_read_back(case: tuple[str, list
     check([Term(f"STRING_TO_{name}('{text}')", name, value) for text, value in zip(texts, values, strict=True)])
 
 
+DECIMAL = st.from_regex(r"-?[0-9]{1,10}(\.[0-9]{1,9})?(E[+-]?[0-9]{1,3})?", fullmatch=True)
+
+
 @PROGRAM
-@given(
-    st.lists(
-        st.from_regex(r"-?[0-9]{1,10}(\.[0-9]{1,9})?(E[+-]?[0-9]{1,3})?", fullmatch=True), min_size=20, max_size=20
-    )
-)
+@given(st.lists(DECIMAL, min_size=EXPRESSIONS, max_size=EXPRESSIONS))
 def test_decimal_texts_read_as_the_nearest_real(texts: list[str]) -> None:
     check([Term(f"STRING_TO_LREAL('{t}')", "LREAL", float(t)) for t in texts])

@@ -199,7 +199,7 @@ class EnumSpec:
 @dataclass(slots=True, eq=False)
 class ArraySpec:
     pos: int
-    bounds: list[tuple[Expr, Expr]]
+    bounds: list[tuple[Expr, Expr] | None]  # None for *
     element: TypeSpec
 
 

@@ -95,6 +95,10 @@ class Builder:
         *bounds, element = rest
         return ast.ArraySpec(keyword.pos, bounds, element)
 
+    def open_bounds(self, star: Token) -> None:
+        if star.text != "*":
+            self.report(star.pos, "syntax", f"expected the bounds of the array or *, found {star.text}")
+
     def bounds(self, low: ast.Expr, high: ast.Expr) -> tuple[ast.Expr, ast.Expr]:
         return low, high
 

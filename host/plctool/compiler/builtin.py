@@ -46,8 +46,8 @@ from plctool.compiler.types import (
     LREAL,
     LTIME,
     REAL,
-    TIME,
     UDINT,
+    WCHAR,
     Elementary,
     EnumType,
     Kind,
@@ -255,6 +255,11 @@ class Builtins(Expressions):
         t = self.common_of(args, name, node.pos, expected)
         if t is ERROR:
             return error_value(self.pos(node.pos))
+        if isinstance(t, StringType):
+            result = args[0]
+            for argument in args[1:]:
+                result = self.call_by_name(name, [result, argument], node.pos, None)
+            return result
         if not is_scalar(t):
             return self.error(node.pos, "type", f"{name} cannot compare values of type {t}")
         result = self.coerce(args[0], t)
@@ -393,6 +398,9 @@ class Builtins(Expressions):
         base = elementary(e.type if isinstance(target, StringType) else target)
         if base is None:
             return self.error(node.pos, "type", f"there is no conversion from {e.type} to {target}")
+        if base is WCHAR and (e.type if isinstance(e.type, StringType) else target).wide:  # type: ignore[union-attr]
+            name = "WCHAR_TO_WSTRING" if isinstance(target, StringType) else "WSTRING_TO_WCHAR"
+            return self.call_by_name(name, [e], node.pos, None)
         if isinstance(target, StringType):
             text = self.call_by_name(f"{base}_TO_STRING", [convert(e, base)], node.pos, None)
             return self.call_by_name("STRING_TO_WSTRING", [text], node.pos, None) if target.wide else text

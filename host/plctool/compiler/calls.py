@@ -32,6 +32,7 @@ from plctool.compiler.typed import (
 from plctool.compiler.types import (
     LREAL,
     REAL,
+    WCHAR,
     PointerType,
     ReferenceType,
     StringType,
@@ -40,7 +41,7 @@ from plctool.compiler.types import (
     Type,
     is_scalar,
 )  # fmt: skip
-from plctool.compiler.units import LIBRARY_STRING
+from plctool.compiler.units import LIBRARY_STRING, WIDE_LIBRARY_STRING
 
 Actual = ast.Argument | Expr | None  # as written, or checked already
 
@@ -139,10 +140,14 @@ class Calls(Builtins):
             return dict(zip(positional, args, strict=False))
         bound: dict[int, ast.Argument] = {}
         index = {name.casefold(): i for i, (name, _) in enumerate(names)}
-        for argument in args:
-            if argument.name is None:
-                self.error(argument.pos, "arguments", "name all arguments or none")
-                return None
+        inputs = [i for i, (_, direction) in enumerate(names) if direction is not Direction.OUTPUT]
+        for position, argument in enumerate(args):
+            if argument.name is None:  # arguments without a name come first
+                if position >= len(inputs) or any(a.name is not None for a in args[:position]):
+                    self.error(argument.pos, "arguments", "arguments without a name come before those with one")
+                    return None
+                bound[inputs[position]] = argument
+                continue
             i = index.get(argument.name.casefold())
             if i is None:
                 hint = did_you_mean(argument.name, (n for n, _ in names))
@@ -414,7 +419,7 @@ class Calls(Builtins):
             wanted = None if wanted is None else common_type(wanted, t)
         if wanted is None:
             return None
-        candidates = [str(elementary(wanted) or wanted), *(["STRING"] if isinstance(wanted, StringType) else [])]
+        candidates = [wanted.keyword if isinstance(wanted, StringType) else str(elementary(wanted) or wanted)]
         if elementary(wanted) is not None:
             prefer_real = not is_large(wanted) if typed else expected is REAL
             candidates += ["REAL", "LREAL"] if prefer_real else ["LREAL", "REAL"]

@@ -113,7 +113,7 @@ class Classes:
                 family.append(symbol)
                 todo += reversed(self._derived.get(symbol, []))
             if len(family) > 1 or any(s.decl.interfaces for s in family):
-                numbers.update((s, len(numbers) + n) for n, s in enumerate(family, 1))
+                numbers.update(zip(family, range(len(numbers) + 1, len(numbers) + 1 + len(family)), strict=True))
         return numbers
 
     # ---- declaring ----

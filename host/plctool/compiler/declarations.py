@@ -41,7 +41,9 @@ from plctool.compiler.types import (
     EnumType,
     Field,
     Kind,
+    OpenArrayType,
     PointerType,
+    RawPointerType,
     ReferenceType,
     StringType,
     StructType,
@@ -87,6 +89,7 @@ class Declarations:
     def __init__(self, world: World) -> None:
         self.world = world
         self._depth = 0
+        self.open_allowed = False  # whether the type being read may be ARRAY[*]
         self._direct: dict[str, VarSymbol] = {}
 
     # ---- types ----
@@ -195,9 +198,13 @@ class Declarations:
         return self.world.expressions(scope)
 
     def _array(self, spec: ast.ArraySpec, scope: Scope) -> tuple[Type, Initial | None]:
+        open_allowed, self.open_allowed = self.open_allowed, False
         element, default = self.type_of(spec.element, scope)
+        self.open_allowed = open_allowed
         checker, bounds = self.checker(scope), list[tuple[int, int]]()
-        for low_node, high_node in spec.bounds:
+        if None in spec.bounds:
+            return self._open_array(spec, element, scope), None
+        for low_node, high_node in (b for b in spec.bounds if b is not None):
             low, high = checker.integer(low_node), checker.integer(high_node)
             if low is None or high is None:
                 return ERROR, None
@@ -215,6 +222,15 @@ class Declarations:
             scope.error(spec.pos, "size", f"an array of {t.size} bytes is too large")
             return ERROR, None
         return t, None if default is None else ArrayInit([(t.count, default)])
+
+    def _open_array(self, spec: ast.ArraySpec, element: Type, scope: Scope) -> Type:
+        if any(b is not None for b in spec.bounds):
+            scope.error(spec.pos, "type", "an array has either bounds in all dimensions or * in all")
+            return ERROR
+        if not self.open_allowed:
+            scope.error(spec.pos, "type", "ARRAY[*] is for VAR_IN_OUT only")
+            return ERROR
+        return ERROR if element is ERROR else OpenArrayType(element, ((0, -1),) * len(spec.bounds))
 
     def _enum(self, spec: ast.EnumSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
         base: Type = INT

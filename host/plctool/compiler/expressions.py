@@ -361,6 +361,7 @@ class Expressions:
             names = (m.name for m in members.values() if m.role in (Role.INPUT, Role.OUTPUT))
             hint = did_you_mean(node.name, names)
             return self.error(node.name_pos, "unknown", f"{base.type} has no variable {node.name}{hint}")
+        symbol.used = True
         if symbol.role is Role.IN_OUT:
             return self.error(node.name_pos, "access", f"{symbol.name} is a VAR_IN_OUT; it can only be given in a call")
         variable = symbol.variable
@@ -555,6 +556,8 @@ class Expressions:
     def _literal_for(self, e: Expr, other: Type, expected: Type | None) -> Expr:
         t = elementary(other)
         assert isinstance(e, Const) and not isinstance(e.value, str)
+        if isinstance(other, PointerType) and e.value == 0:
+            return Const(0, other, e.pos)
         if t is None or t.kind is Kind.TIME:
             return settle(e)
         if t.kind is Kind.REAL:

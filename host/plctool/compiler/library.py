@@ -20,6 +20,7 @@ _FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
 _OPENING = re.compile(
     r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
 )
+_TEXT_FUNCTIONS = "stdlib/strings.st"  # written for STRING, there for WSTRING as well
 _STRUCT = re.compile(r"\bSTRUCT\b.*?\bEND_STRUCT\b", re.DOTALL)
 _DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
 
@@ -79,5 +80,16 @@ class Library:
 @cache
 def standard_library() -> Library:
     """The library that comes with the tool."""
-    paths = sorted(_FOLDER.glob("*.st"))
-    return Library([Source(f"stdlib/{p.name}", p.read_text("latin-1")) for p in paths])
+    sources = [Source(f"stdlib/{p.name}", p.read_text("latin-1")) for p in sorted(_FOLDER.glob("*.st"))]
+    return Library([*sources, *(_widened(s) for s in sources if s.path == _TEXT_FUNCTIONS)])
+
+
+def _widened(source: Source) -> Source:
+    """The functions of a source for WSTRING: LEN becomes LEN__WSTRING, what is internal, such as SPAN__, WSPAN__."""
+    words = {"STRING": "WSTRING", "BYTE": "WORD"}
+    for match in _OPENING.finditer(source.text):
+        name = match["name"]
+        base = name.removesuffix("__STRING")
+        words[name] = f"W{name}" if name.endswith("__") else f"{base}__WSTRING"
+    text = re.sub(rf"\b(?:{'|'.join(words)})\b", lambda m: words[m.group()], source.text)
+    return Source(source.path, text)

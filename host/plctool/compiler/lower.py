@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.ir import Function
+from plctool.compiler.lower_classes import renumber, write_dispatcher
 from plctool.compiler.lower_frame import Ref, string_capacity
 from plctool.compiler.lower_helpers import MEMORY_FUNCTIONS, memory_functions, string_helper
 from plctool.compiler.lower_init import Initialising
 from plctool.compiler.lower_stmt import Body, parameter_list
 from plctool.compiler.lower_unit import Options, Unit, value_type
 from plctool.compiler.typed import Area, External, Pou, PouKind, Task, TypedProgram, Variable
-from plctool.compiler.types import is_scalar
+from plctool.compiler.types import BOOL, is_scalar
 
 GLOBAL_INIT = "global_init"
 _WHOLE = 1_200_000  # characters of IR (about 5000 lines of ST) up to which a program is optimised as one
@@ -34,13 +35,17 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     """Lowers what the tasks of a checked program reach."""
     unit = Unit(options, program.area_sizes, program.defaults)
     tasks = [_task_entry(unit, number, task) for number, task in enumerate(program.tasks)]
-    _global_init(unit, program.globals)
+    _global_init(unit, program.globals, program.startup)
     effects = Effects()
-    done = 0
-    while done < len(unit.pous):
-        pou = list(unit.pous)[done]
-        _pou(unit, pou, effects)
-        done += 1
+    done = chosen = 0
+    while done < len(unit.pous) or chosen < len(unit.dispatchers):
+        if done < len(unit.pous):
+            _pou(unit, list(unit.pous)[done], effects)
+            done += 1
+        else:
+            dispatch, name = list(unit.dispatchers.items())[chosen]
+            write_dispatcher(unit, name, dispatch)
+            chosen += 1
     _struct_initialisers(unit)
     for name in sorted(unit.helpers):
         unit.module.add_helper(string_helper(name, unit.target, unit.plain))
@@ -76,16 +81,26 @@ def _pou(unit: Unit, pou: Pou, effects: Effects) -> None:
     unit.module.add(unit.symbol(pou), fn.text())
 
 
-def _global_init(unit: Unit, variables: list[Variable]) -> None:
+def _global_init(unit: Unit, variables: list[Variable], startup: Pou | None) -> None:
     fn = Function(f"define void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains) {unit.plain}")
     frame = Initialising(unit, fn, None)
     _initialise_area(frame, variables, (Area.DATA, Area.OUTPUT, Area.MEMORY, Area.INPUT))
     if any(v.area is Area.RETAIN for v in variables):
-        retains, end = fn.label("retains"), fn.label("end")
-        fn.branch_if(fn.value("icmp ne i32 %init_retains, 0"), retains, end)
+        retains, kept, end = fn.label("retains"), fn.label("kept"), fn.label("end")
+        fn.branch_if(fn.value("icmp ne i32 %init_retains, 0"), retains, kept)
         fn.begin(retains)
         _initialise_area(frame, variables, (Area.RETAIN,))
+        fn.branch(end)
+        fn.begin(kept)
+        for var in variables:
+            if var.area is Area.RETAIN:
+                renumber(frame, Ref(frame.area_base(var.area), var.offset, var.type, direct=True))
         fn.begin(end)
+    if startup is not None:
+        flag = fn.value("icmp ne i32 %init_retains, 0")
+        text = value_type(BOOL)
+        operand = flag if text == "i1" else fn.value(f"zext i1 {flag} to {text}")
+        fn.do(f"call void @{unit.symbol(startup)}(ptr %ctx, {text} {operand})")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_INIT, fn.text())
 

@@ -26,6 +26,7 @@ from plctool.compiler.typed import (
     Convert,
     DerefPlace,
     Direction,
+    Dispatch,
     Expr,
     IndexPlace,
     Intrinsic,
@@ -36,6 +37,7 @@ from plctool.compiler.typed import (
     Place,
     Pos,
     Pou,
+    SelfPlace,
     Storage,
     Unary,
     ValuePlace,
@@ -45,7 +47,7 @@ from plctool.compiler.typed import (
 from plctool.compiler.types import UDINT, ArrayType, StringType, StructType, Type, is_scalar
 
 _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
-PLACES = (VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace)
+PLACES = (VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, SelfPlace)
 
 
 def parameter_types(pou: Pou, parameter: Parameter) -> list[str]:
@@ -84,7 +86,7 @@ class Expressions(Strings):
             base = self.ref(place.base)
             tag = ""
             if base.direct and isinstance(base.type, StructType) and (base.tag or base.pointer == "%self"):
-                tag = self.unit.tag((base.type.name, place.offset))
+                tag = self.unit.tag((base.type.root.name, place.offset))
             return base.member(place.offset, place.type, tag)
         if isinstance(place, IndexPlace):
             return self._index(place)
@@ -95,6 +97,8 @@ class Expressions(Strings):
             return Ref(pointer, 0, place.type, capacity=string_capacity(place.type))
         if isinstance(place, BitPlace):
             return replace(self.ref(place.base), bit=place.bit)
+        if isinstance(place, SelfPlace):
+            return Ref("%self", 0, place.type, direct=True)
         return self._materialised(place.value)
 
     def _variable(self, var: Variable) -> Ref:
@@ -106,7 +110,7 @@ class Expressions(Strings):
             return Ref(self.area_base(var.area), var.offset, t, tag, True, string_capacity(t))
         if var.storage is Storage.SELF:
             assert self.pou is not None and self.pou.instance is not None
-            tag = self.unit.tag((self.pou.instance.name, var.offset))
+            tag = self.unit.tag((self.pou.instance.root.name, var.offset))
             return Ref("%self", var.offset, t, tag, True, string_capacity(t))
         if var.storage is Storage.REFERENCE and var not in self.locals:
             self.locals[var] = self._stored_reference(var)
@@ -115,7 +119,7 @@ class Expressions(Strings):
     def _stored_reference(self, var: Variable) -> Ref:
         """A VAR_IN_OUT of a function block: the pointer its caller stored in the instance, loaded once."""
         assert self.pou is not None and self.pou.instance is not None
-        tag = self.unit.tag((self.pou.instance.name, var.offset))
+        tag = self.unit.tag((self.pou.instance.root.name, var.offset))
         slot = self.fn.prologue(f"getelementptr inbounds i8, ptr %self, {self._pointer_int} {var.offset}")
         pointer = self.fn.prologue(f"load ptr, ptr {slot}{tag}")
         return Ref(pointer, 0, var.type, capacity=string_capacity(var.type))
@@ -377,6 +381,8 @@ class Expressions(Strings):
         pou = e.function
         write_back: list[tuple[Ref, Ref]] = []
         arguments = [] if pou.external else ["ptr %ctx"]
+        if e.instance is not None:
+            arguments.append(f"ptr {self.address(self.ref(e.instance))}")
         if result is not None:
             arguments.append(f"ptr {self.address(result)}")
             arguments += [f"i32 {self._result_capacity(pou, result)}"] if pou.cuts_result else []
@@ -384,7 +390,7 @@ class Expressions(Strings):
             operands = self._argument(pou, parameter, argument, write_back)
             types = parameter_types(pou, parameter)
             arguments += [f"{text} {operand}" for text, operand in zip(types, operands, strict=True)]
-        value = self._call_instruction(pou, arguments)
+        value = self._call_instruction(pou, e.dispatch, arguments)
         for temporary, place in write_back:
             self.store(place, self.load(temporary))
         return value
@@ -397,7 +403,7 @@ class Expressions(Strings):
             return str(min(int(declared), int(result.capacity)))
         return self.fn.value(f"call i32 @llvm.umin.i32(i32 {declared}, i32 {result.capacity})")
 
-    def _call_instruction(self, pou: Pou, arguments: list[str]) -> str:
+    def _call_instruction(self, pou: Pou, dispatch: Dispatch | None, arguments: list[str]) -> str:
         unit, fn = self.unit, self.fn
         returns = pou.result is not None and is_scalar(pou.result.type)
         text, attributes = "void", ""
@@ -406,7 +412,7 @@ class Expressions(Strings):
             attributes = f" {unit.external_call}"
             convention = f"{unit.target.external_convention} " if unit.target.external_convention else ""
         else:
-            target, convention = f"@{unit.symbol(pou)}", ""
+            target, convention = f"@{unit.target_of(pou, dispatch)}", ""
         if not returns:
             fn.do(f"call {convention}void {target}({', '.join(arguments)}){attributes}")
             return ""

@@ -133,7 +133,7 @@ class Body(Initialising):
             target = self.import_function(self.unit.import_slot(s.block.external))
             self.fn.do(f"call void {target}(ptr {base}) {self.unit.external_call}")
         else:
-            self.fn.do(f"call void @{self.unit.symbol(s.block)}(ptr %ctx, ptr {base})")
+            self.fn.do(f"call void @{self.unit.target_of(s.block, s.dispatch)}(ptr %ctx, ptr {base})")
         for variable, place in s.outputs:
             self._copy_out(self._member(s.block, instance, variable), self.ref(place))
 
@@ -141,7 +141,7 @@ class Body(Initialising):
         tag = ""
         if instance.direct and (instance.tag or instance.pointer == "%self"):
             assert block.instance is not None
-            tag = self.unit.tag((block.instance.name, variable.offset))
+            tag = self.unit.tag((block.instance.root.name, variable.offset))
         return instance.member(variable.offset, variable.type, tag)
 
     def _assign_member(self, target: Ref, value: Expr) -> None:
@@ -271,7 +271,7 @@ class Body(Initialising):
         """Writes everything from the first local variable to the return."""
         pou, fn = self.pou, self.fn
         assert pou is not None
-        if pou.kind is PouKind.FUNCTION:
+        if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
             self._take_parameters(pou)
         if pou.result is not None and result_in_memory(pou):
             capacity = "%result.capacity" if pou.cuts_result else string_capacity(pou.result.type)
@@ -330,12 +330,12 @@ def _is_whole(argument: Expr | Place | None, variable: Variable | None) -> bool:
 def parameter_list(pou: Pou) -> str:
     """The parameters of the define line."""
     words = ["ptr noalias nonnull readonly %ctx"]
-    if pou.kind is PouKind.FUNCTION_BLOCK:
+    if pou.kind in (PouKind.FUNCTION_BLOCK, PouKind.METHOD):
         words.append("ptr nonnull %self")
     if result_in_memory(pou):
         words.append(f"ptr {'' if pou.in_place else 'noalias '}nonnull %result")
         words += ["i32 %result.capacity"] if pou.cuts_result else []
-    if pou.kind is PouKind.FUNCTION:
+    if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
         for number, parameter in enumerate(pou.parameters):
             names = (f"%p{number}", f"%p{number}.capacity")
             words += [f"{text} {name}" for text, name in zip(parameter_types(pou, parameter), names, strict=False)]

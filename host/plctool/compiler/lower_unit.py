@@ -12,7 +12,7 @@ from enum import Enum
 from plctool.compiler.ir import Module, escape
 from plctool.compiler.lower_helpers import LIBRARY_FUNCTIONS
 from plctool.compiler.targets import Target
-from plctool.compiler.typed import Area, External, Pos, Pou, StructInit
+from plctool.compiler.typed import Area, Dispatch, External, Pos, Pou, StructInit
 from plctool.compiler.types import Elementary, Kind, PointerType, StructType, Type, base_of
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
@@ -85,6 +85,7 @@ class Unit:
         self.pous: dict[Pou, str] = {}  # symbol of every POU referred to
         self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol
         self.helpers: set[str] = set()
+        self.dispatchers: dict[Dispatch, str] = {}  # symbol of the function that chooses among several targets
         self.files: dict[str, int] = {}
         self._import_slots: dict[str, int] = {}
         self._symbols: set[str] = set()
@@ -116,6 +117,19 @@ class Unit:
         if name is None:
             name = self.unique(f"st.{pou.name}")
             self.pous[pou] = name
+        return name
+
+    def target_of(self, pou: Pou, dispatch: Dispatch | None) -> str:
+        """The symbol that a call of `pou` goes to: when the class decides among several targets, a function that does."""
+        if dispatch is None:
+            return self.symbol(pou)
+        targets = set(dispatch.targets.values())
+        if len(targets) == 1:
+            return self.symbol(targets.pop())
+        name = self.dispatchers.get(dispatch)
+        if name is None:
+            name = self.unique(f"class.{pou.name}")
+            self.dispatchers[dispatch] = name
         return name
 
     def unique(self, wanted: str) -> str:

@@ -146,11 +146,12 @@ class ObjectCalls(Calls):
             return None
         return Bound(cls, key, place)
 
-    def bound_member(self, node: ast.Expr) -> Bound | None:
-        """What `m`, `fb.m` or `prog.m` stands for when it is a method, action or property."""
+    def bound_member(self, node: ast.Expr, *, called: bool = False) -> Bound | None:
+        """What `m`, `fb.m` or `prog.m` stands for when it is a method, action or property. `called`: the name of the method
+        that it stands in is not its result."""
         if isinstance(node, ast.Name):
             symbol = self.scope.lookup(node.name)
-            if isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT and self.scope.cls is not None:
+            if called and isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT:
                 symbol = self.scope.outer.get(node.name.casefold())
             return self._own_member(node.name) if isinstance(symbol, MemberSymbol) else None
         if not isinstance(node, ast.Member):
@@ -205,7 +206,7 @@ class ObjectCalls(Calls):
 
     def call(self, node: ast.Call, expected: Type | None) -> Expr:
         """A call as a value, or as a statement when it is not one of a function block."""
-        bound = self.bound_member(node.callee)
+        bound = self.bound_member(node.callee, called=True)
         if bound is None:
             dotted = self._dotted(node.callee)
             symbol = self.scope.unit(dotted) if dotted is not None else None

@@ -222,7 +222,7 @@ class Statements(ObjectCalls):
     def _instance(self, call: ast.Call) -> Expr | None:
         """The instance a call statement is about; None when it calls a function."""
         callee = call.callee
-        if self.bound_member(callee) is not None:
+        if self.bound_member(callee, called=True) is not None:
             return None
         if isinstance(callee, ast.Name):
             symbol = self.scope.lookup(callee.name)

@@ -112,12 +112,13 @@ class MemberPlace:
 @dataclass
 class IndexPlace:
     """`base` is an array; one index per dimension, each any integer type. Or a STRING with one 0-based index (type
-    BYTE)."""
+    BYTE, of a WSTRING WORD). `limits`: of an ARRAY[*], the bounds of each dimension (DINT)."""
 
     base: Place
     indices: list[Expr]
     type: Type
     pos: Pos
+    limits: list[tuple[Expr, Expr]] | None = None
 
 
 @dataclass
@@ -422,11 +423,15 @@ class Parameter:
 
     A STRING passed by reference travels as (pointer, u32 capacity), so that STRING_SIZE and cutting work for any
     length.
+
+    `bound`: this is a bound of an ARRAY[*], which is handed over with it: the array, the dimension from 0, and whether it
+    is the upper one.
     """
 
     variable: Variable
     direction: Direction
     by_reference: bool = False
+    bound: tuple[Variable, int, bool] | None = None
 
 
 @dataclass(eq=False)

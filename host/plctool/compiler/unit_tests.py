@@ -26,7 +26,6 @@ from plctool.compiler.expressions import load
 from plctool.compiler.scope import Scope
 from plctool.compiler.source import Source
 from plctool.compiler.symbols import ERROR, PouSymbol, Role, VarSymbol
-from plctool.compiler.test_statements import NUMBER, Assertion, Bench, TestStatements
 from plctool.compiler.typed import (
     Call,
     CallStatement,
@@ -43,6 +42,7 @@ from plctool.compiler.typed import (
     Variable,
 )  # fmt: skip
 from plctool.compiler.types import StringType
+from plctool.compiler.unit_test_statements import NUMBER, Assertion, Bench, TestStatements
 from plctool.compiler.world import World
 
 _NOTHING = StringType(1)

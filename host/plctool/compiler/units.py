@@ -223,8 +223,10 @@ class Units:
         scope.names[decl.name.casefold()] = symbol
 
     def _parameter_type(self, spec: ast.TypeSpec, scope: Scope) -> tuple[Type, Initial | None]:
-        if scope.library and isinstance(spec, ast.NamedType) and spec.name.upper() == "STRING" and spec.length is None:
-            return LIBRARY_STRING, None
+        if scope.library and isinstance(spec, ast.NamedType) and spec.length is None:
+            text = {"STRING": LIBRARY_STRING, "WSTRING": WIDE_LIBRARY_STRING}.get(spec.name.upper())
+            if text is not None:
+                return text, None
         return self.world.declarations.type_of(spec, scope)
 
     def _parameters(self, block: ast.VarBlock, info: FunctionInfo, scope: Scope) -> None:

@@ -102,13 +102,15 @@ static inline void CpuBarrier(void)
 
 /* ---- memory protection ---- */
 
-enum { MPU_NO_ACCESS = 0, MPU_READ_ONLY = 6 };
+/* Attributes: access, and eighths of the region that are left out of it (bit 0 the lowest). */
+enum { MPU_NO_ACCESS = 0, MPU_READ_ONLY = 6 << 24 };
+#define MPU_WITHOUT_EIGHTHS(mask) ((RTS_UI32)((mask) & 0xFF) << 8)
 
 /* Regions; a board may use what is left from MPU_BOARD up to 7 (higher ones win over lower ones). */
 enum { MPU_NULL = 0, MPU_STACK = 1, MPU_IEC_STACK = 2, MPU_BOARD = MPU_IEC_STACK + APP_MAX_TASKS };
 
 /* Protects 2^log2_size bytes at `base`, a multiple of that size; does nothing on a chip without MPU. */
-void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 access);
+void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 attributes);
 void MpuRelease(RTS_UI32 region);
 
 /* ---- for boards ---- */

@@ -78,13 +78,13 @@ static uintptr_t stack_slot(const TRY *try)
     return (uintptr_t)stacks[APP_MAX_TASKS - 1 - (try - state.tries)];
 }
 
-void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 access)
+void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 attributes)
 {
     enum { RBAR_VALID = 1 << 4, RASR_ENABLE = 1, RASR_NORMAL_MEMORY = 6 << 16 };
     if (region >= ((MPU_TYPE >> 8) & 0xFFu))
         return;
     MPU_RBAR = base | RBAR_VALID | region;
-    MPU_RASR = access << 24 | RASR_NORMAL_MEMORY | (log2_size - 1) << 1 | RASR_ENABLE;
+    MPU_RASR = attributes | RASR_NORMAL_MEMORY | (log2_size - 1) << 1 | RASR_ENABLE;
     CpuBarrier();
 }
 
@@ -101,11 +101,13 @@ void MpuRelease(RTS_UI32 region)
 void SysExceptInit(void)
 {
     enum { MPU_ENABLE_WITH_BACKGROUND = 5 };
-    enum { NULL_AREA_LOG2 = 8 }; /* the vectors, which only the hardware reads */
+    /* Where NULL points are the vectors, which only the hardware reads: as many eighths of 32 bytes as they fill. */
+    enum { NULL_LOG2 = 8, NULL_EIGHTHS = (VECTOR_IRQ + BOARD_IRQ_COUNT) * 4 / 32 };
+    const RTS_UI32 behind_vectors = NULL_EIGHTHS < 8 ? MPU_WITHOUT_EIGHTHS(0xFF << NULL_EIGHTHS) : 0;
     extern RTS_UI8 stack_bottom[];
     state.top = state.tries;
     state.code_size = 0;
-    MpuProtect(MPU_NULL, 0, NULL_AREA_LOG2, MPU_NO_ACCESS);
+    MpuProtect(MPU_NULL, 0, NULL_LOG2, MPU_NO_ACCESS | behind_vectors);
     MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, GUARD_LOG2, MPU_NO_ACCESS);
     for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++)
         MpuProtect(MPU_IEC_STACK + i, (uintptr_t)stacks[i], GUARD_LOG2, MPU_NO_ACCESS);

@@ -8,6 +8,7 @@
 
 #define APP_MAX_TASKS 3
 #define NETSERVER_MESSAGE_SIZE 944 /* two full blocks */
+#define EVENT_MAX_CALLBACKS 2
 #define LOG_MAX_ENTRIES 8
 #define LOG_TEXT_SIZE 64
 #define SRV_MAX_GROUPS 4
