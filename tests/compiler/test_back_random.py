@@ -1,4 +1,4 @@
-"""Random programs do the same with and without optimisation, whole or in parts: same memory, same exceptions, same lines."""
+"""Random programs do the same with and without optimisation, whole or in parts: memory, exceptions, lines."""
 
 from __future__ import annotations
 
@@ -51,6 +51,7 @@ from plctool.compiler.types import (
     StringType,
     StructType,
 )
+from plctool.symbols import SymbolTable
 
 POINT = StructType("Point", [Field("x", DINT), Field("b", BOOL), Field("y", DINT)])
 POINT.lay_out()
@@ -262,36 +263,30 @@ class Generator:
         return p.program(*first, *(self.statement(3) for _ in range(8)))
 
 
-def outcome(program: TypedProgram, level: int) -> list[object]:
-    """Memory after each cycle, and what was raised where."""
+def meaningful(symbols: SymbolTable, memory: bytes) -> bytes:
+    """The data area without addresses, and without what is behind the NUL of strings."""
+    data = bytearray(memory)
+    for variable in symbols.variables.values():
+        for leaf in symbols.leaves(variable):
+            end = leaf.offset + leaf.size
+            if isinstance(leaf.type, PointerType):
+                data[leaf.offset : end] = bytes(leaf.size)
+            elif isinstance(leaf.type, StringType):
+                nul = data.find(0, leaf.offset, end)
+                data[nul:end] = bytes(end - nul)
+    return bytes(data)
+
+
+def outcome(program: TypedProgram, level: int) -> list[tuple[int, object, bytes]]:
+    """Of each cycle: what was raised, where, and the memory afterwards."""
     run = Running(build(program, level=level))
-    pointers = {(s.offset, 8) for s in run.built.symbols.variables.values() if isinstance(s.type, PointerType)}
-    found: list[object] = []
+    found: list[tuple[int, object, bytes]] = []
     for _ in range(3):
         code = run.cycle()
         line = run.built.symbols.address_to_line(run.raised_at) if code else None
-        memory = bytearray(run.memory(0, 0, run.image.areas[0]))
-        for offset, size in pointers | links(run):
-            memory[offset : offset + size] = bytes(size)
-        found.append((code, line and (line.pou, line.line), clean(run, bytes(memory))))
+        memory = run.memory(0, 0, run.image.areas[0])
+        found.append((code, line and (line.pou, line.line), meaningful(run.built.symbols, memory)))
     return found
-
-
-def links(run: Running) -> set[tuple[int, int]]:
-    """Where instances keep the address of their VAR_IN_OUT."""
-    names = ("Main.one.link", "Main.many[0].link", "Main.many[1].link")
-    return {(run.built.symbols.resolve(name).offset, 8) for name in names}
-
-
-def clean(run: Running, memory: bytes) -> bytes:
-    """Without the bytes behind the NUL of strings, which have no meaning."""
-    data = bytearray(memory)
-    for variable in run.built.symbols.variables.values():
-        for leaf in run.built.symbols.leaves(variable):
-            if isinstance(leaf.type, StringType):
-                end = data.find(0, leaf.offset, leaf.offset + leaf.size)
-                data[end : leaf.offset + leaf.size] = bytes(leaf.offset + leaf.size - end)
-    return bytes(data)
 
 
 @pytest.mark.parametrize("seed", range(60))

@@ -22,7 +22,7 @@ from plctool.testing.plcrt import find_plcrt
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```(sh|python|iecst \S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN_PORT = "/dev/pts/4"
 
 # Commands that set up what this test runs in, or run it.
@@ -90,6 +90,9 @@ def test_what_the_document_says_works(document: Path, reader: Reader) -> None:
     for language, text in BLOCK.findall(document.read_text()):
         if language == "python":
             reader.run_python(text)
+            continue
+        if language.startswith("iecst"):  # a program that the reader saves under the name that is said
+            (reader.folder / language.split()[1]).write_text(text)
             continue
         for line in text.replace("\\\n", " ").splitlines():
             if line.strip():

@@ -3,8 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Arguments lo=, hi= (the range, hi excluded), n= (0: never), out= (a file that has the number of stores so far). The store is done, then
- * the process ends with status 3. Debian has no header for plugins; these are the few prototypes needed.
+ * Arguments lo=, hi= (the range, hi excluded), n= (0: never), out= (a file that has the number of stores so far). The
+ * store is done, then the process ends with status 3. Debian has no header for plugins; these are the few prototypes
+ * needed.
  */
 #include <stdbool.h>
 #include <stdint.h>

@@ -57,8 +57,10 @@ class Arrangement:
         if isinstance(owner, ast.PouDecl) and owner.keyword in _OWNERS:
             owner.members.append(member)
             return
-        message = f"the {member.keyword} {member.name} has no FUNCTION_BLOCK or PROGRAM that it belongs to in front of it"
-        self._builder.report(member.pos, "syntax", message)
+        what = f"the {member.keyword} {member.name}"
+        self._builder.report(
+            member.pos, "syntax", f"{what} has no FUNCTION_BLOCK or PROGRAM in front that it belongs to"
+        )
 
     def complete(self, decl: ast.PouDecl, bases: Any, interfaces: Any, parts: Sequence[Any]) -> None:
         """Adds what a unit extends, implements and holds."""
@@ -70,7 +72,8 @@ class Arrangement:
                 decl.blocks.append(part)
 
     def property(self, keyword: Token, rest: Sequence[Any]) -> list[ast.PouDecl]:
-        """The GET is a method that returns the value, the SET one that takes it as its input; both by the property's name."""
+        """The GET is a method that returns the value, the SET one that takes it as its input, both by the name of the
+        property."""
         at = next(i for i, part in enumerate(rest) if part is not None and not hasattr(part, "text"))
         *modifiers, name = rest[:at]
         spec, blocks, *accessors = rest[at:]
@@ -79,7 +82,8 @@ class Arrangement:
             if accessor is None:
                 continue
             token, more, own_blocks, body = accessor
-            decl = self._builder.pou(keyword, [*modifiers, *more, name], None, [*(blocks or []), *(own_blocks or [])], body)
+            all_blocks = [*(blocks or []), *(own_blocks or [])]
+            decl = self._builder.pou(keyword, [*modifiers, *more, name], None, all_blocks, body)
             decl.keyword = token.type
             if decl.keyword == "GET":
                 decl.result = spec

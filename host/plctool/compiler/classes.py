@@ -1,7 +1,7 @@
 """What makes function blocks classes: bases, interfaces, methods, actions, properties, and the numbers of classes.
 
-The world is closed: all classes of a program are known before the first of them is declared. A class whose instances may
-stand for others carries its number in a hidden first member of each instance; all other blocks stay as they are.
+The world is closed: all classes of a program are known before the first of them is declared. Instances that may stand
+for those of another class carry the number of theirs in a hidden first member; all other blocks stay as they are.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -27,7 +27,7 @@ from plctool.compiler.symbols import (
     Role,
     VarSymbol,
 )  # fmt: skip
-from plctool.compiler.typed import Dispatch, Initial, Pos, Pou, PouKind, ScalarInit, Storage, StructInit, Variable
+from plctool.compiler.typed import Dispatch, Initial, Pos, Pou, PouKind, ScalarInit, Storage, Variable
 from plctool.compiler.types import UDINT, ArrayType, Field, InterfaceType, StructType, Type
 
 if TYPE_CHECKING:
@@ -103,8 +103,8 @@ class Classes:
 
     @cached_property
     def _numbers(self) -> dict[PouSymbol, int]:
-        """Of the classes that may stand for others: derived, extended or with interfaces. What is derived from itself has
-        none."""
+        """Of the classes that may stand for others: derived, extended or with interfaces. What is derived from itself
+        has none."""
         numbers: dict[PouSymbol, int] = {}
         for root in [s for s in self._derived if self._base_symbol(s) is None]:
             family, todo = list[PouSymbol](), [root]
@@ -324,8 +324,8 @@ class Classes:
     # ---- calls of what is only known when it runs ----
 
     def dispatch(self, cls: ClassInfo, key: str, function: Pou) -> Dispatch | None:
-        """For a call of the member `key`, or of the body for "", of an instance of `cls` or of a class that conforms; None
-        when there is only `cls`."""
+        """For a call of the member `key`, or of the body for "", of an instance of `cls` or of a class that conforms;
+        None when there is only `cls`."""
         if not cls.is_interface and not cls.number:
             return None
         return self._dispatches.setdefault((cls, key), Dispatch(function))
@@ -372,9 +372,3 @@ class Classes:
                 found.insert(0, cls.members[_INITIALISERS[0]])
             cls = cls.base
         return found
-
-
-def default_number(defaults: StructInit | None) -> int:
-    """The class number among the initial values of a block; 0 for none."""
-    number = defaults.members.get(CLASS_NUMBER) if defaults is not None else None
-    return int(number.value) if isinstance(number, ScalarInit) else 0

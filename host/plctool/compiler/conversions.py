@@ -43,6 +43,7 @@ from plctool.compiler.types import (
     InterfaceType,
     Kind,
     PointerType,
+    RawPointerType,
     StringType,
     StructType,
     SubrangeType,
@@ -270,7 +271,22 @@ class Coercion:
                 return replace(e, type=target)
         if isinstance(e.type, PointerType) and isinstance(target, PointerType) and same_type(e.type, target):
             return replace(e, type=target)
+        if isinstance(e.type, RawPointerType) or isinstance(target, RawPointerType):
+            return self._raw_pointer(e, target)
         return self._mismatch(e, target)
+
+    def _raw_pointer(self, e: Expr, target: Type) -> Expr:
+        """POINTER TO takes any address; a number becomes one and the other way round."""
+        if isinstance(e.type, RawPointerType) and isinstance(target, RawPointerType):
+            if not isinstance(e, AddressOf):
+                self._warn(e.pos, "pointer", f"{e.type} becomes {target}: it points to something else")
+            return replace(e, type=target)
+        number = elementary(e.type if isinstance(target, PointerType) else target)
+        if number is None or number.kind not in NUMBERS:
+            return self._mismatch(e, target)
+        if number.bits < 64:
+            self._warn(e.pos, "narrowing", f"a pointer has 64 bits, {number} {number.bits}; use LWORD")
+        return convert(e, target)
 
     def _to_interface(self, e: Expr, target: InterfaceType) -> Expr:
         """The address of an instance, or what another interface variable holds."""
@@ -366,6 +382,8 @@ def common_type(a: Type, b: Type) -> Type | None:
         return a
     if isinstance(a, StringType) and isinstance(b, StringType):
         return None if a.wide is not b.wide else a if a.length >= b.length else b
+    if isinstance(a, RawPointerType) and isinstance(b, RawPointerType):
+        return a
     if isinstance(a, PointerType) and isinstance(b, PointerType):
         both = isinstance(a, InterfaceType) and isinstance(b, InterfaceType)
         return b if a is NULL_TYPE else a if b is NULL_TYPE or both or same_type(a, b) else None

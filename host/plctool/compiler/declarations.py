@@ -91,6 +91,7 @@ class Declarations:
         self._depth = 0
         self.open_allowed = False  # whether the type being read may be ARRAY[*]
         self._direct: dict[str, VarSymbol] = {}
+        self._structs: dict[str, StructType] = {}
 
     # ---- types ----
 
@@ -284,17 +285,18 @@ class Declarations:
         symbol = scope.unit(spec.target.name) if isinstance(spec.target, ast.NamedType) else None
         if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
             target: Type = self.world.units.layout(symbol) or ERROR  # the block itself may hold the pointer
+        elif isinstance(symbol, TypeSymbol) and symbol.busy and symbol.decl.name in self._structs:
+            target = self._structs[symbol.decl.name]  # and so may a struct
         else:
             target, _ = self.type_of(spec.target, scope)
         if target is ERROR:
             return ERROR
-        return ReferenceType(target) if spec.keyword == "REFERENCE" else PointerType(target)
+        kinds = {"REFERENCE": ReferenceType, "POINTER": RawPointerType}
+        return kinds.get(spec.keyword, PointerType)(target)
 
     def _struct(self, spec: ast.StructSpec, scope: Scope, name: str) -> tuple[Type, Initial | None]:
-        if spec.union:
-            scope.error(spec.pos, "unsupported", "UNION is not supported yet")
-            return ERROR, None
-        t, defaults, seen = StructType(name), dict[str, Initial](), set[str]()
+        t, defaults, seen = StructType(name, union=spec.union), dict[str, Initial](), set[str]()
+        self._structs[name] = t
         for decl in spec.fields:
             field_type, default = self.declared_type(decl, scope)
             self.world.classes.require_instances(field_type, scope, decl.pos)
@@ -306,7 +308,7 @@ class Declarations:
                     continue
                 seen.add(field_name.casefold())
                 t.fields.append(Field(field_name, field_type))
-                if default is not None:
+                if default is not None and not (spec.union and defaults):  # of a union the first one counts
                     defaults[field_name] = default
         if any(f.type is ERROR for f in t.fields):
             return ERROR, None

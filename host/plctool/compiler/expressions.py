@@ -358,9 +358,12 @@ class Expressions:
     def _block_member(self, base: Expr, members: dict[str, VarSymbol], node: ast.Member) -> Expr:
         symbol = members.get(node.name.casefold())
         if symbol is None:
-            names = (m.name for m in members.values() if m.role in (Role.INPUT, Role.OUTPUT))
-            hint = did_you_mean(node.name, names)
-            return self.error(node.name_pos, "unknown", f"{base.type} has no variable {node.name}{hint}")
+            names = [m.name for m in members.values() if m.role in (Role.INPUT, Role.OUTPUT)]
+            cls = self.world.classes.class_of(base.type)
+            methods = cls.member_names() if cls is not None else []
+            hint = did_you_mean(node.name, names + methods)
+            what = "variable or method" if methods else "variable"
+            return self.error(node.name_pos, "unknown", f"{base.type} has no {what} {node.name}{hint}")
         symbol.used = True
         if symbol.role is Role.IN_OUT:
             return self.error(node.name_pos, "access", f"{symbol.name} is a VAR_IN_OUT; it can only be given in a call")

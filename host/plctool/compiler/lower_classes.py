@@ -1,5 +1,5 @@
 """Calls whose target depends on the class of the instance: one small function each, that looks at the class number and
-goes on to the right method. Only direct calls result, so LLVM can inline them and the image needs no table of addresses.
+goes on to the right method. Only direct calls result: LLVM can inline them, and the image needs no table of addresses.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ CLASS_NUMBER = "%class"
 
 
 def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
-    """The function `name`, which has the parameters of its targets. An instance of none of the classes is a wrong pointer.
-    """
+    """The function `name`, which has the parameters of its targets. What is an instance of none of the classes was reached
+    through a wrong pointer."""
     pou = dispatch.function
     result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
     fn = Function()
@@ -31,11 +31,11 @@ def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
     by_symbol: dict[str, list[int]] = {}
     for number, target in dispatch.targets.items():
         by_symbol.setdefault(unit.symbol(target), []).append(number)
-    number = fn.value(f"load i32, ptr %self, align 4{unit.tag(CLASS_NUMBER)}")
+    loaded = fn.value(f"load i32, ptr %self, align 4{unit.tag(CLASS_NUMBER)}")
     labels = {symbol: fn.label("class") for symbol in by_symbol}
     unknown = fn.label("unknown")
     cases = " ".join(f"i32 {n}, label %{labels[s]}" for s, numbers in by_symbol.items() for n in numbers)
-    fn.terminate(f"switch i32 {number}, label %{unknown} [ {cases} ]")
+    fn.terminate(f"switch i32 {loaded}, label %{unknown} [ {cases} ]")
     for symbol, label in labels.items():
         fn.begin_detached(label)
         if result == "void":
@@ -57,8 +57,8 @@ def _arguments(parameters: str) -> str:
 
 
 def renumber(frame: Initialising, ref: Ref) -> None:
-    """Writes the class numbers of all instances in a variable that keeps its other values: a new program may have numbered
-    its classes anew."""
+    """Writes the class numbers of all instances in a variable that keeps its other values: a new program may have
+    numbered its classes anew."""
     t = ref.type
     if isinstance(t, ArrayType):
         if has_number(frame.unit, t.element):

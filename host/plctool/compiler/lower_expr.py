@@ -44,7 +44,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.types import UDINT, ArrayType, StringType, StructType, Type, is_scalar
+from plctool.compiler.types import DINT, UDINT, ArrayType, StringType, StructType, Type, is_scalar
 
 _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 PLACES = (VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, SelfPlace)
@@ -85,6 +85,8 @@ class Expressions(Strings):
         if isinstance(place, MemberPlace):
             base = self.ref(place.base)
             tag = ""
+            if isinstance(base.type, StructType) and base.type.union:  # its members overlap, and so do their parts
+                return replace(base.member(place.offset, place.type), direct=False)
             if base.direct and isinstance(base.type, StructType) and (base.tag or base.pointer == "%self"):
                 tag = self.unit.tag((base.type.root.name, place.offset))
             return base.member(place.offset, place.type, tag)
@@ -130,6 +132,8 @@ class Expressions(Strings):
             return self._character(base, place)
         assert isinstance(base.type, ArrayType)
         element = base.type.element
+        if place.limits is not None:
+            return self.element(base, self._open_index(place, place.limits), element, counted=False)
         constant_part, dynamic, counted = 0, "", True
         for expr, (low, high) in zip(place.indices, base.type.bounds, strict=True):
             count = high - low + 1
@@ -145,6 +149,21 @@ class Expressions(Strings):
             dynamic = part if not dynamic else self.fn.value(f"add {self._pointer_int} {dynamic}, {part}")
         base = base.member(constant_part * element.size, element, base.tag)
         return self.element(base, dynamic, element, counted=counted) if dynamic else base
+
+    def _open_index(self, place: IndexPlace, limits: list[tuple[Expr, Expr]]) -> str:
+        """The number of an element of an ARRAY[*] as a pointer-sized integer. It is worked out in 64 bits, where nothing
+        wraps."""
+        fn, number = self.fn, "0"
+        for expr, (low_bound, high_bound) in zip(place.indices, limits, strict=True):
+            low, high = (self._resize(self.value(e), DINT, 64) for e in (low_bound, high_bound))
+            relative = fn.value(f"sub i64 {self._resize(self.value(expr), expr.type, 64)}, {low}")
+            last = fn.value(f"sub i64 {high}, {low}")
+            if Check.BOUNDS in self.checks:
+                self.require(fn.value(f"icmp ule i64 {relative}, {last}"), ARRAY_BOUNDS, place.pos)
+            if number != "0":
+                number = fn.value(f"mul i64 {number}, {fn.value(f'add i64 {last}, 1')}")
+            number = relative if number == "0" else fn.value(f"add i64 {number}, {relative}")
+        return number if self._pointer_int == "i64" else fn.value(f"trunc i64 {number} to {self._pointer_int}")
 
     def _subscript(self, expr: Expr, low: int, high: int, pos: Pos) -> tuple[str, bool]:
         """An index counted from 0 as a pointer-sized integer, and whether it is known to be within the bounds."""
@@ -392,7 +411,8 @@ class Expressions(Strings):
             arguments += [f"{text} {operand}" for text, operand in zip(types, operands, strict=True)]
         value = self._call_instruction(pou, e.dispatch, arguments)
         for temporary, place in write_back:
-            self.store(place, self.load(temporary))
+            wanted = temporary.type if place.bit >= 0 else place.type
+            self.store(place, self.convert(self.load(temporary), temporary.type, wanted))
         return value
 
     def _result_capacity(self, pou: Pou, result: Ref) -> str:
@@ -441,9 +461,10 @@ class Expressions(Strings):
             ref = self.ref(argument)
             if parameter.direction is Direction.INPUT and is_scalar(t) and not parameter.by_reference:
                 return [self.load(ref)]
-            if ref.bit >= 0:  # bits have no address
-                temporary = self.temporary(t)
-                self.store(temporary, self.load(ref))
+            if ref.bit >= 0 or (is_scalar(t) and value_type(t) != value_type(ref.type)):
+                temporary = self.temporary(t)  # bits have no address; outputs may become a number of another width
+                if parameter.direction is not Direction.OUTPUT:
+                    self.store(temporary, self.load(ref))
                 write_back.append((temporary, ref))
                 ref = temporary
         return [self.address(ref), ref.capacity] if isinstance(t, StringType) else [self.address(ref)]

@@ -36,13 +36,15 @@ def encode_scalar(value: int | float | str, t: Type) -> bytes:
 
 
 def struct_members(unit: Unit, t: StructType, initial: Initial | None) -> Iterator[tuple[Field, Initial | None]]:
-    """Every member with the value it gets: the one given, else the default of the struct type, else None."""
+    """Every member with the value it gets: the one given, else the default of the struct type, else None. Of a union those
+    with a value."""
     values: dict[str, Initial] = {}
     for source in (unit.defaults.get(t.name), initial):
         if isinstance(source, StructInit):
             values.update((name.casefold(), value) for name, value in source.members.items())
     for f in t.fields:
-        yield f, values.get(f.name.casefold())
+        if not t.union or f.name.casefold() in values:
+            yield f, values.get(f.name.casefold())
 
 
 def array_runs(t: ArrayType, initial: Initial | None) -> Iterator[tuple[int, Initial | None]]:

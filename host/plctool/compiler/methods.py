@@ -147,8 +147,8 @@ class ObjectCalls(Calls):
         return Bound(cls, key, place)
 
     def bound_member(self, node: ast.Expr, *, called: bool = False) -> Bound | None:
-        """What `m`, `fb.m` or `prog.m` stands for when it is a method, action or property. `called`: the name of the method
-        that it stands in is not its result."""
+        """What `m`, `fb.m` or `prog.m` stands for when it is a method, action or property. `called`: the name of the
+        method around is not its result."""
         if isinstance(node, ast.Name):
             symbol = self.scope.lookup(node.name)
             if called and isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT:
@@ -212,8 +212,6 @@ class ObjectCalls(Calls):
             symbol = self.scope.unit(dotted) if dotted is not None else None
             if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION":
                 return self._call_function(symbol, node, expected)
-            if isinstance(node.callee, ast.Member):
-                self._unknown_method(node.callee)
             return super().call(node, expected)
         args, enable = self.split_enable(node)
         offset = node.callee.name_pos if isinstance(node.callee, ast.Member) else node.pos
@@ -225,21 +223,6 @@ class ObjectCalls(Calls):
         if member is None:
             return error_value(self.pos(node.pos))
         return self._member_call(bound, member, args, node.pos, offset)
-
-    def _unknown_method(self, node: ast.Member) -> None:
-        """`fb.m()` where the block has no m at all."""
-        if isinstance(node.base, ast.Name) and not isinstance(
-            self.scope.lookup(node.base.name), VarSymbol | GlobalSymbol
-        ):
-            return
-        if self._dotted(node) is not None and self.scope.lookup(self._dotted(node) or "") is not None:
-            return
-        base = self.expr(node.base)
-        cls = self.world.classes.class_of(base.type)
-        if cls is None or cls.block is None or node.name.casefold() in cls.block.members:
-            return
-        hint = did_you_mean(node.name, [*cls.member_names(), *(m.name for m in cls.block.members.values())])
-        self.error(node.name_pos, "unknown", f"{cls.name} has no variable or method {node.name}{hint}")
 
     def _member_call(
         self, bound: Bound, member: Member, args: list[ast.Argument], offset: int, name_offset: int
@@ -303,10 +286,10 @@ class ObjectCalls(Calls):
         if bound is None or bound.cls.find(bound.key) is not None:
             return None
         get = bound.cls.find(f"{bound.key}.get")
-        if bound.cls.find(f"{bound.key}.set") is None and get is not None:
-            if isinstance(self.world.classes.signature(get).result, ReferenceType):
-                return None  # what it refers to is assigned
-        return bound
+        if get is None or bound.cls.find(f"{bound.key}.set") is not None:
+            return bound
+        refers = isinstance(self.world.classes.signature(get).result, ReferenceType)
+        return None if refers else bound  # what it refers to is assigned
 
     def assign_property(self, bound: Bound, target: ast.Expr, source: ast.Expr, pos: Pos) -> Statement | None:
         """Calls the SET of a property."""

@@ -88,10 +88,11 @@ static void raise_with_everything_clobbered(void *arg)
 {
     RTS_UNUSED(arg);
 #ifdef __ARM_FP
-    __asm__ volatile("vmov.f32 s16, #1.0\n\tvmov.f32 s20, #2.0\n\tvmov.f32 s31, #3.0\n\tvmov.f32 s1, #4.0" ::: "memory");
+    __asm__ volatile("vmov.f32 s16, #1.0\n\tvmov.f32 s20, #2.0\n\tvmov.f32 s31, #3.0\n\t"
+                     "vmov.f32 s1, #4.0" ::: "memory");
 #endif
-    __asm__ volatile("movs r4, #99\n\tmov r5, r4\n\tmov r6, r4\n\tmov r8, r4\n\tmov r9, r4\n\tmov r10, r4\n\tmov r11, r4\n\t"
-                     "udf #2");
+    __asm__ volatile("movs r4, #99\n\tmov r5, r4\n\tmov r6, r4\n\tmov r8, r4\n\tmov r9, r4\n\tmov r10, r4\n\t"
+                     "mov r11, r4\n\tudf #2");
 }
 
 static void __attribute__((noinline)) recurse(volatile RTS_UI32 *above)
@@ -330,7 +331,8 @@ static void keep_registers_busy(void *arg)
                          "mov r4, #40\n\tmov r5, #50\n\tmov r6, #60\n\tmov r8, #80\n\tmov r9, #90\n\tmov r10, #100\n\t"
                          "mov r11, #110\n\tmov r12, #120\n\tmov r3, #30\n\t"
 #ifdef __ARM_FP
-                         "vmov s0, r4\n\tvmov s1, r5\n\tvmov s15, r6\n\tvmov s16, r8\n\tvmov s20, r9\n\tvmov s31, r10\n\t"
+                         "vmov s0, r4\n\tvmov s1, r5\n\tvmov s15, r6\n\tvmov s16, r8\n\tvmov s20, r9\n\t"
+                         "vmov s31, r10\n\t"
 #endif
                          "mov r2, #1000\n\t1: subs r2, #1\n\tbne 1b\n\t"
                          "cmp r4, #40\n\tit ne\n\taddne %0, #1\n\tcmp r5, #50\n\tit ne\n\taddne %0, #1\n\t"

@@ -1,5 +1,6 @@
 /*
- * test_flash.c - the NOR rules of the board's flash driver, and what surrounds it: random numbers, identity, reset cause.
+ * test_flash.c - the NOR rules of the board's flash driver, and what surrounds it: random numbers, identity, reset
+ * cause.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

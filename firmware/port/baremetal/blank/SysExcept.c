@@ -6,9 +6,9 @@
 #include "SysExcept.h"
 
 /*
- * Write here: remember where to come back to, call fn, and fill *exception when a fault, SysExceptRaise or SysExceptBreak left
- * it. The fault handlers redirect the interrupted program to that place. All registers that a function must keep
- * have to be as before: the task that was interrupted below needs its own.
+ * Write here: remember where to come back to, call fn, and fill *exception when a fault, SysExceptRaise or
+ * SysExceptBreak left it. The fault handlers redirect the interrupted program to that place. All registers that a
+ * function must keep have to be as before: the task that was interrupted below needs its own.
  */
 int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
@@ -27,8 +27,8 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address)
         ;
 }
 
-/* Write here: make the SysExceptTry that runs in `context` leave as soon as that context goes on. We run above it. And let an
- * interrupt above all tasks call SchedWatchdogCheck every millisecond, else nothing ends an endless loop. */
+/* Write here: make the SysExceptTry that runs in `context` leave as soon as that context goes on. We run above it. And
+ * let an interrupt above all tasks call SchedWatchdogCheck every millisecond, else nothing ends an endless loop. */
 void SysExceptBreak(uintptr_t context, RTS_UI32 code)
 {
     RTS_UNUSED(context);

@@ -7,8 +7,8 @@
 
 #include "CompactDownload.h"
 
-/* Write here: your vendor id in the high half of `id` with the device in the low one (plctool must know that pair as a target),
- * and the serial number of this very device, from its fuses or its factory sector. */
+/* Write here: your vendor id in the high half of `id` with the device in the low one (plctool must know that pair as a
+ * target), and the serial number of this very device, from its fuses or its factory sector. */
 const SYS_TARGET *SysTargetGet(void)
 {
     static const SYS_TARGET target = {
@@ -23,8 +23,8 @@ const SYS_TARGET *SysTargetGet(void)
     return &target;
 }
 
-/* Write here: the chip's random generator, or a pool that is stirred by the times of interrupts. Session ids come from it, so
- * they can be guessed when it can. */
+/* Write here: the chip's random generator, or a pool that is stirred by the times of interrupts. Session ids come from
+ * it, so they can be guessed when it can. */
 RTS_UI32 SysTargetRandom(void)
 {
     static RTS_UI32 last = 1;

@@ -6,9 +6,10 @@
 #include "SysTime.h"
 
 /*
- * Write here: a counter that never goes back, in ns. A hardware counter of 32 bits or less is extended by the interrupt of its
- * overflow; read both halves again when the upper one changed meanwhile, and count an overflow that is pending (see
- * cortexm/SysTime.c). Called from every context, several times per task cycle: below 1 us, and without a 64-bit division.
+ * Write here: a counter that never goes back, in ns. A hardware counter of 32 bits or less is extended by the interrupt
+ * of its overflow; read both halves again when the upper one changed meanwhile, and count an overflow that is pending
+ * (see cortexm/SysTime.c). Called from every context, several times per task cycle: below 1 us, and without a 64-bit
+ * division.
  */
 RTS_I64 SysTimeGetNs(void)
 {

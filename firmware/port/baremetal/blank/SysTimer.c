@@ -6,8 +6,9 @@
 #include "SysTimer.h"
 
 /*
- * Write here: take a free timer, keep callback, parameter, interval and priority. Timers of a better priority interrupt those of
- * a worse one. With fewer hardware timers than tasks, one alarm for the earliest due time is enough (see cortexm/SysTimer.c).
+ * Write here: take a free timer, keep callback, parameter, interval and priority. Timers of a better priority interrupt
+ * those of a worse one. With fewer hardware timers than tasks, one alarm for the earliest due time is enough (see
+ * cortexm/SysTimer.c).
  */
 RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
                           RTS_HANDLE *timer)
@@ -20,8 +21,8 @@ RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 int
     return ERR_NOTIMPLEMENTED;
 }
 
-/* Write here: the first call is due now, the n-th at start + n * interval exactly; due times that pass during a callback are
- * skipped and counted. */
+/* Write here: the first call is due now, the n-th at start + n * interval exactly; due times that pass during a
+ * callback are skipped and counted. */
 RTS_RESULT SysTimerStart(RTS_HANDLE timer)
 {
     RTS_UNUSED(timer);

@@ -4,8 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * On a small controller start with the values of port/baremetal/configs/standard/rts_config_size.h. When compiled code
- * is entered in a special way (the import table in a register, the Thumb bit), APP_CALL_ENTRY says how: on Cortex-M include
- * port/baremetal/cortexm/rts_config_cortexm.h.
+ * is entered in a special way (the import table in a register, the Thumb bit), APP_CALL_ENTRY says how: on Cortex-M
+ * include port/baremetal/cortexm/rts_config_cortexm.h.
  */
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H

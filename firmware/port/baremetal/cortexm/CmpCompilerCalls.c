@@ -3,10 +3,10 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Names and meanings are those of the GNU compiler runtime, from which they come. Floating point values travel in core registers,
- * also on cores with an FPU: those are the calls the base procedure call standard has. Three components, so that a
- * device takes only what its applications need: CmpIntCalls (LINT), CmpRealCalls (REAL), CmpLrealCalls (LREAL). The signature
- * of each is the CRC-32 of its interface text, e.g. __addsf3(REAL,REAL):REAL.
+ * Names and meanings are those of the GNU compiler runtime, from which they come. Floating point values travel in core
+ * registers, also on cores with an FPU: those are the calls the base procedure call standard has. Three components, so
+ * that a device takes only what its applications need: CmpIntCalls (LINT), CmpRealCalls (REAL), CmpLrealCalls (LREAL).
+ * The signature of each is the CRC-32 of its interface text, e.g. __addsf3(REAL,REAL):REAL.
  */
 #include "CmpCompilerCalls.h"
 

@@ -1,5 +1,6 @@
 /*
- * CodeInPlace.c - application code runs where it lies in flash: no RAM, no copy. The usual choice; the other is CodeInRam.c.
+ * CodeInPlace.c - application code runs where it lies in flash: no RAM, no copy. The usual choice; the other is
+ * CodeInRam.c.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

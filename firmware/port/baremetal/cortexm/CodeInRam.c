@@ -1,5 +1,6 @@
 /*
- * CodeInRam.c - application code is copied to RAM: for a flash that cannot be mapped, is slow, or stops while it is erased.
+ * CodeInRam.c - application code is copied to RAM: for a flash that cannot be mapped, is slow, or stops while it is
+ * erased.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -3,11 +3,11 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Gives SysTime (SysTick), SysTimer (task interrupts), SysExcept (faults, MPU guards), start-up and reset cause. A board adds
- * board.h (constants, see below), its vectors, and the Board* functions.
+ * Gives SysTime (SysTick), SysTimer (task interrupts), SysExcept (faults, MPU guards), start-up and reset cause. A
+ * board adds board.h (constants, see below), its vectors, and the Board* functions.
  *
- * Priorities, highest first: level 0 faults and SVC; level 1 clock, alarm and board interrupts (short, never foreign code);
- * from level 2 one level per timer, so that tasks pre-empt each other; thread mode: the communication loop.
+ * Priorities, highest first: level 0 faults and SVC; level 1 clock, alarm and board interrupts (short, never foreign
+ * code); from level 2 one level per timer, so that tasks pre-empt each other; thread mode: the communication loop.
  */
 #ifndef CORTEXM_H
 #define CORTEXM_H
@@ -21,7 +21,7 @@
  *   BOARD_CLOCK_HZ       clock of core and SysTick, a multiple of 1000, at least 4 MHz
  *   BOARD_IRQ_COUNT      interrupt lines of the chip
  *   BOARD_PRIORITY_BITS  priority bits of the NVIC, 3 or more
- *   BOARD_TASK_IRQ       first of SYSTIMER_COUNT lines in a row that no peripheral in use drives: software triggers them
+ * BOARD_TASK_IRQ       first of SYSTIMER_COUNT lines in a row that no peripheral in use drives: software triggers them
  *   BOARD_VECTORS        initialisers [IRQ_VECTOR(n)] = {handler} for its peripherals, each followed by a comma
  */
 
@@ -126,8 +126,8 @@ void SysExceptInit(void);
 /* To be called by the board's alarm interrupt after it has silenced its timer. */
 void SysTimerAlarm(void);
 
-/* Where the code of the running application lies, as SysFlashMapCode gave it: so that a fault that lost its program counter
- * can be traced back to the code. */
+/* Where the code of the running application lies, as SysFlashMapCode gave it: so that a fault that lost its program
+ * counter can be traced back to the code. */
 void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size);
 
 /* Bytes of the main stack that were never used. */
@@ -156,11 +156,12 @@ void ResetNow(RESET_CAUSE cause, RTS_UI32 pc) __attribute__((noreturn));
 /* Clocks, pins, peripherals. Interrupts are still masked. */
 void BoardInit(void);
 
-/* One call of SysTimerAlarm in `ns` (at most 10^9) from now, in place of the one asked for before; a little late is fine, early
- * too. With interrupts masked. */
+/* One call of SysTimerAlarm in `ns` (at most 10^9) from now, in place of the one asked for before; a little late is
+ * fine, early too. With interrupts masked. */
 void BoardAlarmSet(RTS_UI32 ns);
 
-/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Never stopped. */
+/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Never stopped.
+ * */
 void BoardWatchdogStart(RTS_UI32 ms);
 void BoardWatchdogKick(void);
 

@@ -3,10 +3,11 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * SysExceptTry is called in handler mode (a timer's interrupt) or in main, both on the main stack. It enters the function
- * by SVC in *thread mode on the process stack*, at the priority of the interrupt it came from (CCR.NONBASETHRDENA), and leaves it
- * by another SVC. So whatever goes wrong in it, the frames of faults and interrupts that need to be trusted lie on the
- * main stack, and leaving is the same exception return for a normal end, a checked error, a fault, and a broken loop:
+ * SysExceptTry is called in handler mode (a timer's interrupt) or in main, both on the main stack. It enters the
+ * function by SVC in *thread mode on the process stack*, at the priority of the interrupt it came from
+ * (CCR.NONBASETHRDENA), and leaves it by another SVC. So whatever goes wrong in it, the frames of faults and interrupts
+ * that need to be trusted lie on the main stack, and leaving is the same exception return for a normal end, a checked
+ * error, a fault, and a broken loop:
  *
  *   main stack:    ... interrupt | SysExceptTry | frame of the SVC that entered      <- leaving returns to it
  *   process stack: slot of this nesting depth, with a guard of the MPU below
@@ -124,7 +125,8 @@ void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size)
 
 /* ---- entering and leaving ---- */
 
-/* The function given to SysExceptTry returned. A store that is still on its way and fails is to fail before we leave. */
+/* The function given to SysExceptTry returned. A store that is still on its way and fails is to fail before we leave.
+ * */
 __attribute__((naked)) static void try_return(void)
 {
     __asm__ volatile("dsb\n\tisb\n\tmovs r0, #0\n\tsvc 0");
@@ -180,8 +182,8 @@ static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
     return (RTS_UI32)EXC_RETURN_THREAD_PSP;
 }
 
-/* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return, because
- * try_enter used the FPU, so that the frame returned to has one too. */
+/* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return,
+ * because try_enter used the FPU, so that the frame returned to has one too. */
 static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address)
 {
     TRY *try = --state.top;

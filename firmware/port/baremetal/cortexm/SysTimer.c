@@ -3,9 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * One hardware timer of the board is the alarm for the earliest due time. When it fires, each timer that is due gets its own
- * interrupt line set pending by software, and runs at its own NVIC level: any number of timers from one hardware timer, and
- * due times that never drift. Rank is by priority, among equals by order of creation.
+ * One hardware timer of the board is the alarm for the earliest due time. When it fires, each timer that is due gets
+ * its own interrupt line set pending by software, and runs at its own NVIC level: any number of timers from one
+ * hardware timer, and due times that never drift. Rank is by priority, among equals by order of creation.
  */
 #include "SysTimer.h"
 

@@ -13,7 +13,8 @@ enum { MAIN_WATCHDOG_MS = 20000 };
 
 static void log_reset_cause(void)
 {
-    static const char *const names[] = {"power on", "reset pin", "software", "fault of the runtime", "hardware watchdog"};
+    static const char *const names[] = {"power on", "reset pin", "software", "fault of the runtime",
+                                        "hardware watchdog"};
     const RESET_RECORD *record = ResetGet();
     if (record->cause < RESET_FATAL)
         LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);
@@ -22,8 +23,8 @@ static void log_reset_cause(void)
                (unsigned)record->pc, (unsigned)record->status);
 }
 
-/* Sleeps until the next interrupt, unless one has brought work since the loop looked. A pending interrupt ends the sleep
- * although it is masked, so none is missed between the question and the sleep. */
+/* Sleeps until the next interrupt, unless one has brought work since the loop looked. A pending interrupt ends the
+ * sleep although it is masked, so none is missed between the question and the sleep. */
 static void idle(void)
 {
     RTS_UI32 mask = CpuMask();

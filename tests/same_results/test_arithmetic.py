@@ -1,0 +1,117 @@
+"""Every operator and conversion on values at the edges of every numeric type gives the same bits on every target."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+from batch import Recorder, Recording, run_batch
+from comparison import differences
+from runners import RUNNERS, Runner
+
+from plctool.compiler.front import check_sources
+from plctool.compiler.source import Source
+
+SIGNED = {"SINT": 8, "INT": 16, "DINT": 32, "LINT": 64}
+UNSIGNED = {"USINT": 8, "UINT": 16, "UDINT": 32, "ULINT": 64}
+BITS = {"BYTE": 8, "WORD": 16, "DWORD": 32, "LWORD": 64}
+REALS = {
+    "REAL": "0.0, -0.0, 1.0, -1.5, 2.5, 3.5, 0.1, 3.4E38, -1.2E-38, 1.0E-45, 16777217.0, -2147483648.0, 4294967040.0, 9.3E18",
+    "LREAL": "0.0, -0.0, 1.0, -1.5, 2.5, 3.5, 0.1, 1.7E308, -2.3E-308, 4.9E-324, 9007199254740993.0, 3.4028236E38, "
+    "4294967295.5, 1.8446744073709552E19",
+}
+NUMBERS = [*SIGNED, *UNSIGNED, *REALS]
+COUNT = 14  # values of each type
+SQUARE = COUNT * COUNT
+
+
+def values(type_name: str) -> str:
+    """COUNT values of a type as initial values of an array, the extremes among them."""
+    if type_name in REALS:
+        return REALS[type_name]
+    if type_name in SIGNED:
+        top = 1 << (SIGNED[type_name] - 1)
+        numbers = [0, 1, -1, 2, -2, 3, -7, 10, 100, top - 1, -top, top - 2, 1 - top, top // 3]
+    else:
+        top = 1 << (UNSIGNED | BITS)[type_name]
+        numbers = [0, 1, 2, 3, 7, 10, 100, top - 1, top - 2, top // 2, top // 2 - 1, top // 2 + 1, top // 3, top // 5]
+    return ", ".join(map(str, numbers))
+
+
+def program(name: str, variables: list[str], body: list[str]) -> str:
+    """A program in ST over indices i and j."""
+    lines = [f"PROGRAM {name}", "VAR", "i, j : DINT;", *variables, "END_VAR", *body, "END_PROGRAM"]
+    return "\n".join(lines)
+
+
+def arithmetic(type_name: str) -> str:
+    """+ - * / MOD and comparisons of all pairs."""
+    operators = {"add": "+", "sub": "-", "mul": "*", "div": "/"} | ({} if type_name in REALS else {"rem": "MOD"})
+    comparisons = {"eq": "=", "ne": "<>", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+    variables = [f"v : ARRAY[0..{COUNT - 1}] OF {type_name} := [{values(type_name)}];"]
+    variables += [f"r_{name} : ARRAY[0..{SQUARE - 1}] OF {type_name};" for name in operators]
+    variables += [f"c_{name} : ARRAY[0..{SQUARE - 1}] OF BOOL;" for name in comparisons]
+    pairs = []
+    for name, operator in operators.items():
+        line = f"r_{name}[i * {COUNT} + j] := v[i] {operator} v[j];"
+        pairs.append(f"IF v[j] <> 0 THEN {line} END_IF;" if name in ("div", "rem") and type_name not in REALS else line)
+    pairs += [f"c_{name}[i * {COUNT} + j] := v[i] {operator} v[j];" for name, operator in comparisons.items()]
+    last = COUNT - 1
+    body = [f"FOR i := 0 TO {last} DO", f"FOR j := 0 TO {last} DO", *pairs, "END_FOR;", "END_FOR;"]
+    return program("Main", variables, body)
+
+
+def conversions(source: str) -> str:
+    """To every other numeric type, and to text; REALs too by truncation and square root."""
+    targets = [name for name in NUMBERS if name != source]
+    variables = [f"v : ARRAY[0..{COUNT - 1}] OF {source} := [{values(source)}];"]
+    variables += [f"r_{name} : ARRAY[0..{COUNT - 1}] OF {name};" for name in targets]
+    variables.append(f"text : ARRAY[0..{COUNT - 1}] OF STRING[40];")
+    body = [f"r_{name}[i] := {source}_TO_{name}(v[i]);" for name in targets]
+    body.append(f"text[i] := {source}_TO_STRING(v[i]);")
+    if source in REALS:
+        variables.append(f"root : ARRAY[0..{COUNT - 1}] OF {source};")
+        variables.append(f"whole : ARRAY[0..{COUNT - 1}] OF DINT;")
+        body += ["root[i] := SQRT(v[i]);", "whole[i] := TRUNC(v[i]);"]
+    return program("Main", variables, [f"FOR i := 0 TO {COUNT - 1} DO", *body, "END_FOR;"])
+
+
+def bits(type_name: str) -> str:
+    """Shifts and rotations by every count up to beyond the width, and the bitwise operators."""
+    counts = BITS[type_name] + 3
+    size = COUNT * counts - 1
+    shifts, operators = ("SHL", "SHR", "ROL", "ROR"), ("AND", "OR", "XOR")
+    variables = [f"v : ARRAY[0..{COUNT - 1}] OF {type_name} := [{values(type_name)}];"]
+    variables += [f"r_{name} : ARRAY[0..{size}] OF {type_name};" for name in shifts]
+    variables += [f"o_{name} : ARRAY[0..{SQUARE - 1}] OF {type_name};" for name in operators]
+    body = [f"FOR i := 0 TO {COUNT - 1} DO", f"FOR j := 0 TO {counts - 1} DO"]
+    body += [f"r_{name}[i * {counts} + j] := {name}(v[i], j);" for name in shifts]
+    body += ["END_FOR;", f"FOR j := 0 TO {COUNT - 1} DO"]
+    body += [f"o_{name}[i * {COUNT} + j] := v[i] {name} NOT v[j];" for name in operators]
+    return program("Main", variables, [*body, "END_FOR;", "END_FOR;"])
+
+
+@cache
+def recordings() -> list[Recording]:
+    texts = {f"arithmetic {name}": arithmetic(name) for name in NUMBERS}
+    texts |= {f"conversions {name}": conversions(name) for name in NUMBERS}
+    texts |= {f"bits {name}": bits(name) for name in BITS}
+    found = []
+    for name, text in texts.items():
+        checked = check_sources([Source(f"{name}.st", text)])
+        assert checked.program, checked.diagnostics
+        recording = Recording(name, checked.program)
+        with Recorder(recording) as plc:
+            plc.run_cycles(1)
+        assert recording.states[0].exception is None
+        found.append(recording)
+    return found
+
+
+@pytest.mark.parametrize("runner", RUNNERS.values(), ids=lambda r: r.target)
+def test_edges_give_the_same_bits(runner: Runner, tmp_path: Path) -> None:
+    runner.skip_without_tools()
+    results = run_batch(runner, recordings(), tmp_path)
+    wrong = [text for r, states in zip(recordings(), results, strict=True) for text in differences(r, states)]
+    assert not wrong, "\n".join(wrong)

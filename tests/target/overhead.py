@@ -1,0 +1,108 @@
+"""What the runtime costs on a Cortex-M, in instructions, which repeat exactly: a task cycle, a variable read.
+
+    overhead.py mps2-an385 build-cm3/firmware/port/baremetal/firmware-standard.elf
+
+Counted by a plugin of QEMU on the running firmware. The program's own instructions are in it: one addition per cycle.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parents[1] / "host"), str(HERE.parents[1] / "build" / "host")]
+
+from elftools.elf.elffile import ELFFile  # noqa: E402
+from programs import Built, compile_text, program  # noqa: E402
+from qemu import Board  # noqa: E402
+
+from plctool.device import Plc  # noqa: E402
+from plctool.link.connection import Connection  # noqa: E402
+from plctool.symbols import symbol_path  # noqa: E402
+
+TARGETS = {"mps2-an385": "cortex-m3", "mps2-an386": "cortex-m4f"}
+VARIABLES = 11
+ENOUGH = 200  # counts
+PATIENCE = 30.0  # [s]
+
+Range = tuple[int, int]
+
+
+class Firmware:
+    """A firmware file and its functions by name."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with path.open("rb") as file:
+            symbols = ELFFile(file).get_section_by_name(".symtab").iter_symbols()
+            found = [(s.name, s["st_value"] & ~1, s["st_size"]) for s in symbols if s["st_info"]["type"] == "STT_FUNC"]
+        self.functions: dict[str, Range] = {name: (start, start + size) for name, start, size in found}
+
+
+class Counter:
+    """Counts on a board that has `built` in its flash already."""
+
+    def __init__(self, machine: str, firmware: Firmware, built: Built, folder: Path) -> None:
+        self.board = Board(machine, firmware.path, folder)
+        self.firmware, self.built, self.folder = firmware, built, folder
+        with self.board, Plc(Connection(self.board.line())) as plc:
+            plc.flash(built.path)
+        self.plugin = folder / "count.so"
+        compiler = shutil.which("cc") or "gcc"
+        subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", self.plugin, HERE / "count.c"], check=True)
+
+    def count(self, start: str, end: Range, work: Callable[[Plc], None] = lambda plc: time.sleep(0.05)) -> int:
+        """The usual number of instructions from function `start` to the range `end`, while `work` is repeated."""
+        out = self.folder / "counts"
+        out.unlink(missing_ok=True)
+        begin, _ = self.firmware.functions[start]
+        plugin = f"file={self.plugin},start={begin:#x},lo={end[0]:#x},hi={end[1]:#x},out={out}"
+        self.board.power_on(plugin=plugin)
+        give_up = time.monotonic() + PATIENCE
+        counts: dict[int, int] = {}
+        with Plc(Connection(self.board.line()), symbol_path(self.built.path)) as plc:
+            while sum(counts.values()) < ENOUGH:
+                work(plc)
+                if out.exists():
+                    lines = (line.split() for line in out.read_text().splitlines())
+                    counts = {int(number): int(times) for number, times in lines}
+                if time.monotonic() > give_up:
+                    raise SystemExit(f"{start} was not seen often enough: {counts}")
+        self.board.power_off()
+        return max(counts, key=lambda number: counts[number])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("machine", choices=TARGETS)
+    parser.add_argument("firmware", type=Path)
+    args = parser.parse_args()
+    firmware = Firmware(args.firmware.resolve())
+    names = [f"v{i}" for i in range(VARIABLES)]
+    text = program(f"VAR {', '.join(names)} : DINT; END_VAR", "v0 := v0 + 1;")
+    full_names = [f"Main.{name}" for name in names]
+    with tempfile.TemporaryDirectory() as folder:
+        built = compile_text(text, TARGETS[args.machine], Path(folder), checks="none")
+        counter = Counter(args.machine, firmware, built, Path(folder))
+        main_loop, enter = firmware.functions["main"], firmware.functions["IecCall"]
+        cycle = counter.count("AlarmIrq", main_loop)
+        until_program = counter.count("AlarmIrq", (enter[0], enter[0] + 2))
+        caller = firmware.functions["ChannelHandlePackage"]
+        one = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names[:1]) and None)
+        more = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names) and None)
+    print(f"{args.machine}: instructions of the runtime")
+    print(f"{cycle:6}  a task cycle: from the alarm's interrupt back to the main loop")
+    print(f"{until_program:6}    of it until the program begins: clock, switch, statistics")
+    print(f"{one:6}  a request that reads one variable")
+    print(f"{(more - one) / (VARIABLES - 1):6.0f}  each further variable")
+
+
+if __name__ == "__main__":
+    main()
