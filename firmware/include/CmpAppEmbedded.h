@@ -63,9 +63,9 @@ typedef struct {
     APP_EXCEPTION exception;
 } APP_STATUS;
 
-enum { APP_REFUSAL_SIZE = 64 + 6 * APP_MAX_IMPORTS };
+enum { APP_REFUSAL_SIZE = APP_REFUSAL_TEXT_SIZE };
 
-/* Why a download was refused: `text` is a sentence, cut to fit. It grows with the functions that may be missing. */
+/* Why a download was refused: `text` is a sentence, cut to fit. */
 typedef struct {
     RTS_RESULT result;
     char text[APP_REFUSAL_SIZE];

@@ -27,8 +27,14 @@ typedef struct {
     char text[LOG_TEXT_SIZE];
 } LOG_ENTRY;
 
-/* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. */
-void LogAdd(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...);
+/* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. Without log its
+ * arguments are not evaluated, and the texts take no flash. */
+#define LogAdd(...)                                                                                                    \
+    do {                                                                                                               \
+        if (LOG_MAX_ENTRIES > 0)                                                                                       \
+            LogAddEntry(__VA_ARGS__);                                                                                  \
+    } while (0)
+void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...);
 
 /* Copies the first entry with a handle >= `handle`. ERR_END_OF_OBJECT when there is none. */
 RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry);

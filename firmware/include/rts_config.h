@@ -21,7 +21,13 @@
 #define APP_MAX_IMPORTS 32
 #endif
 
-/* RAM of each area in bytes. */
+/* Longest sentence that says why an image was refused, with NUL: bytes on the main stack. It names the functions that are
+ * missing. 1: no sentences, only codes, which saves 2 KiB of flash. */
+#ifndef APP_REFUSAL_TEXT_SIZE
+#define APP_REFUSAL_TEXT_SIZE (64 + 6 * APP_MAX_IMPORTS)
+#endif
+
+/* RAM of each area in bytes. The retain area may have none: then nothing of CmpRetain is in use. */
 #ifndef APP_DATA_SIZE
 #define APP_DATA_SIZE 4096
 #endif
@@ -128,7 +134,7 @@
 #define NS_REPLY_SIZE 444
 #endif
 
-/* Entries of the log ring; each about 100 bytes with its text. */
+/* Entries of the log ring; each about 100 bytes with its text. 0: no log, whose texts take 3 KiB of flash. */
 #ifndef LOG_MAX_ENTRIES
 #define LOG_MAX_ENTRIES 16
 #endif

@@ -26,3 +26,11 @@ def read_image(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise UsageError(f"The image {path} cannot be read: {error.strerror}.", "no-image") from None
+
+
+def make_folder(path: Path) -> None:
+    """Makes a folder and those it lies in, unless they are there."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"The folder {path} cannot be made: {error.strerror}.", "cannot-write") from None

@@ -64,7 +64,7 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
     from plctool.compiler import CompileError, load_sources
     from plctool.compiler.export_itf import export_interface as export
     from plctool.compiler.front import check_sources
-    from plctool.files import write_atomically
+    from plctool.files import make_folder, write_atomically
 
     sources = load_sources(paths)
     program = check_sources(sources)
@@ -77,6 +77,7 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
         )
     interface = export(paths[0].resolve().stem, functions)
     header, source = folder / interface.header_name, folder / interface.source_name
+    make_folder(folder)
     write_atomically(header, interface.header.encode("latin-1", "replace"))
     written = force or not source.exists()
     if written:

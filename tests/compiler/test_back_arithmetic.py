@@ -40,7 +40,7 @@ INTEGERS = [SINT, INT, DINT, LINT, USINT, UINT, UDINT, ULINT]
 BITS = [BYTE, WORD, DWORD, LWORD]
 DIVIDEBYZERO = 0x102
 NO_DIV = ALL_CHECKS - {Check.DIV}
-few = settings(max_examples=60, deadline=None)
+few = settings(max_examples=30, deadline=None)
 
 
 def wrap(value: int, t: Elementary) -> int:
@@ -228,7 +228,7 @@ def test_bool_conversions() -> None:
 def test_reals_to_integers_round_and_saturate(source: Elementary, target: Elementary, how: str) -> None:
     low, high = limits(target)
 
-    @settings(max_examples=80, deadline=None)
+    @settings(max_examples=40, deadline=None)
     @given(reals)
     def check(a: float) -> None:
         got = evaluate(how, (source,), target, a)

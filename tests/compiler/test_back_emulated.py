@@ -13,7 +13,7 @@ from test_back_random import Generator, meaningful, outcome
 
 from plctool.image import parse_image
 
-SEEDS = range(100, 130)
+SEEDS = range(100, 116)
 HARNESS = Path(__file__).with_name("emulate.c")
 ARM = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb"]
 SYSTEMS = {

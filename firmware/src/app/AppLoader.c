@@ -28,16 +28,25 @@ typedef RTS_RESULT (*CHECK)(LOADER *l);
 
 #define U(value) ((unsigned)(value))
 
-static RTS_RESULT refuse(LOADER *l, RTS_RESULT result, const char *format, ...)
+static RTS_RESULT set_result(LOADER *l, RTS_RESULT result)
+{
+    l->refusal->result = result;
+    return result;
+}
+
+static RTS_RESULT explain(LOADER *l, RTS_RESULT result, const char *format, ...)
 {
     va_list arguments;
 
     va_start(arguments, format);
     CMUtlvsnprintf(l->refusal->text, sizeof l->refusal->text, format, arguments);
     va_end(arguments);
-    l->refusal->result = result;
-    return result;
+    return set_result(l, result);
 }
+
+/* A macro, so that sentences nobody would see take no flash. */
+#define refuse(l, result, ...)                                                                                         \
+    (APP_REFUSAL_TEXT_SIZE > 1 ? explain(l, result, __VA_ARGS__) : set_result(l, result))
 
 static RTS_RESULT read_image(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 size)
 {
@@ -253,12 +262,12 @@ static RTS_RESULT check_functions(LOADER *l)
  * Reads the NUL-terminated name at `offset` of a table that ends at `end`. *next: where the next entry starts. False when
  * it is empty, not terminated, too long or not plain text.
  */
-static bool read_name(LOADER *l, RTS_UI32 offset, RTS_UI32 end, char name[APP_NAME_SIZE], RTS_UI32 *next)
+static bool read_name(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 end, char name[APP_NAME_SIZE], RTS_UI32 *next)
 {
     RTS_UI32 length;
 
     for (length = 0; length < APP_NAME_SIZE && offset + length < end; length++) {
-        if (read_image(l, offset + length, &name[length], 1) != ERR_OK)
+        if (SysFileRead(file, offset + length, &name[length], 1) != ERR_OK)
             return false;
         if (name[length] == '\0') {
             *next = align4(offset + length + 1);
@@ -271,7 +280,7 @@ static bool read_name(LOADER *l, RTS_UI32 offset, RTS_UI32 end, char name[APP_NA
 }
 
 /* What is wrong with an import, as words for the refusal; NULL when nothing is. */
-static const char *find_import(const EXT_REF_INFO *ref, const char *name, RTS_PFN *function, RTS_RESULT *result)
+static const char *find_import(const EXT_REF_INFO *ref, const char *name, RTS_RESULT *result)
 {
     const CMP_EXT_FUNCTION *found = CMFindExternal(name);
 
@@ -287,7 +296,6 @@ static const char *find_import(const EXT_REF_INFO *ref, const char *name, RTS_PF
         *result = ERR_APP_VERSION_MISMATCH;
         return "other version";
     }
-    *function = found->function;
     return NULL;
 }
 
@@ -298,8 +306,8 @@ static void add_unresolved(LOADER *l, const char *name, const char *problem, RTS
     RTS_SIZE length = strlen(refusal->text);
 
     if (refusal->result == ERR_OK)
-        refuse(l, result, "External functions this device lacks: %s (%s)", name, problem);
-    else
+        (void)refuse(l, result, "External functions this device lacks: %s (%s)", name, problem);
+    else if (APP_REFUSAL_TEXT_SIZE > 1)
         CMUtlsnprintf(refusal->text + length, sizeof refusal->text - length, ", %s (%s)", name, problem);
     LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "External function %s: %s", name, problem);
 }
@@ -320,12 +328,12 @@ static RTS_RESULT check_import(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
     result = read_image(l, *offset, &ref, EXT_REF_INFO_SIZE);
     if (result != ERR_OK)
         return result;
-    if (!read_name(l, *offset + EXT_REF_INFO_SIZE, end, name, offset))
+    if (!read_name(l->image->file, *offset + EXT_REF_INFO_SIZE, end, name, offset))
         return refuse(l, ERR_PARAMETER, "Name of external function %u is empty, too long or not terminated.", U(index));
     if (ref.area != APP_AREA_NONE || ref.offset != index * sizeof(RTS_PFN))
         return refuse(l, ERR_INVALID_REFERENCE, "External function %s is not in import slot %u.",
                       name, U(index));
-    problem = find_import(&ref, name, &l->image->imports[index], &result);
+    problem = find_import(&ref, name, &result);
     if (problem != NULL)
         add_unresolved(l, name, problem, result);
     l->image->import_count++;
@@ -338,6 +346,7 @@ static RTS_RESULT check_imports(LOADER *l)
     RTS_UI32 end = table->offset + table->size;
     RTS_UI32 offset = table->offset;
 
+    l->image->imports = offset;
     while (table->size > 0 && offset < end) {
         RTS_RESULT result = check_import(l, &offset, end);
         if (result != ERR_OK)
@@ -361,7 +370,7 @@ static RTS_RESULT check_iec_functions(LOADER *l)
         result = read_image(l, offset, &info, sizeof info);
         if (result != ERR_OK)
             return result;
-        if (!read_name(l, offset + (RTS_UI32)sizeof info, end, name, &offset))
+        if (!read_name(l->image->file, offset + (RTS_UI32)sizeof info, end, name, &offset))
             return refuse(l, ERR_PARAMETER, "Name in the IEC function table is bad.");
         if (!is_code(l, info.area, info.offset))
             return refuse(l, ERR_INVALID_REFERENCE, "IEC function %s lies outside the code.", name);
@@ -443,6 +452,7 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
 
 static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
 {
+    CDL_TASK task;
     RTS_RESULT result = ERR_OK;
 
     if (l->image->task_count != 0)
@@ -452,13 +462,13 @@ static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
     if (size / sizeof(CDL_TASK) > APP_MAX_TASKS)
         return refuse(l, ERR_NOMEMORY, "The application has %u tasks, this device can run %u.",
                       U(size / sizeof(CDL_TASK)), U(APP_MAX_TASKS));
-    for (; size > 0 && result == ERR_OK; size -= (RTS_UI32)sizeof(CDL_TASK)) {
-        CDL_TASK *task = &l->image->tasks[l->image->task_count];
-        result = read_image(l, offset, task, sizeof *task);
+    l->image->tasks = offset;
+    for (; size > 0 && result == ERR_OK; size -= (RTS_UI32)sizeof task) {
+        result = read_image(l, offset, &task, sizeof task);
         if (result == ERR_OK)
-            result = check_task(l, task);
+            result = check_task(l, &task);
         l->image->task_count++;
-        offset += (RTS_UI32)sizeof *task;
+        offset += (RTS_UI32)sizeof task;
     }
     return result;
 }
@@ -528,4 +538,21 @@ RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE 
     for (i = 0; i < RTS_COUNT(checks) && result == ERR_OK; i++)
         result = checks[i](&l);
     return result;
+}
+
+RTS_RESULT AppLoaderRead(const APP_IMAGE *image, APP_TABLES *tables)
+{
+    RTS_UI32 offset = image->imports;
+    char name[APP_NAME_SIZE];
+    RTS_UI32 i;
+
+    for (i = 0; i < image->import_count; i++) {
+        const CMP_EXT_FUNCTION *found = NULL;
+        if (read_name(image->file, offset + EXT_REF_INFO_SIZE, image->size, name, &offset))
+            found = CMFindExternal(name);
+        if (found == NULL)
+            return ERR_DEVICE;
+        tables->imports[i] = found->function;
+    }
+    return SysFileRead(image->file, image->tasks, tables->tasks, image->task_count * (RTS_UI32)sizeof(CDL_TASK));
 }

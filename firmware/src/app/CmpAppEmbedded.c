@@ -32,7 +32,7 @@ enum { STARTS_WITHOUT_PROOF = 2, STARTS_WITHOUT_FALLBACK = 10 };
 #define NO_CODE_OFFSET 0xFFFFFFFFu
 
 /* The RAM areas, 8-aligned for the largest IEC type. */
-#define AREA_WORDS(size) (((size) + sizeof(RTS_I64) - 1) / sizeof(RTS_I64))
+#define AREA_WORDS(size) (((size) + sizeof(RTS_I64) - 1) / sizeof(RTS_I64) + ((size) == 0))
 static RTS_I64 data_area[AREA_WORDS(APP_DATA_SIZE)];
 static RTS_I64 retain_area[AREA_WORDS(APP_RETAIN_SIZE)];
 static RTS_I64 input_area[AREA_WORDS(APP_INPUT_SIZE)];
@@ -51,6 +51,7 @@ static struct {
     RTS_UI32 slot;  /* of the loaded application */
     const RTS_UI8 *code;
     APP_IMAGE image;
+    APP_TABLES tables;
     IEC_CONTEXT context; /* what every task starts from */
     RTS_I64 run_since_ns;
     APP_EXCEPTION exception;
@@ -121,7 +122,7 @@ void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)
 static void record_exception(RTS_I32 task, RTS_UI32 code, uintptr_t address)
 {
     uintptr_t offset = address - (uintptr_t)app.code;
-    const char *where = task < 0 ? "Initialisation" : app.image.tasks[task].name;
+    const char *where = task < 0 ? "Initialisation" : app.tables.tasks[task].name;
 
     app.exception.task = task;
     app.exception.code = code;
@@ -209,7 +210,7 @@ static void set_context(void)
     app.context.area[APP_AREA_OUTPUT] = (RTS_UI8 *)output_area;
     app.context.area[APP_AREA_MEMORY] = (RTS_UI8 *)memory_area;
     app.context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)app.code;
-    app.context.imports = app.image.imports;
+    app.context.imports = app.tables.imports;
 }
 
 static void zero_areas(bool retain_too)
@@ -231,7 +232,7 @@ static RTS_RESULT initialise(bool init_retains)
     zero_areas(init_retains);
     set_context();
     app.state = AS_STOP;
-    result = IecTaskCreateAll(app.image.tasks, app.image.task_count, &app.context);
+    result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK)
         return result;
     if (!run_function(CDL_FUNCTION_CODE_INIT, false, 0) ||
@@ -284,7 +285,9 @@ static RTS_RESULT load(RTS_UI32 slot, const APP_IMAGE *image, const RTS_UI8 *cod
     restored = RetainRestore(retain_after, retain_until);
     if (restored != ERR_OK && retain_until != retain_after)
         LogAdd(CMPID_CmpRetain, LOG_WARNING, restored, "No saved retain variables fit the application: initial values");
-    result = initialise(restored != ERR_OK);
+    result = AppLoaderRead(image, &app.tables);
+    if (result == ERR_OK)
+        result = initialise(restored != ERR_OK);
     if (result != ERR_OK)
         unload();
     return result;
@@ -445,13 +448,15 @@ void AppDownloadAbort(void)
     app.download.open = false;
 }
 
-static RTS_RESULT refuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *text)
+static RTS_RESULT explain(APP_REFUSAL *refusal, RTS_RESULT result, const char *text)
 {
-    memset(refusal, 0, sizeof *refusal);
     refusal->result = result;
     CMUtlsnprintf(refusal->text, sizeof refusal->text, "%s", text);
     return result;
 }
+
+/* A macro, so that sentences nobody would see take no flash. */
+#define refuse(refusal, result, text) explain(refusal, result, APP_REFUSAL_TEXT_SIZE > 1 ? (text) : "")
 
 /* Makes the image of the download what boots from now on. */
 static RTS_RESULT commit_download(const DOWNLOAD *download)

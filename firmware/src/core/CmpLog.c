@@ -15,15 +15,17 @@
 #include "SysAtomic.h"
 #include "SysTime.h"
 
+enum { PLACES = LOG_MAX_ENTRIES > 0 ? LOG_MAX_ENTRIES : 1 };
+
 static struct {
     RTS_UI32 count; /* entries ever added */
-    LOG_ENTRY ring[LOG_MAX_ENTRIES];
+    LOG_ENTRY ring[PLACES];
 } logger;
 
-void LogAdd(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...)
+void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...)
 {
     RTS_UI32 handle = SysAtomicAdd(&logger.count, 1) + 1;
-    LOG_ENTRY *entry = &logger.ring[handle % LOG_MAX_ENTRIES];
+    LOG_ENTRY *entry = &logger.ring[handle % PLACES];
     va_list arguments;
 
     SysAtomicStore(&entry->handle, 0);
@@ -41,7 +43,7 @@ void LogAdd(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *
 /* Copies entry `handle` when its place still holds it. */
 static bool copy_entry(RTS_UI32 handle, LOG_ENTRY *entry)
 {
-    const LOG_ENTRY *place = &logger.ring[handle % LOG_MAX_ENTRIES];
+    const LOG_ENTRY *place = &logger.ring[handle % PLACES];
 
     if (SysAtomicLoad(&place->handle) != handle)
         return false;
@@ -55,8 +57,8 @@ RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry)
 {
     RTS_UI32 last = SysAtomicLoad(&logger.count);
 
-    if (last > LOG_MAX_ENTRIES && handle <= last - LOG_MAX_ENTRIES)
-        handle = last - LOG_MAX_ENTRIES + 1;
+    if (last > PLACES && handle <= last - PLACES)
+        handle = last - PLACES + 1;
     if (handle == 0)
         handle = 1;
     for (; handle <= last; handle++) {

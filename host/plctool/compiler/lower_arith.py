@@ -249,7 +249,3 @@ class Arithmetic(Frame):
 def known_integer(e: object) -> int | None:
     """The value of a constant integer expression."""
     return e.value if isinstance(e, Const) and isinstance(e.value, int) else None
-
-
-def is_pointer(t: Type) -> bool:
-    return isinstance(t, PointerType)
