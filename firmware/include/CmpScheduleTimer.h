@@ -4,7 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A cyclic task runs in the context of its own SysTimer. Event tasks (rising edge of their BOOL), external event tasks and
- * freewheeling tasks run in main, in CH_COMM_CYCLE, in the order of their priority.
+ * freewheeling tasks run in main, in CH_COMM_CYCLE, in the order of their priority. With CmpScheduleEmbedded.c in place of
+ * CmpScheduleTimer.c cyclic tasks do so too: the super loop of a device without a timer to spare.
  */
 #ifndef CMPSCHEDULETIMER_H
 #define CMPSCHEDULETIMER_H

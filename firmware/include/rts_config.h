@@ -128,6 +128,16 @@
 #define SRV_MAX_GROUPS 8
 #endif
 
+/* Services that only tell about the application (its name and list, its tasks) and the echo service; 1 KiB of flash. 0: none. */
+#ifndef SRV_INFORMATION
+#define SRV_INFORMATION 1
+#endif
+
+/* Whether scans in the older versions of the name service are answered too; 150 bytes of flash. */
+#ifndef NS_OLD_VERSIONS
+#define NS_OLD_VERSIONS 1
+#endif
+
 /* Largest name service reply, bytes on the stack of main while a scan is answered; names that do not fit are cut. The
  * protocol allows 444. */
 #ifndef NS_REPLY_SIZE

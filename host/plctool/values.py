@@ -145,8 +145,8 @@ def parse_time(text: str, t: Type = ELEMENTARY["TIME"]) -> int:
 
 
 def parse_date(text: str, t: Type) -> int:
-    """A date or time of day such as 'D#2024-02-29', '12:30:15.5' or 'LDT#2024-02-29-12:30:15', in the unit of `t`. Raises
-    UsageError."""
+    """A date or time of day such as 'D#2024-02-29', '12:30:15.5' or 'LDT#2024-02-29-12:30:15', in the unit of `t`.
+    Raises UsageError."""
     name = base_of(t).name
     kind = name.removeprefix("L")
     body = text.strip().rpartition("#")[2].replace("_", "")

@@ -88,7 +88,7 @@ const char *CMGetComponentName(RTS_UI32 id)
     return id == CMPID_CmpAppEmbedded ? "CmpAppEmbedded" : "";
 }
 
-void LogAdd(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...)
+void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...)
 {
     RTS_UNUSED(component);
     RTS_UNUSED(log_class);

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import random
 from functools import cache
 from pathlib import Path
 
@@ -17,26 +19,78 @@ SIGNED = {"SINT": 8, "INT": 16, "DINT": 32, "LINT": 64}
 UNSIGNED = {"USINT": 8, "UINT": 16, "UDINT": 32, "ULINT": 64}
 BITS = {"BYTE": 8, "WORD": 16, "DWORD": 32, "LWORD": 64}
 REALS = {
-    "REAL": "0.0, -0.0, 1.0, -1.5, 2.5, 3.5, 0.1, 3.4E38, -1.2E-38, 1.0E-45, 16777217.0, -2147483648.0, 4294967040.0, 9.3E18",
-    "LREAL": "0.0, -0.0, 1.0, -1.5, 2.5, 3.5, 0.1, 1.7E308, -2.3E-308, 4.9E-324, 9007199254740993.0, 3.4028236E38, "
-    "4294967295.5, 1.8446744073709552E19",
+    "REAL": [0.0, -0.0, 1.0, -1.5, 2.5, 3.5, 0.1, 3.4e38, -1.2e-38, 1.0e-45, 16777217.0, -2147483648.0, 4294967040.0],
+    "LREAL": [
+        0.0,
+        -0.0,
+        1.0,
+        -1.5,
+        2.5,
+        3.5,
+        0.1,
+        1.7e308,
+        -2.3e-308,
+        4.9e-324,
+        9007199254740993.0,
+        4294967295.5,
+        1.8446744073709552e19,
+    ],
 }
+MANTISSA_BITS = {"REAL": 24, "LREAL": 53}
 NUMBERS = [*SIGNED, *UNSIGNED, *REALS]
-COUNT = 14  # values of each type
+COUNT = 48  # values of each type
 SQUARE = COUNT * COUNT
 
 
+def real_values(type_name: str) -> list[float]:
+    """The extremes, then runs of ones and zeros at all distances, which is where rounding goes wrong."""
+    rng = random.Random(type_name)
+    width = MANTISSA_BITS[type_name]
+    numbers = list(REALS[type_name])
+    while len(numbers) < COUNT:
+        mantissa = 1 << (width - 1) | ((1 << rng.randrange(width)) - 1) << rng.randrange(width) & ((1 << width) - 1)
+        numbers.append(math.ldexp(mantissa * rng.choice((1, -1)), rng.randrange(-width, width) - width))
+    return numbers
+
+
+def integer_values(type_name: str) -> list[int]:
+    """The extremes, then numbers of every length."""
+    rng = random.Random(type_name)
+    signed = type_name in SIGNED
+    width = (SIGNED | UNSIGNED | BITS)[type_name]
+    low, high = (-(1 << (width - 1)), (1 << (width - 1)) - 1) if signed else (0, (1 << width) - 1)
+    numbers = [
+        0,
+        1,
+        2,
+        3,
+        7,
+        10,
+        100,
+        low,
+        low + 1,
+        high,
+        high - 1,
+        high // 2,
+        high // 2 + 1,
+        high // 3,
+        *([-1, -2, -7] * signed),
+    ]
+    while len(numbers) < COUNT:
+        number = rng.getrandbits(rng.randrange(1, width + 1))
+        numbers.append(number if number <= high else number - (1 << width))
+    return numbers
+
+
+def literal(value: float) -> str:
+    text = repr(value)
+    return text if "." in text or isinstance(value, int) else text.replace("e", ".0e")
+
+
 def values(type_name: str) -> str:
-    """COUNT values of a type as initial values of an array, the extremes among them."""
-    if type_name in REALS:
-        return REALS[type_name]
-    if type_name in SIGNED:
-        top = 1 << (SIGNED[type_name] - 1)
-        numbers = [0, 1, -1, 2, -2, 3, -7, 10, 100, top - 1, -top, top - 2, 1 - top, top // 3]
-    else:
-        top = 1 << (UNSIGNED | BITS)[type_name]
-        numbers = [0, 1, 2, 3, 7, 10, 100, top - 1, top - 2, top // 2, top // 2 - 1, top // 2 + 1, top // 3, top // 5]
-    return ", ".join(map(str, numbers))
+    """COUNT values of a type as initial values of an array."""
+    numbers = real_values(type_name) if type_name in REALS else integer_values(type_name)
+    return ", ".join(map(literal, numbers))
 
 
 def program(name: str, variables: list[str], body: list[str]) -> str:

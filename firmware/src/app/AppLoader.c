@@ -363,7 +363,7 @@ static RTS_RESULT check_iec_functions(LOADER *l)
     char name[APP_NAME_SIZE];
     FUNCTION_INFO info;
 
-    while (table->size > 0 && offset < end) {
+    while (SRV_INFORMATION && table->size > 0 && offset < end) {
         RTS_RESULT result;
         if (end - offset < sizeof info)
             return refuse(l, ERR_SIZE_MISMATCH, "IEC function table ends within an entry.");
@@ -402,7 +402,7 @@ static RTS_RESULT check_info(LOADER *l)
     RTS_UI32 offset = info->offset;
     RTS_UI32 i;
 
-    for (i = 0; i < IMAGE_INFO_COUNT && info->size > 0 && offset < end; i++) {
+    for (i = 0; SRV_INFORMATION && i < IMAGE_INFO_COUNT && info->size > 0 && offset < end; i++) {
         if (!skip_string(l->image->file, &offset, end))
             return refuse(l, ERR_PARAMETER, "Application info %u is not terminated.", U(i));
     }

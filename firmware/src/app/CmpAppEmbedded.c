@@ -63,7 +63,6 @@ static struct {
         uintptr_t address;
     } raised;
     DOWNLOAD download;
-    char info[APP_NAME_SIZE];
 } app;
 
 static void post(RTS_UI32 event)
@@ -276,8 +275,12 @@ static RTS_RESULT load(RTS_UI32 slot, const APP_IMAGE *image, const RTS_UI8 *cod
 {
     RTS_UI32 retain_after = AppCommitGet()->slot[slot].retain_after;
     RTS_RESULT restored;
-    RTS_RESULT result;
+    RTS_RESULT result = AppLoaderRead(image, &app.tables);
 
+    if (result != ERR_OK) {
+        SysFlashReleaseCode(slot);
+        return result;
+    }
     app.slot = slot;
     app.image = *image;
     app.code = code;
@@ -285,9 +288,7 @@ static RTS_RESULT load(RTS_UI32 slot, const APP_IMAGE *image, const RTS_UI8 *cod
     restored = RetainRestore(retain_after, retain_until);
     if (restored != ERR_OK && retain_until != retain_after)
         LogAdd(CMPID_CmpRetain, LOG_WARNING, restored, "No saved retain variables fit the application: initial values");
-    result = AppLoaderRead(image, &app.tables);
-    if (result == ERR_OK)
-        result = initialise(restored != ERR_OK);
+    result = initialise(restored != ERR_OK);
     if (result != ERR_OK)
         unload();
     return result;
@@ -491,9 +492,9 @@ static RTS_RESULT take_over(const DOWNLOAD *download, const APP_IMAGE *image, AP
     unload();
     result = load(download->slot, image, code, AppCommitGet()->slot[download->slot].retain_after);
     post(EVT_DownloadDone);
-    if (result != ERR_OK)
+    if (result == ERR_NOMEMORY)
         return refuse(refusal, result, "The tasks of the application cannot be created: there are not enough timers.");
-    return ERR_OK;
+    return result == ERR_OK ? ERR_OK : refuse(refusal, result, "The flash cannot be read.");
 }
 
 static RTS_RESULT finish_download(APP_REFUSAL *refusal)
@@ -629,10 +630,12 @@ void AppGetStatus(APP_STATUS *status)
 
 const char *AppGetInfo(RTS_UI32 index)
 {
+    static char info[APP_NAME_SIZE]; /* not in `app`: without the service that asks it takes no RAM */
+
     if (!is_loaded() || index >= IMAGE_INFO_COUNT)
         return "";
-    AppLoaderReadInfo(&app.image, index, app.info, sizeof app.info);
-    return app.info;
+    AppLoaderReadInfo(&app.image, index, info, sizeof info);
+    return info;
 }
 
 RTS_UI32 AppGetAreaSize(RTS_UI32 index)

@@ -130,22 +130,38 @@ static RTS_UI32 saturate(RTS_I64 ns)
     return ns > (RTS_I64)0xFFFFFFFF ? 0xFFFFFFFFu : (RTS_UI32)ns;
 }
 
+/* The low half of a quotient. Bit by bit, since the compiler's own division takes 1 KiB on cores that have none. */
+static RTS_UI32 divide(RTS_UI64 dividend, RTS_UI32 divisor, RTS_UI32 *rest)
+{
+    RTS_UI64 part = 0;
+    RTS_UI32 quotient = 0;
+    int bit;
+
+    for (bit = 0; bit < 64; bit++) {
+        part = part << 1 | dividend >> 63;
+        dividend <<= 1;
+        quotient <<= 1;
+        if (part >= divisor) {
+            part -= divisor;
+            quotient |= 1;
+        }
+    }
+    *rest = (RTS_UI32)part;
+    return quotient;
+}
+
 /* Sets the time of the cycle. Milliseconds are counted on, since dividing 64 bits is slow on small cores. */
 static void set_time(TASK *task, RTS_I64 time_ns)
 {
     IEC_CONTEXT *context = &task->context;
-    RTS_I64 sum = time_ns - context->time_ns + task->ms_rest;
-    RTS_UI32 ms;
+    RTS_UI64 sum = (RTS_UI64)(time_ns - context->time_ns) + task->ms_rest;
+    RTS_UI32 ms = (RTS_UI32)sum / NS_PER_MS;
 
     context->time_ns = time_ns;
-    if (sum >= 0 && sum <= (RTS_I64)0xFFFFFFFF) {
-        ms = (RTS_UI32)context->time_ms + (RTS_UI32)sum / NS_PER_MS;
-        task->ms_rest = (RTS_UI32)sum % NS_PER_MS;
-    } else {
-        ms = (RTS_UI32)(time_ns / NS_PER_MS);
-        task->ms_rest = (RTS_UI32)(time_ns % NS_PER_MS);
-    }
-    context->time_ms = (RTS_I32)ms;
+    task->ms_rest = (RTS_UI32)sum % NS_PER_MS;
+    if (sum > 0xFFFFFFFF)
+        ms = divide(sum, NS_PER_MS, &task->ms_rest);
+    context->time_ms = (RTS_I32)((RTS_UI32)context->time_ms + ms);
 }
 
 static void run_entry(void *arg)
@@ -273,6 +289,7 @@ RTS_RESULT IecTaskGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
 {
     const TASK *task;
     RTS_UI64 sum_ns;
+    RTS_UI32 rest;
 
     if (index >= tasks.count)
         return ERR_INVALIDID;
@@ -290,7 +307,7 @@ RTS_RESULT IecTaskGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
     if (info->cycles == 0)
         return ERR_OK;
     info->last_us = task->last_ns / NS_PER_US;
-    info->avg_us = (RTS_UI32)(sum_ns / info->cycles / NS_PER_US);
+    info->avg_us = divide(sum_ns, info->cycles, &rest) / NS_PER_US;
     info->min_us = task->min_ns / NS_PER_US;
     info->max_us = task->max_ns / NS_PER_US;
     info->jitter_us = task->jitter_ns / NS_PER_US;

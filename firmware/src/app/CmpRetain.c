@@ -27,13 +27,14 @@ static struct {
 } retain;
 
 /* What flash holds; it is sized by the application's retain area, as that is. */
-static RTS_UI8 saved_area[APP_RETAIN_SIZE];
+enum { HAS_RETAIN = APP_RETAIN_SIZE > 0 };
+static RTS_UI8 saved_area[HAS_RETAIN ? APP_RETAIN_SIZE : 1];
 
 #define SAVE_NS ((RTS_I64)APP_RETAIN_SAVE_US * 1000)
 
 RTS_UI32 RetainCapacity(void)
 {
-    return FlashLogCapacity(&retain.log);
+    return HAS_RETAIN ? FlashLogCapacity(&retain.log) : 0;
 }
 
 void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout)
@@ -55,6 +56,8 @@ RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until)
     FLASH_LOG_RANGE range = {after, until};
     RTS_RESULT result;
 
+    if (!HAS_RETAIN)
+        return ERR_OK;
     if ((RTS_I32)(after - retain.log.sequence) > 0)
         retain.log.sequence = after; /* the log was lost: what is saved from now on shall count */
     if (retain.size == 0)
@@ -104,7 +107,7 @@ static RTS_RESULT save_copy(void)
 
 RTS_RESULT RetainSave(bool always)
 {
-    if (retain.size == 0 || (is_saved() && !always))
+    if (!HAS_RETAIN || retain.size == 0 || (is_saved() && !always))
         return ERR_OK;
     copy();
     return save_copy();
@@ -145,6 +148,8 @@ static void open_log(void)
 
 RTS_RESULT CmpRetain_Hook(CMP_HOOK hook)
 {
+    if (!HAS_RETAIN)
+        return ERR_OK;
     if (hook == CH_INIT)
         memset(&retain, 0, sizeof retain);
     if (hook == CH_INIT2)

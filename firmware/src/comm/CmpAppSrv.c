@@ -12,6 +12,7 @@
 #include "CmpIecTask.h"
 #include "CmpSrv.h"
 #include "SysExcept.h"
+#include "rts_config.h"
 
 /* The download under way; it outlives channels so that a broken transfer can continue. */
 static struct {
@@ -177,6 +178,7 @@ static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
     return ERR_OK;
 }
 
+#if SRV_INFORMATION
 static RTS_RESULT read_application_list(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     APP_STATUS status;
@@ -246,6 +248,7 @@ static RTS_RESULT read_task_info(SRV_REQUEST *request, BTAG_WRITER *reply)
             write_task(reply, &info);
     return ERR_OK;
 }
+#endif
 
 /* ---- download ---- */
 
@@ -357,7 +360,7 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
     }
     BTagWrite16(reply, TAG_SERVICE_RESULT, result);
     BTagWrite32(reply, TAG_CDL_NEXT, next);
-    if (result != ERR_OK && refusal.text[0] != '\0')
+    if (APP_REFUSAL_TEXT_SIZE > 1 && result != ERR_OK && refusal.text[0] != '\0')
         BTagWriteText(reply, TAG_CDL_REASON, refusal.text, BTagGetRoom(reply) - REASON_OVERHEAD);
     return ERR_OK;
 }
@@ -370,10 +373,12 @@ static const SRV_SERVICE services[] = {
     {SRV_APP_STOP, SRV_NEEDS_LOGIN, stop},
     {SRV_APP_RESET, SRV_NEEDS_LOGIN, reset},
     {SRV_APP_READ_STATUS, SRV_OPEN, read_status},
+    {SRV_APP_DOWNLOAD_COMPACT, SRV_NEEDS_LOGIN, download_compact},
+#if SRV_INFORMATION
     {SRV_APP_READ_APPLICATION_LIST, SRV_OPEN, read_application_list},
     {SRV_APP_READ_APPLICATION_INFO, SRV_OPEN, read_application_info},
-    {SRV_APP_DOWNLOAD_COMPACT, SRV_NEEDS_LOGIN, download_compact},
     {SRV_APP_READ_TASK_INFO, SRV_OPEN, read_task_info},
+#endif
 };
 
 RTS_RESULT CmpAppSrv_Hook(CMP_HOOK hook)

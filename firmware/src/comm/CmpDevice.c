@@ -14,6 +14,7 @@
 #include "CmpChannelServerEmbedded.h"
 #include "CmpSrv.h"
 #include "SysTarget.h"
+#include "rts_config.h"
 
 /* u32 byte length with NUL, UTF-16LE, padding. */
 static void write_wide_text(BTAG_WRITER *reply, RTS_UI32 id, const char *text, RTS_UI32 max)
@@ -113,6 +114,7 @@ static RTS_RESULT logout(SRV_REQUEST *request, BTAG_WRITER *reply)
     return result;
 }
 
+#if SRV_INFORMATION
 static RTS_RESULT echo(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     enum { ECHO_OVERHEAD = 24 }; /* headers of the three elements, result and length */
@@ -139,12 +141,15 @@ static RTS_RESULT echo(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagClose(reply);
     return ERR_OK;
 }
+#endif
 
 static const SRV_SERVICE services[] = {
     {SRV_DEV_GET_TARGET_IDENT, SRV_OPEN, get_target_ident},
     {SRV_DEV_LOGIN, SRV_OPEN, login},
     {SRV_DEV_LOGOUT, SRV_OPEN, logout},
+#if SRV_INFORMATION
     {SRV_DEV_ECHO, SRV_OPEN, echo},
+#endif
     {SRV_DEV_SESSION_CREATE, SRV_OPEN, session_create},
 };
 

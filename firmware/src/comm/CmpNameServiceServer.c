@@ -109,6 +109,8 @@ static RTS_UI16 choose_version(RTS_UI16 wanted)
 {
     if (wanted >= NS_VERSION_0400)
         return NS_VERSION_0400;
+    if (!NS_OLD_VERSIONS)
+        return 0;
     if (wanted == 0x0201) /* bytes swapped by old clients, as the next */
         return NS_VERSION_0102;
     if (wanted >= NS_VERSION_0103)
@@ -141,7 +143,7 @@ static void answer(const ROUTER_PEER *peer, RTS_UI16 version, const RTS_UI8 *req
     BytesPut16(reply, NS_IDENTIFICATION);
     BytesPut16(reply + 2, version);
     memcpy(reply + 4, request_id, 4);
-    if (version == NS_VERSION_0400)
+    if (!NS_OLD_VERSIONS || version == NS_VERSION_0400)
         end = put_0400(reply, target, names, peer->driver->type);
     else if (version == NS_VERSION_0101)
         end = put_0101(reply, target, names);

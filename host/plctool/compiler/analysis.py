@@ -35,8 +35,8 @@ from plctool.compiler.typed import (
 )  # fmt: skip
 
 _NODES = (
-    VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, SelfPlace, Load, Unary, Binary, Convert, IntrinsicCall,
-    AddressOf, Call, Assign, CallStatement, FbCall, If, Case, For, While, Repeat,
+    VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, SelfPlace, Load, Unary, Binary, Convert,
+    IntrinsicCall, AddressOf, Call, Assign, CallStatement, FbCall, If, Case, For, While, Repeat,
 )  # fmt: skip
 
 

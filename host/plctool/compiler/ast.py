@@ -283,11 +283,50 @@ class PouDecl:
     interfaces: list[tuple[int, str]] = field(default_factory=list)  # IMPLEMENTS
     members: list[PouDecl] = field(default_factory=list)
     namespace: Namespace | None = None
+    chart: Chart | None = None  # in place of the body
 
     @property
     def full_name(self) -> str:
         """With the namespace in front."""
         return f"{self.namespace.name}.{self.name}" if self.namespace and self.namespace.name else self.name
+
+
+@dataclass(slots=True, eq=False)
+class StepAction:
+    """`target(qualifier, time, indicators)` in a step: an ACTION or a BOOL variable. `qualifier` in capitals."""
+
+    pos: int
+    target: Expr
+    qualifier: str
+    time: Expr | None
+    indicators: list[Expr]
+
+
+@dataclass(slots=True, eq=False)
+class Step:
+    pos: int
+    name: str
+    initial: bool
+    actions: list[StepAction]
+
+
+@dataclass(slots=True, eq=False)
+class Transition:
+    """`TRANSITION (PRIORITY := priority) FROM sources TO targets := condition`"""
+
+    pos: int
+    priority: int | None
+    sources: list[tuple[int, str]]
+    targets: list[tuple[int, str]]
+    condition: Expr
+
+
+@dataclass(slots=True, eq=False)
+class Chart:
+    """A body that is a Sequential Function Chart; its ACTIONs are members of the unit."""
+
+    steps: list[Step]
+    transitions: list[Transition]
 
 
 @dataclass(slots=True, eq=False)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from plctool.compiler import ast, literals
+from plctool.compiler.builder_chart import read_action, read_priority
 from plctool.compiler.builder_units import Arrangement
 from plctool.compiler.lexer import Report, Token
 from plctool.compiler.source import Source
@@ -172,6 +173,19 @@ class Builder:
     def program(self, keyword: Token, *rest: Any) -> Any:
         return self.function_block(keyword, *rest[:-3], None, None, *rest[-3:])
 
+    # ---- sequential function charts ----
+
+    def step(self, keyword: Token, name: Token, *actions: Any) -> ast.Step:
+        found = [read_action(statement.value, self.report) for statement in actions if statement is not None]
+        return ast.Step(name.pos, name.text, keyword.type == "INITIAL_STEP", _listed(tuple(found)))
+
+    def transition(
+        self, keyword: Token, _name: Any, word: Any, number: Any, sources: Any, targets: Any, condition: Any
+    ) -> ast.Transition:
+        priority = None if word is None else read_priority(word, number, self.report)
+        ends = [[(t.pos, t.text) for t in tokens] for tokens in (sources, targets)]
+        return ast.Transition(keyword.pos, priority, ends[0], ends[1], condition)
+
     # ---- methods, classes, namespaces ----
 
     def class_block(self, keyword: Token, *rest: Any) -> Any:
@@ -188,7 +202,7 @@ class Builder:
         self.units.complete(decl, bases, None, members or [])
         return decl
 
-    parts = members = names = var_blocks
+    parts = members = names = step_names = chart = var_blocks
 
     def method(self, keyword: Token, *rest: Any) -> Any:
         return self.function(keyword, *rest)

@@ -57,19 +57,29 @@ class Arrangement:
         if isinstance(owner, ast.PouDecl) and owner.keyword in _OWNERS:
             owner.members.append(member)
             return
-        what = f"the {member.keyword} {member.name}"
-        self._builder.report(
-            member.pos, "syntax", f"{what} has no FUNCTION_BLOCK or PROGRAM in front that it belongs to"
-        )
+        message = f"the {member.keyword} {member.name} has no FUNCTION_BLOCK or PROGRAM in front of it"
+        self._builder.report(member.pos, "syntax", message)
 
     def complete(self, decl: ast.PouDecl, bases: Any, interfaces: Any, parts: Sequence[Any]) -> None:
         """Adds what a unit extends, implements and holds."""
+        decl.chart, parts = self._chart(decl, parts)
         decl.bases, decl.interfaces = bases or [], interfaces or []
         for part in _flat(parts):
             if isinstance(part, ast.PouDecl):
                 decl.members.append(part)
             else:
                 decl.blocks.append(part)
+
+    def _chart(self, decl: ast.PouDecl, parts: Sequence[Any]) -> tuple[ast.Chart | None, Sequence[Any]]:
+        """The steps and transitions, and the rest."""
+        steps = [p for p in parts if isinstance(p, ast.Step)]
+        transitions = [p for p in parts if isinstance(p, ast.Transition)]
+        if not steps and not transitions:
+            return None, parts
+        if decl.body:
+            message = f"{decl.name} has statements and steps; put the statements into an ACTION"
+            self._builder.report(decl.body[0].pos, "syntax", message)
+        return ast.Chart(steps, transitions), [p for p in parts if not isinstance(p, ast.Step | ast.Transition)]
 
     def property(self, keyword: Token, rest: Sequence[Any]) -> list[ast.PouDecl]:
         """The GET is a method that returns the value, the SET one that takes it as its input, both by the name of the

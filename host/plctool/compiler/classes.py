@@ -191,7 +191,8 @@ class Classes:
         if inherited is not None:
             defaults.update(inherited.members)
         assert info.cls is not None and base.cls is not None
-        info.cls.names.update(base.cls.names)
+        private = {k for k, s in base.cls.names.items() if isinstance(s, VarSymbol) and s.access == "PRIVATE"}
+        info.cls.names.update((k, s) for k, s in base.cls.names.items() if k not in private)
 
     def _add_members(self, cls: ClassInfo) -> None:
         for decl in cls.symbol.decl.members:
@@ -224,10 +225,13 @@ class Classes:
 
     def end_block(self, info: BlockInfo) -> None:
         """The variables of a block are declared: its members see them."""
-        assert info.cls is not None
+        cls = info.cls
+        assert cls is not None
+        inherited = cls.base.block.members if cls.base is not None and cls.base.block is not None else {}
         for key, symbol in info.members.items():
-            if "." not in key:
-                self._see(info.cls, key, symbol)
+            hidden = symbol.access == "PRIVATE" and inherited.get(key) is symbol
+            if "." not in key and not hidden:
+                self._see(cls, key, symbol)
 
     def _see(self, cls: ClassInfo, key: str, symbol: VarSymbol) -> None:
         other = cls.names.get(key)

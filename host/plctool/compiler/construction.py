@@ -1,4 +1,5 @@
-"""FB_Init: every instance gets its call when the application starts, members before the instance that holds them.
+"""What has to run when the application starts: initial values that are addresses, and FB_Init of every instance, first
+of the members, then of the instance that holds them.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -6,13 +7,16 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from plctool.compiler.symbols import Member
 from plctool.compiler.typed import (
     ArrayInit,
+    Assign,
     Call,
     CallStatement,
+    ComputedInit,
     Const,
     Direction,
     Expr,
@@ -27,6 +31,7 @@ from plctool.compiler.typed import (
     Pou,
     PouKind,
     ScalarInit,
+    SelfPlace,
     Statement,
     Storage,
     StructInit,
@@ -69,8 +74,6 @@ class _Construction:
 
     def variable(self, variable: Variable) -> list[Statement]:
         """The calls for a variable and all instances in it."""
-        if not self._needs(variable.type):
-            return []
         return self._place(VarPlace(variable, variable.type, variable.pos), variable.initial, variable.pos)
 
     def _needs(self, t: Type) -> bool:
@@ -81,19 +84,22 @@ class _Construction:
         known = self._needed.get(t)
         if known is None:
             known = bool(self._world.classes.initialisers(t)) or any(self._needs(f.type) for f in t.fields)
+            known = known or _is_computed(self._world.defaults.get(t.name))
             self._needed[t] = known
         return known
 
     def _place(self, place: Place, initial: Initial | None, pos: Pos) -> list[Statement]:
         t = place.type
-        if not self._needs(t):
+        if isinstance(initial, ComputedInit):
+            return [Assign(place, initial.value, pos)]
+        if not self._needs(t) and not _is_computed(initial):
             return []
         if isinstance(t, ArrayType):
             return self._array(place, t, initial, pos)
         assert isinstance(t, StructType)
         values: dict[str, Initial] = {}
         arguments: Mapping[str, Expr] = {}
-        for source in (self._world.defaults.get(t.name), initial):
+        for source in (_moved_initial(self._world.defaults.get(t.name), place), initial):
             if isinstance(source, StructInit):
                 values.update((name.casefold(), value) for name, value in source.members.items())
                 arguments = source.arguments
@@ -149,3 +155,36 @@ class _Construction:
                 args.append(None)
         result = info.result if info.result is not None else BOOL
         return CallStatement(Call(info.pou, args, result, pos, instance=place), pos)
+
+
+def _is_computed(initial: Initial | None) -> bool:
+    """Whether something in an initial value is an address."""
+    if isinstance(initial, StructInit):
+        return any(map(_is_computed, initial.members.values()))
+    if isinstance(initial, ArrayInit):
+        return any(_is_computed(value) for _, value in initial.runs)
+    return isinstance(initial, ComputedInit)
+
+
+def _moved_initial(initial: Initial | None, instance: Place) -> Initial | None:
+    """The default of a function block as it is for one instance: its own members are members of that."""
+    if isinstance(initial, StructInit):
+        moved = {name: _moved_initial(value, instance) for name, value in initial.members.items()}
+        members = {name: value for name, value in moved.items() if value is not None}
+        return StructInit(members, {name: _moved(e, instance) for name, e in initial.arguments.items()})
+    if isinstance(initial, ArrayInit):
+        return ArrayInit([(count, _moved_initial(value, instance)) for count, value in initial.runs])
+    return ComputedInit(_moved(initial.value, instance)) if isinstance(initial, ComputedInit) else initial
+
+
+def _moved(node: Any, instance: Place) -> Any:
+    if isinstance(node, SelfPlace):
+        return instance
+    if isinstance(node, VarPlace):
+        own = node.var.storage is Storage.SELF
+        return MemberPlace(instance, node.var.offset, node.type, node.pos) if own else node
+    if isinstance(node, list):
+        return [_moved(part, instance) for part in node]
+    if isinstance(node, Expr | Place):
+        return replace(node, **{name: _moved(part, instance) for name, part in vars(node).items()})
+    return node

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from plctool.compiler import ast, constants
-from plctool.compiler.analysis import walk
 from plctool.compiler.classes import search_path
 from plctool.compiler.conversions import elementary
 from plctool.compiler.diagnostics import did_you_mean
@@ -22,6 +21,7 @@ from plctool.compiler.typed import (
     Area,
     ArrayInit,
     Assign,
+    ComputedInit,
     Const,
     Expr,
     Initial,
@@ -353,6 +353,8 @@ class Declarations:
         if e.type is ERROR:
             return None
         if not isinstance(e, Const):
+            if isinstance(t, PointerType) and not isinstance(t, ReferenceType):
+                return ComputedInit(e)
             scope.error(node.pos, "constant", "an initial value has to be constant")
             return None
         return ScalarInit(e.value)
@@ -451,10 +453,7 @@ class Declarations:
         for member in reversed(self.world.classes.initialisers(t)):
             for symbol, _ in self.world.classes.signature(member).parameters:
                 if symbol.name.casefold() == name.casefold():
-                    e = self.checker(scope).value(node, symbol.type)
-                    if any(isinstance(n, VarPlace) and n.var.storage is not Storage.AREA for n in walk(e)):
-                        scope.error(node.pos, "constant", "this needs constants and global variables")
-                    arguments[name.casefold()] = e
+                    arguments[name.casefold()] = self.checker(scope).input(node, symbol.type, name)
                     return True
         return False
 
@@ -481,6 +480,8 @@ class Declarations:
         """A constant: scalars and strings are folded, arrays and structs get memory once, however many instances there
         are."""
         pos = scope.pos(offset)
+        if isinstance(init, ComputedInit):
+            scope.error(offset, "constant", f"the value of the constant {name} is not known before the program runs")
         symbol = VarSymbol(name, pos, t, role, constant=True, default=init)
         if is_scalar(t) or isinstance(t, StringType):
             zero: int | float | str = "" if isinstance(t, StringType) else 0.0 if _is_real(t) else 0
@@ -507,6 +508,7 @@ class Declarations:
         if symbol.symbol is not None:
             return symbol.symbol
         scope = self.world.scope(symbol.source)
+        scope.path = search_path(symbol.namespace)
         if symbol.busy:
             scope.error(symbol.pos, "recursion", f"the value of {symbol.name} depends on itself")
             return VarSymbol(symbol.name, scope.pos(symbol.pos), ERROR, Role.GLOBAL)

@@ -365,6 +365,8 @@ class Expressions:
             what = "variable or method" if methods else "variable"
             return self.error(node.name_pos, "unknown", f"{base.type} has no {what} {node.name}{hint}")
         symbol.used = True
+        if symbol.access and not self.may_see(symbol, base.type, node):
+            return error_value(self.pos(node.pos))
         if symbol.role is Role.IN_OUT:
             return self.error(node.name_pos, "access", f"{symbol.name} is a VAR_IN_OUT; it can only be given in a call")
         variable = symbol.variable
@@ -652,6 +654,10 @@ class Expressions:
 
     def _compare(self, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
         left, right = self._match_literals(left, right, None)
+        if isinstance(left.type, InterfaceType) and isinstance(right.type, StructType):
+            right = self.coerce(right, left.type)
+        elif isinstance(right.type, InterfaceType) and isinstance(left.type, StructType):
+            left = self.coerce(left, right.type)
         left, right = character(left, right.type) or left, character(right, left.type) or right
         if is_untyped(left):
             t: Type | None = left.type if left.type is right.type else UNTYPED_REAL
@@ -709,6 +715,10 @@ class Expressions:
         """A call as a value."""
         raise NotImplementedError
 
+    def input(self, node: ast.Expr, t: Type, name: str) -> Expr:
+        """The value of an input."""
+        raise NotImplementedError
+
     def own_name(self, node: ast.Name, symbol: object) -> Expr | None:
         """THIS, SUPER or a property by its bare name."""
         raise NotImplementedError
@@ -723,6 +733,10 @@ class Expressions:
 
     def followed(self, e: Expr) -> Expr:
         """The result of a call, or what it refers to."""
+        raise NotImplementedError
+
+    def may_see(self, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
+        """Whether a variable that is not PUBLIC may be used here; reports it when not."""
         raise NotImplementedError
 
     def _call(self, node: ast.Call, expected: Type | None) -> Expr:

@@ -46,6 +46,7 @@ KEYWORDS = {
         "TRUE",
         "FALSE", "NULL", "NOT", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
         "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET", "ACTION", "NAMESPACE", "USING",
+        "INITIAL_STEP", "STEP", "TRANSITION",
     )},
     **{k: "_" + k for k in (
         "END_TYPE", "END_STRUCT", "END_UNION", "OVERLAP", "OF", "TO", "END_VAR", "AT", "END_FUNCTION",
@@ -53,25 +54,29 @@ KEYWORDS = {
         "END_PROGRAM", "END_CONFIGURATION", "ON", "END_RESOURCE", "WITH", "THEN", "ELSIF", "ELSE", "END_IF", "END_CASE",
         "BY", "DO", "END_FOR", "END_WHILE", "UNTIL", "END_REPEAT", "END_TEST", "END_SETUP", "END_TEARDOWN",
         "EXTENDS", "IMPLEMENTS", "END_CLASS", "END_INTERFACE", "END_METHOD", "END_PROPERTY", "END_GET", "END_SET",
-        "END_ACTION", "END_NAMESPACE",
+        "END_ACTION", "END_NAMESPACE", "END_STEP", "FROM", "END_TRANSITION",
     )},
 }  # fmt: skip
 
 SOFT = frozenset((
     "QUALIFIER", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP", "UNION",
     "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION", "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET",
-    "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS",
+    "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS", "INITIAL_STEP", "STEP", "TRANSITION", "_FROM",
 ))  # fmt: skip
 """Terminals that are names where the grammar has no use for them."""
 
 _OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a parenthesis in place of an operand
 
-OPENING = frozenset(("MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING"))
+OPENING = frozenset((
+    "MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING", "INITIAL_STEP", "STEP",
+    "TRANSITION",
+))  # fmt: skip
 """Terminals that are names where no name follows."""
 
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAME = re.compile(r"\s+[A-Za-z_]")
+_PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
 _QUOTE = re.compile(r"\s*['\"]")
 _COMMENT_MARK = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
@@ -175,6 +180,8 @@ class Lexer:
 def is_followed_by_name(token: Token, text: str) -> bool:
     """Whether MOCK, METHOD ... start something, as in `MOCK pump.valve;`: another name follows, as it never does behind a
     variable of that name."""
+    if token.type == "TRANSITION" and _PRIORITY.match(text, token.end):
+        return True
     return _NAME.match(text, token.end) is not None
 
 

@@ -18,8 +18,8 @@ CLASS_NUMBER = "%class"
 
 
 def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
-    """The function `name`, which has the parameters of its targets. What is an instance of none of the classes was reached
-    through a wrong pointer."""
+    """The function `name`, which has the parameters of its targets. An instance of another class was reached through a
+    wrong pointer."""
     pou = dispatch.function
     result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
     fn = Function()

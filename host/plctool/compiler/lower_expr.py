@@ -37,6 +37,7 @@ from plctool.compiler.typed import (
     Place,
     Pos,
     Pou,
+    PouKind,
     SelfPlace,
     Storage,
     Unary,
@@ -44,7 +45,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.types import DINT, UDINT, ArrayType, StringType, StructType, Type, is_scalar
+from plctool.compiler.types import DINT, UDINT, ArrayType, PointerType, StringType, StructType, Type, is_scalar
 
 _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 PLACES = (VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, SelfPlace)
@@ -81,7 +82,7 @@ class Expressions(Strings):
     def ref(self, place: Place) -> Ref:
         """The address of a place; writes the instructions and checks that it takes."""
         if isinstance(place, VarPlace):
-            return self._variable(place.var)
+            return self._variable(place.var, place.pos)
         if isinstance(place, MemberPlace):
             base = self.ref(place.base)
             tag = ""
@@ -103,7 +104,7 @@ class Expressions(Strings):
             return Ref("%self", 0, place.type, direct=True)
         return self._materialised(place.value)
 
-    def _variable(self, var: Variable) -> Ref:
+    def _variable(self, var: Variable, pos: Pos) -> Ref:
         t = var.type
         if var.storage is Storage.AREA:
             tag = ""
@@ -115,6 +116,8 @@ class Expressions(Strings):
             tag = self.unit.tag((self.pou.instance.root.name, var.offset))
             return Ref("%self", var.offset, t, tag, True, string_capacity(t))
         if var.storage is Storage.REFERENCE and var not in self.locals:
+            if self.pou is not None and self.pou.kind is PouKind.METHOD:
+                return self._unsure_reference(var, pos)
             self.locals[var] = self._stored_reference(var)
         return self.locals[var]
 
@@ -124,6 +127,15 @@ class Expressions(Strings):
         tag = self.unit.tag((self.pou.instance.root.name, var.offset))
         slot = self.fn.prologue(f"getelementptr inbounds i8, ptr %self, {self._pointer_int} {var.offset}")
         pointer = self.fn.prologue(f"load ptr, ptr {slot}{tag}")
+        return Ref(pointer, 0, var.type, capacity=string_capacity(var.type))
+
+    def _unsure_reference(self, var: Variable, pos: Pos) -> Ref:
+        """A VAR_IN_OUT of the block in a method, which may run before the block was called for the first time."""
+        assert self.pou is not None and self.pou.instance is not None
+        tag = self.unit.tag((self.pou.instance.root.name, var.offset))
+        pointer = self.load(Ref("%self", var.offset, PointerType(var.type), tag))
+        if Check.NULL in self.checks:
+            self.require(self.fn.value(f"icmp ne ptr {pointer}, null"), ACCESS_VIOLATION, pos)
         return Ref(pointer, 0, var.type, capacity=string_capacity(var.type))
 
     def _index(self, place: IndexPlace) -> Ref:
@@ -151,8 +163,8 @@ class Expressions(Strings):
         return self.element(base, dynamic, element, counted=counted) if dynamic else base
 
     def _open_index(self, place: IndexPlace, limits: list[tuple[Expr, Expr]]) -> str:
-        """The number of an element of an ARRAY[*] as a pointer-sized integer. It is worked out in 64 bits, where nothing
-        wraps."""
+        """The number of an element of an ARRAY[*] as a pointer-sized integer. It is worked out in 64 bits, where
+        nothing wraps."""
         fn, number = self.fn, "0"
         for expr, (low_bound, high_bound) in zip(place.indices, limits, strict=True):
             low, high = (self._resize(self.value(e), DINT, 64) for e in (low_bound, high_bound))

@@ -36,8 +36,8 @@ def encode_scalar(value: int | float | str, t: Type) -> bytes:
 
 
 def struct_members(unit: Unit, t: StructType, initial: Initial | None) -> Iterator[tuple[Field, Initial | None]]:
-    """Every member with the value it gets: the one given, else the default of the struct type, else None. Of a union those
-    with a value."""
+    """Every member with the value it gets: the one given, else the default of the struct type, else None. Of a union
+    those with a value."""
     values: dict[str, Initial] = {}
     for source in (unit.defaults.get(t.name), initial):
         if isinstance(source, StructInit):

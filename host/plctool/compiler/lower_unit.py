@@ -120,7 +120,7 @@ class Unit:
         return name
 
     def target_of(self, pou: Pou, dispatch: Dispatch | None) -> str:
-        """The symbol that a call of `pou` goes to: when the class decides among several targets, a function that does."""
+        """The symbol that a call of `pou` goes to: of a function that looks at the class when that decides."""
         if dispatch is None:
             return self.symbol(pou)
         targets = set(dispatch.targets.values())

@@ -187,18 +187,31 @@ class ObjectCalls(Calls):
         self.error(offset, "unknown", f"{bound.cls.name} has no method {written}{hint}")
         return None
 
+    def may_see(self, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
+        """Whether a variable that is not PUBLIC may be used here; reports it when not."""
+        cls = self.world.classes.class_of(t)
+        key = symbol.name.casefold()
+        while cls is not None and cls.base is not None and cls.base.block is not None:
+            if cls.base.block.members.get(key) is not symbol:
+                break
+            cls = cls.base
+        return cls is None or self._permitted({symbol.access}, cls, f"{cls.name}.{symbol.name}", node.name_pos)
+
     def _accessible(self, member: Member, offset: int) -> bool:
-        modifiers, owner, here = member.decl.modifiers, member.owner, self.scope.cls
+        return self._permitted(member.decl.modifiers, member.owner, member.name, offset)
+
+    def _permitted(self, modifiers: set[str], owner: ClassInfo, name: str, offset: int) -> bool:
+        here = self.scope.cls
         if "PRIVATE" in modifiers and here is not owner:
-            self.error(offset, "access", f"{member.name} is PRIVATE: only {owner.name} itself may use it")
+            self.error(offset, "access", f"{name} is PRIVATE: only {owner.name} itself may use it")
             return False
         if "PROTECTED" in modifiers and (here is None or not here.derives(owner)):
-            message = f"{member.name} is PROTECTED: only {owner.name} and what extends it may use it"
+            message = f"{name} is PROTECTED: only {owner.name} and what extends it may use it"
             self.error(offset, "access", message)
             return False
         space = owner.symbol.decl.namespace
         if "INTERNAL" in modifiers and space is not None and space.name.casefold() not in self.scope.path:
-            self.error(offset, "access", f"{member.name} is INTERNAL: only the namespace {space.name} may use it")
+            self.error(offset, "access", f"{name} is INTERNAL: only the namespace {space.name} may use it")
             return False
         return True
 

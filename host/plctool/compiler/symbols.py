@@ -65,6 +65,7 @@ class VarSymbol:
     given: bool = False  # has an initial value of its own
     by_reference: bool = False
     used: bool = False
+    access: str = ""  # PRIVATE, PROTECTED or INTERNAL
 
 
 @dataclass(slots=True, eq=False)
@@ -79,6 +80,7 @@ class GlobalSymbol:
     source: Source
     symbol: VarSymbol | None = None
     busy: bool = False
+    namespace: ast.Namespace | None = None
 
 
 @dataclass(slots=True, eq=False)

@@ -26,12 +26,14 @@ _CLOSERS = {
     "CONFIGURATION": "END_CONFIGURATION", "TEST": "END_TEST", "SETUP": "END_SETUP", "TEARDOWN": "END_TEARDOWN",
     "CLASS": "END_CLASS", "INTERFACE": "END_INTERFACE", "METHOD": "END_METHOD", "PROPERTY": "END_PROPERTY",
     "GET": "END_GET", "SET": "END_SET", "ACTION": "END_ACTION", "NAMESPACE": "END_NAMESPACE",
+    "INITIAL_STEP": "END_STEP", "STEP": "END_STEP", "TRANSITION": "END_TRANSITION",
 }  # fmt: skip
 _ENDS = {"_" + end for end in _CLOSERS.values()}
 _UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "GLOBAL", "CONFIGURATION", "TEST", "SETUP", "TEARDOWN"}
 _STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
-_SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL", END}
-_ITEMS = ("stmt", "var_decl", "type_decl", "config_item", "unit")  # what can be left out as a whole
+_CHART = {"INITIAL_STEP", "STEP", "TRANSITION"}
+_SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, *_CHART, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL", END}
+_ITEMS = ("stmt", "var_decl", "type_decl", "config_item", "unit", "expr_stmt", "step")  # what can be left out as a whole
 
 _INSERTIONS = {
     "_SEMI": (";", "expected ; after the {item}"),
@@ -52,8 +54,8 @@ _WORDS = {
 }  # fmt: skip
 
 _LATER = {
-    "EXTENDS", "IMPLEMENTS", "METHOD", "PROPERTY", "INTERFACE", "CLASS", "NAMESPACE", "ACTION", "TRANSITION",
-    "INITIAL_STEP", "ABSTRACT", "FINAL", "VAR_CONFIG", "VAR_ACCESS", "VAR_INST", "USING", "GOTO", "JMP",
+    "EXTENDS", "IMPLEMENTS", "METHOD", "PROPERTY", "INTERFACE", "CLASS", "NAMESPACE", "ACTION",
+    "ABSTRACT", "FINAL", "VAR_CONFIG", "VAR_ACCESS", "VAR_INST", "USING", "GOTO", "JMP",
 }  # fmt: skip
 _PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",)}
 _BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}

@@ -88,7 +88,15 @@ class StructInit:
     arguments: dict[str, Expr] = field(default_factory=dict)
 
 
-Initial = ScalarInit | ArrayInit | StructInit
+@dataclass
+class ComputedInit:
+    """The address of something, for a pointer or interface: assigned by `TypedProgram.startup`. Members of an instance are
+    SELF variables in it."""
+
+    value: Expr
+
+
+Initial = ScalarInit | ArrayInit | StructInit | ComputedInit
 
 
 # ---- places: what can stand left of := ----------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from plctool.compiler.generics import GENERIC
 from plctool.compiler.scope import Scope
 from plctool.compiler.symbols import ERROR, BlockInfo, FunctionInfo, GlobalSymbol, PouSymbol, Role, VarSymbol
 from plctool.compiler.typed import (
+    ComputedInit,
     Direction,
     External,
     Initial,
@@ -50,6 +51,7 @@ _ROLES = {
 }  # fmt: skip
 _KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
 _VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")
+_HIDING = {"PRIVATE", "PROTECTED", "INTERNAL"}
 _RETAIN = {"RETAIN", "PERSISTENT"}
 
 
@@ -237,6 +239,8 @@ class Units:
                 t, default = self._parameter_type(line.type, scope)
             else:
                 t, default = declarations.declared_type(line, scope)
+            if isinstance(default, ComputedInit):
+                scope.error(line.pos, "constant", "the default of a parameter has to be constant")
             by_reference = direction is not Direction.INPUT or self._passes_reference(line, info.attributes, t)
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, _ROLES[block.keyword], default=default)
@@ -339,6 +343,7 @@ class Units:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
                 symbol.given, symbol.used = line.init is not None, direction is not None
+                symbol.access = next(iter(block.qualifiers & _HIDING), "")
                 if not self.world.declarations.add(scope, symbol, offset):
                     continue
                 info.members[name.casefold()] = symbol

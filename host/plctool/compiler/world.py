@@ -43,6 +43,10 @@ def _enum_names(symbol: TypeSymbol) -> list[str]:
     return [name for _, name, _ in spec.values] if isinstance(spec, ast.EnumSpec) else []
 
 
+def _is_in_namespace(decl: ast.GlobalBlock) -> bool:
+    return decl.namespace is not None and decl.namespace.name != ""
+
+
 def enclosing(full_name: str) -> list[str]:
     """The namespaces a dotted name lies in: `a.b` and `a` for `a.b.c`."""
     parts = full_name.split(".")
@@ -94,6 +98,7 @@ class World:
         """Makes the names of declarations known."""
         for decl in declarations:
             if isinstance(decl, ast.PouDecl):
+                sfc.declare(decl, self.diagnostics)
                 self._add(PouSymbol(decl, library), library=library, full_name=decl.full_name)
             elif isinstance(decl, ast.TypeDecl):
                 symbol = TypeSymbol(decl, library)
@@ -112,7 +117,10 @@ class World:
     def register_globals(self, declarations: Sequence[ast.Declaration], source: Source) -> None:
         """The VAR_GLOBAL of a file are known as `x` and as `<file>.x`. A file with nothing else is a named list: there
         `<file>.x` is the full name."""
-        blocks = [d.block for d in declarations if isinstance(d, ast.GlobalBlock)]
+        for decl in declarations:
+            if isinstance(decl, ast.GlobalBlock) and decl.namespace is not None and decl.namespace.name:
+                self._add_globals(decl.block, source, prefix=f"{decl.namespace.name}.", namespace=decl.namespace)
+        blocks = [d.block for d in declarations if isinstance(d, ast.GlobalBlock) and not _is_in_namespace(d)]
         if not blocks:
             return
         alone = all(isinstance(d, ast.GlobalBlock | ast.TestDecl) for d in declarations)
@@ -123,13 +131,22 @@ class World:
         self._lists.setdefault(source.stem.casefold(), namespace)
 
     def _add_globals(
-        self, block: ast.VarBlock, source: Source, *, prefix: str, library: bool = False
+        self,
+        block: ast.VarBlock,
+        source: Source,
+        *,
+        prefix: str,
+        library: bool = False,
+        namespace: ast.Namespace | None = None,
     ) -> list[GlobalSymbol]:
         added = []
         for line in block.decls:
             for offset, name in line.names:
                 symbol = GlobalSymbol(name, prefix + name, offset, line, block.qualifiers, source)
-                key = name.casefold()
+                key = (name if namespace is None else symbol.full_name).casefold()
+                if namespace is not None:
+                    symbol.namespace = namespace
+                    self.namespaces.update(enclosing(key))
                 other = self._globals.get(key)
                 if library:
                     self._library_names[key] = symbol
@@ -295,7 +312,7 @@ class World:
         while self._bodies or self._library_bodies:
             scope, decl, pou = (self._bodies or self._library_bodies).popleft()
             try:
-                body = Statements(scope).body(decl.body)
+                body = Statements(scope).body(sfc.statements(decl, scope))
                 pou.body = [*scope.prologue, *body]
             except NestingError as error:
                 self.nested_too_deeply(error)

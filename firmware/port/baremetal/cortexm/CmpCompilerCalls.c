@@ -260,12 +260,81 @@ static BASE_CALL RTS_REAL64 lreal_sqrt(RTS_REAL64 value)
     return sqrt(value);
 }
 
+#if defined(__arm__) && !defined(__ARM_ARCH_6M__)
+/*
+ * The sum in libgcc of Armv7-M loses a bit when the signs differ, the exponents are FAR apart, and the result has a smaller
+ * exponent than the larger operand: 4294967295.5 - 18446744073709551616.0 is one unit off. Here that case is right.
+ */
+enum { FAR = 33, MANTISSA_BITS = 52, GUARD_BITS = 3, EXPONENTS = 0x7FF };
+
+typedef union {
+    RTS_REAL64 value;
+    RTS_UI64 bits;
+} LREAL_BITS;
+
+static RTS_I32 lreal_exponent(LREAL_BITS x)
+{
+    return (RTS_I32)(x.bits >> MANTISSA_BITS & EXPONENTS);
+}
+
+/* With GUARD_BITS zeros behind it. */
+static RTS_UI64 lreal_mantissa(LREAL_BITS x)
+{
+    RTS_UI64 one = (RTS_UI64)1 << MANTISSA_BITS;
+
+    return ((x.bits & (one - 1)) | (lreal_exponent(x) != 0 ? one : 0)) << GUARD_BITS;
+}
+
+/* `large` minus the magnitude of `small`, which is FAR below: what is lost of it remains as one sticky bit. */
+static RTS_REAL64 lreal_reduce(LREAL_BITS large, LREAL_BITS small)
+{
+    RTS_UI64 mantissa = lreal_mantissa(small);
+    RTS_UI64 sticky = (mantissa & (((RTS_UI64)1 << FAR) - 1)) != 0;
+    RTS_UI64 exponent = (RTS_UI64)lreal_exponent(large);
+
+    mantissa = lreal_mantissa(large) - (mantissa >> FAR | sticky);
+    if (mantissa >> (MANTISSA_BITS + GUARD_BITS) == 0) {
+        mantissa <<= 1;
+        exponent--;
+    }
+    mantissa = (mantissa + 3 + (mantissa >> GUARD_BITS & 1)) >> GUARD_BITS; /* to nearest, halves to even */
+    large.bits &= (RTS_UI64)1 << 63;
+    large.bits += ((exponent - 1) << MANTISSA_BITS) + mantissa; /* adds the leading 1, and a carry from rounding */
+    return large.value;
+}
+
+static BASE_CALL RTS_REAL64 lreal_add(RTS_REAL64 a, RTS_REAL64 b)
+{
+    LREAL_BITS x = {a};
+    LREAL_BITS y = {b};
+    RTS_I32 x_exponent = lreal_exponent(x);
+    RTS_I32 y_exponent = lreal_exponent(y);
+    RTS_I32 distance = (x_exponent != 0 ? x_exponent : 1) - (y_exponent != 0 ? y_exponent : 1);
+
+    if ((distance != FAR && distance != -FAR) || (x.bits ^ y.bits) >> 63 == 0 || x_exponent == EXPONENTS ||
+        y_exponent == EXPONENTS)
+        return a + b;
+    return distance > 0 ? lreal_reduce(x, y) : lreal_reduce(y, x);
+}
+
+static BASE_CALL RTS_REAL64 lreal_subtract(RTS_REAL64 a, RTS_REAL64 b)
+{
+    return lreal_add(a, -b);
+}
+
+#define LREAL_ADD lreal_add
+#define LREAL_SUBTRACT lreal_subtract
+#else
+#define LREAL_ADD __adddf3
+#define LREAL_SUBTRACT __subdf3
+#endif
+
 static const CMP_EXT_FUNCTION lreal_calls[] = {
     {"__fixdfdi", 0x0B7A9758, CALLS_VERSION, (RTS_PFN)lreal_to_lint},
     {"__fixunsdfdi", 0x71038A92, CALLS_VERSION, (RTS_PFN)lreal_to_ulint},
     {"sqrt", 0x02C20D9E, CALLS_VERSION, (RTS_PFN)lreal_sqrt},
-    {"__adddf3", 0x9824AF08, CALLS_VERSION, (RTS_PFN)__adddf3},
-    {"__subdf3", 0x43D1C65B, CALLS_VERSION, (RTS_PFN)__subdf3},
+    {"__adddf3", 0x9824AF08, CALLS_VERSION, (RTS_PFN)LREAL_ADD},
+    {"__subdf3", 0x43D1C65B, CALLS_VERSION, (RTS_PFN)LREAL_SUBTRACT},
     {"__muldf3", 0xB1652F78, CALLS_VERSION, (RTS_PFN)__muldf3},
     {"__divdf3", 0x10D8E79E, CALLS_VERSION, (RTS_PFN)__divdf3},
     {"__eqdf2", 0x4A287FAE, CALLS_VERSION, (RTS_PFN)__eqdf2},

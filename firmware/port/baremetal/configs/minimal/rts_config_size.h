@@ -1,5 +1,6 @@
 /*
- * rts_config_size.h - sizes of the minimal configuration: one serial line, one task, no monitoring, no log.
+ * rts_config_size.h - sizes of the minimal configuration: one serial line, a super loop; no monitoring, no log, no retain
+ * variables, no words for errors.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -8,14 +9,16 @@
 
 #define APP_MAX_TASKS 2
 #define APP_MAX_IMPORTS 16
-#define APP_RETAIN_SIZE 16
 #define CM_MAX_EXT_TABLES 2
 #define EVENT_MAX_CALLBACKS 1
 #define SCHED_MAX_EXTERNAL_EVENTS 1
 #define NETSERVER_MESSAGE_SIZE 512
 #define COM_QUEUE_SIZE 540
-#define LOG_MAX_ENTRIES 1
-#define LOG_TEXT_SIZE 8
+#define LOG_MAX_ENTRIES 0
+#define APP_REFUSAL_TEXT_SIZE 1
+#define APP_RETAIN_SIZE 0
+#define SRV_INFORMATION 0
+#define NS_OLD_VERSIONS 0
 #define SRV_MAX_GROUPS 2
 
 #define BOARD_UART_COUNT 1

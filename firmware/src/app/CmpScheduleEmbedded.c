@@ -1,0 +1,121 @@
+/*
+ * CmpScheduleEmbedded.c - when IEC tasks run: all in main, one after the other (super loop). Takes the place of CmpScheduleTimer.c.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Needs no SysTimer. A task waits for those that run and for communication: what it is late is its jitter.
+ */
+#include <string.h>
+
+#include "CmpIecTask.h"
+#include "CmpScheduleTimer.h"
+#include "SysTime.h"
+#include "TaskTrigger.h"
+#include "rts_config.h"
+
+typedef struct {
+    TRIGGER trigger;
+    RTS_I64 due_ns; /* cyclic tasks */
+} SCHEDULED;
+
+static struct {
+    RTS_UI32 count;
+    bool started;
+    SCHEDULED task[APP_MAX_TASKS];
+    RTS_UI8 order[APP_MAX_TASKS]; /* all tasks, highest priority first */
+} schedule;
+
+/* Runs a cyclic task that is due. Due times that have passed meanwhile are skipped. */
+static void run_cyclic(RTS_UI32 index)
+{
+    SCHEDULED *task = &schedule.task[index];
+    RTS_I64 interval_ns = (RTS_I64)task->trigger.record->interval_us * 1000;
+    RTS_I64 now_ns = SysTimeGetNs();
+    RTS_I64 due_ns = task->due_ns;
+    RTS_UI32 missed = 0;
+
+    if (now_ns < due_ns)
+        return;
+    IecTaskCycle(index, due_ns, now_ns);
+    now_ns = SysTimeGetNs();
+    for (due_ns += interval_ns; due_ns < now_ns; due_ns += interval_ns)
+        missed++;
+    task->due_ns = due_ns;
+    if (missed != 0)
+        IecTaskAddOverruns(index, missed);
+}
+
+void SchedBackgroundCycle(void)
+{
+    RTS_I64 now_ns;
+    RTS_UI32 i;
+
+    for (i = 0; i < schedule.count && schedule.started; i++) {
+        RTS_UI32 index = schedule.order[i];
+        TRIGGER *trigger = &schedule.task[index].trigger;
+        if (trigger->record->kind == KIND_CYCLIC) {
+            run_cyclic(index);
+        } else if (TriggerFired(trigger)) {
+            now_ns = SysTimeGetNs();
+            IecTaskCycle(index, now_ns, now_ns);
+        }
+    }
+}
+
+bool SchedHasBackgroundTasks(void)
+{
+    return schedule.started && schedule.count > 0;
+}
+
+static void add_task(const CDL_TASK *record, RTS_UI8 *const *areas)
+{
+    RTS_UI32 index = schedule.count++;
+    RTS_UI32 place;
+
+    TriggerInit(&schedule.task[index].trigger, record, areas);
+    for (place = index; place > 0; place--) {
+        if (schedule.task[schedule.order[place - 1]].trigger.record->priority <= record->priority)
+            break;
+        schedule.order[place] = schedule.order[place - 1];
+    }
+    schedule.order[place] = (RTS_UI8)index;
+}
+
+RTS_RESULT SchedCreateTasks(const CDL_TASK *records, RTS_UI32 count, RTS_UI8 *const *areas)
+{
+    RTS_UI32 i;
+
+    schedule.count = 0;
+    for (i = 0; i < count; i++)
+        add_task(&records[i], areas);
+    return ERR_OK;
+}
+
+RTS_RESULT SchedStart(void)
+{
+    RTS_I64 now_ns = SysTimeGetNs();
+    RTS_UI32 i;
+
+    for (i = 0; i < schedule.count; i++) {
+        TriggerForget(&schedule.task[i].trigger);
+        schedule.task[i].due_ns = now_ns;
+    }
+    schedule.started = true;
+    return ERR_OK;
+}
+
+void SchedStop(void)
+{
+    schedule.started = false;
+}
+
+RTS_RESULT CmpScheduleTimer_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT) {
+        memset(&schedule, 0, sizeof schedule);
+        TriggerReset();
+    }
+    if (hook == CH_COMM_CYCLE)
+        SchedBackgroundCycle();
+    return ERR_OK;
+}

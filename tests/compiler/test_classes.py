@@ -1,0 +1,102 @@
+"""Function blocks as classes: what instances look like, what calls become, what stays over a restart."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from plctool.compiler import compile_sources
+from plctool.compiler.front import check_sources
+from plctool.compiler.lower import lower
+from plctool.compiler.lower_unit import Options
+from plctool.compiler.source import Source
+from plctool.compiler.targets import TARGETS, find_target
+from plctool.compiler.typed import TypedProgram
+
+FAMILY = """
+FUNCTION_BLOCK Base
+METHOD Value : INT
+Value := 1;
+END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Derived EXTENDS Base
+METHOD Value : INT
+Value := 2;
+END_METHOD
+END_FUNCTION_BLOCK
+"""
+CALL = """
+PROGRAM Main
+VAR
+    {instances}
+    p : POINTER TO Base;
+    x : INT;
+END_VAR
+x := p^.Value();
+END_PROGRAM
+"""
+
+
+def checked(text: str) -> TypedProgram:
+    result = check_sources([Source("f.st", text)])
+    assert result.program is not None, result.diagnostics
+    return result.program
+
+
+def code(text: str) -> str:
+    return "\n".join(lower(checked(text), Options(find_target("x86_64-linux"))).texts)
+
+
+def test_call_is_direct_when_only_one_class_has_instances() -> None:
+    text = code(FAMILY + CALL.format(instances="d : Derived;"))
+    assert "@class." not in text
+    assert "call i16 @st.Derived.Value" in text
+
+
+def test_call_is_decided_by_the_class_when_there_are_several() -> None:
+    text = code(FAMILY + CALL.format(instances="b : Base; d : Derived;"))
+    assert re.search(r"call i16 @class\.Base\.Value\(", text)
+
+
+def test_call_of_a_declared_instance_is_direct() -> None:
+    text = code(
+        FAMILY + "PROGRAM Main VAR b : Base; d : Derived; x : INT; END_VAR x := b.Value() + d.Value(); END_PROGRAM"
+    )
+    assert "@class." not in text
+
+
+def test_class_number_exists_only_where_classes_have_to_be_told_apart() -> None:
+    program = checked(FAMILY + "FUNCTION_BLOCK Alone METHOD M END_METHOD END_FUNCTION_BLOCK "
+                      "PROGRAM Main VAR a : Alone; d : Derived; END_VAR a.M(); d.Value(); END_PROGRAM")  # fmt: skip
+    sizes = {v.name: v.type.size for v in program.globals}
+    assert sizes == {"Main.a": 1, "Main.d": 4}
+
+
+@pytest.mark.parametrize("target", sorted(TARGETS))
+def test_dispatch_compiles_for_every_target(target: str, tmp_path: Path) -> None:
+    file = tmp_path / "f.st"
+    file.write_text(FAMILY + CALL.format(instances="b : Base; d : Derived;"), "latin-1")
+    assert compile_sources([file], target=target).image
+
+
+def test_kept_instances_get_the_class_numbers_of_the_new_program() -> None:
+    """Retain variables keep their values when a program is changed; its classes may have other numbers then."""
+    program = FAMILY + "PROGRAM Main VAR RETAIN f : ARRAY[1..2] OF Derived; END_VAR f[1].Value(); END_PROGRAM"
+    text = code(program)
+    kept = text[text.index("\nkept") :]
+    stores = re.findall(r"store i32 2, ptr", kept[: kept.index("\n}")])
+    assert len(stores) == 2
+
+
+def test_members_of_the_base_are_found_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "f.st"
+    file.write_text(
+        "FUNCTION_BLOCK A VAR one : INT; END_VAR END_FUNCTION_BLOCK\n"
+        "FUNCTION_BLOCK B EXTENDS A VAR two : INT; END_VAR one := two; END_FUNCTION_BLOCK\n"
+        "PROGRAM Main VAR b : B; END_VAR b(); END_PROGRAM\n",
+        "latin-1",
+    )
+    symbols = compile_sources([file]).symbols
+    assert symbols.resolve("Main.b.one").offset == symbols.resolve("Main.b.two").offset - 2
