@@ -45,7 +45,9 @@ def build(text: str) -> BuildResult:
 
 def large_program(statements: int) -> str:
     """A program whose image is large: every statement is its own code."""
-    body = "\n".join(f"a[{i % 50}] := a[{(i * 7) % 50}] * {i * 7919 + 13} + a[{(i * 3) % 50}];" for i in range(statements))
+    body = "\n".join(
+        f"a[{i % 50}] := a[{(i * 7) % 50}] * {i * 7919 + 13} + a[{(i * 3) % 50}];" for i in range(statements)
+    )
     return f"PROGRAM Main VAR a : ARRAY[0..49] OF DINT; END_VAR\n{body}\nEND_PROGRAM"
 
 
@@ -92,9 +94,13 @@ def best_bench(result: BuildResult) -> list[tuple[str, float, float]]:
 
 def bench_empty_task() -> None:
     print("\nOne cycle of an empty task")
-    (_, code, cycle), = best_bench(build(EMPTY))
+    ((_, code, cycle),) = best_bench(build(EMPTY))
     line("call of the compiled code", f"{code:.1f} ns")
-    line("complete cycle: clock, code, statistics, watchdog", f"{cycle:.1f} ns", f"the runtime adds {cycle - code:.1f} ns")
+    line(
+        "complete cycle: clock, code, statistics, watchdog",
+        f"{cycle:.1f} ns",
+        f"the runtime adds {cycle - code:.1f} ns",
+    )
 
 
 def checksum(plc: Simulator) -> int:
@@ -110,7 +116,10 @@ def run_twin(optimisation: str) -> tuple[int, float, float]:
         sources = [ROOT / "bench/tanks_main.c", ROOT / "examples/tanks/c/tanks.c"]
         flags = ["-std=c99", "-ffp-contract=off", optimisation, f"-I{ROOT / 'examples/tanks/c'}"]
         subprocess.run(["cc", *flags, "-o", program, *sources, "-lm"], check=True)
-        outs = [subprocess.run([program, str(CYCLES), str(CALLS)], check=True, capture_output=True, text=True) for _ in range(3)]
+        outs = [
+            subprocess.run([program, str(CYCLES), str(CALLS)], check=True, capture_output=True, text=True)
+            for _ in range(3)
+        ]
     runs = [out.stdout.split() for out in outs]
     return int(runs[0][0]), min(float(r[1]) for r in runs), min(float(r[2]) for r in runs)
 
@@ -125,7 +134,8 @@ def bench_tanks() -> None:
             same = {level: checksum(plc) == twin[0] for level, twin in twins.items()}
         for i, (name, code, _) in enumerate(best_bench(result)):
             beside = ", ".join(
-                f"gcc {level} {twin[1 + i]:.1f} ns: {code / twin[1 + i]:.2f} of it{'' if same[level] else ' (OTHER RESULT)'}"
+                f"gcc {level} {twin[1 + i]:.1f} ns: {code / twin[1 + i]:.2f} of it"
+                + ("" if same[level] else " (OTHER RESULT)")
                 for level, twin in twins.items()
             )
             line(f"{name}, checks {checks}", f"{code:.1f} ns", beside)

@@ -1,7 +1,7 @@
 """Writes the C source of the `_plccore` extension module.
 
-The definitions come from the firmware's own headers, run through the C preprocessor with RTS_CFFI defined: there is no second
-copy of a struct, a number or a prototype that could drift.
+The definitions come from the firmware's own headers, run through the C preprocessor with RTS_CFFI defined: there is
+no second copy of a struct, a number or a prototype that could drift.
 """
 
 from __future__ import annotations

@@ -27,7 +27,9 @@ def run(meson: str, build: Path) -> tuple[int, Counter[str]]:
     reports = build / "pytest-reports"
     for old in reports.glob("*.xml"):
         old.unlink()
-    status = subprocess.run([meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild"], check=False).returncode
+    status = subprocess.run(
+        [meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild"], check=False
+    ).returncode
     counts: Counter[str] = Counter()
     for line in (build / "meson-logs" / "testlog.json").read_text().splitlines():
         test = json.loads(line)

@@ -55,7 +55,12 @@ def bar(value: float, mark: float) -> str:
 
 
 def flash(story: Story, plc: Plc, image: Path) -> None:
-    columns = (TextColumn("   {task.description}"), BarColumn(BAR_WIDTH), TextColumn("{task.completed} bytes"), TimeElapsedColumn())
+    columns = (
+        TextColumn("   {task.description}"),
+        BarColumn(BAR_WIDTH),
+        TextColumn("{task.completed} bytes"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=story.console, disable=story.console.record) as progress:
         task = progress.add_task("flash", total=image.stat().st_size)
         result = plc.flash(image, progress=lambda done, total: progress.update(task, completed=done, total=total))
@@ -146,7 +151,9 @@ def run(console: Console) -> None:
                 if status.state != "run":
                     raise DeviceError("the boot project did not come back", "demo")
                 show_levels(story, plc, lambda values, seconds: seconds > 2)
-    console.print("\n[bold green]That was the whole story.[/] Next: README.md, and examples/ for programs to start from.")
+    console.print(
+        "\n[bold green]That was the whole story.[/] Next: README.md, and examples/ for programs to start from."
+    )
 
 
 def main() -> int:

@@ -1,4 +1,5 @@
-"""Errors that are not our bug: one sentence that says what to do, a short code for machines, an exit code for shells."""
+"""Errors that are not our bug: one sentence that says what to do, a short code for machines, an exit code for
+shells."""
 
 from __future__ import annotations
 

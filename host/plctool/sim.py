@@ -68,7 +68,8 @@ class Simulator:
     # ---- the program ----
 
     def download(self, image: bytes) -> None:
-        """Replaces the program, stopped. Raises DeviceError with the reason when it is refused; the old one runs on then."""
+        """Replaces the program, stopped. Raises DeviceError with the reason when it is refused; the old one runs on
+        then."""
         crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
         _check(lib.AppDownloadBegin(len(image), crc), "The image is refused")
         _check(lib.AppDownloadWrite(0, image, len(image)), "The image cannot be stored")
@@ -114,8 +115,8 @@ class Simulator:
             name = ffi.string(c.name).decode("latin-1")
             infos.append(
                 TaskInfo(
-                    name, c.kind, c.priority, c.interval_us, c.cycles, c.last_us, c.avg_us, c.min_us, c.max_us, c.jitter_us,
-                    c.overruns,
+                    name, c.kind, c.priority, c.interval_us, c.cycles, c.last_us, c.avg_us, c.min_us, c.max_us,
+                    c.jitter_us, c.overruns,
                 )
             )  # fmt: skip
         return infos
@@ -170,7 +171,9 @@ class Simulator:
     def _address(self, symbol: Symbol) -> Any:
         address = lib.AppGetAreaAddress(symbol.area, symbol.offset, symbol.size)
         if address == ffi.NULL:
-            raise DeviceError(f"{symbol.name} is not in the memory of the program; the symbols do not belong to it.", "wrong-symbols")
+            raise DeviceError(
+                f"{symbol.name} is not in the memory of the program; the symbols do not belong to it.", "wrong-symbols"
+            )
         return address
 
 

@@ -82,7 +82,7 @@ def read_script(path: Path) -> Script:
 
 
 def parse_value(text: str) -> Value:
-    """The value of a literal of ST; durations in ns."""
+    """The value of a literal of ST; durations in ns, values of enumerations by name."""
     if text in ("TRUE", "FALSE"):
         return text == "TRUE"
     if text.startswith(("'", '"')):

@@ -1,6 +1,7 @@
 """Every command and every Python example in README and docs is run, in the order in which a reader would type them.
 
-`sh` blocks run in a folder of their own with the repository's examples in it. `plcrt` goes on in the background, as it does for the
+`sh` blocks run in a folder of their own with the repository's examples in it. `plcrt` goes on in the background, as
+it does for the
 reader in another terminal, and the port it prints takes the place of the one in the text. `make` and `pip` are not run
 here: they are what runs this test (see WITHOUT_RUNNING).
 """
@@ -26,7 +27,17 @@ BLOCK = re.compile(r"^```(sh|python|iecst \S+)\n(.*?)^```", re.MULTILINE | re.DO
 SHOWN_PORT = "/dev/pts/4"
 
 # Commands that set up what this test runs in, or run it.
-WITHOUT_RUNNING = ("make ", "python3 -m venv", "venv/bin/", "sudo apt-get", "git clone", "cd ", "meson ", "ninja ", "qemu-")
+WITHOUT_RUNNING = (
+    "make ",
+    "python3 -m venv",
+    "venv/bin/",
+    "sudo apt-get",
+    "git clone",
+    "cd ",
+    "meson ",
+    "ninja ",
+    "qemu-",
+)
 
 
 class Reader:
@@ -48,8 +59,8 @@ class Reader:
             return
         assert words[0] == "plctool", f"this test does not know how to run: {line}"
         done = subprocess.run(
-            [sys.executable, "-m", "plctool", *words[1:]], cwd=self.folder, env=self.env, capture_output=True, text=True,
-            timeout=180, check=False,
+            [sys.executable, "-m", "plctool", *words[1:]], cwd=self.folder, env=self.env, capture_output=True,
+            text=True, timeout=180, check=False,
         )  # fmt: skip
         assert done.returncode == 0, f"{line}\nexit {done.returncode}\n{done.stdout}{done.stderr}"
 
@@ -73,7 +84,13 @@ class Reader:
         path.write_text(code.replace(SHOWN_PORT, self.port))
         how = ["-m", "pytest", "-q", "-p", "no:cacheprovider", str(path)] if "def test_" in code else [str(path)]
         done = subprocess.run(
-            [sys.executable, *how], cwd=self.folder, env=self.env, capture_output=True, text=True, timeout=120, check=False
+            [sys.executable, *how],
+            cwd=self.folder,
+            env=self.env,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
         )
         assert done.returncode == 0, f"{code}\n{done.stdout}{done.stderr}"
 

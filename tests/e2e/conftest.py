@@ -41,7 +41,9 @@ class Tool:
     def __call__(self, *args: str, timeout: float = 120) -> Done:
         env = os.environ | {"XDG_CACHE_HOME": str(self.folder / "cache")}
         command = [sys.executable, "-m", "plctool", *args]
-        done = subprocess.run(command, cwd=self.folder, env=env, capture_output=True, text=True, timeout=timeout, check=False)
+        done = subprocess.run(
+            command, cwd=self.folder, env=env, capture_output=True, text=True, timeout=timeout, check=False
+        )
         return Done(done.returncode, done.stdout, done.stderr)
 
     def ok(self, *args: str, timeout: float = 120) -> Any:

@@ -1,4 +1,5 @@
-"""Flashing over a line that loses, doubles and flips one byte in a thousand: it succeeds, and what runs is what was sent."""
+"""Flashing over a line that loses, doubles and flips one byte in a thousand: it succeeds, and what runs is what was
+sent."""
 
 import pytest
 
@@ -30,7 +31,12 @@ def program() -> tuple[str, int]:
 
 @pytest.mark.parametrize(
     "damage",
-    [Damage(lose=0.001, seed=1), Damage(double=0.001, seed=2), Damage(flip=0.001, seed=3), Damage(0.001, 0.001, 0.001, 4)],
+    [
+        Damage(lose=0.001, seed=1),
+        Damage(double=0.001, seed=2),
+        Damage(flip=0.001, seed=3),
+        Damage(0.001, 0.001, 0.001, 4),
+    ],
     ids=["lost", "doubled", "flipped", "all"],
 )
 def test_flash_over_a_line_with_damaged_bytes_runs_what_was_sent(tool, plcrt, eventually, damage):

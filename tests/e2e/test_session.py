@@ -96,7 +96,21 @@ def test_reading_with_the_symbols_of_another_image_is_refused(tool, plcrt, count
 
 
 def test_division_by_zero_is_reported_with_task_pou_file_and_line(tool, plcrt, eventually):
-    text = "PROGRAM Main\nVAR\n  a : INT := 5;\n  b : INT;\n  n : INT;\nEND_VAR\n  n := n + 1;\n  IF n > 3 THEN\n    a := a / b;\n  END_IF;\nEND_PROGRAM\n"
+    text = "\n".join(
+        (
+            "PROGRAM Main",
+            "VAR",
+            "  a : INT := 5;",
+            "  b : INT;",
+            "  n : INT;",
+            "END_VAR",
+            "  n := n + 1;",
+            "  IF n > 3 THEN",
+            "    a := a / b;",
+            "  END_IF;",
+            "END_PROGRAM",
+        )
+    )
     image = tool.build("divide", text)
     tool.ok("flash", "--port", plcrt.port, str(image))
     status = eventually(lambda: (s := tool.ok("status", "--port", plcrt.port))["state"] == "exception" and s)
@@ -133,7 +147,10 @@ def random_program(seed: int) -> tuple[str, int]:
         value = {"+": value + number, "-": value - number, "*": value * number, "XOR": value ^ number}[op] % (1 << 32)
         lines.append(f"x := x {op} {number};")
     body = "\n".join(lines)
-    return f"PROGRAM Main VAR x : UDINT; done : BOOL; END_VAR\nIF NOT done THEN\n{body}\ndone := TRUE;\nEND_IF;\nEND_PROGRAM\n", value
+    return (
+        f"PROGRAM Main VAR x : UDINT; done : BOOL; END_VAR\nIF NOT done THEN\n{body}\ndone := TRUE;\nEND_IF;\nEND_PROGRAM\n",
+        value,
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -148,7 +165,10 @@ def test_programs_nobody_knows_beforehand_compute_the_right_value(tool, plcrt, e
 def test_bits_at_addresses_and_of_words_are_written_alone(tool, plcrt, eventually):
     text = """
     PROGRAM Main
-    VAR a AT %MX4.0 : BOOL; b AT %MX4.3 : BOOL; all AT %MB4 : BYTE := 16#F0; word : WORD := 16#0101; same : BYTE; END_VAR
+    VAR
+        a AT %MX4.0 : BOOL; b AT %MX4.3 : BOOL; all AT %MB4 : BYTE := 16#F0;
+        word : WORD := 16#0101; same : BYTE;
+    END_VAR
     same := all;
     END_PROGRAM
     """

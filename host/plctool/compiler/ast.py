@@ -267,7 +267,8 @@ class Namespace:
 
 @dataclass(slots=True, eq=False)
 class PouDecl:
-    """PROGRAM, FUNCTION, FUNCTION_BLOCK or INTERFACE (`keyword`), and what such a unit holds: METHOD, ACTION, the GET and
+    """PROGRAM, FUNCTION, FUNCTION_BLOCK or INTERFACE (`keyword`), and what such a unit holds: METHOD, ACTION, the
+    GET and
     SET of a PROPERTY. A CLASS is a FUNCTION_BLOCK with that among its `modifiers`. `attributes` by lower-case name."""
 
     pos: int
@@ -293,9 +294,11 @@ class PouDecl:
 
 @dataclass(slots=True, eq=False)
 class StepAction:
-    """`target(qualifier, time, indicators)` in a step: an ACTION or a BOOL variable. `qualifier` in capitals."""
+    """`name(qualifier, time, indicators)` in a step: an ACTION or a BOOL variable, which `target` names. `qualifier` in
+    capitals."""
 
     pos: int
+    name: str
     target: Expr
     qualifier: str
     time: Expr | None
@@ -323,10 +326,11 @@ class Transition:
 
 @dataclass(slots=True, eq=False)
 class Chart:
-    """A body that is a Sequential Function Chart; its ACTIONs are members of the unit."""
+    """A body that is a Sequential Function Chart; its ACTIONs are members of the unit. `valid` unless errors were found."""
 
     steps: list[Step]
     transitions: list[Transition]
+    valid: bool = True
 
 
 @dataclass(slots=True, eq=False)

@@ -24,16 +24,25 @@ def read_action(node: ast.Expr, report: Report) -> ast.StepAction | None:
                 report(argument.pos, "syntax", "what a step does is written action(qualifier, time, indicator)")
                 return None
             args.append(argument.value)
-    if not isinstance(target, ast.Name | ast.Member):
+    name = _dotted(target)
+    if name is None:
         report(node.pos, "syntax", "a step names actions and BOOL variables; put statements into an ACTION")
         return None
     qualifier, rest = ("N", args) if not args else (_qualifier(args[0], report), args[1:])
     if qualifier not in TIMED:
-        return ast.StepAction(node.pos, target, qualifier, None, rest)
+        return ast.StepAction(node.pos, name, target, qualifier, None, rest)
     if not rest:
         report(args[0].pos, "syntax", f"{qualifier} needs a time: write {qualifier}, T#1s")
         return None
-    return ast.StepAction(node.pos, target, qualifier, rest[0], rest[1:])
+    return ast.StepAction(node.pos, name, target, qualifier, rest[0], rest[1:])
+
+
+def _dotted(node: ast.Expr) -> str | None:
+    """`a` or `a.b`; None for anything else."""
+    if isinstance(node, ast.Member):
+        base = _dotted(node.base)
+        return None if base is None else f"{base}.{node.name}"
+    return node.name if isinstance(node, ast.Name) else None
 
 
 def _qualifier(node: ast.Expr, report: Report) -> str:

@@ -37,15 +37,6 @@ CLASS_NUMBER = "%class"  # the hidden member; no identifier, so nothing else can
 _INITIALISERS = ("fb_init", "fb_reinit", "fb_exit")
 
 
-def search_path(space: ast.Namespace | None) -> tuple[str, ...]:
-    """The namespaces that names are looked for in, innermost first, then those of USING."""
-    if space is None:
-        return ()
-    parts = space.name.casefold().split(".") if space.name else []
-    enclosing = [".".join(parts[:n]) for n in range(len(parts), 0, -1)]
-    return (*enclosing, *(name.casefold() for _, name in space.using))
-
-
 def member_key(decl: ast.PouDecl) -> str:
     """Under which a member is found; a property has two."""
     name = decl.name.casefold()
@@ -73,6 +64,7 @@ class Classes:
         self._blocks: dict[PouSymbol, ClassInfo] = {}
         self._dispatches: dict[tuple[ClassInfo, str], Dispatch] = {}
         self._own_calls: list[tuple[Pou, Dispatch, Pos]] = []
+        self._other_calls: list[tuple[Pou, Pou, Dispatch | None, Pos]] = []
 
     # ---- what extends what, before anything is declared ----
 
@@ -121,7 +113,7 @@ class Classes:
     def scope_of(self, symbol: PouSymbol) -> Scope:
         """The surroundings of a unit: its source and namespace."""
         scope = self.world.scope(symbol.decl.source, library=symbol.library)
-        scope.path = search_path(symbol.decl.namespace)
+        scope.enter(symbol.decl.namespace)
         return scope
 
     def begin_block(self, symbol: PouSymbol, info: BlockInfo, scope: Scope, defaults: dict[str, Initial]) -> None:
@@ -339,6 +331,11 @@ class Classes:
         if caller is not None:
             self._own_calls.append((caller, dispatch, pos))
 
+    def note_other_call(self, caller: Pou | None, function: Pou, dispatch: Dispatch | None, pos: Pos) -> None:
+        """A call on an instance behind a pointer, which may be the own one or not."""
+        if caller is not None:
+            self._other_calls.append((caller, function, dispatch, pos))
+
     def finish(self, variables: Iterable[Variable]) -> None:
         """Finds the targets of all dispatches: of classes that have instances among the variables."""
         present = {t for v in variables for t in instances_in(v.type)}
@@ -355,6 +352,11 @@ class Classes:
         for caller, dispatch, pos in self._own_calls:
             for target in dispatch.targets.values():
                 self.world.add_call(caller, target, pos)
+        for caller, function, dispatch_of, pos in self._other_calls:
+            targets = [function] if dispatch_of is None else list(dispatch_of.targets.values())
+            if caller in targets:
+                message = f"{caller.name} may call itself here: the calls have to fit the stack of the controller"
+                self.world.diagnostics.warning(pos, "recursion", message)
 
     # ---- instances ----
 

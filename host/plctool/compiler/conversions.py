@@ -267,7 +267,11 @@ class Coercion:
             return self._to_interface(e, target)
         if isinstance(e.type, PointerType) and isinstance(target, PointerType) and e.type is not NULL_TYPE:
             inner = e.type.target
-            if isinstance(inner, StructType) and not isinstance(e.type, InterfaceType) and inner.conforms(target.target):
+            if (
+                isinstance(inner, StructType)
+                and not isinstance(e.type, InterfaceType)
+                and inner.conforms(target.target)
+            ):
                 return replace(e, type=target)
         if isinstance(e.type, PointerType) and isinstance(target, PointerType) and same_type(e.type, target):
             return replace(e, type=target)
@@ -291,7 +295,9 @@ class Coercion:
     def _to_interface(self, e: Expr, target: InterfaceType) -> Expr:
         """The address of an instance, or what another interface variable holds."""
         source = e.type.target if isinstance(e.type, PointerType) else e.type
-        if not isinstance(source, StructType) or (isinstance(e.type, PointerType) and not isinstance(e.type, InterfaceType)):
+        if not isinstance(source, StructType) or (
+            isinstance(e.type, PointerType) and not isinstance(e.type, InterfaceType)
+        ):
             return self._mismatch(e, target)
         if not source.conforms(target.target):
             what = "extend" if isinstance(e.type, InterfaceType) else "implement"

@@ -1,4 +1,5 @@
-"""Dates and times of day: how they convert into each other and into durations, and the functions that compute with them.
+"""Dates and times of day: how they convert into each other and into durations, and the functions that compute with
+them.
 
 SPDX-License-Identifier: Apache-2.0
 """

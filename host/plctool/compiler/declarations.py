@@ -10,13 +10,12 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from plctool.compiler import ast, constants
-from plctool.compiler.classes import search_path
 from plctool.compiler.conversions import elementary
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.expressions import Expressions, NestingError, is_untyped
 from plctool.compiler.generics import GENERIC
 from plctool.compiler.scope import Scope
-from plctool.compiler.symbols import ERROR, GlobalSymbol, PouSymbol, Role, TypeSymbol, VarSymbol
+from plctool.compiler.symbols import ERROR, GlobalSymbol, PouSymbol, Role, TypeSymbol, Unit, VarSymbol
 from plctool.compiler.typed import (
     Area,
     ArrayInit,
@@ -146,6 +145,9 @@ class Declarations:
 
     def _declared(self, spec: ast.NamedType, scope: Scope) -> tuple[Type, Initial | None]:
         symbol = scope.unit(spec.name)
+        if symbol is not None and is_internal(symbol) and not scope.is_within(symbol.decl.namespace):
+            scope.error(spec.pos, "access", f"{spec.name} is INTERNAL: only its own namespace may use it")
+            return ERROR, None
         if isinstance(symbol, TypeSymbol):
             if symbol.busy:
                 scope.error(spec.pos, "recursion", f"the type {symbol.decl.name} contains itself")
@@ -173,7 +175,7 @@ class Declarations:
             return symbol.type
         decl = symbol.decl
         scope = self.world.scope(decl.source, library=symbol.library)
-        scope.path = search_path(decl.namespace)
+        scope.enter(decl.namespace)
         if symbol.busy:
             return ERROR
         symbol.busy = True
@@ -508,7 +510,7 @@ class Declarations:
         if symbol.symbol is not None:
             return symbol.symbol
         scope = self.world.scope(symbol.source)
-        scope.path = search_path(symbol.namespace)
+        scope.enter(symbol.namespace)
         if symbol.busy:
             scope.error(symbol.pos, "recursion", f"the value of {symbol.name} depends on itself")
             return VarSymbol(symbol.name, scope.pos(symbol.pos), ERROR, Role.GLOBAL)
@@ -634,6 +636,13 @@ class Declarations:
             return False
         scope.prologue.append(Assign(VarPlace(variable, variable.type, variable.pos), e, e.pos))
         return True
+
+
+def is_internal(symbol: Unit) -> bool:
+    """Whether only its own namespace may use a unit."""
+    decl = symbol.decl
+    marked = isinstance(decl, ast.PouDecl) and "INTERNAL" in decl.modifiers
+    return marked or (decl.namespace is not None and decl.namespace.internal)
 
 
 _DIRECT_TYPES: dict[int, Elementary] = {

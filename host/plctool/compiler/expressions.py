@@ -453,7 +453,11 @@ class Expressions:
             return pointer
         if isinstance(pointer, AddressOf):
             return load(pointer.place)
-        if not isinstance(pointer.type, PointerType) or isinstance(pointer.type, InterfaceType) or pointer.type is NULL_TYPE:
+        if (
+            not isinstance(pointer.type, PointerType)
+            or isinstance(pointer.type, InterfaceType)
+            or pointer.type is NULL_TYPE
+        ):
             return self.error(node.pos, "type", f"{pointer.type} is not a pointer")
         return load(DerefPlace(pointer, pointer.type.target, self.pos(node.pos)))
 

@@ -61,7 +61,8 @@ KEYWORDS = {
 SOFT = frozenset((
     "QUALIFIER", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP", "UNION",
     "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION", "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET",
-    "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS", "INITIAL_STEP", "STEP", "TRANSITION", "_FROM",
+    "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS", "INITIAL_STEP", "STEP", "TRANSITION",
+    "_FROM",
 ))  # fmt: skip
 """Terminals that are names where the grammar has no use for them."""
 
@@ -178,7 +179,8 @@ class Lexer:
 
 
 def is_followed_by_name(token: Token, text: str) -> bool:
-    """Whether MOCK, METHOD ... start something, as in `MOCK pump.valve;`: another name follows, as it never does behind a
+    """Whether MOCK, METHOD ... start something, as in `MOCK pump.valve;`: another name follows, as it never does
+    behind a
     variable of that name."""
     if token.type == "TRANSITION" and _PRIORITY.match(text, token.end):
         return True

@@ -152,7 +152,8 @@ def _clock(name: str, text: str) -> int:
 
 
 def string(text: str) -> str:
-    """The characters of a quoted text with its $ escapes resolved: of a WSTRING as UTF-16 code units when the quotes are
+    """The characters of a quoted text with its $ escapes resolved: of a WSTRING as UTF-16 code units when the quotes
+    are
     double."""
     wide = text.startswith('"')
 

@@ -210,7 +210,7 @@ class ObjectCalls(Calls):
             self.error(offset, "access", message)
             return False
         space = owner.symbol.decl.namespace
-        if "INTERNAL" in modifiers and space is not None and space.name.casefold() not in self.scope.path:
+        if "INTERNAL" in modifiers and space is not None and not self.scope.is_within(space):
             self.error(offset, "access", f"{name} is INTERNAL: only the namespace {space.name} may use it")
             return False
         return True
@@ -254,6 +254,8 @@ class ObjectCalls(Calls):
             e.instance, e.dispatch = place, dispatch
             if dispatch is not None and isinstance(place, SelfPlace):
                 self.world.classes.note_own_call(self.scope.pou, dispatch, e.pos)
+            elif elsewhere:
+                self.world.classes.note_other_call(self.scope.pou, info.pou, dispatch, e.pos)
         return e
 
     def _key(self, member: Member) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from plctool.compiler import ast
 from plctool.compiler.source import Source
 from plctool.compiler.symbols import ClassInfo, PouSymbol, Symbol, Unit
 from plctool.compiler.typed import Pos, Pou, Statement
@@ -24,7 +25,7 @@ class Scope:
     `names` are the local ones by case-folded name; `bindings` the types generic parameters stand for in this instance;
     `prologue` what has to be done before the body: initial values that are not constant; `programs` the PROGRAMs that
     can be instantiated here, as function blocks: in unit tests; `outer` what a method sees of the unit `cls` around it;
-    `path` the namespaces to look into, case-folded, innermost first.
+    `path` the namespaces to look into, case-folded, innermost first; `space` the one this is in.
     """
 
     world: World
@@ -38,6 +39,21 @@ class Scope:
     outer: dict[str, Symbol] = field(default_factory=dict)
     cls: ClassInfo | None = None
     path: tuple[str, ...] = ()
+    space: str = ""
+
+    def enter(self, namespace: ast.Namespace | None) -> None:
+        """Makes what is in a namespace, in those around it and in those it is USING known by bare names."""
+        if namespace is None:
+            return
+        self.space = namespace.name.casefold()
+        parts = self.space.split(".") if self.space else []
+        enclosing = [".".join(parts[:n]) for n in range(len(parts), 0, -1)]
+        self.path = (*enclosing, *(name.casefold() for _, name in namespace.using))
+
+    def is_within(self, namespace: ast.Namespace | None) -> bool:
+        """Whether this is in a namespace, so that it may use what is INTERNAL there."""
+        name = namespace.name.casefold() if namespace is not None else ""
+        return not name or self.space == name or self.space.startswith(name + ".")
 
     def lookup(self, name: str) -> Symbol | None:
         """What a name stands for here."""

@@ -43,6 +43,7 @@ class Role(Enum):
     IN_OUT = "in-out"
     LOCAL = "local variable"
     TEMP = "temporary"
+    STEP = "step"  # of a Sequential Function Chart
     GLOBAL = "global variable"
     RESULT = "result"
 
@@ -181,7 +182,8 @@ class Member:
 
 @dataclass(slots=True, eq=False)
 class ClassInfo:
-    """What a FUNCTION_BLOCK, INTERFACE or PROGRAM has besides variables. `members` are its own; `names` what they see of
+    """What a FUNCTION_BLOCK, INTERFACE or PROGRAM has besides variables. `members` are its own; `names` what they
+    see of
     the unit around them. `number` identifies the class in its instances; 0 when none has to be told from others."""
 
     symbol: PouSymbol

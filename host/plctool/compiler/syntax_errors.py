@@ -33,7 +33,7 @@ _UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "GLOBAL", "CONFIGURAT
 _STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
 _CHART = {"INITIAL_STEP", "STEP", "TRANSITION"}
 _SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, *_CHART, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL", END}
-_ITEMS = ("stmt", "var_decl", "type_decl", "config_item", "unit", "expr_stmt", "step")  # what can be left out as a whole
+_ITEMS = ("stmt", "var_decl", "type_decl", "config_item", "unit", "expr_stmt", "step")  # can be left out as a whole
 
 _INSERTIONS = {
     "_SEMI": (";", "expected ; after the {item}"),

@@ -90,7 +90,8 @@ class StructInit:
 
 @dataclass
 class ComputedInit:
-    """The address of something, for a pointer or interface: assigned by `TypedProgram.startup`. Members of an instance are
+    """The address of something, for a pointer or interface: assigned by `TypedProgram.startup`. Members of an
+    instance are
     SELF variables in it."""
 
     value: Expr
@@ -299,7 +300,8 @@ class Dispatch:
 
 @dataclass
 class Call:
-    """A call of a FUNCTION (or an EXTERNAL one), or of a method of `instance`. `args` in order of `function.parameters`: an expression for VAR_INPUT,
+    """A call of a FUNCTION (or an EXTERNAL one), or of a method of `instance`. `args` in order of
+    `function.parameters`: an expression for VAR_INPUT,
     a place for VAR_IN_OUT, a place or None for VAR_OUTPUT. The result is `type`; strings and structs come back in a
     temporary.
     """
@@ -432,8 +434,8 @@ class Parameter:
     A STRING passed by reference travels as (pointer, u32 capacity), so that STRING_SIZE and cutting work for any
     length.
 
-    `bound`: this is a bound of an ARRAY[*], which is handed over with it: the array, the dimension from 0, and whether it
-    is the upper one.
+    `bound`: this is a bound of an ARRAY[*], which is handed over with it: the array, the dimension from 0, and
+    whether it is the upper one.
     """
 
     variable: Variable

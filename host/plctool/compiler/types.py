@@ -1,8 +1,9 @@
 """IEC 61131-3 types and their memory layout.
 
-The layout is the same on every target (natural alignment, little-endian), so offsets in the symbol file, in the image and
-in the monitoring service mean the same everywhere. TIME is a signed 32-bit count of milliseconds, STRING[n] is n+1 bytes,
-NUL-terminated, as in the CODESYS family.
+The layout is the same on every target (natural alignment, little-endian), so offsets in the symbol file, in the
+image and
+in the monitoring service mean the same everywhere. TIME is a signed 32-bit count of milliseconds, STRING[n] is n+1
+bytes, NUL-terminated, as in the CODESYS family.
 """
 
 from __future__ import annotations

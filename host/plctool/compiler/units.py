@@ -47,7 +47,7 @@ _DIRECTIONS = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VA
 _ROLES = {
     "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,
     "VAR_TEMP": Role.TEMP,
-    "VAR_STAT": Role.LOCAL, "VAR_INST": Role.LOCAL,
+    "VAR_STAT": Role.LOCAL, "VAR_INST": Role.LOCAL, "STEP": Role.STEP,
 }  # fmt: skip
 _KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
 _VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")

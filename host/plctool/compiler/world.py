@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 
-from plctool.compiler import ast
+from plctool.compiler import ast, sfc
 from plctool.compiler.classes import Classes
 from plctool.compiler.construction import construct
 from plctool.compiler.conversions import Coercion

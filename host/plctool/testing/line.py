@@ -1,7 +1,9 @@
 """A serial line between a client and a device that can be as slow and as bad as real ones.
 
-`SerialLine(device)` opens the device's pseudo terminal and offers another one (`line.path`) to the client. Bytes pass at the
-line's rate, and are lost, doubled or flipped at the rates asked for, from a seed, so that a failing run can be repeated.
+`SerialLine(device)` opens the device's pseudo terminal and offers another one (`line.path`) to the client. Bytes
+pass at the
+line's rate, and are lost, doubled or flipped at the rates asked for, from a seed, so that a failing run can be
+repeated.
 """
 
 from __future__ import annotations

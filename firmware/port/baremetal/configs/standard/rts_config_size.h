@@ -9,7 +9,10 @@
 #define APP_MAX_TASKS 3
 #define NETSERVER_MESSAGE_SIZE 944 /* two full blocks */
 #define EVENT_MAX_CALLBACKS 2
-#define LOG_MAX_ENTRIES 8
+#define APP_REFUSAL_TEXT_SIZE 128
+#define COM_QUEUE_SIZE 540
+#define LOG_MAX_ENTRIES 6
+#define RTS_MAIN_STACK_SIZE 2176
 #define LOG_TEXT_SIZE 64
 #define SRV_MAX_GROUPS 4
 
