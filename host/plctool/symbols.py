@@ -23,6 +23,7 @@ from plctool.compiler.types import (
     EnumType,
     Field,
     Kind,
+    InterfaceType,
     PointerType,
     StringType,
     StructType,
@@ -371,6 +372,8 @@ def _describe(t: Type, types: dict[str, Any]) -> None:
     elif isinstance(t, ArrayType):
         entry.update(kind="array", element=t.element.name, bounds=[list(b) for b in t.bounds])
         _describe(t.element, types)
+    elif isinstance(t, InterfaceType):
+        entry.update(kind="pointer", target="BYTE")  # what it leads to is known to the program only
     elif isinstance(t, PointerType):
         entry.update(kind="pointer", target=t.target.name)
         _describe(t.target, types)

@@ -129,6 +129,7 @@ static void stopped_tasks_stay_stopped_and_start_afresh(void)
     CHECK(SimAdvance(ms(1000)) == ERR_OK);
     CHECK(count_of(0) == before);
     CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimCommCycle() == ERR_OK);
     CHECK(SimAdvance(ms(100)) == ERR_OK);
     CHECK(count_of(0) >= before + 10 && count_of(0) <= before + 12);
     CHECK(info_of(0).overruns == 0); /* the time it stood still was not missed */

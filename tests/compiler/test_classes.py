@@ -14,6 +14,7 @@ from plctool.compiler.lower_unit import Options
 from plctool.compiler.source import Source
 from plctool.compiler.targets import TARGETS, find_target
 from plctool.compiler.typed import TypedProgram
+from plctool.symbols import SymbolTable
 
 FAMILY = """
 FUNCTION_BLOCK Base
@@ -100,3 +101,17 @@ def test_members_of_the_base_are_found_by_name(tmp_path: Path) -> None:
     )
     symbols = compile_sources([file]).symbols
     assert symbols.resolve("Main.b.one").offset == symbols.resolve("Main.b.two").offset - 2
+
+
+def test_symbols_of_interfaces_and_of_blocks_that_point_to_themselves_are_read_back(tmp_path: Path) -> None:
+    file = tmp_path / "f.st"
+    file.write_text(
+        "INTERFACE I METHOD M END_METHOD END_INTERFACE\n"
+        "FUNCTION_BLOCK A IMPLEMENTS I VAR_INPUT next : POINTER TO A; i : I; END_VAR METHOD M END_METHOD END_FUNCTION_BLOCK\n"
+        "PROGRAM Main VAR a : A; i : I; END_VAR i := a; a.next := ADR(a); END_PROGRAM\n",
+        "latin-1",
+    )
+    symbols = compile_sources([file]).symbols
+    again = SymbolTable.from_json(symbols.to_json())
+    assert again.resolve("Main.a.i").offset == symbols.resolve("Main.a.i").offset
+    assert again.variables["Main.i"].type.size == 8

@@ -59,6 +59,7 @@ class Classes:
     def __init__(self, world: World) -> None:
         self.world = world
         self.interface_infos: dict[StructType, ClassInfo] = {}
+        self.used = False  # whether anything has methods, actions or properties
         self._interfaces: dict[PouSymbol, InterfaceType] = {}
         self._programs: list[ClassInfo] = []
         self._blocks: dict[PouSymbol, ClassInfo] = {}

@@ -78,6 +78,7 @@ _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}"
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAME = re.compile(r"\s+[A-Za-z_]")
 _PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
+_LABEL = re.compile(r"\s+[A-Za-z_]\w*\s*:(?!=)")
 _QUOTE = re.compile(r"\s*['\"]")
 _COMMENT_MARK = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
@@ -187,8 +188,10 @@ def is_followed_by_name(token: Token, text: str) -> bool:
     return _NAME.match(text, token.end) is not None
 
 
-def begins_test(token: Token, text: str) -> bool:
-    """Whether TEST begins one, wherever it stands: then the text before it is not finished."""
+def begins_unit(token: Token, text: str) -> bool:
+    """Whether TEST or STEP begins one, wherever it stands: then the text before it is not finished."""
+    if token.type in ("STEP", "INITIAL_STEP"):
+        return _LABEL.match(text, token.end) is not None
     return token.type == "TEST" and _QUOTE.match(text, token.end) is not None
 
 

@@ -149,6 +149,8 @@ class ObjectCalls(Calls):
     def bound_member(self, node: ast.Expr, *, called: bool = False) -> Bound | None:
         """What `m`, `fb.m` or `prog.m` stands for when it is a method, action or property. `called`: the name of the
         method around is not its result."""
+        if not self.world.classes.used:
+            return None
         if isinstance(node, ast.Name):
             symbol = self.scope.lookup(node.name)
             if called and isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT:

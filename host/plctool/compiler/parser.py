@@ -17,7 +17,7 @@ from plctool.compiler.lexer import (
     Lexer,
     Report,
     Token,
-    begins_test,
+    begins_unit,
     is_followed_by_name,
     is_operator_function,
 )
@@ -134,7 +134,7 @@ def parse(source: Source, report: Report, start: int = 0, end: int | None = None
         kind = token.type
         if kind not in actions[states[-1]]:
             if kind in SOFT or (kind == "OP" and is_operator_function(token, source.text)):
-                token.type = "TEST" if begins_test(token, source.text) else "IDENT"
+                token.type = kind if begins_unit(token, source.text) else "IDENT"
         elif kind in OPENING and not is_followed_by_name(token, source.text):
             token.type = "IDENT"
         if recovery.skipping and not recovery.resume(token):

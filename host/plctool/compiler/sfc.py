@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler import ast
 from plctool.compiler.diagnostics import Diagnostics, did_you_mean
-from plctool.compiler.symbols import MemberSymbol
+from plctool.compiler.symbols import MemberSymbol, VarSymbol
 
 if TYPE_CHECKING:
     from plctool.compiler.scope import Scope
@@ -336,8 +336,9 @@ class _Execution:
         return found
 
     def _unknown(self, action: _Action) -> None:
-        names = [*self._scope.outer, *self._scope.names]
-        hint = did_you_mean(action.name, [n for n in names if not n.startswith("%")])
+        known = (*self._scope.outer.values(), *self._scope.names.values())
+        names = [s.name for s in known if isinstance(s, MemberSymbol | VarSymbol) and s.name[0] != "%"]
+        hint = did_you_mean(action.name, names)
         message = f"there is no ACTION and no BOOL variable {action.name}{hint}"
         self._scope.error(action.target.pos, "unknown", message)
 

@@ -98,6 +98,7 @@ class World:
         """Makes the names of declarations known."""
         for decl in declarations:
             if isinstance(decl, ast.PouDecl):
+                self.classes.used = self.classes.used or bool(decl.members) or decl.keyword == "INTERFACE"
                 sfc.declare(decl, self.diagnostics)
                 self._add(PouSymbol(decl, library), library=library, full_name=decl.full_name)
             elif isinstance(decl, ast.TypeDecl):

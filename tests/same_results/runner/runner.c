@@ -118,7 +118,7 @@ static void run_step(bool loaded)
     if (!loaded)
         return;
     if (kind == STEP_MS)
-        (void)SimAdvance((RTS_I64)amount * 1000000);
+        (void)SimRunFor((RTS_I64)amount * 1000000);
     else if (amount > 0)
         (void)SimRunCycles(amount);
     put_state();
