@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from plctool import output
-from plctool.errors import PlcError, UsageError
+from plctool.errors import InternalError, PlcError, UsageError
 
 if TYPE_CHECKING:
+    from plctool.compiler.warnings import WarningOptions
     from plctool.device import Plc
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
@@ -62,9 +63,11 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build.add_argument("-O", dest="level", type=int, choices=range(4), default=2, help="optimisation; default: 2")
     build.add_argument("--checks", default="all", metavar="all|none|LIST", help="run-time checks; default: all")
     build.add_argument("--debug", action="store_true", help="keep the code close to its source")
+    _add_warnings(build)
 
     check = command("check", _check, "print every diagnosis of a program")
     _add_sources(check)
+    _add_warnings(check)
 
     info = command("info", _info, "describe an image")
     info.add_argument("image", type=Path)
@@ -82,6 +85,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     test.add_argument("--filter", default="*", metavar="PATTERN", help="only tests of such a name, with * and ?")
     test.add_argument("--junit", type=Path, metavar="FILE", help="write a report in JUnit's format as well")
     test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
+    _add_warnings(test)
 
     export = command("export-itf", _export_itf, "write the C header and frame for functions implemented in C")
     _add_sources(export)
@@ -110,6 +114,15 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(command("tasks", _tasks, "show the times of the tasks"))
     _add_link(command("log", _log, "print the log of a device"))
 
+    port = command("port-check", _port_check, "check a port: run programs on a board and compare with what is expected")
+    port.add_argument("--yes", action="store_true", help="replace the program that is on the board")
+    port.add_argument("--power-cycle", action="store_true", help="ask for the board to be switched off and on, too")
+    port.add_argument(
+        "--max-drift", type=_percent, default=0.01, metavar="PERCENT",
+        help="of its clock, default: 1; simulated boards on a busy host need more",
+    )  # fmt: skip
+    _add_link(port)
+
     read = command("read", _read, "print values of variables")
     read.add_argument("names", nargs="+", metavar="NAME")
     _add_link(read, symbols=True)
@@ -125,6 +138,13 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
 
 def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("sources", nargs="+", type=Path, metavar="FILE.st|DIR")
+
+
+def _add_warnings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--no-warn", action="append", default=[], metavar="NAME,...", help="without these warnings; may be repeated"
+    )
+    parser.add_argument("--werror", action="store_true", help="treat warnings as errors")
 
 
 def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
@@ -151,6 +171,10 @@ def _seconds(text: str) -> float:
     raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds")
 
 
+def _percent(text: str) -> float:
+    return _seconds(text.removesuffix("%")) / 100
+
+
 def _duration_ms(text: str) -> int:
     from plctool.values import parse_time
 
@@ -174,10 +198,18 @@ def _pairs(texts: Sequence[str]) -> dict[str, str]:
 # ---- commands on files -----------------------------------------------------------------------------------------------
 
 
+def _warnings(args: argparse.Namespace) -> WarningOptions:
+    from plctool.compiler.warnings import warning_options
+
+    return warning_options(args.no_warn, as_errors=args.werror)
+
+
 def _build(args: argparse.Namespace) -> int:
     from plctool import ops
 
-    document, warnings = ops.build(args.sources, args.output, args.target, args.level, args.checks, args.debug)
+    document, warnings = ops.build(
+        args.sources, args.output, args.target, args.level, args.checks, args.debug, _warnings(args)
+    )
     if not args.json:
         for warning in warnings:
             print(warning, file=sys.stderr)
@@ -187,7 +219,7 @@ def _build(args: argparse.Namespace) -> int:
 def _check(args: argparse.Namespace) -> int:
     from plctool import ops
 
-    document, texts = ops.check(args.sources)
+    document, texts = ops.check(args.sources, _warnings(args))
     _show(args, document, lambda d: "\n".join(texts))
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
 
@@ -213,7 +245,7 @@ def _test(args: argparse.Namespace) -> int:
     from plctool import st_tests
     from plctool.files import write_atomically
 
-    report = st_tests.run_tests(args.sources, pattern=args.filter, level=args.level)
+    report = st_tests.run_tests(args.sources, pattern=args.filter, level=args.level, warnings=_warnings(args))
     if args.junit:
         write_atomically(args.junit, st_tests.junit_xml(report))
     colour = sys.stdout.isatty() and "NO_COLOR" not in os.environ
@@ -375,6 +407,25 @@ def _log(args: argparse.Namespace) -> int:
         return _show(args, ops.log(plc), output.log_text)
 
 
+def _port_check(args: argparse.Namespace) -> int:
+    from plctool import port_check
+
+    def power_cycle() -> None:
+        print("Switch the board off and on, then press Enter.", file=sys.stderr)
+        sys.stdin.readline()
+
+    report = port_check.run_port_check(
+        lambda: _connect(args),
+        baud=args.baud,
+        replace=args.yes,
+        max_drift=args.max_drift,
+        power_cycle=power_cycle if args.power_cycle else None,
+        show=lambda outcome: None if args.json else print(port_check.outcome_text(outcome), flush=True),
+    )
+    _show(args, report.document(), lambda d: port_check.summary_text(report))
+    return EXIT_FAILED if report.count("failed") else EXIT_OK
+
+
 def _read(args: argparse.Namespace) -> int:
     from plctool import ops
 
@@ -470,9 +521,7 @@ def _report(error: PlcError, as_json: bool) -> int:
 def _internal_error(error: Exception, as_json: bool) -> int:
     if os.environ.get("PLCTOOL_DEBUG"):
         traceback.print_exc()
-    name = type(error).__name__
-    bug = PlcError(f"Internal error ({name}: {error}); set PLCTOOL_DEBUG=1 to see where, and report it.", "internal")
-    return _report(bug, as_json)
+    return _report(error if isinstance(error, InternalError) else InternalError(error), as_json)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -492,6 +541,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run_reported(words: Sequence[str], as_json: bool) -> int:
     try:
         return _command(words)
+    except InternalError as error:
+        return _internal_error(error, as_json)
     except PlcError as error:
         return _report(error, as_json)
     except KeyboardInterrupt:

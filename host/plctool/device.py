@@ -203,7 +203,9 @@ class Plc:
             table = self._symbols_of(status.image_crc)
         except UsageError:
             table = None
-        task = next((t.name for i, t in enumerate(self.tasks()) if i == status.exception.task), None)
+        task = None
+        with suppress(DeviceError):  # a device may be built without task information
+            task = next((t.name for i, t in enumerate(self.tasks()) if i == status.exception.task), None)
         return explain_exception(status.exception, task, table)
 
     def tasks(self) -> list[TaskInfo]:

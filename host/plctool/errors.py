@@ -25,6 +25,17 @@ class DeviceError(PlcError):
         self.result = result
 
 
+class InternalError(PlcError):
+    """A bug of ours. `where`: the place in somebody's program that shows it, such as ` at main.st:7`, if known."""
+
+    def __init__(self, error: Exception, where: str = "") -> None:
+        what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        super().__init__(
+            f"Internal error{where} ({what}); please report it, with what PLCTOOL_DEBUG=1 shows and the program.",
+            "internal",
+        )
+
+
 class UsageError(PlcError):
     """Wrong use or bad input: a missing file, an unknown variable, a program that does not compile."""
 

@@ -11,6 +11,7 @@ from plctool.errors import DeviceError, UsageError
 
 if TYPE_CHECKING:
     from plctool.compiler.diagnostics import Diagnostic
+    from plctool.compiler.warnings import WarningOptions
     from plctool.device import ExceptionInfo, Plc, PlcStatus
     from plctool.sim import Simulator
 
@@ -23,7 +24,13 @@ _CODE_OFFSET = re.compile(r"at code offset 0x([0-9a-f]+)$")
 
 
 def build(
-    paths: Sequence[Path], output: Path, target: str, level: int, checks: str, debug: bool
+    paths: Sequence[Path],
+    output: Path,
+    target: str,
+    level: int,
+    checks: str,
+    debug: bool,
+    warnings: WarningOptions,
 ) -> tuple[Document, list[str]]:
     """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as people read them.
 
@@ -32,7 +39,7 @@ def build(
     from plctool.compiler import compile_sources
     from plctool.symbols import symbol_path
 
-    result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug)
+    result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug, warnings=warnings)
     result.write(output)
     document = {
         "image": str(output),
@@ -45,13 +52,13 @@ def build(
     return document, result.rendered_warnings
 
 
-def check(paths: Sequence[Path]) -> tuple[Document, list[str]]:
+def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, list[str]]:
     """Every diagnosis of a program; the texts are as people read them."""
     from plctool.compiler import check_with_tests, load_sources
     from plctool.compiler.diagnostics import render
 
     sources = load_sources(paths)
-    result = check_with_tests(sources)
+    result = check_with_tests(sources, warnings)
     texts = [render(d, sources) for d in result.diagnostics]
     return {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}, texts
 
@@ -64,10 +71,12 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
     from plctool.compiler import CompileError, load_sources
     from plctool.compiler.export_itf import export_interface as export
     from plctool.compiler.front import check_sources
+    from plctool.compiler.internal import bugs_reported
     from plctool.files import make_folder, write_atomically
 
     sources = load_sources(paths)
-    program = check_sources(sources)
+    with bugs_reported():
+        program = check_sources(sources)
     if program.program is None:
         raise CompileError(program.diagnostics, sources)
     functions = program.program.externals

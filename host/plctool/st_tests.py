@@ -15,12 +15,14 @@ from xml.etree import ElementTree
 from plctool.compiler import CompileError, load_sources
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.front import check_sources
+from plctool.compiler.internal import bugs_reported
 from plctool.compiler.lower_init import encode_scalar
 from plctool.compiler.lower_unit import Options
 from plctool.compiler.targets import DEFAULT_TARGET, TARGETS, find_target
 from plctool.compiler.types import Elementary, Kind, Type, base_of
 from plctool.compiler.unit_test_statements import FAILED, NUMBER, Assertion, Operand
 from plctool.compiler.unit_tests import TestCase, TestSuite
+from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.core import lib
 from plctool.device import explain_exception
 from plctool.errors import UsageError
@@ -88,7 +90,9 @@ class Report:
         return {"tests": tests, "passed": passed, "failed": self.failed, "seconds": round(self.seconds, 3)}
 
 
-def run_tests(paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0) -> Report:
+def run_tests(
+    paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0, warnings: WarningOptions = ALL_WARNINGS
+) -> Report:
     """Runs the tests in sources whose name fits `pattern` (with * and ?, upper and lower case are the same).
 
     `level`: optimisation; the lowest compiles fastest, and the results are the same. Raises CompileError when the
@@ -97,8 +101,8 @@ def run_tests(paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0
     begin = time.perf_counter()
     sources = load_sources(paths)
     suite = TestSuite()
-    with _power():
-        checked = check_sources(sources, tests=suite)
+    with _power(), bugs_reported():
+        checked = check_sources(sources, tests=suite, warnings=warnings)
     if checked.program is None:
         raise CompileError([d for d in checked.diagnostics if d.severity == "error"], sources)
     chosen = [i for i, case in enumerate(suite.cases) if fnmatch(case.name.casefold(), pattern.casefold())]
@@ -107,7 +111,8 @@ def run_tests(paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0
         raise UsageError(f"{what[:1].upper()}{what[1:]}.", "no-tests")
     here = f"{platform.machine()}-linux"
     target = find_target(here if here in TARGETS else DEFAULT_TARGET)
-    built = build_program(checked.program, Options(target, level))
+    with bugs_reported():
+        built = build_program(checked.program, Options(target, level))
     with Simulator(built.image, built.symbols, start=False) as plc:
         bench = _Bench(plc, built, suite)
         outcomes = [bench.run(number) for number in chosen]

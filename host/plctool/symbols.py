@@ -22,8 +22,8 @@ from plctool.compiler.types import (
     Elementary,
     EnumType,
     Field,
-    Kind,
     InterfaceType,
+    Kind,
     PointerType,
     StringType,
     StructType,
@@ -315,6 +315,8 @@ def _member(symbol: Symbol, member: str, name: str) -> Symbol:
     if not isinstance(t, StructType):
         raise UsageError(f"{symbol.name} is a {t} and has no member {member}.", "no-part")
     found = t.member(member)
+    if found is None and member.casefold() in map(str.casefold, t.properties):
+        raise UsageError(f"{name} is a property: only the program can read it, by a call.", "property")
     if found is None:
         raise _no_such("variable", name, [f"{symbol.name}.{f.name}" for f in t.fields])
     return Symbol(name, symbol.area, symbol.offset + found.offset, found.type)
@@ -380,6 +382,8 @@ def _describe(t: Type, types: dict[str, Any]) -> None:
     else:
         assert isinstance(t, StructType)
         entry.update(kind="struct", fields=[[f.name, f.type.name] for f in t.fields], union=t.union)
+        if t.properties:
+            entry["properties"] = t.properties
         for f in t.fields:
             _describe(f.type, types)
 
@@ -391,6 +395,8 @@ def layout_signature(symbols: Iterable[Symbol]) -> int:
     for symbol in symbols:
         _describe(symbol.type, types)
         places.append([symbol.name.casefold(), symbol.offset, symbol.type.name])
+    for entry in types.values():
+        entry.pop("properties", None)  # they are not in memory
     return zlib.crc32(json.dumps([sorted(places), types], sort_keys=True).encode())
 
 
@@ -420,7 +426,7 @@ class _Types:
             return ArrayType(self.get(entry["element"]), tuple((low, high) for low, high in entry["bounds"]))
         if kind == "pointer":
             return self._pointer(entry)
-        struct = StructType(name, union=entry["union"])
+        struct = StructType(name, union=entry["union"], properties=entry.get("properties", []))
         self._made[name] = struct  # references may lead back to it
         struct.fields = [Field(n, self.get(t)) for n, t in entry["fields"]]
         struct.lay_out()

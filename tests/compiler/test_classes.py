@@ -14,6 +14,7 @@ from plctool.compiler.lower_unit import Options
 from plctool.compiler.source import Source
 from plctool.compiler.targets import TARGETS, find_target
 from plctool.compiler.typed import TypedProgram
+from plctool.errors import UsageError
 from plctool.symbols import SymbolTable
 
 FAMILY = """
@@ -107,7 +108,8 @@ def test_symbols_of_interfaces_and_of_blocks_that_point_to_themselves_are_read_b
     file = tmp_path / "f.st"
     file.write_text(
         "INTERFACE I METHOD M END_METHOD END_INTERFACE\n"
-        "FUNCTION_BLOCK A IMPLEMENTS I VAR_INPUT next : POINTER TO A; i : I; END_VAR METHOD M END_METHOD END_FUNCTION_BLOCK\n"
+        "FUNCTION_BLOCK A IMPLEMENTS I VAR_INPUT next : POINTER TO A; i : I; END_VAR\n"
+        "METHOD M END_METHOD END_FUNCTION_BLOCK\n"
         "PROGRAM Main VAR a : A; i : I; END_VAR i := a; a.next := ADR(a); END_PROGRAM\n",
         "latin-1",
     )
@@ -115,3 +117,16 @@ def test_symbols_of_interfaces_and_of_blocks_that_point_to_themselves_are_read_b
     again = SymbolTable.from_json(symbols.to_json())
     assert again.resolve("Main.a.i").offset == symbols.resolve("Main.a.i").offset
     assert again.variables["Main.i"].type.size == 8
+
+
+def test_properties_cannot_be_read_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "f.st"
+    file.write_text(
+        "FUNCTION_BLOCK A PROPERTY P : INT GET P := 1; END_GET END_PROPERTY END_FUNCTION_BLOCK\n"
+        "FUNCTION_BLOCK B EXTENDS A END_FUNCTION_BLOCK\n"
+        "PROGRAM Main VAR b : B; x : INT; END_VAR x := b.P; END_PROGRAM\n",
+        "latin-1",
+    )
+    symbols = SymbolTable.from_json(compile_sources([file]).symbols.to_json())
+    with pytest.raises(UsageError, match=r"Main\.b\.p is a property"):
+        symbols.resolve("Main.b.p")

@@ -17,7 +17,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler import compile_sources
+from plctool.compiler.types import ELEMENTARY
 from plctool.sim import Simulator
+from plctool.values import format_time
 
 Value = bool | int | float | str
 
@@ -455,6 +457,17 @@ def any_integer_text(draw: st.DrawFn, known: Declarations) -> Term:
     return Term(f"STRING_TO_{name}('{a.value}')", name, a.value)
 
 
+def any_duration_text(draw: st.DrawFn, known: Declarations) -> Term:
+    """Durations are read as the text the language uses."""
+    name, whole = draw(st.sampled_from([("TIME", "DINT"), ("LTIME", "LINT")]))
+    value = draw(numbers(whole) | st.integers(-1000, 1000).map(lambda n: n * 1000))
+    text = format_time(value, ELEMENTARY[name])
+    if draw(st.booleans()):
+        return Term(f"STRING_TO_{name}('{text}')", name, text)
+    a = known.variable(whole, f"{whole}#{value}", value)
+    return Term(f"{name}_TO_STRING({whole}_TO_{name}({a.text}))", "STRING", text)
+
+
 def shortest_digits(value: float, name: str) -> str:
     """The fewest significant digits that read back as the same value, without zeros at the end."""
     for precision in range(17):
@@ -481,6 +494,12 @@ def real_texts(draw: st.DrawFn) -> tuple[str, list[float]]:
 @PROGRAM
 @given(batch(any_integer_text))
 def test_integers_and_their_texts_convert_both_ways(program: tuple[list[Term], str]) -> None:
+    check(*program)
+
+
+@PROGRAM
+@given(batch(any_duration_text))
+def test_durations_and_their_texts_convert_both_ways(program: tuple[list[Term], str]) -> None:
     check(*program)
 
 

@@ -223,8 +223,8 @@ def fail(controller: Controller, code: int, offset: int, task: int = 0) -> None:
 @pytest.mark.parametrize(
     ("code", "offset", "line"),
     [
-        ("RTSEXCPT_DIVIDEBYZERO", 0x20, 7),  # the address after the call that raised it
-        ("RTSEXCPT_DIVIDEBYZERO", 0x21, 8),
+        ("RTSEXCPT_DIVIDEBYZERO", 0x1F, 7),  # the last byte of the call that raised it
+        ("RTSEXCPT_DIVIDEBYZERO", 0x20, 8),
         ("RTSEXCPT_WATCHDOG", 0x20, 8),  # where the processor was
     ],
 )

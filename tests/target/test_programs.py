@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import pytest
 from programs import COUNTER, TWO_TASKS, compile_text, program
 from qemu import FLASH_SIZE
 
 from plctool.device import Plc
+from plctool.errors import LinkError
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
 from plctool.symbols import symbol_path
@@ -80,6 +83,13 @@ FAULTS = {
 }
 
 
+def has_stopped(plc: Plc) -> bool:
+    """Whether an exception stopped the application. An endless loop keeps the device from answering until it is broken."""
+    with suppress(LinkError):
+        return plc.status().state is AppState.EXCEPTION
+    return False
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_fault_stops_the_application_and_names_its_line(plc, build, eventually, fault):
     variables, body, name = FAULTS[fault]
@@ -87,7 +97,7 @@ def test_fault_stops_the_application_and_names_its_line(plc, build, eventually, 
     plc.flash(build(text).path)
     eventually(lambda: plc.read("Main.ok") > 3)
     plc.write({"Main.trip": True})
-    eventually(lambda: plc.status().state is AppState.EXCEPTION)
+    eventually(lambda: has_stopped(plc))
     exception = plc.status().exception
     assert (exception.name, exception.task, exception.pou) == (name, "Fast", "Main")
     assert exception.line == text.split("\n").index(body) + 1

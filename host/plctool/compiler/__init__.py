@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.front import CheckResult
     from plctool.compiler.source import Source
+    from plctool.compiler.warnings import WarningOptions
 
 DEFAULT_TARGET = "x86_64-linux"
 
@@ -56,16 +57,19 @@ def check_sources(paths: Sequence[Path | str]) -> CheckResult:
     return check_with_tests(load_sources(paths))
 
 
-def check_with_tests(sources: Sequence[Source]) -> CheckResult:
-    """Checks a program as it is built, and once more as its unit tests see it."""
+def check_with_tests(sources: Sequence[Source], warnings: WarningOptions | None = None) -> CheckResult:
+    """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all."""
     from plctool.compiler.front import check_sources
+    from plctool.compiler.internal import bugs_reported
+    from plctool.compiler.warnings import ALL_WARNINGS
 
-    result = check_sources(sources)
-    if not result.has_tests:
-        return result
-    from plctool.compiler.unit_tests import TestSuite
+    with bugs_reported():
+        result = check_sources(sources, warnings=warnings or ALL_WARNINGS)
+        if not result.has_tests:
+            return result
+        from plctool.compiler.unit_tests import TestSuite
 
-    tests = check_sources(sources, tests=TestSuite())
+        tests = check_sources(sources, tests=TestSuite(), warnings=warnings or ALL_WARNINGS)
     found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
     found_sorted = sorted(found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
     return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)
@@ -78,28 +82,32 @@ def compile_sources(
     level: int = 2,
     checks: str = "all",
     debug: bool = False,
+    warnings: WarningOptions | None = None,
 ) -> BuildResult:
-    """Compiles a program. `level`: optimisation 0..3; `checks`: all, none, or names of run-time checks.
+    """Compiles a program. `level`: optimisation 0..3; `checks`: all, none, or names of run-time checks; `warnings`:
+    which are wanted, all unless said otherwise.
 
-    Raises CompileError when the program has errors, UsageError for options that make no sense.
+    Raises CompileError when the program has errors, UsageError for options that make no sense, InternalError when
+    the compiler has a bug.
     """
     from plctool.compiler.build import build_program
     from plctool.compiler.diagnostics import render
     from plctool.compiler.front import check_sources
+    from plctool.compiler.internal import bugs_reported
     from plctool.compiler.lower_unit import Options, parse_checks
     from plctool.compiler.targets import find_target
+    from plctool.compiler.warnings import ALL_WARNINGS
     from plctool.image import ApplicationInfo
 
     options = Options(find_target(target), level, parse_checks(checks), debug)
     sources = load_sources(paths)
-    checked = check_sources(sources)
+    with bugs_reported():
+        checked = check_sources(sources, warnings=warnings or ALL_WARNINGS)
     if checked.program is None:
         raise CompileError(checked.diagnostics, sources)
-    warnings = checked.diagnostics
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.
     info = ApplicationInfo(project=Path(paths[0]).stem, date=int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
-    return replace(
-        build_program(checked.program, options, info),
-        warnings=warnings,
-        rendered_warnings=[render(d, sources) for d in warnings],
-    )
+    with bugs_reported():
+        built = build_program(checked.program, options, info)
+    found = checked.diagnostics
+    return replace(built, warnings=found, rendered_warnings=[render(d, sources) for d in found])

@@ -326,7 +326,7 @@ class Transition:
 
 @dataclass(slots=True, eq=False)
 class Chart:
-    """A body that is a Sequential Function Chart; its ACTIONs are members of the unit. `valid` unless errors were found."""
+    """A body that is a Sequential Function Chart; its ACTIONs are members of the unit. `valid`: it has no errors."""
 
     steps: list[Step]
     transitions: list[Transition]
@@ -432,6 +432,7 @@ class Case:
     selector: Expr
     branches: list[tuple[list[CaseLabel], list[Stmt]]]
     otherwise: list[Stmt]
+    has_else: bool = False  # also an empty one
 
 
 @dataclass(slots=True, eq=False)

@@ -331,7 +331,7 @@ class Builder:
                     self.report(item.pos, "syntax", "this statement stands before the first label of the CASE")
                     continue
                 branches[-1][1].append(item)
-        return ast.Case(keyword.pos, selector, branches, otherwise or [])
+        return ast.Case(keyword.pos, selector, branches, otherwise or [], otherwise is not None)
 
     def case_labels(self, *labels: ast.CaseLabel) -> list[ast.CaseLabel]:
         return _listed(labels)

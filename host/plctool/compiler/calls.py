@@ -466,6 +466,8 @@ class Calls(Builtins):
             return f"{symbol.name} is a constant"
         if symbol.by_reference and symbol.role is Role.INPUT:
             return f"{symbol.name} is an input passed by reference"
+        if symbol.role is Role.STEP and self.scope.names.get(symbol.name.casefold()) is not symbol:
+            return f"{symbol.name} is a step"  # only the chart itself changes it
         return None
 
     def _member_read_only(self, node: ast.Member) -> str | None:

@@ -14,14 +14,14 @@ from plctool.compiler.symbols import ClassInfo, Member
 if TYPE_CHECKING:
     from plctool.compiler.classes import Classes
 
-_FREE = ("fb_init", "fb_reinit", "fb_exit")  # each class may have its own parameters
+INITIALISERS = ("fb_init", "fb_reinit", "fb_exit")  # each class may have its own parameters
 
 
 def check_class(classes: Classes, cls: ClassInfo) -> None:
     """Reports what is wrong with the members of a class and what is missing."""
     for key, member in cls.members.items():
         inherited = cls.base.find(key) if cls.base is not None else None
-        if inherited is not None and key not in _FREE:
+        if inherited is not None and key not in INITIALISERS:
             _check_override(classes, member, inherited)
         elif "OVERRIDE" in member.decl.modifiers and not any(key in i.members for i in cls.all_interfaces()):
             names = cls.base.member_names() if cls.base is not None else []

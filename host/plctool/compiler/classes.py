@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from plctool.compiler import ast
-from plctool.compiler.class_rules import check_class
+from plctool.compiler.class_rules import INITIALISERS, check_class
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.scope import Scope
 from plctool.compiler.symbols import (
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from plctool.compiler.world import World
 
 CLASS_NUMBER = "%class"  # the hidden member; no identifier, so nothing else can have its name
-_INITIALISERS = ("fb_init", "fb_reinit", "fb_exit")
 
 
 def member_key(decl: ast.PouDecl) -> str:
@@ -137,6 +136,9 @@ class Classes:
                 cls.interfaces.append(interface)
         info.type.interfaces = [i.type for i in cls.all_interfaces() if i.type is not None]
         self._add_members(cls)
+        info.type.properties = sorted({m.decl.name for m in cls.members.values() if m.is_property})
+        if info.type.base is not None:
+            info.type.properties += info.type.base.properties
 
     def _base(self, symbol: PouSymbol, scope: Scope) -> BlockInfo | None:
         bases = symbol.decl.bases
@@ -375,7 +377,7 @@ class Classes:
         found: list[Member] = []
         cls = self.class_of(t)
         while cls is not None:
-            if _INITIALISERS[0] in cls.members:
-                found.insert(0, cls.members[_INITIALISERS[0]])
+            if INITIALISERS[0] in cls.members:
+                found.insert(0, cls.members[INITIALISERS[0]])
             cls = cls.base
         return found

@@ -12,6 +12,7 @@ from typing import Literal
 
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Pos
+from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
 
 Severity = Literal["error", "warning"]
 
@@ -41,6 +42,8 @@ class Diagnostics:
 
     def __init__(self, quiet: Iterable[str] = ()) -> None:
         self._quiet = frozenset(quiet)
+        self.options = ALL_WARNINGS
+        self._muted: dict[tuple[str, str], LineRanges] = {}
         self._found: dict[Diagnostic, None] = {}
         self.errors = 0
 
@@ -49,10 +52,19 @@ class Diagnostics:
         self._add(pos, "error", code, message)
 
     def warning(self, pos: Pos, code: str, message: str) -> None:
-        """Records a warning."""
-        if pos.file in self._quiet:
+        """Records a warning, unless it is not wanted; `code` is one of WARNINGS."""
+        muted = self._muted.get((pos.file, code), ())
+        if pos.file in self._quiet or code in self.options.disabled or any(a <= pos.line < b for a, b in muted):
             return
-        self._add(pos, "warning", code, message)
+        if self.options.as_errors:
+            self._add(pos, "error", code, f"{message} (an error because of --werror)")
+        else:
+            self._add(pos, "warning", code, message)
+
+    def mute(self, source: Source) -> None:
+        """Heeds the pragmas of a text that turn warnings off."""
+        for code, ranges in switched_off(source).items():
+            self._muted[source.path, code] = ranges
 
     def at(self, source: Source) -> Callable[[int, str, str], None]:
         """Reports errors by their offset in a source."""

@@ -16,9 +16,11 @@ from plctool.compiler.configuration import configure
 from plctool.compiler.diagnostics import Diagnostic, TooManyErrors, render
 from plctool.compiler.expressions import NestingError
 from plctool.compiler.library import Library, standard_library
+from plctool.compiler.overlaps import report_overlaps
 from plctool.compiler.parser import parse
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Area, TypedProgram
+from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.compiler.world import World
 
 if TYPE_CHECKING:
@@ -49,15 +51,18 @@ def check_sources(
     library: bool = True,
     library_sources: Sequence[Source] = (),
     tests: TestSuite | None = None,
+    warnings: WarningOptions = ALL_WARNINGS,
 ) -> CheckResult:
     """Checks the files of a program together.
 
     `library`: whether the standard library is there; `library_sources`: other library texts in place of it. `tests`:
-    takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over. Whatever
-    the texts hold, the answer is a program or diagnoses, never an exception.
+    takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
+    `warnings`: which of them are wanted. Whatever the texts hold, the answer is a program or diagnoses, never an
+    exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     world = World(chosen)
+    world.diagnostics.options = warnings
     with _limits():
         program = _guarded(world, sources, tests)
     diagnostics = world.diagnostics
@@ -85,6 +90,7 @@ def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> 
     if tests is not None:
         parsed = tests.prepare(parsed, world)
     for source, declarations in parsed:
+        world.diagnostics.mute(source)
         world.register(declarations)
         world.register_globals(declarations, source)
     world.declare_all()
@@ -96,6 +102,7 @@ def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> 
     world.check_bodies()
     allocation = world.allocation
     _check_sizes(world, sources)
+    report_overlaps(allocation.variables, world.diagnostics)
     if not application.tasks and not world.tests and not world.diagnostics.errors and sources:
         world.diagnostics.warning(sources[0].pos(0), "no-program", "there is no PROGRAM, so nothing would run")
     return TypedProgram(

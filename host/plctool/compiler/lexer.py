@@ -102,11 +102,13 @@ class Token:
 
 
 class Lexer:
-    """Iterates over the tokens of a text; `attributes` collects the pragmas by the offset of the token they precede."""
+    """Iterates over the tokens of a text; `attributes` collects the attributes by the offset of the token they precede,
+    `pragmas` all other pragmas with their own."""
 
     def __init__(self, text: str, report: Report, start: int = 0, end: int | None = None) -> None:
         self.text = text
         self.attributes: dict[int, dict[str, str]] = {}
+        self.pragmas: list[tuple[int, str]] = []
         self._report = report
         self._start = start
         self._end = len(text) if end is None else end
@@ -130,7 +132,7 @@ class Lexer:
                     at = self._skip_comment(word, match.end())
                     break
                 elif kind == "PRAGMA":
-                    self._pragma(word)
+                    self._pragma(word, pos)
                     continue
                 elif kind == "BAD":
                     if self._bad(word, pos):
@@ -157,10 +159,12 @@ class Lexer:
         self._report(start, "comment", "this comment is not closed")
         return self._end
 
-    def _pragma(self, text: str) -> None:
+    def _pragma(self, text: str, pos: int) -> None:
         match = _ATTRIBUTE.fullmatch(text)
         if match:
             self._pending[match.group(1).lower()] = match.group(2) or ""
+        else:
+            self.pragmas.append((pos, text))
 
     def _bad(self, character: str, pos: int) -> bool:
         """Reports a character that starts no token; False when the rest of the line is to be skipped."""

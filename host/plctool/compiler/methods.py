@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from plctool.compiler import ast
+from plctool.compiler import ast, sfc
 from plctool.compiler.calls import Calls
 from plctool.compiler.conversions import error_value
 from plctool.compiler.diagnostics import did_you_mean
@@ -100,7 +100,9 @@ class ObjectCalls(Calls):
         return self._property(bound, node.pos, node.name_pos)
 
     def qualified(self, node: ast.Member) -> Expr | None:
-        """A global, or the value of an enumeration, in a namespace; None when `node` names none."""
+        """A global, or the value of an enumeration, in a namespace, or `action.Q`; None when `node` names none."""
+        if isinstance(node.base, ast.Name) and isinstance(self.scope.lookup(node.base.name), MemberSymbol):
+            return self._action_flag(node, node.base.name)
         name = self._dotted(node)
         if name is None:
             return None
@@ -112,6 +114,17 @@ class ObjectCalls(Calls):
         if isinstance(owner, TypeSymbol):
             return self.expr(ast.EnumValue(node.pos, space, value))
         return None
+
+    def _action_flag(self, node: ast.Member, action: str) -> Expr | None:
+        """`action.Q` of a Sequential Function Chart: whether the action is active; FALSE in its final scan."""
+        cls, state = self.scope.cls, None
+        while cls is not None and state is None:
+            state = self.scope.lookup(sfc.hidden_name(cls.symbol.decl, action))
+            cls = cls.base
+        if not isinstance(state, VarSymbol) or node.name.upper() != "Q":
+            return None
+        e = self.variable(state, self.pos(node.pos))
+        return self.member(e, node) if isinstance(e.type, StructType) else e
 
     def _dotted(self, node: ast.Expr) -> str | None:
         """`a.b.c` as a name when `a` may be a namespace."""

@@ -1,12 +1,14 @@
 """Sequential Function Charts: a chart becomes variables and statements of the unit whose body it is.
 
 - A step is a variable of the type SFC_STEP__, so that `step.X` and `step.T` are read like any members.
-- In a chart without simultaneous branches one step is active at a time: its transitions are a CASE over a hidden number.
-  Else the transitions are evaluated first, into temporaries, and then fire together.
-- An action that has only the qualifier N is called while one of its steps is active, and once more behind that. With any
-  other qualifier an instance of the library's ACTION_CONTROL decides.
+- In a chart without simultaneous branches one step is active at a time: its transitions are a branch of a CASE over a
+  hidden number, and while it stays, so are the calls of its actions. Else the transitions are evaluated first, into
+  temporaries, and then fire together.
+- An action that has only the qualifier N is called while one of its steps is active, and once more behind that. With
+  any other qualifier an instance of the library's ACTION_CONTROL decides.
 
-What is hidden has a name that starts with %, which no identifier does. In the first cycle no transition is looked at:
+What is hidden has a name that starts with %, which no identifier does, and holds that of the unit, because a unit that
+it extends may have a chart as well. In the first cycle no transition is looked at:
 the standard wants the effects of an activation to be over before what follows it is tested.
 
 SPDX-License-Identifier: Apache-2.0
@@ -28,7 +30,9 @@ if TYPE_CHECKING:
 STEP_TYPE = "SFC_STEP__"
 _CONTROL = "ACTION_CONTROL"
 _STATE = "%state"  # of a chart that has one active step: its number from 1; 0 before the first cycle
+_BEFORE = "%before"  # the same number at the beginning of the cycle
 _RUNNING = "%running"  # of any other chart: FALSE before the first cycle
+_FIRES = "%fires"  # whether a transition does, in this cycle
 
 
 @dataclass
@@ -36,6 +40,7 @@ class _Action:
     """An ACTION or a BOOL variable, and the steps that have it. `plain`: with no qualifier but N."""
 
     name: str
+    hidden: str  # the variable that belongs to it: an ACTION_CONTROL, or whether the action is active
     target: ast.Expr
     uses: list[tuple[ast.Step, ast.StepAction]] = field(default_factory=list)
 
@@ -43,17 +48,18 @@ class _Action:
     def plain(self) -> bool:
         return all(use.qualifier == "N" for _, use in self.uses)
 
-    @property
-    def hidden(self) -> str:
-        """The variable that belongs to it: an ACTION_CONTROL, or whether the action is active."""
-        return f"%{self.name}"
+
+def hidden_name(decl: ast.PouDecl, what: str) -> str:
+    """A hidden variable of a unit: that of an action, for example."""
+    return f"%{decl.name}%{what}"
 
 
-def _actions(chart: ast.Chart) -> list[_Action]:
+def _actions(decl: ast.PouDecl, chart: ast.Chart) -> list[_Action]:
     found: dict[str, _Action] = {}
     for step in chart.steps:
         for use in step.actions:
-            found.setdefault(use.name.casefold(), _Action(use.name, use.target)).uses.append((step, use))
+            action = _Action(use.name, hidden_name(decl, use.name), use.target)
+            found.setdefault(use.name.casefold(), action).uses.append((step, use))
     return list(found.values())
 
 
@@ -71,9 +77,13 @@ def declare(decl: ast.PouDecl, diagnostics: Diagnostics) -> None:
         return
     _Structure(decl, decl.chart, diagnostics).check()
     steps = ast.VarBlock(decl.pos, "STEP", set(), [_step_variable(step) for step in decl.chart.steps])
-    decl.blocks = [*decl.blocks, steps, ast.VarBlock(decl.pos, "VAR", set(), _hidden(decl, decl.chart))]
+    steps.decls += _hidden(decl, decl.chart)
+    temporary = [_variable(decl.pos, hidden_name(decl, _BEFORE), "UINT")]
     if not _is_sequential(decl.chart):
-        temporary = [_variable(t.pos, f"%{i}", "BOOL") for i, t in enumerate(decl.chart.transitions)]
+        fires = [hidden_name(decl, f"{_FIRES}{i}") for i in range(len(decl.chart.transitions))]
+        temporary = [_variable(t.pos, name, "BOOL") for t, name in zip(decl.chart.transitions, fires, strict=True)]
+    decl.blocks = [*decl.blocks, steps]
+    if decl.chart.valid:
         decl.blocks.append(ast.VarBlock(decl.pos, "VAR_TEMP", set(), temporary))
 
 
@@ -90,8 +100,8 @@ def _step_variable(step: ast.Step) -> ast.VarDecl:
 def _hidden(decl: ast.PouDecl, chart: ast.Chart) -> list[ast.VarDecl]:
     own = {name.casefold() for block in decl.blocks for line in block.decls for _, name in line.names}
     state = (_STATE, "UINT") if _is_sequential(chart) else (_RUNNING, "BOOL")
-    found = [_variable(decl.pos, *state)]
-    for action in _actions(chart):
+    found = [_variable(decl.pos, hidden_name(decl, state[0]), state[1])]
+    for action in _actions(decl, chart):
         if not action.plain:
             found.append(_variable(action.target.pos, action.hidden, _CONTROL))
         elif isinstance(action.target, ast.Name) and action.name.casefold() not in own:
@@ -184,7 +194,7 @@ def statements(decl: ast.PouDecl, scope: Scope) -> list[ast.Stmt]:
         return decl.body
     if not decl.chart.valid:
         return []
-    return [*_Evolution(decl.chart).statements(), *_Execution(decl, decl.chart, scope).statements()]
+    return [*_Evolution(decl, decl.chart).statements(), *_Execution(decl, decl.chart, scope).statements()]
 
 
 def _name(pos: int, name: str) -> ast.Expr:
@@ -243,7 +253,8 @@ def _left(pos: int, step: ast.Step) -> ast.Stmt:
 class _Evolution:
     """From one situation of the chart to the next."""
 
-    def __init__(self, chart: ast.Chart) -> None:
+    def __init__(self, decl: ast.PouDecl, chart: ast.Chart) -> None:
+        self._decl = decl
         self._chart = chart
         self._steps = {step.name.casefold(): step for step in chart.steps}
         self._initial = next(step for step in chart.steps if step.initial)
@@ -267,23 +278,27 @@ class _Evolution:
             if firing:
                 body.append(ast.If(step.pos, firing, []))
             branches.append(([_label(step.pos, self._numbers[key])], body))
-        return [ast.Case(pos, _name(pos, _STATE), branches, [])]
+        note = _assign(pos, self._hidden(pos, _BEFORE), self._hidden(pos, _STATE))
+        return [note, ast.Case(pos, self._hidden(pos, _STATE), branches, [])]
+
+    def _hidden(self, pos: int, what: str) -> ast.Expr:
+        return _name(pos, hidden_name(self._decl, what))
 
     def _move(self, transition: ast.Transition, source: ast.Step) -> list[ast.Stmt]:
         pos, target = transition.pos, self._steps[transition.targets[0][1].casefold()]
         return [_left(pos, source), *_entered(pos, target), self._state(pos, target)]
 
     def _state(self, pos: int, step: ast.Step) -> ast.Stmt:
-        return _assign(pos, _name(pos, _STATE), _integer(pos, self._numbers[step.name.casefold()]))
+        return _assign(pos, self._hidden(pos, _STATE), _integer(pos, self._numbers[step.name.casefold()]))
 
     def _all_together(self) -> list[ast.Stmt]:
         pos = self._initial.pos
-        first = [_assign(pos, _name(pos, _RUNNING), _bool(pos, True)), _started(pos, self._initial)]
+        first = [_assign(pos, self._hidden(pos, _RUNNING), _bool(pos, True)), _started(pos, self._initial)]
         body: list[ast.Stmt] = [
             ast.If(step.pos, [(_part(step.pos, step, "X"), [_measured(step.pos, step)])], [])
             for step in self._chart.steps
         ]
-        fires = {t: f"%{i}" for i, t in enumerate(self._chart.transitions)}
+        fires = {t: hidden_name(self._decl, f"{_FIRES}{i}") for i, t in enumerate(self._chart.transitions)}
         for i, transition in enumerate(self._transitions):
             body.append(self._test(transition, self._transitions[:i], fires))
         for transition in self._transitions:
@@ -292,12 +307,14 @@ class _Evolution:
         for transition in self._transitions:
             entered = [s for step in self._ends(transition.targets) for s in _entered(transition.pos, step)]
             body.append(ast.If(transition.pos, [(_name(transition.pos, fires[transition]), entered)], []))
-        return [ast.If(pos, [(_name(pos, _RUNNING), body)], first)]
+        return [ast.If(pos, [(self._hidden(pos, _RUNNING), body)], first)]
 
     def _ends(self, names: list[tuple[int, str]]) -> list[ast.Step]:
         return [self._steps[name.casefold()] for _, name in names]
 
-    def _test(self, transition: ast.Transition, before: list[ast.Transition], fires: dict[ast.Transition, str]) -> ast.Stmt:
+    def _test(
+        self, transition: ast.Transition, before: list[ast.Transition], fires: dict[ast.Transition, str]
+    ) -> ast.Stmt:
         """Notes whether a transition fires: its steps are active and none of those before takes one of them away."""
         pos, sources = transition.pos, _keys(transition.sources)
         enabled = [_part(pos, step, "X") for step in self._ends(transition.sources)]
@@ -315,8 +332,11 @@ class _Execution:
     """What the active steps do."""
 
     def __init__(self, decl: ast.PouDecl, chart: ast.Chart, scope: Scope) -> None:
+        self._chart = chart
         self._scope = scope
-        self._actions = _actions(chart)
+        self._decl = decl
+        self._actions = _actions(decl, chart)
+        self._checker = scope.world.expressions(scope)
         self._order = {member.name.casefold(): i for i, member in enumerate(decl.members)}
 
     def statements(self) -> list[ast.Stmt]:
@@ -324,6 +344,8 @@ class _Execution:
         found: list[ast.Stmt] = []
         calls: list[_Action] = []
         for action in self._actions:
+            for indicator in (i for _, use in action.uses for i in use.indicators):
+                self._checker.place(indicator, "an indicator")
             symbol = self._scope.lookup(action.name) if isinstance(action.target, ast.Name) else None
             if isinstance(symbol, MemberSymbol):
                 calls.append(action)
@@ -331,9 +353,22 @@ class _Execution:
                 self._unknown(action)
             else:
                 found += self._variable(action)
-        for action in sorted(calls, key=lambda a: self._order.get(a.name.casefold(), -1)):
-            found += self._call(action)
-        return found
+        calls.sort(key=lambda a: self._order.get(a.name.casefold(), -1))
+        every = [statement for action in calls for statement in self._call(action)]
+        if calls and _is_sequential(self._chart) and all(action.plain for action in calls):
+            return [*found, self._same_step(calls, every)]
+        return found + every
+
+    def _same_step(self, calls: list[_Action], otherwise: list[ast.Stmt]) -> ast.Stmt:
+        """While the active step stays the same, its actions are all there is to call."""
+        branches: list[tuple[list[ast.CaseLabel], list[ast.Stmt]]] = []
+        for number, step in enumerate(self._chart.steps, 1):
+            own = [_run(action) for action in calls if any(s is step for s, _ in action.uses)]
+            branches.append(([_label(step.pos, number)], own))
+        pos = calls[0].target.pos
+        state = _name(pos, hidden_name(self._decl, _STATE))
+        same = ast.Binary(pos, "=", state, _name(pos, hidden_name(self._decl, _BEFORE)))
+        return ast.If(pos, [(same, [ast.Case(pos, state, branches, [])])], otherwise)
 
     def _unknown(self, action: _Action) -> None:
         known = (*self._scope.outer.values(), *self._scope.names.values())
@@ -350,17 +385,21 @@ class _Execution:
 
     def _call(self, action: _Action) -> list[ast.Stmt]:
         pos = action.target.pos
-        call = ast.ExprStmt(pos, ast.Call(pos, action.target, []))
         if not action.plain:
-            return [*_controlled(action), ast.If(pos, [(_output(action, "A"), [call])], [])]
+            return [*_controlled(action), ast.If(pos, [(_output(action, "A"), [_run(action)])], [])]
         condition = ast.Binary(pos, "OR", _active(action, "N"), _name(pos, action.hidden))
         note = _assign(pos, _name(pos, action.hidden), _active(action, "N"))
-        return [ast.If(pos, [(condition, [note, call])], [])]
+        return [ast.If(pos, [(condition, [note, _run(action)])], [])]
 
 
 def _active(action: _Action, qualifier: str) -> ast.Expr:
     """Whether a step is active that has the action with this qualifier."""
     return _joined("OR", [_part(u.pos, step, "X") for step, u in action.uses if u.qualifier == qualifier])
+
+
+def _run(action: _Action) -> ast.Stmt:
+    pos = action.target.pos
+    return ast.ExprStmt(pos, ast.Call(pos, action.target, []))
 
 
 def _output(action: _Action, member: str) -> ast.Expr:

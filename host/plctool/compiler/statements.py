@@ -82,6 +82,44 @@ class _Labels:
             self._ranges.append((low, high, line))
 
 
+def ends(statements: list[Statement]) -> bool:
+    """Whether what stands behind some statements is never reached."""
+    if not statements:
+        return False
+    last = statements[-1]
+    if isinstance(last, If | Case):
+        return ends(last.otherwise) and all(ends(body) for _, body in last.branches)
+    if isinstance(last, While):
+        return _is_constant(last.condition, 1) and not _has_exit(last.body)
+    if isinstance(last, Repeat):
+        return _is_constant(last.until, 0) and not _has_exit(last.body)
+    return isinstance(last, Return | Exit | Continue)
+
+
+def _is_constant(e: Expr, value: int) -> bool:
+    return isinstance(e, Const) and e.value == value
+
+
+def _has_exit(statements: list[Statement]) -> bool:
+    """Whether an EXIT leaves the loop whose body this is."""
+    for statement in statements:
+        bodies: list[list[Statement]] = []
+        if isinstance(statement, If | Case):
+            bodies = [*(body for _, body in statement.branches), statement.otherwise]
+        if isinstance(statement, Exit) or any(map(_has_exit, bodies)):
+            return True
+    return False
+
+
+def _names_something(node: object) -> bool:
+    """Whether a constant expression names a constant."""
+    if isinstance(node, ast.Binary):
+        return _names_something(node.left) or _names_something(node.right)
+    if isinstance(node, ast.Unary):
+        return _names_something(node.operand)
+    return not isinstance(node, ast.Literal)
+
+
 class Statements(ObjectCalls):
     """Checks a body."""
 
@@ -94,16 +132,19 @@ class Statements(ObjectCalls):
         if self._nesting > MAX_DEPTH and nodes:
             raise NestingError(self.pos(nodes[0].pos))
         result: list[Statement] = []
-        ended = False
+        ended = reported = False
         for node in nodes:
             if ended:
-                self.scope.warning(node.pos, "unreachable", "this statement is never reached")
-                ended = False
-            result += self._statements[type(node)](self, node)
-            if isinstance(node, ast.Return | ast.Exit | ast.Continue):
-                ended = True
+                self._unreachable(node.pos)
+            found = self._statements[type(node)](self, node)
+            reported = reported or ended
+            ended = not reported and ends(found)
+            result += found
         self._nesting -= 1
         return result
+
+    def _unreachable(self, offset: int, why: str = "") -> None:
+        self.scope.warning(offset, "unreachable", f"this statement is never reached{why}")
 
     # ---- assignments ----
 
@@ -318,7 +359,23 @@ class Statements(ObjectCalls):
 
     def _if(self, node: ast.If) -> list[Statement]:
         branches = [(self.condition(condition), self.body(body)) for condition, body in node.branches]
+        bodies = [*(body for _, body in node.branches), node.otherwise]
+        for number, (condition, body) in enumerate(node.branches):
+            always = self._always(condition, branches[number][0])
+            if always is False and body:
+                self._unreachable(body[0].pos, ": the condition is always FALSE")
+            elif always:
+                for skipped in filter(None, bodies[number + 1 :]):
+                    self._unreachable(skipped[0].pos, ": a condition before is always TRUE")
+                break
         return [If(branches, self.body(node.otherwise), self.pos(node.pos))]
+
+    @staticmethod
+    def _always(node: ast.Expr, condition: Expr) -> bool | None:
+        """What a condition always is; None when that depends, if only on a constant with a name: a switch."""
+        if not isinstance(condition, Const) or condition.type is ERROR or _names_something(node):
+            return None
+        return bool(condition.value)
 
     def _case(self, node: ast.Case) -> list[Statement]:
         selector = self.settled(node.selector)
@@ -335,7 +392,15 @@ class Statements(ObjectCalls):
         otherwise = self.body(node.otherwise)
         if selector.type is ERROR:
             return []
+        if isinstance(selector.type, EnumType) and not node.has_else:
+            self._report_missing(selector.type, seen, node)
         return [Case(selector, branches, otherwise, self.pos(node.pos))]
+
+    def _report_missing(self, t: EnumType, seen: _Labels, node: ast.Case) -> None:
+        missing = [name for name, value in t.values.items() if seen.overlap(value, value) is None]
+        if missing:
+            listed = ", ".join(missing[:-1]) + " and " * (len(missing) > 1) + missing[-1]
+            self.scope.warning(node.pos, "case", f"this CASE misses {listed} of {t}; add what is missing, or an ELSE")
 
     def _label(self, label: ast.CaseLabel, t: Type, seen: _Labels) -> tuple[int, int] | None:
         low = self._label_value(label.low, t)
@@ -398,6 +463,8 @@ class Statements(ObjectCalls):
 
     def _while(self, node: ast.While) -> list[Statement]:
         condition = self.condition(node.condition)
+        if self._always(node.condition, condition) is False and node.body:
+            self._unreachable(node.body[0].pos, ": the condition is always FALSE")
         return [While(condition, self._loop_body(node.body), self.pos(node.pos))]
 
     def _repeat(self, node: ast.RepeatUntil) -> list[Statement]:

@@ -293,7 +293,7 @@ class Recovery:
         return next((item for s in reversed(stack) if (item := self._item_at(s))), None)
 
     def _item_words(self, stack: Stack) -> str:
-        return "statement" if self._item(stack) == "stmt" else "declaration"
+        return {"stmt": "statement", "expr_stmt": "action"}.get(self._item(stack) or "", "declaration")
 
     def _operand(self, stack: Stack) -> str:
         return "a value" if self._shift(stack, "NUMBER") is not None else "a name"

@@ -266,6 +266,7 @@ class StructType(Type):
     _align: int = 1
     base: StructType | None = None
     interfaces: list[StructType] = field(default_factory=list)
+    properties: list[str] = field(default_factory=list)  # what looks like a member and is none
 
     @property
     def root(self) -> StructType:

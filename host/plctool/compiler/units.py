@@ -218,7 +218,7 @@ class Units:
             scope.error(spec.pos, "type", f"a function cannot return the function block {t}")
             t = ERROR
         info.result = t
-        symbol = VarSymbol(decl.name, scope.pos(decl.pos), t, Role.RESULT, used=True)
+        symbol = VarSymbol(decl.name, scope.pos(decl.pos), t, Role.RESULT)
         if t is not ERROR:
             info.pou.result = symbol.variable = Variable(decl.name, t, Storage.LOCAL, symbol.pos, initial=default)
             info.pou.locals.append(symbol.variable)

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 
 from plctool.compiler import ast, sfc
+from plctool.compiler.class_rules import INITIALISERS
 from plctool.compiler.classes import Classes
 from plctool.compiler.construction import construct
 from plctool.compiler.conversions import Coercion
@@ -331,10 +332,15 @@ class World:
         self.diagnostics.error(error.pos, "nesting", "this is nested too deeply; split it")
 
     def report_unused(self, scope: Scope) -> None:
-        """Warns of variables nobody uses."""
+        """Warns of variables nobody uses, and of results nobody assigns."""
         for symbol in scope.names.values():
-            if isinstance(symbol, VarSymbol) and not symbol.used and symbol.role in (Role.LOCAL, Role.TEMP):
+            if not isinstance(symbol, VarSymbol) or symbol.used:
+                continue
+            if symbol.role in (Role.LOCAL, Role.TEMP):
                 self.diagnostics.warning(symbol.pos, "unused", f"{symbol.name} is never used")
+            elif symbol.role is Role.RESULT and symbol.name.casefold() not in INITIALISERS:
+                message = f"{symbol.name} never assigns its result; write {symbol.name} := ..."
+                self.diagnostics.warning(symbol.pos, "result", message)
 
     def _report_recursion(self) -> None:
         """A call that leads back to its caller: the stack of a controller is bounded."""

@@ -25,7 +25,8 @@ void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
 #define RTS_CODE_RAM_SIZE 8192
 #endif
 
-/* The main stack, bytes, a multiple of 32. The check of a new application's image is what needs most of it. */
+/* The main stack, bytes, a multiple of 32, without what an FPU adds. It holds the check of a new application's image, and
+ * on top of it about 210 for each task and 140 for an interrupt above them. */
 #ifndef RTS_MAIN_STACK_SIZE
 #define RTS_MAIN_STACK_SIZE 2560
 #endif

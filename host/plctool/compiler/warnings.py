@@ -1,0 +1,77 @@
+"""The warnings by name: which there are, which are wanted.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from plctool.compiler.lexer import Lexer
+from plctool.compiler.source import Source
+from plctool.errors import UsageError
+
+WARNINGS = {
+    "case": "a CASE about an enumeration has no ELSE and misses some of its values",
+    "enum": "a number, or a value of another enumeration, becomes a value of an enumeration",
+    "narrowing": "an integer or an LREAL goes where not all of its values fit",
+    "no-program": "there is no PROGRAM, so nothing would run",
+    "overlap": "two variables with AT share memory, and neither is a bit of the other",
+    "pointer": "a pointer becomes a pointer to something else",
+    "precision": "digits are lost: a large number becomes REAL, a duration or time is finer than its type",
+    "recursion": "a call through a pointer or an interface may lead back to its caller",
+    "result": "a function or method never assigns its result",
+    "truncated": "a text is longer than the STRING it goes to",
+    "unreachable": "a statement is never reached",
+    "unused": "a variable is never used, or the result of a call",
+    "widening": "a product is computed in a type that is narrower than where it goes",
+}
+"""What each warning is about; its name is the `code` of the diagnosis."""
+
+_SWITCH = re.compile(r"\{\s*warning\s+(disable|restore)\s+([\w-]+)\s*\}", re.IGNORECASE)
+
+LineRanges = list[tuple[int, int]]  # first line, and the first line that is not in it any more
+
+
+@dataclass(frozen=True)
+class WarningOptions:
+    """`disabled`: names of warnings that are not wanted; `as_errors`: whether the others are errors."""
+
+    disabled: frozenset[str] = frozenset()
+    as_errors: bool = False
+
+
+ALL_WARNINGS = WarningOptions()
+
+
+def warning_options(no_warn: Iterable[str] = (), *, as_errors: bool = False) -> WarningOptions:
+    """Options from names, several in one text with commas between them. Raises UsageError for an unknown name."""
+    names = [name.strip().lower() for text in no_warn for name in text.split(",")]
+    for name in names:
+        if name not in WARNINGS:
+            raise UsageError(f"There is no warning '{name}'; the names are {', '.join(WARNINGS)}.", "unknown-warning")
+    return WarningOptions(frozenset(names), as_errors)
+
+
+def switched_off(source: Source) -> dict[str, LineRanges]:
+    """Where a text says {warning disable name}, up to {warning restore name} or its end. Other names, such as the
+    numbers of other compilers, mean nothing."""
+    if not _SWITCH.search(source.text):
+        return {}
+    lexer = Lexer(source.text, lambda offset, code, message: None)
+    for _ in lexer:
+        pass
+    found: dict[str, LineRanges] = {}
+    for offset, text in lexer.pragmas:
+        match = _SWITCH.fullmatch(text)
+        if match is None:
+            continue
+        ranges = found.setdefault(match[2].lower(), [])
+        line = source.pos(offset).line
+        if match[1].lower() == "restore" and ranges:
+            ranges[-1] = (ranges[-1][0], min(ranges[-1][1], line))
+        elif match[1].lower() == "disable":
+            ranges.append((line, len(source.line_starts) + 1))
+    return found
