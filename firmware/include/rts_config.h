@@ -83,12 +83,12 @@
 #define CM_MAX_EXT_TABLES 4
 #endif
 
-/* Event callbacks that may be registered; five words each. */
+/* Event callbacks that may be registered; five words each. 0: the application sends no events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 4
 #endif
 
-/* External events that may be registered; two words each. */
+/* External events that may be registered; two words each. 0: tasks of that kind never run. */
 #ifndef SCHED_MAX_EXTERNAL_EVENTS
 #define SCHED_MAX_EXTERNAL_EVENTS 2
 #endif

@@ -128,8 +128,6 @@ def test_what_may_lose_something_is_a_warning(target: str, source: str, code: st
         ("a", "i", "ARRAY"),
         ("p", "a", "Point"),
         ("i", "tm", "TON"),
-        ("ptr", "i", "REF_TO"),
-        ("i", "ptr", "REF_TO"),
     ],
 )
 def test_what_does_not_fit_names_both_types_or_the_conversion(target: str, source: str, words: str) -> None:

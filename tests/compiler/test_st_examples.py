@@ -55,6 +55,20 @@ def test_traffic_light_goes_through_its_phases() -> None:
     assert seen[:5] == ["Red", "RedYellow", "Green", "Yellow", "Red"]
 
 
+def test_batch_fills_both_components_at_once_and_counts_what_it_made() -> None:
+    steps = ("Idle", "FillA", "FullA", "FillB", "FullB", "Mix", "Empty")
+    seen: list[list[str]] = []
+    with started("batch") as plc:
+        for _ in range(1700):
+            plc.run_cycles(1)
+            active = [name for name in steps if plc.read(f"Main.mixer.{name}.X")]
+            if not seen or active != seen[-1]:
+                seen.append(active)
+        assert plc.read("Main.mixer.batches") == 1
+    assert seen[:3] == [["Idle"], ["FillA", "FillB"], ["FillA", "FullB"]]
+    assert seen[3:] == [["FullA", "FullB"], ["Mix"], ["Empty"], ["Idle"], ["FillA", "FillB"]]
+
+
 def test_traffic_light_shortens_green_for_the_button() -> None:
     with started("traffic_light") as plc:
         plc.run_for(8000)

@@ -44,11 +44,11 @@ class Term:
     value: Value
 
 
-def evaluate(terms: Sequence[Term], declarations: str = "") -> list[Value]:
-    """What the compiled program makes of the expressions."""
+def evaluate(terms: Sequence[Term], declarations: str = "", statements: str = "") -> list[Value]:
+    """What the compiled program makes of the expressions, after the statements."""
     results = "\n".join(f"r{i} : {t.type};" for i, t in enumerate(terms))
     body = "\n".join(f"r{i} := {t.text};" for i, t in enumerate(terms))
-    text = f"PROGRAM Main\nVAR\n{declarations}{results}\nEND_VAR\n{body}\nEND_PROGRAM\n"
+    text = f"PROGRAM Main\nVAR\n{declarations}{results}\nEND_VAR\n{statements}\n{body}\nEND_PROGRAM\n"
     with TemporaryDirectory() as folder:
         path = Path(folder) / "main.st"
         path.write_text(text, "latin-1")
@@ -59,10 +59,10 @@ def evaluate(terms: Sequence[Term], declarations: str = "") -> list[Value]:
         return [plc.read(f"Main.r{i}") for i in range(len(terms))]
 
 
-def check(terms: Sequence[Term], declarations: str = "") -> None:
+def check(terms: Sequence[Term], declarations: str = "", statements: str = "") -> None:
     wrong = [
         f"{t.text} ({t.type}) gave {value!r}, not {t.value!r}"
-        for t, value in zip(terms, evaluate(terms, declarations), strict=True)
+        for t, value in zip(terms, evaluate(terms, declarations, statements), strict=True)
         if not same(value, t)
     ]
     assert not wrong, "\n".join(wrong)
@@ -434,6 +434,34 @@ def any_string_comparison(draw: st.DrawFn, known: Declarations) -> Term:
     return Term(f"({a.text} {op} {b.text})", "BOOL", comparison(op, a.value, b.value))
 
 
+@st.composite
+def string_scripts(draw: st.DrawFn) -> tuple[str, str, list[Term]]:
+    """Declarations, statements, and what the variables must hold after them; targets are often arguments as well."""
+    capacities = draw(st.lists(st.sampled_from([1, 3, 8, 15, 16, 17, 40]), min_size=2, max_size=4))
+    values = [draw(st.text(CHARACTERS, max_size=c)) for c in capacities]
+    declared = "".join(
+        f"s{i} : STRING[{c}] := '{v}';\n" for i, (c, v) in enumerate(zip(capacities, values, strict=True))
+    )
+    statements = []
+    for _ in range(EXPRESSIONS):
+        target, first, second = (draw(st.integers(0, len(values) - 1)) for _ in range(3))
+        function = draw(st.sampled_from([f for f in ARGUMENTS if f not in ("LEN", "FIND")]))
+        length, place = draw(st.integers(-1, 20)), draw(st.integers(-1, 20))
+        arguments = ARGUMENTS[function].format(s=f"s{first}", t=f"s{second}", l=length, p=place)
+        statements.append(f"s{target} := {function}({arguments});")
+        result = string_function(function, values[first], values[second], length, place)
+        values[target] = str(result)[: capacities[target]]
+    expected = [Term(f"s{i}", f"STRING[{c}]", v) for i, (c, v) in enumerate(zip(capacities, values, strict=True))]
+    return declared, "\n".join(statements), expected
+
+
+@PROGRAM
+@given(string_scripts())
+def test_strings_may_be_assigned_what_is_made_of_them(script: tuple[str, str, list[Term]]) -> None:
+    declared, statements, expected = script
+    check(expected, declared, statements)
+
+
 @PROGRAM
 @given(batch(any_string_call))
 def test_string_functions_agree_with_slices(program: tuple[list[Term], str]) -> None:
@@ -509,13 +537,15 @@ def test_real_texts_are_as_short_as_possible_and_read_back(case: tuple[str, list
     name, values = case
     known = Declarations([])
     variables = [known.variable(name, f"{name}#{v:.17E}", v) for v in values]
-    texts = evaluate([Term(f"{name}_TO_STRING({v.text})", "STRING", "") for v in variables], known.text())
-    for text, value in zip(texts, values, strict=True):
-        assert isinstance(text, str)
-        assert rounded(float(text), name) == value
-        assert math.copysign(1, float(text)) == math.copysign(1, value)
-        assert len(digits_of(text)) <= len(shortest_digits(value, name)), text
-    check([Term(f"STRING_TO_{name}('{text}')", name, value) for text, value in zip(texts, values, strict=True)])
+    to_text = [Term(f"{name}_TO_STRING({v.text})", "STRING", "") for v in variables]
+    and_back = [Term(f"STRING_TO_{name}({t.text})", name, v) for t, v in zip(to_text, values, strict=True)]
+    results = evaluate([*to_text, *and_back], known.text())
+    texts, read_back = results[: len(values)], results[len(values) :]
+    for text, result, term in zip(texts, read_back, and_back, strict=True):
+        assert isinstance(text, str) and isinstance(term.value, float)
+        assert same(float(text), term), text
+        assert same(result, term), text
+        assert len(digits_of(text)) <= len(shortest_digits(term.value, name)), text
 
 
 DECIMAL = st.from_regex(r"-?[0-9]{1,10}(\.[0-9]{1,9})?(E[+-]?[0-9]{1,3})?", fullmatch=True)

@@ -147,10 +147,8 @@ def random_program(seed: int) -> tuple[str, int]:
         value = {"+": value + number, "-": value - number, "*": value * number, "XOR": value ^ number}[op] % (1 << 32)
         lines.append(f"x := x {op} {number};")
     body = "\n".join(lines)
-    return (
-        f"PROGRAM Main VAR x : UDINT; done : BOOL; END_VAR\nIF NOT done THEN\n{body}\ndone := TRUE;\nEND_IF;\nEND_PROGRAM\n",
-        value,
-    )
+    declaration = "PROGRAM Main VAR x : UDINT; done : BOOL; END_VAR"
+    return f"{declaration}\nIF NOT done THEN\n{body}\ndone := TRUE;\nEND_IF;\nEND_PROGRAM\n", value
 
 
 @pytest.mark.parametrize("seed", range(3))

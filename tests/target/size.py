@@ -155,13 +155,22 @@ def with_slack(size: int) -> int:
     return -(-int(size * SLACK) // ROUND) * ROUND
 
 
-def update(path: Path, measured: dict[str, dict[str, Usage]]) -> None:
+def total_limit(usage: dict[str, Usage], goal: dict[str, int]) -> tuple[int, int]:
+    """The budget of a total: a goal that is reached is not given up again."""
+    used = total(usage)
+    pairs = ((used.flash, goal.get("flash", 0)), (used.ram, goal.get("ram", 0)))
+    flash, ram = (min(with_slack(size), wanted) if size <= wanted else with_slack(size) for size, wanted in pairs)
+    return flash, ram
+
+
+def update(path: Path, measured: dict[str, dict[str, Usage]], budget: Budget) -> None:
     """Replaces the limits at the end of the file; what stands before them is kept as it is."""
     head = path.read_text().split("[limit.", 1)[0].rstrip()
     tables = []
     for config, usage in measured.items():
-        entries = [*sorted(usage.items()), (TOTAL, total(usage))]
-        lines = [f'"{name}" = [{with_slack(u.flash)}, {with_slack(u.ram)}]' for name, u in entries]
+        flash, ram = total_limit(usage, budget.goal.get(config, {}))
+        lines = [f'"{name}" = [{with_slack(u.flash)}, {with_slack(u.ram)}]' for name, u in sorted(usage.items())]
+        lines.append(f'"{TOTAL}" = [{flash}, {ram}]')
         tables.append(f"[limit.{config}]\n" + "\n".join(lines))
     path.write_text(head + "\n\n" + "\n\n".join(tables) + "\n")
 
@@ -176,7 +185,7 @@ def main() -> int:
     maps = (text.split("=", 1) for text in args.maps)
     measured = {config: measure(Path(file), budget.application) for config, file in maps}
     if args.update:
-        update(args.budget, measured)
+        update(args.budget, measured, budget)
         budget = read_budget(args.budget)
     print_table(measured)
     complaints = [text for config, usage in measured.items() for text in exceeded(config, usage, budget)]

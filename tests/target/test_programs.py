@@ -84,7 +84,7 @@ FAULTS = {
 
 
 def has_stopped(plc: Plc) -> bool:
-    """Whether an exception stopped the application. An endless loop keeps the device from answering until it is broken."""
+    """Whether an exception stopped the application. The device does not answer before an endless loop was broken."""
     with suppress(LinkError):
         return plc.status().state is AppState.EXCEPTION
     return False

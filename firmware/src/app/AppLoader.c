@@ -68,8 +68,7 @@ static RTS_RESULT check_header(LOADER *l)
     RTS_RESULT result;
 
     if (l->image->size < CDL_HEADER_SIZE)
-        return refuse(l, ERR_SIZE_MISMATCH, "Image of %u bytes is shorter than its header of %u.",
-                      U(l->image->size), U(CDL_HEADER_SIZE));
+        return refuse(l, ERR_SIZE_MISMATCH, "Image of %u bytes is shorter than its header.", U(l->image->size));
     result = read_image(l, 0, &l->header, sizeof l->header);
     if (result != ERR_OK)
         return result;
@@ -77,8 +76,8 @@ static RTS_RESULT check_header(LOADER *l)
         return refuse(l, ERR_TYPE_MISMATCH, "Not a compact download image: it starts with 0x%x.",
                       U(header->header_tag));
     if (header->header_version != CDL_HEADER_VERSION || header->header_size != CDL_HEADER_SIZE)
-        return refuse(l, ERR_VERSION_MISMATCH, "Header version %u of %u bytes, this device knows %u of %u.",
-                      U(header->header_version), U(header->header_size), U(CDL_HEADER_VERSION), U(CDL_HEADER_SIZE));
+        return refuse(l, ERR_VERSION_MISMATCH, "Header version %u of %u bytes is unknown here.",
+                      U(header->header_version), U(header->header_size));
     if (header->total_size != l->image->size)
         return refuse(l, ERR_SIZE_MISMATCH, "The image should have %u bytes, %u arrived.", U(header->total_size),
                       U(l->image->size));
@@ -104,7 +103,7 @@ static RTS_RESULT check_crc(LOADER *l)
         offset += count;
     }
     if (crc != expected)
-        return refuse(l, ERR_CRC_FAILED, "The image is damaged: its CRC is 0x%x, it should be 0x%x.", U(crc),
+        return refuse(l, ERR_CRC_FAILED, "The image is damaged: CRC 0x%x, not 0x%x.", U(crc),
                       U(expected));
     if (crc != l->image->crc)
         return refuse(l, ERR_CRC_FAILED, "CRC 0x%x is not the announced one, 0x%x.",
@@ -321,7 +320,7 @@ static RTS_RESULT check_import(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
     RTS_RESULT result = ERR_OK;
 
     if (index == APP_MAX_IMPORTS)
-        return refuse(l, ERR_NOMEMORY, "More than the %u external functions this device can link.",
+        return refuse(l, ERR_NOMEMORY, "More than the %u external functions possible.",
                       U(APP_MAX_IMPORTS));
     if (end - *offset < EXT_REF_INFO_SIZE)
         return refuse(l, ERR_SIZE_MISMATCH, "External function table ends within entry %u.", U(index));
@@ -329,7 +328,7 @@ static RTS_RESULT check_import(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
     if (result != ERR_OK)
         return result;
     if (!read_name(l->image->file, *offset + EXT_REF_INFO_SIZE, end, name, offset))
-        return refuse(l, ERR_PARAMETER, "Name of external function %u is empty, too long or not terminated.", U(index));
+        return refuse(l, ERR_PARAMETER, "Name of external function %u is empty or too long.", U(index));
     if (ref.area != APP_AREA_NONE || ref.offset != index * sizeof(RTS_PFN))
         return refuse(l, ERR_INVALID_REFERENCE, "External function %s is not in import slot %u.",
                       name, U(index));
@@ -514,7 +513,7 @@ static RTS_RESULT check_blobs(LOADER *l)
     while (blobs->size > 0 && offset < end && result == ERR_OK)
         result = check_blob(l, &offset, end);
     if (result == ERR_OK && l->image->task_count == 0)
-        return refuse(l, ERR_NO_OBJECT, "The application has no task, so nothing would run.");
+        return refuse(l, ERR_NO_OBJECT, "The application has no task.");
     return result;
 }
 

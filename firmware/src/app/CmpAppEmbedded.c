@@ -67,7 +67,8 @@ static struct {
 
 static void post(RTS_UI32 event)
 {
-    EventPost(CMPID_CmpAppEmbedded, event, NULL);
+    if (EVENT_MAX_CALLBACKS > 0)
+        EventPost(CMPID_CmpAppEmbedded, event, NULL);
 }
 
 static bool is_loaded(void)
@@ -485,7 +486,7 @@ static RTS_RESULT take_over(const DOWNLOAD *download, const APP_IMAGE *image, AP
     result = commit_download(download);
     if (result != ERR_OK) {
         SysFlashReleaseCode(download->slot);
-        return refuse(refusal, result, "The flash cannot be written: the commit record failed.");
+        return refuse(refusal, result, "The flash cannot be written.");
     }
     post(EVT_PrepareDownload);
     stop_tasks();
@@ -493,7 +494,7 @@ static RTS_RESULT take_over(const DOWNLOAD *download, const APP_IMAGE *image, AP
     result = load(download->slot, image, code, AppCommitGet()->slot[download->slot].retain_after);
     post(EVT_DownloadDone);
     if (result == ERR_NOMEMORY)
-        return refuse(refusal, result, "The tasks of the application cannot be created: there are not enough timers.");
+        return refuse(refusal, result, "There are not enough timers for the tasks.");
     return result == ERR_OK ? ERR_OK : refuse(refusal, result, "The flash cannot be read.");
 }
 

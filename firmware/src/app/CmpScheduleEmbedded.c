@@ -1,5 +1,6 @@
 /*
- * CmpScheduleEmbedded.c - when IEC tasks run: all in main, one after the other (super loop). Takes the place of CmpScheduleTimer.c.
+ * CmpScheduleEmbedded.c - when IEC tasks run: all in main, one after the other (super loop); in place of
+ * CmpScheduleTimer.c.
  *
  * SPDX-License-Identifier: Apache-2.0
  *

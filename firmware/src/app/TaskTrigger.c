@@ -18,18 +18,20 @@ typedef struct {
     RTS_UI32 posts;
 } EXTERNAL_EVENT;
 
-static EXTERNAL_EVENT events[SCHED_MAX_EXTERNAL_EVENTS];
+enum { PLACES = SCHED_MAX_EXTERNAL_EVENTS > 0 ? SCHED_MAX_EXTERNAL_EVENTS : 1 };
+static EXTERNAL_EVENT events[PLACES];
 
 void TriggerReset(void)
 {
-    memset(events, 0, sizeof events);
+    if (SCHED_MAX_EXTERNAL_EVENTS > 0)
+        memset(events, 0, sizeof events);
 }
 
 static EXTERNAL_EVENT *find_event(const char *name)
 {
     RTS_UI32 i;
 
-    for (i = 0; i < SCHED_MAX_EXTERNAL_EVENTS; i++) {
+    for (i = 0; SCHED_MAX_EXTERNAL_EVENTS > 0 && i < PLACES; i++) {
         if (events[i].name != NULL && strcmp(events[i].name, name) == 0)
             return &events[i];
     }
@@ -103,7 +105,7 @@ RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result)
 
     if (find_event(name) != NULL)
         return no_event(result, ERR_DUPLICATE);
-    for (i = 0; i < SCHED_MAX_EXTERNAL_EVENTS; i++) {
+    for (i = 0; SCHED_MAX_EXTERNAL_EVENTS > 0 && i < PLACES; i++) {
         if (events[i].name == NULL) {
             events[i].name = name;
             if (result != NULL)
@@ -116,7 +118,7 @@ RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result)
 
 static bool is_event(RTS_HANDLE event)
 {
-    return event < SCHED_MAX_EXTERNAL_EVENTS && events[event].name != NULL;
+    return SCHED_MAX_EXTERNAL_EVENTS > 0 && event < PLACES && events[event].name != NULL;
 }
 
 RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE event)

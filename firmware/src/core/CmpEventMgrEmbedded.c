@@ -19,11 +19,12 @@ typedef struct LISTENER {
 } LISTENER;
 
 enum { LISTENER_WORDS = (sizeof(LISTENER) + MEMPOOL_ALIGN - 1) / MEMPOOL_ALIGN };
+enum { LISTENERS = EVENT_MAX_CALLBACKS > 0 ? EVENT_MAX_CALLBACKS : 1 };
 
 static struct {
     LISTENER *first;
     MEM_POOL pool;
-    RTS_I64 memory[EVENT_MAX_CALLBACKS * LISTENER_WORDS];
+    RTS_I64 memory[LISTENERS * LISTENER_WORDS];
 } events;
 
 RTS_RESULT EventRegisterCallback(RTS_UI32 provider, RTS_UI32 event, PF_EVENT_CALLBACK callback, void *user)

@@ -44,7 +44,6 @@ from plctool.compiler.types import (
     ELEMENTARY,
     LINT,
     LREAL,
-    LTIME,
     REAL,
     UDINT,
     WCHAR,
@@ -398,7 +397,8 @@ class Builtins(Expressions):
         base = elementary(e.type if isinstance(target, StringType) else target)
         if base is None:
             return self.error(node.pos, "type", f"there is no conversion from {e.type} to {target}")
-        if base is WCHAR and (e.type if isinstance(e.type, StringType) else target).wide:  # type: ignore[union-attr]
+        text_type = e.type if isinstance(e.type, StringType) else target
+        if base is WCHAR and isinstance(text_type, StringType) and text_type.wide:
             name = "WCHAR_TO_WSTRING" if isinstance(target, StringType) else "WSTRING_TO_WCHAR"
             return self.call_by_name(name, [e], node.pos, None)
         if isinstance(target, StringType):

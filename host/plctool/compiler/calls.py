@@ -180,7 +180,7 @@ class Calls(Builtins):
         values = [self.expr(a.value) for a in args if a.value is not None]
         if len(values) < len(args) or any(v.type is ERROR for v in values):
             return error_value(self.pos(node.pos))
-        if any(isinstance(v.type, StringType) and v.type.wide or v.type is WCHAR for v in values):
+        if any((isinstance(v.type, StringType) and v.type.wide) or v.type is WCHAR for v in values):
             wide = self.world.unit(f"{symbol.decl.name}__wstring".casefold(), library=True)
             assert isinstance(wide, PouSymbol)
             symbol = wide

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 STEP_TYPE = "SFC_STEP__"
 _CONTROL = "ACTION_CONTROL"
+_UNTIMED_CONTROL = "UNTIMED_ACTION_CONTROL"
 _STATE = "%state"  # of a chart that has one active step: its number from 1; 0 before the first cycle
 _BEFORE = "%before"  # the same number at the beginning of the cycle
 _RUNNING = "%running"  # of any other chart: FALSE before the first cycle
@@ -103,7 +104,8 @@ def _hidden(decl: ast.PouDecl, chart: ast.Chart) -> list[ast.VarDecl]:
     found = [_variable(decl.pos, hidden_name(decl, state[0]), state[1])]
     for action in _actions(decl, chart):
         if not action.plain:
-            found.append(_variable(action.target.pos, action.hidden, _CONTROL))
+            timed = any(use.time is not None for _, use in action.uses)
+            found.append(_variable(action.target.pos, action.hidden, _CONTROL if timed else _UNTIMED_CONTROL))
         elif isinstance(action.target, ast.Name) and action.name.casefold() not in own:
             found.append(_variable(action.target.pos, action.hidden, "BOOL"))
     return found

@@ -1,6 +1,6 @@
 /*
- * rts_config_size.h - sizes of the minimal configuration: one serial line, a super loop; no monitoring, no log, no retain
- * variables, no words for errors.
+ * rts_config_size.h - sizes of the minimal configuration: one serial line, a super loop; no monitoring, no log, no
+ * retain variables, no words for errors.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -10,8 +10,8 @@
 #define APP_MAX_TASKS 2
 #define APP_MAX_IMPORTS 16
 #define CM_MAX_EXT_TABLES 2
-#define EVENT_MAX_CALLBACKS 1
-#define SCHED_MAX_EXTERNAL_EVENTS 1
+#define EVENT_MAX_CALLBACKS 0
+#define SCHED_MAX_EXTERNAL_EVENTS 0
 #define NETSERVER_MESSAGE_SIZE 512
 #define COM_QUEUE_SIZE 540
 #define LOG_MAX_ENTRIES 0

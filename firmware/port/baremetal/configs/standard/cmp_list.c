@@ -8,7 +8,6 @@
 /* System components first; services before the components that register with them. */
 #define COMPONENTS(X)                                                                                                  \
     X(CmpLog)                                                                                                          \
-    X(CmpEventMgrEmbedded)                                                                                             \
     X(SysFileFlash)                                                                                                    \
     X(CmpRetain)                                                                                                       \
     X(CmpScheduleTimer)                                                                                                \

@@ -1,5 +1,6 @@
 /*
- * rts_config_size.h - sizes of the standard configuration: three tasks, retain variables, monitoring, log.
+ * rts_config_size.h - sizes of the standard configuration: three tasks, retain variables, monitoring, log. No events
+ * for components in C: who has some raises the two numbers.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -8,11 +9,12 @@
 
 #define APP_MAX_TASKS 3
 #define NETSERVER_MESSAGE_SIZE 944 /* two full blocks */
-#define EVENT_MAX_CALLBACKS 2
+#define EVENT_MAX_CALLBACKS 0
+#define SCHED_MAX_EXTERNAL_EVENTS 0
 #define APP_REFUSAL_TEXT_SIZE 96
 #define COM_QUEUE_SIZE 540
 #define LOG_MAX_ENTRIES 6
-#define RTS_MAIN_STACK_SIZE 2176
+#define RTS_MAIN_STACK_SIZE 2272
 #define LOG_TEXT_SIZE 64
 #define SRV_MAX_GROUPS 4
 

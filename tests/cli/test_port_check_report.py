@@ -1,0 +1,40 @@
+"""What the port check makes of how a check ends."""
+
+from __future__ import annotations
+
+import pytest
+
+from plctool.errors import LinkError
+from plctool.link.services import Identity
+from plctool.port_check import CheckFailed, NotReported, Report, _run, outcome_text, summary_text
+
+IDENTITY = Identity("Device", "Vendor", "node", "1", 0x1000, 0x9001, "1.0.0.0", "1.0.0.0")
+
+
+def ends_with(error):
+    def check():
+        raise error
+
+    return _run("name", check)
+
+
+@pytest.mark.parametrize(
+    "error, verdict, text, figures",
+    [
+        (CheckFailed("too slow", rate=7), "failed", "too slow", {"rate": 7}),
+        (NotReported("not built in"), "not reported", "not built in", {}),
+        (LinkError("The line is gone."), "failed", "The line is gone.", {}),
+    ],
+)
+def test_the_end_of_a_check_is_its_verdict(error, verdict, text, figures):
+    outcome = ends_with(error)
+    assert (outcome.verdict, outcome.text, outcome.figures) == (verdict, text, figures)
+    assert outcome_text(outcome).split() == [*verdict.split(), "name", *text.split()]
+
+
+def test_report_counts_verdicts():
+    outcomes = [_run("good", lambda: ("fine", {})), ends_with(CheckFailed("bad")), ends_with(NotReported("silent"))]
+    report = Report(IDENTITY, "x86_64-linux", outcomes)
+    document = report.document()
+    assert (document["passed"], document["failed"], document["not_reported"]) == (1, 1, 1)
+    assert summary_text(report) == "1 passed, 1 failed, 1 not reported"

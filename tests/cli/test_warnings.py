@@ -1,0 +1,83 @@
+"""Warnings on the command line, and what a bug of the compiler looks like."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from plctool.compiler import ast, lower_stmt
+from plctool.compiler.statements import Statements
+
+PROGRAM = """PROGRAM Main
+VAR
+    n : INT;
+    spare : INT;
+END_VAR
+n := 1;
+RETURN;
+n := 2;
+END_PROGRAM
+TEST 'nothing'
+END_TEST
+"""
+
+
+@pytest.fixture(autouse=True)
+def source(scratch: Path) -> None:
+    (scratch / "main.st").write_text(PROGRAM)
+
+
+def test_check_and_build_show_warnings_unless_they_are_turned_off(tool: Any) -> None:
+    assert [d["code"] for d in tool("check", "main.st", "--json").json["diagnostics"]] == ["unused", "unreachable"]
+    off = ["--no-warn", "unused", "--no-warn=unreachable"]
+    assert tool("check", "main.st", "--json", *off).json["diagnostics"] == []
+    assert [d["code"] for d in tool("build", "main.st", "--json").json["warnings"]] == ["unused", "unreachable"]
+    assert tool("build", "main.st", *off).err == ""
+
+
+@pytest.mark.parametrize("command", ["check", "build", "test"])
+def test_werror_fails_on_a_warning(tool: Any, scratch: Path, command: str) -> None:
+    done = tool(command, "main.st", "--werror")
+    assert done.status == 2
+    assert "main.st:8:1: error: this statement is never reached (an error because of --werror)" in done.out + done.err
+    assert not (scratch / "app.cdl").exists()
+    assert tool(command, "main.st", "--werror", "--no-warn", "unused,unreachable").status == 0
+
+
+@pytest.mark.parametrize("command", ["check", "build", "test"])
+def test_unknown_warning_exits_2_and_lists_the_names(tool: Any, command: str) -> None:
+    done = tool(command, "main.st", "--no-warn", "unusde")
+    assert done.status == 2
+    assert done.err.startswith("plctool: There is no warning 'unusde'; the names are case, ")
+    assert done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["check", "build", "test"])
+def test_bug_in_the_front_end_names_the_place_in_the_program(
+    tool: Any, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.setitem(Statements._statements, ast.Return, lambda self, node: 1 / 0)
+    done = tool(command, "main.st")
+    assert (done.status, done.out) == (1, "")
+    assert done.err.startswith("plctool: Internal error at main.st:7 (ZeroDivisionError: division by zero); please")
+    assert done.err.count("\n") == 1
+
+
+def test_bug_in_the_lowering_names_the_place_in_the_program(tool: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(self: object, node: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(lower_stmt.Body, "_assign", broken)
+    done = tool("build", "main.st")
+    assert (done.status, done.out) == (1, "")
+    assert done.err.startswith("plctool: Internal error at main.st:6 (AssertionError); please report")
+
+
+def test_bug_shows_its_traceback_on_demand(tool: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PLCTOOL_DEBUG", "1")
+    monkeypatch.setitem(Statements._statements, ast.Return, lambda self, node: 1 / 0)
+    done = tool("check", "main.st")
+    assert "Traceback" in done.err
+    assert done.err.splitlines()[-1].startswith("plctool: Internal error at main.st:7")
