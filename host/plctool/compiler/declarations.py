@@ -231,7 +231,7 @@ class Declarations:
             scope.error(spec.pos, "type", "an array has either bounds in all dimensions or * in all")
             return ERROR
         if not self.open_allowed:
-            scope.error(spec.pos, "type", "ARRAY[*] is for VAR_IN_OUT only")
+            scope.error(spec.pos, "type", "ARRAY[*] is not supported yet; give the array its bounds")
             return ERROR
         return ERROR if element is ERROR else OpenArrayType(element, ((0, -1),) * len(spec.bounds))
 
