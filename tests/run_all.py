@@ -33,7 +33,7 @@ def run(meson: str, build: Path) -> tuple[int, Counter[str]]:
     counts: Counter[str] = Counter()
     for line in (build / "meson-logs" / "testlog.json").read_text().splitlines():
         test = json.loads(line)
-        report = reports / f"{test['name'].split(' ')[-1]}.xml"
+        report = reports / f"{test['name'].rsplit(':', 1)[-1]}.xml"
         if report.exists():
             counts += pytest_counts(report)
         else:
