@@ -11,7 +11,7 @@ MESON := $(BIN)/meson
 export PATH := $(abspath $(BIN)):$(PATH)
 
 # The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
-BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f))
+BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7))
 
 .PHONY: demo test lint bench size all clean
 
@@ -34,8 +34,10 @@ lint: $(VENV)/dev
 	$(BIN)/ruff format --check .
 	MYPYPATH=host $(BIN)/mypy -p plctool
 
-bench: build/build.ninja
-	$(MESON) compile -C build
+BENCHED := $(filter build build-cm3 build-cm4f,$(BUILDS))
+
+bench: $(BENCHED:%=%/build.ninja)
+	set -e; for build in $(BENCHED); do $(MESON) compile -C $$build; done
 	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py
 
 size: build-cm3/build.ninja

@@ -58,7 +58,7 @@ typedef struct {
 typedef struct {
     RTS_UI32 state;    /* AS_* */
     RTS_UI32 op_state; /* OS_* */
-    RTS_UI32 image_crc;
+    RTS_UI32 image_crc; /* 0 without application, like the size */
     RTS_UI32 image_size;
     APP_EXCEPTION exception;
 } APP_STATUS;
@@ -104,10 +104,14 @@ const char *AppGetInfo(RTS_UI32 index);
  */
 RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size);
 RTS_UI32 AppGetAreaSize(RTS_UI32 index); /* bytes, as the image asked for */
+/* Finds what a pointer of the application leads to; false when that is in no area, as with NULL and temporary
+ * variables. */
+bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset);
 
 #ifndef RTS_CFFI
-/* Called by CmpIecTask in the context of the task whose cycle failed: records the exception, stops all tasks from starting
- * another cycle. The rest (log, outputs, events) follows in CH_COMM_CYCLE. */
+/* Called by CmpIecTask in the context of the task whose cycle failed, when no task starts another cycle: sets the outputs
+ * to zero and records the exception. The rest (log, outputs that other tasks have written meanwhile, events) follows in
+ * CH_COMM_CYCLE. */
 void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address);
 
 /* The words for an RTSEXCPT_* code, for the log. From any context. */

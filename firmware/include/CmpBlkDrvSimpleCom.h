@@ -11,7 +11,7 @@
 typedef struct {
     RTS_UI32 frames;
     RTS_UI32 crc_errors;
-    RTS_UI32 overflows;           /* longer than BLK_MAX_SIZE */
+    RTS_UI32 overflows;           /* longer than any packet of this device */
     RTS_UI32 too_short;           /* no room for a CRC */
     RTS_UI32 bad_escapes;         /* "#" and neither "_", "<" nor ">" */
     RTS_UI32 unfinished;          /* "#<" within a frame */

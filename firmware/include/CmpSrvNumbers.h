@@ -144,7 +144,8 @@ enum {
  * GET_TARGET_IDENT  request: [TAG_DEV_IDENT 3 x u32: type, id, version expected]. Reply, session id 0: TAG_DEV_RESULT
  *   u16 (OK, or ERR_TYPE_MISMATCH when another type or id was expected), TAG_DEV_IDENT 3 x u32, TAG_DEV_RTS_VERSION
  *   u32, TAG_DEV_DEVICE_NAME, TAG_DEV_VENDOR_NAME, TAG_DEV_NODE_NAME (each u32 byte length with NUL, UTF-16LE text,
- *   NUL, zero padding), TAG_DEV_MAX_CHANNELS u16, TAG_DEV_SERIAL_NUMBER u16 length, ASCII, zero padding.
+ *   NUL, zero padding), TAG_DEV_MAX_CHANNELS u16, TAG_DEV_SERIAL_NUMBER u16 length, ASCII, zero padding, [TAG_DEV_STACK
+ *   2 x u32 (own): bytes of the main stack, 0 when not known, and how many of them have never been used].
  * SESSION_CREATE    request: [TAG_DEV_CLIENT_INFO], [TAG_DEV_AUTH_TYPE u32]. Reply: TAG_DEV_SESSION_ID u32,
  *   TAG_DEV_AUTH_TYPE u32 = DEV_CRYPT_XOR. The session has no rights before the login.
  * LOGIN             header session id: L7_SESSION_INITIAL, L7_SESSION_EMPTY or that of SESSION_CREATE. Request:
@@ -172,6 +173,7 @@ enum {
     TAG_DEV_RTS_VERSION = 0x06,
     TAG_DEV_MAX_CHANNELS = 0x08,
     TAG_DEV_SERIAL_NUMBER = 0x09,
+    TAG_DEV_STACK = 0x60, /* own */
     TAG_DEV_CREDENTIALS = 0x81,
     TAG_DEV_USER = 0x10,
     TAG_DEV_LOGIN_REPLY = 0x82,
@@ -281,17 +283,21 @@ enum { TAG_TASK_INFO = 0x42, TASK_INFO_WORDS = 10 };
  *
  * READ   request: TAG_MON2_READ_LIST { n x TAG_MON2_READ_VAR { [TAG_MON2_VAR_ID 0..0x7FFF, default: index in the
  *   list], TAG_MON2_VAR_SIZE, [TAG_MON2_VAR_TYPE_CLASS], [TAG_MON2_VAR_CODE_SIZE], TAG_MON2_VAR_CODE } }. Code is
- *   exactly `02 lo hi 06 area` or `03 b0 b1 b2 b3 06 area`, with or without a final 01 and zero padding. Unpadded and
+ *   `02 lo hi 06 area` or `03 b0 b1 b2 b3 06 area`, then any number of steps `09 08 02 lo hi 0E` (or with 03): to the
+ *   offset `hi lo` from where the pointer there leads, which must be in one of the areas (otherwise
+ *   MONITORING_ERR_INVALID_POINTER); with or without a final 01 and zero padding. Unpadded and
  *   with the optional tags left out a variable takes 13 bytes: `82 01 0A  02 01 04  05 05 02 lo hi 06 area`, 150 in
  *   one request. Neighbouring variables may be read as one. Reply: TAG_MON2_VALUES = per variable, in the order of
  *   the request: u16 id, u32 size, value. A variable that cannot be read has (own): u16 id | MON2_ID_FAILED, u32 1,
  *   u8 MONITORING_ERR_*. What does not fit the message has MONITORING_ERR_BUFFERSIZE_EXCEEDED; ask for it again in a
- *   request of its own. Padding: less than 6 bytes at the end.
+ *   request of its own. Padding: less than 6 bytes at the end. TAG_MON2_CONSISTENT u16 1 (own) follows when no task was
+ *   in its cycle while the values were copied: together they are a state between two cycles. Otherwise ask again.
  * WRITE  request: TAG_MON2_WRITE_LIST = n x { u16 id, u32 size, value, u16 code size, code }. Code as for reading, or
  *   the program with Cpy of 4.9 (`15 0C 00` address `17 0C 09 04 1B 06 00 01 00 00 17 04 09 04 17 08 09 04 04`).
  *   Reply: empty = all written; TAG_MON2_ERROR and TAG_MON2_ERROR_INDEX u32 (own): the first bad entry, nothing has
- *   been written. Writable are the areas data, retain, input, output and memory.
- * Values of 1, 2, 4 and 8 bytes at a multiple of their size are copied in one piece.
+ *   been written (but the entries before it when a pointer to it changed just then). Writable are the areas data,
+ *   retain, input, output and memory.
+ * Values of 1, 2, 4 and 8 bytes at a multiple of their size are copied in one access where the CPU can.
  */
 enum {
     SRV_MON2_READ = 1,
@@ -308,6 +314,8 @@ enum {
     TAG_MON2_VALUES = 0x40,
     TAG_MON2_ERROR = 0x41,
     TAG_MON2_ERROR_INDEX = 0x42, /* own */
+    TAG_MON2_CONSISTENT = 0x43,  /* own */
+    MON2_POINTER_SIZE = 8,
     MON2_APPLICATION_SIZE = 20,
     MON2_ID_FAILED = 0x8000, /* own */
     MON2_OP_HALT = 0x01,
@@ -315,6 +323,8 @@ enum {
     MON2_OP_LD32 = 0x03,
     MON2_OP_CPY = 0x04,
     MON2_OP_RAO = 0x06, /* relative to the area in the next byte: leaves an address */
+    MON2_OP_DER = 0x09, /* the value, of as many bytes as the next byte says, at an address */
+    MON2_OP_ADD = 0x0E,
 };
 
 /*

@@ -18,10 +18,19 @@ typedef struct {
     const char *serial_number;
 } SYS_TARGET;
 
+/* Bytes of a stack; `unused` have never been used since the start. Size 0: not known. */
+typedef struct {
+    RTS_UI32 size;
+    RTS_UI32 unused;
+} SYS_STACK;
+
 /* From any context; constant after start. */
 const SYS_TARGET *SysTargetGet(void);
 
 /* 32 unpredictable bits for channel and session ids. From main. */
 RTS_UI32 SysTargetRandom(void);
+
+/* The stack of main. From main, when somebody asks: may take a while. */
+SYS_STACK SysTargetGetStack(void);
 
 #endif

@@ -112,12 +112,14 @@
 #define NETSERVER_MESSAGE_SIZE 2048
 #endif
 
-/* Serial lines the block driver serves; each costs one receive packet (514 bytes), COM_QUEUE_SIZE and about 150 bytes. */
+/* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is below
+ * 424), COM_QUEUE_SIZE and about 150 bytes. */
 #ifndef COM_MAX_LINES
 #define COM_MAX_LINES 1
 #endif
 
-/* Queue of outgoing packets per serial line, bytes: one largest packet (514 with its length) and a few small ones. A second
+/* Queue of outgoing packets per serial line, bytes: one largest packet (514 with its length, or NETSERVER_MESSAGE_SIZE + 90 if
+ * that is less) and a few small ones. A second
  * large one is made when the first is on the line. */
 #ifndef COM_QUEUE_SIZE
 #define COM_QUEUE_SIZE 640
@@ -128,7 +130,8 @@
 #define SRV_MAX_GROUPS 8
 #endif
 
-/* Services that only tell about the application (its name and list, its tasks) and the echo service; 1 KiB of flash. 0: none. */
+/* Services that only tell about the application (its name and list, its tasks), the room on the stack, and the echo service;
+ * 1 KiB of flash. 0: none. */
 #ifndef SRV_INFORMATION
 #define SRV_INFORMATION 1
 #endif

@@ -31,6 +31,11 @@ RTS_UI32 SysTimeGetMs(void)
     return fakes.now_ms;
 }
 
+SYS_STACK SysTargetGetStack(void)
+{
+    return (SYS_STACK){2000, 500};
+}
+
 const SYS_TARGET *SysTargetGet(void)
 {
     return &fakes.target;
@@ -134,6 +139,16 @@ RTS_UI32 AppGetAreaSize(RTS_UI32 index)
     return index < APP_AREA_COUNT ? fakes.area_size[index] : 0;
 }
 
+bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
+{
+    for (*index = 0; *index < APP_AREA_COUNT; ++*index) {
+        *offset = (RTS_UI32)(address - (uintptr_t)fakes_area(*index));
+        if (address - (uintptr_t)fakes_area(*index) < fakes.area_size[*index])
+            return true;
+    }
+    return false;
+}
+
 void AppGetStatus(APP_STATUS *status)
 {
     *status = fakes.status;
@@ -174,6 +189,13 @@ RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info)
 {
     *info = fakes.tasks[task];
     return ERR_OK;
+}
+
+RTS_UI32 IecTaskGetActivity(bool *busy)
+{
+    *busy = fakes.task_busy;
+    fakes.task_activity += fakes.activity_per_look;
+    return fakes.task_activity;
 }
 
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)

@@ -54,6 +54,9 @@ typedef struct {
     RTS_UI32 log_count;
     IEC_TASK_INFO tasks[FAKE_TASKS];
     RTS_UI32 task_count;
+    bool task_busy;
+    RTS_UI32 task_activity;
+    RTS_UI32 activity_per_look; /* how much there is from one look at it to the next */
 } FAKES;
 
 extern FAKES fakes;

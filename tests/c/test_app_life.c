@@ -263,6 +263,24 @@ static void area_addresses_are_checked_to_the_byte(void)
     CHECK(AppGetAreaAddress(APP_AREA_CODE, 0, 1) != NULL);
 }
 
+static void pointers_are_found_in_their_area_to_the_byte(void)
+{
+    RTS_UI32 area, offset;
+
+    start_with_counter(1);
+    uintptr_t retain = (uintptr_t)AppGetAreaAddress(APP_AREA_RETAIN, 0, 16);
+    CHECK(AppFindArea(retain, &area, &offset) && area == APP_AREA_RETAIN && offset == 0);
+    CHECK(AppFindArea(retain + 15, &area, &offset) && area == APP_AREA_RETAIN && offset == 15);
+    CHECK(!AppFindArea(retain + 16, &area, &offset));
+    CHECK(!AppFindArea(retain - 1, &area, &offset));
+    CHECK(AppFindArea((uintptr_t)AppGetAreaAddress(APP_AREA_CODE, 4, 1), &area, &offset));
+    CHECK(area == APP_AREA_CODE && offset == 4);
+    CHECK(!AppFindArea(0, &area, &offset));
+    CHECK(!AppFindArea(UINTPTR_MAX, &area, &offset));
+    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    CHECK(!AppFindArea(retain, &area, &offset) && !AppFindArea(0, &area, &offset));
+}
+
 static RTS_UI32 seen_events[16];
 static RTS_UI32 seen_count;
 
@@ -601,6 +619,7 @@ int main(void)
     RUN(the_application_info_can_be_read);
     RUN(info_longer_than_its_buffer_is_cut);
     RUN(area_addresses_are_checked_to_the_byte);
+    RUN(pointers_are_found_in_their_area_to_the_byte);
     RUN(start_stop_reset_and_download_are_announced);
     RUN(global_exit_runs_before_the_application_goes);
     RUN(global_exit_does_not_run_after_an_exception);

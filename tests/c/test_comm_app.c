@@ -79,6 +79,7 @@ static void login_without_application_says_so(void)
 
     fakes_start();
     fakes.status.state = AS_NONE;
+    fakes.status.image_crc = 0;
     client_init(&client, 1);
     CHECK(client_open(&client) && client_login(&client));
     BTagWriteText(begin_content(), TAG_APP_LOGIN_NAME, "Application", 20);

@@ -170,13 +170,15 @@ static void recognised_read_programs(void)
 static void every_other_program_is_refused(void)
 {
     setup();
-    CHECK(READ_ERROR("\x02\x10\x00\x06", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x02\x10\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x02\x10\x00\x06", 2) == MONITORING_ERR_INVALID_AREA);
     CHECK(READ_ERROR("\x02\x10\x00\x07\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
     CHECK(READ_ERROR("\x1C\x10\x00\x06\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
     CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x09\x04", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR); /* Der */
     CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01\x18", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR); /* Call after Halt */
     CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01\x01", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(READ_ERROR("\x03\x10\x00\x00\x00\x06", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x03\x10\x00\x00\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(READ_ERROR("\x03\x10\x00\x00\x00\x06", 2) == MONITORING_ERR_INVALID_AREA);
     CHECK(READ_ERROR("\x18\x00\x00\x00\x00\x00\x01", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
     CHECK(READ_ERROR("\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
 }
@@ -310,13 +312,132 @@ static void large_value_leaves_room_for_the_answers_after_it(void)
     CHECK(failures > 0);
 }
 
-static void empty_list_is_an_empty_reply(void)
+static void empty_list_has_no_values(void)
 {
     setup();
     begin_request();
     BTagAppend(&writer, "\x81\x01\x00", 3);
     CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_READ, &writer, &reply));
-    CHECK(reply.size == 20);
+    BTAG tag;
+    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK(BTagFind(&reply.tags, TAG_MON2_VALUES, 0, NETSERVER_MESSAGE_SIZE, &tag) == ERR_L7_TAG_MISSING);
+}
+
+/* ---- pointers ---- */
+
+enum { POINTER_AT = 0x10, TARGET_AT = 0x20 };
+
+static void put_pointer(RTS_UI32 area, RTS_UI32 offset, uintptr_t value)
+{
+    memset(fakes_area(area) + offset, 0, MON2_POINTER_SIZE);
+    memcpy(fakes_area(area) + offset, &value, sizeof(value));
+}
+
+/* What reading 2 bytes behind the pointer at POINTER_AT of the data area ends with. */
+static RTS_UI32 read_behind(uintptr_t pointer)
+{
+    setup();
+    put_pointer(APP_AREA_DATA, POINTER_AT, pointer);
+    return READ_ERROR("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E", 2);
+}
+
+static void pointers_are_followed_into_every_area(void)
+{
+    for (RTS_UI32 area = 0; area < APP_AREA_COUNT; area++) {
+        CHECK(read_behind((uintptr_t)fakes_area(area) + TARGET_AT) == 0);
+        CHECK(memcmp(values - 2, fakes_area(area) + TARGET_AT + 4, 2) == 0);
+    }
+}
+
+static void pointers_to_pointers_are_followed(void)
+{
+    setup();
+    put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);
+    put_pointer(APP_AREA_MEMORY, TARGET_AT + 8, (uintptr_t)fakes_area(APP_AREA_RETAIN));
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x09\x08\x02\x08\x00\x0E\x09\x08\x03\x30\x00\x00\x00\x0E\x01", 2) == 0);
+    CHECK(memcmp(values - 2, fakes_area(APP_AREA_RETAIN) + 0x30, 2) == 0);
+}
+
+static void pointers_that_lead_outside_are_refused(void)
+{
+    RTS_UI32 outside = 0;
+
+    CHECK(read_behind(0) == MONITORING_ERR_INVALID_POINTER);
+    CHECK(read_behind((uintptr_t)&outside) == MONITORING_ERR_INVALID_POINTER);
+    CHECK(read_behind((uintptr_t)&fakes) == MONITORING_ERR_INVALID_POINTER);
+    CHECK(read_behind(UINTPTR_MAX) == MONITORING_ERR_INVALID_POINTER);
+    CHECK(read_behind((uintptr_t)fakes_area(0) - 1) == MONITORING_ERR_INVALID_POINTER);
+    CHECK(read_behind((uintptr_t)fakes_area(APP_AREA_COUNT - 1) + FAKE_AREA_SIZE) == MONITORING_ERR_INVALID_POINTER);
+}
+
+static void what_a_pointer_leads_to_ends_with_its_area(void)
+{
+    CHECK(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 6) == 0);
+    CHECK(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 5) == MONITORING_ERR_INVALID_INDEX);
+    CHECK(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 1) == MONITORING_ERR_INVALID_INDEX);
+    setup();
+    put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x09\x08\x03\x00\x00\x00\x80\x0E", 2) == MONITORING_ERR_INVALID_INDEX);
+}
+
+static void pointer_itself_must_lie_in_an_area(void)
+{
+    setup();
+    CHECK(READ_ERROR("\x02\xF9\x03\x06\x00\x09\x08\x02\x00\x00\x0E", 2) == MONITORING_ERR_INVALID_INDEX);
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x06\x09\x08\x02\x00\x00\x0E", 2) == MONITORING_ERR_INVALID_AREA);
+    CHECK(READ_ERROR("\x02\x10\x00\x06\x09\x08\x02\x00\x00\x0E", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+}
+
+static void every_other_step_is_refused(void)
+{
+    RTS_UI8 code[] = {MON2_OP_LD16, POINTER_AT, 0, MON2_OP_RAO, 0,
+                      MON2_OP_DER, MON2_POINTER_SIZE, MON2_OP_LD16, 4, 0, MON2_OP_ADD};
+
+    setup();
+    put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);
+    for (RTS_UI32 i = 5; i < sizeof(code); i++) {
+        RTS_UI8 right = code[i];
+        for (RTS_UI32 byte = 0; byte < 256; byte++) {
+            code[i] = (RTS_UI8)byte;
+            bool legal = i == 8 || i == 9 /* the offset */ || byte == right;
+            CHECK((read_error(code, sizeof(code), 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR) == !legal);
+        }
+        code[i] = right;
+    }
+    for (RTS_UI32 size = 6; size < sizeof(code); size++)
+        CHECK(read_error(code, size, 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(read_error(code, sizeof(code), 2) == 0);
+}
+
+/* ---- consistency ---- */
+
+static bool read_says_consistent(void)
+{
+    BTAG tag;
+
+    begin_read();
+    add_read(1, 4, APP_AREA_DATA, 0);
+    CHECK(send_read());
+    CHECK(take_value(1, 4) != NULL);
+    return BTagFind(&reply.tags, TAG_MON2_CONSISTENT, 2, 2, &tag) == ERR_OK;
+}
+
+static void values_are_consistent_when_no_task_ran_meanwhile(void)
+{
+    setup();
+    CHECK(read_says_consistent());
+    fakes.task_activity = 77;
+    CHECK(read_says_consistent());
+}
+
+static void values_are_not_consistent_when_a_task_ran_meanwhile(void)
+{
+    setup();
+    fakes.task_busy = true;
+    CHECK(!read_says_consistent());
+    fakes.task_busy = false;
+    fakes.activity_per_look = 2;
+    CHECK(!read_says_consistent());
 }
 
 static void malformed_variables_fail_the_request(void)
@@ -501,6 +622,19 @@ static void code_cannot_be_written(void)
     CHECK(fakes_area(APP_AREA_CODE)[0] == 0x50);
 }
 
+static void variables_are_written_through_pointers(void)
+{
+    setup();
+    put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);
+    CHECK(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E") == ERR_OK);
+    CHECK(memcmp(fakes_area(APP_AREA_MEMORY) + TARGET_AT + 4, "\xAA\xBB", 2) == 0);
+    put_pointer(APP_AREA_DATA, POINTER_AT, 0);
+    CHECK(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E") == MONITORING_ERR_INVALID_POINTER);
+    put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_CODE));
+    CHECK(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E") == MONITORING_ERR_OPERATION_DENIED);
+    CHECK(fakes_area(APP_AREA_CODE)[4] == 0x54);
+}
+
 static void one_bad_entry_leaves_everything_unwritten(void)
 {
     setup();
@@ -566,7 +700,15 @@ int main(void)
     RUN(compact_form_reads_150_variables_at_once);
     RUN(what_does_not_fit_fails_alone);
     RUN(large_value_leaves_room_for_the_answers_after_it);
-    RUN(empty_list_is_an_empty_reply);
+    RUN(empty_list_has_no_values);
+    RUN(pointers_are_followed_into_every_area);
+    RUN(pointers_to_pointers_are_followed);
+    RUN(pointers_that_lead_outside_are_refused);
+    RUN(what_a_pointer_leads_to_ends_with_its_area);
+    RUN(pointer_itself_must_lie_in_an_area);
+    RUN(every_other_step_is_refused);
+    RUN(values_are_consistent_when_no_task_ran_meanwhile);
+    RUN(values_are_not_consistent_when_a_task_ran_meanwhile);
     RUN(malformed_variables_fail_the_request);
     RUN(application_header_is_checked);
     RUN(variables_of_all_sizes_and_alignments_are_written);
@@ -574,6 +716,7 @@ int main(void)
     RUN(program_of_the_programming_system_is_recognised);
     RUN(every_other_write_program_is_refused);
     RUN(code_cannot_be_written);
+    RUN(variables_are_written_through_pointers);
     RUN(one_bad_entry_leaves_everything_unwritten);
     RUN(size_zero_is_refused);
     RUN(cut_entries_are_refused_and_nothing_is_written);

@@ -355,6 +355,8 @@ static void identity_is_told_in_the_layout_of_the_field(void)
     CHECK(BTagFind(&reply.tags, TAG_DEV_SERIAL_NUMBER, 8, 10, &tag) == ERR_OK);
     CHECK(memcmp(tag.data, "\x05\0SN-42", 8) == 0);
     CHECK(reply_number(&reply, TAG_DEV_MAX_CHANNELS) == 1);
+    CHECK(BTagFind(&reply.tags, TAG_DEV_STACK, 8, 8, &tag) == ERR_OK);
+    CHECK(BytesGet32(tag.data) == 2000 && BytesGet32(tag.data + 4) == 500);
 }
 
 static void empty_names_are_empty(void)

@@ -281,6 +281,17 @@ static void one_good_cycle_starts_the_count_anew(void)
     }
 }
 
+static void outputs_are_zero_when_the_failing_task_returns(void)
+{
+    CDL_TASK *task = begin(10000, 2000);
+
+    task->watchdog_us = 1000;
+    load();
+    AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] = 1;
+    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 0);
+    CHECK(AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] == 0);
+}
+
 static void the_watchdog_stops_the_application_with_its_outputs_at_zero(void)
 {
     CDL_TASK *task = begin(10000, 2000);
@@ -465,6 +476,7 @@ int main(void)
     RUN(cycles_within_the_time_never_trip);
     RUN(without_a_watchdog_nothing_trips);
     RUN(one_good_cycle_starts_the_count_anew);
+    RUN(outputs_are_zero_when_the_failing_task_returns);
     RUN(the_watchdog_stops_the_application_with_its_outputs_at_zero);
     RUN(reset_gives_the_watchdog_its_count_back);
     RUN(the_supervisor_sees_the_limits_of_running_code_only);

@@ -1,4 +1,4 @@
-"""Boards for the tests. Environment: FIRMWARE_DIR (where firmware-*.elf are), QEMU_MACHINE, PLCTOOL_BUILD."""
+"""Boards for the tests. Environment: see environment.py, and PLCTOOL_BUILD."""
 
 from __future__ import annotations
 
@@ -6,20 +6,18 @@ import importlib.util
 import os
 import shutil
 import sys
-import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-SKIPPED = 77  # exit status that Meson counts as skipped
-PATIENCE = 60.0  # of `eventually` [s]; machines under load are slow
+sys.path.append(str(Path(__file__).resolve().parent))
 
-sys.path.append(str(HERE))
+from environment import FIRMWARE, MACHINE, ROOT, TARGET, firmware
+
+SKIPPED = 77  # exit status that Meson counts as skipped
+
 sys.path.append(str(ROOT / os.environ.get("PLCTOOL_BUILD", "build") / "host"))
 
 
@@ -27,7 +25,7 @@ def _missing() -> str | None:
     """What these tests cannot do without."""
     if shutil.which("qemu-system-arm") is None:
         return "qemu-system-arm"
-    if "FIRMWARE_DIR" not in os.environ:
+    if FIRMWARE is None:
         return "firmware: run them by meson test -C build-cm3"
     if importlib.util.find_spec("_plccore") is None:
         return "plctool's extension module in build/host (make build), or in the folder that PLCTOOL_BUILD names"
@@ -43,9 +41,6 @@ else:
 
     from plctool.device import Plc
     from plctool.link.connection import Connection
-
-MACHINE = os.environ.get("QEMU_MACHINE", "")
-TARGET = {"mps2-an385": "cortex-m3", "mps2-an386": "cortex-m4f"}.get(MACHINE, "")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -63,7 +58,7 @@ def make_board(tmp_path: Path) -> Iterator[Callable[..., Board]]:
     def make(config: str = "standard") -> Board:
         folder = tmp_path / f"board{len(boards)}"
         folder.mkdir()
-        boards.append(Board(MACHINE, Path(os.environ["FIRMWARE_DIR"]) / f"firmware-{config}.elf", folder))
+        boards.append(Board(MACHINE, firmware(config), folder))
         return boards[-1]
 
     yield make
@@ -90,17 +85,3 @@ def plc(board: Board) -> Iterator[Plc]:
 def build(tmp_path: Path) -> Callable[[str], Built]:
     """Compiles Structured Text for the board's processor."""
     return cache(lambda text: compile_text(text, TARGET, tmp_path))
-
-
-@pytest.fixture
-def eventually() -> Callable[[Callable[[], Any]], Any]:
-    """Asks until the answer is true, and returns it; fails after PATIENCE."""
-
-    def ask(question: Callable[[], Any]) -> Any:
-        end = time.monotonic() + PATIENCE
-        while not (answer := question()):
-            assert time.monotonic() < end, "did not happen in time"
-            time.sleep(0.01)
-        return answer
-
-    return ask

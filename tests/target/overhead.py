@@ -20,6 +20,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1] / "host"), str(HERE.parents[1] / "build" / "host")]
 
 from elftools.elf.elffile import ELFFile  # noqa: E402
+from environment import TARGETS  # noqa: E402
 from programs import Built, compile_text, program  # noqa: E402
 from qemu import Board  # noqa: E402
 
@@ -27,7 +28,6 @@ from plctool.device import Plc  # noqa: E402
 from plctool.link.connection import Connection  # noqa: E402
 from plctool.symbols import symbol_path  # noqa: E402
 
-TARGETS = {"mps2-an385": "cortex-m3", "mps2-an386": "cortex-m4f"}
 VARIABLES = 11
 ENOUGH = 200  # counts
 PATIENCE = 30.0  # [s]

@@ -12,24 +12,37 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
+from elftools.elf.elffile import ELFFile
+
 from plctool.errors import LinkError
 from plctool.link import simplecom
 
 FLASH_SIZE = 16 * 1024 * 1024  # of the file; what is behind the file area holds the serial number in its last 4 KiB
 FACTORY_OFFSET = FLASH_SIZE - 4096
 START_TIMEOUT = 10.0
+LOCALHOST = "127.0.0.1"
 
 
-class UnixSerial:
-    """Block transport over a serial line that QEMU offers as a unix socket."""
+# What time is on the board: -icount of QEMU, which then counts instructions.
+CLOCKS = {
+    "follow": "shift=3,sleep=on",  # sleep lasts as on the host: as fast as its client, timers are late on a busy host
+    "exact": "shift=3,sleep=off",  # sleep lasts no time: timers are never late, time runs away from a slow client
+    "slow": "shift=8,sleep=off",  # exact with a processor of 4 MIPS: many seconds of work pass quickly
+    "host": None,  # the host's clock: neither repeatable nor, on a busy host, steady
+}
+
+
+class SocketSerial:
+    """Block transport over a serial line that QEMU offers as a socket."""
 
     packet_overhead = simplecom.FRAME_OVERHEAD
     byte_rate = math.inf
     local_address = b"\x00\x02"
 
-    def __init__(self, path: Path) -> None:
-        self.name = str(path)
-        self._socket = _connect(path)
+    def __init__(self, port: int) -> None:
+        self.name = f"socket://{LOCALHOST}:{port}"
+        self._socket = socket.create_connection((LOCALHOST, port))
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._decoder = simplecom.Decoder()
         self._packets: deque[bytes] = deque()
 
@@ -82,16 +95,13 @@ def _connect(path: Path) -> socket.socket:
 
 
 class Board:
-    """One board with its firmware. Context manager: power is on inside.
-
-    Time counts instructions. While the processor sleeps it follows the host's clock, so that the board is as fast as
-    its client, and a busy host makes timers late.
-    """
+    """One board with its firmware. Context manager: power is on inside."""
 
     def __init__(self, machine: str, firmware: Path, folder: Path) -> None:
         self.machine, self.firmware, self.folder = machine, firmware, folder
         self.flash_file = folder / "flash.bin"
         self._process: subprocess.Popen[bytes] | None = None
+        self._port = 0
         if not self.flash_file.exists():
             self.flash_file.touch()
             os.truncate(self.flash_file, FLASH_SIZE)  # a sparse file: flash that nobody has erased yet
@@ -108,28 +118,31 @@ class Board:
             file.seek(offset)
             return file.read(size)
 
-    def power_on(self, *, exact: bool = False, plugin: str = "") -> None:
-        """Starts QEMU and waits until its serial line can be opened.
-
-        `exact`: sleep takes no time on the host, so timers are never late, but time runs away from a slow client.
-        """
-        for name in ("uart", "qmp"):
-            (self.folder / name).unlink(missing_ok=True)
+    def power_on(self, clock: str = "follow", *, plugin: str = "") -> None:
+        """Starts QEMU and waits until its serial line can be opened. `clock` is one of CLOCKS."""
+        (self.folder / "qmp").unlink(missing_ok=True)
+        icount = CLOCKS[clock]
         command = [
             "qemu-system-arm", "-M", f"{self.machine},memory-backend=nv",
             "-object", f"memory-backend-file,id=nv,size=16M,mem-path={self.flash_file},share=on",
             "-display", "none", "-monitor", "none", "-kernel", str(self.firmware),
-            "-icount", f"shift=3,sleep={'off' if exact else 'on'}",
-            "-serial", "unix:uart,server,nowait", "-qmp", "unix:qmp,server,nowait",
+            "-serial", f"tcp:{LOCALHOST}:0,server=on,wait=off,nodelay=on", "-qmp", "unix:qmp,server,nowait",
+            *(["-icount", icount] if icount else []),
             *(["-plugin", plugin] if plugin else []),
         ]  # fmt: skip
         with (self.folder / "qemu.log").open("ab") as log:
             self._process = subprocess.Popen(command, cwd=self.folder, stdout=log, stderr=log)
         end = time.monotonic() + START_TIMEOUT
-        while not ((self.folder / "uart").exists() and (self.folder / "qmp").exists()):
+        while not (self.folder / "qmp").exists():
             if self._process.poll() is not None or time.monotonic() > end:
                 raise RuntimeError(f"QEMU did not start: {(self.folder / 'qemu.log').read_text()}")
             time.sleep(0.005)
+        self._port = self._find_port()
+
+    def _find_port(self) -> int:
+        """The TCP port that QEMU has chosen for the serial line."""
+        names = [device["filename"] for device in self._qmp("query-chardev") if device["label"] == "serial0"]
+        return int(names[0].removeprefix("disconnected:").split(",")[0].rsplit(":", 1)[1])
 
     def power_off(self) -> None:
         """Power cut: whatever the firmware does now stays half done."""
@@ -138,20 +151,20 @@ class Board:
             self._process.wait()
             self._process = None
 
-    def wait_off(self, timeout: float = 20.0) -> int:
-        """Waits until QEMU ends by itself, by a plugin; its exit status."""
-        assert self._process
-        status = self._process.wait(timeout)
-        self._process = None
-        return status
-
     @property
-    def is_on(self) -> bool:
-        return self._process is not None and self._process.poll() is None
+    def pid(self) -> int:
+        """Of the QEMU process."""
+        assert self._process
+        return self._process.pid
 
     def reset(self) -> None:
         """The reset pin: RAM is kept."""
         self._qmp("system_reset")
+
+    def address_of(self, symbol: str) -> int:
+        """Where something of the firmware lies."""
+        with self.firmware.open("rb") as file:
+            return int(ELFFile(file).get_section_by_name(".symtab").get_symbol_by_name(symbol)[0]["st_value"])
 
     def read_memory(self, address: int, size: int) -> bytes:
         """RAM, without stopping the processor."""
@@ -159,11 +172,16 @@ class Board:
         self._qmp("pmemsave", val=address, size=size, filename=str(file))
         return file.read_bytes()
 
-    def line(self) -> UnixSerial:
-        """The serial line, from the client's end."""
-        return UnixSerial(self.folder / "uart")
+    @property
+    def port(self) -> str:
+        """The serial line, for `plctool --port`."""
+        return f"socket://{LOCALHOST}:{self._port}"
 
-    def _qmp(self, command: str, **arguments: Any) -> None:
+    def line(self) -> SocketSerial:
+        """The serial line, from the client's end."""
+        return SocketSerial(self._port)
+
+    def _qmp(self, command: str, **arguments: Any) -> Any:
         with _connect(self.folder / "qmp") as qmp:
             stream = qmp.makefile("rw")
             stream.readline()  # the greeting
@@ -173,6 +191,7 @@ class Board:
                 while "return" not in (answer := json.loads(stream.readline())):
                     if "error" in answer:
                         raise RuntimeError(f"QEMU: {answer['error']['desc']}")
+            return answer["return"]
 
     def __enter__(self) -> Board:
         self.power_on()

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import time
+from pathlib import Path
+
 import pytest
+from environment import eventually
+from programs import program
 from qemu import FACTORY_OFFSET
 
 from plctool.device import Plc
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+
+MAIN_WATCHDOG_MS = 20_000  # see main.c
 
 
 @pytest.mark.parametrize("config", ["minimal", "standard", "full"])
@@ -16,7 +24,7 @@ def test_every_configuration_answers_the_name_service(make_board, config):
     board.power_on()
     with Connection(board.line()) as connection:
         (node,) = connection.scan(10, enough=1)
-    assert node.device_name.startswith("MPS2 AN38")
+    assert node.device_name.startswith("MPS2 AN")
 
 
 def test_a_fresh_board_has_no_application(plc):
@@ -58,3 +66,26 @@ def test_large_messages_arrive_whole(board):
         data = bytes(i * 7 % 251 for i in range(700))
         for _ in range(5):
             assert echo(session, data) == data
+
+
+def test_main_loop_kicks_the_hardware_watchdog(make_board, build):
+    board = make_board()
+    board.power_on("exact")
+    with Plc(Connection(board.line())) as plc:
+        plc.flash(build(program("VAR n : DINT; END_VAR", "n := n + 1;", "T#20ms")).path)
+        eventually(lambda: plc.read("Main.n") * 20 > MAIN_WATCHDOG_MS + 5_000)
+        assert [entry.text for entry in plc.log() if "Reset" in entry.text] == ["Reset: power on"]
+
+
+def processor_time(board) -> float:
+    """Seconds that QEMU has used of the host's processors."""
+    fields = Path(f"/proc/{board.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def test_processor_sleeps_while_there_is_nothing_to_do(board):
+    with Plc(Connection(board.line())) as plc:
+        plc.status()
+    begin, before = time.monotonic(), processor_time(board)
+    time.sleep(1.0)
+    assert processor_time(board) - before < 0.5 * (time.monotonic() - begin)

@@ -1,115 +1,183 @@
 """Power cuts while a program is replaced: the device starts, runs the old program or the new one, and takes another.
 
-POWER_CUTS=all cuts after every store into the flash; otherwise a selection is tried: some from every part of the
-transfer, and all of the last ones, which commit.
+A plugin of QEMU writes down every store into the flash while a program is stopped, started, replaced, and proves
+itself. The flash after the first n stores is what a power cut there leaves; boards are started with it. Tried are all
+n in the logs of commit records and retain variables, and a selection in the slot that takes the program, which
+nobody reads until a record names it. POWER_CUTS=all tries all n.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
+import struct
 import subprocess
-import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 
 import pytest
-from programs import COUNTER, TWO_TASKS
+from environment import MACHINE, TARGET, eventually, firmware
+from programs import COUNTER, TWO_TASKS, Built, compile_text
+from qemu import Board
 
 from plctool.device import Plc
 from plctool.errors import PlcError
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
+from plctool.symbols import symbol_path
 
 HERE = Path(__file__).parent
-FLASH_BASE, FLASH_END = 0x21000000, 0x21080000
-CUT = 3  # exit status of a QEMU that was cut
-SELECTION = 24
+FLASH_SIZE = 0x80000  # of the area for programs and files
+SECTOR_SIZE = 4096
+STORE = struct.Struct("<I8s")
+PROVEN = 3500  # cycles of 1 ms after which a program has proven itself
+IN_SLOT = 40  # cuts to try in the slot
+AT_ONCE = 2  # boards
 
 
-@pytest.fixture(scope="session")
-def cutter(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The plugin that cuts."""
+@dataclass(frozen=True)
+class Cut:
+    """What a power cut leaves: the flash after `stores` stores; `in_slot`: the last one was into the new slot."""
+
+    stores: int
+    in_slot: bool
+    flash: bytes
+
+
+@dataclass(frozen=True)
+class Replacement:
+    """What happened to the flash while `old` was replaced by `new`."""
+
+    old: Built
+    new: Built
+    kept: int  # the retain variable of the old program before
+    before: bytes
+    stores: list[tuple[int, bytes]]
+
+    @property
+    def slot(self) -> range:
+        """The sectors that the new program was written to."""
+        begin = bytes(self._after()).index(self.new.image)
+        end = begin + len(self.new.image)
+        return range(begin // SECTOR_SIZE * SECTOR_SIZE, -(-end // SECTOR_SIZE) * SECTOR_SIZE)
+
+    def _after(self) -> bytearray:
+        flash = bytearray(self.before)
+        for offset, block in self.stores:
+            flash[offset : offset + len(block)] = block
+        return flash
+
+    def cuts(self) -> Iterator[Cut]:
+        """Every cut that leaves something else than the one before."""
+        slot = self.slot
+        flash = bytearray(self.before)
+        for n, (offset, block) in enumerate(self.stores, 1):
+            if flash[offset : offset + len(block)] != block:
+                flash[offset : offset + len(block)] = block
+                yield Cut(n, offset in slot, bytes(flash))
+
+
+@pytest.fixture(scope="module")
+def replacement(tmp_path_factory: pytest.TempPathFactory) -> Replacement:
+    """Recorded on a board whose time does not depend on the host."""
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("needs a C compiler for QEMU's plugin")
-    plugin = tmp_path_factory.mktemp("plugin") / "cut.so"
-    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", plugin, HERE / "cut.c"], check=True)
-    return plugin
+    folder = tmp_path_factory.mktemp("replacement")
+    plugin, record = folder / "stores.so", folder / "stores"
+    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", plugin, HERE / "stores.c"], check=True)
+    old, new = (compile_text(text, TARGET, folder) for text in (COUNTER, TWO_TASKS))
+    board = Board(MACHINE, firmware("standard"), folder)
 
-
-@pytest.fixture
-def prepared(make_board, build, eventually):
-    """A board with the old program, proven, and off; and its flash."""
-    board = make_board()
-    with board, Plc(Connection(board.line())) as plc:
-        plc.flash(build(COUNTER).path)
-        eventually(lambda: plc.read("Main.n") > 3500)
-    return board, board.flash_file.read_bytes()
-
-
-def replace_program(board, image: Path) -> None:
-    """Flashes over the running program; the line may go dead on the way."""
-    with suppress(PlcError), Plc(Connection(board.line())) as plc:
-        plc.flash(image)
-        time.sleep(0.05)
-
-
-def check_survivor(board, old, new) -> str:
-    """What runs after the cut: "old" or "new". The new program can be flashed afterwards."""
+    board.power_on("exact")
     with Plc(Connection(board.line())) as plc:
-        status = plc.status()
-        assert status.state is AppState.RUN
-        names = {old.symbols.image_crc: "old", new.symbols.image_crc: "new"}
-        assert status.image_crc in names
-        plc.flash(new.path)
-        assert plc.status().image_crc == new.symbols.image_crc
-        assert plc.status().state is AppState.RUN
-    return names[status.image_crc]
-
-
-def cut_points(stores: int) -> list[int]:
-    """Numbers of the stores after which to cut. The last ones are those of the commit record."""
-    if os.environ.get("POWER_CUTS") == "all":
-        return list(range(1, stores + 1))
-    early = {1 + stores * i // SELECTION for i in range(SELECTION)}
-    return sorted(early | set(range(stores - SELECTION, stores + 1)))
-
-
-def test_cut_after_a_store_leaves_old_or_new(prepared, build, cutter, tmp_path):
-    board, flash = prepared
-    old, new = build(COUNTER), build(TWO_TASKS)
-    plugin = f"file={cutter},lo={FLASH_BASE:#x},hi={FLASH_END:#x}"
-    count_file = tmp_path / "count"
-    board.power_on(plugin=f"{plugin},out={count_file}")
-    replace_program(board, new.path)
+        plc.flash(old.path)
+        eventually(lambda: plc.read("Main.n") > PROVEN)
+        plc.stop()  # saves the retain variable
+        kept = plc.read("Main.kept")
     board.power_off()
-    stores = int(count_file.read_text())
-    print(f"{stores} stores")
-    assert stores > 500
+    before = board.read_flash(0, FLASH_SIZE)
 
-    seen = []
-    for n in cut_points(stores):
-        board.flash_file.write_bytes(flash)
-        board.power_on(plugin=f"{plugin},n={n}")
-        replace_program(board, new.path)
-        if board.is_on:
-            board.power_off()
-        board.power_on()
-        seen.append(check_survivor(board, old, new))
-        board.power_off()
-    assert seen[0] == "old"
-    assert "new" in seen
+    base = board.address_of("file_flash")
+    arguments = f"base={base},size={FLASH_SIZE},memory={board.flash_file},out={record}"
+    board.power_on("exact", plugin=f"file={plugin},{arguments}")
+    with Plc(Connection(board.line())) as plc:
+        plc.stop()
+        plc.start()
+        plc.flash(new.path)
+        eventually(lambda: plc.read("Fast.n") > PROVEN)
+    board.power_off()
+    return Replacement(old, new, kept, before, list(STORE.iter_unpack(record.read_bytes())))
+
+
+def test_the_running_program_is_untouched_by_the_download(replacement):
+    place = replacement.before.index(replacement.old.image)
+    program = range(place - 8 + 1, place + len(replacement.old.image))  # a store changes 8 bytes from its offset on
+    assert [hex(offset) for offset, _ in replacement.stores if offset in program] == []
+
+
+def selected(replacement: Replacement) -> list[Cut]:
+    """The cuts to try."""
+    cuts = list(replacement.cuts())
+    if os.environ.get("POWER_CUTS") == "all":
+        return cuts
+    in_slot = [cut.stores for cut in cuts if cut.in_slot]
+    some = {in_slot[len(in_slot) * i // IN_SLOT] for i in range(IN_SLOT)} | {in_slot[-1]}
+    return [cut for cut in cuts if not cut.in_slot or cut.stores in some]
+
+
+def survivor(board: Board, replacement: Replacement, cut: Cut) -> str:
+    """What runs after the cut: "old" with its retain variable, or "new". A program can be flashed afterwards."""
+    board.write_flash(0, cut.flash)
+    with board, Plc(Connection(board.line()), symbol_path(replacement.old.path)) as plc:
+        status = plc.status()
+        assert status.state is AppState.RUN, f"after {cut.stores} stores"
+        name = {replacement.old.symbols.image_crc: "old", replacement.new.symbols.image_crc: "new"}[status.image_crc]
+        if name == "old":
+            assert plc.read("Main.kept") >= replacement.kept, f"after {cut.stores} stores"
+        plc.flash(replacement.new.image, force=True)
+        status = plc.status()
+        assert (status.image_crc, status.state) == (replacement.new.symbols.image_crc, AppState.RUN)
+    return name
+
+
+def test_cut_after_a_store_leaves_old_or_new(replacement, make_board):
+    boards: SimpleQueue[Board] = SimpleQueue()
+    for _ in range(AT_ONCE):
+        boards.put(make_board())
+
+    def attempt(cut: Cut) -> str:
+        board = boards.get()
+        try:
+            return survivor(board, replacement, cut)
+        finally:
+            boards.put(board)
+
+    cuts = selected(replacement)
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        seen = list(pool.map(attempt, cuts))
+    print(f"{len(replacement.stores)} stores, {len(cuts)} cuts: {seen.count('old')} old, {seen.count('new')} new")
+    assert len(cuts) > IN_SLOT + 20
+    assert set(seen) == {"old", "new"}
     assert seen == sorted(seen, reverse=True), "once it is the new one it stays the new one"
 
 
-def test_pulling_the_plug_again_and_again(prepared, build):
+def test_pulling_the_plug_again_and_again(make_board, build):
     """Later and later in the transfer; the flash is carried on from one cut to the next."""
-    board, _ = prepared
+    board = make_board()
     old, new = build(COUNTER), build(TWO_TASKS)
+    board.power_on("exact")
+    with Plc(Connection(board.line())) as plc:
+        plc.flash(old.path)
+        eventually(lambda: plc.read("Main.n") > PROVEN)
+    board.power_off()
     for number in range(6):
         board.power_on()
-        image = (old, new)[number % 2]
+        image = (new, old)[number % 2]
 
         def cut(done: int, total: int, part: float = number / 6) -> None:
             if done >= total * part:
@@ -119,4 +187,7 @@ def test_pulling_the_plug_again_and_again(prepared, build):
             plc.flash(image.path, force=True, progress=cut)
         board.power_off()
     board.power_on()
-    check_survivor(board, old, new)
+    with Plc(Connection(board.line())) as plc:
+        assert plc.status().state is AppState.RUN
+        plc.flash(new.path)
+        assert plc.status().image_crc == new.symbols.image_crc

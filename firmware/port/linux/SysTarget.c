@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #if defined(__x86_64__)
@@ -41,6 +42,26 @@ static const SYS_TARGET target = {
 const SYS_TARGET *SysTargetGet(void)
 {
     return &target;
+}
+
+/* It grows by need: what the system says it has grown to, against its limit. */
+SYS_STACK SysTargetGetStack(void)
+{
+    SYS_STACK stack = {0, 0};
+    struct rlimit limit;
+    unsigned grown_kb = 0;
+    char line[128];
+    FILE *file = fopen("/proc/self/status", "re");
+    while (file != NULL && fgets(line, sizeof(line), file) != NULL && sscanf(line, "VmStk: %u kB", &grown_kb) != 1) {
+    }
+    if (file != NULL) {
+        fclose(file);
+    }
+    if (grown_kb != 0 && getrlimit(RLIMIT_STACK, &limit) == 0 && limit.rlim_cur <= INT32_MAX) {
+        stack.size = (RTS_UI32)limit.rlim_cur;
+        stack.unused = stack.size - grown_kb * 1024;
+    }
+    return stack;
 }
 
 RTS_UI32 SysTargetRandom(void)

@@ -111,6 +111,7 @@ const char *AppExceptionName(RTS_UI32 code)
 
 void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)
 {
+    memset(output_area, 0, sizeof output_area); /* at once: main may be busy with the flash */
     if (SysAtomicAdd(&app.exception_claims, 1) != 0)
         return; /* another task was first: one exception stops everything */
     app.raised.task = task;
@@ -147,7 +148,8 @@ static bool is_unproven(void)
     return AppCommitGet()->slot[app.slot].state != SLOT_PROVEN;
 }
 
-/* The safe state after an exception: no task runs, outputs are zero, and an application that is new will not be booted. */
+/* The safe state after an exception: no task runs, outputs are zero (again, since other tasks have finished their
+ * cycle), and an application that is new will not be booted. */
 static void enter_exception_state(void)
 {
     IecTaskStopAll();
@@ -275,6 +277,7 @@ static const RTS_UI8 *map_code(RTS_UI32 slot, const APP_IMAGE *image)
 static RTS_RESULT load(RTS_UI32 slot, const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until)
 {
     RTS_UI32 retain_after = AppCommitGet()->slot[slot].retain_after;
+    RTS_UI32 retain_size = image->area_size[APP_AREA_RETAIN];
     RTS_RESULT restored;
     RTS_RESULT result = AppLoaderRead(image, &app.tables);
 
@@ -285,9 +288,9 @@ static RTS_RESULT load(RTS_UI32 slot, const APP_IMAGE *image, const RTS_UI8 *cod
     app.slot = slot;
     app.image = *image;
     app.code = code;
-    RetainAttach((RTS_UI8 *)retain_area, image->area_size[APP_AREA_RETAIN], image->retain_layout);
+    RetainAttach((RTS_UI8 *)retain_area, retain_size, image->retain_layout);
     restored = RetainRestore(retain_after, retain_until);
-    if (restored != ERR_OK && retain_until != retain_after)
+    if (restored != ERR_OK && retain_size != 0 && retain_until != retain_after)
         LogAdd(CMPID_CmpRetain, LOG_WARNING, restored, "No saved retain variables fit the application: initial values");
     result = initialise(restored != ERR_OK);
     if (result != ERR_OK)
@@ -641,7 +644,7 @@ const char *AppGetInfo(RTS_UI32 index)
 
 RTS_UI32 AppGetAreaSize(RTS_UI32 index)
 {
-    return is_loaded() && index < APP_AREA_COUNT ? app.image.area_size[index] : 0;
+    return index < APP_AREA_COUNT ? app.image.area_size[index] : 0;
 }
 
 RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size)
@@ -651,6 +654,18 @@ RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size)
     if (size > area_size || offset > area_size - size || index >= APP_AREA_COUNT || !is_loaded())
         return NULL;
     return app.context.area[index] + offset;
+}
+
+bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
+{
+    for (*index = 0; *index < APP_AREA_COUNT; ++*index) {
+        uintptr_t distance = address - (uintptr_t)app.context.area[*index];
+        if (distance < app.image.area_size[*index]) {
+            *offset = (RTS_UI32)distance;
+            return true;
+        }
+    }
+    return false;
 }
 
 /* ---- life ---- */

@@ -200,31 +200,39 @@ static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
     return task->exceeded >= task->sensitivity || elapsed_ns > task->guard.limit_ns;
 }
 
-int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns, RTS_I64 now_ns)
+/* The rest of stopping the application is main's. */
+static int report_exception(const TASK *task, RTS_UI32 code, uintptr_t address)
 {
-    TASK *task = &tasks.list[index];
+    AppHandleException((RTS_I32)(task - tasks.list), code, address);
+    return 0;
+}
+
+/* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
+static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns, RTS_I64 now_ns)
+{
     RTS_EXCEPTION exception;
     RTS_I64 elapsed;
+    int failed;
 
-    if (!SysAtomicLoad(&tasks.running))
-        return 0;
     set_time(task, now_ns - tasks.time_zero);
     guard_begin(&task->guard, now_ns);
-    if (SysExceptTry(run_entry, task, &exception)) {
-        SysAtomicStore(&tasks.running, 0);
-        guard_end(&task->guard);
-        AppHandleException((RTS_I32)index, exception.code, exception.address);
-        return 0;
-    }
+    failed = SysExceptTry(run_entry, task, &exception);
+    if (failed)
+        SysAtomicStore(&tasks.running, 0); /* no other cycle starts; before the guard says that this one is over */
     elapsed = SysTimeGetNs() - now_ns;
     guard_end(&task->guard);
+    if (failed)
+        return report_exception(task, exception.code, exception.address);
     account(task, now_ns - due_ns, elapsed);
-    if (watchdog_expired(task, elapsed)) {
-        SysAtomicStore(&tasks.running, 0);
-        AppHandleException((RTS_I32)index, RTSEXCPT_WATCHDOG, 0);
-        return 0;
-    }
-    return 1;
+    if (!watchdog_expired(task, elapsed))
+        return 1;
+    SysAtomicStore(&tasks.running, 0);
+    return report_exception(task, RTSEXCPT_WATCHDOG, 0);
+}
+
+int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns, RTS_I64 now_ns)
+{
+    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], due_ns, now_ns) : 0;
 }
 
 void IecTaskAddOverruns(RTS_UI32 task, RTS_UI32 missed)

@@ -57,11 +57,11 @@ RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until)
     RTS_RESULT result;
 
     if (!HAS_RETAIN)
-        return ERR_OK;
+        return ERR_NO_OBJECT;
     if ((RTS_I32)(after - retain.log.sequence) > 0)
         retain.log.sequence = after; /* the log was lost: what is saved from now on shall count */
     if (retain.size == 0)
-        return ERR_OK;
+        return ERR_NO_OBJECT;
     result = FlashLogRead(&retain.log, range, retain.layout, retain.area, retain.size);
     if (result != ERR_OK)
         return result;

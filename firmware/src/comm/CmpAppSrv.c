@@ -23,16 +23,19 @@ static struct {
 
 /* ---- login ---- */
 
-static RTS_RESULT write_login_reply(BTAG_WRITER *reply, RTS_RESULT result, RTS_UI32 session, const APP_STATUS *status)
+/* Creates an application session; `needs_app`: not when there is no application. */
+static RTS_RESULT write_login_reply(BTAG_WRITER *reply, bool needs_app)
 {
-    RTS_UI32 id = status->state == AS_NONE ? 0 : status->image_crc;
+    APP_STATUS status;
 
+    AppGetStatus(&status);
+    bool refused = needs_app && status.state == AS_NONE;
     BTagOpen(reply, TAG_APP_DESCRIPTOR, BTAG_ALIGN_0);
     BTagOpen(reply, TAG_APP_OPTION, BTAG_ALIGN_2);
-    BTagAppend16(reply, result);
-    BTagAppend32(reply, session);
+    BTagAppend16(reply, refused ? ERR_APP_NOT_EXIST : ERR_OK);
+    BTagAppend32(reply, refused ? 0 : SrvCreateAppSession());
     for (int guid = 0; guid < 2; guid++) { /* code, data */
-        BTagAppend32(reply, id);
+        BTagAppend32(reply, status.image_crc);
         BTagAppendZeros(reply, 12);
     }
     BTagClose(reply);
@@ -42,31 +45,21 @@ static RTS_RESULT write_login_reply(BTAG_WRITER *reply, RTS_RESULT result, RTS_U
 
 static RTS_RESULT login_app(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
-    APP_STATUS status;
     BTAG name;
     RTS_RESULT result = BTagFind(&request->tags, TAG_APP_LOGIN_NAME, 1, APP_NAME_SIZE, &name);
 
-    if (result != ERR_OK)
-        return result;
-    AppGetStatus(&status);
-    if (status.state == AS_NONE)
-        return write_login_reply(reply, ERR_APP_NOT_EXIST, 0, &status);
-    return write_login_reply(reply, ERR_OK, SrvCreateAppSession(), &status);
+    return result == ERR_OK ? write_login_reply(reply, true) : result;
 }
 
 static RTS_RESULT create_app(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
-    APP_STATUS status;
     BTAG_READER descriptor;
     BTAG name;
     RTS_RESULT result = BTagFindContainer(&request->tags, TAG_APP_DESCRIPTOR, &descriptor);
 
     if (result == ERR_OK)
         result = BTagFind(&descriptor, TAG_APP_OPTION, 1, APP_NAME_SIZE, &name);
-    if (result != ERR_OK)
-        return result;
-    AppGetStatus(&status);
-    return write_login_reply(reply, ERR_OK, SrvCreateAppSession(), &status);
+    return result == ERR_OK ? write_login_reply(reply, false) : result;
 }
 
 static RTS_RESULT check_app_session(RTS_UI32 session)

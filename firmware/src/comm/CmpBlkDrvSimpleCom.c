@@ -22,9 +22,14 @@ enum {
     READ_MAX = 2048, /* bytes per cycle, so that a babbling line does not stop the rest of the runtime */
     WRITE_CHUNK = 32,
     LENGTH_SIZE = 2, /* before each packet in the queue */
+    ROUTER_HEADER_MAX = 2 * ROUTER_HEADER_WORDS + 4 * ROUTER_MAX_ADDRESS + 2, /* addresses of both sides, filler */
+    /* A packet with the largest message of the channel in one block. No packet is larger, in either direction. */
+    MESSAGE_MAX = ROUTER_HEADER_MAX + CHANNEL_FIRST_SIZE + NETSERVER_MESSAGE_SIZE,
+    PACKET_MAX = MESSAGE_MAX < BLK_MAX_SIZE ? MESSAGE_MAX : BLK_MAX_SIZE,
 };
 
-RTS_STATIC_ASSERT(COM_QUEUE_SIZE >= BLK_MAX_SIZE + LENGTH_SIZE, com_queue_holds_the_largest_packet);
+RTS_STATIC_ASSERT(COM_QUEUE_SIZE >= PACKET_MAX + LENGTH_SIZE, com_queue_holds_the_largest_packet);
+RTS_STATIC_ASSERT(NS_REPLY_SIZE + ROUTER_HEADER_MAX <= PACKET_MAX, packet_holds_the_name_service_reply);
 
 typedef enum {
     RX_HUNT,      /* between frames */
@@ -36,7 +41,7 @@ typedef enum {
 typedef struct {
     RX_STATE state;
     RTS_UI32 size;
-    RTS_UI8 frame[BLK_MAX_SIZE + CRC_SIZE];
+    RTS_UI8 frame[PACKET_MAX + CRC_SIZE];
     COM_COUNTERS counters;
 } RECEIVER;
 
@@ -197,7 +202,7 @@ static RTS_RESULT com_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI3
 
     for (RTS_UI32 i = 0; i < count; i++)
         size += parts[i].size;
-    if (size == 0 || size > BLK_MAX_SIZE)
+    if (size == 0 || size > PACKET_MAX)
         return ERR_NET_MSGSIZE;
     if (size + LENGTH_SIZE > COM_QUEUE_SIZE - queue->used)
         return ERR_NOBUFFER;

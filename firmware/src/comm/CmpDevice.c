@@ -47,6 +47,16 @@ static void write_serial_number(BTAG_WRITER *reply, const char *text)
     BTagClose(reply);
 }
 
+static void write_stack(BTAG_WRITER *reply)
+{
+    SYS_STACK stack = SysTargetGetStack();
+
+    BTagOpen(reply, TAG_DEV_STACK, BTAG_ALIGN_0);
+    BTagAppend32(reply, stack.size);
+    BTagAppend32(reply, stack.unused);
+    BTagClose(reply);
+}
+
 static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     const SYS_TARGET *target = SysTargetGet();
@@ -72,6 +82,8 @@ static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
     write_wide_text(reply, TAG_DEV_NODE_NAME, target->node_name, NS_MAX_NODE_NAME);
     BTagWrite16(reply, TAG_DEV_MAX_CHANNELS, CHANNEL_MAX_CHANNELS);
     write_serial_number(reply, target->serial_number);
+    if (SRV_INFORMATION)
+        write_stack(reply);
     request->reply_session = L7_SESSION_EMPTY;
     return ERR_OK;
 }

@@ -3,9 +3,10 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Requests carry programs of a stack machine. This is no interpreter: it recognises the two programs clients send
- * (address of a variable; copy to that address) and refuses everything else, so no request can compute, jump, call or
- * reach memory outside the areas.
+ * Requests carry programs of a stack machine. This is no interpreter: it recognises the programs clients send (address
+ * of a variable, perhaps by way of pointers; copy to that address) and refuses everything else, so no request can
+ * compute, jump, call or reach memory outside the areas. What a pointer holds is never used as an address: it is looked
+ * up in the areas, and from there on an area and an offset as any other.
  */
 #include "CmpMonitor2.h"
 
@@ -13,11 +14,13 @@
 
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
+#include "CmpIecTask.h"
 #include "CmpSrv.h"
 
 enum {
     ENTRY_HEAD = 6, /* u16 id, u32 size */
     ENTRY_FAILED = ENTRY_HEAD + 1,
+    CONSISTENT_SIZE = 8, /* its element, with what aligns it */
 };
 
 typedef struct {
@@ -25,26 +28,88 @@ typedef struct {
     RTS_UI32 offset;
 } AREA_ADDRESS;
 
+/* ---- addresses ---- */
+
+static RTS_RESULT resolve(const AREA_ADDRESS *address, RTS_UI32 size, RTS_UI8 **memory)
+{
+    if (size == 0)
+        return MONITORING_ERR_SIZE_0;
+    if (AppGetAreaSize(address->area) == 0)
+        return MONITORING_ERR_INVALID_AREA;
+    *memory = AppGetAreaAddress(address->area, address->offset, size);
+    return *memory != NULL ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_INDEX;
+}
+
+/* Goes on at where the pointer at `address` leads: again an area and an offset, whatever the pointer holds. */
+static RTS_RESULT follow(AREA_ADDRESS *address)
+{
+    RTS_UI8 *memory;
+    uintptr_t pointer;
+    RTS_RESULT result = resolve(address, MON2_POINTER_SIZE, &memory);
+
+    if (result != MONITORING_ERR_OK)
+        return result;
+    memcpy(&pointer, memory, sizeof(pointer));
+    return AppFindArea(pointer, &address->area, &address->offset) ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_POINTER;
+}
+
 /* ---- programs ---- */
 
-/* Recognises "Ld16/Ld32 offset, Rao area" and returns its length, 0 when it is something else. */
-static RTS_UI32 parse_address(const RTS_UI8 *code, RTS_UI32 size, AREA_ADDRESS *address)
-{
-    RTS_UI32 used;
+/* What is left of one. */
+typedef struct {
+    const RTS_UI8 *code;
+    RTS_UI32 size;
+} PROGRAM;
 
-    if (size >= 5 && code[0] == MON2_OP_LD16) {
-        address->offset = BytesGet16(code + 1);
-        used = 3;
-    } else if (size >= 7 && code[0] == MON2_OP_LD32) {
-        address->offset = BytesGet32(code + 1);
-        used = 5;
-    } else {
-        return 0;
+static void skip(PROGRAM *program, RTS_UI32 size)
+{
+    program->code += size;
+    program->size -= size;
+}
+
+static bool goes_on_with(const PROGRAM *program, const RTS_UI8 *bytes, RTS_UI32 size)
+{
+    return program->size >= size && memcmp(program->code, bytes, size) == 0;
+}
+
+/* Takes a number of `size` bytes. What is missing takes the rest with it and is no operator. */
+static RTS_UI32 take(PROGRAM *program, RTS_UI32 size)
+{
+    RTS_UI32 value = 0;
+
+    if (program->size < size) {
+        program->size = 0;
+        return 0xFFFFFFFF;
     }
-    if (code[used] != MON2_OP_RAO)
-        return 0;
-    address->area = code[used + 1];
-    return used + 2;
+    skip(program, size);
+    for (RTS_UI32 i = 1; i <= size; i++)
+        value = value << 8 | *(program->code - i);
+    return value;
+}
+
+/* Takes "Ld16/Ld32 offset, Rao area" and any number of "Der pointer, Ld16/Ld32 offset, Add". */
+static RTS_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address)
+{
+    static const RTS_UI8 der[] = {MON2_OP_DER, MON2_POINTER_SIZE};
+    RTS_UI32 wanted = MON2_OP_RAO;
+
+    address->offset = 0;
+    for (;;) {
+        RTS_UI32 load = take(program, 1);
+        RTS_UI32 offset = take(program, load == MON2_OP_LD16 ? 2 : 4);
+        if ((load != MON2_OP_LD16 && load != MON2_OP_LD32) || take(program, 1) != wanted)
+            return MONITORING_ERR_UNSUPPORTED_OPERATOR;
+        address->offset += offset;
+        if (wanted == MON2_OP_RAO)
+            address->area = take(program, 1);
+        if (!goes_on_with(program, der, sizeof(der)))
+            return MONITORING_ERR_OK;
+        skip(program, sizeof(der));
+        RTS_RESULT result = follow(address);
+        if (result != MONITORING_ERR_OK)
+            return result;
+        wanted = MON2_OP_ADD;
+    }
 }
 
 static bool is_zero(const RTS_UI8 *data, RTS_UI32 size)
@@ -55,105 +120,72 @@ static bool is_zero(const RTS_UI8 *data, RTS_UI32 size)
     return true;
 }
 
-/* What may follow an address program: Halt or not, padding. */
-static bool is_end(const RTS_UI8 *code, RTS_UI32 size)
+/* What may follow: Halt or not, padding. */
+static bool is_end(PROGRAM *program)
 {
-    if (size > 0 && code[0] == MON2_OP_HALT) {
-        code++;
-        size--;
-    }
-    return is_zero(code, size);
+    if (program->size > 0 && program->code[0] == MON2_OP_HALT)
+        skip(program, 1);
+    return is_zero(program->code, program->size);
 }
 
-static RTS_RESULT parse_read(const RTS_UI8 *code, RTS_UI32 size, AREA_ADDRESS *address)
-{
-    RTS_UI32 used = parse_address(code, size, address);
-
-    return used != 0 && is_end(code + used, size - used) ? MONITORING_ERR_OK : MONITORING_ERR_UNSUPPORTED_OPERATOR;
-}
-
-/* The address alone, or the programming system's program: allocate a frame, address, and unless disabled copy to it. */
-static RTS_RESULT parse_write(const RTS_UI8 *code, RTS_UI32 size, AREA_ADDRESS *address)
+/* The address alone; to write also the programming system's program: allocate a frame, address, and unless disabled
+ * copy to it. */
+static RTS_RESULT parse(PROGRAM program, bool is_write, AREA_ADDRESS *address)
 {
     static const RTS_UI8 head[] = {0x15, 0x0C, 0x00};
     static const RTS_UI8 tail[] = {0x17, 0x0C, 0x09, 0x04, 0x1B, 0x06, 0x00, 0x01, 0x00, 0x00,
                                    0x17, 0x04, 0x09, 0x04, 0x17, 0x08, 0x09, 0x04, MON2_OP_CPY};
+    RTS_UI32 tail_size = 0;
 
-    if (size < sizeof(head) || memcmp(code, head, sizeof(head)) != 0)
-        return parse_read(code, size, address);
-    code += sizeof(head);
-    size -= sizeof(head);
-    RTS_UI32 used = parse_address(code, size, address);
-    if (used == 0 || size - used < sizeof(tail) || memcmp(code + used, tail, sizeof(tail)) != 0)
+    if (is_write && goes_on_with(&program, head, sizeof(head))) {
+        skip(&program, sizeof(head));
+        tail_size = sizeof(tail);
+    }
+    RTS_RESULT result = take_address(&program, address);
+    if (result != MONITORING_ERR_OK)
+        return result;
+    if (!goes_on_with(&program, tail, tail_size))
         return MONITORING_ERR_UNSUPPORTED_OPERATOR;
-    used += sizeof(tail);
-    return is_end(code + used, size - used) ? MONITORING_ERR_OK : MONITORING_ERR_UNSUPPORTED_OPERATOR;
+    skip(&program, tail_size);
+    return is_end(&program) ? MONITORING_ERR_OK : MONITORING_ERR_UNSUPPORTED_OPERATOR;
 }
 
 /* ---- memory ---- */
 
-static RTS_RESULT resolve(const AREA_ADDRESS *address, RTS_UI32 size, RTS_UI8 **memory)
+/* Copies a number of 2, 4 or 8 bytes in one access where the CPU can, because a task may use it at the same time. */
+static void copy(void *to, const void *from, RTS_UI32 size)
 {
-    if (size == 0)
-        return MONITORING_ERR_SIZE_0;
-    if (address->area >= APP_AREA_COUNT || AppGetAreaSize(address->area) == 0)
-        return MONITORING_ERR_INVALID_AREA;
-    *memory = AppGetAreaAddress(address->area, address->offset, size);
-    return *memory != NULL ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_INDEX;
+    uintptr_t misfit = ((uintptr_t)to | (uintptr_t)from) & (size - 1);
+
+    if (size == 2 && misfit == 0)
+        *(volatile RTS_UI16 *)to = *(const volatile RTS_UI16 *)from;
+    else if (size == 4 && misfit == 0)
+        *(volatile RTS_UI32 *)to = *(const volatile RTS_UI32 *)from;
+    else if (size == 8 && misfit == 0)
+        *(volatile RTS_UI64 *)to = *(const volatile RTS_UI64 *)from;
+    else
+        memcpy(to, from, size);
 }
 
-static bool is_aligned(const void *memory, RTS_UI32 size)
-{
-    return ((uintptr_t)memory & (size - 1)) == 0;
-}
-
-/* 64 bits that a task may change while they are read: on a 32-bit CPU in two halves, so read until they agree. */
-static RTS_UI64 load64(const volatile RTS_UI64 *memory)
-{
-    RTS_UI64 value = *memory;
-    RTS_UI64 again = *memory;
-
-    for (int i = 0; i < 8 && value != again; i++) {
-        value = again;
-        again = *memory;
-    }
-    return again;
-}
-
-/* Copies a value out of the application's memory, in one access where the CPU can. */
+/* Copies between the application's memory and a message, where numbers lie anywhere. */
 static void load(RTS_UI8 *value, const RTS_UI8 *memory, RTS_UI32 size)
 {
-    if (size == 2 && is_aligned(memory, 2)) {
-        RTS_UI16 v = *(const volatile RTS_UI16 *)(const void *)memory;
-        memcpy(value, &v, sizeof(v));
-    } else if (size == 4 && is_aligned(memory, 4)) {
-        RTS_UI32 v = *(const volatile RTS_UI32 *)(const void *)memory;
-        memcpy(value, &v, sizeof(v));
-    } else if (size == 8 && is_aligned(memory, 8)) {
-        RTS_UI64 v = load64((const volatile RTS_UI64 *)(const void *)memory);
-        memcpy(value, &v, sizeof(v));
-    } else {
-        memcpy(value, memory, size);
+    RTS_UI64 number;
+
+    if (size <= sizeof(number)) {
+        copy(&number, memory, size);
+        memory = (const RTS_UI8 *)&number;
     }
+    memcpy(value, memory, size);
 }
 
 static void store(RTS_UI8 *memory, const RTS_UI8 *value, RTS_UI32 size)
 {
-    if (size == 2 && is_aligned(memory, 2)) {
-        RTS_UI16 v;
-        memcpy(&v, value, sizeof(v));
-        *(volatile RTS_UI16 *)(void *)memory = v;
-    } else if (size == 4 && is_aligned(memory, 4)) {
-        RTS_UI32 v;
-        memcpy(&v, value, sizeof(v));
-        *(volatile RTS_UI32 *)(void *)memory = v;
-    } else if (size == 8 && is_aligned(memory, 8)) {
-        RTS_UI64 v;
-        memcpy(&v, value, sizeof(v));
-        *(volatile RTS_UI64 *)(void *)memory = v;
-    } else {
-        memcpy(memory, value, size);
-    }
+    RTS_UI64 number;
+
+    if (size <= sizeof(number))
+        value = memcpy(&number, value, size);
+    copy(memory, value, size);
 }
 
 /* ---- requests ---- */
@@ -183,8 +215,7 @@ static RTS_RESULT check_application(const SRV_REQUEST *request, RTS_UI32 *error)
 typedef struct {
     RTS_UI32 id;
     RTS_UI32 size;
-    const RTS_UI8 *code;
-    RTS_UI32 code_size;
+    PROGRAM program;
 } READ_VAR;
 
 static RTS_RESULT parse_variable(const BTAG_READER *list, const BTAG *tag, READ_VAR *var)
@@ -201,39 +232,41 @@ static RTS_RESULT parse_variable(const BTAG_READER *list, const BTAG *tag, READ_
         result = BTagFind(&fields, TAG_MON2_VAR_CODE, 1, fields.size, &code);
     if (result != ERR_OK)
         return result;
-    var->code = code.data;
-    var->code_size = code.size;
-    result = BTagFindOptional(&fields, TAG_MON2_VAR_CODE_SIZE, &var->code_size);
+    var->program.code = code.data;
+    var->program.size = code.size;
+    result = BTagFindOptional(&fields, TAG_MON2_VAR_CODE_SIZE, &var->program.size);
     if (result != ERR_OK)
         return result;
-    return var->code_size <= code.size && var->id < MON2_ID_FAILED ? ERR_OK : ERR_PARAMETER;
+    return var->program.size <= code.size && var->id < MON2_ID_FAILED ? ERR_OK : ERR_PARAMETER;
 }
 
-/* Appends the entry of one variable; `reserved` bytes must stay free for the failures of those that follow. */
+/* Appends the entry of one variable; `reserved` bytes must stay free for what follows. */
 static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 reserved)
 {
     AREA_ADDRESS address;
     RTS_UI8 *memory = NULL;
-    RTS_RESULT result = parse_read(var->code, var->code_size, &address);
+    RTS_UI32 room = BTagGetRoom(reply);
+    RTS_UI32 id = var->id;
+    RTS_UI32 size = var->size;
+    RTS_RESULT result = parse(var->program, false, &address);
 
     if (result == MONITORING_ERR_OK)
-        result = resolve(&address, var->size, &memory);
-    if (result == MONITORING_ERR_OK) {
-        RTS_UI32 room = BTagGetRoom(reply);
-        if (room < ENTRY_HEAD + reserved || var->size > room - ENTRY_HEAD - reserved)
-            result = MONITORING_ERR_BUFFERSIZE_EXCEEDED;
+        result = resolve(&address, size, &memory);
+    if (result == MONITORING_ERR_OK && (room < ENTRY_HEAD + reserved || size > room - ENTRY_HEAD - reserved))
+        result = MONITORING_ERR_BUFFERSIZE_EXCEEDED;
+    if (result != MONITORING_ERR_OK) {
+        id |= MON2_ID_FAILED;
+        size = 1;
     }
-    BTagAppend16(reply, result == MONITORING_ERR_OK ? var->id : var->id | MON2_ID_FAILED);
-    if (result == MONITORING_ERR_OK) {
-        BTagAppend32(reply, var->size);
-        RTS_UI8 *value = BTagReserve(reply, var->size);
-        if (value != NULL)
-            load(value, memory, var->size);
-    } else {
-        RTS_UI8 code = (RTS_UI8)result;
-        BTagAppend32(reply, 1);
-        BTagAppend(reply, &code, 1);
-    }
+    BTagAppend16(reply, id);
+    BTagAppend32(reply, size);
+    RTS_UI8 *value = BTagReserve(reply, size);
+    if (value == NULL)
+        return;
+    if (result == MONITORING_ERR_OK)
+        load(value, memory, size);
+    else
+        *value = (RTS_UI8)result;
 }
 
 static RTS_RESULT count_variables(BTAG_READER list, RTS_UI32 *count)
@@ -263,7 +296,7 @@ static RTS_RESULT read_list(BTAG_READER *list, BTAG_WRITER *reply)
         var.id = i++;
         result = parse_variable(list, &tag, &var);
         if (result == ERR_OK)
-            read_variable(reply, &var, (count - i) * ENTRY_FAILED);
+            read_variable(reply, &var, (count - i) * ENTRY_FAILED + CONSISTENT_SIZE);
     }
     BTagClose(reply);
     return result;
@@ -273,23 +306,28 @@ static RTS_RESULT mon_read(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     BTAG_READER list;
     RTS_UI32 error;
+    bool busy;
     RTS_RESULT result = check_application(request, &error);
 
     if (result == ERR_OK)
         result = BTagFindContainer(&request->tags, TAG_MON2_READ_LIST, &list);
     if (result != ERR_OK)
         return result;
-    if (error == ERR_OK)
-        return read_list(&list, reply);
-    BTagWrite32(reply, TAG_MON2_ERROR, error);
-    return ERR_OK;
+    if (error != ERR_OK) {
+        BTagWrite32(reply, TAG_MON2_ERROR, error);
+        return ERR_OK;
+    }
+    RTS_UI32 before = IecTaskGetActivity(&busy);
+    result = read_list(&list, reply);
+    if (!busy && IecTaskGetActivity(&busy) == before)
+        BTagWrite16(reply, TAG_MON2_CONSISTENT, 1);
+    return result;
 }
 
 typedef struct {
     const RTS_UI8 *value;
     RTS_UI32 size;
-    const RTS_UI8 *code;
-    RTS_UI32 code_size;
+    PROGRAM program;
 } WRITE_VAR;
 
 /* Takes one entry off the list; false when the rest is too short for what it says. */
@@ -303,12 +341,12 @@ static bool next_write(const RTS_UI8 **data, RTS_UI32 *size, WRITE_VAR *var)
     if (var->size > rest || rest - var->size < 2)
         return false;
     rest -= var->size + 2;
-    var->code_size = BytesGet16(var->value + var->size);
-    var->code = var->value + var->size + 2;
-    if (var->code_size > rest)
+    var->program.size = BytesGet16(var->value + var->size);
+    var->program.code = var->value + var->size + 2;
+    if (var->program.size > rest)
         return false;
-    *data = var->code + var->code_size;
-    *size = rest - var->code_size;
+    *data = var->program.code + var->program.size;
+    *size = rest - var->program.size;
     return true;
 }
 
@@ -316,7 +354,7 @@ static RTS_RESULT write_variable(const WRITE_VAR *var, bool commit)
 {
     AREA_ADDRESS address;
     RTS_UI8 *memory = NULL;
-    RTS_RESULT result = parse_write(var->code, var->code_size, &address);
+    RTS_RESULT result = parse(var->program, true, &address);
 
     if (result == MONITORING_ERR_OK)
         result = resolve(&address, var->size, &memory);
@@ -354,15 +392,13 @@ static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
 
     if (result == ERR_OK)
         result = BTagFind(&request->tags, TAG_MON2_WRITE_LIST, 1, request->tags.size, &list);
-    if (result == ERR_OK && error == ERR_OK)
-        result = write_list(&list, false, &error, &index);
-    if (result != ERR_OK)
-        return result;
-    if (error == ERR_OK)
-        return write_list(&list, true, &error, &index);
-    BTagWrite32(reply, TAG_MON2_ERROR, error);
-    BTagWrite32(reply, TAG_MON2_ERROR_INDEX, index);
-    return ERR_OK;
+    for (int commit = 0; result == ERR_OK && error == ERR_OK && commit <= 1; commit++)
+        result = write_list(&list, commit, &error, &index);
+    if (result == ERR_OK && error != ERR_OK) {
+        BTagWrite32(reply, TAG_MON2_ERROR, error);
+        BTagWrite32(reply, TAG_MON2_ERROR_INDEX, index);
+    }
+    return result;
 }
 
 static const SRV_SERVICE services[] = {

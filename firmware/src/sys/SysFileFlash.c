@@ -110,7 +110,7 @@ static bool is_power_of_two(RTS_UI32 n)
 static bool flash_is_valid(const SYS_FLASH *flash)
 {
     return is_power_of_two(flash->sector_size) && is_power_of_two(flash->program_size) &&
-           flash->program_size <= FILE_ALIGN && flash->sector_size >= FILE_ALIGN &&
+           flash->program_size <= FILE_ALIGN && flash->sector_size >= 2 * FILE_ALIGN && /* holds a record's head */
            flash->size % flash->sector_size == 0;
 }
 

@@ -6,6 +6,7 @@
 #include "CortexM.h"
 #include "SysExcept.h"
 #include "SysFlash.h"
+#include "SysTarget.h"
 #include "SysTime.h"
 #include "SysTimer.h"
 #include "check.h"
@@ -260,10 +261,10 @@ static void no_room_for_the_leaving_frame_is_a_stack_overflow(void)
 static void many_failures_cost_no_stack(void)
 {
     RTS_EXCEPTION exception;
-    RTS_UI32 before = StackUnused();
+    RTS_UI32 before = SysTargetGetStack().unused;
     for (RTS_UI32 round = 0; round < 100; round++)
         SysExceptTry(failures[round % RTS_COUNT(failures)].function, NULL, &exception);
-    CHECK_EQUAL(StackUnused(), before);
+    CHECK_EQUAL(SysTargetGetStack().unused, before);
     CHECK(before > 100);
 }
 

@@ -23,6 +23,12 @@ const SYS_TARGET *SysTargetGet(void)
     return &target;
 }
 
+/* Write here: when start-up paints the stack of main with a pattern, how much of it is left. Not told: as it is. */
+SYS_STACK SysTargetGetStack(void)
+{
+    return (SYS_STACK){0, 0};
+}
+
 /* Write here: the chip's random generator, or a pool that is stirred by the times of interrupts. Session ids come from
  * it, so they can be guessed when it can. */
 RTS_UI32 SysTargetRandom(void)

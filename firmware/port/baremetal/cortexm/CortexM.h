@@ -130,8 +130,8 @@ void SysTimerAlarm(void);
  * counter can be traced back to the code. */
 void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size);
 
-/* Bytes of the main stack that were never used. */
-RTS_UI32 StackUnused(void);
+/* At the end of each stack, protected by the MPU. */
+enum { STACK_GUARD_LOG2 = 5, STACK_GUARD = 1 << STACK_GUARD_LOG2 };
 
 /* ---- reset ---- */
 

@@ -19,7 +19,6 @@
 #include "CortexM.h"
 #include "rts_config.h"
 
-enum { GUARD_LOG2 = 5, GUARD_SIZE = 1 << GUARD_LOG2 };
 enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_PSP = 4 };
 enum { XPSR_THUMB = 1 << 24 };
 enum { SHCSR_PENDING = 0xF << 12 }; /* UsageFault, MemManage, BusFault, SVCall */
@@ -52,7 +51,7 @@ typedef RTS_UI8 IEC_STACK[RTS_IEC_STACK_SIZE];
 RTS_STATIC_ASSERT(RTS_IEC_STACK_SIZE % 32 == 0 && RTS_IEC_STACK_SIZE >= 256, iec_stack_holds_guard_and_frame);
 
 /* At the bottom of RAM, the deepest first: what gets past a guard hits a slot that is idle now, or no memory at all. */
-__attribute__((section(".bss.iec_stack"), aligned(GUARD_SIZE))) static IEC_STACK stacks[APP_MAX_TASKS];
+__attribute__((section(".bss.iec_stack"), aligned(STACK_GUARD))) static IEC_STACK stacks[APP_MAX_TASKS];
 
 static struct {
     TRY *top; /* behind the innermost that runs */
@@ -109,9 +108,9 @@ void SysExceptInit(void)
     state.top = state.tries;
     state.code_size = 0;
     MpuProtect(MPU_NULL, 0, NULL_LOG2, MPU_NO_ACCESS | behind_vectors);
-    MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, GUARD_LOG2, MPU_NO_ACCESS);
+    MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, STACK_GUARD_LOG2, MPU_NO_ACCESS);
     for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++)
-        MpuProtect(MPU_IEC_STACK + i, (uintptr_t)stacks[i], GUARD_LOG2, MPU_NO_ACCESS);
+        MpuProtect(MPU_IEC_STACK + i, (uintptr_t)stacks[i], STACK_GUARD_LOG2, MPU_NO_ACCESS);
     if (MPU_TYPE != 0)
         MPU_CTRL = MPU_ENABLE_WITH_BACKGROUND;
     CpuBarrier();
@@ -215,7 +214,7 @@ void SvcHandler(void)
 static uintptr_t find_caller(uintptr_t slot)
 {
     const RTS_UI32 *end = (const RTS_UI32 *)(slot + RTS_IEC_STACK_SIZE);
-    for (const RTS_UI32 *word = (const RTS_UI32 *)(slot + GUARD_SIZE); word < end; word++)
+    for (const RTS_UI32 *word = (const RTS_UI32 *)(slot + STACK_GUARD); word < end; word++)
         if ((*word & 1u) && *word - state.code < state.code_size)
             return (*word & ~1u) - 2;
     return 0;
@@ -224,8 +223,8 @@ static uintptr_t find_caller(uintptr_t slot)
 /* The frame could not be pushed, was pushed below the slot, or the guard was hit by the last push that had no room. */
 static int is_overflow(RTS_UI32 cfsr, const FRAME *frame, uintptr_t slot)
 {
-    return (cfsr & CFSR_STACKING) || (uintptr_t)frame < slot + GUARD_SIZE ||
-           ((cfsr & CFSR_MMARVALID) && SCB_MMFAR - slot < GUARD_SIZE);
+    return (cfsr & CFSR_STACKING) || (uintptr_t)frame < slot + STACK_GUARD ||
+           ((cfsr & CFSR_MMARVALID) && SCB_MMFAR - slot < STACK_GUARD);
 }
 
 static RTS_UI32 code_of(RTS_UI32 cfsr)
@@ -239,12 +238,14 @@ static RTS_UI32 code_of(RTS_UI32 cfsr)
     return cfsr == 0 ? RTSEXCPT_BREAKPOINT : RTSEXCPT_ACCESS_VIOLATION;
 }
 
-/* After a jump to nowhere the caller says more than the program counter. */
-static uintptr_t address_of(RTS_UI32 cfsr, const FRAME *frame, uintptr_t slot)
+/* After a jump to nowhere the caller says more than the program counter. So it does when the stack overflows: that is
+ * mostly noticed by what clears the variables of a function, which is no function of the application. */
+static uintptr_t address_of(RTS_UI32 cfsr, RTS_UI32 code, const FRAME *frame, uintptr_t slot)
 {
     if (cfsr & CFSR_STACKING)
         return find_caller(slot);
-    if (cfsr & (CFSR_IACCVIOL | CFSR_IBUSERR | CFSR_INVSTATE))
+    if ((cfsr & (CFSR_IACCVIOL | CFSR_IBUSERR | CFSR_INVSTATE)) ||
+        (code == RTSEXCPT_STACK_OVERFLOW && frame->lr - state.code < state.code_size))
         return (frame->lr & ~1u) - 2;
     return frame->pc;
 }
@@ -256,7 +257,7 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
         ResetNow(RESET_FATAL, cfsr & CFSR_STACKING ? 0 : frame->pc);
     uintptr_t slot = stack_slot(state.top - 1);
     RTS_UI32 code = is_overflow(cfsr, frame, slot) ? RTSEXCPT_STACK_OVERFLOW : code_of(cfsr);
-    uintptr_t address = address_of(cfsr, frame, slot);
+    uintptr_t address = address_of(cfsr, code, frame, slot);
     SCB_CFSR = cfsr;
     SCB_HFSR = SCB_HFSR;
     /* What could not be stacked stays pending: it belongs to the function that is left now. */

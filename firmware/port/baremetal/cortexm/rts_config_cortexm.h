@@ -15,6 +15,12 @@ void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
 #define APP_CALL_ENTRY(entry, context) IecCall((uintptr_t)(entry), (context), 0)
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((uintptr_t)(entry), (context), (init_retains))
 
+/* No program of a small controller takes this long for a cycle [us]: an endless loop is an exception soon. A task that does
+ * says so, by a watchdog of its own. */
+#ifndef APP_DEFAULT_WATCHDOG_US
+#define APP_DEFAULT_WATCHDOG_US 2000000
+#endif
+
 /* Stack of the application code of one task, bytes: a multiple of 32, which are lost to the guard below it. */
 #ifndef RTS_IEC_STACK_SIZE
 #define RTS_IEC_STACK_SIZE 1024

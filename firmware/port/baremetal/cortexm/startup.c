@@ -6,9 +6,11 @@
 #include <string.h>
 
 #include "CortexM.h"
+#include "SysTarget.h"
 
 enum { CCR_NONBASETHRDENA = 1 << 0, CCR_DIV_0_TRP = 1 << 4, CCR_STKALIGN = 1 << 9 };
 enum { SHCSR_MEM_BUS_USAGE = 7 << 16 };
+
 enum { STACK_PAINT = 0x5A };
 
 /* Of the linker script. */
@@ -22,7 +24,7 @@ enum { FPU_CONTEXTS_SIZE = (APP_MAX_TASKS + 1) * (64 + 72) };
 enum { FPU_CONTEXTS_SIZE = 0 };
 #endif
 
-/* Of main, and of everything that interrupts it but application code; a guard of 32 bytes is at its end. */
+/* Of main, and of everything that interrupts it but application code. */
 __attribute__((section(".bss.main_stack"), aligned(32), used)) static RTS_UI8
     main_stack[RTS_MAIN_STACK_SIZE + FPU_CONTEXTS_SIZE];
 
@@ -78,12 +80,12 @@ static void init_core(void)
     SCB_SHPR(VECTOR_SYSTICK) = CpuPriority(LEVEL_DEVICE);
 }
 
-RTS_UI32 StackUnused(void)
+SYS_STACK SysTargetGetStack(void)
 {
-    const RTS_UI8 *end = stack_bottom + 32; /* the guard cannot be read */
-    while (*end == STACK_PAINT)
-        end++;
-    return (RTS_UI32)(end - stack_bottom);
+    SYS_STACK stack = {sizeof(main_stack) - STACK_GUARD, 0};
+    while (main_stack[STACK_GUARD + stack.unused] == STACK_PAINT)
+        stack.unused++;
+    return stack;
 }
 
 void ResetHandler(void)

@@ -1,5 +1,5 @@
 /*
- * board.h - Arm MPS2 with the AN385 (Cortex-M3) or AN386 (Cortex-M4F) image, as QEMU runs it.
+ * board.h - Arm MPS2 with the AN385 (Cortex-M3), AN386 (Cortex-M4F) or AN500 (Cortex-M7) image, as QEMU runs it.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -15,7 +15,6 @@ extern RTS_UI8 file_flash[]; /* of the linker script */
 
 enum { SECTOR_SIZE = 4096, PROGRAM_SIZE = 8, ERASED = 0xFF, FLASH_LOG2 = 24 };
 #define ERASED_WORD (ERASED * 0x01010101u)
-#define FLASH_BASE 0x21000000u
 
 static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 {
@@ -44,7 +43,7 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
         memcpy(&word, (const RTS_UI8 *)data + done, sizeof(word));
         *(volatile RTS_UI32 *)(uintptr_t)(file_flash + offset + done) = word;
     }
-    MpuProtect(MPU_BOARD, FLASH_BASE, FLASH_LOG2, MPU_READ_ONLY);
+    MpuProtect(MPU_BOARD, (uintptr_t)file_flash, FLASH_LOG2, MPU_READ_ONLY);
     return ERR_OK;
 }
 
@@ -55,7 +54,7 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
     MpuRelease(MPU_BOARD);
     for (RTS_UI32 done = 0; done < SECTOR_SIZE; done += sizeof(RTS_UI32))
         *(volatile RTS_UI32 *)(uintptr_t)(file_flash + offset + done) = ERASED_WORD;
-    MpuProtect(MPU_BOARD, FLASH_BASE, FLASH_LOG2, MPU_READ_ONLY);
+    MpuProtect(MPU_BOARD, (uintptr_t)file_flash, FLASH_LOG2, MPU_READ_ONLY);
     return ERR_OK;
 }
 
@@ -68,7 +67,7 @@ static RTS_RESULT flash_sync(void)
 
 void FlashInit(void)
 {
-    MpuProtect(MPU_BOARD, FLASH_BASE, FLASH_LOG2, MPU_READ_ONLY);
+    MpuProtect(MPU_BOARD, (uintptr_t)file_flash, FLASH_LOG2, MPU_READ_ONLY);
 }
 
 const SYS_FLASH *SysFlashGet(void)

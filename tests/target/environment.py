@@ -1,0 +1,31 @@
+"""What the tests run on. Environment: FIRMWARE_DIR (where firmware-*.elf are), QEMU_MACHINE."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE = Path(os.environ["FIRMWARE_DIR"]) if "FIRMWARE_DIR" in os.environ else None
+MACHINE = os.environ.get("QEMU_MACHINE", "")
+TARGETS = {"mps2-an385": "cortex-m3", "mps2-an386": "cortex-m4f", "mps2-an500": "cortex-m7"}
+TARGET = TARGETS.get(MACHINE, "")
+PATIENCE = 60.0  # [s]; machines under load are slow
+
+
+def firmware(config: str) -> Path:
+    """The runtime in one of its configurations."""
+    assert FIRMWARE
+    return FIRMWARE / f"firmware-{config}.elf"
+
+
+def eventually(question: Callable[[], Any]) -> Any:
+    """Asks until the answer is true, and returns it; fails after PATIENCE."""
+    end = time.monotonic() + PATIENCE
+    while not (answer := question()):
+        assert time.monotonic() < end, "did not happen in time"
+        time.sleep(0.01)
+    return answer

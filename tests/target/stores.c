@@ -1,0 +1,92 @@
+/*
+ * stores.c - TCG plugin for QEMU 7.2: every store into the board's flash, in order.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Arguments base=, size= (of the flash, in the guest), memory= (the file it lies in), out=. Each store appends the
+ * offset of its aligned block of 8 bytes (u32) and what that block holds afterwards to `out`, at once: the flash after
+ * n stores is the flash before, with the first n of these written over it. Debian has no header for plugins; these are
+ * the few prototypes needed.
+ */
+#include <fcntl.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#define EXPORT __attribute__((visibility("default")))
+
+typedef uint64_t plugin_id;
+struct qemu_plugin_tb;
+struct qemu_plugin_insn;
+
+enum { NO_REGISTERS = 0, WRITES = 2, BLOCK = 8 };
+
+void qemu_plugin_register_vcpu_tb_trans_cb(plugin_id id, void (*callback)(plugin_id, struct qemu_plugin_tb *));
+size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb *tb);
+struct qemu_plugin_insn *qemu_plugin_tb_get_insn(const struct qemu_plugin_tb *tb, size_t index);
+void qemu_plugin_register_vcpu_mem_cb(struct qemu_plugin_insn *insn,
+                                      void (*callback)(unsigned cpu, uint32_t info, uint64_t address, void *data),
+                                      int registers, int kind, void *data);
+bool qemu_plugin_mem_is_store(uint32_t info);
+
+EXPORT int qemu_plugin_version = 1;
+EXPORT int qemu_plugin_install(plugin_id id, const void *info, int argc, char **argv);
+
+static uint64_t base, size;
+static const uint8_t *memory;
+static int out = -1;
+
+static void on_store(unsigned cpu, uint32_t info, uint64_t address, void *data)
+{
+    struct {
+        uint32_t offset;
+        uint8_t block[BLOCK];
+    } record;
+
+    (void)cpu;
+    (void)data;
+    if (address - base >= size || !qemu_plugin_mem_is_store(info)) /* loads come too, in spite of WRITES */
+        return;
+    record.offset = (uint32_t)(address - base) / BLOCK * BLOCK;
+    memcpy(record.block, memory + record.offset, BLOCK);
+    if (write(out, &record, sizeof(record)) != (ssize_t)sizeof(record))
+        abort();
+}
+
+static void on_translate(plugin_id id, struct qemu_plugin_tb *tb)
+{
+    (void)id;
+    for (size_t i = 0; i < qemu_plugin_tb_n_insns(tb); i++)
+        qemu_plugin_register_vcpu_mem_cb(qemu_plugin_tb_get_insn(tb, i), on_store, NO_REGISTERS, WRITES, NULL);
+}
+
+static const char *value_of(const char *argument, const char *name)
+{
+    size_t length = strlen(name);
+    return strncmp(argument, name, length) == 0 && argument[length] == '=' ? argument + length + 1 : NULL;
+}
+
+static const char *find_value(int argc, char **argv, const char *name)
+{
+    for (int i = 0; i < argc; i++)
+        if (value_of(argv[i], name) != NULL)
+            return value_of(argv[i], name);
+    return "";
+}
+
+int qemu_plugin_install(plugin_id id, const void *info, int argc, char **argv)
+{
+    (void)info;
+    base = strtoull(find_value(argc, argv, "base"), NULL, 0);
+    size = strtoull(find_value(argc, argv, "size"), NULL, 0);
+    out = open(find_value(argc, argv, "out"), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    int file = open(find_value(argc, argv, "memory"), O_RDONLY);
+    memory = mmap(NULL, size, PROT_READ, MAP_SHARED, file, 0);
+    if (out < 0 || memory == MAP_FAILED)
+        return 1;
+    qemu_plugin_register_vcpu_tb_trans_cb(id, on_translate);
+    return 0;
+}
