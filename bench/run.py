@@ -11,6 +11,8 @@ import tempfile
 import time
 from pathlib import Path
 
+import compiling
+import overheads
 import targets
 
 import plctool
@@ -151,53 +153,12 @@ def bench_day() -> None:
         line(f"{plc.read('Main.n')} cycles", f"{time.monotonic() - begin:.2f} s")
 
 
-# ---- compiling -----------------------------------------------------------------------------------------------------
-
-
-def many_blocks(blocks: int) -> str:
-    """A program of `blocks` function blocks of 20 lines each, as programs of people are made."""
-    block = """FUNCTION_BLOCK Block{n}
-VAR_INPUT value : REAL; enable : BOOL; END_VAR
-VAR_OUTPUT output : REAL; alarm : BOOL; count : DINT; END_VAR
-VAR delay : TON; rise : R_TRIG; last : REAL; END_VAR
-IF enable THEN
-    output := LIMIT(0.0, value * {n}.5 + last, 100.0);
-ELSE
-    output := 0.0;
-END_IF;
-last := output / 2.0;
-delay(IN := output > 90.0, PT := T#{n}ms);
-alarm := delay.Q;
-rise(CLK := alarm);
-IF rise.Q THEN
-    count := count + 1;
-END_IF;
-CASE count OF
-    0..9: ;
-    10: count := 0;
-END_CASE;
-END_FUNCTION_BLOCK
-"""
-    texts = [block.format(n=n) for n in range(blocks)]
-    declarations = "".join(f"b{n} : Block{n};\n" for n in range(blocks))
-    calls = "".join(f"b{n}(value := b{max(n - 1, 0)}.output, enable := TRUE);\n" for n in range(blocks))
-    return "".join(texts) + f"PROGRAM Main\nVAR\n{declarations}END_VAR\n{calls}END_PROGRAM\n"
-
-
-def bench_compile() -> None:
-    print("\nCompiling")
-    text = many_blocks(435)
-    begin = time.monotonic()
-    result = build(text)
-    seconds = time.monotonic() - begin
-    line(f"{text.count(chr(10))} lines of Structured Text", f"{seconds:.2f} s", f"{len(result.image)} bytes of image")
-
-
 def main() -> None:
-    bench_compile()
+    compiling.main()
     bench_empty_task()
     bench_tanks()
     targets.main()
+    overheads.main()
     bench_day()
     bench_serial()
 

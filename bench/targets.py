@@ -20,6 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path += [str(ROOT / "tests/same_results"), str(ROOT / "bench/programs")]
 
+import instances  # noqa: E402
 import logic  # noqa: E402
 from runners import RUNNERS, Runner  # noqa: E402
 
@@ -32,7 +33,7 @@ from plctool.compiler.typed import TypedProgram  # noqa: E402
 from plctool.core import lib  # noqa: E402
 from plctool.image import parse_image  # noqa: E402
 from plctool.sim import Simulator  # noqa: E402
-from plctool.symbols import Symbol  # noqa: E402
+from plctool.variables import Symbol  # noqa: E402
 
 CYCLES = 1000  # before the checksums are compared
 GUEST_CYCLES = 200  # fewer, because soft float takes 50 000 instructions in each
@@ -40,6 +41,7 @@ CALLS = 30_000  # of a program or twin, for its time on this machine
 HOST = "x86_64-linux"
 GUESTS = ("cortex-m3", "cortex-m4f")
 CHECKS = ("all", "none")
+VARIANTS = (("all", "-O2"), ("none", "-O2"), ("all", "-O3"), ("all", "-Os"))  # on Cortex-M
 C_FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-strict-aliasing")
 SHARED = ROOT.parent / "shared/bench"  # more programs, when this folder lies beside the checkout
 
@@ -57,8 +59,10 @@ class Program:
         assert checked.program, checked.diagnostics
         return checked.program
 
-    def build(self, target: str, checks: str) -> BuildResult:
-        return build_program(self.typed, Options(find_target(target), checks=parse_checks(checks)))
+    def build(self, target: str, checks: str, level: str = "-O2") -> BuildResult:
+        number, size = (2, True) if level == "-Os" else (int(level[2:]), False)
+        options = Options(find_target(target), number, parse_checks(checks), size=size)
+        return build_program(self.typed, options)
 
 
 def checksum(built: BuildResult) -> Symbol:
@@ -144,22 +148,25 @@ def bench_guest(target: str, programs: list[Program], folder: Path) -> None:
         print(f"\nBenchmark programs on {target}: left out, {' and '.join(missing)} not found")
         return
     print(
-        f"\nBenchmark programs on {target} in QEMU: instructions per cycle and bytes of code, beside arm-none-eabi-gcc"
+        f"\nBenchmark programs on {target} in QEMU: instructions per cycle, bytes of code, beside arm-none-eabi-gcc\n"
+        "(the twins of pid, blocks, b1_pid and b3_fb loop over arrays, so their size is not comparable)"
     )
     print(
-        f"  {'':<12}{'checks':<8}{'plctool':>10}{'gcc -O2':>10}{'ratio':>8}{'bytes':>10}{'gcc -Os':>10}{'gcc -O2':>10}"
+        f"  {'':<12}{'checks':<8}{'level':<8}{'plctool':>10}{'gcc -O2':>10}{'ratio':>8}"
+        f"{'bytes':>10}{'gcc -Os':>10}{'gcc -O2':>10}{'to -Os':>8}{'to -O2':>8}"
     )
     guest = runner.compile(folder, ROOT / "bench/guest/iec.c", f"-DCYCLES={GUEST_CYCLES}", f"-I{ROOT / 'bench/guest'}")
     for program in programs:
         twin_value, twin = guest_twin(runner, program.twin, "-O2", folder)
-        sizes = "".join(f"{twin_flash(runner, program.twin, level, folder):>10}" for level in ("-Os", "-O2"))
-        for checks in CHECKS:
-            built = program.build(target, checks)
+        sizes = [twin_flash(runner, program.twin, level, folder) for level in ("-Os", "-O2")]
+        for checks, level in VARIANTS:
+            built = program.build(target, checks, level)
             value, instructions = guest_program(runner, guest, built, folder)
             same = "" if value == twin_value else "  OTHER CHECKSUM"
             code = len(parse_image(built.image).code)
-            figures = f"{instructions:>10}{twin:>10}{instructions / twin:>8.2f}{code:>10}{sizes}"
-            print(f"  {program.st.stem:<12}{checks:<8}{figures}{same}", flush=True)
+            figures = f"{instructions:>10}{twin:>10}{instructions / twin:>8.2f}{code:>10}"
+            figures += "".join(f"{size:>10}" for size in sizes) + "".join(f"{code / size:>8.2f}" for size in sizes)
+            print(f"  {program.st.stem:<12}{checks:<8}{level:<8}{figures}{same}", flush=True)
 
 
 # ---- all of it -----------------------------------------------------------------------------------------------------
@@ -174,9 +181,10 @@ def pairs(folder: Path) -> Iterator[Program]:
 
 
 def find_programs(more: Path, folder: Path) -> list[Program]:
-    """Ours, one of which is generated into `folder`, and those of `more` if it is there."""
-    for suffix, text in zip((".st", ".c"), logic.texts(), strict=True):
-        (folder / f"logic{suffix}").write_text(text)
+    """Ours, some of which are generated into `folder`, and those of `more` if it is there."""
+    for generator in (logic, instances):
+        for suffix, text in zip((".st", ".c"), generator.texts(), strict=True):
+            (folder / f"{generator.__name__}{suffix}").write_text(text)
     return [*pairs(ROOT / "bench/programs"), *pairs(folder), *(pairs(more) if more.is_dir() else [])]
 
 

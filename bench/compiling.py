@@ -1,0 +1,178 @@
+"""How long the compiler takes for programs of 10 000 lines, where the time goes, and how quickly plctool starts."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import llvmlite.binding as llvm
+
+from plctool.compiler import compile_sources, load_sources
+from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.emit import optimised
+from plctool.compiler.front import check_sources
+from plctool.compiler.link import link
+from plctool.compiler.lower import lower
+from plctool.compiler.lower_unit import Options
+from plctool.compiler.parser import parse
+from plctool.compiler.targets import DEFAULT_TARGET, find_target
+
+LINES = 10_000
+STARTS = 5
+
+BLOCK = """FUNCTION_BLOCK Block{n}
+VAR_INPUT value : REAL; enable : BOOL; END_VAR
+VAR_OUTPUT output : REAL; alarm : BOOL; count : DINT; END_VAR
+VAR delay : TON; rise : R_TRIG; last : REAL; END_VAR
+IF enable THEN
+    output := LIMIT(0.0, value * {n}.5 + last, 100.0);
+ELSE
+    output := 0.0;
+END_IF;
+last := output / 2.0;
+delay(IN := output > 90.0, PT := T#{n}ms);
+alarm := delay.Q;
+rise(CLK := alarm);
+IF rise.Q THEN
+    count := count + 1;
+END_IF;
+CASE count OF
+    0..9: ;
+    10: count := 0;
+END_CASE;
+END_FUNCTION_BLOCK
+"""
+
+NETWORKS = (
+    "m{k} := (m{a} OR m{k}) AND NOT in{b};",
+    "IF in{b} AND NOT m{a} THEN\n    n{c} := n{c} + {k};\nELSE\n    n{c} := n{d} - 1;\nEND_IF;",
+    "r{c} := r{d} * 0.5 + INT_TO_REAL(n{c});",
+    "CASE n{c} OF\n    0: n{c} := {k};\n    1..9: n{c} := n{d} / 3;\nELSE\n    n{c} := 0;\nEND_CASE;",
+    "FOR j := 0 TO 9 DO\n    a[j] := a[j] + n{c};\nEND_FOR;",
+)
+
+
+def with_main(blocks: list[str], arguments: Callable[[int], str]) -> str:
+    """The blocks Block0, Block1 ... and a program that has one of each."""
+    declarations = "".join(f"b{n} : Block{n};\n" for n in range(len(blocks)))
+    calls = "".join(f"b{n}({arguments(n)});\n" for n in range(len(blocks)))
+    return "".join(blocks) + f"PROGRAM Main\nVAR\n{declarations}END_VAR\n{calls}END_PROGRAM\n"
+
+
+def blocks_with_timers() -> str:
+    """Small function blocks that have a timer each."""
+    blocks = [BLOCK.format(n=n) for n in range(LINES * 10 // 226)]
+    return with_main(blocks, lambda n: f"value := b{max(n - 1, 0)}.output, enable := TRUE")
+
+
+def networks() -> str:
+    """Function blocks of 100 lines of every kind of statement."""
+    names = {prefix: ", ".join(f"{prefix}{x}" for x in range(40)) for prefix in ("in", "m", "n", "r")}
+    head = (
+        f"VAR_INPUT {names['in']} : BOOL; END_VAR\nVAR {names['m']} : BOOL; {names['n']} : INT; {names['r']} : REAL;\n"
+        "j : INT; a : ARRAY[0..9] OF DINT; END_VAR\n"
+    )
+    blocks = []
+    for n in range(LINES // 105):
+        body: list[str] = []
+        while len(body) < 100:
+            k = len(body)
+            body += NETWORKS[k % 5].format(k=k % 40, a=k * 7 % 40, b=k % 32, c=k * 3 % 40, d=k * 11 % 40).split("\n")
+        blocks.append(f"FUNCTION_BLOCK Block{n}\n{head}" + "\n".join(body) + "\nEND_FUNCTION_BLOCK\n")
+    return with_main(blocks, lambda n: "in0 := TRUE")
+
+
+def one_body() -> str:
+    """A single program of assignments, each with its own constants, as generators write them."""
+    body = "\n".join(f"a[{i % 50}] := a[{i * 7 % 50}] * {i * 7919 + 13} + a[{i * 3 % 50}];" for i in range(LINES))
+    return f"PROGRAM Main VAR a : ARRAY[0..49] OF DINT; END_VAR\n{body}\nEND_PROGRAM\n"
+
+
+class Stages:
+    """Processor seconds by name of the stage, in order."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        begin = time.process_time()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - begin
+
+
+def profile(path: Path) -> Stages:
+    """Where the time of a compilation goes, all of it in this process."""
+    target, stages = find_target(DEFAULT_TARGET), Stages()
+    options = Options(target)
+    sources = load_sources([path])
+    with stages.stage("lexing, parsing"):
+        for source in sources:
+            parse(source, Diagnostics().at(source))
+    with stages.stage("names and types"):
+        checked = check_sources(sources)
+    stages.seconds["names and types"] -= stages.seconds["lexing, parsing"]
+    assert checked.program, checked.diagnostics
+    with stages.stage("lowering"):
+        lowered = lower(checked.program, options)
+    objects = []
+    for text in lowered.texts:
+        with stages.stage("LLVM: reading"):
+            llvm.parse_assembly(text, llvm.create_context())
+        with stages.stage("LLVM: optimising"):
+            module, machine = optimised(text, target, options.opt_level)
+        with stages.stage("LLVM: code"):
+            objects.append(machine.emit_object(module))
+    stages.seconds["LLVM: optimising"] -= stages.seconds["LLVM: reading"]
+    with stages.stage("linking"):
+        link(objects, target, [*lowered.tasks, *lowered.functions.values()], len(lowered.imports))
+    return stages
+
+
+def bench_start() -> None:
+    seconds = []
+    for _ in range(STARTS):
+        begin = time.monotonic()
+        subprocess.run([sys.executable, "-m", "plctool", "--version"], check=True, stdout=subprocess.DEVNULL)
+        seconds.append(time.monotonic() - begin)
+    print(f"\nplctool --version: {min(seconds):.2f} s, the best of {STARTS}")
+
+
+def bench_compile() -> None:
+    texts = {"timers": blocks_with_timers(), "networks": networks(), "one body": one_body()}
+    print(f"\nCompiling about {LINES} lines of Structured Text, in seconds")
+    print(f"  {'':<28}" + "".join(f"{name:>12}" for name in texts))
+    rows: dict[str, list[str]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for text in texts.values():
+            path = Path(folder) / "large.st"
+            path.write_text(text)
+            begin = time.monotonic()
+            built = compile_sources([path])
+            seconds = time.monotonic() - begin
+            stages = profile(path).seconds
+            figures = {
+                "lines": f"{text.count(chr(10))}",
+                "bytes of image": f"{len(built.image)}",
+                "seconds until built": f"{seconds:.2f}",
+                **{f"  {name}": f"{value:.2f}" for name, value in stages.items()},
+                "  in all, in one process": f"{sum(stages.values()):.2f}",
+            }
+            for name, figure in figures.items():
+                rows.setdefault(name, []).append(figure)
+    for name, row in rows.items():
+        print(f"  {name:<28}" + "".join(f"{figure:>12}" for figure in row), flush=True)
+
+
+def main() -> None:
+    bench_start()
+    bench_compile()
+
+
+if __name__ == "__main__":
+    main()
