@@ -15,6 +15,7 @@ from plctool import output
 from plctool.errors import InternalError, PlcError, UsageError
 
 if TYPE_CHECKING:
+    from plctool.compiler import Level
     from plctool.compiler.warnings import WarningOptions
     from plctool.device import Plc
 
@@ -60,7 +61,9 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_sources(build)
     build.add_argument("-o", "--output", type=Path, default=Path("app.cdl"), metavar="IMAGE", help="default: app.cdl")
     build.add_argument("--target", default="x86_64-linux", metavar="NAME", help="processor; default: x86_64-linux")
-    build.add_argument("-O", dest="level", type=int, choices=range(4), default=2, help="optimisation; default: 2")
+    build.add_argument(
+        "-O", dest="level", type=_level, metavar="0..3|s", default=2, help="optimisation, s for small code; default: 2"
+    )
     build.add_argument("--checks", default="all", metavar="all|none|LIST", help="run-time checks; default: all")
     build.add_argument("--debug", action="store_true", help="keep the code close to its source")
     _add_warnings(build)
@@ -72,6 +75,10 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     info = command("info", _info, "describe an image")
     info.add_argument("image", type=Path)
 
+    symbols = command("symbols", _symbols, "list the variables of an image with their types")
+    symbols.add_argument("image", type=Path)
+    symbols.add_argument("patterns", nargs="*", metavar="PATTERN", help="names with * and ?: 'Main.pump.*'")
+
     run = command("run", _run, "run an image in this process, on a virtual clock")
     run.add_argument("image", type=Path)
     length = run.add_mutually_exclusive_group()
@@ -82,7 +89,13 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     test = command("test", _test, "run the unit tests of a program in this process, on a virtual clock")
     _add_sources(test)
-    test.add_argument("--filter", default="*", metavar="PATTERN", help="only tests of such a name, with * and ?")
+    test.add_argument(
+        "-k",
+        "--filter",
+        default="*",
+        metavar="PATTERN",
+        help="only tests whose name holds this, or fits it with * and ?",
+    )
     test.add_argument("--junit", type=Path, metavar="FILE", help="write a report in JUnit's format as well")
     test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
     _add_warnings(test)
@@ -171,12 +184,20 @@ def _seconds(text: str) -> float:
     raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds")
 
 
+def _level(text: str) -> Level:
+    if text == "s":
+        return "s"
+    if text not in ("0", "1", "2", "3"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a level of optimisation; use 0, 1, 2, 3 or s")
+    return int(text)
+
+
 def _percent(text: str) -> float:
     return _seconds(text.removesuffix("%")) / 100
 
 
 def _duration_ms(text: str) -> int:
-    from plctool.values import parse_time
+    from plctool.value_texts import parse_time
 
     milliseconds = parse_time(text)
     if milliseconds < 0:
@@ -185,13 +206,14 @@ def _duration_ms(text: str) -> int:
 
 
 def _pairs(texts: Sequence[str]) -> dict[str, str]:
-    """NAME=VALUE arguments."""
+    """NAME=VALUE or NAME:=VALUE arguments."""
     pairs = {}
     for text in texts:
         name, equals, value = text.partition("=")
-        if not equals or not name.strip():
+        name = name.strip().removesuffix(":").strip()
+        if not equals or not name:
             raise UsageError(f"'{text}' is not NAME=VALUE; write for example Main.speed=5.", "usage")
-        pairs[name.strip()] = value
+        pairs[name] = value
     return pairs
 
 
@@ -230,14 +252,21 @@ def _info(args: argparse.Namespace) -> int:
     return _show(args, ops.info(args.image), output.info_text)
 
 
+def _symbols(args: argparse.Namespace) -> int:
+    from plctool import ops
+
+    document = ops.variables(args.image, args.patterns)
+    return _show(args, document, lambda d: output.table(d["variables"], ("name", "type", "area")))
+
+
 def _run(args: argparse.Namespace) -> int:
     from plctool import ops
 
-    document = ops.run(args.image, args.cycles, args.time, _pairs(args.set), args.get)
+    document, texts = ops.run(args.image, args.cycles, args.time, _pairs(args.set), args.get)
     return _show(
         args,
         document,
-        lambda d: f"{output.values_text(d['values'])}\n{d['cycles']} cycles, {d['time_ms']:.10g} ms".lstrip(),
+        lambda d: f"{output.values_text(texts)}\n{d['cycles']} cycles, {d['time_ms']:.10g} ms".lstrip(),
     )
 
 
@@ -248,6 +277,9 @@ def _test(args: argparse.Namespace) -> int:
     report = st_tests.run_tests(args.sources, pattern=args.filter, level=args.level, warnings=_warnings(args))
     if args.junit:
         write_atomically(args.junit, st_tests.junit_xml(report))
+    if not args.json:
+        for warning in report.warning_texts():
+            print(warning, file=sys.stderr)
     colour = sys.stdout.isatty() and "NO_COLOR" not in os.environ
     _show(args, report.document(), lambda d: st_tests.report_text(report, colour=colour))
     return EXIT_FAILED if report.failed else EXIT_OK
@@ -430,14 +462,18 @@ def _read(args: argparse.Namespace) -> int:
     from plctool import ops
 
     with _connect(args) as plc:
-        return _show(args, ops.read(plc, args.names), lambda d: output.values_text(d["values"]))
+        document, texts = ops.read(plc, args.names)
+    if not (document["consistent"] or args.json):
+        print("plctool: a task ran meanwhile: these values are of more than one cycle.", file=sys.stderr)
+    return _show(args, document, lambda d: output.values_text(texts))
 
 
 def _write(args: argparse.Namespace) -> int:
     from plctool import ops
 
     with _connect(args) as plc:
-        return _show(args, ops.write(plc, _pairs(args.values)), lambda d: output.values_text(d["values"]))
+        document, texts = ops.write(plc, _pairs(args.values))
+    return _show(args, document, lambda d: output.values_text(texts))
 
 
 def _watch(args: argparse.Namespace) -> int:
@@ -446,9 +482,8 @@ def _watch(args: argparse.Namespace) -> int:
     if sys.stdout.isatty():
         return _watch_live(args)
     with _connect(args) as plc:
-        for seconds, values in plc.watch(args.names, args.interval, args.count):
-            text = "  ".join(f"{name} = {output.value_text(value)}" for name, value in values.items())
-            print(f"{seconds:8.3f} s  {text}", flush=True)
+        for seconds, reading in plc.watch(args.names, args.interval, args.count):
+            print(f"{seconds:8.3f} s  {output.values_text(reading.texts, '  ')}", flush=True)
     return EXIT_OK
 
 
@@ -456,20 +491,22 @@ def _watch_json(args: argparse.Namespace) -> int:
     """All samples as one document, when the count is reached or at Ctrl-C."""
     samples = []
     with _connect(args) as plc, suppress(KeyboardInterrupt):
-        for seconds, values in plc.watch(args.names, args.interval, args.count):
-            samples.append({"time_s": round(seconds, 6), "values": values})
+        for seconds, reading in plc.watch(args.names, args.interval, args.count):
+            sample = {"time_s": round(seconds, 6), "values": reading.values, "consistent": reading.consistent}
+            samples.append(sample)
     return _show(args, {"samples": samples}, lambda d: "")
 
 
 def _watch_live(args: argparse.Namespace) -> int:
     from rich.live import Live
     from rich.table import Table
+    from rich.text import Text
 
     with _connect(args) as plc, Live(auto_refresh=False) as live:
-        for seconds, values in plc.watch(args.names, args.interval, args.count):
+        for seconds, reading in plc.watch(args.names, args.interval, args.count):
             table = Table("variable", "value", caption=f"{seconds:.1f} s, Ctrl-C ends")
-            for name, value in values.items():
-                table.add_row(name, output.value_text(value))
+            for name, text in reading.texts.items():
+                table.add_row(Text(name), Text(text))
             live.update(table, refresh=True)
     return EXIT_OK
 

@@ -16,12 +16,14 @@ from plctool.errors import DeviceError, LinkError, UsageError
 from plctool.image import parse_image
 from plctool.link import services
 from plctool.link.connection import Connection
+from plctool.link.monitoring import AreaRange, Contents, read_memory, write_memory
 from plctool.link.names import Node
 from plctool.link.serial import DEFAULT_BAUD, SerialTransport
-from plctool.link.services import AppState, AreaRange, Identity, LogEntry, TaskInfo
+from plctool.link.services import AppState, Identity, LogEntry, Stack, TaskInfo
 from plctool.link.session import Session
 from plctool.link.transport import BlockTransport
-from plctool.symbols import Symbol, SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
+from plctool.symbols import SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
+from plctool.variables import Reading, Symbol, unreachable
 
 RESET_OPTIONS = {
     "warm": lib.RESET_OPTION_WARM,
@@ -121,6 +123,10 @@ class Plc:
     def identity(self) -> Identity:
         """Name, vendor, target and versions of the controller."""
         return services.read_identity(self._session)
+
+    def stack(self) -> Stack | None:
+        """What the main stack of the controller has left; None when it does not tell."""
+        return services.read_stack(self._session)
 
     def info(self) -> dict[str, str]:
         """Project, author, version and so on, of the application."""
@@ -247,10 +253,29 @@ class Plc:
 
     def read_all(self, names: Sequence[str]) -> dict[str, Any]:
         """Values by name. Structs and arrays come as dicts and lists, TIME as text."""
+        return self.sample(names).values
+
+    def sample(self, names: Sequence[str]) -> Reading:
+        """The variables with these names as they are now; of one moment between two cycles if the reading says so.
+
+        Pointers are followed by the controller. Raises DeviceError when one leads to no variable.
+        """
         table = self.symbols()
-        symbols = [table.resolve(name) for name in names]
-        contents = services.read_memory(self._session, table.image_crc, [_range(symbol) for symbol in symbols])
-        return {name: s.decode(data) for name, s, data in zip(names, symbols, contents, strict=True)}
+        reading = self._sample(table, names)
+        reading.check(lambda pointer: self._read(table, [pointer]).values[0])
+        return reading
+
+    def _sample(self, table: SymbolTable, names: Sequence[str]) -> Reading:
+        symbols = {name: table.resolve(name) for name in names}
+        contents = self._read(table, list(symbols.values()))
+        return Reading(symbols, dict(zip(symbols, contents.values, strict=True)), contents.consistent)
+
+    def _read(self, table: SymbolTable, symbols: Sequence[Symbol]) -> Contents:
+        """Raises DeviceError when the symbols are no longer those of the application."""
+        ranges = [_range(symbol) for symbol in symbols if symbol.fixed is None]
+        contents = read_memory(self._session, table.image_crc, ranges)
+        read = iter(contents.values)
+        return Contents([next(read) if s.fixed is None else s.fixed for s in symbols], contents.consistent)
 
     def write(self, values: Mapping[str, Any]) -> None:
         """Sets variables, by one message if they fit; texts such as 'T#80ms' are understood.
@@ -261,26 +286,38 @@ class Plc:
         table = self.symbols()
         named = [(table.resolve(name), value) for name, value in values.items()]
         for symbol, _ in named:
-            if symbol.area == lib.APP_AREA_CODE:
-                raise UsageError(f"{symbol.name} is a constant and cannot be written.", "constant")
-        around_bits = list({_range(symbol) for symbol, _ in named if symbol.bit is not None})
-        contents = dict(
-            zip(around_bits, services.read_memory(self._session, table.image_crc, around_bits), strict=True)
-            if around_bits
-            else ()
-        )
+            symbol.check_writable(symbol.area)
+        contents = self._read_reachable(table, [symbol for symbol, _ in named if symbol.bit is not None])
+        data: dict[AreaRange, bytes] = {}
         for symbol, value in named:
-            contents[_range(symbol)] = symbol.encode(value, contents.get(_range(symbol)))
-        services.write_memory(self._session, table.image_crc, list(contents.items()))
+            place = _range(symbol)
+            data[place] = symbol.encode(value, data.get(place, contents.get(place)))
+        try:
+            write_memory(self._session, table.image_crc, list(data.items()))
+        except DeviceError:
+            self._read_reachable(table, [symbol for symbol, _ in named if symbol.pointer is not None])
+            raise
+
+    def _read_reachable(self, table: SymbolTable, symbols: Sequence[Symbol]) -> dict[AreaRange, bytes]:
+        """What the variables hold. Raises DeviceError when a pointer to one of them leads to no variable."""
+        found: dict[AreaRange, bytes] = {}
+        for symbol, data in zip(symbols, self._read(table, symbols).values if symbols else (), strict=True):
+            if data is None:
+                raise unreachable(symbol, lambda pointer: self._read(table, [pointer]).values[0])
+            found[_range(symbol)] = data
+        return found
 
     def watch(
         self, names: Sequence[str], interval: float = 0.5, count: int | None = None
-    ) -> Iterator[tuple[float, dict[str, Any]]]:
-        """Reads again and again: yields seconds since the first reading, and the values. Endless without `count`."""
+    ) -> Iterator[tuple[float, Reading]]:
+        """Reads again and again: yields seconds since the first reading, and what was read. Endless without `count`.
+
+        Pointers are followed anew each time; what is behind one that leads to no variable is None then.
+        """
         begin = time.monotonic()
         for n in itertools.count() if count is None else range(count):
             time.sleep(max(0.0, begin + n * interval - time.monotonic()))
-            yield time.monotonic() - begin, self.read_all(names)
+            yield time.monotonic() - begin, self._sample(self.symbols(), names)
 
 
 def explain_exception(exception: services.AppException, task: str | None, table: SymbolTable | None) -> ExceptionInfo:
@@ -303,4 +340,5 @@ def _keep_symbols(image: Path, crc: int) -> None:
 
 
 def _range(symbol: Symbol) -> AreaRange:
-    return AreaRange(symbol.area, symbol.offset, symbol.size)
+    area, offset, hops = symbol.place
+    return AreaRange(area, offset, symbol.size, hops)

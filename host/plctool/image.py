@@ -401,6 +401,7 @@ def describe_image(data: bytes) -> dict[str, Any]:
                 "priority": t.priority,
                 "interval_us": t.interval_us,
                 "watchdog_us": t.watchdog_us,
+                "watchdog_sensitivity": t.watchdog_sensitivity,
                 "entry": t.entry,
             }
             for t in image.tasks

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any
 from plctool.errors import DeviceError, UsageError
 
 if TYPE_CHECKING:
+    from plctool.compiler import Level
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.warnings import WarningOptions
     from plctool.device import ExceptionInfo, Plc, PlcStatus
     from plctool.sim import Simulator
 
 Document = dict[str, Any]
+Texts = dict[str, str]
+"""Values of variables by name, as ST writes them."""
 
 _CODE_OFFSET = re.compile(r"at code offset 0x([0-9a-f]+)$")
 
@@ -27,7 +30,7 @@ def build(
     paths: Sequence[Path],
     output: Path,
     target: str,
-    level: int,
+    level: Level,
     checks: str,
     debug: bool,
     warnings: WarningOptions,
@@ -127,6 +130,23 @@ def info(path: Path) -> Document:
     return document
 
 
+def variables(path: Path, patterns: Sequence[str]) -> Document:
+    """The variables of an image, and parts of them, whose names match one of the patterns; without patterns all
+    variables."""
+    from plctool.compiler.typed import Area
+    from plctool.image import describe_image
+    from plctool.symbols import find_symbols
+
+    symbols = find_symbols(int(describe_image(read_image(path))["crc"], 16), path)
+    areas = {area.value: area.name.lower() for area in Area}
+    return {
+        "variables": [
+            {"name": s.name, "type": str(s.type), "area": areas[s.area], "offset": s.offset, "size": s.size}
+            for s in symbols.find(patterns)
+        ]
+    }
+
+
 def read_image(path: Path) -> bytes:
     try:
         return path.read_bytes()
@@ -137,34 +157,34 @@ def read_image(path: Path) -> bytes:
 # ---- in this process -------------------------------------------------------------------------------------------------
 
 
-def run(path: Path, cycles: int | None, time_ms: int | None, sets: Mapping[str, str], gets: Sequence[str]) -> Document:
-    """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`.
+def run(
+    path: Path, cycles: int | None, time_ms: int | None, sets: Mapping[str, str], gets: Sequence[str]
+) -> tuple[Document, Texts]:
+    """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
+    values as people read them.
 
     Raises DeviceError when the program stops with an exception.
     """
     from plctool.sim import Simulator
 
     with Simulator.from_file(path) as plc:
+        assert plc.symbols
         for name in gets:
-            plc.read(name)  # a wrong name is told before the run
+            plc.symbols.resolve(name)  # a wrong name is told before the run
         for name, text in sets.items():
-            plc.write(name, _parsed(plc, name, text))
+            plc.write(name, plc.symbols.resolve(name).parse(text))
         if time_ms is None:
             plc.run_cycles(1 if cycles is None else cycles)
         else:
             plc.run_for(time_ms)
         _raise_exception(plc)
-        tasks = plc.tasks()
-        return {
-            "values": plc.read_all(gets),
+        tasks, reading = plc.tasks(), plc.sample(gets)
+        document = {
+            "values": reading.values,
             "cycles": tasks[0].cycles if tasks else 0,
             "time_ms": plc.now_ns / 1e6,
         }
-
-
-def _parsed(plc: Simulator, name: str, text: str) -> Any:
-    assert plc.symbols
-    return plc.symbols.resolve(name).parse(text)
+        return document, reading.texts
 
 
 def _raise_exception(plc: Simulator) -> None:
@@ -221,15 +241,17 @@ def tasks(plc: Plc) -> Document:
     return {"tasks": [vars(task) for task in plc.tasks()]}
 
 
-def read(plc: Plc, names: Sequence[str]) -> Document:
-    return {"values": plc.read_all(names)}
+def read(plc: Plc, names: Sequence[str]) -> tuple[Document, Texts]:
+    reading = plc.sample(names)
+    return {"values": reading.values, "consistent": reading.consistent}, reading.texts
 
 
-def write(plc: Plc, texts: Mapping[str, str]) -> Document:
+def write(plc: Plc, texts: Mapping[str, str]) -> tuple[Document, Texts]:
     """Writes values as typed and reads them back."""
     table = plc.symbols()
     plc.write({name: table.resolve(name).parse(text) for name, text in texts.items()})
-    return {"values": plc.read_all(list(texts))}
+    reading = plc.sample(list(texts))
+    return {"values": reading.values}, reading.texts
 
 
 def log(plc: Plc) -> Document:

@@ -12,19 +12,9 @@ def as_json(document: Any) -> str:
     return json.dumps(document, allow_nan=False)
 
 
-def value_text(value: Any) -> str:
-    """A value of a variable as ST writes it, as far as that is short."""
-    if isinstance(value, bool):
-        return "TRUE" if value else "FALSE"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(value_text, value)) + "]"
-    if isinstance(value, dict):
-        return "(" + ", ".join(f"{name} := {value_text(v)}" for name, v in value.items()) + ")"
-    return str(value)
-
-
-def values_text(values: dict[str, Any]) -> str:
-    return "\n".join(f"{name} = {value_text(value)}" for name, value in values.items())
+def values_text(texts: dict[str, str], separator: str = "\n") -> str:
+    """Names and values, as ST writes them."""
+    return separator.join(f"{name} = {text}" for name, text in texts.items())
 
 
 def table(rows: Sequence[dict[str, Any]], columns: Iterable[str]) -> str:

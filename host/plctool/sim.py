@@ -12,7 +12,8 @@ from typing import Any
 from plctool.core import error_name, ffi, lib
 from plctool.errors import DeviceError, UsageError
 from plctool.link.services import AppException, AppState, Status, TaskInfo
-from plctool.symbols import Symbol, SymbolTable, find_symbols
+from plctool.symbols import SymbolTable, find_symbols
+from plctool.variables import Reading, Symbol, unreachable
 
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _SECTOR = 4096
@@ -149,18 +150,27 @@ class Simulator:
 
     def read(self, name: str) -> Any:
         """The value of a variable, a member or an element; structs and arrays come as dicts and lists."""
-        symbol = self._resolve(name)
-        return symbol.decode(bytes(ffi.buffer(self._address(symbol), symbol.size)))
+        return self.read_all([name])[name]
 
     def read_all(self, names: Iterable[str]) -> dict[str, Any]:
-        return {name: self.read(name) for name in names}
+        return self.sample(names).values
+
+    def sample(self, names: Iterable[str]) -> Reading:
+        """The variables with these names, as they are between two cycles. Raises DeviceError when a pointer leads to no
+        variable."""
+        symbols = {name: self._resolve(name) for name in names}
+        reading = Reading(symbols, {name: self._content(symbol) for name, symbol in symbols.items()})
+        reading.check(self._content)
+        return reading
 
     def write(self, name: str, value: Any) -> None:
         """Sets a variable; `value` as Python value or as text such as 'T#80ms'. Bits of a word can be set too."""
         symbol = self._resolve(name)
-        if symbol.area == lib.APP_AREA_CODE:
-            raise UsageError(f"{symbol.name} is a constant and cannot be written.", "constant")
-        memory = ffi.buffer(self._address(symbol), symbol.size)
+        place = self._place(symbol)
+        symbol.check_writable(symbol.area if place is None else place[0])
+        memory = self._memory(symbol)
+        if memory is None:
+            raise unreachable(symbol, self._content)
         memory[:] = symbol.encode(value, bytes(memory))
 
     def _resolve(self, name: str) -> Symbol:
@@ -168,13 +178,33 @@ class Simulator:
             raise UsageError("The program was loaded without symbols; variables cannot be named.", "no-symbols")
         return self.symbols.resolve(name)
 
-    def _address(self, symbol: Symbol) -> Any:
-        address = lib.AppGetAreaAddress(symbol.area, symbol.offset, symbol.size)
-        if address == ffi.NULL:
-            raise DeviceError(
-                f"{symbol.name} is not in the memory of the program; the symbols do not belong to it.", "wrong-symbols"
-            )
-        return address
+    def _content(self, symbol: Symbol) -> bytes | None:
+        if symbol.fixed is not None:
+            return symbol.fixed
+        memory = self._memory(symbol)
+        return None if memory is None else bytes(memory)
+
+    def _memory(self, symbol: Symbol) -> Any:
+        """A variable as a writable buffer; None when a pointer to it leads to none."""
+        place = self._place(symbol)
+        address = ffi.NULL if place is None else lib.AppGetAreaAddress(*place, symbol.size)
+        if address != ffi.NULL:
+            return ffi.buffer(address, symbol.size)
+        if symbol.pointer is not None:
+            return None
+        raise DeviceError(
+            f"{symbol.name} is not in the memory of the program; the symbols do not belong to it.", "wrong-symbols"
+        )
+
+    def _place(self, symbol: Symbol) -> tuple[int, int] | None:
+        """Area and offset."""
+        if symbol.pointer is None:
+            return symbol.area, symbol.offset
+        held = self._memory(symbol.pointer)
+        area, offset = ffi.new("RTS_UI32 *"), ffi.new("RTS_UI32 *")
+        if held is None or not lib.AppFindArea(int.from_bytes(held[:], "little"), area, offset):
+            return None
+        return area[0], offset[0] + symbol.offset
 
 
 def _check(result: int, what: str) -> None:

@@ -6,7 +6,7 @@ import platform
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,19 +14,20 @@ from xml.etree import ElementTree
 
 from plctool.compiler import CompileError, load_sources
 from plctool.compiler.build import BuildResult, build_program
-from plctool.compiler.front import check_sources
+from plctool.compiler.front import Diagnostic, check_sources, render
 from plctool.compiler.internal import bugs_reported
 from plctool.compiler.lower_init import encode_scalar
 from plctool.compiler.lower_unit import Options
 from plctool.compiler.targets import DEFAULT_TARGET, TARGETS, find_target
-from plctool.compiler.types import Elementary, Kind, Type, base_of
+from plctool.compiler.typed import Area
 from plctool.compiler.unit_test_statements import FAILED, NUMBER, Assertion, Operand
 from plctool.compiler.unit_tests import TestCase, TestSuite
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
-from plctool.core import lib
+from plctool.core import ffi, lib
 from plctool.device import explain_exception
 from plctool.errors import UsageError
 from plctool.sim import Simulator
+from plctool.value_texts import literal
 from plctool.values import decode
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ class Failure:
     actual: Any = None
     expected: Any = None
     is_exception: bool = False
+    pou: str | None = None  # where an exception happened
 
 
 @dataclass(frozen=True)
@@ -70,15 +72,20 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Report:
-    """All outcomes in the order of the sources. `seconds`: with compiling."""
+    """All outcomes in the order of the sources. `seconds`: with compiling. `warnings`: of the compiler."""
 
     outcomes: list[Outcome]
     seconds: float
     sources: Sequence[Source]
+    warnings: Sequence[Diagnostic] = ()
 
     @property
     def failed(self) -> int:
         return sum(outcome.failure is not None for outcome in self.outcomes)
+
+    def warning_texts(self) -> list[str]:
+        """The warnings with their lines, as `check` prints them."""
+        return [render(warning, self.sources) for warning in self.warnings]
 
     def document(self) -> dict[str, Any]:
         """What `--json` prints."""
@@ -87,13 +94,20 @@ class Report:
             failure = vars(outcome.failure) if outcome.failure else None
             tests.append({**vars(outcome), "passed": failure is None, "failure": failure})
         passed = len(tests) - self.failed
-        return {"tests": tests, "passed": passed, "failed": self.failed, "seconds": round(self.seconds, 3)}
+        return {
+            "tests": tests,
+            "passed": passed,
+            "failed": self.failed,
+            "seconds": round(self.seconds, 3),
+            "warnings": [asdict(warning) for warning in self.warnings],
+        }
 
 
 def run_tests(
     paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0, warnings: WarningOptions = ALL_WARNINGS
 ) -> Report:
-    """Runs the tests in sources whose name fits `pattern` (with * and ?, upper and lower case are the same).
+    """Runs the tests in sources whose name fits `pattern`: with * and ? all of it, else it holds the pattern; upper and
+    lower case are the same.
 
     `level`: optimisation; the lowest compiles fastest, and the results are the same. Raises CompileError when the
     program has errors, UsageError when there are no tests.
@@ -105,7 +119,7 @@ def run_tests(
         checked = check_sources(sources, tests=suite, warnings=warnings)
     if checked.program is None:
         raise CompileError([d for d in checked.diagnostics if d.severity == "error"], sources)
-    chosen = [i for i, case in enumerate(suite.cases) if fnmatch(case.name.casefold(), pattern.casefold())]
+    chosen = [i for i, case in enumerate(suite.cases) if _fits(case.name.casefold(), pattern.casefold())]
     if not chosen:
         what = f"no test fits '{pattern}'" if suite.cases else "there are no tests: write TEST 'name' ... END_TEST"
         raise UsageError(f"{what[:1].upper()}{what[1:]}.", "no-tests")
@@ -114,9 +128,13 @@ def run_tests(
     with bugs_reported():
         built = build_program(checked.program, Options(target, level))
     with Simulator(built.image, built.symbols, start=False) as plc:
-        bench = _Bench(plc, built, suite)
+        bench = _Bench(plc, built, suite, checked.program.area_sizes)
         outcomes = [bench.run(number) for number in chosen]
-    return Report(outcomes, time.perf_counter() - begin, sources)
+    return Report(outcomes, time.perf_counter() - begin, sources, checked.diagnostics)
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return fnmatch(name, pattern) if any(c in pattern for c in "*?[") else pattern in name
 
 
 @contextmanager
@@ -132,8 +150,9 @@ def _power() -> Iterator[None]:
 class _Bench:
     """Runs one test after the other."""
 
-    def __init__(self, plc: Simulator, built: BuildResult, suite: TestSuite) -> None:
+    def __init__(self, plc: Simulator, built: BuildResult, suite: TestSuite, sizes: dict[Area, int]) -> None:
         self._plc = plc
+        self._sizes = sizes
         self._built = built
         self._suite = suite
 
@@ -143,20 +162,36 @@ class _Bench:
         plc.reset(lib.RESET_OPTION_COLD)
         failure = self._exception(case)
         if failure is None:
-            plc.write(NUMBER, number)
-            plc.start()
-            plc.run_cycles(1)
+            self._cycle(number)
             failure = self._exception(case) or self._assert()
+            teardown = self._suite.teardown_of(case)
+            if failure is not None and failure.is_exception and teardown is not None:
+                self._continue(teardown)
         return Outcome(case.name, case.pos.file, case.pos.line, time.perf_counter() - begin, failure)
+
+    def _cycle(self, number: int) -> None:
+        self._plc.write(NUMBER, number)
+        self._plc.start()
+        self._plc.run_cycles(1)
+
+    def _continue(self, number: int) -> None:
+        """Runs what has this number on the variables as they are after an exception."""
+        areas = {lib.AppGetAreaAddress(area.value, 0, size): size for area, size in self._sizes.items() if size}
+        kept = {address: bytes(ffi.buffer(address, size)) for address, size in areas.items()}
+        self._plc.reset(lib.RESET_OPTION_COLD)
+        for address, content in kept.items():
+            ffi.memmove(address, content, len(content))
+        self._cycle(number)
 
     def _exception(self, case: TestCase) -> Failure | None:
         exception = self._plc.status().exception
         if exception is None:
             return None
         info = explain_exception(exception, None, self._built.symbols)
-        text = _EXCEPTIONS.get(exception.code, "run-time exception")
+        where = f" in {info.pou}" if info.pou and not info.pou.startswith("TEST_") else ""
+        text = _EXCEPTIONS.get(exception.code, "run-time exception") + where
         place = (info.file, info.line) if info.file and info.line else (case.pos.file, case.pos.line)
-        return Failure(info.name, text, *place, is_exception=True)
+        return Failure(info.name, text, *place, is_exception=True, pou=info.pou)
 
     def _assert(self) -> Failure | None:
         number = self._plc.read(FAILED)
@@ -174,29 +209,17 @@ class _Bench:
         return decode(operand.type, encode_scalar(operand.value, operand.type))
 
     def _text(self, assertion: Assertion, actual: Any, expected: Any) -> str:
-        name, got = assertion.name, _literal(assertion.actual.type, actual)
+        name, got = assertion.name, literal(assertion.actual.type, actual)
         if name == "MOCK_VERIFY_CALLED":
             return "expected a call, got none"
-        wanted = _COMPARED.get(name, "") + _literal(assertion.expected.type, expected)
+        wanted = _COMPARED.get(name, "") + literal(assertion.expected.type, expected)
         if name == "MOCK_VERIFY_CALL_COUNT":
             return f"expected {wanted} calls, got {got}"
         if name == "ASSERT_NEQ":
             return f"expected anything but {wanted}"
         if assertion.tolerance is not None:
-            wanted += f" +- {_literal(assertion.tolerance.type, self._value(assertion.tolerance))}"
+            wanted += f" +- {literal(assertion.tolerance.type, self._value(assertion.tolerance))}"
         return f"expected {wanted}, got {got}"
-
-
-def _literal(t: Type, value: Any) -> str:
-    """A value as ST writes it."""
-    base = base_of(t)
-    if isinstance(value, bool):
-        return "TRUE" if value else "FALSE"
-    if isinstance(base, Elementary) and base.kind is Kind.BIT and isinstance(value, int):
-        return f"16#{value:0{base.bits // 4}X}"
-    if isinstance(value, str) and not isinstance(base, Elementary):
-        return "'" + value.replace("$", "$$").replace("'", "$'") + "'"
-    return str(value)
 
 
 # ---- for people ------------------------------------------------------------------------------------------------------

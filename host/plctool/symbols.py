@@ -5,84 +5,36 @@ It is JSON, written by `build`, and found again for what runs on a device by the
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 import re
 import zlib
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler.types import (
-    ELEMENTARY,
-    ArrayType,
-    Elementary,
-    EnumType,
-    Field,
-    InterfaceType,
-    Kind,
-    PointerType,
-    StringType,
-    StructType,
-    SubrangeType,
-    Type,
-    base_of,
-)
+from plctool.compiler.types import ArrayType
 from plctool.errors import UsageError
 from plctool.files import write_atomically
-from plctool.values import decode, encode, parse_value
+from plctool.type_descriptions import DescribedTypes, describe
+from plctool.variables import Symbol, Units, constant_symbol, walk
 
-FORMAT = 1
-_TOKEN = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]*)\]|\.(\d+)|(\^)")
-
-
-@dataclass(frozen=True)
-class Symbol:
-    """A variable or a part of one. `offset` in bytes in the area; `bit` when it is one bit of an integer."""
-
-    name: str
-    area: int
-    offset: int
-    type: Type
-    bit: int | None = None
-
-    @property
-    def size(self) -> int:
-        return self.type.size
-
-    def decode(self, data: bytes) -> Any:
-        """The value in `size` bytes read from the device."""
-        if self.bit is not None:
-            return bool(int.from_bytes(data[: self.size], "little") >> self.bit & 1)
-        return decode(self.type, data)
-
-    def encode(self, value: Any, before: bytes | None = None) -> bytes:
-        """The bytes to write. `before`: the present ones, needed to change a single bit. Raises UsageError."""
-        if self.bit is None:
-            return encode(self.type, value)
-        if before is None:
-            raise UsageError(f"{self.name} is a bit; write the whole {self.type}.", "bit")
-        word = int.from_bytes(before[: self.size], "little") & ~(1 << self.bit)
-        bit = encode(ELEMENTARY["BOOL"], value)[0]
-        return (word | bit << self.bit).to_bytes(self.size, "little")
-
-    def parse(self, text: str) -> Any:
-        """The value a person typed for it, for `encode`. Raises UsageError."""
-        return parse_value(ELEMENTARY["BOOL"] if self.bit is not None else self.type, text)
+FORMAT = 2
 
 
 @dataclass(frozen=True)
 class CodeUnit:
-    """A POU: `offset` and `size` of its code (size 0 when it is only part of its callers), where its source begins."""
+    """A POU: `offset` and `size` of its code (size 0 when it is only part of its callers), where its source begins, its
+    variables that live only while it runs."""
 
     name: str
     offset: int
     size: int
     file: str
     line: int
+    temporaries: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -97,7 +49,8 @@ class SourceLine:
 @dataclass
 class SymbolTable:
     """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry holds up to
-    the next one."""
+    the next one. `aliases`: other names of variables. `classes`: the numbers by which instances tell their class.
+    `constants`: those that have no place in memory."""
 
     image_crc: int
     target: str
@@ -107,9 +60,17 @@ class SymbolTable:
     pous: list[CodeUnit] = field(default_factory=list)
     lines: list[tuple[int, int, int]] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
+    aliases: dict[str, str] = field(default_factory=dict)
+    classes: dict[str, int] = field(default_factory=dict)
+    constants: dict[str, Symbol] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._by_key = {name.casefold(): symbol for name, symbol in self.variables.items()}
+        self._all = self.variables | self.constants
+        self._by_key = {name.casefold(): symbol for name, symbol in self._all.items()}
+        known = {other: self._by_key.get(name.casefold()) for other, name in self.aliases.items()}
+        self._by_key |= {other.casefold(): symbol for other, symbol in known.items() if symbol is not None}
+        temporaries = {u.name.casefold(): {name.casefold() for name in u.temporaries} for u in self.pous}
+        self._units = Units(self.classes, temporaries)
 
     # ---- variables ----
 
@@ -121,54 +82,36 @@ class SymbolTable:
         while at > 0:
             symbol = self._by_key.get(text[:at].casefold())
             if symbol is not None:
-                return self._walk(symbol, text, at)
+                return walk(symbol, text, at, self._units)
             at = max(text.rfind(".", 0, at), text.rfind("[", 0, at), text.rfind("^", 0, at))
         raise self._unknown(text)
 
     def _unknown(self, text: str) -> UsageError:
         prefix = text.casefold() + "."
-        inside = [name for name in self.variables if name.casefold().startswith(prefix)]
+        inside = [name for name in self._all if name.casefold().startswith(prefix)]
         if inside:
             return UsageError(
                 f"{text} has no value of its own; name one of its variables, such as {inside[0]}.", "no-value"
             )
-        return _no_such("variable", text, list(self.variables))
+        return self._units.no_variable(text, text.rpartition(".")[0], [*self._all, *self.aliases])
 
-    def _walk(self, symbol: Symbol, text: str, at: int) -> Symbol:
-        while at < len(text):
-            match = _TOKEN.match(text, at)
-            if match is None:
-                raise UsageError(
-                    f"'{text}' cannot be read from '{text[at:]}' on; write for example Main.a[3].x.", "syntax"
-                )
-            member, indices, bit, deref = match.groups()
-            at = match.end()
-            name = text[:at]
-            if symbol.bit is not None:
-                raise UsageError(f"{symbol.name} is a BOOL and has no parts.", "no-part")
-            if deref:
-                raise UsageError(f"{symbol.name} is a reference; what it points to is not known here.", "reference")
-            if member:
-                symbol = _member(symbol, member, name)
-            elif bit:
-                symbol = _bit(symbol, int(bit), name)
-            else:
-                symbol = _element(symbol, indices, name)
-        return symbol
-
-    def leaves(self, symbol: Symbol) -> list[Symbol]:
-        """The scalars and strings that a structured variable consists of; the variable itself when it is one."""
-        t = symbol.type
-        if isinstance(t, StructType):
-            parts = [Symbol(f"{symbol.name}.{f.name}", symbol.area, symbol.offset + f.offset, f.type) for f in t.fields]
-        elif isinstance(t, ArrayType):
-            parts = [
-                Symbol(f"{symbol.name}[{index}]", symbol.area, symbol.offset + i * t.element.size, t.element)
-                for i, index in enumerate(_indices(t))
-            ]
-        else:
-            return [symbol]
-        return [leaf for part in parts for leaf in self.leaves(part)]
+    def find(self, patterns: Sequence[str]) -> Iterator[Symbol]:
+        """The variables and constants, and parts of them, whose name matches one of the patterns with * and ?; elements
+        of arrays only where a pattern has an index. Without patterns all variables, as they were declared."""
+        if not patterns:
+            yield from (s for s in self._all.values() if "%" not in s.name)
+            return
+        wanted = re.compile("|".join(map(_pattern, patterns)), re.IGNORECASE)
+        elements = any("[" in pattern for pattern in patterns)
+        todo = list(self._all.values())[::-1]
+        while todo:
+            symbol = todo.pop()
+            if "%" in symbol.name:  # our own
+                continue
+            if wanted.fullmatch(symbol.name):
+                yield symbol
+            if elements or not isinstance(symbol.type, ArrayType):
+                todo += list(symbol.parts())[::-1]
 
     # ---- code ----
 
@@ -197,12 +140,7 @@ class SymbolTable:
 
     def to_json(self) -> str:
         types: dict[str, Any] = {}
-        variables = {}
-        for name, symbol in self.variables.items():
-            _describe(symbol.type, types)
-            variables[name] = {"area": symbol.area, "offset": symbol.offset, "type": symbol.type.name}
-            if symbol.bit is not None:
-                variables[name]["bit"] = symbol.bit
+        variables = {name: _variable(symbol, types) for name, symbol in self.variables.items()}
         document = {
             "format": FORMAT,
             "image_crc": self.image_crc,
@@ -210,7 +148,10 @@ class SymbolTable:
             "project": self.project,
             "tasks": self.tasks,
             "variables": variables,
+            "constants": {name: _constant(symbol, types) for name, symbol in self.constants.items()},
             "types": types,
+            "aliases": self.aliases,
+            "classes": self.classes,
             "pous": [vars(unit) for unit in self.pous],
             "lines": self.lines,
             "files": self.files,
@@ -227,19 +168,19 @@ class SymbolTable:
                     f"The symbol file has format {document['format']}, this plctool knows {FORMAT}; build again.",
                     "bad-symbols",
                 )
-            types = _Types(document["types"])
+            types = DescribedTypes(document["types"])
             return SymbolTable(
                 document["image_crc"],
                 document["target"],
                 document["project"],
                 document["tasks"],
-                {
-                    n: Symbol(n, v["area"], v["offset"], types.get(v["type"]), v.get("bit"))
-                    for n, v in document["variables"].items()
-                },
+                {n: _read_variable(n, v, types) for n, v in document["variables"].items()},
                 [CodeUnit(**unit) for unit in document["pous"]],
                 [(offset, file, line) for offset, file, line in document["lines"]],
                 document["files"],
+                document["aliases"],
+                document["classes"],
+                {n: _read_constant(n, c, types) for n, c in document["constants"].items()},
             )
         except (ValueError, KeyError, TypeError, AttributeError):
             raise UsageError("The symbol file cannot be read; build again.", "bad-symbols") from None
@@ -254,6 +195,35 @@ class SymbolTable:
             write_atomically(copy, text.encode())
         except (OSError, UsageError):
             return  # the cache only saves naming the file
+
+
+def _variable(symbol: Symbol, types: dict[str, Any]) -> dict[str, Any]:
+    describe(symbol.type, types)
+    entry: dict[str, Any] = {"area": symbol.area, "offset": symbol.offset, "type": symbol.type.name}
+    if symbol.bit is not None:
+        entry["bit"] = symbol.bit
+    if symbol.constant:
+        entry["constant"] = True
+    return entry
+
+
+def _read_variable(name: str, entry: dict[str, Any], types: DescribedTypes) -> Symbol:
+    t, constant = types.get(entry["type"]), entry.get("constant", False)
+    return Symbol(name, entry["area"], entry["offset"], t, entry.get("bit"), constant=constant)
+
+
+def _constant(symbol: Symbol, types: dict[str, Any]) -> dict[str, Any]:
+    assert symbol.fixed is not None
+    describe(symbol.type, types)
+    return {"type": symbol.type.name, "content": symbol.fixed.hex()}
+
+
+def _read_constant(name: str, entry: dict[str, Any], types: DescribedTypes) -> Symbol:
+    return constant_symbol(name, types.get(entry["type"]), bytes.fromhex(entry["content"]))
+
+
+def _pattern(text: str) -> str:
+    return re.escape(text.strip()).replace(r"\*", ".*").replace(r"\?", ".")
 
 
 def load_symbols(path: Path) -> SymbolTable:
@@ -300,137 +270,13 @@ def find_symbols(image_crc: int, beside: Path | None = None) -> SymbolTable:
     )
 
 
-# ---- parts of variables --------------------------------------------------------------------------------------------
-
-
-def _no_such(what: str, name: str, known: list[str]) -> UsageError:
-    lower = {k.casefold(): k for k in known}
-    close = difflib.get_close_matches(name.casefold(), lower, n=1, cutoff=0.6)
-    hint = f" Did you mean {lower[close[0]]}?" if close else ""
-    return UsageError(f"There is no {what} {name}.{hint}", "unknown-variable")
-
-
-def _member(symbol: Symbol, member: str, name: str) -> Symbol:
-    t = symbol.type
-    if not isinstance(t, StructType):
-        raise UsageError(f"{symbol.name} is a {t} and has no member {member}.", "no-part")
-    found = t.member(member)
-    if found is None and member.casefold() in map(str.casefold, t.properties):
-        raise UsageError(f"{name} is a property: only the program can read it, by a call.", "property")
-    if found is None:
-        raise _no_such("variable", name, [f"{symbol.name}.{f.name}" for f in t.fields])
-    return Symbol(name, symbol.area, symbol.offset + found.offset, found.type)
-
-
-def _bit(symbol: Symbol, bit: int, name: str) -> Symbol:
-    base = base_of(symbol.type)
-    if not isinstance(base, Elementary) or base.kind not in (Kind.BIT, Kind.INT) or bit >= base.bits:
-        raise UsageError(f"{symbol.name} is a {symbol.type} and has no bit {bit}.", "no-part")
-    return Symbol(name, symbol.area, symbol.offset, symbol.type, bit)
-
-
-def _element(symbol: Symbol, text: str, name: str) -> Symbol:
-    t = symbol.type
-    try:
-        indices = [int(part) for part in text.split(",")]
-    except ValueError:
-        raise UsageError(f"'{text}' is not an index; write a number as in {symbol.name}[1].", "syntax") from None
-    if isinstance(t, StringType) and len(indices) == 1:
-        if not 0 <= indices[0] <= t.length:
-            raise UsageError(f"{symbol.name} has the characters 0 to {t.length - 1}, not {indices[0]}.", "no-part")
-        return Symbol(name, symbol.area, symbol.offset + indices[0] * t.unit, ELEMENTARY["WORD" if t.wide else "BYTE"])
-    if not isinstance(t, ArrayType) or len(indices) != len(t.bounds):
-        raise UsageError(f"{symbol.name} is a {t} and cannot be indexed with [{text}].", "no-part")
-    flat = 0
-    for index, (low, high) in zip(indices, t.bounds, strict=True):
-        if not low <= index <= high:
-            raise UsageError(f"{symbol.name} has the elements {low} to {high}, not {index}.", "no-part")
-        flat = flat * (high - low + 1) + index - low
-    return Symbol(name, symbol.area, symbol.offset + flat * t.element.size, t.element)
-
-
-def _indices(t: ArrayType) -> list[str]:
-    texts = [""]
-    for low, high in t.bounds:
-        texts = [f"{text},{i}" if text else str(i) for text in texts for i in range(low, high + 1)]
-    return texts
-
-
-# ---- types in JSON -------------------------------------------------------------------------------------------------
-
-
-def _describe(t: Type, types: dict[str, Any]) -> None:
-    """Adds a type and those it consists of to `types`, by name."""
-    if isinstance(t, Elementary) or t.name in types:
-        return
-    entry: dict[str, Any] = {}
-    types[t.name] = entry
-    if isinstance(t, StringType):
-        entry.update(kind="string", length=t.length, wide=t.wide)
-    elif isinstance(t, EnumType):
-        entry.update(kind="enum", base=t.base.name, values=t.values)
-    elif isinstance(t, SubrangeType):
-        entry.update(kind="subrange", base=t.base.name, low=t.low, high=t.high)
-    elif isinstance(t, ArrayType):
-        entry.update(kind="array", element=t.element.name, bounds=[list(b) for b in t.bounds])
-        _describe(t.element, types)
-    elif isinstance(t, InterfaceType):
-        entry.update(kind="pointer", target="BYTE")  # what it leads to is known to the program only
-    elif isinstance(t, PointerType):
-        entry.update(kind="pointer", target=t.target.name)
-        _describe(t.target, types)
-    else:
-        assert isinstance(t, StructType)
-        entry.update(kind="struct", fields=[[f.name, f.type.name] for f in t.fields], union=t.union)
-        if t.properties:
-            entry["properties"] = t.properties
-        for f in t.fields:
-            _describe(f.type, types)
-
-
 def layout_signature(symbols: Iterable[Symbol]) -> int:
     """A number that changes when a name, a place or a type among `symbols` does."""
     types: dict[str, Any] = {}
     places = []
     for symbol in symbols:
-        _describe(symbol.type, types)
+        describe(symbol.type, types)
         places.append([symbol.name.casefold(), symbol.offset, symbol.type.name])
     for entry in types.values():
         entry.pop("properties", None)  # they are not in memory
     return zlib.crc32(json.dumps([sorted(places), types], sort_keys=True).encode())
-
-
-class _Types:
-    """Types by name, made from their description when they are first asked for."""
-
-    def __init__(self, described: dict[str, Any]) -> None:
-        self._described = described
-        self._made: dict[str, Type] = dict(ELEMENTARY)
-
-    def get(self, name: str) -> Type:
-        made = self._made.get(name)
-        if made is None:
-            made = self._make(name, self._described[name])
-            self._made[name] = made
-        return made
-
-    def _make(self, name: str, entry: dict[str, Any]) -> Type:
-        kind = entry["kind"]
-        if kind == "string":
-            return StringType(entry["length"], entry["wide"])
-        if kind == "enum":
-            return EnumType(name, ELEMENTARY[entry["base"]], entry["values"])
-        if kind == "subrange":
-            return SubrangeType(name, ELEMENTARY[entry["base"]], entry["low"], entry["high"])
-        if kind == "array":
-            return ArrayType(self.get(entry["element"]), tuple((low, high) for low, high in entry["bounds"]))
-        if kind == "pointer":
-            return self._pointer(entry)
-        struct = StructType(name, union=entry["union"], properties=entry.get("properties", []))
-        self._made[name] = struct  # references may lead back to it
-        struct.fields = [Field(n, self.get(t)) for n, t in entry["fields"]]
-        struct.lay_out()
-        return struct
-
-    def _pointer(self, entry: dict[str, Any]) -> Type:
-        return PointerType(self.get(entry["target"]))

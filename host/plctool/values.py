@@ -1,18 +1,16 @@
-"""Values of variables: bytes in memory <-> Python values <-> texts a person types.
+"""Values of variables: bytes in memory <-> Python values, which are ready for JSON.
 
-TIME is shown as 'T#1s500ms', enums by name, REAL with the fewest digits that read back as the same number.
+TIME and dates are texts such as 'T#1s500ms', values of enumerations their names, a REAL is the number with the fewest
+digits that reads back as the same. How texts look is in `value_texts`.
 """
 
 from __future__ import annotations
 
-import datetime
 import math
-import re
 import struct
 from typing import Any
 
 from plctool.compiler.types import (
-    ELEMENTARY,
     ArrayType,
     Elementary,
     EnumType,
@@ -25,21 +23,7 @@ from plctool.compiler.types import (
     base_of,
 )
 from plctool.errors import UsageError
-
-_UNITS_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
-             "us": 1_000, "ns": 1}  # fmt: skip
-_DATE_UNITS_NS = {"DATE": 1_000_000_000, "DT": 1_000_000_000, "TOD": 1_000_000}
-_EPOCH = datetime.date(1970, 1, 1)
-_DAY = r"(?P<y>\d{4})-(?P<mo>\d{1,2})-(?P<d>\d{1,2})"
-_CLOCK = r"(?P<h>\d{1,2}):(?P<mi>\d{1,2})(?::(?P<s>\d{1,2})(?:\.(?P<f>\d{1,9}))?)?"
-_DATE_FORMS = {"DATE": re.compile(_DAY), "TOD": re.compile(_CLOCK), "DT": re.compile(f"{_DAY}-{_CLOCK}")}
-_PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)")
-_TYPED = re.compile(r"^(?P<type>[A-Za-z]\w*)#(?P<rest>.+)$")
-
-
-def _bad(text: object, t: Type, hint: str) -> UsageError:
-    return UsageError(f"'{text}' is not a value of {t}; {hint}.", "bad-value")
-
+from plctool.value_texts import bad_value, format_date, format_time, parse_value
 
 # ---- bytes -> value ------------------------------------------------------------------------------------------------
 
@@ -51,11 +35,11 @@ def decode(t: Type, data: bytes) -> Any:
         items = [decode(t.element, data[i * size : (i + 1) * size]) for i in range(t.count)]
         return _nest(items, [high - low + 1 for low, high in t.bounds])
     if isinstance(t, StructType):
-        return {f.name: decode(f.type, data[f.offset : f.offset + f.type.size]) for f in t.fields}
+        return {f.name: decode(f.type, data[f.offset : f.offset + f.type.size]) for f in t.fields if not f.hidden}
     if isinstance(t, StringType):
         return _decode_text(t, data)
     if isinstance(t, PointerType):
-        return int.from_bytes(data[:8], "little")
+        return int.from_bytes(data[: t.size], "little") or None
     base = base_of(t)
     assert isinstance(base, Elementary)
     if base.kind is Kind.REAL:
@@ -98,146 +82,6 @@ def _decode_real(base: Elementary, data: bytes) -> float | str:
     return value
 
 
-def format_time(value: int, t: Type) -> str:
-    """'T#1h2m3s4ms' for TIME [ms], 'LTIME#...' for LTIME [ns]."""
-    wide = base_of(t).size == 8
-    prefix, left = ("LTIME#", abs(value)) if wide else ("T#", abs(value) * 1_000_000)
-    text = ""
-    for unit, size in _UNITS_NS.items():
-        if left >= size:
-            text += f"{left // size}{unit}"
-            left %= size
-    sign = "-" if value < 0 else ""
-    return prefix + sign + (text or ("0ns" if wide else "0ms"))
-
-
-def format_date(value: int, t: Type) -> str:
-    """'D#2024-02-29', 'TOD#12:30:15.500', 'DT#2024-02-29-12:30:15'; LDATE#, LTOD#, LDT# for the types that count ns."""
-    name = base_of(t).name
-    kind = name.removeprefix("L")
-    nanoseconds = value * _DATE_UNITS_NS.get(name, 1)
-    days, in_day = divmod(nanoseconds, _UNITS_NS["d"])
-    seconds, fraction = divmod(in_day, _UNITS_NS["s"])
-    clock = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
-    if fraction:
-        digits = f"{fraction:09}"
-        clock += "." + (digits[:3] if digits.endswith("000000") else digits[:6] if digits.endswith("000") else digits)
-    if kind == "TOD":
-        return f"{name}#{clock}"
-    day = (_EPOCH + datetime.timedelta(days)).isoformat()
-    return f"D#{day}" if name == "DATE" else f"{name}#{day}" + (f"-{clock}" if kind == "DT" else "")
-
-
-# ---- text -> value -------------------------------------------------------------------------------------------------
-
-
-def parse_time(text: str, t: Type = ELEMENTARY["TIME"]) -> int:
-    """A duration such as 'T#1.5s', 'LTIME#20us' or '80ms', in the unit of `t`: ms for TIME, ns for LTIME. Raises
-    UsageError."""
-    body = re.sub(r"(?i)^l?t(ime)?#", "", text.strip()).replace("_", "").lower()
-    sign = -1 if body.startswith("-") else 1
-    parts = body.removeprefix("-")
-    matches = list(_PART.finditer(parts))
-    if not matches or "".join(m.group(0) for m in matches) != parts:
-        raise _bad(text, t, "write a duration such as T#1s500ms")
-    nanoseconds = sum(_scaled(m.group(1), _UNITS_NS[m.group(2)]) for m in matches)
-    return sign * (nanoseconds if base_of(t).size == 8 else nanoseconds // 1_000_000)
-
-
-def parse_date(text: str, t: Type) -> int:
-    """A date or time of day such as 'D#2024-02-29', '12:30:15.5' or 'LDT#2024-02-29-12:30:15', in the unit of `t`.
-    Raises UsageError."""
-    name = base_of(t).name
-    kind = name.removeprefix("L")
-    body = text.strip().rpartition("#")[2].replace("_", "")
-    match = _DATE_FORMS[kind].fullmatch(body)
-    example = {"DATE": "D#2024-02-29", "TOD": "TOD#12:30:15", "DT": "DT#2024-02-29-12:30:15"}[kind]
-    if match is None:
-        raise _bad(text, t, f"write {example}")
-    part = match.groupdict(default="0")
-    try:
-        day = datetime.date(int(part["y"]), int(part["mo"]), int(part["d"])) if kind != "TOD" else _EPOCH
-        clock = datetime.time(int(part["h"]), int(part["mi"]), int(part["s"])) if kind != "DATE" else datetime.time()
-    except ValueError:
-        raise _bad(text, t, f"there is no such day or time; write {example}") from None
-    seconds = (clock.hour * 60 + clock.minute) * 60 + clock.second
-    total = (day - _EPOCH).days * _UNITS_NS["d"] + seconds * _UNITS_NS["s"]
-    total += int(part["f"].ljust(9, "0")) if kind != "DATE" else 0
-    return total // _DATE_UNITS_NS.get(name, 1)
-
-
-def _scaled(number: str, unit: int) -> int:
-    whole, _, fraction = number.partition(".")
-    return int(whole) * unit + (int(fraction) * unit // 10 ** len(fraction) if fraction else 0)
-
-
-def parse_value(t: Type, text: str) -> Any:
-    """What a person typed for a variable of type `t`. Raises UsageError."""
-    text = text.strip()
-    if isinstance(t, StringType):
-        quoted = len(text) >= 2 and text[0] == text[-1] and text[0] in "'\""
-        return text[1:-1] if quoted else text
-    base = base_of(t)
-    if not isinstance(base, Elementary):
-        raise UsageError(f"A value of {t} cannot be written as a whole; write its parts.", "bad-value")
-    if isinstance(t, EnumType):
-        return _parse_enum(t, text)
-    if base.kind is Kind.TIME:
-        return parse_time(text, base)
-    if base.kind is Kind.DATE:
-        return parse_date(text, base)
-    if base.kind is Kind.CHAR:
-        return _parse_character(base, text)
-    typed = _TYPED.match(text)
-    if typed and typed["type"].upper() in ELEMENTARY:
-        text = typed["rest"]
-    if base.kind is Kind.BOOL:
-        return _parse_bool(t, text)
-    if base.kind is Kind.REAL:
-        try:
-            return float(text.replace("_", ""))
-        except ValueError:
-            raise _bad(text, t, "write a number such as 1.5 or -2e3") from None
-    return _parse_integer(t, text)
-
-
-def _parse_character(t: Type, text: str) -> int:
-    text = text.rpartition("#")[2] if len(text) > 2 else text
-    if len(text) == 3 and text[0] == text[-1] and text[0] in "'\"":
-        text = text[1]
-    if len(text) != 1:
-        raise _bad(text, t, "write one character")
-    return ord(text)
-
-
-def _parse_bool(t: Type, text: str) -> bool:
-    known = {"true": True, "1": True, "on": True, "false": False, "0": False, "off": False}
-    if text.lower() not in known:
-        raise _bad(text, t, "write TRUE or FALSE")
-    return known[text.lower()]
-
-
-def _parse_integer(t: Type, text: str) -> int:
-    match = re.fullmatch(r"(-?)(?:(2|8|10|16)#)?([0-9A-Fa-f_]+)", text)
-    try:
-        if match is None:
-            raise ValueError
-        value = int(match[3].replace("_", ""), int(match[2] or 10))
-    except ValueError:
-        raise _bad(text, t, "write a whole number such as 42 or 16#2A") from None
-    return -value if match[1] else value
-
-
-def _parse_enum(t: EnumType, text: str) -> int:
-    key = text.rpartition("#")[2].rpartition(".")[2].casefold()
-    for name, value in t.values.items():
-        if name.casefold() == key:
-            return value
-    if re.fullmatch(r"-?\d+", text):
-        return int(text)
-    raise _bad(text, t, f"choose one of {', '.join(t.values)}")
-
-
 # ---- value -> bytes ------------------------------------------------------------------------------------------------
 
 
@@ -252,13 +96,16 @@ def encode(t: Type, value: Any) -> bytes:
         return _encode_string(t, value)
     if isinstance(value, str):
         value = parse_value(t, value)
+    if isinstance(t, PointerType):
+        if value is not None:
+            raise bad_value(value, t, "only the program gives out addresses; write NULL or what it leads to")
+        return bytes(t.size)
     base = base_of(t)
-    if not isinstance(base, Elementary):
-        raise UsageError(f"A value of {t} cannot be written.", "bad-value")
+    assert isinstance(base, Elementary)
     if base.kind is Kind.REAL:
         return _encode_real(base, value)
     if isinstance(value, float) and not value.is_integer():
-        raise _bad(value, t, "write a whole number")
+        raise bad_value(value, t, "write a whole number")
     return _encode_integer(t, base, int(value))
 
 
@@ -266,7 +113,7 @@ def _flat(t: ArrayType, value: Any) -> list[Any]:
     items = [value]
     for low, high in t.bounds:
         if any(not isinstance(item, list | tuple) or len(item) != high - low + 1 for item in items):
-            raise _bad(value, t, f"give a list with {high - low + 1} elements")
+            raise bad_value(value, t, f"give a list with {high - low + 1} elements")
         items = [element for item in items for element in item]
     return items
 
@@ -274,21 +121,23 @@ def _flat(t: ArrayType, value: Any) -> list[Any]:
 def _encode_struct(t: StructType, value: Any) -> bytes:
     if not isinstance(value, dict):
         raise UsageError(f"A value of {t} cannot be written as a whole; write its members.", "bad-value")
+    if t.union or any(f.hidden for f in t.fields):
+        raise UsageError(f"A value of {t} cannot be written as a whole; write its members one by one.", "bad-value")
     data = bytearray(t.size)
     for f in t.fields:
         if f.name not in value:
-            raise _bad(value, t, f"the member {f.name} is missing")
+            raise bad_value(value, t, f"the member {f.name} is missing")
         data[f.offset : f.offset + f.type.size] = encode(f.type, value[f.name])
     return bytes(data)
 
 
 def _encode_string(t: StringType, value: Any) -> bytes:
     try:
-        data = str(value).encode("utf-16-le" if t.wide else "latin-1")
+        data = str(value).encode(*(("utf-16-le", "surrogatepass") if t.wide else ("latin-1",)))
     except UnicodeEncodeError:
-        raise _bad(value, t, "use only characters of Latin-1") from None
+        raise bad_value(value, t, "use only characters of Latin-1") from None
     if len(data) > t.length * t.unit or "\0" in str(value):
-        raise _bad(value, t, f"it holds at most {t.length} characters, none of them NUL")
+        raise bad_value(value, t, f"it holds at most {t.length} characters, none of them NUL")
     return data + bytes(t.size - len(data))
 
 
@@ -296,7 +145,7 @@ def _encode_real(base: Elementary, value: Any) -> bytes:
     try:
         return struct.pack("<f" if base.bits == 32 else "<d", float(value))
     except OverflowError:
-        raise _bad(value, base, "it is too large") from None
+        raise bad_value(value, base, "it is too large") from None
 
 
 def _encode_integer(t: Type, base: Elementary, value: int) -> bytes:
@@ -305,5 +154,5 @@ def _encode_integer(t: Type, base: Elementary, value: int) -> bytes:
     if isinstance(t, SubrangeType):
         low, high = t.low, t.high
     if not low <= value <= high:
-        raise _bad(value, t, f"it takes {low} to {high}")
+        raise bad_value(value, t, f"it takes {low} to {high}")
     return value.to_bytes(base.size, "little", signed=base.signed)

@@ -143,8 +143,28 @@ def test_read_gives_values_by_the_names_asked_for(tool: Any, running: FakePlc) -
     running.memory[0][12:16] = (80).to_bytes(4, "little")
     running.memory[0][16:20] = b"abc\0"
     done = tool("read", *PORT, "Main.count", "Main.ok", "Main.name", "Main.pause", "--json")
-    assert done.json == {"values": {"Main.count": 168, "Main.ok": True, "Main.name": "abc", "Main.pause": "T#80ms"}}
-    assert tool("read", *PORT, "Main.count", "Main.ok").out == "Main.count = 168\nMain.ok = TRUE\n"
+    values = {"Main.count": 168, "Main.ok": True, "Main.name": "abc", "Main.pause": "T#80ms"}
+    assert done.json == {"values": values, "consistent": True}
+
+
+def test_read_shows_values_as_st_writes_them(tool: Any, running: FakePlc) -> None:
+    running.memory[0][:5] = (168).to_bytes(4, "little") + b"\1"
+    running.memory[0][16:20] = b"ab'\0"
+    running.memory[0][28] = 7
+    done = tool("read", *PORT, "Main.count", "Main.ok", "Main.name", "Main.list")
+    assert done.out == "Main.count = 168\nMain.ok = TRUE\nMain.name = 'ab$''\nMain.list = [7, 0, 0]\n"
+    assert done.err == ""
+
+
+def test_read_says_when_the_values_are_not_of_one_cycle(tool: Any, running: FakePlc) -> None:
+    running.disturbed = 1000
+    assert "more than one cycle" in tool("read", *PORT, "Main.count", "Main.ok").err
+    assert tool("read", *PORT, "Main.count", "Main.ok", "--json").json["consistent"] is False
+
+
+def test_lists_are_written_as_a_whole(tool: Any, running: FakePlc) -> None:
+    assert tool("write", *PORT, "Main.list := [1, 2(5)]").out == "Main.list = [1, 5, 5]\n"
+    assert bytes(running.memory[0][28:34]) == bytes([1, 0, 5, 0, 5, 0])
 
 
 def test_read_of_an_unknown_name_exits_2_with_a_suggestion(tool: Any, running: FakePlc) -> None:

@@ -60,6 +60,12 @@ FUNCTION SensorSum : LREAL
 VAR_INPUT values : ARRAY[0..3] OF LREAL; int : POINTER TO INT; p : Point; END_VAR
 END_FUNCTION
 
+{attribute 'external' := 'sensor_mean'}
+FUNCTION SensorMean : REAL
+VAR_IN_OUT CONSTANT values : ARRAY[*, *] OF INT; END_VAR
+VAR_INPUT int : INT; END_VAR
+END_FUNCTION
+
 {attribute 'external' := 'sensor_best'}
 FUNCTION SensorBest : POINTER TO INT
 VAR_INPUT int : POINTER TO INT; END_VAR
@@ -92,6 +98,13 @@ def test_any_file_name_will_do(tool: Tool, library: str) -> None:
     Path(library).write_text(LIBRARY, "utf-8")
     document = tool("export-itf", library, "--json").json
     compile_c("-c", document["source"], "-o", "library.o")
+
+
+def test_an_array_of_any_size_comes_with_its_bounds(tool: Tool) -> None:
+    export(tool)
+    words = " ".join(Path("sensorsItf.h").read_text("utf-8").split())
+    bounds = ", ".join(f"RTS_I32 values_{end}{n}" for n in (1, 2) for end in ("lower", "upper"))
+    assert f"sensor_mean(RTS_I16 *values, RTS_I16 int_, {bounds})" in words
 
 
 def test_the_table_has_what_images_ask_for(tool: Tool) -> None:

@@ -80,6 +80,14 @@ def test_build_for_another_target(tool: Any, scratch: Path) -> None:
     assert tool("info", "m3.cdl", "--json").json["target"] == "cortex-m3"
 
 
+def test_build_for_small_code(tool: Any, scratch: Path) -> None:
+    timers = "".join(f"t{n} : TON;" for n in range(9))
+    calls = "".join(f"t{n}(IN := NOT t{n}.Q, PT := T#{n + 1}ms);" for n in range(9))
+    (scratch / "timers.st").write_text(f"PROGRAM Main VAR {timers} END_VAR {calls} END_PROGRAM")
+    small, normal = (tool("build", "timers.st", f"-O{level}", "--json").json["size"] for level in "s2")
+    assert small < normal
+
+
 @pytest.mark.parametrize(
     "options",
     [("--target", "z80"), ("--checks", "spelling"), ("-O7",), ("nothing.st",), ("-o", "no/such/folder/x.cdl")],
@@ -147,6 +155,28 @@ def test_info_without_symbols_has_no_pous(tool: Any, image: Path) -> None:
 def test_info_of_what_is_no_image_exits_2(tool: Any, scratch: Path, content: bytes) -> None:
     (scratch / "bad.cdl").write_bytes(content)
     assert tool("info", "bad.cdl", "--json").status == 2
+
+
+# ---- symbols ---------------------------------------------------------------------------------------------------------
+
+
+def test_symbols_lists_the_variables_with_their_types(tool: Any, counter: Path) -> None:
+    variables = tool("symbols", str(counter), "--json").json["variables"]
+    assert [v["name"] for v in variables] == ["Main.n", "Main.step", "Main.pause", "Main.text", "Main.list"]
+    assert variables[4] | {"offset": 0} == {
+        "name": "Main.list", "type": "ARRAY[1..3] OF INT", "area": "data", "offset": 0, "size": 6,
+    }  # fmt: skip
+
+
+def test_symbols_takes_patterns(tool: Any, counter: Path) -> None:
+    lines = tool("symbols", str(counter), "main.?", "*t[2]").out.splitlines()
+    assert [line.split()[0] for line in lines] == ["name", "Main.n", "Main.list[2]"]
+    assert tool("symbols", str(counter), "nothing", "--json").json == {"variables": []}
+
+
+def test_symbols_of_an_image_without_any_exits_2(tool: Any, image: Path) -> None:
+    image.with_suffix(".sym").unlink()
+    assert tool("symbols", str(image)).status == 2
 
 
 # ---- run, bench ------------------------------------------------------------------------------------------------------
@@ -258,7 +288,7 @@ def test_help_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
     assert caught.value.code == 0
     text = capsys.readouterr().out
     for command in ("build", "check", "info", "flash", "scan", "status", "start", "stop", "reset", "tasks", "read",
-                    "write", "watch", "log", "run", "bench", "demo"):  # fmt: skip
+                    "write", "watch", "log", "run", "symbols", "bench", "demo"):  # fmt: skip
         assert f"    {command} " in text
 
 
@@ -294,21 +324,6 @@ def test_a_reader_that_goes_away_is_no_error(image: Path) -> None:
     os.close(writer)
     assert done.stderr == ""
     assert done.returncode == 141
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (True, "TRUE"),
-        (-5, "-5"),
-        (1.5, "1.5"),
-        ("T#80ms", "T#80ms"),
-        ([1, [True]], "[1, [TRUE]]"),
-        ({"a": 1, "b": "x"}, "(a := 1, b := x)"),
-    ],
-)
-def test_values_look_like_st(value: Any, text: str) -> None:
-    assert output.value_text(value) == text
 
 
 def test_tables_align_numbers_right() -> None:

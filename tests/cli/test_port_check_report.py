@@ -6,7 +6,7 @@ import pytest
 
 from plctool.errors import LinkError
 from plctool.link.services import Identity
-from plctool.port_check import CheckFailed, NotReported, Report, _run, outcome_text, summary_text
+from plctool.port_check.report import CheckFailed, NotAvailable, Report, judge, outcome_text, summary_text
 
 IDENTITY = Identity("Device", "Vendor", "node", "1", 0x1000, 0x9001, "1.0.0.0", "1.0.0.0")
 
@@ -15,14 +15,14 @@ def ends_with(error):
     def check():
         raise error
 
-    return _run("name", check)
+    return judge("name", check)
 
 
 @pytest.mark.parametrize(
     "error, verdict, text, figures",
     [
         (CheckFailed("too slow", rate=7), "failed", "too slow", {"rate": 7}),
-        (NotReported("not built in"), "not reported", "not built in", {}),
+        (NotAvailable("not built in"), "not available", "not built in", {}),
         (LinkError("The line is gone."), "failed", "The line is gone.", {}),
     ],
 )
@@ -33,8 +33,10 @@ def test_the_end_of_a_check_is_its_verdict(error, verdict, text, figures):
 
 
 def test_report_counts_verdicts():
-    outcomes = [_run("good", lambda: ("fine", {})), ends_with(CheckFailed("bad")), ends_with(NotReported("silent"))]
+    outcomes = [judge("good", lambda: ("fine", {})), ends_with(CheckFailed("bad")), ends_with(NotAvailable("silent"))]
     report = Report(IDENTITY, "x86_64-linux", outcomes)
     document = report.document()
-    assert (document["passed"], document["failed"], document["not_reported"]) == (1, 1, 1)
-    assert summary_text(report) == "1 passed, 1 failed, 1 not reported"
+    assert (document["passed"], document["failed"], document["not_available"]) == (1, 1, 1)
+    who, counts = summary_text(report).split("\n")
+    assert who == "Device of Vendor, version 1.0.0.0, serial number 1, runtime 1.0.0.0, x86_64-linux"
+    assert counts == "1 passed, 1 failed, 1 not available"

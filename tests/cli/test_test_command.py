@@ -5,10 +5,13 @@ from __future__ import annotations
 import shutil
 import time
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 from conftest import Done, Tool
+
+from plctool.sim import Simulator
 
 ROOT = Path(__file__).parents[2]
 PASSING = sorted((ROOT / "tests" / "st_unit").glob("*.st"))
@@ -174,6 +177,30 @@ def test_an_endless_loop_ends(tool: Tool) -> None:
     assert (found["kind"], found["line"]) == ("WATCHDOG", 3)
 
 
+def test_teardown_runs_after_an_exception_on_the_variables_as_they_are(tool: Tool, monkeypatch: Any) -> None:
+    text = (
+        "VAR_GLOBAL seen : INT; END_VAR\n"
+        "SETUP VAR x : INT; END_VAR END_SETUP\nTEARDOWN seen := x + 1; END_TEARDOWN\n"
+        "TEST 't' x := 41; x := x / seen; END_TEST"
+    )
+    found: list[int] = []
+    close = Simulator.close
+    monkeypatch.setattr(Simulator, "close", lambda plc: (found.append(plc.read("seen")), close(plc)))
+    assert tool("test", str(write(text))).status == 1
+    assert found == [42]
+
+
+def test_an_endless_loop_in_teardown_ends_too(tool: Tool) -> None:
+    before = "TEARDOWN WHILE TRUE DO ; END_WHILE END_TEARDOWN\n"
+    assert failure(tool, "VAR i : INT; END_VAR i := 1 / i;", before)["kind"] == "DIVIDEBYZERO"
+
+
+def test_an_exception_tells_the_unit_it_happened_in(tool: Tool) -> None:
+    before = "FUNCTION_BLOCK B\nMETHOD m : INT\nm := 1 / m;\nEND_METHOD\nEND_FUNCTION_BLOCK\n"
+    found = failure(tool, "VAR b : B; i : INT; END_VAR\ni := b.m();", before)
+    assert (found["pou"], found["line"], found["text"]) == ("B.m", 3, "division by zero in B.m")
+
+
 def test_a_failing_setup_keeps_the_test_from_running(tool: Tool) -> None:
     before = "SETUP\nASSERT_TRUE(FALSE, 'setup');\nEND_SETUP\n"
     assert failure(tool, "ASSERT_TRUE(FALSE, 'test');", before)["message"] == "setup"
@@ -220,10 +247,12 @@ def test_a_block_that_was_not_called_is_told(tool: Tool) -> None:
         ("ASSERT_NEAR(1.0, 2.0);", "ASSERT_NEAR takes 3 arguments"),
         ("ASSERT_NEAR('a', 'b', 'c');", "cannot combine"),
         ("ASSERT_EQ(actual := 1, expected := 1);", "have no names"),
-        ("ADVANCE_TIME(5);", "a duration such as T#10ms"),
+        ("ADVANCE_TIME('5');", "a duration such as T#10ms"),
+        ("ADVANCE_TIME(-T#5s);", "time does not go back"),
         ("ASSERT_EQ(x, 1);", "unknown name x"),
         ("MOCK i;", "MOCK needs an instance of a function block"),
-        ("MOCK t;", "MOCK needs an instance of a function block"),
+        ("MOCK_FUNCTION t.Q RETURNS 1;", "a method of an instance"),
+        ("MOCK b.m;", "for a method write MOCK_FUNCTION"),
         ("MOCK_FUNCTION Nobody RETURNS 1;", "there is no function Nobody"),
         ("MOCK_FUNCTION F GIVES 1;", "expected RETURNS"),
         ("MOCK_FUNCTION F RETURNS 'a';", "STRING"),
@@ -232,8 +261,8 @@ def test_a_block_that_was_not_called_is_told(tool: Tool) -> None:
     ],
 )
 def test_mistakes_in_tests_are_compile_errors(tool: Tool, body: str, words: str) -> None:
-    before = "FUNCTION F : INT\nEND_FUNCTION\n"
-    done = diagnoses(tool, f"{before}TEST 't'\nVAR i : INT; t : TON; END_VAR\n{body}\nEND_TEST")
+    before = "FUNCTION F : INT END_FUNCTION\nFUNCTION_BLOCK B METHOD m : INT m := 1; END_METHOD END_FUNCTION_BLOCK\n"
+    done = diagnoses(tool, f"{before}TEST 't'\nVAR i : INT; t : TON; b : B; END_VAR\n{body}\nEND_TEST")
     assert words in done.err
     assert "program.st:5:" in done.err or "program.st:6:" in done.err
 
@@ -292,6 +321,18 @@ def test_filter_chooses_by_name(tool: Tool) -> None:
     assert [test["name"] for test in done.json["tests"]] == ["good"]
     assert done.status == 0
     assert tool("test", "program.st", "--filter", "nothing").status == 2
+
+
+def test_a_filter_without_wildcards_is_a_part_of_the_name(tool: Tool) -> None:
+    done = tool("test", str(write(TWO)), "-k", "OO", "--json")
+    assert [test["name"] for test in done.json["tests"]] == ["good"]
+
+
+def test_warnings_are_told(tool: Tool) -> None:
+    path = str(write("TEST 't' VAR unneeded : INT; END_VAR END_TEST"))
+    done = tool("test", path)
+    assert "program.st:1:14: warning: unneeded is never used" in done.err
+    assert [w["code"] for w in tool("test", path, "--json").json["warnings"]] == ["unused"]
 
 
 def test_junit_report_holds_every_test(tool: Tool) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 
 from plctool.compiler import typed
+from plctool.compiler.conversions import SIGNED
 from plctool.compiler.front import CheckResult, Source, check_sources
 from plctool.compiler.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import Binary, BinaryOp, Call, Const, Pou, Statement, TypedProgram, Variable
@@ -104,7 +105,9 @@ def _verify_node(node: object) -> None:
     elif isinstance(node, typed.If):
         assert all(condition.type is BOOL for condition, _ in node.branches)
     elif isinstance(node, typed.For):
-        assert node.start.type == node.stop.type == node.step.type == base_of(node.var.type)
+        counter = base_of(node.var.type)
+        assert node.start.type == node.stop.type == counter
+        assert node.step.type in (counter, SIGNED[counter.size * 8])
     elif isinstance(node, typed.FbCall):
         for target, value in node.inputs:
             _verify_assignment(target.type, value.type)

@@ -264,7 +264,7 @@ def meaningful(symbols: SymbolTable, memory: bytes) -> bytes:
     """The data area without addresses, and without what is behind the NUL of strings."""
     data = bytearray(memory)
     for variable in symbols.variables.values():
-        for leaf in symbols.leaves(variable):
+        for leaf in variable.leaves():
             end = leaf.offset + leaf.size
             if isinstance(leaf.type, PointerType):
                 data[leaf.offset : end] = bytes(leaf.size)
@@ -291,5 +291,5 @@ def test_optimised_programs_do_the_same(seed: int, monkeypatch: pytest.MonkeyPat
     expected = outcome(Generator(seed).program(), 0)
     assert outcome(Generator(seed).program(), 2) == expected
     if seed % 6 == 0:
-        monkeypatch.setattr("plctool.compiler.lower._WHOLE", 5000)
+        monkeypatch.setattr("plctool.compiler.partition._WHOLE", 100)
         assert outcome(Generator(seed).program(), 2) == expected

@@ -8,13 +8,16 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
+from plctool.compiler.build import BuildResult
 from plctool.compiler.front import check_sources
 from plctool.compiler.lower import lower
 from plctool.compiler.lower_unit import Options
 from plctool.compiler.source import Source
 from plctool.compiler.targets import TARGETS, find_target
 from plctool.compiler.typed import TypedProgram
+from plctool.core import lib
 from plctool.errors import UsageError
+from plctool.sim import Simulator
 from plctool.symbols import SymbolTable
 
 FAMILY = """
@@ -130,3 +133,56 @@ def test_properties_cannot_be_read_by_name(tmp_path: Path) -> None:
     symbols = SymbolTable.from_json(compile_sources([file]).symbols.to_json())
     with pytest.raises(UsageError, match=r"Main\.b\.p is a property"):
         symbols.resolve("Main.b.p")
+
+
+LEAVING = """
+VAR_GLOBAL RETAIN log : STRING; END_VAR
+FUNCTION_BLOCK Base
+VAR_INPUT n : INT; END_VAR
+METHOD FB_Exit : BOOL
+VAR_INPUT bInCopyCode : BOOL; END_VAR
+log := CONCAT(log, CONCAT('b', INT_TO_STRING(n)));
+END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Derived EXTENDS Base
+METHOD FB_Exit : BOOL
+VAR_INPUT bInCopyCode : BOOL; END_VAR
+log := CONCAT(log, CONCAT('d', INT_TO_STRING(n)));
+END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Holder
+VAR inner : Base := (n := 5); END_VAR
+METHOD FB_Exit
+log := CONCAT(log, 'h');
+END_METHOD
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR
+    first : Base := (n := 1);
+    second : Derived := (n := 2);
+    holder : Holder;
+    several : ARRAY[1..2] OF Base := [(n := 7), (n := 8)];
+END_VAR
+first(); second(); holder(); several[1]();
+END_PROGRAM
+"""
+
+
+def built_from(folder: Path, text: str) -> BuildResult:
+    file = folder / "f.st"
+    file.write_text(text, "latin-1")
+    return compile_sources([file])
+
+
+def test_fb_exit_runs_in_the_opposite_order_of_fb_init_before_a_reset(tmp_path: Path) -> None:
+    built = built_from(tmp_path, LEAVING)
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(2)
+        assert plc.read("log") == ""
+        plc.reset(lib.RESET_OPTION_WARM)
+        assert plc.read("log") == "b8b7hb5d2b2b1"
+
+
+def test_without_fb_exit_the_image_has_no_such_function() -> None:
+    program = checked(FAMILY + CALL.format(instances="d : Derived;"))
+    assert program.shutdown is None

@@ -182,7 +182,7 @@ def test_result_that_is_not_used_is_fine_for_a_call_with_effects() -> None:
         ("i := Add3(r, 1);", "11: REAL does not fit INT by itself; write REAL_TO_INT(...)"),
         ("i := Add4(1);", "6: unknown function Add4; did you mean Add3?"),
         ("i := i(1);", "6: i is not a function"),
-        ("i := Main(1);", "6: the program Main is run by a task and cannot be called"),
+        ("i := Main(1);", "6: a call of the program Main is a statement and has no value"),
         ("i := COUNTER(1);", "6: COUNTER is a function block type; declare an instance of it and call that"),
         ("i := Proc(s);", "6: nothing does not fit INT"),
         ("i := SHL(1);", "6: SHL takes 2 arguments, not 1"),
@@ -324,7 +324,7 @@ def test_library_is_checked_only_where_it_is_used() -> None:
 
 def test_conversion_to_text_calls_the_library() -> None:
     c = body_of("s : STRING; i : INT;", "s := INT_TO_STRING(i);")[0].value  # type: ignore[union-attr]
-    assert c.function.name == "INT_TO_STRING"  # type: ignore[union-attr]
+    assert c.function.name == "DINT_TO_STRING"  # type: ignore[union-attr]
 
 
 # ---- function blocks ----
@@ -381,13 +381,19 @@ def test_wrong_use_of_a_function_block_is_explained(statement: str, message: str
     assert faults(statement) == [message]
 
 
-def test_inputs_of_an_instance_may_be_assigned_and_all_may_be_read() -> None:
-    assert faults("c.UP := b; b2 := c.Q; b := c.LAST; i := c.LIMIT;") == []
+def test_inputs_of_an_instance_may_be_assigned_and_inputs_outputs_and_constants_read() -> None:
+    assert faults("c.UP := b; b2 := c.Q; b := c.UP; i := c.LIMIT;") == []
 
 
-def test_function_block_in_a_function_needs_memory_elsewhere() -> None:
-    (message,) = messages("FUNCTION F : INT VAR t : TON; END_VAR END_FUNCTION")
-    assert "FUNCTION_BLOCK or PROGRAM" in message
+def test_variable_of_an_instance_is_not_written_from_outside() -> None:
+    assert "local variable" in faults("c.LAST := b;")[0]
+
+
+def test_function_block_in_a_function_lives_for_one_call() -> None:
+    text = "FUNCTION F : INT VAR t : TON; END_VAR t(); F := 1; END_FUNCTION"
+    (message,) = [m for m in messages(text, "warning") if "anew" in m]
+    assert "FUNCTION_BLOCK" in message
+    assert messages(text) == []
 
 
 def test_string_in_out_of_a_function_block_must_be_long_enough() -> None:

@@ -48,6 +48,14 @@ def test_without_configuration_several_programs_are_an_error() -> None:
     ]
 
 
+def test_task_takes_a_watchdog_time_and_its_sensitivity() -> None:
+    guarded, plain = tasks(
+        "TASK a(INTERVAL := T#10ms, WATCHDOG := T#5ms, SENSITIVITY := 3); TASK b(INTERVAL := T#10ms);"
+    )
+    assert (guarded.watchdog_us, guarded.watchdog_sensitivity) == (5_000, 3)
+    assert (plain.watchdog_us, plain.watchdog_sensitivity) == (0, 1)
+
+
 def test_nothing_to_run_is_a_warning() -> None:
     text = "FUNCTION_BLOCK F END_FUNCTION_BLOCK"
     assert messages(text, "warning") == ["1:1: there is no PROGRAM, so nothing would run"]
@@ -135,11 +143,24 @@ def test_globals_of_a_configuration_are_known_everywhere() -> None:
         ("TASK t(INTERVAL := T#-1s);", "2:20: INTERVAL has to lie between 0 and 35 minutes"),
         ("TASK t(PRIORITY := 32);", "2:20: PRIORITY is 0 (highest) to 31, not 32"),
         ("TASK t(SINGLE := 5);", "2:18: SINGLE is a global BOOL variable"),
-        ("TASK t(SPEED := 5);", "2:8: a TASK has INTERVAL, PRIORITY and SINGLE, not SPEED"),
-        ("PROGRAM one : P(x := 5);", "2:17: P has no input x"),
+        (
+            "TASK t(SINGLE := %IX0.1);",
+            "2:18: SINGLE is a global BOOL variable, not a bit at an address: copy that to one in another task",
+        ),
+        (
+            "TASK t(SPEED := 5);",
+            "2:8: a TASK has INTERVAL, PRIORITY, SINGLE, WATCHDOG and SENSITIVITY, not SPEED",
+        ),
+        ("TASK t(WATCHDOG := 5);", "2:20: WATCHDOG is a duration such as T#10ms, not integer constant"),
+        ("TASK t(WATCHDOG := T#2h);", "2:20: WATCHDOG has to lie between 0 and 35 minutes"),
+        ("TASK t(WATCHDOG := T#1s, SENSITIVITY := 0);", "2:41: SENSITIVITY is 1 to 65535, not 0"),
+        (
+            "TASK t(SENSITIVITY := 2);",
+            "2:8: SENSITIVITY says how often in a row a cycle may be longer than WATCHDOG, which is missing",
+        ),
+        ("PROGRAM one : P(x := 5);", "2:17: one has no parameter x"),
         ("PROGRAM one : P(a := TRUE);", "2:22: BOOL does not fit INT by itself; write BOOL_TO_INT(...)"),
-        ("PROGRAM one : P(o => 5);", "2:22: an output needs a variable"),
-        ("PROGRAM one : P(5);", "2:17: write name := value or name => variable"),
+        ("PROGRAM one : P(o => 5);", "2:22: the output o needs a variable"),
     ],
 )
 def test_wrong_configuration_is_explained(items: str, message: str) -> None:

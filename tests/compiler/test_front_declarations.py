@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from front_support import check, findings, main, messages, program, variable
 
+from plctool.compiler.front import Source, check_sources
 from plctool.compiler.typed import Area, ArrayInit, Const, ScalarInit, Storage, StructInit, TypedProgram
 from plctool.compiler.types import ArrayType, EnumType, StringType, StructType, SubrangeType
 
@@ -197,7 +198,6 @@ def test_defaults_of_a_function_block_hold_those_of_its_parts() -> None:
         ("INT := 1.5", "REAL_TO_INT"),
         ("INT := 'a'", "does not fit INT"),
         ("BOOL := 2", "does not fit BOOL"),
-        ("INT := w", "constant"),
         ("ARRAY[1..2] OF INT := [1, 2, 3]", "3 initial values for the 2 elements"),
         ("INT := [1]", "does not initialise INT"),
         ("INT := (a := 1)", "does not initialise INT"),
@@ -273,7 +273,6 @@ def test_area_reaches_to_the_last_address() -> None:
         ("v AT %IW0 : DINT;", "has 32 bits"),
         ("v AT %IB1 : ARRAY[0..1] OF DINT;", "multiple of 4"),
         ("v AT %IB70000 : BYTE;", "too far"),
-        ("v AT %I* : BOOL;", "not supported"),
     ],
 )
 def test_wrong_address_is_explained(declared: str, words: str) -> None:
@@ -342,8 +341,6 @@ def test_scalar_constants_take_no_memory() -> None:
 
 
 def files(**texts: str) -> TypedProgram:
-    from plctool.compiler.front import Source, check_sources
-
     result = check_sources([Source(f"{name}.st", text) for name, text in texts.items()])
     assert result.program is not None, result.diagnostics
     return result.program
@@ -365,8 +362,6 @@ def test_global_in_two_lists_needs_the_name_of_its_list() -> None:
     gvl = "VAR_GLOBAL x : INT; END_VAR"
     p = files(A=gvl, B=gvl, m=main("v : INT;", "v := A.x + B.x;"))
     assert [v.name for v in p.globals][:2] == ["A.x", "B.x"]
-    from plctool.compiler.front import Source, check_sources
-
     found = check_sources([Source("A.st", gvl), Source("B.st", gvl), Source("m.st", main("v : INT;", "v := x;"))])
     assert [d.message for d in found.diagnostics] == ["x is in several lists; write A.x or B.x"]
 
@@ -404,3 +399,15 @@ def test_folded_constant_keeps_its_declared_type() -> None:
     (assign,) = program(text).programs["Main"].body
     assert isinstance(assign.value, Const)  # type: ignore[union-attr]
     assert str(assign.value.type) == "DINT"  # type: ignore[union-attr]
+
+
+def test_external_variable_of_several_lists_is_an_error() -> None:
+    lists = [Source(f"{name}.st", "VAR_GLOBAL x : INT; END_VAR") for name in ("one", "two")]
+    main_file = Source("main.st", "PROGRAM Main VAR_EXTERNAL x : INT; END_VAR x := 1; END_PROGRAM")
+    found = [d.message for d in check_sources([*lists, main_file]).diagnostics if d.severity == "error"]
+    assert "one.x or two.x" in found[0]
+
+
+def test_external_variable_may_be_one_of_the_same_namespace() -> None:
+    text = "NAMESPACE N VAR_GLOBAL x : INT; END_VAR\nFUNCTION_BLOCK F VAR_EXTERNAL x : INT; END_VAR x := 1;\n"
+    assert messages(text + "END_FUNCTION_BLOCK END_NAMESPACE") == []

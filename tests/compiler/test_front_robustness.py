@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -187,3 +188,10 @@ def test_ten_thousand_lines_take_no_more_than_a_few_seconds() -> None:
     started = time.process_time()
     assert check(main(VARIABLES, block * 2000)).ok
     assert time.process_time() - started < 5
+
+
+def test_the_recursion_limit_of_the_process_stays_as_it_was() -> None:
+    limit = sys.getrecursionlimit()
+    nested = "(" * 300 + "1" + ")" * 300
+    check_sources([Source("f.st", f"PROGRAM Main VAR i : INT; END_VAR i := {nested}; END_PROGRAM")])
+    assert sys.getrecursionlimit() == limit

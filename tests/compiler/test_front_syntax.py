@@ -125,7 +125,7 @@ def test_assignments_may_be_chained_from_the_right() -> None:
         ("END_IF;", "5:1: END_IF without an IF"),
         ("ELSE x := 1;", "5:1: ELSE without an IF"),
         ("x = 5;", "5:3: an assignment is written :=, not ="),
-        ("x == 5;", "5:3: an assignment is written :=, not ="),
+        ("x == 5;", "5:3: a comparison is written =, an assignment :=; there is no =="),
         ("CASE x OF 1: y := 1; 2 y := 3; END_CASE;", "5:23: expected :"),
         ("CASE x OF y := 1; END_CASE", "5:11: this statement stands before the first label of the CASE"),
         ("x := 'abc;", "5:6: this string is not closed before the end of the line"),

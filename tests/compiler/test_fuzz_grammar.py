@@ -301,7 +301,7 @@ def checked(text: str) -> CheckResult:
 def canonical(symbols: SymbolTable, memory: bytes) -> bytes:
     """The data without what has no meaning; that includes the sign of a NaN, which IEEE 754 leaves open."""
     data = bytearray(meaningful(symbols, memory))
-    for leaf in (leaf for variable in symbols.variables.values() for leaf in symbols.leaves(variable)):
+    for leaf in (leaf for variable in symbols.variables.values() for leaf in variable.leaves()):
         if leaf.area == Area.DATA.value and leaf.type in (REAL, LREAL):
             (value,) = struct.unpack_from("<f" if leaf.type == REAL else "<d", data, leaf.offset)
             if math.isnan(value):

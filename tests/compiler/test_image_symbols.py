@@ -1,8 +1,7 @@
-"""The symbol file: names to places, values to text, code to lines."""
+"""The symbol file: names to places, code to lines."""
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
@@ -15,19 +14,17 @@ from plctool.compiler.types import (
     DINT,
     INT,
     LREAL,
-    LTIME,
-    REAL,
-    SINT,
     TIME,
     UDINT,
-    ULINT,
-    USINT,
     WORD,
     ArrayType,
-    Elementary,
     EnumType,
     Field,
+    InterfaceType,
+    OpenArrayType,
     PointerType,
+    RawPointerType,
+    ReferenceType,
     StringType,
     StructType,
     SubrangeType,
@@ -37,14 +34,13 @@ from plctool.errors import UsageError
 from plctool.symbols import (
     CodeUnit,
     SourceLine,
-    Symbol,
     SymbolTable,
     cache_path,
     find_symbols,
     load_symbols,
     symbol_path,
 )
-from plctool.values import decode, encode, format_time, parse_time, parse_value
+from plctool.variables import Symbol, constant_symbol, unreachable
 
 
 def point() -> StructType:
@@ -60,6 +56,11 @@ BLOCK = StructType(
     [Field("q", BOOL), Field("arr", ArrayType(POINT, ((2, 4),))), Field("grid", ArrayType(INT, ((0, 1), (-1, 1))))],
 )
 BLOCK.lay_out()
+NODE = StructType("Node", [Field("%class", UDINT), Field("value", INT)])
+NODE.fields.append(Field("next", PointerType(NODE)))
+NODE.fields.append(Field("list", ReferenceType(ArrayType(INT, ((1, 3),)))))
+NODE.lay_out()
+TITLE = constant_symbol("Main.title", StringType(4), b"abc\0\0")
 
 
 def table() -> SymbolTable:
@@ -72,15 +73,27 @@ def table() -> SymbolTable:
         "Main.level": (0, 122, SubrangeType("INT(1..10)", INT, 1, 10)),
         "Main.p": (0, 128, PointerType(POINT)),
         "total": (0, 136, TIME),
+        "Main.head": (0, 144, PointerType(NODE)),
+        "Main.ref": (0, 152, ReferenceType(POINT)),
+        "Main.raw": (0, 160, RawPointerType(WORD)),
+        "Main.itf": (0, 168, InterfaceType(StructType("IDrive"))),
+        "Main.open": (0, 176, ReferenceType(OpenArrayType(INT, ((0, -1),)))),
+        "GVL.x": (0, 184, DINT),
+        "%hidden": (0, 188, DINT),
     }
     symbols = {name: Symbol(name, *place) for name, place in variables.items()}
     units = [
-        CodeUnit("Main", 16, 100, "a.st", 10),
+        CodeUnit("Main", 16, 100, "a.st", 10, ["tmp"]),
         CodeUnit("Fb", 0, 0, "a.st", 2),
+        CodeUnit("Node", 0, 0, "a.st", 5, ["Swap"]),
         CodeUnit("Other", 116, 20, "b.st", 1),
     ]
     lines = [(0, -1, 0), (16, 0, 11), (20, 0, 4), (24, 0, 0), (40, 0, 12), (116, 1, 3), (136, -1, 0)]
-    return SymbolTable(0xCAFE, "x86_64-linux", "demo", ["task"], symbols, units, lines, ["a.st", "b.st"])
+    return SymbolTable(
+        0xCAFE, "x86_64-linux", "demo", ["task"], symbols, units, lines, ["a.st", "b.st"],
+        {"x": "GVL.x", "gone": "GVL.gone"}, {"Motor": 1, "Pump": 2},
+        {"Main.limit": constant_symbol("Main.limit", WORD, b"\7\1"), "Main.title": TITLE},
+    )  # fmt: skip
 
 
 # ---- names ----
@@ -125,7 +138,19 @@ def test_paths_are_resolved(path: str, area: int, offset: int, t: Type, bit: int
         ("Main.word.3.1", "has no parts"),
         ("Main.n[1]", "cannot be indexed"),
         ("Main.text[11]", "has the characters 0 to 9"),
-        ("Main.p^.x", "is a reference"),
+        ("Main.p.x", "write Main.p^.x"),
+        ("Main.p[1]", "write Main.p^[1]"),
+        ("Main.n^", "no pointer"),
+        ("Main.ref^", "no pointer"),
+        ("Main.p^^", "no pointer"),
+        ("Main.itf.speed", "the class of its instance"),
+        ("Main.itf^", "no pointer"),
+        ("Main.open[1]", "whose bounds change with each call"),
+        ("Main.open", "whose bounds change with each call"),
+        ("Main.tmp", "lives only while Main runs"),
+        ("main.TMP", "lives only while main runs"),
+        ("Main.head^.swap", "lives only while Node runs"),
+        ("Main.head^.valu", "Did you mean Main.head^.value?"),
         ("Main.fb.arr[2", "cannot be read"),
     ],
 )
@@ -133,6 +158,97 @@ def test_wrong_paths_get_a_sentence(path: str, words: str) -> None:
     with pytest.raises(UsageError) as error:
         table().resolve(path)
     assert words in error.value.message
+
+
+@pytest.mark.parametrize(
+    ("path", "place", "t"),
+    [
+        ("Main.p^", (0, 128, (0,)), POINT),
+        ("main.P^.Y", (0, 128, (8,)), LREAL),
+        ("Main.raw^", (0, 160, (0,)), WORD),
+        ("Main.ref", (0, 152, (0,)), POINT),
+        ("Main.ref.y", (0, 152, (8,)), LREAL),
+        ("Main.head^.next", (0, 144, (8,)), PointerType(NODE)),
+        ("Main.head^.next^.value", (0, 144, (8, 4)), INT),
+        ("Main.head^.next^.list[3]", (0, 144, (8, 16, 4)), INT),
+        ("Main.head^.list", (0, 144, (16, 0)), ArrayType(INT, ((1, 3),))),
+    ],
+)
+def test_pointers_and_references_are_part_of_the_place(
+    path: str, place: tuple[int, int, tuple[int, ...]], t: Type
+) -> None:
+    symbol = table().resolve(path)
+    assert (symbol.place, symbol.type) == (place, t)
+
+
+def test_bits_behind_pointers_are_read() -> None:
+    symbol = table().resolve("Main.raw^.9")
+    assert (symbol.place, symbol.bit) == ((0, 160, (0,)), 9)
+    assert symbol.decode(b"\0\2") is True
+
+
+def test_an_interface_variable_shows_the_class_of_its_instance() -> None:
+    symbol = table().resolve("Main.itf")
+    assert symbol.place == (0, 168, (0,))
+    assert symbol.decode((2).to_bytes(4, "little")) == "Pump"
+    with pytest.raises(UsageError, match="only the program"):
+        symbol.check_writable(symbol.area)
+
+
+@pytest.mark.parametrize(("path", "value"), [("main.LIMIT", 263), ("Main.limit.8", True), ("Main.title[1]", 98)])
+def test_constants_have_their_value_in_the_file(path: str, value: object) -> None:
+    symbol = SymbolTable.from_json(table().to_json()).resolve(path)
+    assert symbol.fixed is not None and symbol.decode(symbol.fixed) == value
+    with pytest.raises(UsageError, match="is a constant"):
+        symbol.check_writable(symbol.area)
+
+
+def test_constants_that_lie_in_memory_cannot_be_written_either() -> None:
+    symbols = SymbolTable(1, "t", "", [], {"list": Symbol("list", 0, 0, BLOCK, constant=True)})
+    with pytest.raises(UsageError, match="is a constant"):
+        SymbolTable.from_json(symbols.to_json()).resolve("list.arr[3].x").check_writable(0)
+
+
+def test_other_names_of_globals_are_known() -> None:
+    assert table().resolve("X") == table().resolve("gvl.x")
+    with pytest.raises(UsageError, match=r"Did you mean GVL\.x\?"):
+        table().resolve("GVLx")
+
+
+@pytest.mark.parametrize(
+    ("held", "code", "words"),
+    [
+        ([b"\1" * 8, bytes(8)], "null", "Main.head^.next is NULL"),
+        ([bytes(8), None], "null", "Main.head is NULL"),
+        ([b"\1" * 8, b"\2" * 8], "no-target", "Main.head^.next leads to no variable"),
+        ([b"\1" * 8, None], "no-target", "Main.head leads to no variable"),
+    ],
+)
+def test_the_pointer_that_leads_nowhere_is_named(held: list[bytes | None], code: str, words: str) -> None:
+    by_name = dict(zip(("Main.head", "Main.head^.next"), held, strict=True))
+    error = unreachable(table().resolve("Main.head^.next^.value"), lambda pointer: by_name[pointer.name])
+    assert error.code == code
+    assert "Main.head^.next^.value cannot be reached" in error.message and words in error.message
+
+
+@pytest.mark.parametrize(
+    ("patterns", "names"),
+    [
+        (["main.fb*"], ["Main.fb", "Main.fb.q", "Main.fb.arr", "Main.fb.grid"]),
+        (["*.arr[3]*"], ["Main.fb.arr[3]", "Main.fb.arr[3].x", "Main.fb.arr[3].y"]),
+        (["Main.?"], ["Main.n", "Main.p"]),
+        (["gvl.x", "Main.n"], ["Main.n", "GVL.x"]),
+        (["nothing"], []),
+        (["*hidden*"], []),
+    ],
+)
+def test_variables_are_found_by_pattern(patterns: list[str], names: list[str]) -> None:
+    assert [symbol.name for symbol in table().find(patterns)] == names
+
+
+def test_without_a_pattern_all_variables_are_listed_as_they_were_declared() -> None:
+    names = [symbol.name for symbol in table().find([])]
+    assert names[:3] == ["Main.n", "Main.word", "Main.fb"] and names[-3:] == ["GVL.x", "Main.limit", "Main.title"]
 
 
 @settings(max_examples=300, deadline=None)
@@ -145,8 +261,7 @@ def test_any_text_is_resolved_or_refused(path: str) -> None:
 
 
 def test_leaves_are_the_scalars_of_a_variable() -> None:
-    symbols = table()
-    assert [s.name for s in symbols.leaves(symbols.resolve("Main.fb"))] == [
+    assert [s.name for s in table().resolve("Main.fb").leaves()] == [
         "Main.fb.q",
         *(f"Main.fb.arr[{i}].{m}" for i in (2, 3, 4) for m in "xy"),
         *(f"Main.fb.grid[{i},{k}]" for i in (0, 1) for k in (-1, 0, 1)),
@@ -155,7 +270,7 @@ def test_leaves_are_the_scalars_of_a_variable() -> None:
 
 def test_every_leaf_resolves_to_itself() -> None:
     symbols = table()
-    for leaf in symbols.leaves(symbols.resolve("Main.fb")):
+    for leaf in symbols.resolve("Main.fb").leaves():
         assert symbols.resolve(leaf.name) == leaf
 
 
@@ -172,6 +287,23 @@ def test_the_file_is_read_as_it_was_written(tmp_path: Path, monkeypatch: pytest.
     assert read.lines == original.lines and read.pous == original.pous
 
 
+@pytest.mark.parametrize("path", ["Main.head^.next^.list[3]", "Main.ref.y", "Main.raw^.9", "Main.itf", "x"])
+def test_pointers_are_read_from_the_file_as_they_were_written(path: str) -> None:
+    read, original = SymbolTable.from_json(table().to_json()).resolve(path), table().resolve(path)
+    assert (read.place, read.bit, read.type.name) == (original.place, original.bit, original.type.name)
+
+
+def test_members_keep_their_offsets_in_the_file() -> None:
+    base = StructType("Base", [Field("a", LREAL), Field("b", BOOL)])
+    base.lay_out()
+    derived = StructType("Derived", [*base.fields, Field("c", BOOL)], base=base)
+    derived.lay_out()
+    symbols = SymbolTable(1, "t", "", [], {"d": Symbol("d", 0, 0, derived)})
+    read = SymbolTable.from_json(symbols.to_json())
+    assert read.resolve("d.c").offset == derived.fields[2].offset
+    assert read.resolve("d").size == derived.size
+
+
 def test_types_that_refer_to_themselves_are_kept() -> None:
     node = StructType("Node", [Field("value", INT)])
     node.fields.append(Field("next", PointerType(node)))
@@ -182,7 +314,7 @@ def test_types_that_refer_to_themselves_are_kept() -> None:
     assert isinstance(found, PointerType) and found.target is read.resolve("list").type
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[]", "null", '{"format":1}', '{"format":2}', '{"format":1,"types":3}'])
+@pytest.mark.parametrize("text", ["", "{}", "[]", "null", '{"format":1}', '{"format":2}', '{"format":2,"types":3}'])
 def test_what_is_no_symbol_file_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="symbol file"):
         SymbolTable.from_json(text)
@@ -226,114 +358,3 @@ def test_symbols_of_another_image_are_refused(tmp_path: Path, monkeypatch: pytes
 )
 def test_code_offsets_become_lines(offset: int, expected: SourceLine | None) -> None:
     assert table().address_to_line(offset) == expected
-
-
-# ---- values ----
-
-NUMBERS = [SINT, USINT, INT, WORD, DINT, UDINT, ULINT]
-
-
-@pytest.mark.parametrize("t", NUMBERS, ids=str)
-def test_numbers_are_read_as_they_were_written(t: Elementary) -> None:
-    low = -(1 << (t.bits - 1)) if t.signed else 0
-
-    @settings(max_examples=50, deadline=None)
-    @given(st.integers(low, low + (1 << t.bits) - 1))
-    def check(value: int) -> None:
-        assert decode(t, encode(t, value)) == value
-        assert parse_value(t, str(value)) == value
-
-    check()
-
-
-@given(st.floats(width=32))
-def test_reals_are_shown_with_the_fewest_digits_that_read_back(value: float) -> None:
-    shown = decode(REAL, encode(REAL, value))
-    if math.isfinite(value):
-        assert encode(REAL, shown) == encode(REAL, value)
-        assert len(repr(shown)) <= len(repr(value))
-    else:
-        assert shown in ("NaN", "Infinity", "-Infinity")
-        assert encode(REAL, shown) == encode(REAL, float(shown))
-
-
-@given(st.floats(allow_nan=False, allow_infinity=False))
-def test_lreals_are_read_as_they_were_written(value: float) -> None:
-    assert decode(LREAL, encode(LREAL, value)) == value
-
-
-@pytest.mark.parametrize(
-    ("ms", "text"),
-    [(0, "T#0ms"), (80, "T#80ms"), (1500, "T#1s500ms"), (-250, "T#-250ms"), (90_061_001, "T#1d1h1m1s1ms")],
-)
-def test_time_is_shown_as_a_literal(ms: int, text: str) -> None:
-    assert format_time(ms, TIME) == text
-    assert parse_time(text) == ms
-
-
-@given(st.integers(-(2**31), 2**31 - 1))
-def test_any_time_is_read_as_it_is_shown(ms: int) -> None:
-    assert parse_time(format_time(ms, TIME)) == ms
-
-
-@given(st.integers(-(2**63), 2**63 - 1))
-def test_any_ltime_is_read_as_it_is_shown(ns: int) -> None:
-    assert parse_time(format_time(ns, LTIME), LTIME) == ns
-
-
-@pytest.mark.parametrize(
-    ("text", "ms"),
-    [("T#1.5s", 1500), ("time#2m_30s", 150_000), ("80ms", 80), ("T#0.25h", 900_000), ("T#1s200us", 1000)],
-)
-def test_durations_may_be_typed_in_many_ways(text: str, ms: int) -> None:
-    assert parse_time(text) == ms
-
-
-@pytest.mark.parametrize("text", ["", "T#", "T#5", "T#5x", "5 s", "T#1.2.3s", "T#s"])
-def test_what_is_no_duration_is_refused(text: str) -> None:
-    with pytest.raises(UsageError, match="duration"):
-        parse_time(text)
-
-
-@pytest.mark.parametrize(
-    ("t", "text", "value"),
-    [
-        (BOOL, "true", True), (BOOL, "0", False), (INT, "16#7F", 127), (INT, "-2#101", -5), (INT, "INT#5", 5), (DINT,
-        "1_000", 1000), (REAL, "1e3", 1000.0), (COLOUR, "green", 5), (COLOUR, "Colour#Blue", 6), (COLOUR, "6", 6),
-        (StringType(9), "'a b'", "a b"), (StringType(9), "it's", "it's"),
-    ],
-)  # fmt: skip
-def test_typed_values(t: Type, text: str, value: object) -> None:
-    assert parse_value(t, text) == value
-
-
-@pytest.mark.parametrize(
-    ("t", "value"),
-    [
-        (BOOL, "maybe"), (BOOL, 2), (INT, "1.5"), (INT, 40000), (INT, "x"), (USINT, -1), (COLOUR, "Pink"), (REAL,
-        "one"), (StringType(2), "abc"), (StringType(9), "\u20ac"), (SubrangeType("S", INT, 1, 10), 11), (POINT, 5),
-        (ArrayType(INT, ((0, 2),)), [1, 2]), (PointerType(INT), 5), (INT, 1.5),
-    ],
-)  # fmt: skip
-def test_values_that_do_not_fit_are_refused(t: Type, value: object) -> None:
-    with pytest.raises(UsageError):
-        encode(t, value)
-
-
-def test_structs_and_arrays_are_dicts_and_lists() -> None:
-    value = {"q": True, "arr": [{"x": i, "y": i / 2} for i in range(3)], "grid": [[1, 2, 3], [4, 5, 6]]}
-    assert decode(BLOCK, encode(BLOCK, value)) == value
-
-
-def test_bits_are_changed_in_their_word() -> None:
-    symbol = table().resolve("Main.word.3")
-    assert symbol.encode(True, b"\x01\x80") == b"\x09\x80"
-    assert symbol.encode("FALSE", b"\xff\xff") == b"\xf7\xff"
-    assert symbol.decode(b"\x08\x00") is True
-    with pytest.raises(UsageError):
-        symbol.encode(True)
-
-
-def test_enums_are_shown_by_name() -> None:
-    assert decode(COLOUR, encode(COLOUR, 5)) == "Green"
-    assert decode(COLOUR, b"\x09\x00") == 9

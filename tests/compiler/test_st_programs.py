@@ -16,7 +16,8 @@ from plctool.compiler.literals import string, typed, unsigned
 from plctool.compiler.types import ELEMENTARY, REAL
 from plctool.sim import Simulator
 from plctool.symbols import SymbolTable
-from plctool.values import decode, encode, format_date, parse_date
+from plctool.value_texts import format_date, parse_date
+from plctool.values import decode, encode
 
 FOLDER = Path(__file__).parents[1] / "st"
 PROGRAMS = sorted(FOLDER.glob("*.st"))
@@ -44,7 +45,7 @@ class Script:
 
 
 def directives(path: Path) -> Iterator[tuple[str, str]]:
-    for line in path.read_text("latin-1").splitlines():
+    for line in path.read_text("utf-8").splitlines():
         if match := DIRECTIVE.match(line):
             yield match[1], match[2]
         elif not line.startswith("(*"):
@@ -199,7 +200,7 @@ def test_every_comment_that_looks_like_a_directive_is_one() -> None:
     misspelt = [
         f"{path.name}: {line}"
         for path in PROGRAMS
-        for line in path.read_text("latin-1").splitlines()
+        for line in path.read_text("utf-8").splitlines()
         if head.match(line) and not DIRECTIVE.match(line)
     ]
     assert not misspelt

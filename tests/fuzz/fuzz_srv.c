@@ -74,6 +74,11 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
                                  "\x17\x04\x09\x04\x17\x08\x09\x04\x04");
     case 17:
         return SEED(5, 1, "\x02\x04\x01\0\0\0\x04\x04\x10\0\0\0");
+    case 18:
+        return SEED(0x1B, 1, APP "\x81\x01\x1B" "\x82\x01\x18\x02\x01\x04\x05\x13\x02\x10\x00\x06\x00"
+                                 "\x09\x08\x02\x20\x00\x0E\x09\x08\x03\x04\x00\x00\x00\x0E");
+    case 19:
+        return SEED(0x1B, 2, APP "\x03\x14" "\0\0\x01\0\0\0\x55\x0B\x00\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E");
     default:
         return 0;
     }
@@ -88,6 +93,23 @@ static void repair(uint8_t *message, size_t size, RTS_UI32 session, RTS_UI32 app
     for (size_t i = 20; i + 4 <= size; i++)
         if (memcmp(message + i, "SSSS", 4) == 0)
             BytesPut32(message + i, app_session);
+}
+
+/* Pointers of which some lead into areas: 0x10 of the data area into memory, from there on into the retain area. */
+static void put_pointers(void)
+{
+    static const struct {
+        RTS_UI32 area, offset, to_area, to;
+    } pointers[] = {
+        {APP_AREA_DATA, 0x10, APP_AREA_MEMORY, 0x100},
+        {APP_AREA_MEMORY, 0x120, APP_AREA_RETAIN, FAKE_AREA_SIZE - 8},
+        {APP_AREA_DATA, 0x18, APP_AREA_CODE, 0},
+    };
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(pointers); i++) {
+        uintptr_t address = (uintptr_t)fakes_area(pointers[i].to_area) + pointers[i].to;
+        memcpy(fakes_area(pointers[i].area) + pointers[i].offset, &address, sizeof(address));
+    }
 }
 
 /* The content can be walked to its end, containers included. */
@@ -117,6 +139,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fakes_start();
     fakes.task_count = FAKE_TASKS;
     fakes.log_count = 5;
+    put_pointers();
     RTS_UI32 session = SrvLogin(0);
     RTS_UI32 app_session = SrvCreateAppSession();
     memcpy(message, "\x55\xCD\x10\x00", 4);

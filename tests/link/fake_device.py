@@ -305,6 +305,7 @@ class FakePlc:
         self.image = b""
         self.exception = (lib.RTSEXCPT_NOEXCEPTION, 0xFFFFFFFF, -1)
         self.memory = {area: bytearray(70000) for area in range(5)}
+        self.disturbed = 0  # how many readings from now on a task runs in
         self.transfer: tuple[int, int] | None = None
         self.received = bytearray()
         self.refuse = ""  # reason to refuse the next complete image for
@@ -457,14 +458,17 @@ class FakePlc:
         if error := self._check_monitoring(tags):
             return error
         values = bytearray()
+        self.disturbed -= 1
         for index, variable in enumerate(tags.container(lib.TAG_MON2_READ_LIST).containers(lib.TAG_MON2_READ_VAR)):
             size = int.from_bytes(variable.bytes(lib.TAG_MON2_VAR_SIZE), "little")
-            area, offset = self._address(variable.bytes(lib.TAG_MON2_VAR_CODE))
+            area, offset, followed = self._address(variable.bytes(lib.TAG_MON2_VAR_CODE))
             if area not in self.memory or offset + size > len(self.memory[area]):
-                values += struct.pack("<HIB", index | lib.MON2_ID_FAILED, 1, lib.MONITORING_ERR_INVALID_INDEX)
+                error = lib.MONITORING_ERR_INVALID_POINTER if followed else lib.MONITORING_ERR_INVALID_INDEX
+                values += struct.pack("<HIB", index | lib.MON2_ID_FAILED, 1, error)
             else:
                 values += struct.pack("<HI", index, size) + self.memory[area][offset : offset + size]
-        return [bintag.data(lib.TAG_MON2_VALUES, bytes(values))]
+        consistent = [bintag.u16(lib.TAG_MON2_CONSISTENT, 1)] if self.disturbed < 0 else []
+        return [bintag.data(lib.TAG_MON2_VALUES, bytes(values)), *consistent]
 
     def _write(self, tags: bintag.Tags) -> list[bintag.Tag]:
         if error := self._check_monitoring(tags):
@@ -474,20 +478,27 @@ class FakePlc:
             _, size = struct.unpack_from("<HI", data, at)
             value = data[at + 6 : at + 6 + size]
             code_size = struct.unpack_from("<H", data, at + 6 + size)[0]
-            area, offset = self._address(data[at + 8 + size : at + 8 + size + code_size])
+            area, offset, _ = self._address(data[at + 8 + size : at + 8 + size + code_size])
             self.memory[area][offset : offset + size] = value
             at += 8 + size + code_size
             self.writes += 1
         return []
 
+    def _address(self, code: bytes) -> tuple[int, int, bool]:
+        """Area and offset, and whether a pointer led there. A pointer holds the number of an area + 1 and an offset."""
+        offset, code = self._load(code)
+        area, code, followed = code[1], code[2:], False
+        while code[:2] == bytes([lib.MON2_OP_DER, lib.MON2_POINTER_SIZE]):
+            held = int.from_bytes(self.memory.get(area, b"")[offset : offset + 8], "little")
+            hop, code = self._load(code[2:])
+            area, offset, code, followed = (held >> 32) - 1, (held & 0xFFFFFFFF) + hop, code[1:], True
+        assert not code
+        return area, offset, followed
+
     @staticmethod
-    def _address(code: bytes) -> tuple[int, int]:
-        if code[0] == lib.MON2_OP_LD16:
-            offset, rao, area = struct.unpack("<HBB", code[1:5])
-        else:
-            offset, rao, area = struct.unpack("<IBB", code[1:7])
-        assert rao == lib.MON2_OP_RAO
-        return area, offset
+    def _load(code: bytes) -> tuple[int, bytes]:
+        size = 2 if code[0] == lib.MON2_OP_LD16 else 4
+        return int.from_bytes(code[1 : 1 + size], "little"), code[1 + size :]
 
     def _log(self, tags: bintag.Tags) -> list[bintag.Tag]:
         start = tags.u32(lib.TAG_LOG_START_HANDLE)

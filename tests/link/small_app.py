@@ -5,7 +5,8 @@ from __future__ import annotations
 from plctool.compiler.types import BOOL, DINT, INT, REAL, TIME, ArrayType, StringType
 from plctool.core import lib
 from plctool.image import ApplicationInfo, Image, ImageTask, build_image
-from plctool.symbols import CodeUnit, Symbol, SymbolTable
+from plctool.symbols import CodeUnit, SymbolTable
+from plctool.variables import Symbol
 
 RETURN = b"\xc3"
 DATA, CODE = int(lib.APP_AREA_DATA), int(lib.APP_AREA_CODE)

@@ -207,7 +207,7 @@ def test_an_image_that_changed_while_the_channel_was_lost_is_never_read_with_old
 
 def test_watch_reads_as_often_as_asked(running: Controller) -> None:
     samples = list(running.plc.watch(["Main.count"], interval=0, count=3))
-    assert [values for _, values in samples] == [{"Main.count": 0}] * 3
+    assert [reading.values for _, reading in samples] == [{"Main.count": 0}] * 3
     times = [seconds for seconds, _ in samples]
     assert times == sorted(times)
 

@@ -22,9 +22,10 @@ from hypothesis import strategies as st
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
-from plctool.link import l7, services
+from plctool.link import l7, monitoring, services
 from plctool.link.connection import Connection
-from plctool.link.services import AppException, AppState, AreaRange
+from plctool.link.monitoring import AreaRange
+from plctool.link.services import AppException, AppState
 from plctool.link.session import Session
 
 
@@ -196,26 +197,27 @@ def test_values_are_read_from_their_places() -> None:
     bench = Bench()
     bench.plc.memory[0][10:14] = b"\x01\x02\x03\x04"
     bench.plc.memory[3][66000] = 9
-    values = services.read_memory(
+    contents = monitoring.read_memory(
         bench.session, bench.crc, [AreaRange(0, 10, 4), AreaRange(3, 66000, 1), AreaRange(0, 12, 1)]
     )
-    assert values == [b"\x01\x02\x03\x04", b"\x09", b"\x03"]
+    assert contents.values == [b"\x01\x02\x03\x04", b"\x09", b"\x03"]
 
 
 def test_many_values_take_few_requests() -> None:
     bench = Bench(buffer_size=2048)
     for n in range(1000):
         bench.plc.memory[0][n] = n & 0xFF
-    values = services.read_memory(bench.session, bench.crc, [AreaRange(0, n, 1) for n in range(1000)])
-    assert values == [bytes([n & 0xFF]) for n in range(1000)]
+    contents = monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, n, 1) for n in range(1000)])
+    assert contents.values == [bytes([n & 0xFF]) for n in range(1000)]
     assert bench.plc.requests.count((lib.SG_MONITORING2, lib.SRV_MON2_READ)) <= 8
 
 
 def test_values_longer_than_a_message_are_read_in_pieces() -> None:
     bench = Bench(buffer_size=512)
     bench.plc.memory[0][:3000] = bytes(n % 251 for n in range(3000))
-    first, second = services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 2500), AreaRange(0, 2500, 500)])
-    assert first + second == bytes(bench.plc.memory[0][:3000])
+    ranges = [AreaRange(0, 0, 2500), AreaRange(0, 2500, 500)]
+    first, second = monitoring.read_memory(bench.session, bench.crc, ranges).values
+    assert first and second and first + second == bytes(bench.plc.memory[0][:3000])
 
 
 @given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 69000), st.integers(1, 1000)), max_size=30))
@@ -224,45 +226,114 @@ def test_any_ranges_read_what_is_in_memory(ranges: list[tuple[int, int, int]]) -
     bench = Bench(buffer_size=600)
     for area, memory in bench.plc.memory.items():
         memory[:] = bytes((n * 7 + area) & 0xFF for n in range(256)) * (len(memory) // 256) + bytes(len(memory) % 256)
-    values = services.read_memory(bench.session, bench.crc, [AreaRange(*r) for r in ranges])
-    assert values == [bytes(bench.plc.memory[a][o : o + s]) for a, o, s in ranges]
+    contents = monitoring.read_memory(bench.session, bench.crc, [AreaRange(*r) for r in ranges])
+    assert contents.values == [bytes(bench.plc.memory[a][o : o + s]) for a, o, s in ranges]
 
 
 def test_a_value_outside_memory_is_a_device_error() -> None:
     bench = Bench()
     with pytest.raises(DeviceError, match="MONITORING_ERR_INVALID_INDEX"):
-        services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1), AreaRange(0, 70000, 4)])
+        monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1), AreaRange(0, 70000, 4)])
+
+
+def pointer(area: int, offset: int) -> bytes:
+    """What a pointer of the fake controller holds."""
+    return ((area + 1) << 32 | offset).to_bytes(8, "little")
+
+
+def test_pointers_are_followed_by_the_device() -> None:
+    bench = Bench()
+    bench.plc.memory[0][16:24] = pointer(3, 66000)
+    bench.plc.memory[3][66008:66016] = pointer(4, 10)
+    bench.plc.memory[4][10:14] = b"\x01\x02\x03\x04"
+    ranges = [AreaRange(0, 16, 2, (8, 1)), AreaRange(0, 16, 8, (8,)), AreaRange(4, 10, 1)]
+    contents = monitoring.read_memory(bench.session, bench.crc, ranges)
+    assert contents.values == [b"\x02\x03", pointer(4, 10), b"\x01"]
+    assert bench.plc.requests.count((lib.SG_MONITORING2, lib.SRV_MON2_READ)) == 1
+
+
+def test_what_is_behind_a_pointer_to_nothing_is_none_and_the_rest_is_read() -> None:
+    bench = Bench()
+    bench.plc.memory[0][8:16] = pointer(0, 69_999)
+    contents = monitoring.read_memory(
+        bench.session, bench.crc, [AreaRange(0, 0, 2, (0,)), AreaRange(0, 8, 2, (0,)), AreaRange(0, 8, 1)]
+    )
+    assert contents.values == [None, None, b"\x6f"]
+
+
+def test_long_values_behind_pointers_are_read_in_pieces() -> None:
+    bench = Bench(buffer_size=512)
+    bench.plc.memory[0][0:8] = pointer(1, 100)
+    bench.plc.memory[1][:3000] = bytes(n % 251 for n in range(3000))
+    contents = monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 2000, (4,))])
+    assert contents.values == [bytes(bench.plc.memory[1][104:2104])]
+
+
+def test_values_are_written_behind_pointers() -> None:
+    bench = Bench()
+    bench.plc.memory[0][0:8] = pointer(1, 100)
+    monitoring.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 2, (4,)), b"\xaa\xbb")])
+    assert bench.plc.memory[1][104:106] == b"\xaa\xbb"
+
+
+def test_values_of_one_request_are_asked_for_until_they_are_consistent() -> None:
+    bench = Bench()
+    bench.plc.disturbed = 2
+    contents = monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1), AreaRange(0, 8, 4)])
+    assert contents.consistent
+    assert bench.plc.requests.count((lib.SG_MONITORING2, lib.SRV_MON2_READ)) == 3
+
+
+def test_values_that_never_are_consistent_are_given_all_the_same() -> None:
+    bench = Bench()
+    bench.plc.disturbed = 1000
+    contents = monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1), AreaRange(0, 8, 4)])
+    assert not contents.consistent
+    assert contents.values == [b"\0", bytes(4)]
+
+
+def test_a_single_value_that_is_read_in_one_access_is_asked_for_once() -> None:
+    bench = Bench()
+    bench.plc.disturbed = 1000
+    assert monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 8, 4)]).consistent
+    assert bench.plc.requests.count((lib.SG_MONITORING2, lib.SRV_MON2_READ)) == 1
+
+
+def test_values_of_several_requests_are_not_consistent() -> None:
+    bench = Bench(buffer_size=512)
+    contents = monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, n, 1) for n in range(300)])
+    assert not contents.consistent
 
 
 def test_values_are_written_to_their_places() -> None:
     bench = Bench()
     values = [(AreaRange(0, 10, 2), b"\xaa\xbb"), (AreaRange(4, 66000, 1), b"c")]
-    services.write_memory(bench.session, bench.crc, values)
+    monitoring.write_memory(bench.session, bench.crc, values)
     assert bench.plc.memory[0][10:12] == b"\xaa\xbb"
     assert bench.plc.memory[4][66000] == ord("c")
 
 
 def test_more_values_than_a_message_holds_are_all_written() -> None:
     bench = Bench(buffer_size=512)
-    services.write_memory(bench.session, bench.crc, [(AreaRange(0, n, 1), bytes([n & 0xFF])) for n in range(300)])
+    monitoring.write_memory(bench.session, bench.crc, [(AreaRange(0, n, 1), bytes([n & 0xFF])) for n in range(300)])
     assert bench.plc.memory[0][:300] == bytes(n & 0xFF for n in range(300))
 
 
 def test_nothing_is_read_from_another_application_than_meant() -> None:
     bench = Bench()
     with pytest.raises(DeviceError, match="Another application") as caught:
-        services.read_memory(bench.session, bench.crc ^ 1, [AreaRange(0, 0, 1)])
+        monitoring.read_memory(bench.session, bench.crc ^ 1, [AreaRange(0, 0, 1)])
     assert caught.value.code == "app-changed"
 
 
 def test_an_application_that_changes_meanwhile_is_noticed() -> None:
     bench = Bench()
-    services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
+    monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
     old = bench.crc
     bench.plc.image = make_image(1000, seed=2)
     with pytest.raises(DeviceError, match="Another application"):
-        services.read_memory(bench.session, old, [AreaRange(0, 0, 1)])
-    services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
+        monitoring.read_memory(bench.session, old, [AreaRange(0, 0, 1)])
+    monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
 
 
 # ---- lost channels ---------------------------------------------------------------------------------------------------
@@ -274,20 +345,20 @@ def test_a_lost_channel_is_opened_again_without_anybody_noticing() -> None:
     bench.device.restart()
     assert services.read_status(bench.session).state is AppState.RUN
     bench.device.restart()
-    assert services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)]) == [b"\0"]
+    assert monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)]).values == [b"\0"]
 
 
 def test_a_write_that_the_device_did_not_take_is_repeated() -> None:
     bench = Bench()
     services.read_status(bench.session)
     bench.device.restart()
-    services.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 1), b"x")])
+    monitoring.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 1), b"x")])
     assert bench.plc.writes == 1
 
 
 def test_a_write_whose_answer_is_lost_is_not_repeated() -> None:
     bench = Bench()
-    services.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
+    monitoring.read_memory(bench.session, bench.crc, [AreaRange(0, 0, 1)])
     handle = bench.plc.handle
 
     def answer_and_die(message: bytes) -> bytes:
@@ -296,7 +367,7 @@ def test_a_write_whose_answer_is_lost_is_not_repeated() -> None:
 
     bench.device.handler = answer_and_die
     with pytest.raises(LinkError):
-        services.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 1), b"x")])
+        monitoring.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 1), b"x")])
     assert bench.plc.writes == 1
 
 

@@ -16,7 +16,7 @@ from plctool.compiler.targets import find_target
 from plctool.compiler.typed import Area, TypedProgram
 from plctool.core import ffi, lib
 from plctool.sim import Simulator
-from plctool.symbols import Symbol
+from plctool.variables import Symbol
 
 REFERENCE = "x86_64-linux"
 AREAS = (Area.DATA, Area.RETAIN, Area.OUTPUT, Area.MEMORY)
@@ -64,7 +64,7 @@ class Recording:
     def leaves(self) -> list[Symbol]:
         """Every scalar and string in memory that has a name."""
         symbols = self.built.symbols
-        found = [leaf for symbol in symbols.variables.values() for leaf in symbols.leaves(symbol)]
+        found = [leaf for symbol in symbols.variables.values() for leaf in symbol.leaves()]
         return [leaf for leaf in found if Area(leaf.area) in AREAS and leaf.bit is None]
 
 
@@ -79,7 +79,9 @@ class Recorder(Simulator):
     def write(self, name: str, value: object) -> None:
         super().write(name, value)
         symbol = self._resolve(name)
-        self.writes.append((symbol.area, symbol.offset, bytes(ffi.buffer(self._address(symbol), symbol.size))))
+        place = self._place(symbol)
+        assert place is not None
+        self.writes.append((*place, bytes(self._memory(symbol))))
 
     def run_cycles(self, count: int) -> None:
         super().run_cycles(count)

@@ -9,7 +9,7 @@ from batch import AREAS, Recording, State
 
 from plctool.compiler.typed import Area
 from plctool.compiler.types import LREAL, REAL, PointerType, StringType
-from plctool.symbols import Symbol
+from plctool.variables import Symbol
 
 
 def is_nan(data: bytes) -> bool:

@@ -1,7 +1,10 @@
-"""Flash and RAM of each component of the firmware, from the map files of the linker, held against a budget.
+"""Flash and RAM of each component of the firmware, from the linked programs, held against a budget.
 
-    size.py BUDGET.toml CONFIG=FILE.map ...             prints the table; exit status 1 when a budget is exceeded
-    size.py --update BUDGET.toml CONFIG=FILE.map ...    makes the present figures the budget of the components
+    size.py BUDGET.toml CONFIG=FILE.elf ...             prints the table; exit status 1 when a budget is exceeded
+    size.py --update BUDGET.toml CONFIG=FILE.elf ...    makes the present figures the budget of the components
+
+The sections say how much there is, the debugging information which component each function and variable is of: the
+program is optimised as a whole, so the linker does not know any more. A function that was inlined counts where it went.
 
 Flash counts what is stored there, initial values of variables included. RAM counts variables and the main stack; what
 belongs to the application alone (its areas, the stacks of its tasks) is printed apart and has no budget: the device's
@@ -11,13 +14,18 @@ maker chooses it.
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 import tomllib
+from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
+from itertools import pairwise
+from pathlib import Path, PurePosixPath
+
+from elftools.dwarf.dwarfinfo import DWARFInfo
+from elftools.elf.constants import SH_FLAGS
+from elftools.elf.elffile import ELFFile
 
 FLASH_SECTIONS = {".vectors", ".text", ".ARM.exidx", ".data"}
 STACK_SECTION = ".stack"
@@ -27,12 +35,10 @@ SLACK = 1.04  # the budget of a component is what it takes now, and four per cen
 ROUND = 16
 TOTAL = "total"
 
-_OUTPUT = re.compile(r"^(\.\S+)")
-_NAME = re.compile(r"^ (\.\S+|COMMON)")
-_PLACED = re.compile(r"\s0x[0-9a-f]+\s+0x([0-9a-f]+) (\S.*)$")
-_FILL = re.compile(r"^ \*fill\*\s+0x[0-9a-f]+\s+0x([0-9a-f]+)")
-_OWNER = re.compile(r"(cmp_list|[A-Za-z0-9]+)\.c\.o(?:bj)?$")
-_LIBRARY = re.compile(r"(lib\w+)\.a\(")
+LIBRARIES = "libraries"  # of the C compiler, perhaps without debugging information
+REST = "strings, padding"  # what has no symbol
+ADDRESS_OF = 3  # DW_OP_addr
+OUR_DWARF = 5  # version; libraries may have others
 
 
 @dataclass
@@ -56,48 +62,86 @@ class Budget:
 
 @dataclass(frozen=True)
 class Piece:
-    """One input section: where it went, what it is called, whose it is, bytes."""
+    """A line of a function, a variable, or the part of a section that is neither: section, symbol, component, bytes."""
 
-    output: str
+    section: str
     name: str
     owner: str
     size: int
 
 
-def pieces(map_text: str) -> Iterator[Piece]:
-    """The input sections that were linked, and the gaps between them."""
-    _, _, body = map_text.partition("Linker script and memory map")
-    output = name = ""
-    for line in body.splitlines():
-        if match := _OUTPUT.match(line):
-            output = match[1]
-        elif match := _FILL.match(line):
-            yield Piece(output, "", "alignment", int(match[1], 16))
-        else:
-            if match := _NAME.match(line):
-                name = match[1]
-            if match := _PLACED.search(line):
-                owner = "main stack" if output == STACK_SECTION else _owner(match[2])
-                yield Piece(output, name, owner, int(match[1], 16))
+def _component(path: PurePosixPath) -> str:
+    return path.stem if "firmware" in path.parts else LIBRARIES
 
 
-def _owner(path: str) -> str:
-    """The component an object file belongs to: the name of its source file, or of its library."""
-    match = _LIBRARY.search(path) or _OWNER.search(path)
-    return match[1] if match else "start-up"
+def variable_owners(dwarf: DWARFInfo) -> dict[int, str]:
+    """The component of each variable by its address."""
+    found: dict[int, str] = {}
+    for die in (die for unit in dwarf.iter_CUs() for die in unit.iter_DIEs() if die.tag == "DW_TAG_variable"):
+        place = die.attributes.get("DW_AT_location")
+        if place and place.form == "DW_FORM_exprloc" and place.value[0] == ADDRESS_OF and len(place.value) == 5:
+            while "DW_AT_abstract_origin" in die.attributes:
+                die = die.get_DIE_from_attribute("DW_AT_abstract_origin")
+            source = die.cu.get_top_DIE().attributes["DW_AT_name"].value.decode()
+            found[int.from_bytes(place.value[1:], "little")] = _component(PurePosixPath(source))
+    return found
 
 
-def measure(map_file: Path, application: set[str]) -> dict[str, Usage]:
-    """Usage by component, from one map file."""
+def line_owners(dwarf: DWARFInfo, functions: set[int]) -> dict[int, str]:
+    """The component of each line of code by its address. Functions that were not linked still have lines, at 0."""
+    found: dict[int, str] = {}
+    for unit in dwarf.iter_CUs():
+        program = dwarf.line_program_for_CU(unit)
+        if program is None or program["version"] < OUR_DWARF:
+            continue
+        files = [(program["include_directory"][file.dir_index], file.name) for file in program["file_entry"]]
+        components = [_component(PurePosixPath(folder.decode(), name.decode())) for folder, name in files]
+        sequence: dict[int, str] = {}
+        for state in (entry.state for entry in program.get_entries() if entry.state is not None):
+            if not state.end_sequence:
+                sequence[state.address] = components[state.file]
+                continue
+            if next(iter(sequence), None) in functions:
+                found |= sequence
+            sequence = {}
+    return found
+
+
+def pieces(elf: ELFFile) -> Iterator[Piece]:
+    """Everything in the sections that take flash or RAM."""
+    sections = [section for section in elf.iter_sections() if section["sh_flags"] & SH_FLAGS.SHF_ALLOC]
+    rest = {section.name: section["sh_size"] for section in sections}
+    symbols = {s["st_value"]: s for s in elf.get_section_by_name(".symtab").iter_symbols() if s["st_size"]}
+    functions = {address & ~1 for address, s in symbols.items() if s["st_info"]["type"] == "STT_FUNC"}
+    dwarf = elf.get_dwarf_info()
+    variables, lines = variable_owners(dwarf), line_owners(dwarf, functions)
+    starts = sorted(lines)
+    for address, symbol in symbols.items():
+        section, size = elf.get_section(symbol["st_shndx"]).name, symbol["st_size"]
+        rest[section] -= size
+        if symbol["st_info"]["type"] != "STT_FUNC":
+            yield Piece(section, symbol.name, variables.get(address, LIBRARIES), size)
+            continue
+        begin, end = address & ~1, (address & ~1) + size
+        bounds = [begin, *starts[bisect_right(starts, begin) : bisect_left(starts, end)], end]
+        for start, stop in pairwise(bounds):
+            yield Piece(section, symbol.name, lines.get(start, LIBRARIES), stop - start)
+    for section, size in rest.items():
+        yield Piece(section, "", REST, size)
+
+
+def measure(program: Path, application: set[str]) -> dict[str, Usage]:
+    """Usage by component, of one program."""
     usage: dict[str, Usage] = defaultdict(Usage)
-    for piece in pieces(map_file.read_text()):
-        mine = usage[piece.owner]
-        if piece.output in FLASH_SECTIONS:
-            mine.flash += piece.size
-        if piece.output == APPLICATION_SECTION or piece.name in application:
-            mine.application += piece.size
-        elif piece.output in RAM_SECTIONS:
-            mine.ram += piece.size
+    with program.open("rb") as file:
+        for piece in pieces(ELFFile(file)):
+            mine = usage["main stack" if piece.section == STACK_SECTION else piece.owner]
+            if piece.section in FLASH_SECTIONS:
+                mine.flash += piece.size
+            if piece.section == APPLICATION_SECTION or piece.name in application:
+                mine.application += piece.size
+            elif piece.section in RAM_SECTIONS:
+                mine.ram += piece.size
     return {name: u for name, u in usage.items() if u.flash or u.ram or u.application}
 
 
@@ -179,11 +223,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--update", action="store_true", help="make the present figures the budget")
     parser.add_argument("budget", type=Path)
-    parser.add_argument("maps", nargs="+", metavar="CONFIG=FILE.map")
+    parser.add_argument("programs", nargs="+", metavar="CONFIG=FILE.elf")
     args = parser.parse_args()
     budget = read_budget(args.budget)
-    maps = (text.split("=", 1) for text in args.maps)
-    measured = {config: measure(Path(file), budget.application) for config, file in maps}
+    programs = (text.split("=", 1) for text in args.programs)
+    measured = {config: measure(Path(file), budget.application) for config, file in programs}
     if args.update:
         update(args.budget, measured, budget)
         budget = read_budget(args.budget)

@@ -9,7 +9,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from plctool.errors import UsageError
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from plctool.compiler.warnings import WarningOptions
 
 DEFAULT_TARGET = "x86_64-linux"
+Level = int | Literal["s"]
+"""How much is optimised: 0 .. 3, or "s" for small code."""
 
 
 class CompileError(UsageError):
@@ -34,20 +36,20 @@ class CompileError(UsageError):
 
 
 def load_sources(paths: Sequence[Path | str]) -> list[Source]:
-    """The `.st` files named, and all that are in the folders named. Raises UsageError when there is nothing to read."""
-    from plctool.compiler.source import Source
+    """The files named, and all sources in the folders named. Raises UsageError when there is nothing to read."""
+    from plctool.compiler.source_files import find_sources, read_source
 
     files: dict[Path, None] = {}
     for path in map(Path, paths):
         if path.is_dir():
-            found = sorted(path.rglob("*.st"))
+            found = find_sources(path)
             if not found:
-                raise UsageError(f"There is no .st file in {path}.", "no-source")
+                raise UsageError(f"There is no source file (.st, .exp, .TcPOU ...) in {path}.", "no-source")
             files.update(dict.fromkeys(found))
         else:
             files[path] = None
     try:
-        return [Source(str(file), file.read_text("utf-8-sig", errors="replace")) for file in files]
+        return [read_source(file) for file in files]
     except OSError as error:
         raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
 
@@ -79,13 +81,13 @@ def compile_sources(
     paths: Sequence[Path | str],
     *,
     target: str = DEFAULT_TARGET,
-    level: int = 2,
+    level: Level = 2,
     checks: str = "all",
     debug: bool = False,
     warnings: WarningOptions | None = None,
 ) -> BuildResult:
-    """Compiles a program. `level`: optimisation 0..3; `checks`: all, none, or names of run-time checks; `warnings`:
-    which are wanted, all unless said otherwise.
+    """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
+    said otherwise.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense, InternalError when
     the compiler has a bug.
@@ -99,7 +101,8 @@ def compile_sources(
     from plctool.compiler.warnings import ALL_WARNINGS
     from plctool.image import ApplicationInfo
 
-    options = Options(find_target(target), level, parse_checks(checks), debug)
+    number, size = (2, True) if level == "s" else (level, False)
+    options = Options(find_target(target), number, parse_checks(checks), debug, size)
     sources = load_sources(paths)
     with bugs_reported():
         checked = check_sources(sources, warnings=warnings or ALL_WARNINGS)

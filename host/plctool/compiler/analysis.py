@@ -3,41 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
+from typing import get_args
 
 from plctool.compiler.typed import (
     AddressOf,
     Assign,
-    Binary,
-    BitPlace,
     Call,
-    CallStatement,
-    Case,
-    Convert,
+    Const,
+    Continue,
     DerefPlace,
     Direction,
+    Exit,
+    Expr,
     FbCall,
     For,
-    If,
-    IndexPlace,
-    IntrinsicCall,
-    Load,
-    MemberPlace,
     Place,
     Pou,
-    Repeat,
     SelfPlace,
+    Statement,
     Storage,
-    Unary,
     ValuePlace,
     Variable,
     VarPlace,
-    While,
-)  # fmt: skip
+)
 
-_NODES = (
-    VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, SelfPlace, Load, Unary, Binary, Convert,
-    IntrinsicCall, AddressOf, Call, Assign, CallStatement, FbCall, If, Case, For, While, Repeat,
-)  # fmt: skip
+_NODES = set(get_args(Place) + get_args(Expr) + get_args(Statement)) - {Const, Exit, Continue}  # without the smallest
+_LEAVES = frozenset(("type", "pos", "op", "offset", "bit", "intrinsic", "truncate", "check", "dispatch", "function"))
+_PARTS = {node: tuple(f.name for f in fields(node) if f.name not in _LEAVES) for node in _NODES}  # what may hold nodes
 
 
 def walk(root: object) -> Iterator[object]:
@@ -45,11 +38,13 @@ def walk(root: object) -> Iterator[object]:
     stack = [root]
     while stack:
         node = stack.pop()
-        if isinstance(node, list | tuple):
-            stack.extend(node)
-        elif isinstance(node, _NODES):
+        kind = type(node)
+        if kind is list or kind is tuple:
+            stack.extend(node)  # type: ignore[arg-type]
+        elif kind in _PARTS:
             yield node
-            stack.extend(vars(node).values())
+            for name in _PARTS[kind]:
+                stack.append(getattr(node, name))
 
 
 def root_of(place: Place) -> Variable | None:

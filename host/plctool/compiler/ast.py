@@ -39,6 +39,8 @@ class Literal:
 
 @dataclass(slots=True, eq=False)
 class Name:
+    """`x`, or `.x` for the global variable behind a local one of that name."""
+
     pos: int
     name: str
 
@@ -170,11 +172,13 @@ Init = Expr | ArrayInit | StructInit
 
 @dataclass(slots=True, eq=False)
 class NamedType:
-    """A type by its name; `length` for STRING[length]."""
+    """A type by its name; `length` for STRING[length], `inits` for the elements of `ARRAY[1..2] OF Block[(id := 1), (id
+    := 2)]`."""
 
     pos: int
     name: str
     length: Expr | None = None
+    inits: ArrayInit | None = None
 
 
 @dataclass(slots=True, eq=False)
@@ -217,6 +221,7 @@ class StructSpec:
     pos: int
     fields: list[VarDecl]
     union: bool = False
+    base: NamedType | None = None  # what it EXTENDS
 
 
 TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | StructSpec
@@ -226,7 +231,7 @@ TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | Struc
 
 @dataclass(slots=True, eq=False)
 class VarDecl:
-    """One declaration line: `names AT location : type := init`."""
+    """One declaration line: `names AT location : type edge := init`; `edge` is R_EDGE, F_EDGE or ""."""
 
     pos: int
     names: list[tuple[int, str]]
@@ -234,6 +239,7 @@ class VarDecl:
     type: TypeSpec
     init: Init | None
     attributes: dict[str, str] = field(default_factory=dict)
+    edge: str = ""
 
 
 @dataclass(slots=True, eq=False)
@@ -248,21 +254,25 @@ class VarBlock:
 
 @dataclass(slots=True, eq=False)
 class TypeDecl:
+    """`qualified`: the values of the enumeration need its name in front, {attribute 'qualified_only'}."""
+
     pos: int
     name: str
     spec: TypeSpec
     init: Init | None
     source: Source
     namespace: Namespace | None = None
+    qualified: bool = False
 
 
 @dataclass(slots=True, eq=False)
 class Namespace:
-    """Where a declaration stands: the dotted name of its NAMESPACE, "" for none, and what it is USING."""
+    """Where a declaration stands: the dotted name of its NAMESPACE, "" for none, and what it is USING. `internal`: of
+    an INTERNAL one, the namespace around it, which may use it; "" when that is none and it has to do with itself."""
 
     name: str = ""
     using: list[tuple[int, str]] = field(default_factory=list)
-    internal: bool = False
+    internal: str | None = None
 
 
 @dataclass(slots=True, eq=False)
@@ -326,18 +336,23 @@ class Transition:
 
 @dataclass(slots=True, eq=False)
 class Chart:
-    """A body that is a Sequential Function Chart; its ACTIONs are members of the unit. `valid`: it has no errors."""
+    """A body that is a Sequential Function Chart; its ACTIONs are members of the unit. `valid`: it has no errors.
+    `asked`: the actions, case-folded, whose A somebody reads."""
 
     steps: list[Step]
     transitions: list[Transition]
     valid: bool = True
+    asked: set[str] = field(default_factory=set)
 
 
 @dataclass(slots=True, eq=False)
 class GlobalBlock:
+    """`qualified`: the names need that of the list in front, {attribute 'qualified_only'}."""
+
     block: VarBlock
     source: Source
     namespace: Namespace | None = None
+    qualified: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -363,6 +378,36 @@ class ProgramInstance:
 
 
 @dataclass(slots=True, eq=False)
+class ConfigLine:
+    """`resource.program.fb.variable AT location : type := init` of VAR_CONFIG."""
+
+    pos: int
+    path: Expr
+    location: DirectAddress | None
+    type: TypeSpec
+    init: Init | None
+
+
+@dataclass(slots=True, eq=False)
+class AccessLine:
+    """`name : resource.program.fb.variable : type READ_WRITE` of VAR_ACCESS; without it the variable is only read."""
+
+    pos: int
+    name: str
+    path: Expr
+    type: TypeSpec
+    writable: bool
+
+
+@dataclass(slots=True, eq=False)
+class InstanceBlock:
+    """VAR_CONFIG or VAR_ACCESS: it names variables from outside, by their path."""
+
+    lines: list[ConfigLine] | list[AccessLine]
+    source: Source
+
+
+@dataclass(slots=True, eq=False)
 class ConfigurationDecl:
     """A CONFIGURATION with what its resources hold, in order."""
 
@@ -372,6 +417,8 @@ class ConfigurationDecl:
     tasks: list[TaskDecl]
     programs: list[ProgramInstance]
     source: Source
+    resources: list[str] = field(default_factory=list)
+    instance_blocks: list[InstanceBlock] = field(default_factory=list)
 
 
 @dataclass(slots=True, eq=False)
@@ -385,9 +432,10 @@ class TestDecl:
     blocks: list[VarBlock]
     body: list[Stmt]
     source: Source
+    namespace: Namespace | None = None  # what its file is USING
 
 
-Declaration = TypeDecl | PouDecl | GlobalBlock | ConfigurationDecl | TestDecl
+Declaration = TypeDecl | PouDecl | GlobalBlock | InstanceBlock | ConfigurationDecl | TestDecl
 
 # ---- statements ----------------------------------------------------------------------------------------------------
 

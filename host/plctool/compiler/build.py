@@ -8,15 +8,20 @@ from pathlib import Path
 
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.emit import emit_objects
+from plctool.compiler.garbage import no_collection
 from plctool.compiler.link import Linked, link
-from plctool.compiler.lower import GLOBAL_INIT, Lowered, lower
+from plctool.compiler.lower import Lowered, lower
+from plctool.compiler.lower_classes import CLASS_NUMBER
 from plctool.compiler.lower_unit import Options
+from plctool.compiler.nesting import room_for_nesting
 from plctool.compiler.targets import Machine, Target
-from plctool.compiler.typed import Area, Task, TypedProgram
+from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TypedProgram
 from plctool.core import lib
 from plctool.files import write_atomically
 from plctool.image import ApplicationInfo, ExternalFunction, Image, ImageTask, build_image
-from plctool.symbols import CodeUnit, Symbol, SymbolTable, layout_signature, symbol_path
+from plctool.symbols import CodeUnit, SymbolTable, layout_signature, symbol_path
+from plctool.values import encode
+from plctool.variables import Symbol, constant_symbol
 
 
 @dataclass(frozen=True)
@@ -41,18 +46,23 @@ class BuildResult:
 
 def build_program(program: TypedProgram, options: Options, info: ApplicationInfo | None = None) -> BuildResult:
     """Compiles a checked program. Raises UsageError when the target cannot run it."""
+    with no_collection():
+        return _build(program, options, info or ApplicationInfo())
+
+
+def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> BuildResult:
     target = options.target
-    lowered = lower(program, options)
+    with room_for_nesting():
+        lowered = lower(program, options)
     objects = emit_objects(lowered.texts, target, options.opt_level)
-    linked = link(objects, target, [*lowered.tasks, GLOBAL_INIT], len(lowered.imports))
-    info = info or ApplicationInfo()
+    linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], len(lowered.imports))
     symbols = _symbols(program, lowered, linked, target, info.project)
-    retained = [s for s in symbols.variables.values() if s.area == Area.RETAIN.value]
+    retained = [symbols.variables[v.name] for v in program.globals if v.area is Area.RETAIN]
     image = Image(
         device_id=int(getattr(lib, target.device_id)),
         code=linked.code,
         areas={area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE},
-        functions={int(lib.CDL_FUNCTION_GLOBAL_INIT): _entry(linked, GLOBAL_INIT, target)},
+        functions={number: _entry(linked, name, target) for number, name in lowered.functions.items()},
         externals=[
             ExternalFunction(e.name, e.signature, e.version, slot * target.pointer_size)
             for slot, e in enumerate(lowered.imports + linked.imports)
@@ -88,19 +98,45 @@ def _task(task: Task, entry: int) -> ImageTask:
 
 
 def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, project: str) -> SymbolTable:
-    variables = {v.name: Symbol(v.name, v.area.value, v.offset, v.type, v.bit) for v in program.globals}
+    named = (*program.globals, *program.accesses)
+    variables = {v.name: Symbol(v.name, v.area.value, v.offset, v.type, v.bit, constant=v.constant) for v in named}
     units = []
     for name, pou in lowered.pous.items():
         symbol = linked.symbols.get(name)
         offset, size = (symbol.offset, symbol.size) if symbol else (0, 0)
-        units.append(CodeUnit(pou.name, offset, size, pou.pos.file, pou.pos.line))
+        units.append(CodeUnit(pou.name, offset, size, pou.pos.file, pou.pos.line, _temporaries(pou)))
     units.sort(key=lambda u: (u.offset, u.name))
     files: dict[str, int] = {}
     lines = []
     for line in linked.lines:
         index = files.setdefault(line.file, len(files)) if line.file else -1
         lines.append((line.address, index, line.line))
-    return SymbolTable(0, target.name, project, [t.name for t in program.tasks], variables, units, lines, list(files))
+    return SymbolTable(
+        0,
+        target.name,
+        project,
+        [t.name for t in program.tasks],
+        variables,
+        units,
+        lines,
+        list(files),
+        program.aliases,
+        _classes(program),
+        {name: constant_symbol(name, c.type, encode(c.type, c.value)) for name, c in program.constants.items()},
+    )
+
+
+def _temporaries(pou: Pou) -> list[str]:
+    """The variables of a unit that live only while it runs."""
+    variables = list(pou.locals)
+    if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
+        variables += [p.variable for p in pou.parameters]
+    return [v.name for v in variables if "%" not in v.name]
+
+
+def _classes(program: TypedProgram) -> dict[str, int]:
+    numbers = {name: init.members.get(CLASS_NUMBER) for name, init in program.defaults.items()}
+    return {name: int(n.value) for name, n in numbers.items() if isinstance(n, ScalarInit)}
 
 
 def code_sizes(symbols: SymbolTable, code_size: int) -> dict[str, int]:

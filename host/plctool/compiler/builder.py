@@ -59,20 +59,31 @@ class Builder:
     def start(self, *units: Any) -> list[Any]:
         return self.units.arrange(units)
 
-    def types(self, _type: Token, *decls: Any) -> list[Any]:
-        return [d for d in decls if d is not None]
+    def types(self, keyword: Token, *decls: Any) -> list[Any]:
+        for decl in _listed(decls):
+            decl.qualified = self._is_qualified(keyword) or self._is_qualified(decl)
+        return _listed(decls)
 
-    def type_decl(self, name: Token, spec: ast.TypeSpec, init: ast.Init | None) -> ast.TypeDecl:
+    def _is_qualified(self, start: Token | ast.TypeDecl) -> bool:
+        return "qualified_only" in self.attributes.get(start.pos, {})
+
+    def type_decl(
+        self, name: Token, base: tuple[int, str] | None, spec: ast.TypeSpec, init: ast.Init | None
+    ) -> ast.TypeDecl:
+        if base is not None and isinstance(spec, ast.StructSpec):
+            spec.base = ast.NamedType(*base)
+        elif base is not None:
+            self.report(base[0], "syntax", "only a STRUCT or UNION can extend another one")
         return ast.TypeDecl(name.pos, name.text, spec, init, self.source)
 
     def named_type(self, name: tuple[int, str]) -> ast.NamedType:
         return ast.NamedType(*name)
 
-    def sized_type(self, name: Token, length: ast.Expr) -> ast.NamedType:
-        return ast.NamedType(name.pos, name.text, length)
+    def initialised_type(self, name: Token, inits: ast.ArrayInit) -> ast.NamedType:
+        return ast.NamedType(name.pos, name.text, inits=inits)
 
-    def sized_by_number(self, name: Token, length: Token) -> ast.NamedType:
-        return ast.NamedType(name.pos, name.text, self.number(length))
+    def text_type(self, name: Token, length: ast.Expr | None) -> ast.NamedType:
+        return ast.NamedType(name.pos, name.text, length)
 
     def subrange(self, base: Token, low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
         return ast.SubrangeSpec(base.pos, base.text, low, high)
@@ -83,11 +94,15 @@ class Builder:
     def enum_with_base(self, values: list[tuple[int, str, ast.Init | None]], base: Token) -> ast.EnumSpec:
         return ast.EnumSpec(base.pos, base.text, values)
 
-    def enum_of_base(self, base: Token, values: list[tuple[int, str, ast.Init | None]]) -> ast.EnumSpec:
-        return ast.EnumSpec(base.pos, base.text, values)
+    def enum_of_base(self, base: Token, values: list[Any]) -> ast.EnumSpec:
+        """`INT (red, green := 5)`, or an instance with values, perhaps without names: `Pump(valve, limit := 5)`."""
+        named = [(v.pos, v.name, None) if isinstance(v, ast.Name) else v for v in values]
+        return ast.EnumSpec(base.pos, base.text, [v if isinstance(v, tuple) else (v.pos, "", v) for v in named])
 
     def enum_values(self, *values: Any) -> list[Any]:
         return [v for v in values if v is not None]
+
+    type_args = enum_values
 
     def enum_value(self, name: Token, value: ast.Init | None) -> tuple[int, str, ast.Init | None]:
         return name.pos, name.text, value
@@ -120,15 +135,26 @@ class Builder:
         return ast.VarBlock(keyword.pos, keyword.text.upper(), qualifiers, decls)
 
     def var_decl(
-        self, names: list[Token], location: Token | None, spec: ast.TypeSpec, init: ast.Init | None
+        self,
+        names: list[Token],
+        location: Token | None,
+        spec: ast.TypeSpec,
+        edge: Token | None,
+        init: ast.Init | None,
     ) -> ast.VarDecl:
         pos = names[0].pos
-        address = ast.DirectAddress(location.pos, location.text) if location else None
+        address = self.direct(location) if location else None
         attributes = self.attributes.get(pos, {})
-        return ast.VarDecl(pos, [(t.pos, t.text) for t in names], address, spec, init, attributes)
+        written = [(t.pos, t.text) for t in names]
+        return ast.VarDecl(pos, written, address, spec, init, attributes, edge.text.upper() if edge else "")
 
     def var_names(self, *names: Token) -> list[Token]:
         return list(names)
+
+    def ref_init(self, op: Token, _equals: Token, value: ast.Expr) -> ast.Expr:
+        if op.text.upper() != "REF":
+            self.report(op.pos, "syntax", f"{op.text} has no place here; an initial value is written :=, or REF=")
+        return value
 
     def array_init(self, *items: Any) -> ast.ArrayInit:
         return ast.ArrayInit(items[0].pos, list(items))
@@ -136,8 +162,21 @@ class Builder:
     def repeat(self, count: Token, *values: Any) -> ast.Repeat:
         return ast.Repeat(count.pos, self.number(count), _listed(values))
 
-    def struct_init(self, *members: tuple[int, str, ast.Init]) -> ast.StructInit:
-        return ast.StructInit(members[0][0], list(members))
+    def struct_init(self, *items: Any) -> ast.StructInit:
+        """Values without a name are further elements of the array in front of them: `(start := 3, 4, end := 5)`."""
+        members: list[tuple[int, str, ast.Init]] = []
+        listed: ast.ArrayInit | None = None
+        for item in _listed(items):
+            if isinstance(item, tuple):
+                members.append(item)
+                listed = None
+            elif listed is None:
+                offset, name, first = members[-1]
+                listed = ast.ArrayInit(first.pos, [first, item])
+                members[-1] = offset, name, listed
+            else:
+                listed.items.append(item)
+        return ast.StructInit(members[0][0], members)
 
     def member_init(self, name: Token, value: ast.Init) -> tuple[int, str, ast.Init]:
         return name.pos, name.text, value
@@ -145,7 +184,8 @@ class Builder:
     # ---- units ----
 
     def global_block(self, keyword: Token, *items: Any) -> ast.GlobalBlock:
-        return ast.GlobalBlock(self.var_block(keyword, *items), self.source)
+        block = self.var_block(keyword, *items)
+        return ast.GlobalBlock(block, self.source, qualified=self._is_qualified(keyword))
 
     def var_blocks(self, *blocks: Any) -> list[Any]:
         return [b for b in blocks if b is not None]
@@ -154,10 +194,9 @@ class Builder:
         """`head`: modifiers and name."""
         *modifiers, name = head
         attributes = self.attributes.get(keyword.pos, {})
-        decl = ast.PouDecl(
-            name.pos, keyword.text.upper(), name.text, result, blocks, body or [], attributes, self.source
-        )
+        decl = ast.PouDecl(name.pos, keyword.text.upper(), name.text, result, [], body or [], attributes, self.source)
         decl.modifiers = {t.text.upper() for t in modifiers if t is not None}
+        self.units.complete(decl, None, None, blocks or [])
         return decl
 
     def function(self, keyword: Token, *rest: Any) -> Any:
@@ -202,10 +241,11 @@ class Builder:
         self.units.complete(decl, bases, None, members or [])
         return decl
 
-    parts = members = names = step_names = chart = var_blocks
+    parts = members = names = step_names = chart = steps = var_blocks
 
     def method(self, keyword: Token, *rest: Any) -> Any:
-        return self.function(keyword, *rest)
+        *head, result, blocks, body, steps = rest
+        return self.pou(keyword, head, result, [*(blocks or []), *(steps or [])], body)
 
     def property(self, keyword: Token, *rest: Any) -> list[ast.PouDecl]:
         return self.units.property(keyword, rest)
@@ -214,8 +254,8 @@ class Builder:
         *modifiers, blocks, body = rest
         return keyword, modifiers, blocks, body
 
-    def action(self, keyword: Token, name: Token, body: Any) -> Any:
-        return self.pou(keyword, [name], None, [], body)
+    def action(self, keyword: Token, name: Token, body: Any, steps: Any) -> Any:
+        return self.pou(keyword, [name], None, steps, body)
 
     def namespace(self, keyword: Token, *rest: Any) -> list[Any]:
         return self.units.namespace(rest)
@@ -236,14 +276,31 @@ class Builder:
                 decl.tasks.append(item)
             elif isinstance(item, ast.ProgramInstance):
                 decl.programs.append(item)
-            elif isinstance(item, list):
-                self._configure(decl, item)
+            elif isinstance(item, ast.InstanceBlock):
+                decl.instance_blocks.append(item)
+            elif isinstance(item, tuple):
+                decl.resources.append(item[0])
+                self._configure(decl, item[1])
 
     def config_globals(self, keyword: Token, *items: Any) -> ast.VarBlock:
         return self.var_block(keyword, *items)
 
-    def resource(self, _keyword: Token, _name: Token, _type: Token, *items: Any) -> list[Any]:
-        return list(items)
+    def resource(self, _keyword: Token, name: Token, _type: Token, *items: Any) -> tuple[str, Any]:
+        return name.text, items
+
+    def instance_config(self, _keyword: Token, *lines: Any) -> ast.InstanceBlock:
+        return ast.InstanceBlock(_listed(lines), self.source)
+
+    instance_access = instance_config
+
+    def config_line(
+        self, path: ast.Expr, location: Token | None, spec: ast.TypeSpec, init: ast.Init | None
+    ) -> ast.ConfigLine:
+        return ast.ConfigLine(path.pos, path, self.direct(location) if location else None, spec, init)
+
+    def access_line(self, name: Token, path: ast.Expr, spec: ast.TypeSpec, rights: Token | None) -> ast.AccessLine:
+        writable = rights is not None and rights.text.upper() == "READ_WRITE"
+        return ast.AccessLine(name.pos, name.text, path, spec, writable)
 
     def task(self, _keyword: Token, name: Token, *properties: Any) -> ast.TaskDecl:
         return ast.TaskDecl(name.pos, name.text, _listed(properties))
@@ -274,10 +331,10 @@ class Builder:
     def mock(self, keyword: Token, instance: ast.Expr) -> ast.ExprStmt:
         return self._statement_call(keyword, ast.Argument(instance.pos, None, instance))
 
-    def mock_function(self, keyword: Token, name: Token, returns: Token, value: ast.Expr) -> ast.ExprStmt:
+    def mock_function(self, keyword: Token, target: ast.Expr, returns: Token, value: ast.Expr) -> ast.ExprStmt:
         if returns.text.upper() != "RETURNS":
             self.report(returns.pos, "syntax", f"expected RETURNS before the value, found {returns.text}")
-        function = ast.Argument(name.pos, None, self.name_expr(name))
+        function = ast.Argument(target.pos, None, target)
         return self._statement_call(keyword, function, ast.Argument(value.pos, None, value))
 
     def _statement_call(self, keyword: Token, *args: ast.Argument) -> ast.ExprStmt:
@@ -415,6 +472,9 @@ class Builder:
 
     def name_expr(self, token: Token) -> ast.Name:
         return ast.Name(token.pos, token.text)
+
+    def global_name(self, token: Token) -> ast.Name:
+        return ast.Name(token.pos - 1, f".{token.text}")
 
     def direct(self, token: Token) -> ast.DirectAddress:
         return ast.DirectAddress(token.pos, token.text.upper())

@@ -67,6 +67,8 @@ class Arrangement:
         for part in _flat(parts):
             if isinstance(part, ast.PouDecl):
                 decl.members.append(part)
+            elif isinstance(part, ast.Namespace):
+                _namespace(decl).using += part.using
             else:
                 decl.blocks.append(part)
 
@@ -113,7 +115,10 @@ class Arrangement:
         for unit in units:
             space = _namespace(unit)
             space.name = f"{name}.{space.name}" if space.name else name
-            space.internal = space.internal or internal
+            if space.internal is not None:
+                space.internal = f"{name}.{space.internal}" if space.internal else name
+            elif internal:
+                space.internal = name.rpartition(".")[0]
         return units
 
 
@@ -121,6 +126,6 @@ def _namespace(unit: Any) -> ast.Namespace:
     space: ast.Namespace | None = getattr(unit, "namespace", None)
     if space is None:
         space = ast.Namespace()
-        if isinstance(unit, ast.PouDecl | ast.TypeDecl | ast.GlobalBlock):
+        if isinstance(unit, ast.PouDecl | ast.TypeDecl | ast.GlobalBlock | ast.TestDecl):
             unit.namespace = space
     return space

@@ -1,21 +1,21 @@
-"""Functions the compiler knows itself: operators as functions, intrinsics, conversions by name.
+"""Functions the compiler knows itself: operators as functions, intrinsics.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, ClassVar
 
 from plctool.compiler import ast, constants, dates
+from plctool.compiler.checker import is_untyped, load, place_of
+from plctool.compiler.conversion_calls import ConversionCalls
 from plctool.compiler.conversions import (
     NUMBERS,
-    SIGNED,
-    UNSIGNED,
+    character,
     common_type,
     convert,
     elementary,
@@ -23,7 +23,8 @@ from plctool.compiler.conversions import (
     literal_type,
     settle,
 )  # fmt: skip
-from plctool.compiler.expressions import Expressions, is_untyped, load
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.open_arrays import bounds_of
 from plctool.compiler.symbols import ERROR, UNTYPED_INT, PouSymbol, TypeSymbol
 from plctool.compiler.typed import (
     Binary,
@@ -40,6 +41,7 @@ from plctool.compiler.typed import (
 )
 from plctool.compiler.types import (
     BOOL,
+    CHAR,
     DINT,
     ELEMENTARY,
     LINT,
@@ -47,9 +49,11 @@ from plctool.compiler.types import (
     REAL,
     UDINT,
     WCHAR,
-    Elementary,
-    EnumType,
+    ArrayType,
     Kind,
+    OpenArrayType,
+    PointerType,
+    RawPointerType,
     ReferenceType,
     StringType,
     SubrangeType,
@@ -57,8 +61,6 @@ from plctool.compiler.types import (
     is_scalar,
 )  # fmt: skip
 
-_CONVERSION = re.compile(r"(?:(?P<source>\w+?)_)?(?P<how>TO|TRUNC)_(?P<target>\w+)")
-_BITCAST = re.compile(r"(?P<source>[A-Z]+)_AS_(?P<target>[A-Z]+)")
 _FOLDED = {
     "ADD": BinaryOp.ADD, "MUL": BinaryOp.MUL, "AND": BinaryOp.AND, "OR": BinaryOp.OR, "XOR": BinaryOp.XOR,
 }  # fmt: skip
@@ -66,28 +68,34 @@ _PAIRS = {"SUB": BinaryOp.SUB, "DIV": BinaryOp.DIV, "MOD": BinaryOp.MOD, "NE": B
 _CHAINS = {"GT": BinaryOp.GT, "GE": BinaryOp.GE, "EQ": BinaryOp.EQ, "LE": BinaryOp.LE, "LT": BinaryOp.LT}
 _SHIFTS = {"SHL": Intrinsic.SHL, "SHR": Intrinsic.SHR, "ROL": Intrinsic.ROL, "ROR": Intrinsic.ROR}
 _FORMAL = {
+    "LOWER_BOUND": ("ARR", "DIM"), "UPPER_BOUND": ("ARR", "DIM"),
     "SHL": ("IN", "N"), "SHR": ("IN", "N"), "ROL": ("IN", "N"), "ROR": ("IN", "N"), "SEL": ("G", "IN0", "IN1"),
 }  # fmt: skip
+_OF_VARIABLES = ("SIZEOF", "XSIZEOF", "ADR", "REF", "__ISVALIDREF")
 
 
-class Builtins(Expressions):
+class Builtins(ConversionCalls):
     """Calls of built-in functions."""
 
     def built_in(self, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
         """The call of a built-in function; None when there is none of that name."""
-        if name in ("SIZEOF", "ADR", "REF", "__ISVALIDREF"):
+        if name in _OF_VARIABLES:
             return self._of_variable(name, node)
         handler = self._functions.get(name)
         if handler is not None:
-            args = self._arguments(name, node, expected)
+            args = self._checked_arguments(name, node, expected)
             return error_value(self.pos(node.pos)) if args is None else handler(self, name, args, node, expected)
-        match = _CONVERSION.fullmatch(name)
-        if match is not None:
-            return self._conversion(name, match, node, expected)
-        match = _BITCAST.fullmatch(name)
-        return None if match is None else self._bitcast(name, match, node)
+        return self.conversion(name, node, expected)
 
-    def _arguments(self, name: str, node: ast.Call, expected: Type | None) -> list[Expr] | None:
+    def function_hint(self, name: str) -> str:
+        """`; did you mean ADD?` for an unknown function, else nothing: what the program has comes first."""
+        return (
+            self.conversion_hint(name.upper())
+            or did_you_mean(name, self.world.function_names())
+            or did_you_mean(name, [*self._functions, *_OF_VARIABLES])
+        )
+
+    def _checked_arguments(self, name: str, node: ast.Call, expected: Type | None) -> list[Expr] | None:
         """Checked arguments in order; formal ones by the names of the standard."""
         passes_expected = name not in _CHAINS and name != "NE"
         found: dict[int, Expr] = {}
@@ -180,7 +188,7 @@ class Builtins(Expressions):
         if any(a.type is ERROR for a in args):
             return error_value(pos)
         if all(isinstance(a, Const) for a in args):
-            value = fold(intrinsic, [a.value for a in args if isinstance(a, Const)], t)
+            value = constants.intrinsic(intrinsic, [a.value for a in args if isinstance(a, Const)], t)
             if value is not None:
                 return Const(value, t, pos)
         return IntrinsicCall(intrinsic, args, t, pos)
@@ -268,6 +276,9 @@ class Builtins(Expressions):
 
     def common_of(self, values: list[Expr], name: str, offset: int, expected: Type | None) -> Type:
         """The type all arguments of `name` are brought to; ERROR after a diagnosis."""
+        characters = [v.type for v in values if v.type in (CHAR, WCHAR)]
+        if characters:  # beside them, a text constant of one character is one
+            values = [character(v, characters[0]) or v for v in values]
         typed = [v.type for v in values if not is_untyped(v)]
         if not typed:
             base = elementary(expected) if expected is not None else None
@@ -320,14 +331,28 @@ class Builtins(Expressions):
         )
         return IntrinsicCall(Intrinsic.STRING_SIZE, [e], UDINT, self.pos(node.pos))
 
+    def _bound(self, name: str, args: list[Expr], node: ast.Call, expected: Type | None) -> Expr:
+        """`LOWER_BOUND(array, dimension)`"""
+        if not self._count(name, args, node, 2, 2):
+            return error_value(self.pos(node.pos))
+        array, dimension = args
+        if not isinstance(array.type, ArrayType):
+            return self.error(node.pos, "type", f"{name} needs an array, not {array.type}")
+        count = len(array.type.bounds)
+        number = dimension.value if isinstance(dimension, Const) else None
+        if not isinstance(number, int) or not 1 <= number <= count:
+            which = "the constant 1" if count == 1 else f"a constant from 1 to {count}"
+            return self.error(node.args[1].pos, "range", f"the dimension of {array.type} is {which}")
+        return bounds_of(place_of(array))[number - 1][name == "UPPER_BOUND"]
+
     def _of_variable(self, name: str, node: ast.Call) -> Expr:
         if len(node.args) != 1 or node.args[0].value is None:
             return self.error(node.pos, "arguments", f"{name} takes 1 argument, not {len(node.args)}")
         argument = node.args[0].value
         if name == "__ISVALIDREF":
             return self._is_valid(argument)
-        if name != "SIZEOF":
-            return self.address_of(argument)
+        if name not in ("SIZEOF", "XSIZEOF"):
+            return self.address_of(argument, RawPointerType if name == "ADR" else PointerType)
         if isinstance(argument, ast.Name):
             symbol = self.scope.lookup(argument.name)
             is_block = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK"
@@ -335,7 +360,18 @@ class Builtins(Expressions):
                 t = self.world.declarations.named_type(argument.pos, argument.name, self.scope)
                 return error_value(self.pos(node.pos)) if t is ERROR else self._size(t, node)
         e = settle(self.expr(argument))
+        if isinstance(e.type, OpenArrayType):
+            return self._open_size(e, e.type, node.pos)
         return e if e.type is ERROR else self._size(e.type, node)
+
+    def _open_size(self, e: Expr, t: OpenArrayType, offset: int) -> Expr:
+        """The bytes of an ARRAY[*], which are known when it runs."""
+        size: Expr = Const(t.element.size, DINT, e.pos)
+        for low, high in bounds_of(place_of(e)):
+            last = self.operate(BinaryOp.SUB, high, low, offset)
+            count = self.operate(BinaryOp.ADD, last, Const(1, DINT, e.pos), offset)
+            size = self.operate(BinaryOp.MUL, size, count, offset)
+        return size
 
     def _is_valid(self, node: ast.Expr) -> Expr:
         """Whether a reference refers to something."""
@@ -348,117 +384,9 @@ class Builtins(Expressions):
     def _size(self, t: Type, node: ast.Call) -> Expr:
         return Const(t.size, UNTYPED_INT, self.pos(node.pos))
 
-    def address_of(self, node: ast.Expr) -> Expr:
+    def address_of(self, node: ast.Expr, kind: type[PointerType]) -> Expr:
         """ADR(x), REF(x)"""
         raise NotImplementedError
-
-    # ---- conversions by name ----
-
-    def _conversion_type(self, name: str) -> Type | None:
-        if name in ELEMENTARY:
-            return ELEMENTARY[name]
-        if name in ("STRING", "WSTRING"):
-            return StringType(255, name == "WSTRING")
-        symbol = self.world.unit(name.casefold(), library=self.scope.library)
-        if isinstance(symbol, TypeSymbol):
-            t = self.world.declarations.resolve_symbol(symbol)
-            return t if isinstance(t, EnumType | SubrangeType) else None
-        return None
-
-    def _conversion(self, name: str, match: re.Match[str], node: ast.Call, expected: Type | None) -> Expr | None:
-        """`INT_TO_REAL(x)`, `TO_REAL(x)`, `REAL_TRUNC_INT(x)`"""
-        source = self._conversion_type(match["source"]) if match["source"] else None
-        target = self._conversion_type(match["target"])
-        if target is None or (match["source"] and source is None):
-            return None
-        args = self._arguments("", node, source)
-        if args is None:
-            return error_value(self.pos(node.pos))
-        if not self._count(name, args, node, 1, 1):
-            return error_value(self.pos(node.pos))
-        e = settle(args[0]) if source is None else self.coerce(args[0], source)
-        if e.type is ERROR:
-            return e
-        if isinstance(e.type, StringType) or isinstance(target, StringType):
-            return self._text_conversion(e, source, target, node)
-        result = self.convert_explicitly(e, target, node.pos, truncate=match["how"] == "TRUNC")
-        return (
-            result
-            if result is not None
-            else self.error(node.pos, "type", f"there is no conversion from {e.type} to {target}")
-        )
-
-    def _text_conversion(self, e: Expr, source: Type | None, target: Type, node: ast.Call) -> Expr:
-        """Conversions from and to text are functions of the library."""
-        if isinstance(e.type, StringType) and isinstance(target, StringType):
-            if e.type.wide is target.wide:
-                return e
-            return self.call_by_name(f"{e.type.keyword}_TO_{target.keyword}", [e], node.pos, None)
-        base = elementary(e.type if isinstance(target, StringType) else target)
-        if base is None:
-            return self.error(node.pos, "type", f"there is no conversion from {e.type} to {target}")
-        text_type = e.type if isinstance(e.type, StringType) else target
-        if base is WCHAR and isinstance(text_type, StringType) and text_type.wide:
-            name = "WCHAR_TO_WSTRING" if isinstance(target, StringType) else "WSTRING_TO_WCHAR"
-            return self.call_by_name(name, [e], node.pos, None)
-        if isinstance(target, StringType):
-            text = self.call_by_name(f"{base}_TO_STRING", [convert(e, base)], node.pos, None)
-            return self.call_by_name("STRING_TO_WSTRING", [text], node.pos, None) if target.wide else text
-        if isinstance(e.type, StringType) and e.type.wide:
-            e = self.call_by_name("WSTRING_TO_STRING", [e], node.pos, None)
-        return convert(self.call_by_name(f"STRING_TO_{base}", [e], node.pos, None), target)
-
-    def convert_explicitly(self, e: Expr, target: Type, offset: int, *, truncate: bool = False) -> Expr | None:
-        """Any scalar as any other; None where it makes no sense."""
-        source, to = elementary(e.type), elementary(target)
-        if source is None or to is None:
-            return None
-        if isinstance(target, SubrangeType):
-            return self.coerce(self._scalar_conversion(e, source, to, truncate=truncate), target)
-        result = self._scalar_conversion(e, source, to, truncate=truncate)
-        return result if target is to else convert(result, target)
-
-    def _scalar_conversion(self, e: Expr, source: Elementary, to: Elementary, *, truncate: bool) -> Expr:
-        if e.type is not source:
-            e = convert(e, source)
-        if source is to:
-            return e
-        if source in dates.UNIT_NS and to in dates.UNIT_NS:
-            return dates.convert_date(e, to)
-        if to is BOOL:
-            return convert(e, BOOL)
-        if to.kind is Kind.REAL and source.kind is not Kind.REAL:
-            if source.kind is not Kind.INT:
-                e = convert(e, UNSIGNED[source.bits] if not source.signed else SIGNED[source.bits])
-            return convert(e, to)
-        if source.kind is Kind.REAL and to.kind not in (Kind.REAL, Kind.INT):
-            number = SIGNED[to.bits] if to.signed else UNSIGNED[to.bits]
-            return convert(convert(e, number, truncate=truncate), to)
-        return convert(e, to, truncate=truncate and source.kind is Kind.REAL)
-
-    def _trunc(self, name: str, args: list[Expr], node: ast.Call, expected: Type | None) -> Expr:
-        if not self._count(name, args, node, 1, 1):
-            return error_value(self.pos(node.pos))
-        e = settle(args[0])
-        source = elementary(e.type)
-        if source is None or source.kind is not Kind.REAL:
-            return self.error(node.pos, "type", f"{name} needs a REAL or LREAL, not {e.type}")
-        wanted = elementary(expected) if expected is not None else None
-        target = ELEMENTARY["INT"] if name == "TRUNC_INT" else DINT
-        if name == "TRUNC" and wanted is not None and wanted.kind is Kind.INT:
-            target = wanted
-        return convert(e, target, truncate=True)
-
-    def _bitcast(self, name: str, match: re.Match[str], node: ast.Call) -> Expr | None:
-        """`REAL_AS_DWORD(x)`: the bits, not the value."""
-        source, target = ELEMENTARY.get(match["source"]), ELEMENTARY.get(match["target"])
-        if source is None or target is None or source.bits != target.bits or BOOL in (source, target):
-            return None
-        args = self._arguments("", node, source)
-        if args is None or not self._count(name, args, node, 1, 1):
-            return error_value(self.pos(node.pos))
-        e = self.coerce(args[0], source)
-        return e if e.type is ERROR else IntrinsicCall(Intrinsic.BITCAST, [e], target, self.pos(node.pos))
 
     _functions: ClassVar[dict[str, Callable[[Any, str, list[Expr], ast.Call, Type | None], Expr]]] = {
         **dict.fromkeys(_FOLDED, _folded),
@@ -477,39 +405,6 @@ class Builtins(Expressions):
         "TIME": _time,
         "LTIME": _time,
         "STRING_SIZE": _string_size,
-        "TRUNC": _trunc,
-        "TRUNC_INT": _trunc,
+        "LOWER_BOUND": _bound,
+        "UPPER_BOUND": _bound,
     }
-
-
-def fold(intrinsic: Intrinsic, values: list[int | float | str], t: Type) -> int | float | str | None:
-    """The value of an intrinsic of constants; None when it is left to run time."""
-    base = elementary(t)
-    if intrinsic is Intrinsic.SELECT:
-        return values[2] if values[0] else values[1]
-    if intrinsic is Intrinsic.MUX:
-        assert isinstance(values[0], int)
-        return values[1 + min(max(values[0], 0), len(values) - 2)]
-    numbers = [v for v in values if not isinstance(v, str)]
-    if base is None or len(numbers) < len(values):
-        return None
-    if intrinsic is Intrinsic.ABS:
-        value = abs(numbers[0])
-        return value if isinstance(value, float) or base.type_class < 0 else constants.wrap(value, base)
-    if intrinsic is Intrinsic.SQRT:
-        return constants.rounded(math.sqrt(numbers[0]), base) if numbers[0] >= 0 else None
-    if intrinsic in (Intrinsic.MIN, Intrinsic.MAX):
-        return min(numbers) if intrinsic is Intrinsic.MIN else max(numbers)
-    value, count = numbers
-    assert isinstance(value, int) and isinstance(count, int)
-    return _shifted(intrinsic, value, count, base)
-
-
-def _shifted(intrinsic: Intrinsic, value: int, count: int, t: Elementary) -> int:
-    bits, pattern = t.bits, value & ((1 << t.bits) - 1)
-    if intrinsic in (Intrinsic.SHL, Intrinsic.SHR):
-        if not 0 <= count < bits:
-            return 0
-        return constants.wrap(pattern << count if intrinsic is Intrinsic.SHL else pattern >> count, t)
-    count = (count if intrinsic is Intrinsic.ROL else -count) % bits
-    return constants.wrap(pattern << count | pattern >> (bits - count), t)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from plctool.compiler.conversions import same_type
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.symbols import ClassInfo, Member
+from plctool.compiler.types import BOOL
 
 if TYPE_CHECKING:
     from plctool.compiler.classes import Classes
@@ -27,12 +28,21 @@ def check_class(classes: Classes, cls: ClassInfo) -> None:
             names = cls.base.member_names() if cls.base is not None else []
             hint = did_you_mean(member.decl.name, names)
             _error(classes, member, f"{member.name} overrides nothing{hint}")
+        if key == "fb_exit":
+            _check_exit(classes, member)
         if member.abstract and not cls.abstract:
             _error(classes, member, f"{member.name} is ABSTRACT, so {cls.name} has to be ABSTRACT as well")
     if not cls.is_interface:
         _check_interfaces(classes, cls)
         if not cls.abstract and cls.base is not None:
             _check_complete(classes, cls)
+
+
+def _check_exit(classes: Classes, member: Member) -> None:
+    """The runtime calls it, and tells nothing but whether the instance moves."""
+    parameters = [(symbol.name.casefold(), symbol.type) for symbol, _ in classes.signature(member).parameters]
+    if parameters not in ([], [("bincopycode", BOOL)]):
+        _error(classes, member, f"{member.name} has bInCopyCode : BOOL as its only input, or none")
 
 
 def _check_override(classes: Classes, member: Member, inherited: Member) -> None:

@@ -8,13 +8,14 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from plctool.compiler import ast
-from plctool.compiler.class_rules import INITIALISERS, check_class
+from plctool.compiler.class_rules import check_class
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.hierarchy import Hierarchy
+from plctool.compiler.queries import Queries
 from plctool.compiler.scope import Scope
 from plctool.compiler.symbols import (
     ERROR,
@@ -33,6 +34,7 @@ from plctool.compiler.types import UDINT, ArrayType, Field, InterfaceType, Struc
 if TYPE_CHECKING:
     from plctool.compiler.world import World
 
+_LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
 CLASS_NUMBER = "%class"  # the hidden member; no identifier, so nothing else can have its name
 
 
@@ -40,6 +42,11 @@ def member_key(decl: ast.PouDecl) -> str:
     """Under which a member is found; a property has two."""
     name = decl.name.casefold()
     return f"{name}.{decl.keyword.lower()}" if decl.keyword in ("GET", "SET") else name
+
+
+def _named(interfaces: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Without the interface that __QUERYINTERFACE needs elsewhere; here every instance can be asked."""
+    return ((offset, name) for offset, name in interfaces if name.casefold() != "__system.iqueryinterface")
 
 
 def instances_in(t: Type) -> Iterator[StructType]:
@@ -61,52 +68,13 @@ class Classes:
         self.used = False  # whether anything has methods, actions or properties
         self._interfaces: dict[PouSymbol, InterfaceType] = {}
         self._programs: list[ClassInfo] = []
+        self._complete: set[ClassInfo] = set()
+        self.hierarchy = Hierarchy(world)
+        self.queries = Queries()
         self._blocks: dict[PouSymbol, ClassInfo] = {}
         self._dispatches: dict[tuple[ClassInfo, str], Dispatch] = {}
         self._own_calls: list[tuple[Pou, Dispatch, Pos]] = []
         self._other_calls: list[tuple[Pou, Pou, Dispatch | None, Pos]] = []
-
-    # ---- what extends what, before anything is declared ----
-
-    @cached_property
-    def _derived(self) -> dict[PouSymbol, list[PouSymbol]]:
-        """The blocks derived directly from a block; roots are among the keys."""
-        derived: dict[PouSymbol, list[PouSymbol]] = {}
-        todo = [s for s in self.world.pou_symbols() if s.keyword == "FUNCTION_BLOCK"]
-        seen = set(todo)
-        while todo:
-            symbol = todo.pop(0)
-            base = self._base_symbol(symbol)
-            if base is None:
-                derived.setdefault(symbol, [])
-                continue
-            derived.setdefault(base, []).append(symbol)
-            if base not in seen:
-                seen.add(base)
-                todo.append(base)
-        return derived
-
-    def _base_symbol(self, symbol: PouSymbol) -> PouSymbol | None:
-        for _, name in symbol.decl.bases[:1]:
-            base = self.scope_of(symbol).unit(name)
-            if isinstance(base, PouSymbol) and base.keyword == "FUNCTION_BLOCK":
-                return base
-        return None
-
-    @cached_property
-    def _numbers(self) -> dict[PouSymbol, int]:
-        """Of the classes that may stand for others: derived, extended or with interfaces. What is derived from itself
-        has none."""
-        numbers: dict[PouSymbol, int] = {}
-        for root in [s for s in self._derived if self._base_symbol(s) is None]:
-            family, todo = list[PouSymbol](), [root]
-            while todo:
-                symbol = todo.pop()
-                family.append(symbol)
-                todo += reversed(self._derived.get(symbol, []))
-            if len(family) > 1 or any(s.decl.interfaces for s in family):
-                numbers.update(zip(family, range(len(numbers) + 1, len(numbers) + 1 + len(family)), strict=True))
-        return numbers
 
     # ---- declaring ----
 
@@ -119,7 +87,7 @@ class Classes:
     def begin_block(self, symbol: PouSymbol, info: BlockInfo, scope: Scope, defaults: dict[str, Initial]) -> None:
         """Gives a block that is being declared what it inherits, and its class number."""
         decl = symbol.decl
-        cls = ClassInfo(symbol, decl.full_name, info.type, info, number=self._numbers.get(symbol, 0))
+        cls = ClassInfo(symbol, decl.full_name, info.type, info, number=self.hierarchy.numbers.get(symbol, 0))
         info.cls = self._blocks[symbol] = scope.cls = cls
         scope.outer = cls.names
         base = self._base(symbol, scope)
@@ -130,7 +98,7 @@ class Classes:
             info.type.fields.append(Field(CLASS_NUMBER, UDINT))
         if cls.number:
             defaults[CLASS_NUMBER] = ScalarInit(cls.number)
-        for offset, name in decl.interfaces:
+        for offset, name in _named(decl.interfaces):
             interface = self._interface_named(offset, name, scope)
             if interface is not None:
                 cls.interfaces.append(interface)
@@ -148,10 +116,12 @@ class Classes:
             scope.error(bases[1][0], "inheritance", "a function block extends one other; use IMPLEMENTS for interfaces")
         offset, name = bases[0]
         base = scope.unit(name)
+        if base is not None and not scope.may_use(base, name, offset):
+            return None
         if isinstance(base, PouSymbol) and base.keyword == "FUNCTION_BLOCK":
             info = self.world.units.block(base)
             if info is None:
-                scope.error(offset, "recursion", f"{symbol.decl.name} extends itself: {self._circle(symbol)}")
+                scope.error(offset, "recursion", f"{symbol.decl.name} extends itself: {self.hierarchy.circle(symbol)}")
             elif "FINAL" in base.decl.modifiers:
                 scope.error(offset, "inheritance", f"{name} is FINAL and cannot be extended")
             return info
@@ -160,14 +130,6 @@ class Classes:
         else:
             self._no_such(offset, name, scope, "function block", base is None)
         return None
-
-    def _circle(self, symbol: PouSymbol) -> str:
-        """`A extends B extends A`"""
-        names, at = [symbol.decl.name], self._base_symbol(symbol)
-        while at is not None and at.decl.name not in names:
-            names.append(at.decl.name)
-            at = self._base_symbol(at)
-        return " extends ".join([*names, at.decl.name if at is not None else "?"])
 
     def _no_such(self, offset: int, name: str, scope: Scope, what: str, unknown: bool) -> None:
         if unknown:
@@ -200,33 +162,40 @@ class Classes:
             cls.names[decl.name.casefold()] = MemberSymbol(decl.name)
 
     def instance_variables(self, info: BlockInfo, defaults: dict[str, Initial], scope: Scope) -> None:
-        """VAR_INST of methods: hidden members of the instance."""
+        """VAR_INST of methods, and the steps of charts in actions: hidden members of the instance."""
         assert info.cls is not None
-        for key, member in info.cls.members.items():
-            lines = [line for b in member.decl.blocks if b.keyword == "VAR_INST" for line in b.decls]
-            for line in lines:
-                t, default = self.world.declarations.declared_type(line, scope)
-                for offset, name in line.names:
-                    full_name = f"{key}.{name}"
-                    symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL, default=default)
-                    info.cls.instance_variables.setdefault(key, {})[name.casefold()] = symbol
-                    if t is ERROR:
-                        continue
-                    symbol.variable = Variable(full_name, t, Storage.SELF, symbol.pos, initial=default)
-                    info.members[full_name.casefold()] = symbol
-                    info.type.fields.append(Field(full_name, t))
-                    if default is not None:
-                        defaults[full_name] = default
+        for full_name, symbol in self._lasting(info.cls, scope):
+            symbol.variable = Variable(full_name, symbol.type, Storage.SELF, symbol.pos, initial=symbol.default)
+            info.members[full_name.casefold()] = symbol
+            info.type.fields.append(Field(full_name, symbol.type))
+            if symbol.default is not None:
+                defaults[full_name] = symbol.default
 
-    def end_block(self, info: BlockInfo) -> None:
+    def _lasting(self, cls: ClassInfo, scope: Scope) -> Iterator[tuple[str, VarSymbol]]:
+        """The variables of members that last as long as the instance, as `member.variable`."""
+        for key, member in cls.members.items():
+            for block in member.decl.blocks:
+                role = _LASTING.get(block.keyword)
+                for line in block.decls if role is not None else []:
+                    assert role is not None
+                    t, default = self.world.declarations.declared_type(line, scope)
+                    for offset, name in line.names:
+                        symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
+                        cls.instance_variables.setdefault(key, {})[name.casefold()] = symbol
+                        if t is not ERROR:
+                            yield f"{key}.{name}", symbol
+
+    def end_block(self, info: BlockInfo, scope: Scope) -> None:
         """The variables of a block are declared: its members see them."""
         cls = info.cls
         assert cls is not None
         inherited = cls.base.block.members if cls.base is not None and cls.base.block is not None else {}
+        own = {member.decl.name.casefold() for member in cls.members.values()}
         for key, symbol in info.members.items():
-            hidden = symbol.access == "PRIVATE" and inherited.get(key) is symbol
-            if "." not in key and not hidden:
+            known = inherited.get(key) is symbol and (symbol.access == "PRIVATE" or key not in own)
+            if "." not in key and not known:
                 self._see(cls, key, symbol)
+        cls.names.update(scope.edges)
 
     def _see(self, cls: ClassInfo, key: str, symbol: VarSymbol) -> None:
         other = cls.names.get(key)
@@ -234,22 +203,30 @@ class Classes:
             message = f"{symbol.name} is a variable of {cls.name} and a method, action or property as well"
             self.world.diagnostics.error(symbol.pos, "duplicate", message)
             return
-        if isinstance(other, VarSymbol) and other is not symbol and other.role is not Role.TEMP:
+        if isinstance(other, VarSymbol) and other.pos == symbol.pos:
+            return  # inherited; for an input with R_EDGE that is its edge
+        if isinstance(other, VarSymbol) and other.role is not Role.TEMP:
             where = f"{other.name} in line {other.pos.line}"
             message = f"{symbol.name} is inherited already: {where}"
             self.world.diagnostics.error(symbol.pos, "duplicate", message)
         cls.names[key] = symbol
 
-    def program(self, symbol: PouSymbol, scope: Scope) -> ClassInfo | None:
-        """The actions and methods of a program instance whose variables are declared; None when it has none."""
+    def program(
+        self, symbol: PouSymbol, scope: Scope, place: Callable[[str, VarSymbol], Variable | None]
+    ) -> ClassInfo | None:
+        """The actions and methods of a program instance whose variables are declared; None when it has none. `place`
+        makes a variable of the instance."""
         if not symbol.decl.members:
             return None
         assert scope.pou is not None
         cls = ClassInfo(symbol, scope.pou.name)
         self._add_members(cls)
+        for full_name, lasting in self._lasting(cls, scope):
+            lasting.variable = place(full_name, lasting)
         for key, variable in scope.names.items():
             if isinstance(variable, VarSymbol) and variable.role is not Role.TEMP:
                 self._see(cls, key, variable)
+        cls.names.update(scope.edges)
         scope.outer, scope.cls = cls.names, cls
         self._programs.append(cls)
         return cls
@@ -265,7 +242,7 @@ class Classes:
         t = self._interfaces[symbol] = InterfaceType(target)
         self.interface_infos[target] = cls
         self._add_members(cls)
-        for offset, name in decl.bases:
+        for offset, name in _named(decl.bases):
             base = self._interface_named(offset, name, scope)
             if base is not None and (base is cls or cls in base.all_interfaces()):
                 scope.error(offset, "recursion", f"{decl.name} extends itself through {name}")
@@ -276,6 +253,8 @@ class Classes:
 
     def _interface_named(self, offset: int, name: str, scope: Scope) -> ClassInfo | None:
         symbol = scope.unit(name)
+        if symbol is not None and not scope.may_use(symbol, name, offset):
+            return None
         if isinstance(symbol, PouSymbol) and symbol.keyword == "INTERFACE":
             return self.interface_infos[self.interface(symbol).target]  # type: ignore[index]
         self._no_such(offset, name, scope, "interface", symbol is None)
@@ -300,6 +279,8 @@ class Classes:
         info = member.info = FunctionInfo(pou, [], None, decl.attributes)
         scope = self.scope_of(cls.symbol)
         scope.pou, scope.cls, scope.outer = pou, cls, cls.names
+        if decl.namespace is not None:
+            scope.use(decl.namespace.using)
         scope.names.update(cls.instance_variables.get(member_key(decl), {}))
         self.world.units.signature(info, decl, scope)
         if not member.abstract:
@@ -308,16 +289,18 @@ class Classes:
             scope.error(decl.pos, "inheritance", f"{member.name} has no body, because it is ABSTRACT")
         return info
 
-    def declare_all(self) -> None:
-        """Declares the members of everything, used or not, so that all of it is checked."""
+    def declare_members(self) -> None:
+        """Declares the members of everything known so far, used or not, so that all of it is checked."""
         for symbol in self.world.pou_symbols():
             if symbol.keyword == "INTERFACE":
                 self.interface(symbol)
         classes = [*self.interface_infos.values(), *self._blocks.values(), *self._programs]
-        for cls in classes:
+        new = [cls for cls in classes if cls not in self._complete]
+        self._complete.update(new)
+        for cls in new:
             for member in cls.members.values():
                 self.signature(member)
-        for cls in classes:
+        for cls in new:
             check_class(self, cls)
 
     # ---- calls of what is only known when it runs ----
@@ -342,6 +325,7 @@ class Classes:
     def finish(self, variables: Iterable[Variable]) -> None:
         """Finds the targets of all dispatches: of classes that have instances among the variables."""
         present = {t for v in variables for t in instances_in(v.type)}
+        self.queries.finish(cls for cls in self._blocks.values() if cls.number and cls.type in present)
         for (cls, key), dispatch in self._dispatches.items():
             for other in self._blocks.values():
                 if other.type not in present or cls.type is None or not other.type.conforms(cls.type):
@@ -354,7 +338,7 @@ class Classes:
                     dispatch.targets[other.number] = self.signature(member).pou
         for caller, dispatch, pos in self._own_calls:
             for target in dispatch.targets.values():
-                self.world.add_call(caller, target, pos)
+                self.world.calls.add(caller, target, pos)
         for caller, function, dispatch_of, pos in self._other_calls:
             targets = [function] if dispatch_of is None else list(dispatch_of.targets.values())
             if caller in targets:
@@ -374,10 +358,18 @@ class Classes:
 
     def initialisers(self, t: StructType) -> list[Member]:
         """The FB_Init methods of a block, that of the base first."""
+        return list(reversed(self._each(t, "fb_init")))
+
+    def finalisers(self, t: StructType) -> list[Member]:
+        """The FB_Exit methods of a block, that of the base last."""
+        return self._each(t, "fb_exit")
+
+    def _each(self, t: StructType, key: str) -> list[Member]:
+        """The methods of that name of a block and of its bases."""
         found: list[Member] = []
         cls = self.class_of(t)
         while cls is not None:
-            if INITIALISERS[0] in cls.members:
-                found.insert(0, cls.members[INITIALISERS[0]])
+            if key in cls.members:
+                found.append(cls.members[key])
             cls = cls.base
         return found

@@ -8,44 +8,28 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from plctool.compiler import ast
-from plctool.compiler.declarations import Allocation
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.scope import Scope
 from plctool.compiler.statements import Statements
-from plctool.compiler.symbols import ERROR, PouSymbol
-from plctool.compiler.typed import (
-    Assign,
-    Direction,
-    Load,
-    Parameter,
-    Pou,
-    PouKind,
-    Statement,
-    Task,
-    TaskKind,
-    Variable,
-    VarPlace,
-)
-from plctool.compiler.types import BOOL, LTIME, TIME
+from plctool.compiler.symbols import PouSymbol, ProgramInfo
+from plctool.compiler.tasks import background, read_task
+from plctool.compiler.typed import Pou, PouKind, Task, TaskKind
 from plctool.compiler.world import World
 
 DEFAULT_INTERVAL_US = 10_000
 DEFAULT_TASK = "Main"
-DEFAULT_PROGRAM = "PLC_PRG"
-LOWEST_PRIORITY = 31
-MAX_INTERVAL_US = 0x7FFF_FFFF
+DEFAULT_PROGRAMS = ("PLC_PRG", "MAIN")
 
 
 @dataclass
 class Application:
-    """The tasks, and the program instances by name."""
+    """The tasks."""
 
     tasks: list[Task] = field(default_factory=list)
-    programs: dict[str, Pou] = field(default_factory=dict)
 
 
 def configure(world: World) -> Application:
-    """Instantiates the programs. Programs that no task runs are checked all the same."""
+    """Instantiates the programs that tasks run."""
     application = Application()
     builder = _Builder(world, application)
     if world.configurations:
@@ -53,46 +37,47 @@ def configure(world: World) -> Application:
             builder.configuration(decl)
     else:
         builder.default()
-    builder.check_others()
+    world.instance_config.apply(application.tasks)
     return application
+
+
+def default_programs(world: World) -> list[PouSymbol]:
+    """What runs without a CONFIGURATION when it is just one: that with a usual name, else all there are."""
+    programs = world.program_symbols()
+    for name in DEFAULT_PROGRAMS:
+        for symbol in programs:
+            if symbol.decl.name.upper() == name:
+                return [symbol]
+    return programs
 
 
 class _Builder:
     def __init__(self, world: World, application: Application) -> None:
         self._world = world
         self._application = application
-        self._used: set[PouSymbol] = set()
-        self._connections: list[tuple[ast.ProgramInstance, Pou, Task]] = []
+        self._names: set[str] = set()
+        self._connections: list[tuple[ast.ProgramInstance, ProgramInfo, Task]] = []
 
     # ---- without CONFIGURATION ----
 
     def default(self) -> None:
-        programs = self._world.program_symbols()
-        chosen = [p for p in programs if p.decl.name.upper() == DEFAULT_PROGRAM] or programs
+        chosen = default_programs(self._world)
         if not chosen:
             return
         if len(chosen) > 1:
             decl = chosen[1].decl
             self._world.diagnostics.error(
                 decl.source.pos(decl.pos), "configuration",
-                f"several programs: name one {DEFAULT_PROGRAM}, or write a CONFIGURATION that says what runs",
+                f"several programs: name one {DEFAULT_PROGRAMS[0]}, or write a CONFIGURATION that says what runs",
             )  # fmt: skip
             return
-        pou = self._instance(chosen[0], chosen[0].decl.name, set())
-        self._application.tasks.append(Task(DEFAULT_TASK, TaskKind.CYCLIC, 1, DEFAULT_INTERVAL_US, [pou]))
+        program = self._instance(chosen[0].decl.full_name)
+        self._application.tasks.append(Task(DEFAULT_TASK, TaskKind.CYCLIC, 1, DEFAULT_INTERVAL_US, [program.pou]))
 
-    def check_others(self) -> None:
-        """Programs without an instance: their variables go nowhere."""
-        for symbol in self._world.program_symbols():
-            if symbol not in self._used:
-                self._world.units.program(symbol, symbol.decl.name, Allocation(), set())
-
-    def _instance(self, symbol: PouSymbol, name: str, qualifiers: set[str]) -> Pou:
-        self._used.add(symbol)
-        pou, scope = self._world.units.program(symbol, name, self._world.allocation, qualifiers)
-        self._application.programs[name] = pou
-        self._world.add_instance(name, scope)
-        return pou
+    def _instance(self, name: str) -> ProgramInfo:
+        instance = self._world.programs.find(name.casefold())
+        assert instance is not None and instance.program is not None
+        return instance.program
 
     # ---- with CONFIGURATION ----
 
@@ -103,21 +88,21 @@ class _Builder:
             if task_decl.name.casefold() in tasks:
                 scope.error(task_decl.pos, "duplicate", f"there is a task {task_decl.name} already")
                 continue
-            tasks[task_decl.name.casefold()] = self._task(task_decl, scope)
+            tasks[task_decl.name.casefold()] = read_task(task_decl, scope)
         self._application.tasks += tasks.values()
-        background: Task | None = None
+        freewheeling: Task | None = None
         for instance in decl.programs:
             task = self._task_of(instance, tasks, scope)
             if task is None:
                 continue
             if task is _BACKGROUND:
-                if background is None:
-                    background = Task("Background", TaskKind.FREEWHEELING, LOWEST_PRIORITY, 0, [])
-                    self._application.tasks.append(background)
-                task = background
+                if freewheeling is None:
+                    freewheeling = background("Background")
+                    self._application.tasks.append(freewheeling)
+                task = freewheeling
             self._program(instance, task, scope)
-        for instance, pou, task in self._connections:
-            self._connect(instance, pou, task, scope)
+        for instance, program, task in self._connections:
+            self._connect(instance, program, task, scope)
         self._connections.clear()
 
     def _task_of(self, instance: ast.ProgramInstance, tasks: dict[str, Task], scope: Scope) -> Task | None:
@@ -136,33 +121,21 @@ class _Builder:
             hint = did_you_mean(instance.type_name, (p.decl.name for p in self._world.program_symbols()))
             scope.error(instance.type_pos, "unknown", f"there is no program {instance.type_name}{hint}")
             return
-        if instance.name.casefold() in (n.casefold() for n in self._application.programs):
+        if instance.name.casefold() in self._names:
             scope.error(instance.pos, "duplicate", f"there is a program instance {instance.name} already")
             return
-        pou = self._instance(symbol, instance.name, instance.qualifiers)
-        task.programs.append(pou)
+        self._names.add(instance.name.casefold())
+        program = self._instance(instance.name)
+        task.programs.append(program.pou)
         if instance.args:
-            self._connections.append((instance, pou, task))
+            self._connections.append((instance, program, task))
 
-    def _connect(self, instance: ast.ProgramInstance, pou: Pou, task: Task, scope: Scope) -> None:
+    def _connect(self, instance: ast.ProgramInstance, program: ProgramInfo, task: Task, scope: Scope) -> None:
         """`PROGRAM p WITH t : Type(input := x, output => y)`: small programs before and behind do the assignments."""
-        checker = Statements(scope)
-        before: list[Statement] = []
-        behind: list[Statement] = []
-        for argument in instance.args:
-            parameter = self._parameter(argument, pou, instance, scope)
-            if parameter is None or argument.value is None:
-                continue
-            variable, pos = parameter.variable, scope.pos(argument.pos)
-            place = VarPlace(variable, variable.type, pos)
-            if not argument.output:
-                value = checker.value(argument.value, variable.type)
-                before.append(Assign(place, value, pos))
-                continue
-            target = checker.target(argument.value, "an output", "take an output")
-            if target is not None:
-                value = checker.coerce(Load(place, variable.type, pos), target.type)
-                behind.append(Assign(target, value, pos))
+        handed = Statements(scope).program_arguments(instance.args, program, instance.pos)
+        if handed is None:
+            return
+        (before, behind), pou = handed, program.pou
         at = task.programs.index(pou)
         task.programs[at : at + 1] = [
             *([Pou(f"{pou.name}.inputs", PouKind.PROGRAM, pou.pos, body=before)] if before else []),
@@ -171,70 +144,5 @@ class _Builder:
         ]
         self._world.pous += [p for p in task.programs[at : at + 3] if p.name.startswith(f"{pou.name}.")]
 
-    def _parameter(
-        self, argument: ast.Argument, pou: Pou, instance: ast.ProgramInstance, scope: Scope
-    ) -> Parameter | None:
-        if argument.name is None:
-            scope.error(argument.pos, "arguments", "write name := value or name => variable")
-            return None
-        direction = Direction.OUTPUT if argument.output else Direction.INPUT
-        names = {p.variable.name.rpartition(".")[2]: p for p in pou.parameters if p.direction is direction}
-        found = next((p for n, p in names.items() if n.casefold() == argument.name.casefold()), None)
-        if found is None:
-            what = "output" if argument.output else "input"
-            hint = did_you_mean(argument.name, names)
-            scope.error(argument.pos, "unknown", f"{instance.type_name} has no {what} {argument.name}{hint}")
-        return found
 
-    # ---- tasks ----
-
-    def _task(self, decl: ast.TaskDecl, scope: Scope) -> Task:
-        task = Task(decl.name, TaskKind.FREEWHEELING, LOWEST_PRIORITY, 0, [])
-        checker = Statements(scope)
-        for offset, name, value in decl.properties:
-            key = name.upper()
-            if isinstance(value, ast.ArrayInit | ast.StructInit) or key not in ("INTERVAL", "PRIORITY", "SINGLE"):
-                scope.error(offset, "unknown", f"a TASK has INTERVAL, PRIORITY and SINGLE, not {name}")
-            elif key == "INTERVAL":
-                interval = self._interval(checker, value)
-                if interval:
-                    task.interval_us, task.kind = interval, TaskKind.CYCLIC
-            elif key == "PRIORITY":
-                task.priority = self._priority(checker, value)
-            else:
-                event = self._event(checker, value)
-                if event is not None:
-                    task.event, task.kind = event, TaskKind.EVENT
-        return task
-
-    def _interval(self, checker: Statements, node: ast.Expr) -> int:
-        e = checker.constant(node)
-        if e is None:
-            return 0
-        if e.type not in (TIME, LTIME) or not isinstance(e.value, int):
-            checker.error(node.pos, "type", f"INTERVAL is a duration such as T#10ms, not {e.type}")
-            return 0
-        interval = e.value * 1000 if e.type is TIME else e.value // 1000
-        if not 0 <= interval <= MAX_INTERVAL_US:
-            checker.error(node.pos, "range", "INTERVAL has to lie between 0 and 35 minutes")
-            return 0
-        return interval
-
-    def _priority(self, checker: Statements, node: ast.Expr) -> int:
-        priority = checker.integer(node)
-        if priority is None or 0 <= priority <= LOWEST_PRIORITY:
-            return LOWEST_PRIORITY if priority is None else priority
-        checker.error(node.pos, "range", f"PRIORITY is 0 (highest) to {LOWEST_PRIORITY}, not {priority}")
-        return LOWEST_PRIORITY
-
-    def _event(self, checker: Statements, node: ast.Expr) -> Variable | None:
-        e = checker.expr(node)
-        if e.type is ERROR:
-            return None
-        if e.type is BOOL and isinstance(e, Load) and isinstance(e.place, VarPlace):
-            return e.place.var
-        checker.error(node.pos, "type", "SINGLE is a global BOOL variable")
-        return None
-
-
-_BACKGROUND = Task("", TaskKind.FREEWHEELING, LOWEST_PRIORITY, 0, [])
+_BACKGROUND = background("")

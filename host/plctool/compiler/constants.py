@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from plctool.compiler.symbols import UNTYPED_INT
-from plctool.compiler.typed import BinaryOp
+from plctool.compiler.typed import BinaryOp, Intrinsic
 from plctool.compiler.types import BOOL, REAL, Elementary, EnumType, Kind, PointerType, SubrangeType, Type, base_of
 
 Value = int | float | str
@@ -173,6 +173,39 @@ def power(base: Value, exponent: Value) -> Value:
     except (OverflowError, ValueError):
         raise ConstantError("this power has no value in LREAL") from None
     return value
+
+
+def intrinsic(op: Intrinsic, values: list[Value], t: Type) -> Value | None:
+    """The value of an intrinsic of constants; None when it is left to run time."""
+    base = base_of(t)
+    if op is Intrinsic.SELECT:
+        return values[2] if values[0] else values[1]
+    if op is Intrinsic.MUX:
+        assert isinstance(values[0], int)
+        return values[1 + min(max(values[0], 0), len(values) - 2)]
+    numbers = [v for v in values if not isinstance(v, str)]
+    if not isinstance(base, Elementary) or len(numbers) < len(values):
+        return None
+    if op is Intrinsic.ABS:
+        value = abs(numbers[0])
+        return value if isinstance(value, float) or base.type_class < 0 else wrap(value, base)
+    if op is Intrinsic.SQRT:
+        return rounded(math.sqrt(numbers[0]), base) if numbers[0] >= 0 else None
+    if op in (Intrinsic.MIN, Intrinsic.MAX):
+        return min(numbers) if op is Intrinsic.MIN else max(numbers)
+    value, count = numbers
+    assert isinstance(value, int) and isinstance(count, int)
+    return _shifted(op, value, count, base)
+
+
+def _shifted(op: Intrinsic, value: int, count: int, t: Elementary) -> int:
+    bits, pattern = t.bits, value & ((1 << t.bits) - 1)
+    if op in (Intrinsic.SHL, Intrinsic.SHR):
+        if not 0 <= count < bits:
+            return 0
+        return wrap(pattern << count, t) if op is Intrinsic.SHL else value >> count
+    count = (count if op is Intrinsic.ROL else -count) % bits
+    return wrap(pattern << count | pattern >> (bits - count), t)
 
 
 def fits(value: int, t: Type) -> bool:

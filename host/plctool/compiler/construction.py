@@ -1,5 +1,5 @@
-"""What has to run when the application starts: initial values that are addresses, and FB_Init of every instance, first
-of the members, then of the instance that holds them.
+"""What has to run when the application starts: initial values that are not constant, and FB_Init of every instance,
+first of the members, then of the instance that holds them. And when it ends: FB_Exit, the other way round.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -10,8 +10,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from plctool.compiler.classes import instances_in
 from plctool.compiler.symbols import Member
 from plctool.compiler.typed import (
+    Area,
     ArrayInit,
     Assign,
     Call,
@@ -21,6 +23,7 @@ from plctool.compiler.typed import (
     Direction,
     Expr,
     For,
+    If,
     IndexPlace,
     Initial,
     Load,
@@ -38,7 +41,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.types import BOOL, DINT, ArrayType, StringType, StructType, Type
+from plctool.compiler.types import BOOL, DINT, ArrayType, PointerType, StringType, StructType, Type
 
 if TYPE_CHECKING:
     from plctool.compiler.world import World
@@ -48,8 +51,8 @@ _LOOP_FROM = 4  # equal elements that are worth a loop
 
 
 def construct(world: World) -> None:
-    """Makes the start-up routine `world.startup` of all global instances, and lets units begin with the FB_Init of
-    instances among their own variables."""
+    """Makes the routines `world.startup` and `world.shutdown` of all global instances, and lets units begin with the
+    FB_Init of instances among their own variables, which live for one call."""
     start = Pou("FB_Init", PouKind.FUNCTION, Pos("", 1, 1))
     flag = Variable("init_retains", BOOL, Storage.LOCAL, start.pos)
     start.parameters.append(Parameter(flag, Direction.INPUT))
@@ -60,9 +63,15 @@ def construct(world: World) -> None:
         world.startup = start
         world.pous.append(start)
     for pou in world.pous:
-        if pou.kind is PouKind.PROGRAM or pou.kind is PouKind.FUNCTION_BLOCK:
+        if pou is not start:
             local = _Construction(world, pou, Const(1, BOOL, pou.pos))
             pou.body = [s for v in list(pou.locals) for s in local.variable(v)] + pou.body
+    end = Pou("FB_Exit", PouKind.FUNCTION, Pos("", 1, 1))
+    exits = _Destruction(world, end)
+    end.body = [s for v in reversed(world.allocation.variables) for s in exits.variable(v)]
+    if end.body:
+        world.shutdown = end
+        world.pous.append(end)
 
 
 class _Construction:
@@ -70,10 +79,12 @@ class _Construction:
         self._world = world
         self._pou = pou
         self._init_retains = init_retains
+        self._retained = False  # the variable keeps its values
         self._needed: dict[StructType, bool] = {}
 
     def variable(self, variable: Variable) -> list[Statement]:
-        """The calls for a variable and all instances in it."""
+        """What a variable and all instances in it need."""
+        self._retained = variable.area is Area.RETAIN
         return self._place(VarPlace(variable, variable.type, variable.pos), variable.initial, variable.pos)
 
     def _needs(self, t: Type) -> bool:
@@ -91,7 +102,9 @@ class _Construction:
     def _place(self, place: Place, initial: Initial | None, pos: Pos) -> list[Statement]:
         t = place.type
         if isinstance(initial, ComputedInit):
-            return [Assign(place, initial.value, pos)]
+            assign = Assign(place, initial.value, pos)
+            kept = self._retained and not isinstance(t, PointerType)  # an address may be another one each time
+            return [If([(self._init_retains, [assign])], [], pos)] if kept else [assign]
         if not self._needs(t) and not _is_computed(initial):
             return []
         if isinstance(t, ArrayType):
@@ -111,20 +124,16 @@ class _Construction:
         return statements
 
     def _array(self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos) -> list[Statement]:
-        flat = ArrayType(t.element, ((0, t.count - 1),))
-        base = MemberPlace(place, 0, flat, pos)
+        base = _flat(place, t, pos)
         runs = list(initial.runs) if isinstance(initial, ArrayInit) else []
         runs.append((t.count - sum(count for count, _ in runs), None))
         statements: list[Statement] = []
         first = 0
         for count, value in runs:
             if count >= _LOOP_FROM:
-                counter = Variable(f"element {len(self._pou.locals)}", DINT, Storage.LOCAL, pos)
-                self._pou.locals.append(counter)
-                index = VarPlace(counter, DINT, pos)
-                element = IndexPlace(base, [Load(index, DINT, pos)], t.element, pos)
-                low, high, one = (Const(n, DINT, pos) for n in (first, first + count - 1, 1))
-                statements.append(For(index, low, high, one, self._place(element, value, pos), pos))
+                loop, element = _loop(self._pou, base, t.element, first, first + count - 1)
+                loop.body = self._place(element, value, pos)
+                statements.append(loop)
             else:
                 for n in range(first, first + count):
                     element = IndexPlace(base, [Const(n, DINT, pos)], t.element, pos)
@@ -157,8 +166,54 @@ class _Construction:
         return CallStatement(Call(info.pou, args, result, pos, instance=place), pos)
 
 
+class _Destruction:
+    """The FB_Exit of what variables hold: of a derived block before that of its base, of a block before its members."""
+
+    def __init__(self, world: World, pou: Pou) -> None:
+        self._world = world
+        self._pou = pou
+
+    def variable(self, variable: Variable) -> list[Statement]:
+        """The calls for a variable and all instances in it."""
+        return self._place(VarPlace(variable, variable.type, variable.pos))
+
+    def _place(self, place: Place) -> list[Statement]:
+        t, pos = place.type, place.pos
+        if not any(self._world.classes.finalisers(instance) for instance in instances_in(t)):
+            return []
+        if isinstance(t, ArrayType):
+            loop, element = _loop(self._pou, _flat(place, t, pos), t.element, t.count - 1, 0)
+            loop.body = self._place(element)
+            return [loop]
+        assert isinstance(t, StructType)
+        statements = [self._call(member, place) for member in self._world.classes.finalisers(t)]
+        for f in reversed(t.fields):
+            statements += self._place(MemberPlace(place, f.offset, f.type, pos))
+        return statements
+
+    def _call(self, member: Member, place: Place) -> Statement:
+        info, pos = self._world.classes.signature(member), place.pos
+        args: list[Expr | Place | None] = [Const(0, symbol.type, pos) for symbol, _ in info.parameters]
+        return CallStatement(Call(info.pou, args, info.result or BOOL, pos, instance=place), pos)
+
+
+def _flat(place: Place, t: ArrayType, pos: Pos) -> Place:
+    """An array as one with a single index from 0."""
+    return MemberPlace(place, 0, ArrayType(t.element, ((0, t.count - 1),)), pos)
+
+
+def _loop(pou: Pou, base: Place, t: Type, first: int, last: int) -> tuple[For, Place]:
+    """A loop over elements of an array, upwards or downwards, without a body; and the element it is about."""
+    pos = base.pos
+    counter = Variable(f"element {len(pou.locals)}", DINT, Storage.LOCAL, pos)
+    pou.locals.append(counter)
+    index = VarPlace(counter, DINT, pos)
+    start, stop, step = (Const(n, DINT, pos) for n in (first, last, 1 if first <= last else -1))
+    return For(index, start, stop, step, [], pos), IndexPlace(base, [Load(index, DINT, pos)], t, pos)
+
+
 def _is_computed(initial: Initial | None) -> bool:
-    """Whether something in an initial value is an address."""
+    """Whether something in an initial value is not constant."""
     if isinstance(initial, StructInit):
         return any(map(_is_computed, initial.members.values()))
     if isinstance(initial, ArrayInit):

@@ -5,10 +5,12 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from plctool.compiler import constants
 from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.literals import BitPattern
 from plctool.compiler.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Const, Convert, Expr, Load, Pos
 from plctool.compiler.types import (
@@ -42,6 +44,7 @@ from plctool.compiler.types import (
     EnumType,
     InterfaceType,
     Kind,
+    OpenArrayType,
     PointerType,
     RawPointerType,
     StringType,
@@ -81,6 +84,13 @@ def same_type(a: Type, b: Type) -> bool:
     if isinstance(a, PointerType) and isinstance(b, PointerType):
         return same_type(a.target, b.target)
     return ERROR in (a, b)
+
+
+def takes_array(t: Type, actual: Type) -> bool:
+    """Whether `t` is an ARRAY[*] and an array of type `actual` can be handed over for it."""
+    if not isinstance(t, OpenArrayType) or not isinstance(actual, ArrayType):
+        return False
+    return len(t.bounds) == len(actual.bounds) and same_type(t.element, actual.element)
 
 
 # ---- building conversions -----------------------------------------------------------------------------------------
@@ -141,8 +151,10 @@ def character(e: Expr, target: Type) -> Expr | None:
 class Coercion:
     """Implicit conversions with their diagnoses."""
 
-    def __init__(self, diagnostics: Diagnostics) -> None:
+    def __init__(self, diagnostics: Diagnostics, text_of: Callable[[Expr], Expr]) -> None:
+        """`text_of` makes a text of a CHAR or WCHAR."""
         self._diagnostics = diagnostics
+        self._text_of = text_of
 
     def __call__(self, e: Expr, target: Type) -> Expr:
         """`e` as a value of `target`; what does not fit is reported and becomes the error value."""
@@ -163,8 +175,11 @@ class Coercion:
             return self._pointer(e, target)
         from_, to = elementary(source), elementary(target)
         if from_ is None or to is None:
-            single = character(e, target)
-            return single or (e if same_type(source, target) else self._mismatch(e, target))
+            if isinstance(target, StringType) and source is target.character:
+                if isinstance(e, Const) and isinstance(e.value, int):
+                    return Const(chr(e.value), StringType(1, target.wide), e.pos)
+                return self._text_of(e)
+            return character(e, target) or (e if same_type(source, target) else self._no_scalars(e, target))
         if from_ is to:
             return Const(e.value, target, e.pos) if isinstance(e, Const) else convert(e, target)
         return self._scalar(e, from_, to)
@@ -181,10 +196,18 @@ class Coercion:
     def _mismatch(self, e: Expr, target: Type) -> Expr:
         return self._error(e.pos, "type", f"{e.type} does not fit {target}")
 
-    def _needs(self, e: Expr, source: Elementary, target: Elementary) -> Expr:
-        return self._error(
-            e.pos, "type", f"{e.type} does not fit {target} by itself; write {source}_TO_{target}(...)"
-        )  # fmt: skip
+    def _no_scalars(self, e: Expr, target: Type) -> Expr:
+        """A text and a number need a conversion; anything else does not go together."""
+        source, to = elementary(e.type), elementary(target)
+        if isinstance(target, StringType) and source is not None:
+            return self._needs(e, source.name, target.keyword)
+        if isinstance(e.type, StringType) and to is not None:
+            return self._needs(e, e.type.keyword, to.name)
+        return self._mismatch(e, target)
+
+    def _needs(self, e: Expr, source: str, target: str) -> Expr:
+        message = f"{e.type} does not fit {target} by itself; write {source}_TO_{target}(...)"
+        return self._error(e.pos, "type", message)
 
     # ---- by kind ----
 
@@ -215,6 +238,10 @@ class Coercion:
             )
         if to.kind in (Kind.DATE, Kind.CHAR):
             return self._error(e.pos, "type", f"{value} is not a {to}; write {_EXAMPLES[to.kind].format(to)}")
+        if isinstance(value, BitPattern) and to.signed and value >> to.bits == 0 and not constants.fits(value, to):
+            negative = constants.wrap(value, to)
+            self._warn(e.pos, "narrowing", f"{value} becomes {target} {negative}, which has the same bits")
+            return Const(negative, target, e.pos)
         if not constants.fits(value, to):
             low, high = constants.limits(to)
             return self._error(e.pos, "range", f"{value} does not fit {target} ({low}..{high})")
@@ -281,8 +308,10 @@ class Coercion:
 
     def _raw_pointer(self, e: Expr, target: Type) -> Expr:
         """POINTER TO takes any address; a number becomes one and the other way round."""
-        if isinstance(e.type, RawPointerType) and isinstance(target, RawPointerType):
-            if not isinstance(e, AddressOf):
+        if isinstance(e.type, PointerType) and isinstance(target, PointerType):
+            if isinstance(e.type, InterfaceType):
+                return self._mismatch(e, target)
+            if not isinstance(e, AddressOf) and BYTE not in (e.type.target, target.target):
                 self._warn(e.pos, "pointer", f"{e.type} becomes {target}: it points to something else")
             return replace(e, type=target)
         number = elementary(e.type if isinstance(target, PointerType) else target)
@@ -310,9 +339,9 @@ class Coercion:
         if target is BOOL:
             if isinstance(e, Const) and e.value in (0, 1) and source.kind in NUMBERS:
                 return Const(e.value, BOOL, e.pos)
-            return self._needs(e, source, target)
+            return self._needs(e, source.name, target.name)
         if source is BOOL:
-            return convert(e, target) if target.kind is Kind.BIT else self._needs(e, source, target)
+            return convert(e, target) if target.kind is Kind.BIT else self._needs(e, source.name, target.name)
         if source.kind in NUMBERS and target.kind in NUMBERS:
             return self._integer(e, source, target)
         if target.kind is Kind.REAL:
@@ -321,7 +350,7 @@ class Coercion:
             return time_to_ltime(e)
         if (source, target) in _LONGER:
             return scaled(convert(e, target), BinaryOp.MUL, _LONGER[source, target])
-        return self._needs(e, source, target)
+        return self._needs(e, source.name, target.name)
 
     def _integer(self, e: Expr, source: Elementary, target: Elementary) -> Expr:
         if isinstance(e, Const) and isinstance(e.value, int):
@@ -350,8 +379,12 @@ class Coercion:
             if target is REAL and not isinstance(e, Const):
                 self._warn(e.pos, "narrowing", "LREAL becomes REAL: digits may be lost")
             return convert(e, target)
+        if source.kind is Kind.BIT:
+            self._warn(e.pos, "bits", f"{e.type} becomes {target}: its bits count as an unsigned number")
+            source = UNSIGNED[source.bits]
+            e = convert(e, source)
         if source.kind is not Kind.INT:
-            return self._needs(e, source, target)
+            return self._needs(e, source.name, target.name)
         if source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
             self._warn(e.pos, "precision", f"{e.type} becomes {target}: large values are rounded")
         return convert(e, target)
@@ -368,7 +401,7 @@ def common_number(a: Elementary, b: Elementary) -> Elementary | None:
         if a.kind is b.kind:
             return LREAL
         real, other = (a, b) if a.kind is Kind.REAL else (b, a)
-        return real if other.kind is Kind.INT else None
+        return real if other.kind in NUMBERS else None
     if a.kind is Kind.BIT and b.kind is Kind.BIT:
         return a if a.bits >= b.bits else b
     if Kind.BIT in (a.kind, b.kind):
@@ -386,6 +419,9 @@ def common_type(a: Type, b: Type) -> Type | None:
         return ERROR
     if a == b:
         return a
+    for text, other in ((a, b), (b, a)):
+        if isinstance(text, StringType) and other is text.character:
+            return text
     if isinstance(a, StringType) and isinstance(b, StringType):
         return None if a.wide is not b.wide else a if a.length >= b.length else b
     if isinstance(a, RawPointerType) and isinstance(b, RawPointerType):

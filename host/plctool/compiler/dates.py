@@ -23,6 +23,8 @@ WIDE: dict[Type, Elementary] = {TIME: LTIME, DATE: LDATE, TOD: LTOD, DT: LDT}
 
 _ADD, _SUB, _MUL, _DIV = BinaryOp.ADD, BinaryOp.SUB, BinaryOp.MUL, BinaryOp.DIV
 FUNCTIONS: dict[str, tuple[BinaryOp, Elementary, Elementary | None]] = {
+    "ADD_TIME": (_ADD, TIME, TIME), "ADD_LTIME": (_ADD, LTIME, LTIME),
+    "SUB_TIME": (_SUB, TIME, TIME), "SUB_LTIME": (_SUB, LTIME, LTIME),
     "ADD_TOD_TIME": (_ADD, TOD, TIME), "ADD_LTOD_LTIME": (_ADD, LTOD, LTIME),
     "ADD_DT_TIME": (_ADD, DT, TIME), "ADD_LDT_LTIME": (_ADD, LDT, LTIME),
     "SUB_DATE_DATE": (_SUB, DATE, DATE), "SUB_LDATE_LDATE": (_SUB, LDATE, LDATE),

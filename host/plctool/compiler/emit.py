@@ -14,6 +14,9 @@ from plctool.compiler.targets import Target
 def _initialise() -> None:
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
+    # How far back an earlier load of a variable is looked for. What is loaded once and used far apart has to be kept
+    # on the stack, which costs more than to load it again.
+    llvm.set_option("", "-memdep-block-scan-limit=30")
 
 
 def target_machine(target: Target, opt_level: int) -> llvm.TargetMachine:
@@ -30,7 +33,8 @@ def optimised(text: str, target: Target, opt_level: int) -> tuple[llvm.ModuleRef
     module = llvm.parse_assembly(text, llvm.create_context())
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=opt_level)
-    options.loop_vectorization = options.slp_vectorization = opt_level >= 2
+    options.loop_vectorization = opt_level >= 2
+    options.slp_vectorization = opt_level >= 3  # slow, and seldom of use for what programs of controllers do
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
     return module, machine

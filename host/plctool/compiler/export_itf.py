@@ -152,7 +152,7 @@ def _parameter(parameter: Parameter) -> Iterator[str]:
 
 def c_name(name: str) -> str:
     """The name of a variable in C."""
-    lower = name.lower()
+    lower = "_".join(_NAME.findall(name.lower()))  # the bounds of an ARRAY[*] called a are %a.lower1, %a.upper1 ...
     return f"{lower}_" if lower in _C_WORDS else lower
 
 

@@ -5,21 +5,20 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-import gc
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plctool.compiler.configuration import configure
 from plctool.compiler.diagnostics import Diagnostic, TooManyErrors, render
-from plctool.compiler.expressions import NestingError
+from plctool.compiler.garbage import no_collection
 from plctool.compiler.library import Library, standard_library
+from plctool.compiler.nesting import NestingError, room_for_nesting
 from plctool.compiler.overlaps import report_overlaps
 from plctool.compiler.parser import parse
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Area, TypedProgram
+from plctool.compiler.types import MAX_SIZE
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.compiler.world import World
 
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from plctool.compiler.unit_tests import TestSuite
 
 __all__ = ["CheckResult", "Diagnostic", "Source", "check_sources", "render"]
-
-_RECURSION_LIMIT = 20_000  # enough for MAX_DEPTH levels of nesting here and in the lowering
 
 
 @dataclass
@@ -63,7 +60,7 @@ def check_sources(
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     world = World(chosen)
     world.diagnostics.options = warnings
-    with _limits():
+    with no_collection(), room_for_nesting():
         program = _guarded(world, sources, tests)
     diagnostics = world.diagnostics
     return CheckResult(None if diagnostics.errors else program, diagnostics.sorted(), bool(world.tests))
@@ -100,6 +97,9 @@ def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> 
         application = tests.configure(world)
         tests.add(world)
     world.check_bodies()
+    if tests is None and application.tasks:
+        world.programs.report_unused()
+    world.calls.report_shared(application.tasks)
     allocation = world.allocation
     _check_sizes(world, sources)
     report_overlaps(allocation.variables, world.diagnostics)
@@ -111,29 +111,19 @@ def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> 
         tasks=application.tasks,
         area_sizes={area: allocation.sizes.get(area, 0) for area in Area},
         defaults=world.defaults,
-        programs=application.programs,
+        programs=world.programs.declared(),
         startup=world.startup,
+        shutdown=world.shutdown,
         aliases=world.aliases(),
+        accesses=world.instance_config.accesses,
+        constants=world.constants,
         externals=world.external_functions(),
     )
 
 
 def _check_sizes(world: World, sources: Sequence[Source]) -> None:
     for area, size in world.allocation.sizes.items():
-        if size > 0x7FFF_FFFF and sources:
+        if size > MAX_SIZE and sources:
             world.diagnostics.error(
                 sources[0].pos(0), "size", f"the {area.name} area has {size} bytes, which is too large"
             )
-
-
-@contextmanager
-def _limits() -> Iterator[None]:
-    """Room for deep nesting; and no garbage collection in between, which would only look at what stays."""
-    collecting = gc.isenabled()
-    gc.disable()
-    sys.setrecursionlimit(max(sys.getrecursionlimit(), _RECURSION_LIMIT))
-    try:
-        yield
-    finally:
-        if collecting:
-            gc.enable()

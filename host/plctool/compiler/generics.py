@@ -1,13 +1,15 @@
-"""Generic types: parameters of type ANY_... take every type of a group.
+"""Generic types: parameters of type ANY_... take every type of a group. Those of one name take the same type: ANY_INT_2
+is one of ANY_INT as well, and may be another one.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
-from plctool.compiler.types import BOOL, Elementary, EnumType, Kind, StringType, SubrangeType, Type, base_of
+from plctool.compiler.types import BOOL, ELEMENTARY, Elementary, EnumType, Kind, StringType, SubrangeType, Type, base_of
 
 
 def _of_kind(*kinds: Kind) -> Callable[[Type], bool]:
@@ -36,7 +38,7 @@ def _string(t: Type) -> bool:
     return isinstance(t, StringType)
 
 
-GENERIC: dict[str, Callable[[Type], bool]] = {
+GROUPS: dict[str, Callable[[Type], bool]] = {
     "ANY": lambda t: True,
     "ANY_DERIVED": lambda t: not _elementary(t),
     "ANY_ELEMENTARY": _elementary,
@@ -54,3 +56,25 @@ GENERIC: dict[str, Callable[[Type], bool]] = {
     "ANY_CHAR": _of_kind(Kind.CHAR),
 }
 """Group name -> whether a type belongs to it. Bit strings count as unsigned integers, as existing dialects have it."""
+
+_NUMBERED = re.compile(r"_\d+\Z")
+
+
+def group_name(name: str) -> str:
+    """ANY_INT of ANY_INT_2, in capitals."""
+    return _NUMBERED.sub("", name.upper())
+
+
+def is_group(name: str) -> bool:
+    """Whether a type of this name is a generic one."""
+    return group_name(name) in GROUPS
+
+
+def accepts(name: str, t: Type) -> bool:
+    """Whether a type belongs to a group."""
+    return GROUPS[group_name(name)](t)
+
+
+def first_of(name: str) -> Type:
+    """Some type of a group, for what is not used."""
+    return next(t for t in ELEMENTARY.values() if accepts(name, t))

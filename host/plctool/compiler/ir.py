@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 import struct
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 _CALLED = re.compile(r"call [^@\n]*@([\w.]+)\(")
-_COPIED = 8000  # characters; about what LLVM would still inline
 
 
 class Module:
@@ -19,7 +20,7 @@ class Module:
     def __init__(self, triple: str) -> None:
         self._triple = triple
         self._globals: list[str] = []
-        self._functions: dict[str, str] = {}
+        self.functions: dict[str, Definition] = {}
         self._helpers: list[str] = []
         self._attributes: dict[str, int] = {}
         self._metadata: list[str] = []
@@ -65,52 +66,16 @@ class Module:
         """Protects an internal symbol from removal by the optimiser."""
         self._kept.append(name)
 
-    def add(self, name: str, definition: str) -> None:
-        """A function that exists once in the program."""
-        self._functions[name] = definition
+    def add(self, name: str, function: Function, linkage: str = "internal") -> None:
+        """A function that exists once in the program. `linkage`: "" when it is called from outside."""
+        self.functions[name] = Definition(function, linkage)
 
     def add_helper(self, definition: str) -> None:
         """A small internal function, or several, of which every part of the module has its own copy."""
         self._helpers.append(definition)
 
-    def texts(self, limit: int) -> list[str]:
-        """The module in LLVM's assembly language. When it is longer than `limit` characters, in an even number of parts
-        that can be compiled side by side; small functions of other parts are there as well, to be inlined."""
-        total = sum(map(len, self._functions.values()))
-        if total <= limit:
-            return [self._text(list(self._functions.values()))]
-        part_size = total // (2 * (1 + total // (4 * limit)))
-        parts: list[list[str]] = []
-        size = part_size
-        for name, definition in self._functions.items():
-            if size >= part_size:
-                parts.append([])
-                size = 0
-            parts[-1].append(name)
-            size += len(definition)
-        return [self._text(self._part(names)) for names in parts]
-
-    def _part(self, own: list[str]) -> list[str]:
-        """The functions of one part, and what they call in the others: a copy when it is small, else a declaration."""
-        texts, seen, todo = [], set(own), list(own)
-        while todo:
-            name = todo.pop()
-            text = self._functions[name]
-            if name in own:
-                texts.append(text.replace("define internal ", "define hidden ", 1))
-            elif len(text) <= _COPIED:
-                texts.append(text.replace("define internal ", "define available_externally hidden ", 1))
-            else:
-                head = text.partition(" {\n")[0].partition(" !dbg ")[0]
-                texts.append(head.replace("define internal ", "declare hidden ", 1))
-                continue
-            for called in _CALLED.findall(text):
-                if called in self._functions and called not in seen:
-                    seen.add(called)
-                    todo.append(called)
-        return texts
-
-    def _text(self, functions: list[str]) -> str:
+    def text(self, functions: Iterable[str]) -> str:
+        """The module in LLVM's assembly language, with these functions in it."""
         parts = [f'target triple = "{self._triple}"']
         parts += self._globals
         if self._kept:
@@ -130,15 +95,19 @@ class Module:
 class Function:
     """The body of one function while it is written."""
 
-    def __init__(self, head: str = "") -> None:
-        """`head`: the define line up to and without the opening brace, e.g. 'define void @f(ptr %ctx) #0'."""
-        self.head = head
+    def __init__(self, signature: str, attributes: str, inlining: str = "") -> None:
+        """`signature`: result, name and parameters, e.g. 'void @f(ptr %ctx)'; `inlining`: 'noinline', 'inlinehint', or
+        "" to leave it to LLVM."""
+        self._signature = signature
+        self._attributes = attributes
+        self.inlining = inlining
         self._allocas: list[str] = []
         self._prologue: list[str] = []
         self._lines: list[str] = []
         self._count = 0
         self._dead = False
         self.block = "entry"
+        self.scope = -1  # its DISubprogram
         self.debug = ""  # e.g. ', !dbg !7', added to every instruction
 
     # ---- instructions ----
@@ -208,9 +177,32 @@ class Function:
         assert self._dead, "the block before is open"
         self.begin(label)
 
-    def text(self) -> str:
-        """The finished function; the last block must have been terminated."""
-        return "\n".join([self.head + " {", "entry:", *self._allocas, *self._prologue, *self._lines, "}"])
+    # ---- the finished function; its last block was terminated ----
+
+    @property
+    def size(self) -> int:
+        """Instructions, about."""
+        return len(self._prologue) + len(self._lines)
+
+    def callees(self) -> list[str]:
+        """The name of the callee of every call."""
+        return _CALLED.findall("\n".join(self._lines))
+
+    def definition(self, linkage: str) -> str:
+        scope = f"!dbg !{self.scope}" if self.scope >= 0 else ""
+        head = " ".join(filter(None, ("define", linkage, self._signature, self.inlining, self._attributes, scope, "{")))
+        return "\n".join([head, "entry:", *self._allocas, *self._prologue, *self._lines, "}"])
+
+    def declaration(self, linkage: str) -> str:
+        return f"declare {linkage} {self._signature}"
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A function of a module."""
+
+    function: Function
+    linkage: str
 
 
 def bytes_literal(data: bytes) -> str:

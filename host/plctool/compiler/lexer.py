@@ -8,22 +8,27 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
+from plctool.compiler import slips
+from plctool.compiler.conditions import Conditions
+
 _TOKEN = re.compile(
     r"""\s*(?:
-    (?P<WORD>[A-Za-z_]\w*+(?!\#))
-  | (?P<PUNCT>:=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*&)\[\]:;,.<>=^])
-  | (?P<NUMBER>\d[\d_]*(?:\#\w+|(?:\.\d[\d_]*)?(?:[eE][+-]?\d+)?))
+    (?P<WORD>[A-Za-z_\xC0-\uFFFF][\w\xC0-\uFFFF]*+(?!\#))
+  | (?P<PUNCT>:=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*)\[\]:;,.<>^]|=(?!=)|&(?!&))
+  | (?P<NUMBER>\d[\d_]*+(?:\#\w++|(?:\.\d[\d_]*+)?(?:[eE][+-]?\d++)?)(?!\w))
   | (?P<SKIP>//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/)
   | (?P<DATE>(?i:L?(?:DATE_AND_TIME|DATE|DT|D|TIME_OF_DAY|TOD))\#[\d:._-]+)
   | (?P<STRING>(?i:(?:W?STRING|W?CHAR)\#)?(?:'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*"))
   | (?P<TYPED>[A-Za-z_]\w*\#(?:[+-]?\d[\d_]*(?:\.[\d_]+)?[eE][+-]?\d+|[+-]?\w+(?:\.\w+)*(?:\#\w+)?)?)
   | (?P<DIRECT>%(?:[IQMiqm](?:\*|[XBWDLxbwdl]?\d+(?:\.\d+)*)|[XBWDLxbwdl]\d+))
   | (?P<PRAGMA>\{[^{}]*\})
+  | (?P<FOREIGN>\{\{.*?\}\})
   | (?P<NESTED>\(\*|/\*)
+  | (?P<SLIP>==|&&|!=|\|\|?|!|%(?=[\s\d(])|\d\w+)
   | (?P<BAD>\S)
   | (?P<END>\Z)
   )""",
-    re.VERBOSE | re.ASCII,
+    re.VERBOSE | re.ASCII | re.DOTALL,
 )
 
 _PUNCTUATION = {
@@ -40,6 +45,11 @@ KEYWORDS = {
     "VAR_INST": "VAR",
     **dict.fromkeys(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "FINAL", "ABSTRACT", "OVERRIDE"), "MODIFIER"),
     "VAR_GLOBAL": "GLOBAL",
+    "VAR_CONFIG": "CONFIG",
+    "VAR_ACCESS": "ACCESS",
+    **dict.fromkeys(("R_EDGE", "F_EDGE"), "EDGE"),
+    **dict.fromkeys(("READ_ONLY", "READ_WRITE"), "RIGHTS"),
+    **dict.fromkeys(("STRING", "WSTRING"), "TEXT"),
     **{k: k for k in (
         "TYPE", "STRUCT", "UNION", "ARRAY", "POINTER", "REFERENCE", "REF_TO", "FUNCTION", "FUNCTION_BLOCK", "PROGRAM",
         "CONFIGURATION", "RESOURCE", "TASK", "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN",
@@ -58,11 +68,14 @@ KEYWORDS = {
     )},
 }  # fmt: skip
 
+KEYWORDS |= dict.fromkeys(slips.WORDS, "MISSPELT") | dict.fromkeys(slips.REFUSED, "REFUSED")
+
 SOFT = frozenset((
-    "QUALIFIER", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP", "UNION",
-    "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION", "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET",
-    "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS", "INITIAL_STEP", "STEP", "TRANSITION",
-    "_FROM",
+    "MISSPELT", "REFUSED",
+    "QUALIFIER", "TEXT", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP",
+    "UNION", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION", "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET",
+    "SET", "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS", "INITIAL_STEP", "STEP", "TRANSITION",
+    "_FROM", "EDGE", "RIGHTS",
 ))  # fmt: skip
 """Terminals that are names where the grammar has no use for them."""
 
@@ -75,7 +88,10 @@ OPENING = frozenset((
 """Terminals that are names where no name follows."""
 
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
+_STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quotes
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
+_NAMED_ARGUMENT = re.compile(r"\s*\(\s*[A-Za-z_]\w*\s*(?::=|=>)", re.ASCII)
+_PART_FOLLOWS = re.compile(r"\s*[:.,^\[]")
 _NAME = re.compile(r"\s+[A-Za-z_]")
 _PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
 _LABEL = re.compile(r"\s+[A-Za-z_]\w*\s*:(?!=)")
@@ -113,6 +129,7 @@ class Lexer:
         self._start = start
         self._end = len(text) if end is None else end
         self._pending: dict[str, str] = {}
+        self._conditions = Conditions(report)
 
     def __iter__(self) -> Iterator[Token]:
         """All tokens, last one of type $END."""
@@ -133,7 +150,15 @@ class Lexer:
                     break
                 elif kind == "PRAGMA":
                     self._pragma(word, pos)
+                    if self._conditions.active:
+                        continue
+                    at = self._skip_branch(match.end())
+                    break
+                elif kind == "FOREIGN":
+                    self._foreign(pos)
                     continue
+                elif kind == "SLIP":
+                    token = self._slip(word, pos)
                 elif kind == "BAD":
                     if self._bad(word, pos):
                         continue
@@ -145,6 +170,8 @@ class Lexer:
                 if self._pending:
                     self.attributes[pos] = self._pending
                     self._pending = {}
+                if kind == "END":
+                    self._conditions.finish()
                 yield token
                 if kind == "END":
                     return
@@ -159,12 +186,39 @@ class Lexer:
         self._report(start, "comment", "this comment is not closed")
         return self._end
 
+    def _skip_branch(self, at: int) -> int:
+        """The end of what a conditional pragma leaves out, or of the text."""
+        for match in _TOKEN.finditer(self.text, at, self._end):
+            kind = match.lastgroup
+            if kind == "PRAGMA":
+                self._conditions.take(match[kind], match.start(kind))
+                if self._conditions.active:
+                    return match.end()
+            elif kind == "NESTED":
+                return self._skip_branch(self._skip_comment(match[kind], match.end()))
+        return self._end
+
     def _pragma(self, text: str, pos: int) -> None:
         match = _ATTRIBUTE.fullmatch(text)
         if match:
             self._pending[match.group(1).lower()] = match.group(2) or ""
-        else:
+        elif _STATEMENT_IN_C.fullmatch(text):
+            self._foreign(pos)
+        elif not self._conditions.take(text, pos):
             self.pragmas.append((pos, text))
+
+    def _foreign(self, pos: int) -> None:
+        self._report(pos, "pragma", "code in C cannot be compiled; put it into an EXTERNAL function")
+
+    def _slip(self, text: str, pos: int) -> Token:
+        """What was meant by a sign or number of another language."""
+        if text in slips.SIGNS:
+            kind, meant, message = slips.SIGNS[text]
+        else:
+            kind, meant = "NUMBER", text.lower().replace("0x", "16#", 1).replace("0b", "2#", 1)
+            message = f"a number is written {meant}, not {text}" if "#" in meant else f"{text} is not a number"
+        self._report(pos, "syntax", message)
+        return Token(kind, meant if "#" in meant or kind != "NUMBER" else "0", pos)
 
     def _bad(self, character: str, pos: int) -> bool:
         """Reports a character that starts no token; False when the rest of the line is to be skipped."""
@@ -199,6 +253,14 @@ def begins_unit(token: Token, text: str) -> bool:
     return token.type == "TEST" and _QUOTE.match(text, token.end) is not None
 
 
+def meant(token: Token, text: str) -> str:
+    """The terminal of the keyword that a misspelt one stands for, "" when it seems to be a name."""
+    return "" if _PART_FOLLOWS.match(text, token.end) else KEYWORDS[slips.WORDS[token.text.upper()]]
+
+
 def is_operator_function(token: Token, text: str) -> bool:
-    """Whether AND, OR, XOR or MOD at the place of an operand starts a call such as `AND(a, b)`."""
+    """Whether AND, OR, XOR or MOD at the place of an operand starts a call such as `AND(a, b)`; NOT does with a named
+    argument."""
+    if token.type == "NOT":
+        return _NAMED_ARGUMENT.match(text, token.end) is not None
     return token.text.upper() in _OPERATOR_FUNCTIONS and _OPEN_PARENTHESIS.match(text, token.end) is not None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -20,9 +20,14 @@ _FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
 _OPENING = re.compile(
     r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
 )
-_TEXT_FUNCTIONS = "stdlib/strings.st"  # written for STRING, there for WSTRING as well
+_QUALIFIED = re.compile(r"(?:standard|tc2_standard|tc2_system)\.(?=\w+$)")
 _STRUCT = re.compile(r"\bSTRUCT\b.*?\bEND_STRUCT\b", re.DOTALL)
 _DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
+
+
+def without_library(key: str) -> str:
+    """A case-folded name without the library of other systems in front of it: there is one library here."""
+    return _QUALIFIED.sub("", key, count=1) if "." in key else key
 
 
 @dataclass(frozen=True)
@@ -77,19 +82,47 @@ class Library:
         return parse(entry.source, diagnostics.at(entry.source), entry.start, entry.end) if entry else []
 
 
+@dataclass(frozen=True)
+class Variant:
+    """The same units for another type: their names become `name`, with the unit's own in place of {}, and each word of
+    `words` what it stands for."""
+
+    name: str
+    words: dict[str, str] = field(default_factory=dict)
+
+    def __call__(self, source: Source) -> Source:
+        words = dict(self.words)
+        for match in _OPENING.finditer(source.text):
+            if match["name"]:
+                words[match["name"]] = self._renamed(match["name"])
+        text = re.sub(rf"\b(?:{'|'.join(words)})\b", lambda m: words[m.group()], source.text)
+        return Source(source.path, text)
+
+    def _renamed(self, name: str) -> str:
+        """What is internal, such as SPAN__, cannot be an overload."""
+        return f"W{name}" if name.endswith("__") else self.name.format(name.removesuffix("__STRING"))
+
+
+def _counter(name: str, bits: int, *, signed: bool) -> Variant:
+    low, high = (1 << bits - 1, (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+    return Variant(f"{{}}_{name}", {"INT": name, "32768": str(low), "32767": str(high)})
+
+
+_WIDE = {"STRING": "WSTRING", "BYTE": "WORD"}
+_LONG = {"TIME": "LTIME", "T": "LTIME"}
+_VARIANTS: dict[str, list[Variant]] = {
+    "stdlib/strings.st": [Variant("{}__WSTRING", _WIDE), Variant("W{}", _WIDE)],
+    "stdlib/timers.st": [Variant("{}_TIME"), Variant("{}_LTIME", _LONG), Variant("L{}", _LONG)],
+    "stdlib/counters.st": [
+        Variant("{}_INT"), _counter("DINT", 32, signed=True), _counter("LINT", 64, signed=True),
+        _counter("UDINT", 32, signed=False), _counter("ULINT", 64, signed=False),
+    ],
+}  # fmt: skip
+"""What a source is written for once, and is there for other types as well."""
+
+
 @cache
 def standard_library() -> Library:
     """The library that comes with the tool."""
     sources = [Source(f"stdlib/{p.name}", p.read_text("latin-1")) for p in sorted(_FOLDER.glob("*.st"))]
-    return Library([*sources, *(_widened(s) for s in sources if s.path == _TEXT_FUNCTIONS)])
-
-
-def _widened(source: Source) -> Source:
-    """The functions of a source for WSTRING: LEN becomes LEN__WSTRING, what is internal, such as SPAN__, WSPAN__."""
-    words = {"STRING": "WSTRING", "BYTE": "WORD"}
-    for match in _OPENING.finditer(source.text):
-        name = match["name"]
-        base = name.removesuffix("__STRING")
-        words[name] = f"W{name}" if name.endswith("__") else f"{base}__WSTRING"
-    text = re.sub(rf"\b(?:{'|'.join(words)})\b", lambda m: words[m.group()], source.text)
-    return Source(source.path, text)
+    return Library([*sources, *(variant(s) for s in sources for variant in _VARIANTS.get(s.path, ()))])

@@ -41,6 +41,10 @@ _ESCAPE = re.compile(r"\$([0-9A-Fa-f]{2}|[$'\"LNPRTlnprt]|.|\Z)", re.DOTALL)
 _WIDE_ESCAPE = re.compile(r"\$([0-9A-Fa-f]{4}|[$'\"LNPRTlnprt]|.|\Z)", re.DOTALL)
 
 
+class BitPattern(int):
+    """An integer written with a base. Its highest bit may be the sign of the type it goes to: 16#FFFF is -1 as INT."""
+
+
 class LiteralError(Exception):
     """The text is no literal; the message says why in one sentence."""
 
@@ -67,12 +71,12 @@ def unsigned(text: str) -> tuple[LiteralKind, Value]:
     return LiteralKind.REAL, value
 
 
-def _based(base: str, digits: str) -> int:
+def _based(base: str, digits: str) -> BitPattern:
     radix = _BASES.get(base)
     if radix is None:
         raise LiteralError(f"the base of a number is 2, 8 or 16, not {base}")
     try:
-        return int(digits, radix)
+        return BitPattern(digits, radix)
     except ValueError:
         raise LiteralError(f"{digits} is not a number of base {base}") from None
 
@@ -88,12 +92,11 @@ def typed(text: str) -> tuple[LiteralKind, Value, str]:
         return LiteralKind.DATE, date(name, rest), _DATE_TYPES[name]
     if name == "BOOL" and rest.upper() in ("TRUE", "FALSE", "1", "0"):
         return LiteralKind.BOOL, int(rest.upper() in ("TRUE", "1")), name
-    sign, digits = (-1, rest[1:]) if rest.startswith("-") else (1, rest.removeprefix("+"))
-    kind, value = unsigned(digits)
+    kind, value = unsigned(rest[1:] if rest.startswith(("+", "-")) else rest)
     assert not isinstance(value, str)
     if name in _REAL_TYPES:
-        return LiteralKind.REAL, sign * float(value), name
-    return kind, sign * value, name
+        kind, value = LiteralKind.REAL, float(value)
+    return kind, -value if rest.startswith("-") else value, name
 
 
 def duration(text: str) -> int:

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from plctool.compiler.ir import Function
 from plctool.compiler.lower_frame import ACCESS_VIOLATION, Frame, Ref
 from plctool.compiler.lower_init import Initialising, struct_members
-from plctool.compiler.lower_stmt import parameter_list
 from plctool.compiler.lower_unit import Unit, value_type
+from plctool.compiler.signatures import parameter_list
 from plctool.compiler.typed import Dispatch, ScalarInit
 from plctool.compiler.types import UDINT, ArrayType, StructType, Type, is_scalar
 
@@ -22,11 +22,10 @@ def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
     wrong pointer."""
     pou = dispatch.function
     result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
-    fn = Function()
+    parameters = parameter_list(pou, unit.handed)
+    fn = Function(f"{result} @{name}({parameters})", unit.plain)
     frame = Frame(unit, fn, None)
-    scope = frame.open_scope(pou.name, pou.pos)
-    parameters = parameter_list(pou)
-    fn.head = f"define internal {result} @{name}({parameters}) {unit.plain} !dbg !{scope}"
+    frame.open_scope(pou.name, pou.pos)
     arguments = _arguments(parameters)
     by_symbol: dict[str, list[int]] = {}
     for number, target in dispatch.targets.items():
@@ -47,7 +46,7 @@ def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
     frame.require("false", ACCESS_VIOLATION, pou.pos)
     fn.terminate("unreachable")
     frame.write_raises()
-    unit.module.add(name, fn.text())
+    unit.module.add(name, fn)
 
 
 def _arguments(parameters: str) -> str:

@@ -17,6 +17,7 @@ from plctool.compiler.lower_frame import (
 from plctool.compiler.lower_string import Strings
 from plctool.compiler.lower_unit import Check, value_type
 from plctool.compiler.ranges import type_range, value_range
+from plctool.compiler.signatures import extended, parameter_types
 from plctool.compiler.typed import (
     Binary,
     BinaryOp,
@@ -49,29 +50,6 @@ from plctool.compiler.types import DINT, UDINT, ArrayType, PointerType, StringTy
 
 _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 PLACES = (VarPlace, MemberPlace, IndexPlace, DerefPlace, BitPlace, ValuePlace, SelfPlace)
-
-
-def parameter_types(pou: Pou, parameter: Parameter) -> list[str]:
-    """The LLVM parameters that carry one IEC parameter."""
-    t = parameter.variable.type
-    if isinstance(t, StringType):
-        return ["ptr", "i32"]
-    if parameter.by_reference or not is_scalar(t):
-        return ["ptr"]
-    return [_extended(t)] if pou.external else [value_type(t)]
-
-
-def _extended(t: Type) -> str:
-    """A scalar parameter or result of a C function."""
-    text = value_type(t)
-    if text in ("i8", "i16"):
-        return f"{text} {'signext' if is_signed(t) else 'zeroext'}"
-    return text
-
-
-def result_in_memory(pou: Pou) -> bool:
-    """Whether the result comes back through a hidden pointer, the first argument after the context."""
-    return pou.result is not None and not is_scalar(pou.result.type)
 
 
 class Expressions(Strings):
@@ -452,7 +430,7 @@ class Expressions(Strings):
         t = pou.result.type
         text = value_type(t)
         if pou.external:
-            words = _extended(t).split()
+            words = extended(t).split()
             text = " ".join(reversed(words))
             return fn.value(f"call {convention}{text} {target}({', '.join(arguments)}){attributes}")
         return fn.value(f"call {text} {target}({', '.join(arguments)})")

@@ -53,25 +53,23 @@ class Frame:
         self.locals: dict[Variable, Ref] = {}
         self.shadows: dict[Variable, str] = {}  # FOR variables that live in a register inside their loop
         self.ranges: dict[Variable, tuple[int, int]] = {}
-        self._scope = -1
         self._bases: dict[Area, str] = {}
-        self._addresses: dict[tuple[str, int], str] = {}
+        self._addresses: dict[tuple[str, str, int], str] = {}  # by block, so that none lives longer than it must
         self._fixed: set[str] = set()  # area bases: pointers that hold in the whole function
         self._raises: dict[tuple[int, str], str] = {}
         self._free: dict[tuple[int, int], list[str]] = {}
         self._busy: list[tuple[tuple[int, int], str]] = []
         self._pointer_int = f"i{8 * unit.target.pointer_size}"
 
-    def open_scope(self, name: str, pos: Pos) -> int:
-        """Starts line information; returns the DISubprogram for the define line."""
-        self._scope = self.unit.subprogram(name, pos)
+    def open_scope(self, name: str, pos: Pos) -> None:
+        """Starts line information."""
+        self.fn.scope = self.unit.subprogram(name, pos)
         self.at(pos)
-        return self._scope
 
     def at(self, pos: Pos) -> None:
         """What is written from now on belongs to the line of `pos`."""
-        if self._scope >= 0:
-            self.fn.debug = self.unit.location(pos.line, self._scope)
+        if self.fn.scope >= 0:
+            self.fn.debug = self.unit.location(pos.line, self.fn.scope)
 
     # ---- context ----
 
@@ -133,13 +131,12 @@ class Frame:
         """The pointer to `ref`."""
         if ref.offset == 0:
             return ref.pointer
-        key = (ref.pointer, ref.offset)
+        key = (self.fn.block, ref.pointer, ref.offset)
         known = self._addresses.get(key)
         if known is None:
-            text = f"getelementptr i8, ptr {ref.pointer}, {self._pointer_int} {ref.offset}"
-            if ref.pointer not in self._fixed and not ref.pointer.startswith(_FUNCTION_WIDE):
-                return self.fn.value(text)
-            known = self.fn.prologue(text.replace("getelementptr", "getelementptr inbounds", 1))
+            sure = ref.pointer in self._fixed or ref.pointer.startswith(_FUNCTION_WIDE)
+            flag = "inbounds " if sure else ""
+            known = self.fn.value(f"getelementptr {flag}i8, ptr {ref.pointer}, {self._pointer_int} {ref.offset}")
             self._addresses[key] = known
         return known
 

@@ -12,7 +12,34 @@ from dataclasses import dataclass
 
 from plctool.compiler.targets import Target
 
-# The chunk loop: %w runs over the chunks within %room bytes; %x is %w as an address.
+# The chunk loop of a function that stops at a NUL or after %count characters: %w runs over the chunks within %room
+# bytes; %x is %w as an address. VISIT loads the chunk as %v. It ends in %full with %n, the number of characters, or
+# goes on in the byte loop.
+_COUNTED = """  %inner = call i32 @llvm.usub.sat.i32(i32 %room, i32 LAST)
+  %bound = call i32 @llvm.umin.i32(i32 %inner, i32 %count)
+  %none = icmp eq i32 %bound, 0
+  br i1 %none, label %loop, label %chunk
+chunk:
+  %w = phi i32 [ 0, %entry ], [ %w.next, %clear ]
+  %w.next = add i32 %w, CHUNK
+  %x = zext i32 %w to PTR
+VISITMARKS  %hit = icmp ne MARK %marks, 0
+  br i1 %hit, label %found, label %clear
+clear:
+  %on = icmp ult i32 %w.next, %bound
+  br i1 %on, label %chunk, label %short
+short:
+  %enough = icmp uge i32 %w.next, %count
+  br i1 %enough, label %full, label %loop
+found:
+FIRST  %at = add i32 %w, %k
+  br label %full
+full:
+  %end = phi i32 [ %w.next, %short ], [ %at, %found ]
+  %n = call i32 @llvm.umin.i32(i32 %end, i32 %count)
+"""
+
+# The chunk loop of a comparison.
 _CHUNKS = """  %chunks = and i32 %room, -CHUNK
   br label %wide
 wide:
@@ -36,13 +63,14 @@ def _load(name: str, address: str) -> str:
 
 @dataclass(frozen=True)
 class _Walk:
-    """A function that walks a string. `head`: up to the loops, sets %room; `chunk`: handles the chunk at %x and goes to
-    %skip, %loop or out; `rest`: the byte loop and the end. `extra`: what the chunk block adds to the phi marked
-    EXTRA."""
+    """A function that walks a string. `head`: up to the loops, sets %room (and %count); `chunks`: the loop over chunks,
+    which leads to the byte loop with index START; `rest`: the byte loop and the end. `extra`: what the loop over chunks
+    adds to the phi marked EXTRA."""
 
     head: str
-    chunk: str
+    chunks: str
     rest: str
+    start: str
     extra: str = ""
 
 
@@ -56,12 +84,11 @@ _INTEGER_MARKS = """  %less = sub VEC %v, ONES
   %marks = and VEC %under, HIGHS
 """
 
-# The index of the first NUL as i32 %k; CHUNK when there is none.
+# The index of the first NUL, which is there, as i32 %k.
 _VECTOR_FIRST = """  %marks.wide = zext iCHUNK %marks to i32
-  %marks.end = or i32 %marks.wide, NONE
-  %k = call i32 @llvm.cttz.i32(i32 %marks.end, i1 true)
+  %k = call i32 @llvm.cttz.i32(i32 %marks.wide, i1 true)
 """
-_INTEGER_FIRST = """  %k.bit = call VEC @llvm.cttz.VEC(VEC %marks, i1 false)
+_INTEGER_FIRST = """  %k.bit = call VEC @llvm.cttz.VEC(VEC %marks, i1 true)
   %k.byte = lshr VEC %k.bit, 3
   %k = trunc VEC %k.byte to i32
 """
@@ -71,6 +98,10 @@ _VECTOR_UNLIKE = """  %u = icmp ne VEC %v, %o
   %unlike = icmp ne iCHUNK %u.marks, 0
 """
 _INTEGER_UNLIKE = "  %unlike = icmp ne VEC %v, %o\n"
+
+_STORE = """  %to.a = getelementptr i8, ptr %to, PTR %x
+  store VEC %v, ptr %to.a, align 1
+"""
 
 # SPAN__ of stdlib/strings.st: the index at most COUNT characters behind START where the string ends.
 _SPAN = _Walk(
@@ -82,19 +113,13 @@ entry:
   %start.x = zext i32 %start to PTR
   %base = getelementptr i8, ptr %s, PTR %start.x
 """,
-    chunk=_load("v", "%base")
-    + """MARKSFIRST  %at = add i32 %w, %k
-  %on.a = icmp uge i32 %at, %w.next
-  %on.b = icmp ugt i32 %count, %w.next
-  %on = and i1 %on.a, %on.b
-  br i1 %on, label %skip, label %found
-found:
-  %n = call i32 @llvm.umin.i32(i32 %at, i32 %count)
-  %r = add i32 %start, %n
+    chunks=_COUNTED.replace("VISIT", _load("v", "%base"))
+    + """  %r = add i32 %start, %n
   ret i32 %r
 """,
+    start="[ 0, %entry ], [ %w.next, %short ]",
     rest="""loop:
-  %i = phi i32 [ START ], [ %i.next, %next ]
+  %i = phi i32 START, [ %i.next, %next ]
   %inside = icmp ult i32 %i, %count
   br i1 %inside, label %test, label %done
 test:
@@ -131,16 +156,10 @@ entry:
   %start.x = zext i32 %start to PTR
   %from = getelementptr i8, ptr %s, PTR %start.x
 """,
-    chunk=_load("v", "%from")
-    + """  %to.a = getelementptr i8, ptr %to, PTR %x
-  store VEC %v, ptr %to.a, align 1
-MARKSFIRST  %at = add i32 %w, %k
-  %n = call i32 @llvm.umin.i32(i32 %at, i32 %count)
-  %on = icmp uge i32 %n, %w.next
-  br i1 %on, label %skip, label %done
-""",
+    chunks=_COUNTED.replace("VISIT", _load("v", "%from") + _STORE) + "  br label %done\n",
+    start="[ 0, %entry ], [ %w.next, %short ]",
     rest="""loop:
-  %i = phi i32 [ START ], [ %i.next, %next ]
+  %i = phi i32 START, [ %i.next, %next ]
   %inside = icmp ult i32 %i, %count
   br i1 %inside, label %test, label %done
 test:
@@ -164,7 +183,7 @@ done:
   ret i32 %r
 }
 """,
-    extra="[ %n, %chunk ], ",
+    extra="[ %n, %full ], ",
 )
 
 # Less than, equal to or greater than 0 as the first string is less than, equal to or greater than the second.
@@ -174,14 +193,16 @@ entry:
   %limit = call i32 @llvm.umin.i32(i32 %acap, i32 %bcap)
   %room = add i32 %limit, 1
 """,
-    chunk=_load("v", "%a")
+    chunks=_CHUNKS
+    + _load("v", "%a")
     + _load("o", "%b")
     + """MARKSUNLIKE  %any = icmp ne MARK %marks, 0
   %stop = or i1 %any, %unlike
   br i1 %stop, label %loop, label %skip
 """,
+    start="[ %w, %wide ]",
     rest="""loop:
-  %i = phi i32 [ START ], EXTRA[ %i.next, %next ]
+  %i = phi i32 START, EXTRA[ %i.next, %next ]
   %i.x = zext i32 %i to PTR
   %a.in = icmp ult i32 %i, %acap
   br i1 %a.in, label %a.load, label %a.done
@@ -325,11 +346,11 @@ def string_helper(name: str, target: Target, attributes: str) -> str:
         text = walk.head + "  br label %loop\n" + walk.rest
         if wide:
             text = re.sub(r"\bi8\b", "i16", text).replace("align 1", "align 2").replace("@str.", "@str.w", 1)
-        return _finish(text.replace("START", "0, %entry").replace("EXTRA", ""), target, attributes)
-    text = walk.head + _CHUNKS + walk.chunk + walk.rest
+        return _finish(text.replace("START", "[ 0, %entry ]").replace("EXTRA", ""), target, attributes)
+    text = walk.head + walk.chunks + walk.rest
     integer, vector = f"i{8 * chunk}", target.vectors
     parts = {
-        "START": "%w, %wide",
+        "START": walk.start,
         "EXTRA": walk.extra,
         "MARKS": _VECTOR_MARKS if vector else _INTEGER_MARKS,
         "FIRST": _VECTOR_FIRST if vector else _INTEGER_FIRST,
@@ -338,7 +359,7 @@ def string_helper(name: str, target: Target, attributes: str) -> str:
         "cttz.VEC": f"cttz.{integer}",
         "VEC": f"<{chunk} x i8>" if vector else integer,
         "CHUNK": str(chunk),
-        "NONE": str(1 << chunk),
+        "LAST": str(chunk - 1),
         "ONES": str(int.from_bytes(b"\x01" * chunk, "little")),
         "HIGHS": str(int.from_bytes(b"\x80" * chunk, "little")),
     }

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from plctool.compiler.analysis import Effects, root_of, walk
 from plctool.compiler.ir import Function
 from plctool.compiler.lower_arith import is_signed, known_integer
-from plctool.compiler.lower_expr import parameter_types, result_in_memory
+from plctool.compiler.lower_blocks import BlockCalls
 from plctool.compiler.lower_frame import DIVIDE_BY_ZERO, Ref, string_capacity
-from plctool.compiler.lower_init import Initialising
 from plctool.compiler.lower_unit import Check, Unit, value_type
 from plctool.compiler.ranges import type_range, value_range
+from plctool.compiler.signatures import result_in_memory
 from plctool.compiler.typed import (
     Assign,
     BinaryOp,
     Call,
     CallStatement,
     Case,
-    Const,
     Continue,
     Exit,
     Expr,
@@ -36,14 +33,12 @@ from plctool.compiler.typed import (
     VarPlace,
     While,
 )
-from plctool.compiler.types import BOOL, PointerType, StringType, is_scalar
-
-_POINTER = PointerType(BOOL)  # what an instance stores for a VAR_IN_OUT
+from plctool.compiler.types import StringType, is_scalar
 
 _WIDEST_SWITCH = 64  # labels of one range that become cases of a switch
 
 
-class Body(Initialising):
+class Body(BlockCalls):
     """The body of one POU."""
 
     def __init__(self, unit: Unit, fn: Function, pou: Pou, effects: Effects) -> None:
@@ -64,7 +59,7 @@ class Body(Initialising):
         elif isinstance(s, If):
             self._if(s)
         elif isinstance(s, FbCall):
-            self._fb_call(s)
+            self.fb_call(s)
         elif isinstance(s, CallStatement):
             self._call_statement(s.call)
         elif isinstance(s, Case):
@@ -92,15 +87,7 @@ class Body(Initialising):
         elif isinstance(s.value, Call) and self._may_write_directly(target, s.value):
             self.call(s.value, self.ref(target))
         else:
-            self._assign_aggregate(self.ref(target), s.value)
-
-    def _assign_aggregate(self, target: Ref, value: Expr) -> None:
-        if not isinstance(target.type, StringType):
-            self.copy(target, self.aggregate(value), target.type.size)
-        elif isinstance(value, Const):
-            self.copy_literal(target, str(value.value))
-        else:
-            self.copy_string(target, self.aggregate(value))
+            self.assign_aggregate(self.ref(target), s.value)
 
     def _may_write_directly(self, target: Place, call: Call) -> bool:
         """Whether the callee may build its result in the target: it fits, and nobody sees it half done."""
@@ -119,45 +106,6 @@ class Body(Initialising):
 
     def _call_statement(self, call: Call) -> None:
         self.call(call, self.temporary(call.type) if result_in_memory(call.function) else None)
-
-    def _fb_call(self, s: FbCall) -> None:
-        instance = self.ref(s.instance)
-        base = self.address(instance)
-        instance = replace(instance, pointer=base, offset=0)
-        for variable, value in s.inputs:
-            self._assign_member(self._member(s.block, instance, variable), value)
-        for variable, place in s.in_outs:
-            slot = Ref(base, variable.offset, _POINTER)
-            self.store(slot, self.address(self.ref(place)))
-        if s.block.external:
-            target = self.import_function(self.unit.import_slot(s.block.external))
-            self.fn.do(f"call void {target}(ptr {base}) {self.unit.external_call}")
-        else:
-            self.fn.do(f"call void @{self.unit.target_of(s.block, s.dispatch)}(ptr %ctx, ptr {base})")
-        for variable, place in s.outputs:
-            self._copy_out(self._member(s.block, instance, variable), self.ref(place))
-
-    def _member(self, block: Pou, instance: Ref, variable: Variable) -> Ref:
-        tag = ""
-        if instance.direct and (instance.tag or instance.pointer == "%self"):
-            assert block.instance is not None
-            tag = self.unit.tag((block.instance.root.name, variable.offset))
-        return instance.member(variable.offset, variable.type, tag)
-
-    def _assign_member(self, target: Ref, value: Expr) -> None:
-        if is_scalar(target.type):
-            self.store(target, self.value(value))
-        else:
-            self._assign_aggregate(target, value)
-
-    def _copy_out(self, source: Ref, target: Ref) -> None:
-        if target.bit >= 0 or is_scalar(target.type):
-            wanted = BOOL if target.bit >= 0 else target.type
-            self.store(target, self.convert(self.load(source), source.type, wanted))
-        elif isinstance(target.type, StringType):
-            self.copy_string(target, source)
-        else:
-            self.copy(target, source, target.type.size)
 
     # ---- branches ----
 
@@ -258,8 +206,10 @@ class Body(Initialising):
         loop.set(fn.value(f"add {loop.text} {current}, {step}"))
         fn.branch(body)
         fn.begin_detached(last)
-        word = f"@llvm.{'s' if is_signed(s.var.type) else 'u'}add.sat.{loop.text}"
-        loop.set(fn.value(f"call {loop.text} {word}({loop.text} {current}, {loop.text} {step})"))
+        word = "sadd" if is_signed(s.var.type) else "uadd"
+        if known_step is not None and known_step < 0 and word == "uadd":
+            word, step = "usub", str(-known_step)
+        loop.set(fn.value(f"call {loop.text} @llvm.{word}.sat.{loop.text}({loop.text} {current}, {loop.text} {step})"))
         fn.begin(end)
         if var is not None:
             self.shadows.pop(var, None)
@@ -273,13 +223,14 @@ class Body(Initialising):
         assert pou is not None
         if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
             self._take_parameters(pou)
+        self.take_inputs(pou)
         if pou.result is not None and result_in_memory(pou):
             capacity = "%result.capacity" if pou.cuts_result else string_capacity(pou.result.type)
             self.locals[pou.result] = Ref("%result", 0, pou.result.type, direct=True, capacity=capacity)
         for var in pou.locals:
             if var not in self.locals:
                 self.locals[var] = self._stack_memory(var)
-            if not pou.no_init:
+            if not (pou.no_init or (pou.cuts_result and var is pou.result)):  # whose size is the caller's
                 self.clear(self.locals[var])
             self.initialise(self.locals[var], var.initial)
         self.statements(pou.body)
@@ -289,6 +240,15 @@ class Body(Initialising):
         else:
             fn.terminate("ret void")
         self.write_raises()
+
+    def write_calls(self, parts: list[str]) -> None:
+        """Writes calls of the parts that the body was cut into."""
+        assert self.pou is not None
+        self.take_inputs(self.pou)
+        instance = ", ptr %self" if self.pou.kind is PouKind.FUNCTION_BLOCK else ""
+        for symbol in parts:
+            self.fn.do(f"call void @{symbol}(ptr %ctx{instance})")
+        self.fn.terminate("ret void")
 
     def _stack_memory(self, var: Variable) -> Ref:
         t = var.type
@@ -325,21 +285,6 @@ def _is_whole(argument: Expr | Place | None, variable: Variable | None) -> bool:
     """Whether an argument is just that variable."""
     place = argument.place if isinstance(argument, Load) else argument
     return isinstance(place, VarPlace) and place.var is variable
-
-
-def parameter_list(pou: Pou) -> str:
-    """The parameters of the define line."""
-    words = ["ptr noalias nonnull readonly %ctx"]
-    if pou.kind in (PouKind.FUNCTION_BLOCK, PouKind.METHOD):
-        words.append("ptr nonnull %self")
-    if result_in_memory(pou):
-        words.append(f"ptr {'' if pou.in_place else 'noalias '}nonnull %result")
-        words += ["i32 %result.capacity"] if pou.cuts_result else []
-    if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
-        for number, parameter in enumerate(pou.parameters):
-            names = (f"%p{number}", f"%p{number}.capacity")
-            words += [f"{text} {name}" for text, name in zip(parameter_types(pou, parameter), names, strict=False)]
-    return ", ".join(words)
 
 
 class _Loop:

@@ -12,10 +12,13 @@ from enum import Enum
 from plctool.compiler.ir import Module, escape
 from plctool.compiler.lower_helpers import LIBRARY_FUNCTIONS
 from plctool.compiler.targets import Target
-from plctool.compiler.typed import Area, Dispatch, External, Pos, Pou, StructInit
+from plctool.compiler.typed import Area, Dispatch, External, Pos, Pou, PouKind, StructInit, Variable
 from plctool.compiler.types import Elementary, Kind, PointerType, StructType, Type, base_of
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
+
+_ALWAYS = 'nounwind "no-builtins"'
+_INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
 
 
 class Check(Enum):
@@ -45,12 +48,20 @@ def parse_checks(text: str) -> frozenset[Check]:
 
 @dataclass(frozen=True)
 class Options:
-    """How to compile. `debug`: keep the program closer to its source (no inlining across POUs)."""
+    """How to compile. `debug`: keep the program closer to its source (no inlining across POUs); `size`: rather small
+    than fast."""
 
     target: Target
     opt_level: int = 2
     checks: frozenset[Check] = ALL_CHECKS
     debug: bool = False
+    size: bool = False
+
+    @property
+    def compact(self) -> bool:
+        """Whether loops are not unrolled and blocks of the library are not inlined: where memory is small, unless
+        level 3 asks for it."""
+        return self.size or (self.target.compact and self.opt_level < 3)
 
 
 def interface_signature(text: str) -> int:
@@ -82,6 +93,8 @@ class Unit:
         self.area_sizes = area_sizes
         self.defaults = defaults
         self.imports: list[External] = []
+        self._sections: set[Pou] = set()
+        self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
         self.pous: dict[Pou, str] = {}  # symbol of every POU referred to
         self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol
         self.helpers: set[str] = set()
@@ -98,14 +111,28 @@ class Unit:
         tree = module.metadata('!{!"st"}')
         self._tag_root = module.metadata(f'!{{!"any", !{tree}, i64 0}}')
         self._tags: dict[object, str] = {}
-        self.compact = module.attributes('minsize optsize nounwind "no-builtins"')
-        self.plain = module.attributes('nounwind "no-builtins"')
-        self.noinline = module.attributes('noinline nounwind "no-builtins"')
-        self.hinted = module.attributes('inlinehint nounwind "no-builtins"')
+        self.smallest = module.attributes(f"minsize optsize {_ALWAYS}")
+        self.plain = module.attributes(f"{'optsize ' if options.compact else ''}{_ALWAYS}")
+        self.strings = module.attributes(f"{'optsize ' if options.size else ''}{_ALWAYS}")
+        self._program = self.plain
+        if options.compact and not options.size:
+            self._program = module.attributes(f'optsize {_ALWAYS} "function-inline-threshold"="{_INLINED}"')
         # LLVM's fast instruction selection (level 0) takes a call that only reads memory for dead.
         reads = " memory(read)" if options.opt_level > 0 else ""
         self.raising = module.attributes(f"cold noreturn nounwind nomerge{reads}")
         self.external_call = module.attributes("nounwind")
+
+    def attributes(self, pou: Pou) -> str:
+        """The attributes of a POU's function. Those of the string functions are worth more room, they are all loops."""
+        if pou.no_init:
+            return self.strings
+        return self._program if pou.checks else self.plain
+
+    def inlining(self, pou: Pou) -> str:
+        """What LLVM is told about inlining a POU: the standard library is made for it, if there is room."""
+        if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self._sections:
+            return "noinline"
+        return "inlinehint" if not pou.checks and (pou.no_init or not self.options.compact) else ""
 
     # ---- what is referred to ----
 
@@ -118,6 +145,11 @@ class Unit:
             name = self.unique(f"st.{pou.name}")
             self.pous[pou] = name
         return name
+
+    def section(self, part: Pou) -> str:
+        """The symbol of a part of a POU."""
+        self._sections.add(part)
+        return self.symbol(part)
 
     def target_of(self, pou: Pou, dispatch: Dispatch | None) -> str:
         """The symbol that a call of `pou` goes to: of a function that looks at the class when that decides."""

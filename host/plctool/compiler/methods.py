@@ -1,4 +1,4 @@
-"""Methods, actions and properties in expressions; THIS, SUPER; names in namespaces.
+"""Methods, actions and properties in expressions; THIS, SUPER.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -7,19 +7,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from plctool.compiler import ast, sfc
+from plctool.compiler import ast
 from plctool.compiler.calls import Calls
+from plctool.compiler.checker import load, place_of
 from plctool.compiler.conversions import error_value
 from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.expressions import load, place_of
 from plctool.compiler.symbols import (
     ERROR,
     BlockInfo,
     ClassInfo,
-    GlobalSymbol,
     Member,
     MemberSymbol,
-    Namespace,
     PouSymbol,
     Role,
     TypeSymbol,
@@ -65,6 +63,8 @@ class ObjectCalls(Calls):
         if isinstance(symbol, MemberSymbol):
             bound = self._own_member(node.name)
             return None if bound is None else self._property(bound, node.pos, node.pos)
+        if symbol is None and self.is_namespace(node.name):
+            return self.error(node.pos, "name", f"{node.name} is a namespace, not a value")
         if symbol is None and node.name.upper() in _OWN:
             place = self._own_instance(node)
             return error_value(self.pos(node.pos)) if place is None else _address(place)
@@ -99,45 +99,6 @@ class ObjectCalls(Calls):
             return self.error(node.name_pos, "call", f"{bound.cls.name}.{node.name} is called with ()")
         return self._property(bound, node.pos, node.name_pos)
 
-    def qualified(self, node: ast.Member) -> Expr | None:
-        """A global, or the value of an enumeration, in a namespace, or `action.Q`; None when `node` names none."""
-        if isinstance(node.base, ast.Name) and isinstance(self.scope.lookup(node.base.name), MemberSymbol):
-            return self._action_flag(node, node.base.name)
-        name = self._dotted(node)
-        if name is None:
-            return None
-        symbol = self.scope.lookup(name)
-        if isinstance(symbol, GlobalSymbol):
-            return self.variable(self.world.declarations.global_variable(symbol), self.pos(node.pos))
-        space, _, value = name.rpartition(".")
-        owner = self.scope.lookup(space)
-        if isinstance(owner, TypeSymbol):
-            return self.expr(ast.EnumValue(node.pos, space, value))
-        return None
-
-    def _action_flag(self, node: ast.Member, action: str) -> Expr | None:
-        """`action.Q` of a Sequential Function Chart: whether the action is active; FALSE in its final scan."""
-        cls, state = self.scope.cls, None
-        while cls is not None and state is None:
-            state = self.scope.lookup(sfc.hidden_name(cls.symbol.decl, action))
-            cls = cls.base
-        if not isinstance(state, VarSymbol) or node.name.upper() != "Q":
-            return None
-        e = self.variable(state, self.pos(node.pos))
-        return self.member(e, node) if isinstance(e.type, StructType) else e
-
-    def _dotted(self, node: ast.Expr) -> str | None:
-        """`a.b.c` as a name when `a` may be a namespace."""
-        if not self.world.namespaces:
-            return None
-        parts = list[str]()
-        while isinstance(node, ast.Member):
-            parts.insert(0, node.name)
-            node = node.base
-        if not isinstance(node, ast.Name) or not parts or isinstance(self.scope.lookup(node.name), VarSymbol):
-            return None
-        return ".".join([node.name, *parts])
-
     # ---- members ----
 
     def _bind(self, base: Expr, node: ast.Member) -> Bound | None:
@@ -159,6 +120,14 @@ class ObjectCalls(Calls):
             return None
         return Bound(cls, key, place)
 
+    def is_called_by_name(self, node: ast.Expr) -> bool:
+        """Whether a name alone is a call: of an action or a program, as older programs write it."""
+        if self.called_program(node) is not None:
+            return True
+        bound = self.bound_member(node)
+        member = None if bound is None else bound.cls.find(bound.key)
+        return member is not None and member.decl.keyword == "ACTION"
+
     def bound_member(self, node: ast.Expr, *, called: bool = False) -> Bound | None:
         """What `m`, `fb.m` or `prog.m` stands for when it is a method, action or property. `called`: the name of the
         method around is not its result."""
@@ -171,16 +140,17 @@ class ObjectCalls(Calls):
             return self._own_member(node.name) if isinstance(symbol, MemberSymbol) else None
         if not isinstance(node, ast.Member):
             return None
-        if isinstance(node.base, ast.Name):
-            space = self.scope.lookup(node.base.name)
-            if isinstance(space, Namespace):
-                key = node.name.casefold()
-                found = space.cls is not None and any(space.cls.find(k) for k in (key, f"{key}.get", f"{key}.set"))
-                return Bound(space.cls, key, None) if found and space.cls is not None else None
-            if isinstance(space, TypeSymbol | PouSymbol):
-                return None
-        dotted = self._dotted(node)
+        space = self.space_of(node.base)
+        if space is not None:
+            key = node.name.casefold()
+            found = space.cls is not None and any(space.cls.find(k) for k in (key, f"{key}.get", f"{key}.set"))
+            return Bound(space.cls, key, None) if found and space.cls is not None else None
+        if isinstance(node.base, ast.Name) and isinstance(self.scope.lookup(node.base.name), TypeSymbol | PouSymbol):
+            return None
+        dotted = self.dotted(node)
         if dotted is not None and (self.scope.lookup(dotted) is not None or dotted.casefold() in self.world.namespaces):
+            return None
+        if isinstance(node.base, ast.Name) and self.is_namespace(node.base.name):
             return None
         if isinstance(node.base, ast.Member) and self._dotted_type(node.base):
             return None
@@ -188,7 +158,7 @@ class ObjectCalls(Calls):
         return None if base.type is ERROR else self._bind(base, node)
 
     def _dotted_type(self, node: ast.Member) -> bool:
-        name = self._dotted(node)
+        name = self.dotted(node)
         return name is not None and isinstance(self.scope.lookup(name), TypeSymbol)
 
     def _find(self, bound: Bound, key: str, offset: int) -> Member | None:
@@ -203,14 +173,22 @@ class ObjectCalls(Calls):
         return None
 
     def may_see(self, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
-        """Whether a variable that is not PUBLIC may be used here; reports it when not."""
+        """Whether a variable of an instance may be used here; reports it when not. A VAR is for its own block, but
+        existing programs read it from outside, so that is a warning only; writing it is an error anyway."""
+        plain = not symbol.access
+        if plain and (symbol.role is not Role.LOCAL or symbol.constant or self.scope.sees_inside):
+            return True
         cls = self.world.classes.class_of(t)
         key = symbol.name.casefold()
         while cls is not None and cls.base is not None and cls.base.block is not None:
             if cls.base.block.members.get(key) is not symbol:
                 break
             cls = cls.base
-        return cls is None or self._permitted({symbol.access}, cls, f"{cls.name}.{symbol.name}", node.name_pos)
+        here = self.scope.cls
+        if plain and cls is not None and (here is None or not here.derives(cls)):
+            message = f"{symbol.name} is a VAR of {cls.name} for its own use; make it VAR_OUTPUT to read it outside"
+            self.scope.warning(node.name_pos, "access", message)
+        return cls is None or plain or self._permitted({symbol.access}, cls, f"{cls.name}.{symbol.name}", node.name_pos)
 
     def _accessible(self, member: Member, offset: int) -> bool:
         return self._permitted(member.decl.modifiers, member.owner, member.name, offset)
@@ -225,7 +203,7 @@ class ObjectCalls(Calls):
             self.error(offset, "access", message)
             return False
         space = owner.symbol.decl.namespace
-        if "INTERNAL" in modifiers and space is not None and not self.scope.is_within(space):
+        if "INTERNAL" in modifiers and space is not None and not self.scope.is_within(space.name):
             self.error(offset, "access", f"{name} is INTERNAL: only the namespace {space.name} may use it")
             return False
         return True
@@ -236,10 +214,12 @@ class ObjectCalls(Calls):
         """A call as a value, or as a statement when it is not one of a function block."""
         bound = self.bound_member(node.callee, called=True)
         if bound is None:
-            dotted = self._dotted(node.callee)
+            dotted = self.dotted(node.callee)
             symbol = self.scope.unit(dotted) if dotted is not None else None
             if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION":
                 return self._call_function(symbol, node, expected)
+            if isinstance(symbol, PouSymbol):
+                return self.error(node.pos, "call", self._not_callable(symbol, symbol.decl.full_name))
             return super().call(node, expected)
         args, enable = self.split_enable(node)
         offset = node.callee.name_pos if isinstance(node.callee, ast.Member) else node.pos

@@ -20,6 +20,7 @@ from plctool.compiler.lexer import (
     begins_unit,
     is_followed_by_name,
     is_operator_function,
+    meant,
 )
 from plctool.compiler.source import Source
 from plctool.compiler.syntax_errors import Recovery
@@ -122,6 +123,33 @@ def _machine() -> tuple[Tables, Builder, list[Reducer | None]]:
     return tables, builder, [_reducer(rule, builder) for rule in tables.rules]
 
 
+_AMBIGUOUS = SOFT | {"OP", "NOT"}
+
+
+def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None:
+    """Gives a word that the language may have a use for the type it has where it stands."""
+    kind = token.type
+    if kind == "MISSPELT":
+        right = meant(token, text)
+        is_name = not right or parser.tables.after(parser.states, right) is None
+        if not is_name:
+            recovery.report_misspelt(token, right)
+    elif kind == "REFUSED":
+        is_name = recovery.skipping or not (token.text.startswith("_") or is_followed_by_name(token, text))
+        if not is_name:
+            recovery.refuse(token)
+    elif kind == "NOT":
+        is_name = is_operator_function(token, text)
+    elif kind == "OP":
+        is_name = kind not in parser.tables.actions[parser.states[-1]] and is_operator_function(token, text)
+    elif parser.tables.after(parser.states, kind) is None:
+        is_name = not begins_unit(token, text)
+    else:
+        is_name = kind in OPENING and not is_followed_by_name(token, text)
+    if is_name:
+        token.type = "IDENT"
+
+
 def parse(source: Source, report: Report, start: int = 0, end: int | None = None) -> list[ast.Declaration]:
     """The declarations of a text (of the part from offset `start` to `end`). Errors go to `report`."""
     tables, builder, reducers = _machine()
@@ -129,14 +157,10 @@ def parse(source: Source, report: Report, start: int = 0, end: int | None = None
     recovery = Recovery(parser, source, report)
     lexer = Lexer(source.text, recovery.report_token, start, end)
     builder.source, builder.attributes, builder.report = source, lexer.attributes, report
-    actions, states, feed = tables.actions, parser.states, parser.feed
+    feed = parser.feed
     for token in lexer:
-        kind = token.type
-        if kind not in actions[states[-1]]:
-            if kind in SOFT or (kind == "OP" and is_operator_function(token, source.text)):
-                token.type = kind if begins_unit(token, source.text) else "IDENT"
-        elif kind in OPENING and not is_followed_by_name(token, source.text):
-            token.type = "IDENT"
+        if token.type in _AMBIGUOUS:
+            _decide(token, parser, recovery, source.text)
         if recovery.skipping and not recovery.resume(token):
             continue
         if feed(token):

@@ -5,53 +5,36 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Container
+from dataclasses import replace
 from typing import Any, ClassVar
 
 from plctool.compiler import ast, constants
-from plctool.compiler.conversions import NUMBERS, elementary, same_type
-from plctool.compiler.expressions import MAX_DEPTH, NestingError, is_untyped, load, place_of
-from plctool.compiler.methods import ObjectCalls
-from plctool.compiler.symbols import ERROR, BlockInfo, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.block_calls import BlockCalls
+from plctool.compiler.checker import is_untyped
+from plctool.compiler.conversions import NUMBERS, SIGNED, elementary
+from plctool.compiler.nesting import MAX_DEPTH, NestingError
+from plctool.compiler.symbols import ERROR
 from plctool.compiler.typed import (
     Assign,
-    BitPlace,
     Call,
     CallStatement,
     Case,
     Const,
     Continue,
     DerefPlace,
-    Direction,
     Exit,
     Expr,
-    FbCall,
     For,
     If,
     Load,
-    MemberPlace,
-    Place,
     Pos,
     Repeat,
     Return,
     Statement,
-    Unary,
-    UnaryOp,
-    Variable,
     While,
 )  # fmt: skip
-from plctool.compiler.types import BOOL, EnumType, ReferenceType, StringType, StructType, Type
-
-
-@dataclass
-class _FbArguments:
-    """What a call of a function block hands over."""
-
-    inputs: list[tuple[Variable, Expr]] = field(default_factory=list)
-    in_outs: list[tuple[Variable, Place]] = field(default_factory=list)
-    outputs: list[tuple[Variable, Place]] = field(default_factory=list)
-    after: list[Statement] = field(default_factory=list)  # outputs that need a conversion
+from plctool.compiler.types import BOOL, EnumType, OpenArrayType, ReferenceType, StructType, Type
 
 
 class _Labels:
@@ -120,7 +103,7 @@ def _names_something(node: object) -> bool:
     return not isinstance(node, ast.Literal)
 
 
-class Statements(ObjectCalls):
+class Statements(BlockCalls):
     """Checks a body."""
 
     _loops = 0
@@ -153,8 +136,10 @@ class Statements(ObjectCalls):
             return self._assign_reference(node)
         if node.op != ":=":
             return self._set_or_reset(node)
-        if isinstance(node.value, ast.Call) and self._has_enable(node.value):
-            return self._enabled_assignment(node, node.value)
+        if isinstance(node.value, ast.Call):
+            declared = self.parameter_names(node.value.callee)
+            if self._has_enable(node.value, declared):
+                return self._enabled_assignment(node, node.value, declared)
         result: list[Statement] = []
         source: ast.Expr = node.value
         for target in reversed(node.targets):
@@ -174,6 +159,9 @@ class Statements(ObjectCalls):
             return None
         value = self.coerce(self.expr(source, place.type), place.type)
         if value.type is ERROR:
+            return None
+        if isinstance(place.type, OpenArrayType):
+            self.error(target.pos, "type", "an ARRAY[*] cannot be assigned as a whole; assign its elements in a loop")
             return None
         block = self.world.blocks.get(place.type) if isinstance(place.type, StructType) else None
         if block is not None:
@@ -211,20 +199,29 @@ class Statements(ObjectCalls):
     # ---- calls ----
 
     @staticmethod
-    def _has_enable(node: ast.Call) -> bool:
-        return any(a.name is not None and a.name.upper() in ("EN", "ENO") for a in node.args)
+    def _has_enable(node: ast.Call, declared: Container[str]) -> bool:
+        keys = ((a.name or "").casefold() for a in node.args)
+        return any(key in ("en", "eno") and key not in declared for key in keys)
 
     def _call_statement(self, node: ast.ExprStmt) -> list[Statement]:
         call = node.value
+        if not isinstance(call, ast.Call) and self.is_called_by_name(call):
+            call = ast.Call(call.pos, call, [])
         if not isinstance(call, ast.Call):
             e = self.expr(call)
             if e.type is not ERROR:
                 self.error(node.pos, "statement", "this is a value, not a statement; write an assignment or a call")
             return []
-        instance = self._instance(call)
+        program = self.called_program(call.callee)
+        if program is not None:
+            names = {symbol.name.casefold() for symbol, _ in program.parameters}
+            return self._enabled(call, names, lambda plain: self.program_call(plain, program))
+        instance = self.called_instance(call)
         if instance is not None:
-            return self._enabled(call, lambda plain: self._fb_call(plain, instance))
-        return self._enabled(call, self._function_statement)
+            block = self.world.blocks.get(instance.type) if isinstance(instance.type, StructType) else None
+            members = block.members if block is not None else ()
+            return self._enabled(call, members, lambda plain: self.block_call(plain, instance))
+        return self._enabled(call, self.parameter_names(call.callee), self._function_statement)
 
     def _function_statement(self, call: ast.Call) -> list[Statement]:
         e = self.call(call, None)
@@ -234,11 +231,14 @@ class Statements(ObjectCalls):
             self.scope.warning(call.pos, "unused", "the result of this call is not used")
         return []
 
-    def _enabled(self, call: ast.Call, make: Callable[[ast.Call], list[Statement]]) -> list[Statement]:
-        """A call with EN and ENO: not executed unless EN is TRUE; ENO tells."""
-        if not self._has_enable(call):
+    def _enabled(
+        self, call: ast.Call, declared: Container[str], make: Callable[[ast.Call], list[Statement]]
+    ) -> list[Statement]:
+        """A call with EN and ENO: not executed unless EN is TRUE; ENO tells. Where the callee declares them itself they
+        are variables like others."""
+        if not self._has_enable(call, declared):
             return make(call)
-        args, enable = self.split_enable(call)
+        args, enable = self.split_enable(call, declared)
         statements = make(ast.Call(call.pos, call.callee, args))
         pos = self.pos(call.pos)
         done: list[Statement] = []
@@ -257,103 +257,8 @@ class Statements(ObjectCalls):
         condition = self.condition(enable.en)
         return [] if condition.type is ERROR else [If([(condition, statements + done)], skipped, pos)]
 
-    def _enabled_assignment(self, node: ast.Assign, call: ast.Call) -> list[Statement]:
-        return self._enabled(call, lambda plain: self._assign(ast.Assign(node.pos, node.targets, ":=", plain)))
-
-    def _instance(self, call: ast.Call) -> Expr | None:
-        """The instance a call statement is about; None when it calls a function."""
-        callee = call.callee
-        if self.bound_member(callee, called=True) is not None:
-            return None
-        if isinstance(callee, ast.Name):
-            symbol = self.scope.lookup(callee.name)
-            if symbol is None and callee.name.upper() == "SUPER" and self.scope.cls is not None:
-                return self.expr(ast.Deref(callee.pos, callee))
-            if not isinstance(symbol, VarSymbol | GlobalSymbol) or (
-                isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT
-            ):  # fmt: skip
-                return None
-        e = self.expr(callee)
-        return e if (isinstance(e.type, StructType) and e.type in self.world.blocks) or e.type is ERROR else None
-
-    def _fb_call(self, call: ast.Call, instance: Expr) -> list[Statement]:
-        if not isinstance(instance.type, StructType):
-            for argument in call.args:
-                if argument.value is not None:
-                    self.expr(argument.value)
-            return []
-        block = self.world.blocks[instance.type]
-        if block.cls is not None and "CLASS" in block.cls.symbol.decl.modifiers:
-            self.error(call.pos, "call", f"{block.type} is a CLASS and has no body; call one of its methods")
-            return []
-        names = [(p.variable.name, p.direction) for p in block.pou.parameters]
-        bound = self.bind(call.args, names, block.type.name, call.pos)
-        if bound is None:
-            return []
-        place, pos = place_of(instance), self.pos(call.pos)
-        handed = self._fb_arguments(block, bound, call, place)
-        if handed is None:
-            return []
-        if not isinstance(place, DerefPlace):
-            self.world.add_call(self.scope.pou, block.pou, pos)
-        statement = FbCall(block.pou, place, handed.inputs, handed.in_outs, handed.outputs, pos)
-        statement.dispatch = self.body_dispatch(block, place)
-        return [statement, *handed.after]
-
-    def _fb_arguments(
-        self, block: BlockInfo, bound: dict[int, ast.Argument], call: ast.Call, instance: Place
-    ) -> _FbArguments | None:
-        handed, ok = _FbArguments(), True
-        for i, parameter in enumerate(block.pou.parameters):
-            variable, argument = parameter.variable, bound.get(i)
-            if parameter.direction is Direction.IN_OUT:
-                place = self._fb_in_out(variable, argument, block, call)
-                ok = ok and place is not None
-                if place is not None:
-                    handed.in_outs.append((variable, place))
-            elif argument is None or argument.value is None:
-                continue
-            elif parameter.direction is Direction.INPUT:
-                e = self.input(argument.value, variable.type, variable.name)
-                ok = ok and e.type is not ERROR
-                handed.inputs.append((variable, e))
-            else:
-                ok = self._fb_output(variable, argument, instance, handed) and ok
-        return handed if ok else None
-
-    def _fb_in_out(
-        self, variable: Variable, argument: ast.Argument | None, block: BlockInfo, call: ast.Call
-    ) -> Place | None:
-        if argument is None or argument.value is None:
-            self.error(call.pos, "arguments", f"the VAR_IN_OUT {variable.name} of {block.type} is missing")
-            return None
-        place = self.reference(argument.value, variable.type, variable.name, output=False)
-        if place is None or not isinstance(place.type, StringType) or not isinstance(variable.type, StringType):
-            return place
-        if place.type.length < variable.type.length:
-            self.error(
-                argument.pos, "type", f"the VAR_IN_OUT {variable.name} is {variable.type}, {place.type} is too short"
-            )  # fmt: skip
-            return None
-        return place
-
-    def _fb_output(self, variable: Variable, argument: ast.Argument, instance: Place, handed: _FbArguments) -> bool:
-        """`q => target`; with another type or NOT it is an assignment after the call."""
-        assert argument.value is not None
-        what = f"the output {variable.name}"
-        target = self.target(argument.value, what, f"take {what}")
-        if target is None:
-            return False
-        if same_type(target.type, variable.type) and not argument.negated and not isinstance(target, BitPlace):
-            handed.outputs.append((variable, target))
-            return True
-        pos = self.pos(argument.pos)
-        value: Expr = load(MemberPlace(instance, variable.offset, variable.type, pos))
-        if argument.negated:
-            value = Unary(UnaryOp.NOT, self.coerce(value, BOOL), BOOL, pos)
-        value = self.coerce(value, target.type)
-        handed.after.append(Assign(target, value, pos))
-        return value.type is not ERROR
+    def _enabled_assignment(self, node: ast.Assign, call: ast.Call, declared: Container[str]) -> list[Statement]:
+        return self._enabled(call, declared, lambda plain: self._assign(replace(node, value=plain)))
 
     # ---- control structures ----
 
@@ -438,13 +343,15 @@ class Statements(ObjectCalls):
     def _for(self, node: ast.For) -> list[Statement]:
         place = self.target(node.var, "the FOR loop", "be the variable of a FOR loop")
         t = None if place is None else elementary(place.type)
-        if place is not None and (t is None or t.kind not in NUMBERS or isinstance(place.type, EnumType)):
+        if place is not None and (t is None or t.kind not in NUMBERS):
             self.error(node.var.pos, "type", f"a FOR loop counts with an integer, not with {place.type}")
             place = None
+        elif place is not None and isinstance(place.type, EnumType):
+            self.scope.warning(node.var.pos, "enum", f"the loop takes {place.type} for a number, beyond its last value")
         target = t if place is not None and t is not None else ERROR
         pos = self.pos(node.pos)
         start, stop = self.value(node.start, target), self.value(node.stop, target)
-        step: Expr = Const(1, target, pos) if node.step is None else self.value(node.step, target)
+        step: Expr = Const(1, target, pos) if node.step is None else self._step(node.step, target)
         if isinstance(step, Const) and step.value == 0 and step.type is not ERROR:
             self.error(
                 node.pos if node.step is None else node.step.pos, "range", "a FOR loop with a step of zero never ends"
@@ -454,6 +361,13 @@ class Statements(ObjectCalls):
         if place is None or ERROR in (start.type, stop.type, step.type):
             return []
         return [For(place, start, stop, step, body, pos)]
+
+    def _step(self, node: ast.Expr, target: Type) -> Expr:
+        """The step of a FOR loop. A constant one may lead downwards, whatever counts."""
+        e, counter = self.expr(node, target), elementary(target)
+        if isinstance(e, Const) and isinstance(e.value, int) and e.value < 0 and counter is not None:
+            target = SIGNED[counter.bits]
+        return self.coerce(e, target)
 
     def _loop_body(self, nodes: list[ast.Stmt]) -> list[Statement]:
         self._loops += 1

@@ -29,6 +29,15 @@ class _ErrorType(Type):
 
 
 ERROR: Type = _ErrorType()
+
+
+class _Nothing(Type):
+    """The result of what returns none."""
+
+    name = "nothing"
+
+
+NOTHING: Type = _Nothing()
 UNTYPED_INT = Elementary("integer constant", Kind.INT, 64, True, -1)
 """An integer literal, or a calculation of such: takes the type its surroundings need."""
 UNTYPED_REAL = Elementary("real constant", Kind.REAL, 64, True, -1)
@@ -66,7 +75,8 @@ class VarSymbol:
     given: bool = False  # has an initial value of its own
     by_reference: bool = False
     used: bool = False
-    access: str = ""  # PRIVATE, PROTECTED or INTERNAL
+    access: str = ""  # PUBLIC, PRIVATE, PROTECTED or INTERNAL, where it is written
+    open_area: str = ""  # I, Q or M: of a member of a function block AT %I*, %Q* or %M*
 
 
 @dataclass(slots=True, eq=False)
@@ -115,6 +125,15 @@ class PouSymbol:
 
 
 @dataclass(slots=True, eq=False)
+class ProgramInfo:
+    """An instance of a PROGRAM. Its variables have places of their own: a call assigns them and hands nothing over."""
+
+    name: str
+    pou: Pou
+    parameters: list[tuple[VarSymbol, Direction]]
+
+
+@dataclass(slots=True, eq=False)
 class Namespace:
     """A list of globals, or a program instance: `GVL.x`, `Main.x`."""
 
@@ -122,6 +141,7 @@ class Namespace:
     what: str
     members: dict[str, GlobalSymbol | VarSymbol]
     cls: ClassInfo | None = None  # of a program: its actions and methods
+    program: ProgramInfo | None = None
 
 
 @dataclass(slots=True, eq=False)

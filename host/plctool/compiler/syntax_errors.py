@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from plctool.compiler import slips
 from plctool.compiler.lexer import KEYWORDS, Report, Token
 from plctool.compiler.source import Source
 from plctool.compiler.tables import END
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
 _CLOSERS = {
     "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT",
-    "VAR": "END_VAR",
-    "GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE", "FUNCTION": "END_FUNCTION",
+    "VAR": "END_VAR", "GLOBAL": "END_VAR", "CONFIG": "END_VAR", "ACCESS": "END_VAR",
+    "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE", "FUNCTION": "END_FUNCTION",
     "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM", "RESOURCE": "END_RESOURCE",
     "CONFIGURATION": "END_CONFIGURATION", "TEST": "END_TEST", "SETUP": "END_SETUP", "TEARDOWN": "END_TEARDOWN",
     "CLASS": "END_CLASS", "INTERFACE": "END_INTERFACE", "METHOD": "END_METHOD", "PROPERTY": "END_PROPERTY",
@@ -29,7 +30,11 @@ _CLOSERS = {
     "INITIAL_STEP": "END_STEP", "STEP": "END_STEP", "TRANSITION": "END_TRANSITION",
 }  # fmt: skip
 _ENDS = {"_" + end for end in _CLOSERS.values()}
-_UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "GLOBAL", "CONFIGURATION", "TEST", "SETUP", "TEARDOWN"}
+_UNITS = {
+    "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "GLOBAL", "CONFIG", "ACCESS", "CONFIGURATION", "TEST", "SETUP",
+    "TEARDOWN",
+}  # fmt: skip
+_INSTRUCTIONS = {"LD", "LDN", "ST", "STN", "CAL", "CALC", "CALCN", "JMPC", "JMPCN", "RETC", "RETCN"}
 _STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
 _CHART = {"INITIAL_STEP", "STEP", "TRANSITION"}
 _SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, *_CHART, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL", END}
@@ -53,11 +58,8 @@ _WORDS = {
     "_DOTDOT": "..", "_THEN": "THEN", "_DO": "DO", "_OF": "OF", "_TO": "TO", "_UNTIL": "UNTIL", "_ON": "ON",
 }  # fmt: skip
 
-_LATER = {
-    "EXTENDS", "IMPLEMENTS", "METHOD", "PROPERTY", "INTERFACE", "CLASS", "NAMESPACE", "ACTION",
-    "ABSTRACT", "FINAL", "VAR_CONFIG", "VAR_ACCESS", "VAR_INST", "USING", "GOTO", "JMP",
-}  # fmt: skip
 _PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",)}
+_RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
 _BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
 _APART = 3  # an error closer than so many tokens to the one before is a consequence of it
 
@@ -77,15 +79,15 @@ class Recovery:
         self._last: tuple[Token, ...] = ()
         self._accepted = _APART  # tokens since the last error
         self._quiet = False
+        self._skip_to = ""  # the word or sign that ends what is refused
         self._dropped: list[str] = []  # openings that were thrown away, whose ends are still to come
 
     def handle(self, token: Token) -> None:
         """Reports that `token` does not fit, and repairs what can be repaired."""
         self._quiet = self._accepted < _APART
-        self._not_yet(token)
         self._accepted = 0
         self._reduce()
-        if self._stray_end(token):
+        if self._late_variables(token) or self._stray_end(token):
             return
         while self._insert(token) or self._close(token):
             if self._parser.feed(token):
@@ -98,6 +100,16 @@ class Recovery:
         self._report(offset, code, message)
         self._accepted = 0
 
+    def report_misspelt(self, token: Token, kind: str) -> None:
+        """Reports a keyword that is spelled wrongly; `kind` is the terminal it stands for."""
+        self.report_token(token.pos, "syntax", f"{token.text} is written {kind.removeprefix('_')}")
+        token.type = kind
+
+    def refuse(self, token: Token) -> None:
+        """Reports a word that begins what this compiler leaves out, and leaves it out."""
+        refusal = slips.REFUSED[token.text.upper()]
+        self._leave_out(token, refusal.message, refusal.end)
+
     def accept(self, token: Token) -> None:
         """Notes a token that was fine."""
         self._last = (self.previous, token) if self.previous else (token,)
@@ -106,6 +118,10 @@ class Recovery:
 
     def resume(self, token: Token) -> bool:
         """While skipping: whether to go on with `token`. A semicolon ends what is skipped and belongs to it."""
+        if self._skip_to and token.type != END:
+            if token.text.upper() == self._skip_to:
+                self._skip_to, self.skipping, self._accepted = "", False, _APART
+            return False
         if token.type != "_SEMI" and token.type not in _SYNC:
             return False
         if self._shift(self._parser.states, token.type) is not None:
@@ -119,8 +135,9 @@ class Recovery:
     def _insert(self, token: Token) -> bool:
         """Puts in one missing token before `token`, or before the name in front of it."""
         stack, values = self._parser.states, self._parser.values
-        if token.type == "EQ" and self._shift(stack, "_ASSIGN") and self._item(stack) == "stmt":
-            self._say(token.pos, "an assignment is written :=, not =")
+        if token.type == "EQ" and self._shift(stack, "_ASSIGN"):
+            what = "an assignment" if self._item(stack) == "stmt" else "an initial value"
+            self._say(token.pos, f"{what} is written :=, not =")
             token.type = "_ASSIGN"
             return True
         if self._keyword_as_name(token):
@@ -129,6 +146,8 @@ class Recovery:
             if kind == "_ASSIGN" and token.type not in _VALUES:
                 continue
             if self._shift(stack, kind, token.type) is not None:
+                if kind == "_SEMI" and self.previous is not None and self.previous.type == "RETURN":
+                    message = _RETURN
                 self._say(self._gap(token), message.format(item=self._item_words(stack)))
                 self._parser.feed(Token(kind, text, self._gap(token)))
                 return True
@@ -140,7 +159,7 @@ class Recovery:
         last = values[-1] if values else None
         if isinstance(last, Token) and last.type == "IDENT" and self._insert_before_name(last, token):
             return True
-        if self._shift(stack, "IDENT", token.type) is not None and token.type not in _ENDS | _UNITS | {END}:
+        if self._shift(stack, "IDENT", token.type) is not None and token.type not in _ENDS | _UNITS | {END, "_LSQB"}:
             self._say(token.pos, f"expected {self._operand(stack)} before {_shown(token)}")
             self._parser.feed(Token("IDENT", "", token.pos))
             return True
@@ -150,13 +169,15 @@ class Recovery:
         """`f(x) y := 1`: the name was taken for the S of S=; `VAR a : INT; a := 1`: for a declaration."""
         stack = self._parser.states[:-1]
         for kind, text in (("_SEMI", ";"), ("_END_VAR", "END_VAR")):
-            if self._shift(stack, kind, "IDENT", token.type) is None:
+            if token.type == "_SEMI" or self._shift(stack, kind, "IDENT", token.type) is None:
                 continue
             self._parser.states.pop()
             self._parser.values.pop()
             if kind == "_SEMI":
                 before = self._source.text[: name.pos].rstrip()
-                self._say(len(before), f"expected ; after the {self._item_words(stack)}")
+                instruction = self.previous is not None and self._last[0].text.upper() in _INSTRUCTIONS
+                hint = "; Instruction List is not supported, write Structured Text" if instruction else ""
+                self._say(len(before), f"expected ; after the {self._item_words(stack)}{hint}")
             else:
                 self._report_open(name, self._open())
             self._parser.feed(Token(kind, text, name.pos))
@@ -193,12 +214,17 @@ class Recovery:
         self._parser.feed(Token("_" + end, end, token.pos))
         return True
 
-    def _not_yet(self, token: Token) -> None:
-        """Says so when the error comes from a part of the language that is still missing."""
-        for word in (*self._last, token):
-            if word.text.upper() in _LATER and word.type == "IDENT":
-                self._say(word.pos, f"{word.text} is not supported yet")
-                self._quiet = True
+    def _leave_out(self, token: Token, message: str, end: str) -> None:
+        """Reports `token`, and goes on behind the word or sign `end`."""
+        self._say(token.pos, message)
+        self.skipping, self._skip_to = True, end
+
+    def _late_variables(self, token: Token) -> bool:
+        """Variables declared between statements."""
+        if token.type != "VAR" or self._item(self._parser.states) != "stmt":
+            return False
+        self._leave_out(token, f"{token.text} stands in front of the first statement", "END_VAR")
+        return True
 
     def _stray_end(self, token: Token) -> bool:
         """An END_... that closes nothing that is open: it stands for the right one, or is left out."""
@@ -269,22 +295,7 @@ class Recovery:
 
     def _shift(self, stack: Stack, *kinds: str) -> Stack | None:
         """The states after tokens of these kinds, None when one does not fit."""
-        tables, stack = self._tables, list(stack)
-        for kind in kinds:
-            while True:
-                action = tables.actions[stack[-1]].get(kind)
-                if action is None:
-                    return None
-                if action >= 0:
-                    stack.append(action)
-                    break
-                rule = tables.rules[-1 - action]
-                if rule.size:
-                    del stack[-rule.size :]
-                stack.append(tables.gotos[stack[-1]][rule.origin])
-                if kind == END and stack[-1] == tables.end:
-                    return stack
-        return stack
+        return self._tables.after(stack, *kinds)
 
     def _item_at(self, state: int) -> str | None:
         return next((item for item in _ITEMS if item in self._tables.gotos[state]), None)
@@ -307,8 +318,28 @@ class Recovery:
     def _gap(self, token: Token) -> int:
         return self.previous.end if self.previous else token.pos
 
+    def _known_slip(self, token: Token, stack: Stack) -> str:
+        """What to say of a mistake that is made often; "" when it is another one."""
+        if self._shift(stack, "NUMBER") is not None:
+            listed = "a list of values is for declarations; assign the elements one by one, or copy a constant"
+            return listed if token.type == "_LSQB" else ""
+        if self.previous is not None and self.previous.type == "RETURN":
+            return _RETURN
+        if self._item(stack) != "stmt":
+            return ""
+        if token.type == "_COLON":
+            return slips.REFUSED["JMP"].message
+        if token.type == "_ASSIGN" and self._shift(stack, "_RPAR") is not None:
+            return "values by name are for declarations and calls; assign the members one by one"
+        if _is_doubled(token, self._source.text) and self._shift(stack, "_ASSIGN") is not None:
+            return f"there is no {token.text}{self._source.text[token.end]}; write x := x {token.text} 1"
+        return ""
+
     def _unexpected(self, token: Token) -> str:
         stack = self._parser.states
+        slip = self._known_slip(token, stack)
+        if slip:
+            return slip
         if self._shift(stack, "NUMBER") is not None:
             return f"expected a value, found {_shown(token)}"
         if self._item_at(stack[-1]) == "unit":
@@ -326,6 +357,11 @@ class Recovery:
             return f"{_shown(token)} has no place here"
         listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
         return f"expected {listed}, found {_shown(token)}"
+
+
+def _is_doubled(token: Token, text: str) -> bool:
+    """Whether this is the first sign of `+=` or `++`."""
+    return token.type in ("SIGN", "OP") and text[token.end : token.end + 1] in ("=", token.text)
 
 
 def _a(word: str) -> str:

@@ -50,6 +50,26 @@ class Tables:
     start: int
     end: int
 
+    def after(self, stack: list[int], *kinds: str) -> list[int] | None:
+        """The states after tokens of these kinds, None when one does not fit. More than a look into `actions`: that
+        may hold reductions for tokens that fit nowhere behind them."""
+        stack = list(stack)
+        for kind in kinds:
+            while True:
+                action = self.actions[stack[-1]].get(kind)
+                if action is None:
+                    return None
+                if action >= 0:
+                    stack.append(action)
+                    break
+                rule = self.rules[-1 - action]
+                if rule.size:
+                    del stack[-rule.size :]
+                stack.append(self.gotos[stack[-1]][rule.origin])
+                if kind == END and stack[-1] == self.end:
+                    return stack
+        return stack
+
 
 @cache
 def load_tables() -> Tables:

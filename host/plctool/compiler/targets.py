@@ -24,7 +24,8 @@ class Target:
 
     `device_id` names a TARGET_ID_* of CompactDownload.h. `stubs`: undefined compiler calls (soft float, 64-bit
     division) go through the import table, whose base is in a reserved register. `unaligned`: loads and stores of any
-    size work at any address. `vectors`: 16-byte vector compares are cheap.
+    size work at any address. `vectors`: 16-byte vector compares are cheap. `registers`: that carry arguments inside the
+    image, for addresses and integers, and for reals (0: reals are like integers).
     """
 
     name: str
@@ -34,6 +35,7 @@ class Target:
     machine: Machine
     device_id: str
     pointer_size: int
+    registers: tuple[int, int]
     stubs: bool
     unaligned: bool
     vectors: bool = False
@@ -42,37 +44,44 @@ class Target:
         ""  # LLVM calling convention of C functions that take or return floats; "" is the default
     )
 
+    @property
+    def compact(self) -> bool:
+        """Whether programs lie in a small flash."""
+        return self.pointer_size == 4
+
 
 TARGETS: dict[str, Target] = {
     t.name: t
     for t in (
         Target(
             "x86_64-linux", "x86_64-unknown-linux-gnu", "x86-64", "", Machine.X86_64, "TARGET_ID_X86_64_LINUX",
-            pointer_size=8, stubs=False, unaligned=True, vectors=True,
+            pointer_size=8, registers=(6, 8), stubs=False, unaligned=True, vectors=True,
         ),
         Target(
             "aarch64-linux", "aarch64-unknown-linux-gnu", "generic", "", Machine.AARCH64, "TARGET_ID_AARCH64_LINUX",
-            pointer_size=8, stubs=False, unaligned=True,
+            pointer_size=8, registers=(8, 8), stubs=False, unaligned=True,
         ),
         Target(
             "cortex-m0", "thumbv6m-none-unknown", "cortex-m0", "+reserve-r9", Machine.THUMB_V6M, "TARGET_ID_CORTEX_M0",
-            pointer_size=4, stubs=True, unaligned=False,
+            pointer_size=4, registers=(4, 0), stubs=True, unaligned=False,
         ),
         Target(
             "cortex-m3", "thumbv7m-none-unknown", "cortex-m3", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M3",
-            pointer_size=4, stubs=True, unaligned=True,
+            pointer_size=4, registers=(4, 0), stubs=True, unaligned=True,
         ),
         Target(
             "cortex-m4f", "thumbv7em-none-unknown", "cortex-m4", "+reserve-r9", Machine.THUMB, "TARGET_ID_CORTEX_M4F",
-            pointer_size=4, stubs=True, unaligned=True, external_convention="arm_aapcs_vfpcc",
+            pointer_size=4, registers=(4, 8), stubs=True, unaligned=True,
+            external_convention="arm_aapcs_vfpcc",
         ),
         Target(
             "cortex-m7", "thumbv7em-none-unknown", "cortex-m7", "+reserve-r9,-fp64", Machine.THUMB,
-            "TARGET_ID_CORTEX_M7", pointer_size=4, stubs=True, unaligned=True, external_convention="arm_aapcs_vfpcc",
+            "TARGET_ID_CORTEX_M7", pointer_size=4, registers=(4, 8), stubs=True, unaligned=True,
+            external_convention="arm_aapcs_vfpcc",
         ),
         Target(
             "rv32imac", "riscv32-unknown-unknown", "generic-rv32", "+m,+a,+c,-relax,+reserve-x27", Machine.RISCV32,
-            "TARGET_ID_RV32IMAC", pointer_size=4, stubs=True, unaligned=False, abi="ilp32",
+            "TARGET_ID_RV32IMAC", pointer_size=4, registers=(8, 0), stubs=True, unaligned=False, abi="ilp32",
         ),
     )
 }  # fmt: skip

@@ -48,7 +48,8 @@ class Variable:
     """A declared variable. `initial` is None for all zero.
 
     `offset`: bytes in the area (AREA) or in the instance (SELF); for REFERENCE in a function block the offset of the
-    stored 8-byte pointer in the instance (SELF slot), in a function the parameter itself.
+    stored 8-byte pointer in the instance (SELF slot), in a function the parameter itself. `bounds`: the variables with
+    the bounds of an ARRAY[*], lower and upper one of each dimension.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Variable:
     initial: Initial | None = None
     constant: bool = False
     bit: int | None = None  # a BOOL at an address such as %IX0.3: the bit in the byte at `offset`
+    bounds: list[tuple[Variable, Variable]] = field(default_factory=list)
 
 
 # ---- initial values ------------------------------------------------------------------------------------------------
@@ -90,9 +92,8 @@ class StructInit:
 
 @dataclass
 class ComputedInit:
-    """The address of something, for a pointer or interface: assigned by `TypedProgram.startup`. Members of an
-    instance are
-    SELF variables in it."""
+    """What is not known before the program runs, such as an address: assigned by `TypedProgram.startup`. Members of an
+    instance are SELF variables in it."""
 
     value: Expr
 
@@ -369,7 +370,8 @@ class Case:
 @dataclass
 class For:
     """`stop` and `step` are evaluated once. The loop ends without wrapping, also at the limits of the type; `FOR i := 5
-    TO 5` runs once. A step of 0 raises DIVIDEBYZERO when it is not a constant (a constant 0 is a compile error)."""
+    TO 5` runs once. A step of 0 raises DIVIDEBYZERO when it is not a constant (a constant 0 is a compile error).
+    `step` is signed when it leads downwards, whatever the type of `var`."""
 
     var: Place
     start: Expr
@@ -434,14 +436,12 @@ class Parameter:
     A STRING passed by reference travels as (pointer, u32 capacity), so that STRING_SIZE and cutting work for any
     length.
 
-    `bound`: this is a bound of an ARRAY[*], which is handed over with it: the array, the dimension from 0, and
-    whether it is the upper one.
+    Behind the parameters that the program declares stand the bounds of those that are an ARRAY[*] (Variable.bounds).
     """
 
     variable: Variable
     direction: Direction
     by_reference: bool = False
-    bound: tuple[Variable, int, bool] | None = None
 
 
 @dataclass(eq=False)
@@ -506,5 +506,8 @@ class TypedProgram:
     aliases: dict[str, str] = field(
         default_factory=dict
     )  # other names of globals -> name in `globals`: `x` for `GVL.x`
+    accesses: list[Variable] = field(default_factory=list)  # VAR_ACCESS: other names of parts of globals
+    constants: dict[str, Const] = field(default_factory=dict)  # that have no memory, by full name
     startup: Pou | None = None  # (init_retains : BOOL): what is called when the variables have their initial values
+    shutdown: Pou | None = None  # what is called when the application ends, or its variables start anew
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not

@@ -94,11 +94,12 @@ ELEMENTARY: dict[str, Elementary] = {
     )
 } | {
     "TIME_OF_DAY": TOD, "LTIME_OF_DAY": LTOD, "DATE_AND_TIME": DT, "LDATE_AND_TIME": LDT,
-    "__XWORD": LWORD, "__UXINT": ULINT, "__XINT": LINT,
+    "__XWORD": LWORD, "__UXINT": ULINT, "__XINT": LINT, "XWORD": LWORD, "UXINT": ULINT, "XINT": LINT,
 }  # fmt: skip
-"""By name, in capitals; a type may have several names. The last three are integers as wide as a pointer in memory."""
+"""By name, in capitals; a type may have several names. The last six are integers as wide as a pointer in memory."""
 
 DEFAULT_STRING_LENGTH = 80
+MAX_SIZE = 0x7FFF_FFFF  # of a variable and of an area; offsets are signed 32-bit numbers on the targets
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,11 @@ class StringType(Type):
     def keyword(self) -> str:
         """STRING or WSTRING."""
         return "WSTRING" if self.wide else "STRING"
+
+    @property
+    def character(self) -> Elementary:
+        """CHAR or WCHAR."""
+        return WCHAR if self.wide else CHAR
 
     @property
     def unit(self) -> int:
@@ -246,11 +252,17 @@ class ReferenceType(PointerType):
 
 @dataclass
 class Field:
-    """A member of a struct or function block; `offset` in bytes is set by `lay_out`."""
+    """A member of a struct or function block; `offset` in bytes is set by `lay_out`. `alias`: a second name."""
 
     name: str
     type: Type
     offset: int = -1
+    alias: str = ""
+
+    @property
+    def hidden(self) -> bool:
+        """Whether it is our own, such as the number of a class: its name is no identifier."""
+        return self.name.startswith("%")
 
 
 @dataclass(eq=False)
@@ -279,10 +291,13 @@ class StructType(Type):
             return True
         return self.base is not None and self.base.conforms(other)
 
-    def lay_out(self) -> None:
-        """Gives every field its offset. Call once, when all field types are known and laid out."""
+    def lay_out(self, *, behind_base: bool = False) -> None:
+        """Gives every field its offset. Call once, when all field types are known and laid out. `behind_base`: own
+        fields do not use the padding at the end of the base, which is copied as a whole when it is assigned."""
         end, align = 0, 1
-        for f in self.fields:
+        for number, f in enumerate(self.fields):
+            if behind_base and self.base is not None and number == len(self.base.fields):
+                end = self.base.size
             f.offset = 0 if self.union else align_up(end, f.type.align)
             end = max(end, f.offset + f.type.size)
             align = max(align, f.type.align)
@@ -291,7 +306,7 @@ class StructType(Type):
 
     def member(self, name: str) -> Field | None:
         key = name.casefold()
-        return next((f for f in self.fields if f.name.casefold() == key), None)
+        return next((f for f in self.fields if key in (f.name.casefold(), f.alias.casefold())), None)
 
     @property
     def size(self) -> int:

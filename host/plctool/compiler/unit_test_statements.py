@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from plctool.compiler import ast, mocks
+from plctool.compiler.checker import is_untyped, load, place_of
 from plctool.compiler.conversions import NUMBERS, convert, elementary, settle, time_to_ltime
-from plctool.compiler.expressions import NestingError, is_untyped, load, place_of
+from plctool.compiler.nesting import NestingError
 from plctool.compiler.scope import Scope
 from plctool.compiler.statements import Statements
 from plctool.compiler.symbols import ERROR, GlobalSymbol
@@ -32,7 +33,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )  # fmt: skip
-from plctool.compiler.types import BOOL, DINT, LREAL, LTIME, TIME, UDINT, ArrayType, StringType, StructType, Type
+from plctool.compiler.types import BOOL, DINT, LREAL, LTIME, TIME, UDINT, ArrayType, Kind, StringType, StructType, Type
 from plctool.compiler.world import World
 
 NUMBER, FAILED = "__test", "__failed"
@@ -236,7 +237,9 @@ class TestStatements(Statements):
             return []
         if message:
             text = self.expr(message[0])
-            if not isinstance(text.type, StringType):
+            if isinstance(text, Const) and isinstance(text.value, str):  # "..." is a WSTRING elsewhere
+                text = Const(text.value, StringType(len(text.value)), text.pos)
+            if not isinstance(text.type, StringType) or text.type.wide:
                 self.error(message[0].pos, "type", f"the message of an assert is a STRING, not {text.type}")
                 return []
             operands = [*operands, ("message", text)]
@@ -266,13 +269,20 @@ class TestStatements(Statements):
         if e is None or e.type is ERROR:
             return []
         if e.type not in (TIME, LTIME):
-            self.error(call.pos, "type", f"ADVANCE_TIME takes a duration such as T#10ms, not {e.type}")
+            base = elementary(e.type)
+            if base is None or base.kind is not Kind.INT:
+                message = f"ADVANCE_TIME takes a duration such as T#10ms, or a number of nanoseconds, not {e.type}"
+                self.error(call.pos, "type", message)
+                return []
+            e = convert(e, LTIME)
+        if isinstance(e, Const) and isinstance(e.value, int) and e.value < 0:
+            self.error(call.pos, "range", "time does not go back")
             return []
         pos = self.pos(call.pos)
         long, short = self._bench.place(_LTIME, pos), self._bench.place(_TIME, pos)
         step = time_to_ltime(e) if e.type is TIME else e
         total = Binary(BinaryOp.ADD, Load(long, LTIME, pos), step, LTIME, pos)
-        milliseconds = self.convert_explicitly(Load(long, LTIME, pos), TIME, call.pos)
+        milliseconds = self.convert_explicitly(Load(long, LTIME, pos), TIME)
         assert milliseconds is not None
         return [Assign(long, total, pos), Assign(short, milliseconds, pos)]
 
@@ -286,36 +296,58 @@ class TestStatements(Statements):
     def _mock_member(self, call: ast.Call, count: int, name: str) -> Expr | None:
         """A hidden member of the instance that is the first argument."""
         nodes = self._nodes(call, count, message=name == mocks.CALLS)
-        instance = None if nodes is None else self.expr(nodes[0])
-        if nodes is None or instance is None or instance.type is ERROR:
+        if nodes is None:
+            return None
+        method = self._hidden_of(nodes[0], mocks.calls_of) if name == mocks.CALLS else None
+        if method is not None:
+            return method
+        if isinstance(nodes[0], ast.Member) and self.bound_member(nodes[0]) is not None:
+            message = "this is no instance; for a method write MOCK_FUNCTION instance.m RETURNS ..."
+            self.error(nodes[0].pos, "mock", message)
+            return None
+        instance = self.expr(nodes[0])
+        if instance.type is ERROR:
             return None
         block = self.world.blocks.get(instance.type) if isinstance(instance.type, StructType) else None
         if block is None or name not in block.members:
-            self.error(nodes[0].pos, "mock", "MOCK needs an instance of a function block of this program")
+            self.error(nodes[0].pos, "mock", "MOCK needs an instance of a function block")
             return None
         return self.member(instance, ast.Member(nodes[0].pos, nodes[0], name, nodes[0].pos))
 
+    def _hidden_of(self, node: ast.Expr, name: Callable[[str], str]) -> Expr | None:
+        """A hidden variable of the method or property `instance.m`; None when there is none."""
+        bound = self.bound_member(node) if isinstance(node, ast.Member) else None
+        if bound is None or bound.place is None or not isinstance(node, ast.Member):
+            return None
+        member = bound.cls.find(bound.key) or bound.cls.find(f"{bound.key}.get")
+        block = member.owner.block if member is not None else None
+        if member is None or block is None or name(member.name) not in block.members:
+            return None
+        return self.member(self.expr(node.base), ast.Member(node.pos, node.base, name(member.name), node.name_pos))
+
     def _mock_function(self, call: ast.Call) -> list[Statement]:
-        """MOCK_FUNCTION name RETURNS value;"""
+        """`MOCK_FUNCTION name RETURNS value`, `MOCK_FUNCTION instance.method RETURNS value`"""
         target, value = call.args[0].value, call.args[1].value
-        assert isinstance(target, ast.Name) and value is not None
-        switch, result = (
-            self.world.lookup(name(target.name), library=False) for name in (mocks.switch_of, mocks.value_of)
-        )
-        if not isinstance(switch, GlobalSymbol) or not isinstance(result, GlobalSymbol):
-            self.error(target.pos, "mock", f"there is no function {target.name} in this program that could be mocked")
+        assert target is not None and value is not None
+        if isinstance(target, ast.Name):
+            switch, result = (self._global(name(target.name)) for name in (mocks.switch_of, mocks.value_of))
+            what = f"there is no function {target.name} in this program that could be mocked"
+        else:
+            switch, result = (self._hidden_of(target, name) for name in (mocks.switch_of, mocks.value_of))
+            what = "MOCK_FUNCTION needs a function, or a method of an instance, that returns something"
+        if switch is None or result is None:
+            self.error(target.pos, "mock", what)
             return []
-        pos = self.pos(call.pos)
-        statements: list[Statement] = []
-        for symbol in (switch, result):
-            variable = self.world.declarations.global_variable(symbol).variable
-            if variable is None:
-                return []
-            e = Const(1, BOOL, pos) if symbol is switch else self.value(value, variable.type)
-            if e.type is ERROR:
-                return []
-            statements.append(Assign(VarPlace(variable, variable.type, pos), e, pos))
-        return statements
+        e, pos = self.value(value, result.type), self.pos(call.pos)
+        if e.type is ERROR:
+            return []
+        return [Assign(place_of(switch), Const(1, BOOL, pos), pos), Assign(place_of(result), e, pos)]
+
+    def _global(self, name: str) -> Expr | None:
+        symbol = self.world.lookup(name, library=False)
+        if not isinstance(symbol, GlobalSymbol):
+            return None
+        return self.variable(self.world.declarations.global_variable(symbol), self.pos(0))
 
     def _verify_called(self, call: ast.Call) -> list[Statement]:
         calls = self._mock_member(call, 1, mocks.CALLS)

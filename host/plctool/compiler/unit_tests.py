@@ -7,7 +7,7 @@ out:
 - The variables of a test live on the stack, those of SETUP in the data area, so all are fresh at every start. A PROGRAM
   is instantiated as a function block; a variable with an address (AT) is a plain member of it then.
 - An assert that does not hold stores its number and both values in hidden variables and returns. TEARDOWN follows in
-  any case, but not behind a run-time exception, which ends the program.
+  any case; behind a run-time exception, which ends the program, the host runs it by a number of its own.
 - TIME() reads a hidden variable instead of the time of the cycle, and ADVANCE_TIME adds to it: so time goes on within
   one call, and optimisation knows of it.
 
@@ -20,16 +20,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from plctool.compiler import ast, mocks
-from plctool.compiler.configuration import DEFAULT_PROGRAM, Application, configure
-from plctool.compiler.expressions import load
+from plctool.compiler import ast
+from plctool.compiler.checker import load
+from plctool.compiler.configuration import Application, configure, default_programs
+from plctool.compiler.declarations import May
+from plctool.compiler.mocks import Mocks, raising
 from plctool.compiler.scope import Scope
 from plctool.compiler.source import Source
-from plctool.compiler.symbols import ERROR, PouSymbol, Role, VarSymbol
+from plctool.compiler.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
 from plctool.compiler.typed import (
+    Assign,
     Call,
     CallStatement,
     Case,
+    ComputedInit,
     If,
     Initial,
     Pos,
@@ -40,12 +44,11 @@ from plctool.compiler.typed import (
     Task,
     TaskKind,
     Variable,
+    VarPlace,
 )  # fmt: skip
-from plctool.compiler.types import StringType
 from plctool.compiler.unit_test_statements import NUMBER, Assertion, Bench, TestStatements
 from plctool.compiler.world import World
 
-_NOTHING = StringType(1)
 _LARGEST_ON_STACK = 0x4000  # bytes; what is larger lives in the data area
 
 
@@ -71,6 +74,7 @@ class TestSuite:
 
     def __init__(self) -> None:
         self.cases: list[TestCase] = []
+        self._teardowns: dict[str, int] = {}  # by file
         self._bench: Bench | None = None
         self._branches: list[tuple[list[tuple[int, int]], list[Statement]]] = []
         self._programs: dict[str, PouSymbol] = {}
@@ -80,6 +84,10 @@ class TestSuite:
         """All asserts; the first one has number 1."""
         return self._bench.asserts if self._bench else []
 
+    def teardown_of(self, case: TestCase) -> int | None:
+        """The number that runs just the TEARDOWN behind a test."""
+        return self._teardowns.get(case.pos.file)
+
     # ---- the steps of the check ----
 
     def prepare(
@@ -87,15 +95,16 @@ class TestSuite:
     ) -> list[tuple[Source, list[ast.Declaration]]]:
         """Sets the hidden variables up, and adds to the syntax tree what MOCK needs."""
         self._bench = Bench(world)
-        world.register([mocks.raising()])
-        return mocks.with_mocks(parsed, world.diagnostics)
+        world.register([raising()])
+        everything = [decl for _, declarations in parsed for decl in declarations]
+        world.rewritten = Mocks((d for d in everything if isinstance(d, ast.TestDecl)), world.diagnostics).rewritten
+        return [(source, world.rewritten(declarations)) for source, declarations in parsed]
 
     def configure(self, world: World) -> Application:
         """The programs as the CONFIGURATION has them, so that their names are known; no task runs them. Without a
         CONFIGURATION there may be any number."""
-        programs = world.program_symbols()
-        chosen = [p for p in programs if p.decl.name.upper() == DEFAULT_PROGRAM] or programs
-        application = configure(world) if world.configurations or len(chosen) == 1 else Application()
+        alone = len(default_programs(world)) == 1
+        application = configure(world) if world.configurations or alone else Application()
         application.tasks = [self._task(world)]
         return application
 
@@ -118,6 +127,10 @@ class TestSuite:
             self._teardown(world, decl, files.setdefault(decl.source.path, _File()))
         for decl in (t for t in world.tests if t.keyword == "TEST"):
             self._test(world, decl, files.get(decl.source.path, _File()))
+        for path, file in files.items():
+            if file.teardown is not None:
+                number = self._teardowns[path] = len(self.cases) + len(self._teardowns)
+                self._branches.append(([(number, number)], [_call(file.teardown)]))
 
     # ---- blocks ----
 
@@ -160,6 +173,8 @@ class TestSuite:
 
     def _begin(self, world: World, decl: ast.TestDecl, file: _File, name: str) -> tuple[Scope, TestStatements]:
         scope = world.scope(decl.source)
+        scope.enter(decl.namespace)
+        scope.sees_inside = True
         scope.pou = Pou(name, PouKind.PROGRAM, decl.source.pos(decl.pos))
         scope.programs = self._programs
         scope.names.update(file.names)
@@ -187,8 +202,9 @@ class TestSuite:
     def _line(self, line: ast.VarDecl, scope: Scope, shared: _File | None) -> None:
         world, pou = scope.world, scope.pou
         assert pou is not None
-        dynamic = line.init is not None and not isinstance(line.init, ast.Literal | ast.ArrayInit | ast.StructInit)
-        t, default = world.declarations.declared_type(replace(line, init=None) if dynamic else line, scope)
+        t, default = world.declarations.declared_type(line, scope, May.HAVE_ADDRESS)
+        computed = default.value if isinstance(default, ComputedInit) else None
+        default = None if computed is not None else default
         for offset, name in line.names:
             symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
             if t is not ERROR:
@@ -203,8 +219,8 @@ class TestSuite:
                 world.allocation.add(variable)
             elif variable is not None:
                 pou.locals.append(variable)
-            if variable is not None and dynamic and not world.declarations.runtime_initial(line, variable, scope):
-                variable.initial = world.declarations.declared_type(line, scope)[1]
+            if variable is not None and computed is not None:
+                scope.prologue.append(Assign(VarPlace(variable, t, variable.pos), computed, variable.pos))
             world.declarations.add(scope, symbol, offset)
 
     def _instance(self, symbol: VarSymbol, default: Initial | None, pou: Pou, shared: bool) -> Variable:
@@ -231,4 +247,4 @@ def _constant(line: ast.VarDecl, scope: Scope, owner: str) -> None:
 
 
 def _call(pou: Pou) -> Statement:
-    return CallStatement(Call(pou, [], _NOTHING, pou.pos), pou.pos)
+    return CallStatement(Call(pou, [], NOTHING, pou.pos), pou.pos)

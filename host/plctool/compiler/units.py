@@ -12,9 +12,20 @@ import zlib
 from typing import TYPE_CHECKING
 
 from plctool.compiler import ast
-from plctool.compiler.generics import GENERIC
+from plctool.compiler.declarations import RETAINING, May
+from plctool.compiler.edges import edge_variables, see_edge
+from plctool.compiler.generics import is_group
+from plctool.compiler.open_arrays import bound_parameters, give_bounds
 from plctool.compiler.scope import Scope
-from plctool.compiler.symbols import ERROR, BlockInfo, FunctionInfo, GlobalSymbol, PouSymbol, Role, VarSymbol
+from plctool.compiler.symbols import (
+    ERROR,
+    BlockInfo,
+    FunctionInfo,
+    PouSymbol,
+    ProgramInfo,
+    Role,
+    VarSymbol,
+)
 from plctool.compiler.typed import (
     ComputedInit,
     Direction,
@@ -30,11 +41,13 @@ from plctool.compiler.typed import (
 from plctool.compiler.types import (
     ArrayType,
     Field,
-    PointerType,
+    OpenArrayType,
+    ReferenceType,
     StringType,
     StructType,
     Type,
 )  # fmt: skip
+from plctool.compiler.unit_variables import DIRECTIONS, ROLES, UnitVariables, holds_constants
 
 if TYPE_CHECKING:
     from plctool.compiler.declarations import Allocation
@@ -43,23 +56,23 @@ if TYPE_CHECKING:
 LIBRARY_STRING = StringType(255)  # STRING without a length, as parameter or result of a library function
 WIDE_LIBRARY_STRING = StringType(255, wide=True)
 
-_DIRECTIONS = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VAR_IN_OUT": Direction.IN_OUT}
-_ROLES = {
-    "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,
-    "VAR_TEMP": Role.TEMP,
-    "VAR_STAT": Role.LOCAL, "VAR_INST": Role.LOCAL, "STEP": Role.STEP,
-}  # fmt: skip
 _KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
 _VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")
-_HIDING = {"PRIVATE", "PROTECTED", "INTERNAL"}
-_RETAIN = {"RETAIN", "PERSISTENT"}
+_ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
+_MEMBER_MAY = {
+    Role.INPUT: May.BE_EDGE | May.HAVE_OPEN_ADDRESS, Role.OUTPUT: May.HAVE_OPEN_ADDRESS,
+    Role.IN_OUT: May.BE_OPEN_ARRAY, Role.LOCAL: May.HAVE_OPEN_ADDRESS, Role.STEP: May.BE_PLAIN,
+}  # fmt: skip
+_PROGRAM_MAY = {
+    Direction.INPUT: May.HAVE_ADDRESS | May.BE_EDGE, Direction.OUTPUT: May.HAVE_ADDRESS, None: May.HAVE_ADDRESS,
+}  # fmt: skip
 
 
-class Units:
+class Units(UnitVariables):
     """Declares POUs when they are first referred to."""
 
     def __init__(self, world: World) -> None:
-        self.world = world
+        super().__init__(world)
         self._functions: dict[tuple[PouSymbol, tuple[tuple[str, Type], ...]], FunctionInfo] = {}
         self._blocks: dict[PouSymbol, BlockInfo] = {}
         self._layouts: dict[PouSymbol, StructType] = {}
@@ -82,76 +95,6 @@ class Units:
         pou.in_place = "in_place" in decl.attributes
         return pou
 
-    def _constants(self, decl: ast.PouDecl, scope: Scope) -> None:
-        """VAR CONSTANT comes first, wherever it stands: array bounds and initial values may use it."""
-        for block in decl.blocks:
-            if "CONSTANT" not in block.qualifiers or block.keyword == "VAR_EXTERNAL":
-                continue
-            role = _ROLES[block.keyword]
-            for line in block.decls:
-                t, init = self.world.declarations.declared_type(line, scope)
-                for offset, name in line.names:
-                    symbol = self.world.declarations.constant_symbol(offset, name, t, init, scope, decl.name, role)
-                    symbol.given = line.init is not None
-                    self.world.declarations.add(scope, symbol, offset)
-
-    def _externals(self, block: ast.VarBlock, scope: Scope) -> None:
-        """VAR_EXTERNAL only repeats what is declared elsewhere."""
-        for line in block.decls:
-            t, _ = self.world.declarations.declared_type(line, scope)
-            for offset, name in line.names:
-                found = self.world.lookup(name.casefold(), library=scope.library)
-                if not isinstance(found, GlobalSymbol):
-                    scope.error(offset, "unknown", f"there is no VAR_GLOBAL {name}")
-                    continue
-                symbol = self.world.declarations.global_variable(found)
-                if ERROR not in (t, symbol.type) and t != symbol.type:
-                    scope.error(offset, "type", f"the VAR_GLOBAL {name} is of type {symbol.type}, not {t}")
-                scope.names[name.casefold()] = symbol
-
-    def _statics(self, block: ast.VarBlock, decl: ast.PouDecl, scope: Scope) -> None:
-        for line in block.decls:
-            t, init = self.world.declarations.declared_type(line, scope)
-            for offset, name in line.names:
-                symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
-                if t is not ERROR:
-                    owner = scope.pou.name if scope.pou is not None and decl.keyword == "METHOD" else decl.name
-                    full_name = f"{owner}.{name}"
-                    symbol.variable = self.world.declarations.shared_variable(full_name, t, init, scope, offset)
-                self.world.declarations.add(scope, symbol, offset)
-
-    def _stack_variables(self, block: ast.VarBlock, pou: Pou, scope: Scope) -> None:
-        """VAR of a function, VAR_TEMP: they live during the call."""
-        declarations = self.world.declarations
-        for line in block.decls:
-            spec = ast.VarDecl(line.pos, line.names, None, line.type, None)
-            dynamic = line.init is not None and not isinstance(line.init, ast.Literal | ast.ArrayInit | ast.StructInit)
-            t, init = declarations.declared_type(spec if dynamic else line, scope)
-            for offset, name in line.names:
-                symbol = VarSymbol(name, scope.pos(offset), t, _ROLES[block.keyword])
-                if self._is_instance(t):
-                    scope.error(
-                        offset,
-                        "type",
-                        f"{name} keeps its values between calls, so it needs a FUNCTION_BLOCK or PROGRAM",
-                    )
-                elif t is not ERROR:
-                    variable = Variable(name, t, Storage.LOCAL, symbol.pos, initial=init)
-                    if dynamic and not declarations.runtime_initial(line, variable, scope):
-                        variable.initial = declarations.declared_type(line, scope)[1]
-                    pou.locals.append(variable)
-                    symbol.variable = variable
-                declarations.add(scope, symbol, offset)
-
-    def _is_instance(self, t: Type) -> bool:
-        while isinstance(t, ArrayType):
-            t = t.element
-        return isinstance(t, StructType) and t in self.world.blocks
-
-    def _reject_location(self, line: ast.VarDecl, scope: Scope) -> None:
-        if line.location is not None:
-            scope.error(line.location.pos, "location", "only variables of a PROGRAM and global ones have an address")
-
     # ---- functions ----
 
     def function(self, symbol: PouSymbol, bindings: dict[str, Type] | None = None) -> FunctionInfo | None:
@@ -173,9 +116,9 @@ class Units:
     def is_generic(self, symbol: PouSymbol) -> bool:
         """Whether parameters of the function are of a type ANY_..."""
         return any(
-            isinstance(line.type, ast.NamedType) and line.type.name.upper() in GENERIC
+            isinstance(line.type, ast.NamedType) and is_group(line.type.name)
             for block in symbol.decl.blocks
-            if block.keyword in _DIRECTIONS
+            if block.keyword in DIRECTIONS
             for line in block.decls
         )
 
@@ -197,24 +140,23 @@ class Units:
         """Declares result, parameters and variables of a function or method."""
         if decl.result is not None:
             self._declare_result(info, decl, decl.result, scope)
-        self._constants(decl, scope)
+        self.declare_constants(decl, scope)
         for block in decl.blocks:
-            if block.keyword == "VAR_INST" or ("CONSTANT" in block.qualifiers and block.keyword not in _DIRECTIONS):
+            if block.keyword in ("VAR_INST", "STEP") or holds_constants(block):
                 continue
-            if block.keyword in _DIRECTIONS:
+            if block.keyword in DIRECTIONS:
                 self._parameters(block, info, scope)
             elif block.keyword == "VAR_EXTERNAL":
-                self._externals(block, scope)
+                self.declare_externals(block, scope)
             elif block.keyword == "VAR_STAT":
-                self._statics(block, decl, scope)
+                self.declare_statics(block, decl, scope)
             else:
-                for line in block.decls:
-                    self._reject_location(line, scope)
-                self._stack_variables(block, info.pou, scope)
+                self.declare_stack_variables(block, info.pou, scope)
+        info.pou.parameters += bound_parameters(info.pou.parameters)
 
     def _declare_result(self, info: FunctionInfo, decl: ast.PouDecl, spec: ast.TypeSpec, scope: Scope) -> None:
         t, default = self._parameter_type(spec, scope)
-        if self._is_instance(t):
+        if self.is_instance(t):
             scope.error(spec.pos, "type", f"a function cannot return the function block {t}")
             t = ERROR
         info.result = t
@@ -232,22 +174,22 @@ class Units:
         return self.world.declarations.type_of(spec, scope)
 
     def _parameters(self, block: ast.VarBlock, info: FunctionInfo, scope: Scope) -> None:
-        direction, declarations = _DIRECTIONS[block.keyword], self.world.declarations
+        direction, declarations = DIRECTIONS[block.keyword], self.world.declarations
         for line in block.decls:
-            self._reject_location(line, scope)
-            if scope.library and line.init is None:
+            if scope.library and line.init is None and isinstance(line.type, ast.NamedType):
                 t, default = self._parameter_type(line.type, scope)
             else:
-                t, default = declarations.declared_type(line, scope)
+                t, default = declarations.declared_type(line, scope, May.BE_OPEN_ARRAY)
             if isinstance(default, ComputedInit):
                 scope.error(line.pos, "constant", "the default of a parameter has to be constant")
             by_reference = direction is not Direction.INPUT or self._passes_reference(line, info.attributes, t)
             for offset, name in line.names:
-                symbol = VarSymbol(name, scope.pos(offset), t, _ROLES[block.keyword], default=default)
+                symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=default)
                 symbol.given, symbol.by_reference, symbol.used = line.init is not None, by_reference, True
+                symbol.constant = "CONSTANT" in block.qualifiers
                 if not declarations.add(scope, symbol, offset):
                     continue
-                if direction is not Direction.IN_OUT and self._is_instance(t):
+                if direction is not Direction.IN_OUT and self.is_instance(t):
                     scope.error(offset, "type", f"pass the function block {name} as VAR_IN_OUT")
                     symbol.type = ERROR
                 storage = Storage.REFERENCE if by_reference else Storage.LOCAL
@@ -256,8 +198,8 @@ class Units:
                 info.pou.parameters.append(Parameter(symbol.variable, direction, by_reference))
 
     def _passes_reference(self, line: ast.VarDecl, attributes: dict[str, str], t: Type) -> bool:
-        """A read-only string, array or struct input, which the library passes without a copy."""
-        wanted = "by_reference" in line.attributes or "by_reference" in attributes
+        """A read-only string, array or struct input, which the library passes without a copy; an ARRAY[*]."""
+        wanted = isinstance(t, OpenArrayType) or "by_reference" in line.attributes or "by_reference" in attributes
         return wanted and isinstance(t, StringType | ArrayType | StructType)
 
     def _external(self, name: str, info: FunctionInfo, scope: Scope) -> External:
@@ -298,16 +240,16 @@ class Units:
         defaults: dict[str, Initial] = {}
         self._layouts[symbol] = layout
         self.world.classes.begin_block(symbol, info, scope, defaults)
-        self._constants(decl, scope)
+        self.declare_constants(decl, scope)
         for block in decl.blocks:
-            if "CONSTANT" in block.qualifiers:
+            if holds_constants(block):
                 continue
             if block.keyword == "VAR_EXTERNAL":
-                self._externals(block, scope)
+                self.declare_externals(block, scope)
             elif block.keyword == "VAR_STAT":
-                self._statics(block, decl, scope)
+                self.declare_statics(block, decl, scope)
             elif block.keyword == "VAR_TEMP":
-                self._stack_variables(block, pou, scope)
+                self.declare_stack_variables(block, pou, scope)
             else:
                 self._members(block, info, defaults, scope)
         self.world.classes.instance_variables(info, defaults, scope)
@@ -321,7 +263,7 @@ class Units:
             self.world.defaults[layout.name] = StructInit(defaults)
         info.members |= {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
         self.world.blocks[layout] = info
-        self.world.classes.end_block(info)
+        self.world.classes.end_block(info, scope)
         self.world.add_body(scope, decl, pou, symbol.library)
         return info
 
@@ -332,81 +274,114 @@ class Units:
         return self._layouts.get(symbol)
 
     def _members(self, block: ast.VarBlock, info: BlockInfo, defaults: dict[str, Initial], scope: Scope) -> None:
-        role, direction = _ROLES[block.keyword], _DIRECTIONS.get(block.keyword)
-        info.retain = info.retain or bool(block.qualifiers & _RETAIN)
+        role, direction = ROLES[block.keyword], DIRECTIONS.get(block.keyword)
+        info.retain = info.retain or bool(block.qualifiers & RETAINING)
         for line in block.decls:
-            self._reject_location(line, scope)
-            t, default = self.world.declarations.declared_type(line, scope)
+            t, default = self.world.declarations.declared_type(line, scope, _MEMBER_MAY[role])
             if role is not Role.IN_OUT:
                 self.world.classes.require_instances(t, scope, line.pos)
             info.retain = info.retain or (role is not Role.IN_OUT and self.world.declarations.is_retain(t))
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
                 symbol.given, symbol.used = line.init is not None, direction is not None
-                symbol.access = next(iter(block.qualifiers & _HIDING), "")
+                symbol.access = next(iter(block.qualifiers & _ACCESS), "")
+                symbol.open_area = line.location.text[1] if line.location is not None else ""
+                symbol.constant = "CONSTANT" in block.qualifiers
                 if not self.world.declarations.add(scope, symbol, offset):
                     continue
                 info.members[name.casefold()] = symbol
+                alias = line.attributes.get("alias", "") if scope.library else ""
+                if alias:
+                    info.members[alias.casefold()] = symbol
                 if t is ERROR:
                     continue
                 reference = role is Role.IN_OUT
                 storage = Storage.REFERENCE if reference else Storage.SELF
                 symbol.variable = Variable(name, t, storage, symbol.pos, initial=None if reference else default)
-                info.type.fields.append(Field(name, PointerType(t) if reference else t))
+                info.type.fields.append(Field(name, ReferenceType(t) if reference else t, alias=alias))
                 if default is not None and not reference:
                     defaults[name] = default
                 if direction is not None:
                     info.pou.parameters.append(Parameter(symbol.variable, direction, reference))
+                for bound in give_bounds(symbol.variable, Storage.SELF):
+                    self._hidden_member(bound, info)
+                if line.edge:
+                    last, edge = edge_variables(symbol.variable)
+                    self._hidden_member(last, info)
+                    self._hidden_member(edge, info)
+                    see_edge(symbol, line.edge, last, edge, scope)
+
+    def _hidden_member(self, variable: Variable, info: BlockInfo) -> None:
+        """A member that has no name in the program."""
+        symbol = VarSymbol(variable.name, variable.pos, variable.type, Role.LOCAL, variable)
+        info.members[variable.name.casefold()] = symbol
+        info.type.fields.append(Field(variable.name, variable.type))
 
     # ---- programs ----
 
-    def program(self, symbol: PouSymbol, name: str, allocation: Allocation, qualifiers: set[str]) -> tuple[Pou, Scope]:
+    def program(
+        self, symbol: PouSymbol, name: str, allocation: Allocation, qualifiers: set[str]
+    ) -> tuple[ProgramInfo, Scope]:
         """An instance of a program with its variables placed; its body is queued for checking. `qualifiers` of the
         instance, such as RETAIN, are for all variables that have none."""
         decl = symbol.decl
         pou = self._pou(symbol, name)
+        info = ProgramInfo(name, pou, [])
         scope = self._scope(symbol, pou)
-        self._constants(decl, scope)
+        self.declare_constants(decl, scope)
         for block in decl.blocks:
-            if "CONSTANT" in block.qualifiers:
+            if holds_constants(block):
                 continue
             if block.keyword == "VAR_EXTERNAL":
-                self._externals(block, scope)
+                self.declare_externals(block, scope)
             elif block.keyword == "VAR_STAT":
-                self._statics(block, decl, scope)
+                self.declare_statics(block, decl, scope)
             elif block.keyword == "VAR_TEMP":
-                self._stack_variables(block, pou, scope)
+                self.declare_stack_variables(block, pou, scope)
             elif block.keyword == "VAR_IN_OUT":
                 scope.error(
                     block.pos, "unsupported", "a PROGRAM has no VAR_IN_OUT; use VAR_EXTERNAL or a global variable"
                 )
             else:
-                self._program_variables(block, pou, scope, allocation, block.qualifiers or qualifiers)
-        self.world.classes.program(symbol, scope)
+                self._program_variables(block, info, scope, allocation, block.qualifiers or qualifiers)
+
+        def place(member: str, variable: VarSymbol) -> Variable | None:
+            full_name, t = f"{name}.{member}", variable.type
+            placed = self.world.declarations.area_variable(full_name, t, variable.default, None, qualifiers, scope, 0)
+            if placed is not None:
+                allocation.add(placed)
+            return placed
+
+        self.world.classes.program(symbol, scope, place)
         self.world.add_body(scope, decl, pou, symbol.library)
-        return pou, scope
+        return info, scope
 
     def _program_variables(
-        self, block: ast.VarBlock, pou: Pou, scope: Scope, allocation: Allocation, qualifiers: set[str]
+        self, block: ast.VarBlock, info: ProgramInfo, scope: Scope, allocation: Allocation, qualifiers: set[str]
     ) -> None:
         declarations = self.world.declarations
-        direction = _DIRECTIONS.get(block.keyword)
+        direction = DIRECTIONS.get(block.keyword)
         for line in block.decls:
-            t, init = declarations.declared_type(line, scope)
+            t, init = declarations.declared_type(line, scope, _PROGRAM_MAY[direction])
             self.world.classes.require_instances(t, scope, line.pos)
             for offset, name in line.names:
-                symbol = VarSymbol(name, scope.pos(offset), t, _ROLES[block.keyword], default=init)
+                symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=init)
                 symbol.used = direction is not None or line.location is not None
                 if not declarations.add(scope, symbol, offset) or t is ERROR:
                     continue
-                symbol.variable = declarations.area_variable(
-                    f"{pou.name}.{name}", t, init, line.location, qualifiers, scope, offset
-                )
+                full_name = f"{info.name}.{name}"
+                location = declarations.address(line.location, t, symbol.pos, full_name)
+                symbol.variable = declarations.area_variable(full_name, t, init, location, qualifiers, scope, offset)
                 if symbol.variable is None:
                     continue
                 allocation.add(symbol.variable)
                 if direction is not None:
-                    pou.parameters.append(Parameter(symbol.variable, direction))
+                    info.parameters.append((symbol, direction))
+                if line.edge:
+                    last, edge = edge_variables(symbol.variable)
+                    allocation.add(last)
+                    allocation.add(edge)
+                    see_edge(symbol, line.edge, last, edge, scope)
 
 
 def interface_text(name: str, pou: Pou) -> str:

@@ -14,8 +14,12 @@ from plctool.compiler.source import Source
 from plctool.errors import UsageError
 
 WARNINGS = {
+    "access": "a VAR of a function block is read from outside",
+    "bits": "a BYTE, WORD, DWORD or LWORD is taken for an unsigned number where a REAL is needed",
     "case": "a CASE about an enumeration has no ELSE and misses some of its values",
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration",
+    "layout": "a type takes more memory than it does in other systems",
+    "lifetime": "an instance of a function block lives for one call only, and starts anew in the next one",
     "narrowing": "an integer or an LREAL goes where not all of its values fit",
     "no-program": "there is no PROGRAM, so nothing would run",
     "overlap": "two variables with AT share memory, and neither is a bit of the other",
@@ -23,9 +27,11 @@ WARNINGS = {
     "precision": "digits are lost: a large number becomes REAL, a duration or time is finer than its type",
     "recursion": "a call through a pointer or an interface may lead back to its caller",
     "result": "a function or method never assigns its result",
+    "task": "a program is called that another task, or its own, runs as well",
     "truncated": "a text is longer than the STRING it goes to",
+    "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG",
     "unreachable": "a statement is never reached",
-    "unused": "a variable is never used, or the result of a call",
+    "unused": "a variable or program is never used, or the result of a call",
     "widening": "a product is computed in a type that is narrower than where it goes",
 }
 """What each warning is about; its name is the `code` of the diagnosis."""

@@ -6,19 +6,25 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 from plctool.compiler import ast, sfc
+from plctool.compiler.call_graph import CallGraph
 from plctool.compiler.class_rules import INITIALISERS
 from plctool.compiler.classes import Classes
 from plctool.compiler.construction import construct
 from plctool.compiler.conversions import Coercion
 from plctool.compiler.declarations import Allocation, Declarations
 from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.expressions import Expressions, NestingError
-from plctool.compiler.generics import GENERIC
-from plctool.compiler.library import Library
+from plctool.compiler.expressions import Expressions
+from plctool.compiler.generics import GROUPS
+from plctool.compiler.instance_config import InstanceConfig
+from plctool.compiler.library import Library, without_library
+from plctool.compiler.nesting import NestingError
+from plctool.compiler.programs import Programs
 from plctool.compiler.scope import Scope
+from plctool.compiler.sfc_statements import statements_of
 from plctool.compiler.source import Source
 from plctool.compiler.statements import Statements
 from plctool.compiler.symbols import (
@@ -32,11 +38,11 @@ from plctool.compiler.symbols import (
     Unit,
     VarSymbol,
 )  # fmt: skip
-from plctool.compiler.typed import Const, Expr, Pos, Pou, StructInit, Variable
-from plctool.compiler.types import ELEMENTARY, EnumType, StructType, Type
+from plctool.compiler.typed import Call, Const, Expr, Pos, Pou, StructInit, Variable
+from plctool.compiler.types import ELEMENTARY, WCHAR, EnumType, StructType, Type
 from plctool.compiler.units import Units
 
-_RESERVED = {*ELEMENTARY, "STRING", "WSTRING", *GENERIC}
+_RESERVED = {*ELEMENTARY, "STRING", "WSTRING", *GROUPS}
 
 
 def _enum_names(symbol: TypeSymbol) -> list[str]:
@@ -60,16 +66,22 @@ class World:
     def __init__(self, library: Library) -> None:
         self.library = library
         self.diagnostics = Diagnostics(s.path for s in library.sources)
-        self.coerce = Coercion(self.diagnostics)
+        self.coerce = Coercion(self.diagnostics, self._text_of)
         self.declarations = Declarations(self)
         self.units = Units(self)
         self.classes = Classes(self)
-        self.namespaces: set[str] = set()
+        self.programs = Programs(self)
+        self.calls = CallGraph(self.diagnostics)
+        self.instance_config = InstanceConfig(self)
+        self.namespaces: dict[str, str] = {}  # as written, by case-folded name
+        self.rewritten: Callable[[list[ast.Declaration]], list[ast.Declaration]] = list  # what unit tests replace
         self.startup: Pou | None = None  # calls FB_Init
+        self.shutdown: Pou | None = None  # calls FB_Exit
         self.allocation = Allocation()
         self.blocks: dict[StructType, BlockInfo] = {}
         self.defaults: dict[str, StructInit] = {}
         self.shared: dict[tuple[str, int], Variable] = {}
+        self.constants: dict[str, Const] = {}  # that have no memory, by full name
         self.configurations: list[ast.ConfigurationDecl] = []
         self.tests: list[ast.TestDecl] = []
         self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
@@ -79,11 +91,9 @@ class World:
         self._lists: dict[str, Namespace] = {}
         self._library_names: dict[str, Unit | GlobalSymbol | None] = {}
         self._ambiguous: dict[str, list[GlobalSymbol]] = {}
-        self._instances: dict[str, Namespace] = {}
         self._enum_values: dict[str, list[TypeSymbol]] = {}
         self._bodies: deque[tuple[Scope, ast.PouDecl, Pou]] = deque()
         self._library_bodies: deque[tuple[Scope, ast.PouDecl, Pou]] = deque()
-        self._calls: dict[Pou, dict[Pou, Pos]] = {}
 
     def scope(self, source: Source, *, library: bool = False) -> Scope:
         """An empty scope in a source."""
@@ -105,30 +115,35 @@ class World:
             elif isinstance(decl, ast.TypeDecl):
                 symbol = TypeSymbol(decl, library)
                 self._add(symbol, library=library, full_name=symbol.full_name)
-                for name in _enum_names(symbol):
+                for name in _enum_names(symbol) if not decl.qualified else ():
                     self._enum_values.setdefault(name.casefold(), []).append(symbol)
             elif isinstance(decl, ast.TestDecl):
                 self.tests.append(decl)
             elif isinstance(decl, ast.GlobalBlock) and library:
                 self._add_globals(decl.block, decl.source, prefix="", library=True)
+            elif isinstance(decl, ast.InstanceBlock):
+                self.instance_config.add(decl)
             elif isinstance(decl, ast.ConfigurationDecl):
                 self.configurations.append(decl)
+                self.instance_config.add(decl)
                 for block in decl.globals:
                     self._add_globals(block, decl.source, prefix="", library=library)
 
     def register_globals(self, declarations: Sequence[ast.Declaration], source: Source) -> None:
         """The VAR_GLOBAL of a file are known as `x` and as `<file>.x`. A file with nothing else is a named list: there
-        `<file>.x` is the full name."""
+        `<file>.x` is the full name, and with {attribute 'qualified_only'} the only one."""
         for decl in declarations:
             if isinstance(decl, ast.GlobalBlock) and decl.namespace is not None and decl.namespace.name:
                 self._add_globals(decl.block, source, prefix=f"{decl.namespace.name}.", namespace=decl.namespace)
-        blocks = [d.block for d in declarations if isinstance(d, ast.GlobalBlock) and not _is_in_namespace(d)]
+        blocks = [d for d in declarations if isinstance(d, ast.GlobalBlock) and not _is_in_namespace(d)]
         if not blocks:
             return
-        alone = all(isinstance(d, ast.GlobalBlock | ast.TestDecl) for d in declarations)
+        qualified = any(d.qualified for d in blocks)
+        alone = all(isinstance(d, ast.GlobalBlock | ast.InstanceBlock | ast.TestDecl) for d in declarations)
         namespace = Namespace(source.stem, "list of globals", {})
         for block in blocks:
-            for symbol in self._add_globals(block, source, prefix=f"{source.stem}." if alone else ""):
+            prefix = f"{source.stem}." if alone or qualified else ""
+            for symbol in self._add_globals(block.block, source, prefix=prefix, qualified=qualified):
                 namespace.members.setdefault(symbol.name.casefold(), symbol)
         self._lists.setdefault(source.stem.casefold(), namespace)
 
@@ -140,15 +155,16 @@ class World:
         prefix: str,
         library: bool = False,
         namespace: ast.Namespace | None = None,
+        qualified: bool = False,
     ) -> list[GlobalSymbol]:
         added = []
         for line in block.decls:
             for offset, name in line.names:
                 symbol = GlobalSymbol(name, prefix + name, offset, line, block.qualifiers, source)
-                key = (name if namespace is None else symbol.full_name).casefold()
+                key = (symbol.full_name if qualified or namespace is not None else name).casefold()
                 if namespace is not None:
                     symbol.namespace = namespace
-                    self.namespaces.update(enclosing(key))
+                    self._add_namespaces(symbol.full_name)
                 other = self._globals.get(key)
                 if library:
                     self._library_names[key] = symbol
@@ -165,7 +181,7 @@ class World:
         decl = symbol.decl
         key = full_name.casefold()
         if decl.namespace is not None:
-            self.namespaces.update(space for space in enclosing(key))
+            self._add_namespaces(full_name)
         if library:
             self._library_names[key] = symbol
             return
@@ -176,6 +192,16 @@ class World:
         other = self._units.setdefault(key, symbol)
         if other is not symbol:
             self._duplicate(decl.name, pos, other.decl.source.pos(other.decl.pos))
+
+    def _add_namespaces(self, full_name: str) -> None:
+        for space in enclosing(full_name):
+            self.namespaces.setdefault(space.casefold(), space)
+
+    def names_in(self, namespace: str) -> list[str]:
+        """The bare names of what a namespace holds, for suggestions."""
+        prefix = namespace.casefold() + "."
+        keys = [key for key in (*self._units, *self._globals, *self.namespaces) if key.startswith(prefix)]
+        return [key.removeprefix(prefix) for key in keys if "." not in key.removeprefix(prefix)]
 
     def _duplicate(self, name: str, pos: Pos, first: Pos) -> None:
         where = f"in line {first.line}" if first.file == pos.file else f"in {first.file}"
@@ -188,7 +214,7 @@ class World:
             return symbol
         return (
             self._globals.get(key)
-            or self._instances.get(key)
+            or self.programs.find(key, self._units.get(key))
             or self._units.get(key)
             or self._lists.get(key)
             or self._library_symbol(key)
@@ -202,10 +228,19 @@ class World:
         other = self._library_symbol(key)
         return own if other is None or isinstance(other, GlobalSymbol) else other
 
+    def _text_of(self, character: Expr) -> Expr:
+        """A CHAR or WCHAR as a text, by a function of the library."""
+        symbol = self._library_symbol("wchar_to_wstring" if character.type is WCHAR else "char_to_string")
+        assert isinstance(symbol, PouSymbol)
+        info = self.units.function(symbol)
+        assert info is not None and info.result is not None
+        return Call(info.pou, [character], info.result, character.pos)
+
     def _library_symbol(self, key: str) -> Unit | GlobalSymbol | None:
+        key = without_library(key)
         if key not in self._library_names:
             self._library_names[key] = None
-            self.register(self.library.parse(key, self.diagnostics), library=True)
+            self.register(self.rewritten(self.library.parse(key, self.diagnostics)), library=True)
         return self._library_names[key]
 
     def same_named(self, name: str) -> list[GlobalSymbol]:
@@ -215,11 +250,6 @@ class World:
     def is_user_name(self, name: str) -> bool:
         """Whether the program itself declares a global name."""
         return name.casefold() in self._units
-
-    def add_instance(self, name: str, scope: Scope) -> None:
-        """Makes the variables of a program instance known as `Main.x`."""
-        members = {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
-        self._instances[name.casefold()] = Namespace(name, "program", dict(members), scope.cls)
 
     def enum_value(self, name: str, scope: Scope, offset: int, expected: Type | None) -> Expr | None:
         """The value of an enumeration by its bare name; None when there is none of that name."""
@@ -238,12 +268,19 @@ class World:
                     return Const(value, t, scope.pos(offset))
         return None
 
+    def qualified_names(self, name: str) -> list[str]:
+        """What a name could mean that needs that of its list or enumeration in front."""
+        key = name.casefold()
+        found = [f"{s.name}.{m.name}" for s in self._lists.values() if (m := s.members.get(key)) is not None]
+        types = [s for s in self._units.values() if isinstance(s, TypeSymbol) and s.decl.qualified]
+        return found + [f"{t.decl.name}.{v}" for t in types for v in _enum_names(t) if v.casefold() == key]
+
     def visible_names(self) -> list[str]:
         """Names of globals, functions and enumeration values, for suggestions."""
         values = [name for s in self._units.values() if isinstance(s, TypeSymbol) for name in _enum_names(s)]
         units = [s.decl.name for s in self._units.values()]
         named = [s.name for s in self._globals.values()]
-        named += [s.name for s in (*self._lists.values(), *self._instances.values())]
+        named += [s.name for s in self._lists.values()] + self.programs.names()
         return units + named + values + self.library.names()
 
     def type_names(self) -> list[str]:
@@ -259,12 +296,9 @@ class World:
 
     def add_body(self, scope: Scope, decl: ast.PouDecl, pou: Pou, library: bool) -> None:
         """Queues a body for checking."""
+        if scope.edges:
+            scope = replace(scope, names=scope.names | scope.edges)
         (self._library_bodies if library else self._bodies).append((scope, decl, pou))
-
-    def add_call(self, caller: Pou | None, callee: Pou, pos: Pos) -> None:
-        """Notes who calls whom."""
-        if caller is not None:
-            self._calls.setdefault(caller, {}).setdefault(callee, pos)
 
     def declare_all(self) -> None:
         """Declares what the program itself has, used or not, so that all of it is checked."""
@@ -293,8 +327,10 @@ class World:
         return [s for s in self._units.values() if isinstance(s, PouSymbol) and s.keyword == "PROGRAM"]
 
     def lookup_program(self, name: str) -> PouSymbol | None:
-        """The PROGRAM of that name."""
-        return next((p for p in self.program_symbols() if p.decl.name.casefold() == name.casefold()), None)
+        """The PROGRAM of that name, perhaps with its namespace in front."""
+        key = name.casefold()
+        named = (p for p in self.program_symbols() if key in (p.decl.name.casefold(), p.decl.full_name.casefold()))
+        return next(named, None)
 
     def aliases(self) -> dict[str, str]:
         """Other names of globals: `x` for `GVL.x` and the other way round, where they are unambiguous."""
@@ -302,30 +338,42 @@ class World:
         for namespace in self._lists.values():
             for symbol in namespace.members.values():
                 assert isinstance(symbol, GlobalSymbol)
-                for other in (symbol.name, f"{namespace.name}.{symbol.name}"):
-                    if other != symbol.full_name and symbol.name.casefold() not in self._ambiguous:
+                key = symbol.name.casefold()
+                bare = self._globals.get(key) is symbol and key not in self._ambiguous
+                for other in (*((symbol.name,) if bare else ()), f"{namespace.name}.{symbol.name}"):
+                    if other != symbol.full_name:
                         found[other] = symbol.full_name
         return found
 
     def check_bodies(self) -> None:
-        """Checks all bodies, then those of the library they need."""
-        self.classes.declare_all()
+        """Checks all bodies, and those of the library and of the programs they need; what is left over at the end."""
+        checked = self._check_queue()
+        while self.programs.declare_others():
+            checked += self._check_queue()
+        for scope in checked:
+            self.report_unused(scope)
+        construct(self)
+        self.pous += self.classes.queries.pous()
+        self.classes.finish(v for vs in (self.allocation.variables, *(p.locals for p in self.pous)) for v in vs)
+        self.calls.report_recursion()
+
+    def _check_queue(self) -> list[Scope]:
+        """Checks what is queued and what that needs; the scopes to look into for what is not used."""
         checked: list[Scope] = []
+        self.classes.declare_members()
         while self._bodies or self._library_bodies:
             scope, decl, pou = (self._bodies or self._library_bodies).popleft()
             try:
-                body = Statements(scope).body(sfc.statements(decl, scope))
+                body = Statements(scope).body(statements_of(decl, scope))
                 pou.body = [*scope.prologue, *body]
             except NestingError as error:
                 self.nested_too_deeply(error)
             self.pous.append(pou)
             if not scope.library:
                 checked.append(scope)
-        for scope in checked:
-            self.report_unused(scope)
-        construct(self)
-        self.classes.finish(v for vs in (self.allocation.variables, *(p.locals for p in self.pous)) for v in vs)
-        self._report_recursion()
+            if not self._bodies:
+                self.classes.declare_members()
+        return checked
 
     def nested_too_deeply(self, error: NestingError) -> None:
         """Reports what goes beyond MAX_DEPTH."""
@@ -341,32 +389,3 @@ class World:
             elif symbol.role is Role.RESULT and symbol.name.casefold() not in INITIALISERS:
                 message = f"{symbol.name} never assigns its result; write {symbol.name} := ..."
                 self.diagnostics.warning(symbol.pos, "result", message)
-
-    def _report_recursion(self) -> None:
-        """A call that leads back to its caller: the stack of a controller is bounded."""
-        done: set[Pou] = set()
-        for start in list(self._calls):
-            path: list[Pou] = []
-            stack: list[tuple[Pou, Iterable[Pou]]] = [(start, iter(self._calls.get(start, {})))]
-            while stack:
-                pou, callees = stack[-1]
-                if pou not in path:
-                    path.append(pou)
-                following = next(iter(callees), None)
-                if following is None:
-                    done.add(pou)
-                    path.pop()
-                    stack.pop()
-                elif following in path:
-                    self._recursion(path[path.index(following) :], following, self._calls[pou][following])
-                elif following not in done:
-                    stack.append((following, iter(self._calls.get(following, {}))))
-
-    def _recursion(self, cycle: list[Pou], pou: Pou, pos: Pos) -> None:
-        if len(cycle) == 1:
-            message = f"{pou.name} calls itself"
-        else:
-            message = f"{pou.name} calls itself through {' and '.join(p.name for p in cycle[1:])}"
-        self.diagnostics.error(
-            pos, "recursion", f"{message}, which the stack of a controller does not allow; use a loop"
-        )

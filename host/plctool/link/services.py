@@ -1,4 +1,5 @@
-"""The services of a device as typed functions (codesys-v3-protocol 4.4 .. 4.10 and CmpSrvNumbers.h).
+"""The services of a device as typed functions (codesys-v3-protocol 4.4 .. 4.10 and CmpSrvNumbers.h); monitoring has a
+module of its own.
 
 Every function takes a `Session`; requests that were lost with their channel are repeated unless said otherwise.
 """
@@ -6,7 +7,7 @@ Every function takes a `Session`; requests that were lost with their channel are
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -36,6 +37,14 @@ class Identity:
     target_id: int
     version: str
     runtime_version: str
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Bytes of the device's main stack, and how many of them have never been used since its start."""
+
+    size: int
+    unused: int
 
 
 class AppState(StrEnum):
@@ -98,15 +107,6 @@ class LogEntry:
     text: str
 
 
-@dataclass(frozen=True)
-class AreaRange:
-    """`size` bytes of memory area `area` (APP_AREA_*) from `offset` on."""
-
-    area: int
-    offset: int
-    size: int
-
-
 # ---- device ----------------------------------------------------------------------------------------------------------
 
 
@@ -124,6 +124,15 @@ def read_identity(session: Session) -> Identity:
         version=version_text(version),
         runtime_version=version_text(tags.u32(lib.TAG_DEV_RTS_VERSION)),
     )
+
+
+def read_stack(session: Session) -> Stack | None:
+    """What the main stack has left; None from a device that does not tell."""
+    tags = session.recover(lambda: session.call(lib.SG_DEVICE, lib.SRV_DEV_GET_TARGET_IDENT))
+    if tags.find(lib.TAG_DEV_STACK) is None:
+        return None
+    stack = Stack(*struct.unpack_from("<2I", tags.bytes(lib.TAG_DEV_STACK, 8)))
+    return stack if stack.size else None
 
 
 def _wide_text(content: bytes) -> str:
@@ -284,149 +293,6 @@ class _Transfer:
         l7.check_result(tags.u16(lib.TAG_SERVICE_RESULT), "download", tags.text(lib.TAG_CDL_REASON))
         self.arrived = tags.u32(lib.TAG_CDL_NEXT)
         self._progress(self.arrived)
-
-
-# ---- monitoring ------------------------------------------------------------------------------------------------------
-
-_VALUE_HEAD = struct.Struct("<HI")  # id and size before each value
-_MESSAGE_OVERHEAD = 96  # layer 7 header, application tag and list heads, bytes
-
-
-def read_memory(session: Session, image_crc: int, ranges: Sequence[AreaRange]) -> list[bytes]:
-    """The bytes of every range of the application with this CRC, as many in one request as fit.
-
-    Raises DeviceError when one cannot be read, or when the device has another application.
-    """
-    session.recover(session.application)
-    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
-    longest = room - _VALUE_HEAD.size
-    pieces = [
-        AreaRange(r.area, at, min(longest, r.offset + r.size - at))
-        for r in ranges
-        for at in range(r.offset, r.offset + r.size, longest)
-    ]
-    values: list[bytes] = []
-    while len(values) < len(pieces):
-        batch = _fitting(pieces[len(values) :], room)
-        values += session.recover(partial(_read_batch, session, image_crc, batch))
-    joined, at = b"".join(values), 0
-    result = []
-    for r in ranges:
-        result.append(joined[at : at + r.size])
-        at += r.size
-    return result
-
-
-def _fitting(pieces: Sequence[AreaRange], room: int) -> Sequence[AreaRange]:
-    """As many pieces as fit a request and its reply; at least one."""
-    request = reply = count = 0
-    for piece in pieces:
-        request += len(_read_variable(piece))
-        reply += _VALUE_HEAD.size + piece.size
-        if count and max(request, reply) > room:
-            break
-        count += 1
-    return pieces[:count]
-
-
-def _read_variable(piece: AreaRange) -> bytes:
-    variable = [
-        bintag.raw(lib.TAG_MON2_VAR_SIZE, _short(piece.size)),
-        bintag.raw(lib.TAG_MON2_VAR_CODE, _address_code(piece.area, piece.offset)),
-    ]
-    return bintag.encode([bintag.Tag(lib.TAG_MON2_READ_VAR, bintag.encode(variable, aligned=False))], aligned=False)
-
-
-def _short(value: int) -> bytes:
-    return value.to_bytes(1 if value < 0x100 else 2 if value < 0x10000 else 4, "little")
-
-
-def _address_code(area: int, offset: int) -> bytes:
-    """Byte code that leaves the address of a variable: load the offset, make it relative to the area."""
-    if offset < 0x10000:
-        return struct.pack("<BHBB", lib.MON2_OP_LD16, offset, lib.MON2_OP_RAO, area)
-    return struct.pack("<BIBB", lib.MON2_OP_LD32, offset, lib.MON2_OP_RAO, area)
-
-
-def _read_batch(session: Session, image_crc: int, batch: Sequence[AreaRange]) -> list[bytes]:
-    variables = b"".join(map(_read_variable, batch))
-    tags = session.call(
-        lib.SG_MONITORING2,
-        lib.SRV_MON2_READ,
-        [_application_tag(session, image_crc), bintag.Tag(lib.TAG_MON2_READ_LIST, variables)],
-    )
-    _check_monitoring(session, tags, "read")
-    content, at = tags.bytes(lib.TAG_MON2_VALUES), 0
-    values = []
-    for index, piece in enumerate(batch):
-        if at + _VALUE_HEAD.size > len(content):
-            break
-        value_id, size = _VALUE_HEAD.unpack_from(content, at)
-        value = content[at + _VALUE_HEAD.size : at + _VALUE_HEAD.size + size]
-        at += _VALUE_HEAD.size + size
-        if value_id == index | lib.MON2_ID_FAILED and value:
-            raise _monitoring_error("read", value[0])
-        if value_id != index or len(value) != piece.size:
-            break
-        values.append(value)
-    if len(values) != len(batch):
-        raise bintag.malformed("values are missing")
-    return values
-
-
-def write_memory(session: Session, image_crc: int, values: Sequence[tuple[AreaRange, bytes]]) -> None:
-    """Writes all values, in one request if they fit, to the application with this CRC.
-
-    Not repeated when it is unknown whether they were written.
-    """
-    session.recover(session.application)
-    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
-    message = b""
-    for index, (where, value) in enumerate(values):
-        code = _address_code(where.area, where.offset)
-        entry = _VALUE_HEAD.pack(index, len(value)) + value + struct.pack("<H", len(code)) + code
-        if message and len(message) + len(entry) > room:
-            _write_batch(session, image_crc, message)
-            message = b""
-        message += entry
-    if message:
-        _write_batch(session, image_crc, message)
-
-
-def _write_batch(session: Session, image_crc: int, entries: bytes) -> None:
-    def request() -> bintag.Tags:
-        tags = [_application_tag(session, image_crc), bintag.raw(lib.TAG_MON2_WRITE_LIST, entries)]
-        return session.call(lib.SG_MONITORING2, lib.SRV_MON2_WRITE, tags)
-
-    _check_monitoring(session, session.recover(request, repeatable=False), "write")
-
-
-def _application_tag(session: Session, image_crc: int) -> bintag.Tag:
-    application = session.application()
-    if application.image_crc != image_crc:
-        raise _application_changed(session)
-    return bintag.raw(lib.TAG_MON2_APPLICATION, struct.pack("<I", application.session) + application.data_guid)
-
-
-def _application_changed(session: Session) -> DeviceError:
-    session.forget_application()
-    return DeviceError("Another application was loaded meanwhile; try again with its symbols.", "app-changed")
-
-
-def _check_monitoring(session: Session, tags: bintag.Tags, action: str) -> None:
-    if tags.find(lib.TAG_MON2_ERROR) is None:
-        return
-    error = tags.u32(lib.TAG_MON2_ERROR)
-    if error == lib.ERR_APP_INVALID_DATAID:
-        raise _application_changed(session)
-    if error > lib.MONITORING_ERR_UNKNOWN:
-        l7.check_result(error, action)
-    raise _monitoring_error(action, error)
-
-
-def _monitoring_error(action: str, error: int) -> DeviceError:
-    name = l7.monitoring_error_name(error)
-    return DeviceError(f"The device refused the {action}: {name}.", l7.slug(name), error)
 
 
 # ---- log -------------------------------------------------------------------------------------------------------------

@@ -199,8 +199,8 @@ __attribute__((used)) static RTS_UI32 svc_dispatch(FRAME *frame, RTS_UI32 exc_re
 
 /* Hands the frame that the exception pushed, and EXC_RETURN, to `function`, and returns to where that says. */
 #define DISPATCH(function)                                                                                             \
-    __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\tpush {r4, lr}\n\t"      \
-                     "bl " #function "\n\tpop {r4, lr}\n\tbx r0")
+    __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\t"                          \
+                     "bl " #function "\n\tbx r0")
 
 __attribute__((naked)) void SvcHandler(void);
 void SvcHandler(void)
@@ -270,7 +270,7 @@ __attribute__((naked)) void FaultHandler(void);
 void FaultHandler(void)
 {
     __asm__ volatile("tst lr, #4\n\tbne 1f\n\tmrs r0, msp\n\tldr r1, =stack_top\n\tmsr msp, r1\n\tmov r1, lr\n\t"
-                     "b fault_dispatch\n1:");
+                     "b fault_dispatch\n\t.ltorg\n1:");
     DISPATCH(fault_dispatch);
 }
 

@@ -5,7 +5,8 @@
  *
  * One hardware timer of the board is the alarm for the earliest due time. When it fires, each timer that is due gets
  * its own interrupt line set pending by software, and runs at its own NVIC level: any number of timers from one
- * hardware timer, and due times that never drift. Rank is by priority, among equals by order of creation.
+ * hardware timer, and due times that never drift. Due times are the alarm's alone: it goes on while callbacks run, and
+ * counts what they miss. Rank is by priority, among equals by order of creation.
  */
 #include "SysTimer.h"
 
@@ -20,64 +21,55 @@ typedef struct {
     SYS_TIMER_CALLBACK callback;
     void *param;
     RTS_I64 interval_ns;
-    RTS_I64 due_ns;
+    RTS_I64 next_ns;  /* due time to come */
+    RTS_I64 due_ns;   /* for the callback, like `missed` */
     RTS_UI32 missed;
+    RTS_UI32 skipped; /* due times since the callback began */
     RTS_UI8 priority;
     volatile RTS_UI8 state; /* TIMER_STATE */
 } TIMER;
 
 static struct {
     TIMER timer[SYSTIMER_COUNT];
-    RTS_I64 alarm_ns;
 } state;
 
 void SysTimerInit(void)
 {
-    state.alarm_ns = INT64_MAX;
     for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
         state.timer[i].state = TIMER_FREE;
         IrqEnable(BOARD_TASK_IRQ + i, LEVEL_TIMER + i);
     }
 }
 
-/* With interrupts masked, or from the alarm itself. */
-static void set_alarm(RTS_I64 at_ns, RTS_I64 now_ns)
+static void fall_due(TIMER *timer, RTS_UI32 irq)
 {
-    RTS_I64 delay = at_ns - now_ns;
-    state.alarm_ns = at_ns;
-    BoardAlarmSet(delay < 0 ? 0 : delay > ALARM_MAX_NS ? (RTS_UI32)ALARM_MAX_NS : (RTS_UI32)delay);
+    if (timer->state == TIMER_FIRED) {
+        timer->skipped++;
+    } else {
+        timer->due_ns = timer->next_ns;
+        timer->missed = timer->skipped;
+        timer->skipped = 0;
+        timer->state = TIMER_FIRED;
+        NVIC_ISPR(irq / 32) = 1u << irq % 32;
+    }
+    timer->next_ns += timer->interval_ns;
 }
 
 void SysTimerAlarm(void)
 {
     RTS_I64 now = SysTimeGetNs();
-    RTS_I64 next = INT64_MAX;
+    RTS_I64 delay = INT64_MAX;
     for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
         TIMER *timer = &state.timer[i];
-        if (timer->state != TIMER_WAITING)
+        if (timer->state < TIMER_WAITING)
             continue;
-        if (timer->due_ns <= now) {
-            timer->state = TIMER_FIRED;
-            NVIC_ISPR((BOARD_TASK_IRQ + i) / 32) = 1u << ((BOARD_TASK_IRQ + i) % 32);
-        } else if (timer->due_ns < next) {
-            next = timer->due_ns;
-        }
+        while (timer->next_ns <= now)
+            fall_due(timer, BOARD_TASK_IRQ + i);
+        if (timer->next_ns - now < delay)
+            delay = timer->next_ns - now;
     }
-    state.alarm_ns = next;
-    if (next != INT64_MAX)
-        set_alarm(next, now);
-}
-
-/* The timer waits for due_ns from now on. */
-static void wait_until_due(TIMER *timer, RTS_I64 due_ns, RTS_UI32 missed, RTS_I64 now_ns)
-{
-    RTS_UI32 mask = CpuMask();
-    timer->due_ns = due_ns;
-    timer->missed = missed;
-    timer->state = TIMER_WAITING;
-    if (due_ns < state.alarm_ns)
-        set_alarm(due_ns, now_ns);
-    CpuRestore(mask);
+    if (delay != INT64_MAX)
+        BoardAlarmSet(delay > ALARM_MAX_NS ? (RTS_UI32)ALARM_MAX_NS : (RTS_UI32)delay);
 }
 
 /* Every timer's interrupt; the number of the running exception says which. */
@@ -88,13 +80,7 @@ void TimerIrq(void)
     if (timer->state != TIMER_FIRED)
         return;
     timer->callback(timer->param, timer->due_ns, timer->missed);
-
-    RTS_I64 now = SysTimeGetNs();
-    RTS_I64 due = timer->due_ns + timer->interval_ns;
-    RTS_UI32 missed = 0;
-    for (; due <= now; due += timer->interval_ns)
-        missed++;
-    wait_until_due(timer, due, missed, now);
+    timer->state = TIMER_WAITING;
 }
 
 static int outranks(RTS_UI32 one, RTS_UI32 other)
@@ -144,8 +130,12 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     TIMER *timer = find_timer(handle);
     if (timer == NULL)
         return ERR_INVALID_HANDLE;
-    RTS_I64 now = SysTimeGetNs();
-    wait_until_due(timer, now, 0, now);
+    RTS_UI32 mask = CpuMask();
+    timer->next_ns = SysTimeGetNs();
+    timer->skipped = 0;
+    timer->state = TIMER_WAITING;
+    BoardAlarmSet(0);
+    CpuRestore(mask);
     return ERR_OK;
 }
 

@@ -1,0 +1,212 @@
+"""Monitoring: reads and writes the memory of the application (codesys-v3-protocol 4.9 and CmpSrvNumbers.h)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from plctool.core import lib
+from plctool.errors import DeviceError
+from plctool.link import bintag, l7
+from plctool.link.session import Session
+
+_VALUE_HEAD = struct.Struct("<HI")  # id and size before each value
+_MESSAGE_OVERHEAD = 96  # layer 7 header, application tag and list heads, bytes
+_TRIES = 5  # to read values while no task runs
+
+
+@dataclass(frozen=True)
+class AreaRange:
+    """`size` bytes of memory area `area` (APP_AREA_*) from `offset` on. With `hops` a pointer lies there, and it is
+    `hops[0]` bytes on from where that leads, and so on."""
+
+    area: int
+    offset: int
+    size: int
+    hops: tuple[int, ...] = ()
+
+    def part(self, at: int, size: int) -> AreaRange:
+        """`size` bytes from byte `at` on."""
+        if self.hops:
+            return AreaRange(self.area, self.offset, size, (*self.hops[:-1], self.hops[-1] + at))
+        return AreaRange(self.area, self.offset + at, size)
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What was read, in order; None where a pointer leads to no memory of the application. `consistent`: no task was
+    in its cycle meanwhile."""
+
+    values: list[bytes | None]
+    consistent: bool
+
+
+def read_memory(session: Session, image_crc: int, ranges: Sequence[AreaRange]) -> Contents:
+    """The bytes of every range of the application with this CRC, as many in one request as fit. What fits one request
+    is asked for again, a few times, until it is consistent.
+
+    Raises DeviceError when one cannot be read, or when the device has another application.
+    """
+    session.recover(session.application)
+    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
+    longest = room - _VALUE_HEAD.size
+    cut = [[r.part(at, min(longest, r.size - at)) for at in range(0, r.size, longest)] for r in ranges]
+    pieces = [piece for parts in cut for piece in parts]
+    in_one_access = len(pieces) == 1 and pieces[0].size in (1, 2, 4)
+    for _ in range(_TRIES):
+        values, consistent = _read_pieces(session, image_crc, pieces, room)
+        consistent = consistent or in_one_access
+        if consistent or len(_fitting(pieces, room)) < len(pieces):
+            break
+    rest = iter(values)
+    return Contents([_joined([next(rest) for _ in parts]) for parts in cut], consistent)
+
+
+def _joined(parts: Sequence[bytes | None]) -> bytes | None:
+    found = [part for part in parts if part is not None]
+    return b"".join(found) if len(found) == len(parts) else None
+
+
+def _read_pieces(
+    session: Session, image_crc: int, pieces: Sequence[AreaRange], room: int
+) -> tuple[list[bytes | None], bool]:
+    values: list[bytes | None] = []
+    consistent = True
+    while len(values) < len(pieces):
+        batch = _fitting(pieces[len(values) :], room)
+        found, undisturbed = session.recover(partial(_read_batch, session, image_crc, batch))
+        consistent = undisturbed and len(batch) == len(pieces)
+        values += found
+    return values, consistent
+
+
+def _fitting(pieces: Sequence[AreaRange], room: int) -> Sequence[AreaRange]:
+    """As many pieces as fit a request and its reply; at least one."""
+    request = reply = count = 0
+    for piece in pieces:
+        request += len(_read_variable(piece))
+        reply += _VALUE_HEAD.size + piece.size
+        if count and max(request, reply) > room:
+            break
+        count += 1
+    return pieces[:count]
+
+
+def _read_variable(piece: AreaRange) -> bytes:
+    variable = [
+        bintag.raw(lib.TAG_MON2_VAR_SIZE, _short(piece.size)),
+        bintag.raw(lib.TAG_MON2_VAR_CODE, _address_code(piece)),
+    ]
+    return bintag.encode([bintag.Tag(lib.TAG_MON2_READ_VAR, bintag.encode(variable, aligned=False))], aligned=False)
+
+
+def _short(value: int) -> bytes:
+    return value.to_bytes(1 if value < 0x100 else 2 if value < 0x10000 else 4, "little")
+
+
+def _address_code(where: AreaRange) -> bytes:
+    """Byte code that leaves the address of a variable: load the offset, make it relative to the area; for each hop
+    dereference and add."""
+    code = _load(where.offset) + bytes([lib.MON2_OP_RAO, where.area])
+    for hop in where.hops:
+        code += bytes([lib.MON2_OP_DER, lib.MON2_POINTER_SIZE]) + _load(hop) + bytes([lib.MON2_OP_ADD])
+    return code
+
+
+def _load(value: int) -> bytes:
+    if value < 0x10000:
+        return struct.pack("<BH", lib.MON2_OP_LD16, value)
+    return struct.pack("<BI", lib.MON2_OP_LD32, value)
+
+
+def _read_batch(session: Session, image_crc: int, batch: Sequence[AreaRange]) -> tuple[list[bytes | None], bool]:
+    """The values, and whether they are consistent."""
+    variables = b"".join(map(_read_variable, batch))
+    tags = session.call(
+        lib.SG_MONITORING2,
+        lib.SRV_MON2_READ,
+        [_application_tag(session, image_crc), bintag.Tag(lib.TAG_MON2_READ_LIST, variables)],
+    )
+    _check_monitoring(session, tags, "read")
+    content = tags.bytes(lib.TAG_MON2_VALUES)
+    values: list[bytes | None] = []
+    for index, piece in enumerate(batch):
+        if len(content) < _VALUE_HEAD.size:
+            break
+        value_id, size = _VALUE_HEAD.unpack_from(content)
+        value = content[_VALUE_HEAD.size : _VALUE_HEAD.size + size]
+        content = content[_VALUE_HEAD.size + size :]
+        if value_id == index | lib.MON2_ID_FAILED and value:
+            if not _leads_nowhere(piece, value[0]):
+                raise _monitoring_error("read", value[0])
+            values.append(None)
+        elif value_id != index or len(value) != piece.size:
+            break
+        else:
+            values.append(value)
+    if len(values) != len(batch):
+        raise bintag.malformed("values are missing")
+    return values, tags.find(lib.TAG_MON2_CONSISTENT) is not None
+
+
+def _leads_nowhere(piece: AreaRange, error: int) -> bool:
+    """Whether the value of a pointer is the reason of an error."""
+    outside = (lib.MONITORING_ERR_INVALID_POINTER, lib.MONITORING_ERR_INVALID_INDEX)
+    return bool(piece.hops) and error in outside
+
+
+def write_memory(session: Session, image_crc: int, values: Sequence[tuple[AreaRange, bytes]]) -> None:
+    """Writes all values, in one request if they fit, to the application with this CRC.
+
+    Not repeated when it is unknown whether they were written.
+    """
+    session.recover(session.application)
+    room = session.connection.buffer_size - _MESSAGE_OVERHEAD
+    message = b""
+    for index, (where, value) in enumerate(values):
+        code = _address_code(where)
+        entry = _VALUE_HEAD.pack(index, len(value)) + value + struct.pack("<H", len(code)) + code
+        if message and len(message) + len(entry) > room:
+            _write_batch(session, image_crc, message)
+            message = b""
+        message += entry
+    if message:
+        _write_batch(session, image_crc, message)
+
+
+def _write_batch(session: Session, image_crc: int, entries: bytes) -> None:
+    def request() -> bintag.Tags:
+        tags = [_application_tag(session, image_crc), bintag.raw(lib.TAG_MON2_WRITE_LIST, entries)]
+        return session.call(lib.SG_MONITORING2, lib.SRV_MON2_WRITE, tags)
+
+    _check_monitoring(session, session.recover(request, repeatable=False), "write")
+
+
+def _application_tag(session: Session, image_crc: int) -> bintag.Tag:
+    application = session.application()
+    if application.image_crc != image_crc:
+        raise _application_changed(session)
+    return bintag.raw(lib.TAG_MON2_APPLICATION, struct.pack("<I", application.session) + application.data_guid)
+
+
+def _application_changed(session: Session) -> DeviceError:
+    session.forget_application()
+    return DeviceError("Another application was loaded meanwhile; try again with its symbols.", "app-changed")
+
+
+def _check_monitoring(session: Session, tags: bintag.Tags, action: str) -> None:
+    if tags.find(lib.TAG_MON2_ERROR) is None:
+        return
+    error = tags.u32(lib.TAG_MON2_ERROR)
+    if error == lib.ERR_APP_INVALID_DATAID:
+        raise _application_changed(session)
+    if error > lib.MONITORING_ERR_UNKNOWN:
+        l7.check_result(error, action)
+    raise _monitoring_error(action, error)
+
+
+def _monitoring_error(action: str, error: int) -> DeviceError:
+    name = l7.monitoring_error_name(error)
+    return DeviceError(f"The device refused the {action}: {name}.", l7.slug(name), error)

@@ -1,0 +1,148 @@
+"""The bench of the port check: a controller under test, programs for it, and what it can tell about them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from plctool.core import lib
+from plctool.device import FlashResult, Plc
+from plctool.errors import DeviceError, UsageError
+from plctool.link.services import AppState, Identity, TaskInfo
+from plctool.port_check.report import CheckFailed, NotAvailable
+
+INTERVAL_US = 10_000  # of the programs' task
+TASK = "Cycle"
+PATIENCE = 15.0
+NO_SERVICE = ("l7-unknowncmdgroup", "l7-unknowncmd")  # codes of DeviceError: the controller is built without a service
+
+_CYCLES = "Main.n"
+
+
+def target_of(identity: Identity) -> str:
+    """The target that plctool compiles for a controller. Raises UsageError when there is none."""
+    from plctool.compiler.targets import TARGETS
+
+    for target in TARGETS.values():
+        if getattr(lib, target.device_id) == identity.target_id:
+            return target.name
+    raise UsageError(
+        f"plctool has no target for the device id 0x{identity.target_id:08X}; the check needs one to compile for.",
+        "unknown-target",
+    )
+
+
+def program(variables: str, body: str) -> str:
+    """A program Main that counts its cycles in `n`, in a task of 10 ms."""
+    return f"""
+PROGRAM Main
+VAR
+    n : DINT;
+END_VAR
+{variables}
+n := n + 1;
+{body}
+END_PROGRAM
+CONFIGURATION Config
+    RESOURCE Res ON PLC
+        TASK {TASK}(INTERVAL := T#10ms, PRIORITY := 1);
+        PROGRAM Main WITH {TASK} : Main;
+    END_RESOURCE
+END_CONFIGURATION
+"""
+
+
+class Bench:
+    """The controller under test, its target, and where programs for it are built."""
+
+    def __init__(self, connect: Callable[[], Plc], plc: Plc, target: str, folder: Path, baud: int) -> None:
+        self.plc = plc
+        self.target = target
+        self.baud = baud
+        self._connect = connect
+        self._folder = folder
+        self._built: dict[str, Path] = {}
+
+    def reconnect(self) -> None:
+        """A new link, after the controller was without power."""
+        self.plc.close()
+        self.plc = self._connect()
+
+    def flash(self, text: str) -> FlashResult:
+        """Builds a program and starts it afresh, with its initial values."""
+        return self.plc.flash(self.build(text), force=True)
+
+    def build(self, text: str) -> Path:
+        """The image of a program; its symbols lie beside it."""
+        from plctool.compiler import compile_sources
+        from plctool.symbols import symbol_path
+
+        if text not in self._built:
+            source = self._folder / f"check{len(self._built)}.st"
+            source.write_text(text)
+            built = compile_sources([source], target=self.target)
+            image = source.with_suffix(".cdl")
+            image.write_bytes(built.image)
+            built.symbols.save(symbol_path(image))
+            self._built[text] = image
+        return self._built[text]
+
+    # ---- what a controller may be built without ----
+
+    @cached_property
+    def has_monitoring(self) -> bool:
+        """Whether variables can be read. A program has to be on the controller."""
+        try:
+            self.plc.read(_CYCLES)
+        except DeviceError as error:
+            if error.code not in NO_SERVICE:
+                raise
+            return False
+        return True
+
+    def need_monitoring(self) -> None:
+        """Ends a check that cannot do without."""
+        if not self.has_monitoring:
+            raise NotAvailable("no monitoring in this configuration")
+
+    def tasks(self) -> list[TaskInfo]:
+        """Statistics of the tasks; ends the check of a controller that has none."""
+        try:
+            return self.plc.tasks()
+        except DeviceError as error:
+            if error.code not in NO_SERVICE:
+                raise
+            raise NotAvailable("no task information in this configuration") from None
+
+    def log(self) -> list[Any]:
+        """The entries, none of a controller that has no log."""
+        try:
+            return list(self.plc.log())
+        except DeviceError as error:
+            if error.code not in NO_SERVICE:
+                raise
+            return []
+
+    # ---- waiting ----
+
+    def wait(self, question: Callable[[], bool], what: str, patience: float = PATIENCE) -> float:
+        """Asks until the answer is yes; the seconds that took. Fails with `what` when patience is over."""
+        begin = time.monotonic()
+        while not question():
+            if time.monotonic() - begin > patience:
+                raise CheckFailed(f"{what} within {patience:.0f} s.")
+            time.sleep(0.02)
+        return time.monotonic() - begin
+
+    def wait_until_it_runs(self, cycles: int = 3) -> None:
+        """Waits for so many cycles; without monitoring the controller's word has to do."""
+        if self.has_monitoring:
+            self.wait(lambda: bool(self.plc.read(_CYCLES) >= cycles), "The program does not run: no cycles")
+        elif (state := self.plc.status().state) is not AppState.RUN:
+            raise CheckFailed(f"The program does not run: its state is {state}.")
+
+    def cycles(self) -> int:
+        return int(self.plc.read(_CYCLES))

@@ -1,0 +1,278 @@
+"""The checks of the port check, in the order in which they are run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+
+from plctool.device import Plc
+from plctool.errors import LinkError
+from plctool.link.services import AppState, TaskInfo
+from plctool.port_check.bench import INTERVAL_US, TASK, Bench, program
+from plctool.port_check.report import CheckFailed, NotAvailable, Result
+
+CLOCK_SPAN = 4.0  # seconds over which clocks are compared
+MAX_DRIFT = 0.01  # default, of the controller's clock against the host's, beyond what the link leaves uncertain
+TIMER_TRIES = 3  # the best counts: hosts and simulated boards are sometimes kept from running
+MAX_MISSED = 0.01  # share of due times
+DOWNLOAD_UNITS = (20, 200, 1, 300, 50, 150, 5)  # sizes of the programs, in statements
+COMMITS = 300  # changes of the commit record: several times what two sectors of 4 KiB hold
+BITS_PER_BYTE = 10
+MIN_LINE_SHARE = 0.5  # of the byte rate, downloads with their writing to flash
+FAULT_PATIENCE = 60.0  # the default watchdog needs 10 s, simulated boards are slower
+MIN_STACK_SHARE = 0.05  # of the main stack, after all that the checks did
+
+_CLOCK = program(
+    "VAR now : LTIME; before : LTIME; now_ns : LINT; backwards : DINT; END_VAR",
+    "now := LTIME(); IF now < before THEN backwards := backwards + 1; END_IF "
+    "before := now; now_ns := LTIME_TO_LINT(now);",
+)
+_COUNTER = program("", "")
+_RETAIN = program("VAR RETAIN kept : DINT := 7; END_VAR", "")
+
+_HEALTHY_CYCLES = 30  # before a faulty program fails
+_FAULTS = {
+    "division by zero": ("VAR a : DINT := 1; b : DINT; END_VAR", "a := a / b;", {"DIVIDEBYZERO"}),
+    "array bounds": ("VAR f : ARRAY[0..3] OF INT; i : INT := 9; END_VAR", "f[i] := 1;", {"ARRAYBOUNDS"}),
+    "null reference": ("VAR p : POINTER TO DINT; END_VAR", "p^ := 1;", {"ACCESS_VIOLATION"}),
+    "endless loop": ("VAR x : DINT; END_VAR", "WHILE TRUE DO x := x + 1; END_WHILE", {"WATCHDOG"}),
+    "stack overflow": ("VAR i : DINT; END_VAR", "i := Large(i);", {"STACK_OVERFLOW", "ACCESS_VIOLATION"}),
+}
+_SMALL_FRAME, _LARGE_FRAME = 1000, 500_000  # DINTs that no stack of a controller, or of an operating system, holds
+
+
+class Checks:
+    """Each check returns its text and figures, or raises CheckFailed or NotAvailable."""
+
+    def __init__(self, bench: Bench, power_cycle: Callable[[], None] | None, max_drift: float) -> None:
+        self._bench = bench
+        self._power_cycle = power_cycle
+        self._max_drift = max_drift
+        self._drift = 0.0  # as it was measured
+
+    @property
+    def _plc(self) -> Plc:
+        return self._bench.plc
+
+    def all(self) -> Iterator[tuple[str, Callable[[], Result]]]:
+        yield "clock", self.clock
+        yield "timer", self.timer
+        yield "serial throughput", self.throughput
+        yield "flash downloads", self.downloads
+        yield "flash commit log", self.commits
+        yield "retain, warm reset", self.warm_reset
+        yield "retain, cold reset", self.cold_reset
+        if self._power_cycle is not None:
+            yield "power cycle", self.power_cycle
+        for name in _FAULTS:
+            yield f"exception: {name}", partial(self.exception, name)
+        yield "stack headroom", self.stack
+        yield "origin reset", self.origin_reset
+
+    # ---- time ----
+
+    def _read_clock(self) -> tuple[float, float, float]:
+        """The controller's time, the host's time at the middle of the question, and half of what that took [s]."""
+        before = time.monotonic()
+        now_ns = self._plc.read("Main.now_ns")
+        after = time.monotonic()
+        return now_ns / 1e9, (before + after) / 2, (after - before) / 2
+
+    def clock(self) -> Result:
+        """Goes forward, and as fast as the host's."""
+        self._bench.flash(_CLOCK)
+        self._bench.need_monitoring()
+        self._bench.wait_until_it_runs()
+        device, host, doubt = self._read_clock()
+        begin = time.monotonic()
+        while time.monotonic() - begin < CLOCK_SPAN:
+            time.sleep(0.1)
+            self._plc.read("Main.now_ns")
+        last_device, last_host, last_doubt = self._read_clock()
+        backwards = self._plc.read("Main.backwards")
+        span = last_host - host
+        drift = self._drift = (last_device - device) / span - 1
+        doubt = (doubt + last_doubt + 2 * INTERVAL_US / 1e6) / span
+        figures = {"drift_ppm": round(drift * 1e6), "uncertainty_ppm": round(doubt * 1e6), "backwards": backwards}
+        text = f"drift {drift * 100:+.2f} % (known to {doubt * 100:.2f} %) in {span:.1f} s, {backwards} steps back"
+        if backwards or abs(drift) > self._max_drift + doubt:
+            raise CheckFailed(f"{text}; allowed are {self._max_drift * 100:g} % and 0", **figures)
+        return text, figures
+
+    def timer(self) -> Result:
+        """A cyclic task runs at its interval. The best of several runs counts."""
+        best: TaskInfo | None = None
+        for _ in range(TIMER_TRIES):
+            self._bench.flash(_COUNTER)
+            self._bench.tasks()
+            time.sleep(CLOCK_SPAN / 2)
+            task = self._bench.tasks()[0]
+            if best is None or task.jitter_us < best.jitter_us:
+                best = task
+            if best.overruns == 0 and best.jitter_us < INTERVAL_US // 10:
+                break
+        assert best
+        missed = best.overruns / max(1, best.cycles + best.overruns)
+        figures = {"jitter_us": best.jitter_us, "overruns": best.overruns, "cycles": best.cycles}
+        text = f"latest start {best.jitter_us} us after its due time, {best.overruns} of {best.cycles} cycles missed"
+        expected = CLOCK_SPAN / 2 * 1e6 / INTERVAL_US * max(0.0, 1 + self._drift)
+        if best.cycles + best.overruns < expected / 2 or missed > MAX_MISSED:
+            raise CheckFailed(f"{text}; about {expected:.0f} cycles and no misses are expected", **figures)
+        return text, figures
+
+    # ---- line and flash ----
+
+    def throughput(self) -> Result:
+        """How much of the line's byte rate a download gets."""
+        result = self._bench.flash(_padded(max(DOWNLOAD_UNITS)))
+        rate = result.bytes / max(result.seconds, 1e-6)
+        share = rate / (self._bench.baud / BITS_PER_BYTE)
+        figures = {"bytes": result.bytes, "bytes_per_s": round(rate), "share": round(share, 3)}
+        text = f"{result.bytes} bytes at {rate:.0f} bytes/s: {share * 100:.0f} % of the byte rate"
+        if share < MIN_LINE_SHARE:
+            raise CheckFailed(f"{text}; at least {MIN_LINE_SHARE * 100:.0f} % are expected", **figures)
+        return text, figures
+
+    def downloads(self) -> Result:
+        """Programs of different sizes take each other's place in the two slots, and run."""
+        sizes = []
+        for units in DOWNLOAD_UNITS:
+            sizes.append(self._bench.flash(_padded(units)).bytes)
+            self._bench.wait_until_it_runs()
+            if self._bench.has_monitoring and (found := self._plc.read("Main.units")) != units:
+                raise CheckFailed(f"Program {len(sizes)} of {sizes[-1]} bytes does not run as built: {found}.")
+        figures = {"downloads": len(sizes), "smallest": min(sizes), "largest": max(sizes)}
+        return f"{len(sizes)} programs of {min(sizes)} to {max(sizes)} bytes", figures
+
+    def commits(self) -> Result:
+        """The log of the commit record goes round. Stop and start of a new program write a record each."""
+        self._bench.flash(_COUNTER)
+        image = self._plc.status().image_crc
+        for _ in range(COMMITS // 2):
+            self._plc.stop()
+            self._plc.start()
+        status = self._plc.status()
+        if status.image_crc != image or status.state is not AppState.RUN:
+            raise CheckFailed(f"After {COMMITS} records the program is another one, or it is in {status.state}.")
+        faults = [entry.text for entry in self._bench.log() if entry.text.startswith("The commit record cannot")]
+        if faults:
+            raise CheckFailed(f"The log says: {faults[-1]}")
+        return f"{COMMITS} records written", {"records": COMMITS}
+
+    # ---- what is kept ----
+
+    def _flash_retain(self) -> None:
+        self._bench.need_monitoring()
+        self._bench.flash(_RETAIN)
+        self._bench.wait_until_it_runs()
+        self._plc.write({"Main.kept": 4711})
+
+    def _expect_kept(self, value: int) -> Result:
+        if (found := self._plc.read("Main.kept")) != value:
+            raise CheckFailed(f"The retain variable is {found}, it should be {value}.", found=found, expected=value)
+        return f"retain variable {value}", {"value": value}
+
+    def warm_reset(self) -> Result:
+        """Retain variables stay, others start afresh."""
+        self._flash_retain()
+        self._plc.reset("warm")
+        if (count := self._bench.cycles()) != 0:
+            raise CheckFailed(f"Main.n is {count} after the reset, it should be 0.")
+        result = self._expect_kept(4711)
+        self._plc.start()
+        self._bench.wait_until_it_runs()
+        return result
+
+    def cold_reset(self) -> Result:
+        """Retain variables have their initial values again."""
+        self._flash_retain()
+        self._plc.reset("cold")
+        return self._expect_kept(7)
+
+    def power_cycle(self) -> Result:
+        """The application is booted from flash, with its retain variables if those can be looked at."""
+        assert self._power_cycle
+        if self._bench.has_monitoring:
+            self._flash_retain()
+        else:
+            self._bench.flash(_COUNTER)
+        self._plc.stop()  # saves
+        image = self._plc.status().image_crc
+        self._power_cycle()
+        self._bench.reconnect()
+        status = self._plc.status()
+        if status.image_crc != image or status.state is not AppState.RUN:
+            raise CheckFailed(f"The application was not booted: the state is {status.state}.")
+        return self._expect_kept(4711) if self._bench.has_monitoring else ("the program was booted", {})
+
+    # ---- what goes wrong ----
+
+    def exception(self, name: str) -> Result:
+        """A fault stops the application, not the controller; after a reset it runs again."""
+        variables, body, expected = _FAULTS[name]
+        self._bench.flash(self._faulty(variables, body))
+        seconds = self._bench.wait(self._has_failed, "No exception", FAULT_PATIENCE)
+        found = self._plc.status().exception
+        figures = {"exception": found.name if found else None, "seconds": round(seconds, 3)}
+        if found is None or found.name not in expected or found.task not in (TASK, None):
+            raise CheckFailed(f"Reported as {found}; expected {' or '.join(sorted(expected))}.", **figures)
+        self._plc.reset("warm")
+        self._plc.start()
+        self._bench.wait_until_it_runs()
+        place = ", ".join(filter(None, (found.task, found.pou)))
+        return f"{found.name} in {place} after {seconds:.2f} s; runs again", figures
+
+    def _has_failed(self) -> bool:
+        """An endless loop may keep the controller from answering until it is broken."""
+        with suppress(LinkError):
+            return self._plc.status().state is AppState.EXCEPTION
+        return False
+
+    def _faulty(self, variables: str, body: str) -> str:
+        """A program that fails after some good cycles."""
+        from plctool.compiler.targets import find_target
+
+        text = program(variables, f"IF n > {_HEALTHY_CYCLES} THEN\n{body}\nEND_IF")
+        if "Large" not in body:
+            return text
+        size = _LARGE_FRAME if find_target(self._bench.target).pointer_size == 8 else _SMALL_FRAME
+        return f"""
+FUNCTION Large : DINT
+VAR_INPUT
+    i : DINT;
+END_VAR
+VAR
+    f : ARRAY[0..{size - 1}] OF DINT;
+END_VAR
+f[i] := i;
+Large := f[i + 1] + f[i];
+END_FUNCTION
+{text}"""
+
+    # ---- at the end ----
+
+    def stack(self) -> Result:
+        """What all this has left of the main stack."""
+        stack = self._plc.stack()
+        if stack is None:
+            raise NotAvailable("the controller does not tell what its stack has left")
+        figures = {"size": stack.size, "unused": stack.unused}
+        text = f"{stack.unused} of {stack.size} bytes of the main stack were never used"
+        if stack.unused < stack.size * MIN_STACK_SHARE:
+            raise CheckFailed(f"{text}; at least {MIN_STACK_SHARE * 100:.0f} % are expected", **figures)
+        return text, figures
+
+    def origin_reset(self) -> Result:
+        """Deletes the application; the controller is empty afterwards."""
+        self._plc.reset("origin")
+        if (state := self._plc.status().state) is not AppState.NONE:
+            raise CheckFailed(f"The state is {state}, there should be no application.")
+        return "the controller is empty", {}
+
+
+def _padded(units: int) -> str:
+    """A program that is longer the more `units`, and tells them."""
+    lines = "\n".join(f"x := (x XOR {i * 7919 + 1}) * {2 * i + 3};" for i in range(units))
+    return program(f"VAR x : DINT; units : DINT := {units}; END_VAR", lines)

@@ -1,0 +1,89 @@
+"""What the port check found: one outcome per check, and the report that a vendor files."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from plctool.errors import PlcError
+from plctool.link.services import Identity
+
+Result = tuple[str, dict[str, Any]]
+
+
+class CheckFailed(Exception):
+    """What a check found wrong, for people; `figures` as far as there are any."""
+
+    def __init__(self, text: str, **figures: Any) -> None:
+        super().__init__(text)
+        self.figures = figures
+
+
+class NotAvailable(Exception):
+    """The controller is built without what a check looks at; that is no failure."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One line of the report: `verdict` is "passed", "failed" or "not available"."""
+
+    name: str
+    verdict: str
+    text: str
+    seconds: float
+    figures: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that a vendor files: who was checked, and how each check went."""
+
+    identity: Identity
+    target: str
+    outcomes: list[Outcome]
+
+    def count(self, verdict: str) -> int:
+        return sum(outcome.verdict == verdict for outcome in self.outcomes)
+
+    def document(self) -> dict[str, Any]:
+        """For --json."""
+        return {
+            "device": vars(self.identity) | {"target": self.target},
+            "checks": [vars(outcome) for outcome in self.outcomes],
+            "passed": self.count("passed"),
+            "failed": self.count("failed"),
+            "not_available": self.count("not available"),
+        }
+
+
+def outcome_text(outcome: Outcome) -> str:
+    """The line of one check."""
+    return f"{outcome.verdict:<15}{outcome.name:<30}{outcome.text}"
+
+
+def summary_text(report: Report) -> str:
+    """The last lines: who was checked, and how often each verdict was given."""
+    who = report.identity
+    missing = report.count("not available")
+    tail = f", {missing} not available" if missing else ""
+    return (
+        f"{who.device_name} of {who.vendor_name}, version {who.version}, serial number {who.serial_number}, "
+        f"runtime {who.runtime_version}, {report.target}\n"
+        f"{report.count('passed')} passed, {report.count('failed')} failed{tail}"
+    )
+
+
+def judge(name: str, check: Callable[[], Result]) -> Outcome:
+    """Runs a check; how it ends is its verdict."""
+    begin = time.monotonic()
+    try:
+        verdict, (text, figures) = "passed", check()
+    except NotAvailable as reason:
+        verdict, text, figures = "not available", str(reason), {}
+    except CheckFailed as failure:
+        verdict, text, figures = "failed", str(failure), failure.figures
+    except PlcError as error:
+        verdict, text, figures = "failed", error.message, {}
+    return Outcome(name, verdict, text, round(time.monotonic() - begin, 3), figures)

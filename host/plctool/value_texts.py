@@ -1,0 +1,295 @@
+"""Values of variables as Structured Text writes them: what is shown to people, and what they may type.
+
+`parse_value(t, literal(t, value))` is the value again. What is typed may be less formal: 80ms, abc, on.
+"""
+
+from __future__ import annotations
+
+import datetime
+import re
+from typing import Any
+
+from plctool.compiler.literals import LiteralError, string
+from plctool.compiler.types import (
+    ELEMENTARY,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Kind,
+    PointerType,
+    StringType,
+    StructType,
+    Type,
+    base_of,
+)
+from plctool.errors import UsageError
+
+_UNITS_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
+             "us": 1_000, "ns": 1}  # fmt: skip
+_DATE_UNITS_NS = {"DATE": 1_000_000_000, "DT": 1_000_000_000, "TOD": 1_000_000}
+_EPOCH = datetime.date(1970, 1, 1)
+_DAY = r"(?P<y>\d{4})-(?P<mo>\d{1,2})-(?P<d>\d{1,2})"
+_CLOCK = r"(?P<h>\d{1,2}):(?P<mi>\d{1,2})(?::(?P<s>\d{1,2})(?:\.(?P<f>\d{1,9}))?)?"
+_DATE_FORMS = {"DATE": re.compile(_DAY), "TOD": re.compile(_CLOCK), "DT": re.compile(f"{_DAY}-{_CLOCK}")}
+_PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)")
+_PUNCTUATION = re.compile(r"""'(?:\$.|[^$'])*'|"(?:\$.|[^$"])*"|[][(),]""")  # texts hide what is in them
+_REPEATED = re.compile(r"(?P<count>\d+)\s*\((?P<items>.*)\)", re.DOTALL)
+_TYPED = re.compile(r"^(?P<type>[A-Za-z]\w*)#(?P<rest>.+)$")
+
+
+def bad_value(text: object, t: Type, hint: str) -> UsageError:
+    """The error about a value that does not fit its type."""
+    return UsageError(f"'{text}' is not a value of {t}; {hint}.", "bad-value")
+
+
+# ---- value -> text -------------------------------------------------------------------------------------------------
+
+
+def literal(t: Type, value: Any) -> str:
+    """A value, as `values.decode` gives it, the way ST writes it."""
+    if isinstance(t, ArrayType):
+        return _list(t, value)
+    if isinstance(t, StructType):
+        shown = [f for f in t.fields if not f.hidden]
+        return "(" + ", ".join(f"{f.name} := {literal(f.type, value[f.name])}" for f in shown) + ")"
+    if isinstance(t, StringType):
+        return quoted(value, t.wide)
+    if isinstance(t, PointerType):
+        return "NULL" if value is None else f"16#{value:X}"
+    base = base_of(t)
+    assert isinstance(base, Elementary)
+    if base.kind is Kind.BOOL:
+        return "TRUE" if value else "FALSE"
+    if base.kind is Kind.CHAR:
+        return quoted(value or "\0", base.size == 2)
+    return f"16#{value:0{2 * base.size}X}" if base.kind is Kind.BIT else str(value)
+
+
+def _list(t: ArrayType, value: Any) -> str:
+    def nested(item: Any, depth: int) -> str:
+        if depth == len(t.bounds):
+            return literal(t.element, item)
+        return "[" + ", ".join(nested(part, depth + 1) for part in item) + "]"
+
+    return nested(value, 0)
+
+
+def quoted(text: str, wide: bool) -> str:
+    """A STRING or WSTRING literal, with $ escapes for what cannot be seen."""
+    quote = '"' if wide else "'"
+
+    def shown(c: str) -> str:
+        if c in ("$", quote):
+            return f"${c}"
+        if c.isprintable():
+            return c
+        digits = c.encode("utf-16-be", "surrogatepass").hex().upper() if wide else f"{ord(c):02X}"
+        return re.sub("..(..)?", r"$\g<0>", digits)  # one escape for each character in memory
+
+    return quote + "".join(map(shown, text)) + quote
+
+
+def format_time(value: int, t: Type) -> str:
+    """'T#1h2m3s4ms' for TIME [ms], 'LTIME#...' for LTIME [ns]."""
+    wide = base_of(t).size == 8
+    prefix, left = ("LTIME#", abs(value)) if wide else ("T#", abs(value) * 1_000_000)
+    text = ""
+    for unit, size in _UNITS_NS.items():
+        if left >= size:
+            text += f"{left // size}{unit}"
+            left %= size
+    sign = "-" if value < 0 else ""
+    return prefix + sign + (text or ("0ns" if wide else "0ms"))
+
+
+def format_date(value: int, t: Type) -> str:
+    """'D#2024-02-29', 'TOD#12:30:15.500', 'DT#2024-02-29-12:30:15'; LDATE#, LTOD#, LDT# for the types that count ns."""
+    name = base_of(t).name
+    kind = name.removeprefix("L")
+    nanoseconds = value * _DATE_UNITS_NS.get(name, 1)
+    days, in_day = divmod(nanoseconds, _UNITS_NS["d"])
+    seconds, fraction = divmod(in_day, _UNITS_NS["s"])
+    clock = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
+    if fraction:
+        digits = f"{fraction:09}"
+        clock += "." + (digits[:3] if digits.endswith("000000") else digits[:6] if digits.endswith("000") else digits)
+    if kind == "TOD":
+        return f"{name}#{clock}"
+    day = (_EPOCH + datetime.timedelta(days)).isoformat()
+    return f"D#{day}" if name == "DATE" else f"{name}#{day}" + (f"-{clock}" if kind == "DT" else "")
+
+
+# ---- text -> value -------------------------------------------------------------------------------------------------
+
+
+def parse_time(text: str, t: Type = ELEMENTARY["TIME"]) -> int:
+    """A duration such as 'T#1.5s', 'LTIME#20us' or '80ms', in the unit of `t`: ms for TIME, ns for LTIME. Raises
+    UsageError."""
+    body = re.sub(r"(?i)^l?t(ime)?#", "", text.strip()).replace("_", "").lower()
+    sign = -1 if body.startswith("-") else 1
+    parts = body.removeprefix("-")
+    matches = list(_PART.finditer(parts))
+    if not matches or "".join(m.group(0) for m in matches) != parts:
+        raise bad_value(text, t, "write a duration such as T#1s500ms")
+    nanoseconds = sum(_scaled(m.group(1), _UNITS_NS[m.group(2)]) for m in matches)
+    return sign * (nanoseconds if base_of(t).size == 8 else nanoseconds // 1_000_000)
+
+
+def parse_date(text: str, t: Type) -> int:
+    """A date or time of day such as 'D#2024-02-29', '12:30:15.5' or 'LDT#2024-02-29-12:30:15', in the unit of `t`.
+    Raises UsageError."""
+    name = base_of(t).name
+    kind = name.removeprefix("L")
+    body = text.strip().rpartition("#")[2].replace("_", "")
+    match = _DATE_FORMS[kind].fullmatch(body)
+    example = {"DATE": "D#2024-02-29", "TOD": "TOD#12:30:15", "DT": "DT#2024-02-29-12:30:15"}[kind]
+    if match is None:
+        raise bad_value(text, t, f"write {example}")
+    part = match.groupdict(default="0")
+    try:
+        day = datetime.date(int(part["y"]), int(part["mo"]), int(part["d"])) if kind != "TOD" else _EPOCH
+        clock = datetime.time(int(part["h"]), int(part["mi"]), int(part["s"])) if kind != "DATE" else datetime.time()
+    except ValueError:
+        raise bad_value(text, t, f"there is no such day or time; write {example}") from None
+    seconds = (clock.hour * 60 + clock.minute) * 60 + clock.second
+    total = (day - _EPOCH).days * _UNITS_NS["d"] + seconds * _UNITS_NS["s"]
+    total += int(part["f"].ljust(9, "0")) if kind != "DATE" else 0
+    return total // _DATE_UNITS_NS.get(name, 1)
+
+
+def _scaled(number: str, unit: int) -> int:
+    whole, _, fraction = number.partition(".")
+    return int(whole) * unit + (int(fraction) * unit // 10 ** len(fraction) if fraction else 0)
+
+
+def parse_value(t: Type, text: str) -> Any:
+    """What a person typed for a variable of type `t`. Raises UsageError."""
+    text = text.strip()
+    if isinstance(t, StringType):
+        return _parse_text(t, text, t.wide)
+    if isinstance(t, ArrayType):
+        return _parse_array(t, text)
+    if isinstance(t, StructType):
+        return _parse_struct(t, text)
+    if isinstance(t, PointerType):
+        if text.upper() not in ("NULL", "0"):
+            raise bad_value(text, t, "only the program gives out addresses; write NULL or what it leads to")
+        return None
+    base = base_of(t)
+    assert isinstance(base, Elementary)
+    if isinstance(t, EnumType):
+        return _parse_enum(t, text)
+    if base.kind is Kind.TIME:
+        return parse_time(text, base)
+    if base.kind is Kind.DATE:
+        return parse_date(text, base)
+    if base.kind is Kind.CHAR:
+        return _parse_character(base, text)
+    typed = _TYPED.match(text)
+    if typed and typed["type"].upper() in ELEMENTARY:
+        text = typed["rest"]
+    if base.kind is Kind.BOOL:
+        return _parse_bool(t, text)
+    if base.kind is Kind.REAL:
+        try:
+            return float(text.replace("_", ""))
+        except ValueError:
+            raise bad_value(text, t, "write a number such as 1.5 or -2e3") from None
+    return _parse_integer(t, text)
+
+
+def _parse_text(t: Type, text: str, wide: bool) -> str:
+    """A literal with its $ escapes, or just the characters."""
+    if len(text) < 2 or text[0] != text[-1] or text[0] not in "'\"":
+        return text
+    quote = '"' if wide else "'"
+    try:
+        return string(quote + text[1:-1] + quote)
+    except LiteralError as error:
+        raise bad_value(text, t, str(error)) from None
+
+
+def _parse_character(t: Type, text: str) -> int:
+    typed = _TYPED.match(text)
+    if typed and typed["type"].upper() in ("CHAR", "WCHAR"):
+        text = typed["rest"]
+    character = _parse_text(t, text, t.size == 2)
+    if len(character) != 1:
+        raise bad_value(text, t, "write one character")
+    return ord(character)
+
+
+def _parse_array(t: ArrayType, text: str, dimension: int = 0) -> list[Any]:
+    """A list; of lists as long as there are more dimensions."""
+    low, high = t.bounds[dimension]
+    found = _parse_items(t, text, dimension)
+    if len(found) != high - low + 1:
+        raise bad_value(text, t, f"give a list with {high - low + 1} elements")
+    return found
+
+
+def _parse_items(t: ArrayType, text: str, dimension: int) -> list[Any]:
+    found: list[Any] = []
+    for item in _split(t, text, "[]"):
+        if repeated := _REPEATED.fullmatch(item):
+            items = _parse_items(t, f"[{repeated['items']}]", dimension)
+            found += items * min(int(repeated["count"]), t.count + 1)
+        elif dimension + 1 < len(t.bounds):
+            found.append(_parse_array(t, item, dimension + 1))
+        else:
+            found.append(parse_value(t.element, item))
+        if len(found) > t.count:
+            raise bad_value(text, t, f"it has {t.count} elements")
+    return found
+
+
+def _parse_struct(t: StructType, text: str) -> dict[str, Any]:
+    members = {}
+    for item in _split(t, text, "()"):
+        name, assigned, value = item.partition(":=")
+        member = t.member(name.strip())
+        if not assigned or member is None:
+            raise bad_value(text, t, f"write its members as in ({t.fields[0].name} := ..., ...)")
+        members[member.name] = parse_value(member.type, value)
+    return members
+
+
+def _split(t: Type, text: str, brackets: str) -> list[str]:
+    """The items of a list in `brackets`."""
+    if len(text) < 2 or text[0] + text[-1] != brackets:
+        raise bad_value(text, t, f"write a list in {brackets[0]} {brackets[1]}")
+    items, depth, begin = [], 0, 1
+    for match in _PUNCTUATION.finditer(text, 1, len(text) - 1):
+        depth += {"[": 1, "(": 1, "]": -1, ")": -1}.get(match[0], 0)
+        if match[0] == "," and depth == 0:
+            items.append(text[begin : match.start()].strip())
+            begin = match.end()
+    return [*items, text[begin:-1].strip()]
+
+
+def _parse_bool(t: Type, text: str) -> bool:
+    known = {"true": True, "1": True, "on": True, "false": False, "0": False, "off": False}
+    if text.lower() not in known:
+        raise bad_value(text, t, "write TRUE or FALSE")
+    return known[text.lower()]
+
+
+def _parse_integer(t: Type, text: str) -> int:
+    match = re.fullmatch(r"(-?)(?:(2|8|10|16)#)?([0-9A-Fa-f_]+)", text)
+    try:
+        if match is None:
+            raise ValueError
+        value = int(match[3].replace("_", ""), int(match[2] or 10))
+    except ValueError:
+        raise bad_value(text, t, "write a whole number such as 42 or 16#2A") from None
+    return -value if match[1] else value
+
+
+def _parse_enum(t: EnumType, text: str) -> int:
+    key = text.rpartition("#")[2].rpartition(".")[2].casefold()
+    for name, value in t.values.items():
+        if name.casefold() == key:
+            return value
+    if re.fullmatch(r"-?\d+", text):
+        return int(text)
+    raise bad_value(text, t, f"choose one of {', '.join(t.values)}")

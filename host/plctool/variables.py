@@ -1,0 +1,301 @@
+"""Variables by name: the parts of a variable, what a path such as 'Main.fb.arr[3].x' or 'Main.next^.value' leads to.
+
+A path is looked up without a device: what a pointer holds is looked at when the variable is read, each time anew.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from plctool.compiler.typed import Area
+from plctool.compiler.types import (
+    ELEMENTARY,
+    ArrayType,
+    Elementary,
+    EnumType,
+    InterfaceType,
+    Kind,
+    OpenArrayType,
+    PointerType,
+    ReferenceType,
+    StringType,
+    StructType,
+    Type,
+    base_of,
+)
+from plctool.errors import DeviceError, UsageError
+from plctool.value_texts import literal, parse_value
+from plctool.values import decode, encode
+
+_TOKEN = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]*)\]|\.(\d+)|(\^)")
+
+
+class ClassType(EnumType):
+    """The class of the instance behind an interface variable: its number in memory, its name to people."""
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """A variable or a part of one. `offset` in bytes in the area or, when `pointer` leads to it, from there on; `bit`
+    when it is one bit of an integer; `fixed` is the content of a constant that has no place in memory."""
+
+    name: str
+    area: int
+    offset: int
+    type: Type
+    bit: int | None = None
+    pointer: Symbol | None = None
+    constant: bool = False
+    fixed: bytes | None = None
+
+    @property
+    def size(self) -> int:
+        return self.type.size
+
+    @property
+    def place(self) -> tuple[int, int, tuple[int, ...]]:
+        """Area and offset of where the way begins, and the offset behind each pointer on it."""
+        if self.pointer is None:
+            return self.area, self.offset, ()
+        area, offset, hops = self.pointer.place
+        return area, offset, (*hops, self.offset)
+
+    def decode(self, data: bytes) -> Any:
+        """The value in `size` bytes read from the device."""
+        if self.bit is not None:
+            return bool(int.from_bytes(data[: self.size], "little") >> self.bit & 1)
+        return decode(self.type, data)
+
+    def encode(self, value: Any, before: bytes | None = None) -> bytes:
+        """The bytes to write. `before`: the present ones, needed to change a single bit. Raises UsageError."""
+        if self.bit is None:
+            return encode(self.type, value)
+        if before is None:
+            raise UsageError(f"{self.name} is a bit; write the whole {self.type}.", "bit")
+        word = int.from_bytes(before[: self.size], "little") & ~(1 << self.bit)
+        bit = encode(ELEMENTARY["BOOL"], value)[0]
+        return (word | bit << self.bit).to_bytes(self.size, "little")
+
+    def parse(self, text: str) -> Any:
+        """The value a person typed for it, for `encode`. Raises UsageError."""
+        return parse_value(self._shown_type, text)
+
+    def literal(self, value: Any) -> str:
+        """A decoded value as ST writes it; None is that of a variable to which a pointer does not lead."""
+        return "NULL" if value is None else literal(self._shown_type, value)
+
+    @property
+    def _shown_type(self) -> Type:
+        return self.type if self.bit is None else ELEMENTARY["BOOL"]
+
+    def check_writable(self, area: int) -> None:
+        """Raises UsageError when it is a constant, since it lies in `area`, or not for us to write."""
+        if isinstance(self.type, ClassType):
+            raise UsageError(f"{self.name} is an interface variable: only the program can assign it.", "interface")
+        if self.constant or area == Area.CODE.value:
+            raise UsageError(f"{self.name} is a constant or a READ_ONLY access and cannot be written.", "constant")
+
+    # ---- parts ----
+
+    def part(self, name: str, offset: int, t: Type) -> Symbol:
+        """A part that begins `offset` bytes on."""
+        fixed = None if self.fixed is None else self.fixed[offset : offset + t.size]
+        return replace(self, name=name, offset=self.offset + offset, type=t, fixed=fixed)
+
+    def target(self, name: str, t: Type) -> Symbol:
+        """What this pointer leads to."""
+        return Symbol(name, self.area, 0, t, None, self)
+
+    def followed(self) -> Symbol:
+        """The variable itself or, as in ST, what a REFERENCE TO refers to."""
+        return self.target(self.name, self.type.target) if isinstance(self.type, ReferenceType) else self
+
+    def parts(self) -> Iterator[Symbol]:
+        """Members or elements, none of a scalar."""
+        t = self.type
+        if isinstance(t, StructType):
+            for f in t.fields:
+                yield self.part(f"{self.name}.{f.name}", f.offset, f.type)
+        elif isinstance(t, ArrayType):
+            for i, index in enumerate(_indices(t)):
+                yield self.part(f"{self.name}[{index}]", i * t.element.size, t.element)
+
+    def leaves(self) -> Iterator[Symbol]:
+        """The scalars and strings that it consists of; the variable itself when it is one. No pointer is followed."""
+        if not isinstance(self.type, StructType | ArrayType):
+            yield self
+        for part in self.parts():
+            yield from part.leaves()
+
+
+@dataclass(frozen=True)
+class Units:
+    """What is known of the units of a program. `classes`: the number of each class that an interface variable may refer
+    to. `temporaries`: of each unit, the variables that live only while it runs; names in small letters."""
+
+    classes: dict[str, int] = field(default_factory=dict)
+    temporaries: dict[str, set[str]] = field(default_factory=dict)
+
+    def no_variable(self, path: str, unit: str, known: Iterable[str]) -> UsageError:
+        """The error about a path that leads to nothing in `unit`; `known` are those that would."""
+        if path.rpartition(".")[2].casefold() in self.temporaries.get(unit.casefold(), ()):
+            return UsageError(f"{path} lives only while {unit} runs: there is nothing to read or write.", "temporary")
+        lower = {k.casefold(): k for k in known}
+        close = difflib.get_close_matches(path.casefold(), lower, n=1, cutoff=0.6)
+        hint = f" Did you mean {lower[close[0]]}?" if close else ""
+        return UsageError(f"There is no variable {path}.{hint}", "unknown-variable")
+
+
+def constant_symbol(name: str, t: Type, content: bytes) -> Symbol:
+    """A constant that the compiler has put into the code wherever it is used."""
+    return Symbol(name, Area.CODE.value, 0, t, constant=True, fixed=content)
+
+
+def walk(symbol: Symbol, text: str, at: int, units: Units) -> Symbol:
+    """What the path `text` leads to; `symbol` is what it names up to `at`. Raises UsageError."""
+    while at < len(text):
+        match = _TOKEN.match(text, at)
+        if match is None:
+            raise UsageError(f"'{text}' cannot be read from '{text[at:]}' on; write for example Main.a[3].x.", "syntax")
+        if symbol.bit is not None:
+            raise UsageError(f"{symbol.name} is a BOOL and has no parts.", "no-part")
+        at = match.end()
+        symbol = _step(symbol.followed(), match, text[:at], units)
+    symbol = symbol.followed()
+    if isinstance(symbol.type, InterfaceType) and units.classes:
+        return symbol.target(symbol.name, ClassType(symbol.type.name, ELEMENTARY["UDINT"], units.classes))
+    if isinstance(symbol.type, OpenArrayType):
+        raise _open_array(symbol)
+    return symbol
+
+
+def _step(symbol: Symbol, match: re.Match[str], name: str, units: Units) -> Symbol:
+    member, indices, bit, dereference = match.groups()
+    if member:
+        return _member(symbol, member, name, units)
+    if bit:
+        return _bit(symbol, int(bit), name)
+    if dereference:
+        return _target(symbol, name)
+    return _element(symbol, indices, name)
+
+
+def _member(symbol: Symbol, member: str, name: str, units: Units) -> Symbol:
+    t = symbol.type
+    if isinstance(t, InterfaceType):
+        raise UsageError(f"{symbol.name} is an interface variable; its value is the class of its instance.", "no-part")
+    if isinstance(t, PointerType):
+        raise UsageError(f"{symbol.name} is a pointer; write {symbol.name}^.{member} for what it leads to.", "pointer")
+    if not isinstance(t, StructType):
+        raise UsageError(f"{symbol.name} is a {t} and has no member {member}.", "no-part")
+    found = t.member(member)
+    if found is None and member.casefold() in map(str.casefold, t.properties):
+        raise UsageError(f"{name} is a property: only the program can read it, by a call.", "property")
+    if found is None:
+        raise units.no_variable(name, t.name, [f"{symbol.name}.{f.name}" for f in t.fields])
+    return symbol.part(name, found.offset, found.type)
+
+
+def _target(symbol: Symbol, name: str) -> Symbol:
+    t = symbol.type
+    if not isinstance(t, PointerType) or isinstance(t, InterfaceType):
+        raise UsageError(f"{symbol.name} is a {t} and no pointer; leave out the ^.", "no-part")
+    return symbol.target(name, t.target)
+
+
+def _bit(symbol: Symbol, bit: int, name: str) -> Symbol:
+    base = base_of(symbol.type)
+    if not isinstance(base, Elementary) or base.kind not in (Kind.BIT, Kind.INT) or bit >= base.bits:
+        raise UsageError(f"{symbol.name} is a {symbol.type} and has no bit {bit}.", "no-part")
+    return replace(symbol, name=name, bit=bit)
+
+
+def _element(symbol: Symbol, text: str, name: str) -> Symbol:
+    t = symbol.type
+    try:
+        indices = [int(part) for part in text.split(",")]
+    except ValueError:
+        raise UsageError(f"'{text}' is not an index; write a number as in {symbol.name}[1].", "syntax") from None
+    if isinstance(t, StringType) and len(indices) == 1:
+        if not 0 <= indices[0] <= t.length:
+            raise UsageError(f"{symbol.name} has the characters 0 to {t.length - 1}, not {indices[0]}.", "no-part")
+        return symbol.part(name, indices[0] * t.unit, ELEMENTARY["WORD" if t.wide else "BYTE"])
+    if isinstance(t, PointerType) and not isinstance(t, InterfaceType):
+        raise UsageError(f"{symbol.name} is a pointer; write {symbol.name}^[{text}] for what it leads to.", "pointer")
+    if isinstance(t, OpenArrayType):
+        raise _open_array(symbol)
+    if not isinstance(t, ArrayType) or len(indices) != len(t.bounds):
+        raise UsageError(f"{symbol.name} is a {t} and cannot be indexed with [{text}].", "no-part")
+    flat = 0
+    for index, (low, high) in zip(indices, t.bounds, strict=True):
+        if not low <= index <= high:
+            raise UsageError(f"{symbol.name} has the elements {low} to {high}, not {index}.", "no-part")
+        flat = flat * (high - low + 1) + index - low
+    return symbol.part(name, flat * t.element.size, t.element)
+
+
+def _open_array(symbol: Symbol) -> UsageError:
+    return UsageError(
+        f"{symbol.name} is an {symbol.type}, whose bounds change with each call; name the array itself.", "open-array"
+    )
+
+
+def _indices(t: ArrayType) -> list[str]:
+    texts = [""]
+    for low, high in t.bounds:
+        texts = [f"{text},{i}" if text else str(i) for text in texts for i in range(low, high + 1)]
+    return texts
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Variables that were read together, and what they held, by the names they were asked for. `consistent`: no task
+    ran meanwhile, so this is a state between two cycles."""
+
+    symbols: dict[str, Symbol]
+    contents: dict[str, bytes | None]
+    consistent: bool = True
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Ready for JSON. None for what is behind a pointer that leads to no variable."""
+        return {name: None if data is None else self.symbols[name].decode(data) for name, data in self.contents.items()}
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """The values as ST writes them."""
+        return {name: self.symbols[name].literal(value) for name, value in self.values.items()}
+
+    def check(self, read: Callable[[Symbol], bytes | None]) -> None:
+        """Raises DeviceError when a pointer does not lead to a variable. An interface variable may be NULL."""
+        for name, data in self.contents.items():
+            if data is None:
+                error = unreachable(self.symbols[name], read)
+                if error.code != "null" or not isinstance(self.symbols[name].type, ClassType):
+                    raise error
+
+
+def unreachable(symbol: Symbol, read: Callable[[Symbol], bytes | None]) -> DeviceError:
+    """Says why there is no `symbol`: which of the pointers that lead to it does not. `read` gives what a pointer
+    holds."""
+    pointer = symbol.pointer
+    while pointer is not None:
+        held = read(pointer)
+        if held is not None:
+            return _leads_nowhere(symbol, pointer, is_null=not any(held))
+        pointer = pointer.pointer
+    return DeviceError(f"{symbol.name} is not in the memory of the program.", "no-target")
+
+
+def _leads_nowhere(symbol: Symbol, pointer: Symbol, is_null: bool) -> DeviceError:
+    if is_null:
+        return DeviceError(f"{symbol.name} cannot be reached: {pointer.name} is NULL.", "null")
+    return DeviceError(
+        f"{symbol.name} cannot be reached: {pointer.name} leads to no variable that lasts; it may refer to a temporary "
+        "variable, or to none at all.",
+        "no-target",
+    )

@@ -1,0 +1,141 @@
+"""How the lowering cuts a program into functions: what is inlined, what is handed over in registers, what is cut."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from plctool.compiler import load_sources
+from plctool.compiler.build import BuildResult, build_program
+from plctool.compiler.front import check_sources
+from plctool.compiler.lower import lower
+from plctool.compiler.lower_unit import Options
+from plctool.compiler.source import Source
+from plctool.compiler.targets import find_target
+from plctool.compiler.typed import TypedProgram
+from plctool.image import parse_image
+from plctool.sim import Simulator
+
+BLOCK = """FUNCTION_BLOCK Block
+VAR_INPUT a, b : DINT; c : LREAL; END_VAR
+VAR_OUTPUT sum : DINT; END_VAR
+sum := sum + a * b;
+END_FUNCTION_BLOCK
+"""
+
+
+def checked(text: str) -> TypedProgram:
+    result = check_sources([Source("main.st", text)])
+    assert result.program, result.diagnostics
+    return result.program
+
+
+def lowered(text: str, target: str = "x86_64-linux", **options: object) -> str:
+    return "\n".join(lower(checked(text), Options(find_target(target), **options)).texts)  # type: ignore[arg-type]
+
+
+def signature(text: str, symbol: str) -> str:
+    found = re.search(rf"^define (.*@{re.escape(symbol)}\(.*)\{{$", text, re.M)
+    assert found, symbol
+    return found[1]
+
+
+def run(text: str, *names: str) -> list[object]:
+    built = build_program(checked(text), Options(find_target("x86_64-linux")))
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(2)
+        return [plc.read(name) for name in names]
+
+
+def main(calls: str) -> str:
+    return f"{BLOCK}PROGRAM Main VAR x : Block; p : POINTER TO Block; END_VAR {calls} END_PROGRAM"
+
+
+def test_inputs_that_every_call_gives_are_handed_over() -> None:
+    text = lowered(main("x(a := 1, b := 2, c := 3.0); x(a := 3, b := 4);"))
+    assert signature(text, "st.Block").count("%p") == 2
+    assert "i32 1, i32 2)" in text
+
+
+def test_inputs_that_a_call_leaves_out_stay_in_the_instance() -> None:
+    text = lowered(main("x(a := 1, b := 2); x(b := 3);"))
+    assert signature(text, "st.Block").count("%p") == 1
+
+
+def test_inputs_go_as_far_as_there_are_registers() -> None:
+    calls = "x(a := 1, b := 2, c := 3.0);"
+    assert signature(lowered(main(calls), "aarch64-linux"), "st.Block").count("%p") == 3
+    assert signature(lowered(main(calls), "cortex-m3"), "st.Block").count("%p") == 2  # an LREAL has no register there
+
+
+def large_callers(blocks: int) -> str:
+    body = "\n".join(f"sum := sum + a * {k} - b;" for k in range(40))
+    texts = [BLOCK.replace("Block", f"Block{n}").replace("sum := sum + a * b;", body) for n in range(blocks)]
+    variables = "".join(f"x{n} : Block{n};" for n in range(blocks))
+    calls = "".join(f"x{n}(a := 1, b := 2);" for n in range(blocks))
+    return f"{''.join(texts)}PROGRAM Main VAR {variables} END_VAR {calls} END_PROGRAM"
+
+
+def test_blocks_that_are_called_once_may_be_inlined() -> None:
+    assert "noinline" not in signature(lowered(large_callers(3)), "st.Block0")
+
+
+def test_no_function_grows_without_limit_by_inlining() -> None:
+    assert "noinline" in signature(lowered(large_callers(100)), "st.Block0")
+
+
+def long_body(statement: str, count: int = 1000) -> str:
+    body = "\n".join([*["n := n + n * 3 - 1; m := m + n;"] * count, statement])
+    return f"PROGRAM Main VAR n, m : DINT; END_VAR\n{body}\nEND_PROGRAM"
+
+
+def test_a_long_body_becomes_several_functions() -> None:
+    text = long_body("m := m + 1;")
+    assert len(re.findall(r"^define internal void @st\.Main", lowered(text), re.M)) > 3
+    assert run(text, "Main.m") == run(text.replace("n := n + n * 3 - 1;", "n := n * 4 - 1;"), "Main.m")
+
+
+def test_a_long_body_with_return_stays_one_function() -> None:
+    assert len(re.findall(r"^define internal void @st\.Main", lowered(long_body("RETURN;")), re.M)) == 1
+
+
+def test_an_exception_in_a_long_body_names_its_line() -> None:
+    text = long_body("m := 1 / (n - n);")
+    built = build_program(checked(text), Options(find_target("x86_64-linux")))
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        found = plc.status().exception
+    assert found is not None and found.code_offset is not None
+    place = built.symbols.address_to_line(found.code_offset)
+    assert place is not None
+    assert (place.pou, place.line) == ("Main", len(text.split("\n")) - 1)
+
+
+@pytest.fixture(scope="module")
+def timers(tmp_path_factory: pytest.TempPathFactory) -> TypedProgram:
+    declarations = "".join(f"t{n} : TON;" for n in range(30))
+    calls = "".join(f"t{n}(IN := NOT t{n}.Q, PT := T#{n + 1}ms);" for n in range(30))
+    path = tmp_path_factory.mktemp("timers") / "timers.st"
+    path.write_text(f"PROGRAM Main VAR {declarations} END_VAR {calls} END_PROGRAM")
+    result = check_sources(load_sources([Path(path)]))
+    assert result.program, result.diagnostics
+    return result.program
+
+
+def code(built: BuildResult) -> int:
+    return len(parse_image(built.image).code)
+
+
+@pytest.mark.parametrize("target", ["cortex-m0", "cortex-m3", "rv32imac"])
+def test_blocks_of_the_library_are_not_inlined_where_flash_is_small(timers: TypedProgram, target: str) -> None:
+    normal, fast = (code(build_program(timers, Options(find_target(target), level))) for level in (2, 3))
+    assert normal < fast / 2
+
+
+def test_small_code_is_smaller(timers: TypedProgram) -> None:
+    normal, small = (
+        code(build_program(timers, Options(find_target("x86_64-linux"), size=size))) for size in (False, True)
+    )
+    assert small < normal / 2

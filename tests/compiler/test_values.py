@@ -1,0 +1,288 @@
+"""Values of variables: bytes in memory, Python values, texts."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from plctool.compiler.types import (
+    BOOL,
+    CHAR,
+    DATE,
+    DINT,
+    DT,
+    INT,
+    LDT,
+    LREAL,
+    LTIME,
+    LWORD,
+    REAL,
+    SINT,
+    TIME,
+    TOD,
+    UDINT,
+    ULINT,
+    USINT,
+    WCHAR,
+    WORD,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Field,
+    PointerType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+)
+from plctool.errors import UsageError
+from plctool.value_texts import format_time, literal, parse_time, parse_value
+from plctool.values import decode, encode
+from plctool.variables import Symbol
+
+
+def laid_out(t: StructType) -> StructType:
+    t.lay_out()
+    return t
+
+
+POINT = laid_out(StructType("Point", [Field("x", INT), Field("y", LREAL)]))
+COLOUR = EnumType("Colour", INT, {"Red": 0, "Green": 5, "Blue": 6})
+BLOCK = laid_out(
+    StructType(
+        "Block",
+        [Field("q", BOOL), Field("arr", ArrayType(POINT, ((2, 4),))), Field("grid", ArrayType(INT, ((0, 1), (-1, 1))))],
+    )
+)
+COUNTED = laid_out(StructType("Counted", [Field("%class", UDINT), Field("x", INT)]))
+OVERLAY = laid_out(StructType("Overlay", [Field("w", WORD), Field("n", INT)], union=True))
+
+# ---- values ----
+
+NUMBERS = [SINT, USINT, INT, WORD, DINT, UDINT, ULINT]
+
+
+@pytest.mark.parametrize("t", NUMBERS, ids=str)
+def test_numbers_are_read_as_they_were_written(t: Elementary) -> None:
+    low = -(1 << (t.bits - 1)) if t.signed else 0
+
+    @settings(max_examples=50, deadline=None)
+    @given(st.integers(low, low + (1 << t.bits) - 1))
+    def check(value: int) -> None:
+        assert decode(t, encode(t, value)) == value
+        assert parse_value(t, str(value)) == value
+
+    check()
+
+
+@given(st.floats(width=32))
+def test_reals_are_shown_with_the_fewest_digits_that_read_back(value: float) -> None:
+    shown = decode(REAL, encode(REAL, value))
+    if math.isfinite(value):
+        assert encode(REAL, shown) == encode(REAL, value)
+        assert len(repr(shown)) <= len(repr(value))
+    else:
+        assert shown in ("NaN", "Infinity", "-Infinity")
+        assert encode(REAL, shown) == encode(REAL, float(shown))
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_lreals_are_read_as_they_were_written(value: float) -> None:
+    assert decode(LREAL, encode(LREAL, value)) == value
+
+
+@pytest.mark.parametrize(
+    ("ms", "text"),
+    [(0, "T#0ms"), (80, "T#80ms"), (1500, "T#1s500ms"), (-250, "T#-250ms"), (90_061_001, "T#1d1h1m1s1ms")],
+)
+def test_time_is_shown_as_a_literal(ms: int, text: str) -> None:
+    assert format_time(ms, TIME) == text
+    assert parse_time(text) == ms
+
+
+@given(st.integers(-(2**31), 2**31 - 1))
+def test_any_time_is_read_as_it_is_shown(ms: int) -> None:
+    assert parse_time(format_time(ms, TIME)) == ms
+
+
+@given(st.integers(-(2**63), 2**63 - 1))
+def test_any_ltime_is_read_as_it_is_shown(ns: int) -> None:
+    assert parse_time(format_time(ns, LTIME), LTIME) == ns
+
+
+@pytest.mark.parametrize(
+    ("text", "ms"),
+    [("T#1.5s", 1500), ("time#2m_30s", 150_000), ("80ms", 80), ("T#0.25h", 900_000), ("T#1s200us", 1000)],
+)
+def test_durations_may_be_typed_in_many_ways(text: str, ms: int) -> None:
+    assert parse_time(text) == ms
+
+
+@pytest.mark.parametrize("text", ["", "T#", "T#5", "T#5x", "5 s", "T#1.2.3s", "T#s"])
+def test_what_is_no_duration_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="duration"):
+        parse_time(text)
+
+
+@pytest.mark.parametrize(
+    ("t", "text", "value"),
+    [
+        (BOOL, "true", True), (BOOL, "0", False), (INT, "16#7F", 127), (INT, "-2#101", -5), (INT, "INT#5", 5), (DINT,
+        "1_000", 1000), (REAL, "1e3", 1000.0), (COLOUR, "green", 5), (COLOUR, "Colour#Blue", 6), (COLOUR, "6", 6),
+        (StringType(9), "'a b'", "a b"), (StringType(9), "it's", "it's"),
+    ],
+)  # fmt: skip
+def test_typed_values(t: Type, text: str, value: object) -> None:
+    assert parse_value(t, text) == value
+
+
+@pytest.mark.parametrize(
+    ("t", "value"),
+    [
+        (BOOL, "maybe"), (BOOL, 2), (INT, "1.5"), (INT, 40000), (INT, "x"), (USINT, -1), (COLOUR, "Pink"), (REAL,
+        "one"), (StringType(2), "abc"), (StringType(9), "\u20ac"), (SubrangeType("S", INT, 1, 10), 11), (POINT, 5),
+        (ArrayType(INT, ((0, 2),)), [1, 2]), (PointerType(INT), 5), (INT, 1.5),
+    ],
+)  # fmt: skip
+def test_values_that_do_not_fit_are_refused(t: Type, value: object) -> None:
+    with pytest.raises(UsageError):
+        encode(t, value)
+
+
+def test_structs_and_arrays_are_dicts_and_lists() -> None:
+    value = {"q": True, "arr": [{"x": i, "y": i / 2} for i in range(3)], "grid": [[1, 2, 3], [4, 5, 6]]}
+    assert decode(BLOCK, encode(BLOCK, value)) == value
+
+
+def test_bits_are_changed_in_their_word() -> None:
+    symbol = Symbol("Main.word.3", 0, 0, WORD, bit=3)
+    assert symbol.encode(True, b"\x01\x80") == b"\x09\x80"
+    assert symbol.encode("FALSE", b"\xff\xff") == b"\xf7\xff"
+    assert symbol.decode(b"\x08\x00") is True
+    with pytest.raises(UsageError):
+        symbol.encode(True)
+
+
+def test_enums_are_shown_by_name() -> None:
+    assert decode(COLOUR, encode(COLOUR, 5)) == "Green"
+    assert decode(COLOUR, b"\x09\x00") == 9
+
+
+# ---- as ST writes them ----
+
+SCALARS = [BOOL, SINT, INT, UDINT, WORD, LWORD, REAL, LREAL, TIME, LTIME, DATE, TOD, DT, LDT, CHAR, WCHAR, COLOUR]
+TYPES = [
+    *SCALARS,
+    StringType(12),
+    StringType(5, wide=True),
+    SubrangeType("S", INT, -32768, 32767),
+    PointerType(INT),
+    POINT,
+    ArrayType(DINT, ((1, 3),)),
+    ArrayType(StringType(3), ((0, 1), (0, 2))),
+    ArrayType(ArrayType(INT, ((0, 1),)), ((0, 2),)),
+    laid_out(StructType("Mixed", [Field("name", StringType(4)), Field("points", ArrayType(POINT, ((0, 1),)))])),
+]
+
+
+@pytest.mark.parametrize("t", TYPES, ids=str)
+def test_what_is_shown_can_be_typed(t: Type) -> None:
+    @settings(max_examples=60, deadline=None)
+    @given(st.binary(min_size=t.size, max_size=t.size))
+    def check(data: bytes) -> None:
+        if isinstance(t, PointerType):
+            data = bytes(t.size)
+        text = literal(t, decode(t, data))
+        assert literal(t, decode(t, encode(t, parse_value(t, text)))) == text
+
+    check()
+
+
+@pytest.mark.parametrize(
+    ("t", "data", "text"),
+    [
+        (BOOL, b"\1", "TRUE"),
+        (INT, b"\xfb\xff", "-5"),
+        (WORD, b"\x1f\0", "16#001F"),
+        (REAL, b"\0\0\xc0\x3f", "1.5"),
+        (COLOUR, b"\5\0", "Green"),
+        (COLOUR, b"\7\0", "7"),
+        (TIME, b"\x50\0\0\0", "T#80ms"),
+        (StringType(9), b"it's $\n\0\0\0", "'it$'s $$$0A'"),
+        (StringType(3, wide=True), 'é"'.encode("utf-16-le") + bytes(4), '"é$""'),
+        (StringType(2, wide=True), b"\x29\xd8\x41\xdc\0\0", '"$D829$DC41"'),
+        (CHAR, b"a", "'a'"),
+        (CHAR, b"\0", "'$00'"),
+        (WCHAR, b"a\0", '"a"'),
+        (PointerType(INT), bytes(8), "NULL"),
+        (PointerType(INT), b"\x10\x20" + bytes(6), "16#2010"),
+        (ArrayType(BOOL, ((0, 1), (0, 1))), b"\1\0\0\1", "[[TRUE, FALSE], [FALSE, TRUE]]"),
+        (COUNTED, b"\7\0\0\0\2\0\0\0", "(x := 2)"),
+    ],
+)
+def test_values_are_shown_as_literals(t: Type, data: bytes, text: str) -> None:
+    assert literal(t, decode(t, data)) == text
+
+
+@pytest.mark.parametrize(
+    ("t", "text", "value"),
+    [
+        (ArrayType(INT, ((1, 3),)), "[1, 2,3 ]", [1, 2, 3]),
+        (ArrayType(INT, ((1, 5),)), "[1, 3(7), 2]", [1, 7, 7, 7, 2]),
+        (ArrayType(INT, ((1, 4),)), "[2(1, 2)]", [1, 2, 1, 2]),
+        (ArrayType(INT, ((0, 1), (0, 1))), "[2([1, 2])]", [[1, 2], [1, 2]]),
+        (ArrayType(COLOUR, ((1, 2),)), "[Red, Colour#Green]", [0, 5]),
+        (ArrayType(StringType(5), ((1, 2),)), "['a,]', '$'']", ["a,]", "'"]),
+        (POINT, "(y := -1.5, x := 16#10)", {"x": 16, "y": -1.5}),
+        (ArrayType(POINT, ((1, 2),)), "[2((x := 1, y := 2))]", [{"x": 1, "y": 2.0}] * 2),
+        (PointerType(INT), "null", None),
+        (StringType(5, wide=True), '"$00E9"', "é"),
+    ],
+)
+def test_lists_and_members_may_be_typed(t: Type, text: str, value: object) -> None:
+    assert parse_value(t, text) == value
+
+
+@pytest.mark.parametrize(
+    ("t", "text", "words"),
+    [
+        (ArrayType(INT, ((1, 3),)), "[1, 2]", "3 elements"),
+        (ArrayType(INT, ((1, 3),)), "5", "list in [ ]"),
+        (ArrayType(INT, ((1, 3),)), "[999999999999(1)]", "3 elements"),
+        (ArrayType(INT, ((1, 3),)), "[9(9(9(1)))]", "3 elements"),
+        (ArrayType(INT, ((1, 2),)), "[1, x]", "whole number"),
+        (ArrayType(INT, ((0, 1), (0, 1))), "[1, 2, 3, 4]", "list in [ ]"),
+        (POINT, "(1, 2)", "x := ..."),
+        (POINT, "(x := 1, z := 2)", "x := ..."),
+        (PointerType(INT), "16#1000", "only the program"),
+        (StringType(5), "'$q'", "escape"),
+        (CHAR, "''", "one character"),
+    ],
+)
+def test_what_cannot_be_typed_gets_a_sentence(t: Type, text: str, words: str) -> None:
+    with pytest.raises(UsageError) as error:
+        parse_value(t, text)
+    assert words in error.value.message
+
+
+@pytest.mark.parametrize(("t", "value"), [(COUNTED, {"x": 1}), (OVERLAY, {"w": 1, "n": 1}), (POINT, {"x": 1})])
+def test_what_is_not_all_of_a_variable_cannot_be_written_as_a_whole(t: Type, value: object) -> None:
+    with pytest.raises(UsageError, match="member"):
+        encode(t, value)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.sampled_from(TYPES), st.text("[](),'\"$ 0123456789abcTRUE#:=-.xy", max_size=24))
+def test_any_text_is_a_value_or_refused(t: Type, text: str) -> None:
+    try:
+        value = parse_value(t, text)
+    except UsageError as error:
+        assert error.message
+    else:
+        try:
+            assert len(encode(t, value)) == t.size
+        except UsageError as error:
+            assert error.message
