@@ -13,14 +13,14 @@ from pathlib import Path
 import llvmlite.binding as llvm
 
 from plctool.compiler import compile_sources, load_sources
+from plctool.compiler.codegen.emit import optimised
+from plctool.compiler.codegen.link import link
+from plctool.compiler.codegen.lower import lower
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.targets import DEFAULT_TARGET, find_target
 from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.emit import optimised
 from plctool.compiler.front import check_sources
-from plctool.compiler.link import link
-from plctool.compiler.lower import lower
-from plctool.compiler.lower_unit import Options
-from plctool.compiler.parser import parse
-from plctool.compiler.targets import DEFAULT_TARGET, find_target
+from plctool.compiler.syntax.parser import parse
 
 LINES = 10_000
 STARTS = 5

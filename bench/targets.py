@@ -26,9 +26,9 @@ from runners import RUNNERS, Runner  # noqa: E402
 
 from plctool.compiler import load_sources  # noqa: E402
 from plctool.compiler.build import BuildResult, build_program  # noqa: E402
+from plctool.compiler.codegen.lower_unit import Options, parse_checks  # noqa: E402
+from plctool.compiler.codegen.targets import find_target  # noqa: E402
 from plctool.compiler.front import check_sources  # noqa: E402
-from plctool.compiler.lower_unit import Options, parse_checks  # noqa: E402
-from plctool.compiler.targets import find_target  # noqa: E402
 from plctool.compiler.typed import TypedProgram  # noqa: E402
 from plctool.core import lib  # noqa: E402
 from plctool.image import parse_image  # noqa: E402

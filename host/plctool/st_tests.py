@@ -14,14 +14,14 @@ from xml.etree import ElementTree
 
 from plctool.compiler import CompileError, load_sources
 from plctool.compiler.build import BuildResult, build_program
+from plctool.compiler.codegen.lower_init import encode_scalar
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.targets import DEFAULT_TARGET, TARGETS, find_target
 from plctool.compiler.front import Diagnostic, check_sources, render
 from plctool.compiler.internal import bugs_reported
-from plctool.compiler.lower_init import encode_scalar
-from plctool.compiler.lower_unit import Options
-from plctool.compiler.targets import DEFAULT_TARGET, TARGETS, find_target
+from plctool.compiler.semantics.unit_test_statements import FAILED, NUMBER, Assertion, Operand
+from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.typed import Area
-from plctool.compiler.unit_test_statements import FAILED, NUMBER, Assertion, Operand
-from plctool.compiler.unit_tests import TestCase, TestSuite
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.core import ffi, lib
 from plctool.device import explain_exception

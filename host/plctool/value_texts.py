@@ -9,7 +9,7 @@ import datetime
 import re
 from typing import Any
 
-from plctool.compiler.literals import LiteralError, string
+from plctool.compiler.syntax.literals import LiteralError, string
 from plctool.compiler.types import (
     ELEMENTARY,
     ArrayType,

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from plctool.compiler import ast, lower_stmt
-from plctool.compiler.statements import Statements
+from plctool.compiler.codegen import lower_stmt
+from plctool.compiler.semantics.statements import Statements
+from plctool.compiler.syntax import ast
 
 PROGRAM = """PROGRAM Main
 VAR

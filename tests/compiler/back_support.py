@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from plctool.compiler.build import BuildResult, build_program
-from plctool.compiler.lower_unit import ALL_CHECKS, Check, Options
-from plctool.compiler.targets import find_target
+from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check, Options
+from plctool.compiler.codegen.targets import find_target
 from plctool.compiler.typed import (
     Area,
     Binary,

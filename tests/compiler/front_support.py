@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 
 from plctool.compiler import typed
-from plctool.compiler.conversions import SIGNED
 from plctool.compiler.front import CheckResult, Source, check_sources
-from plctool.compiler.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.semantics.conversions import SIGNED
+from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import Binary, BinaryOp, Call, Const, Pou, Statement, TypedProgram, Variable
 from plctool.compiler.types import BOOL, Elementary, Kind, StringType, Type, base_of, is_scalar
 

@@ -7,7 +7,7 @@ from back_support import POS, ProgramBuilder, binary, build, const, load, place
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.compiler.lower_unit import interface_signature
+from plctool.compiler.codegen.lower_unit import interface_signature
 from plctool.compiler.typed import (
     Area,
     ArrayInit,

@@ -291,5 +291,5 @@ def test_optimised_programs_do_the_same(seed: int, monkeypatch: pytest.MonkeyPat
     expected = outcome(Generator(seed).program(), 0)
     assert outcome(Generator(seed).program(), 2) == expected
     if seed % 6 == 0:
-        monkeypatch.setattr("plctool.compiler.partition._WHOLE", 100)
+        monkeypatch.setattr("plctool.compiler.codegen.partition._WHOLE", 100)
         assert outcome(Generator(seed).program(), 2) == expected

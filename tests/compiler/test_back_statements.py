@@ -9,8 +9,8 @@ from back_support import POS, ProgramBuilder, Running, binary, const, load, plac
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.compiler.lower_unit import ALL_CHECKS, Check
-from plctool.compiler.ranges import type_range
+from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
+from plctool.compiler.codegen.ranges import type_range
 from plctool.compiler.typed import (
     AddressOf,
     Assign,

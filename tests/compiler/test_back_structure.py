@@ -9,11 +9,11 @@ import pytest
 
 from plctool.compiler import load_sources
 from plctool.compiler.build import BuildResult, build_program
+from plctool.compiler.codegen.lower import lower
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.targets import find_target
 from plctool.compiler.front import check_sources
-from plctool.compiler.lower import lower
-from plctool.compiler.lower_unit import Options
 from plctool.compiler.source import Source
-from plctool.compiler.targets import find_target
 from plctool.compiler.typed import TypedProgram
 from plctool.image import parse_image
 from plctool.sim import Simulator

@@ -7,11 +7,11 @@ import struct
 import pytest
 from back_support import POS, ProgramBuilder, Running, binary, build, const, load, place
 
-from plctool.compiler.compiler_calls import COMPILER_CALLS
-from plctool.compiler.emit import emit_object
-from plctool.compiler.link import link
-from plctool.compiler.relocations import OutOfReach, stub
-from plctool.compiler.targets import TARGETS, Machine, Target, find_target
+from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
+from plctool.compiler.codegen.emit import emit_object
+from plctool.compiler.codegen.link import link
+from plctool.compiler.codegen.relocations import OutOfReach, stub
+from plctool.compiler.codegen.targets import TARGETS, Machine, Target, find_target
 from plctool.compiler.typed import (
     Area,
     Assign,
@@ -127,7 +127,7 @@ def test_a_large_program_is_compiled_in_parts(target: Target, monkeypatch: pytes
     sums: list[Statement] = [Assign(place(n), binary(BinaryOp.ADD, load(n), call), POS)]
     program = p.program()
     program.tasks[0].programs[:] = [Pou(f"P{k}", PouKind.PROGRAM, POS, body=sums * 5) for k in range(9)]
-    monkeypatch.setattr("plctool.compiler.partition._WHOLE", 40)
+    monkeypatch.setattr("plctool.compiler.codegen.partition._WHOLE", 40)
     built = build(program, target.name)
     assert {unit.name for unit in built.symbols.pous} == {"Small", *(f"P{k}" for k in range(9))}
     if target.name == "x86_64-linux":
@@ -137,7 +137,7 @@ def test_a_large_program_is_compiled_in_parts(target: Target, monkeypatch: pytes
 
 
 def test_parts_are_the_same_without_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("plctool.compiler.partition._WHOLE", 40)
+    monkeypatch.setattr("plctool.compiler.codegen.partition._WHOLE", 40)
     image = build(everything()).image
     monkeypatch.setattr("os.cpu_count", lambda: 1)
     assert build(everything()).image == image

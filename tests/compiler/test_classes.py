@@ -9,11 +9,11 @@ import pytest
 
 from plctool.compiler import compile_sources
 from plctool.compiler.build import BuildResult
+from plctool.compiler.codegen.lower import lower
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.targets import TARGETS, find_target
 from plctool.compiler.front import check_sources
-from plctool.compiler.lower import lower
-from plctool.compiler.lower_unit import Options
 from plctool.compiler.source import Source
-from plctool.compiler.targets import TARGETS, find_target
 from plctool.compiler.typed import TypedProgram
 from plctool.core import lib
 from plctool.errors import UsageError

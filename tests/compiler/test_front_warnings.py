@@ -195,7 +195,7 @@ def test_method_that_never_assigns_its_result_is_a_warning_but_not_fb_init() -> 
 def test_every_warning_of_the_compiler_has_a_name() -> None:
     """Whatever is reported as a warning can be turned off."""
     used: set[object] = set()
-    for path in Path(warnings.__file__).parent.glob("*.py"):
+    for path in Path(warnings.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             name = getattr(node.func, "attr", "") if isinstance(node, ast.Call) else ""
             if isinstance(node, ast.Call) and name in ("warning", "_warn"):

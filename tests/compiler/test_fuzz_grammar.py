@@ -13,10 +13,10 @@ from front_support import verify
 from test_back_random import meaningful
 
 from plctool.compiler.build import build_program
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.targets import find_target
 from plctool.compiler.diagnostics import render
 from plctool.compiler.front import CheckResult, Source, check_sources
-from plctool.compiler.lower_unit import Options
-from plctool.compiler.targets import find_target
 from plctool.compiler.typed import Area, TypedProgram
 from plctool.compiler.types import LREAL, REAL
 from plctool.core import ffi, lib

@@ -12,7 +12,7 @@ import pytest
 
 from plctool.compiler import check_sources, compile_sources
 from plctool.compiler.diagnostics import Diagnostic
-from plctool.compiler.literals import string, typed, unsigned
+from plctool.compiler.syntax.literals import string, typed, unsigned
 from plctool.compiler.types import ELEMENTARY, REAL
 from plctool.sim import Simulator
 from plctool.symbols import SymbolTable

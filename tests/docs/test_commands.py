@@ -109,7 +109,9 @@ def test_what_the_document_says_works(document: Path, reader: Reader) -> None:
             reader.run_python(text)
             continue
         if language.startswith("iecst"):  # a program that the reader saves under the name that is said
-            (reader.folder / language.split()[1]).write_text(text)
+            path = reader.folder / language.split()[1]
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
             continue
         for line in text.replace("\\\n", " ").splitlines():
             if line.strip():

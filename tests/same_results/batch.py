@@ -11,8 +11,8 @@ from pathlib import Path
 from runners import Runner
 
 from plctool.compiler.build import BuildResult, build_program
-from plctool.compiler.lower_unit import Options, parse_checks
-from plctool.compiler.targets import find_target
+from plctool.compiler.codegen.lower_unit import Options, parse_checks
+from plctool.compiler.codegen.targets import find_target
 from plctool.compiler.typed import Area, TypedProgram
 from plctool.core import ffi, lib
 from plctool.sim import Simulator

@@ -69,7 +69,7 @@ def check_with_tests(sources: Sequence[Source], warnings: WarningOptions | None 
         result = check_sources(sources, warnings=warnings or ALL_WARNINGS)
         if not result.has_tests:
             return result
-        from plctool.compiler.unit_tests import TestSuite
+        from plctool.compiler.semantics.unit_tests import TestSuite
 
         tests = check_sources(sources, tests=TestSuite(), warnings=warnings or ALL_WARNINGS)
     found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
@@ -93,11 +93,11 @@ def compile_sources(
     the compiler has a bug.
     """
     from plctool.compiler.build import build_program
+    from plctool.compiler.codegen.lower_unit import Options, parse_checks
+    from plctool.compiler.codegen.targets import find_target
     from plctool.compiler.diagnostics import render
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
-    from plctool.compiler.lower_unit import Options, parse_checks
-    from plctool.compiler.targets import find_target
     from plctool.compiler.warnings import ALL_WARNINGS
     from plctool.image import ApplicationInfo
 

@@ -6,15 +6,15 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from plctool.compiler.codegen.emit import emit_objects
+from plctool.compiler.codegen.link import Linked, link
+from plctool.compiler.codegen.lower import Lowered, lower
+from plctool.compiler.codegen.lower_classes import CLASS_NUMBER
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.targets import Machine, Target
 from plctool.compiler.diagnostics import Diagnostic
-from plctool.compiler.emit import emit_objects
 from plctool.compiler.garbage import no_collection
-from plctool.compiler.link import Linked, link
-from plctool.compiler.lower import Lowered, lower
-from plctool.compiler.lower_classes import CLASS_NUMBER
-from plctool.compiler.lower_unit import Options
 from plctool.compiler.nesting import room_for_nesting
-from plctool.compiler.targets import Machine, Target
 from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TypedProgram
 from plctool.core import lib
 from plctool.files import write_atomically

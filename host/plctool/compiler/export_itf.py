@@ -13,6 +13,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from plctool.compiler.semantics.units import interface_text
 from plctool.compiler.typed import Direction, Parameter, Pou
 from plctool.compiler.types import (
     ArrayType,
@@ -27,7 +28,6 @@ from plctool.compiler.types import (
     base_of,
     is_scalar,
 )
-from plctool.compiler.units import interface_text
 from plctool.errors import UsageError
 
 _C_WORDS = frozenset((

@@ -9,21 +9,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plctool.compiler.configuration import configure
 from plctool.compiler.diagnostics import Diagnostic, TooManyErrors, render
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.library import Library, standard_library
 from plctool.compiler.nesting import NestingError, room_for_nesting
-from plctool.compiler.overlaps import report_overlaps
-from plctool.compiler.parser import parse
+from plctool.compiler.semantics.configuration import configure
+from plctool.compiler.semantics.overlaps import report_overlaps
+from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
+from plctool.compiler.syntax.parser import parse
 from plctool.compiler.typed import Area, TypedProgram
 from plctool.compiler.types import MAX_SIZE
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
-from plctool.compiler.world import World
 
 if TYPE_CHECKING:
-    from plctool.compiler.unit_tests import TestSuite
+    from plctool.compiler.semantics.unit_tests import TestSuite
 
 __all__ = ["CheckResult", "Diagnostic", "Source", "check_sources", "render"]
 

@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from plctool.compiler.scope import Scope
+from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Pos
 from plctool.errors import InternalError, PlcError

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from plctool.compiler import ast
 from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.parser import parse
 from plctool.compiler.source import Source
+from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.parser import parse
 
 _FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
 _OPENING = re.compile(

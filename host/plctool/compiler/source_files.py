@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from plctool.compiler.lexer import Lexer
 from plctool.compiler.source import Source
+from plctool.compiler.syntax.lexer import Lexer
 from plctool.errors import UsageError
 
 SUFFIXES = frozenset((".st", ".exp", ".tcpou", ".tcgvl", ".tcdut", ".tcio"))

@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from plctool.compiler.lexer import Lexer
 from plctool.compiler.source import Source
+from plctool.compiler.syntax.lexer import Lexer
 from plctool.errors import UsageError
 
 WARNINGS = {

@@ -24,7 +24,7 @@ _CYCLES = "Main.n"
 
 def target_of(identity: Identity) -> str:
     """The target that plctool compiles for a controller. Raises UsageError when there is none."""
-    from plctool.compiler.targets import TARGETS
+    from plctool.compiler.codegen.targets import TARGETS
 
     for target in TARGETS.values():
         if getattr(lib, target.device_id) == identity.target_id:

@@ -1,0 +1,1 @@
+"""Typed program to LLVM IR, object, and linked code of one target."""

@@ -1,0 +1,92 @@
+"""From LLVM IR in text form to one ELF object: llvmlite parses, verifies, optimises and emits."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+
+import llvmlite.binding as llvm
+
+from plctool.compiler.codegen.targets import Target
+
+
+@cache
+def _initialise() -> None:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    # How far back an earlier load of a variable is looked for. What is loaded once and used far apart has to be kept
+    # on the stack, which costs more than to load it again.
+    llvm.set_option("", "-memdep-block-scan-limit=30")
+
+
+def target_machine(target: Target, opt_level: int) -> llvm.TargetMachine:
+    """LLVM's code generator for a target."""
+    _initialise()
+    return llvm.Target.from_triple(target.triple).create_target_machine(
+        cpu=target.cpu, features=target.features, opt=opt_level, reloc="pic", codemodel="small", abiname=target.abi
+    )
+
+
+def optimised(text: str, target: Target, opt_level: int) -> tuple[llvm.ModuleRef, llvm.TargetMachine]:
+    """The module after LLVM's standard pipeline of the level."""
+    machine = target_machine(target, opt_level)
+    module = llvm.parse_assembly(text, llvm.create_context())
+    module.verify()
+    options = llvm.create_pipeline_tuning_options(speed_level=opt_level)
+    options.loop_vectorization = opt_level >= 2
+    options.slp_vectorization = opt_level >= 3  # slow, and seldom of use for what programs of controllers do
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    return module, machine
+
+
+def emit_object(text: str, target: Target, opt_level: int) -> bytes:
+    """The ELF object of a module. A module that LLVM refuses is a bug of the lowering and raises RuntimeError."""
+    module, machine = optimised(text, target, opt_level)
+    data: bytes = machine.emit_object(module)
+    return data
+
+
+def emit_objects(texts: list[str], target: Target, opt_level: int) -> list[bytes]:
+    """The objects of several modules, side by side in processes of their own where the system can fork; the result is
+    the same either way."""
+    if len(texts) == 1 or not hasattr(os, "fork") or (os.cpu_count() or 1) < 2:
+        return [emit_object(text, target, opt_level) for text in texts]
+    _initialise()
+    children = [_Child(text, target, opt_level) for text in texts[1:]]
+    objects = [emit_object(texts[0], target, opt_level)]
+    for text, child in zip(texts[1:], children, strict=True):
+        objects.append(child.result() or emit_object(text, target, opt_level))
+    return objects
+
+
+class _Child:
+    """A process that emits one object. A process, because llvmlite lets only one thread at a time into LLVM."""
+
+    def __init__(self, text: str, target: Target, opt_level: int) -> None:
+        read, write = os.pipe()
+        self._pid = os.fork()
+        if self._pid == 0:
+            status = 1
+            try:
+                with open(write, "wb") as pipe:
+                    pipe.write(emit_object(text, target, opt_level))
+                status = 0
+            finally:
+                os._exit(status)
+        os.close(write)
+        self._read = read
+
+    def result(self) -> bytes:
+        """The object; empty when the process failed, which it then also does here, with a message."""
+        with open(self._read, "rb") as pipe:
+            data = pipe.read()
+        _, status = os.waitpid(self._pid, 0)
+        return data if status == 0 else b""
+
+
+def emit_assembly(text: str, target: Target, opt_level: int) -> str:
+    """What `emit_object` makes, for people."""
+    module, machine = optimised(text, target, opt_level)
+    assembly: str = machine.emit_assembly(module)
+    return assembly

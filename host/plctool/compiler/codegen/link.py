@@ -1,0 +1,271 @@
+"""The linker: one ELF object becomes one block of position independent code and constants without relocations.
+
+Sections that are reached from the entries are laid out one behind the other, PC-relative relocations between them are
+applied, everything else (writable data, absolute addresses, undefined symbols) is refused with an error that names it.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from elftools.elf.elffile import ELFFile
+
+from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
+from plctool.compiler.codegen.line_table import Line, in_order, read_line_table
+from plctool.compiler.codegen.relocations import (
+    AARCH64_ADRP,
+    AARCH64_LOW12,
+    APPLY,
+    LINE_ADDRESS,
+    RISCV_HIGH,
+    RISCV_LOW,
+    OutOfReach,
+    Relocation,
+    stub,
+    thumb_addend,
+)
+from plctool.compiler.codegen.targets import Machine, Target
+from plctool.compiler.typed import External
+from plctool.compiler.types import align_up
+from plctool.errors import UsageError
+
+_WRITABLE, _ALLOCATED, _EXECUTABLE = 1, 2, 4
+_DROPPED = (".ARM.exidx", ".ARM.extab", ".eh_frame")
+_FUNCTION = 2  # STT_FUNC
+_RELAX_HINT = 51  # R_RISCV_RELAX: nothing to do
+_THUMBS = (Machine.THUMB, Machine.THUMB_V6M)
+
+
+@dataclass(frozen=True)
+class LinkedSymbol:
+    """A function or constant of the block: byte offset (of the instruction, without a Thumb bit) and size."""
+
+    offset: int
+    size: int
+
+
+@dataclass(frozen=True)
+class Linked:
+    """`code`: the block. `lines`: sorted by address, an address being an offset in the block. `imports`: the compiler
+    calls that got a stub, in the order of their slots, starting with `first_slot`."""
+
+    code: bytes
+    symbols: dict[str, LinkedSymbol]
+    lines: list[Line]
+    imports: list[External]
+
+
+@dataclass(frozen=True)
+class _ElfSymbol:
+    name: str
+    section: int  # index in `_Linker`; 0 when undefined
+    value: int
+    size: int
+    kind: int
+    is_global: bool
+
+
+@dataclass
+class _Section:
+    name: str
+    data: bytes
+    flags: int
+    align: int
+    relocations: list[tuple[int, int, _ElfSymbol, int]]  # offset, kind, symbol, addend
+    offset: int = -1  # in the block; -1 when it is not part of it
+
+
+def link(objects: Sequence[bytes], target: Target, roots: Sequence[str], first_slot: int) -> Linked:
+    """Links the objects of one program. `roots`: symbols that have to be in the block. `first_slot`: the first free
+    import slot.
+
+    Raises UsageError naming what cannot be linked.
+    """
+    return _Linker(objects, target, first_slot).run(roots)
+
+
+class _Linker:
+    def __init__(self, objects: Sequence[bytes], target: Target, first_slot: int) -> None:
+        self._target = target
+        self._first_slot = first_slot
+        self._sections: list[_Section] = []
+        self._symbols: list[_ElfSymbol] = []
+        for data in objects:
+            sections, symbols = _read_elf(data, target, len(self._sections))
+            self._sections += sections
+            self._symbols += symbols
+        self._defined = {s.name: s for s in self._symbols if s.section and s.is_global}
+        self._stubs: dict[str, int] = {}  # offset in the block, by name, in the order of slots
+
+    def run(self, roots: Sequence[str]) -> Linked:
+        used = self._reach({self._defined[name].section for name in roots})
+        code = self._lay_out(used)
+        self._add_stubs(code, used)
+        for index in used:
+            self._apply(code, self._sections[index])
+        symbols = {
+            s.name: LinkedSymbol(self._address(s), s.size)
+            for s in self._symbols
+            if s.section in used and s.name and not s.name.startswith((".", "$"))
+        }
+        imports = [COMPILER_CALLS[name] for name in self._stubs]
+        return Linked(bytes(code), symbols, self._lines(), imports)
+
+    def _reach(self, start: set[int]) -> list[int]:
+        """The sections that the given ones refer to, directly or not, code first."""
+        found, todo = set(start), list(start)
+        while todo:
+            section = self._sections[todo.pop()]
+            for _, _, symbol, _ in section.relocations:
+                index = self._resolved(symbol).section
+                if index and index not in found:
+                    found.add(index)
+                    todo.append(index)
+        for index in found:
+            section = self._sections[index]
+            if section.flags & _WRITABLE or not section.flags & _ALLOCATED:
+                raise UsageError(
+                    f"The program needs the writable section {section.name}, which the image has no room for; "
+                    "please report this as a bug of plctool.",
+                    "link",
+                )
+        return sorted(found, key=lambda i: (not self._sections[i].flags & _EXECUTABLE, i))
+
+    def _lay_out(self, used: list[int]) -> bytearray:
+        code = bytearray()
+        for index in used:
+            section = self._sections[index]
+            code += bytes(align_up(len(code), section.align) - len(code))
+            section.offset = len(code)
+            code += section.data
+        return code
+
+    def _add_stubs(self, code: bytearray, used: list[int]) -> None:
+        """A jump through the import table for every compiler call."""
+        wanted = (self._resolved(symbol) for i in used for _, _, symbol, _ in self._sections[i].relocations)
+        names = sorted({symbol.name for symbol in wanted if not symbol.section})
+        unknown = [name for name in names if not self._target.stubs or name not in COMPILER_CALLS]
+        if unknown:
+            raise UsageError(
+                f"The target {self._target.name} has no {', '.join(unknown)}, which the program needs.",
+                "undefined-symbol",
+            )
+        for slot, name in enumerate(names, self._first_slot):
+            code += bytes(align_up(len(code), 4) - len(code))
+            self._stubs[name] = len(code)
+            code += stub(self._target.machine, slot)
+
+    def _resolved(self, symbol: _ElfSymbol) -> _ElfSymbol:
+        """The definition, which may be in another object, or the symbol itself when there is none."""
+        return symbol if symbol.section else self._defined.get(symbol.name, symbol)
+
+    def _address(self, symbol: _ElfSymbol) -> int:
+        symbol = self._resolved(symbol)
+        if not symbol.section:
+            return self._stubs[symbol.name]
+        value = symbol.value & ~1 if symbol.kind == _FUNCTION and self._target.machine in _THUMBS else symbol.value
+        return self._sections[symbol.section].offset + value
+
+    def _apply(self, code: bytearray, section: _Section) -> None:
+        table = APPLY[self._target.machine]
+        high = {
+            section.offset + offset: self._address(symbol) + addend
+            for offset, kind, symbol, addend in section.relocations
+            if kind == RISCV_HIGH and self._target.machine is Machine.RISCV32
+        }
+        self._check_pages(section)
+        for offset, kind, symbol, addend in section.relocations:
+            if self._target.machine is Machine.RISCV32 and kind == _RELAX_HINT:
+                continue
+            symbol = self._resolved(symbol)
+            target = self._address(symbol)
+            paired = high[target] if self._target.machine is Machine.RISCV32 and kind in RISCV_LOW else 0
+            function = symbol.kind == _FUNCTION or not symbol.section
+            apply = table.get(kind)
+            if apply is None:
+                raise UsageError(
+                    f"Relocation type {kind} against '{symbol.name}' in {section.name} is not position independent; "
+                    "please report this as a bug of plctool.",
+                    "link",
+                )
+            try:
+                apply(code, Relocation(section.offset + offset, target, addend, function, paired))
+            except OutOfReach:
+                raise UsageError(
+                    f"The program is too large for {self._target.name}: '{symbol.name}' is out of reach of its caller.",
+                    "too-large",
+                ) from None
+
+    def _check_pages(self, section: _Section) -> None:
+        """AArch64: every low part must have the ADRP of exactly its target, which becomes an ADR."""
+        if self._target.machine is not Machine.AARCH64:
+            return
+        pages = {(r[2], r[3]) for r in section.relocations if r[1] == AARCH64_ADRP}
+        for _, kind, symbol, addend in section.relocations:
+            if kind in AARCH64_LOW12 and (symbol, addend) not in pages:
+                raise UsageError(
+                    f"A reference to '{symbol.name}' shares its page address with another one; "
+                    "please report this as a bug of plctool.",
+                    "link",
+                )
+
+    def _lines(self) -> list[Line]:
+        """The line tables of the sections in the block."""
+        rows: list[Line] = []
+        width = 8 if self._target.pointer_size == 8 else 4
+        for section in self._sections:
+            if section.name != ".debug_line":
+                continue
+            data = bytearray(section.data)
+            for offset, kind, symbol, addend in section.relocations:
+                if kind == LINE_ADDRESS[self._target.machine]:
+                    inside = self._sections[symbol.section].offset >= 0
+                    address = self._address(symbol) + addend if inside else -1
+                    data[offset : offset + width] = (address & ((1 << 8 * width) - 1)).to_bytes(width, "little")
+            rows += (line for line in read_line_table(bytes(data)) if line.address < 1 << 31)
+        return in_order(rows)
+
+
+def _read_elf(data: bytes, target: Target, base: int) -> tuple[list[_Section], list[_ElfSymbol]]:
+    """`base`: index of the first section; symbols refer to sections by index."""
+    elf = ELFFile(io.BytesIO(data))
+    wide = target.pointer_size == 8
+    sections: list[_Section] = []
+    symbols: list[_ElfSymbol] = []
+    for s in elf.iter_sections():
+        body = b"" if s["sh_type"] == "SHT_NOBITS" or s.name.startswith(_DROPPED) else s.data()
+        sections.append(_Section(s.name, body, s["sh_flags"], max(s["sh_addralign"], 1), []))
+    for s in elf.iter_sections():
+        if s["sh_type"] == "SHT_SYMTAB":
+            symbols = _read_symbols(s.data(), elf.get_section(s["sh_link"]).data(), len(sections), base, wide)
+    for s in elf.iter_sections():
+        owner = sections[s["sh_info"]] if s["sh_type"] in ("SHT_REL", "SHT_RELA") else None
+        if owner is not None and owner.data and (owner.flags & _ALLOCATED or owner.name == ".debug_line"):
+            entries = _read_relocations(s.data(), s["sh_type"] == "SHT_RELA", wide, owner.data)
+            owner.relocations = [(offset, kind, symbols[number], addend) for offset, kind, number, addend in entries]
+    return sections, symbols
+
+
+def _read_symbols(data: bytes, names: bytes, section_count: int, base: int, wide: bool) -> list[_ElfSymbol]:
+    symbols = []
+    for fields in struct.iter_unpack("<IBBHQQ" if wide else "<IIIBBH", data):
+        if wide:
+            name, info, _, section, value, size = fields
+        else:
+            name, value, size, info, _, section = fields
+        text = names[name : names.index(0, name)].decode()
+        index = base + section if 0 < section < section_count else 0
+        symbols.append(_ElfSymbol(text, index, value, size, info & 15, info >> 4 == 1))
+    return symbols
+
+
+def _read_relocations(data: bytes, explicit: bool, wide: bool, body: bytes) -> list[tuple[int, int, int, int]]:
+    """(offset, kind, symbol, addend) of each entry."""
+    if wide:
+        return [(o, i & 0xFFFFFFFF, i >> 32, a) for o, i, a in struct.iter_unpack("<QQq", data)]
+    if explicit:
+        return [(o, i & 0xFF, i >> 8, a) for o, i, a in struct.iter_unpack("<IIi", data)]
+    return [(o, i & 0xFF, i >> 8, thumb_addend(body, o, i & 0xFF)) for o, i in struct.iter_unpack("<II", data)]

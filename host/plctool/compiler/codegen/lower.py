@@ -1,0 +1,141 @@
+"""From the typed program to LLVM IR: one module with an external function per task and one for initialisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from plctool.compiler.codegen.analysis import Effects
+from plctool.compiler.codegen.ir import Function
+from plctool.compiler.codegen.lower_classes import renumber, write_dispatcher
+from plctool.compiler.codegen.lower_frame import Ref, string_capacity
+from plctool.compiler.codegen.lower_helpers import MEMORY_FUNCTIONS, memory_functions, string_helper
+from plctool.compiler.codegen.lower_init import Initialising
+from plctool.compiler.codegen.lower_stmt import Body
+from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
+from plctool.compiler.codegen.partition import texts
+from plctool.compiler.codegen.sections import sections
+from plctool.compiler.codegen.signatures import handed_inputs, parameter_list
+from plctool.compiler.typed import Area, External, Pou, Task, TypedProgram, Variable
+from plctool.compiler.types import BOOL, is_scalar
+from plctool.core import lib
+
+GLOBAL_INIT = "global_init"
+GLOBAL_EXIT = "global_exit"
+
+
+@dataclass(frozen=True)
+class Lowered:
+    """LLVM IR, in parts to be compiled each by itself, and what an image of it needs. `tasks`: entry symbols
+    in the order of the program's tasks; `functions`: those the runtime calls besides, by CDL_FUNCTION_...; `pous`: by
+    symbol, all that are part of it; `imports`: in the order of their slots."""
+
+    texts: list[str]
+    tasks: list[str]
+    functions: dict[int, str]
+    pous: dict[str, Pou]
+    imports: list[External]
+
+
+def lower(program: TypedProgram, options: Options) -> Lowered:
+    """Lowers what the tasks of a checked program reach."""
+    unit = Unit(options, program.area_sizes, program.defaults)
+    unit.handed = handed_inputs(program, options.target)
+    tasks = [_task_entry(unit, number, task) for number, task in enumerate(program.tasks)]
+    _global_init(unit, program.globals, program.startup)
+    functions = {int(lib.CDL_FUNCTION_GLOBAL_INIT): GLOBAL_INIT}
+    if program.shutdown is not None:
+        _global_exit(unit, program.shutdown)
+        functions[int(lib.CDL_FUNCTION_GLOBAL_EXIT)] = GLOBAL_EXIT
+    effects = Effects()
+    done = chosen = 0
+    while done < len(unit.pous) or chosen < len(unit.dispatchers):
+        if done < len(unit.pous):
+            _pou(unit, list(unit.pous)[done], effects)
+            done += 1
+        else:
+            dispatch, name = list(unit.dispatchers.items())[chosen]
+            write_dispatcher(unit, name, dispatch)
+            chosen += 1
+    _struct_initialisers(unit)
+    for name in sorted(unit.helpers):
+        unit.module.add_helper(string_helper(name, unit.target, unit.strings))
+    unit.module.add_helper(memory_functions(unit.target, unit.smallest))
+    for name in MEMORY_FUNCTIONS:
+        unit.module.keep(name)
+    pous = {name: pou for pou, name in unit.pous.items()}
+    return Lowered(texts(unit.module), tasks, functions, pous, unit.imports)
+
+
+def _task_entry(unit: Unit, number: int, task: Task) -> str:
+    """Calls the programs of a task in order."""
+    name = f"task.{number}"
+    fn = Function(f"void @{name}(ptr noalias nonnull readonly %ctx)", unit.plain)
+    for pou in task.programs:
+        fn.do(f"call void @{unit.symbol(pou)}(ptr %ctx)")
+    fn.terminate("ret void")
+    unit.module.add(name, fn, linkage="")
+    return name
+
+
+def _pou(unit: Unit, pou: Pou, effects: Effects) -> None:
+    result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
+    signature = f"{result} @{unit.symbol(pou)}({parameter_list(pou, unit.handed)})"
+    fn = Function(signature, unit.attributes(pou), unit.inlining(pou))
+    body = Body(unit, fn, pou, effects)
+    body.open_scope(pou.name, pou.pos)
+    parts = sections(pou)
+    if len(parts) > 1:
+        body.write_calls([unit.section(part) for part in parts])
+    else:
+        body.write()
+    unit.module.add(unit.symbol(pou), fn)
+
+
+def _global_init(unit: Unit, variables: list[Variable], startup: Pou | None) -> None:
+    fn = Function(f"void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains)", unit.plain)
+    frame = Initialising(unit, fn, None)
+    _initialise_area(frame, variables, (Area.DATA, Area.OUTPUT, Area.MEMORY, Area.INPUT))
+    if any(v.area is Area.RETAIN for v in variables):
+        retains, kept, end = fn.label("retains"), fn.label("kept"), fn.label("end")
+        fn.branch_if(fn.value("icmp ne i32 %init_retains, 0"), retains, kept)
+        fn.begin(retains)
+        _initialise_area(frame, variables, (Area.RETAIN,))
+        fn.branch(end)
+        fn.begin(kept)
+        for var in variables:
+            if var.area is Area.RETAIN:
+                renumber(frame, Ref(frame.area_base(var.area), var.offset, var.type, direct=True))
+        fn.begin(end)
+    if startup is not None:
+        flag = fn.value("icmp ne i32 %init_retains, 0")
+        text = value_type(BOOL)
+        operand = flag if text == "i1" else fn.value(f"zext i1 {flag} to {text}")
+        fn.do(f"call void @{unit.symbol(startup)}(ptr %ctx, {text} {operand})")
+    fn.terminate("ret void")
+    unit.module.add(GLOBAL_INIT, fn, linkage="")
+
+
+def _global_exit(unit: Unit, shutdown: Pou) -> None:
+    fn = Function(f"void @{GLOBAL_EXIT}(ptr noalias nonnull readonly %ctx)", unit.plain)
+    fn.do(f"call void @{unit.symbol(shutdown)}(ptr %ctx)")
+    fn.terminate("ret void")
+    unit.module.add(GLOBAL_EXIT, fn, linkage="")
+
+
+def _initialise_area(frame: Initialising, variables: list[Variable], areas: tuple[Area, ...]) -> None:
+    for var in variables:
+        if var.area in areas:
+            ref = Ref(frame.area_base(var.area), var.offset, var.type, direct=True, capacity=string_capacity(var.type))
+            frame.initialise(ref, var.initial)
+
+
+def _struct_initialisers(unit: Unit) -> None:
+    done = 0
+    while done < len(unit.structs):
+        name, struct = list(unit.structs.items())[done]
+        fn = Function(f"void @{name}(ptr nonnull %self)", unit.plain)
+        frame = Initialising(unit, fn, None)
+        frame.initialise_members(Ref("%self", 0, struct, direct=True), struct, None)
+        fn.terminate("ret void")
+        unit.module.add(name, fn)
+        done += 1

@@ -1,0 +1,87 @@
+"""Calls whose target depends on the class of the instance: one small function each, that looks at the class number and
+goes on to the right method. Only direct calls result: LLVM can inline them, and the image needs no table of addresses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from plctool.compiler.codegen.ir import Function
+from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame, Ref
+from plctool.compiler.codegen.lower_init import Initialising, struct_members
+from plctool.compiler.codegen.lower_unit import Unit, value_type
+from plctool.compiler.codegen.signatures import parameter_list
+from plctool.compiler.typed import Dispatch, ScalarInit
+from plctool.compiler.types import UDINT, ArrayType, StructType, Type, is_scalar
+
+CLASS_NUMBER = "%class"
+
+
+def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
+    """The function `name`, which has the parameters of its targets. An instance of another class was reached through a
+    wrong pointer."""
+    pou = dispatch.function
+    result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
+    parameters = parameter_list(pou, unit.handed)
+    fn = Function(f"{result} @{name}({parameters})", unit.plain)
+    frame = Frame(unit, fn, None)
+    frame.open_scope(pou.name, pou.pos)
+    arguments = _arguments(parameters)
+    by_symbol: dict[str, list[int]] = {}
+    for number, target in dispatch.targets.items():
+        by_symbol.setdefault(unit.symbol(target), []).append(number)
+    loaded = fn.value(f"load i32, ptr %self, align 4{unit.tag(CLASS_NUMBER)}")
+    labels = {symbol: fn.label("class") for symbol in by_symbol}
+    unknown = fn.label("unknown")
+    cases = " ".join(f"i32 {n}, label %{labels[s]}" for s, numbers in by_symbol.items() for n in numbers)
+    fn.terminate(f"switch i32 {loaded}, label %{unknown} [ {cases} ]")
+    for symbol, label in labels.items():
+        fn.begin_detached(label)
+        if result == "void":
+            fn.do(f"tail call void @{symbol}({arguments})")
+            fn.terminate("ret void")
+        else:
+            fn.terminate(f"ret {result} {fn.value(f'tail call {result} @{symbol}({arguments})')}")
+    fn.begin_detached(unknown)
+    frame.require("false", ACCESS_VIOLATION, pou.pos)
+    fn.terminate("unreachable")
+    frame.write_raises()
+    unit.module.add(name, fn)
+
+
+def _arguments(parameters: str) -> str:
+    """The arguments that hand all parameters on: types and names without attributes."""
+    words = (p.split() for p in parameters.split(", "))
+    return ", ".join(f"{w[0]} {w[-1]}" for w in words)
+
+
+def renumber(frame: Initialising, ref: Ref) -> None:
+    """Writes the class numbers of all instances in a variable that keeps its other values: a new program may have
+    numbered its classes anew."""
+    t = ref.type
+    if isinstance(t, ArrayType):
+        if has_number(frame.unit, t.element):
+            for n in range(t.count):
+                renumber(frame, ref.member(n * t.element.size, t.element))
+    elif isinstance(t, StructType):
+        for f, value in struct_members(frame.unit, t, None):
+            if f.name == CLASS_NUMBER and isinstance(value, ScalarInit):
+                frame.store(ref.member(f.offset, UDINT), str(value.value))
+            else:
+                renumber(frame, ref.member(f.offset, f.type))
+
+
+def has_number(unit: Unit, t: Type) -> bool:
+    """Whether a type holds instances with class numbers."""
+    return any(True for _ in _numbers(unit, t))
+
+
+def _numbers(unit: Unit, t: Type) -> Iterator[int]:
+    if isinstance(t, ArrayType):
+        yield from _numbers(unit, t.element)
+    elif isinstance(t, StructType):
+        for f in t.fields:
+            if f.name == CLASS_NUMBER:
+                yield f.offset
+            else:
+                yield from _numbers(unit, f.type)

@@ -1,0 +1,244 @@
+"""The function being written: its context, its memory, its run-time checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from plctool.compiler.codegen.ir import Function
+from plctool.compiler.codegen.lower_unit import RAISE, Check, Unit, value_type
+from plctool.compiler.typed import Area, Pos, Pou, Variable
+from plctool.compiler.types import Elementary, StringType, Type, base_of, is_scalar
+from plctool.core import ffi, lib
+
+_FUNCTION_WIDE = ("%self", "%result", "%p", "%m", "%s")  # parameters and stack memory, by the names `ir` and we give
+TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)
+
+
+@dataclass(frozen=True, slots=True)
+class Ref:
+    """An address in the generated code: `pointer` plus `offset` bytes, holding a `type`.
+
+    `tag`: alias tag or "". `direct`: reached by name only, not through a pointer. `capacity`: of a STRING
+    [characters], as an i32 operand. `bit`: the bit of an integer that a BOOL lives in, -1 for none; `type` is then that
+    integer's. `loose`: a character that may never have been written (behind the NUL).
+    """
+
+    pointer: str
+    offset: int
+    type: Type
+    tag: str = ""
+    direct: bool = False
+    capacity: str = ""
+    bit: int = -1
+    loose: bool = False
+
+    def member(self, offset: int, t: Type, tag: str = "") -> Ref:
+        """A part of it, `offset` bytes further on."""
+        return Ref(self.pointer, self.offset + offset, t, tag, self.direct, string_capacity(t))
+
+
+def string_capacity(t: Type) -> str:
+    return str(t.length) if isinstance(t, StringType) else ""
+
+
+class Frame:
+    """State of the function being written and access to memory and context."""
+
+    def __init__(self, unit: Unit, fn: Function, pou: Pou | None) -> None:
+        """`pou`: None for functions that have no source."""
+        self.unit = unit
+        self.fn = fn
+        self.pou = pou
+        self.checks = unit.options.checks if pou is None or pou.checks else frozenset[Check]()
+        self.locals: dict[Variable, Ref] = {}
+        self.shadows: dict[Variable, str] = {}  # FOR variables that live in a register inside their loop
+        self.ranges: dict[Variable, tuple[int, int]] = {}
+        self._bases: dict[Area, str] = {}
+        self._addresses: dict[tuple[str, str, int], str] = {}  # by block, so that none lives longer than it must
+        self._fixed: set[str] = set()  # area bases: pointers that hold in the whole function
+        self._raises: dict[tuple[int, str], str] = {}
+        self._free: dict[tuple[int, int], list[str]] = {}
+        self._busy: list[tuple[tuple[int, int], str]] = []
+        self._pointer_int = f"i{8 * unit.target.pointer_size}"
+
+    def open_scope(self, name: str, pos: Pos) -> None:
+        """Starts line information."""
+        self.fn.scope = self.unit.subprogram(name, pos)
+        self.at(pos)
+
+    def at(self, pos: Pos) -> None:
+        """What is written from now on belongs to the line of `pos`."""
+        if self.fn.scope >= 0:
+            self.fn.debug = self.unit.location(pos.line, self.fn.scope)
+
+    # ---- context ----
+
+    def context_load(self, offset: int, llvm_type: str, extra: str = "") -> str:
+        """A load from the context at the start of the function."""
+        address = self.fn.prologue(f"getelementptr inbounds i8, ptr %ctx, i64 {offset}")
+        return self.fn.prologue(f"load {llvm_type}, ptr {address}{extra}, !invariant.load !{self.unit.empty}")
+
+    def area_base(self, area: Area) -> str:
+        base = self._bases.get(area)
+        if base is None:
+            metadata = self.unit.module.metadata
+            size = metadata(f"!{{i64 {max(self.unit.area_sizes.get(area, 0), 1)}}}")
+            facts = f", !nonnull !{self.unit.empty}, !align !{metadata('!{i64 8}')}, !dereferenceable !{size}"
+            offset = self.unit.area_offset + area.value * self.unit.target.pointer_size
+            base = self.context_load(offset, "ptr", facts)
+            self._bases[area] = base
+            self._fixed.add(base)
+        return base
+
+    def import_function(self, slot: int) -> str:
+        """The address of import `slot`, loaded here."""
+        fn, size = self.fn, self.unit.target.pointer_size
+        invariant = f"!invariant.load !{self.unit.empty}"
+        table = fn.value(f"getelementptr inbounds i8, ptr %ctx, i64 {self.unit.imports_offset}")
+        base = fn.value(f"load ptr, ptr {table}, {invariant}")
+        entry = fn.value(f"getelementptr inbounds i8, ptr {base}, i64 {slot * size}")
+        return fn.value(f"load ptr, ptr {entry}, {invariant}")
+
+    # ---- checks ----
+
+    def require(self, condition: str, code: int, pos: Pos) -> None:
+        """Raises RTSEXCPT_* `code` unless the i1 `condition` holds."""
+        keep = self.fn.debug
+        self.at(pos)
+        key = (code, self.fn.debug)
+        label = self._raises.get(key)
+        if label is None:
+            label = self.fn.label("raise")
+            self._raises[key] = label
+        self.fn.debug = keep
+        ok = self.fn.label("ok")
+        self.fn.branch_if(condition, ok, label)
+        self.fn.begin(ok)
+
+    def write_raises(self) -> None:
+        """Writes the cold blocks at the end of the function."""
+        fn, unit = self.fn, self.unit
+        for (code, debug), label in self._raises.items():
+            fn.debug = debug
+            fn.begin_detached(label)
+            target = self.import_function(unit.import_slot(RAISE))
+            fn.do(f"call void {target}(i32 {code}) {unit.raising}")
+            fn.terminate("unreachable")
+
+    # ---- memory ----
+
+    def address(self, ref: Ref) -> str:
+        """The pointer to `ref`."""
+        if ref.offset == 0:
+            return ref.pointer
+        key = (self.fn.block, ref.pointer, ref.offset)
+        known = self._addresses.get(key)
+        if known is None:
+            sure = ref.pointer in self._fixed or ref.pointer.startswith(_FUNCTION_WIDE)
+            flag = "inbounds " if sure else ""
+            known = self.fn.value(f"getelementptr {flag}i8, ptr {ref.pointer}, {self._pointer_int} {ref.offset}")
+            self._addresses[key] = known
+        return known
+
+    def element(self, ref: Ref, index: str, t: Type, *, counted: bool) -> Ref:
+        """Element `index` (pointer-sized integer) of the array of `t` at `ref`. `counted`: it is known to be within."""
+        flags = "inbounds nuw " if counted and ref.offset >= 0 else ""
+        pointer = self.fn.value(
+            f"getelementptr {flags}[{t.size} x i8], ptr {self.address(ref)}, {self._pointer_int} {index}"
+        )
+        return replace(ref, pointer=pointer, offset=0, type=t, capacity=string_capacity(t))
+
+    def load(self, ref: Ref) -> str:
+        """The scalar at `ref`."""
+        fn = self.fn
+        text = value_type(ref.type)
+        value = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.type.align}{ref.tag}")
+        if ref.loose:
+            return fn.value(f"freeze {text} {value}")
+        if ref.bit >= 0:
+            shifted = fn.value(f"lshr {text} {value}, {ref.bit}")
+            bit = shifted if text == "i8" else fn.value(f"trunc {text} {shifted} to i8")
+            return fn.value(f"and i8 {bit}, 1")
+        return value
+
+    def store(self, ref: Ref, value: str) -> None:
+        """Stores a scalar."""
+        fn = self.fn
+        text = value_type(ref.type)
+        address = self.address(ref)
+        if ref.bit >= 0:
+            value = self._with_bit(ref, text, value)
+        fn.do(f"store {text} {value}, ptr {address}, align {ref.type.align}{ref.tag}")
+        if text == "ptr" and self.unit.target.pointer_size == 4:  # pointers take 8 bytes in memory on every target
+            upper = self.address(replace(ref, offset=ref.offset + 4))
+            fn.do(f"store i32 0, ptr {upper}, align 4{ref.tag}")
+
+    def _with_bit(self, ref: Ref, text: str, value: str) -> str:
+        fn = self.fn
+        base = base_of(ref.type)
+        assert isinstance(base, Elementary)
+        mask = 1 << ref.bit
+        old = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.type.align}{ref.tag}")
+        if value == "1":
+            return fn.value(f"or {text} {old}, {mask}")
+        cleared = fn.value(f"and {text} {old}, {~mask}")
+        if value == "0":
+            return cleared
+        wide = fn.value(f"and i8 {value}, 1")
+        if text != "i8":
+            wide = fn.value(f"zext i8 {wide} to {text}")
+        return fn.value(f"or disjoint {text} {cleared}, {fn.value(f'shl {text} {wide}, {ref.bit}')}")
+
+    def copy(self, target: Ref, source: Ref, size: int) -> None:
+        """Copies `size` bytes between places that are the same or do not overlap."""
+        if size:
+            align = min(target.type.align, source.type.align)
+            name, size_type = "memcpy" if target.direct and source.direct else "memmove", self._pointer_int
+            self.fn.do(
+                f"call void @llvm.{name}.p0.p0.{size_type}(ptr align {align} {self.address(target)}, "
+                f"ptr align {align} {self.address(source)}, {size_type} {size}, i1 false)"
+            )
+
+    def clear(self, ref: Ref) -> None:
+        """Zeroes a place."""
+        if is_scalar(ref.type):
+            self.store(ref, zero(ref.type))
+            return
+        size_type = self._pointer_int
+        self.fn.do(
+            f"call void @llvm.memset.p0.{size_type}(ptr align {ref.type.align} {self.address(ref)}, i8 0, "
+            f"{size_type} {ref.type.size}, i1 false)"
+        )
+
+    # ---- temporaries ----
+
+    def temporary(self, t: Type) -> Ref:
+        """Memory for a value of `t` until the next statement; contents undefined."""
+        if is_scalar(t):
+            return Ref(self.fn.slot(value_type(t)), 0, t, direct=True)
+        key = (t.size, t.align)
+        free = self._free.setdefault(key, [])
+        pointer = free.pop() if free else self.fn.alloca(*key)
+        self._busy.append((key, pointer))
+        return Ref(pointer, 0, t, direct=True, capacity=string_capacity(t))
+
+    def release_temporaries(self) -> None:
+        """Called between statements."""
+        for key, pointer in self._busy:
+            self._free[key].append(pointer)
+        self._busy.clear()
+
+
+def zero(t: Type) -> str:
+    """The zero of a scalar type as an LLVM constant."""
+    text = value_type(t)
+    if text == "ptr":
+        return "null"
+    return "0.0" if text in ("float", "double") else "0"
+
+
+DIVIDE_BY_ZERO = int(lib.RTSEXCPT_DIVIDEBYZERO)
+ARRAY_BOUNDS = int(lib.RTSEXCPT_ARRAYBOUNDS)
+ACCESS_VIOLATION = int(lib.RTSEXCPT_ACCESS_VIOLATION)
+TIME_MS_OFFSET = int(ffi.offsetof("IEC_CONTEXT", "time_ms"))
+TIME_NS_OFFSET = int(ffi.offsetof("IEC_CONTEXT", "time_ns"))

@@ -1,0 +1,159 @@
+"""Initial values: of local variables at every call, of everything else in GlobalInit.
+
+Memory is zeroed before, so only what is not zero is written. A struct or function block type with defaults gets one
+function that writes them; arrays are filled by loops; runs of different numbers are copied from a constant in the
+image.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+
+from plctool.compiler.codegen.ir import round_to_single
+from plctool.compiler.codegen.lower_arith import constant
+from plctool.compiler.codegen.lower_expr import Expressions
+from plctool.compiler.codegen.lower_frame import Ref
+from plctool.compiler.codegen.lower_string import encode_text
+from plctool.compiler.codegen.lower_unit import Unit
+from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, StructInit
+from plctool.compiler.types import ArrayType, Elementary, Field, Kind, StringType, StructType, Type, base_of, is_scalar
+
+_LOOP_FROM = 5  # equal scalars that are worth a loop
+_CONSTANT_FROM = 4  # different scalars that are worth a constant
+
+
+def encode_scalar(value: int | float | str, t: Type) -> bytes:
+    """A scalar or string constant as it lies in memory."""
+    if isinstance(t, StringType):
+        text = encode_text(str(value)[: t.length], t)
+        return text + bytes(t.size - len(text))
+    base = base_of(t)
+    if isinstance(base, Elementary) and base.kind is Kind.REAL:
+        number = float(value)
+        return struct.pack("<f", round_to_single(number)) if base.bits == 32 else struct.pack("<d", number)
+    return (int(value) & ((1 << 8 * t.size) - 1)).to_bytes(t.size, "little")
+
+
+def struct_members(unit: Unit, t: StructType, initial: Initial | None) -> Iterator[tuple[Field, Initial | None]]:
+    """Every member with the value it gets: the one given, else the default of the struct type, else None. Of a union
+    those with a value."""
+    values: dict[str, Initial] = {}
+    for source in (unit.defaults.get(t.name), initial):
+        if isinstance(source, StructInit):
+            values.update((name.casefold(), value) for name, value in source.members.items())
+    for f in t.fields:
+        if not t.union or f.name.casefold() in values:
+            yield f, values.get(f.name.casefold())
+
+
+def array_runs(t: ArrayType, initial: Initial | None) -> Iterator[tuple[int, Initial | None]]:
+    """Runs of equal elements that cover the whole array."""
+    left = t.count
+    for count, value in initial.runs if isinstance(initial, ArrayInit) else []:
+        yield min(count, left), value
+        left -= min(count, left)
+    if left:
+        yield left, None
+
+
+def image_of(unit: Unit, t: Type, initial: Initial | None) -> bytes:
+    """The bytes of a variable with its initial value."""
+    if isinstance(initial, ScalarInit):
+        return encode_scalar(initial.value, t)
+    if isinstance(t, ArrayType):
+        return b"".join(image_of(unit, t.element, value) * count for count, value in array_runs(t, initial))
+    data = bytearray(t.size)
+    if isinstance(t, StructType):
+        for f, value in struct_members(unit, t, initial):
+            data[f.offset : f.offset + f.type.size] = image_of(unit, f.type, value)
+    return bytes(data)
+
+
+class Initialising(Expressions):
+    """Writes initial values in the function being written."""
+
+    def initialise(self, ref: Ref, initial: Initial | None) -> None:
+        """Gives zeroed memory its initial value; None is the default of the type."""
+        t = ref.type
+        if isinstance(initial, ScalarInit):
+            self._initialise_scalar(ref, initial)
+        elif isinstance(t, ArrayType):
+            self._initialise_array(ref, t, initial)
+        elif isinstance(t, StructType):
+            self._initialise_struct(ref, t, initial)
+
+    def _initialise_scalar(self, ref: Ref, initial: ScalarInit) -> None:
+        if isinstance(ref.type, StringType):
+            if initial.value:
+                self.copy_literal(ref, str(initial.value))
+        elif any(encode_scalar(initial.value, ref.type)):
+            self.store(ref, constant(initial.value, ref.type))
+
+    def _initialise_struct(self, ref: Ref, t: StructType, initial: Initial | None) -> None:
+        if initial is None:
+            if any(image_of(self.unit, t, None)):
+                self.fn.do(f"call void @{self.unit.initialiser(t)}(ptr {self.address(ref)})")
+            return
+        self.initialise_members(ref, t, initial)
+
+    def initialise_members(self, ref: Ref, t: StructType, initial: Initial | None) -> None:
+        for f, value in struct_members(self.unit, t, initial):
+            self.initialise(ref.member(f.offset, f.type), value)
+
+    def _initialise_array(self, ref: Ref, t: ArrayType, initial: Initial | None) -> None:
+        if is_scalar(t.element):
+            self._initialise_scalars(ref, t, initial)
+            return
+        offset = 0
+        for count, value in array_runs(t, initial):
+            if any(image_of(self.unit, t.element, value)):
+                self._repeat(ref.member(offset, t), t.element, count, value)
+            offset += count * t.element.size
+
+    def _initialise_scalars(self, ref: Ref, t: ArrayType, initial: Initial | None) -> None:
+        data, size = image_of(self.unit, t, initial), t.element.size
+        used = [i for i in range(t.count) if any(data[i * size : (i + 1) * size])]
+        if not used:
+            return
+        first, last = used[0], used[-1] + 1
+        part = data[first * size : last * size]
+        if last - first >= _LOOP_FROM and part == part[:size] * (last - first):
+            value = next(
+                v
+                for n, v in array_runs(t, initial)
+                if isinstance(v, ScalarInit) and any(encode_scalar(v.value, t.element))
+            )
+            self._repeat(ref.member(first * size, t), t.element, last - first, value)
+        elif len(used) >= _CONSTANT_FROM:
+            pointer = self.unit.module.constant(part, t.element.align)
+            source = Ref(pointer, 0, t.element, direct=True)
+            self.copy(ref.member(first * size, t.element), source, len(part))
+        else:
+            for i in used:
+                element = ref.member(i * size, t.element)
+                self.store(element, self._constant_at(data, i * size, t.element))
+
+    def _constant_at(self, data: bytes, offset: int, t: Type) -> str:
+        raw = data[offset : offset + t.size]
+        base = base_of(t)
+        if isinstance(base, Elementary) and base.kind is Kind.REAL:
+            return constant(struct.unpack("<f" if base.bits == 32 else "<d", raw)[0], t)
+        return constant(int.from_bytes(raw, "little"), t)
+
+    def _repeat(self, ref: Ref, element: Type, count: int, initial: Initial | None) -> None:
+        """The same initial value in `count` elements from `ref` on."""
+        if count == 1:
+            self.initialise(ref.member(0, element), initial)
+            return
+        fn, width = self.fn, self._pointer_int
+        base, loop, end = self.address(ref), fn.label("fill"), fn.label("filled")
+        counter = fn.slot(width)
+        fn.do(f"store {width} 0, ptr {counter}")
+        fn.begin(loop)
+        index = fn.value(f"load {width}, ptr {counter}")
+        self.initialise(self.element(Ref(base, 0, element), index, element, counted=True), initial)
+        following = fn.value(f"add {width} {index}, 1")
+        fn.do(f"store {width} {following}, ptr {counter}")
+        fn.branch_if(fn.value(f"icmp ult {width} {following}, {count}"), loop, end)
+        fn.begin(end)

@@ -1,0 +1,258 @@
+"""What all functions of one compilation share: the module, the imports, the queue of what has to be lowered.
+
+A function enters the queue the first time something refers to it, so what is not called is not in the image.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from enum import Enum
+
+from plctool.compiler.codegen.ir import Module, escape
+from plctool.compiler.codegen.lower_helpers import LIBRARY_FUNCTIONS
+from plctool.compiler.codegen.targets import Target
+from plctool.compiler.typed import Area, Dispatch, External, Pos, Pou, PouKind, StructInit, Variable
+from plctool.compiler.types import Elementary, Kind, PointerType, StructType, Type, base_of
+from plctool.core import ffi, lib
+from plctool.errors import UsageError
+
+_ALWAYS = 'nounwind "no-builtins"'
+_INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
+
+
+class Check(Enum):
+    """Run-time checks, by the name `--checks` uses."""
+
+    DIV = "div"
+    BOUNDS = "bounds"
+    SUBRANGE = "subrange"
+    NULL = "null"
+
+
+ALL_CHECKS = frozenset(Check)
+
+
+def parse_checks(text: str) -> frozenset[Check]:
+    """'all', 'none' or a comma separated list such as 'div,bounds'. Raises UsageError."""
+    if text == "all":
+        return ALL_CHECKS
+    if text == "none":
+        return frozenset()
+    try:
+        return frozenset(Check(name.strip()) for name in text.split(","))
+    except ValueError:
+        names = ", ".join(c.value for c in Check)
+        raise UsageError(f"'{text}' is not a choice of checks; use all, none or a list of {names}.", "checks") from None
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to compile. `debug`: keep the program closer to its source (no inlining across POUs); `size`: rather small
+    than fast."""
+
+    target: Target
+    opt_level: int = 2
+    checks: frozenset[Check] = ALL_CHECKS
+    debug: bool = False
+    size: bool = False
+
+    @property
+    def compact(self) -> bool:
+        """Whether loops are not unrolled and blocks of the library are not inlined: where memory is small, unless
+        level 3 asks for it."""
+        return self.size or (self.target.compact and self.opt_level < 3)
+
+
+def interface_signature(text: str) -> int:
+    """The signature id of an external function: CRC-32 of its interface text, e.g. 'sin(LREAL):LREAL'."""
+    return zlib.crc32(text.encode("ascii"))
+
+
+RAISE = External("iecraise", interface_signature("iecraise(UDINT)"), 0x00010000)
+
+
+def value_type(t: Type) -> str:
+    """The LLVM type of a scalar. A BOOL is an i8 whose lowest bit counts: it goes to and from memory as it is."""
+    base = base_of(t)
+    if isinstance(base, PointerType):
+        return "ptr"
+    assert isinstance(base, Elementary), t
+    if base.kind is Kind.REAL:
+        return "float" if base.bits == 32 else "double"
+    return f"i{base.bits}"
+
+
+class Unit:
+    """One compilation."""
+
+    def __init__(self, options: Options, area_sizes: dict[Area, int], defaults: dict[str, StructInit]) -> None:
+        self.options = options
+        self.target = options.target
+        self.module = Module(options.target.triple)
+        self.area_sizes = area_sizes
+        self.defaults = defaults
+        self.imports: list[External] = []
+        self._sections: set[Pou] = set()
+        self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
+        self.pous: dict[Pou, str] = {}  # symbol of every POU referred to
+        self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol
+        self.helpers: set[str] = set()
+        self.dispatchers: dict[Dispatch, str] = {}  # symbol of the function that chooses among several targets
+        self.files: dict[str, int] = {}
+        self._import_slots: dict[str, int] = {}
+        self._symbols: set[str] = set()
+        self._locations: dict[tuple[int, int], str] = {}
+        self._struct_symbols: dict[StructType, str] = {}
+        self._subroutine_type = -1
+        self._compile_unit = -1
+        module = self.module
+        self.empty = module.metadata("!{}")
+        tree = module.metadata('!{!"st"}')
+        self._tag_root = module.metadata(f'!{{!"any", !{tree}, i64 0}}')
+        self._tags: dict[object, str] = {}
+        self.smallest = module.attributes(f"minsize optsize {_ALWAYS}")
+        self.plain = module.attributes(f"{'optsize ' if options.compact else ''}{_ALWAYS}")
+        self.strings = module.attributes(f"{'optsize ' if options.size else ''}{_ALWAYS}")
+        self._program = self.plain
+        if options.compact and not options.size:
+            self._program = module.attributes(f'optsize {_ALWAYS} "function-inline-threshold"="{_INLINED}"')
+        # LLVM's fast instruction selection (level 0) takes a call that only reads memory for dead.
+        reads = " memory(read)" if options.opt_level > 0 else ""
+        self.raising = module.attributes(f"cold noreturn nounwind nomerge{reads}")
+        self.external_call = module.attributes("nounwind")
+
+    def attributes(self, pou: Pou) -> str:
+        """The attributes of a POU's function. Those of the string functions are worth more room, they are all loops."""
+        if pou.no_init:
+            return self.strings
+        return self._program if pou.checks else self.plain
+
+    def inlining(self, pou: Pou) -> str:
+        """What LLVM is told about inlining a POU: the standard library is made for it, if there is room."""
+        if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self._sections:
+            return "noinline"
+        return "inlinehint" if not pou.checks and (pou.no_init or not self.options.compact) else ""
+
+    # ---- what is referred to ----
+
+    def symbol(self, pou: Pou) -> str:
+        """The symbol of a POU; puts it in the queue."""
+        if pou.no_init and pou.name in LIBRARY_FUNCTIONS:
+            return self.helper(LIBRARY_FUNCTIONS[pou.name])
+        name = self.pous.get(pou)
+        if name is None:
+            name = self.unique(f"st.{pou.name}")
+            self.pous[pou] = name
+        return name
+
+    def section(self, part: Pou) -> str:
+        """The symbol of a part of a POU."""
+        self._sections.add(part)
+        return self.symbol(part)
+
+    def target_of(self, pou: Pou, dispatch: Dispatch | None) -> str:
+        """The symbol that a call of `pou` goes to: of a function that looks at the class when that decides."""
+        if dispatch is None:
+            return self.symbol(pou)
+        targets = set(dispatch.targets.values())
+        if len(targets) == 1:
+            return self.symbol(targets.pop())
+        name = self.dispatchers.get(dispatch)
+        if name is None:
+            name = self.unique(f"class.{pou.name}")
+            self.dispatchers[dispatch] = name
+        return name
+
+    def unique(self, wanted: str) -> str:
+        """A symbol name not used so far, safe to write without quotes."""
+        clean = "".join(c if c.isascii() and (c.isalnum() or c in "._") else "_" for c in wanted)
+        name, n = clean, 1
+        while name in self._symbols:
+            n += 1
+            name = f"{clean}.{n}"
+        self._symbols.add(name)
+        return name
+
+    def initialiser(self, struct: StructType) -> str:
+        """The symbol of the function that gives a struct or FB in zeroed memory its defaults; puts it in the queue."""
+        name = self._struct_symbols.get(struct)
+        if name is None:
+            name = self.unique(f"init.{struct.name}")
+            self._struct_symbols[struct] = name
+            self.structs[name] = struct
+        return name
+
+    def import_slot(self, external: External) -> int:
+        """The index of an external function in the import table."""
+        slot = self._import_slots.get(external.name)
+        if slot is None:
+            slot = len(self.imports)
+            self._import_slots[external.name] = slot
+            self.imports.append(external)
+        return slot
+
+    def helper(self, name: str) -> str:
+        """The symbol of a function of `lower_helpers`, which is then put in the module."""
+        self.helpers.add(name)
+        return name
+
+    # ---- context layout ----
+
+    @property
+    def area_offset(self) -> int:
+        return int(ffi.offsetof("IEC_CONTEXT", "area"))
+
+    @property
+    def imports_offset(self) -> int:
+        return self.area_offset + int(lib.APP_AREA_COUNT) * self.target.pointer_size
+
+    @property
+    def context_size(self) -> int:
+        return self.imports_offset + self.target.pointer_size
+
+    # ---- metadata ----
+
+    def tag(self, key: object) -> str:
+        """Alias tag: accesses with different tags do not overlap; those without a tag may overlap all."""
+        text = self._tags.get(key)
+        if text is None:
+            node = self.module.metadata(f'!{{!"{len(self._tags)}", !{self._tag_root}, i64 0}}')
+            text = f", !tbaa !{self.module.metadata(f'!{{!{node}, !{node}, i64 0}}')}"
+            self._tags[key] = text
+        return text
+
+    def file(self, path: str) -> int:
+        """The DIFile of a source file."""
+        node = self.files.get(path)
+        if node is None:
+            node = self.module.metadata(f'!DIFile(filename: "{escape(path.encode())}", directory: "")')
+            self.files[path] = node
+        return node
+
+    def subprogram(self, name: str, pos: Pos) -> int:
+        """Debug scope of a function. Only line directives are made from it, no other debug information."""
+        module = self.module
+        file = self.file(pos.file)
+        if self._compile_unit < 0:
+            self._subroutine_type = module.metadata(f"!DISubroutineType(types: !{self.empty})")
+            self._compile_unit = module.distinct_metadata(
+                f'!DICompileUnit(language: DW_LANG_C99, file: !{file}, producer: "plctool", isOptimized: true, '
+                "runtimeVersion: 0, emissionKind: DebugDirectivesOnly)"
+            )
+            module.named_metadata("llvm.dbg.cu", [self._compile_unit])
+            flags = ('!{i32 7, !"Dwarf Version", i32 4}', '!{i32 2, !"Debug Info Version", i32 3}')
+            module.named_metadata("llvm.module.flags", [module.metadata(flag) for flag in flags])
+        return module.distinct_metadata(
+            f'!DISubprogram(name: "{name}", scope: !{file}, file: !{file}, line: {pos.line}, '
+            f"type: !{self._subroutine_type}, spFlags: DISPFlagDefinition, unit: !{self._compile_unit})"
+        )
+
+    def location(self, line: int, scope: int) -> str:
+        """The `, !dbg` suffix for instructions of a line."""
+        key = (line, scope)
+        text = self._locations.get(key)
+        if text is None:
+            text = f", !dbg !{self.module.metadata(f'!DILocation(line: {line}, scope: !{scope})')}"
+            self._locations[key] = text
+        return text

@@ -1,0 +1,208 @@
+"""How each instruction set encodes a distance: the PC-relative relocations LLVM emits for position independent code.
+
+All offsets are in the linked block. A relocation writes "target + addend - place", as the ELF supplement of the
+processor defines it; what is not in these tables is not position independent and is refused by the linker.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from plctool.compiler.codegen.targets import Machine
+
+
+@dataclass(frozen=True)
+class Relocation:
+    """`place`: where it is applied. `target`: offset of the symbol (without Thumb bit). `function`: the symbol is code.
+    `paired`: target + addend of the relocation at `target` (RISC-V low parts refer to their high part), else 0."""
+
+    place: int
+    target: int
+    addend: int
+    function: bool = False
+    paired: int = 0
+
+    @property
+    def distance(self) -> int:
+        return self.target + self.addend - self.place
+
+
+class OutOfReach(Exception):
+    """The distance does not fit the instruction."""
+
+
+Apply = Callable[[bytearray, Relocation], None]
+
+
+def _fit(value: int, bits: int) -> int:
+    """A signed value as `bits` bits."""
+    if not -(1 << (bits - 1)) <= value < 1 << (bits - 1):
+        raise OutOfReach
+    return value & ((1 << bits) - 1)
+
+
+def _word(code: bytearray, at: int) -> int:
+    return int.from_bytes(code[at : at + 4], "little")
+
+
+def _put_word(code: bytearray, at: int, value: int) -> None:
+    code[at : at + 4] = (value & 0xFFFFFFFF).to_bytes(4, "little")
+
+
+def _relative32(code: bytearray, r: Relocation) -> None:
+    _put_word(code, r.place, _fit(r.distance, 32))
+
+
+# ---- Thumb ----
+
+
+def _thumb_relative32(code: bytearray, r: Relocation) -> None:
+    _put_word(code, r.place, _fit(r.distance, 32) | r.function)
+
+
+def _thumb_branch(code: bytearray, r: Relocation) -> None:
+    """BL and B.W: S:I1:I2:imm10:imm11, the two I bits stored inverted relative to S."""
+    offset = _fit(r.distance, 25)
+    first, second = struct.unpack_from("<HH", code, r.place)
+    sign = offset >> 24
+    j1 = ~((offset >> 23) ^ sign) & 1
+    j2 = ~((offset >> 22) ^ sign) & 1
+    first = (first & 0xF800) | sign << 10 | (offset >> 12 & 0x3FF)
+    second = (second & 0xD000) | j1 << 13 | j2 << 11 | (offset >> 1 & 0x7FF)
+    struct.pack_into("<HH", code, r.place, first, second)
+
+
+def _thumb_short_branch(code: bytearray, r: Relocation) -> None:
+    offset = _fit(r.distance, 12)
+    opcode = struct.unpack_from("<H", code, r.place)[0]
+    struct.pack_into("<H", code, r.place, (opcode & 0xF800) | offset >> 1)
+
+
+def thumb_addend(code: bytes, place: int, kind: int) -> int:
+    """The addend that REL sections keep in place."""
+    if kind in (2, 3):
+        return int.from_bytes(code[place : place + 4], "little", signed=True)
+    if kind == 102:
+        value: int = (struct.unpack_from("<H", code, place)[0] & 0x7FF) << 1
+        return value - 0x1000 if value & 0x800 else value
+    first, second = struct.unpack_from("<HH", code, place)
+    sign = first >> 10 & 1
+    i1 = ~((second >> 13) ^ sign) & 1
+    i2 = ~((second >> 11) ^ sign) & 1
+    value = int(sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1)
+    return value - (1 << 25) if sign else value
+
+
+# ---- AArch64 ----
+
+
+def _adrp(code: bytearray, r: Relocation) -> None:
+    """ADRP becomes ADR: the exact address, so the block needs no alignment to pages (see `_low12`)."""
+    offset = _fit(r.distance, 21)
+    word = _word(code, r.place) & 0x0000001F
+    _put_word(code, r.place, 0x10000000 | word | (offset & 3) << 29 | (offset >> 2 & 0x7FFFF) << 5)
+
+
+def _low12(code: bytearray, r: Relocation) -> None:
+    """The part that ADR has added already. The linker has checked that there is an ADRP of the same target."""
+    _put_word(code, r.place, _word(code, r.place) & ~(0xFFF << 10))
+
+
+def _aarch64_branch(code: bytearray, r: Relocation) -> None:
+    _put_word(code, r.place, (_word(code, r.place) & 0xFC000000) | _fit(r.distance, 28) >> 2)
+
+
+# ---- RISC-V ----
+
+
+def _riscv_call(code: bytearray, r: Relocation) -> None:
+    offset = _fit(r.distance, 32)
+    _put_word(code, r.place, (_word(code, r.place) & 0xFFF) | (offset + 0x800 & 0xFFFFF000))
+    _put_word(code, r.place + 4, (_word(code, r.place + 4) & 0xFFFFF) | (offset & 0xFFF) << 20)
+
+
+def _riscv_high(code: bytearray, r: Relocation) -> None:
+    _put_word(code, r.place, (_word(code, r.place) & 0xFFF) | (_fit(r.distance, 32) + 0x800 & 0xFFFFF000))
+
+
+def _riscv_low(code: bytearray, r: Relocation) -> None:
+    offset = r.paired - r.target
+    _put_word(code, r.place, (_word(code, r.place) & 0xFFFFF) | (offset & 0xFFF) << 20)
+
+
+def _riscv_low_store(code: bytearray, r: Relocation) -> None:
+    offset = r.paired - r.target
+    word = _word(code, r.place) & 0x01FFF07F
+    _put_word(code, r.place, word | (offset >> 5 & 0x7F) << 25 | (offset & 0x1F) << 7)
+
+
+def _riscv_add(code: bytearray, r: Relocation) -> None:
+    """Entries of switch tables are differences: an addition and a subtraction at the same place."""
+    _put_word(code, r.place, _word(code, r.place) + r.target + r.addend)
+
+
+def _riscv_subtract(code: bytearray, r: Relocation) -> None:
+    _put_word(code, r.place, _word(code, r.place) - r.target - r.addend)
+
+
+_THUMB: dict[int, Apply] = {
+    3: _thumb_relative32,
+    10: _thumb_branch,
+    30: _thumb_branch,
+    102: _thumb_short_branch,
+}
+
+APPLY: dict[Machine, dict[int, Apply]] = {
+    Machine.X86_64: {2: _relative32, 4: _relative32},
+    Machine.THUMB: _THUMB,
+    Machine.THUMB_V6M: _THUMB,
+    Machine.AARCH64: {
+        261: _relative32,
+        275: _adrp,
+        277: _low12,
+        278: _low12,
+        282: _aarch64_branch,
+        283: _aarch64_branch,
+        284: _low12,
+        285: _low12,
+        286: _low12,
+        299: _low12,
+    },
+    Machine.RISCV32: {
+        19: _riscv_call,
+        23: _riscv_high,
+        24: _riscv_low,
+        25: _riscv_low_store,
+        35: _riscv_add,
+        39: _riscv_subtract,
+        57: _relative32,
+    },
+}
+
+AARCH64_ADRP = 275
+AARCH64_LOW12 = frozenset((277, 278, 284, 285, 286, 299))
+RISCV_HIGH = 23
+RISCV_LOW = frozenset((24, 25))
+
+# Relocations of .debug_line: the absolute address of a sequence.
+LINE_ADDRESS = {Machine.X86_64: 1, Machine.THUMB: 2, Machine.THUMB_V6M: 2, Machine.AARCH64: 257, Machine.RISCV32: 1}
+
+
+def stub(machine: Machine, slot: int) -> bytes:
+    """Jumps to import `slot`; the base of the import table is in r9 (Thumb) or s11 (RISC-V)."""
+    if machine is Machine.THUMB:  # ldr.w ip, [r9, #4*slot]; bx ip; nop
+        return struct.pack("<HHHH", 0xF8D9, 0xC000 | 4 * slot, 0x4760, 0xBF00)
+    if (
+        machine is Machine.THUMB_V6M
+    ):  # push {r4}; mov r4, r9; adds r4, #128*n; ldr r4, [r4, #..]; mov ip, r4; pop {r4}; bx ip; nop
+        far, near = slot // 32, slot % 32
+        if far > 1:
+            raise OutOfReach
+        return struct.pack(
+            "<HHHHHHHH", 0xB410, 0x464C, 0x3400 | 128 * far, 0x6824 | near << 6, 0x46A4, 0xBC10, 0x4760, 0xBF00
+        )
+    return struct.pack(
+        "<II", 4 * slot << 20 | 27 << 15 | 2 << 12 | 6 << 7 | 0x03, 6 << 15 | 0x67
+    )  # lw t1, (s11); jr t1

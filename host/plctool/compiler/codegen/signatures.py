@@ -1,0 +1,100 @@
+"""Parameters of compiled functions: the context, the instance, room for a result in memory, then what the program
+declares.
+
+A function block finds its inputs in its instance. Those that every call of the block gives, it is handed as parameters,
+as far as there are registers for them, and stores them itself: that is smaller and faster than to store them before
+each call and to load them in the block.
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.codegen.analysis import walk
+from plctool.compiler.codegen.lower_arith import is_real, is_signed
+from plctool.compiler.codegen.lower_unit import value_type
+from plctool.compiler.codegen.targets import Target
+from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
+from plctool.compiler.types import StringType, Type, is_scalar
+
+HandedInputs = dict[Pou, list[Variable]]
+
+
+def parameter_types(pou: Pou, parameter: Parameter) -> list[str]:
+    """The LLVM parameters that carry one IEC parameter."""
+    t = parameter.variable.type
+    if isinstance(t, StringType):
+        return ["ptr", "i32"]
+    if parameter.by_reference or not is_scalar(t):
+        return ["ptr"]
+    return [extended(t)] if pou.external else [value_type(t)]
+
+
+def extended(t: Type) -> str:
+    """A scalar parameter or result of a C function."""
+    text = value_type(t)
+    if text in ("i8", "i16"):
+        return f"{text} {'signext' if is_signed(t) else 'zeroext'}"
+    return text
+
+
+def result_in_memory(pou: Pou) -> bool:
+    """Whether the result comes back through a hidden pointer, the first argument after the context."""
+    return pou.result is not None and not is_scalar(pou.result.type)
+
+
+def parameter_list(pou: Pou, handed: HandedInputs) -> str:
+    """The parameters of the define line."""
+    words = ["ptr noalias nonnull readonly %ctx"]
+    if pou.kind in (PouKind.FUNCTION_BLOCK, PouKind.METHOD):
+        words.append("ptr nonnull %self")
+    if result_in_memory(pou):
+        words.append(f"ptr {'' if pou.in_place else 'noalias '}nonnull %result")
+        words += ["i32 %result.capacity"] if pou.cuts_result else []
+    if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
+        for number, parameter in enumerate(pou.parameters):
+            names = (f"%p{number}", f"%p{number}.capacity")
+            words += [f"{text} {name}" for text, name in zip(parameter_types(pou, parameter), names, strict=False)]
+    words += [f"{value_type(variable.type)} %p{n}" for n, variable in enumerate(handed.get(pou, ()))]
+    return ", ".join(words)
+
+
+def handed_inputs(program: TypedProgram, target: Target) -> HandedInputs:
+    """The inputs of each function block that it is handed as parameters."""
+    extra = (pou for pou in (program.startup, program.shutdown) if pou is not None)
+    reached = dict.fromkeys([*program.pous, *program.programs.values(), *extra])  # and perhaps some that never run
+    given: HandedInputs = {}
+    todo = list(reached)
+    while todo:
+        for call in walk(todo.pop().body):
+            if isinstance(call, Call | FbCall):
+                others = list(call.dispatch.targets.values()) if call.dispatch is not None else []
+                called = [call.function if isinstance(call, Call) else call.block, *others]
+                todo += [pou for pou in called if pou not in reached]
+                reached.update(dict.fromkeys(called))
+                if isinstance(call, FbCall):
+                    _restrict(given, call, others)
+    return {block: found for block, inputs in given.items() if (found := _in_registers(inputs, target))}
+
+
+def _restrict(given: HandedInputs, call: FbCall, others: list[Pou]) -> None:
+    """Takes out what a call of a block does not give. The blocks of which only the class decides which is called have
+    one signature."""
+    if call.dispatch is not None or call.block.external:
+        given.update((block, []) for block in (call.block, *others))
+    else:
+        here = [variable for variable, _ in call.inputs]
+        given[call.block] = [variable for variable in given.get(call.block, here) if variable in here]
+
+
+def _in_registers(inputs: list[Variable], target: Target) -> list[Variable]:
+    """The first inputs, as many as fit; the context and the instance take two registers for integers."""
+    found = []
+    integers, reals = target.registers
+    left = {False: integers - 2, True: reals}
+    for variable in sorted(inputs, key=lambda v: v.offset):
+        t, in_memory = variable.type, variable.storage is Storage.SELF
+        if in_memory and is_scalar(t) and t.size <= target.pointer_size:
+            kind = reals > 0 and is_real(t)
+            if left[kind]:
+                left[kind] -= 1
+                found.append(variable)
+    return found

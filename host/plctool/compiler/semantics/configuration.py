@@ -1,0 +1,148 @@
+"""Tasks and program instances: what a CONFIGURATION says, or what is meant when there is none.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.statements import Statements
+from plctool.compiler.semantics.symbols import PouSymbol, ProgramInfo
+from plctool.compiler.semantics.tasks import background, read_task
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Pou, PouKind, Task, TaskKind
+
+DEFAULT_INTERVAL_US = 10_000
+DEFAULT_TASK = "Main"
+DEFAULT_PROGRAMS = ("PLC_PRG", "MAIN")
+
+
+@dataclass
+class Application:
+    """The tasks."""
+
+    tasks: list[Task] = field(default_factory=list)
+
+
+def configure(world: World) -> Application:
+    """Instantiates the programs that tasks run."""
+    application = Application()
+    builder = _Builder(world, application)
+    if world.configurations:
+        for decl in world.configurations:
+            builder.configuration(decl)
+    else:
+        builder.default()
+    world.instance_config.apply(application.tasks)
+    return application
+
+
+def default_programs(world: World) -> list[PouSymbol]:
+    """What runs without a CONFIGURATION when it is just one: that with a usual name, else all there are."""
+    programs = world.program_symbols()
+    for name in DEFAULT_PROGRAMS:
+        for symbol in programs:
+            if symbol.decl.name.upper() == name:
+                return [symbol]
+    return programs
+
+
+class _Builder:
+    def __init__(self, world: World, application: Application) -> None:
+        self._world = world
+        self._application = application
+        self._names: set[str] = set()
+        self._connections: list[tuple[ast.ProgramInstance, ProgramInfo, Task]] = []
+
+    # ---- without CONFIGURATION ----
+
+    def default(self) -> None:
+        chosen = default_programs(self._world)
+        if not chosen:
+            return
+        if len(chosen) > 1:
+            decl = chosen[1].decl
+            self._world.diagnostics.error(
+                decl.source.pos(decl.pos), "configuration",
+                f"several programs: name one {DEFAULT_PROGRAMS[0]}, or write a CONFIGURATION that says what runs",
+            )  # fmt: skip
+            return
+        program = self._instance(chosen[0].decl.full_name)
+        self._application.tasks.append(Task(DEFAULT_TASK, TaskKind.CYCLIC, 1, DEFAULT_INTERVAL_US, [program.pou]))
+
+    def _instance(self, name: str) -> ProgramInfo:
+        instance = self._world.programs.find(name.casefold())
+        assert instance is not None and instance.program is not None
+        return instance.program
+
+    # ---- with CONFIGURATION ----
+
+    def configuration(self, decl: ast.ConfigurationDecl) -> None:
+        scope = self._world.scope(decl.source)
+        tasks: dict[str, Task] = {}
+        for task_decl in decl.tasks:
+            if task_decl.name.casefold() in tasks:
+                scope.error(task_decl.pos, "duplicate", f"there is a task {task_decl.name} already")
+                continue
+            tasks[task_decl.name.casefold()] = read_task(task_decl, scope)
+        self._application.tasks += tasks.values()
+        freewheeling: Task | None = None
+        for instance in decl.programs:
+            task = self._task_of(instance, tasks, scope)
+            if task is None:
+                continue
+            if task is _BACKGROUND:
+                if freewheeling is None:
+                    freewheeling = background("Background")
+                    self._application.tasks.append(freewheeling)
+                task = freewheeling
+            self._program(instance, task, scope)
+        for instance, program, task in self._connections:
+            self._connect(instance, program, task, scope)
+        self._connections.clear()
+
+    def _task_of(self, instance: ast.ProgramInstance, tasks: dict[str, Task], scope: Scope) -> Task | None:
+        if instance.task is None:
+            return _BACKGROUND
+        offset, name = instance.task
+        task = tasks.get(name.casefold())
+        if task is None:
+            hint = did_you_mean(name, (t.name for t in tasks.values()))
+            scope.error(offset, "unknown", f"there is no task {name}{hint}")
+        return task
+
+    def _program(self, instance: ast.ProgramInstance, task: Task, scope: Scope) -> None:
+        symbol = self._world.lookup_program(instance.type_name)
+        if symbol is None:
+            hint = did_you_mean(instance.type_name, (p.decl.name for p in self._world.program_symbols()))
+            scope.error(instance.type_pos, "unknown", f"there is no program {instance.type_name}{hint}")
+            return
+        if instance.name.casefold() in self._names:
+            scope.error(instance.pos, "duplicate", f"there is a program instance {instance.name} already")
+            return
+        self._names.add(instance.name.casefold())
+        program = self._instance(instance.name)
+        task.programs.append(program.pou)
+        if instance.args:
+            self._connections.append((instance, program, task))
+
+    def _connect(self, instance: ast.ProgramInstance, program: ProgramInfo, task: Task, scope: Scope) -> None:
+        """`PROGRAM p WITH t : Type(input := x, output => y)`: small programs before and behind do the assignments."""
+        handed = Statements(scope).program_arguments(instance.args, program, instance.pos)
+        if handed is None:
+            return
+        (before, behind), pou = handed, program.pou
+        at = task.programs.index(pou)
+        task.programs[at : at + 1] = [
+            *([Pou(f"{pou.name}.inputs", PouKind.PROGRAM, pou.pos, body=before)] if before else []),
+            pou,
+            *([Pou(f"{pou.name}.outputs", PouKind.PROGRAM, pou.pos, body=behind)] if behind else []),
+        ]
+        self._world.pous += [p for p in task.programs[at : at + 3] if p.name.startswith(f"{pou.name}.")]
+
+
+_BACKGROUND = background("")

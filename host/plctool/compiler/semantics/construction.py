@@ -1,0 +1,245 @@
+"""What has to run when the application starts: initial values that are not constant, and FB_Init of every instance,
+first of the members, then of the instance that holds them. And when it ends: FB_Exit, the other way round.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from plctool.compiler.semantics.classes import instances_in
+from plctool.compiler.semantics.symbols import Member
+from plctool.compiler.typed import (
+    Area,
+    ArrayInit,
+    Assign,
+    Call,
+    CallStatement,
+    ComputedInit,
+    Const,
+    Direction,
+    Expr,
+    For,
+    If,
+    IndexPlace,
+    Initial,
+    Load,
+    MemberPlace,
+    Parameter,
+    Place,
+    Pos,
+    Pou,
+    PouKind,
+    ScalarInit,
+    SelfPlace,
+    Statement,
+    Storage,
+    StructInit,
+    Variable,
+    VarPlace,
+)
+from plctool.compiler.types import BOOL, DINT, ArrayType, PointerType, StringType, StructType, Type
+
+if TYPE_CHECKING:
+    from plctool.compiler.semantics.world import World
+
+INIT_RETAINS, COPY_CODE = "binitretains", "bincopycode"  # what every FB_Init is told
+_LOOP_FROM = 4  # equal elements that are worth a loop
+
+
+def construct(world: World) -> None:
+    """Makes the routines `world.startup` and `world.shutdown` of all global instances, and lets units begin with the
+    FB_Init of instances among their own variables, which live for one call."""
+    start = Pou("FB_Init", PouKind.FUNCTION, Pos("", 1, 1))
+    flag = Variable("init_retains", BOOL, Storage.LOCAL, start.pos)
+    start.parameters.append(Parameter(flag, Direction.INPUT))
+    builder = _Construction(world, start, Load(VarPlace(flag, BOOL, start.pos), BOOL, start.pos))
+    for variable in world.allocation.variables:
+        start.body += builder.variable(variable)
+    if start.body:
+        world.startup = start
+        world.pous.append(start)
+    for pou in world.pous:
+        if pou is not start:
+            local = _Construction(world, pou, Const(1, BOOL, pou.pos))
+            pou.body = [s for v in list(pou.locals) for s in local.variable(v)] + pou.body
+    end = Pou("FB_Exit", PouKind.FUNCTION, Pos("", 1, 1))
+    exits = _Destruction(world, end)
+    end.body = [s for v in reversed(world.allocation.variables) for s in exits.variable(v)]
+    if end.body:
+        world.shutdown = end
+        world.pous.append(end)
+
+
+class _Construction:
+    def __init__(self, world: World, pou: Pou, init_retains: Expr) -> None:
+        self._world = world
+        self._pou = pou
+        self._init_retains = init_retains
+        self._retained = False  # the variable keeps its values
+        self._needed: dict[StructType, bool] = {}
+
+    def variable(self, variable: Variable) -> list[Statement]:
+        """What a variable and all instances in it need."""
+        self._retained = variable.area is Area.RETAIN
+        return self._place(VarPlace(variable, variable.type, variable.pos), variable.initial, variable.pos)
+
+    def _needs(self, t: Type) -> bool:
+        while isinstance(t, ArrayType):
+            t = t.element
+        if not isinstance(t, StructType):
+            return False
+        known = self._needed.get(t)
+        if known is None:
+            known = bool(self._world.classes.initialisers(t)) or any(self._needs(f.type) for f in t.fields)
+            known = known or _is_computed(self._world.defaults.get(t.name))
+            self._needed[t] = known
+        return known
+
+    def _place(self, place: Place, initial: Initial | None, pos: Pos) -> list[Statement]:
+        t = place.type
+        if isinstance(initial, ComputedInit):
+            assign = Assign(place, initial.value, pos)
+            kept = self._retained and not isinstance(t, PointerType)  # an address may be another one each time
+            return [If([(self._init_retains, [assign])], [], pos)] if kept else [assign]
+        if not self._needs(t) and not _is_computed(initial):
+            return []
+        if isinstance(t, ArrayType):
+            return self._array(place, t, initial, pos)
+        assert isinstance(t, StructType)
+        values: dict[str, Initial] = {}
+        arguments: Mapping[str, Expr] = {}
+        for source in (_moved_initial(self._world.defaults.get(t.name), place), initial):
+            if isinstance(source, StructInit):
+                values.update((name.casefold(), value) for name, value in source.members.items())
+                arguments = source.arguments
+        statements: list[Statement] = []
+        for f in t.fields:
+            statements += self._place(MemberPlace(place, f.offset, f.type, pos), values.get(f.name.casefold()), pos)
+        for member in self._world.classes.initialisers(t):
+            statements.append(self._call(member, place, arguments, pos))
+        return statements
+
+    def _array(self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos) -> list[Statement]:
+        base = _flat(place, t, pos)
+        runs = list(initial.runs) if isinstance(initial, ArrayInit) else []
+        runs.append((t.count - sum(count for count, _ in runs), None))
+        statements: list[Statement] = []
+        first = 0
+        for count, value in runs:
+            if count >= _LOOP_FROM:
+                loop, element = _loop(self._pou, base, t.element, first, first + count - 1)
+                loop.body = self._place(element, value, pos)
+                statements.append(loop)
+            else:
+                for n in range(first, first + count):
+                    element = IndexPlace(base, [Const(n, DINT, pos)], t.element, pos)
+                    statements += self._place(element, value, pos)
+            first += count
+        return statements
+
+    def _call(self, member: Member, place: Place, arguments: Mapping[str, Expr], pos: Pos) -> Statement:
+        info = self._world.classes.signature(member)
+        args: list[Expr | Place | None] = []
+        for symbol, direction in info.parameters:
+            key = symbol.name.casefold()
+            if key == INIT_RETAINS:
+                args.append(self._init_retains)
+            elif key == COPY_CODE:
+                args.append(Const(0, BOOL, pos))
+            elif key in arguments:
+                args.append(arguments[key])
+            elif isinstance(symbol.default, ScalarInit):
+                args.append(Const(symbol.default.value, symbol.type, pos))
+            elif symbol.given:
+                args.append(Const("" if isinstance(symbol.type, StringType) else 0, symbol.type, pos))
+            elif direction is Direction.INPUT:
+                message = f"{member.name} needs {symbol.name}; write {member.owner.name}({symbol.name} := ...)"
+                self._world.diagnostics.error(pos, "arguments", message)
+                args.append(Const(0, symbol.type, pos))
+            else:
+                args.append(None)
+        result = info.result if info.result is not None else BOOL
+        return CallStatement(Call(info.pou, args, result, pos, instance=place), pos)
+
+
+class _Destruction:
+    """The FB_Exit of what variables hold: of a derived block before that of its base, of a block before its members."""
+
+    def __init__(self, world: World, pou: Pou) -> None:
+        self._world = world
+        self._pou = pou
+
+    def variable(self, variable: Variable) -> list[Statement]:
+        """The calls for a variable and all instances in it."""
+        return self._place(VarPlace(variable, variable.type, variable.pos))
+
+    def _place(self, place: Place) -> list[Statement]:
+        t, pos = place.type, place.pos
+        if not any(self._world.classes.finalisers(instance) for instance in instances_in(t)):
+            return []
+        if isinstance(t, ArrayType):
+            loop, element = _loop(self._pou, _flat(place, t, pos), t.element, t.count - 1, 0)
+            loop.body = self._place(element)
+            return [loop]
+        assert isinstance(t, StructType)
+        statements = [self._call(member, place) for member in self._world.classes.finalisers(t)]
+        for f in reversed(t.fields):
+            statements += self._place(MemberPlace(place, f.offset, f.type, pos))
+        return statements
+
+    def _call(self, member: Member, place: Place) -> Statement:
+        info, pos = self._world.classes.signature(member), place.pos
+        args: list[Expr | Place | None] = [Const(0, symbol.type, pos) for symbol, _ in info.parameters]
+        return CallStatement(Call(info.pou, args, info.result or BOOL, pos, instance=place), pos)
+
+
+def _flat(place: Place, t: ArrayType, pos: Pos) -> Place:
+    """An array as one with a single index from 0."""
+    return MemberPlace(place, 0, ArrayType(t.element, ((0, t.count - 1),)), pos)
+
+
+def _loop(pou: Pou, base: Place, t: Type, first: int, last: int) -> tuple[For, Place]:
+    """A loop over elements of an array, upwards or downwards, without a body; and the element it is about."""
+    pos = base.pos
+    counter = Variable(f"element {len(pou.locals)}", DINT, Storage.LOCAL, pos)
+    pou.locals.append(counter)
+    index = VarPlace(counter, DINT, pos)
+    start, stop, step = (Const(n, DINT, pos) for n in (first, last, 1 if first <= last else -1))
+    return For(index, start, stop, step, [], pos), IndexPlace(base, [Load(index, DINT, pos)], t, pos)
+
+
+def _is_computed(initial: Initial | None) -> bool:
+    """Whether something in an initial value is not constant."""
+    if isinstance(initial, StructInit):
+        return any(map(_is_computed, initial.members.values()))
+    if isinstance(initial, ArrayInit):
+        return any(_is_computed(value) for _, value in initial.runs)
+    return isinstance(initial, ComputedInit)
+
+
+def _moved_initial(initial: Initial | None, instance: Place) -> Initial | None:
+    """The default of a function block as it is for one instance: its own members are members of that."""
+    if isinstance(initial, StructInit):
+        moved = {name: _moved_initial(value, instance) for name, value in initial.members.items()}
+        members = {name: value for name, value in moved.items() if value is not None}
+        return StructInit(members, {name: _moved(e, instance) for name, e in initial.arguments.items()})
+    if isinstance(initial, ArrayInit):
+        return ArrayInit([(count, _moved_initial(value, instance)) for count, value in initial.runs])
+    return ComputedInit(_moved(initial.value, instance)) if isinstance(initial, ComputedInit) else initial
+
+
+def _moved(node: Any, instance: Place) -> Any:
+    if isinstance(node, SelfPlace):
+        return instance
+    if isinstance(node, VarPlace):
+        own = node.var.storage is Storage.SELF
+        return MemberPlace(instance, node.var.offset, node.type, node.pos) if own else node
+    if isinstance(node, list):
+        return [_moved(part, instance) for part in node]
+    if isinstance(node, Expr | Place):
+        return replace(node, **{name: _moved(part, instance) for name, part in vars(node).items()})
+    return node

@@ -1,0 +1,193 @@
+"""Variables of all kinds: where each lives and what it starts with.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plctool.compiler.semantics.addresses import DirectVariables, is_open, located
+from plctool.compiler.semantics.classes import instances_in
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.semantics.type_declarations import May, TypeDeclarations
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    Area,
+    ComputedInit,
+    Const,
+    Initial,
+    Pos,
+    ScalarInit,
+    Storage,
+    Variable,
+)
+from plctool.compiler.types import (
+    ArrayType,
+    Elementary,
+    Kind,
+    StringType,
+    StructType,
+    Type,
+    align_up,
+    base_of,
+    is_scalar,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from plctool.compiler.semantics.world import World
+
+__all__ = ["RETAINING", "Allocation", "Declarations", "May"]
+
+RETAINING = frozenset(("RETAIN", "PERSISTENT"))  # qualifiers that let a variable keep its value over a power cut
+
+
+class Allocation:
+    """Gives variables their place in the areas."""
+
+    def __init__(self) -> None:
+        self.sizes: dict[Area, int] = {area: 0 for area in Area if area is not Area.CODE}
+        self.variables: list[Variable] = []
+
+    def add(self, variable: Variable) -> None:
+        """Places a variable at the end of its area, or notes one that has an address."""
+        t, area = variable.type, variable.area
+        if variable.offset < 0:
+            variable.offset = align_up(self.sizes[area], t.align)
+        self.sizes[area] = max(self.sizes[area], variable.offset + t.size)
+        self.variables.append(variable)
+
+
+class Declarations(TypeDeclarations):
+    """Turns declarations into types and variables."""
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self.direct = DirectVariables(world)
+
+    def add(self, scope: Scope, symbol: VarSymbol, offset: int) -> bool:
+        """Makes a name known in a scope; False when it is taken."""
+        key = symbol.name.casefold()
+        other = scope.names.get(key)
+        if isinstance(other, VarSymbol):
+            if other.role is Role.RESULT:
+                scope.error(offset, "duplicate", f"{symbol.name} is the name of this function")
+            else:
+                scope.error(
+                    offset, "duplicate", f"{symbol.name} is declared already: {other.name} in line {other.pos.line}"
+                )
+            return False
+        scope.names[key] = symbol
+        return True
+
+    def constant_symbol(
+        self, offset: int, name: str, t: Type, init: Initial | None, scope: Scope, owner: str, role: Role
+    ) -> VarSymbol:
+        """A constant: scalars and strings are folded, arrays and structs get memory once, however many instances there
+        are."""
+        pos, full_name = scope.pos(offset), f"{owner}.{name}" if owner else name
+        if isinstance(init, ComputedInit):
+            scope.error(offset, "constant", f"the value of the constant {name} is not known before the program runs")
+        symbol = VarSymbol(name, pos, t, role, constant=True, default=init)
+        if is_scalar(t) or isinstance(t, StringType):
+            zero: int | float | str = "" if isinstance(t, StringType) else 0.0 if _is_real(t) else 0
+            symbol.value = Const(init.value if isinstance(init, ScalarInit) else zero, t, pos)
+            if not scope.library:
+                self.world.constants[full_name] = symbol.value
+        elif t is not ERROR:
+            symbol.variable = self.shared_variable(full_name, t, init, scope, offset, constant=True)
+        return symbol
+
+    def shared_variable(
+        self,
+        full_name: str,
+        t: Type,
+        init: Initial | None,
+        scope: Scope,
+        offset: int,
+        *,
+        constant: bool = False,
+        retain: bool = False,
+    ) -> Variable:
+        """A variable that exists once for all instances of its POU."""
+        key = (scope.source.path, offset)
+        variable = self.world.shared.get(key)
+        if variable is None:
+            area = Area.RETAIN if retain or self.is_retain(t) else Area.DATA
+            variable = Variable(full_name, t, Storage.AREA, scope.pos(offset), area, initial=init, constant=constant)
+            self.world.shared[key] = variable
+            self.world.allocation.add(variable)
+        return variable
+
+    def global_variable(self, symbol: GlobalSymbol) -> VarSymbol:
+        """Declares a global when it is first used, so that the order of declarations does not matter."""
+        if symbol.symbol is not None:
+            return symbol.symbol
+        scope = self.world.scope(symbol.source)
+        scope.enter(symbol.namespace)
+        if symbol.busy:
+            scope.error(symbol.pos, "recursion", f"the value of {symbol.name} depends on itself")
+            return VarSymbol(symbol.name, scope.pos(symbol.pos), ERROR, Role.GLOBAL)
+        symbol.busy = True
+        t, init = self.declared_type(symbol.decl, scope, May.HAVE_ADDRESS)
+        self.world.classes.require_instances(t, scope, symbol.pos)
+        owner = symbol.full_name.rpartition(".")[0]
+        if "CONSTANT" in symbol.qualifiers:
+            result = self.constant_symbol(symbol.pos, symbol.name, t, init, scope, owner, Role.GLOBAL)
+        else:
+            result = VarSymbol(symbol.name, scope.pos(symbol.pos), t, Role.GLOBAL, default=init)
+            if t is not ERROR:
+                location = self.address(symbol.decl.location, t, result.pos, symbol.full_name, symbol.name)
+                result.variable = self.area_variable(
+                    symbol.full_name, t, init, location, symbol.qualifiers, scope, symbol.pos
+                )
+                if result.variable is not None:
+                    self.world.allocation.add(result.variable)
+        symbol.busy = False
+        symbol.symbol = result
+        return result
+
+    def address(self, location: ast.DirectAddress | None, t: Type, pos: Pos, *names: str) -> ast.DirectAddress | None:
+        """Where a variable with these names lies: for `AT %I*` VAR_CONFIG says it. None: it has no address."""
+        if location is None or not is_open(location):
+            return location
+        return self.world.instance_config.location(location.text[1], t, pos, *names)
+
+    def area_variable(
+        self,
+        name: str,
+        t: Type,
+        init: Initial | None,
+        location: ast.DirectAddress | None,
+        qualifiers: set[str],
+        scope: Scope,
+        offset: int,
+    ) -> Variable | None:
+        """A variable of a program or a global one; not allocated yet."""
+        pos = scope.pos(offset)
+        if location is not None and self._holds_instances(t):
+            message = f"{t} has instances of function blocks, which have no address; give one to their variables"
+            scope.error(location.pos, "location", message)
+            return None
+        if location is not None:
+            return located(name, t, init, location, scope, offset)
+        retain = bool(qualifiers & RETAINING) or self.is_retain(t)
+        return Variable(name, t, Storage.AREA, pos, Area.RETAIN if retain else Area.DATA, initial=init)
+
+    def _holds_instances(self, t: Type) -> bool:
+        return any(part in self.world.blocks for part in instances_in(t))
+
+    def is_retain(self, t: Type) -> bool:
+        """Whether instances of the type live in the retain area as a whole."""
+        while isinstance(t, ArrayType):
+            t = t.element
+        block = self.world.blocks.get(t) if isinstance(t, StructType) else None
+        if block is not None:
+            return block.retain
+        return isinstance(t, StructType) and any(self.is_retain(f.type) for f in t.fields)
+
+
+def _is_real(t: Type) -> bool:
+    base = base_of(t)
+    return isinstance(base, Elementary) and base.kind is Kind.REAL

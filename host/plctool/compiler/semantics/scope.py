@@ -1,0 +1,131 @@
+"""Where a piece of program stands: which names it sees, in which source it is written.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.symbols import ClassInfo, GlobalSymbol, PouSymbol, Symbol, TypeSymbol, Unit
+from plctool.compiler.source import Source
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Pos, Pou, Statement
+from plctool.compiler.types import Type
+
+if TYPE_CHECKING:
+    from plctool.compiler.semantics.world import World
+
+
+def internal_to(symbol: Symbol) -> str | None:
+    """The namespace that alone may use a unit or global; None when everybody may."""
+    if isinstance(symbol, GlobalSymbol):
+        space, marked = symbol.namespace, "INTERNAL" in symbol.qualifiers
+    elif isinstance(symbol, TypeSymbol | PouSymbol):
+        decl = symbol.decl
+        space, marked = decl.namespace, isinstance(decl, ast.PouDecl) and "INTERNAL" in decl.modifiers
+    else:
+        return None
+    if space is None or not space.name or not (marked or space.internal is not None):
+        return None
+    return space.name if marked else space.internal or space.name
+
+
+@dataclass(eq=False)
+class Scope:
+    """The surroundings of declarations and statements.
+
+    `names` are the local ones by case-folded name; `bindings` the types generic parameters stand for in this instance;
+    `prologue` what has to be done before the body: finding edges; `programs` the PROGRAMs that
+    can be instantiated here, as function blocks: in unit tests; `outer` what a method sees of the unit `cls` around it;
+    `sees_inside`: VAR of instances may be read, as tests and VAR_CONFIG do; `edges` what the body sees in place of
+    inputs with R_EDGE; `path` the namespaces to look into, case-folded, innermost first; `space` the one this is in.
+    """
+
+    world: World
+    source: Source
+    library: bool = False
+    names: dict[str, Symbol] = field(default_factory=dict)
+    bindings: dict[str, Type] = field(default_factory=dict)
+    pou: Pou | None = None
+    prologue: list[Statement] = field(default_factory=list)
+    programs: dict[str, PouSymbol] = field(default_factory=dict)
+    outer: dict[str, Symbol] = field(default_factory=dict)
+    cls: ClassInfo | None = None
+    sees_inside: bool = False
+    edges: dict[str, Symbol] = field(default_factory=dict)
+    path: tuple[str, ...] = ()
+    space: str = ""
+
+    def enter(self, namespace: ast.Namespace | None) -> None:
+        """Makes what is in a namespace, in those around it and in those it is USING known by bare names."""
+        if namespace is None:
+            return
+        self.space = namespace.name.casefold()
+        parts = self.space.split(".") if self.space else []
+        enclosing = [".".join(parts[:n]) for n in range(len(parts), 0, -1)]
+        self.path = tuple(enclosing)
+        self.use(namespace.using)
+
+    def use(self, names: list[tuple[int, str]]) -> None:
+        """USING: makes what is in namespaces known by bare names, behind what is nearer."""
+        self.path += tuple(found for offset, name in names if (found := self._namespace(offset, name)) is not None)
+
+    def _namespace(self, offset: int, name: str) -> str | None:
+        """The full name of a namespace, written in full or from here on."""
+        spaces, key = self.world.namespaces, name.casefold()
+        parts = self.space.split(".") if self.space else []
+        for full_name in (".".join([*parts[:n], key]) for n in range(len(parts), -1, -1)):
+            if full_name in spaces:
+                return full_name
+        hint = did_you_mean(name, spaces.values())
+        self.error(offset, "unknown", f"there is no NAMESPACE {name}{hint}")
+        return None
+
+    def is_within(self, namespace: str) -> bool:
+        """Whether this is in a namespace, so that it may use what is INTERNAL there."""
+        name = namespace.casefold()
+        return self.space == name or self.space.startswith(name + ".")
+
+    def may_use(self, symbol: Symbol, name: str, offset: int) -> bool:
+        """Whether a unit or global may be used here; reports what is INTERNAL elsewhere."""
+        owner = internal_to(symbol)
+        if owner is None or self.is_within(owner):
+            return True
+        self.error(offset, "access", f"{name} is INTERNAL: only the namespace {owner} may use it")
+        return False
+
+    def lookup(self, name: str) -> Symbol | None:
+        """What a name stands for here."""
+        key = name.casefold()
+        symbol = self.names.get(key) or self.outer.get(key)
+        if symbol is not None:
+            return symbol
+        for space in self.path:
+            symbol = self.world.lookup(f"{space}.{key}", library=self.library)
+            if symbol is not None:
+                return symbol
+        return self.world.lookup(key.removeprefix("."), library=self.library)
+
+    def unit(self, name: str) -> Unit | None:
+        """A type, function, function block or program, whatever variables have its name."""
+        key = name.casefold()
+        if key in self.programs:
+            return self.programs[key]
+        spaces = (f"{space}.{key}" for space in self.path)
+        found = (self.world.unit(k, library=self.library) for k in (*spaces, key))
+        return next((symbol for symbol in found if symbol is not None), None)
+
+    def pos(self, offset: int) -> Pos:
+        """Line and column of an offset in this source."""
+        return self.source.pos(offset)
+
+    def error(self, offset: int, code: str, message: str) -> None:
+        """Reports an error at an offset."""
+        self.world.diagnostics.error(self.source.pos(offset), code, message)
+
+    def warning(self, offset: int, code: str, message: str) -> None:
+        """Reports a warning at an offset."""
+        self.world.diagnostics.warning(self.source.pos(offset), code, message)

@@ -1,0 +1,103 @@
+"""The properties of a TASK: `TASK Fast(INTERVAL := T#10ms, PRIORITY := 1, WATCHDOG := T#5ms, SENSITIVITY := 3);`
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.statements import Statements
+from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import BitPlace, Load, Task, TaskKind, VarPlace
+from plctool.compiler.types import BOOL, LTIME, TIME
+
+LOWEST_PRIORITY = 31
+MAX_DURATION_US = 0x7FFF_FFFF
+MAX_SENSITIVITY = 0xFFFF
+
+
+def background(name: str) -> Task:
+    """A task that runs when there is time."""
+    return Task(name, TaskKind.FREEWHEELING, LOWEST_PRIORITY, 0, [])
+
+
+def read_task(decl: ast.TaskDecl, scope: Scope) -> Task:
+    """The task that is declared; without INTERVAL and SINGLE it runs when there is time."""
+    return _Reader(decl, scope).task
+
+
+class _Reader:
+    def __init__(self, decl: ast.TaskDecl, scope: Scope) -> None:
+        self.task = background(decl.name)
+        self._checker = Statements(scope)
+        for offset, name, value in decl.properties:
+            read = self._properties.get(name.upper())
+            if read is None or isinstance(value, ast.ArrayInit | ast.StructInit):
+                *most, last = self._properties
+                hint = did_you_mean(name, self._properties)
+                scope.error(offset, "unknown", f"a TASK has {', '.join(most)} and {last}, not {name}{hint}")
+            else:
+                read(self, value)
+        sensitivity = next((offset for offset, name, _ in decl.properties if name.upper() == "SENSITIVITY"), None)
+        if sensitivity is not None and not any(name.upper() == "WATCHDOG" for _, name, _ in decl.properties):
+            message = "SENSITIVITY says how often in a row a cycle may be longer than WATCHDOG, which is missing"
+            scope.error(sensitivity, "configuration", message)
+
+    def _interval(self, node: ast.Expr) -> None:
+        interval = self._duration(node, "INTERVAL")
+        if interval:
+            self.task.interval_us, self.task.kind = interval, TaskKind.CYCLIC
+
+    def _watchdog(self, node: ast.Expr) -> None:
+        self.task.watchdog_us = self._duration(node, "WATCHDOG")
+
+    def _duration(self, node: ast.Expr, name: str) -> int:
+        """In microseconds; 0 for none, and after a diagnosis."""
+        e = self._checker.constant(node)
+        if e is None:
+            return 0
+        if e.type not in (TIME, LTIME) or not isinstance(e.value, int):
+            self._checker.error(node.pos, "type", f"{name} is a duration such as T#10ms, not {e.type}")
+            return 0
+        duration = e.value * 1000 if e.type is TIME else e.value // 1000
+        if not 0 <= duration <= MAX_DURATION_US:
+            self._checker.error(node.pos, "range", f"{name} has to lie between 0 and 35 minutes")
+            return 0
+        return duration
+
+    def _priority(self, node: ast.Expr) -> None:
+        priority = self._checker.integer(node)
+        if priority is not None and 0 <= priority <= LOWEST_PRIORITY:
+            self.task.priority = priority
+        elif priority is not None:
+            message = f"PRIORITY is 0 (highest) to {LOWEST_PRIORITY}, not {priority}"
+            self._checker.error(node.pos, "range", message)
+
+    def _sensitivity(self, node: ast.Expr) -> None:
+        number = self._checker.integer(node)
+        if number is not None and 1 <= number <= MAX_SENSITIVITY:
+            self.task.watchdog_sensitivity = number
+        elif number is not None:
+            self._checker.error(node.pos, "range", f"SENSITIVITY is 1 to {MAX_SENSITIVITY}, not {number}")
+
+    def _single(self, node: ast.Expr) -> None:
+        e = self._checker.expr(node)
+        if e.type is BOOL and isinstance(e, Load) and isinstance(e.place, VarPlace):
+            self.task.event, self.task.kind = e.place.var, TaskKind.EVENT
+        elif e.type is not ERROR:
+            bit = isinstance(e, Load) and isinstance(e.place, BitPlace)
+            reason = ", not a bit at an address: copy that to one in another task" if bit else ""
+            self._checker.error(node.pos, "type", f"SINGLE is a global BOOL variable{reason}")
+
+    _properties: ClassVar[dict[str, Callable[[Any, ast.Expr], None]]] = {
+        "INTERVAL": _interval,
+        "PRIORITY": _priority,
+        "SINGLE": _single,
+        "WATCHDOG": _watchdog,
+        "SENSITIVITY": _sensitivity,
+    }

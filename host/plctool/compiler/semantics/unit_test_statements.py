@@ -1,0 +1,393 @@
+"""The statements of unit tests: asserts, the passing of time, mocks.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from plctool.compiler.nesting import NestingError
+from plctool.compiler.semantics import mocks
+from plctool.compiler.semantics.checker import is_untyped, load, place_of
+from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, settle, time_to_ltime
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.statements import Statements
+from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    Assign,
+    Binary,
+    BinaryOp,
+    Const,
+    Expr,
+    If,
+    Load,
+    Pos,
+    Return,
+    Statement,
+    Storage,
+    Unary,
+    UnaryOp,
+    Variable,
+    VarPlace,
+)  # fmt: skip
+from plctool.compiler.types import BOOL, DINT, LREAL, LTIME, TIME, UDINT, ArrayType, Kind, StringType, StructType, Type
+
+NUMBER, FAILED = "__test", "__failed"
+"""Hidden variables: the test to run (from 0); afterwards the assert that failed (from 1)."""
+
+_TIME, _LTIME = "__time", "__ltime"
+_MESSAGE = StringType(255)
+_NOWHERE = Pos("", 0, 0)
+
+
+@dataclass(frozen=True)
+class Operand:
+    """A value an assert is about: a constant, or what the hidden variable holds after the failure."""
+
+    type: Type
+    value: int | float | str = 0
+    variable: str = ""
+
+
+@dataclass(frozen=True)
+class Assertion:
+    """An assert: where it stands, what it is called, what it compares."""
+
+    pos: Pos
+    name: str
+    actual: Operand
+    expected: Operand
+    tolerance: Operand | None = None
+    message: Operand | None = None
+
+
+class Bench:
+    """What all tests of a program share: its asserts, numbered from 1, and the hidden variables."""
+
+    def __init__(self, world: World) -> None:
+        self.asserts: list[Assertion] = []
+        self._world = world
+        self._operands: dict[tuple[str, Type], Variable] = {}
+        hidden = ((NUMBER, DINT), (FAILED, DINT), (_TIME, TIME), (_LTIME, LTIME))
+        self._hidden = {name: self._variable(name, t) for name, t in hidden}
+        world.clock = {"TIME": self._hidden[_TIME], "LTIME": self._hidden[_LTIME]}
+
+    def _variable(self, name: str, t: Type) -> Variable:
+        made = Variable(name, t, Storage.AREA, _NOWHERE)
+        self._world.allocation.add(made)
+        return made
+
+    def operand(self, role: str, t: Type) -> Variable:
+        """The hidden variable for one side of an assert."""
+        found = self._operands.get((role, t))
+        if found is None:
+            found = self._variable(f"__{role}{len(self._operands)}", t)
+            self._operands[role, t] = found
+        return found
+
+    def place(self, name: str, pos: Pos) -> VarPlace:
+        """One of the hidden variables that every program of tests has."""
+        variable = self._hidden[name]
+        return VarPlace(variable, variable.type, pos)
+
+    def passed(self, pos: Pos) -> Expr:
+        """Whether no assert has failed so far."""
+        return Binary(BinaryOp.EQ, load(self.place(FAILED, pos)), Const(0, DINT, pos), BOOL, pos)
+
+
+_OPERATORS = {
+    "ASSERT_EQ": BinaryOp.EQ, "ASSERT_NEQ": BinaryOp.NE, "ASSERT_GT": BinaryOp.GT, "ASSERT_GE": BinaryOp.GE,
+    "ASSERT_LT": BinaryOp.LT, "ASSERT_LE": BinaryOp.LE,
+}  # fmt: skip
+
+
+class TestStatements(Statements):
+    """Checks the body of a TEST, SETUP or TEARDOWN. It may write every variable of what it tests."""
+
+    def __init__(self, scope: Scope, bench: Bench) -> None:
+        super().__init__(scope)
+        self.cleaning = False  # in TEARDOWN only the first failure counts
+        self._bench = bench
+        self._kept: dict[tuple[str, Type], Variable] = {}
+
+    def write_body(self, decl: ast.TestDecl) -> None:
+        """Checks the statements into the unit of the scope."""
+        pou = self.scope.pou
+        assert pou is not None
+        try:
+            body = self.body(decl.body)
+        except NestingError as error:
+            self.world.nested_too_deeply(error)
+            return
+        pou.body = [*self.scope.prologue, *body]
+        self.world.pous.append(pou)
+        if decl.keyword != "SETUP":
+            self.world.report_unused(self.scope)
+
+    def _member_read_only(self, node: ast.Member) -> str | None:
+        return self._read_only(node.base)
+
+    def _test_statement(self, node: ast.ExprStmt) -> list[Statement]:
+        call = node.value
+        if isinstance(call, ast.Call) and isinstance(call.callee, ast.Name):
+            handler = self._special.get(call.callee.name.upper())
+            if handler is not None:
+                return handler(self, call)
+        return super()._call_statement(node)
+
+    def _nodes(self, call: ast.Call, count: int, *, message: bool = True) -> list[ast.Expr] | None:
+        """The arguments, perhaps with a message behind them; None after a diagnosis."""
+        assert isinstance(call.callee, ast.Name)
+        name = call.callee.name.upper()
+        nodes = [a.value for a in call.args if a.name is None and a.value is not None]
+        if len(nodes) < len(call.args):
+            self.error(call.pos, "arguments", f"the arguments of {name} have no names")
+        elif len(nodes) == count or (message and len(nodes) == count + 1):
+            return nodes
+        else:
+            more = " and perhaps a message" if message else ""
+            plural = "" if count == 1 else "s"
+            self.error(call.pos, "arguments", f"{name} takes {count} argument{plural}{more}, not {len(nodes)}")
+        return None
+
+    # ---- asserts ----
+
+    def _keep(self, role: str, e: Expr, before: list[Statement]) -> Expr:
+        """Evaluates an operand once: into a variable of the test, unless it is constant."""
+        e = settle(e)
+        if isinstance(e, Const) or isinstance(e.type, StructType | ArrayType):
+            return e
+        pou = self.scope.pou
+        assert pou is not None
+        variable = self._kept.get((role, e.type))
+        if variable is None:
+            variable = Variable(f"__{role}", e.type, Storage.LOCAL, e.pos)
+            self._kept[role, e.type] = variable
+            pou.locals.append(variable)
+        place = VarPlace(variable, e.type, e.pos)
+        before.append(Assign(place, e, e.pos))
+        return load(place)
+
+    def _compared(self, call: ast.Call) -> list[Statement]:
+        """ASSERT_EQ and the other comparisons."""
+        nodes = self._nodes(call, 2)
+        if nodes is None:
+            return []
+        assert isinstance(call.callee, ast.Name)
+        name, before = call.callee.name.upper(), list[Statement]()
+        left = self.expr(nodes[0])
+        right = self.expr(nodes[1], None if is_untyped(left) else left.type)
+        if left.type is ERROR or right.type is ERROR:
+            return []
+        left, right = self._match_literals(left, right, None)
+        left, right = self._keep("actual", left, before), self._keep("expected", right, before)
+        holds = self.operate(_OPERATORS[name], left, right, call.pos)
+        return self._assertion(call, holds, before, [("actual", left), ("expected", right)], nodes[2:])
+
+    def _truth(self, call: ast.Call) -> list[Statement]:
+        """ASSERT_TRUE, ASSERT_FALSE."""
+        nodes = self._nodes(call, 1)
+        condition = None if nodes is None else self.condition(nodes[0])
+        if nodes is None or condition is None or condition.type is ERROR:
+            return []
+        assert isinstance(call.callee, ast.Name)
+        wanted, pos = call.callee.name.upper() == "ASSERT_TRUE", self.pos(call.pos)
+        holds = condition if wanted else Unary(UnaryOp.NOT, condition, BOOL, pos)
+        operands: list[tuple[str, Expr]] = [
+            ("actual", Const(int(not wanted), BOOL, pos)),
+            ("expected", Const(int(wanted), BOOL, pos)),
+        ]
+        return self._assertion(call, holds, [], operands, nodes[1:])
+
+    def _near(self, call: ast.Call) -> list[Statement]:
+        """ASSERT_NEAR(actual, expected, tolerance): within the tolerance, both ends included."""
+        nodes = self._nodes(call, 3)
+        if nodes is None:
+            return []
+        before = list[Statement]()
+        actual = self.expr(nodes[0])
+        wanted = None if is_untyped(actual) else actual.type
+        expected, tolerance = self.expr(nodes[1], wanted), self.expr(nodes[2], wanted)
+        if ERROR in (actual.type, expected.type, tolerance.type):
+            return []
+        actual, expected = self._match_literals(actual, expected, None)
+        tolerance = self._match_literals(actual, tolerance, None)[1]
+        roles = ("actual", "expected", "tolerance")
+        kept = [self._keep(r, e, before) for r, e in zip(roles, (actual, expected, tolerance), strict=True)]
+        a, e, t = (_as_real(v) for v in kept)
+        below = self.operate(BinaryOp.LE, self.operate(BinaryOp.SUB, a, e, call.pos), t, call.pos)
+        above = self.operate(BinaryOp.LE, self.operate(BinaryOp.SUB, e, a, call.pos), t, call.pos)
+        holds = self.operate(BinaryOp.AND, below, above, call.pos)
+        return self._assertion(call, holds, before, list(zip(roles, kept, strict=True)), nodes[3:])
+
+    def _assertion(
+        self,
+        call: ast.Call,
+        holds: Expr,
+        before: list[Statement],
+        operands: list[tuple[str, Expr]],
+        message: list[ast.Expr],
+    ) -> list[Statement]:
+        """`IF NOT holds THEN` what is needed to tell `RETURN; END_IF`"""
+        if holds.type is ERROR:
+            return []
+        if message:
+            text = self.expr(message[0])
+            if isinstance(text, Const) and isinstance(text.value, str):  # "..." is a WSTRING elsewhere
+                text = Const(text.value, StringType(len(text.value)), text.pos)
+            if not isinstance(text.type, StringType) or text.type.wide:
+                self.error(message[0].pos, "type", f"the message of an assert is a STRING, not {text.type}")
+                return []
+            operands = [*operands, ("message", text)]
+        assert isinstance(call.callee, ast.Name)
+        pos, store = self.pos(call.pos), list[Statement]()
+        told = {role: self._store(role, e, store) for role, e in operands}
+        number = len(self._bench.asserts) + 1
+        self._bench.asserts.append(Assertion(pos, call.callee.name.upper(), **told))
+        store.append(Assign(self._bench.place(FAILED, pos), Const(number, DINT, pos), pos))
+        if self.cleaning:
+            store = [If([(self._bench.passed(pos), store)], [], pos)]
+        return [*before, If([(Unary(UnaryOp.NOT, holds, BOOL, pos), [*store, Return(pos)])], [], pos)]
+
+    def _store(self, role: str, e: Expr, store: list[Statement]) -> Operand:
+        if isinstance(e, Const):
+            return Operand(e.type, e.value)
+        t = _MESSAGE if role == "message" else e.type
+        variable = self._bench.operand(role, t)
+        store.append(Assign(VarPlace(variable, t, e.pos), e, e.pos))
+        return Operand(t, variable=variable.name)
+
+    # ---- time ----
+
+    def _advance_time(self, call: ast.Call) -> list[Statement]:
+        nodes = self._nodes(call, 1, message=False)
+        e = None if nodes is None else self.settled(nodes[0])
+        if e is None or e.type is ERROR:
+            return []
+        if e.type not in (TIME, LTIME):
+            base = elementary(e.type)
+            if base is None or base.kind is not Kind.INT:
+                message = f"ADVANCE_TIME takes a duration such as T#10ms, or a number of nanoseconds, not {e.type}"
+                self.error(call.pos, "type", message)
+                return []
+            e = convert(e, LTIME)
+        if isinstance(e, Const) and isinstance(e.value, int) and e.value < 0:
+            self.error(call.pos, "range", "time does not go back")
+            return []
+        pos = self.pos(call.pos)
+        long, short = self._bench.place(_LTIME, pos), self._bench.place(_TIME, pos)
+        step = time_to_ltime(e) if e.type is TIME else e
+        total = Binary(BinaryOp.ADD, Load(long, LTIME, pos), step, LTIME, pos)
+        milliseconds = self.convert_explicitly(Load(long, LTIME, pos), TIME)
+        assert milliseconds is not None
+        return [Assign(long, total, pos), Assign(short, milliseconds, pos)]
+
+    # ---- mocks ----
+
+    def _mock(self, call: ast.Call) -> list[Statement]:
+        """MOCK instance;"""
+        place = self._mock_member(call, 1, mocks.MOCKED)
+        return [] if place is None else [Assign(place_of(place), Const(1, BOOL, place.pos), place.pos)]
+
+    def _mock_member(self, call: ast.Call, count: int, name: str) -> Expr | None:
+        """A hidden member of the instance that is the first argument."""
+        nodes = self._nodes(call, count, message=name == mocks.CALLS)
+        if nodes is None:
+            return None
+        method = self._hidden_of(nodes[0], mocks.calls_of) if name == mocks.CALLS else None
+        if method is not None:
+            return method
+        if isinstance(nodes[0], ast.Member) and self.bound_member(nodes[0]) is not None:
+            message = "this is no instance; for a method write MOCK_FUNCTION instance.m RETURNS ..."
+            self.error(nodes[0].pos, "mock", message)
+            return None
+        instance = self.expr(nodes[0])
+        if instance.type is ERROR:
+            return None
+        block = self.world.blocks.get(instance.type) if isinstance(instance.type, StructType) else None
+        if block is None or name not in block.members:
+            self.error(nodes[0].pos, "mock", "MOCK needs an instance of a function block")
+            return None
+        return self.member(instance, ast.Member(nodes[0].pos, nodes[0], name, nodes[0].pos))
+
+    def _hidden_of(self, node: ast.Expr, name: Callable[[str], str]) -> Expr | None:
+        """A hidden variable of the method or property `instance.m`; None when there is none."""
+        bound = self.bound_member(node) if isinstance(node, ast.Member) else None
+        if bound is None or bound.place is None or not isinstance(node, ast.Member):
+            return None
+        member = bound.cls.find(bound.key) or bound.cls.find(f"{bound.key}.get")
+        block = member.owner.block if member is not None else None
+        if member is None or block is None or name(member.name) not in block.members:
+            return None
+        return self.member(self.expr(node.base), ast.Member(node.pos, node.base, name(member.name), node.name_pos))
+
+    def _mock_function(self, call: ast.Call) -> list[Statement]:
+        """`MOCK_FUNCTION name RETURNS value`, `MOCK_FUNCTION instance.method RETURNS value`"""
+        target, value = call.args[0].value, call.args[1].value
+        assert target is not None and value is not None
+        if isinstance(target, ast.Name):
+            switch, result = (self._global(name(target.name)) for name in (mocks.switch_of, mocks.value_of))
+            what = f"there is no function {target.name} in this program that could be mocked"
+        else:
+            switch, result = (self._hidden_of(target, name) for name in (mocks.switch_of, mocks.value_of))
+            what = "MOCK_FUNCTION needs a function, or a method of an instance, that returns something"
+        if switch is None or result is None:
+            self.error(target.pos, "mock", what)
+            return []
+        e, pos = self.value(value, result.type), self.pos(call.pos)
+        if e.type is ERROR:
+            return []
+        return [Assign(place_of(switch), Const(1, BOOL, pos), pos), Assign(place_of(result), e, pos)]
+
+    def _global(self, name: str) -> Expr | None:
+        symbol = self.world.lookup(name, library=False)
+        if not isinstance(symbol, GlobalSymbol):
+            return None
+        return self.variable(self.world.declarations.global_variable(symbol), self.pos(0))
+
+    def _verify_called(self, call: ast.Call) -> list[Statement]:
+        calls = self._mock_member(call, 1, mocks.CALLS)
+        if calls is None:
+            return []
+        return self._verify(call, BinaryOp.GT, calls, Const(0, UDINT, calls.pos), 1)
+
+    def _verify_call_count(self, call: ast.Call) -> list[Statement]:
+        calls = self._mock_member(call, 2, mocks.CALLS)
+        count = call.args[1].value if len(call.args) > 1 else None
+        if calls is None or count is None:
+            return []
+        return self._verify(call, BinaryOp.EQ, calls, self.value(count, UDINT), 2)
+
+    def _verify(self, call: ast.Call, op: BinaryOp, calls: Expr, wanted: Expr, count: int) -> list[Statement]:
+        before: list[Statement] = []
+        actual, expected = self._keep("actual", calls, before), self._keep("expected", wanted, before)
+        holds = self.operate(op, actual, expected, call.pos)
+        message = [a.value for a in call.args[count:] if a.value is not None]
+        return self._assertion(call, holds, before, [("actual", actual), ("expected", expected)], message)
+
+    _special: ClassVar[dict[str, Callable[[Any, ast.Call], list[Statement]]]] = {
+        **dict.fromkeys(_OPERATORS, _compared),
+        "ASSERT_TRUE": _truth,
+        "ASSERT_FALSE": _truth,
+        "ASSERT_NEAR": _near,
+        "ADVANCE_TIME": _advance_time,
+        "MOCK": _mock,
+        "MOCK_FUNCTION": _mock_function,
+        "MOCK_VERIFY_CALLED": _verify_called,
+        "MOCK_VERIFY_CALL_COUNT": _verify_call_count,
+    }
+    _statements: ClassVar[dict[type, Callable[[Any, Any], list[Statement]]]] = {
+        **Statements._statements,
+        ast.ExprStmt: _test_statement,
+    }
+
+
+def _as_real(e: Expr) -> Expr:
+    """Integers as LREAL, so that a difference of unsigned ones may be negative."""
+    base = elementary(e.type)
+    return convert(e, LREAL) if base is not None and base.kind in NUMBERS else e

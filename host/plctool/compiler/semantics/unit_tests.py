@@ -1,0 +1,250 @@
+"""Unit tests in ST: TEST blocks become a program that runs one of them at a time.
+
+The program is like any other; only its tasks are replaced by one, which finds the number of the test in a hidden
+variable. All that the host has to do for a test is a cold start, writing the number, one cycle, and reading what came
+out:
+
+- The variables of a test live on the stack, those of SETUP in the data area, so all are fresh at every start. A PROGRAM
+  is instantiated as a function block; a variable with an address (AT) is a plain member of it then.
+- An assert that does not hold stores its number and both values in hidden variables and returns. TEARDOWN follows in
+  any case; behind a run-time exception, which ends the program, the host runs it by a number of its own.
+- TIME() reads a hidden variable instead of the time of the cycle, and ADVANCE_TIME adds to it: so time goes on within
+  one call, and optimisation knows of it.
+
+The notation is that of OpenPLC's compiler STruC++: TEST, SETUP, TEARDOWN, ASSERT_..., ADVANCE_TIME, MOCK....
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from plctool.compiler.semantics.checker import load
+from plctool.compiler.semantics.configuration import Application, configure, default_programs
+from plctool.compiler.semantics.declarations import May
+from plctool.compiler.semantics.mocks import Mocks, raising
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
+from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestStatements
+from plctool.compiler.semantics.world import World
+from plctool.compiler.source import Source
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    Assign,
+    Call,
+    CallStatement,
+    Case,
+    ComputedInit,
+    If,
+    Initial,
+    Pos,
+    Pou,
+    PouKind,
+    Statement,
+    Storage,
+    Task,
+    TaskKind,
+    Variable,
+    VarPlace,
+)  # fmt: skip
+
+_LARGEST_ON_STACK = 0x4000  # bytes; what is larger lives in the data area
+
+
+@dataclass(frozen=True)
+class TestCase:
+    """A TEST; its number is its index in `TestSuite.cases`."""
+
+    name: str
+    pos: Pos
+
+
+@dataclass
+class _File:
+    """What the tests of one file share."""
+
+    setup: Pou | None = None
+    teardown: Pou | None = None
+    names: dict[str, VarSymbol] = field(default_factory=dict)
+
+
+class TestSuite:
+    """The tests of one program; filled by `check_sources`."""
+
+    def __init__(self) -> None:
+        self.cases: list[TestCase] = []
+        self._teardowns: dict[str, int] = {}  # by file
+        self._bench: Bench | None = None
+        self._branches: list[tuple[list[tuple[int, int]], list[Statement]]] = []
+        self._programs: dict[str, PouSymbol] = {}
+
+    @property
+    def asserts(self) -> list[Assertion]:
+        """All asserts; the first one has number 1."""
+        return self._bench.asserts if self._bench else []
+
+    def teardown_of(self, case: TestCase) -> int | None:
+        """The number that runs just the TEARDOWN behind a test."""
+        return self._teardowns.get(case.pos.file)
+
+    # ---- the steps of the check ----
+
+    def prepare(
+        self, parsed: list[tuple[Source, list[ast.Declaration]]], world: World
+    ) -> list[tuple[Source, list[ast.Declaration]]]:
+        """Sets the hidden variables up, and adds to the syntax tree what MOCK needs."""
+        self._bench = Bench(world)
+        world.register([raising()])
+        everything = [decl for _, declarations in parsed for decl in declarations]
+        world.rewritten = Mocks((d for d in everything if isinstance(d, ast.TestDecl)), world.diagnostics).rewritten
+        return [(source, world.rewritten(declarations)) for source, declarations in parsed]
+
+    def configure(self, world: World) -> Application:
+        """The programs as the CONFIGURATION has them, so that their names are known; no task runs them. Without a
+        CONFIGURATION there may be any number."""
+        alone = len(default_programs(world)) == 1
+        application = configure(world) if world.configurations or alone else Application()
+        application.tasks = [self._task(world)]
+        return application
+
+    def _task(self, world: World) -> Task:
+        assert self._bench is not None
+        pos = next((t.source.pos(t.pos) for t in world.tests), Pos("", 1, 1))
+        runner = Pou("Tests", PouKind.PROGRAM, pos)
+        runner.body = [Case(load(self._bench.place(NUMBER, pos)), self._branches, [], pos)]
+        return Task("Tests", TaskKind.CYCLIC, 1, 10_000, [runner])
+
+    def add(self, world: World) -> None:
+        """Checks the tests."""
+        self._programs = {p.decl.name.casefold(): _as_block(p) for p in world.program_symbols()}
+        for symbol in self._programs.values():
+            world.units.block(symbol)
+        files: dict[str, _File] = {}
+        for decl in (t for t in world.tests if t.keyword == "SETUP"):
+            self._setup(world, decl, files.setdefault(decl.source.path, _File()))
+        for decl in (t for t in world.tests if t.keyword == "TEARDOWN"):
+            self._teardown(world, decl, files.setdefault(decl.source.path, _File()))
+        for decl in (t for t in world.tests if t.keyword == "TEST"):
+            self._test(world, decl, files.get(decl.source.path, _File()))
+        for path, file in files.items():
+            if file.teardown is not None:
+                number = self._teardowns[path] = len(self.cases) + len(self._teardowns)
+                self._branches.append(([(number, number)], [_call(file.teardown)]))
+
+    # ---- blocks ----
+
+    def _setup(self, world: World, decl: ast.TestDecl, file: _File) -> None:
+        scope, checker = self._begin(world, decl, file, "SETUP")
+        if file.setup is not None:
+            scope.error(decl.pos, "duplicate", "there is a SETUP in this file already")
+            return
+        file.setup = scope.pou
+        self._declare(decl, scope, file)
+        file.names = {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol)}
+        for symbol in file.names.values():
+            symbol.used = True
+        checker.write_body(decl)
+
+    def _teardown(self, world: World, decl: ast.TestDecl, file: _File) -> None:
+        scope, checker = self._begin(world, decl, file, "TEARDOWN")
+        if file.teardown is not None:
+            scope.error(decl.pos, "duplicate", "there is a TEARDOWN in this file already")
+            return
+        file.teardown = scope.pou
+        self._declare(decl, scope, None)
+        checker.cleaning = True
+        checker.write_body(decl)
+
+    def _test(self, world: World, decl: ast.TestDecl, file: _File) -> None:
+        number, pos = len(self.cases), decl.source.pos(decl.pos)
+        self.cases.append(TestCase(decl.name, pos))
+        scope, checker = self._begin(world, decl, file, f"TEST_{number}")
+        self._declare(decl, scope, None)
+        checker.write_body(decl)
+        assert scope.pou is not None
+        body = [_call(scope.pou)]
+        if file.setup is not None:
+            assert self._bench is not None
+            body = [_call(file.setup), If([(self._bench.passed(pos), body)], [], pos)]
+        if file.teardown is not None:
+            body.append(_call(file.teardown))
+        self._branches.append(([(number, number)], body))
+
+    def _begin(self, world: World, decl: ast.TestDecl, file: _File, name: str) -> tuple[Scope, TestStatements]:
+        scope = world.scope(decl.source)
+        scope.enter(decl.namespace)
+        scope.sees_inside = True
+        scope.pou = Pou(name, PouKind.PROGRAM, decl.source.pos(decl.pos))
+        scope.programs = self._programs
+        scope.names.update(file.names)
+        assert self._bench is not None
+        return scope, TestStatements(scope, self._bench)
+
+    def _declare(self, decl: ast.TestDecl, scope: Scope, shared: _File | None) -> None:
+        """The variables: of SETUP (`shared`) in the data area, others on the stack."""
+        pou = scope.pou
+        assert pou is not None
+        for name in {name.casefold() for b in decl.blocks for line in b.decls for _, name in line.names}:
+            if isinstance(scope.names.get(name), VarSymbol):
+                del scope.names[name]  # hides one of SETUP
+        blocks = sorted(decl.blocks, key=lambda b: "CONSTANT" not in b.qualifiers)  # bounds may need constants
+        for block in blocks:
+            if block.keyword not in ("VAR", "VAR_TEMP", "VAR_EXTERNAL"):
+                scope.error(block.pos, "unsupported", f"a {decl.keyword} has VAR, not {block.keyword}")
+            elif block.keyword != "VAR_EXTERNAL":  # globals are known anyway
+                for line in block.decls:
+                    if "CONSTANT" in block.qualifiers:
+                        _constant(line, scope, pou.name)
+                    else:
+                        self._line(line, scope, shared)
+
+    def _line(self, line: ast.VarDecl, scope: Scope, shared: _File | None) -> None:
+        world, pou = scope.world, scope.pou
+        assert pou is not None
+        t, default = world.declarations.declared_type(line, scope, May.HAVE_ADDRESS)
+        computed = default.value if isinstance(default, ComputedInit) else None
+        default = None if computed is not None else default
+        for offset, name in line.names:
+            symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
+            if t is not ERROR:
+                if line.location is not None:
+                    symbol.variable = world.declarations.area_variable(
+                        name, t, default, line.location, set(), scope, offset
+                    )
+                else:
+                    symbol.variable = self._instance(symbol, default, pou, shared is not None)
+            variable = symbol.variable
+            if variable is not None and variable.storage is Storage.AREA:
+                world.allocation.add(variable)
+            elif variable is not None:
+                pou.locals.append(variable)
+            if variable is not None and computed is not None:
+                scope.prologue.append(Assign(VarPlace(variable, t, variable.pos), computed, variable.pos))
+            world.declarations.add(scope, symbol, offset)
+
+    def _instance(self, symbol: VarSymbol, default: Initial | None, pou: Pou, shared: bool) -> Variable:
+        t = symbol.type
+        if shared or t.size > _LARGEST_ON_STACK:
+            name = f"{pou.pos.file}:{pou.pos.line}.{symbol.name}"
+            return Variable(name, t, Storage.AREA, symbol.pos, initial=default)
+        return Variable(symbol.name, t, Storage.LOCAL, symbol.pos, initial=default)
+
+
+def _as_block(program: PouSymbol) -> PouSymbol:
+    """A PROGRAM as a type with instances. Addresses are dropped: each instance has its own inputs and outputs."""
+    decl = program.decl
+    blocks = [replace(b, decls=[replace(line, location=None) for line in b.decls]) for b in decl.blocks]
+    return PouSymbol(replace(decl, keyword="FUNCTION_BLOCK", blocks=blocks), library=False)
+
+
+def _constant(line: ast.VarDecl, scope: Scope, owner: str) -> None:
+    declarations = scope.world.declarations
+    t, init = declarations.declared_type(line, scope)
+    for offset, name in line.names:
+        symbol = declarations.constant_symbol(offset, name, t, init, scope, owner, Role.LOCAL)
+        declarations.add(scope, symbol, offset)
+
+
+def _call(pou: Pou) -> Statement:
+    return CallStatement(Call(pou, [], NOTHING, pou.pos), pou.pos)

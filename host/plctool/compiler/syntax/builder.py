@@ -1,0 +1,515 @@
+"""Builds the syntax tree: one method for each rule of grammar.lark.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from plctool.compiler.source import Source
+from plctool.compiler.syntax import ast, literals
+from plctool.compiler.syntax.builder_chart import read_action, read_priority
+from plctool.compiler.syntax.builder_units import Arrangement
+from plctool.compiler.syntax.lexer import Report, Token
+
+_PRECEDENCE = {
+    "**": 7, "*": 6, "/": 6, "MOD": 6, "+": 5, "-": 5, "<": 4, ">": 4, "<=": 4, ">=": 4, "=": 3, "<>": 3,
+    "AND": 2, "&": 2, "AND_THEN": 2, "XOR": 1, "OR": 0, "OR_ELSE": 0,
+}  # fmt: skip
+
+
+def _chain(operands: Sequence[ast.Expr], operators: Sequence[Token]) -> ast.Expr:
+    """Sorts out `a op b op c` by precedence, left-associative."""
+    values, pending = [operands[0]], list[tuple[int, str, int]]()
+
+    def reduce() -> None:
+        _, op, pos = pending.pop()
+        right = values.pop()
+        values[-1] = ast.Binary(pos, op, values[-1], right)
+
+    for token, operand in zip(operators, operands[1:], strict=True):
+        op = token.text.upper()
+        precedence = _PRECEDENCE[op]
+        while pending and pending[-1][0] >= precedence:
+            reduce()
+        pending.append((precedence, "AND" if op == "&" else op, token.pos))
+        values.append(operand)
+    while pending:
+        reduce()
+    return values[0]
+
+
+def _listed(children: tuple[Any, ...]) -> list[Any]:
+    return [c for c in children if c is not None]
+
+
+class Builder:
+    """One method per grammar rule. What an optional part left out is None; so is what error recovery put in."""
+
+    def __init__(self) -> None:
+        self.source = Source("", "")
+        self.attributes: dict[int, dict[str, str]] = {}
+        self.report: Report = lambda pos, code, message: None
+        self.units = Arrangement(self)
+
+    # ---- types ----
+
+    def start(self, *units: Any) -> list[Any]:
+        return self.units.arrange(units)
+
+    def types(self, keyword: Token, *decls: Any) -> list[Any]:
+        for decl in _listed(decls):
+            decl.qualified = self._is_qualified(keyword) or self._is_qualified(decl)
+        return _listed(decls)
+
+    def _is_qualified(self, start: Token | ast.TypeDecl) -> bool:
+        return "qualified_only" in self.attributes.get(start.pos, {})
+
+    def type_decl(
+        self, name: Token, base: tuple[int, str] | None, spec: ast.TypeSpec, init: ast.Init | None
+    ) -> ast.TypeDecl:
+        if base is not None and isinstance(spec, ast.StructSpec):
+            spec.base = ast.NamedType(*base)
+        elif base is not None:
+            self.report(base[0], "syntax", "only a STRUCT or UNION can extend another one")
+        return ast.TypeDecl(name.pos, name.text, spec, init, self.source)
+
+    def named_type(self, name: tuple[int, str]) -> ast.NamedType:
+        return ast.NamedType(*name)
+
+    def initialised_type(self, name: Token, inits: ast.ArrayInit) -> ast.NamedType:
+        return ast.NamedType(name.pos, name.text, inits=inits)
+
+    def text_type(self, name: Token, length: ast.Expr | None) -> ast.NamedType:
+        return ast.NamedType(name.pos, name.text, length)
+
+    def subrange(self, base: Token, low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
+        return ast.SubrangeSpec(base.pos, base.text, low, high)
+
+    def enum(self, values: list[tuple[int, str, ast.Init | None]]) -> ast.EnumSpec:
+        return ast.EnumSpec(values[0][0] if values else 0, None, values)
+
+    def enum_with_base(self, values: list[tuple[int, str, ast.Init | None]], base: Token) -> ast.EnumSpec:
+        return ast.EnumSpec(base.pos, base.text, values)
+
+    def enum_of_base(self, base: Token, values: list[Any]) -> ast.EnumSpec:
+        """`INT (red, green := 5)`, or an instance with values, perhaps without names: `Pump(valve, limit := 5)`."""
+        named = [(v.pos, v.name, None) if isinstance(v, ast.Name) else v for v in values]
+        return ast.EnumSpec(base.pos, base.text, [v if isinstance(v, tuple) else (v.pos, "", v) for v in named])
+
+    def enum_values(self, *values: Any) -> list[Any]:
+        return [v for v in values if v is not None]
+
+    type_args = enum_values
+
+    def enum_value(self, name: Token, value: ast.Init | None) -> tuple[int, str, ast.Init | None]:
+        return name.pos, name.text, value
+
+    def array(self, keyword: Token, *rest: Any) -> ast.ArraySpec:
+        *bounds, element = rest
+        return ast.ArraySpec(keyword.pos, bounds, element)
+
+    def open_bounds(self, star: Token) -> None:
+        if star.text != "*":
+            self.report(star.pos, "syntax", f"expected the bounds of the array or *, found {star.text}")
+
+    def bounds(self, low: ast.Expr, high: ast.Expr) -> tuple[ast.Expr, ast.Expr]:
+        return low, high
+
+    def pointer(self, keyword: Token, target: ast.TypeSpec) -> ast.PointerSpec:
+        return ast.PointerSpec(keyword.pos, keyword.text.upper(), target)
+
+    def struct(self, keyword: Token, *fields: ast.VarDecl | None) -> ast.StructSpec:
+        return ast.StructSpec(keyword.pos, [f for f in fields if f is not None], keyword.type == "UNION")
+
+    def name(self, first: Token, *rest: Token) -> tuple[int, str]:
+        return first.pos, ".".join((first.text, *(t.text for t in rest)))
+
+    # ---- variables ----
+
+    def var_block(self, keyword: Token, *items: Any) -> ast.VarBlock:
+        qualifiers = {t.text.upper() for t in items if isinstance(t, Token)}
+        decls = [d for d in items if isinstance(d, ast.VarDecl)]
+        return ast.VarBlock(keyword.pos, keyword.text.upper(), qualifiers, decls)
+
+    def var_decl(
+        self,
+        names: list[Token],
+        location: Token | None,
+        spec: ast.TypeSpec,
+        edge: Token | None,
+        init: ast.Init | None,
+    ) -> ast.VarDecl:
+        pos = names[0].pos
+        address = self.direct(location) if location else None
+        attributes = self.attributes.get(pos, {})
+        written = [(t.pos, t.text) for t in names]
+        return ast.VarDecl(pos, written, address, spec, init, attributes, edge.text.upper() if edge else "")
+
+    def var_names(self, *names: Token) -> list[Token]:
+        return list(names)
+
+    def ref_init(self, op: Token, _equals: Token, value: ast.Expr) -> ast.Expr:
+        if op.text.upper() != "REF":
+            self.report(op.pos, "syntax", f"{op.text} has no place here; an initial value is written :=, or REF=")
+        return value
+
+    def array_init(self, *items: Any) -> ast.ArrayInit:
+        return ast.ArrayInit(items[0].pos, list(items))
+
+    def repeat(self, count: Token, *values: Any) -> ast.Repeat:
+        return ast.Repeat(count.pos, self.number(count), _listed(values))
+
+    def struct_init(self, *items: Any) -> ast.StructInit:
+        """Values without a name are further elements of the array in front of them: `(start := 3, 4, end := 5)`."""
+        members: list[tuple[int, str, ast.Init]] = []
+        listed: ast.ArrayInit | None = None
+        for item in _listed(items):
+            if isinstance(item, tuple):
+                members.append(item)
+                listed = None
+            elif listed is None:
+                offset, name, first = members[-1]
+                listed = ast.ArrayInit(first.pos, [first, item])
+                members[-1] = offset, name, listed
+            else:
+                listed.items.append(item)
+        return ast.StructInit(members[0][0], members)
+
+    def member_init(self, name: Token, value: ast.Init) -> tuple[int, str, ast.Init]:
+        return name.pos, name.text, value
+
+    # ---- units ----
+
+    def global_block(self, keyword: Token, *items: Any) -> ast.GlobalBlock:
+        block = self.var_block(keyword, *items)
+        return ast.GlobalBlock(block, self.source, qualified=self._is_qualified(keyword))
+
+    def var_blocks(self, *blocks: Any) -> list[Any]:
+        return [b for b in blocks if b is not None]
+
+    def pou(self, keyword: Token, head: list[Any], result: Any, blocks: Any, body: Any) -> ast.PouDecl:
+        """`head`: modifiers and name."""
+        *modifiers, name = head
+        attributes = self.attributes.get(keyword.pos, {})
+        decl = ast.PouDecl(name.pos, keyword.text.upper(), name.text, result, [], body or [], attributes, self.source)
+        decl.modifiers = {t.text.upper() for t in modifiers if t is not None}
+        self.units.complete(decl, None, None, blocks or [])
+        return decl
+
+    def function(self, keyword: Token, *rest: Any) -> Any:
+        *head, result, blocks, body = rest
+        return self.pou(keyword, head, result, blocks, body)
+
+    def function_block(self, keyword: Token, *rest: Any) -> Any:
+        *head, bases, interfaces, parts, body, members = rest
+        decl = self.pou(keyword, head, None, [], body)
+        self.units.complete(decl, bases, interfaces, [*(parts or []), *(members or [])])
+        return decl
+
+    def program(self, keyword: Token, *rest: Any) -> Any:
+        return self.function_block(keyword, *rest[:-3], None, None, *rest[-3:])
+
+    # ---- sequential function charts ----
+
+    def step(self, keyword: Token, name: Token, *actions: Any) -> ast.Step:
+        found = [read_action(statement.value, self.report) for statement in actions if statement is not None]
+        return ast.Step(name.pos, name.text, keyword.type == "INITIAL_STEP", _listed(tuple(found)))
+
+    def transition(
+        self, keyword: Token, _name: Any, word: Any, number: Any, sources: Any, targets: Any, condition: Any
+    ) -> ast.Transition:
+        priority = None if word is None else read_priority(word, number, self.report)
+        ends = [[(t.pos, t.text) for t in tokens] for tokens in (sources, targets)]
+        return ast.Transition(keyword.pos, priority, ends[0], ends[1], condition)
+
+    # ---- methods, classes, namespaces ----
+
+    def class_block(self, keyword: Token, *rest: Any) -> Any:
+        *head, bases, interfaces, parts = rest
+        decl = self.pou(keyword, head, None, [], [])
+        decl.keyword = "FUNCTION_BLOCK"
+        decl.modifiers.add("CLASS")
+        self.units.complete(decl, bases, interfaces, parts or [])
+        return decl
+
+    def interface(self, keyword: Token, *rest: Any) -> Any:
+        *head, bases, members = rest
+        decl = self.pou(keyword, head, None, [], [])
+        self.units.complete(decl, bases, None, members or [])
+        return decl
+
+    parts = members = names = step_names = chart = steps = var_blocks
+
+    def method(self, keyword: Token, *rest: Any) -> Any:
+        *head, result, blocks, body, steps = rest
+        return self.pou(keyword, head, result, [*(blocks or []), *(steps or [])], body)
+
+    def property(self, keyword: Token, *rest: Any) -> list[ast.PouDecl]:
+        return self.units.property(keyword, rest)
+
+    def accessor(self, keyword: Token, *rest: Any) -> tuple[Token, list[Any], Any, Any]:
+        *modifiers, blocks, body = rest
+        return keyword, modifiers, blocks, body
+
+    def action(self, keyword: Token, name: Token, body: Any, steps: Any) -> Any:
+        return self.pou(keyword, [name], None, steps, body)
+
+    def namespace(self, keyword: Token, *rest: Any) -> list[Any]:
+        return self.units.namespace(rest)
+
+    def using(self, keyword: Token, names: Any) -> ast.Namespace:
+        return ast.Namespace("", names or [])
+
+    def configuration(self, keyword: Token, name: Token, *items: Any) -> ast.ConfigurationDecl:
+        decl = ast.ConfigurationDecl(name.pos, name.text, [], [], [], self.source)
+        self._configure(decl, items)
+        return decl
+
+    def _configure(self, decl: ast.ConfigurationDecl, items: Any) -> None:
+        for item in items:
+            if isinstance(item, ast.VarBlock):
+                decl.globals.append(item)
+            elif isinstance(item, ast.TaskDecl):
+                decl.tasks.append(item)
+            elif isinstance(item, ast.ProgramInstance):
+                decl.programs.append(item)
+            elif isinstance(item, ast.InstanceBlock):
+                decl.instance_blocks.append(item)
+            elif isinstance(item, tuple):
+                decl.resources.append(item[0])
+                self._configure(decl, item[1])
+
+    def config_globals(self, keyword: Token, *items: Any) -> ast.VarBlock:
+        return self.var_block(keyword, *items)
+
+    def resource(self, _keyword: Token, name: Token, _type: Token, *items: Any) -> tuple[str, Any]:
+        return name.text, items
+
+    def instance_config(self, _keyword: Token, *lines: Any) -> ast.InstanceBlock:
+        return ast.InstanceBlock(_listed(lines), self.source)
+
+    instance_access = instance_config
+
+    def config_line(
+        self, path: ast.Expr, location: Token | None, spec: ast.TypeSpec, init: ast.Init | None
+    ) -> ast.ConfigLine:
+        return ast.ConfigLine(path.pos, path, self.direct(location) if location else None, spec, init)
+
+    def access_line(self, name: Token, path: ast.Expr, spec: ast.TypeSpec, rights: Token | None) -> ast.AccessLine:
+        writable = rights is not None and rights.text.upper() == "READ_WRITE"
+        return ast.AccessLine(name.pos, name.text, path, spec, writable)
+
+    def task(self, _keyword: Token, name: Token, *properties: Any) -> ast.TaskDecl:
+        return ast.TaskDecl(name.pos, name.text, _listed(properties))
+
+    def instance(
+        self, _keyword: Token, qualifier: Token | None, name: Token, task: Token | None, type_name: Token, args: Any
+    ) -> ast.ProgramInstance:
+        qualifiers = {qualifier.text.upper()} if qualifier else set[str]()
+        return ast.ProgramInstance(
+            name.pos,
+            name.text,
+            (task.pos, task.text) if task else None,
+            type_name.pos,
+            type_name.text,
+            args or [],
+            qualifiers,
+        )
+
+    # ---- unit tests ----
+
+    def test(self, keyword: Token, name: Token, blocks: Any, body: Any) -> ast.TestDecl:
+        text = self.string(name)
+        return ast.TestDecl(keyword.pos, "TEST", str(text.value), blocks, body, self.source)
+
+    def setup(self, keyword: Token, blocks: Any, body: Any) -> ast.TestDecl:
+        return ast.TestDecl(keyword.pos, keyword.type, keyword.text, blocks, body, self.source)
+
+    def mock(self, keyword: Token, instance: ast.Expr) -> ast.ExprStmt:
+        return self._statement_call(keyword, ast.Argument(instance.pos, None, instance))
+
+    def mock_function(self, keyword: Token, target: ast.Expr, returns: Token, value: ast.Expr) -> ast.ExprStmt:
+        if returns.text.upper() != "RETURNS":
+            self.report(returns.pos, "syntax", f"expected RETURNS before the value, found {returns.text}")
+        function = ast.Argument(target.pos, None, target)
+        return self._statement_call(keyword, function, ast.Argument(value.pos, None, value))
+
+    def _statement_call(self, keyword: Token, *args: ast.Argument) -> ast.ExprStmt:
+        """A statement that begins with a keyword, as a call of that name."""
+        callee = ast.Name(keyword.pos, keyword.type)
+        return ast.ExprStmt(keyword.pos, ast.Call(keyword.pos, callee, list(args)))
+
+    # ---- statements ----
+
+    def stmts(self, *children: Any) -> list[Any]:
+        return [c for c in children if c is not None]
+
+    def empty(self) -> None:
+        return None
+
+    def assign(self, target: ast.Expr, value: Any) -> ast.Assign:
+        if type(value) is tuple:
+            return ast.Assign(target.pos, [target, *value[0]], ":=", value[1])
+        return ast.Assign(target.pos, [target], ":=", value)
+
+    def chained(self, target: ast.Expr, value: Any) -> tuple[list[ast.Expr], ast.Expr]:
+        if type(value) is tuple:
+            return [target, *value[0]], value[1]
+        return [target], value
+
+    def assign_with(self, target: ast.Expr, op: Token, _equals: Token, value: ast.Expr) -> ast.Assign | None:
+        name = op.text.upper()
+        if name not in ("S", "R", "REF"):
+            self.report(op.pos, "syntax", f"{op.text} has no place here; an assignment is written :=, S= or R=")
+            return None
+        return ast.Assign(op.pos, [target], name + "=", value)
+
+    def expr_stmt(self, value: ast.Expr) -> ast.ExprStmt:
+        return ast.ExprStmt(value.pos, value)
+
+    def if_stmt(self, keyword: Token, condition: ast.Expr, body: list[ast.Stmt], *rest: Any) -> ast.If:
+        *elsifs, otherwise = rest
+        return ast.If(keyword.pos, [(condition, body), *elsifs], otherwise or [])
+
+    def elsif(self, condition: ast.Expr, body: list[ast.Stmt]) -> tuple[ast.Expr, list[ast.Stmt]]:
+        return condition, body
+
+    def case_stmt(self, keyword: Token, selector: ast.Expr, *rest: Any) -> ast.Case:
+        *items, otherwise = rest
+        branches: list[tuple[list[ast.CaseLabel], list[ast.Stmt]]] = []
+        for item in items:
+            if type(item) is list:
+                branches.append((item, []))
+            elif item is not None:
+                if not branches:
+                    self.report(item.pos, "syntax", "this statement stands before the first label of the CASE")
+                    continue
+                branches[-1][1].append(item)
+        return ast.Case(keyword.pos, selector, branches, otherwise or [], otherwise is not None)
+
+    def case_labels(self, *labels: ast.CaseLabel) -> list[ast.CaseLabel]:
+        return _listed(labels)
+
+    def case_label(self, low: ast.Expr, high: ast.Expr | None) -> ast.CaseLabel:
+        return ast.CaseLabel(low.pos, low, high)
+
+    def for_stmt(self, keyword: Token, var: Any, start: Any, stop: Any, step: Any, body: Any) -> ast.For:
+        return ast.For(keyword.pos, var, start, stop, step, body)
+
+    def while_stmt(self, keyword: Token, condition: ast.Expr, body: list[ast.Stmt]) -> ast.While:
+        return ast.While(keyword.pos, condition, body)
+
+    def repeat_stmt(self, keyword: Token, body: list[ast.Stmt], until: ast.Expr) -> ast.RepeatUntil:
+        return ast.RepeatUntil(keyword.pos, body, until)
+
+    def exit_stmt(self, keyword: Token) -> ast.Exit:
+        return ast.Exit(keyword.pos)
+
+    def continue_stmt(self, keyword: Token) -> ast.Continue:
+        return ast.Continue(keyword.pos)
+
+    def return_stmt(self, keyword: Token) -> ast.Return:
+        return ast.Return(keyword.pos)
+
+    # ---- expressions ----
+
+    def binary(self, *children: Any) -> ast.Expr:
+        if len(children) == 3:
+            op = children[1].text.upper()
+            return ast.Binary(children[1].pos, "AND" if op == "&" else op, children[0], children[2])
+        return _chain(children[::2], children[1::2])
+
+    def unary(self, op: Token, operand: ast.Expr) -> ast.Expr:
+        return ast.Unary(op.pos, op.text.upper(), operand)
+
+    def parenthesised(self, value: ast.Expr) -> ast.Expr:
+        return value
+
+    def number(self, token: Token) -> ast.Literal:
+        if len(token.text) < 19 and token.text.isdigit():
+            return ast.Literal(token.pos, ast.LiteralKind.INT, int(token.text))
+        try:
+            return ast.Literal(token.pos, *literals.unsigned(token.text))
+        except literals.LiteralError as error:
+            return self._bad(token, error)
+
+    def typed(self, token: Token) -> ast.Expr:
+        prefix, _, rest = token.text.partition("#")
+        if literals.is_enum_value(prefix, rest):
+            return ast.EnumValue(token.pos, prefix, rest)
+        try:
+            kind, value, name = literals.typed(token.text)
+            return ast.Literal(token.pos, kind, value, name)
+        except literals.LiteralError as error:
+            return self._bad(token, error)
+
+    def string(self, token: Token) -> ast.Literal:
+        prefix, hash_sign, rest = token.text.partition("#")
+        typed = bool(hash_sign) and prefix[:1] not in "'\""
+        text = rest if typed else token.text
+        wide = text.startswith('"')
+        name = prefix.upper() if typed else "WSTRING" if wide else "STRING"
+        try:
+            if wide is not (name[0] == "W"):
+                right = "'...'" if wide else '"..."'
+                raise literals.LiteralError(f"a {name} is written {name}#{right}")
+            kind = ast.LiteralKind.WSTRING if wide else ast.LiteralKind.STRING
+            return ast.Literal(token.pos, kind, literals.string(text), name)
+        except literals.LiteralError as error:
+            return self._bad(token, error)
+
+    def word(self, token: Token) -> ast.Literal:
+        if token.type == "NULL":
+            return ast.Literal(token.pos, ast.LiteralKind.NULL, 0)
+        return ast.Literal(token.pos, ast.LiteralKind.BOOL, int(token.type == "TRUE"))
+
+    def _bad(self, token: Token, error: literals.LiteralError) -> ast.Literal:
+        self.report(token.pos, "literal", str(error))
+        return ast.Literal(token.pos, ast.LiteralKind.BAD, 0)
+
+    def name_expr(self, token: Token) -> ast.Name:
+        return ast.Name(token.pos, token.text)
+
+    def global_name(self, token: Token) -> ast.Name:
+        return ast.Name(token.pos - 1, f".{token.text}")
+
+    def direct(self, token: Token) -> ast.DirectAddress:
+        return ast.DirectAddress(token.pos, token.text.upper())
+
+    def member(self, base: ast.Expr, name: Token) -> ast.Member:
+        return ast.Member(base.pos, base, name.text, name.pos)
+
+    def bit(self, base: ast.Expr, token: Token) -> ast.Expr:
+        text = token.text.lstrip("%").upper()
+        width = text[0] if text[0] in "XBWDL" else "X"
+        digits = text.removeprefix(width)
+        if not digits.isdigit() or len(digits) > 4:
+            return self._bad(token, literals.LiteralError(f"{token.text} is not the number of a bit"))
+        return ast.BitAccess(base.pos, base, width, int(digits), token.pos)
+
+    def index(self, base: ast.Expr, *indices: ast.Expr) -> ast.Index:
+        return ast.Index(base.pos, base, list(indices))
+
+    def deref(self, base: ast.Expr) -> ast.Deref:
+        return ast.Deref(base.pos, base)
+
+    def call(self, callee: ast.Expr, args: list[ast.Argument]) -> ast.Call:
+        return ast.Call(callee.pos, callee, args)
+
+    def args(self, *children: Any) -> list[Any]:
+        return [c for c in children if c is not None]
+
+    def positional(self, value: ast.Expr) -> ast.Argument:
+        return ast.Argument(value.pos, None, value)
+
+    def input(self, name: Token, value: ast.Expr) -> ast.Argument:
+        return ast.Argument(name.pos, name.text, value)
+
+    def output(self, name: Token, target: ast.Expr | None = None) -> ast.Argument:
+        return ast.Argument(name.pos, name.text, target, output=True)
+
+    def output_negated(self, _not: Token, name: Token, target: ast.Expr | None = None) -> ast.Argument:
+        return ast.Argument(name.pos, name.text, target, output=True, negated=True)

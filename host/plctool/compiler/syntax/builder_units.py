@@ -1,0 +1,131 @@
+"""Puts declarations together: methods with the unit they belong to, namespaces with what they hold.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from plctool.compiler.syntax import ast
+
+if TYPE_CHECKING:
+    from plctool.compiler.syntax.builder import Builder
+    from plctool.compiler.syntax.lexer import Token
+
+MEMBERS = frozenset(("METHOD", "ACTION", "GET", "SET"))
+"""Keywords of PouDecls that stand in another unit, or behind it."""
+
+_OWNERS = frozenset(("FUNCTION_BLOCK", "PROGRAM", "INTERFACE"))
+
+
+def _flat(units: Iterable[Any]) -> list[Any]:
+    found: list[Any] = []
+    for unit in units:
+        if isinstance(unit, list):
+            found += _flat(unit)
+        elif unit is not None:
+            found.append(unit)
+    return found
+
+
+class Arrangement:
+    """What the tree builder does with whole units."""
+
+    def __init__(self, builder: Builder) -> None:
+        self._builder = builder
+
+    def arrange(self, units: Iterable[Any]) -> list[Any]:
+        """The units of a file or namespace. A METHOD or ACTION between units belongs to the one in front of it."""
+        found: list[Any] = []
+        using: list[tuple[int, str]] = []
+        for unit in _flat(units):
+            if isinstance(unit, ast.Namespace):
+                using += unit.using
+            elif isinstance(unit, ast.PouDecl) and unit.keyword in MEMBERS:
+                self._attach(unit, found)
+            else:
+                found.append(unit)
+        if using:
+            for unit in found:
+                _namespace(unit).using += using
+        return found
+
+    def _attach(self, member: ast.PouDecl, units: list[Any]) -> None:
+        owner = units[-1] if units else None
+        if isinstance(owner, ast.PouDecl) and owner.keyword in _OWNERS:
+            owner.members.append(member)
+            return
+        message = f"the {member.keyword} {member.name} has no FUNCTION_BLOCK or PROGRAM in front of it"
+        self._builder.report(member.pos, "syntax", message)
+
+    def complete(self, decl: ast.PouDecl, bases: Any, interfaces: Any, parts: Sequence[Any]) -> None:
+        """Adds what a unit extends, implements and holds."""
+        decl.chart, parts = self._chart(decl, parts)
+        decl.bases, decl.interfaces = bases or [], interfaces or []
+        for part in _flat(parts):
+            if isinstance(part, ast.PouDecl):
+                decl.members.append(part)
+            elif isinstance(part, ast.Namespace):
+                _namespace(decl).using += part.using
+            else:
+                decl.blocks.append(part)
+
+    def _chart(self, decl: ast.PouDecl, parts: Sequence[Any]) -> tuple[ast.Chart | None, Sequence[Any]]:
+        """The steps and transitions, and the rest."""
+        steps = [p for p in parts if isinstance(p, ast.Step)]
+        transitions = [p for p in parts if isinstance(p, ast.Transition)]
+        if not steps and not transitions:
+            return None, parts
+        if decl.body:
+            message = f"{decl.name} has statements and steps; put the statements into an ACTION"
+            self._builder.report(decl.body[0].pos, "syntax", message)
+        return ast.Chart(steps, transitions), [p for p in parts if not isinstance(p, ast.Step | ast.Transition)]
+
+    def property(self, keyword: Token, rest: Sequence[Any]) -> list[ast.PouDecl]:
+        """The GET is a method that returns the value, the SET one that takes it as its input, both by the name of the
+        property."""
+        at = next(i for i, part in enumerate(rest) if part is not None and not hasattr(part, "text"))
+        *modifiers, name = rest[:at]
+        spec, blocks, *accessors = rest[at:]
+        found = []
+        for accessor in accessors:
+            if accessor is None:
+                continue
+            token, more, own_blocks, body = accessor
+            all_blocks = [*(blocks or []), *(own_blocks or [])]
+            decl = self._builder.pou(keyword, [*modifiers, *more, name], None, all_blocks, body)
+            decl.keyword = token.type
+            if decl.keyword == "GET":
+                decl.result = spec
+            else:
+                line = ast.VarDecl(name.pos, [(name.pos, name.text)], None, spec, None)
+                decl.blocks.insert(0, ast.VarBlock(name.pos, "VAR_INPUT", set(), [line]))
+            found.append(decl)
+        if not found:
+            self._builder.report(name.pos, "syntax", f"the property {name.text} needs a GET or a SET")
+        return found
+
+    def namespace(self, rest: Sequence[Any]) -> list[Any]:
+        """The units of a namespace, which know its name."""
+        at = next(i for i, part in enumerate(rest) if isinstance(part, tuple))
+        internal, name = at > 0, rest[at][1]
+        units = self.arrange(rest[at + 1 :])
+        for unit in units:
+            space = _namespace(unit)
+            space.name = f"{name}.{space.name}" if space.name else name
+            if space.internal is not None:
+                space.internal = f"{name}.{space.internal}" if space.internal else name
+            elif internal:
+                space.internal = name.rpartition(".")[0]
+        return units
+
+
+def _namespace(unit: Any) -> ast.Namespace:
+    space: ast.Namespace | None = getattr(unit, "namespace", None)
+    if space is None:
+        space = ast.Namespace()
+        if isinstance(unit, ast.PouDecl | ast.TypeDecl | ast.GlobalBlock | ast.TestDecl):
+            unit.namespace = space
+    return space

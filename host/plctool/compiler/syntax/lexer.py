@@ -1,0 +1,266 @@
+"""From text to tokens. Keywords are case-insensitive; comments nest; pragmas are put aside as attributes.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+from plctool.compiler.syntax import slips
+from plctool.compiler.syntax.conditions import Conditions
+
+_TOKEN = re.compile(
+    r"""\s*(?:
+    (?P<WORD>[A-Za-z_\xC0-\uFFFF][\w\xC0-\uFFFF]*+(?!\#))
+  | (?P<PUNCT>:=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*)\[\]:;,.<>^]|=(?!=)|&(?!&))
+  | (?P<NUMBER>\d[\d_]*+(?:\#\w++|(?:\.\d[\d_]*+)?(?:[eE][+-]?\d++)?)(?!\w))
+  | (?P<SKIP>//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/)
+  | (?P<DATE>(?i:L?(?:DATE_AND_TIME|DATE|DT|D|TIME_OF_DAY|TOD))\#[\d:._-]+)
+  | (?P<STRING>(?i:(?:W?STRING|W?CHAR)\#)?(?:'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*"))
+  | (?P<TYPED>[A-Za-z_]\w*\#(?:[+-]?\d[\d_]*(?:\.[\d_]+)?[eE][+-]?\d+|[+-]?\w+(?:\.\w+)*(?:\#\w+)?)?)
+  | (?P<DIRECT>%(?:[IQMiqm](?:\*|[XBWDLxbwdl]?\d+(?:\.\d+)*)|[XBWDLxbwdl]\d+))
+  | (?P<PRAGMA>\{[^{}]*\})
+  | (?P<FOREIGN>\{\{.*?\}\})
+  | (?P<NESTED>\(\*|/\*)
+  | (?P<SLIP>==|&&|!=|\|\|?|!|%(?=[\s\d(])|\d\w+)
+  | (?P<BAD>\S)
+  | (?P<END>\Z)
+  )""",
+    re.VERBOSE | re.ASCII | re.DOTALL,
+)
+
+_PUNCTUATION = {
+    ";": "_SEMI", ":": "_COLON", ",": "_COMMA", ".": "_DOT", "..": "_DOTDOT", ":=": "_ASSIGN", "=>": "_ARROW",
+    "(": "_LPAR", ")": "_RPAR", "[": "_LSQB", "]": "_RSQB", "^": "_CARET",
+    "=": "EQ", "+": "SIGN", "-": "SIGN", "*": "OP", "/": "OP", "&": "OP", "**": "OP",
+    "<": "OP", ">": "OP", "<=": "OP", ">=": "OP", "<>": "OP",
+}  # fmt: skip
+
+KEYWORDS = {
+    **dict.fromkeys(("AND", "OR", "XOR", "MOD", "AND_THEN", "OR_ELSE"), "OP"),
+    **dict.fromkeys(("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "QUALIFIER"),
+    **dict.fromkeys(("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_STAT", "VAR_EXTERNAL"), "VAR"),
+    "VAR_INST": "VAR",
+    **dict.fromkeys(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "FINAL", "ABSTRACT", "OVERRIDE"), "MODIFIER"),
+    "VAR_GLOBAL": "GLOBAL",
+    "VAR_CONFIG": "CONFIG",
+    "VAR_ACCESS": "ACCESS",
+    **dict.fromkeys(("R_EDGE", "F_EDGE"), "EDGE"),
+    **dict.fromkeys(("READ_ONLY", "READ_WRITE"), "RIGHTS"),
+    **dict.fromkeys(("STRING", "WSTRING"), "TEXT"),
+    **{k: k for k in (
+        "TYPE", "STRUCT", "UNION", "ARRAY", "POINTER", "REFERENCE", "REF_TO", "FUNCTION", "FUNCTION_BLOCK", "PROGRAM",
+        "CONFIGURATION", "RESOURCE", "TASK", "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN",
+        "TRUE",
+        "FALSE", "NULL", "NOT", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
+        "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET", "ACTION", "NAMESPACE", "USING",
+        "INITIAL_STEP", "STEP", "TRANSITION",
+    )},
+    **{k: "_" + k for k in (
+        "END_TYPE", "END_STRUCT", "END_UNION", "OVERLAP", "OF", "TO", "END_VAR", "AT", "END_FUNCTION",
+        "END_FUNCTION_BLOCK",
+        "END_PROGRAM", "END_CONFIGURATION", "ON", "END_RESOURCE", "WITH", "THEN", "ELSIF", "ELSE", "END_IF", "END_CASE",
+        "BY", "DO", "END_FOR", "END_WHILE", "UNTIL", "END_REPEAT", "END_TEST", "END_SETUP", "END_TEARDOWN",
+        "EXTENDS", "IMPLEMENTS", "END_CLASS", "END_INTERFACE", "END_METHOD", "END_PROPERTY", "END_GET", "END_SET",
+        "END_ACTION", "END_NAMESPACE", "END_STEP", "FROM", "END_TRANSITION",
+    )},
+}  # fmt: skip
+
+KEYWORDS |= dict.fromkeys(slips.WORDS, "MISSPELT") | dict.fromkeys(slips.REFUSED, "REFUSED")
+
+SOFT = frozenset((
+    "MISSPELT", "REFUSED",
+    "QUALIFIER", "TEXT", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP",
+    "UNION", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION", "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET",
+    "SET", "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS", "INITIAL_STEP", "STEP", "TRANSITION",
+    "_FROM", "EDGE", "RIGHTS",
+))  # fmt: skip
+"""Terminals that are names where the grammar has no use for them."""
+
+_OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a parenthesis in place of an operand
+
+OPENING = frozenset((
+    "MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING", "INITIAL_STEP", "STEP",
+    "TRANSITION",
+))  # fmt: skip
+"""Terminals that are names where no name follows."""
+
+_ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
+_STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quotes
+_OPEN_PARENTHESIS = re.compile(r"\s*\(")
+_NAMED_ARGUMENT = re.compile(r"\s*\(\s*[A-Za-z_]\w*\s*(?::=|=>)", re.ASCII)
+_PART_FOLLOWS = re.compile(r"\s*[:.,^\[]")
+_NAME = re.compile(r"\s+[A-Za-z_]")
+_PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
+_LABEL = re.compile(r"\s+[A-Za-z_]\w*\s*:(?!=)")
+_QUOTE = re.compile(r"\s*['\"]")
+_COMMENT_MARK = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
+
+Report = Callable[[int, str, str], None]  # offset, code, message
+
+
+class Token:
+    """A token; `pos` is the offset of its first character. Duck-typed to what lark's LALR driver reads of its own."""
+
+    __slots__ = ("pos", "text", "type")
+
+    def __init__(self, type_: str, text: str, pos: int) -> None:
+        self.type = type_
+        self.text = text
+        self.pos = pos
+
+    @property
+    def end(self) -> int:
+        """The offset behind the last character."""
+        return self.pos + len(self.text)
+
+
+class Lexer:
+    """Iterates over the tokens of a text; `attributes` collects the attributes by the offset of the token they precede,
+    `pragmas` all other pragmas with their own."""
+
+    def __init__(self, text: str, report: Report, start: int = 0, end: int | None = None) -> None:
+        self.text = text
+        self.attributes: dict[int, dict[str, str]] = {}
+        self.pragmas: list[tuple[int, str]] = []
+        self._report = report
+        self._start = start
+        self._end = len(text) if end is None else end
+        self._pending: dict[str, str] = {}
+        self._conditions = Conditions(report)
+
+    def __iter__(self) -> Iterator[Token]:
+        """All tokens, last one of type $END."""
+        at = self._start
+        while True:
+            for match in _TOKEN.finditer(self.text, at, self._end):
+                kind = match.lastgroup
+                assert kind is not None
+                word, pos = match[kind], match.start(kind)
+                if kind == "WORD":
+                    token = Token(KEYWORDS.get(word.upper(), "IDENT"), word, pos)
+                elif kind == "PUNCT":
+                    token = Token(_PUNCTUATION[word], word, pos)
+                elif kind == "SKIP":
+                    continue
+                elif kind == "NESTED":
+                    at = self._skip_comment(word, match.end())
+                    break
+                elif kind == "PRAGMA":
+                    self._pragma(word, pos)
+                    if self._conditions.active:
+                        continue
+                    at = self._skip_branch(match.end())
+                    break
+                elif kind == "FOREIGN":
+                    self._foreign(pos)
+                    continue
+                elif kind == "SLIP":
+                    token = self._slip(word, pos)
+                elif kind == "BAD":
+                    if self._bad(word, pos):
+                        continue
+                    at = self._end_of_line(pos)
+                    yield Token("STRING", "''", pos)
+                    break
+                else:
+                    token = Token({"END": "$END", "DATE": "TYPED"}.get(kind, kind), word, pos)
+                if self._pending:
+                    self.attributes[pos] = self._pending
+                    self._pending = {}
+                if kind == "END":
+                    self._conditions.finish()
+                yield token
+                if kind == "END":
+                    return
+
+    def _skip_comment(self, mark: str, at: int) -> int:
+        """The end of a comment that holds comments, or of the text."""
+        start, depth = at - 2, 1
+        for match in _COMMENT_MARK[mark].finditer(self.text, at, self._end):
+            depth += 1 if match.group() == mark else -1
+            if depth == 0:
+                return match.end()
+        self._report(start, "comment", "this comment is not closed")
+        return self._end
+
+    def _skip_branch(self, at: int) -> int:
+        """The end of what a conditional pragma leaves out, or of the text."""
+        for match in _TOKEN.finditer(self.text, at, self._end):
+            kind = match.lastgroup
+            if kind == "PRAGMA":
+                self._conditions.take(match[kind], match.start(kind))
+                if self._conditions.active:
+                    return match.end()
+            elif kind == "NESTED":
+                return self._skip_branch(self._skip_comment(match[kind], match.end()))
+        return self._end
+
+    def _pragma(self, text: str, pos: int) -> None:
+        match = _ATTRIBUTE.fullmatch(text)
+        if match:
+            self._pending[match.group(1).lower()] = match.group(2) or ""
+        elif _STATEMENT_IN_C.fullmatch(text):
+            self._foreign(pos)
+        elif not self._conditions.take(text, pos):
+            self.pragmas.append((pos, text))
+
+    def _foreign(self, pos: int) -> None:
+        self._report(pos, "pragma", "code in C cannot be compiled; put it into an EXTERNAL function")
+
+    def _slip(self, text: str, pos: int) -> Token:
+        """What was meant by a sign or number of another language."""
+        if text in slips.SIGNS:
+            kind, meant, message = slips.SIGNS[text]
+        else:
+            kind, meant = "NUMBER", text.lower().replace("0x", "16#", 1).replace("0b", "2#", 1)
+            message = f"a number is written {meant}, not {text}" if "#" in meant else f"{text} is not a number"
+        self._report(pos, "syntax", message)
+        return Token(kind, meant if "#" in meant or kind != "NUMBER" else "0", pos)
+
+    def _bad(self, character: str, pos: int) -> bool:
+        """Reports a character that starts no token; False when the rest of the line is to be skipped."""
+        if character in "'\"":
+            self._report(pos, "string", "this string is not closed before the end of the line")
+            return False
+        if character == "{":
+            self._report(pos, "pragma", "this pragma is not closed")
+            return True
+        shown = character if character.isprintable() else f"character {ord(character)}"
+        self._report(pos, "character", f"{shown} has no place in a program")
+        return True
+
+    def _end_of_line(self, pos: int) -> int:
+        end = self.text.find("\n", pos, self._end)
+        return self._end if end < 0 else end
+
+
+def is_followed_by_name(token: Token, text: str) -> bool:
+    """Whether MOCK, METHOD ... start something, as in `MOCK pump.valve;`: another name follows, as it never does
+    behind a
+    variable of that name."""
+    if token.type == "TRANSITION" and _PRIORITY.match(text, token.end):
+        return True
+    return _NAME.match(text, token.end) is not None
+
+
+def begins_unit(token: Token, text: str) -> bool:
+    """Whether TEST or STEP begins one, wherever it stands: then the text before it is not finished."""
+    if token.type in ("STEP", "INITIAL_STEP"):
+        return _LABEL.match(text, token.end) is not None
+    return token.type == "TEST" and _QUOTE.match(text, token.end) is not None
+
+
+def meant(token: Token, text: str) -> str:
+    """The terminal of the keyword that a misspelt one stands for, "" when it seems to be a name."""
+    return "" if _PART_FOLLOWS.match(text, token.end) else KEYWORDS[slips.WORDS[token.text.upper()]]
+
+
+def is_operator_function(token: Token, text: str) -> bool:
+    """Whether AND, OR, XOR or MOD at the place of an operand starts a call such as `AND(a, b)`; NOT does with a named
+    argument."""
+    if token.type == "NOT":
+        return _NAMED_ARGUMENT.match(text, token.end) is not None
+    return token.text.upper() in _OPERATOR_FUNCTIONS and _OPEN_PARENTHESIS.match(text, token.end) is not None

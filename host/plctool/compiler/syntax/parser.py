@@ -1,0 +1,171 @@
+"""From tokens to the syntax tree: an LALR(1) parser that recovers from errors.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from plctool.compiler.source import Source
+from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.builder import Builder
+from plctool.compiler.syntax.lexer import (
+    OPENING,
+    SOFT,
+    Lexer,
+    Report,
+    Token,
+    begins_unit,
+    is_followed_by_name,
+    is_operator_function,
+    meant,
+)
+from plctool.compiler.syntax.syntax_errors import Recovery
+from plctool.compiler.syntax.tables import END, Rule, Tables, load_tables
+
+Reducer = Callable[[list[Any]], Any]
+
+
+class Parser:
+    """The state of one parse. `states` and `values` are the stacks; they are repaired by `Recovery`."""
+
+    def __init__(self, tables: Tables, reducers: list[Reducer | None]) -> None:
+        self.tables = tables
+        self.states = [tables.start]
+        self.values: list[Any] = []
+        self._reducers = reducers
+
+    def feed(self, token: Token) -> bool:
+        """Takes a token; False when it does not fit. The stacks then are as if it had not been there, but for
+        reductions that were due."""
+        states, values, actions = self.states, self.values, self.tables.actions
+        kind = token.type
+        while True:
+            action = actions[states[-1]].get(kind)
+            if action is None:
+                return False
+            if action >= 0:
+                states.append(action)
+                values.append(token)
+                return True
+            self.reduce(-1 - action)
+            if kind == END and states[-1] == self.tables.end:
+                return True
+
+    def reduce(self, number: int) -> None:
+        """Replaces the symbols of a rule by what it stands for."""
+        states, values = self.states, self.values
+        rule, reducer = self.tables.rules[number], self._reducers[number]
+        size = rule.size
+        if reducer is None:
+            del states[-1]
+        elif size:
+            children = values[-size:]
+            del states[-size:], values[-size:]
+            values.append(reducer(children))
+        else:
+            values.append(reducer([]))
+        states.append(self.tables.gotos[states[-1]][rule.origin])
+
+
+def _reducer(rule: Rule, builder: Builder) -> Reducer | None:
+    """The function that makes the value of a rule from its children; None when the only child is the value."""
+    parts = rule.parts
+    plain = not any(spliced or index < 0 for index, spliced in parts)
+    if rule.is_list:
+        return _list_reducer(rule)
+    if rule.transparent and plain and len(parts) == 1:
+        index = parts[0][0]
+        return None if rule.size == 1 else lambda children: children[index]
+    callback = getattr(builder, rule.callback)
+    if plain and len(parts) == rule.size:
+        return lambda children: callback(*children)
+    if plain and len(parts) == 1:
+        first = parts[0][0]
+        return lambda children: callback(children[first])
+    if plain and len(parts) == 2:
+        left, right = parts[0][0], parts[1][0]
+        return lambda children: callback(children[left], children[right])
+    return lambda children: callback(*_gather(children, parts))
+
+
+def _list_reducer(rule: Rule) -> Reducer:
+    """A helper rule makes a list; one that continues a list adds to it."""
+    parts = rule.parts
+    if parts and parts[0] == (0, True):
+        more = parts[1:]
+
+        def extend(children: list[Any]) -> list[Any]:
+            found: list[Any] = children[0]
+            found += _gather(children, more)
+            return found
+
+        return extend
+    return lambda children: _gather(children, parts)
+
+
+def _gather(children: list[Any], parts: tuple[tuple[int, bool], ...]) -> list[Any]:
+    found: list[Any] = []
+    for index, spliced in parts:
+        if spliced:
+            found += children[index]
+        else:
+            found.append(children[index] if index >= 0 else None)
+    return found
+
+
+@cache
+def _machine() -> tuple[Tables, Builder, list[Reducer | None]]:
+    tables, builder = load_tables(), Builder()
+    return tables, builder, [_reducer(rule, builder) for rule in tables.rules]
+
+
+_AMBIGUOUS = SOFT | {"OP", "NOT"}
+
+
+def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None:
+    """Gives a word that the language may have a use for the type it has where it stands."""
+    kind = token.type
+    if kind == "MISSPELT":
+        right = meant(token, text)
+        is_name = not right or parser.tables.after(parser.states, right) is None
+        if not is_name:
+            recovery.report_misspelt(token, right)
+    elif kind == "REFUSED":
+        is_name = recovery.skipping or not (token.text.startswith("_") or is_followed_by_name(token, text))
+        if not is_name:
+            recovery.refuse(token)
+    elif kind == "NOT":
+        is_name = is_operator_function(token, text)
+    elif kind == "OP":
+        is_name = kind not in parser.tables.actions[parser.states[-1]] and is_operator_function(token, text)
+    elif parser.tables.after(parser.states, kind) is None:
+        is_name = not begins_unit(token, text)
+    else:
+        is_name = kind in OPENING and not is_followed_by_name(token, text)
+    if is_name:
+        token.type = "IDENT"
+
+
+def parse(source: Source, report: Report, start: int = 0, end: int | None = None) -> list[ast.Declaration]:
+    """The declarations of a text (of the part from offset `start` to `end`). Errors go to `report`."""
+    tables, builder, reducers = _machine()
+    parser = Parser(tables, reducers)
+    recovery = Recovery(parser, source, report)
+    lexer = Lexer(source.text, recovery.report_token, start, end)
+    builder.source, builder.attributes, builder.report = source, lexer.attributes, report
+    feed = parser.feed
+    for token in lexer:
+        if token.type in _AMBIGUOUS:
+            _decide(token, parser, recovery, source.text)
+        if recovery.skipping and not recovery.resume(token):
+            continue
+        if feed(token):
+            recovery.accept(token)
+        else:
+            recovery.handle(token)
+    result = parser.values[0] if len(parser.values) == 1 else []
+    return result if isinstance(result, list) else []

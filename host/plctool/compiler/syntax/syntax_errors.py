@@ -1,0 +1,374 @@
+"""Syntax errors: what to say, and how to go on so that the next error is found as well.
+
+First a repair is tried that loses nothing: put in the one token that is missing, or the END_... of what is still open.
+Only when none fits, text is skipped to the end of the statement or to the next keyword that makes sense where the
+parser stands.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plctool.compiler.source import Source
+from plctool.compiler.syntax import slips
+from plctool.compiler.syntax.lexer import KEYWORDS, Report, Token
+from plctool.compiler.syntax.tables import END
+
+if TYPE_CHECKING:
+    from plctool.compiler.syntax.parser import Parser
+
+_CLOSERS = {
+    "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT",
+    "VAR": "END_VAR", "GLOBAL": "END_VAR", "CONFIG": "END_VAR", "ACCESS": "END_VAR",
+    "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE", "FUNCTION": "END_FUNCTION",
+    "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM", "RESOURCE": "END_RESOURCE",
+    "CONFIGURATION": "END_CONFIGURATION", "TEST": "END_TEST", "SETUP": "END_SETUP", "TEARDOWN": "END_TEARDOWN",
+    "CLASS": "END_CLASS", "INTERFACE": "END_INTERFACE", "METHOD": "END_METHOD", "PROPERTY": "END_PROPERTY",
+    "GET": "END_GET", "SET": "END_SET", "ACTION": "END_ACTION", "NAMESPACE": "END_NAMESPACE",
+    "INITIAL_STEP": "END_STEP", "STEP": "END_STEP", "TRANSITION": "END_TRANSITION",
+}  # fmt: skip
+_ENDS = {"_" + end for end in _CLOSERS.values()}
+_UNITS = {
+    "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "GLOBAL", "CONFIG", "ACCESS", "CONFIGURATION", "TEST", "SETUP",
+    "TEARDOWN",
+}  # fmt: skip
+_INSTRUCTIONS = {"LD", "LDN", "ST", "STN", "CAL", "CALC", "CALCN", "JMPC", "JMPCN", "RETC", "RETCN"}
+_STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
+_CHART = {"INITIAL_STEP", "STEP", "TRANSITION"}
+_SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, *_CHART, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL", END}
+_ITEMS = ("stmt", "var_decl", "type_decl", "config_item", "unit", "expr_stmt", "step")  # can be left out as a whole
+
+_INSERTIONS = {
+    "_SEMI": (";", "expected ; after the {item}"),
+    "_THEN": ("THEN", "expected THEN after the condition"),
+    "_DO": ("DO", "expected DO before the body of the loop"),
+    "_OF": ("OF", "expected OF"),
+    "_TO": ("TO", "expected TO"),
+    "_RPAR": (")", "expected )"),
+    "_RSQB": ("]", "expected ]"),
+    "_COLON": (":", "expected :"),
+    "_ASSIGN": (":=", "expected :="),
+    "_COMMA": (",", "expected ,"),
+}
+_VALUES = {"IDENT", "NUMBER", "TYPED", "STRING", "TRUE", "FALSE"}
+_WORDS = {
+    "_SEMI": ";", "_COLON": ":", "_COMMA": ",", "_ASSIGN": ":=", "_LPAR": "(", "_RPAR": ")", "_LSQB": "[", "_RSQB": "]",
+    "_DOTDOT": "..", "_THEN": "THEN", "_DO": "DO", "_OF": "OF", "_TO": "TO", "_UNTIL": "UNTIL", "_ON": "ON",
+}  # fmt: skip
+
+_PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",)}
+_RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
+_BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
+_APART = 3  # an error closer than so many tokens to the one before is a consequence of it
+
+Stack = list[int]
+
+
+class Recovery:
+    """Repairs the state of one parser. `skipping` is set while text is thrown away."""
+
+    def __init__(self, parser: Parser, source: Source, report: Report) -> None:
+        self._parser = parser
+        self._tables = parser.tables
+        self._source = source
+        self._report = report
+        self.skipping = False
+        self.previous: Token | None = None
+        self._last: tuple[Token, ...] = ()
+        self._accepted = _APART  # tokens since the last error
+        self._quiet = False
+        self._skip_to = ""  # the word or sign that ends what is refused
+        self._dropped: list[str] = []  # openings that were thrown away, whose ends are still to come
+
+    def handle(self, token: Token) -> None:
+        """Reports that `token` does not fit, and repairs what can be repaired."""
+        self._quiet = self._accepted < _APART
+        self._accepted = 0
+        self._reduce()
+        if self._late_variables(token) or self._stray_end(token):
+            return
+        while self._insert(token) or self._close(token):
+            if self._parser.feed(token):
+                return
+        self._say(token.pos, self._unexpected(token))
+        self._skip(token)
+
+    def report_token(self, offset: int, code: str, message: str) -> None:
+        """Reports a fault of the text; what does not fit right behind it is a consequence."""
+        self._report(offset, code, message)
+        self._accepted = 0
+
+    def report_misspelt(self, token: Token, kind: str) -> None:
+        """Reports a keyword that is spelled wrongly; `kind` is the terminal it stands for."""
+        self.report_token(token.pos, "syntax", f"{token.text} is written {kind.removeprefix('_')}")
+        token.type = kind
+
+    def refuse(self, token: Token) -> None:
+        """Reports a word that begins what this compiler leaves out, and leaves it out."""
+        refusal = slips.REFUSED[token.text.upper()]
+        self._leave_out(token, refusal.message, refusal.end)
+
+    def accept(self, token: Token) -> None:
+        """Notes a token that was fine."""
+        self._last = (self.previous, token) if self.previous else (token,)
+        self.previous = token
+        self._accepted += 1
+
+    def resume(self, token: Token) -> bool:
+        """While skipping: whether to go on with `token`. A semicolon ends what is skipped and belongs to it."""
+        if self._skip_to and token.type != END:
+            if token.text.upper() == self._skip_to:
+                self._skip_to, self.skipping, self._accepted = "", False, _APART
+            return False
+        if token.type != "_SEMI" and token.type not in _SYNC:
+            return False
+        if self._shift(self._parser.states, token.type) is not None:
+            self.skipping = False
+            self._accepted = _APART
+            return True
+        return self._drop(None if token.type == "_SEMI" else token.type) and token.type != "_SEMI"
+
+    # ---- repairs ----
+
+    def _insert(self, token: Token) -> bool:
+        """Puts in one missing token before `token`, or before the name in front of it."""
+        stack, values = self._parser.states, self._parser.values
+        if token.type == "EQ" and self._shift(stack, "_ASSIGN"):
+            what = "an assignment" if self._item(stack) == "stmt" else "an initial value"
+            self._say(token.pos, f"{what} is written :=, not =")
+            token.type = "_ASSIGN"
+            return True
+        if self._keyword_as_name(token):
+            return True
+        for kind, (text, message) in _INSERTIONS.items():
+            if kind == "_ASSIGN" and token.type not in _VALUES:
+                continue
+            if self._shift(stack, kind, token.type) is not None:
+                if kind == "_SEMI" and self.previous is not None and self.previous.type == "RETURN":
+                    message = _RETURN
+                self._say(self._gap(token), message.format(item=self._item_words(stack)))
+                self._parser.feed(Token(kind, text, self._gap(token)))
+                return True
+        if self._shift(stack, "_UNTIL", "IDENT", token.type) is not None:
+            self._say(token.pos, f"UNTIL and a condition missing before {token.text}")
+            self._parser.feed(Token("_UNTIL", "UNTIL", token.pos))
+            self._parser.feed(Token("IDENT", "", token.pos))
+            return True
+        last = values[-1] if values else None
+        if isinstance(last, Token) and last.type == "IDENT" and self._insert_before_name(last, token):
+            return True
+        if self._shift(stack, "IDENT", token.type) is not None and token.type not in _ENDS | _UNITS | {END, "_LSQB"}:
+            self._say(token.pos, f"expected {self._operand(stack)} before {_shown(token)}")
+            self._parser.feed(Token("IDENT", "", token.pos))
+            return True
+        return False
+
+    def _insert_before_name(self, name: Token, token: Token) -> bool:
+        """`f(x) y := 1`: the name was taken for the S of S=; `VAR a : INT; a := 1`: for a declaration."""
+        stack = self._parser.states[:-1]
+        for kind, text in (("_SEMI", ";"), ("_END_VAR", "END_VAR")):
+            if token.type == "_SEMI" or self._shift(stack, kind, "IDENT", token.type) is None:
+                continue
+            self._parser.states.pop()
+            self._parser.values.pop()
+            if kind == "_SEMI":
+                before = self._source.text[: name.pos].rstrip()
+                instruction = self.previous is not None and self._last[0].text.upper() in _INSTRUCTIONS
+                hint = "; Instruction List is not supported, write Structured Text" if instruction else ""
+                self._say(len(before), f"expected ; after the {self._item_words(stack)}{hint}")
+            else:
+                self._report_open(name, self._open())
+            self._parser.feed(Token(kind, text, name.pos))
+            self._parser.feed(name)
+            return True
+        return False
+
+    def _keyword_as_name(self, token: Token) -> bool:
+        if token.text.upper() not in KEYWORDS or self._shift(self._parser.states, "IDENT") is None:
+            return False
+        if self._item(self._parser.states) == "stmt" or self._source.text[token.end :].lstrip()[:1] not in (
+            ":",
+            ",",
+        ):
+            return False
+        self._say(token.pos, f"{token.text} is a keyword and cannot be a name")
+        token.type = "IDENT"
+        return True
+
+    def _close(self, token: Token) -> bool:
+        """Closes the innermost open IF, FOR, VAR ... when `token` can only stand further out."""
+        opener = self._open()
+        if opener is None or token.type not in _SYNC:
+            return False
+        if token.type in _PARTS and not any(t.type in _PARTS[token.type] for t in self._openers()[:-1]):
+            return False
+        end = _CLOSERS[opener.type]
+        stack = self._shift(self._parser.states, "_" + end)
+        if stack is None:
+            return False
+        if token.type in _STATEMENTS and self._shift(stack, token.type) is None:
+            return False
+        self._report_open(token, opener)
+        self._parser.feed(Token("_" + end, end, token.pos))
+        return True
+
+    def _leave_out(self, token: Token, message: str, end: str) -> None:
+        """Reports `token`, and goes on behind the word or sign `end`."""
+        self._say(token.pos, message)
+        self.skipping, self._skip_to = True, end
+
+    def _late_variables(self, token: Token) -> bool:
+        """Variables declared between statements."""
+        if token.type != "VAR" or self._item(self._parser.states) != "stmt":
+            return False
+        self._leave_out(token, f"{token.text} stands in front of the first statement", "END_VAR")
+        return True
+
+    def _stray_end(self, token: Token) -> bool:
+        """An END_... that closes nothing that is open: it stands for the right one, or is left out."""
+        needed = _PARTS.get(token.type)
+        if needed is not None and not any(t.type in needed for t in self._openers()):
+            self._say(token.pos, f"{token.text} without {_a(needed[0])}")
+            return True
+        if token.type not in _ENDS:
+            return False
+        if any("_" + _CLOSERS[t.type] == token.type for t in self._openers()):
+            return False
+        opener = self._open()
+        name = token.text.upper().removeprefix("END_")
+        if name in self._dropped:
+            self._dropped.remove(name)
+            return True
+        if opener is None or (opener.type in _BLOCKS) is not (name in _BLOCKS):
+            self._say(token.pos, f"{token.text} without {_a(name)}")
+            return True
+        line = self._source.pos(opener.pos).line
+        end = _CLOSERS[opener.type]
+        self._say(token.pos, f"expected {end} for the {opener.text.upper()} in line {line}, not {token.text}")
+        token.type = "_" + end
+        return self._parser.feed(token)
+
+    def _report_open(self, token: Token, opener: Token | None) -> None:
+        assert opener is not None
+        line = self._source.pos(opener.pos).line
+        self._say(token.pos, f"{_CLOSERS[opener.type]} missing for the {opener.text.upper()} in line {line}")
+
+    def _skip(self, token: Token) -> None:
+        if self._shift(self._parser.states, token.type) is None:
+            self.skipping = True
+            if not self.resume(token):
+                return
+        self._parser.feed(token)
+
+    def _drop(self, before: str | None) -> bool:
+        """Leaves out the unfinished statement or declaration, and as many around it as need be for `before` to fit."""
+        states, values = self._parser.states, self._parser.values
+        for depth in range(len(states), 0, -1):
+            item = self._item_at(states[depth - 1])
+            if item is None:
+                continue
+            after = [*states[:depth], self._tables.gotos[states[depth - 1]][item]]
+            if before is None or self._shift(after, before) is not None:
+                self._dropped += [v.type for v in values[depth - 1 :] if isinstance(v, Token) and v.type in _CLOSERS]
+                states[:] = after
+                values[depth - 1 :] = [None]
+                self.skipping = False
+                self._accepted = _APART
+                return True
+        return False
+
+    def _say(self, offset: int, message: str) -> None:
+        if not self._quiet:
+            self._report(offset, "syntax", message)
+
+    # ---- looking at the parser ----
+
+    def _reduce(self) -> None:
+        """Does the reductions that are due whatever comes next, so that what is complete is no longer open."""
+        while True:
+            actions = set(self._tables.actions[self._parser.states[-1]].values())
+            if len(actions) != 1 or min(actions) >= 0:
+                return
+            self._parser.reduce(-1 - min(actions))
+
+    def _shift(self, stack: Stack, *kinds: str) -> Stack | None:
+        """The states after tokens of these kinds, None when one does not fit."""
+        return self._tables.after(stack, *kinds)
+
+    def _item_at(self, state: int) -> str | None:
+        return next((item for item in _ITEMS if item in self._tables.gotos[state]), None)
+
+    def _item(self, stack: Stack) -> str | None:
+        return next((item for s in reversed(stack) if (item := self._item_at(s))), None)
+
+    def _item_words(self, stack: Stack) -> str:
+        return {"stmt": "statement", "expr_stmt": "action"}.get(self._item(stack) or "", "declaration")
+
+    def _operand(self, stack: Stack) -> str:
+        return "a value" if self._shift(stack, "NUMBER") is not None else "a name"
+
+    def _openers(self) -> list[Token]:
+        return [v for v in self._parser.values if isinstance(v, Token) and v.type in _CLOSERS]
+
+    def _open(self) -> Token | None:
+        return next(reversed(self._openers()), None)
+
+    def _gap(self, token: Token) -> int:
+        return self.previous.end if self.previous else token.pos
+
+    def _known_slip(self, token: Token, stack: Stack) -> str:
+        """What to say of a mistake that is made often; "" when it is another one."""
+        if self._shift(stack, "NUMBER") is not None:
+            listed = "a list of values is for declarations; assign the elements one by one, or copy a constant"
+            return listed if token.type == "_LSQB" else ""
+        if self.previous is not None and self.previous.type == "RETURN":
+            return _RETURN
+        if self._item(stack) != "stmt":
+            return ""
+        if token.type == "_COLON":
+            return slips.REFUSED["JMP"].message
+        if token.type == "_ASSIGN" and self._shift(stack, "_RPAR") is not None:
+            return "values by name are for declarations and calls; assign the members one by one"
+        if _is_doubled(token, self._source.text) and self._shift(stack, "_ASSIGN") is not None:
+            return f"there is no {token.text}{self._source.text[token.end]}; write x := x {token.text} 1"
+        return ""
+
+    def _unexpected(self, token: Token) -> str:
+        stack = self._parser.states
+        slip = self._known_slip(token, stack)
+        if slip:
+            return slip
+        if self._shift(stack, "NUMBER") is not None:
+            return f"expected a value, found {_shown(token)}"
+        if self._item_at(stack[-1]) == "unit":
+            return (
+                f"expected PROGRAM, FUNCTION, FUNCTION_BLOCK, TYPE, VAR_GLOBAL or CONFIGURATION, found {_shown(token)}"
+            )
+        if self._shift(stack, "_ASSIGN") is not None and self._shift(stack, "_SEMI") is not None:
+            return f"expected := or ;, found {_shown(token)}"
+        words = [word for kind, word in _WORDS.items() if self._shift(stack, kind) is not None]
+        if self._shift(stack, "IDENT") is not None:
+            words.insert(0, "a name")
+        if self._shift(stack, "OP") is not None:
+            words.insert(0, "an operator")
+        if not words or len(words) > 5:
+            return f"{_shown(token)} has no place here"
+        listed = words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
+        return f"expected {listed}, found {_shown(token)}"
+
+
+def _is_doubled(token: Token, text: str) -> bool:
+    """Whether this is the first sign of `+=` or `++`."""
+    return token.type in ("SIGN", "OP") and text[token.end : token.end + 1] in ("=", token.text)
+
+
+def _a(word: str) -> str:
+    return f"an {word}" if word == "IF" else f"a {word}"
+
+
+def _shown(token: Token) -> str:
+    if token.type == END:
+        return "the end of the file"
+    return token.text if len(token.text) <= 40 else token.text[:37] + "..."
