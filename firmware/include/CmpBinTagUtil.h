@@ -43,7 +43,10 @@ RTS_RESULT BTagReadContainer(const BTAG_READER *reader, const BTAG *tag, BTAG_RE
  * ERR_SIZE_MISMATCH, ERR_BTAG_*. */
 RTS_RESULT BTagFind(const BTAG_READER *reader, RTS_UI32 id, RTS_UI32 min, RTS_UI32 max, BTAG *tag);
 
-/* The unsigned integer (1, 2 or 4 bytes) in element `id`. */
+/* The unsigned integer in an element of 1, 2 or 4 bytes; else ERR_SIZE_MISMATCH. */
+RTS_RESULT BTagGetUnsigned(const BTAG *tag, RTS_UI32 *value);
+
+/* The same of element `id`. */
 RTS_RESULT BTagFindUnsigned(const BTAG_READER *reader, RTS_UI32 id, RTS_UI32 *value);
 
 /* The same for an element that may be absent: *value is left alone then. */

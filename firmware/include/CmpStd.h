@@ -42,6 +42,12 @@ typedef void (*RTS_PFN)(void);
 #define RTS_STATIC_ASSERT(cond, name) typedef char rts_assert_##name[(cond) ? 1 : -1]
 #define RTS_COUNT(array) (sizeof(array) / sizeof((array)[0]))
 #define RTS_UNUSED(x) ((void)(x))
+/* Of a function whose frame or whose name is needed, by what measures it, when the program is optimised as a whole. */
+#ifdef __GNUC__
+#define RTS_NOINLINE __attribute__((noinline))
+#else
+#define RTS_NOINLINE
+#endif
 #endif
 
 #endif

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Objects of at most 32 bits. Load acquires, Store releases: what was written before a Store is seen after the Load that
+ * Objects of type RTS_UI32. Load acquires, Store releases: what was written before a Store is seen after the Load that
  * reads it. Add returns the value before; a core without exclusive access instructions (Cortex-M0) supplies
  * __atomic_fetch_add_4 with interrupts masked. Fence keeps reads and writes before it from mixing with those after it, for
  * a number that is changed, or looked at, both before and after the data it stands for.
@@ -11,9 +11,43 @@
 #ifndef SYSATOMIC_H
 #define SYSATOMIC_H
 
-#define SysAtomicLoad(object) __atomic_load_n((object), __ATOMIC_ACQUIRE)
-#define SysAtomicStore(object, value) __atomic_store_n((object), (value), __ATOMIC_RELEASE)
-#define SysAtomicAdd(object, value) __atomic_fetch_add((object), (value), __ATOMIC_ACQ_REL)
+#include "CmpStd.h"
+#include "rts_config.h"
+
+/* Shorter than a call also where the compiler looks at size. */
+#define SYSATOMIC_INLINE static inline __attribute__((always_inline))
+
+#ifdef RTS_ONE_CORE
+#define SysAtomicFence() __atomic_signal_fence(__ATOMIC_ACQ_REL)
+#else
 #define SysAtomicFence() __atomic_thread_fence(__ATOMIC_ACQ_REL)
+#endif
+
+SYSATOMIC_INLINE RTS_UI32 SysAtomicLoad(const RTS_UI32 *object)
+{
+#ifdef RTS_ONE_CORE
+    RTS_UI32 value = __atomic_load_n(object, __ATOMIC_RELAXED);
+
+    SysAtomicFence();
+    return value;
+#else
+    return __atomic_load_n(object, __ATOMIC_ACQUIRE);
+#endif
+}
+
+SYSATOMIC_INLINE void SysAtomicStore(RTS_UI32 *object, RTS_UI32 value)
+{
+#ifdef RTS_ONE_CORE
+    SysAtomicFence();
+    __atomic_store_n(object, value, __ATOMIC_RELAXED);
+#else
+    __atomic_store_n(object, value, __ATOMIC_RELEASE);
+#endif
+}
+
+SYSATOMIC_INLINE RTS_UI32 SysAtomicAdd(RTS_UI32 *object, RTS_UI32 value)
+{
+    return __atomic_fetch_add(object, value, __ATOMIC_ACQ_REL);
+}
 
 #endif

@@ -43,7 +43,8 @@ class Firmware:
         with path.open("rb") as file:
             symbols = ELFFile(file).get_section_by_name(".symtab").iter_symbols()
             found = [(s.name, s["st_value"] & ~1, s["st_size"]) for s in symbols if s["st_info"]["type"] == "STT_FUNC"]
-        self.functions: dict[str, Range] = {name: (start, start + size) for name, start, size in found}
+        # A function that was optimised has a suffix.
+        self.functions: dict[str, Range] = {name.split(".")[0]: (start, start + size) for name, start, size in found}
 
 
 class Counter:

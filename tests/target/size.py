@@ -24,6 +24,7 @@ from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
 from elftools.dwarf.dwarfinfo import DWARFInfo
+from elftools.dwarf.lineprogram import LineProgram
 from elftools.elf.constants import SH_FLAGS
 from elftools.elf.elffile import ELFFile
 
@@ -38,7 +39,6 @@ TOTAL = "total"
 LIBRARIES = "libraries"  # of the C compiler, perhaps without debugging information
 REST = "strings, padding"  # what has no symbol
 ADDRESS_OF = 3  # DW_OP_addr
-OUR_DWARF = 5  # version; libraries may have others
 
 
 @dataclass
@@ -87,15 +87,22 @@ def variable_owners(dwarf: DWARFInfo) -> dict[int, str]:
     return found
 
 
+def _line_components(program: LineProgram) -> list[str]:
+    """The component of each source file that a line program names by its number, from 1 on before DWARF 5."""
+    old = program["version"] < 5
+    folders = [b""] * old + list(program["include_directory"])
+    paths = (PurePosixPath(folders[f.dir_index].decode(), f.name.decode()) for f in program["file_entry"])
+    return [LIBRARIES] * old + [_component(path) for path in paths]
+
+
 def line_owners(dwarf: DWARFInfo, functions: set[int]) -> dict[int, str]:
     """The component of each line of code by its address. Functions that were not linked still have lines, at 0."""
     found: dict[int, str] = {}
     for unit in dwarf.iter_CUs():
         program = dwarf.line_program_for_CU(unit)
-        if program is None or program["version"] < OUR_DWARF:
+        if program is None:
             continue
-        files = [(program["include_directory"][file.dir_index], file.name) for file in program["file_entry"]]
-        components = [_component(PurePosixPath(folder.decode(), name.decode())) for folder, name in files]
+        components = _line_components(program)
         sequence: dict[int, str] = {}
         for state in (entry.state for entry in program.get_entries() if entry.state is not None):
             if not state.end_sequence:

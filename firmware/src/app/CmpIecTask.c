@@ -125,9 +125,9 @@ int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception
 
 static RTS_UI32 saturate(RTS_I64 ns)
 {
-    if (ns < 0)
-        return 0;
-    return ns > (RTS_I64)0xFFFFFFFF ? 0xFFFFFFFFu : (RTS_UI32)ns;
+    if (ns >> 32 == 0)
+        return (RTS_UI32)ns;
+    return ns < 0 ? 0 : 0xFFFFFFFFu;
 }
 
 /* The low half of a quotient. Bit by bit, since the compiler's own division takes 1 KiB on cores that have none. */

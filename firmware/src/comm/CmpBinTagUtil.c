@@ -86,26 +86,29 @@ RTS_RESULT BTagFind(const BTAG_READER *reader, RTS_UI32 id, RTS_UI32 min, RTS_UI
     return result;
 }
 
-RTS_RESULT BTagFindUnsigned(const BTAG_READER *reader, RTS_UI32 id, RTS_UI32 *value)
+RTS_RESULT BTagGetUnsigned(const BTAG *tag, RTS_UI32 *value)
 {
-    BTAG tag;
-    RTS_RESULT result = BTagFind(reader, id, 1, 4, &tag);
-
-    if (result != ERR_OK)
-        return result;
-    switch (tag.size) {
+    switch (tag->size) {
     case 1:
-        *value = tag.data[0];
+        *value = tag->data[0];
         return ERR_OK;
     case 2:
-        *value = BytesGet16(tag.data);
+        *value = BytesGet16(tag->data);
         return ERR_OK;
     case 4:
-        *value = BytesGet32(tag.data);
+        *value = BytesGet32(tag->data);
         return ERR_OK;
     default:
         return ERR_SIZE_MISMATCH;
     }
+}
+
+RTS_RESULT BTagFindUnsigned(const BTAG_READER *reader, RTS_UI32 id, RTS_UI32 *value)
+{
+    BTAG tag;
+    RTS_RESULT result = BTagFind(reader, id, 0, reader->size, &tag);
+
+    return result == ERR_OK ? BTagGetUnsigned(&tag, value) : result;
 }
 
 RTS_RESULT BTagFindOptional(const BTAG_READER *reader, RTS_UI32 id, RTS_UI32 *value)

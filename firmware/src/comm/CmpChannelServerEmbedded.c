@@ -512,7 +512,7 @@ static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RT
         send_rts_info(peer);
 }
 
-void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
+RTS_NOINLINE void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
     if (size == 0)
         server.counters.malformed++;

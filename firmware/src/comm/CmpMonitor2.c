@@ -216,28 +216,47 @@ typedef struct {
     RTS_UI32 id;
     RTS_UI32 size;
     PROGRAM program;
+    RTS_UI32 code_size; /* of which the program may be a part */
 } READ_VAR;
 
+static RTS_RESULT parse_field(const BTAG *field, READ_VAR *var)
+{
+    switch (field->id) {
+    case TAG_MON2_VAR_ID:
+        return BTagGetUnsigned(field, &var->id);
+    case TAG_MON2_VAR_SIZE:
+        return BTagGetUnsigned(field, &var->size);
+    case TAG_MON2_VAR_CODE_SIZE:
+        return BTagGetUnsigned(field, &var->program.size);
+    case TAG_MON2_VAR_CODE:
+        var->program.code = field->data;
+        var->code_size = field->size;
+        return field->size > 0 ? ERR_OK : ERR_SIZE_MISMATCH;
+    default:
+        return ERR_OK;
+    }
+}
+
+/* In one pass over the fields. var->id is the default. */
 static RTS_RESULT parse_variable(const BTAG_READER *list, const BTAG *tag, READ_VAR *var)
 {
+    enum { NEEDED = 1 << TAG_MON2_VAR_SIZE | 1 << TAG_MON2_VAR_CODE };
     BTAG_READER fields;
-    BTAG code;
+    BTAG field;
+    RTS_UI32 found = 0;
     RTS_RESULT result = BTagReadContainer(list, tag, &fields);
 
-    if (result == ERR_OK)
-        result = BTagFindOptional(&fields, TAG_MON2_VAR_ID, &var->id);
-    if (result == ERR_OK)
-        result = BTagFindUnsigned(&fields, TAG_MON2_VAR_SIZE, &var->size);
-    if (result == ERR_OK)
-        result = BTagFind(&fields, TAG_MON2_VAR_CODE, 1, fields.size, &code);
-    if (result != ERR_OK)
+    while (result == ERR_OK && (result = BTagReadNext(&fields, &field)) == ERR_OK) {
+        found |= field.id < 32 ? 1u << field.id : 0;
+        result = parse_field(&field, var);
+    }
+    if (result != ERR_END_OF_OBJECT)
         return result;
-    var->program.code = code.data;
-    var->program.size = code.size;
-    result = BTagFindOptional(&fields, TAG_MON2_VAR_CODE_SIZE, &var->program.size);
-    if (result != ERR_OK)
-        return result;
-    return var->program.size <= code.size && var->id < MON2_ID_FAILED ? ERR_OK : ERR_PARAMETER;
+    if ((found & NEEDED) != NEEDED)
+        return ERR_L7_TAG_MISSING;
+    if ((found & 1 << TAG_MON2_VAR_CODE_SIZE) == 0)
+        var->program.size = var->code_size;
+    return var->program.size <= var->code_size && var->id < MON2_ID_FAILED ? ERR_OK : ERR_PARAMETER;
 }
 
 /* Appends the entry of one variable; `reserved` bytes must stay free for what follows. */

@@ -158,7 +158,7 @@ static void put_header(RTS_UI8 *reply, RTS_UI32 header, const RTS_UI8 *message, 
     BytesPut32(reply + 12, content);
 }
 
-RTS_UI32 SrvHandleMessage(const RTS_UI8 *message, RTS_UI32 size, RTS_UI8 *reply, RTS_UI32 capacity)
+RTS_NOINLINE RTS_UI32 SrvHandleMessage(const RTS_UI8 *message, RTS_UI32 size, RTS_UI8 *reply, RTS_UI32 capacity)
 {
     enum { ERROR_CONTENT = 8 };
     RTS_UI32 start = check_header(message, size);

@@ -162,7 +162,7 @@ static uintptr_t context_of(RTS_UI32 exception_number)
     return exception_number + 1;
 }
 
-static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
+__attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 {
     TRY *try = state.top;
     if (try == state.tries + APP_MAX_TASKS)
@@ -183,7 +183,7 @@ static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 
 /* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return,
  * because try_enter used the FPU, so that the frame returned to has one too. */
-static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address)
+__attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address)
 {
     TRY *try = --state.top;
     try->entered->r0 = code;
@@ -192,20 +192,17 @@ static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address)
     return try->exc_return;
 }
 
-__attribute__((used)) static RTS_UI32 svc_dispatch(FRAME *frame, RTS_UI32 exc_return)
-{
-    return exc_return & EXC_RETURN_PSP ? leave(frame->r0, frame->r1) : enter(frame, exc_return);
-}
-
 /* Hands the frame that the exception pushed, and EXC_RETURN, to `function`, and returns to where that says. */
 #define DISPATCH(function)                                                                                             \
     __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\t"                          \
                      "bl " #function "\n\tbx r0")
 
+/* From the process stack the call leaves, with what is in r0 and r1 of its frame; from the main stack it enters. */
 __attribute__((naked)) void SvcHandler(void);
 void SvcHandler(void)
 {
-    DISPATCH(svc_dispatch);
+    __asm__ volatile("tst lr, #4\n\tbne 1f\n\tmrs r0, msp\n\tmov r1, lr\n\tbl enter\n\tbx r0\n"
+                     "1:\n\tmrs r2, psp\n\tldrd r0, r1, [r2]\n\tbl leave\n\tbx r0");
 }
 
 /* ---- faults ---- */

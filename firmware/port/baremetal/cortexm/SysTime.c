@@ -55,7 +55,7 @@ static inline RTS_UI32 since_tick(RTS_UI32 count)
 #endif
 }
 
-/* Four of these are in each task cycle. In a context above the tick it may be pending and not counted. */
+/* Three of these are in each task cycle. In a context above the tick it may be pending and not counted. */
 RTS_I64 SysTimeGetNs(void)
 {
     RTS_UI32 low, high, count;

@@ -13,16 +13,16 @@
 #include "CortexM.h"
 #include "SysTime.h"
 
-enum { ALARM_MAX_NS = 1000000000 };
+enum { ALARM_MAX_NS = 1000000000, NS_PER_US = 1000 };
 
 typedef enum { TIMER_FREE, TIMER_STOPPED, TIMER_WAITING, TIMER_FIRED } TIMER_STATE;
 
 typedef struct {
     SYS_TIMER_CALLBACK callback;
     void *param;
-    RTS_I64 interval_ns;
     RTS_I64 next_ns;  /* due time to come */
     RTS_I64 due_ns;   /* for the callback, like `missed` */
+    RTS_UI32 interval_us;
     RTS_UI32 missed;
     RTS_UI32 skipped; /* due times since the callback began */
     RTS_UI8 priority;
@@ -52,24 +52,25 @@ static void fall_due(TIMER *timer, RTS_UI32 irq)
         timer->state = TIMER_FIRED;
         NVIC_ISPR(irq / 32) = 1u << irq % 32;
     }
-    timer->next_ns += timer->interval_ns;
+    timer->next_ns += (RTS_I64)timer->interval_us * NS_PER_US;
 }
 
+/* A due time that has passed too is the next alarm's, which comes at once. */
 void SysTimerAlarm(void)
 {
     RTS_I64 now = SysTimeGetNs();
-    RTS_I64 delay = INT64_MAX;
-    for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
-        TIMER *timer = &state.timer[i];
+    RTS_I32 delay = ALARM_MAX_NS;
+    RTS_UI32 irq = BOARD_TASK_IRQ;
+    for (TIMER *timer = state.timer; timer < state.timer + SYSTIMER_COUNT; timer++, irq++) {
         if (timer->state < TIMER_WAITING)
             continue;
-        while (timer->next_ns <= now)
-            fall_due(timer, BOARD_TASK_IRQ + i);
-        if (timer->next_ns - now < delay)
-            delay = timer->next_ns - now;
+        if (timer->next_ns <= now)
+            fall_due(timer, irq);
+        RTS_I64 left = timer->next_ns - now;
+        if (left < delay)
+            delay = left < 0 ? 0 : (RTS_I32)left;
     }
-    if (delay != INT64_MAX)
-        BoardAlarmSet(delay > ALARM_MAX_NS ? (RTS_UI32)ALARM_MAX_NS : (RTS_UI32)delay);
+    BoardAlarmSet((RTS_UI32)delay);
 }
 
 /* Every timer's interrupt; the number of the running exception says which. */
@@ -115,7 +116,7 @@ RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 int
             continue;
         state.timer[i] = (TIMER){.callback = callback,
                                  .param = param,
-                                 .interval_ns = (RTS_I64)interval_us * 1000,
+                                 .interval_us = interval_us,
                                  .priority = (RTS_UI8)priority,
                                  .state = TIMER_STOPPED};
         assign_levels();

@@ -33,7 +33,8 @@ static void idle(void)
     CpuRestore(mask);
 }
 
-int main(void)
+/* Not a part of ResetHandler, which paints the stack right below its own frame. */
+RTS_NOINLINE int main(void)
 {
     BoardWatchdogStart(MAIN_WATCHDOG_MS);
     if (CMInit() != ERR_OK)

@@ -11,6 +11,9 @@
 /* Calls an entry of compiled code with r9 holding the import table; `argument` is init_retains or 0. */
 void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
 
+/* The runtime has one core: interrupts and main see each other's writes in order, so only the compiler has to keep it. */
+#define RTS_ONE_CORE
+
 #define APP_ENTRY_MODE_BIT 1
 #define APP_CALL_ENTRY(entry, context) IecCall((uintptr_t)(entry), (context), 0)
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((uintptr_t)(entry), (context), (init_retains))

@@ -28,7 +28,7 @@ enum { FPU_CONTEXTS_SIZE = 0 };
 __attribute__((section(".bss.main_stack"), aligned(32), used)) static RTS_UI8
     main_stack[RTS_MAIN_STACK_SIZE + FPU_CONTEXTS_SIZE];
 
-__attribute__((noinline)) int main(void); /* ResetHandler paints the stack right below its own frame */
+int main(void);
 void ResetHandler(void);
 void NmiHandler(void);
 void FaultHandler(void);
