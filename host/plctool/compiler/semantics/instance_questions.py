@@ -1,4 +1,4 @@
-"""What can be asked of instances: the flags of actions in charts, __QUERYINTERFACE and __QUERYPOINTER.
+"""What can be asked of instances: the flags of actions in charts, __QUERYINTERFACE, __QUERYPOINTER and ?=.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -11,10 +11,22 @@ from plctool.compiler.semantics.conversions import error_value
 from plctool.compiler.semantics.methods import ObjectCalls
 from plctool.compiler.semantics.symbols import ERROR, ClassInfo, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import AddressOf, Call, Expr, MemberPlace, Place
-from plctool.compiler.types import BOOL, InterfaceType, PointerType, StructType, Type
+from plctool.compiler.typed import (
+    AddressOf,
+    Call,
+    CallStatement,
+    DerefPlace,
+    Expr,
+    Load,
+    MemberPlace,
+    Place,
+    Pos,
+    Statement,
+)
+from plctool.compiler.types import BOOL, InterfaceType, PointerType, ReferenceType, StructType, Type
 
-_QUERIES = {"__QUERYINTERFACE": "an interface", "__QUERYPOINTER": "a pointer to a function block"}
+_INTERFACE, _POINTER = "an interface", "a pointer to a function block"
+_QUERIES = {"__QUERYINTERFACE": _INTERFACE, "__QUERYPOINTER": _POINTER}
 
 
 class InstanceQuestions(ObjectCalls):
@@ -71,18 +83,40 @@ class InstanceQuestions(ObjectCalls):
         args = [a.value for a in node.args if a.value is not None and a.name is None]
         if len(node.args) != 2 or len(args) != 2:
             return self.error(node.pos, "arguments", f"{name} takes 2 arguments: what is asked, and {wanted}")
-        source, target = self.expr(args[0]), self.target(args[1], f"the second argument of {name}", "take an address")
+        target = self.target(args[1], f"the second argument of {name}", "take an address")
+        t = None if target is None else target.type
+        if t is not None and not (self._takes_instances(t) and isinstance(t, InterfaceType) is (wanted == _INTERFACE)):
+            return self.error(args[1].pos, "type", f"the second argument of {name} is {wanted}, not {t}")
+        return self._ask(name, args[0], target, self.pos(node.pos))
+
+    def attempt(self, node: ast.Assign) -> list[Statement]:
+        """`target ?= source`: the target holds the instance behind the source if it may, and else NULL."""
+        pos = self.pos(node.pos)
+        target = self.target(node.targets[0], "the left side of ?=", "take an address")
+        reference = target.pointer if isinstance(target, DerefPlace) else None
+        if isinstance(reference, Load) and isinstance(reference.type, ReferenceType):
+            target = reference.place
+        if target is not None and not self._takes_instances(target.type):
+            wanted = f"{_INTERFACE}, a reference or {_POINTER}"
+            self.error(node.targets[0].pos, "type", f"the left side of ?= is {wanted}, not {target.type}; write :=")
+            return []
+        asked = self._ask("?=", node.value, target, pos)
+        return [CallStatement(asked, pos)] if isinstance(asked, Call) else []
+
+    def _takes_instances(self, t: Type) -> bool:
+        return isinstance(t, PointerType) and self.world.classes.class_of(t.target) is not None
+
+    def _ask(self, name: str, node: ast.Expr, target: Place | None, pos: Pos) -> Expr:
+        """Whether the instance that `node` gives is what the target may hold, which is then there."""
+        source = self.expr(node)
         if source.type is ERROR or target is None:
-            return error_value(self.pos(node.pos))
+            return error_value(pos)
         if isinstance(source.type, StructType):
             source = AddressOf(place_of(source), PointerType(source.type), source.pos)
         cls = self.world.classes.class_of(source.type.target) if isinstance(source.type, PointerType) else None
         if cls is None or not isinstance(source.type, PointerType):
             message = f"{name} asks an instance, an interface or a pointer to a function block, not {source.type}"
-            return self.error(args[0].pos, "type", message)
-        t = target.type
-        fits = isinstance(t, PointerType) and isinstance(t, InterfaceType) is (name == "__QUERYINTERFACE")
-        if not fits or not isinstance(t, PointerType) or self.world.classes.class_of(t.target) is None:
-            return self.error(args[1].pos, "type", f"the second argument of {name} is {wanted}, not {t}")
-        function = self.world.classes.queries.function(cls, source.type, t, self.pos(node.pos))
-        return Call(function, [source, target], BOOL, self.pos(node.pos))
+            return self.error(node.pos, "type", message)
+        assert isinstance(target.type, PointerType)
+        function = self.world.classes.queries.function(cls, source.type, target.type, pos)
+        return Call(function, [source, target], BOOL, pos)

@@ -135,6 +135,8 @@ class Statements(BlockCalls):
     def _assign(self, node: ast.Assign) -> list[Statement]:
         if node.op == "REF=":
             return self._assign_reference(node)
+        if node.op == "?=":
+            return self.attempt(node)
         if node.op != ":=":
             return self._set_or_reset(node)
         if isinstance(node.value, ast.Call):

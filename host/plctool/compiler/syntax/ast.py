@@ -442,7 +442,7 @@ Declaration = TypeDecl | PouDecl | GlobalBlock | InstanceBlock | ConfigurationDe
 
 @dataclass(slots=True, eq=False)
 class Assign:
-    """`targets[0] := targets[1] := ... := value`; `op` is :=, S=, R= or REF=. `pos` is that of the operator."""
+    """`targets[0] := targets[1] := ... := value`; `op` is :=, S=, R=, REF= or ?=. `pos` is that of the operator."""
 
     pos: int
     targets: list[Expr]

@@ -367,6 +367,9 @@ class Builder:
             return None
         return ast.Assign(op.pos, [target], name + "=", value)
 
+    def attempt(self, target: ast.Expr, op: Token, value: ast.Expr) -> ast.Assign:
+        return ast.Assign(op.pos, [target], op.text, value)
+
     def expr_stmt(self, value: ast.Expr) -> ast.ExprStmt:
         return ast.ExprStmt(value.pos, value)
 

@@ -14,7 +14,7 @@ from plctool.compiler.syntax.conditions import Conditions
 _TOKEN = re.compile(
     r"""\s*(?:
     (?P<WORD>[A-Za-z_\xC0-\uFFFF][\w\xC0-\uFFFF]*+(?!\#))
-  | (?P<PUNCT>:=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*)\[\]:;,.<>^]|=(?!=)|&(?!&))
+  | (?P<PUNCT>:=|\?=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*)\[\]:;,.<>^]|=(?!=)|&(?!&))
   | (?P<NUMBER>\d[\d_]*+(?:\#\w++|(?:\.\d[\d_]*+)?(?:[eE][+-]?\d++)?)(?!\w))
   | (?P<SKIP>//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/)
   | (?P<DATE>(?i:L?(?:DATE_AND_TIME|DATE|DT|D|TIME_OF_DAY|TOD))\#[\d:._-]+)
@@ -33,6 +33,7 @@ _TOKEN = re.compile(
 
 _PUNCTUATION = {
     ";": "_SEMI", ":": "_COLON", ",": "_COMMA", ".": "_DOT", "..": "_DOTDOT", ":=": "_ASSIGN", "=>": "_ARROW",
+    "?=": "ATTEMPT",
     "(": "_LPAR", ")": "_RPAR", "[": "_LSQB", "]": "_RSQB", "^": "_CARET",
     "=": "EQ", "+": "SIGN", "-": "SIGN", "*": "OP", "/": "OP", "&": "OP", "**": "OP",
     "<": "OP", ">": "OP", "<=": "OP", ">=": "OP", "<>": "OP",
