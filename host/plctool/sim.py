@@ -133,6 +133,9 @@ class Simulator:
         """Runs until the first task has made `count` more cycles, or the program stopped with an exception."""
         if count > 0:
             result = lib.SimRunCycles(count)
+            if result == lib.ERR_TIMEOUT:
+                message = "The first task waits for something that does not happen; give a time (--time) instead."
+                raise DeviceError(message, "waits", result)
             if result not in (lib.ERR_OK, lib.ERR_EXCEPTION):
                 _check(result, "The program does not run")
 

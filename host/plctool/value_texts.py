@@ -56,6 +56,8 @@ def literal(t: Type, value: Any) -> str:
         return quoted(value, t.wide)
     if isinstance(t, PointerType):
         return "NULL" if value is None else f"16#{value:X}"
+    if isinstance(t, EnumType) and isinstance(value, str):  # the name of a value; others are numbers
+        return value
     base = base_of(t)
     assert isinstance(base, Elementary)
     if base.kind is Kind.BOOL:
@@ -290,6 +292,6 @@ def _parse_enum(t: EnumType, text: str) -> int:
     for name, value in t.values.items():
         if name.casefold() == key:
             return value
-    if re.fullmatch(r"-?\d+", text):
-        return int(text)
+    if re.match(r"-?\d", text):
+        return _parse_integer(t, text)
     raise bad_value(text, t, f"choose one of {', '.join(t.values)}")

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from plctool.compiler.types import (
     BOOL,
+    BYTE,
     CHAR,
     DATE,
     DINT,
@@ -51,6 +52,7 @@ def laid_out(t: StructType) -> StructType:
 
 POINT = laid_out(StructType("Point", [Field("x", INT), Field("y", LREAL)]))
 COLOUR = EnumType("Colour", INT, {"Red": 0, "Green": 5, "Blue": 6})
+LAMP = EnumType("Lamp", BYTE, {"Off": 0, "On": 255})
 BLOCK = laid_out(
     StructType(
         "Block",
@@ -173,9 +175,11 @@ def test_enums_are_shown_by_name() -> None:
 
 # ---- as ST writes them ----
 
-SCALARS = [BOOL, SINT, INT, UDINT, WORD, LWORD, REAL, LREAL, TIME, LTIME, DATE, TOD, DT, LDT, CHAR, WCHAR, COLOUR]
+SCALARS = [BOOL, SINT, INT, UDINT, WORD, LWORD, REAL, LREAL, TIME, LTIME, DATE, TOD, DT, LDT, CHAR, WCHAR]
 TYPES = [
     *SCALARS,
+    COLOUR,
+    LAMP,
     StringType(12),
     StringType(5, wide=True),
     SubrangeType("S", INT, -32768, 32767),
@@ -210,6 +214,8 @@ def test_what_is_shown_can_be_typed(t: Type) -> None:
         (REAL, b"\0\0\xc0\x3f", "1.5"),
         (COLOUR, b"\5\0", "Green"),
         (COLOUR, b"\7\0", "7"),
+        (LAMP, b"\xff", "On"),
+        (LAMP, b"\x10", "16#10"),
         (TIME, b"\x50\0\0\0", "T#80ms"),
         (StringType(9), b"it's $\n\0\0\0", "'it$'s $$$0A'"),
         (StringType(3, wide=True), 'é"'.encode("utf-16-le") + bytes(4), '"é$""'),

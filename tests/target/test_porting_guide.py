@@ -82,6 +82,7 @@ class Vendor:
         (folder / "build-cm3").symlink_to(FIRMWARE.parents[2])
         self._env = os.environ | {
             "PATH": f"{tools}:{os.environ['PATH']}",
+            "PYTHONUNBUFFERED": "1",  # what tools say comes in the order of a terminal
             "PYTHONPATH": os.pathsep.join(sys.path),
             "XDG_CACHE_HOME": str(folder / "cache"),
         }
