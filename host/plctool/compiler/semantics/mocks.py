@@ -13,7 +13,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from plctool.compiler.diagnostics import Diagnostics
@@ -60,7 +60,7 @@ class Mocks:
         self._blocks = False  # whether any instance is mocked
         self._functions: set[str] = set()
         self._members: set[str] = set()  # names of methods and properties, and perhaps of other members
-        for call in _calls([test.body for test in tests]):
+        for call in ast.every(ast.Call, [test.body for test in tests]):
             name = call.callee.name.upper() if isinstance(call.callee, ast.Name) else ""
             target = call.args[0].value if call.args else None
             if name == "MOCK_FUNCTION" and isinstance(target, ast.Name):
@@ -138,19 +138,6 @@ def _member(decl: ast.PouDecl, name: str, *, chosen: bool) -> ast.PouDecl:
         if decl.result is not None:
             give.append(_assign(pos, decl.name, ast.Name(pos, value_of(name))))
     return replace(decl, body=[ast.If(pos, [(condition, [*give, ast.Return(pos)])], []), *decl.body])
-
-
-def _calls(root: object) -> Iterator[ast.Call]:
-    """Every call in statements."""
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        if isinstance(node, list | tuple):
-            stack.extend(node)
-        elif hasattr(node, "__slots__"):
-            if isinstance(node, ast.Call):
-                yield node
-            stack.extend(getattr(node, name) for name in node.__slots__)
 
 
 def _is_elsewhere(decl: ast.PouDecl) -> bool:

@@ -17,7 +17,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from plctool.compiler.diagnostics import Diagnostics, did_you_mean
@@ -87,7 +87,7 @@ def _declare(decl: ast.PouDecl, owner: ast.PouDecl, diagnostics: Diagnostics) ->
     assert decl.chart is not None
     decl.chart.asked = {
         node.base.name.casefold()
-        for node in _members_in([owner.body, [m.body for m in owner.members]])
+        for node in ast.every(ast.Member, [owner.body, [m.body for m in owner.members]])
         if node.name.upper() == "A" and isinstance(node.base, ast.Name)
     }
     _Structure(decl, owner, diagnostics).check()
@@ -100,19 +100,6 @@ def _declare(decl: ast.PouDecl, owner: ast.PouDecl, diagnostics: Diagnostics) ->
     decl.blocks = [*decl.blocks, steps]
     if decl.chart.valid:
         decl.blocks.append(ast.VarBlock(decl.pos, "VAR_TEMP", set(), temporary))
-
-
-def _members_in(root: object) -> Iterator[ast.Member]:
-    """Every `a.b` in statements."""
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        if isinstance(node, list | tuple):
-            stack.extend(node)
-        elif hasattr(node, "__slots__"):
-            if isinstance(node, ast.Member):
-                yield node
-            stack.extend(getattr(node, name) for name in node.__slots__)
 
 
 def _variable(pos: int, name: str, type_name: str, init: ast.Init | None = None) -> ast.VarDecl:

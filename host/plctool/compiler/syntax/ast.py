@@ -5,10 +5,14 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from typing import TypeVar
 
 from plctool.compiler.source import Source
+
+N = TypeVar("N")
 
 # ---- expressions ---------------------------------------------------------------------------------------------------
 
@@ -523,3 +527,19 @@ class Return:
 
 
 Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return
+
+
+# ---- looking through a tree ----------------------------------------------------------------------------------------
+
+
+def every(kind: type[N], root: object) -> Iterator[N]:
+    """Every node of a kind in `root` (a node, or lists and tuples of them), in no particular order."""
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, list | tuple):
+            stack.extend(node)
+        elif hasattr(node, "__slots__"):
+            if isinstance(node, kind):
+                yield node
+            stack.extend(getattr(node, name) for name in node.__slots__)
