@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,7 @@ _KEEPING = {
 }  # fmt: skip
 
 
-def holds_constants(block: ast.VarBlock) -> bool:
+def _holds_constants(block: ast.VarBlock) -> bool:
     """Whether what a block declares has one value for ever. CONSTANT parameters are only read-only."""
     return "CONSTANT" in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL")
 
@@ -64,9 +65,24 @@ class UnitVariables:
     def __init__(self, world: World) -> None:
         self.world = world
 
-    def declare_constants(self, decl: ast.PouDecl, scope: Scope) -> None:
+    def declare_alike(self, decl: ast.PouDecl, pou: Pou, scope: Scope) -> Iterator[ast.VarBlock]:
+        """Declares constants, VAR_EXTERNAL, VAR_STAT and VAR_TEMP; gives the other sections, each in its turn."""
+        self._declare_constants(decl, scope)
+        for block in decl.blocks:
+            if _holds_constants(block):
+                continue
+            if block.keyword == "VAR_EXTERNAL":
+                self._declare_externals(block, scope)
+            elif block.keyword == "VAR_STAT":
+                self._declare_statics(block, decl, scope)
+            elif block.keyword == "VAR_TEMP":
+                self.declare_stack_variables(block, pou, scope)
+            else:
+                yield block
+
+    def _declare_constants(self, decl: ast.PouDecl, scope: Scope) -> None:
         """VAR CONSTANT comes first, wherever it stands: array bounds and initial values may use it."""
-        lines = [(line, ROLES[b.keyword]) for b in decl.blocks if holds_constants(b) for line in b.decls]
+        lines = [(line, ROLES[b.keyword]) for b in decl.blocks if _holds_constants(b) for line in b.decls]
         for line, role in _in_order_of_use(lines):
             t, init = self.world.declarations.declared_type(line, scope)
             for offset, name in line.names:
@@ -74,7 +90,7 @@ class UnitVariables:
                 symbol.given = line.init is not None
                 self.world.declarations.add(scope, symbol, offset)
 
-    def declare_externals(self, block: ast.VarBlock, scope: Scope) -> None:
+    def _declare_externals(self, block: ast.VarBlock, scope: Scope) -> None:
         """VAR_EXTERNAL only repeats what is declared elsewhere."""
         for line in block.decls:
             t, _ = self.world.declarations.declared_type(line, scope)
@@ -96,7 +112,7 @@ class UnitVariables:
                     symbol = replace(symbol, constant=True)
                 scope.names[name.casefold()] = symbol
 
-    def declare_statics(self, block: ast.VarBlock, decl: ast.PouDecl, scope: Scope) -> None:
+    def _declare_statics(self, block: ast.VarBlock, decl: ast.PouDecl, scope: Scope) -> None:
         """VAR_STAT exists once, whatever calls or has the unit."""
         for line in block.decls:
             t, init = self.world.declarations.declared_type(line, scope)

@@ -25,7 +25,7 @@ from plctool.compiler.semantics.symbols import (
     Role,
     VarSymbol,
 )
-from plctool.compiler.semantics.unit_variables import DIRECTIONS, ROLES, UnitVariables, holds_constants
+from plctool.compiler.semantics.unit_variables import DIRECTIONS, ROLES, UnitVariables
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     ComputedInit,
@@ -140,17 +140,10 @@ class Units(UnitVariables):
         """Declares result, parameters and variables of a function or method."""
         if decl.result is not None:
             self._declare_result(info, decl, decl.result, scope)
-        self.declare_constants(decl, scope)
-        for block in decl.blocks:
-            if block.keyword in ("VAR_INST", "STEP") or holds_constants(block):
-                continue
+        for block in self.declare_alike(decl, info.pou, scope):
             if block.keyword in DIRECTIONS:
                 self._parameters(block, info, scope)
-            elif block.keyword == "VAR_EXTERNAL":
-                self.declare_externals(block, scope)
-            elif block.keyword == "VAR_STAT":
-                self.declare_statics(block, decl, scope)
-            else:
+            elif block.keyword not in ("VAR_INST", "STEP"):
                 self.declare_stack_variables(block, info.pou, scope)
         info.pou.parameters += bound_parameters(info.pou.parameters)
 
@@ -240,18 +233,8 @@ class Units(UnitVariables):
         defaults: dict[str, Initial] = {}
         self._layouts[symbol] = layout
         self.world.classes.begin_block(symbol, info, scope, defaults)
-        self.declare_constants(decl, scope)
-        for block in decl.blocks:
-            if holds_constants(block):
-                continue
-            if block.keyword == "VAR_EXTERNAL":
-                self.declare_externals(block, scope)
-            elif block.keyword == "VAR_STAT":
-                self.declare_statics(block, decl, scope)
-            elif block.keyword == "VAR_TEMP":
-                self.declare_stack_variables(block, pou, scope)
-            else:
-                self._members(block, info, defaults, scope)
+        for block in self.declare_alike(decl, pou, scope):
+            self._members(block, info, defaults, scope)
         self.world.classes.instance_variables(info, defaults, scope)
         layout.fields = [f for f in layout.fields if f.type is not ERROR]
         layout.lay_out()
@@ -328,17 +311,8 @@ class Units(UnitVariables):
         pou = self._pou(symbol, name)
         info = ProgramInfo(name, pou, [])
         scope = self._scope(symbol, pou)
-        self.declare_constants(decl, scope)
-        for block in decl.blocks:
-            if holds_constants(block):
-                continue
-            if block.keyword == "VAR_EXTERNAL":
-                self.declare_externals(block, scope)
-            elif block.keyword == "VAR_STAT":
-                self.declare_statics(block, decl, scope)
-            elif block.keyword == "VAR_TEMP":
-                self.declare_stack_variables(block, pou, scope)
-            elif block.keyword == "VAR_IN_OUT":
+        for block in self.declare_alike(decl, pou, scope):
+            if block.keyword == "VAR_IN_OUT":
                 scope.error(
                     block.pos, "unsupported", "a PROGRAM has no VAR_IN_OUT; use VAR_EXTERNAL or a global variable"
                 )
