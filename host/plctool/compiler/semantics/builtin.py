@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
+from abc import abstractmethod
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, ClassVar
@@ -385,9 +386,9 @@ class Builtins(ConversionCalls):
     def _size(self, t: Type, node: ast.Call) -> Expr:
         return Const(t.size, UNTYPED_INT, self.pos(node.pos))
 
+    @abstractmethod
     def address_of(self, node: ast.Expr, kind: type[PointerType]) -> Expr:
         """ADR(x), REF(x)"""
-        raise NotImplementedError
 
     _functions: ClassVar[dict[str, Callable[[Any, str, list[Expr], ast.Call, Type | None], Expr]]] = {
         **dict.fromkeys(_FOLDED, _folded),

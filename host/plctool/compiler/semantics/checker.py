@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from plctool.compiler.nesting import MAX_DEPTH, NestingError
@@ -64,7 +65,7 @@ def load(place: Place) -> Load:
     return Load(place, place.type, place.pos)
 
 
-class Checker:
+class Checker(ABC):
     """Checks the expressions of one scope. What it needs is provided by the classes built on it."""
 
     def __init__(self, scope: Scope) -> None:
@@ -134,38 +135,38 @@ class Checker:
 
     # ---- what the classes built on this one provide ----
 
+    @abstractmethod
     def expr(self, node: ast.Expr, expected: Type | None = None) -> Expr:
         """The typed expression; `expected` is the type the surroundings would like. Untyped constants stay untyped."""
-        raise NotImplementedError
 
+    @abstractmethod
     def call_by_name(self, name: str, args: list[Expr], offset: int, expected: Type | None) -> Expr:
         """A call of a library function with checked arguments."""
-        raise NotImplementedError
 
+    @abstractmethod
     def call(self, node: ast.Call, expected: Type | None) -> Expr:
         """A call as a value."""
-        raise NotImplementedError
 
+    @abstractmethod
     def input(self, node: ast.Expr, t: Type, name: str) -> Expr:
         """The value of an input."""
-        raise NotImplementedError
 
+    @abstractmethod
     def own_name(self, node: ast.Name, symbol: object) -> Expr | None:
         """THIS, SUPER or a property by its bare name."""
-        raise NotImplementedError
 
+    @abstractmethod
     def member_of(self, base: Expr, node: ast.Member) -> Expr | None:
         """A property of an instance."""
-        raise NotImplementedError
 
+    @abstractmethod
     def qualified(self, node: ast.Member) -> Expr | None:
         """What is in a namespace."""
-        raise NotImplementedError
 
+    @abstractmethod
     def followed(self, e: Expr) -> Expr:
         """The result of a call, or what it refers to."""
-        raise NotImplementedError
 
+    @abstractmethod
     def may_see(self, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
         """Whether a variable that is not PUBLIC may be used here; reports it when not."""
-        raise NotImplementedError
