@@ -4,43 +4,9 @@
  * SPDX-License-Identifier: Apache-2.0
  */
 #include "CmpScheduleTimer.h"
-#include "app_image.h"
-#include "test.h"
-
-static APP_SPEC spec;
-static APP_BYTES image;
+#include "counting_tasks.h"
 
 enum { ORDER_OFFSET = 16, SEEN_OFFSET = 32, EVENT_OFFSET = 60 };
-
-static void begin(void)
-{
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    spec_init(&spec);
-}
-
-/* A task that counts at data[4 * index]. */
-static CDL_TASK *add_counting_task(const char *name, RTS_UI8 kind, RTS_UI32 interval_us)
-{
-    RTS_UI32 entry = here(&spec);
-    CDL_TASK *task = add_task(&spec, name, kind, interval_us, entry);
-
-    emit_add(&spec, APP_AREA_DATA, 4 * (spec.task_count - 1), 1);
-    emit_ret(&spec);
-    return task;
-}
-
-static void load(void)
-{
-    build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-}
-
-static RTS_UI32 count_of(RTS_UI32 task)
-{
-    return read_u32(APP_AREA_DATA, 4 * task);
-}
 
 static void set_event(RTS_UI8 value)
 {
