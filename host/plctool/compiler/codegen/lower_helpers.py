@@ -103,6 +103,21 @@ _STORE = """  %to.a = getelementptr i8, ptr %to, PTR %x
   store VEC %v, ptr %to.a, align 1
 """
 
+# The rest, byte by byte, up to COUNT of them or the end of the string. What is done with each follows.
+_BYTES = """loop:
+  %i = phi i32 START, [ %i.next, %next ]
+  %inside = icmp ult i32 %i, %count
+  br i1 %inside, label %test, label %done
+test:
+  %i.x = zext i32 %i to PTR
+  %p = getelementptr i8, ptr BASE, PTR %i.x
+  %c.l = load i8, ptr %p, align 1
+  %c = freeze i8 %c.l
+  %z = icmp eq i8 %c, 0
+  br i1 %z, label %done, label %next
+next:
+"""
+
 # SPAN__ of stdlib/strings.st: the index at most COUNT characters behind START where the string ends.
 _SPAN = _Walk(
     head="""define internal i32 @str.span(ptr %ctx, ptr %s, i32 %cap, i32 %start, i32 %want) ATTRIBUTES {
@@ -118,19 +133,8 @@ entry:
   ret i32 %r
 """,
     start="[ 0, %entry ], [ %w.next, %short ]",
-    rest="""loop:
-  %i = phi i32 START, [ %i.next, %next ]
-  %inside = icmp ult i32 %i, %count
-  br i1 %inside, label %test, label %done
-test:
-  %i.x = zext i32 %i to PTR
-  %p = getelementptr i8, ptr %base, PTR %i.x
-  %c.l = load i8, ptr %p, align 1
-  %c = freeze i8 %c.l
-  %z = icmp eq i8 %c, 0
-  br i1 %z, label %done, label %next
-next:
-  %i.next = add i32 %i, 1
+    rest=_BYTES.replace("BASE", "%base")
+    + """  %i.next = add i32 %i, 1
   br label %loop
 done:
   %q = add i32 %start, %i
@@ -158,19 +162,8 @@ entry:
 """,
     chunks=_COUNTED.replace("VISIT", _load("v", "%from") + _STORE) + "  br label %done\n",
     start="[ 0, %entry ], [ %w.next, %short ]",
-    rest="""loop:
-  %i = phi i32 START, [ %i.next, %next ]
-  %inside = icmp ult i32 %i, %count
-  br i1 %inside, label %test, label %done
-test:
-  %i.x = zext i32 %i to PTR
-  %p = getelementptr i8, ptr %from, PTR %i.x
-  %c.l = load i8, ptr %p, align 1
-  %c = freeze i8 %c.l
-  %z = icmp eq i8 %c, 0
-  br i1 %z, label %done, label %next
-next:
-  %q = getelementptr i8, ptr %to, PTR %i.x
+    rest=_BYTES.replace("BASE", "%from")
+    + """  %q = getelementptr i8, ptr %to, PTR %i.x
   store i8 %c, ptr %q, align 1
   %i.next = add i32 %i, 1
   br label %loop
