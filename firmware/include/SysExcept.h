@@ -10,6 +10,7 @@
 #define SYSEXCEPT_H
 
 #include "CmpStd.h"
+#include "rts_config.h"
 
 enum {
     RTSEXCPT_NOEXCEPTION = 0x0000,
@@ -65,12 +66,29 @@ enum {
     RTSEXCPT_VENDOR_EXCEPTION_BASE = 0x2000,
 };
 
-/* What is known about an exception. `code_offset` is the fault address relative to the start of the application's code
- * segment, 0xFFFFFFFF when it was elsewhere. */
 typedef struct {
     RTS_UI32 code;        /* RTSEXCPT_*, RTSEXCPT_NOEXCEPTION when the function returned normally */
     uintptr_t address;    /* program counter at the fault; for checked errors that of the call that raised it */
 } RTS_EXCEPTION;
+
+#if EXCEPT_MAX_CALLS > 0
+/* A word that may be a return address: `target`, an offset in the application's code, was found `distance` bytes above the
+ * stack pointer of the exception, or in the link register of processors that have one. */
+enum { EXCEPT_LINK = 0xFFFFFF };
+typedef struct {
+    RTS_UI32 target;
+    RTS_UI32 distance; /* EXCEPT_LINK: the link register */
+} EXCEPT_CALL;
+
+typedef struct {
+    uintptr_t address; /* that of the exception */
+    RTS_UI32 count;
+    EXCEPT_CALL call[EXCEPT_MAX_CALLS];
+} EXCEPT_TRACE;
+
+/* What is known of the exception that stopped the application. From main. */
+const EXCEPT_TRACE *SysExceptGetTrace(void);
+#endif
 
 #ifndef RTS_CFFI
 
@@ -83,9 +101,9 @@ typedef struct {
  */
 int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
 
-/* Leaves the running SysExceptTry of this context with RTSEXCPT_* `code`. `address`: where the error was seen. Does not
- * return. Outside a SysExceptTry it is a fatal error of the runtime. */
-void SysExceptRaise(RTS_UI32 code, uintptr_t address);
+/* Leaves the running SysExceptTry of this context with RTSEXCPT_* `code`. `address`: where the error was seen; `stack`: the
+ * stack pointer there. Does not return. Outside a SysExceptTry it is a fatal error of the runtime. */
+void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack);
 
 /*
  * Breaks into the SysExceptTry that runs in the context of timer task `context` (as SysExceptContext gave it), with
@@ -100,6 +118,28 @@ uintptr_t SysExceptContext(void);
 /* Gives back what catching took from the process (signal handlers); the next SysExceptTry takes it again. From main,
  * when no SysExceptTry runs. Empty on bare metal. */
 void SysExceptShutdown(void);
+
+/* ---- SysExceptTrace.c, for all ports ---- */
+
+/* Where the code of the application lies; size 0: there is none. From main, while no IEC code runs. */
+void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size);
+bool SysExceptIsCode(uintptr_t address);
+
+#if EXCEPT_MAX_CALLS > 0
+/*
+ * Notes which calls may have led to the exception at `address`. A port calls it before it leaves SysExceptTry, in the
+ * context of the exception: interrupt, fault or signal handler. `stack` .. `end`: what the stack holds of the code that
+ * ran, from the stack pointer on; empty when it cannot be read. `link`: the link register, 0 without. The first exception
+ * counts, until it is forgotten.
+ */
+void SysExceptTrace(uintptr_t address, const uintptr_t *stack, const uintptr_t *end, uintptr_t link);
+
+/* Forgets what was noted, if it is not of the exception at `address`; 0: in any case. From main, while no IEC code runs. */
+void SysExceptKeepTrace(uintptr_t address);
+#else
+#define SysExceptTrace(address, stack, end, link) ((void)(address), (void)(stack), (void)(end), (void)(link))
+#define SysExceptKeepTrace(address) ((void)(address))
+#endif
 
 #endif
 #endif

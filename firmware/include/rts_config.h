@@ -27,6 +27,12 @@
 #define APP_REFUSAL_TEXT_SIZE (64 + 6 * APP_MAX_IMPORTS)
 #endif
 
+/* Words of the stack that are kept of an exception, from which the host tells the calls that led there; 8 bytes each. 0: only
+ * the place is known. */
+#ifndef EXCEPT_MAX_CALLS
+#define EXCEPT_MAX_CALLS 16
+#endif
+
 /* RAM of each area in bytes. The retain area may have none: then nothing of CmpRetain is in use. */
 #ifndef APP_DATA_SIZE
 #define APP_DATA_SIZE 4096

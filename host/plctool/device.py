@@ -7,7 +7,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, overload
 
@@ -22,7 +22,7 @@ from plctool.link.serial import DEFAULT_BAUD, SerialTransport
 from plctool.link.services import AppState, Identity, LogEntry, Stack, TaskInfo
 from plctool.link.session import Session
 from plctool.link.transport import BlockTransport
-from plctool.symbols import SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
+from plctool.symbols import SourceLine, SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
 from plctool.variables import Reading, Symbol, unreachable
 
 RESET_OPTIONS = {
@@ -35,7 +35,8 @@ _SCAN_SECONDS = 1.5
 
 @dataclass(frozen=True)
 class ExceptionInfo:
-    """What stopped the program. `task` is None for initialisation code; the place is None without symbols."""
+    """What stopped the program. `task` is None for initialisation code; the place is None without symbols. `calls`
+    led there, the nearest first."""
 
     code: int
     name: str
@@ -43,11 +44,13 @@ class ExceptionInfo:
     pou: str | None = None
     file: str | None = None
     line: int | None = None
+    calls: list[SourceLine] = field(default_factory=list)
 
     def __str__(self) -> str:
         task = f" in task {self.task}" if self.task else ""
         place = f", {self.pou}, {self.file}:{self.line}" if self.file else ""
-        return f"{self.name}{task}{place}"
+        calls = "".join(f", called from {c.pou}, {c.file}:{c.line}" for c in self.calls)
+        return f"{self.name}{task}{place}{calls}"
 
 
 @dataclass(frozen=True)
@@ -321,13 +324,12 @@ class Plc:
 
 
 def explain_exception(exception: services.AppException, task: str | None, table: SymbolTable | None) -> ExceptionInfo:
-    """The exception with the source line that `table` knows for it."""
-    place = None
-    if table and exception.code_offset is not None:
-        place = table.address_to_line(exception.code_offset)
-    if place is None:
+    """The exception with the source lines that `table` knows for it."""
+    places = table.call_stack(exception.code_offset, exception.trace) if table else []
+    if not places:
         return ExceptionInfo(exception.code, exception.name, task)
-    return ExceptionInfo(exception.code, exception.name, task, place.pou, place.file, place.line)
+    place = places[0]
+    return ExceptionInfo(exception.code, exception.name, task, place.pou, place.file, place.line, places[1:])
 
 
 def _keep_symbols(image: Path, crc: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 Texts = dict[str, str]
 """Values of variables by name, as ST writes them."""
-
-_CODE_OFFSET = re.compile(r"at code offset 0x([0-9a-f]+)$")
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -234,7 +231,7 @@ def status_document(status: PlcStatus) -> Document:
 
 
 def _exception_document(exception: ExceptionInfo) -> Document:
-    return vars(exception)
+    return {**vars(exception), "calls": [vars(call) for call in exception.calls]}
 
 
 def tasks(plc: Plc) -> Document:
@@ -273,6 +270,7 @@ def log(plc: Plc) -> Document:
     ]
     exception = plc.status().exception
     last = next((e for e in reversed(entries) if e["class"] == "exception"), None)
-    if exception and exception.file and last and _CODE_OFFSET.search(last["text"]):
-        last.update(pou=exception.pou, file=exception.file, line=exception.line)
+    if exception and exception.file and last:
+        known = _exception_document(exception)
+        last |= {name: known[name] for name in ("pou", "file", "line", "calls")}
     return {"entries": entries}

@@ -37,19 +37,24 @@ def place_text(place: dict[str, Any]) -> str:
     return f", {place['pou']}, {place['file']}:{place['line']}" if place.get("file") else ""
 
 
+def calls_text(place: dict[str, Any]) -> str:
+    """A line for each call that led to a place."""
+    return "".join(f"\n  called from {call['pou']}, {call['file']}:{call['line']}" for call in place.get("calls", []))
+
+
 def status_text(document: dict[str, Any]) -> str:
     lines = [f"state: {document['state']}"]
     if document["image_crc"]:
         lines.append(f"image: {document['image_crc']}")
     if exception := document["exception"]:
         task = f" in task {exception['task']}" if exception["task"] else ""
-        lines.append(f"exception: {exception['name']}{task}{place_text(exception)}")
+        lines.append(f"exception: {exception['name']}{task}{place_text(exception)}{calls_text(exception)}")
     return "\n".join(lines)
 
 
 def log_text(document: dict[str, Any]) -> str:
     return "\n".join(
-        f"{e['time_s']:12.6f} s  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}"
+        f"{e['time_s']:12.6f} s  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}{calls_text(e)}"
         for e in document["entries"]
     )
 

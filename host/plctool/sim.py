@@ -11,7 +11,7 @@ from typing import Any
 
 from plctool.core import error_name, ffi, lib
 from plctool.errors import DeviceError, UsageError
-from plctool.link.services import AppException, AppState, Status, TaskInfo
+from plctool.link.services import AppException, AppState, Status, TaskInfo, Trace
 from plctool.symbols import SymbolTable, find_symbols
 from plctool.variables import Reading, Symbol, unreachable
 
@@ -104,7 +104,9 @@ class Simulator:
         exception = None
         if c.exception.code != lib.RTSEXCPT_NOEXCEPTION:
             offset = None if c.exception.code_offset == 0xFFFFFFFF else c.exception.code_offset
-            exception = AppException(c.exception.code, offset, c.exception.task)
+            found = lib.SysExceptGetTrace()
+            trace = Trace.of((call.target, call.distance) for call in found.call[0 : found.count])
+            exception = AppException(c.exception.code, offset, c.exception.task, trace)
         return Status(state, c.image_crc, c.image_size, exception, c.op_state)
 
     def tasks(self) -> list[TaskInfo]:

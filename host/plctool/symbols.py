@@ -5,6 +5,7 @@ It is JSON, written by `build`, and found again for what runs on a device by the
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import re
@@ -12,8 +13,10 @@ import zlib
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from plctool.compiler.types import ArrayType
 from plctool.errors import UsageError
@@ -21,7 +24,11 @@ from plctool.files import write_atomically
 from plctool.type_descriptions import DescribedTypes, describe
 from plctool.variables import Symbol, Units, constant_symbol, walk
 
-FORMAT = 2
+if TYPE_CHECKING:
+    from plctool.debug_info import DebugInfo
+    from plctool.link.services import Trace
+
+FORMAT = 3
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,7 @@ class SourceLine:
 class SymbolTable:
     """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry holds up to
     the next one. `aliases`: other names of variables. `classes`: the numbers by which instances tell their class.
-    `constants`: those that have no place in memory."""
+    `constants`: those that have no place in memory. `debug`: see `DebugInfo`."""
 
     image_crc: int
     target: str
@@ -63,6 +70,7 @@ class SymbolTable:
     aliases: dict[str, str] = field(default_factory=dict)
     classes: dict[str, int] = field(default_factory=dict)
     constants: dict[str, Symbol] = field(default_factory=dict)
+    debug: list[bytes] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -127,6 +135,25 @@ class SymbolTable:
         _, file_index, line = self.lines[i]
         return SourceLine(self._pou_at(self.files[file_index], line, unit), self.files[file_index], line)
 
+    def call_stack(self, code_offset: int | None, trace: Trace) -> list[SourceLine]:
+        """Where the program was at a code offset (None: not in its own code), and the calls that led there, the
+        innermost first."""
+        places: list[SourceLine] = []
+        offsets = [] if code_offset is None else [code_offset]
+        for offset in offsets + self._debug_info.callers(code_offset, trace):
+            scopes = self._debug_info.scopes(offset)
+            place = self.address_to_line(offset)
+            if place is not None:
+                places.append(SourceLine(scopes[0].pou, place.file, place.line) if scopes else place)
+            places += [SourceLine(o.pou, i.call_file, i.call_line) for i, o in pairwise(scopes) if i.call_line]
+        return places
+
+    @cached_property
+    def _debug_info(self) -> DebugInfo:
+        from plctool.debug_info import DebugInfo
+
+        return DebugInfo(self.debug)
+
     def _pou_at(self, file: str, line: int, unit: CodeUnit | None) -> str:
         """The POU whose source holds the line, which is not the one with the code when it was inlined."""
         candidates = [u for u in self.pous if u.file == file and u.line <= line]
@@ -155,6 +182,7 @@ class SymbolTable:
             "pous": [vars(unit) for unit in self.pous],
             "lines": self.lines,
             "files": self.files,
+            "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
 
@@ -181,8 +209,9 @@ class SymbolTable:
                 document["aliases"],
                 document["classes"],
                 {n: _read_constant(n, c, types) for n, c in document["constants"].items()},
+                [zlib.decompress(base64.b64decode(text)) for text in document["debug"]],
             )
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
             raise UsageError("The symbol file cannot be read; build again.", "bad-symbols") from None
 
     def save(self, path: Path) -> None:

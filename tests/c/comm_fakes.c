@@ -154,6 +154,11 @@ void AppGetStatus(APP_STATUS *status)
     *status = fakes.status;
 }
 
+const EXCEPT_TRACE *SysExceptGetTrace(void)
+{
+    return &fakes.trace;
+}
+
 const char *AppGetInfo(RTS_UI32 index)
 {
     static const char *const texts[] = {"project", "author", "1.2.3", "", "profile"};

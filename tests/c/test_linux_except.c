@@ -72,7 +72,7 @@ static void overflow_stack(void *arg)
 static void raise_bounds(void *arg)
 {
     RTS_UNUSED(arg);
-    SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0x1234);
+    SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0x1234, NULL);
 }
 
 static void loop_forever(void *arg)
@@ -332,7 +332,7 @@ static void be_sent_a_fault(void)
 static void raise_outside(void)
 {
     fclose(stderr);
-    SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0);
+    SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0, NULL);
 }
 
 static void a_fault_outside_of_try_ends_the_process_as_ever(void)

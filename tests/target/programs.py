@@ -6,7 +6,7 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from plctool.compiler import compile_sources
+from plctool.compiler import Level, compile_sources
 from plctool.symbols import SymbolTable, symbol_path
 
 
@@ -19,11 +19,11 @@ class Built:
     symbols: SymbolTable
 
 
-def compile_text(text: str, target: str, folder: Path, checks: str = "all") -> Built:
+def compile_text(text: str, target: str, folder: Path, checks: str = "all", level: Level = 2) -> Built:
     """Compiles `text`; the files go to `folder`."""
     source = folder / f"{zlib.crc32(text.encode()):08x}.st"
     source.write_text(text)
-    built = compile_sources([source], target=target, checks=checks)
+    built = compile_sources([source], target=target, checks=checks, level=level)
     path = source.with_suffix(".cdl")
     path.write_bytes(built.image)
     built.symbols.save(symbol_path(path))

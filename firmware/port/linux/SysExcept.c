@@ -81,23 +81,33 @@ static void fatal(const char *message)
 
 /* ---- in the handler ---- */
 
-static uintptr_t program_counter(const void *ucontext)
+/* Where a thread was when it was interrupted, and its link register, 0 without. */
+typedef struct {
+    uintptr_t address, stack, link;
+} PLACE;
+
+static PLACE place_of(const void *ucontext)
 {
     const ucontext_t *at = ucontext;
 #if defined(__x86_64__)
-    return (uintptr_t)at->uc_mcontext.gregs[REG_RIP];
+    const greg_t *registers = at->uc_mcontext.gregs;
+    return (PLACE){.address = (uintptr_t)registers[REG_RIP], .stack = (uintptr_t)registers[REG_RSP]};
 #elif defined(__aarch64__)
-    return (uintptr_t)at->uc_mcontext.pc;
+    return (PLACE){.address = at->uc_mcontext.pc, .stack = at->uc_mcontext.sp, .link = at->uc_mcontext.regs[30]};
 #else
-#error "SysExcept.c: say where this architecture keeps the program counter in its ucontext_t."
+#error "SysExcept.c: say where this architecture keeps these registers in its ucontext_t."
 #endif
 }
 
-static void leave(CONTEXT *context, RTS_UI32 code, uintptr_t address)
+/* What lies between the stack pointer and SysExceptTry is the application's. */
+static void leave(CONTEXT *context, RTS_UI32 code, PLACE place)
 {
     sigjmp_buf *jump = context->jump;
+    uintptr_t readable = context->stack_end + GUARD_SIZE;
+    uintptr_t stack = place.stack > readable ? place.stack : readable;
+    SysExceptTrace(place.address, (const uintptr_t *)stack, (const uintptr_t *)jump, place.link);
     context->exception.code = code;
-    context->exception.address = address;
+    context->exception.address = place.address;
     __atomic_store_n(&context->jump, NULL, __ATOMIC_RELEASE);
     siglongjmp(*jump, 1);
 }
@@ -139,7 +149,7 @@ static void on_fault(int number, siginfo_t *info, void *ucontext)
     CONTEXT *context = self;
     SIGNAL *signal = find_signal(number);
     if (context != NULL && context->jump != NULL) {
-        leave(context, fault_code(context, signal, info), program_counter(ucontext));
+        leave(context, fault_code(context, signal, info), place_of(ucontext));
     }
     chain(signal, info, ucontext);
 }
@@ -151,7 +161,7 @@ static void on_break(int number, siginfo_t *info, void *ucontext)
     RTS_UNUSED(info);
     if (context != NULL && context->jump != NULL &&
         __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round) {
-        leave(context, context->break_code, program_counter(ucontext));
+        leave(context, context->break_code, place_of(ucontext));
     }
 }
 
@@ -333,13 +343,13 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     return 0;
 }
 
-void SysExceptRaise(RTS_UI32 code, uintptr_t address)
+void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     CONTEXT *context = self;
     if (context == NULL || context->jump == NULL) {
         fatal("an exception was raised outside of IEC code");
     }
-    leave(context, code, address);
+    leave(context, code, (PLACE){.address = address, .stack = (uintptr_t)stack});
 }
 
 /* At most one signal per round: a thread that does not get the processor would find all of them stacked on top of each

@@ -122,12 +122,13 @@ void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)
 
 static void record_exception(RTS_I32 task, RTS_UI32 code, uintptr_t address)
 {
-    uintptr_t offset = address - (uintptr_t)app.code;
+    RTS_UI32 offset = (RTS_UI32)(address - (uintptr_t)app.code);
     const char *where = task < 0 ? "Initialisation" : app.tables.tasks[task].name;
 
     app.exception.task = task;
     app.exception.code = code;
-    app.exception.code_offset = offset < app.image.code.size ? (RTS_UI32)offset : NO_CODE_OFFSET;
+    app.exception.code_offset = SysExceptIsCode(address) ? offset : NO_CODE_OFFSET;
+    SysExceptKeepTrace(address);
     if (app.exception.code_offset == NO_CODE_OFFSET)
         LogAdd(CMPID_CmpAppEmbedded, LOG_EXCEPTION, code, "%s: %s", where, AppExceptionName(code));
     else
@@ -138,6 +139,7 @@ static void record_exception(RTS_I32 task, RTS_UI32 code, uintptr_t address)
 static void clear_exception(void)
 {
     memset(&app.exception, 0, sizeof app.exception);
+    SysExceptKeepTrace(0);
     SysAtomicStore(&app.exception_pending, 0);
     SysAtomicStore(&app.exception_claims, 0);
 }
@@ -263,6 +265,7 @@ static void unload(void)
     app.state = AS_NONE;
     app.slot = SLOT_NONE;
     app.code = NULL;
+    SysExceptCodeRange(NULL, 0);
     memset(&app.image, 0, sizeof app.image);
 }
 
@@ -288,6 +291,7 @@ static RTS_RESULT load(RTS_UI32 slot, const APP_IMAGE *image, const RTS_UI8 *cod
     app.slot = slot;
     app.image = *image;
     app.code = code;
+    SysExceptCodeRange(code, image->code.size);
     RetainAttach((RTS_UI8 *)retain_area, retain_size, image->retain_layout);
     restored = RetainRestore(retain_after, retain_until);
     if (restored != ERR_OK && retain_size != 0 && retain_until != retain_after)

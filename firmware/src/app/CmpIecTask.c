@@ -60,7 +60,7 @@ static void iecraise(RTS_UI32 code)
 {
     uintptr_t address = (uintptr_t)__builtin_return_address(0) & ~(uintptr_t)APP_ENTRY_MODE_BIT;
 
-    SysExceptRaise(code, address - 1);
+    SysExceptRaise(code, address - 1, __builtin_dwarf_cfa());
 }
 
 static const CMP_EXT_FUNCTION externals[] = {

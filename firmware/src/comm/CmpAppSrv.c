@@ -150,6 +150,26 @@ static void write_exception(BTAG_WRITER *reply, const APP_EXCEPTION *exception)
     BTagClose(reply);
 }
 
+#if EXCEPT_MAX_CALLS > 0
+static void write_calls(BTAG_WRITER *reply)
+{
+    const EXCEPT_TRACE *trace = SysExceptGetTrace();
+    RTS_UI32 i;
+
+    BTagOpen(reply, TAG_APP_CALLS, BTAG_ALIGN_0);
+    for (i = 0; i < trace->count; i++) {
+        BTagAppend32(reply, trace->call[i].target);
+        BTagAppend32(reply, trace->call[i].distance);
+    }
+    BTagClose(reply);
+}
+#else
+static void write_calls(BTAG_WRITER *reply)
+{
+    RTS_UNUSED(reply);
+}
+#endif
+
 static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     APP_STATUS status;
@@ -163,6 +183,7 @@ static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagAppend32(reply, status.op_state);
     BTagClose(reply);
     write_exception(reply, &status.exception);
+    write_calls(reply);
     BTagOpen(reply, TAG_APP_IMAGE, BTAG_ALIGN_0);
     BTagAppend32(reply, status.image_crc);
     BTagAppend32(reply, status.image_size);

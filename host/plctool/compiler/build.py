@@ -123,6 +123,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         program.aliases,
         _classes(program),
         {name: constant_symbol(name, c.type, encode(c.type, c.value)) for name, c in program.constants.items()},
+        linked.debug,
     )
 
 

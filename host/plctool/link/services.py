@@ -7,8 +7,8 @@ Every function takes a `Session`; requests that were lost with their channel are
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
 
@@ -55,12 +55,28 @@ class AppState(StrEnum):
 
 
 @dataclass(frozen=True)
+class Trace:
+    """What the stack had when the application stopped. `words`: by distance from the stack pointer in bytes, the code
+    offsets to which calls may return. `link`: the same of the link register of processors that have one."""
+
+    words: dict[int, int] = field(default_factory=dict)
+    link: int | None = None
+
+    @staticmethod
+    def of(calls: Iterable[tuple[int, int]]) -> Trace:
+        """From (target, distance) of each EXCEPT_CALL."""
+        words = {distance: target for target, distance in calls}
+        return Trace({d: t for d, t in words.items() if d != lib.EXCEPT_LINK}, words.get(lib.EXCEPT_LINK))
+
+
+@dataclass(frozen=True)
 class AppException:
     """The last exception. `code_offset` is None when it was outside the application's code, `task` an index or -1."""
 
     code: int
     code_offset: int | None
     task: int
+    trace: Trace = field(default_factory=Trace)
 
     @property
     def name(self) -> str:
@@ -163,7 +179,8 @@ def read_status(session: Session) -> Status:
     crc, size = struct.unpack_from("<II", status.bytes(lib.TAG_APP_IMAGE, 8))
     exception = None
     if code != lib.RTSEXCPT_NOEXCEPTION:
-        exception = AppException(code, None if offset == _NO_OFFSET else offset, task)
+        trace = Trace.of(struct.iter_unpack("<II", status.find(lib.TAG_APP_CALLS) or b""))
+        exception = AppException(code, None if offset == _NO_OFFSET else offset, task, trace)
     return Status(_app_state(state, operating), crc, size, exception, operating)
 
 

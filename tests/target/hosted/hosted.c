@@ -34,8 +34,9 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     return exception->code != RTSEXCPT_NOEXCEPTION;
 }
 
-void SysExceptRaise(RTS_UI32 code, uintptr_t address)
+void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
+    RTS_UNUSED(stack);
     if (except.jump == NULL)
         abort();
     except.exception.code = code;

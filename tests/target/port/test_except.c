@@ -82,7 +82,7 @@ static void hit_a_breakpoint(void *arg)
 static void raise(void *arg)
 {
     RTS_UNUSED(arg);
-    SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0x1235);
+    SysExceptRaise(RTSEXCPT_ARRAYBOUNDS, 0x1235, NULL);
 }
 
 static void raise_with_everything_clobbered(void *arg)

@@ -18,11 +18,13 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     return 0;
 }
 
-/* Write here: leave the SysExceptTry of this context. Outside of one: reset, with the reason kept for the log. */
-void SysExceptRaise(RTS_UI32 code, uintptr_t address)
+/* Write here: leave the SysExceptTry of this context, after a call of SysExceptTrace, as from the fault handlers, for the
+ * calls that led there. Outside of a SysExceptTry: reset, with the reason kept for the log. */
+void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     RTS_UNUSED(code);
     RTS_UNUSED(address);
+    RTS_UNUSED(stack);
     for (;;)
         ;
 }

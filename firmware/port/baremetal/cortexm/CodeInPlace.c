@@ -13,7 +13,6 @@ const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
     RTS_UNUSED(slot);
     if (offset % APP_CODE_ALIGN || offset > flash->size || size > flash->size - offset)
         return NULL;
-    SysExceptCodeRange(flash->mapped + offset, size);
     return flash->mapped + offset;
 }
 

@@ -17,7 +17,6 @@ const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
     if (slot >= SLOT_COUNT || size > RTS_CODE_RAM_SIZE || SysFlashGet()->read(offset, code_ram[slot], size) != ERR_OK)
         return NULL;
     CpuBarrier(); /* the first fetch sees the new code; a core with caches cleans and invalidates them here */
-    SysExceptCodeRange(code_ram[slot], size);
     return code_ram[slot];
 }
 

@@ -46,6 +46,7 @@ enum { LEVEL_FAULT = 0, LEVEL_DEVICE = 1, LEVEL_TIMER = 2 };
 #define SCB_SHPR(n) (*(volatile RTS_UI8 *)(uintptr_t)(0xE000ED18u + (n) - 4u)) /* n: exception number */
 #define SCB_SHCSR REG32(0xE000ED24u)
 #define SCB_CFSR REG32(0xE000ED28u)
+#define FPU_FPCAR REG32(0xE000EF38u) /* where the FPU registers of the last exception frame go */
 #define SCB_HFSR REG32(0xE000ED2Cu)
 #define SCB_MMFAR REG32(0xE000ED34u)
 #define SCB_CPACR REG32(0xE000ED88u)
@@ -125,10 +126,6 @@ void SysExceptInit(void);
 
 /* To be called by the board's alarm interrupt after it has silenced its timer. */
 void SysTimerAlarm(void);
-
-/* Where the code of the running application lies, as SysFlashMapCode gave it: so that a fault that lost its program
- * counter can be traced back to the code. */
-void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size);
 
 /* At the end of each stack, protected by the MPU. */
 enum { STACK_GUARD_LOG2 = 5, STACK_GUARD = 1 << STACK_GUARD_LOG2 };

@@ -19,8 +19,8 @@
 #include "CortexM.h"
 #include "rts_config.h"
 
-enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_PSP = 4 };
-enum { XPSR_THUMB = 1 << 24 };
+enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_PSP = 4, EXC_RETURN_BASIC = 16 };
+enum { XPSR_THUMB = 1 << 24, XPSR_ALIGNED = 1 << 9 };
 enum { SHCSR_PENDING = 0xF << 12 }; /* UsageFault, MemManage, BusFault, SVCall */
 enum { CONTROL_SPSEL = 2 };
 
@@ -56,8 +56,6 @@ __attribute__((section(".bss.iec_stack"), aligned(STACK_GUARD))) static IEC_STAC
 static struct {
     TRY *top; /* behind the innermost that runs */
     TRY tries[APP_MAX_TASKS];
-    uintptr_t code;
-    RTS_UI32 code_size;
 } state;
 
 static FRAME *process_stack(void)
@@ -106,7 +104,6 @@ void SysExceptInit(void)
     const RTS_UI32 behind_vectors = NULL_EIGHTHS < 8 ? MPU_WITHOUT_EIGHTHS(0xFF << NULL_EIGHTHS) : 0;
     extern RTS_UI8 stack_bottom[];
     state.top = state.tries;
-    state.code_size = 0;
     MpuProtect(MPU_NULL, 0, NULL_LOG2, MPU_NO_ACCESS | behind_vectors);
     MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, STACK_GUARD_LOG2, MPU_NO_ACCESS);
     for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++)
@@ -114,12 +111,6 @@ void SysExceptInit(void)
     if (MPU_TYPE != 0)
         MPU_CTRL = MPU_ENABLE_WITH_BACKGROUND;
     CpuBarrier();
-}
-
-void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size)
-{
-    state.code = (uintptr_t)code;
-    state.code_size = size;
 }
 
 /* ---- entering and leaving ---- */
@@ -131,11 +122,13 @@ __attribute__((naked)) static void try_return(void)
     __asm__ volatile("dsb\n\tisb\n\tmovs r0, #0\n\tsvc 0");
 }
 
-/* Leaves the running Try with code r0 and address r1. */
-__attribute__((naked, noreturn)) static void try_raise(RTS_UI32 code, uintptr_t address)
+/* Leaves the running Try. */
+__attribute__((naked, noreturn)) static void try_raise(RTS_UI32 code, uintptr_t address, const void *stack, uintptr_t link)
 {
     RTS_UNUSED(code);
     RTS_UNUSED(address);
+    RTS_UNUSED(stack);
+    RTS_UNUSED(link);
     __asm__ volatile("svc 0");
 }
 
@@ -183,9 +176,12 @@ __attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 
 /* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return,
  * because try_enter used the FPU, so that the frame returned to has one too. */
-__attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address)
+__attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link)
 {
     TRY *try = --state.top;
+    uintptr_t slot = stack_slot(try);
+    if (code != RTSEXCPT_NOEXCEPTION && stack - slot < RTS_IEC_STACK_SIZE)
+        SysExceptTrace(address, (const uintptr_t *)stack, (const uintptr_t *)(slot + RTS_IEC_STACK_SIZE), link);
     try->entered->r0 = code;
     try->entered->r1 = address;
     set_process_stack(try->outer_process);
@@ -197,12 +193,21 @@ __attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address)
     __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\t"                          \
                      "bl " #function "\n\tbx r0")
 
-/* From the process stack the call leaves, with what is in r0 and r1 of its frame; from the main stack it enters. */
+/* From the process stack the call leaves, with what is in r0 to r3 of its frame; from the main stack it enters. */
 __attribute__((naked)) void SvcHandler(void);
 void SvcHandler(void)
 {
     __asm__ volatile("tst lr, #4\n\tbne 1f\n\tmrs r0, msp\n\tmov r1, lr\n\tbl enter\n\tbx r0\n"
-                     "1:\n\tmrs r2, psp\n\tldrd r0, r1, [r2]\n\tbl leave\n\tbx r0");
+                     "1:\n\tmrs r12, psp\n\tldm r12, {r0-r3}\n\tbl leave\n\tbx r0");
+}
+
+/* The stack pointer before the exception pushed its frame, with or without the FPU's registers; for the trace alone. */
+static uintptr_t stack_before(const FRAME *frame, int has_fpu)
+{
+    enum { FPU_SIZE = 18 * 4 };
+    if (EXCEPT_MAX_CALLS == 0)
+        return 0;
+    return (uintptr_t)(frame + 1) + (has_fpu ? FPU_SIZE : 0) + (frame->xpsr & XPSR_ALIGNED ? 4 : 0);
 }
 
 /* ---- faults ---- */
@@ -212,7 +217,7 @@ static uintptr_t find_caller(uintptr_t slot)
 {
     const RTS_UI32 *end = (const RTS_UI32 *)(slot + RTS_IEC_STACK_SIZE);
     for (const RTS_UI32 *word = (const RTS_UI32 *)(slot + STACK_GUARD); word < end; word++)
-        if ((*word & 1u) && *word - state.code < state.code_size)
+        if ((*word & 1u) && SysExceptIsCode(*word))
             return (*word & ~1u) - 2;
     return 0;
 }
@@ -242,7 +247,7 @@ static uintptr_t address_of(RTS_UI32 cfsr, RTS_UI32 code, const FRAME *frame, ui
     if (cfsr & CFSR_STACKING)
         return find_caller(slot);
     if ((cfsr & (CFSR_IACCVIOL | CFSR_IBUSERR | CFSR_INVSTATE)) ||
-        (code == RTSEXCPT_STACK_OVERFLOW && frame->lr - state.code < state.code_size))
+        (code == RTSEXCPT_STACK_OVERFLOW && SysExceptIsCode(frame->lr)))
         return (frame->lr & ~1u) - 2;
     return frame->pc;
 }
@@ -259,7 +264,9 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     SCB_HFSR = SCB_HFSR;
     /* What could not be stacked stays pending: it belongs to the function that is left now. */
     SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
-    return leave(code, address);
+    if (cfsr & CFSR_STACKING)
+        return leave(code, address, 0, 0);
+    return leave(code, address, stack_before(frame, !(exc_return & EXC_RETURN_BASIC)), frame->lr);
 }
 
 /* A fault on the main stack is one of the runtime; that stack may be at its end, so it is given up. */
@@ -301,11 +308,11 @@ static int in_try(void)
     return (control & CONTROL_SPSEL) != 0;
 }
 
-void SysExceptRaise(RTS_UI32 code, uintptr_t address)
+void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     if (!in_try())
         ResetNow(RESET_FATAL, (RTS_UI32)address);
-    try_raise(code, address & ~(uintptr_t)1);
+    try_raise(code, address & ~(uintptr_t)1, stack, 0);
 }
 
 uintptr_t SysExceptContext(void)
@@ -317,6 +324,17 @@ void SysExceptShutdown(void)
 {
 }
 
+/* Whether the frame of a thread that is interrupted is followed by the FPU's registers: by where they were to be saved. */
+static int has_fpu_registers(const FRAME *frame)
+{
+#ifdef __ARM_FP
+    return FPU_FPCAR == (uintptr_t)(frame + 1);
+#else
+    RTS_UNUSED(frame);
+    return 0;
+#endif
+}
+
 /* We run above `context`, so its Try is interrupted, and where it is to go on lies on its process stack. */
 void SysExceptBreak(uintptr_t context, RTS_UI32 code)
 {
@@ -326,8 +344,10 @@ void SysExceptBreak(uintptr_t context, RTS_UI32 code)
             continue;
         frame->r0 = code;
         frame->r1 = frame->pc;
+        frame->r2 = stack_before(frame, has_fpu_registers(frame));
+        frame->r3 = frame->lr;
         frame->pc = (RTS_UI32)(uintptr_t)try_raise & ~1u;
-        frame->xpsr = (frame->xpsr & 1u << 9) | XPSR_THUMB;
+        frame->xpsr = (frame->xpsr & XPSR_ALIGNED) | XPSR_THUMB;
         return;
     }
 }

@@ -18,8 +18,8 @@ from plctool.compiler.codegen.line_table import Line, in_order, read_line_table
 from plctool.compiler.codegen.relocations import (
     AARCH64_ADRP,
     AARCH64_LOW12,
+    ABSOLUTE,
     APPLY,
-    LINE_ADDRESS,
     RISCV_HIGH,
     RISCV_LOW,
     OutOfReach,
@@ -49,12 +49,14 @@ class LinkedSymbol:
 
 @dataclass(frozen=True)
 class Linked:
-    """`code`: the block. `lines`: sorted by address, an address being an offset in the block. `imports`: the compiler
-    calls that got a stub, in the order of their slots, starting with `first_slot`."""
+    """`code`: the block. `lines`: sorted by address, an address being an offset in the block. `debug`: the objects with
+    nothing but their debugging information, in which addresses are such offsets too, or -1 outside of the block.
+    `imports`: the compiler calls that got a stub, in the order of their slots, starting with `first_slot`."""
 
     code: bytes
     symbols: dict[str, LinkedSymbol]
     lines: list[Line]
+    debug: list[bytes]
     imports: list[External]
 
 
@@ -75,7 +77,12 @@ class _Section:
     flags: int
     align: int
     relocations: list[tuple[int, int, _ElfSymbol, int]]  # offset, kind, symbol, addend
+    place: int  # in its object
     offset: int = -1  # in the block; -1 when it is not part of it
+
+    @property
+    def is_debug(self) -> bool:
+        return self.name.startswith(".debug_")
 
 
 def link(objects: Sequence[bytes], target: Target, roots: Sequence[str], first_slot: int) -> Linked:
@@ -93,8 +100,10 @@ class _Linker:
         self._first_slot = first_slot
         self._sections: list[_Section] = []
         self._symbols: list[_ElfSymbol] = []
+        self._objects: list[tuple[list[_Section], bytes]] = []
         for data in objects:
             sections, symbols = _read_elf(data, target, len(self._sections))
+            self._objects.append((sections, data))
             self._sections += sections
             self._symbols += symbols
         self._defined = {s.name: s for s in self._symbols if s.section and s.is_global}
@@ -112,7 +121,9 @@ class _Linker:
             if s.section in used and s.name and not s.name.startswith((".", "$"))
         }
         imports = [COMPILER_CALLS[name] for name in self._stubs]
-        return Linked(bytes(code), symbols, self._lines(), imports)
+        self._relocate_debug()
+        debug = [_only_debug(sections, data) for sections, data in self._objects]
+        return Linked(bytes(code), symbols, self._lines(), debug, imports)
 
     def _reach(self, start: set[int]) -> list[int]:
         """The sections that the given ones refer to, directly or not, code first."""
@@ -212,21 +223,41 @@ class _Linker:
                     "link",
                 )
 
-    def _lines(self) -> list[Line]:
-        """The line tables of the sections in the block."""
-        rows: list[Line] = []
-        width = 8 if self._target.pointer_size == 8 else 4
+    def _relocate_debug(self) -> None:
+        """Addresses become offsets in the block, -1 for what is no part of it."""
+        widths = ABSOLUTE[self._target.machine]
         for section in self._sections:
-            if section.name != ".debug_line":
+            if not section.is_debug:
                 continue
             data = bytearray(section.data)
             for offset, kind, symbol, addend in section.relocations:
-                if kind == LINE_ADDRESS[self._target.machine]:
-                    inside = self._sections[symbol.section].offset >= 0
-                    address = self._address(symbol) + addend if inside else -1
-                    data[offset : offset + width] = (address & ((1 << 8 * width) - 1)).to_bytes(width, "little")
-            rows += (line for line in read_line_table(bytes(data)) if line.address < 1 << 31)
-        return in_order(rows)
+                width = widths.get(kind, 0)
+                value = self._debug_address(symbol, addend) & ((1 << 8 * width) - 1)
+                data[offset : offset + width] = value.to_bytes(width, "little")
+            section.data = bytes(data)
+
+    def _debug_address(self, symbol: _ElfSymbol, addend: int) -> int:
+        target = self._sections[symbol.section]
+        if target.is_debug:
+            return symbol.value + addend
+        return self._address(symbol) + addend if target.offset >= 0 else -1
+
+    def _lines(self) -> list[Line]:
+        """The line tables of the sections in the block."""
+        tables = [section.data for section in self._sections if section.name == ".debug_line"]
+        return in_order([line for table in tables for line in read_line_table(table) if line.address < 1 << 31])
+
+
+def _only_debug(sections: list[_Section], data: bytes) -> bytes:
+    """An object with its debugging information as it is now, without code and relocations; all keeps its place."""
+    kept = bytearray(data)
+    for section in sections:
+        size = len(section.data)
+        if section.is_debug:
+            kept[section.place : section.place + size] = section.data
+        elif section.flags & _ALLOCATED or section.name.startswith(".rel"):
+            kept[section.place : section.place + size] = bytes(size)
+    return bytes(kept)
 
 
 def _read_elf(data: bytes, target: Target, base: int) -> tuple[list[_Section], list[_ElfSymbol]]:
@@ -237,13 +268,13 @@ def _read_elf(data: bytes, target: Target, base: int) -> tuple[list[_Section], l
     symbols: list[_ElfSymbol] = []
     for s in elf.iter_sections():
         body = b"" if s["sh_type"] == "SHT_NOBITS" or s.name.startswith(_DROPPED) else s.data()
-        sections.append(_Section(s.name, body, s["sh_flags"], max(s["sh_addralign"], 1), []))
+        sections.append(_Section(s.name, body, s["sh_flags"], max(s["sh_addralign"], 1), [], s["sh_offset"]))
     for s in elf.iter_sections():
         if s["sh_type"] == "SHT_SYMTAB":
             symbols = _read_symbols(s.data(), elf.get_section(s["sh_link"]).data(), len(sections), base, wide)
     for s in elf.iter_sections():
         owner = sections[s["sh_info"]] if s["sh_type"] in ("SHT_REL", "SHT_RELA") else None
-        if owner is not None and owner.data and (owner.flags & _ALLOCATED or owner.name == ".debug_line"):
+        if owner is not None and owner.data and (owner.flags & _ALLOCATED or owner.is_debug):
             entries = _read_relocations(s.data(), s["sh_type"] == "SHT_RELA", wide, owner.data)
             owner.relocations = [(offset, kind, symbols[number], addend) for offset, kind, number, addend in entries]
     return sections, symbols

@@ -111,12 +111,14 @@ class Unit:
         tree = module.metadata('!{!"st"}')
         self._tag_root = module.metadata(f'!{{!"any", !{tree}, i64 0}}')
         self._tags: dict[object, str] = {}
+        # An access through NULL that is not checked is left to the processor, which faults.
+        always = _ALWAYS if Check.NULL in options.checks else f"{_ALWAYS} null_pointer_is_valid"
         self.smallest = module.attributes(f"minsize optsize {_ALWAYS}")
-        self.plain = module.attributes(f"{'optsize ' if options.compact else ''}{_ALWAYS}")
+        self.plain = module.attributes(f"{'optsize ' if options.compact else ''}{always}")
         self.strings = module.attributes(f"{'optsize ' if options.size else ''}{_ALWAYS}")
         self._program = self.plain
         if options.compact and not options.size:
-            self._program = module.attributes(f'optsize {_ALWAYS} "function-inline-threshold"="{_INLINED}"')
+            self._program = module.attributes(f'optsize {always} "function-inline-threshold"="{_INLINED}"')
         # LLVM's fast instruction selection (level 0) takes a call that only reads memory for dead.
         reads = " memory(read)" if options.opt_level > 0 else ""
         self.raising = module.attributes(f"cold noreturn nounwind nomerge{reads}")
@@ -238,7 +240,7 @@ class Unit:
             self._subroutine_type = module.metadata(f"!DISubroutineType(types: !{self.empty})")
             self._compile_unit = module.distinct_metadata(
                 f'!DICompileUnit(language: DW_LANG_C99, file: !{file}, producer: "plctool", isOptimized: true, '
-                "runtimeVersion: 0, emissionKind: DebugDirectivesOnly)"
+                "runtimeVersion: 0, emissionKind: LineTablesOnly)"
             )
             module.named_metadata("llvm.dbg.cu", [self._compile_unit])
             flags = ('!{i32 7, !"Dwarf Version", i32 4}', '!{i32 2, !"Debug Info Version", i32 3}')

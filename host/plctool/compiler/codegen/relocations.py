@@ -186,8 +186,14 @@ AARCH64_LOW12 = frozenset((277, 278, 284, 285, 286, 299))
 RISCV_HIGH = 23
 RISCV_LOW = frozenset((24, 25))
 
-# Relocations of .debug_line: the absolute address of a sequence.
-LINE_ADDRESS = {Machine.X86_64: 1, Machine.THUMB: 2, Machine.THUMB_V6M: 2, Machine.AARCH64: 257, Machine.RISCV32: 1}
+# Relocations of debugging information: kinds of absolute addresses, and their bytes.
+ABSOLUTE = {
+    Machine.X86_64: {1: 8, 10: 4},
+    Machine.THUMB: {2: 4},
+    Machine.THUMB_V6M: {2: 4},
+    Machine.AARCH64: {257: 8, 258: 4},
+    Machine.RISCV32: {1: 4},
+}
 
 
 def stub(machine: Machine, slot: int) -> bytes:

@@ -15,6 +15,7 @@
 #define NETSERVER_MESSAGE_SIZE 216 /* holds the reply to who it is: more for names longer than about 20 characters */
 #define COM_QUEUE_SIZE 308
 #define LOG_MAX_ENTRIES 0
+#define EXCEPT_MAX_CALLS 0
 #define APP_REFUSAL_TEXT_SIZE 1
 #define APP_RETAIN_SIZE 0
 #define SRV_INFORMATION 0

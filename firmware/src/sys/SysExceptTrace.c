@@ -1,0 +1,73 @@
+/*
+ * SysExceptTrace.c - what the stack tells about an exception: the portable half of SysExcept.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Only words that may be return addresses are kept. Which of them are, says the debugging information on the host, which
+ * knows how much stack each function holds at each instruction: it costs the running program nothing.
+ */
+#include "SysExcept.h"
+
+#include <string.h>
+
+#include "SysAtomic.h"
+#include "rts_config.h"
+
+static uintptr_t code_start;
+static RTS_UI32 code_size;
+
+void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size)
+{
+    code_start = (uintptr_t)code;
+    code_size = size;
+}
+
+bool SysExceptIsCode(uintptr_t address)
+{
+    return address - code_start < code_size;
+}
+
+#if EXCEPT_MAX_CALLS > 0
+
+static struct {
+    RTS_UI32 claims;
+    EXCEPT_TRACE trace;
+} state;
+
+static void add_call(uintptr_t target, uintptr_t distance)
+{
+    EXCEPT_CALL *call = &state.trace.call[state.trace.count];
+
+    if (!SysExceptIsCode(target))
+        return;
+    call->target = (RTS_UI32)(target - code_start);
+    call->distance = (RTS_UI32)distance;
+    state.trace.count++;
+}
+
+/* The stack is read whole, whatever a sanitizer thinks of the gaps between its variables. */
+__attribute__((no_sanitize("address"))) void SysExceptTrace(uintptr_t address, const uintptr_t *stack,
+                                                            const uintptr_t *end, uintptr_t link)
+{
+    const uintptr_t *word;
+
+    if (SysAtomicAdd(&state.claims, 1) != 0)
+        return;
+    state.trace.address = address;
+    add_call(link, EXCEPT_LINK);
+    for (word = stack; word < end && state.trace.count < EXCEPT_MAX_CALLS; word++)
+        add_call(*word, (uintptr_t)word - (uintptr_t)stack);
+}
+
+const EXCEPT_TRACE *SysExceptGetTrace(void)
+{
+    return &state.trace;
+}
+
+void SysExceptKeepTrace(uintptr_t address)
+{
+    if (state.trace.address != address)
+        memset(&state, 0, sizeof state);
+}
+
+#endif

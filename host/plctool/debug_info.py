@@ -1,0 +1,157 @@
+"""What the compiler's debugging information says about a moment of the program: which calls led to it.
+
+A call that was inlined is in the DWARF tree of the function; a call that was made is on the stack, at the place that
+the call frame information (DWARF 4, 6.4) tells for each instruction.
+"""
+
+from __future__ import annotations
+
+import io
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from elftools.dwarf.callframe import FDE
+from elftools.dwarf.ranges import BaseAddressEntry
+from elftools.elf.elffile import ELFFile
+
+if TYPE_CHECKING:
+    from plctool.link.services import Trace
+
+# Registers of the stack pointer in DWARF.
+_STACK_POINTER = {"EM_X86_64": 7, "EM_ARM": 13, "EM_AARCH64": 31, "EM_RISCV": 2}
+_MOST_CALLS = 64
+_MOST_PUSHED = 128  # bytes, by a function of the runtime
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Code that came from the source of `pou`. When it was inlined: the line with the call, else line 0."""
+
+    pou: str
+    call_file: str
+    call_line: int
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """At an instruction: bytes of stack that the function holds, and where below their end the return address lies
+    (None: in the link register)."""
+
+    size: int
+    return_address: int | None
+
+
+class DebugInfo:
+    """Reads the objects of `Linked.debug`; the tables are made at the first question."""
+
+    def __init__(self, objects: list[bytes]) -> None:
+        self._scopes: list[tuple[int, int, int, Scope]] = []  # begin, end, depth
+        self._frames: list[tuple[int, int, _Frame | None]] = []  # begin, end
+        self._word = 8
+        for data in objects:
+            elf = ELFFile(io.BytesIO(data))
+            self._word = elf.elfclass // 8
+            dwarf = elf.get_dwarf_info(relocate_dwarf_sections=False)
+            for unit in dwarf.iter_CUs():
+                self._scopes += _Unit(dwarf, unit).scopes()
+            self._frames += _frames(dwarf, _STACK_POINTER[elf["e_machine"]])
+        self._scopes.sort(key=lambda scope: scope[:3])
+        self._frames.sort(key=lambda frame: frame[:2])
+
+    def scopes(self, offset: int) -> list[Scope]:
+        """The scopes that hold the code at `offset`, the innermost first; the last one is that of the function."""
+        found = [(depth, scope) for begin, end, depth, scope in self._scopes if begin <= offset < end]
+        return [scope for _, scope in sorted(found, key=lambda item: -item[0])]
+
+    def callers(self, offset: int | None, trace: Trace) -> list[int]:
+        """Offsets of the calls on the stack that led to `offset`, the innermost first. `offset` is None when the
+        program stopped in a function that is not its own; then those are taken that lead furthest."""
+        if offset is not None:
+            return self._unwind(offset, 0, trace)
+        starts = [(at + self._word, target) for at, target in sorted(trace.words.items())]
+        if trace.link is not None:  # a function that calls no other; how much it has pushed is not known
+            starts += [(pushed, trace.link) for pushed in range(0, _MOST_PUSHED, self._word)]
+        chains = ([target - 1, *self._unwind(target - 1, pointer, trace)] for pointer, target in starts)
+        return max(chains, key=len, default=[])
+
+    def _unwind(self, offset: int, pointer: int, trace: Trace) -> list[int]:
+        calls: list[int] = []
+        while len(calls) < _MOST_CALLS and (frame := self._frame(offset)) is not None:
+            pointer += frame.size
+            if frame.return_address is not None:
+                target = trace.words.get(pointer + frame.return_address)
+            else:
+                target = trace.link if not calls else None
+            if target is None:
+                break
+            offset = target - 1
+            calls.append(offset)
+        return calls
+
+    def _frame(self, offset: int) -> _Frame | None:
+        i = bisect_right(self._frames, offset, key=lambda frame: frame[0]) - 1
+        if i < 0 or offset >= self._frames[i][1]:
+            return None
+        return self._frames[i][2]
+
+
+class _Unit:
+    """The functions of one compilation unit."""
+
+    def __init__(self, dwarf: Any, unit: Any) -> None:
+        self._unit = unit
+        self._ranges = dwarf.range_lists()
+        self._files = [""]
+        lines = dwarf.line_program_for_CU(unit)
+        directories = [b"", *lines["include_directory"]]
+        for entry in lines["file_entry"]:
+            directory = directories[entry.dir_index]
+            self._files.append((directory + b"/" + entry.name if directory else entry.name).decode())
+
+    def scopes(self) -> Iterator[tuple[int, int, int, Scope]]:
+        top = self._unit.get_top_DIE()
+        todo = [(die, 0) for die in top.iter_children()]
+        while todo:
+            die, depth = todo.pop()
+            if die.tag not in ("DW_TAG_subprogram", "DW_TAG_inlined_subroutine"):
+                continue
+            todo += [(child, depth + 1) for child in die.iter_children()]
+            scope = self._scope(die)
+            for begin, end in self._places(die, top):
+                yield begin, end, depth, scope
+
+    def _scope(self, die: Any) -> Scope:
+        origin = die
+        while "DW_AT_abstract_origin" in origin.attributes:
+            origin = origin.get_DIE_from_attribute("DW_AT_abstract_origin")
+        values = {name: attribute.value for name, attribute in die.attributes.items()}
+        file = self._files[values.get("DW_AT_call_file", 0)]
+        return Scope(origin.attributes["DW_AT_name"].value.decode(), file, values.get("DW_AT_call_line", 0))
+
+    def _places(self, die: Any, top: Any) -> Iterator[tuple[int, int]]:
+        values = {name: attribute.value for name, attribute in die.attributes.items()}
+        if "DW_AT_high_pc" in values:
+            yield values["DW_AT_low_pc"], values["DW_AT_low_pc"] + values["DW_AT_high_pc"]
+        elif "DW_AT_ranges" in values:
+            base = top.attributes["DW_AT_low_pc"].value
+            for entry in self._ranges.get_range_list_at_offset(values["DW_AT_ranges"], self._unit):
+                if isinstance(entry, BaseAddressEntry):
+                    base = entry.base_address
+                else:
+                    yield base + entry.begin_offset, base + entry.end_offset
+
+
+def _frames(dwarf: Any, stack_pointer: int) -> Iterator[tuple[int, int, _Frame | None]]:
+    for entry in dwarf.CFI_entries() if dwarf.has_CFI() else []:
+        if not isinstance(entry, FDE):
+            continue
+        link = entry.cie["return_address_register"] if entry.cie else -1
+        rows = entry.get_decoded().table
+        ends = [*(row["pc"] for row in rows[1:]), entry["initial_location"] + entry["address_range"]]
+        for row, end in zip(rows, ends, strict=True):
+            rule = row.get(link)
+            known = row["cfa"].reg == stack_pointer and (rule is None or rule.type == "OFFSET")
+            frame = _Frame(row["cfa"].offset, rule.arg if rule else None) if known else None
+            yield row["pc"], end, frame

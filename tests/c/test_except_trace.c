@@ -1,0 +1,106 @@
+/*
+ * test_except_trace.c - which words of a stack are kept of an exception.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "SysExcept.h"
+
+#include <string.h>
+
+#include "test.h"
+
+static const RTS_UI8 code[64];
+static uintptr_t stack[EXCEPT_MAX_CALLS + 4];
+
+static void setup(void)
+{
+    SysExceptKeepTrace(0);
+    SysExceptCodeRange(code, sizeof code);
+    memset(stack, 0, sizeof stack);
+}
+
+static uintptr_t in_code(RTS_UI32 offset)
+{
+    return (uintptr_t)code + offset;
+}
+
+static void only_words_that_lead_into_the_code_are_kept(void)
+{
+    const EXCEPT_TRACE *trace = SysExceptGetTrace();
+
+    setup();
+    stack[0] = in_code(0) - 1;
+    stack[1] = in_code(63);
+    stack[2] = in_code(64);
+    stack[3] = in_code(0);
+    SysExceptTrace(in_code(5), stack, stack + 4, 0);
+    CHECK(trace->count == 2);
+    CHECK(trace->call[0].target == 63 && trace->call[0].distance == sizeof stack[0]);
+    CHECK(trace->call[1].target == 0 && trace->call[1].distance == 3 * sizeof stack[0]);
+}
+
+static void the_link_register_is_told_apart(void)
+{
+    const EXCEPT_TRACE *trace = SysExceptGetTrace();
+
+    setup();
+    SysExceptTrace(in_code(5), NULL, NULL, in_code(7));
+    CHECK(trace->count == 1 && trace->call[0].target == 7 && trace->call[0].distance == EXCEPT_LINK);
+}
+
+static void a_full_trace_keeps_the_nearest(void)
+{
+    const EXCEPT_TRACE *trace = SysExceptGetTrace();
+    RTS_UI32 i;
+
+    setup();
+    for (i = 0; i < RTS_COUNT(stack); i++)
+        stack[i] = in_code(i);
+    SysExceptTrace(in_code(5), stack, stack + RTS_COUNT(stack), 0);
+    CHECK(trace->count == EXCEPT_MAX_CALLS);
+    CHECK(trace->call[EXCEPT_MAX_CALLS - 1].target == EXCEPT_MAX_CALLS - 1);
+}
+
+static void the_first_exception_counts_until_it_is_forgotten(void)
+{
+    const EXCEPT_TRACE *trace = SysExceptGetTrace();
+
+    setup();
+    SysExceptTrace(in_code(5), NULL, NULL, in_code(7));
+    SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
+    CHECK(trace->count == 1 && trace->call[0].target == 7);
+    SysExceptKeepTrace(in_code(5));
+    CHECK(trace->count == 1);
+    SysExceptKeepTrace(0);
+    CHECK(trace->count == 0);
+    SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
+    CHECK(trace->count == 1 && trace->call[0].target == 8);
+}
+
+static void the_trace_of_another_exception_is_not_kept(void)
+{
+    setup();
+    SysExceptTrace(in_code(5), NULL, NULL, in_code(7));
+    SysExceptKeepTrace(in_code(6));
+    CHECK(SysExceptGetTrace()->count == 0);
+}
+
+static void without_code_there_are_no_calls(void)
+{
+    setup();
+    stack[0] = in_code(3);
+    SysExceptCodeRange(NULL, 0);
+    SysExceptTrace(in_code(5), stack, stack + 1, 0);
+    CHECK(SysExceptGetTrace()->count == 0);
+}
+
+int main(void)
+{
+    RUN(only_words_that_lead_into_the_code_are_kept);
+    RUN(the_link_register_is_told_apart);
+    RUN(a_full_trace_keeps_the_nearest);
+    RUN(the_first_exception_counts_until_it_is_forgotten);
+    RUN(the_trace_of_another_exception_is_not_kept);
+    RUN(without_code_there_are_no_calls);
+    return test_result();
+}

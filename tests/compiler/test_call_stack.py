@@ -1,0 +1,105 @@
+"""Which calls led to an exception is told exactly, whether they were inlined or made, at each level of optimisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from plctool.compiler import Level, compile_sources
+from plctool.sim import Simulator
+from plctool.symbols import SymbolTable
+
+LEVELS: list[Level] = [0, 1, 2, 3, "s"]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One on the way down: how it is called, and how much stack it uses."""
+
+    kind: str
+    locals: int
+    twice: bool  # called a second time, so that it is not worth inlining
+
+
+UNITS = st.lists(
+    st.builds(Unit, st.sampled_from(["FUNCTION", "FUNCTION_BLOCK", "METHOD"]), st.integers(0, 70), st.booleans()),
+    min_size=1,
+    max_size=6,
+)
+
+
+class Program:
+    """Main calls unit 0, that calls unit 1 ..., the last one divides by zero in the fourth cycle."""
+
+    def __init__(self, units: list[Unit]) -> None:
+        self.lines: list[str] = []
+        self.places: list[tuple[str, int]] = []  # unit and line of the calls, the innermost first
+        for n in reversed(range(len(units))):
+            self._unit(n, units)
+        self.lines += [
+            "PROGRAM Main",
+            "VAR cycle, x : DINT;",
+            *self._instance(0, units),
+            "END_VAR",
+            "cycle := cycle + 1;",
+        ]
+        self._body("Main", 0, units, "4 - cycle")
+        self.lines += ["END_PROGRAM"]
+
+    @property
+    def text(self) -> str:
+        return "\n".join(self.lines)
+
+    def _instance(self, n: int, units: list[Unit]) -> list[str]:
+        return [f"u{n} : Unit{n};"] if n < len(units) and units[n].kind != "FUNCTION" else []
+
+    def _unit(self, n: int, units: list[Unit]) -> None:
+        unit = units[n]
+        names = {"FUNCTION": f"FUNCTION Unit{n} : DINT", "METHOD": "METHOD PUBLIC Run : DINT"}
+        if unit.kind == "METHOD":
+            self.lines += [f"FUNCTION_BLOCK Unit{n}", "VAR", *self._instance(n + 1, units), "END_VAR"]
+        self.lines += [names.get(unit.kind, f"FUNCTION_BLOCK Unit{n}"), "VAR_INPUT n : DINT; END_VAR"]
+        own = [] if unit.kind == "METHOD" else self._instance(n + 1, units)
+        self.lines += ["VAR x, i : DINT;", f"a : ARRAY[0..{unit.locals}] OF DINT;", *own, "END_VAR"]
+        self.lines += [f"FOR i := 0 TO {unit.locals} DO a[i] := n + i * 3; END_FOR"]
+        name = f"Unit{n}.Run" if unit.kind == "METHOD" else f"Unit{n}"
+        self._body(name, n + 1, units, f"n + a[{unit.locals}] - a[{unit.locals}]")
+        self.lines += {
+            "FUNCTION": [f"Unit{n} := x;", "END_FUNCTION"],
+            "METHOD": ["Run := x;", "END_METHOD", "END_FUNCTION_BLOCK"],
+        }.get(unit.kind, ["END_FUNCTION_BLOCK"])
+
+    def _body(self, name: str, callee: int, units: list[Unit], argument: str) -> None:
+        if callee == len(units):
+            self.places.append((name, len(self.lines) + 1))
+            self.lines += [f"x := 100 / ({argument});"]
+            return
+        calls = {"FUNCTION": "x := Unit{0}({1});", "METHOD": "x := u{0}.Run({1});"}
+        call = calls.get(units[callee].kind, "u{0}({1});")
+        if units[callee].twice:
+            self.lines += [call.format(callee, "1000")]
+        self.places.append((name, len(self.lines) + 1))
+        self.lines += [call.format(callee, argument), "x := x + 1;"]  # a call at the end may become a jump
+
+
+def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
+    """Unit and line where the program stopped, and of the calls that led there."""
+    exception = plc.status().exception
+    assert exception is not None
+    return [(place.pou, place.line) for place in symbols.call_stack(exception.code_offset, exception.trace)]
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@settings(max_examples=25, deadline=None)
+@given(units=UNITS)
+def test_each_call_is_told(tmp_path_factory, level: Level, units: list[Unit]) -> None:
+    program = Program(units)
+    path = tmp_path_factory.mktemp("calls") / "calls.st"
+    path.write_text(program.text)
+    built = compile_sources([path], level=level)
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(4)
+        assert places(plc, built.symbols) == program.places
