@@ -250,6 +250,9 @@ class Builder:
     def property(self, keyword: Token, *rest: Any) -> list[ast.PouDecl]:
         return self.units.property(keyword, rest)
 
+    def single_accessor(self, keyword: Token, *rest: Any) -> ast.PouDecl:
+        return self.units.single_accessor(keyword, rest)
+
     def accessor(self, keyword: Token, *rest: Any) -> tuple[Token, list[Any], Any, Any]:
         *modifiers, blocks, body = rest
         return keyword, modifiers, blocks, body

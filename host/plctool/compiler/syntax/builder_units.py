@@ -96,16 +96,25 @@ class Arrangement:
             token, more, own_blocks, body = accessor
             all_blocks = [*(blocks or []), *(own_blocks or [])]
             decl = self._builder.pou(keyword, [*modifiers, *more, name], None, all_blocks, body)
-            decl.keyword = token.type
-            if decl.keyword == "GET":
-                decl.result = spec
-            else:
-                line = ast.VarDecl(name.pos, [(name.pos, name.text)], None, spec, None)
-                decl.blocks.insert(0, ast.VarBlock(name.pos, "VAR_INPUT", set(), [line]))
-            found.append(decl)
+            found.append(self._accessor(decl, token.type, spec, name))
         if not found:
             self._builder.report(name.pos, "syntax", f"the property {name.text} needs a GET or a SET")
         return found
+
+    def single_accessor(self, keyword: Token, rest: Sequence[Any]) -> ast.PouDecl:
+        """PROPERTY_GET and PROPERTY_SET of the fourth edition."""
+        *head, spec, blocks, body = rest
+        decl = self._builder.pou(keyword, head, None, blocks, body)
+        return self._accessor(decl, keyword.type.removeprefix("PROPERTY_"), spec, head[-1])
+
+    def _accessor(self, decl: ast.PouDecl, kind: str, spec: ast.TypeSpec, name: Token) -> ast.PouDecl:
+        decl.keyword = kind
+        if kind == "GET":
+            decl.result = spec
+        else:
+            line = ast.VarDecl(name.pos, [(name.pos, name.text)], None, spec, None)
+            decl.blocks.insert(0, ast.VarBlock(name.pos, "VAR_INPUT", set(), [line]))
+        return decl
 
     def namespace(self, rest: Sequence[Any]) -> list[Any]:
         """The units of a namespace, which know its name."""

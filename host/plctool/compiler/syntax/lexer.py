@@ -57,7 +57,7 @@ KEYWORDS = {
         "TRUE",
         "FALSE", "NULL", "NOT", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
         "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET", "ACTION", "NAMESPACE", "USING",
-        "INITIAL_STEP", "STEP", "TRANSITION",
+        "PROPERTY_GET", "PROPERTY_SET", "INITIAL_STEP", "STEP", "TRANSITION",
     )},
     **{k: "_" + k for k in (
         "END_TYPE", "END_STRUCT", "END_UNION", "OVERLAP", "OF", "TO", "END_VAR", "AT", "END_FUNCTION",
@@ -76,7 +76,7 @@ SOFT = frozenset((
     "QUALIFIER", "TEXT", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "_OVERLAP",
     "UNION", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION", "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET",
     "SET", "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS", "INITIAL_STEP", "STEP", "TRANSITION",
-    "_FROM", "EDGE", "RIGHTS",
+    "_FROM", "EDGE", "RIGHTS", "PROPERTY_GET", "PROPERTY_SET",
 ))  # fmt: skip
 """Terminals that are names where the grammar has no use for them."""
 
@@ -84,7 +84,7 @@ _OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a p
 
 OPENING = frozenset((
     "MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING", "INITIAL_STEP", "STEP",
-    "TRANSITION",
+    "TRANSITION", "PROPERTY_GET", "PROPERTY_SET",
 ))  # fmt: skip
 """Terminals that are names where no name follows."""
 
