@@ -89,6 +89,8 @@ class Declarations(TypeDeclarations):
         pos, full_name = scope.pos(offset), f"{owner}.{name}" if owner else name
         if isinstance(init, ComputedInit):
             scope.error(offset, "constant", f"the value of the constant {name} is not known before the program runs")
+        if any(instance in self.world.blocks for instance in instances_in(t)):
+            scope.error(offset, "constant", f"{name} changes when it is called; declare it without CONSTANT")
         symbol = VarSymbol(name, pos, t, role, constant=True, default=init)
         if is_scalar(t) or isinstance(t, StringType):
             zero: int | float | str = "" if isinstance(t, StringType) else 0.0 if _is_real(t) else 0
