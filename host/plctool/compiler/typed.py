@@ -101,6 +101,14 @@ class ComputedInit:
 Initial = ScalarInit | ArrayInit | StructInit | ComputedInit
 
 
+def overlay(given: Initial, default: Initial | None) -> Initial:
+    """An initial value that is complete: members that `given` does not name, at any depth, are as in `default`."""
+    if isinstance(given, StructInit) and isinstance(default, StructInit):
+        named = {name: overlay(value, default.members.get(name)) for name, value in given.members.items()}
+        return StructInit({**default.members, **named}, {**default.arguments, **given.arguments})
+    return given
+
+
 # ---- places: what can stand left of := ----------------------------------------------------------------------------
 
 

@@ -16,7 +16,7 @@ from plctool.compiler.codegen.lower_expr import Expressions
 from plctool.compiler.codegen.lower_frame import Ref
 from plctool.compiler.codegen.lower_string import encode_text
 from plctool.compiler.codegen.lower_unit import Unit
-from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, StructInit
+from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, StructInit, overlay
 from plctool.compiler.types import ArrayType, Elementary, Field, Kind, StringType, StructType, Type, base_of, is_scalar
 
 _LOOP_FROM = 5  # equal scalars that are worth a loop
@@ -38,13 +38,12 @@ def encode_scalar(value: int | float | str, t: Type) -> bytes:
 def struct_members(unit: Unit, t: StructType, initial: Initial | None) -> Iterator[tuple[Field, Initial | None]]:
     """Every member with the value it gets: the one given, else the default of the struct type, else None. Of a union
     those with a value."""
-    values: dict[str, Initial] = {}
-    for source in (unit.defaults.get(t.name), initial):
-        if isinstance(source, StructInit):
-            values.update((name.casefold(), value) for name, value in source.members.items())
+    given = initial if isinstance(initial, StructInit) else StructInit({})
+    complete = overlay(given, unit.defaults.get(t.name))
+    assert isinstance(complete, StructInit)
     for f in t.fields:
-        if not t.union or f.name.casefold() in values:
-            yield f, values.get(f.name.casefold())
+        if not t.union or f.name in complete.members:
+            yield f, complete.members.get(f.name)
 
 
 def array_runs(t: ArrayType, initial: Initial | None) -> Iterator[tuple[int, Initial | None]]:

@@ -40,6 +40,7 @@ from plctool.compiler.typed import (
     StructInit,
     Variable,
     VarPlace,
+    overlay,
 )
 from plctool.compiler.types import BOOL, DINT, ArrayType, PointerType, StringType, StructType, Type
 
@@ -110,17 +111,14 @@ class _Construction:
         if isinstance(t, ArrayType):
             return self._array(place, t, initial, pos)
         assert isinstance(t, StructType)
-        values: dict[str, Initial] = {}
-        arguments: Mapping[str, Expr] = {}
-        for source in (_moved_initial(self._world.defaults.get(t.name), place), initial):
-            if isinstance(source, StructInit):
-                values.update((name.casefold(), value) for name, value in source.members.items())
-                arguments = source.arguments
+        given = initial if isinstance(initial, StructInit) else StructInit({})
+        complete = overlay(given, _moved_initial(self._world.defaults.get(t.name), place))
+        assert isinstance(complete, StructInit)
         statements: list[Statement] = []
         for f in t.fields:
-            statements += self._place(MemberPlace(place, f.offset, f.type, pos), values.get(f.name.casefold()), pos)
+            statements += self._place(MemberPlace(place, f.offset, f.type, pos), complete.members.get(f.name), pos)
         for member in self._world.classes.initialisers(t):
-            statements.append(self._call(member, place, arguments, pos))
+            statements.append(self._call(member, place, complete.arguments, pos))
         return statements
 
     def _array(self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos) -> list[Statement]:

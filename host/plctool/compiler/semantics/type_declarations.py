@@ -18,7 +18,7 @@ from plctool.compiler.semantics.initial_values import InitialValues
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbol, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import ArrayInit, Const, Initial, ScalarInit, StructInit
+from plctool.compiler.typed import ArrayInit, Const, Initial, ScalarInit, StructInit, overlay
 from plctool.compiler.types import (
     BOOL,
     BYTE,
@@ -85,7 +85,7 @@ class TypeDeclarations:
         given = self._initials.initial(init, t, scope)
         if given is None or (default is None and given == ScalarInit(0) and str(given.value) != "-0.0"):
             return t, default if given is None else None
-        return t, given
+        return t, overlay(given, default)
 
     def _with_arguments(self, decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
         """Type and initial value with what stands behind the name of a type: `TON(PT := T#1s)` and `TON[(PT := T#1s)]`
@@ -209,7 +209,8 @@ class TypeDeclarations:
         if symbol.type is None:
             symbol.type, symbol.default = t, default
         if decl.init is not None and t is not ERROR:  # it may name a value of this very enumeration
-            symbol.default = self._initials.initial(decl.init, t, scope) or default
+            given = self._initials.initial(decl.init, t, scope)
+            symbol.default = default if given is None else overlay(given, default)
         symbol.busy = False
         return symbol.type
 
