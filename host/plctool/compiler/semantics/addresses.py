@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler.semantics.conversions import elementary
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import Role, VarSymbol
+from plctool.compiler.semantics.symbols import GlobalSymbol, Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Area, Initial, Storage, Variable
 from plctool.compiler.types import BOOL, ELEMENTARY, Elementary, Type, base_of
@@ -99,7 +99,10 @@ class DirectVariables:
     def find(self, node: ast.DirectAddress, scope: Scope) -> VarSymbol | None:
         """The variable at an address; None after a diagnosis."""
         key = node.text.upper()
-        symbol = self._known.get(key)
+        declared = scope.lookup(key)  # AT %MW1 : INT, without a name
+        if isinstance(declared, GlobalSymbol):
+            return self._world.declarations.global_variable(declared)
+        symbol = declared if isinstance(declared, VarSymbol) else self._known.get(key)
         if symbol is not None:
             return symbol
         address = read_address(node, scope)

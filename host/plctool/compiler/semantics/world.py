@@ -383,7 +383,7 @@ class World:
     def report_unused(self, scope: Scope) -> None:
         """Warns of variables nobody uses, and of results nobody assigns."""
         for symbol in scope.names.values():
-            if not isinstance(symbol, VarSymbol) or symbol.used:
+            if not isinstance(symbol, VarSymbol) or symbol.used or symbol.name.startswith("%"):
                 continue
             if symbol.role in (Role.LOCAL, Role.TEMP):
                 self.diagnostics.warning(symbol.pos, "unused", f"{symbol.name} is never used")

@@ -148,6 +148,10 @@ class Builder:
         written = [(t.pos, t.text) for t in names]
         return ast.VarDecl(pos, written, address, spec, init, attributes, edge.text.upper() if edge else "")
 
+    def nameless_decl(self, location: Token, spec: ast.TypeSpec, init: ast.Init | None) -> ast.VarDecl:
+        """`AT %MW1 : INT;`: the address is its name."""
+        return self.var_decl([location], location, spec, None, init)
+
     def var_names(self, *names: Token) -> list[Token]:
         return list(names)
 

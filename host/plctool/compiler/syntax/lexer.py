@@ -84,9 +84,9 @@ _OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a p
 
 OPENING = frozenset((
     "MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING", "INITIAL_STEP", "STEP",
-    "TRANSITION", "PROPERTY_GET", "PROPERTY_SET",
+    "TRANSITION", "PROPERTY_GET", "PROPERTY_SET", "_AT",
 ))  # fmt: skip
-"""Terminals that are names where no name follows."""
+"""Terminals that are names where no name (behind AT, no address) follows."""
 
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
 _STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quotes
@@ -94,6 +94,7 @@ _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAMED_ARGUMENT = re.compile(r"\s*\(\s*[A-Za-z_]\w*\s*(?::=|=>)", re.ASCII)
 _PART_FOLLOWS = re.compile(r"\s*[:.,^\[]")
 _NAME = re.compile(r"\s+[A-Za-z_]")
+_ADDRESS = re.compile(r"\s*%")
 _PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
 _LABEL = re.compile(r"\s+[A-Za-z_]\w*\s*:(?!=)")
 _QUOTE = re.compile(r"\s*['\"]")
@@ -244,7 +245,7 @@ def is_followed_by_name(token: Token, text: str) -> bool:
     variable of that name."""
     if token.type == "TRANSITION" and _PRIORITY.match(text, token.end):
         return True
-    return _NAME.match(text, token.end) is not None
+    return (_ADDRESS if token.type == "_AT" else _NAME).match(text, token.end) is not None
 
 
 def begins_unit(token: Token, text: str) -> bool:
