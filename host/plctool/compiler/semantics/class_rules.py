@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.conversions import same_type
-from plctool.compiler.semantics.symbols import ClassInfo, Member
+from plctool.compiler.semantics.symbols import ERROR, ClassInfo, Member
 from plctool.compiler.types import BOOL
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ def check_class(classes: Classes, cls: ClassInfo) -> None:
             _error(classes, member, f"{member.name} overrides nothing{hint}")
         if key == "fb_exit":
             _check_exit(classes, member)
+        if member.is_property:
+            _check_accessors(classes, member, key)
         if member.abstract and not cls.abstract:
             _error(classes, member, f"{member.name} is ABSTRACT, so {cls.name} has to be ABSTRACT as well")
     if not cls.is_interface:
@@ -43,6 +45,17 @@ def _check_exit(classes: Classes, member: Member) -> None:
     parameters = [(symbol.name.casefold(), symbol.type) for symbol, _ in classes.signature(member).parameters]
     if parameters not in ([], [("bincopycode", BOOL)]):
         _error(classes, member, f"{member.name} has bInCopyCode : BOOL as its only input, or none")
+
+
+def _check_accessors(classes: Classes, member: Member, key: str) -> None:
+    """What is read is what was written: GET and SET have one type, also when one of them is inherited."""
+    name, _, kind = key.rpartition(".")
+    get, set_ = member.owner.find(f"{name}.get"), member.owner.find(f"{name}.set")
+    if get is None or set_ is None or (kind == "get" and set_.owner is member.owner):
+        return
+    read, written = classes.signature(get).result, classes.signature(set_).parameters[0][0].type
+    if read is not None and ERROR not in (read, written) and not same_type(read, written):
+        _error(classes, member, f"the GET of {member.decl.name} gives {read}, its SET takes {written}; use one type")
 
 
 def _check_override(classes: Classes, member: Member, inherited: Member) -> None:

@@ -327,6 +327,9 @@ class TypeDeclarations:
             target, _ = self.type_of(spec.target, scope)
         if target is ERROR:
             return ERROR
+        if spec.keyword == "REFERENCE" and isinstance(target, ReferenceType):
+            scope.error(spec.pos, "type", f"there is no REFERENCE to a REFERENCE; write {target}")
+            return ERROR
         kinds = {"REFERENCE": ReferenceType, "POINTER": RawPointerType}
         return kinds.get(spec.keyword, PointerType)(target)
 
