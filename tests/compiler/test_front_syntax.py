@@ -148,6 +148,11 @@ def test_syntax_error_is_one_clear_sentence(text: str, message: str) -> None:
             "3:1: END_VAR missing for the VAR in line 2",
         ),
         ("PROGRAM p\nVAR if : INT; END_VAR\nEND_PROGRAM", "2:5: if is a keyword and cannot be a name"),
+        (
+            "PROGRAM p\nVAR x AT y : INT; END_VAR\nEND_PROGRAM",
+            "2:10: AT is for an address such as %IX0.3, not for y",
+        ),
+        ("END_ACTION", "1:1: END_ACTION without an ACTION"),
         ("PROGRAM p\nVAR x INT; END_VAR\nEND_PROGRAM", "2:6: expected :"),
         ("PROGRAM p\nx := 1;", "2:8: END_PROGRAM missing for the PROGRAM in line 1"),
         ("FUNCTION f : INT\nf := 1;\nPROGRAM p\nEND_PROGRAM", "3:1: END_FUNCTION missing for the FUNCTION in line 1"),

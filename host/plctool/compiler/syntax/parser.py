@@ -146,6 +146,7 @@ def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None
         is_name = not begins_unit(token, text)
     else:
         is_name = kind in OPENING and not is_followed_by_name(token, text)
+        is_name = is_name and parser.tables.after(parser.states, "IDENT") is not None
     if is_name:
         token.type = "IDENT"
 

@@ -343,6 +343,8 @@ class Recovery:
             return slip
         if self._shift(stack, "NUMBER") is not None:
             return f"expected a value, found {_shown(token)}"
+        if self._shift(stack, "DIRECT") is not None:
+            return f"AT is for an address such as %IX0.3, not for {_shown(token)}"
         if self._item_at(stack[-1]) == "unit":
             return (
                 f"expected PROGRAM, FUNCTION, FUNCTION_BLOCK, TYPE, VAR_GLOBAL or CONFIGURATION, found {_shown(token)}"
@@ -366,7 +368,7 @@ def _is_doubled(token: Token, text: str) -> bool:
 
 
 def _a(word: str) -> str:
-    return f"an {word}" if word == "IF" else f"a {word}"
+    return f"an {word}" if word[0] in "AEIO" else f"a {word}"
 
 
 def _shown(token: Token) -> str:
