@@ -523,3 +523,8 @@ class Builder:
 
     def output_negated(self, _not: Token, name: Token, target: ast.Expr | None = None) -> ast.Argument:
         return ast.Argument(name.pos, name.text, target, output=True, negated=True)
+
+    def block_with_task(self, block: Token, task: Token) -> None:
+        """`PROGRAM p : Main(timer WITH fast);`: a task for a block of its own, which is refused."""
+        message = f"a task runs programs only; call {block.text} in a program that {task.text} runs"
+        self.report(block.pos, "syntax", message)
