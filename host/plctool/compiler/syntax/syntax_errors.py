@@ -343,7 +343,7 @@ class Recovery:
             return slip
         if self._shift(stack, "NUMBER") is not None:
             return f"expected a value, found {_shown(token)}"
-        if self._shift(stack, "DIRECT") is not None:
+        if self._shift(stack, "DIRECT") is not None and self._shift(stack, "IDENT") is None:
             return f"AT is for an address such as %IX0.3, not for {_shown(token)}"
         if self._item_at(stack[-1]) == "unit":
             return (
@@ -353,7 +353,7 @@ class Recovery:
             return f"expected := or ;, found {_shown(token)}"
         words = [word for kind, word in _WORDS.items() if self._shift(stack, kind) is not None]
         if self._shift(stack, "IDENT") is not None:
-            words.insert(0, "a name")
+            words = ["a name", *(word for word in words if word != "(")]
         if self._shift(stack, "OP") is not None:
             words.insert(0, "an operator")
         if not words or len(words) > 5:
