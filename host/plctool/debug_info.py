@@ -48,7 +48,7 @@ class DebugInfo:
 
     def __init__(self, objects: list[bytes]) -> None:
         self._scopes: list[tuple[int, int, int, Scope]] = []  # begin, end, depth
-        self._frames: list[tuple[int, int, _Frame | None]] = []  # begin, end
+        self._functions: list[tuple[int, int, Any, int]] = []  # begin, end, how its frame changes, the stack pointer
         self._word = 8
         for data in objects:
             elf = ELFFile(io.BytesIO(data))
@@ -56,9 +56,9 @@ class DebugInfo:
             dwarf = elf.get_dwarf_info(relocate_dwarf_sections=False)
             for unit in dwarf.iter_CUs():
                 self._scopes += _Unit(dwarf, unit).scopes()
-            self._frames += _frames(dwarf, _STACK_POINTER[elf["e_machine"]])
+            self._functions += _functions(dwarf, _STACK_POINTER[elf["e_machine"]])
         self._scopes.sort(key=lambda scope: scope[:3])
-        self._frames.sort(key=lambda frame: frame[:2])
+        self._functions.sort(key=lambda function: function[0])
 
     def scopes(self, offset: int) -> list[Scope]:
         """The scopes that hold the code at `offset`, the innermost first; the last one is that of the function."""
@@ -91,10 +91,15 @@ class DebugInfo:
         return calls
 
     def _frame(self, offset: int) -> _Frame | None:
-        i = bisect_right(self._frames, offset, key=lambda frame: frame[0]) - 1
-        if i < 0 or offset >= self._frames[i][1]:
+        i = bisect_right(self._functions, offset, key=lambda function: function[0]) - 1
+        if i < 0 or offset >= self._functions[i][1]:
             return None
-        return self._frames[i][2]
+        _, _, changes, stack_pointer = self._functions[i]
+        row = [row for row in changes.get_decoded().table if row["pc"] <= offset][-1]
+        rule = row.get(changes.cie["return_address_register"])
+        if row["cfa"].reg != stack_pointer or (rule is not None and rule.type != "OFFSET"):
+            return None
+        return _Frame(row["cfa"].offset, rule.arg if rule else None)
 
 
 class _Unit:
@@ -143,15 +148,8 @@ class _Unit:
                     yield base + entry.begin_offset, base + entry.end_offset
 
 
-def _frames(dwarf: Any, stack_pointer: int) -> Iterator[tuple[int, int, _Frame | None]]:
+def _functions(dwarf: Any, stack_pointer: int) -> Iterator[tuple[int, int, Any, int]]:
     for entry in dwarf.CFI_entries() if dwarf.has_CFI() else []:
-        if not isinstance(entry, FDE):
-            continue
-        link = entry.cie["return_address_register"] if entry.cie else -1
-        rows = entry.get_decoded().table
-        ends = [*(row["pc"] for row in rows[1:]), entry["initial_location"] + entry["address_range"]]
-        for row, end in zip(rows, ends, strict=True):
-            rule = row.get(link)
-            known = row["cfa"].reg == stack_pointer and (rule is None or rule.type == "OFFSET")
-            frame = _Frame(row["cfa"].offset, rule.arg if rule else None) if known else None
-            yield row["pc"], end, frame
+        if isinstance(entry, FDE):
+            begin = entry["initial_location"]
+            yield begin, begin + entry["address_range"], entry, stack_pointer
