@@ -65,16 +65,16 @@ typedef struct {
 
 enum { APP_REFUSAL_SIZE = APP_REFUSAL_TEXT_SIZE };
 
-/* Why a download was refused: `text` is a sentence, cut to fit. */
+/* Why a download was refused: a sentence, cut to fit; "" when it was not. */
 typedef struct {
-    RTS_RESULT result;
     char text[APP_REFUSAL_SIZE];
 } APP_REFUSAL;
 
 /*
  * Download. Begin opens the idle slot (erases lazily, sector by sector), Write appends, End checks everything
  * and, only when all is well, stops the old application, commits the slot and loads the new one (state AS_STOP).
- * On any error the old application has not been touched and runs on.
+ * On any error the old application runs on, untouched; except that when the tasks of the new one cannot be created, it is
+ * loaded again, with its retain variables, and started if it ran.
  *
  * Begin: ERR_NOMEMORY too large for the slot. Write: ERR_INVALID_SEQUENCE not begun or `offset` is not what
  * AppDownloadOffset says; ERR_DEVICE flash fault. End: the reason as ERR_* and in *refusal (never NULL).

@@ -230,7 +230,6 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
 {
     fakes.download_ends++;
     fakes.download_offset = 0;
-    refusal->result = fakes.end_result;
     strcpy(refusal->text, fakes.end_result == ERR_OK ? "" : fakes.end_text);
     if (fakes.end_result == ERR_OK) {
         fakes.status.image_size = fakes.download_total;

@@ -6,6 +6,7 @@
 #include "CmpEventMgr.h"
 #include "CmpLog.h"
 #include "SysFileFlash.h"
+#include "SysTimer.h"
 #include "app_image.h"
 #include "test.h"
 
@@ -216,6 +217,39 @@ static void begin_again_starts_anew(void)
     CHECK(download(&image) == ERR_OK);
     CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
     CHECK(SimFlashViolations() == 0);
+}
+
+static void no_task(void *param, RTS_I64 due_ns, RTS_UI32 missed)
+{
+    RTS_UNUSED(param);
+    RTS_UNUSED(due_ns);
+    RTS_UNUSED(missed);
+}
+
+/* The timers are found to be too few when the old application has been given up. */
+static void an_application_without_timers_for_its_tasks_makes_room_for_the_old_one(void)
+{
+    RTS_HANDLE timer;
+    APP_REFUSAL refusal;
+    APP_BYTES image;
+    APP_SPEC spec;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    while (SysTimerCreate(no_task, NULL, 1000, 0, &timer) == ERR_OK)
+        ;
+    spec_counter(&spec, 2);
+    add_task(&spec, "Second", KIND_CYCLIC, 10000, spec.tasks[0].entry_offset);
+    build_image(&image, &spec);
+    CHECK(download_part(&image, image.size, &refusal) == ERR_NOMEMORY);
+    CHECK(strstr(refusal.text, "timers") != NULL);
+    CHECK(app_state() == AS_RUN);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 100 + 534 + 11);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
 }
 
 static void the_application_info_can_be_read(void)
@@ -616,6 +650,7 @@ int main(void)
     RUN(the_old_application_runs_on_while_a_new_one_arrives);
     RUN(download_calls_out_of_order_are_refused);
     RUN(begin_again_starts_anew);
+    RUN(an_application_without_timers_for_its_tasks_makes_room_for_the_old_one);
     RUN(the_application_info_can_be_read);
     RUN(info_longer_than_its_buffer_is_cut);
     RUN(area_addresses_are_checked_to_the_byte);

@@ -22,31 +22,27 @@ typedef struct {
     APP_IMAGE *image;
     APP_REFUSAL *refusal;
     CDL_HEADER header;
+    RTS_UI32 segment; /* SEGMENT_*: the one that is read now */
+    RTS_UI32 offset;  /* of its next entry */
+    RTS_UI32 end;
+    RTS_UI32 areas_seen;   /* a bit for each */
+    RTS_RESULT unresolved; /* what was wrong with the first import that was */
 } LOADER;
 
 typedef RTS_RESULT (*CHECK)(LOADER *l);
 
 #define U(value) ((unsigned)(value))
+#define refuse(l, result, ...) APP_REFUSE((l)->refusal, result, __VA_ARGS__)
 
-static RTS_RESULT set_result(LOADER *l, RTS_RESULT result)
-{
-    l->refusal->result = result;
-    return result;
-}
-
-static RTS_RESULT explain(LOADER *l, RTS_RESULT result, const char *format, ...)
+RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...)
 {
     va_list arguments;
 
     va_start(arguments, format);
-    CMUtlvsnprintf(l->refusal->text, sizeof l->refusal->text, format, arguments);
+    CMUtlvsnprintf(refusal->text, sizeof refusal->text, format, arguments);
     va_end(arguments);
-    return set_result(l, result);
+    return result;
 }
-
-/* A macro, so that sentences nobody would see take no flash. */
-#define refuse(l, result, ...)                                                                                         \
-    (APP_REFUSAL_TEXT_SIZE > 1 ? explain(l, result, __VA_ARGS__) : set_result(l, result))
 
 static RTS_RESULT read_image(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 size)
 {
@@ -55,9 +51,72 @@ static RTS_RESULT read_image(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 si
     return result == ERR_OK ? ERR_OK : refuse(l, result, "Flash cannot be read at offset %u.", U(offset));
 }
 
+/* ---- segments ---- */
+
+enum {
+    SEGMENT_CODE,
+    SEGMENT_INFO,
+    SEGMENT_AREAS,
+    SEGMENT_FUNCTIONS,
+    SEGMENT_IMPORTS,
+    SEGMENT_IEC_FUNCTIONS,
+    SEGMENT_BLOBS,
+    SEGMENT_COUNT
+};
+
+static const char *const segment_names[SEGMENT_COUNT] = {
+    "Code", "Application info", "Area table", "Function table", "External function table", "IEC function table", "Blob",
+};
+
+static const CDL_SEGMENT *find_segment(const LOADER *l, RTS_UI32 segment)
+{
+    static const RTS_UI8 places[SEGMENT_COUNT] = {
+        offsetof(CDL_HEADER, code),
+        offsetof(CDL_HEADER, application_info),
+        offsetof(CDL_HEADER, area_table),
+        offsetof(CDL_HEADER, function_table),
+        offsetof(CDL_HEADER, external_function_table),
+        offsetof(CDL_HEADER, iec_function_table),
+        offsetof(CDL_HEADER, blob),
+    };
+
+    return (const CDL_SEGMENT *)((const RTS_UI8 *)&l->header + places[segment]);
+}
+
 static RTS_UI32 align4(RTS_UI32 offset)
 {
     return (offset + 3) & ~(RTS_UI32)3;
+}
+
+/* Reads the next `size` bytes of the segment. */
+static RTS_RESULT read_next(LOADER *l, void *data, RTS_UI32 size)
+{
+    RTS_UI32 offset = l->offset;
+
+    if (size > l->end - offset)
+        return refuse(l, ERR_SIZE_MISMATCH, "%s segment ends within an entry.", segment_names[l->segment]);
+    l->offset = offset + size;
+    return read_image(l, offset, data, size);
+}
+
+static void open_segment(LOADER *l, RTS_UI32 segment)
+{
+    const CDL_SEGMENT *place = find_segment(l, segment);
+
+    l->segment = segment;
+    l->offset = place->offset;
+    l->end = place->offset + place->size;
+}
+
+/* Has every entry of a segment checked by `check_entry`, which reads it. */
+static RTS_RESULT check_entries(LOADER *l, RTS_UI32 segment, CHECK check_entry)
+{
+    RTS_RESULT result = ERR_OK;
+
+    open_segment(l, segment);
+    while (l->offset < l->end && result == ERR_OK)
+        result = check_entry(l);
+    return result;
 }
 
 /* ---- header, CRC, target ---- */
@@ -127,42 +186,32 @@ static RTS_RESULT check_target(LOADER *l)
     return ERR_OK;
 }
 
-/* ---- segments and areas ---- */
+/* ---- places of segments, areas ---- */
 
-static RTS_RESULT check_segment(LOADER *l, const char *name, const CDL_SEGMENT *segment, RTS_UI32 align)
+static RTS_RESULT check_segment(LOADER *l, RTS_UI32 segment)
 {
-    if (segment->size == 0)
+    const CDL_SEGMENT *place = find_segment(l, segment);
+    const char *name = segment_names[segment];
+    RTS_UI32 align = segment == SEGMENT_CODE ? APP_CODE_ALIGN : 4;
+
+    if (place->size == 0)
         return ERR_OK;
-    if (segment->offset < CDL_HEADER_SIZE)
+    if (place->offset < CDL_HEADER_SIZE)
         return refuse(l, ERR_OUT_OF_LIMITS, "%s segment overlaps the header.", name);
-    if (segment->offset > l->image->size || segment->size > l->image->size - segment->offset)
+    if (place->offset > l->image->size || place->size > l->image->size - place->offset)
         return refuse(l, ERR_OUT_OF_LIMITS, "%s segment ends beyond the image.", name);
-    if (segment->offset % align != 0)
+    if (place->offset % align != 0)
         return refuse(l, ERR_ALIGNMENT, "%s segment is not aligned to %u bytes.", name, U(align));
     return ERR_OK;
 }
 
 static RTS_RESULT check_segments(LOADER *l)
 {
-    const CDL_HEADER *h = &l->header;
-    const struct {
-        const char *name;
-        const CDL_SEGMENT *segment;
-        RTS_UI32 align;
-    } segments[] = {
-        {"Code", &h->code, APP_CODE_ALIGN},
-        {"Application info", &h->application_info, 4},
-        {"Area table", &h->area_table, 4},
-        {"Function table", &h->function_table, 4},
-        {"External function table", &h->external_function_table, 4},
-        {"IEC function table", &h->iec_function_table, 4},
-        {"Blob", &h->blob, 4},
-    };
     RTS_RESULT result = ERR_OK;
-    RTS_SIZE i;
+    RTS_UI32 i;
 
-    for (i = 0; i < RTS_COUNT(segments) && result == ERR_OK; i++)
-        result = check_segment(l, segments[i].name, segments[i].segment, segments[i].align);
+    for (i = 0; i < SEGMENT_COUNT && result == ERR_OK; i++)
+        result = check_segment(l, i);
     return result;
 }
 
@@ -180,7 +229,7 @@ static RTS_RESULT check_code(LOADER *l)
     return ERR_OK;
 }
 
-static RTS_RESULT check_area(LOADER *l, const AREA_INFO *area, RTS_UI32 *seen)
+static RTS_RESULT check_area(LOADER *l)
 {
     static const struct {
         const char *name;
@@ -189,39 +238,30 @@ static RTS_RESULT check_area(LOADER *l, const AREA_INFO *area, RTS_UI32 *seen)
         {"data", APP_DATA_SIZE},     {"retain", APP_RETAIN_SIZE}, {"input", APP_INPUT_SIZE},
         {"output", APP_OUTPUT_SIZE}, {"memory", APP_MEMORY_SIZE},
     };
+    AREA_INFO area;
     RTS_UI32 limit;
+    RTS_RESULT result = read_next(l, &area, sizeof area);
 
-    if (area->index >= APP_AREA_COUNT || (*seen >> area->index & 1) != 0)
-        return refuse(l, ERR_OUT_OF_LIMITS, "Area %u is unknown or listed twice.", U(area->index));
-    *seen |= 1u << area->index;
-    if (area->index == APP_AREA_CODE)
+    if (result != ERR_OK)
+        return result;
+    if (area.index >= APP_AREA_COUNT || (l->areas_seen >> area.index & 1) != 0)
+        return refuse(l, ERR_OUT_OF_LIMITS, "Area %u is unknown or listed twice.", U(area.index));
+    l->areas_seen |= 1u << area.index;
+    if (area.index == APP_AREA_CODE)
         return ERR_OK;
-    limit = areas[area->index].limit;
-    if (area->index == APP_AREA_RETAIN && RetainCapacity() < limit)
+    limit = areas[area.index].limit;
+    if (area.index == APP_AREA_RETAIN && RetainCapacity() < limit)
         limit = RetainCapacity();
-    if (area->size > limit)
-        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", areas[area->index].name,
-                      U(area->size), U(limit));
-    l->image->area_size[area->index] = area->size;
+    if (area.size > limit)
+        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", areas[area.index].name,
+                      U(area.size), U(limit));
+    l->image->area_size[area.index] = area.size;
     return ERR_OK;
 }
 
 static RTS_RESULT check_areas(LOADER *l)
 {
-    const CDL_SEGMENT *table = &l->header.area_table;
-    RTS_UI32 offset;
-    RTS_UI32 seen = 0;
-    AREA_INFO area;
-    RTS_RESULT result = ERR_OK;
-
-    if (table->size % sizeof area != 0)
-        return refuse(l, ERR_SIZE_MISMATCH, "Area table of %u bytes has a part of an entry.", U(table->size));
-    for (offset = 0; offset < table->size && result == ERR_OK; offset += (RTS_UI32)sizeof area) {
-        result = read_image(l, table->offset + offset, &area, sizeof area);
-        if (result == ERR_OK)
-            result = check_area(l, &area, &seen);
-    }
-    return result;
+    return check_entries(l, SEGMENT_AREAS, check_area);
 }
 
 /* ---- functions ---- */
@@ -258,18 +298,18 @@ static RTS_RESULT check_functions(LOADER *l)
 }
 
 /*
- * Reads the NUL-terminated name at `offset` of a table that ends at `end`. *next: where the next entry starts. False when
- * it is empty, not terminated, too long or not plain text.
+ * Reads the NUL-terminated name at *offset of a table that ends at `end`; *offset is where the next entry starts then.
+ * False when it is empty, not terminated, too long or not plain text.
  */
-static bool read_name(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 end, char name[APP_NAME_SIZE], RTS_UI32 *next)
+static bool read_name(RTS_UI32 file, RTS_UI32 *offset, RTS_UI32 end, char name[APP_NAME_SIZE])
 {
     RTS_UI32 length;
 
-    for (length = 0; length < APP_NAME_SIZE && offset + length < end; length++) {
-        if (SysFileRead(file, offset + length, &name[length], 1) != ERR_OK)
+    for (length = 0; length < APP_NAME_SIZE && *offset < end; length++) {
+        if (SysFileRead(file, (*offset)++, &name[length], 1) != ERR_OK)
             return false;
         if (name[length] == '\0') {
-            *next = align4(offset + length + 1);
+            *offset = align4(*offset);
             return length > 0;
         }
         if (name[length] < '!' || name[length] > '~')
@@ -278,103 +318,91 @@ static bool read_name(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 end, char name[AP
     return false;
 }
 
-/* What is wrong with an import, as words for the refusal; NULL when nothing is. */
-static const char *find_import(const EXT_REF_INFO *ref, const char *name, RTS_RESULT *result)
+static RTS_RESULT find_import(const EXT_REF_INFO *ref, const char *name)
 {
     const CMP_EXT_FUNCTION *found = CMFindExternal(name);
 
-    if (found == NULL) {
-        *result = ERR_APP_UNRESOLVED_REFERENCE;
-        return "missing";
-    }
-    if (found->signature != ref->signature_id) {
-        *result = ERR_APP_SIGNATURE_MISMATCH;
-        return "other parameters";
-    }
-    if (found->version >> 16 != ref->version >> 16 || found->version < ref->version) {
-        *result = ERR_APP_VERSION_MISMATCH;
-        return "other version";
-    }
-    return NULL;
+    if (found == NULL)
+        return ERR_APP_UNRESOLVED_REFERENCE;
+    if (found->signature != ref->signature_id)
+        return ERR_APP_SIGNATURE_MISMATCH;
+    if (found->version >> 16 != ref->version >> 16 || found->version < ref->version)
+        return ERR_APP_VERSION_MISMATCH;
+    return ERR_OK;
 }
 
-/* Adds an import that cannot be resolved to the refusal; the first one decides its result. */
-static void add_unresolved(LOADER *l, const char *name, const char *problem, RTS_RESULT result)
+static const char *problem_text(RTS_RESULT result)
+{
+    return result == ERR_APP_UNRESOLVED_REFERENCE ? "missing"
+           : result == ERR_APP_SIGNATURE_MISMATCH ? "other parameters"
+                                                  : "other version";
+}
+
+/* Adds an import that cannot be resolved to the refusal, which is to name all of them. */
+static void add_unresolved(LOADER *l, const char *name, RTS_RESULT result)
 {
     APP_REFUSAL *refusal = l->refusal;
     RTS_SIZE length = strlen(refusal->text);
 
-    if (refusal->result == ERR_OK)
-        (void)refuse(l, result, "External functions this device lacks: %s (%s)", name, problem);
+    if (l->unresolved == ERR_OK)
+        l->unresolved =
+            refuse(l, result, "External functions this device lacks: %s (%s)", name, problem_text(result));
     else if (APP_REFUSAL_TEXT_SIZE > 1)
-        CMUtlsnprintf(refusal->text + length, sizeof refusal->text - length, ", %s (%s)", name, problem);
-    LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "External function %s: %s", name, problem);
+        CMUtlsnprintf(refusal->text + length, sizeof refusal->text - length, ", %s (%s)", name, problem_text(result));
+    LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "External function %s: %s", name, problem_text(result));
 }
 
-static RTS_RESULT check_import(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
+static RTS_RESULT check_import(LOADER *l)
 {
     RTS_UI32 index = l->image->import_count;
-    EXT_REF_INFO ref = {0, 0, 0, 0, 0};
+    EXT_REF_INFO ref;
     char name[APP_NAME_SIZE];
-    const char *problem;
-    RTS_RESULT result = ERR_OK;
+    RTS_RESULT result;
 
     if (index == APP_MAX_IMPORTS)
         return refuse(l, ERR_NOMEMORY, "More than the %u external functions possible.",
                       U(APP_MAX_IMPORTS));
-    if (end - *offset < EXT_REF_INFO_SIZE)
-        return refuse(l, ERR_SIZE_MISMATCH, "External function table ends within entry %u.", U(index));
-    result = read_image(l, *offset, &ref, EXT_REF_INFO_SIZE);
+    result = read_next(l, &ref, EXT_REF_INFO_SIZE);
     if (result != ERR_OK)
         return result;
-    if (!read_name(l->image->file, *offset + EXT_REF_INFO_SIZE, end, name, offset))
+    if (!read_name(l->image->file, &l->offset, l->end, name))
         return refuse(l, ERR_PARAMETER, "Name of external function %u is empty or too long.", U(index));
     if (ref.area != APP_AREA_NONE || ref.offset != index * sizeof(RTS_PFN))
         return refuse(l, ERR_INVALID_REFERENCE, "External function %s is not in import slot %u.",
                       name, U(index));
-    problem = find_import(&ref, name, &result);
-    if (problem != NULL)
-        add_unresolved(l, name, problem, result);
+    result = find_import(&ref, name);
+    if (result != ERR_OK)
+        add_unresolved(l, name, result);
     l->image->import_count++;
     return ERR_OK;
 }
 
 static RTS_RESULT check_imports(LOADER *l)
 {
-    const CDL_SEGMENT *table = &l->header.external_function_table;
-    RTS_UI32 end = table->offset + table->size;
-    RTS_UI32 offset = table->offset;
+    RTS_RESULT result = check_entries(l, SEGMENT_IMPORTS, check_import);
 
-    l->image->imports = offset;
-    while (table->size > 0 && offset < end) {
-        RTS_RESULT result = check_import(l, &offset, end);
-        if (result != ERR_OK)
-            return result;
-    }
-    return l->refusal->result;
+    l->image->imports = l->header.external_function_table.offset;
+    return result == ERR_OK ? l->unresolved : result;
+}
+
+static RTS_RESULT check_iec_function(LOADER *l)
+{
+    char name[APP_NAME_SIZE];
+    FUNCTION_INFO info;
+    RTS_RESULT result = read_next(l, &info, sizeof info);
+
+    if (result != ERR_OK)
+        return result;
+    if (!read_name(l->image->file, &l->offset, l->end, name))
+        return refuse(l, ERR_PARAMETER, "Name in the IEC function table is bad.");
+    if (!is_code(l, info.area, info.offset))
+        return refuse(l, ERR_INVALID_REFERENCE, "IEC function %s lies outside the code.", name);
+    return ERR_OK;
 }
 
 static RTS_RESULT check_iec_functions(LOADER *l)
 {
-    const CDL_SEGMENT *table = &l->header.iec_function_table;
-    RTS_UI32 end = table->offset + table->size;
-    RTS_UI32 offset = table->offset;
-    char name[APP_NAME_SIZE];
-    FUNCTION_INFO info;
-
-    while (SRV_INFORMATION && table->size > 0 && offset < end) {
-        RTS_RESULT result;
-        if (end - offset < sizeof info)
-            return refuse(l, ERR_SIZE_MISMATCH, "IEC function table ends within an entry.");
-        result = read_image(l, offset, &info, sizeof info);
-        if (result != ERR_OK)
-            return result;
-        if (!read_name(l->image->file, offset + (RTS_UI32)sizeof info, end, name, &offset))
-            return refuse(l, ERR_PARAMETER, "Name in the IEC function table is bad.");
-        if (!is_code(l, info.area, info.offset))
-            return refuse(l, ERR_INVALID_REFERENCE, "IEC function %s lies outside the code.", name);
-    }
-    return ERR_OK;
+    return SRV_INFORMATION ? check_entries(l, SEGMENT_IEC_FUNCTIONS, check_iec_function) : (RTS_RESULT)ERR_OK;
 }
 
 /* ---- application info ---- */
@@ -394,18 +422,17 @@ static bool skip_string(RTS_UI32 file, RTS_UI32 *offset, RTS_UI32 end)
     return false;
 }
 
+/* Only the strings; a date follows. */
 static RTS_RESULT check_info(LOADER *l)
 {
-    const CDL_SEGMENT *info = &l->header.application_info;
-    RTS_UI32 end = info->offset + info->size;
-    RTS_UI32 offset = info->offset;
     RTS_UI32 i;
 
-    for (i = 0; SRV_INFORMATION && i < IMAGE_INFO_COUNT && info->size > 0 && offset < end; i++) {
-        if (!skip_string(l->image->file, &offset, end))
+    l->image->info = l->header.application_info;
+    open_segment(l, SEGMENT_INFO);
+    for (i = 0; SRV_INFORMATION && i < IMAGE_INFO_COUNT && l->offset < l->end; i++) {
+        if (!skip_string(l->image->file, &l->offset, l->end))
             return refuse(l, ERR_PARAMETER, "Application info %u is not terminated.", U(i));
     }
-    l->image->info = *info;
     return ERR_OK;
 }
 
@@ -449,69 +476,63 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
     return ERR_OK;
 }
 
-static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
+static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)
 {
+    RTS_UI32 count = size / (RTS_UI32)sizeof(CDL_TASK);
     CDL_TASK task;
     RTS_RESULT result = ERR_OK;
 
     if (l->image->task_count != 0)
         return refuse(l, ERR_DUPLICATE, "The image has two lists of tasks.");
-    if (size % sizeof(CDL_TASK) != 0)
+    if (count * sizeof(CDL_TASK) != size)
         return refuse(l, ERR_SIZE_MISMATCH, "Task list of %u bytes has a part of an entry.", U(size));
-    if (size / sizeof(CDL_TASK) > APP_MAX_TASKS)
-        return refuse(l, ERR_NOMEMORY, "The application has %u tasks, this device can run %u.",
-                      U(size / sizeof(CDL_TASK)), U(APP_MAX_TASKS));
-    l->image->tasks = offset;
-    for (; size > 0 && result == ERR_OK; size -= (RTS_UI32)sizeof task) {
-        result = read_image(l, offset, &task, sizeof task);
+    if (count > APP_MAX_TASKS)
+        return refuse(l, ERR_NOMEMORY, "The application has %u tasks, this device can run %u.", U(count),
+                      U(APP_MAX_TASKS));
+    l->image->tasks = l->offset;
+    for (; l->image->task_count < count && result == ERR_OK; l->image->task_count++) {
+        result = read_next(l, &task, sizeof task);
         if (result == ERR_OK)
             result = check_task(l, &task);
-        l->image->task_count++;
-        offset += (RTS_UI32)sizeof task;
     }
     return result;
 }
 
-static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
+static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 size)
 {
     if (size != sizeof l->image->retain_layout)
         return refuse(l, ERR_SIZE_MISMATCH, "Retain layout has %u bytes, not 4.", U(size));
-    return read_image(l, offset, &l->image->retain_layout, size);
+    return read_next(l, &l->image->retain_layout, size);
 }
 
-static RTS_RESULT check_blob(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
+static RTS_RESULT check_blob(LOADER *l)
 {
     CDL_BLOB blob;
-    RTS_UI32 payload = *offset + (RTS_UI32)sizeof blob;
-    RTS_RESULT result;
+    RTS_UI32 next;
+    RTS_RESULT result = read_next(l, &blob, sizeof blob);
 
-    if (end - *offset < sizeof blob)
-        return refuse(l, ERR_SIZE_MISMATCH, "Blob segment ends within a head.");
-    result = read_image(l, *offset, &blob, sizeof blob);
     if (result != ERR_OK)
         return result;
     if (blob.magic != (RTS_UI32)CDL_BLOB_MAGIC)
-        return refuse(l, ERR_TYPE_MISMATCH, "There is no blob at offset %u.", U(*offset));
-    if (blob.size > end - payload)
+        return refuse(l, ERR_TYPE_MISMATCH, "There is no blob at offset %u.", U(l->offset - sizeof blob));
+    if (blob.size > l->end - l->offset)
         return refuse(l, ERR_OUT_OF_LIMITS, "Blob %u ends beyond its segment.", U(blob.id));
-    *offset = align4(payload + blob.size);
+    next = align4(l->offset + blob.size);
     if (blob.id == CDL_BLOB_TASKS)
-        return check_tasks(l, payload, blob.size);
-    if (blob.id == CDL_BLOB_RETAIN)
-        return check_retain_layout(l, payload, blob.size);
-    return ERR_OK; /* of a newer tool, and not needed to run */
+        result = check_tasks(l, blob.size);
+    else if (blob.id == CDL_BLOB_RETAIN)
+        result = check_retain_layout(l, blob.size);
+    /* Others are of a newer tool, and not needed to run. */
+    l->offset = next;
+    return result;
 }
 
 static RTS_RESULT check_blobs(LOADER *l)
 {
-    const CDL_SEGMENT *blobs = &l->header.blob;
-    RTS_UI32 end = blobs->offset + blobs->size;
-    RTS_UI32 offset = blobs->offset;
-    RTS_RESULT result = ERR_OK;
+    RTS_RESULT result;
 
-    l->image->retain_layout = l->image->crc;
-    while (blobs->size > 0 && offset < end && result == ERR_OK)
-        result = check_blob(l, &offset, end);
+    l->image->retain_layout = l->image->crc; /* unless a blob says more */
+    result = check_entries(l, SEGMENT_BLOBS, check_blob);
     if (result == ERR_OK && l->image->task_count == 0)
         return refuse(l, ERR_NO_OBJECT, "The application has no task.");
     return result;
@@ -528,7 +549,8 @@ RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE 
     RTS_SIZE i;
 
     memset(image, 0, sizeof *image);
-    memset(refusal, 0, sizeof *refusal);
+    memset(&l, 0, sizeof l);
+    refusal->text[0] = '\0';
     image->file = file;
     image->size = size;
     image->crc = crc;
@@ -547,7 +569,8 @@ RTS_RESULT AppLoaderRead(const APP_IMAGE *image, APP_TABLES *tables)
 
     for (i = 0; i < image->import_count; i++) {
         const CMP_EXT_FUNCTION *found = NULL;
-        if (read_name(image->file, offset + EXT_REF_INFO_SIZE, image->size, name, &offset))
+        offset += EXT_REF_INFO_SIZE;
+        if (read_name(image->file, &offset, image->size, name))
             found = CMFindExternal(name);
         if (found == NULL)
             return ERR_DEVICE;

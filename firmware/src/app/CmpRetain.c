@@ -39,6 +39,8 @@ RTS_UI32 RetainCapacity(void)
 
 void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout)
 {
+    if (!HAS_RETAIN)
+        return;
     retain.area = area;
     retain.size = size;
     retain.layout = layout;
@@ -48,7 +50,7 @@ void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout)
 
 RTS_UI32 RetainGetSequence(void)
 {
-    return retain.log.sequence;
+    return HAS_RETAIN ? retain.log.sequence : 0;
 }
 
 RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until)
@@ -151,7 +153,7 @@ RTS_RESULT CmpRetain_Hook(CMP_HOOK hook)
     if (!HAS_RETAIN)
         return ERR_OK;
     if (hook == CH_INIT)
-        memset(&retain, 0, sizeof retain);
+        CMP_CLEAR(retain);
     if (hook == CH_INIT2)
         open_log();
     if (hook == CH_COMM_CYCLE)
