@@ -9,11 +9,8 @@
 #ifndef CMPITF_H
 #define CMPITF_H
 
-#include <string.h>
-
 #include "CmpErrors.h"
 #include "CmpStd.h"
-#include "rts_config.h"
 
 /* Hooks in the order of start-up; manual 3.1.1. Each CH_EXIT_x undoes CH_INIT_x; they are in reverse order. */
 typedef enum {
@@ -40,7 +37,8 @@ typedef enum {
 /* A component's hook function. An error from a CH_INIT_* hook stops the start-up; others are ignored. */
 typedef RTS_RESULT (*PF_HOOK_FUNCTION)(CMP_HOOK hook);
 
-/* Clears the variable a component keeps its state in; in the first hook it has. */
+/* Clears the variable a component keeps its state in, in the first hook it has. For a source that includes rts_config.h
+ * and string.h. */
 #define CMP_CLEAR(state)                                                                                               \
     do {                                                                                                               \
         if (!RTS_STARTS_ONCE)                                                                                          \

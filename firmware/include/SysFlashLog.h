@@ -14,16 +14,20 @@
 
 typedef struct {
     RTS_UI32 file;
-    RTS_UI32 half_size;
+    RTS_RESULT opened; /* nothing is appended to a log that cannot be read */
     RTS_UI32 start;    /* of the half in use */
     RTS_UI32 used;     /* bytes of that half that may have been programmed */
-    RTS_UI32 sequence; /* of the newest record, 0 when there is none */
+    RTS_UI32 newest;   /* position of the newest record */
+    RTS_UI32 sequence; /* its number, 0 when there is none */
 } FLASH_LOG;
 
 enum { FLASH_LOG_HEAD_SIZE = 20 };
 
 /* Finds the newest record and the place for the next. ERR_DEVICE flash fault. */
 RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file);
+
+/* Reads the newest record into `data`; ERR_NO_OBJECT when there is none or it has another tag or size. */
+RTS_RESULT FlashLogReadNewest(const FLASH_LOG *log, RTS_UI32 tag, void *data, RTS_UI32 size);
 
 /* Which records to read: those numbered after `after`, up to and with `until`. Numbers wrap. */
 typedef struct {
@@ -35,7 +39,8 @@ typedef struct {
  * was then. */
 RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size);
 
-/* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault. */
+/* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault,
+ * also an earlier one of FlashLogOpen. */
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);
 
 /* The largest record, in bytes of data. */

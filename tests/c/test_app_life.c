@@ -219,6 +219,36 @@ static void begin_again_starts_anew(void)
     CHECK(SimFlashViolations() == 0);
 }
 
+/* The application before fails as well, when it comes back with the retain variables it had: both are known to fail then, and
+ * later start-ups write nothing. */
+static void a_rollback_to_an_application_that_fails_too_is_written_down(void)
+{
+    APP_BYTES image;
+    APP_SPEC spec;
+    int i;
+
+    start_blank();
+    spec_counter(&spec, 1);
+    spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
+    emit_skip_unless_init_retains(&spec, 1);
+    emit_ret(&spec);
+    emit_divide_by_zero(&spec);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    spec_counter(&spec, 2);
+    spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
+    emit_divide_by_zero(&spec);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    for (i = 0; i < 3; i++) {
+        CHECK(SimStart() == ERR_OK);
+        CHECK(app_state() == AS_STOP);
+        CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+        CHECK((SimFlashOps() != 0) == (i == 0));
+    }
+}
+
 static void no_task(void *param, RTS_I64 due_ns, RTS_UI32 missed)
 {
     RTS_UNUSED(param);
@@ -650,6 +680,7 @@ int main(void)
     RUN(the_old_application_runs_on_while_a_new_one_arrives);
     RUN(download_calls_out_of_order_are_refused);
     RUN(begin_again_starts_anew);
+    RUN(a_rollback_to_an_application_that_fails_too_is_written_down);
     RUN(an_application_without_timers_for_its_tasks_makes_room_for_the_old_one);
     RUN(the_application_info_can_be_read);
     RUN(info_longer_than_its_buffer_is_cut);

@@ -13,6 +13,7 @@
 #define SysFileGetPos test_pos
 #define SysFileClose test_close
 #define SysFileRead test_read
+#define SysFileCRC32 test_crc
 #define SysFileErase test_erase
 #define SysFileFlash_Hook test_hook
 #include "../../firmware/src/sys/SysFileFlash.c"

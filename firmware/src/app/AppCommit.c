@@ -27,15 +27,13 @@ static void set_blank(COMMIT *commit)
 
 RTS_RESULT AppCommitOpen(void)
 {
-    FLASH_LOG_RANGE all = {0, 0};
     RTS_RESULT result;
 
     set_blank(&record.commit);
     result = FlashLogOpen(&record.log, FILE_COMMIT);
     if (result != ERR_OK)
         return result;
-    all.until = record.log.sequence;
-    if (FlashLogRead(&record.log, all, COMMIT_TAG, &record.commit, sizeof record.commit) != ERR_OK ||
+    if (FlashLogReadNewest(&record.log, COMMIT_TAG, &record.commit, sizeof record.commit) != ERR_OK ||
         (record.commit.active >= SLOT_COUNT && record.commit.active != SLOT_NONE))
         set_blank(&record.commit);
     return ERR_OK;

@@ -146,27 +146,18 @@ static RTS_RESULT check_header(LOADER *l)
 static RTS_RESULT check_crc(LOADER *l)
 {
     RTS_UI32 expected = l->header.crc;
-    RTS_UI32 offset = CDL_HEADER_SIZE;
-    RTS_UI8 part[64];
     RTS_UI32 crc;
+    RTS_RESULT result;
 
     l->header.crc = 0;
     crc = CRC32Update(0, &l->header, sizeof l->header);
-    l->header.crc = expected;
-    while (offset < l->image->size) {
-        RTS_UI32 count = l->image->size - offset < sizeof part ? l->image->size - offset : (RTS_UI32)sizeof part;
-        RTS_RESULT result = read_image(l, offset, part, count);
-        if (result != ERR_OK)
-            return result;
-        crc = CRC32Update(crc, part, count);
-        offset += count;
-    }
+    result = SysFileCRC32(l->image->file, CDL_HEADER_SIZE, l->image->size - CDL_HEADER_SIZE, &crc);
+    if (result != ERR_OK)
+        return refuse(l, result, "Flash cannot be read.");
     if (crc != expected)
-        return refuse(l, ERR_CRC_FAILED, "The image is damaged: CRC 0x%x, not 0x%x.", U(crc),
-                      U(expected));
+        return refuse(l, ERR_CRC_FAILED, "The image is damaged: CRC 0x%x, not 0x%x.", U(crc), U(expected));
     if (crc != l->image->crc)
-        return refuse(l, ERR_CRC_FAILED, "CRC 0x%x is not the announced one, 0x%x.",
-                      U(crc), U(l->image->crc));
+        return refuse(l, ERR_CRC_FAILED, "CRC 0x%x is not the announced one, 0x%x.", U(crc), U(l->image->crc));
     return ERR_OK;
 }
 

@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "CmpChecksum.h"
 #include "CmpLog.h"
 #include "SysFlash.h"
 #include "SysFlashLog.h"
@@ -187,6 +188,21 @@ RTS_RESULT SysFileRead(RTS_UI32 file, RTS_UI32 offset, void *data, RTS_UI32 size
         return flash->read(area->offset + offset, data, size);
     memcpy(data, flash->mapped + area->offset + offset, size);
     return ERR_OK;
+}
+
+RTS_RESULT SysFileCRC32(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size, RTS_UI32 *crc)
+{
+    RTS_UI8 part[64];
+    RTS_RESULT result = ERR_OK;
+
+    while (size > 0 && result == ERR_OK) {
+        RTS_UI32 count = size < sizeof part ? size : (RTS_UI32)sizeof part;
+        result = SysFileRead(file, offset, part, count);
+        *crc = CRC32Update(*crc, part, count);
+        offset += count;
+        size -= count;
+    }
+    return result;
 }
 
 RTS_RESULT SysFileErase(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size)
