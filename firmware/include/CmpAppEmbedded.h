@@ -82,6 +82,8 @@ typedef struct {
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc);
 RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size);
 RTS_UI32 AppDownloadOffset(void); /* bytes received so far; a broken transfer continues here */
+/* Whether the download that has begun is that of this image. It outlives the channel it came through. */
+bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc);
 RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal);
 void AppDownloadAbort(void);
 

@@ -54,6 +54,11 @@ RTS_UI32 AppDownloadOffset(void)
     return download.open ? SysFileGetPos(download.slot) : 0;
 }
 
+bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc)
+{
+    return download.open && download.size == total_size && download.crc == image_crc;
+}
+
 bool AppDownloadIsOpen(void)
 {
     return download.open;
