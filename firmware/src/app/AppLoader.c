@@ -222,13 +222,9 @@ static RTS_RESULT check_code(LOADER *l)
 
 static RTS_RESULT check_area(LOADER *l)
 {
-    static const struct {
-        const char *name;
-        RTS_UI32 limit;
-    } areas[APP_AREA_CODE] = {
-        {"data", APP_DATA_SIZE},     {"retain", APP_RETAIN_SIZE}, {"input", APP_INPUT_SIZE},
-        {"output", APP_OUTPUT_SIZE}, {"memory", APP_MEMORY_SIZE},
-    };
+    static const char *const names[APP_AREA_CODE] = {"data", "retain", "input", "output", "memory"};
+    static const RTS_UI32 limits[APP_AREA_CODE] = {APP_DATA_SIZE, APP_RETAIN_SIZE, APP_INPUT_SIZE, APP_OUTPUT_SIZE,
+                                                   APP_MEMORY_SIZE};
     AREA_INFO area;
     RTS_UI32 limit;
     RTS_RESULT result = read_next(l, &area, sizeof area);
@@ -240,11 +236,11 @@ static RTS_RESULT check_area(LOADER *l)
     l->areas_seen |= 1u << area.index;
     if (area.index == APP_AREA_CODE)
         return ERR_OK;
-    limit = areas[area.index].limit;
+    limit = limits[area.index];
     if (area.index == APP_AREA_RETAIN && RetainCapacity() < limit)
         limit = RetainCapacity();
     if (area.size > limit)
-        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", areas[area.index].name,
+        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", names[area.index],
                       U(area.size), U(limit));
     l->image->area_size[area.index] = area.size;
     return ERR_OK;
@@ -418,9 +414,11 @@ static RTS_RESULT check_info(LOADER *l)
 {
     RTS_UI32 i;
 
+    if (!SRV_INFORMATION)
+        return ERR_OK;
     l->image->info = l->header.application_info;
     open_segment(l, SEGMENT_INFO);
-    for (i = 0; SRV_INFORMATION && i < IMAGE_INFO_COUNT && l->offset < l->end; i++) {
+    for (i = 0; i < IMAGE_INFO_COUNT && l->offset < l->end; i++) {
         if (!skip_string(l->image->file, &l->offset, l->end))
             return refuse(l, ERR_PARAMETER, "Application info %u is not terminated.", U(i));
     }
