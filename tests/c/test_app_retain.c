@@ -274,6 +274,52 @@ static void a_rollback_brings_back_the_last_values_of_an_application_that_ran(vo
     CHECK(retain_value() == 634);
 }
 
+static void start_up(void *unused)
+{
+    RTS_UNUSED(unused);
+    (void)CMInit();
+}
+
+/* The same when a half of the log holds one record only, and power fails at any operation of the start-up that goes back. */
+static void a_rollback_brings_back_large_values_too(void)
+{
+    CDL_TASK *task;
+    RTS_UI32 k;
+    int i;
+
+    CHECK(SimFlashConfigure(1024 * 1024, 4096, 16, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    spec_counter(&spec, 1);
+    spec.areas[APP_AREA_RETAIN] = APP_RETAIN_SIZE;
+    load();
+    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    spec_counter(&spec, 2);
+    spec.areas[APP_AREA_RETAIN] = APP_RETAIN_SIZE;
+    task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
+    task->event_area = APP_AREA_DATA;
+    task->event_offset = 32;
+    emit_divide_by_zero(&spec);
+    load();
+    CHECK(SimAdvance(ms(2500)) == ERR_OK);
+    *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
+    CHECK(SimAdvance(ms(10)) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK(SimFlashSave() == ERR_OK);
+    for (k = 1; k < 10000; k += k < 40 ? 1 : 97) {
+        CHECK(SimFlashRestore() == ERR_OK);
+        SimFlashCut(k, SIM_CUT_AFTER);
+        if (SimCall(start_up, NULL) == ERR_OK)
+            break;
+        for (i = 0; i < 2; i++) {
+            CHECK(SimStart() == ERR_OK);
+            CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+            CHECK(retain_value() == 634);
+        }
+    }
+    CHECK(k > 40 && k < 10000);
+    CHECK(SimFlashViolations() == 0);
+}
+
 /* The retain log is gone, the commit record is not: saving starts anew and works. */
 static void a_lost_log_costs_its_values_only(void)
 {
@@ -376,6 +422,7 @@ int main(void)
     RUN(values_of_the_application_before_are_not_taken_over);
     RUN(a_rollback_brings_back_the_values_of_its_application);
     RUN(a_rollback_brings_back_the_last_values_of_an_application_that_ran);
+    RUN(a_rollback_brings_back_large_values_too);
     RUN(a_lost_log_costs_its_values_only);
     RUN(damaged_values_give_way_to_initial_ones);
     RUN(without_a_layout_only_the_same_image_gets_its_values_back);

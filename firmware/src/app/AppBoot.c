@@ -32,15 +32,18 @@ bool AppRollBack(RTS_UI32 failed)
 {
     const COMMIT *commit = AppCommitGet();
     RTS_UI32 other = AppCommitOtherSlot(failed);
+    RTS_UI32 retain_until = commit->slot[failed].retain_after;
     RTS_UI32 retain_after;
 
     if (commit->slot[other].state == SLOT_EMPTY || commit->slot[other].state == SLOT_FAILED ||
-        !load_from_slot(other, commit->slot[failed].retain_after))
+        !load_from_slot(other, retain_until))
         return false;
     /* A record of its own numbers its retain variables as newest before the commit makes it so. */
+    RetainKeep(retain_until);
     retain_after = RetainGetSequence();
     (void)RetainSave(true);
     (void)AppCommitRollBack(failed, retain_after);
+    RetainKeepNone();
     LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "The new application failed: back to the one before");
     return true;
 }

@@ -64,6 +64,11 @@ bool AppHasException(void)
     return app.exception.code != RTSEXCPT_NOEXCEPTION;
 }
 
+static bool is_proven(void)
+{
+    return AppCommitGet()->slot[app.image.file].state == SLOT_PROVEN;
+}
+
 /* ---- exceptions ---- */
 
 const char *AppExceptionName(RTS_UI32 code)
@@ -247,6 +252,10 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     restored = RetainRestore(retain_after, retain_until);
     if (restored != ERR_OK && retain_size != 0 && retain_until != retain_after)
         LogAdd(CMPID_CmpRetain, LOG_WARNING, restored, "No saved retain variables fit the application: initial values");
+    if (is_proven())
+        RetainKeepNone();
+    else
+        RetainKeep(retain_after);
     result = initialise(restored != ERR_OK);
     if (result != ERR_OK)
         AppUnload();
@@ -313,8 +322,11 @@ RTS_RESULT AppStopApplication(void)
 
 static void check_proof(void)
 {
-    if (app.state == AS_RUN && SysTimeGetNs() - app.run_since_ns >= PROVE_NS &&
-        AppCommitSetState(app.image.file, SLOT_PROVEN, 0) != ERR_OK)
+    if (app.state != AS_RUN || is_proven() || SysTimeGetNs() - app.run_since_ns < PROVE_NS)
+        return;
+    if (AppCommitSetState(app.image.file, SLOT_PROVEN, 0) == ERR_OK)
+        RetainKeepNone();
+    else
         app.run_since_ns = SysTimeGetNs(); /* try again later, not in every pass */
 }
 

@@ -115,6 +115,18 @@ RTS_RESULT RetainSave(bool always)
     return save_copy();
 }
 
+void RetainKeep(RTS_UI32 until)
+{
+    if (HAS_RETAIN)
+        (void)FlashLogKeep(&retain.log, until);
+}
+
+void RetainKeepNone(void)
+{
+    if (HAS_RETAIN)
+        FlashLogKeepNone(&retain.log);
+}
+
 static void save_when_due(void)
 {
     enum { TRIES = 4 };

@@ -25,6 +25,7 @@ enum { RECORD_MAGIC = 0x474F4C52 };
 /* The records a scan looks for. */
 typedef struct {
     FLASH_LOG_RANGE range;
+    bool any_kind; /* of any tag and size */
     RTS_UI32 tag;
     RTS_UI32 size;
 } WANTED;
@@ -66,9 +67,10 @@ static bool data_is_valid(RTS_UI32 file, RTS_UI32 position, const RECORD_HEAD *h
 
 static bool is_wanted(const WANTED *wanted, const RECORD_HEAD *head)
 {
-    return wanted == NULL || (head->tag == wanted->tag && head->size == wanted->size &&
-                              is_newer(head->sequence, wanted->range.after) &&
-                              !is_newer(head->sequence, wanted->range.until));
+    if (wanted == NULL)
+        return true;
+    return is_newer(head->sequence, wanted->range.after) && !is_newer(head->sequence, wanted->range.until) &&
+           (wanted->any_kind || (head->tag == wanted->tag && head->size == wanted->size));
 }
 
 static void note(FOUND *found, const RECORD_HEAD *head, RTS_UI32 position)
@@ -148,6 +150,7 @@ RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file)
 
     memset(log, 0, sizeof *log);
     log->file = file;
+    log->kept = FLASH_LOG_NONE;
     log->used = half_size(log); /* without a record the first one erases its half */
     log->opened = scan(log, NULL, &found);
     if (log->opened != ERR_OK || !found.any)
@@ -174,7 +177,7 @@ RTS_RESULT FlashLogReadNewest(const FLASH_LOG *log, RTS_UI32 tag, void *data, RT
 
 RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size)
 {
-    const WANTED wanted = {range, tag, size};
+    const WANTED wanted = {range, false, tag, size};
     FOUND found;
     RTS_RESULT result = scan(log, &wanted, &found);
 
@@ -185,18 +188,37 @@ RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 ta
     return SysFileRead(log->file, found.position + FLASH_LOG_HEAD_SIZE, data, size);
 }
 
+RTS_RESULT FlashLogKeep(FLASH_LOG *log, RTS_UI32 until)
+{
+    const WANTED wanted = {{until - 0x7FFFFFFF, until}, true, 0, 0};
+    FOUND found;
+    RTS_RESULT result = scan(log, &wanted, &found);
+
+    FlashLogKeepNone(log);
+    if (result == ERR_OK && found.any)
+        log->kept = found.position < half_size(log) ? 0 : half_size(log);
+    return result;
+}
+
+void FlashLogKeepNone(FLASH_LOG *log)
+{
+    log->kept = FLASH_LOG_NONE;
+}
+
 /* Makes room for `length` bytes: in this half, or by changing over to the other. */
 static RTS_RESULT make_room(FLASH_LOG *log, RTS_UI32 length)
 {
     RTS_UI32 size = half_size(log);
-    RTS_UI32 other = log->start == 0 ? size : 0;
+    RTS_UI32 next = log->start == 0 ? size : 0;
     RTS_RESULT result;
 
     if (length <= size - log->used)
         return ERR_OK;
-    result = SysFileErase(log->file, other, size);
+    if (next == log->kept)
+        next = log->start;
+    result = SysFileErase(log->file, next, size);
     if (result == ERR_OK) {
-        log->start = other;
+        log->start = next;
         log->used = 0;
     }
     return result;
