@@ -270,9 +270,12 @@ static void an_application_without_timers_for_its_tasks_makes_room_for_the_old_o
         ;
     spec_counter(&spec, 2);
     add_task(&spec, "Second", KIND_CYCLIC, 10000, spec.tasks[0].entry_offset);
+    spec.function[CDL_FUNCTION_GLOBAL_EXIT] = (RTS_I32)here(&spec); /* of what was never initialised: not called */
+    emit_divide_by_zero(&spec);
     build_image(&image, &spec);
     CHECK(download_part(&image, image.size, &refusal) == ERR_NOMEMORY);
     CHECK(strstr(refusal.text, "timers") != NULL);
+    CHECK(!log_has("division by zero"));
     CHECK(app_state() == AS_RUN);
     CHECK(SimAdvance(ms(100)) == ERR_OK);
     CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
@@ -280,6 +283,22 @@ static void an_application_without_timers_for_its_tasks_makes_room_for_the_old_o
     CHECK(SimStart() == ERR_OK);
     CHECK(app_state() == AS_RUN);
     CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+}
+
+static void a_start_that_fails_leaves_no_outputs(void)
+{
+    RTS_HANDLE timer;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
+    for (timer = 0; SysTimerDelete(timer) == ERR_OK; timer++)
+        ;
+    CHECK(timer > 0);
+    *AppGetAreaAddress(APP_AREA_OUTPUT, OUTPUT_OFFSET, 1) = 1; /* as if a task had run before the next one failed to start */
+    CHECK(AppStartApplication() != ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 0);
 }
 
 static void the_application_info_can_be_read(void)
@@ -682,6 +701,7 @@ int main(void)
     RUN(begin_again_starts_anew);
     RUN(a_rollback_to_an_application_that_fails_too_is_written_down);
     RUN(an_application_without_timers_for_its_tasks_makes_room_for_the_old_one);
+    RUN(a_start_that_fails_leaves_no_outputs);
     RUN(the_application_info_can_be_read);
     RUN(info_longer_than_its_buffer_is_cut);
     RUN(area_addresses_are_checked_to_the_byte);

@@ -191,17 +191,32 @@ static void set_context(void)
     app.context.imports = app.tables.imports;
 }
 
-/* Initial values and fresh tasks; the application is in AS_STOP then, perhaps with an exception. */
+/* Gives up what is loaded, as it is. */
+static void unload(void)
+{
+    (void)IecTaskCreateAll(NULL, 0, &app.context);
+    RetainAttach(NULL, 0, 0);
+    SysFlashReleaseCode(app.image.file);
+    clear_exception();
+    app.state = AS_NONE;
+    app.code = NULL;
+    memset(&app.image, 0, sizeof app.image);
+}
+
+/* Initial values and fresh tasks; the application is in AS_STOP then, perhaps with an exception. It is given up when its
+ * tasks cannot be created. */
 static RTS_RESULT initialise(bool init_retains)
 {
     RTS_RESULT result;
 
     clear_exception();
     AppAreasClear(init_retains);
-    app.state = AS_STOP;
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
-    if (result != ERR_OK)
+    if (result != ERR_OK) {
+        unload();
         return result;
+    }
+    app.state = AS_STOP;
     if (!run_function(CDL_FUNCTION_CODE_INIT, init_retains) || !run_function(CDL_FUNCTION_GLOBAL_INIT, init_retains))
         enter_exception_state();
     else if (init_retains)
@@ -211,7 +226,7 @@ static RTS_RESULT initialise(bool init_retains)
 
 static void run_global_exit(void)
 {
-    if (is_loaded() && !AppHasException())
+    if (!AppHasException())
         (void)run_function(CDL_FUNCTION_GLOBAL_EXIT, false);
 }
 
@@ -220,13 +235,7 @@ void AppUnload(void)
     if (!is_loaded())
         return;
     run_global_exit();
-    (void)IecTaskCreateAll(NULL, 0, &app.context);
-    RetainAttach(NULL, 0, 0);
-    SysFlashReleaseCode(app.image.file);
-    clear_exception();
-    app.state = AS_NONE;
-    app.code = NULL;
-    memset(&app.image, 0, sizeof app.image);
+    unload();
 }
 
 const RTS_UI8 *AppMapCode(const APP_IMAGE *image)
@@ -256,10 +265,7 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
         RetainKeepNone();
     else
         RetainKeep(retain_after);
-    result = initialise(restored != ERR_OK);
-    if (result != ERR_OK)
-        AppUnload();
-    return result;
+    return initialise(restored != ERR_OK);
 }
 
 /* ---- start and stop ---- */
@@ -291,6 +297,7 @@ RTS_RESULT AppStart(RTS_UI32 died_before)
     result = IecTaskStartAll();
     if (result != ERR_OK) {
         IecTaskStopAll();
+        AppAreasClearOutputs(); /* some tasks may have run */
         return result;
     }
     app.state = AS_RUN;
