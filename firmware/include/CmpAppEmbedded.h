@@ -48,10 +48,12 @@ enum {
 
 enum { APP_NAME_SIZE = 60 }; /* with NUL */
 
+#define APP_NO_CODE_OFFSET 0xFFFFFFFFu
+
 /* The last exception; code RTSEXCPT_NOEXCEPTION when there is none. */
 typedef struct {
     RTS_UI32 code;
-    RTS_UI32 code_offset; /* fault address in the code segment, 0xFFFFFFFF when it was elsewhere */
+    RTS_UI32 code_offset; /* fault address in the code segment, APP_NO_CODE_OFFSET when it was elsewhere */
     RTS_I32 task;         /* index of the task, -1 when in initialisation code */
 } APP_EXCEPTION;
 

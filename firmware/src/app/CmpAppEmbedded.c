@@ -13,18 +13,16 @@
 #include "App.h"
 #include "AppAreas.h"
 #include "AppCommit.h"
+#include "AppException.h"
 #include "CmpEventMgr.h"
 #include "CmpIecTask.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
-#include "SysAtomic.h"
-#include "SysExcept.h"
 #include "SysFileFlash.h"
 #include "SysFlash.h"
 #include "SysTime.h"
 
 #define PROVE_NS ((RTS_I64)APP_PROVE_US * 1000)
-#define NO_CODE_OFFSET 0xFFFFFFFFu
 
 static struct {
     RTS_UI32 state; /* AS_* */
@@ -33,14 +31,6 @@ static struct {
     APP_TABLES tables;
     IEC_CONTEXT context; /* what every task starts from */
     RTS_I64 run_since_ns;
-    APP_EXCEPTION exception;
-    RTS_UI32 exception_claims;  /* how many contexts had an exception since the last was handled */
-    RTS_UI32 exception_pending; /* `raised` is complete and waits for main */
-    struct {
-        RTS_I32 task;
-        RTS_UI32 code;
-        uintptr_t address;
-    } raised;
 } app;
 
 void AppPostEvent(RTS_UI32 event)
@@ -61,7 +51,7 @@ RTS_UI32 AppGetSlot(void)
 
 bool AppHasException(void)
 {
-    return app.exception.code != RTSEXCPT_NOEXCEPTION;
+    return AppExceptionGet()->code != RTSEXCPT_NOEXCEPTION;
 }
 
 static bool is_proven(void)
@@ -71,63 +61,14 @@ static bool is_proven(void)
 
 /* ---- exceptions ---- */
 
-const char *AppExceptionName(RTS_UI32 code)
+static void record_exception(const APP_RAISED *raised)
 {
-    static const struct {
-        RTS_UI32 code;
-        const char *name;
-    } names[] = {
-        {RTSEXCPT_WATCHDOG, "watchdog expired"},
-        {RTSEXCPT_DIVIDEBYZERO, "division by zero"},
-        {RTSEXCPT_ARRAYBOUNDS, "index out of range"},
-        {RTSEXCPT_ACCESS_VIOLATION, "access violation"},
-        {RTSEXCPT_ILLEGAL_INSTRUCTION, "illegal instruction"},
-        {RTSEXCPT_PRIV_INSTRUCTION, "privileged instruction"},
-        {RTSEXCPT_STACK_OVERFLOW, "stack overflow"},
-        {RTSEXCPT_MISALIGNMENT, "misaligned access"},
-        {RTSEXCPT_OVERFLOW, "overflow"},
-        {RTSEXCPT_FPU_ERROR, "floating point error"},
-    };
-    RTS_SIZE i;
+    uintptr_t offset = raised->address - (uintptr_t)app.code;
+    APP_EXCEPTION exception = {raised->code, APP_NO_CODE_OFFSET, raised->task};
 
-    for (i = 0; i < RTS_COUNT(names); i++) {
-        if (names[i].code == code)
-            return names[i].name;
-    }
-    return "exception";
-}
-
-void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)
-{
-    AppAreasClearOutputs(); /* at once: main may be busy with the flash */
-    if (SysAtomicAdd(&app.exception_claims, 1) != 0)
-        return; /* another task was first: one exception stops everything */
-    app.raised.task = task;
-    app.raised.code = code;
-    app.raised.address = address;
-    SysAtomicStore(&app.exception_pending, 1);
-}
-
-static void record_exception(RTS_I32 task, RTS_UI32 code, uintptr_t address)
-{
-    uintptr_t offset = address - (uintptr_t)app.code;
-    const char *where = task < 0 ? "Initialisation" : app.tables.tasks[task].name;
-
-    app.exception.task = task;
-    app.exception.code = code;
-    app.exception.code_offset = offset < app.image.code.size ? (RTS_UI32)offset : NO_CODE_OFFSET;
-    if (app.exception.code_offset == NO_CODE_OFFSET)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_EXCEPTION, code, "%s: %s", where, AppExceptionName(code));
-    else
-        LogAdd(CMPID_CmpAppEmbedded, LOG_EXCEPTION, code, "%s: %s at code offset 0x%x", where, AppExceptionName(code),
-               (unsigned)app.exception.code_offset);
-}
-
-static void clear_exception(void)
-{
-    memset(&app.exception, 0, sizeof app.exception);
-    SysAtomicStore(&app.exception_pending, 0);
-    SysAtomicStore(&app.exception_claims, 0);
+    if (offset < app.image.code.size)
+        exception.code_offset = (RTS_UI32)offset;
+    AppExceptionSet(&exception, raised->task < 0 ? "Initialisation" : app.tables.tasks[raised->task].name);
 }
 
 /* The safe state after an exception: no task runs, outputs are zero (again, since other tasks have finished their
@@ -143,10 +84,11 @@ static void enter_exception_state(void)
 
 void AppHandlePendingException(void)
 {
-    if (!SysAtomicLoad(&app.exception_pending))
+    APP_RAISED raised;
+
+    if (!AppExceptionTake(&raised))
         return;
-    SysAtomicStore(&app.exception_pending, 0);
-    record_exception(app.raised.task, app.raised.code, app.raised.address);
+    record_exception(&raised);
     enter_exception_state();
     (void)RetainSave(false);
 }
@@ -173,11 +115,14 @@ static void call_init(void *arg)
 static bool run_function(RTS_UI32 function, bool init_retains)
 {
     INIT_CALL call = {function, init_retains};
+    APP_RAISED raised = {-1, RTSEXCPT_NOEXCEPTION, 0};
     RTS_EXCEPTION exception;
 
     if (app.image.entry[function] == IMAGE_NO_ENTRY || !IecTaskRunGuarded(call_init, &call, &exception))
         return true;
-    record_exception(-1, exception.code, exception.address);
+    raised.code = exception.code;
+    raised.address = exception.address;
+    record_exception(&raised);
     return false;
 }
 
@@ -197,7 +142,7 @@ static void unload(void)
     (void)IecTaskCreateAll(NULL, 0, &app.context);
     RetainAttach(NULL, 0, 0);
     SysFlashReleaseCode(app.image.file);
-    clear_exception();
+    AppExceptionClear();
     app.state = AS_NONE;
     app.code = NULL;
     memset(&app.image, 0, sizeof app.image);
@@ -209,7 +154,7 @@ static RTS_RESULT initialise(bool init_retains)
 {
     RTS_RESULT result;
 
-    clear_exception();
+    AppExceptionClear();
     AppAreasClear(init_retains);
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK) {
@@ -383,7 +328,7 @@ void AppGetStatus(APP_STATUS *status)
     status->state = app.state;
     status->image_crc = app.image.crc;
     status->image_size = app.image.size;
-    status->exception = app.exception;
+    status->exception = *AppExceptionGet();
     if (is_loaded())
         status->op_state |= OS_PROGRAM_LOADED;
     if (AppDownloadIsOpen())
@@ -437,6 +382,7 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
     switch (hook) {
     case CH_INIT:
         CMP_CLEAR(app);
+        AppExceptionClear();
         if (!RTS_STARTS_ONCE)
             AppAreasClear(true);
         AppDownloadAbort();

@@ -128,7 +128,7 @@ static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static void write_exception(BTAG_WRITER *reply, const APP_EXCEPTION *exception)
 {
-    if (exception->code != RTSEXCPT_NOEXCEPTION && exception->code_offset != 0xFFFFFFFF) {
+    if (exception->code != RTSEXCPT_NOEXCEPTION && exception->code_offset != APP_NO_CODE_OFFSET) {
         BTagOpen(reply, TAG_APP_EXECUTION_POSITION, BTAG_ALIGN_2);
         BTagAppend16(reply, APP_AREA_CODE);
         BTagAppend32(reply, exception->code_offset);
