@@ -249,11 +249,8 @@ static void a_rollback_to_an_application_that_fails_too_is_written_down(void)
     }
 }
 
-static void no_task(void *param, RTS_I64 due_ns, RTS_UI32 missed)
+static void never_called(void)
 {
-    RTS_UNUSED(param);
-    RTS_UNUSED(due_ns);
-    RTS_UNUSED(missed);
 }
 
 /* The timers are found to be too few when the old application has been given up. */
@@ -266,7 +263,7 @@ static void an_application_without_timers_for_its_tasks_makes_room_for_the_old_o
 
     start_with_counter(1);
     CHECK(SimAdvance(ms(5330)) == ERR_OK);
-    while (SysTimerCreate(no_task, NULL, 1000, 0, &timer) == ERR_OK)
+    while (SysTimerCreate((SYS_TIMER_CALLBACK)never_called, NULL, 1000, 0, &timer) == ERR_OK)
         ;
     spec_counter(&spec, 2);
     add_task(&spec, "Second", KIND_CYCLIC, 10000, spec.tasks[0].entry_offset);
