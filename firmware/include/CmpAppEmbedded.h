@@ -48,10 +48,12 @@ enum {
 
 enum { APP_NAME_SIZE = 60 }; /* with NUL */
 
+#define APP_NO_CODE_OFFSET 0xFFFFFFFFu
+
 /* The last exception; code RTSEXCPT_NOEXCEPTION when there is none. */
 typedef struct {
     RTS_UI32 code;
-    RTS_UI32 code_offset; /* fault address in the code segment, 0xFFFFFFFF when it was elsewhere */
+    RTS_UI32 code_offset; /* fault address in the code segment, APP_NO_CODE_OFFSET when it was elsewhere */
     RTS_I32 task;         /* index of the task, -1 when in initialisation code */
 } APP_EXCEPTION;
 
@@ -65,16 +67,16 @@ typedef struct {
 
 enum { APP_REFUSAL_SIZE = APP_REFUSAL_TEXT_SIZE };
 
-/* Why a download was refused: `text` is a sentence, cut to fit. */
+/* Why a download was refused: a sentence, cut to fit; "" when it was not. */
 typedef struct {
-    RTS_RESULT result;
     char text[APP_REFUSAL_SIZE];
 } APP_REFUSAL;
 
 /*
  * Download. Begin opens the idle slot (erases lazily, sector by sector), Write appends, End checks everything
  * and, only when all is well, stops the old application, commits the slot and loads the new one (state AS_STOP).
- * On any error the old application has not been touched and runs on.
+ * On any error the old application runs on, untouched; except that when the tasks of the new one cannot be created, it is
+ * loaded again, with its retain variables, and started if it ran.
  *
  * Begin: ERR_NOMEMORY too large for the slot. Write: ERR_INVALID_SEQUENCE not begun or `offset` is not what
  * AppDownloadOffset says; ERR_DEVICE flash fault. End: the reason as ERR_* and in *refusal (never NULL).
@@ -82,6 +84,8 @@ typedef struct {
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc);
 RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size);
 RTS_UI32 AppDownloadOffset(void); /* bytes received so far; a broken transfer continues here */
+/* Whether the download that has begun is that of this image. It outlives the channel it came through. */
+bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc);
 RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal);
 void AppDownloadAbort(void);
 

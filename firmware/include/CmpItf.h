@@ -12,7 +12,7 @@
 #include "CmpErrors.h"
 #include "CmpStd.h"
 
-/* Hooks in the order of start-up; manual 3.1.1. Each CH_EXIT_x undoes CH_INIT_x. */
+/* Hooks in the order of start-up; manual 3.1.1. Each CH_EXIT_x undoes CH_INIT_x; they are in reverse order. */
 typedef enum {
     CH_INIT_SYSTEM,       /* system components (log, memory, time): reset all own state */
     CH_INIT_SYSTEM2,      /* what needs other system components */
@@ -36,6 +36,14 @@ typedef enum {
 
 /* A component's hook function. An error from a CH_INIT_* hook stops the start-up; others are ignored. */
 typedef RTS_RESULT (*PF_HOOK_FUNCTION)(CMP_HOOK hook);
+
+/* Clears the variable a component keeps its state in, in the first hook it has. For a source that includes rts_config.h
+ * and string.h. */
+#define CMP_CLEAR(state)                                                                                               \
+    do {                                                                                                               \
+        if (!RTS_STARTS_ONCE)                                                                                          \
+            memset(&(state), 0, sizeof(state));                                                                        \
+    } while (0)
 
 /* Component numbers, in log entries; the field's numbers where known. */
 enum {
@@ -69,16 +77,23 @@ enum {
 typedef struct {
     RTS_UI32 id; /* CMPID_* */
     const char *name;
-    PF_HOOK_FUNCTION hook;
-} CMP_COMPONENT;
+} CMP_NAME;
 
-/* For the port's list: CMP_DECLARE(CmpLog) declares the hook CmpLog_Hook, CMP_ENTRY(CmpLog) is its CMP_COMPONENT. */
-#define CMP_DECLARE(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
-#define CMP_ENTRY(component) {CMPID_##component, #component, component##_Hook},
-
-/* The port's list, system components first. */
-extern const CMP_COMPONENT cmp_components[];
+/* The port's list, system components first. Names are apart from the hooks: where nobody asks for them they take no
+ * flash. */
+extern const PF_HOOK_FUNCTION cmp_hooks[];
+extern const CMP_NAME cmp_names[];
 extern const RTS_SIZE cmp_component_count;
+
+/* Defines the list from a macro of the port that names the components, COMPONENTS(X) being X(CmpLog) X(CmpSrv) and so
+ * on. CmpLog has the hook CmpLog_Hook and the number CMPID_CmpLog. */
+#define CMP_LIST(components)                                                                                           \
+    components(CMP_DECLARE) const PF_HOOK_FUNCTION cmp_hooks[] = {components(CMP_HOOK_OF)};                            \
+    const CMP_NAME cmp_names[] = {components(CMP_NAME_OF)};                                                            \
+    const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_hooks)
+#define CMP_DECLARE(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
+#define CMP_HOOK_OF(component) component##_Hook,
+#define CMP_NAME_OF(component) {CMPID_##component, #component},
 
 /* Runs all CH_INIT_* hooks. On an error the ones that ran are undone by their CH_EXIT_* and the error is returned. */
 RTS_RESULT CMInit(void);

@@ -30,6 +30,11 @@ RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until);
 /* Saves the area when it is not what was saved last, or always; no task runs. ERR_DEVICE flash fault. */
 RTS_RESULT RetainSave(bool always);
 
+/* From now on the record numbered `until`, or the newest before it, is kept in flash, whatever is saved. It is that of the
+ * application before, as long as the device may go back to it. */
+void RetainKeep(RTS_UI32 until);
+void RetainKeepNone(void);
+
 RTS_RESULT CmpRetain_Hook(CMP_HOOK hook);
 
 #endif

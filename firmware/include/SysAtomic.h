@@ -47,7 +47,16 @@ SYSATOMIC_INLINE void SysAtomicStore(RTS_UI32 *object, RTS_UI32 value)
 
 SYSATOMIC_INLINE RTS_UI32 SysAtomicAdd(RTS_UI32 *object, RTS_UI32 value)
 {
+#ifdef RTS_ONE_CORE
+    RTS_UI32 before;
+
+    SysAtomicFence();
+    before = __atomic_fetch_add(object, value, __ATOMIC_RELAXED);
+    SysAtomicFence();
+    return before;
+#else
     return __atomic_fetch_add(object, value, __ATOMIC_ACQ_REL);
+#endif
 }
 
 #endif

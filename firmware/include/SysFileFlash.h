@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Where the files lie: FILE_MAP of rts_config_port.h, or computed from the size of the flash. A file is written in sequence;
- * sectors are erased when the first byte of them is due, no byte is programmed twice. All from main.
+ * Where the files lie: FILE_MAP of rts_config_port.h, or computed from the size of the flash. A file is written in sequence, in
+ * units of FILE_ALIGN bytes; sectors are erased when the first unit of them is due, no byte is programmed twice. All from main.
  */
 #ifndef SYSFILEFLASH_H
 #define SYSFILEFLASH_H
@@ -16,7 +16,7 @@
 /* The files. Commit and retain are record logs (SysFlashLog.h). */
 enum { FILE_SLOT_A = 0, FILE_SLOT_B = 1, FILE_COMMIT = 2, FILE_RETAIN = 3, FILE_COUNT = 4 };
 
-/* Every write position that was closed lies at a multiple of this, which all program sizes divide. */
+/* Bytes that are programmed at a time; all program sizes divide it. */
 enum { FILE_ALIGN = 16 };
 
 /* Where a file lies in flash: both multiples of the sector size. */
@@ -39,11 +39,14 @@ RTS_RESULT SysFileWrite(RTS_UI32 file, const void *data, RTS_UI32 size);
 /* Bytes written so far, the position of the next one. */
 RTS_UI32 SysFileGetPos(RTS_UI32 file);
 
-/* Programs what is still buffered, padded with the erased value, and syncs. */
+/* Programs what is still buffered, padded to a unit with the erased value, and syncs. */
 RTS_RESULT SysFileClose(RTS_UI32 file);
 
 /* Reads what is in flash. ERR_OUT_OF_LIMITS beyond the end of the file. */
 RTS_RESULT SysFileRead(RTS_UI32 file, RTS_UI32 offset, void *data, RTS_UI32 size);
+
+/* Goes on with the CRC-32 in *crc over `size` bytes at `offset`. Errors as SysFileRead; *crc is worthless then. */
+RTS_RESULT SysFileCRC32(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size, RTS_UI32 *crc);
 
 /* Erases [offset, offset + size), multiples of the sector size. */
 RTS_RESULT SysFileErase(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size);

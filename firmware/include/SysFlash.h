@@ -21,7 +21,7 @@ typedef struct {
     /* The flash as memory for reading, size bytes; NULL when it cannot be mapped. */
     const RTS_UI8 *mapped;
 
-    /* ERR_OK, or ERR_DEVICE when the hardware failed. */
+    /* ERR_OK, or ERR_DEVICE when the hardware failed. SysFileFlash programs 16 bytes (FILE_ALIGN) at a time. */
     RTS_RESULT (*read)(RTS_UI32 offset, void *data, RTS_UI32 size);
     RTS_RESULT (*program)(RTS_UI32 offset, const void *data, RTS_UI32 size);
     RTS_RESULT (*erase)(RTS_UI32 offset); /* the sector that starts at offset */

@@ -14,16 +14,22 @@
 
 typedef struct {
     RTS_UI32 file;
-    RTS_UI32 half_size;
+    RTS_RESULT opened; /* nothing is appended to a log that cannot be read */
     RTS_UI32 start;    /* of the half in use */
     RTS_UI32 used;     /* bytes of that half that may have been programmed */
-    RTS_UI32 sequence; /* of the newest record, 0 when there is none */
+    RTS_UI32 newest;   /* position of the newest record */
+    RTS_UI32 sequence; /* its number, 0 when there is none */
+    RTS_UI32 kept;     /* start of a half that is not erased; FLASH_LOG_NONE */
 } FLASH_LOG;
 
 enum { FLASH_LOG_HEAD_SIZE = 20 };
+#define FLASH_LOG_NONE 0xFFFFFFFFu
 
 /* Finds the newest record and the place for the next. ERR_DEVICE flash fault. */
 RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file);
+
+/* Reads the newest record into `data`; ERR_NO_OBJECT when there is none or it has another tag or size. */
+RTS_RESULT FlashLogReadNewest(const FLASH_LOG *log, RTS_UI32 tag, void *data, RTS_UI32 size);
 
 /* Which records to read: those numbered after `after`, up to and with `until`. Numbers wrap. */
 typedef struct {
@@ -35,8 +41,16 @@ typedef struct {
  * was then. */
 RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size);
 
-/* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault. */
+/* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault,
+ * also an earlier one of FlashLogOpen. */
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);
+
+/*
+ * From now on the newest record up to number `until` is kept: when there is no room, it is the other half that is erased, even
+ * with the newest record. FlashLogKeepNone ends that. ERR_DEVICE flash fault.
+ */
+RTS_RESULT FlashLogKeep(FLASH_LOG *log, RTS_UI32 until);
+void FlashLogKeepNone(FLASH_LOG *log);
 
 /* The largest record, in bytes of data. */
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log);

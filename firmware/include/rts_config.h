@@ -84,6 +84,12 @@
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) (entry)(context, init_retains)
 #endif
 
+/* 1: the runtime starts only after a reset that has set all variables to zero, so that no component clears its own; 150
+ * bytes of flash. 0: it may be started again in the same process. */
+#ifndef RTS_STARTS_ONCE
+#define RTS_STARTS_ONCE 0
+#endif
+
 /* Tables of external functions that components may register; two words each. */
 #ifndef CM_MAX_EXT_TABLES
 #define CM_MAX_EXT_TABLES 4

@@ -205,11 +205,12 @@ RTS_UI32 IecTaskGetActivity(bool *busy)
 
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
 {
-    RTS_UNUSED(image_crc);
-    if (total_size > FAKE_IMAGE_SIZE)
+    fakes.download_open = total_size <= FAKE_IMAGE_SIZE;
+    if (!fakes.download_open)
         return ERR_NOMEMORY;
     fakes.download_begins++;
     fakes.download_total = total_size;
+    fakes.download_crc = image_crc;
     fakes.download_offset = 0;
     return ERR_OK;
 }
@@ -231,11 +232,16 @@ RTS_UI32 AppDownloadOffset(void)
     return fakes.download_offset;
 }
 
+bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc)
+{
+    return fakes.download_open && fakes.download_total == total_size && fakes.download_crc == image_crc;
+}
+
 RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
 {
     fakes.download_ends++;
+    fakes.download_open = false;
     fakes.download_offset = 0;
-    refusal->result = fakes.end_result;
     strcpy(refusal->text, fakes.end_result == ERR_OK ? "" : fakes.end_text);
     if (fakes.end_result == ERR_OK) {
         fakes.status.image_size = fakes.download_total;
@@ -247,6 +253,7 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
 void AppDownloadAbort(void)
 {
     fakes.download_aborts++;
+    fakes.download_open = false;
     fakes.download_offset = 0;
 }
 

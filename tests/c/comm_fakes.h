@@ -41,7 +41,9 @@ typedef struct {
     RTS_UI32 reset_option;
 
     RTS_UI8 image[FAKE_IMAGE_SIZE];
+    bool download_open;
     RTS_UI32 download_total;
+    RTS_UI32 download_crc;
     RTS_UI32 download_offset;
     RTS_UI32 download_begins;
     RTS_UI32 download_writes;

@@ -6,6 +6,7 @@
 #include "CmpEventMgr.h"
 #include "CmpLog.h"
 #include "SysFileFlash.h"
+#include "SysTimer.h"
 #include "app_image.h"
 #include "test.h"
 
@@ -216,6 +217,85 @@ static void begin_again_starts_anew(void)
     CHECK(download(&image) == ERR_OK);
     CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
     CHECK(SimFlashViolations() == 0);
+}
+
+/* The application before fails as well, when it comes back with the retain variables it had: both are known to fail then, and
+ * later start-ups write nothing. */
+static void a_rollback_to_an_application_that_fails_too_is_written_down(void)
+{
+    APP_BYTES image;
+    APP_SPEC spec;
+    int i;
+
+    start_blank();
+    spec_counter(&spec, 1);
+    spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
+    emit_skip_unless_init_retains(&spec, 1);
+    emit_ret(&spec);
+    emit_divide_by_zero(&spec);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    spec_counter(&spec, 2);
+    spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
+    emit_divide_by_zero(&spec);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    for (i = 0; i < 3; i++) {
+        CHECK(SimStart() == ERR_OK);
+        CHECK(app_state() == AS_STOP);
+        CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+        CHECK((SimFlashOps() != 0) == (i == 0));
+    }
+}
+
+static void never_called(void)
+{
+}
+
+/* The timers are found to be too few when the old application has been given up. */
+static void an_application_without_timers_for_its_tasks_makes_room_for_the_old_one(void)
+{
+    RTS_HANDLE timer;
+    APP_REFUSAL refusal;
+    APP_BYTES image;
+    APP_SPEC spec;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    while (SysTimerCreate((SYS_TIMER_CALLBACK)never_called, NULL, 1000, 0, &timer) == ERR_OK)
+        ;
+    spec_counter(&spec, 2);
+    add_task(&spec, "Second", KIND_CYCLIC, 10000, spec.tasks[0].entry_offset);
+    spec.function[CDL_FUNCTION_GLOBAL_EXIT] = (RTS_I32)here(&spec); /* of what was never initialised: not called */
+    emit_divide_by_zero(&spec);
+    build_image(&image, &spec);
+    CHECK(download_part(&image, image.size, &refusal) == ERR_NOMEMORY);
+    CHECK(strstr(refusal.text, "timers") != NULL);
+    CHECK(!log_has("division by zero"));
+    CHECK(app_state() == AS_RUN);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 100 + 534 + 11);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+}
+
+static void a_start_that_fails_leaves_no_outputs(void)
+{
+    RTS_HANDLE timer;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
+    for (timer = 0; SysTimerDelete(timer) == ERR_OK; timer++)
+        ;
+    CHECK(timer > 0);
+    *AppGetAreaAddress(APP_AREA_OUTPUT, OUTPUT_OFFSET, 1) = 1; /* as if a task had run before the next one failed to start */
+    CHECK(AppStartApplication() != ERR_OK);
+    CHECK(app_state() == AS_STOP);
+    CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 0);
 }
 
 static void the_application_info_can_be_read(void)
@@ -616,6 +696,9 @@ int main(void)
     RUN(the_old_application_runs_on_while_a_new_one_arrives);
     RUN(download_calls_out_of_order_are_refused);
     RUN(begin_again_starts_anew);
+    RUN(a_rollback_to_an_application_that_fails_too_is_written_down);
+    RUN(an_application_without_timers_for_its_tasks_makes_room_for_the_old_one);
+    RUN(a_start_that_fails_leaves_no_outputs);
     RUN(the_application_info_can_be_read);
     RUN(info_longer_than_its_buffer_is_cut);
     RUN(area_addresses_are_checked_to_the_byte);

@@ -200,30 +200,32 @@ static void download_image(void *arg)
     (void)download(&image);
 }
 
-/* Power fails after the commit of image 2, before its initial values are saved: only those of image 1 are there. They are of
- * the same layout, but not of this application. */
+/* Power fails at some time during the download of image 2, while application 1 runs and changes its values. Those are of the
+ * same layout, but never become those of application 2. */
 static void values_of_the_application_before_are_not_taken_over(void)
 {
-    enum { OPERATIONS_OF_A_SAVE = 4 };
-    RTS_UI32 operations;
+    RTS_UI32 taken_over = 0;
+    RTS_UI32 k;
 
     start_with_counter(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
     CHECK(SimFlashSave() == ERR_OK);
     spec_counter(&spec, 2);
     build_image(&image, &spec);
-    operations = SimFlashOps();
-    CHECK(SimCall(download_image, NULL) == ERR_OK);
-    operations = SimFlashOps() - operations;
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
-    SimFlashCut(operations - OPERATIONS_OF_A_SAVE + 1, SIM_CUT_BEFORE);
-    CHECK(SimCall(download_image, NULL) == SIM_POWER_CUT);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
-    CHECK(retain_value() == 200);
+    for (k = 1; k < 1000; k++) {
+        CHECK(SimFlashRestore() == ERR_OK);
+        CHECK(SimStart() == ERR_OK);
+        CHECK(SimAdvance(ms(330)) == ERR_OK);
+        SimFlashCut(k, SIM_CUT_AFTER);
+        if (SimCall(download_image, NULL) == ERR_OK)
+            break;
+        CHECK(SimStart() == ERR_OK);
+        if (read_u32(APP_AREA_DATA, STEP_OFFSET) == 2) {
+            CHECK(retain_value() == 200);
+            taken_over++;
+        }
+    }
+    CHECK(k < 1000 && taken_over > 3); /* cuts after the commit: in the last save of 1, in the first of 2 */
 }
 
 /* Application 2, of the same layout, runs for a moment, saves, and dies: application 1 goes on with what it had itself. */
@@ -253,6 +255,69 @@ static void a_rollback_brings_back_the_values_of_its_application(void)
     CHECK(SimAdvance(ms(2000)) == ERR_OK);
     CHECK(SimStart() == ERR_OK);
     CHECK(retain_value() > 700);
+}
+
+/* The same when application 1 ran until application 2 took over: what it had then, not what was saved some time before. */
+static void a_rollback_brings_back_the_last_values_of_an_application_that_ran(void)
+{
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    CHECK(retain_value() == 634);
+    spec_counter(&spec, 2);
+    spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
+    emit_divide_by_zero(&spec);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK(retain_value() == 634);
+}
+
+static void start_up(void *unused)
+{
+    RTS_UNUSED(unused);
+    (void)CMInit();
+}
+
+/* The same when a half of the log holds one record only, and power fails at any operation of the start-up that goes back. */
+static void a_rollback_brings_back_large_values_too(void)
+{
+    CDL_TASK *task;
+    RTS_UI32 k;
+    int i;
+
+    CHECK(SimFlashConfigure(1024 * 1024, 4096, 16, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    spec_counter(&spec, 1);
+    spec.areas[APP_AREA_RETAIN] = APP_RETAIN_SIZE;
+    load();
+    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    spec_counter(&spec, 2);
+    spec.areas[APP_AREA_RETAIN] = APP_RETAIN_SIZE;
+    task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
+    task->event_area = APP_AREA_DATA;
+    task->event_offset = 32;
+    emit_divide_by_zero(&spec);
+    load();
+    CHECK(SimAdvance(ms(2500)) == ERR_OK);
+    *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
+    CHECK(SimAdvance(ms(10)) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK(SimFlashSave() == ERR_OK);
+    for (k = 1; k < 10000; k += k < 40 ? 1 : 97) {
+        CHECK(SimFlashRestore() == ERR_OK);
+        SimFlashCut(k, SIM_CUT_AFTER);
+        if (SimCall(start_up, NULL) == ERR_OK)
+            break;
+        for (i = 0; i < 2; i++) {
+            CHECK(SimStart() == ERR_OK);
+            CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+            CHECK(retain_value() == 634);
+        }
+    }
+    CHECK(k > 40 && k < 10000);
+    CHECK(SimFlashViolations() == 0);
 }
 
 /* The retain log is gone, the commit record is not: saving starts anew and works. */
@@ -356,6 +421,8 @@ int main(void)
     RUN(another_layout_is_not_restored);
     RUN(values_of_the_application_before_are_not_taken_over);
     RUN(a_rollback_brings_back_the_values_of_its_application);
+    RUN(a_rollback_brings_back_the_last_values_of_an_application_that_ran);
+    RUN(a_rollback_brings_back_large_values_too);
     RUN(a_lost_log_costs_its_values_only);
     RUN(damaged_values_give_way_to_initial_ones);
     RUN(without_a_layout_only_the_same_image_gets_its_values_back);

@@ -17,6 +17,8 @@
 #define RetainRestore test_restore
 #define RetainGetSequence test_sequence
 #define RetainSave test_save
+#define RetainKeep test_keep
+#define RetainKeepNone test_keep_none
 #define CmpRetain_Hook test_hook
 #define FlashLogOpen fake_open
 #define FlashLogRead fake_read

@@ -14,7 +14,8 @@
 #define CMGetComponentName test_component_name
 #define CMRegisterExternal test_register
 #define CMFindExternal test_find
-#define cmp_components test_components
+#define cmp_hooks test_hooks
+#define cmp_names test_names
 #define cmp_component_count test_component_count
 #include "../../firmware/src/core/CmpMgr.c"
 
@@ -48,7 +49,8 @@ static RTS_RESULT hook_c(CMP_HOOK hook)
     return note('c', hook);
 }
 
-const CMP_COMPONENT test_components[] = {{1000, "A", hook_a}, {1001, "B", hook_b}, {1002, "C", hook_c}};
+const PF_HOOK_FUNCTION test_hooks[] = {hook_a, hook_b, hook_c};
+const CMP_NAME test_names[] = {{1000, "A"}, {1001, "B"}, {1002, "C"}};
 const RTS_SIZE test_component_count = 3;
 
 static void begin(char name, CMP_HOOK hook)

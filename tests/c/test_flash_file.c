@@ -108,16 +108,20 @@ static void an_odd_end_is_padded_with_the_erased_value(void)
     }
 }
 
-static void sectors_are_erased_when_their_first_byte_is_due(void)
+static void sectors_are_erased_when_their_first_unit_is_due(void)
 {
+    enum { UNITS = 512 / FILE_ALIGN };
+
     start((GEOMETRY){1, 0xFF});
     SysFileCreate(FILE_SLOT_A);
     CHECK(SysFileWrite(FILE_SLOT_A, pattern, 512) == ERR_OK);
-    CHECK(SimFlashOps() == 2); /* one erase, one program */
+    CHECK(SimFlashOps() == 1 + UNITS); /* one erase, all units programmed */
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN - 1) == ERR_OK);
+    CHECK(SimFlashOps() == 1 + UNITS);
     CHECK(SysFileWrite(FILE_SLOT_A, pattern, 1) == ERR_OK);
-    CHECK(SimFlashOps() == 4);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 511) == ERR_OK);
-    CHECK(SimFlashOps() == 5);
+    CHECK(SimFlashOps() == 1 + UNITS + 2);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 512 - FILE_ALIGN) == ERR_OK);
+    CHECK(SimFlashOps() == 2 * (1 + UNITS));
 }
 
 static void a_second_writing_replaces_the_first(void)
@@ -167,10 +171,10 @@ static void faults_are_reported(void)
     start((GEOMETRY){8, 0xFF});
     SysFileCreate(FILE_SLOT_A);
     SimFlashCut(1, SIM_FAULT);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 8) == ERR_DEVICE);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN) == ERR_DEVICE);
     SysFileCreate(FILE_SLOT_A);
     SimFlashCut(2, SIM_FAULT);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 8) == ERR_DEVICE);
+    CHECK(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN) == ERR_DEVICE);
     SysFileCreate(FILE_SLOT_A);
     CHECK(SysFileWrite(FILE_SLOT_A, pattern, 1) == ERR_OK);
     SimFlashCut(2, SIM_FAULT);
@@ -186,7 +190,7 @@ int main(void)
     RUN(a_flash_that_is_too_small_stops_the_start_up);
     RUN(what_is_written_in_pieces_can_be_read);
     RUN(an_odd_end_is_padded_with_the_erased_value);
-    RUN(sectors_are_erased_when_their_first_byte_is_due);
+    RUN(sectors_are_erased_when_their_first_unit_is_due);
     RUN(a_second_writing_replaces_the_first);
     RUN(a_file_ends_where_its_area_ends);
     RUN(reading_stays_within_the_file);

@@ -86,6 +86,33 @@ static void the_newest_record_wins_over_many_wraps(void)
     }
 }
 
+static RTS_RESULT broken_read(RTS_UI32 offset, void *data, RTS_UI32 size)
+{
+    RTS_UNUSED(offset);
+    RTS_UNUSED(data);
+    RTS_UNUSED(size);
+    return ERR_DEVICE;
+}
+
+/* Records that cannot be read now are there, and shall be when the flash works again. */
+static void nothing_is_appended_to_a_log_that_cannot_be_read(void)
+{
+    SYS_FLASH *flash = (SYS_FLASH *)(uintptr_t)SysFlashGet();
+    RTS_RESULT (*read)(RTS_UI32 offset, void *data, RTS_UI32 size) = flash->read;
+
+    SimFlashSetMapped(0);
+    start(geometries[0]);
+    CHECK(append(1) == ERR_OK);
+    CHECK(append(2) == ERR_OK);
+    flash->read = broken_read;
+    CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_DEVICE);
+    flash->read = read;
+    CHECK(append(3) == ERR_DEVICE);
+    CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
+    CHECK(newest() == 2);
+    SimFlashSetMapped(1);
+}
+
 static RTS_UI32 number_to_append;
 
 static void append_number(void *unused)
@@ -281,6 +308,7 @@ int main(void)
 {
     RUN(a_blank_log_has_no_record);
     RUN(the_newest_record_wins_over_many_wraps);
+    RUN(nothing_is_appended_to_a_log_that_cannot_be_read);
     RUN(a_cut_at_any_operation_leaves_the_old_or_the_new_record);
     RUN(a_record_of_erased_bytes_is_not_taken_for_free_space);
     RUN(records_are_told_apart_by_tag_and_size);

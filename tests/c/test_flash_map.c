@@ -13,6 +13,7 @@
 #define SysFileGetPos test_pos
 #define SysFileClose test_close
 #define SysFileRead test_read
+#define SysFileCRC32 test_crc
 #define SysFileErase test_erase
 #define SysFileFlash_Hook test_hook
 #include "../../firmware/src/sys/SysFileFlash.c"
@@ -29,7 +30,7 @@ static RTS_RESULT start(RTS_UI32 size, RTS_UI32 sector_size)
 
 static void files_lie_where_the_map_says(void)
 {
-    RTS_UI8 data[8] = "1234567";
+    RTS_UI8 data[FILE_ALIGN] = "1234567";
 
     CHECK(start(0xC000, 512) == ERR_OK);
     CHECK(SysFileGetArea(FILE_SLOT_B)->offset == 0x8000);

@@ -27,7 +27,7 @@ def value(board, built, name: str) -> int:
     """A DINT, from where the runtime keeps the data area."""
     symbol = built.symbols.resolve(name)
     assert symbol.area == lib.APP_AREA_DATA
-    return int.from_bytes(board.read_memory(board.address_of("data_area") + symbol.offset, 4), "little")
+    return int.from_bytes(board.read_memory(board.address_of("areas") + symbol.offset, 4), "little")
 
 
 def test_super_loop_runs_all_tasks(minimal, build):

@@ -28,7 +28,4 @@
     X(CmpNameServiceServer) \
     X(CmpChannelServerEmbedded)
 
-COMPONENTS(CMP_DECLARE)
-
-const CMP_COMPONENT cmp_components[] = {COMPONENTS(CMP_ENTRY)};
-const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_components);
+CMP_LIST(COMPONENTS);

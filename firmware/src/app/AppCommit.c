@@ -27,15 +27,13 @@ static void set_blank(COMMIT *commit)
 
 RTS_RESULT AppCommitOpen(void)
 {
-    FLASH_LOG_RANGE all = {0, 0};
     RTS_RESULT result;
 
     set_blank(&record.commit);
     result = FlashLogOpen(&record.log, FILE_COMMIT);
     if (result != ERR_OK)
         return result;
-    all.until = record.log.sequence;
-    if (FlashLogRead(&record.log, all, COMMIT_TAG, &record.commit, sizeof record.commit) != ERR_OK ||
+    if (FlashLogReadNewest(&record.log, COMMIT_TAG, &record.commit, sizeof record.commit) != ERR_OK ||
         (record.commit.active >= SLOT_COUNT && record.commit.active != SLOT_NONE))
         set_blank(&record.commit);
     return ERR_OK;
@@ -46,7 +44,12 @@ const COMMIT *AppCommitGet(void)
     return &record.commit;
 }
 
-RTS_RESULT AppCommitWrite(const COMMIT *commit)
+RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot)
+{
+    return slot == FILE_SLOT_A ? FILE_SLOT_B : FILE_SLOT_A;
+}
+
+static RTS_RESULT write_record(const COMMIT *commit)
 {
     RTS_RESULT result = FlashLogAppend(&record.log, COMMIT_TAG, commit, sizeof *commit);
 
@@ -57,13 +60,43 @@ RTS_RESULT AppCommitWrite(const COMMIT *commit)
     return result;
 }
 
+RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 size, RTS_UI32 crc, RTS_UI32 retain_after)
+{
+    COMMIT commit = record.commit;
+    const COMMIT_SLOT trial = {size, crc, retain_after, SLOT_TRIAL, 0, 0};
+
+    commit.active = (RTS_UI8)slot;
+    commit.slot[slot] = trial;
+    return write_record(&commit);
+}
+
+RTS_RESULT AppCommitErase(void)
+{
+    COMMIT commit;
+
+    set_blank(&commit);
+    return write_record(&commit);
+}
+
+RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after)
+{
+    COMMIT commit = record.commit;
+    RTS_UI32 other = AppCommitOtherSlot(failed);
+
+    commit.active = (RTS_UI8)other;
+    commit.slot[failed].state = SLOT_FAILED;
+    commit.slot[other].retain_after = retain_after;
+    return write_record(&commit);
+}
+
 RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state, RTS_UI8 starts)
 {
     COMMIT commit = record.commit;
+    COMMIT_SLOT *changed = &commit.slot[slot];
 
-    if (commit.slot[slot].state == state && commit.slot[slot].starts == starts)
+    if (changed->state == SLOT_PROVEN || (changed->state == state && changed->starts == starts))
         return ERR_OK;
-    commit.slot[slot].state = state;
-    commit.slot[slot].starts = starts;
-    return AppCommitWrite(&commit);
+    changed->state = state;
+    changed->starts = starts;
+    return write_record(&commit);
 }

@@ -43,10 +43,23 @@ RTS_RESULT AppCommitOpen(void);
 /* The record in force. */
 const COMMIT *AppCommitGet(void);
 
-/* Makes `commit` the record in force, atomically. ERR_DEVICE flash fault: the one before stays. */
-RTS_RESULT AppCommitWrite(const COMMIT *commit);
+/* The slot that is not `slot`; of SLOT_NONE the first. */
+RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
 
-/* Writes a new state of one slot; nothing when it has that state already. */
+/*
+ * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the one before stays.
+ */
+
+/* The image in `slot` is what boots: a trial. */
+RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 size, RTS_UI32 crc, RTS_UI32 retain_after);
+
+/* Nothing boots. */
+RTS_RESULT AppCommitErase(void);
+
+/* The slot that is not `failed` is what boots; its retain records are those after `retain_after`. */
+RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after);
+
+/* A new state of the image in `slot`. Writes nothing when it has proven itself, or that is its state already. */
 RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state, RTS_UI8 starts);
 
 #endif

@@ -1,63 +1,95 @@
 /*
- * AppLoader.c - checks an application image.
+ * AppLoader.c - checks an application image: header, CRC, target, segments, areas.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
  * A row of checks, each may rely on the ones before it. Every refusal is a sentence of its own.
  */
-#include "AppLoader.h"
+#include "AppChecks.h"
 
 #include <string.h>
 
 #include "CMUtils.h"
 #include "CmpChecksum.h"
-#include "CmpIecTask.h"
-#include "CmpItf.h"
-#include "CmpLog.h"
 #include "CmpRetain.h"
 #include "SysFileFlash.h"
 #include "SysTarget.h"
 
-typedef struct {
-    APP_IMAGE *image;
-    APP_REFUSAL *refusal;
-    CDL_HEADER header;
-} LOADER;
-
-typedef RTS_RESULT (*CHECK)(LOADER *l);
-
-#define U(value) ((unsigned)(value))
-
-static RTS_RESULT set_result(LOADER *l, RTS_RESULT result)
-{
-    l->refusal->result = result;
-    return result;
-}
-
-static RTS_RESULT explain(LOADER *l, RTS_RESULT result, const char *format, ...)
+RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...)
 {
     va_list arguments;
 
     va_start(arguments, format);
-    CMUtlvsnprintf(l->refusal->text, sizeof l->refusal->text, format, arguments);
+    CMUtlvsnprintf(refusal->text, sizeof refusal->text, format, arguments);
     va_end(arguments);
-    return set_result(l, result);
+    return result;
 }
 
-/* A macro, so that sentences nobody would see take no flash. */
-#define refuse(l, result, ...)                                                                                         \
-    (APP_REFUSAL_TEXT_SIZE > 1 ? explain(l, result, __VA_ARGS__) : set_result(l, result))
-
-static RTS_RESULT read_image(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 size)
+RTS_RESULT LoaderRead(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 size)
 {
     RTS_RESULT result = SysFileRead(l->image->file, offset, data, size);
 
     return result == ERR_OK ? ERR_OK : refuse(l, result, "Flash cannot be read at offset %u.", U(offset));
 }
 
-static RTS_UI32 align4(RTS_UI32 offset)
+/* ---- segments ---- */
+
+static const char *const segment_names[SEGMENT_COUNT] = {
+    "Code", "Application info", "Area table", "Function table", "External function table", "IEC function table", "Blob",
+};
+
+static const CDL_SEGMENT *find_segment(const LOADER *l, RTS_UI32 segment)
+{
+    static const RTS_UI8 places[SEGMENT_COUNT] = {
+        offsetof(CDL_HEADER, code),
+        offsetof(CDL_HEADER, application_info),
+        offsetof(CDL_HEADER, area_table),
+        offsetof(CDL_HEADER, function_table),
+        offsetof(CDL_HEADER, external_function_table),
+        offsetof(CDL_HEADER, iec_function_table),
+        offsetof(CDL_HEADER, blob),
+    };
+
+    return (const CDL_SEGMENT *)((const RTS_UI8 *)&l->header + places[segment]);
+}
+
+RTS_UI32 LoaderAlign(RTS_UI32 offset)
 {
     return (offset + 3) & ~(RTS_UI32)3;
+}
+
+RTS_RESULT LoaderReadNext(LOADER *l, void *data, RTS_UI32 size)
+{
+    RTS_UI32 offset = l->offset;
+
+    if (size > l->end - offset)
+        return refuse(l, ERR_SIZE_MISMATCH, "%s segment ends within an entry.", segment_names[l->segment]);
+    l->offset = offset + size;
+    return LoaderRead(l, offset, data, size);
+}
+
+void LoaderOpen(LOADER *l, RTS_UI32 segment)
+{
+    const CDL_SEGMENT *place = find_segment(l, segment);
+
+    l->segment = segment;
+    l->offset = place->offset;
+    l->end = place->offset + place->size;
+}
+
+RTS_RESULT LoaderCheckEntries(LOADER *l, RTS_UI32 segment, CHECK check_entry)
+{
+    RTS_RESULT result = ERR_OK;
+
+    LoaderOpen(l, segment);
+    while (l->offset < l->end && result == ERR_OK)
+        result = check_entry(l);
+    return result;
+}
+
+bool LoaderIsCode(const LOADER *l, RTS_UI32 area, RTS_UI32 offset)
+{
+    return area == APP_AREA_CODE && offset < l->image->code.size;
 }
 
 /* ---- header, CRC, target ---- */
@@ -69,7 +101,7 @@ static RTS_RESULT check_header(LOADER *l)
 
     if (l->image->size < CDL_HEADER_SIZE)
         return refuse(l, ERR_SIZE_MISMATCH, "Image of %u bytes is shorter than its header.", U(l->image->size));
-    result = read_image(l, 0, &l->header, sizeof l->header);
+    result = LoaderRead(l, 0, &l->header, sizeof l->header);
     if (result != ERR_OK)
         return result;
     if (header->header_tag != CDL_HEADER_TAG)
@@ -87,27 +119,18 @@ static RTS_RESULT check_header(LOADER *l)
 static RTS_RESULT check_crc(LOADER *l)
 {
     RTS_UI32 expected = l->header.crc;
-    RTS_UI32 offset = CDL_HEADER_SIZE;
-    RTS_UI8 part[64];
     RTS_UI32 crc;
+    RTS_RESULT result;
 
     l->header.crc = 0;
     crc = CRC32Update(0, &l->header, sizeof l->header);
-    l->header.crc = expected;
-    while (offset < l->image->size) {
-        RTS_UI32 count = l->image->size - offset < sizeof part ? l->image->size - offset : (RTS_UI32)sizeof part;
-        RTS_RESULT result = read_image(l, offset, part, count);
-        if (result != ERR_OK)
-            return result;
-        crc = CRC32Update(crc, part, count);
-        offset += count;
-    }
+    result = SysFileCRC32(l->image->file, CDL_HEADER_SIZE, l->image->size - CDL_HEADER_SIZE, &crc);
+    if (result != ERR_OK)
+        return refuse(l, result, "Flash cannot be read.");
     if (crc != expected)
-        return refuse(l, ERR_CRC_FAILED, "The image is damaged: CRC 0x%x, not 0x%x.", U(crc),
-                      U(expected));
+        return refuse(l, ERR_CRC_FAILED, "The image is damaged: CRC 0x%x, not 0x%x.", U(crc), U(expected));
     if (crc != l->image->crc)
-        return refuse(l, ERR_CRC_FAILED, "CRC 0x%x is not the announced one, 0x%x.",
-                      U(crc), U(l->image->crc));
+        return refuse(l, ERR_CRC_FAILED, "CRC 0x%x is not the announced one, 0x%x.", U(crc), U(l->image->crc));
     return ERR_OK;
 }
 
@@ -127,42 +150,32 @@ static RTS_RESULT check_target(LOADER *l)
     return ERR_OK;
 }
 
-/* ---- segments and areas ---- */
+/* ---- places of segments, areas ---- */
 
-static RTS_RESULT check_segment(LOADER *l, const char *name, const CDL_SEGMENT *segment, RTS_UI32 align)
+static RTS_RESULT check_segment(LOADER *l, RTS_UI32 segment)
 {
-    if (segment->size == 0)
+    const CDL_SEGMENT *place = find_segment(l, segment);
+    const char *name = segment_names[segment];
+    RTS_UI32 align = segment == SEGMENT_CODE ? APP_CODE_ALIGN : 4;
+
+    if (place->size == 0)
         return ERR_OK;
-    if (segment->offset < CDL_HEADER_SIZE)
+    if (place->offset < CDL_HEADER_SIZE)
         return refuse(l, ERR_OUT_OF_LIMITS, "%s segment overlaps the header.", name);
-    if (segment->offset > l->image->size || segment->size > l->image->size - segment->offset)
+    if (place->offset > l->image->size || place->size > l->image->size - place->offset)
         return refuse(l, ERR_OUT_OF_LIMITS, "%s segment ends beyond the image.", name);
-    if (segment->offset % align != 0)
+    if (place->offset % align != 0)
         return refuse(l, ERR_ALIGNMENT, "%s segment is not aligned to %u bytes.", name, U(align));
     return ERR_OK;
 }
 
 static RTS_RESULT check_segments(LOADER *l)
 {
-    const CDL_HEADER *h = &l->header;
-    const struct {
-        const char *name;
-        const CDL_SEGMENT *segment;
-        RTS_UI32 align;
-    } segments[] = {
-        {"Code", &h->code, APP_CODE_ALIGN},
-        {"Application info", &h->application_info, 4},
-        {"Area table", &h->area_table, 4},
-        {"Function table", &h->function_table, 4},
-        {"External function table", &h->external_function_table, 4},
-        {"IEC function table", &h->iec_function_table, 4},
-        {"Blob", &h->blob, 4},
-    };
     RTS_RESULT result = ERR_OK;
-    RTS_SIZE i;
+    RTS_UI32 i;
 
-    for (i = 0; i < RTS_COUNT(segments) && result == ERR_OK; i++)
-        result = check_segment(l, segments[i].name, segments[i].segment, segments[i].align);
+    for (i = 0; i < SEGMENT_COUNT && result == ERR_OK; i++)
+        result = check_segment(l, i);
     return result;
 }
 
@@ -180,355 +193,50 @@ static RTS_RESULT check_code(LOADER *l)
     return ERR_OK;
 }
 
-static RTS_RESULT check_area(LOADER *l, const AREA_INFO *area, RTS_UI32 *seen)
+static RTS_RESULT check_area(LOADER *l)
 {
-    static const struct {
-        const char *name;
-        RTS_UI32 limit;
-    } areas[APP_AREA_CODE] = {
-        {"data", APP_DATA_SIZE},     {"retain", APP_RETAIN_SIZE}, {"input", APP_INPUT_SIZE},
-        {"output", APP_OUTPUT_SIZE}, {"memory", APP_MEMORY_SIZE},
-    };
+    static const char *const names[APP_AREA_CODE] = {"data", "retain", "input", "output", "memory"};
+    static const RTS_UI32 limits[APP_AREA_CODE] = {APP_DATA_SIZE, APP_RETAIN_SIZE, APP_INPUT_SIZE, APP_OUTPUT_SIZE,
+                                                   APP_MEMORY_SIZE};
+    AREA_INFO area;
     RTS_UI32 limit;
+    RTS_RESULT result = LoaderReadNext(l, &area, sizeof area);
 
-    if (area->index >= APP_AREA_COUNT || (*seen >> area->index & 1) != 0)
-        return refuse(l, ERR_OUT_OF_LIMITS, "Area %u is unknown or listed twice.", U(area->index));
-    *seen |= 1u << area->index;
-    if (area->index == APP_AREA_CODE)
+    if (result != ERR_OK)
+        return result;
+    if (area.index >= APP_AREA_COUNT || (l->areas_seen >> area.index & 1) != 0)
+        return refuse(l, ERR_OUT_OF_LIMITS, "Area %u is unknown or listed twice.", U(area.index));
+    l->areas_seen |= 1u << area.index;
+    if (area.index == APP_AREA_CODE)
         return ERR_OK;
-    limit = areas[area->index].limit;
-    if (area->index == APP_AREA_RETAIN && RetainCapacity() < limit)
+    limit = limits[area.index];
+    if (area.index == APP_AREA_RETAIN && RetainCapacity() < limit)
         limit = RetainCapacity();
-    if (area->size > limit)
-        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", areas[area->index].name,
-                      U(area->size), U(limit));
-    l->image->area_size[area->index] = area->size;
+    if (area.size > limit)
+        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", names[area.index],
+                      U(area.size), U(limit));
+    l->image->area_size[area.index] = area.size;
     return ERR_OK;
 }
 
 static RTS_RESULT check_areas(LOADER *l)
 {
-    const CDL_SEGMENT *table = &l->header.area_table;
-    RTS_UI32 offset;
-    RTS_UI32 seen = 0;
-    AREA_INFO area;
-    RTS_RESULT result = ERR_OK;
-
-    if (table->size % sizeof area != 0)
-        return refuse(l, ERR_SIZE_MISMATCH, "Area table of %u bytes has a part of an entry.", U(table->size));
-    for (offset = 0; offset < table->size && result == ERR_OK; offset += (RTS_UI32)sizeof area) {
-        result = read_image(l, table->offset + offset, &area, sizeof area);
-        if (result == ERR_OK)
-            result = check_area(l, &area, &seen);
-    }
-    return result;
-}
-
-/* ---- functions ---- */
-
-static bool is_code(const LOADER *l, RTS_UI32 area, RTS_UI32 offset)
-{
-    return area == APP_AREA_CODE && offset < l->image->code.size;
-}
-
-static RTS_RESULT check_functions(LOADER *l)
-{
-    POU_REF table[CDL_FUNCTION_COUNT];
-    RTS_UI32 i;
-    RTS_RESULT result;
-
-    if (l->header.function_table.size != sizeof table)
-        return refuse(l, ERR_SIZE_MISMATCH, "Function table has %u bytes, not %u.",
-                      U(l->header.function_table.size), U(sizeof table));
-    result = read_image(l, l->header.function_table.offset, table, sizeof table);
-    if (result != ERR_OK)
-        return result;
-    for (i = 0; i < CDL_FUNCTION_COUNT; i++) {
-        l->image->entry[i] = IMAGE_NO_ENTRY;
-        if (table[i].area == APP_AREA_NONE)
-            continue;
-        if (i >= CDL_FUNCTION_RELOC)
-            return refuse(l, ERR_NOT_SUPPORTED, "Function %u is not supported.",
-                          U(i));
-        if (!is_code(l, table[i].area, table[i].offset))
-            return refuse(l, ERR_INVALID_REFERENCE, "Function %u lies outside the code.", U(i));
-        l->image->entry[i] = table[i].offset;
-    }
-    return ERR_OK;
-}
-
-/*
- * Reads the NUL-terminated name at `offset` of a table that ends at `end`. *next: where the next entry starts. False when
- * it is empty, not terminated, too long or not plain text.
- */
-static bool read_name(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 end, char name[APP_NAME_SIZE], RTS_UI32 *next)
-{
-    RTS_UI32 length;
-
-    for (length = 0; length < APP_NAME_SIZE && offset + length < end; length++) {
-        if (SysFileRead(file, offset + length, &name[length], 1) != ERR_OK)
-            return false;
-        if (name[length] == '\0') {
-            *next = align4(offset + length + 1);
-            return length > 0;
-        }
-        if (name[length] < '!' || name[length] > '~')
-            return false;
-    }
-    return false;
-}
-
-/* What is wrong with an import, as words for the refusal; NULL when nothing is. */
-static const char *find_import(const EXT_REF_INFO *ref, const char *name, RTS_RESULT *result)
-{
-    const CMP_EXT_FUNCTION *found = CMFindExternal(name);
-
-    if (found == NULL) {
-        *result = ERR_APP_UNRESOLVED_REFERENCE;
-        return "missing";
-    }
-    if (found->signature != ref->signature_id) {
-        *result = ERR_APP_SIGNATURE_MISMATCH;
-        return "other parameters";
-    }
-    if (found->version >> 16 != ref->version >> 16 || found->version < ref->version) {
-        *result = ERR_APP_VERSION_MISMATCH;
-        return "other version";
-    }
-    return NULL;
-}
-
-/* Adds an import that cannot be resolved to the refusal; the first one decides its result. */
-static void add_unresolved(LOADER *l, const char *name, const char *problem, RTS_RESULT result)
-{
-    APP_REFUSAL *refusal = l->refusal;
-    RTS_SIZE length = strlen(refusal->text);
-
-    if (refusal->result == ERR_OK)
-        (void)refuse(l, result, "External functions this device lacks: %s (%s)", name, problem);
-    else if (APP_REFUSAL_TEXT_SIZE > 1)
-        CMUtlsnprintf(refusal->text + length, sizeof refusal->text - length, ", %s (%s)", name, problem);
-    LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "External function %s: %s", name, problem);
-}
-
-static RTS_RESULT check_import(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
-{
-    RTS_UI32 index = l->image->import_count;
-    EXT_REF_INFO ref = {0, 0, 0, 0, 0};
-    char name[APP_NAME_SIZE];
-    const char *problem;
-    RTS_RESULT result = ERR_OK;
-
-    if (index == APP_MAX_IMPORTS)
-        return refuse(l, ERR_NOMEMORY, "More than the %u external functions possible.",
-                      U(APP_MAX_IMPORTS));
-    if (end - *offset < EXT_REF_INFO_SIZE)
-        return refuse(l, ERR_SIZE_MISMATCH, "External function table ends within entry %u.", U(index));
-    result = read_image(l, *offset, &ref, EXT_REF_INFO_SIZE);
-    if (result != ERR_OK)
-        return result;
-    if (!read_name(l->image->file, *offset + EXT_REF_INFO_SIZE, end, name, offset))
-        return refuse(l, ERR_PARAMETER, "Name of external function %u is empty or too long.", U(index));
-    if (ref.area != APP_AREA_NONE || ref.offset != index * sizeof(RTS_PFN))
-        return refuse(l, ERR_INVALID_REFERENCE, "External function %s is not in import slot %u.",
-                      name, U(index));
-    problem = find_import(&ref, name, &result);
-    if (problem != NULL)
-        add_unresolved(l, name, problem, result);
-    l->image->import_count++;
-    return ERR_OK;
-}
-
-static RTS_RESULT check_imports(LOADER *l)
-{
-    const CDL_SEGMENT *table = &l->header.external_function_table;
-    RTS_UI32 end = table->offset + table->size;
-    RTS_UI32 offset = table->offset;
-
-    l->image->imports = offset;
-    while (table->size > 0 && offset < end) {
-        RTS_RESULT result = check_import(l, &offset, end);
-        if (result != ERR_OK)
-            return result;
-    }
-    return l->refusal->result;
-}
-
-static RTS_RESULT check_iec_functions(LOADER *l)
-{
-    const CDL_SEGMENT *table = &l->header.iec_function_table;
-    RTS_UI32 end = table->offset + table->size;
-    RTS_UI32 offset = table->offset;
-    char name[APP_NAME_SIZE];
-    FUNCTION_INFO info;
-
-    while (SRV_INFORMATION && table->size > 0 && offset < end) {
-        RTS_RESULT result;
-        if (end - offset < sizeof info)
-            return refuse(l, ERR_SIZE_MISMATCH, "IEC function table ends within an entry.");
-        result = read_image(l, offset, &info, sizeof info);
-        if (result != ERR_OK)
-            return result;
-        if (!read_name(l->image->file, offset + (RTS_UI32)sizeof info, end, name, &offset))
-            return refuse(l, ERR_PARAMETER, "Name in the IEC function table is bad.");
-        if (!is_code(l, info.area, info.offset))
-            return refuse(l, ERR_INVALID_REFERENCE, "IEC function %s lies outside the code.", name);
-    }
-    return ERR_OK;
-}
-
-/* ---- application info ---- */
-
-/* Finds the end of the string at `offset`; false when it is not terminated before `end`. */
-static bool skip_string(RTS_UI32 file, RTS_UI32 *offset, RTS_UI32 end)
-{
-    char c = 1;
-
-    while (*offset < end && SysFileRead(file, *offset, &c, 1) == ERR_OK) {
-        ++*offset;
-        if (c == '\0') {
-            *offset = align4(*offset);
-            return true;
-        }
-    }
-    return false;
-}
-
-static RTS_RESULT check_info(LOADER *l)
-{
-    const CDL_SEGMENT *info = &l->header.application_info;
-    RTS_UI32 end = info->offset + info->size;
-    RTS_UI32 offset = info->offset;
-    RTS_UI32 i;
-
-    for (i = 0; SRV_INFORMATION && i < IMAGE_INFO_COUNT && info->size > 0 && offset < end; i++) {
-        if (!skip_string(l->image->file, &offset, end))
-            return refuse(l, ERR_PARAMETER, "Application info %u is not terminated.", U(i));
-    }
-    l->image->info = *info;
-    return ERR_OK;
-}
-
-void AppLoaderReadInfo(const APP_IMAGE *image, RTS_UI32 index, char *text, RTS_SIZE size)
-{
-    RTS_UI32 end = image->info.offset + image->info.size;
-    RTS_UI32 offset = image->info.offset;
-    RTS_SIZE length = 0;
-
-    while (index > 0 && skip_string(image->file, &offset, end))
-        index--;
-    if (index == 0) {
-        while (length + 1 < size && offset < end && SysFileRead(image->file, offset, &text[length], 1) == ERR_OK &&
-               text[length] != '\0') {
-            length++;
-            offset++;
-        }
-    }
-    text[length] = '\0';
-}
-
-/* ---- blobs: tasks, retain layout ---- */
-
-static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
-{
-    const char *name = task->name;
-
-    if (name[0] == '\0' || memchr(name, '\0', sizeof task->name) == NULL)
-        return refuse(l, ERR_PARAMETER, "Task %u has no name.", U(l->image->task_count));
-    if (task->kind > KIND_FREEWHEELING)
-        return refuse(l, ERR_NOT_SUPPORTED, "Task %s has the unknown kind %u.", name, U(task->kind));
-    if (task->priority > 31)
-        return refuse(l, ERR_OUT_OF_LIMITS, "Task %s has priority %u, above 31.", name, U(task->priority));
-    if (task->kind == KIND_CYCLIC && task->interval_us == 0)
-        return refuse(l, ERR_PARAMETER, "Cyclic task %s has no interval.", name);
-    if (task->entry_offset >= l->image->code.size)
-        return refuse(l, ERR_INVALID_REFERENCE, "Task %s lies outside the code.", name);
-    if (task->kind == KIND_EVENT &&
-        (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
-        return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s lies outside its area.", name);
-    return ERR_OK;
-}
-
-static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
-{
-    CDL_TASK task;
-    RTS_RESULT result = ERR_OK;
-
-    if (l->image->task_count != 0)
-        return refuse(l, ERR_DUPLICATE, "The image has two lists of tasks.");
-    if (size % sizeof(CDL_TASK) != 0)
-        return refuse(l, ERR_SIZE_MISMATCH, "Task list of %u bytes has a part of an entry.", U(size));
-    if (size / sizeof(CDL_TASK) > APP_MAX_TASKS)
-        return refuse(l, ERR_NOMEMORY, "The application has %u tasks, this device can run %u.",
-                      U(size / sizeof(CDL_TASK)), U(APP_MAX_TASKS));
-    l->image->tasks = offset;
-    for (; size > 0 && result == ERR_OK; size -= (RTS_UI32)sizeof task) {
-        result = read_image(l, offset, &task, sizeof task);
-        if (result == ERR_OK)
-            result = check_task(l, &task);
-        l->image->task_count++;
-        offset += (RTS_UI32)sizeof task;
-    }
-    return result;
-}
-
-static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 offset, RTS_UI32 size)
-{
-    if (size != sizeof l->image->retain_layout)
-        return refuse(l, ERR_SIZE_MISMATCH, "Retain layout has %u bytes, not 4.", U(size));
-    return read_image(l, offset, &l->image->retain_layout, size);
-}
-
-static RTS_RESULT check_blob(LOADER *l, RTS_UI32 *offset, RTS_UI32 end)
-{
-    CDL_BLOB blob;
-    RTS_UI32 payload = *offset + (RTS_UI32)sizeof blob;
-    RTS_RESULT result;
-
-    if (end - *offset < sizeof blob)
-        return refuse(l, ERR_SIZE_MISMATCH, "Blob segment ends within a head.");
-    result = read_image(l, *offset, &blob, sizeof blob);
-    if (result != ERR_OK)
-        return result;
-    if (blob.magic != (RTS_UI32)CDL_BLOB_MAGIC)
-        return refuse(l, ERR_TYPE_MISMATCH, "There is no blob at offset %u.", U(*offset));
-    if (blob.size > end - payload)
-        return refuse(l, ERR_OUT_OF_LIMITS, "Blob %u ends beyond its segment.", U(blob.id));
-    *offset = align4(payload + blob.size);
-    if (blob.id == CDL_BLOB_TASKS)
-        return check_tasks(l, payload, blob.size);
-    if (blob.id == CDL_BLOB_RETAIN)
-        return check_retain_layout(l, payload, blob.size);
-    return ERR_OK; /* of a newer tool, and not needed to run */
-}
-
-static RTS_RESULT check_blobs(LOADER *l)
-{
-    const CDL_SEGMENT *blobs = &l->header.blob;
-    RTS_UI32 end = blobs->offset + blobs->size;
-    RTS_UI32 offset = blobs->offset;
-    RTS_RESULT result = ERR_OK;
-
-    l->image->retain_layout = l->image->crc;
-    while (blobs->size > 0 && offset < end && result == ERR_OK)
-        result = check_blob(l, &offset, end);
-    if (result == ERR_OK && l->image->task_count == 0)
-        return refuse(l, ERR_NO_OBJECT, "The application has no task.");
-    return result;
+    return LoaderCheckEntries(l, SEGMENT_AREAS, check_area);
 }
 
 RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE *image, APP_REFUSAL *refusal)
 {
     static const CHECK checks[] = {
         check_header,    check_crc,     check_target,        check_segments, check_code,  check_areas,
-        check_functions, check_imports, check_iec_functions, check_info,     check_blobs,
+        LoaderCheckFunctions, LoaderCheckImports, LoaderCheckIecFunctions, LoaderCheckInfo,     LoaderCheckBlobs,
     };
     LOADER l;
     RTS_RESULT result = ERR_OK;
     RTS_SIZE i;
 
     memset(image, 0, sizeof *image);
-    memset(refusal, 0, sizeof *refusal);
+    memset(&l, 0, sizeof l);
+    refusal->text[0] = '\0';
     image->file = file;
     image->size = size;
     image->crc = crc;
@@ -537,21 +245,4 @@ RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE 
     for (i = 0; i < RTS_COUNT(checks) && result == ERR_OK; i++)
         result = checks[i](&l);
     return result;
-}
-
-RTS_RESULT AppLoaderRead(const APP_IMAGE *image, APP_TABLES *tables)
-{
-    RTS_UI32 offset = image->imports;
-    char name[APP_NAME_SIZE];
-    RTS_UI32 i;
-
-    for (i = 0; i < image->import_count; i++) {
-        const CMP_EXT_FUNCTION *found = NULL;
-        if (read_name(image->file, offset + EXT_REF_INFO_SIZE, image->size, name, &offset))
-            found = CMFindExternal(name);
-        if (found == NULL)
-            return ERR_DEVICE;
-        tables->imports[i] = found->function;
-    }
-    return SysFileRead(image->file, image->tasks, tables->tasks, image->task_count * (RTS_UI32)sizeof(CDL_TASK));
 }

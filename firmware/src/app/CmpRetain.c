@@ -39,6 +39,8 @@ RTS_UI32 RetainCapacity(void)
 
 void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout)
 {
+    if (!HAS_RETAIN)
+        return;
     retain.area = area;
     retain.size = size;
     retain.layout = layout;
@@ -48,7 +50,7 @@ void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout)
 
 RTS_UI32 RetainGetSequence(void)
 {
-    return retain.log.sequence;
+    return HAS_RETAIN ? retain.log.sequence : 0;
 }
 
 RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until)
@@ -113,6 +115,18 @@ RTS_RESULT RetainSave(bool always)
     return save_copy();
 }
 
+void RetainKeep(RTS_UI32 until)
+{
+    if (HAS_RETAIN)
+        (void)FlashLogKeep(&retain.log, until);
+}
+
+void RetainKeepNone(void)
+{
+    if (HAS_RETAIN)
+        FlashLogKeepNone(&retain.log);
+}
+
 static void save_when_due(void)
 {
     enum { TRIES = 4 };
@@ -151,7 +165,7 @@ RTS_RESULT CmpRetain_Hook(CMP_HOOK hook)
     if (!HAS_RETAIN)
         return ERR_OK;
     if (hook == CH_INIT)
-        memset(&retain, 0, sizeof retain);
+        CMP_CLEAR(retain);
     if (hook == CH_INIT2)
         open_log();
     if (hook == CH_COMM_CYCLE)

@@ -5,21 +5,12 @@
  */
 #include "CmpAppSrv.h"
 
-#include <string.h>
-
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
 #include "CmpIecTask.h"
 #include "CmpSrv.h"
 #include "SysExcept.h"
 #include "rts_config.h"
-
-/* The download under way; it outlives channels so that a broken transfer can continue. */
-static struct {
-    RTS_UI32 total;
-    RTS_UI32 crc;
-    bool active;
-} transfer;
 
 /* ---- login ---- */
 
@@ -137,7 +128,7 @@ static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static void write_exception(BTAG_WRITER *reply, const APP_EXCEPTION *exception)
 {
-    if (exception->code != RTSEXCPT_NOEXCEPTION && exception->code_offset != 0xFFFFFFFF) {
+    if (exception->code != RTSEXCPT_NOEXCEPTION && exception->code_offset != APP_NO_CODE_OFFSET) {
         BTagOpen(reply, TAG_APP_EXECUTION_POSITION, BTAG_ALIGN_2);
         BTagAppend16(reply, APP_AREA_CODE);
         BTagAppend32(reply, exception->code_offset);
@@ -302,7 +293,7 @@ static bool is_installed(const DOWNLOAD_BLOCK *block)
 
 static bool is_under_way(const DOWNLOAD_BLOCK *block)
 {
-    return transfer.active && transfer.total == block->total && transfer.crc == block->crc;
+    return AppDownloadIsOf(block->total, block->crc);
 }
 
 static RTS_UI32 bytes_received(const DOWNLOAD_BLOCK *block)
@@ -310,16 +301,6 @@ static RTS_UI32 bytes_received(const DOWNLOAD_BLOCK *block)
     if (is_under_way(block))
         return AppDownloadOffset();
     return is_installed(block) ? block->total : 0;
-}
-
-static RTS_RESULT begin(const DOWNLOAD_BLOCK *block)
-{
-    RTS_RESULT result = AppDownloadBegin(block->total, block->crc);
-
-    transfer.active = result == ERR_OK;
-    transfer.total = block->total;
-    transfer.crc = block->crc;
-    return result;
 }
 
 /* Writes what of the block is new. Parts that are there already are a repetition after a lost reply. */
@@ -333,10 +314,8 @@ static RTS_RESULT write_new_part(const DOWNLOAD_BLOCK *block)
     if (known >= block->size)
         return ERR_OK;
     RTS_RESULT result = AppDownloadWrite(next, block->data + known, block->size - known);
-    if (result != ERR_OK) {
+    if (result != ERR_OK)
         AppDownloadAbort();
-        transfer.active = false;
-    }
     return result;
 }
 
@@ -347,7 +326,7 @@ static RTS_RESULT take_block(const DOWNLOAD_BLOCK *block)
     if (block->offset > block->total || block->size > block->total - block->offset)
         return ERR_OUT_OF_LIMITS;
     if (block->offset == 0 && (block->flags & DLF_CONTINUEDOWNLOAD) == 0)
-        result = begin(block);
+        result = AppDownloadBegin(block->total, block->crc);
     if (result != ERR_OK)
         return result;
     if (!is_under_way(block))
@@ -368,10 +347,8 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
     if (block.size != 0)
         result = take_block(&block);
     RTS_UI32 next = bytes_received(&block);
-    if (result == ERR_OK && is_under_way(&block) && next == block.total) {
-        transfer.active = false;
+    if (result == ERR_OK && is_under_way(&block) && next == block.total)
         result = AppDownloadEnd(&refusal);
-    }
     BTagWrite16(reply, TAG_SERVICE_RESULT, result);
     BTagWrite32(reply, TAG_CDL_NEXT, next);
     if (APP_REFUSAL_TEXT_SIZE > 1 && result != ERR_OK && refusal.text[0] != '\0')
@@ -397,9 +374,5 @@ static const SRV_SERVICE services[] = {
 
 RTS_RESULT CmpAppSrv_Hook(CMP_HOOK hook)
 {
-    if (hook == CH_INIT)
-        memset(&transfer, 0, sizeof(transfer));
-    if (hook == CH_INIT3)
-        return SrvRegisterGroup(SG_APPLICATION, services, RTS_COUNT(services));
-    return ERR_OK;
+    return hook == CH_INIT3 ? SrvRegisterGroup(SG_APPLICATION, services, RTS_COUNT(services)) : ERR_OK;
 }

@@ -71,6 +71,6 @@ RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry)
 RTS_RESULT CmpLog_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT_SYSTEM)
-        memset(&logger, 0, sizeof logger);
+        CMP_CLEAR(logger);
     return ERR_OK;
 }

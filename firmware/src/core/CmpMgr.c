@@ -20,75 +20,52 @@ static struct {
     RTS_SIZE table_count;
 } manager;
 
-/* A step of the start-up and what undoes it. */
-typedef struct {
-    CMP_HOOK init;
-    CMP_HOOK exit;
-} STEP;
-
-static const STEP steps[] = {
-    {CH_INIT_SYSTEM, CH_EXIT_SYSTEM},
-    {CH_INIT_SYSTEM2, CH_EXIT_SYSTEM2},
-    {CH_INIT, CH_EXIT},
-    {CH_INIT2, CH_EXIT2},
-    {CH_INIT3, CH_EXIT3},
-    {CH_INIT_SYSTEM_TASKS, CH_EXIT_SYSTEM_TASKS},
-    {CH_INIT_TASKS, CH_EXIT_TASKS},
-    {CH_INIT_COMM, CH_EXIT_COMM},
-};
-
-/* Calls the exit hook of step `step` for the first `count` components, last one first. */
-static void undo_step(RTS_SIZE step, RTS_SIZE count)
+/*
+ * Start-up is a row of calls: each hook before CH_INIT_FINISHED for each component, the components of a hook in the order of
+ * the list. Shutdown is the same row backwards, with the hooks that undo.
+ */
+static RTS_SIZE row_length(void)
 {
-    while (count > 0)
-        (void)cmp_components[--count].hook(steps[step].exit);
+    return CH_INIT_FINISHED * cmp_component_count;
 }
 
-static void undo_all(RTS_SIZE step_count)
+static RTS_RESULT do_call(RTS_SIZE place)
 {
-    while (step_count > 0)
-        undo_step(--step_count, cmp_component_count);
+    return cmp_hooks[place % cmp_component_count]((CMP_HOOK)(place / cmp_component_count));
 }
 
-static RTS_RESULT do_step(RTS_SIZE step)
+/* Undoes the first `count` calls of the row, the last one first. */
+static void undo(RTS_SIZE count)
 {
-    RTS_SIZE i;
-    RTS_RESULT result;
-
-    for (i = 0; i < cmp_component_count; i++) {
-        result = cmp_components[i].hook(steps[step].init);
-        if (result != ERR_OK) {
-            LogAdd(CMPID_CmpMgr, LOG_ERROR, result, "Start-up failed in %s, step %u", cmp_components[i].name,
-                   (unsigned)step);
-            undo_step(step, i);
-            return result;
-        }
-    }
-    return ERR_OK;
+    while (count-- > 0)
+        (void)cmp_hooks[count % cmp_component_count]((CMP_HOOK)(CH_EXIT_SYSTEM - count / cmp_component_count));
 }
+
+RTS_STATIC_ASSERT((int)CH_EXIT_SYSTEM - (int)CH_INIT_COMM == (int)CH_EXIT_COMM, exit_hooks_mirror_init_hooks);
 
 RTS_RESULT CMInit(void)
 {
-    RTS_SIZE step;
-    RTS_RESULT result;
+    RTS_SIZE done;
+    RTS_RESULT result = ERR_OK;
 
-    memset(&manager, 0, sizeof manager);
-    for (step = 0; step < RTS_COUNT(steps); step++) {
-        result = do_step(step);
-        if (result != ERR_OK) {
-            undo_all(step);
-            return result;
-        }
+    CMP_CLEAR(manager);
+    for (done = 0; done < row_length() && result == ERR_OK; done++)
+        result = do_call(done);
+    if (result != ERR_OK) {
+        done--; /* the one that failed has undone what it did itself */
+        LogAdd(CMPID_CmpMgr, LOG_ERROR, result, "Start-up failed in %s, step %u",
+               cmp_names[done % cmp_component_count].name, (unsigned)(done / cmp_component_count));
+    } else {
+        result = CMCallHook(CH_INIT_FINISHED);
     }
-    result = CMCallHook(CH_INIT_FINISHED);
     if (result != ERR_OK)
-        undo_all(RTS_COUNT(steps));
+        undo(done);
     return result;
 }
 
 RTS_RESULT CMExit(void)
 {
-    undo_all(RTS_COUNT(steps));
+    undo(row_length());
     return ERR_OK;
 }
 
@@ -98,7 +75,7 @@ RTS_RESULT CMCallHook(CMP_HOOK hook)
     RTS_SIZE i;
 
     for (i = 0; i < cmp_component_count; i++) {
-        RTS_RESULT result = cmp_components[i].hook(hook);
+        RTS_RESULT result = cmp_hooks[i](hook);
         if (first == ERR_OK)
             first = result;
     }
@@ -112,8 +89,8 @@ const char *CMGetComponentName(RTS_UI32 id)
     if (id == CMPID_CmpMgr)
         return "CmpMgr";
     for (i = 0; i < cmp_component_count; i++) {
-        if (cmp_components[i].id == id)
-            return cmp_components[i].name;
+        if (cmp_names[i].id == id)
+            return cmp_names[i].name;
     }
     return "";
 }

@@ -22,16 +22,26 @@ RTS_STATIC_ASSERT(sizeof(RECORD_HEAD) == FLASH_LOG_HEAD_SIZE, record_head_size);
 
 enum { RECORD_MAGIC = 0x474F4C52 };
 
-/* What a scan looks for and what it finds. */
+/* The records a scan looks for. */
 typedef struct {
-    bool any; /* any record, or only one of the range with this tag and size */
     FLASH_LOG_RANGE range;
+    bool any_kind; /* of any tag and size */
     RTS_UI32 tag;
     RTS_UI32 size;
-    bool found;
+} WANTED;
+
+/* The newest of them. */
+typedef struct {
+    bool any;
     RTS_UI32 sequence;
     RTS_UI32 position; /* in the file */
-} SEARCH;
+    RTS_UI32 end;      /* of all records in its half, half written ones included */
+} FOUND;
+
+static RTS_UI32 half_size(const FLASH_LOG *log)
+{
+    return SysFileGetArea(log->file)->size / 2;
+}
 
 static RTS_UI32 record_length(RTS_UI32 size)
 {
@@ -51,64 +61,66 @@ static RTS_UI32 head_crc(const RECORD_HEAD *head)
 static bool data_is_valid(RTS_UI32 file, RTS_UI32 position, const RECORD_HEAD *head)
 {
     RTS_UI32 crc = head_crc(head);
-    RTS_UI32 done = 0;
-    RTS_UI8 part[64];
 
-    while (done < head->size) {
-        RTS_UI32 count = head->size - done < sizeof part ? head->size - done : (RTS_UI32)sizeof part;
-        if (SysFileRead(file, position + FLASH_LOG_HEAD_SIZE + done, part, count) != ERR_OK)
-            return false;
-        crc = CRC32Update(crc, part, count);
-        done += count;
-    }
-    return crc == head->crc;
+    return SysFileCRC32(file, position + FLASH_LOG_HEAD_SIZE, head->size, &crc) == ERR_OK && crc == head->crc;
 }
 
-static bool is_wanted(const SEARCH *search, const RECORD_HEAD *head)
+static bool is_wanted(const WANTED *wanted, const RECORD_HEAD *head)
 {
-    return search->any || (head->tag == search->tag && head->size == search->size &&
-                           is_newer(head->sequence, search->range.after) &&
-                           !is_newer(head->sequence, search->range.until));
+    if (wanted == NULL)
+        return true;
+    return is_newer(head->sequence, wanted->range.after) && !is_newer(head->sequence, wanted->range.until) &&
+           (wanted->any_kind || (head->tag == wanted->tag && head->size == wanted->size));
 }
 
-static void note(SEARCH *search, const RECORD_HEAD *head, RTS_UI32 position)
+static void note(FOUND *found, const RECORD_HEAD *head, RTS_UI32 position)
 {
-    if (!is_wanted(search, head))
+    if (found->any && !is_newer(head->sequence, found->sequence))
         return;
-    if (search->found && !is_newer(head->sequence, search->sequence))
-        return;
-    search->found = true;
-    search->sequence = head->sequence;
-    search->position = position;
+    found->any = true;
+    found->sequence = head->sequence;
+    found->position = position;
 }
 
-/*
- * Looks at the records of the half at `start`. *end: the place after the last one, half written ones included. A
- * record that was cut off may reach as far as its head says, though the bytes look erased.
- */
-static RTS_RESULT scan_half(const FLASH_LOG *log, RTS_UI32 start, SEARCH *search, RTS_UI32 *end)
+/* Looks at the records of the half at `start`. One that was cut off may reach as far as its head says, though the bytes
+ * look erased. */
+static RTS_RESULT scan_half(const FLASH_LOG *log, RTS_UI32 start, const WANTED *wanted, FOUND *found)
 {
+    RTS_UI32 size = half_size(log);
     RTS_UI32 offset = 0;
+    RTS_UI32 end = 0;
     RECORD_HEAD head;
 
-    *end = 0;
-    while (log->half_size - offset >= FLASH_LOG_HEAD_SIZE) {
+    while (size - offset >= FLASH_LOG_HEAD_SIZE) {
         RTS_RESULT result = SysFileRead(log->file, start + offset, &head, sizeof head);
         RTS_UI32 step = FILE_ALIGN;
         if (result != ERR_OK)
             return result;
-        if (head.magic == RECORD_MAGIC && head.size <= log->half_size - offset - FLASH_LOG_HEAD_SIZE) {
+        if (head.magic == RECORD_MAGIC && head.size <= size - offset - FLASH_LOG_HEAD_SIZE) {
             RTS_UI32 length = record_length(head.size);
-            if (offset + length > *end)
-                *end = offset + length;
+            if (offset + length > end)
+                end = offset + length;
             if (data_is_valid(log->file, start + offset, &head)) {
-                note(search, &head, start + offset);
+                if (is_wanted(wanted, &head))
+                    note(found, &head, start + offset);
                 step = length;
             }
         }
         offset += step;
     }
+    if (found->any && found->position >= start)
+        found->end = end;
     return ERR_OK;
+}
+
+/* Finds the newest wanted record, of all records when `wanted` is NULL. */
+static RTS_RESULT scan(const FLASH_LOG *log, const WANTED *wanted, FOUND *found)
+{
+    RTS_RESULT result;
+
+    memset(found, 0, sizeof *found);
+    result = scan_half(log, 0, wanted, found);
+    return result == ERR_OK ? scan_half(log, half_size(log), wanted, found) : result;
 }
 
 static bool is_erased(const RTS_UI8 *data, RTS_UI32 size)
@@ -123,7 +135,7 @@ static bool is_erased(const RTS_UI8 *data, RTS_UI32 size)
 /* The place after the last byte that is not erased, but not before `end`. */
 static RTS_UI32 skip_garbage(const FLASH_LOG *log, RTS_UI32 end)
 {
-    RTS_UI32 offset = log->half_size;
+    RTS_UI32 offset = half_size(log);
     RTS_UI8 part[FILE_ALIGN];
 
     while (offset > end && SysFileRead(log->file, log->start + offset - FILE_ALIGN, part, sizeof part) == ERR_OK &&
@@ -134,55 +146,79 @@ static RTS_UI32 skip_garbage(const FLASH_LOG *log, RTS_UI32 end)
 
 RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file)
 {
-    SEARCH search = {true, {0, 0}, 0, 0, false, 0, 0};
-    RTS_UI32 end[2];
-    RTS_UI32 half;
-    RTS_RESULT result;
+    FOUND found;
 
     memset(log, 0, sizeof *log);
     log->file = file;
-    log->half_size = SysFileGetArea(file)->size / 2;
-    log->used = log->half_size; /* without a record the first one erases its half */
-    for (half = 0; half < 2; half++) {
-        result = scan_half(log, half * log->half_size, &search, &end[half]);
-        if (result != ERR_OK)
-            return result;
-    }
-    if (search.found) {
-        half = search.position / log->half_size;
-        log->start = half * log->half_size;
-        log->sequence = search.sequence;
-        log->used = skip_garbage(log, end[half]);
-    }
+    log->kept = FLASH_LOG_NONE;
+    log->used = half_size(log); /* without a record the first one erases its half */
+    log->opened = scan(log, NULL, &found);
+    if (log->opened != ERR_OK || !found.any)
+        return log->opened;
+    if (found.position >= half_size(log))
+        log->start = half_size(log);
+    log->newest = found.position;
+    log->sequence = found.sequence;
+    log->used = skip_garbage(log, found.end);
     return ERR_OK;
+}
+
+RTS_RESULT FlashLogReadNewest(const FLASH_LOG *log, RTS_UI32 tag, void *data, RTS_UI32 size)
+{
+    RECORD_HEAD head;
+    RTS_RESULT result = SysFileRead(log->file, log->newest, &head, sizeof head);
+
+    if (result != ERR_OK)
+        return result;
+    if (log->sequence == 0 || head.tag != tag || head.size != size)
+        return ERR_NO_OBJECT;
+    return SysFileRead(log->file, log->newest + FLASH_LOG_HEAD_SIZE, data, size);
 }
 
 RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size)
 {
-    SEARCH search = {false, range, tag, size, false, 0, 0};
-    RTS_UI32 end;
-    RTS_RESULT result = scan_half(log, 0, &search, &end);
+    const WANTED wanted = {range, false, tag, size};
+    FOUND found;
+    RTS_RESULT result = scan(log, &wanted, &found);
 
-    if (result == ERR_OK)
-        result = scan_half(log, log->half_size, &search, &end);
     if (result != ERR_OK)
         return result;
-    if (!search.found)
+    if (!found.any)
         return ERR_NO_OBJECT;
-    return SysFileRead(log->file, search.position + FLASH_LOG_HEAD_SIZE, data, size);
+    return SysFileRead(log->file, found.position + FLASH_LOG_HEAD_SIZE, data, size);
+}
+
+RTS_RESULT FlashLogKeep(FLASH_LOG *log, RTS_UI32 until)
+{
+    const WANTED wanted = {{until - 0x7FFFFFFF, until}, true, 0, 0};
+    FOUND found;
+    RTS_RESULT result = scan(log, &wanted, &found);
+
+    FlashLogKeepNone(log);
+    if (result == ERR_OK && found.any)
+        log->kept = found.position < half_size(log) ? 0 : half_size(log);
+    return result;
+}
+
+void FlashLogKeepNone(FLASH_LOG *log)
+{
+    log->kept = FLASH_LOG_NONE;
 }
 
 /* Makes room for `length` bytes: in this half, or by changing over to the other. */
 static RTS_RESULT make_room(FLASH_LOG *log, RTS_UI32 length)
 {
-    RTS_UI32 other = log->start == 0 ? log->half_size : 0;
+    RTS_UI32 size = half_size(log);
+    RTS_UI32 next = log->start == 0 ? size : 0;
     RTS_RESULT result;
 
-    if (length <= log->half_size - log->used)
+    if (length <= size - log->used)
         return ERR_OK;
-    result = SysFileErase(log->file, other, log->half_size);
+    if (next == log->kept)
+        next = log->start;
+    result = SysFileErase(log->file, next, size);
     if (result == ERR_OK) {
-        log->start = other;
+        log->start = next;
         log->used = 0;
     }
     return result;
@@ -203,25 +239,29 @@ static RTS_RESULT write_record(RTS_UI32 file, RTS_UI32 position, const RECORD_HE
 
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size)
 {
-    RECORD_HEAD head = {RECORD_MAGIC, ++log->sequence, tag, size, 0};
+    RECORD_HEAD head = {RECORD_MAGIC, log->sequence + 1, tag, size, 0};
     RTS_UI32 position;
-    RTS_RESULT result;
+    RTS_RESULT result = log->opened;
 
     if (size > FlashLogCapacity(log))
-        return ERR_DISK_FULL;
-    result = make_room(log, record_length(size));
+        result = ERR_DISK_FULL;
+    if (result == ERR_OK)
+        result = make_room(log, record_length(size));
     if (result != ERR_OK)
         return result;
     head.crc = CRC32Update(head_crc(&head), data, size);
     position = log->start + log->used;
     log->used += record_length(size); /* also when it fails: nothing is programmed twice */
+    log->sequence++;
     result = write_record(log->file, position, &head, data);
-    if (data_is_valid(log->file, position, &head))
-        return ERR_OK; /* whatever failed: from now on this record is the newest */
+    if (data_is_valid(log->file, position, &head)) {
+        log->newest = position; /* whatever failed: from now on */
+        return ERR_OK;
+    }
     return result != ERR_OK ? result : (RTS_RESULT)ERR_DEVICE;
 }
 
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log)
 {
-    return log->half_size - FLASH_LOG_HEAD_SIZE;
+    return half_size(log) - FLASH_LOG_HEAD_SIZE;
 }

@@ -262,7 +262,7 @@ def _source(name: str, header: str, functions: list[Pou]) -> str:
         f"    {name.upper()}_EXT_FUNCTIONS",
         "};",
         "",
-        "/* Add CMP_DECLARE and CMP_ENTRY of the component to the port's list, and this file to its sources. */",
+        f"/* Add the component to the port's cmp_list.c, with a number CMPID_{name}, and this file to its sources. */",
         f"RTS_RESULT {name}_Hook(CMP_HOOK hook);",
         f"RTS_RESULT {name}_Hook(CMP_HOOK hook)",
         "{",

@@ -14,6 +14,9 @@ void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
 /* The runtime has one core: interrupts and main see each other's writes in order, so only the compiler has to keep it. */
 #define RTS_ONE_CORE
 
+/* startup.c clears all variables, and whatever ends the runtime is a reset. */
+#define RTS_STARTS_ONCE 1
+
 #define APP_ENTRY_MODE_BIT 1
 #define APP_CALL_ENTRY(entry, context) IecCall((uintptr_t)(entry), (context), 0)
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((uintptr_t)(entry), (context), (init_retains))

@@ -26,7 +26,4 @@
     X(CmpChannelServerEmbedded)                                                                                        \
     X(CmpBlkDrvSimpleCom)
 
-COMPONENTS(CMP_DECLARE)
-
-const CMP_COMPONENT cmp_components[] = {COMPONENTS(CMP_ENTRY)};
-const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_components);
+CMP_LIST(COMPONENTS);

@@ -1,0 +1,54 @@
+/*
+ * App.h - the loaded application, for the parts CmpAppEmbedded is made of.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * CmpAppEmbedded.c is its life: load, start, stop, reset, exceptions. AppDownload.c puts another one in its place, AppBoot.c
+ * loads what is in flash; both call the life. All from main.
+ */
+#ifndef APP_H
+#define APP_H
+
+#include "AppLoader.h"
+
+/* ---- life ---- */
+
+/* Slot of the loaded application, SLOT_NONE without one. */
+RTS_UI32 AppGetSlot(void);
+bool AppHasException(void);
+
+/* Makes the code of a checked image executable and returns where; NULL when the port cannot. */
+const RTS_UI8 *AppMapCode(const APP_IMAGE *image);
+
+/* Takes over a checked image with its code mapped at `code`, when nothing is loaded. Retain variables come from a record
+ * up to number `retain_until`. The application is in AS_STOP then, perhaps with an exception. */
+RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until);
+void AppUnload(void);
+
+/* Starts the loaded application. `died_before`: starts of an unproven one that were not ended in good order. */
+RTS_RESULT AppStart(RTS_UI32 died_before);
+
+/* Stops the tasks; true when they ran. */
+bool AppStopTasks(void);
+
+/* Completes what AppHandleException has begun. */
+void AppHandlePendingException(void);
+
+void AppPostEvent(RTS_UI32 event);
+
+/* ---- download ---- */
+
+bool AppDownloadIsOpen(void);
+
+/* ---- boot project ---- */
+
+/* Loads and starts what is in flash. */
+void AppBoot(void);
+
+/*
+ * Loads the other slot instead of `failed`, from now on; false when it holds nothing that can run. Its retain variables
+ * are those it had when the failed application came.
+ */
+bool AppRollBack(RTS_UI32 failed);
+
+#endif

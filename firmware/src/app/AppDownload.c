@@ -1,0 +1,134 @@
+/*
+ * AppDownload.c - the way of a new application into the device.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * An image is written to the idle slot, checked there, mapped, committed (from here on it is what boots), and only then is the
+ * old application stopped and this one loaded.
+ */
+#include "App.h"
+#include "AppCommit.h"
+#include "CmpLog.h"
+#include "CmpRetain.h"
+#include "SysFileFlash.h"
+#include "SysFlash.h"
+
+static struct {
+    bool open;
+    RTS_UI32 slot;
+    RTS_UI32 size;
+    RTS_UI32 crc;
+} download;
+
+RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
+{
+    RTS_UI32 slot = AppCommitOtherSlot(AppGetSlot());
+
+    AppDownloadAbort();
+    if (total_size > SysFileGetArea(slot)->size)
+        return ERR_NOMEMORY;
+    download.open = true;
+    download.slot = slot;
+    download.size = total_size;
+    download.crc = image_crc;
+    SysFileCreate(slot);
+    return ERR_OK;
+}
+
+RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_RESULT result;
+
+    if (!download.open || offset != SysFileGetPos(download.slot))
+        return ERR_INVALID_SEQUENCE;
+    if (size > download.size - offset)
+        return ERR_OUT_OF_LIMITS;
+    result = SysFileWrite(download.slot, data, size);
+    if (result != ERR_OK)
+        AppDownloadAbort();
+    return result;
+}
+
+RTS_UI32 AppDownloadOffset(void)
+{
+    return download.open ? SysFileGetPos(download.slot) : 0;
+}
+
+bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc)
+{
+    return download.open && download.size == total_size && download.crc == image_crc;
+}
+
+bool AppDownloadIsOpen(void)
+{
+    return download.open;
+}
+
+void AppDownloadAbort(void)
+{
+    download.open = false;
+}
+
+/* Goes back to the application that ran until now. */
+static void put_back(RTS_UI32 failed_slot, bool ran)
+{
+    if (AppRollBack(failed_slot) && ran && !AppHasException())
+        (void)AppStart(0);
+}
+
+/* The checked image takes the place of the old application. */
+static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
+{
+    const RTS_UI8 *code = AppMapCode(image);
+    RTS_UI32 retain_after = RetainGetSequence() + 1; /* stopping the old application may write one more record */
+    RTS_RESULT result;
+    bool ran;
+
+    if (code == NULL)
+        return APP_REFUSE(refusal, ERR_NOMEMORY, "There is no executable memory for the code.");
+    result = AppCommitInstall(image->file, image->size, image->crc, retain_after);
+    if (result != ERR_OK) {
+        SysFlashReleaseCode(image->file);
+        return APP_REFUSE(refusal, result, "The flash cannot be written.");
+    }
+    AppPostEvent(EVT_PrepareDownload);
+    ran = AppStopTasks();
+    AppUnload();
+    result = AppLoad(image, code, retain_after);
+    if (result != ERR_OK)
+        put_back(image->file, ran);
+    AppPostEvent(EVT_DownloadDone);
+    if (result == ERR_NOMEMORY)
+        return APP_REFUSE(refusal, result, "There are not enough timers for the tasks.");
+    return result == ERR_OK ? ERR_OK : APP_REFUSE(refusal, result, "The flash cannot be read.");
+}
+
+static RTS_RESULT finish_download(APP_REFUSAL *refusal)
+{
+    APP_IMAGE image;
+    RTS_RESULT result;
+
+    if (!download.open)
+        return APP_REFUSE(refusal, ERR_INVALID_SEQUENCE, "No download has begun.");
+    if (SysFileGetPos(download.slot) != download.size)
+        return APP_REFUSE(refusal, ERR_SIZE_MISMATCH, "The image is not complete.");
+    AppDownloadAbort();
+    if (SysFileClose(download.slot) != ERR_OK)
+        return APP_REFUSE(refusal, ERR_DEVICE, "The flash cannot be written.");
+    result = AppLoaderCheck(download.slot, download.size, download.crc, &image, refusal);
+    return result == ERR_OK ? take_over(&image, refusal) : result;
+}
+
+RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
+{
+    RTS_RESULT result;
+
+    refusal->text[0] = '\0';
+    AppHandlePendingException();
+    result = finish_download(refusal);
+    if (result == ERR_OK)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application loaded, CRC 0x%x", (unsigned)download.crc);
+    else
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Download refused: %s", refusal->text);
+    return result;
+}

@@ -1,0 +1,92 @@
+/*
+ * AppTasks.c - checks the blobs of an image: tasks, layout of the retain area.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "AppChecks.h"
+
+#include <string.h>
+
+#include "CmpIecTask.h"
+
+static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
+{
+    const char *name = task->name;
+
+    if (name[0] == '\0' || memchr(name, '\0', sizeof task->name) == NULL)
+        return refuse(l, ERR_PARAMETER, "Task %u has no name.", U(l->image->task_count));
+    if (task->kind > KIND_FREEWHEELING)
+        return refuse(l, ERR_NOT_SUPPORTED, "Task %s has the unknown kind %u.", name, U(task->kind));
+    if (task->priority > 31)
+        return refuse(l, ERR_OUT_OF_LIMITS, "Task %s has priority %u, above 31.", name, U(task->priority));
+    if (task->kind == KIND_CYCLIC && task->interval_us == 0)
+        return refuse(l, ERR_PARAMETER, "Cyclic task %s has no interval.", name);
+    if (task->entry_offset >= l->image->code.size)
+        return refuse(l, ERR_INVALID_REFERENCE, "Task %s lies outside the code.", name);
+    if (task->kind == KIND_EVENT &&
+        (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
+        return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s lies outside its area.", name);
+    return ERR_OK;
+}
+
+static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)
+{
+    RTS_UI32 count = size / (RTS_UI32)sizeof(CDL_TASK);
+    CDL_TASK task;
+    RTS_RESULT result = ERR_OK;
+
+    if (l->image->task_count != 0)
+        return refuse(l, ERR_DUPLICATE, "The image has two lists of tasks.");
+    if (count * sizeof(CDL_TASK) != size)
+        return refuse(l, ERR_SIZE_MISMATCH, "Task list of %u bytes has a part of an entry.", U(size));
+    if (count > APP_MAX_TASKS)
+        return refuse(l, ERR_NOMEMORY, "The application has %u tasks, this device can run %u.", U(count),
+                      U(APP_MAX_TASKS));
+    l->image->tasks = l->offset;
+    for (; l->image->task_count < count && result == ERR_OK; l->image->task_count++) {
+        result = LoaderReadNext(l, &task, sizeof task);
+        if (result == ERR_OK)
+            result = check_task(l, &task);
+    }
+    return result;
+}
+
+static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 size)
+{
+    if (size != sizeof l->image->retain_layout)
+        return refuse(l, ERR_SIZE_MISMATCH, "Retain layout has %u bytes, not 4.", U(size));
+    return LoaderReadNext(l, &l->image->retain_layout, size);
+}
+
+static RTS_RESULT check_blob(LOADER *l)
+{
+    CDL_BLOB blob;
+    RTS_UI32 next;
+    RTS_RESULT result = LoaderReadNext(l, &blob, sizeof blob);
+
+    if (result != ERR_OK)
+        return result;
+    if (blob.magic != (RTS_UI32)CDL_BLOB_MAGIC)
+        return refuse(l, ERR_TYPE_MISMATCH, "There is no blob at offset %u.", U(l->offset - sizeof blob));
+    if (blob.size > l->end - l->offset)
+        return refuse(l, ERR_OUT_OF_LIMITS, "Blob %u ends beyond its segment.", U(blob.id));
+    next = LoaderAlign(l->offset + blob.size);
+    if (blob.id == CDL_BLOB_TASKS)
+        result = check_tasks(l, blob.size);
+    else if (blob.id == CDL_BLOB_RETAIN)
+        result = check_retain_layout(l, blob.size);
+    /* Others are of a newer tool, and not needed to run. */
+    l->offset = next;
+    return result;
+}
+
+RTS_RESULT LoaderCheckBlobs(LOADER *l)
+{
+    RTS_RESULT result;
+
+    l->image->retain_layout = l->image->crc; /* unless a blob says more */
+    result = LoaderCheckEntries(l, SEGMENT_BLOBS, check_blob);
+    if (result == ERR_OK && l->image->task_count == 0)
+        return refuse(l, ERR_NO_OBJECT, "The application has no task.");
+    return result;
+}
