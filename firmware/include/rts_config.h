@@ -118,11 +118,16 @@
 #define COM_MAX_LINES 1
 #endif
 
-/* Queue of outgoing packets per serial line, bytes: one largest packet (514 with its length, or NETSERVER_MESSAGE_SIZE + 90 if
- * that is less) and a few small ones. A second
- * large one is made when the first is on the line. */
+/* Queue of outgoing packets per serial line, bytes: one largest packet (516 with length and CRC, or NETSERVER_MESSAGE_SIZE +
+ * 92 if that is less) and a few small ones. A second large one is made when the first is on the line. */
 #ifndef COM_QUEUE_SIZE
 #define COM_QUEUE_SIZE 640
+#endif
+
+/* Whether block drivers, router and channel server count what arrives, is dropped and is repeated: for tests, and for a look
+ * with the debugger at a bad line. 300 bytes of flash, 80 of RAM. */
+#ifndef COMM_COUNTERS
+#define COMM_COUNTERS 1
 #endif
 
 /* Service groups of layer 7; three words each. */

@@ -28,138 +28,112 @@ enum {
     PACKET_MAX = MESSAGE_MAX < BLK_MAX_SIZE ? MESSAGE_MAX : BLK_MAX_SIZE,
 };
 
-RTS_STATIC_ASSERT(COM_QUEUE_SIZE >= PACKET_MAX + LENGTH_SIZE, com_queue_holds_the_largest_packet);
+RTS_STATIC_ASSERT(COM_QUEUE_SIZE >= LENGTH_SIZE + PACKET_MAX + CRC_SIZE, com_queue_holds_the_largest_packet);
 RTS_STATIC_ASSERT(NS_REPLY_SIZE + ROUTER_HEADER_MAX <= PACKET_MAX, packet_holds_the_name_service_reply);
 
-typedef enum {
-    RX_HUNT,      /* between frames */
-    RX_HUNT_HASH, /* between frames, after "#" */
-    RX_DATA,
-    RX_DATA_HASH,
-} RX_STATE;
-
 typedef struct {
-    RX_STATE state;
+    bool in_frame;
+    bool escape; /* the last byte was "#" */
     RTS_UI32 size;
     RTS_UI8 frame[PACKET_MAX + CRC_SIZE];
-    COM_COUNTERS counters;
 } RECEIVER;
 
-/* Packets to send, each after its length, in a ring. */
+/* Packets to send, each between its length and its CRC, in a ring. */
 typedef struct {
-    RTS_UI8 data[COM_QUEUE_SIZE];
     RTS_UI32 head; /* where to read */
     RTS_UI32 used;
+    RTS_UI8 data[COM_QUEUE_SIZE];
 } QUEUE;
 
 typedef struct {
-    QUEUE queue;
-    RTS_UI32 left; /* packet bytes still to be encoded */
-    RTS_UI16 crc;
-    bool in_frame;
-    RTS_UI8 chunk[WRITE_CHUNK]; /* encoded, not yet taken by the port */
+    RTS_UI32 left; /* bytes of the frame still to be encoded; 0 between frames */
     RTS_UI32 chunk_size;
     RTS_UI32 chunk_sent;
+    RTS_UI8 chunk[WRITE_CHUNK]; /* encoded, not yet taken by the port */
+    QUEUE queue;
 } SENDER;
 
 typedef struct {
-    BLK_DRV driver;
     RTS_UI32 index;
     bool open;
-    RECEIVER rx;
+    BLK_DRV driver;
     SENDER tx;
+    RECEIVER rx;
 } COM_LINE;
 
 static COM_LINE lines[COM_MAX_LINES];
+static COM_COUNTERS counters[COM_MAX_LINES];
 
 /* ---- receiving ---- */
-
-static void start_frame(RECEIVER *rx)
-{
-    rx->state = RX_DATA;
-    rx->size = 0;
-}
 
 /* Hands a frame up when its CRC is right. */
 static void end_frame(COM_LINE *line)
 {
     RECEIVER *rx = &line->rx;
 
-    rx->state = RX_HUNT;
     if (rx->size <= CRC_SIZE) {
-        rx->counters.too_short++;
+        COMM_COUNT(counters[line->index].too_short);
         return;
     }
     RTS_UI32 size = rx->size - CRC_SIZE;
     if (CRC16Update(CRC16_INIT, rx->frame, size) != BytesGet16(rx->frame + size)) {
-        rx->counters.crc_errors++;
+        COMM_COUNT(counters[line->index].crc_errors);
         return;
     }
-    rx->counters.frames++;
+    COMM_COUNT(counters[line->index].frames);
     RouterHandleData(&line->driver, rx->frame, size);
 }
 
-static void take_byte(RECEIVER *rx, RTS_UI8 byte)
-{
-    if (rx->size == sizeof(rx->frame)) {
-        rx->counters.overflows++;
-        rx->state = RX_HUNT;
-        return;
-    }
-    rx->frame[rx->size++] = byte;
-    rx->state = RX_DATA;
-}
-
-static void hunt_after_hash(RECEIVER *rx, RTS_UI8 byte)
-{
-    if (byte == SIMPLECOM_START_2) {
-        start_frame(rx);
-        return;
-    }
-    if (byte == SIMPLECOM_END_2)
-        rx->counters.ends_without_start++;
-    rx->state = byte == SIMPLECOM_START_1 ? RX_HUNT_HASH : RX_HUNT;
-}
-
-static void data_after_hash(COM_LINE *line, RTS_UI8 byte)
+/* A byte of a frame; between frames it belongs to nothing. */
+static void take_byte(COM_LINE *line, RTS_UI8 byte)
 {
     RECEIVER *rx = &line->rx;
 
+    if (!rx->in_frame)
+        return;
+    if (rx->size == sizeof(rx->frame)) {
+        COMM_COUNT(counters[line->index].overflows);
+        rx->in_frame = false;
+        return;
+    }
+    rx->frame[rx->size++] = byte;
+}
+
+/* The byte after "#". All but "_" end a frame, rightly or not. */
+static void take_escaped(COM_LINE *line, RTS_UI8 byte)
+{
+    RECEIVER *rx = &line->rx;
+    bool in_frame = rx->in_frame;
+
     if (byte == SIMPLECOM_STUFF) {
-        take_byte(rx, SIMPLECOM_ESCAPE);
-    } else if (byte == SIMPLECOM_END_2) {
-        end_frame(line);
+        take_byte(line, SIMPLECOM_ESCAPE);
+        return;
+    }
+    rx->in_frame = byte == SIMPLECOM_START_2;
+    rx->escape = byte == SIMPLECOM_ESCAPE;
+    if (byte == SIMPLECOM_END_2) {
+        if (in_frame)
+            end_frame(line);
+        else
+            COMM_COUNT(counters[line->index].ends_without_start);
     } else if (byte == SIMPLECOM_START_2) {
-        rx->counters.unfinished++;
-        start_frame(rx);
-    } else {
-        rx->counters.bad_escapes++;
-        rx->state = byte == SIMPLECOM_START_1 ? RX_HUNT_HASH : RX_HUNT;
+        rx->size = 0;
+        if (in_frame)
+            COMM_COUNT(counters[line->index].unfinished);
+    } else if (in_frame) {
+        COMM_COUNT(counters[line->index].bad_escapes);
     }
 }
 
 static void receive_byte(COM_LINE *line, RTS_UI8 byte)
 {
-    RECEIVER *rx = &line->rx;
+    bool escaped = line->rx.escape;
 
-    switch (rx->state) {
-    case RX_HUNT:
-        if (byte == SIMPLECOM_START_1)
-            rx->state = RX_HUNT_HASH;
-        break;
-    case RX_HUNT_HASH:
-        hunt_after_hash(rx, byte);
-        break;
-    case RX_DATA:
-        if (byte == SIMPLECOM_ESCAPE)
-            rx->state = RX_DATA_HASH;
-        else
-            take_byte(rx, byte);
-        break;
-    case RX_DATA_HASH:
-        data_after_hash(line, byte);
-        break;
-    }
+    line->rx.escape = !escaped && byte == SIMPLECOM_ESCAPE;
+    if (escaped)
+        take_escaped(line, byte);
+    else if (byte != SIMPLECOM_ESCAPE)
+        take_byte(line, byte);
 }
 
 static void receive(COM_LINE *line)
@@ -180,86 +154,89 @@ static void receive(COM_LINE *line)
 
 static void push(QUEUE *queue, const RTS_UI8 *data, RTS_UI32 size)
 {
-    for (RTS_UI32 i = 0; i < size; i++)
-        queue->data[(queue->head + queue->used++) % COM_QUEUE_SIZE] = data[i];
+    for (RTS_UI32 i = 0; i < size; i++) {
+        RTS_UI32 tail = queue->head + queue->used++;
+        queue->data[tail < COM_QUEUE_SIZE ? tail : tail - COM_QUEUE_SIZE] = data[i];
+    }
 }
 
 static RTS_UI8 pop(QUEUE *queue)
 {
-    RTS_UI8 byte = queue->data[queue->head];
+    RTS_UI8 byte = queue->data[queue->head++];
 
-    queue->head = (queue->head + 1) % COM_QUEUE_SIZE;
+    if (queue->head == COM_QUEUE_SIZE)
+        queue->head = 0;
     queue->used--;
     return byte;
+}
+
+static void push16(QUEUE *queue, RTS_UI32 value)
+{
+    RTS_UI8 bytes[2];
+
+    BytesPut16(bytes, value);
+    push(queue, bytes, sizeof(bytes));
 }
 
 static RTS_RESULT com_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count)
 {
     COM_LINE *line = driver->instance;
     QUEUE *queue = &line->tx.queue;
-    RTS_UI8 length[LENGTH_SIZE];
-    RTS_UI32 size = 0;
+    RTS_UI32 size = CRC_SIZE;
+    RTS_UI16 crc = CRC16_INIT;
 
     for (RTS_UI32 i = 0; i < count; i++)
         size += parts[i].size;
-    if (size == 0 || size > PACKET_MAX)
+    if (size > PACKET_MAX + CRC_SIZE)
         return ERR_NET_MSGSIZE;
-    if (size + LENGTH_SIZE > COM_QUEUE_SIZE - queue->used)
+    if (LENGTH_SIZE + size > COM_QUEUE_SIZE - queue->used)
         return ERR_NOBUFFER;
-    BytesPut16(length, size);
-    push(queue, length, sizeof(length));
-    for (RTS_UI32 i = 0; i < count; i++)
+    push16(queue, size);
+    for (RTS_UI32 i = 0; i < count; i++) {
+        crc = CRC16Update(crc, parts[i].data, parts[i].size);
         push(queue, parts[i].data, parts[i].size);
+    }
+    push16(queue, crc);
     return ERR_OK;
 }
 
-static void put_raw(SENDER *tx, RTS_UI8 byte)
+static void put(SENDER *tx, RTS_UI8 byte)
 {
     tx->chunk[tx->chunk_size++] = byte;
-}
-
-static void put_escaped(SENDER *tx, RTS_UI8 byte)
-{
-    put_raw(tx, byte);
-    if (byte == SIMPLECOM_ESCAPE)
-        put_raw(tx, SIMPLECOM_STUFF);
 }
 
 static void encode_start(SENDER *tx)
 {
     tx->left = pop(&tx->queue);
     tx->left |= (RTS_UI32)pop(&tx->queue) << 8;
-    tx->crc = CRC16_INIT;
-    tx->in_frame = true;
-    put_raw(tx, SIMPLECOM_START_1);
-    put_raw(tx, SIMPLECOM_START_2);
+    put(tx, SIMPLECOM_START_1);
+    put(tx, SIMPLECOM_START_2);
 }
 
-static void encode_end(SENDER *tx)
+static void encode_byte(SENDER *tx)
 {
-    put_escaped(tx, (RTS_UI8)tx->crc);
-    put_escaped(tx, (RTS_UI8)(tx->crc >> 8));
-    put_raw(tx, SIMPLECOM_START_1);
-    put_raw(tx, SIMPLECOM_END_2);
-    tx->in_frame = false;
+    RTS_UI8 byte = pop(&tx->queue);
+
+    put(tx, byte);
+    if (byte == SIMPLECOM_ESCAPE)
+        put(tx, SIMPLECOM_STUFF);
+    if (--tx->left == 0) {
+        put(tx, SIMPLECOM_START_1);
+        put(tx, SIMPLECOM_END_2);
+    }
 }
 
-/* Fills the chunk; no step adds more than 6 bytes. */
 static void encode_chunk(SENDER *tx)
 {
+    enum { STEP_MAX = 4 }; /* an escaped byte and the end */
+
     tx->chunk_size = 0;
     tx->chunk_sent = 0;
-    while (tx->chunk_size + 6 <= WRITE_CHUNK && (tx->in_frame || tx->queue.used != 0)) {
-        if (!tx->in_frame) {
+    while (tx->chunk_size <= WRITE_CHUNK - STEP_MAX && tx->queue.used != 0) {
+        if (tx->left == 0)
             encode_start(tx);
-        } else if (tx->left == 0) {
-            encode_end(tx);
-        } else {
-            RTS_UI8 byte = pop(&tx->queue);
-            tx->left--;
-            tx->crc = CRC16Update(tx->crc, &byte, 1);
-            put_escaped(tx, byte);
-        }
+        else
+            encode_byte(tx);
     }
 }
 
@@ -281,6 +258,13 @@ static void transmit(COM_LINE *line)
 }
 
 /* ---- life ---- */
+
+static void reset_lines(void)
+{
+    memset(lines, 0, sizeof(lines));
+    if (COMM_COUNTERS)
+        memset(counters, 0, sizeof(counters));
+}
 
 static void open_lines(void)
 {
@@ -325,13 +309,13 @@ static void cycle(void)
 
 const COM_COUNTERS *BlkDrvComGetCounters(RTS_UI32 line)
 {
-    return line < COM_MAX_LINES ? &lines[line].rx.counters : NULL;
+    return line < COM_MAX_LINES ? &counters[line] : NULL;
 }
 
 RTS_RESULT CmpBlkDrvSimpleCom_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT)
-        memset(lines, 0, sizeof(lines));
+        reset_lines();
     else if (hook == CH_INIT_COMM)
         open_lines();
     else if (hook == CH_COMM_CYCLE)

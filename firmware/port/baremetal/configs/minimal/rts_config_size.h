@@ -19,6 +19,7 @@
 #define APP_RETAIN_SIZE 0
 #define SRV_INFORMATION 0
 #define NS_OLD_VERSIONS 0
+#define COMM_COUNTERS 0
 #define NS_REPLY_SIZE 192
 #define SRV_MAX_GROUPS 2
 #define RTS_MAIN_STACK_SIZE 1280 /* no task interrupts main */
