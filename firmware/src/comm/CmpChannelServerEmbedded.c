@@ -47,7 +47,7 @@ typedef struct {
     RTS_UI32 missed_at;
 } SENDER;
 
-/* The channel; id 0 when closed. Times are ms of the clock handed in. */
+/* The channel; id 0 when closed. Times are those of SysTimeGetMs. */
 typedef struct {
     RTS_UI16 id;
     RTS_UI8 address_words; /* of both addresses, agreed */
@@ -498,8 +498,10 @@ static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RT
         send_rts_info(peer);
 }
 
-RTS_NOINLINE void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
+RTS_NOINLINE void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
 {
+    RTS_UI32 now_ms = SysTimeGetMs();
+
     if (size == 0)
         COMM_COUNT(counters.malformed);
     else if (data[0] & CHANNEL_META)
@@ -507,7 +509,7 @@ RTS_NOINLINE void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *d
     else
         handle_channel_package(peer, data, size, now_ms);
     if (channel.id != 0)
-        pump(now_ms);
+        pump(SysTimeGetMs()); /* a service may have taken its time */
 }
 
 /* ---- time ---- */
@@ -523,7 +525,7 @@ static void repeat_when_overdue(RTS_UI32 now_ms)
     repeat_reply();
 }
 
-void ChannelCycle(RTS_UI32 now_ms)
+static void cycle(RTS_UI32 now_ms)
 {
     if (channel.id == 0)
         return;
@@ -553,7 +555,7 @@ RTS_RESULT CmpChannelServerEmbedded_Hook(CMP_HOOK hook)
     if (hook == CH_INIT)
         reset_all();
     else if (hook == CH_COMM_CYCLE)
-        ChannelCycle(SysTimeGetMs());
+        cycle(SysTimeGetMs());
     else if (hook == CH_EXIT_COMM && channel.id != 0)
         close_channel(ERR_CHS_SHUTDOWN);
     return ERR_OK;

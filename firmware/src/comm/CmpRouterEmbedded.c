@@ -9,7 +9,6 @@
 
 #include "CmpChannelServerEmbedded.h"
 #include "CmpNameServiceServer.h"
-#include "SysTime.h"
 
 enum {
     HEADER_SIZE = 2 * ROUTER_HEADER_WORDS,
@@ -76,7 +75,7 @@ static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *pay
 {
     if (service == ROUTER_SVC_CHANNEL) {
         COMM_COUNT(counters.handled);
-        ChannelHandlePackage(peer, payload, size, SysTimeGetMs());
+        ChannelHandlePackage(peer, payload, size);
     } else if (service == ROUTER_SVC_NAME_REQUEST) {
         COMM_COUNT(counters.handled);
         NSHandleRequest(peer, payload, size);
