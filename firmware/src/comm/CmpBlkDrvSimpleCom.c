@@ -31,34 +31,25 @@ enum {
 RTS_STATIC_ASSERT(COM_QUEUE_SIZE >= LENGTH_SIZE + PACKET_MAX + CRC_SIZE, com_queue_holds_the_largest_packet);
 RTS_STATIC_ASSERT(NS_REPLY_SIZE + ROUTER_HEADER_MAX <= PACKET_MAX, packet_holds_the_name_service_reply);
 
-typedef struct {
-    bool in_frame;
-    bool escape; /* the last byte was "#" */
-    RTS_UI32 size;
-    RTS_UI8 frame[PACKET_MAX + CRC_SIZE];
-} RECEIVER;
-
-/* Packets to send, each between its length and its CRC, in a ring. */
-typedef struct {
-    RTS_UI32 head; /* where to read */
-    RTS_UI32 used;
-    RTS_UI8 data[COM_QUEUE_SIZE];
-} QUEUE;
-
-typedef struct {
-    RTS_UI32 left; /* bytes of the frame still to be encoded; 0 between frames */
-    RTS_UI32 chunk_size;
-    RTS_UI32 chunk_sent;
-    RTS_UI8 chunk[WRITE_CHUNK]; /* encoded, not yet taken by the port */
-    QUEUE queue;
-} SENDER;
-
+/* Numbers before buffers, where short instructions reach them. */
 typedef struct {
     RTS_UI32 index;
     bool open;
+    /* the frame that arrives */
+    bool in_frame;
+    bool escape; /* the last byte was "#" */
+    RTS_UI32 fill;
+    /* the queue of packets to send, each between its length and its CRC: a ring */
+    RTS_UI32 head;
+    RTS_UI32 used;
+    /* the frame on its way out */
+    RTS_UI32 left; /* bytes still to be encoded; 0 between frames */
+    RTS_UI32 chunk_size;
+    RTS_UI32 chunk_sent;
     BLK_DRV driver;
-    SENDER tx;
-    RECEIVER rx;
+    RTS_UI8 chunk[WRITE_CHUNK]; /* encoded, not yet taken by the port */
+    RTS_UI8 queue[COM_QUEUE_SIZE];
+    RTS_UI8 frame[PACKET_MAX + CRC_SIZE];
 } COM_LINE;
 
 static COM_LINE lines[COM_MAX_LINES];
@@ -69,55 +60,50 @@ static COM_COUNTERS counters[COM_MAX_LINES];
 /* Hands a frame up when its CRC is right. */
 static void end_frame(COM_LINE *line)
 {
-    RECEIVER *rx = &line->rx;
-
-    if (rx->size <= CRC_SIZE) {
+    if (line->fill <= CRC_SIZE) {
         COMM_COUNT(counters[line->index].too_short);
         return;
     }
-    RTS_UI32 size = rx->size - CRC_SIZE;
-    if (CRC16Update(CRC16_INIT, rx->frame, size) != BytesGet16(rx->frame + size)) {
+    RTS_UI32 size = line->fill - CRC_SIZE;
+    if (CRC16Update(CRC16_INIT, line->frame, size) != BytesGet16(line->frame + size)) {
         COMM_COUNT(counters[line->index].crc_errors);
         return;
     }
     COMM_COUNT(counters[line->index].frames);
-    RouterHandleData(&line->driver, rx->frame, size);
+    RouterHandleData(&line->driver, line->frame, size);
 }
 
 /* A byte of a frame; between frames it belongs to nothing. */
 static void take_byte(COM_LINE *line, RTS_UI8 byte)
 {
-    RECEIVER *rx = &line->rx;
-
-    if (!rx->in_frame)
+    if (!line->in_frame)
         return;
-    if (rx->size == sizeof(rx->frame)) {
+    if (line->fill == sizeof(line->frame)) {
         COMM_COUNT(counters[line->index].overflows);
-        rx->in_frame = false;
+        line->in_frame = false;
         return;
     }
-    rx->frame[rx->size++] = byte;
+    line->frame[line->fill++] = byte;
 }
 
 /* The byte after "#". All but "_" end a frame, rightly or not. */
 static void take_escaped(COM_LINE *line, RTS_UI8 byte)
 {
-    RECEIVER *rx = &line->rx;
-    bool in_frame = rx->in_frame;
+    bool in_frame = line->in_frame;
 
     if (byte == SIMPLECOM_STUFF) {
         take_byte(line, SIMPLECOM_ESCAPE);
         return;
     }
-    rx->in_frame = byte == SIMPLECOM_START_2;
-    rx->escape = byte == SIMPLECOM_ESCAPE;
+    line->in_frame = byte == SIMPLECOM_START_2;
+    line->escape = byte == SIMPLECOM_ESCAPE;
     if (byte == SIMPLECOM_END_2) {
         if (in_frame)
             end_frame(line);
         else
             COMM_COUNT(counters[line->index].ends_without_start);
     } else if (byte == SIMPLECOM_START_2) {
-        rx->size = 0;
+        line->fill = 0;
         if (in_frame)
             COMM_COUNT(counters[line->index].unfinished);
     } else if (in_frame) {
@@ -127,9 +113,9 @@ static void take_escaped(COM_LINE *line, RTS_UI8 byte)
 
 static void receive_byte(COM_LINE *line, RTS_UI8 byte)
 {
-    bool escaped = line->rx.escape;
+    bool escaped = line->escape;
 
-    line->rx.escape = !escaped && byte == SIMPLECOM_ESCAPE;
+    line->escape = !escaped && byte == SIMPLECOM_ESCAPE;
     if (escaped)
         take_escaped(line, byte);
     else if (byte != SIMPLECOM_ESCAPE)
@@ -152,36 +138,35 @@ static void receive(COM_LINE *line)
 
 /* ---- sending ---- */
 
-static void push(QUEUE *queue, const RTS_UI8 *data, RTS_UI32 size)
+static void push(COM_LINE *line, const RTS_UI8 *data, RTS_UI32 size)
 {
     for (RTS_UI32 i = 0; i < size; i++) {
-        RTS_UI32 tail = queue->head + queue->used++;
-        queue->data[tail < COM_QUEUE_SIZE ? tail : tail - COM_QUEUE_SIZE] = data[i];
+        RTS_UI32 tail = line->head + line->used++;
+        line->queue[tail < COM_QUEUE_SIZE ? tail : tail - COM_QUEUE_SIZE] = data[i];
     }
 }
 
-static RTS_UI8 pop(QUEUE *queue)
+static RTS_UI8 pop(COM_LINE *line)
 {
-    RTS_UI8 byte = queue->data[queue->head++];
+    RTS_UI8 byte = line->queue[line->head++];
 
-    if (queue->head == COM_QUEUE_SIZE)
-        queue->head = 0;
-    queue->used--;
+    if (line->head == COM_QUEUE_SIZE)
+        line->head = 0;
+    line->used--;
     return byte;
 }
 
-static void push16(QUEUE *queue, RTS_UI32 value)
+static void push16(COM_LINE *line, RTS_UI32 value)
 {
     RTS_UI8 bytes[2];
 
     BytesPut16(bytes, value);
-    push(queue, bytes, sizeof(bytes));
+    push(line, bytes, sizeof(bytes));
 }
 
 static RTS_RESULT com_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count)
 {
     COM_LINE *line = driver->instance;
-    QUEUE *queue = &line->tx.queue;
     RTS_UI32 size = CRC_SIZE;
     RTS_UI16 crc = CRC16_INIT;
 
@@ -189,69 +174,67 @@ static RTS_RESULT com_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI3
         size += parts[i].size;
     if (size > PACKET_MAX + CRC_SIZE)
         return ERR_NET_MSGSIZE;
-    if (LENGTH_SIZE + size > COM_QUEUE_SIZE - queue->used)
+    if (LENGTH_SIZE + size > COM_QUEUE_SIZE - line->used)
         return ERR_NOBUFFER;
-    push16(queue, size);
+    push16(line, size);
     for (RTS_UI32 i = 0; i < count; i++) {
         crc = CRC16Update(crc, parts[i].data, parts[i].size);
-        push(queue, parts[i].data, parts[i].size);
+        push(line, parts[i].data, parts[i].size);
     }
-    push16(queue, crc);
+    push16(line, crc);
     return ERR_OK;
 }
 
-static void put(SENDER *tx, RTS_UI8 byte)
+static void put(COM_LINE *line, RTS_UI8 byte)
 {
-    tx->chunk[tx->chunk_size++] = byte;
+    line->chunk[line->chunk_size++] = byte;
 }
 
-static void encode_start(SENDER *tx)
+static void encode_start(COM_LINE *line)
 {
-    tx->left = pop(&tx->queue);
-    tx->left |= (RTS_UI32)pop(&tx->queue) << 8;
-    put(tx, SIMPLECOM_START_1);
-    put(tx, SIMPLECOM_START_2);
+    line->left = pop(line);
+    line->left |= (RTS_UI32)pop(line) << 8;
+    put(line, SIMPLECOM_START_1);
+    put(line, SIMPLECOM_START_2);
 }
 
-static void encode_byte(SENDER *tx)
+static void encode_byte(COM_LINE *line)
 {
-    RTS_UI8 byte = pop(&tx->queue);
+    RTS_UI8 byte = pop(line);
 
-    put(tx, byte);
+    put(line, byte);
     if (byte == SIMPLECOM_ESCAPE)
-        put(tx, SIMPLECOM_STUFF);
-    if (--tx->left == 0) {
-        put(tx, SIMPLECOM_START_1);
-        put(tx, SIMPLECOM_END_2);
+        put(line, SIMPLECOM_STUFF);
+    if (--line->left == 0) {
+        put(line, SIMPLECOM_START_1);
+        put(line, SIMPLECOM_END_2);
     }
 }
 
-static void encode_chunk(SENDER *tx)
+static void encode_chunk(COM_LINE *line)
 {
     enum { STEP_MAX = 4 }; /* an escaped byte and the end */
 
-    tx->chunk_size = 0;
-    tx->chunk_sent = 0;
-    while (tx->chunk_size <= WRITE_CHUNK - STEP_MAX && tx->queue.used != 0) {
-        if (tx->left == 0)
-            encode_start(tx);
+    line->chunk_size = 0;
+    line->chunk_sent = 0;
+    while (line->chunk_size <= WRITE_CHUNK - STEP_MAX && line->used != 0) {
+        if (line->left == 0)
+            encode_start(line);
         else
-            encode_byte(tx);
+            encode_byte(line);
     }
 }
 
 static void transmit(COM_LINE *line)
 {
-    SENDER *tx = &line->tx;
-
     for (;;) {
-        if (tx->chunk_sent == tx->chunk_size)
-            encode_chunk(tx);
-        RTS_UI32 offered = tx->chunk_size - tx->chunk_sent;
+        if (line->chunk_sent == line->chunk_size)
+            encode_chunk(line);
+        RTS_UI32 offered = line->chunk_size - line->chunk_sent;
         if (offered == 0)
             return;
-        RTS_UI32 taken = SysComWrite(line->index, tx->chunk + tx->chunk_sent, offered);
-        tx->chunk_sent += taken < offered ? taken : offered;
+        RTS_UI32 taken = SysComWrite(line->index, line->chunk + line->chunk_sent, offered);
+        line->chunk_sent += taken < offered ? taken : offered;
         if (taken < offered)
             return;
     }

@@ -121,7 +121,7 @@ static void answer(const ROUTER_PEER *peer, RTS_UI16 version, const RTS_UI8 *req
     (void)RouterSend(peer, ROUTER_SVC_NAME_RESPONSE, &part, 1);
 }
 
-void NSHandleRequest(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
+RTS_NOINLINE void NSHandleRequest(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
 {
     if (size < NS_REQUEST_SIZE)
         return;
