@@ -12,7 +12,7 @@
 #define CM_MAX_EXT_TABLES 2
 #define EVENT_MAX_CALLBACKS 0
 #define SCHED_MAX_EXTERNAL_EVENTS 0
-#define NETSERVER_MESSAGE_SIZE 216 /* holds the reply to who it is: more for names longer than about 20 characters */
+#define NETSERVER_MESSAGE_SIZE 216 /* holds the reply to who it is: more for names longer than 19 characters */
 #define COM_QUEUE_SIZE 308
 #define LOG_MAX_ENTRIES 0
 #define APP_REFUSAL_TEXT_SIZE 1
