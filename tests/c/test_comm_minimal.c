@@ -66,16 +66,17 @@ static void only_the_newest_version_of_the_name_service_is_answered(void)
     CHECK(scan(NS_VERSION_0101) == 0);
 }
 
-static void identity_with_names_of_nineteen_characters_fits_a_message(void)
+static void names_of_19_characters_and_a_serial_number_of_24_are_told_whole(void)
 {
     REPLY answer;
 
     setup();
     fakes.target.node_name = fakes.target.device_name = fakes.target.vendor_name = "0123456789012345678";
-    fakes.target.serial_number = "0123456789AB";
+    fakes.target.serial_number = "0123456789ABCDEF01234567"; /* of an STM32 */
     CHECK(client_open(&client));
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &answer));
     CHECK(reply_error(&answer) == ERR_OK);
+    CHECK(scan(NS_VERSION_0400) == DEVICE_NAME_OFFSET + 3 * 2 * 20 + 25);
 }
 
 static void largest_message_goes_to_and_fro(void)
@@ -108,7 +109,7 @@ int main(void)
 {
     RUN(names_that_do_not_fit_are_cut_and_the_serial_number_is_whole);
     RUN(only_the_newest_version_of_the_name_service_is_answered);
-    RUN(identity_with_names_of_nineteen_characters_fits_a_message);
+    RUN(names_of_19_characters_and_a_serial_number_of_24_are_told_whole);
     RUN(largest_message_goes_to_and_fro);
     RUN(services_that_only_inform_are_unknown);
     return test_result();
