@@ -10,8 +10,8 @@
 
 #include "CmpStd.h"
 
-/* Whether the CPU keeps integers like this itself. The compiler knows: only one of the two ways below is in the code, and
- * memcpy is one instruction on CPUs that reach integers anywhere. */
+/* Whether the CPU itself keeps integers like this. The compiler knows: only one of the two ways below is in the code,
+ * and memcpy is one instruction on CPUs that reach integers anywhere. */
 static inline bool BytesAreNative(void)
 {
     const RTS_UI16 one = 1;

@@ -259,7 +259,7 @@ void BTagPad(BTAG_WRITER *writer)
 
 void BTagAppendText(BTAG_WRITER *writer, const char *text, RTS_UI32 max)
 {
-    BTagAppend(writer, text, (RTS_UI32)CMUtlStrNLen(text, max));
+    BTagAppend(writer, text, CMUtlStrNLen(text, max));
     BTagAppendZeros(writer, 1);
     BTagPad(writer);
 }

@@ -18,7 +18,7 @@
 /* u32 byte length with NUL, UTF-16LE, padding. */
 static void write_wide_text(BTAG_WRITER *reply, RTS_UI32 id, const char *text, RTS_UI32 max)
 {
-    RTS_UI32 length = (RTS_UI32)CMUtlStrNLen(text, max);
+    RTS_UI32 length = CMUtlStrNLen(text, max);
     RTS_UI32 size = 2 * (length + 1);
 
     BTagOpen(reply, id, BTAG_ALIGN_0);
@@ -34,7 +34,7 @@ static void write_wide_text(BTAG_WRITER *reply, RTS_UI32 id, const char *text, R
 static void write_serial_number(BTAG_WRITER *reply, const char *text)
 {
     BTagOpen(reply, TAG_DEV_SERIAL_NUMBER, BTAG_ALIGN_2);
-    BTagAppend16(reply, (RTS_UI32)CMUtlStrNLen(text, NS_MAX_SERIAL));
+    BTagAppend16(reply, CMUtlStrNLen(text, NS_MAX_SERIAL));
     BTagAppendText(reply, text, NS_MAX_SERIAL);
     BTagClose(reply);
 }

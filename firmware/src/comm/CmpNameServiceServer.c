@@ -33,7 +33,7 @@ typedef struct {
 /* Writes a name, cut to `max` characters and the room; returns its length. */
 static RTS_UI32 put_name(NAMES *names, const char *text, RTS_UI32 max)
 {
-    RTS_UI32 length = (RTS_UI32)CMUtlStrNLen(text, max < names->room ? max : names->room);
+    RTS_UI32 length = CMUtlStrNLen(text, max < names->room ? max : names->room);
 
     names->place = CMUtlPutWide(names->place, text, length);
     names->room -= length;
@@ -43,7 +43,7 @@ static RTS_UI32 put_name(NAMES *names, const char *text, RTS_UI32 max)
 /* What follows the first 8 bytes in versions 1.02, 1.03 and 4.00, the last one with more of it; returns the end. */
 static RTS_UI8 *put_body(RTS_UI8 *reply, const SYS_TARGET *target, bool is_0400, RTS_UI8 driver_type)
 {
-    RTS_UI32 serial = (RTS_UI32)CMUtlStrNLen(target->serial_number, NS_MAX_SERIAL);
+    RTS_UI32 serial = CMUtlStrNLen(target->serial_number, NS_MAX_SERIAL);
     NAMES names = {reply + (is_0400 ? REPLY_0400_SIZE : REPLY_0103_SIZE), (ROOM_FOR_TEXTS - serial) / 2};
 
     BytesPut16(reply + 8, CHANNEL_MAX_CHANNELS);

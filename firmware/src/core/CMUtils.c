@@ -92,18 +92,18 @@ RTS_SIZE CMUtlsnprintf(char *out, RTS_SIZE size, const char *format, ...)
     return length;
 }
 
-RTS_SIZE CMUtlStrNLen(const char *text, RTS_SIZE max)
+RTS_UI32 CMUtlStrNLen(const char *text, RTS_UI32 max)
 {
-    RTS_SIZE length = 0;
+    RTS_UI32 length = 0;
 
     while (length < max && text[length] != '\0')
         length++;
     return length;
 }
 
-RTS_UI8 *CMUtlPutWide(RTS_UI8 *place, const char *text, RTS_SIZE length)
+RTS_UI8 *CMUtlPutWide(RTS_UI8 *place, const char *text, RTS_UI32 length)
 {
-    for (RTS_SIZE i = 0; i < length; i++, place += 2)
+    for (RTS_UI32 i = 0; i < length; i++, place += 2)
         BytesPut16(place, (RTS_UI8)text[i]);
     BytesPut16(place, 0);
     return place + 2;
