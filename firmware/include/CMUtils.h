@@ -17,4 +17,10 @@
 RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list arguments);
 RTS_SIZE CMUtlsnprintf(char *out, RTS_SIZE size, const char *format, ...);
 
+/* Length of a text that may be cut: at most `max`. */
+RTS_UI32 CMUtlStrNLen(const char *text, RTS_UI32 max);
+
+/* Writes `length` characters as UTF-16LE and a NUL; returns their end. */
+RTS_UI8 *CMUtlPutWide(RTS_UI8 *place, const char *text, RTS_UI32 length);
+
 #endif

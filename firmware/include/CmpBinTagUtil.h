@@ -62,10 +62,10 @@ typedef struct {
     RTS_UI8 *data;
     RTS_UI32 capacity;
     RTS_UI32 size;
-    RTS_UI32 open[BTAG_MAX_NESTING]; /* position of each open element */
-    RTS_UI32 start[BTAG_MAX_NESTING]; /* position of its content */
     RTS_UI32 depth;
     bool overflow; /* something did not fit; sticks, to be checked once at the end */
+    RTS_UI32 open[BTAG_MAX_NESTING]; /* position of each open element */
+    RTS_UI32 start[BTAG_MAX_NESTING]; /* position of its content */
 } BTAG_WRITER;
 
 void BTagWriterInit(BTAG_WRITER *writer, RTS_UI8 *data, RTS_UI32 capacity);
@@ -84,11 +84,12 @@ RTS_UI8 *BTagReserve(BTAG_WRITER *writer, RTS_UI32 size);
 void BTagAppendZeros(BTAG_WRITER *writer, RTS_UI32 size);
 /* Zeros up to the next multiple of 4, so that the next element begins there. */
 void BTagPad(BTAG_WRITER *writer);
+/* At most `max` characters of text, NUL, padding. */
+void BTagAppendText(BTAG_WRITER *writer, const char *text, RTS_UI32 max);
 
 /* Whole elements. */
 void BTagWrite16(BTAG_WRITER *writer, RTS_UI32 id, RTS_UI32 value);
 void BTagWrite32(BTAG_WRITER *writer, RTS_UI32 id, RTS_UI32 value);
-/* At most `max` characters of text, NUL, padding. */
 void BTagWriteText(BTAG_WRITER *writer, RTS_UI32 id, const char *text, RTS_UI32 max);
 
 /* Everything fits and every element has been closed. */

@@ -25,10 +25,7 @@ typedef struct {
 } CHANNEL_COUNTERS;
 
 /* Called by the router for a packet of service ROUTER_SVC_CHANNEL. */
-void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms);
-
-/* Time-outs, repetitions, and what the driver had no room for; called in each CH_COMM_CYCLE. */
-void ChannelCycle(RTS_UI32 now_ms);
+void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size);
 
 const CHANNEL_COUNTERS *ChannelGetCounters(void);
 

@@ -10,6 +10,10 @@
 
 #include "CmpItf.h"
 #include "CmpSrvNumbers.h"
+#include "rts_config.h"
+
+/* Counts what happened on one of the layers 2 to 4, if anybody wants to know. */
+#define COMM_COUNT(counter) ((void)(COMM_COUNTERS && ++(counter)))
 
 /* A packet to send, in pieces, so that nobody has to assemble it in a buffer of his own. */
 typedef struct {

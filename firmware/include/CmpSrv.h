@@ -14,9 +14,9 @@
 
 /* A request as a handler sees it. `tags` and what is found in them are valid during the call only. */
 typedef struct {
+    BTAG_READER tags;
     RTS_UI32 session;       /* from the header */
     RTS_UI32 reply_session; /* what the reply's header will carry; a handler may change it */
-    BTAG_READER tags;
 } SRV_REQUEST;
 
 /* Writes the content of the reply. Any result but ERR_OK replaces that content by TAG_ERROR with the result. */
@@ -48,9 +48,9 @@ bool SrvIsLoggedIn(void);
 /* Called by the channel server: the session ends with its channel. */
 void SrvEndSession(void);
 
-/* The application session within the session: creates a new one; 0 when there is none. */
+/* The application session within the session: creates a new one and returns its id. */
 RTS_UI32 SrvCreateAppSession(void);
-RTS_UI32 SrvGetAppSession(void);
+bool SrvIsAppSession(RTS_UI32 id);
 void SrvEndAppSession(void);
 
 RTS_RESULT CmpSrv_Hook(CMP_HOOK hook);

@@ -166,23 +166,29 @@ const char *AppGetInfo(RTS_UI32 index)
     return texts[index];
 }
 
+static RTS_RESULT control(void)
+{
+    fakes.now_ms += fakes.control_ms;
+    return fakes.control_result;
+}
+
 RTS_RESULT AppStartApplication(void)
 {
     fakes.starts++;
-    return fakes.control_result;
+    return control();
 }
 
 RTS_RESULT AppStopApplication(void)
 {
     fakes.stops++;
-    return fakes.control_result;
+    return control();
 }
 
 RTS_RESULT AppReset(RTS_UI32 option)
 {
     fakes.resets++;
     fakes.reset_option = option;
-    return fakes.control_result;
+    return control();
 }
 
 RTS_UI32 IecTaskGetCount(void)

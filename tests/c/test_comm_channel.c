@@ -596,6 +596,25 @@ static void reply_is_repeated_until_acknowledged(void)
     CHECK(counters()->repeats == 1);
 }
 
+static void reply_of_a_slow_service_is_not_repeated_before_its_time(void)
+{
+    RTS_UI8 content[32];
+    BTAG_WRITER writer;
+    REPLY answer;
+
+    setup();
+    CHECK(client_login(&client) && client_login_app(&client));
+    fakes.control_ms = 5000;
+    BTagWriterInit(&writer, content, sizeof(content));
+    BTagOpen(&writer, TAG_APP_DESCRIPTOR, BTAG_ALIGN_0);
+    BTagWrite32(&writer, TAG_APP_SESSION, client.app_session);
+    BTagClose(&writer);
+    CHECK(client_call(&client, SG_APPLICATION, SRV_APP_STOP, &writer, &answer));
+    CHECK(fakes.stops == 1);
+    fakes_cycle(999);
+    CHECK(is_silent());
+}
+
 static void repetitions_become_rarer_and_end(void)
 {
     RTS_UI32 blocks = 0;
@@ -920,6 +939,7 @@ int main(void)
     RUN(each_gap_is_reported);
     RUN(gap_is_reported_again_when_the_repetition_is_lost_too);
     RUN(reply_is_repeated_until_acknowledged);
+    RUN(reply_of_a_slow_service_is_not_repeated_before_its_time);
     RUN(repetitions_become_rarer_and_end);
     RUN(partly_acknowledged_reply_is_repeated_from_there);
     RUN(asking_again_and_again_brings_one_repetition);

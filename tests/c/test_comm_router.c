@@ -229,6 +229,25 @@ static void payload_room_counts_the_header_in_steps_of_four(void)
     CHECK(RouterGetMaxPayload(&peer, 30) == 0);
 }
 
+static void peers_are_told_apart_by_driver_and_address(void)
+{
+    const ROUTER_PEER peer = {&driver, 512, 1, {0x12, 0x34}};
+    BLK_DRV other_driver = driver;
+    ROUTER_PEER other = peer;
+
+    other.max_packet = 64;
+    other.address[2] = 0x56; /* behind the address */
+    CHECK(RouterIsSamePeer(&peer, &other));
+    other.address[1] = 0x35;
+    CHECK(!RouterIsSamePeer(&peer, &other));
+    other = peer;
+    other.address_words = 2;
+    CHECK(!RouterIsSamePeer(&peer, &other));
+    other = peer;
+    other.driver = &other_driver;
+    CHECK(!RouterIsSamePeer(&peer, &other));
+}
+
 /* ---- name service ---- */
 
 static RTS_UI32 scan(RTS_UI16 type, RTS_UI16 version, const char *name, RTS_UI32 name_size)
@@ -394,6 +413,7 @@ int main(void)
     RUN(address_service_is_ignored_so_nobody_becomes_parent);
     RUN(announced_block_length_limits_the_answer);
     RUN(payload_room_counts_the_header_in_steps_of_four);
+    RUN(peers_are_told_apart_by_driver_and_address);
     RUN(captured_scan_is_answered_in_the_captured_form);
     RUN(third_party_scanner_with_a_longer_header_is_answered);
     RUN(broadcast_scan_is_answered);

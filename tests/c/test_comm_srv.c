@@ -265,7 +265,7 @@ static void second_login_replaces_the_session(void)
     client.session = L7_SESSION_INITIAL;
     CHECK(client_login(&client));
     CHECK(client.session != before.session);
-    CHECK(SrvGetAppSession() == 0);
+    CHECK(!SrvIsAppSession(before.app_session));
     before.sent = client.sent;
     before.received = client.received;
     CHECK(!client_login_app(&before));

@@ -1,5 +1,5 @@
 /*
- * test_core_text.c - the formatter.
+ * test_core_text.c - the formatter, and what else there is for text.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -48,10 +48,32 @@ static void output_is_cut_to_its_size(void)
     CHECK(small[0] == '\0');
 }
 
+static void length_of_a_text_ends_at_its_nul_or_the_limit(void)
+{
+    static const char unterminated[3] = {'a', 'b', 'c'};
+
+    CHECK(CMUtlStrNLen("", 5) == 0);
+    CHECK(CMUtlStrNLen("abc", 5) == 3);
+    CHECK(CMUtlStrNLen("abc", 2) == 2);
+    CHECK(CMUtlStrNLen(unterminated, sizeof unterminated) == 3);
+}
+
+static void wide_text_has_two_bytes_a_character_and_a_nul(void)
+{
+    RTS_UI8 wide[8];
+
+    memset(wide, 'x', sizeof wide);
+    CHECK(CMUtlPutWide(wide, "a\xE4zz", 2) == wide + 6);
+    CHECK(memcmp(wide, "a\0\xE4\0\0\0xx", sizeof wide) == 0);
+    CHECK(CMUtlPutWide(wide, "", 0) == wide + 2);
+}
+
 int main(void)
 {
     RUN(every_conversion_works);
     RUN(unknown_conversions_do_no_harm);
     RUN(output_is_cut_to_its_size);
+    RUN(length_of_a_text_ends_at_its_nul_or_the_limit);
+    RUN(wide_text_has_two_bytes_a_character_and_a_nul);
     return test_result();
 }

@@ -20,11 +20,11 @@ static RTS_RESULT write_login_reply(BTAG_WRITER *reply, bool needs_app)
     APP_STATUS status;
 
     AppGetStatus(&status);
-    bool refused = needs_app && status.state == AS_NONE;
+    RTS_UI32 session = needs_app && status.state == AS_NONE ? 0 : SrvCreateAppSession();
     BTagOpen(reply, TAG_APP_DESCRIPTOR, BTAG_ALIGN_0);
     BTagOpen(reply, TAG_APP_OPTION, BTAG_ALIGN_2);
-    BTagAppend16(reply, refused ? ERR_APP_NOT_EXIST : ERR_OK);
-    BTagAppend32(reply, refused ? 0 : SrvCreateAppSession());
+    BTagAppend16(reply, session == 0 ? ERR_APP_NOT_EXIST : ERR_OK);
+    BTagAppend32(reply, session);
     for (int guid = 0; guid < 2; guid++) { /* code, data */
         BTagAppend32(reply, status.image_crc);
         BTagAppendZeros(reply, 12);
@@ -55,7 +55,7 @@ static RTS_RESULT create_app(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static RTS_RESULT check_app_session(RTS_UI32 session)
 {
-    return session != 0 && session == SrvGetAppSession() ? ERR_OK : ERR_APP_INVALID_SESSIONID;
+    return SrvIsAppSession(session) ? ERR_OK : ERR_APP_INVALID_SESSIONID;
 }
 
 static RTS_RESULT logout_app(SRV_REQUEST *request, BTAG_WRITER *reply)
@@ -230,16 +230,11 @@ static void write_task(BTAG_WRITER *reply, const IEC_TASK_INFO *info)
         info->kind,   info->priority, info->interval_us, info->cycles,    info->last_us,
         info->avg_us, info->min_us,   info->max_us,      info->jitter_us, info->overruns,
     };
-    RTS_UI32 length = 0;
 
-    while (length < sizeof(info->name) - 1 && info->name[length] != '\0')
-        length++;
     BTagOpen(reply, TAG_TASK_INFO, BTAG_ALIGN_0);
     for (RTS_UI32 i = 0; i < TASK_INFO_WORDS; i++)
         BTagAppend32(reply, words[i]);
-    BTagAppend(reply, info->name, length);
-    BTagAppendZeros(reply, 1);
-    BTagPad(reply);
+    BTagAppendText(reply, info->name, sizeof(info->name) - 1);
     BTagClose(reply);
 }
 

@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "CMUtils.h"
 #include "CmpBytes.h"
 
 /* ---- reader ---- */
@@ -130,9 +131,11 @@ RTS_RESULT BTagFindContainer(const BTAG_READER *reader, RTS_UI32 id, BTAG_READER
 
 void BTagWriterInit(BTAG_WRITER *writer, RTS_UI8 *data, RTS_UI32 capacity)
 {
-    memset(writer, 0, sizeof(*writer));
     writer->data = data;
     writer->capacity = capacity;
+    writer->size = 0;
+    writer->depth = 0;
+    writer->overflow = false;
 }
 
 RTS_UI32 BTagGetRoom(const BTAG_WRITER *writer)
@@ -254,6 +257,13 @@ void BTagPad(BTAG_WRITER *writer)
     BTagAppendZeros(writer, -writer->size & 3);
 }
 
+void BTagAppendText(BTAG_WRITER *writer, const char *text, RTS_UI32 max)
+{
+    BTagAppend(writer, text, CMUtlStrNLen(text, max));
+    BTagAppendZeros(writer, 1);
+    BTagPad(writer);
+}
+
 void BTagWrite16(BTAG_WRITER *writer, RTS_UI32 id, RTS_UI32 value)
 {
     open_element(writer, id, BTAG_ALIGN_2, 1);
@@ -270,13 +280,7 @@ void BTagWrite32(BTAG_WRITER *writer, RTS_UI32 id, RTS_UI32 value)
 
 void BTagWriteText(BTAG_WRITER *writer, RTS_UI32 id, const char *text, RTS_UI32 max)
 {
-    RTS_UI32 size = 0;
-
-    while (size < max && text[size] != '\0')
-        size++;
     BTagOpen(writer, id, BTAG_ALIGN_0);
-    BTagAppend(writer, text, size);
-    BTagAppendZeros(writer, 1);
-    BTagPad(writer);
+    BTagAppendText(writer, text, max);
     BTagClose(writer);
 }

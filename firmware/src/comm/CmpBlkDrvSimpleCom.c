@@ -28,138 +28,98 @@ enum {
     PACKET_MAX = MESSAGE_MAX < BLK_MAX_SIZE ? MESSAGE_MAX : BLK_MAX_SIZE,
 };
 
-RTS_STATIC_ASSERT(COM_QUEUE_SIZE >= PACKET_MAX + LENGTH_SIZE, com_queue_holds_the_largest_packet);
+RTS_STATIC_ASSERT(COM_QUEUE_SIZE >= LENGTH_SIZE + PACKET_MAX + CRC_SIZE, com_queue_holds_the_largest_packet);
 RTS_STATIC_ASSERT(NS_REPLY_SIZE + ROUTER_HEADER_MAX <= PACKET_MAX, packet_holds_the_name_service_reply);
 
-typedef enum {
-    RX_HUNT,      /* between frames */
-    RX_HUNT_HASH, /* between frames, after "#" */
-    RX_DATA,
-    RX_DATA_HASH,
-} RX_STATE;
-
+/* Numbers before buffers, where short instructions reach them. */
 typedef struct {
-    RX_STATE state;
-    RTS_UI32 size;
-    RTS_UI8 frame[PACKET_MAX + CRC_SIZE];
-    COM_COUNTERS counters;
-} RECEIVER;
-
-/* Packets to send, each after its length, in a ring. */
-typedef struct {
-    RTS_UI8 data[COM_QUEUE_SIZE];
-    RTS_UI32 head; /* where to read */
-    RTS_UI32 used;
-} QUEUE;
-
-typedef struct {
-    QUEUE queue;
-    RTS_UI32 left; /* packet bytes still to be encoded */
-    RTS_UI16 crc;
-    bool in_frame;
-    RTS_UI8 chunk[WRITE_CHUNK]; /* encoded, not yet taken by the port */
-    RTS_UI32 chunk_size;
-    RTS_UI32 chunk_sent;
-} SENDER;
-
-typedef struct {
-    BLK_DRV driver;
     RTS_UI32 index;
     bool open;
-    RECEIVER rx;
-    SENDER tx;
+    /* the frame that arrives */
+    bool in_frame;
+    bool escape; /* the last byte was "#" */
+    RTS_UI32 fill;
+    /* the queue of packets to send, each between its length and its CRC: a ring */
+    RTS_UI32 head;
+    RTS_UI32 used;
+    /* the frame on its way out */
+    RTS_UI32 left; /* bytes still to be encoded; 0 between frames */
+    RTS_UI32 chunk_size;
+    RTS_UI32 chunk_sent;
+    BLK_DRV driver;
+    RTS_UI8 chunk[WRITE_CHUNK]; /* encoded, not yet taken by the port */
+    RTS_UI8 queue[COM_QUEUE_SIZE];
+    RTS_UI8 frame[PACKET_MAX + CRC_SIZE];
 } COM_LINE;
 
 static COM_LINE lines[COM_MAX_LINES];
+static COM_COUNTERS counters[COM_MAX_LINES];
 
 /* ---- receiving ---- */
-
-static void start_frame(RECEIVER *rx)
-{
-    rx->state = RX_DATA;
-    rx->size = 0;
-}
 
 /* Hands a frame up when its CRC is right. */
 static void end_frame(COM_LINE *line)
 {
-    RECEIVER *rx = &line->rx;
-
-    rx->state = RX_HUNT;
-    if (rx->size <= CRC_SIZE) {
-        rx->counters.too_short++;
+    if (line->fill <= CRC_SIZE) {
+        COMM_COUNT(counters[line->index].too_short);
         return;
     }
-    RTS_UI32 size = rx->size - CRC_SIZE;
-    if (CRC16Update(CRC16_INIT, rx->frame, size) != BytesGet16(rx->frame + size)) {
-        rx->counters.crc_errors++;
+    RTS_UI32 size = line->fill - CRC_SIZE;
+    if (CRC16Update(CRC16_INIT, line->frame, size) != BytesGet16(line->frame + size)) {
+        COMM_COUNT(counters[line->index].crc_errors);
         return;
     }
-    rx->counters.frames++;
-    RouterHandleData(&line->driver, rx->frame, size);
+    COMM_COUNT(counters[line->index].frames);
+    RouterHandleData(&line->driver, line->frame, size);
 }
 
-static void take_byte(RECEIVER *rx, RTS_UI8 byte)
+/* A byte of a frame; between frames it belongs to nothing. */
+static void take_byte(COM_LINE *line, RTS_UI8 byte)
 {
-    if (rx->size == sizeof(rx->frame)) {
-        rx->counters.overflows++;
-        rx->state = RX_HUNT;
+    if (!line->in_frame)
+        return;
+    if (line->fill == sizeof(line->frame)) {
+        COMM_COUNT(counters[line->index].overflows);
+        line->in_frame = false;
         return;
     }
-    rx->frame[rx->size++] = byte;
-    rx->state = RX_DATA;
+    line->frame[line->fill++] = byte;
 }
 
-static void hunt_after_hash(RECEIVER *rx, RTS_UI8 byte)
+/* The byte after "#". All but "_" end a frame, rightly or not. */
+static void take_escaped(COM_LINE *line, RTS_UI8 byte)
 {
-    if (byte == SIMPLECOM_START_2) {
-        start_frame(rx);
-        return;
-    }
-    if (byte == SIMPLECOM_END_2)
-        rx->counters.ends_without_start++;
-    rx->state = byte == SIMPLECOM_START_1 ? RX_HUNT_HASH : RX_HUNT;
-}
-
-static void data_after_hash(COM_LINE *line, RTS_UI8 byte)
-{
-    RECEIVER *rx = &line->rx;
+    bool in_frame = line->in_frame;
 
     if (byte == SIMPLECOM_STUFF) {
-        take_byte(rx, SIMPLECOM_ESCAPE);
-    } else if (byte == SIMPLECOM_END_2) {
-        end_frame(line);
+        take_byte(line, SIMPLECOM_ESCAPE);
+        return;
+    }
+    line->in_frame = byte == SIMPLECOM_START_2;
+    line->escape = byte == SIMPLECOM_ESCAPE;
+    if (byte == SIMPLECOM_END_2) {
+        if (in_frame)
+            end_frame(line);
+        else
+            COMM_COUNT(counters[line->index].ends_without_start);
     } else if (byte == SIMPLECOM_START_2) {
-        rx->counters.unfinished++;
-        start_frame(rx);
-    } else {
-        rx->counters.bad_escapes++;
-        rx->state = byte == SIMPLECOM_START_1 ? RX_HUNT_HASH : RX_HUNT;
+        line->fill = 0;
+        if (in_frame)
+            COMM_COUNT(counters[line->index].unfinished);
+    } else if (in_frame) {
+        COMM_COUNT(counters[line->index].bad_escapes);
     }
 }
 
 static void receive_byte(COM_LINE *line, RTS_UI8 byte)
 {
-    RECEIVER *rx = &line->rx;
+    bool escaped = line->escape;
 
-    switch (rx->state) {
-    case RX_HUNT:
-        if (byte == SIMPLECOM_START_1)
-            rx->state = RX_HUNT_HASH;
-        break;
-    case RX_HUNT_HASH:
-        hunt_after_hash(rx, byte);
-        break;
-    case RX_DATA:
-        if (byte == SIMPLECOM_ESCAPE)
-            rx->state = RX_DATA_HASH;
-        else
-            take_byte(rx, byte);
-        break;
-    case RX_DATA_HASH:
-        data_after_hash(line, byte);
-        break;
-    }
+    line->escape = !escaped && byte == SIMPLECOM_ESCAPE;
+    if (escaped)
+        take_escaped(line, byte);
+    else if (byte != SIMPLECOM_ESCAPE)
+        take_byte(line, byte);
 }
 
 static void receive(COM_LINE *line)
@@ -178,109 +138,116 @@ static void receive(COM_LINE *line)
 
 /* ---- sending ---- */
 
-static void push(QUEUE *queue, const RTS_UI8 *data, RTS_UI32 size)
+static void push(COM_LINE *line, const RTS_UI8 *data, RTS_UI32 size)
 {
-    for (RTS_UI32 i = 0; i < size; i++)
-        queue->data[(queue->head + queue->used++) % COM_QUEUE_SIZE] = data[i];
+    for (RTS_UI32 i = 0; i < size; i++) {
+        RTS_UI32 tail = line->head + line->used++;
+        line->queue[tail < COM_QUEUE_SIZE ? tail : tail - COM_QUEUE_SIZE] = data[i];
+    }
 }
 
-static RTS_UI8 pop(QUEUE *queue)
+static RTS_UI8 pop(COM_LINE *line)
 {
-    RTS_UI8 byte = queue->data[queue->head];
+    RTS_UI8 byte = line->queue[line->head++];
 
-    queue->head = (queue->head + 1) % COM_QUEUE_SIZE;
-    queue->used--;
+    if (line->head == COM_QUEUE_SIZE)
+        line->head = 0;
+    line->used--;
     return byte;
+}
+
+static void push16(COM_LINE *line, RTS_UI32 value)
+{
+    RTS_UI8 bytes[2];
+
+    BytesPut16(bytes, value);
+    push(line, bytes, sizeof(bytes));
 }
 
 static RTS_RESULT com_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count)
 {
     COM_LINE *line = driver->instance;
-    QUEUE *queue = &line->tx.queue;
-    RTS_UI8 length[LENGTH_SIZE];
-    RTS_UI32 size = 0;
+    RTS_UI32 size = CRC_SIZE;
+    RTS_UI16 crc = CRC16_INIT;
 
     for (RTS_UI32 i = 0; i < count; i++)
         size += parts[i].size;
-    if (size == 0 || size > PACKET_MAX)
+    if (size > PACKET_MAX + CRC_SIZE)
         return ERR_NET_MSGSIZE;
-    if (size + LENGTH_SIZE > COM_QUEUE_SIZE - queue->used)
+    if (LENGTH_SIZE + size > COM_QUEUE_SIZE - line->used)
         return ERR_NOBUFFER;
-    BytesPut16(length, size);
-    push(queue, length, sizeof(length));
-    for (RTS_UI32 i = 0; i < count; i++)
-        push(queue, parts[i].data, parts[i].size);
+    push16(line, size);
+    for (RTS_UI32 i = 0; i < count; i++) {
+        crc = CRC16Update(crc, parts[i].data, parts[i].size);
+        push(line, parts[i].data, parts[i].size);
+    }
+    push16(line, crc);
     return ERR_OK;
 }
 
-static void put_raw(SENDER *tx, RTS_UI8 byte)
+static void put(COM_LINE *line, RTS_UI8 byte)
 {
-    tx->chunk[tx->chunk_size++] = byte;
+    line->chunk[line->chunk_size++] = byte;
 }
 
-static void put_escaped(SENDER *tx, RTS_UI8 byte)
+static void encode_start(COM_LINE *line)
 {
-    put_raw(tx, byte);
+    line->left = pop(line);
+    line->left |= (RTS_UI32)pop(line) << 8;
+    put(line, SIMPLECOM_START_1);
+    put(line, SIMPLECOM_START_2);
+}
+
+static void encode_byte(COM_LINE *line)
+{
+    RTS_UI8 byte = pop(line);
+
+    put(line, byte);
     if (byte == SIMPLECOM_ESCAPE)
-        put_raw(tx, SIMPLECOM_STUFF);
+        put(line, SIMPLECOM_STUFF);
+    if (--line->left == 0) {
+        put(line, SIMPLECOM_START_1);
+        put(line, SIMPLECOM_END_2);
+    }
 }
 
-static void encode_start(SENDER *tx)
+static void encode_chunk(COM_LINE *line)
 {
-    tx->left = pop(&tx->queue);
-    tx->left |= (RTS_UI32)pop(&tx->queue) << 8;
-    tx->crc = CRC16_INIT;
-    tx->in_frame = true;
-    put_raw(tx, SIMPLECOM_START_1);
-    put_raw(tx, SIMPLECOM_START_2);
-}
+    enum { STEP_MAX = 4 }; /* an escaped byte and the end */
 
-static void encode_end(SENDER *tx)
-{
-    put_escaped(tx, (RTS_UI8)tx->crc);
-    put_escaped(tx, (RTS_UI8)(tx->crc >> 8));
-    put_raw(tx, SIMPLECOM_START_1);
-    put_raw(tx, SIMPLECOM_END_2);
-    tx->in_frame = false;
-}
-
-/* Fills the chunk; no step adds more than 6 bytes. */
-static void encode_chunk(SENDER *tx)
-{
-    tx->chunk_size = 0;
-    tx->chunk_sent = 0;
-    while (tx->chunk_size + 6 <= WRITE_CHUNK && (tx->in_frame || tx->queue.used != 0)) {
-        if (!tx->in_frame) {
-            encode_start(tx);
-        } else if (tx->left == 0) {
-            encode_end(tx);
-        } else {
-            RTS_UI8 byte = pop(&tx->queue);
-            tx->left--;
-            tx->crc = CRC16Update(tx->crc, &byte, 1);
-            put_escaped(tx, byte);
-        }
+    line->chunk_size = 0;
+    line->chunk_sent = 0;
+    while (line->chunk_size <= WRITE_CHUNK - STEP_MAX && line->used != 0) {
+        if (line->left == 0)
+            encode_start(line);
+        else
+            encode_byte(line);
     }
 }
 
 static void transmit(COM_LINE *line)
 {
-    SENDER *tx = &line->tx;
-
     for (;;) {
-        if (tx->chunk_sent == tx->chunk_size)
-            encode_chunk(tx);
-        RTS_UI32 offered = tx->chunk_size - tx->chunk_sent;
+        if (line->chunk_sent == line->chunk_size)
+            encode_chunk(line);
+        RTS_UI32 offered = line->chunk_size - line->chunk_sent;
         if (offered == 0)
             return;
-        RTS_UI32 taken = SysComWrite(line->index, tx->chunk + tx->chunk_sent, offered);
-        tx->chunk_sent += taken < offered ? taken : offered;
+        RTS_UI32 taken = SysComWrite(line->index, line->chunk + line->chunk_sent, offered);
+        line->chunk_sent += taken < offered ? taken : offered;
         if (taken < offered)
             return;
     }
 }
 
 /* ---- life ---- */
+
+static void reset_lines(void)
+{
+    memset(lines, 0, sizeof(lines));
+    if (COMM_COUNTERS)
+        memset(counters, 0, sizeof(counters));
+}
 
 static void open_lines(void)
 {
@@ -325,13 +292,13 @@ static void cycle(void)
 
 const COM_COUNTERS *BlkDrvComGetCounters(RTS_UI32 line)
 {
-    return line < COM_MAX_LINES ? &lines[line].rx.counters : NULL;
+    return line < COM_MAX_LINES ? &counters[line] : NULL;
 }
 
 RTS_RESULT CmpBlkDrvSimpleCom_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT)
-        memset(lines, 0, sizeof(lines));
+        reset_lines();
     else if (hook == CH_INIT_COMM)
         open_lines();
     else if (hook == CH_COMM_CYCLE)

@@ -18,57 +18,64 @@ enum {
     REPEAT_FIRST_MS = 1000, /* doubles with each repetition */
     REPEAT_COUNT = 4,
     REPEAT_GAP_MS = 100, /* between repetitions that the client's own repetitions ask for */
-    MIN_PAYLOAD = CHANNEL_FIRST_SIZE + 12, /* a path that carries less is not worth a channel */
+    /* Length and CRC of a message travel before its bytes and fill the first block together with them. */
+    PREFIX_SIZE = CHANNEL_FIRST_SIZE - CHANNEL_DATA_SIZE,
+    MIN_ROOM = PREFIX_SIZE + 12, /* a path whose packets carry less is not worth a channel */
 };
 
-/* The channel; id 0 when closed. Times are ms of the clock handed in. */
-static struct {
-    ROUTER_PEER peer;
-    RTS_UI32 request_id; /* of the open request */
-    RTS_UI32 limit;      /* largest message, both directions */
-    RTS_UI32 payload;    /* largest package of this channel */
-    RTS_UI32 last_received;
-    RTS_UI32 last_sent;
+typedef RTS_UI8 MESSAGE[PREFIX_SIZE + NETSERVER_MESSAGE_SIZE]; /* after its length and CRC */
+
+/* The request on its way in. */
+typedef struct {
+    RTS_UI32 block; /* number of the highest block received in order */
+    RTS_UI32 gap;   /* the nearest block that has come too early since then, counted from there; 0: none */
+    RTS_UI32 fill;
+    RTS_UI32 left; /* bytes still missing; 0 between requests */
+} RECEIVER;
+
+/* The reply on its way out. It is kept after the acknowledgement, as nothing needs the room. What concerns one reply
+ * counts its blocks, so that their numbers may wrap. */
+typedef struct {
+    RTS_UI32 base; /* number of the last block before the reply */
+    RTS_UI32 count;
+    RTS_UI32 sent;
+    RTS_UI32 acked;
+    RTS_UI32 size;
+    RTS_UI32 sent_at;
+    RTS_UI32 repeats;
+    RTS_UI32 missed; /* block the client last asked for; 0: none */
+    RTS_UI32 missed_at;
+} SENDER;
+
+/* The channel; id 0 when closed. Times are those of SysTimeGetMs. */
+typedef struct {
     RTS_UI16 id;
     RTS_UI8 address_words; /* of both addresses, agreed */
     bool fresh;            /* no block has arrived yet */
     bool open_due;         /* the open response is waiting for room in the driver */
     bool ack_due;
-    bool missing_due; /* the acknowledgement asks for a repetition */
-} channel;
+    bool missing_due;    /* the acknowledgement asks for a repetition */
+    RTS_UI32 request_id; /* of the open request */
+    RTS_UI32 limit;      /* largest message, both directions */
+    RTS_UI32 room;       /* bytes of a message, with its prefix, in one block */
+    RTS_UI32 last_received;
+    RTS_UI32 last_sent;
+    RECEIVER rx;
+    SENDER tx;
+    ROUTER_PEER peer;
+} CHANNEL;
 
-/* The request on its way in. */
-static struct {
-    RTS_UI32 block; /* highest block received in order */
-    RTS_UI32 gap;   /* lowest block that has come too early since then; 0: none */
-    RTS_UI32 length;
-    RTS_UI32 crc;
-    RTS_UI32 fill;
-    bool active;
-    RTS_UI8 data[NETSERVER_MESSAGE_SIZE];
-} rx;
+static CHANNEL channel;
+static MESSAGE request_buffer;
+static MESSAGE reply_buffer;
 
-/* The reply on its way out: blocks first..last. Also kept after the acknowledgement, as nothing needs the room. */
+/* What outlives a channel. */
 static struct {
-    RTS_UI32 first;
-    RTS_UI32 last;
-    RTS_UI32 next;  /* to be sent; last + 1 when all are */
-    RTS_UI32 acked; /* highest acknowledged; last when all are */
-    RTS_UI32 size;
-    RTS_UI32 crc;
-    RTS_UI32 sent_at;
-    RTS_UI32 repeats;
-    RTS_UI32 missed; /* block the client last asked for; 0: none */
-    RTS_UI32 missed_at;
-    RTS_UI8 data[NETSERVER_MESSAGE_SIZE];
-} tx;
-
-static struct {
-    CHANNEL_COUNTERS counters;
-    RTS_UI16 last_id;
     RTS_UI32 complained_at;
-    bool complained;
+    RTS_UI16 last_id;
 } server;
+
+static CHANNEL_COUNTERS counters;
 
 /* ---- packages without blocks ---- */
 
@@ -129,21 +136,14 @@ static void send_rts_info(const ROUTER_PEER *peer)
     (void)send_meta(peer, CHANNEL_PKG_RTSINFO_RESP, package, sizeof(package));
 }
 
-static RTS_RESULT send_ack(void)
+/* An acknowledgement; its beginning alone is a keepalive. */
+static RTS_RESULT send_short(RTS_UI8 type, RTS_UI8 flags, RTS_UI32 size)
 {
-    RTS_UI8 package[CHANNEL_ACK_SIZE] = {CHANNEL_PKG_ACK, channel.missing_due ? CHANNEL_FLAG_MISSING : 0};
+    RTS_UI8 package[CHANNEL_ACK_SIZE] = {type, flags};
 
     BytesPut16(package + 2, channel.id);
-    BytesPut32(package + 4, rx.block);
-    return send_package(&channel.peer, package, sizeof(package));
-}
-
-static void send_keepalive(void)
-{
-    RTS_UI8 package[CHANNEL_KEEPALIVE_SIZE] = {CHANNEL_PKG_KEEPALIVE, 0};
-
-    BytesPut16(package + 2, channel.id);
-    (void)send_package(&channel.peer, package, sizeof(package));
+    BytesPut32(package + 4, channel.rx.block);
+    return send_package(&channel.peer, package, size);
 }
 
 /* ---- life of the channel ---- */
@@ -156,7 +156,7 @@ static void forget_channel(void)
 
 static void close_channel(RTS_RESULT error)
 {
-    server.counters.failed++;
+    COMM_COUNT(counters.failed);
     send_close(&channel.peer, channel.id, error);
     forget_channel();
 }
@@ -164,10 +164,10 @@ static void close_channel(RTS_RESULT error)
 /* 1..CHANNEL_ID_MAX, and another one than last time. */
 static RTS_UI16 new_id(void)
 {
-    RTS_UI32 id = 1 + SysTargetRandom() % CHANNEL_ID_MAX;
+    RTS_UI32 id = 1 + SysTargetRandom() % (CHANNEL_ID_MAX - 1);
 
-    if (id == server.last_id)
-        id = 1 + id % CHANNEL_ID_MAX;
+    if (id >= server.last_id)
+        id++;
     server.last_id = (RTS_UI16)id;
     return server.last_id;
 }
@@ -175,7 +175,7 @@ static RTS_UI16 new_id(void)
 typedef struct {
     RTS_UI32 request_id;
     RTS_UI32 limit;
-    RTS_UI32 payload;
+    RTS_UI32 room;
     RTS_UI8 address_words;
 } OPEN_REQUEST;
 
@@ -193,8 +193,9 @@ static bool read_open_request(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_
     if (request->limit > NETSERVER_MESSAGE_SIZE)
         request->limit = NETSERVER_MESSAGE_SIZE;
     request->address_words = (RTS_UI8)words;
-    request->payload = RouterGetMaxPayload(peer, words);
-    return request->limit >= CHANNEL_MIN_MESSAGE && request->payload >= MIN_PAYLOAD;
+    RTS_UI32 payload = RouterGetMaxPayload(peer, words);
+    request->room = payload - CHANNEL_DATA_SIZE;
+    return request->limit >= CHANNEL_MIN_MESSAGE && payload >= CHANNEL_DATA_SIZE + MIN_ROOM;
 }
 
 /* Somebody is using the channel and has shown that he may. */
@@ -220,18 +221,11 @@ static void open_channel(const ROUTER_PEER *peer, const OPEN_REQUEST *request)
     channel.peer = *peer;
     channel.request_id = request->request_id;
     channel.limit = request->limit;
-    channel.payload = request->payload;
+    channel.room = request->room;
     channel.address_words = request->address_words;
     channel.id = new_id();
     channel.fresh = true;
-    rx.block = 0;
-    rx.gap = 0;
-    rx.active = false;
-    tx.first = 1;
-    tx.last = 0;
-    tx.next = 1;
-    tx.acked = 0;
-    server.counters.opened++;
+    COMM_COUNT(counters.opened);
 }
 
 static void handle_open(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
@@ -239,11 +233,11 @@ static void handle_open(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 s
     OPEN_REQUEST request;
 
     if (!read_open_request(peer, data, size, &request)) {
-        server.counters.malformed++;
+        COMM_COUNT(counters.malformed);
         return;
     }
     if (is_taken(peer, now_ms)) {
-        server.counters.refused++;
+        COMM_COUNT(counters.refused);
         (void)send_open_response(peer, request.request_id, CHANNEL_OPEN_NO_CHANNEL, CHANNEL_ID_NONE);
         return;
     }
@@ -255,179 +249,172 @@ static void handle_open(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 s
 
 /* ---- sending the reply ---- */
 
-/* Bytes of the reply before block `block`. */
-static RTS_UI32 block_offset(RTS_UI32 block)
-{
-    if (block == tx.first)
-        return 0;
-    return channel.payload - CHANNEL_FIRST_SIZE + (block - tx.first - 1) * (channel.payload - CHANNEL_DATA_SIZE);
-}
-
+/* Of the message in reply_buffer. */
 static void start_reply(RTS_UI32 size)
 {
-    RTS_UI32 in_first = channel.payload - CHANNEL_FIRST_SIZE;
-    RTS_UI32 in_next = channel.payload - CHANNEL_DATA_SIZE;
-    RTS_UI32 rest = size > in_first ? size - in_first : 0;
+    SENDER *tx = &channel.tx;
 
-    tx.first = tx.last + 1;
-    tx.last = tx.first + (rest + in_next - 1) / in_next;
-    tx.next = tx.first;
-    tx.size = size;
-    tx.crc = CRC32Update(0, tx.data, size);
-    tx.repeats = 0;
-    tx.missed = 0;
+    BytesPut32(reply_buffer, size);
+    BytesPut32(reply_buffer + 4, CRC32Update(0, reply_buffer + PREFIX_SIZE, size));
+    tx->base += tx->count;
+    tx->size = PREFIX_SIZE + size;
+    tx->count = (tx->size + channel.room - 1) / channel.room;
+    tx->sent = 0;
+    tx->acked = 0;
+    tx->repeats = 0;
+    tx->missed = 0;
 }
 
-static RTS_RESULT send_block(RTS_UI32 block)
+static RTS_RESULT send_block(void)
 {
-    RTS_UI8 header[CHANNEL_FIRST_SIZE] = {CHANNEL_PKG_DATA, 0};
-    RTS_UI32 offset = block_offset(block);
-    RTS_UI32 end = block == tx.last ? tx.size : block_offset(block + 1);
-    BLK_PART parts[2] = {{header, CHANNEL_DATA_SIZE}, {tx.data + offset, end - offset}};
+    const SENDER *tx = &channel.tx;
+    RTS_UI8 header[CHANNEL_DATA_SIZE] = {CHANNEL_PKG_DATA, tx->sent == 0 ? CHANNEL_FLAG_FIRST : 0};
+    RTS_UI32 offset = tx->sent * channel.room;
+    RTS_UI32 left = tx->size - offset;
+    BLK_PART parts[2] = {{header, sizeof(header)}, {reply_buffer + offset, left < channel.room ? left : channel.room}};
 
     BytesPut16(header + 2, channel.id);
-    BytesPut32(header + 4, block);
-    BytesPut32(header + 8, rx.block);
-    if (block == tx.first) {
-        header[1] = CHANNEL_FLAG_FIRST;
-        BytesPut32(header + 12, tx.size);
-        BytesPut32(header + 16, tx.crc);
-        parts[0].size = CHANNEL_FIRST_SIZE;
-    }
+    BytesPut32(header + 4, tx->base + tx->sent + 1);
+    BytesPut32(header + 8, channel.rx.block);
     return RouterSend(&channel.peer, ROUTER_SVC_CHANNEL, parts, 2);
 }
 
-/* Sends what is due, in order of urgency, as far as the driver has room. */
+/* Sends the most urgent of what is due. ERR_NOTHING_TO_DO, ERR_NOBUFFER. */
+static RTS_RESULT send_next(RTS_UI32 now_ms)
+{
+    RTS_RESULT result = ERR_NOTHING_TO_DO;
+
+    if (channel.open_due) {
+        result = send_open_response(&channel.peer, channel.request_id, CHANNEL_OPEN_OK, channel.id);
+        channel.open_due = result != ERR_OK;
+    } else if (channel.ack_due) {
+        result = send_short(CHANNEL_PKG_ACK, channel.missing_due ? CHANNEL_FLAG_MISSING : 0, CHANNEL_ACK_SIZE);
+        channel.ack_due = result != ERR_OK;
+        channel.missing_due = channel.missing_due && channel.ack_due;
+    } else if (channel.tx.sent < channel.tx.count) {
+        result = send_block();
+        if (result == ERR_OK) {
+            channel.tx.sent++;
+            channel.tx.sent_at = now_ms;
+        }
+    } else if (now_ms - channel.last_sent >= CHANNEL_KEEPALIVE_MS) {
+        result = send_short(CHANNEL_PKG_KEEPALIVE, 0, CHANNEL_KEEPALIVE_SIZE);
+    }
+    return result;
+}
+
+/* Sends what is due as far as the driver has room. */
 static void pump(RTS_UI32 now_ms)
 {
-    if (channel.open_due) {
-        if (send_open_response(&channel.peer, channel.request_id, CHANNEL_OPEN_OK, channel.id) != ERR_OK)
-            return;
-        channel.open_due = false;
+    while (send_next(now_ms) == ERR_OK)
         channel.last_sent = now_ms;
-    }
-    if (channel.ack_due) {
-        if (send_ack() != ERR_OK)
-            return;
-        channel.ack_due = false;
-        channel.missing_due = false;
-        channel.last_sent = now_ms;
-    }
-    while (tx.next <= tx.last && send_block(tx.next) == ERR_OK) {
-        tx.next++;
-        tx.sent_at = now_ms;
-        channel.last_sent = now_ms;
-    }
 }
 
 static bool is_waiting_for_ack(void)
 {
-    return tx.acked < tx.last && tx.next > tx.last;
+    return channel.tx.acked < channel.tx.count && channel.tx.sent == channel.tx.count;
 }
 
 static void repeat_reply(void)
 {
-    tx.next = tx.acked < tx.first ? tx.first : tx.acked + 1;
-    server.counters.repeats++;
+    channel.tx.sent = channel.tx.acked;
+    COMM_COUNT(counters.repeats);
 }
 
-/* The client asks for the block after `ack`. Some ask with each block that comes after it: once is enough. */
-static void handle_missing(RTS_UI32 ack, RTS_UI32 now_ms)
+/* The client asks for the block after those it has. Some ask with each block that comes after it: once is enough. */
+static void handle_missing(RTS_UI32 now_ms)
 {
-    if (tx.next == ack + 1 || (tx.missed == ack + 1 && now_ms - tx.missed_at < REPEAT_GAP_MS))
+    SENDER *tx = &channel.tx;
+    RTS_UI32 missed = tx->acked + 1;
+
+    if (tx->sent == tx->acked || (tx->missed == missed && now_ms - tx->missed_at < REPEAT_GAP_MS))
         return;
-    tx.missed = ack + 1;
-    tx.missed_at = now_ms;
+    tx->missed = missed;
+    tx->missed_at = now_ms;
     repeat_reply();
 }
 
-static void handle_ack(RTS_UI32 ack, bool missing, RTS_UI32 now_ms)
+static void handle_ack(RTS_UI32 block, bool missing, RTS_UI32 now_ms)
 {
-    if (ack < tx.acked || ack > tx.last)
+    SENDER *tx = &channel.tx;
+    RTS_UI32 acked = block - tx->base; /* of an earlier reply: more than there are */
+
+    if (acked < tx->acked || acked > tx->count)
         return;
-    if (ack > tx.acked)
-        tx.repeats = 0;
-    tx.acked = ack;
-    if (tx.next <= ack)
-        tx.next = ack + 1;
-    if (missing && ack < tx.last)
-        handle_missing(ack, now_ms);
+    if (acked > tx->acked)
+        tx->repeats = 0;
+    tx->acked = acked;
+    if (tx->sent < acked)
+        tx->sent = acked;
+    if (missing && acked < tx->count)
+        handle_missing(now_ms);
 }
 
 /* ---- receiving the request ---- */
 
-static void handle_message(void)
+static RTS_RESULT handle_message(void)
 {
-    rx.active = false;
-    if (CRC32Update(0, rx.data, rx.length) != rx.crc) {
-        close_channel(ERR_CHS_CHECKSUM);
-        return;
-    }
-    tx.acked = tx.last; /* whoever asks again has the answer before */
-    RTS_UI32 size = SrvHandleMessage(rx.data, rx.length, tx.data, channel.limit);
-    if (size == 0)
-        close_channel(ERR_CHS_REQNOTHANDLED);
-    else
-        start_reply(size);
-}
+    const RTS_UI8 *message = request_buffer + PREFIX_SIZE;
+    RTS_UI32 size = BytesGet32(request_buffer);
 
-static RTS_RESULT start_message(const RTS_UI8 *data, RTS_UI32 size)
-{
-    if (size < CHANNEL_FIRST_SIZE)
-        return ERR_CHS_PROTOCOL;
-    rx.length = BytesGet32(data + 12);
-    rx.crc = BytesGet32(data + 16);
-    rx.fill = 0;
-    if (rx.length == 0)
-        return ERR_CHS_PROTOCOL;
-    if (rx.length > channel.limit)
-        return ERR_CHS_MESSAGESIZE;
-    rx.active = true;
+    if (CRC32Update(0, message, size) != BytesGet32(request_buffer + 4))
+        return ERR_CHS_CHECKSUM;
+    size = SrvHandleMessage(message, size, reply_buffer + PREFIX_SIZE, channel.limit);
+    if (size == 0)
+        return ERR_CHS_REQNOTHANDLED;
+    start_reply(size); /* whoever asks again has had the reply before */
     return ERR_OK;
 }
 
-/* Takes the block that is next in order. */
-static void accept_block(const RTS_UI8 *data, RTS_UI32 size)
+/* A new request, whatever has become of the one before. */
+static RTS_RESULT start_message(const RTS_UI8 *data, RTS_UI32 size)
 {
-    RTS_UI32 header = CHANNEL_DATA_SIZE;
+    RTS_UI32 length = size < PREFIX_SIZE ? 0 : BytesGet32(data);
 
-    if (data[1] & CHANNEL_FLAG_FIRST) {
-        RTS_RESULT result = start_message(data, size);
-        if (result != ERR_OK) {
-            close_channel(result);
-            return;
-        }
-        header = CHANNEL_FIRST_SIZE;
-    }
-    size -= header;
-    if (!rx.active || size > rx.length - rx.fill) {
-        close_channel(ERR_CHS_PROTOCOL);
-        return;
-    }
-    memcpy(rx.data + rx.fill, data + header, size);
-    rx.fill += size;
-    rx.block++;
-    rx.gap = 0;
-    if (rx.fill == rx.length)
-        handle_message();
+    channel.rx.fill = 0;
+    channel.rx.left = 0;
+    if (length == 0)
+        return ERR_CHS_PROTOCOL;
+    if (length > channel.limit)
+        return ERR_CHS_MESSAGESIZE;
+    channel.rx.left = PREFIX_SIZE + length;
+    return ERR_OK;
+}
+
+/* Takes the block that is next in order: `data` is what follows its header. */
+static RTS_RESULT accept_block(bool is_first, const RTS_UI8 *data, RTS_UI32 size)
+{
+    RECEIVER *rx = &channel.rx;
+    RTS_RESULT result = is_first ? start_message(data, size) : ERR_OK;
+
+    if (result != ERR_OK)
+        return result;
+    if (rx->left == 0 || size > rx->left)
+        return ERR_CHS_PROTOCOL;
+    memcpy(request_buffer + rx->fill, data, size);
+    rx->fill += size;
+    rx->left -= size;
+    rx->block++;
+    rx->gap = 0;
+    return rx->left == 0 ? handle_message() : ERR_OK;
 }
 
 /* A block received before: its acknowledgement was lost, and perhaps the reply too. */
 static void handle_duplicate(RTS_UI32 now_ms)
 {
-    server.counters.duplicates++;
+    COMM_COUNT(counters.duplicates);
     channel.ack_due = true;
-    if (is_waiting_for_ack() && now_ms - tx.sent_at >= REPEAT_GAP_MS)
+    if (is_waiting_for_ack() && now_ms - channel.tx.sent_at >= REPEAT_GAP_MS)
         repeat_reply();
 }
 
-/* A block before this one is missing. Said once per run of the client through its blocks, or one loss would be
+/* Blocks before this one are missing. Said once per run of the client through its blocks, or one loss would be
  * answered with a storm of repetitions. */
-static void handle_gap(RTS_UI32 block)
+static void handle_gap(RTS_UI32 ahead)
 {
-    server.counters.gaps++;
-    if (rx.gap == 0 || block <= rx.gap) {
-        rx.gap = block;
+    COMM_COUNT(counters.gaps);
+    if (channel.rx.gap == 0 || ahead <= channel.rx.gap) {
+        channel.rx.gap = ahead;
         channel.ack_due = true;
         channel.missing_due = true;
     }
@@ -435,19 +422,19 @@ static void handle_gap(RTS_UI32 block)
 
 static void handle_data(const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
-    if (size < CHANNEL_DATA_SIZE) {
-        server.counters.malformed++;
-        return;
-    }
-    RTS_UI32 block = BytesGet32(data + 4);
+    RTS_UI32 ahead = BytesGet32(data + 4) - channel.rx.block; /* numbers wrap */
+    RTS_RESULT result = ERR_OK;
+
     channel.fresh = false;
     handle_ack(BytesGet32(data + 8), false, now_ms);
-    if (block == rx.block + 1)
-        accept_block(data, size);
-    else if (block <= rx.block)
+    if (ahead == 1)
+        result = accept_block((data[1] & CHANNEL_FLAG_FIRST) != 0, data + CHANNEL_DATA_SIZE, size - CHANNEL_DATA_SIZE);
+    else if ((RTS_I32)ahead <= 0)
         handle_duplicate(now_ms);
     else
-        handle_gap(block);
+        handle_gap(ahead);
+    if (result != ERR_OK)
+        close_channel(result);
 }
 
 /* ---- packages ---- */
@@ -455,10 +442,9 @@ static void handle_data(const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 /* Tells whoever uses a channel that is not his (or not any more), so that he need not wait for a time-out. */
 static void complain(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
 {
-    server.counters.foreign++;
-    if (server.complained && now_ms - server.complained_at < CHANNEL_COMPLAINT_MS)
+    COMM_COUNT(counters.foreign);
+    if (now_ms - server.complained_at < CHANNEL_COMPLAINT_MS)
         return;
-    server.complained = true;
     server.complained_at = now_ms;
     send_close(peer, id, ERR_CHS_CHINVALID);
 }
@@ -471,7 +457,7 @@ static bool is_owner(const ROUTER_PEER *peer, RTS_UI16 id)
 static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
     if (size < CHANNEL_KEEPALIVE_SIZE || (data[1] & CHANNEL_FLAG_TO_SERVER) == 0) {
-        server.counters.malformed++;
+        COMM_COUNT(counters.malformed);
         return;
     }
     if (!is_owner(peer, BytesGet16(data + 2))) {
@@ -479,29 +465,29 @@ static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data,
         return;
     }
     channel.last_received = now_ms;
-    if (data[0] == CHANNEL_PKG_DATA)
+    if (data[0] == CHANNEL_PKG_DATA && size >= CHANNEL_DATA_SIZE)
         handle_data(data, size, now_ms);
     else if (data[0] == CHANNEL_PKG_ACK && size >= CHANNEL_ACK_SIZE)
         handle_ack(BytesGet32(data + 4), (data[1] & CHANNEL_FLAG_MISSING) != 0, now_ms);
     else if (data[0] != CHANNEL_PKG_KEEPALIVE)
-        server.counters.malformed++;
+        COMM_COUNT(counters.malformed);
 }
 
 static void handle_close(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
 {
     if (size < CHANNEL_CLOSE_SIZE)
-        server.counters.malformed++;
+        COMM_COUNT(counters.malformed);
     else if (is_owner(peer, BytesGet16(data + 8)))
         forget_channel();
     else
-        server.counters.foreign++;
+        COMM_COUNT(counters.foreign);
 }
 
 static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
     if (size < CHANNEL_META_SIZE || BytesGet16(data + 2) >> 8 != CHANNEL_VERSION >> 8 ||
         BytesGet32(data + 4) != meta_crc(data, size)) {
-        server.counters.malformed++;
+        COMM_COUNT(counters.malformed);
         return;
     }
     if (data[0] == CHANNEL_PKG_OPEN_REQ)
@@ -512,30 +498,34 @@ static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RT
         send_rts_info(peer);
 }
 
-RTS_NOINLINE void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
+RTS_NOINLINE void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
 {
+    RTS_UI32 now_ms = SysTimeGetMs();
+
     if (size == 0)
-        server.counters.malformed++;
+        COMM_COUNT(counters.malformed);
     else if (data[0] & CHANNEL_META)
         handle_meta_package(peer, data, size, now_ms);
     else
         handle_channel_package(peer, data, size, now_ms);
     if (channel.id != 0)
-        pump(now_ms);
+        pump(SysTimeGetMs()); /* a service may have taken its time */
 }
 
 /* ---- time ---- */
 
 static void repeat_when_overdue(RTS_UI32 now_ms)
 {
-    if (!is_waiting_for_ack() || tx.repeats >= REPEAT_COUNT ||
-        now_ms - tx.sent_at < (RTS_UI32)REPEAT_FIRST_MS << tx.repeats)
+    SENDER *tx = &channel.tx;
+
+    if (!is_waiting_for_ack() || tx->repeats >= REPEAT_COUNT ||
+        now_ms - tx->sent_at < (RTS_UI32)REPEAT_FIRST_MS << tx->repeats)
         return;
-    tx.repeats++;
+    tx->repeats++;
     repeat_reply();
 }
 
-void ChannelCycle(RTS_UI32 now_ms)
+static void cycle(RTS_UI32 now_ms)
 {
     if (channel.id == 0)
         return;
@@ -545,23 +535,19 @@ void ChannelCycle(RTS_UI32 now_ms)
     }
     repeat_when_overdue(now_ms);
     pump(now_ms);
-    if (now_ms - channel.last_sent >= CHANNEL_KEEPALIVE_MS) {
-        channel.last_sent = now_ms;
-        send_keepalive();
-    }
 }
 
 const CHANNEL_COUNTERS *ChannelGetCounters(void)
 {
-    return &server.counters;
+    return &counters;
 }
 
 static void reset_all(void)
 {
     memset(&channel, 0, sizeof(channel));
-    memset(&rx, 0, sizeof(rx));
-    memset(&tx, 0, sizeof(tx));
     memset(&server, 0, sizeof(server));
+    if (COMM_COUNTERS)
+        memset(&counters, 0, sizeof(counters));
 }
 
 RTS_RESULT CmpChannelServerEmbedded_Hook(CMP_HOOK hook)
@@ -569,7 +555,7 @@ RTS_RESULT CmpChannelServerEmbedded_Hook(CMP_HOOK hook)
     if (hook == CH_INIT)
         reset_all();
     else if (hook == CH_COMM_CYCLE)
-        ChannelCycle(SysTimeGetMs());
+        cycle(SysTimeGetMs());
     else if (hook == CH_EXIT_COMM && channel.id != 0)
         close_channel(ERR_CHS_SHUTDOWN);
     return ERR_OK;

@@ -8,8 +8,7 @@
  */
 #include "CmpDevice.h"
 
-#include <string.h>
-
+#include "CMUtils.h"
 #include "CmpBytes.h"
 #include "CmpChannelServerEmbedded.h"
 #include "CmpSrv.h"
@@ -19,15 +18,14 @@
 /* u32 byte length with NUL, UTF-16LE, padding. */
 static void write_wide_text(BTAG_WRITER *reply, RTS_UI32 id, const char *text, RTS_UI32 max)
 {
-    RTS_UI32 length = 0;
+    RTS_UI32 length = CMUtlStrNLen(text, max);
+    RTS_UI32 size = 2 * (length + 1);
 
-    while (length < max && text[length] != '\0')
-        length++;
     BTagOpen(reply, id, BTAG_ALIGN_0);
-    BTagAppend32(reply, 2 * (length + 1));
-    for (RTS_UI32 i = 0; i < length; i++)
-        BTagAppend16(reply, (RTS_UI8)text[i]);
-    BTagAppend16(reply, 0);
+    BTagAppend32(reply, size);
+    RTS_UI8 *place = BTagReserve(reply, size);
+    if (place != NULL)
+        (void)CMUtlPutWide(place, text, length);
     BTagPad(reply);
     BTagClose(reply);
 }
@@ -35,15 +33,9 @@ static void write_wide_text(BTAG_WRITER *reply, RTS_UI32 id, const char *text, R
 /* u16 length, ASCII, padding. */
 static void write_serial_number(BTAG_WRITER *reply, const char *text)
 {
-    RTS_UI32 length = 0;
-
-    while (length < NS_MAX_SERIAL && text[length] != '\0')
-        length++;
     BTagOpen(reply, TAG_DEV_SERIAL_NUMBER, BTAG_ALIGN_2);
-    BTagAppend16(reply, length);
-    BTagAppend(reply, text, length);
-    BTagAppendZeros(reply, 1);
-    BTagPad(reply);
+    BTagAppend16(reply, CMUtlStrNLen(text, NS_MAX_SERIAL));
+    BTagAppendText(reply, text, NS_MAX_SERIAL);
     BTagClose(reply);
 }
 

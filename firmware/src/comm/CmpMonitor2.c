@@ -203,7 +203,7 @@ static RTS_RESULT check_application(const SRV_REQUEST *request, RTS_UI32 *error)
     AppGetStatus(&status);
     if (status.state == AS_NONE)
         *error = ERR_APP_NOT_LOADED;
-    else if (SrvGetAppSession() == 0 || BytesGet32(tag.data) != SrvGetAppSession())
+    else if (!SrvIsAppSession(BytesGet32(tag.data)))
         *error = ERR_APP_INVALID_SESSIONID;
     else if (BytesGet32(tag.data + 4) != status.image_crc)
         *error = ERR_APP_INVALID_DATAID;

@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "CMUtils.h"
 #include "CmpBytes.h"
 #include "CmpChannelServerEmbedded.h"
 #include "SysTarget.h"
@@ -17,91 +18,61 @@ enum {
     REPLY_0103_SIZE = 32,
     REPLY_0101_SIZE = 22,
     NUL_SIZES = 3 * 2 + 1, /* of three wide names and the serial number */
+    ROOM_FOR_TEXTS = NS_REPLY_SIZE - REPLY_0400_SIZE - NUL_SIZES,
 };
 
 RTS_STATIC_ASSERT(NS_REPLY_SIZE <= NS_MAX_REPLY, ns_reply_fits_a_packet);
-RTS_STATIC_ASSERT(NS_REPLY_SIZE >= REPLY_0400_SIZE + NUL_SIZES, ns_reply_holds_its_head);
+RTS_STATIC_ASSERT(ROOM_FOR_TEXTS >= (int)NS_MAX_SERIAL, ns_reply_holds_its_head_and_the_serial_number);
 
-/* The names with their lengths, bounded as the protocol wants it and by the room in the reply. */
+/* Where the next wide name goes, and how many characters of it and those after it there is room for. */
 typedef struct {
-    const char *text;
-    RTS_UI32 length;
-} NAME;
-
-static NAME bound_name(const char *text, RTS_UI32 max, RTS_UI32 character_size, RTS_UI32 *room)
-{
-    NAME name = {text, 0};
-
-    while (name.length < max && text[name.length] != '\0' && *room >= character_size) {
-        name.length++;
-        *room -= character_size;
-    }
-    return name;
-}
-
-typedef struct {
-    NAME node;
-    NAME device;
-    NAME vendor;
-    NAME serial;
+    RTS_UI8 *place;
+    RTS_UI32 room;
 } NAMES;
 
-static void get_names(const SYS_TARGET *target, NAMES *names)
+/* Writes a name, cut to `max` characters and the room; returns its length. */
+static RTS_UI32 put_name(NAMES *names, const char *text, RTS_UI32 max)
 {
-    RTS_UI32 room = NS_REPLY_SIZE - REPLY_0400_SIZE - NUL_SIZES;
+    RTS_UI32 length = CMUtlStrNLen(text, max < names->room ? max : names->room);
 
-    names->node = bound_name(target->node_name, NS_MAX_NODE_NAME, 2, &room);
-    names->serial = bound_name(target->serial_number, NS_MAX_SERIAL, 1, &room);
-    names->device = bound_name(target->device_name, NS_MAX_TYPE_NAMES, 2, &room);
-    names->vendor = bound_name(target->vendor_name, NS_MAX_TYPE_NAMES - names->device.length, 2, &room);
+    names->place = CMUtlPutWide(names->place, text, length);
+    names->room -= length;
+    return length;
 }
 
-/* UTF-16LE and NUL; returns where it ends. */
-static RTS_UI8 *put_wide(RTS_UI8 *place, const NAME *name)
+/* What follows the first 8 bytes in versions 1.02, 1.03 and 4.00, the last one with more of it; returns the end. */
+static RTS_UI8 *put_body(RTS_UI8 *reply, const SYS_TARGET *target, bool is_0400, RTS_UI8 driver_type)
 {
-    for (RTS_UI32 i = 0; i < name->length; i++, place += 2)
-        BytesPut16(place, (RTS_UI8)name->text[i]);
-    BytesPut16(place, 0);
-    return place + 2;
-}
+    RTS_UI32 serial = CMUtlStrNLen(target->serial_number, NS_MAX_SERIAL);
+    NAMES names = {reply + (is_0400 ? REPLY_0400_SIZE : REPLY_0103_SIZE), (ROOM_FOR_TEXTS - serial) / 2};
 
-/* The fields that versions 1.02, 1.03 and 4.00 have in common; returns their end. */
-static RTS_UI8 *put_common(RTS_UI8 *reply, const SYS_TARGET *target, const NAMES *names)
-{
     BytesPut16(reply + 8, CHANNEL_MAX_CHANNELS);
     reply[10] = 1; /* little endian */
-    BytesPut16(reply + 14, names->node.length);
-    BytesPut16(reply + 16, names->device.length);
-    BytesPut16(reply + 18, names->vendor.length);
+    BytesPut16(reply + 14, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
+    RTS_UI32 device = put_name(&names, target->device_name, NS_MAX_TYPE_NAMES);
+    BytesPut16(reply + 16, device);
+    BytesPut16(reply + 18, put_name(&names, target->vendor_name, NS_MAX_TYPE_NAMES - device));
     BytesPut32(reply + 20, target->type);
     BytesPut32(reply + 24, target->id);
     BytesPut32(reply + 28, target->version);
-    return reply + REPLY_0103_SIZE;
+    if (!is_0400)
+        return names.place;
+    reply[36] = (RTS_UI8)serial;
+    reply[38] = driver_type;
+    memcpy(names.place, target->serial_number, serial); /* the NUL is there */
+    return names.place + serial + 1;
 }
 
-static RTS_UI8 *put_0101(RTS_UI8 *reply, const SYS_TARGET *target, const NAMES *names)
+static RTS_UI8 *put_body_0101(RTS_UI8 *reply, const SYS_TARGET *target)
 {
+    NAMES names = {reply + REPLY_0101_SIZE, ROOM_FOR_TEXTS / 2};
+
     BytesPut32(reply + 8, target->type);
     BytesPut16(reply + 12, CHANNEL_MAX_CHANNELS);
     reply[14] = 1; /* little endian */
-    BytesPut16(reply + 18, names->node.length);
-    BytesPut16(reply + 20, names->device.length);
-    return put_wide(put_wide(reply + REPLY_0101_SIZE, &names->node), &names->device);
-}
-
-static RTS_UI8 *put_wide_names(RTS_UI8 *place, const NAMES *names)
-{
-    return put_wide(put_wide(put_wide(place, &names->node), &names->device), &names->vendor);
-}
-
-static RTS_UI8 *put_0400(RTS_UI8 *reply, const SYS_TARGET *target, const NAMES *names, RTS_UI8 driver_type)
-{
-    put_common(reply, target, names);
-    reply[36] = (RTS_UI8)names->serial.length;
-    reply[38] = driver_type;
-    RTS_UI8 *place = put_wide_names(reply + REPLY_0400_SIZE, names);
-    memcpy(place, names->serial.text, names->serial.length);
-    return place + names->serial.length + 1;
+    BytesPut16(reply + 18, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
+    BytesPut16(reply + 20, put_name(&names, target->device_name, NS_MAX_TYPE_NAMES));
+    return names.place;
 }
 
 /* The version to answer with; 0 for one that never existed. */
@@ -119,54 +90,47 @@ static RTS_UI16 choose_version(RTS_UI16 wanted)
 }
 
 /* Compares UTF-16LE text, with or without NUL, with our node name. */
-static bool is_our_name(const RTS_UI8 *text, RTS_UI32 size, const NAME *node)
+static bool is_our_name(const RTS_UI8 *text, RTS_UI32 size)
 {
-    RTS_UI32 length = 0;
+    const char *own = SysTargetGet()->node_name;
 
-    while (2 * length + 2 <= size && BytesGet16(text + 2 * length) != 0)
-        length++;
-    if (length != node->length)
-        return false;
-    for (RTS_UI32 i = 0; i < length; i++)
-        if (BytesGet16(text + 2 * i) != (RTS_UI8)node->text[i])
+    for (RTS_UI32 i = 0;; i++) {
+        RTS_UI32 character = 2 * i + 2 <= size ? BytesGet16(text + 2 * i) : 0;
+        RTS_UI32 expected = i < NS_MAX_NODE_NAME ? (RTS_UI8)own[i] : 0;
+        if (character != expected)
             return false;
-    return true;
+        if (expected == 0)
+            return true;
+    }
 }
 
-static void answer(const ROUTER_PEER *peer, RTS_UI16 version, const RTS_UI8 *request_id, const NAMES *names)
+static void answer(const ROUTER_PEER *peer, RTS_UI16 version, const RTS_UI8 *request_id)
 {
-    const SYS_TARGET *target = SysTargetGet();
     RTS_UI8 reply[NS_REPLY_SIZE] = {0};
     RTS_UI8 *end;
-    BLK_PART part = {reply, 0};
 
     BytesPut16(reply, NS_IDENTIFICATION);
     BytesPut16(reply + 2, version);
     memcpy(reply + 4, request_id, 4);
-    if (!NS_OLD_VERSIONS || version == NS_VERSION_0400)
-        end = put_0400(reply, target, names, peer->driver->type);
-    else if (version == NS_VERSION_0101)
-        end = put_0101(reply, target, names);
+    if (NS_OLD_VERSIONS && version == NS_VERSION_0101)
+        end = put_body_0101(reply, SysTargetGet());
     else
-        end = put_wide_names(put_common(reply, target, names), names);
-    part.size = (RTS_UI32)(end - reply);
+        end = put_body(reply, SysTargetGet(), !NS_OLD_VERSIONS || version == NS_VERSION_0400, peer->driver->type);
+    BLK_PART part = {reply, (RTS_UI32)(end - reply)};
     /* Without room in the driver the scan goes unanswered; scanners ask again. */
     (void)RouterSend(peer, ROUTER_SVC_NAME_RESPONSE, &part, 1);
 }
 
-void NSHandleRequest(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
+RTS_NOINLINE void NSHandleRequest(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
 {
-    NAMES names;
-
     if (size < NS_REQUEST_SIZE)
         return;
     RTS_UI16 type = BytesGet16(data);
     RTS_UI16 version = choose_version(BytesGet16(data + 2));
-    get_names(SysTargetGet(), &names);
     bool asked = type == NS_RESOLVE_ADDRESS ||
-                 (type == NS_RESOLVE_NAME && is_our_name(data + NS_REQUEST_SIZE, size - NS_REQUEST_SIZE, &names.node));
+                 (type == NS_RESOLVE_NAME && is_our_name(data + NS_REQUEST_SIZE, size - NS_REQUEST_SIZE));
     if (asked && version != 0)
-        answer(peer, version, data + 4, &names);
+        answer(peer, version, data + 4);
 }
 
 RTS_RESULT CmpNameServiceServer_Hook(CMP_HOOK hook)

@@ -9,7 +9,6 @@
 
 #include "CmpChannelServerEmbedded.h"
 #include "CmpNameServiceServer.h"
-#include "SysTime.h"
 
 enum {
     HEADER_SIZE = 2 * ROUTER_HEADER_WORDS,
@@ -47,9 +46,11 @@ static bool parse_header(const RTS_UI8 *data, RTS_UI32 size, HEADER *header)
     header->receiver_words = data[5] & 0x0F;
     header->sender_words = data[5] >> 4;
     header->size = header_size(fixed, header->receiver_words + header->sender_words);
+    if (header->size > size)
+        return false;
     header->receiver = data + fixed;
     header->sender = header->receiver + 2 * header->receiver_words;
-    return header->size <= size;
+    return true;
 }
 
 static bool is_for_us(const BLK_DRV *driver, const RTS_UI8 *data, const HEADER *header)
@@ -73,14 +74,14 @@ static RTS_UI16 max_packet(RTS_UI8 flags)
 static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *payload, RTS_UI32 size)
 {
     if (service == ROUTER_SVC_CHANNEL) {
-        counters.handled++;
-        ChannelHandlePackage(peer, payload, size, SysTimeGetMs());
+        COMM_COUNT(counters.handled);
+        ChannelHandlePackage(peer, payload, size);
     } else if (service == ROUTER_SVC_NAME_REQUEST) {
-        counters.handled++;
+        COMM_COUNT(counters.handled);
         NSHandleRequest(peer, payload, size);
     } else {
         /* Address requests are for parents; a notification would make anybody our parent. */
-        counters.ignored++;
+        COMM_COUNT(counters.ignored);
     }
 }
 
@@ -90,21 +91,20 @@ void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
     ROUTER_PEER peer;
 
     if (!parse_header(data, size, &header)) {
-        counters.malformed++;
+        COMM_COUNT(counters.malformed);
         return;
     }
     if (!is_for_us(driver, data, &header)) {
-        counters.not_for_us++;
+        COMM_COUNT(counters.not_for_us);
         return;
     }
     if ((data[2] & FLAG_SIGNAL) != 0 || header.sender_words == 0) {
-        counters.ignored++;
+        COMM_COUNT(counters.ignored);
         return;
     }
     peer.driver = driver;
     peer.max_packet = max_packet(data[2]);
     peer.address_words = (RTS_UI8)header.sender_words;
-    memset(peer.address, 0, sizeof(peer.address));
     memcpy(peer.address, header.sender, 2 * header.sender_words);
     deliver(&peer, data[3], data + header.size, size - header.size);
 }
@@ -120,7 +120,7 @@ RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *
 {
     const BLK_DRV *driver = peer->driver;
     RTS_UI8 header[HEADER_SIZE + 4 * ROUTER_MAX_ADDRESS + 2] = {
-        ROUTER_MAGIC, ROUTER_HOP_COUNT << HOP_SHIFT | ROUTER_HEADER_WORDS, ROUTER_PRIO_NORMAL << PRIO_SHIFT,
+        ROUTER_MAGIC, ROUTER_HOP_COUNT << HOP_SHIFT | ROUTER_HEADER_WORDS, ROUTER_PRIO_NORMAL << PRIO_SHIFT, service,
     };
     BLK_PART all[1 + ROUTER_MAX_PARTS];
     RTS_UI32 receiver = 2u * peer->address_words;
@@ -128,7 +128,6 @@ RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *
 
     if (count > ROUTER_MAX_PARTS)
         return ERR_PARAMETER;
-    header[3] = service;
     header[5] = (RTS_UI8)(driver->address_words << 4 | peer->address_words);
     memcpy(header + HEADER_SIZE, peer->address, receiver);
     memcpy(header + HEADER_SIZE + receiver, driver->address, 2u * driver->address_words);
@@ -154,7 +153,7 @@ const ROUTER_COUNTERS *RouterGetCounters(void)
 
 RTS_RESULT CmpRouterEmbedded_Hook(CMP_HOOK hook)
 {
-    if (hook == CH_INIT)
+    if (COMM_COUNTERS && hook == CH_INIT)
         memset(&counters, 0, sizeof(counters));
     return ERR_OK;
 }

@@ -21,14 +21,19 @@ typedef struct {
 } SRV_GROUP;
 
 static struct {
-    SRV_GROUP groups[SRV_MAX_GROUPS];
-    RTS_SIZE group_count;
+    bool logged_in;
     RTS_UI32 session; /* 0: none */
     RTS_UI32 app_session;
-    bool logged_in;
+    RTS_SIZE group_count;
+    SRV_GROUP groups[SRV_MAX_GROUPS];
 } srv;
 
 /* ---- session ---- */
+
+static bool is_session(RTS_UI32 id)
+{
+    return id != 0 && id == srv.session;
+}
 
 RTS_UI32 SrvCreateSession(void)
 {
@@ -39,7 +44,7 @@ RTS_UI32 SrvCreateSession(void)
 
 RTS_UI32 SrvLogin(RTS_UI32 id)
 {
-    if (srv.session == 0 || id != srv.session)
+    if (!is_session(id))
         SrvCreateSession();
     srv.logged_in = true;
     return srv.session;
@@ -47,7 +52,7 @@ RTS_UI32 SrvLogin(RTS_UI32 id)
 
 RTS_RESULT SrvLogout(RTS_UI32 id)
 {
-    if (srv.session == 0 || id != srv.session)
+    if (!is_session(id))
         return ERR_INVALID_SESSION_ID;
     SrvEndSession();
     return ERR_OK;
@@ -71,9 +76,9 @@ RTS_UI32 SrvCreateAppSession(void)
     return srv.app_session;
 }
 
-RTS_UI32 SrvGetAppSession(void)
+bool SrvIsAppSession(RTS_UI32 id)
 {
-    return srv.app_session;
+    return id != 0 && id == srv.app_session;
 }
 
 void SrvEndAppSession(void)
@@ -87,10 +92,10 @@ RTS_RESULT SrvRegisterGroup(RTS_UI16 group, const SRV_SERVICE *services, RTS_SIZ
 {
     if (srv.group_count >= SRV_MAX_GROUPS)
         return ERR_NOMEMORY;
-    srv.groups[srv.group_count].group = group;
-    srv.groups[srv.group_count].services = services;
-    srv.groups[srv.group_count].count = count;
-    srv.group_count++;
+    SRV_GROUP *place = &srv.groups[srv.group_count++];
+    place->group = group;
+    place->services = services;
+    place->count = count;
     return ERR_OK;
 }
 
@@ -114,7 +119,7 @@ static RTS_RESULT check_access(const SRV_SERVICE *service, RTS_UI32 session)
 {
     if (service->access == SRV_OPEN)
         return ERR_OK;
-    if (srv.session == 0 || session != srv.session)
+    if (!is_session(session))
         return ERR_INVALID_SESSION_ID;
     return srv.logged_in ? ERR_OK : ERR_NO_ACCESS_RIGHTS;
 }
@@ -149,7 +154,7 @@ static RTS_UI32 check_header(const RTS_UI8 *message, RTS_UI32 size)
 
 static void put_header(RTS_UI8 *reply, RTS_UI32 header, const RTS_UI8 *message, RTS_UI32 session, RTS_UI32 content)
 {
-    memset(reply, 0, header);
+    BytesPut32(reply + header - 4, 0); /* customer id, if the header has one; else the content length below */
     BytesPut16(reply, L7_PROTOCOL);
     BytesPut16(reply + 2, header - L7_HEADER_PREFIX);
     BytesPut16(reply + 4, BytesGet16(message + 4) | L7_REPLY);

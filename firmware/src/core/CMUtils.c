@@ -5,6 +5,8 @@
  */
 #include "CMUtils.h"
 
+#include "CmpBytes.h"
+
 typedef struct {
     char *text;
     RTS_SIZE size;
@@ -88,4 +90,21 @@ RTS_SIZE CMUtlsnprintf(char *out, RTS_SIZE size, const char *format, ...)
     length = CMUtlvsnprintf(out, size, format, arguments);
     va_end(arguments);
     return length;
+}
+
+RTS_UI32 CMUtlStrNLen(const char *text, RTS_UI32 max)
+{
+    RTS_UI32 length = 0;
+
+    while (length < max && text[length] != '\0')
+        length++;
+    return length;
+}
+
+RTS_UI8 *CMUtlPutWide(RTS_UI8 *place, const char *text, RTS_UI32 length)
+{
+    for (RTS_UI32 i = 0; i < length; i++, place += 2)
+        BytesPut16(place, (RTS_UI8)text[i]);
+    BytesPut16(place, 0);
+    return place + 2;
 }

@@ -12,15 +12,16 @@
 #define CM_MAX_EXT_TABLES 2
 #define EVENT_MAX_CALLBACKS 0
 #define SCHED_MAX_EXTERNAL_EVENTS 0
-#define NETSERVER_MESSAGE_SIZE 216 /* holds the reply to who it is: more for names longer than about 20 characters */
-#define COM_QUEUE_SIZE 308
+#define NETSERVER_MESSAGE_SIZE 232 /* who it is, with names of 19 characters and a serial number of 24 */
+#define COM_QUEUE_SIZE 324
 #define LOG_MAX_ENTRIES 0
 #define EXCEPT_MAX_CALLS 0
 #define APP_REFUSAL_TEXT_SIZE 1
 #define APP_RETAIN_SIZE 0
 #define SRV_INFORMATION 0
 #define NS_OLD_VERSIONS 0
-#define NS_REPLY_SIZE 192
+#define COMM_COUNTERS 0
+#define NS_REPLY_SIZE 196 /* the same in a scan */
 #define SRV_MAX_GROUPS 2
 #define RTS_MAIN_STACK_SIZE 1280 /* no task interrupts main */
 
