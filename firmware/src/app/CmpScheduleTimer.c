@@ -29,13 +29,14 @@ static struct {
 
 /* ---- cyclic tasks ---- */
 
-static void on_timer(void *param, RTS_I64 due_ns, RTS_UI32 missed)
+static void on_timer(void *param, RTS_I64 due_ns)
 {
-    RTS_UI32 task = (RTS_UI32)(uintptr_t)param;
+    (void)IecTaskCycle((RTS_UI32)(uintptr_t)param, due_ns);
+}
 
-    if (missed != 0)
-        IecTaskAddOverruns(task, missed);
-    IecTaskCycle(task, due_ns, SysTimeGetNs());
+RTS_UI32 SchedGetOverruns(RTS_UI32 task)
+{
+    return SysTimerGetOverruns(schedule.task[task].timer);
 }
 
 /* ---- tasks in main ---- */
@@ -60,10 +61,8 @@ void SchedBackgroundCycle(void)
         return;
     for (i = 0; i < schedule.background_count; i++) {
         RTS_UI32 task = schedule.background[i];
-        if (TriggerFired(&schedule.task[task].trigger)) {
-            RTS_I64 now_ns = SysTimeGetNs();
-            IecTaskCycle(task, now_ns, now_ns);
-        }
+        if (TriggerFired(&schedule.task[task].trigger))
+            (void)IecTaskCycle(task, SysTimeGetNs());
     }
 }
 

@@ -178,6 +178,6 @@ void SchedWatchdogCheck(RTS_I64 now_ns)
         if (guard.start_ns < latest_ns)
             *since_ns += held_ns;
         if (now_ns - *since_ns > guard.limit_ns)
-            SysExceptBreak(guard.context, RTSEXCPT_WATCHDOG);
+            SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
     }
 }

@@ -41,10 +41,10 @@ typedef struct {
 } FRAME;
 
 typedef struct {
+    FRAME *first;         /* on the process stack, at the upper end of the slot of this depth; never changes */
     FRAME *entered;       /* on the main stack */
     FRAME *outer_process; /* process stack pointer of the depth below */
     RTS_UI32 exc_return;
-    uintptr_t context;
 } TRY;
 
 typedef RTS_UI8 IEC_STACK[RTS_IEC_STACK_SIZE];
@@ -75,7 +75,7 @@ static void set_process_stack(FRAME *pointer)
 /* Where the stack of a depth ends. */
 static uintptr_t stack_slot(const TRY *try)
 {
-    return (uintptr_t)stacks[APP_MAX_TASKS - 1 - (try - state.tries)];
+    return (uintptr_t)(try->first + 1) - RTS_IEC_STACK_SIZE;
 }
 
 void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 attributes)
@@ -109,8 +109,10 @@ void SysExceptInit(void)
     state.code_size = 0;
     MpuProtect(MPU_NULL, 0, NULL_LOG2, MPU_NO_ACCESS | behind_vectors);
     MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, STACK_GUARD_LOG2, MPU_NO_ACCESS);
-    for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++)
+    for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++) {
+        state.tries[i].first = (FRAME *)stacks[APP_MAX_TASKS - i] - 1;
         MpuProtect(MPU_IEC_STACK + i, (uintptr_t)stacks[i], STACK_GUARD_LOG2, MPU_NO_ACCESS);
+    }
     if (MPU_TYPE != 0)
         MPU_CTRL = MPU_ENABLE_WITH_BACKGROUND;
     CpuBarrier();
@@ -156,23 +158,16 @@ __attribute__((naked, noinline)) static RTS_UI64 try_enter(void (*fn)(void *arg)
                      "pop {r3-r11, pc}");
 }
 
-/* A context is named by the exception it runs in, plus 1 because main's is 0. */
-static uintptr_t context_of(RTS_UI32 exception_number)
-{
-    return exception_number + 1;
-}
-
 __attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 {
     TRY *try = state.top;
     if (try == state.tries + APP_MAX_TASKS)
         ResetNow(RESET_FATAL, caller->pc);
-    FRAME *frame = (FRAME *)(stack_slot(try) + RTS_IEC_STACK_SIZE) - 1;
+    FRAME *frame = try->first;
     state.top = try + 1;
     try->entered = caller;
     try->outer_process = process_stack();
     try->exc_return = exc_return;
-    try->context = context_of(caller->xpsr & 0x1FFu);
     frame->r0 = caller->r1;
     frame->lr = (RTS_UI32)(uintptr_t)try_return;
     frame->pc = caller->r0 & ~1u;
@@ -308,40 +303,39 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address)
     try_raise(code, address & ~(uintptr_t)1);
 }
 
-uintptr_t SysExceptContext(void)
-{
-    return in_try() ? state.top[-1].context : context_of(CpuExceptionNumber());
-}
-
 void SysExceptShutdown(void)
 {
 }
 
-/* We run above `context`, so its Try is interrupted, and where it is to go on lies on its process stack. */
-void SysExceptBreak(uintptr_t context, RTS_UI32 code)
+/* The function goes on with raising the exception. Unless it does so already: then where it was must not be forgotten. */
+static void redirect(FRAME *frame, RTS_UI32 code)
+{
+    const RTS_UI32 raise = (RTS_UI32)(uintptr_t)try_raise & ~1u;
+    if (frame->pc == raise)
+        return;
+    frame->r0 = code;
+    frame->r1 = frame->pc;
+    frame->pc = raise;
+    frame->xpsr = (frame->xpsr & 1u << 9) | XPSR_THUMB;
+}
+
+/* We run above the Try, so it is interrupted, and where it is to go on lies on its process stack. */
+void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     FRAME *frame = process_stack();
     for (TRY *try = state.top; try-- > state.tries; frame = try->outer_process) {
-        if (try->context != context)
-            continue;
-        frame->r0 = code;
-        frame->r1 = frame->pc;
-        frame->pc = (RTS_UI32)(uintptr_t)try_raise & ~1u;
-        frame->xpsr = (frame->xpsr & 1u << 9) | XPSR_THUMB;
-        return;
+        if (try->entered->r1 == (uintptr_t)arg)
+            redirect(frame, code);
     }
 }
 
-__attribute__((naked)) void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument)
+__attribute__((naked)) void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry)
 {
-    RTS_UNUSED(entry);
     RTS_UNUSED(context);
     RTS_UNUSED(argument);
+    RTS_UNUSED(entry);
     __asm__ volatile("push {r9, lr}\n\t"
-                     "mov r12, r0\n\t"
-                     "mov r0, r1\n\t"
                      "ldr r9, [r0, %0]\n\t"
-                     "mov r1, r2\n\t"
-                     "blx r12\n\t"
+                     "blx r2\n\t"
                      "pop {r9, pc}" ::"i"(offsetof(IEC_CONTEXT, imports)));
 }

@@ -34,7 +34,6 @@ void BoardInit(void)
 
 void BoardAlarmSet(RTS_UI32 ns)
 {
-    TIMER_CTRL = 0;
     TIMER_RELOAD = ns / (1000000000u / BOARD_CLOCK_HZ) + 1;
     TIMER_CTRL = TIMER_ENABLE_IRQ;
 }
