@@ -145,10 +145,12 @@ RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event)
 
 /* ---- supervision ---- */
 
-/* The guard of the cycle that started last: on one core the only one that gets on. */
+enum { NOTHING_RUNS = -1 };
+
+/* Of the cycles that run; on one core the one that started last is the only one that gets on. */
 static RTS_I64 find_latest_start(void)
 {
-    RTS_I64 latest_ns = 0;
+    RTS_I64 latest_ns = NOTHING_RUNS;
     IEC_GUARD guard;
     RTS_UI32 i;
 
@@ -169,7 +171,7 @@ void SchedWatchdogCheck(RTS_I64 now_ns)
     RTS_UI32 i;
 
     watch.checked_ns = now_ns;
-    for (i = 0; i <= IecTaskGetCount(); i++) {
+    for (i = 0; latest_ns != NOTHING_RUNS && i <= IecTaskGetCount(); i++) {
         RTS_I64 *since_ns = &watch.since_ns[i];
         if (!IecTaskReadGuard(i, &guard))
             continue;
