@@ -16,6 +16,7 @@ from elftools.elf.elffile import ELFFile
 
 from plctool.errors import LinkError
 from plctool.link import simplecom
+from plctool.testing.children import ends_with_us
 
 FLASH_SIZE = 16 * 1024 * 1024  # of the file; what is behind the file area holds the serial number in its last 4 KiB
 FACTORY_OFFSET = FLASH_SIZE - 4096
@@ -131,7 +132,7 @@ class Board:
             *(["-plugin", plugin] if plugin else []),
         ]  # fmt: skip
         with (self.folder / "qemu.log").open("ab") as log:
-            self._process = subprocess.Popen(command, cwd=self.folder, stdout=log, stderr=log)
+            self._process = subprocess.Popen(ends_with_us(command), cwd=self.folder, stdout=log, stderr=log)
         end = time.monotonic() + START_TIMEOUT
         while not (self.folder / "qmp").exists():
             if self._process.poll() is not None or time.monotonic() > end:

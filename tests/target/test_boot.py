@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -77,9 +79,40 @@ def test_main_loop_kicks_the_hardware_watchdog(make_board, build):
         assert [entry.text for entry in plc.log() if "Reset" in entry.text] == ["Reset: power on"]
 
 
+def process_status(pid: int) -> list[str]:
+    """The fields of /proc/PID/stat behind the name."""
+    return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+
+
+def has_ended(pid: int) -> bool:
+    try:
+        return process_status(pid)[0] in "ZX"
+    except OSError:
+        return True
+
+
+def test_the_board_goes_off_with_a_test_that_is_killed(tmp_path):
+    code = f"""
+import sys, time
+sys.path.append({str(Path(__file__).parent)!r})
+from pathlib import Path
+from environment import MACHINE, firmware
+from qemu import Board
+with Board(MACHINE, firmware("standard"), Path(sys.argv[1])) as board:
+    print(board.pid, flush=True)
+    time.sleep(60)
+"""
+    with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, text=True) as test:
+        assert test.stdout
+        pid = int(test.stdout.readline())
+        assert not has_ended(pid)
+        test.kill()
+    eventually(lambda: has_ended(pid))
+
+
 def processor_time(board) -> float:
     """Seconds that QEMU has used of the host's processors."""
-    fields = Path(f"/proc/{board.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    fields = process_status(board.pid)
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
