@@ -16,8 +16,8 @@
 
 typedef struct {
     TRIGGER trigger;
-    RTS_I64 due_ns; /* cyclic tasks */
     RTS_UI32 overruns;
+    RTS_I64 due_ns; /* cyclic tasks */
 } SCHEDULED;
 
 static struct {

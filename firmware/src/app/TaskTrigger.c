@@ -57,19 +57,19 @@ void TriggerForget(TRIGGER *trigger)
     const EXTERNAL_EVENT *event;
 
     if (trigger->record->kind == KIND_EVENT)
-        trigger->flag_before = *trigger->flag != 0;
+        trigger->seen = *trigger->flag != 0;
     if (trigger->record->kind == KIND_EXTERNAL) {
         event = find_event(trigger->record->name);
-        trigger->posts_done = event != NULL ? SysAtomicLoad(&event->posts) : 0;
+        trigger->seen = event != NULL ? SysAtomicLoad(&event->posts) : 0;
     }
 }
 
 static bool has_rising_edge(TRIGGER *trigger)
 {
-    RTS_UI8 now = *trigger->flag != 0;
-    bool rising = now && !trigger->flag_before;
+    RTS_UI32 now = *trigger->flag != 0;
+    bool rising = now > trigger->seen;
 
-    trigger->flag_before = now;
+    trigger->seen = now;
     return rising;
 }
 
@@ -78,9 +78,9 @@ static bool has_post(TRIGGER *trigger)
 {
     const EXTERNAL_EVENT *event = find_event(trigger->record->name);
 
-    if (event == NULL || SysAtomicLoad(&event->posts) == trigger->posts_done)
+    if (event == NULL || SysAtomicLoad(&event->posts) == trigger->seen)
         return false;
-    trigger->posts_done++;
+    trigger->seen++;
     return true;
 }
 

@@ -104,6 +104,12 @@ static void __attribute__((noinline)) recurse(volatile RTS_UI32 *above)
     sink = here[0];
 }
 
+static void fail_with_interrupts_masked(void *arg)
+{
+    RTS_UNUSED(arg);
+    __asm__ volatile("cpsid i\n\tudf #1" ::: "memory");
+}
+
 static void overflow_the_stack(void *arg)
 {
     RTS_UNUSED(arg);
@@ -178,6 +184,7 @@ static const FAILURE failures[] = {
     {hit_a_breakpoint, RTSEXCPT_BREAKPOINT},
     {raise, RTSEXCPT_ARRAYBOUNDS},
     {raise_with_everything_clobbered, RTSEXCPT_ILLEGAL_INSTRUCTION},
+    {fail_with_interrupts_masked, RTSEXCPT_ILLEGAL_INSTRUCTION},
     {overflow_the_stack, RTSEXCPT_STACK_OVERFLOW},
     {overflow_the_stack_with_large_frames, RTSEXCPT_STACK_OVERFLOW},
     {overflow_past_the_guard, RTSEXCPT_STACK_OVERFLOW},

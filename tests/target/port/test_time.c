@@ -25,6 +25,14 @@ static void wait_ms(RTS_UI32 ms)
         ;
 }
 
+/* The same, quickly: QEMU skips sleep. */
+static void sleep_ms(RTS_UI32 ms)
+{
+    RTS_UI32 start = SysTimeGetMs();
+    while (SysTimeGetMs() - start < ms)
+        __asm__ volatile("wfi");
+}
+
 static void clock_never_goes_back(void)
 {
     RTS_I64 last = SysTimeGetNs();
@@ -197,6 +205,32 @@ static void stopped_timer_is_silent(void)
     CHECK_EQUAL(SysTimerStart(timer), ERR_INVALID_HANDLE);
 }
 
+/* Interrupts are masked meanwhile, or the board's alarm is silent: the call does not come. */
+static void call_that_does_not_come_is_noticed(void)
+{
+    RTS_HANDLE timer;
+    CHECK_EQUAL(SysTimerCreate(on_fast, &fast, 500, 5, &timer), ERR_OK);
+    CHECK_EQUAL(SysTimersWork(), 1); /* nobody waits for one that is stopped */
+    SysTimerStart(timer);
+    wait_ms(3);
+    CHECK_EQUAL(SysTimersWork(), 1);
+    NVIC_ICER(IRQ_TIMER0 / 32) = 1u << IRQ_TIMER0 % 32;
+    sleep_ms(990);
+    CHECK_EQUAL(SysTimersWork(), 1);
+    sleep_ms(20);
+    CHECK_EQUAL(SysTimersWork(), 0);
+    NVIC_ISER(IRQ_TIMER0 / 32) = 1u << IRQ_TIMER0 % 32;
+    while (SysTimeGetNs() - fast.last_due > 1000000)
+        ;
+    CHECK_EQUAL(SysTimersWork(), 1);
+    NVIC_ICER(BOARD_TASK_IRQ / 32) = ((1u << SYSTIMER_COUNT) - 1) << BOARD_TASK_IRQ % 32;
+    sleep_ms(1010);
+    CHECK_EQUAL(SysTimersWork(), 0);
+    SysTimerDelete(timer);
+    CHECK_EQUAL(SysTimersWork(), 1);
+    NVIC_ISER(BOARD_TASK_IRQ / 32) = ((1u << SYSTIMER_COUNT) - 1) << BOARD_TASK_IRQ % 32;
+}
+
 static void all_timers_and_no_more_can_be_created(void)
 {
     RTS_HANDLE timers[SYSTIMER_COUNT], one_more;
@@ -230,6 +264,7 @@ int main(void)
     TEST_RUN(slow_timer_waits_for_fast_one);
     TEST_RUN(overrun_skips_due_times_and_counts_them);
     TEST_RUN(stopped_timer_is_silent);
+    TEST_RUN(call_that_does_not_come_is_noticed);
     TEST_RUN(all_timers_and_no_more_can_be_created);
     TEST_RUN(bad_timer_parameters_are_refused);
     TEST_END();

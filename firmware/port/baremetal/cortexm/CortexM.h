@@ -126,6 +126,9 @@ void SysExceptInit(void);
 /* To be called by the board's alarm interrupt after it has silenced its timer. */
 void SysTimerAlarm(void);
 
+/* Whether no timer's call is overdue by more than a second, asked by main, which all of them interrupt. */
+int SysTimersWork(void);
+
 /* Where the code of the running application lies, as SysFlashMapCode gave it: so that a fault that lost its program
  * counter can be traced back to the code. */
 void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size);
@@ -135,7 +138,7 @@ enum { STACK_GUARD_LOG2 = 5, STACK_GUARD = 1 << STACK_GUARD_LOG2 };
 
 /* ---- reset ---- */
 
-typedef enum { RESET_POWER_ON, RESET_PIN, RESET_SOFTWARE, RESET_FATAL, RESET_WATCHDOG } RESET_CAUSE;
+typedef enum { RESET_POWER_ON, RESET_PIN, RESET_SOFTWARE, RESET_FATAL, RESET_WATCHDOG, RESET_CAUSE_COUNT } RESET_CAUSE;
 
 /* Why the controller started, and for the last two where it was. In RAM that no start-up clears. */
 typedef struct {

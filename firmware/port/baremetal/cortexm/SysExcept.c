@@ -254,6 +254,7 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     SCB_HFSR = SCB_HFSR;
     /* What could not be stacked stays pending: it belongs to the function that is left now. */
     SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
+    CpuRestore(0); /* the fault may have been in a place where interrupts are masked */
     return leave(code, address);
 }
 

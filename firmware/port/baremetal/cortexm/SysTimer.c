@@ -13,7 +13,7 @@
 #include "CortexM.h"
 #include "SysTime.h"
 
-enum { ALARM_MAX_NS = 1000000000, NS_PER_US = 1000 };
+enum { ALARM_MAX_NS = 1000000000, OVERDUE_NS = 1000000000, NS_PER_US = 1000 };
 
 typedef enum { TIMER_FREE, TIMER_STOPPED, TIMER_WAITING, TIMER_FIRED } TIMER_STATE;
 
@@ -79,6 +79,23 @@ void TimerIrq(void)
     timer->state = TIMER_WAITING;
 }
 
+/* Since when the timer's next call has been due. */
+static RTS_I64 due_since(const TIMER *timer)
+{
+    return timer->state == TIMER_FIRED ? timer->due_ns : timer->next_ns;
+}
+
+int SysTimersWork(void)
+{
+    RTS_UI32 mask = CpuMask();
+    RTS_I64 overdue = SysTimeGetNs() - OVERDUE_NS;
+    int work = 1;
+    for (const TIMER *timer = state.timer; timer < state.end; timer++)
+        work &= timer->state < TIMER_WAITING || due_since(timer) > overdue;
+    CpuRestore(mask);
+    return work;
+}
+
 static int outranks(RTS_UI32 one, RTS_UI32 other)
 {
     RTS_UI8 a = state.timer[one].priority, b = state.timer[other].priority;
@@ -136,22 +153,22 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     return ERR_OK;
 }
 
-/* Called from main, so no timer's interrupt is active: it is enough that none starts again. */
+/* Called from main, so no timer's interrupt is active: it is enough that none starts again, nor one that is pending. */
 RTS_RESULT SysTimerStop(RTS_HANDLE handle)
 {
     TIMER *timer = find_timer(handle);
     if (timer == NULL)
         return ERR_INVALID_HANDLE;
     timer->state = TIMER_STOPPED;
+    NVIC_ICPR((BOARD_TASK_IRQ + handle) / 32) = 1u << (BOARD_TASK_IRQ + handle) % 32;
     return ERR_OK;
 }
 
 RTS_RESULT SysTimerDelete(RTS_HANDLE handle)
 {
-    TIMER *timer = find_timer(handle);
-    if (timer == NULL)
+    if (SysTimerStop(handle) != ERR_OK)
         return ERR_INVALID_HANDLE;
-    timer->state = TIMER_FREE;
+    state.timer[handle].state = TIMER_FREE;
     while (state.end > state.timer && state.end[-1].state == TIMER_FREE)
         state.end--;
     return ERR_OK;
