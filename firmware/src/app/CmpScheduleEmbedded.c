@@ -10,6 +10,7 @@
 
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
+#include "SysExcept.h"
 #include "SysTime.h"
 #include "TaskTrigger.h"
 #include "rts_config.h"
@@ -107,6 +108,18 @@ RTS_RESULT SchedStart(void)
 void SchedStop(void)
 {
     schedule.started = false;
+}
+
+/* One cycle runs at a time, or none. */
+void SchedWatchdogCheck(RTS_I64 now_ns)
+{
+    IEC_GUARD guard;
+    RTS_UI32 i;
+
+    for (i = 0; i <= IecTaskGetCount(); i++) {
+        if (IecTaskReadGuard(i, &guard) && now_ns - guard.start_ns > guard.limit_ns)
+            SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
+    }
 }
 
 RTS_RESULT CmpScheduleTimer_Hook(CMP_HOOK hook)

@@ -1,5 +1,5 @@
 /*
- * TaskTrigger.c - events that make a task run; external events; supervision of cycles.
+ * TaskTrigger.c - events that make a task run; external events.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -10,7 +10,6 @@
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
 #include "SysAtomic.h"
-#include "SysExcept.h"
 #include "rts_config.h"
 
 typedef struct {
@@ -21,14 +20,8 @@ typedef struct {
 enum { PLACES = SCHED_MAX_EXTERNAL_EVENTS > 0 ? SCHED_MAX_EXTERNAL_EVENTS : 1 };
 static EXTERNAL_EVENT events[PLACES];
 
-static struct {
-    RTS_I64 checked_ns;                  /* when the last check was */
-    RTS_I64 since_ns[APP_MAX_TASKS + 1]; /* by guard: start of its cycle plus the time it was held up */
-} watch;
-
 void TriggerReset(void)
 {
-    memset(&watch, 0, sizeof watch);
     if (SCHED_MAX_EXTERNAL_EVENTS > 0)
         memset(events, 0, sizeof events);
 }
@@ -141,45 +134,4 @@ RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event)
         return ERR_INVALID_HANDLE;
     (void)SysAtomicAdd(&events[event].posts, 1);
     return ERR_OK;
-}
-
-/* ---- supervision ---- */
-
-enum { NOTHING_RUNS = -1 };
-
-/* Of the cycles that run; on one core the one that started last is the only one that gets on. */
-static RTS_I64 find_latest_start(void)
-{
-    RTS_I64 latest_ns = NOTHING_RUNS;
-    IEC_GUARD guard;
-    RTS_UI32 i;
-
-    for (i = 0; i <= IecTaskGetCount(); i++) {
-        if (IecTaskReadGuard(i, &guard) && guard.start_ns > latest_ns)
-            latest_ns = guard.start_ns;
-    }
-    return latest_ns;
-}
-
-/* Time stands still for a cycle as long as one that started later, and may have interrupted it, goes on from one check to
- * the next. Of several tasks that take too long the one that holds up the others is broken first, and they finish. */
-void SchedWatchdogCheck(RTS_I64 now_ns)
-{
-    RTS_I64 latest_ns = find_latest_start();
-    RTS_I64 held_ns = latest_ns < watch.checked_ns ? now_ns - watch.checked_ns : 0;
-    IEC_GUARD guard;
-    RTS_UI32 i;
-
-    watch.checked_ns = now_ns;
-    for (i = 0; latest_ns != NOTHING_RUNS && i <= IecTaskGetCount(); i++) {
-        RTS_I64 *since_ns = &watch.since_ns[i];
-        if (!IecTaskReadGuard(i, &guard))
-            continue;
-        if (*since_ns < guard.start_ns)
-            *since_ns = guard.start_ns; /* a new cycle */
-        if (guard.start_ns < latest_ns)
-            *since_ns += held_ns;
-        if (now_ns - *since_ns > guard.limit_ns)
-            SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
-    }
 }

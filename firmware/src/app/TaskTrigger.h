@@ -20,7 +20,7 @@ void TriggerInit(TRIGGER *trigger, const CDL_TASK *record, RTS_UI8 *const *areas
 void TriggerForget(TRIGGER *trigger);
 /* Whether a task that is not cyclic shall run now; asked once in each pass of main. */
 bool TriggerFired(TRIGGER *trigger);
-/* Forgets all external events, and what the supervision of cycles has seen. */
+/* Forgets all external events. */
 void TriggerReset(void);
 
 #endif

@@ -21,7 +21,7 @@
 #define NS_OLD_VERSIONS 0
 #define NS_REPLY_SIZE 192
 #define SRV_MAX_GROUPS 2
-#define RTS_MAIN_STACK_SIZE 1280 /* no task interrupts main */
+#define RTS_MAIN_STACK_SIZE 1312 /* no task interrupts main */
 
 #define BOARD_UART_COUNT 1
 #define BOARD_UART_RX_SIZE 128
