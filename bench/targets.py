@@ -33,6 +33,7 @@ from plctool.compiler.typed import TypedProgram  # noqa: E402
 from plctool.core import lib  # noqa: E402
 from plctool.image import parse_image  # noqa: E402
 from plctool.sim import Simulator  # noqa: E402
+from plctool.testing.children import ends_with_us  # noqa: E402
 from plctool.variables import Symbol  # noqa: E402
 
 CYCLES = 1000  # before the checksums are compared
@@ -111,7 +112,9 @@ def run_guest(runner: Runner, program: Path, folder: Path) -> tuple[int, int]:
     """Checksum and instructions per cycle that a guest program prints."""
     command: list[str | Path] = [*runner.command[:-1], "-icount", "shift=0", runner.command[-1], program]
     # What a guest prints comes out on QEMU's standard error.
-    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120)
+    done = subprocess.run(
+        ends_with_us(command), cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120
+    )
     if done.returncode:
         raise RuntimeError(f"{program.name} failed: {done.stdout}")
     value, instructions = done.stdout.split()

@@ -40,18 +40,15 @@ RTS_RESULT IecTaskCreateAll(const CDL_TASK *tasks, RTS_UI32 count, const IEC_CON
 RTS_RESULT IecTaskStartAll(void);
 void IecTaskStopAll(void);
 
-/* One cycle of a task that is due at `due_ns`, now being `now_ns` (both SysTimeGetNs). Called by the scheduler in the
- * context of the task. Returns 0 when the task must not be scheduled again (exception), 1 otherwise. */
-int IecTaskCycle(RTS_UI32 task, RTS_I64 due_ns, RTS_I64 now_ns);
+/* One cycle of a task that is due since `due_ns` (SysTimeGetNs). Called by the scheduler in the context of the task. Returns 0
+ * when the task must not be scheduled again (exception), 1 otherwise. */
+int IecTaskCycle(RTS_UI32 task, RTS_I64 due_ns);
 
 RTS_UI32 IecTaskGetCount(void);
 /* ERR_INVALIDID when there is no such task. */
 RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
 
 #ifndef RTS_CFFI
-/* Adds due times that were skipped. Called by the scheduler in the context of the task. */
-void IecTaskAddOverruns(RTS_UI32 task, RTS_UI32 missed);
-
 /* Runs fn(arg), code of the application other than a task (initialisation), from main, watched and caught like a cycle.
  * Returns as SysExceptTry. */
 int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
@@ -69,7 +66,7 @@ typedef struct {
     RTS_UI32 serial;   /* differs from one cycle of the task to its next */
     RTS_I64 start_ns;
     RTS_I64 limit_ns;  /* how long it may take */
-    uintptr_t context; /* for SysExceptBreak */
+    const void *arg;   /* for SysExceptBreak */
 } IEC_GUARD;
 
 /* Reads guard `index`: one for each task, and one at IecTaskGetCount() for code that IecTaskRunGuarded runs. Returns 0 when

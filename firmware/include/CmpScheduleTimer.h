@@ -23,6 +23,9 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
 RTS_RESULT SchedStart(void);
 void SchedStop(void);
 
+/* How many due times of a task were skipped since SchedCreateTasks, because a cycle took too long. From main. */
+RTS_UI32 SchedGetOverruns(RTS_UI32 task);
+
 /* One pass over the tasks that run in main; part of CH_COMM_CYCLE. */
 void SchedBackgroundCycle(void);
 /* Whether there are such tasks. */

@@ -106,14 +106,10 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack);
 
 /*
- * Breaks into the SysExceptTry that runs in the context of timer task `context` (as SysExceptContext gave it), with
- * RTSEXCPT_* `code`. Called by the watchdog, from another context. Does nothing when that context is not in IEC code.
+ * Leaves the SysExceptTry that was called with `arg` and runs in another context, with RTSEXCPT_* `code`. Called by the
+ * watchdog, from above that context, and again as long as it runs. Does nothing when none with that `arg` runs.
  */
-void SysExceptBreak(uintptr_t context, RTS_UI32 code);
-
-/* Names the calling context (thread, interrupt level) for SysExceptBreak. Never 0; 0 and a context that has ended are
- * names of nobody. A context that calls this before its first cycle has what catching needs then already. */
-uintptr_t SysExceptContext(void);
+void SysExceptBreak(const void *arg, RTS_UI32 code);
 
 /* Gives back what catching took from the process (signal handlers); the next SysExceptTry takes it again. From main,
  * when no SysExceptTry runs. Empty on bare metal. */

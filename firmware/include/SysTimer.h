@@ -14,10 +14,9 @@
 
 /*
  * Called once per period, in the timer's own context. `due_ns`: when it should have been called (SysTimeGetNs), start
- * + n * interval exactly. When a callback takes longer than its period, the missed due times are skipped and their
- * number is in `missed`.
+ * + n * interval exactly. Due times that pass while a callback runs are skipped and counted.
  */
-typedef void (*SYS_TIMER_CALLBACK)(void *param, RTS_I64 due_ns, RTS_UI32 missed);
+typedef void (*SYS_TIMER_CALLBACK)(void *param, RTS_I64 due_ns);
 
 /* Creates a stopped timer; priority 0 (highest) .. 31. From main. ERR_NOMEMORY when all timers are in use. */
 RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
@@ -32,5 +31,8 @@ RTS_RESULT SysTimerStop(RTS_HANDLE timer);
 
 /* Stops and frees. */
 RTS_RESULT SysTimerDelete(RTS_HANDLE timer);
+
+/* How many due times were skipped since the timer was created; 0 when there is no such timer. From main. */
+RTS_UI32 SysTimerGetOverruns(RTS_HANDLE timer);
 
 #endif

@@ -151,7 +151,7 @@ static void a_stack_overflow_of_a_thread_is_caught(void)
 /* ---- the watchdog's break ---- */
 
 typedef struct {
-    uintptr_t context;
+    int calls;
     int done;
 } VICTIM;
 
@@ -160,7 +160,7 @@ static void *breaker(void *arg)
 {
     VICTIM *victim = arg;
     while (!__atomic_load_n(&victim->done, __ATOMIC_ACQUIRE)) {
-        SysExceptBreak(victim->context, RTSEXCPT_WATCHDOG);
+        SysExceptBreak(&victim->calls, RTSEXCPT_WATCHDOG);
         sched_yield();
     }
     return NULL;
@@ -169,10 +169,10 @@ static void *breaker(void *arg)
 static void an_endless_loop_is_broken(void)
 {
     pthread_t thread;
-    VICTIM victim = {SysExceptContext(), 0};
+    VICTIM victim = {0, 0};
     pthread_create(&thread, NULL, breaker, &victim);
     RTS_EXCEPTION exception;
-    CHECK(SysExceptTry(loop_forever, NULL, &exception) == 1);
+    CHECK(SysExceptTry(loop_forever, &victim.calls, &exception) == 1);
     __atomic_store_n(&victim.done, 1, __ATOMIC_RELEASE);
     pthread_join(thread, NULL);
     CHECK(exception.code == RTSEXCPT_WATCHDOG);
@@ -181,23 +181,22 @@ static void an_endless_loop_is_broken(void)
 static void breaks_at_any_moment_do_no_harm(void)
 {
     pthread_t thread;
-    VICTIM victim = {SysExceptContext(), 0};
-    int calls = 0;
+    VICTIM victim = {0, 0};
     pthread_create(&thread, NULL, breaker, &victim);
     for (int i = 0; i < 200000; i++) {
         RTS_EXCEPTION exception;
-        int left = SysExceptTry(count_up, &calls, &exception);
+        int left = SysExceptTry(count_up, &victim.calls, &exception);
         CHECK(exception.code == (left ? (RTS_UI32)RTSEXCPT_WATCHDOG : (RTS_UI32)RTSEXCPT_NOEXCEPTION));
     }
     __atomic_store_n(&victim.done, 1, __ATOMIC_RELEASE);
     pthread_join(thread, NULL);
-    CHECK(calls > 0);
+    CHECK(victim.calls > 0);
     CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
 }
 
 static void a_break_outside_of_try_does_nothing(void)
 {
-    SysExceptBreak(SysExceptContext(), RTSEXCPT_WATCHDOG);
+    SysExceptBreak(NULL, RTSEXCPT_WATCHDOG);
     CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
 }
 
@@ -210,9 +209,8 @@ static void mask_all(int how)
 
 static void break_itself_with_signals_held(void *arg)
 {
-    RTS_UNUSED(arg);
     mask_all(SIG_BLOCK);
-    SysExceptBreak(SysExceptContext(), RTSEXCPT_WATCHDOG);
+    SysExceptBreak(arg, RTSEXCPT_WATCHDOG);
 }
 
 static void let_signals_come(void *arg)
@@ -227,22 +225,33 @@ static void a_break_that_comes_late_does_not_hit_the_next_try(void)
     CHECK(code_of(let_signals_come) == RTSEXCPT_NOEXCEPTION);
 }
 
-static void *give_context(void *arg)
+static void *try_once(void *arg)
 {
-    *(uintptr_t *)arg = SysExceptContext();
+    RTS_EXCEPTION exception;
+    SysExceptTry(do_nothing, arg, &exception);
     return NULL;
 }
 
 static void a_break_of_a_thread_that_ended_does_nothing(void)
 {
     pthread_t thread;
-    uintptr_t gone = 0;
-    pthread_create(&thread, NULL, give_context, &gone);
+    int gone;
+    pthread_create(&thread, NULL, try_once, &gone);
     pthread_join(thread, NULL);
-    CHECK(gone != 0);
-    CHECK(gone != SysExceptContext());
-    SysExceptBreak(gone, RTSEXCPT_WATCHDOG);
-    SysExceptBreak(0, RTSEXCPT_WATCHDOG);
+    SysExceptBreak(&gone, RTSEXCPT_WATCHDOG);
+    CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
+}
+
+static void break_something_else(void *arg)
+{
+    SysExceptBreak((char *)arg + 1, RTSEXCPT_WATCHDOG);
+}
+
+static void a_break_of_something_else_does_nothing(void)
+{
+    char here[2];
+    RTS_EXCEPTION exception;
+    CHECK(SysExceptTry(break_something_else, here, &exception) == 0);
 }
 
 /* ---- many of them ---- */
@@ -378,6 +387,7 @@ int main(void)
     RUN(a_break_outside_of_try_does_nothing);
     RUN(a_break_that_comes_late_does_not_hit_the_next_try);
     RUN(a_break_of_a_thread_that_ended_does_nothing);
+    RUN(a_break_of_something_else_does_nothing);
     RUN(threads_do_not_disturb_each_other);
     RUN(threads_that_end_leave_room_for_others);
     RUN(a_hundred_thousand_tries_work);

@@ -3,8 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Tasks are driven by hand here: the clock of the simulator stands still while IecTaskCycle gets the times a test wants. How long a
- * cycle takes is what "simburn" burns.
+ * Tasks are driven by hand here: the clock of the simulator stands still but for the `cycle_us` that each cycle takes.
  */
 #define _GNU_SOURCE
 #include <pthread.h>
@@ -16,26 +15,48 @@
 #include "app_image.h"
 #include "test.h"
 
-enum { SIMBURN_SIGNATURE = 0x76DDCD81 };
-
 static APP_SPEC spec;
 static APP_BYTES image;
+static RTS_UI32 cycle_us;
 
-/* An application with one task that burns `burn_us` per cycle, counts, and stores its time. */
+/* Lets virtual time pass. */
+static void burn(RTS_UI32 us)
+{
+    ((void (*)(RTS_UI32))CMFindExternal("simburn")->function)(us);
+}
+
+static void burn_cycle(RTS_UI32 unused)
+{
+    RTS_UNUSED(unused);
+    burn(cycle_us);
+}
+
+static const CMP_EXT_FUNCTION burner[] = {{"burncycle", 1, 0x00010000, (RTS_PFN)burn_cycle}};
+
+/* An application with one task that counts, stores its time, and whose cycles take `burn_us` until a test changes that. */
 static CDL_TASK *begin(RTS_UI32 interval_us, RTS_UI32 burn_us)
 {
     CDL_TASK *task;
 
+    cycle_us = burn_us;
     CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
     CHECK(SimStart() == ERR_OK);
+    CHECK(CMRegisterExternal(burner, 1) == ERR_OK);
     spec_init(&spec);
-    add_import(&spec, "simburn", SIMBURN_SIGNATURE, 0x00010000);
+    add_import(&spec, "burncycle", 1, 0x00010000);
     task = add_task(&spec, "Main", KIND_CYCLIC, interval_us, here(&spec));
     emit_store_time_ms(&spec, APP_AREA_DATA, 8);
     emit_add(&spec, APP_AREA_DATA, 0, 1);
-    emit_call(&spec, 0, burn_us);
+    emit_call(&spec, 0, 0);
     emit_ret(&spec);
     return task;
+}
+
+/* A cycle that is due now and takes `us`. */
+static int cycle_of(RTS_UI32 us)
+{
+    cycle_us = us;
+    return IecTaskCycle(0, SimNow());
 }
 
 static void load(void)
@@ -84,7 +105,7 @@ static void statistics_count_what_cycles_take(void)
         begin(1000, burns[i]);
         load();
         for (k = 0; k < 10; k++)
-            CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
+            CHECK(IecTaskCycle(0, SimNow()) == 1);
         info = info_of(0);
         CHECK(info.cycles == 10);
         CHECK(info.last_us == burns[i] && info.min_us == burns[i] && info.max_us == burns[i]);
@@ -92,18 +113,15 @@ static void statistics_count_what_cycles_take(void)
     }
 }
 
-/* Two tasks would do; one that burns more each time shows minimum, maximum and average apart. */
 static void minimum_maximum_and_average_differ(void)
 {
     IEC_TASK_INFO info;
-    RTS_I64 now;
 
-    begin(1000, 100);
+    begin(1000, 0);
     load();
-    now = SimNow();
-    CHECK(IecTaskCycle(0, now, now) == 1);                 /* 100 us */
-    CHECK(IecTaskCycle(0, now, SimNow() - 400000) == 1);   /* looks like 500 us */
-    CHECK(IecTaskCycle(0, now, SimNow() - 50000) == 1);    /* 150 us */
+    CHECK(cycle_of(100) == 1);
+    CHECK(cycle_of(500) == 1);
+    CHECK(cycle_of(150) == 1);
     info = info_of(0);
     CHECK(info.cycles == 3);
     CHECK(info.min_us == 100);
@@ -118,7 +136,7 @@ static void times_beyond_four_seconds_saturate(void)
 
     begin(1000, 0);
     load();
-    CHECK(IecTaskCycle(0, 0, SimNow() - 9000000000) == 1);
+    CHECK(cycle_of(9000000) == 1);
     info = info_of(0);
     CHECK(info.max_us == 4294967);
 }
@@ -127,11 +145,11 @@ static void jitter_is_the_largest_delay_of_a_start(void)
 {
     begin(1000, 0);
     load();
-    CHECK(IecTaskCycle(0, 0, 7000) == 1);
-    CHECK(IecTaskCycle(0, 1000000, 1020000) == 1);
-    CHECK(IecTaskCycle(0, 2000000, 2003000) == 1);
+    CHECK(IecTaskCycle(0, SimNow() - 7000) == 1);
+    CHECK(IecTaskCycle(0, SimNow() - 20000) == 1);
+    CHECK(IecTaskCycle(0, SimNow() - 3000) == 1);
     CHECK(info_of(0).jitter_us == 20);
-    CHECK(IecTaskCycle(0, 3000000, 2999000) == 1); /* early does not count */
+    CHECK(IecTaskCycle(0, SimNow() + 30000) == 1); /* early does not count */
     CHECK(info_of(0).jitter_us == 20);
 }
 
@@ -144,7 +162,7 @@ static void missed_due_times_are_counted_as_overruns(void)
     CHECK(SimAdvance(ms(12)) == ERR_OK); /* runs at 0, 3, 6, 9, 12 ms */
     info = info_of(0);
     CHECK(info.cycles == 5);
-    CHECK(info.overruns == 8);
+    CHECK(info.overruns == 10);
     CHECK(info.jitter_us == 0);
 }
 
@@ -200,20 +218,21 @@ static void the_time_goes_on_over_stop_and_start(void)
 /* Milliseconds are counted on from cycle to cycle; they must be those of the division, whatever the steps are. */
 static void milliseconds_follow_the_nanoseconds(void)
 {
-    static const RTS_I64 steps[] = {1, 999999, 1000000, 1234567, 10000000, 4294967295, 4294967296, 4300000000, 86400000000000};
+    static const RTS_I64 steps[] = {1, 999999, 1000000, 1234567, 10000000, 4294967295, 4294967296, 4300000000, 3600000000000};
     RTS_I64 zero;
-    RTS_I64 now;
     RTS_UI32 i;
     RTS_UI32 k;
 
     begin(1000, 0);
     load();
-    zero = now = SimNow();
+    zero = SimNow();
     for (i = 0; i < RTS_COUNT(steps); i++) {
         for (k = 0; k < 50; k++) {
-            now += steps[i];
-            CHECK(IecTaskCycle(0, now, now) == 1);
-            CHECK(read_u32(APP_AREA_DATA, 8) == (RTS_UI32)((now - zero) / 1000000));
+            IecTaskStopAll(); /* no cycle while time passes */
+            CHECK(SimAdvance(steps[i]) == ERR_OK);
+            CHECK(IecTaskStartAll() == ERR_OK);
+            CHECK(IecTaskCycle(0, SimNow()) == 1);
+            CHECK(read_u32(APP_AREA_DATA, 8) == (RTS_UI32)((SimNow() - zero) / 1000000));
         }
     }
 }
@@ -230,7 +249,7 @@ static RTS_UI32 cycles_until_trip(RTS_UI32 watchdog_us, RTS_UI16 sensitivity, RT
     task->watchdog_sensitivity = sensitivity;
     load();
     for (i = 1; i <= 100; i++) {
-        if (!IecTaskCycle(0, SimNow(), SimNow())) {
+        if (!IecTaskCycle(0, SimNow())) {
             CHECK(app_exception() == RTSEXCPT_WATCHDOG);
             return i;
         }
@@ -274,10 +293,9 @@ static void one_good_cycle_starts_the_count_anew(void)
     task->watchdog_sensitivity = 3;
     load();
     for (i = 0; i < 20; i++) {
-        RTS_I64 now = SimNow();
-        CHECK(IecTaskCycle(0, now, now) == 1);
-        CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
-        CHECK(IecTaskCycle(0, SimNow(), SimNow() + 1000000) == 1); /* looks like 500 us */
+        CHECK(cycle_of(1500) == 1);
+        CHECK(cycle_of(1500) == 1);
+        CHECK(cycle_of(500) == 1);
     }
 }
 
@@ -288,7 +306,7 @@ static void outputs_are_zero_when_the_failing_task_returns(void)
     task->watchdog_us = 1000;
     load();
     AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] = 1;
-    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 0);
+    CHECK(IecTaskCycle(0, SimNow()) == 0);
     CHECK(AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] == 0);
 }
 
@@ -317,13 +335,13 @@ static void reset_gives_the_watchdog_its_count_back(void)
     task->watchdog_us = 1000;
     task->watchdog_sensitivity = 3;
     load();
-    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
-    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
+    CHECK(IecTaskCycle(0, SimNow()) == 1);
+    CHECK(IecTaskCycle(0, SimNow()) == 1);
     CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
     CHECK(AppStartApplication() == ERR_OK);
-    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
-    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 1);
-    CHECK(IecTaskCycle(0, SimNow(), SimNow()) == 0);
+    CHECK(IecTaskCycle(0, SimNow()) == 1);
+    CHECK(IecTaskCycle(0, SimNow()) == 1);
+    CHECK(IecTaskCycle(0, SimNow()) == 0);
 }
 
 static void the_supervisor_sees_the_limits_of_running_code_only(void)
@@ -339,7 +357,7 @@ static void the_supervisor_sees_the_limits_of_running_code_only(void)
     CHECK(!IecTaskReadGuard(1, &guard));
     CHECK(IecTaskGetActivity(&busy) == 0);
     CHECK(!busy);
-    CHECK(IecTaskCycle(0, 0, 0) == 1);
+    CHECK(IecTaskCycle(0, 0) == 1);
     CHECK(IecTaskGetActivity(&busy) == 2);
     SchedWatchdogCheck(ms(1000000)); /* nothing runs: nothing happens */
     CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
@@ -420,6 +438,162 @@ static void the_supervisor_breaks_a_task_without_watchdog_after_the_default(void
     CHECK(app_exception() == RTSEXCPT_WATCHDOG);
 }
 
+/* ---- two tasks, each in a thread, that loop until they are broken or released ---- */
+
+typedef struct {
+    pthread_t thread;
+    RTS_UI32 inside;
+    RTS_UI32 released;
+    int result; /* of the cycle */
+} LOOPER;
+
+static LOOPER loopers[2];
+
+static void loop(RTS_UI32 task)
+{
+    time_t start = time(NULL);
+
+    SysAtomicStore(&loopers[task].inside, 1);
+    while (SysAtomicLoad(&loopers[task].released) == 0 && time(NULL) - start < 10)
+        ;
+}
+
+static const CMP_EXT_FUNCTION looping[] = {{"loop", 1, 0x00010000, (RTS_PFN)loop}};
+
+enum { LOOP_LIMIT_US = 5000 };
+
+/* Two tasks with a limit of LOOP_LIMIT_US. */
+static void begin_looping(void)
+{
+    CDL_TASK *task;
+    RTS_UI32 i;
+
+    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(CMRegisterExternal(looping, 1) == ERR_OK);
+    SimSetCycleLimit(30000); /* the simulator's own supervisor, in real time, stays out of it */
+    spec_init(&spec);
+    add_import(&spec, "loop", 1, 0x00010000);
+    for (i = 0; i < 2; i++) {
+        loopers[i].inside = loopers[i].released = 0;
+        task = add_task(&spec, i == 0 ? "Slow" : "Fast", KIND_CYCLIC, 1000, here(&spec));
+        task->watchdog_us = LOOP_LIMIT_US;
+        task->watchdog_sensitivity = 1;
+        emit_call(&spec, 0, i);
+        emit_ret(&spec);
+    }
+    load();
+}
+
+static void *run_cycle_of(void *arg)
+{
+    LOOPER *looper = arg;
+
+    looper->result = IecTaskCycle((RTS_UI32)(looper - loopers), SimNow());
+    SysAtomicStore(&looper->inside, 1);
+    return NULL;
+}
+
+/* Starts a cycle, and returns when it loops, or is over because none may start any more. */
+static void start_looping(RTS_UI32 task)
+{
+    CHECK(pthread_create(&loopers[task].thread, NULL, run_cycle_of, &loopers[task]) == 0);
+    while (SysAtomicLoad(&loopers[task].inside) == 0)
+        ;
+}
+
+static int result_of(RTS_UI32 task)
+{
+    CHECK(pthread_join(loopers[task].thread, NULL) == 0);
+    return loopers[task].result;
+}
+
+/* Checks every millisecond, at the same virtual time as the tasks see, as the port does. */
+static void supervise_for(RTS_UI32 us)
+{
+    for (; us > 0; us -= 1000) {
+        burn(1000);
+        SchedWatchdogCheck(SimNow());
+    }
+}
+
+/* A broken thread may take its time. */
+static bool is_broken(RTS_UI32 task)
+{
+    time_t start = time(NULL);
+    IEC_GUARD guard;
+
+    while (IecTaskReadGuard(task, &guard) && time(NULL) - start < 5)
+        ;
+    return !IecTaskReadGuard(task, &guard);
+}
+
+static RTS_I32 exception_task(void)
+{
+    APP_STATUS status;
+
+    AppGetStatus(&status);
+    return status.exception.task;
+}
+
+static bool is_running(RTS_UI32 task)
+{
+    IEC_GUARD guard;
+
+    return IecTaskReadGuard(task, &guard) != 0;
+}
+
+static void only_the_later_of_two_loops_is_broken_and_the_other_cycle_finishes(void)
+{
+    begin_looping();
+    start_looping(0);
+    supervise_for(2000);
+    start_looping(1);
+    supervise_for(LOOP_LIMIT_US + 1000);
+    CHECK(is_broken(1));
+    CHECK(result_of(1) == 0);
+    supervise_for(2000);
+    CHECK(is_running(0)); /* it had 2 ms before the other began and 2 since */
+    SysAtomicStore(&loopers[0].released, 1);
+    (void)result_of(0);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(exception_task() == 1);
+}
+
+static void of_two_endless_loops_both_are_broken_one_limit_after_the_other(void)
+{
+    begin_looping();
+    start_looping(0);
+    supervise_for(1000);
+    start_looping(1);
+    supervise_for(LOOP_LIMIT_US + 1000);
+    CHECK(is_broken(1));
+    CHECK(is_running(0));
+    supervise_for(LOOP_LIMIT_US + 1000);
+    CHECK(is_broken(0));
+    CHECK(result_of(0) == 0 && result_of(1) == 0);
+}
+
+/* A fast task that is in its cycle whenever the watchdog looks, but never for long, hides nothing. */
+static void short_cycles_of_another_task_do_not_protect_a_loop(void)
+{
+    RTS_UI32 i;
+
+    begin_looping();
+    start_looping(0);
+    for (i = 0; i < LOOP_LIMIT_US / 1000 + 2; i++) {
+        burn(900);
+        loopers[1].inside = loopers[1].released = 0;
+        start_looping(1);
+        burn(100);
+        SchedWatchdogCheck(SimNow());
+        SysAtomicStore(&loopers[1].released, 1);
+        (void)result_of(1);
+    }
+    CHECK(is_broken(0));
+    CHECK(result_of(0) == 0);
+}
+
 static void the_supervisor_breaks_initialisation_code_too(void)
 {
     begin_supervised(APP_DEFAULT_WATCHDOG_US + 1, true);
@@ -434,7 +608,7 @@ static void no_cycle_starts_while_the_application_is_stopped(void)
     begin(1000, 0);
     load();
     CHECK(AppStopApplication() == ERR_OK);
-    CHECK(IecTaskCycle(0, 0, 0) == 0);
+    CHECK(IecTaskCycle(0, 0) == 0);
     CHECK(read_u32(APP_AREA_DATA, 0) == 0);
 }
 
@@ -482,6 +656,9 @@ int main(void)
     RUN(the_supervisor_sees_the_limits_of_running_code_only);
     RUN(the_supervisor_breaks_a_cycle_beyond_time_times_sensitivity);
     RUN(the_supervisor_breaks_a_task_without_watchdog_after_the_default);
+    RUN(only_the_later_of_two_loops_is_broken_and_the_other_cycle_finishes);
+    RUN(of_two_endless_loops_both_are_broken_one_limit_after_the_other);
+    RUN(short_cycles_of_another_task_do_not_protect_a_loop);
     RUN(the_supervisor_breaks_initialisation_code_too);
     RUN(no_cycle_starts_while_the_application_is_stopped);
     RUN(the_bench_measures_real_time_and_keeps_the_schedule);

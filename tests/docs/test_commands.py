@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 
+from plctool.testing.children import ends_with_us
 from plctool.testing.plcrt import find_plcrt
 
 ROOT = Path(__file__).parents[2]
@@ -66,7 +67,9 @@ class Reader:
 
     def start_runtime(self, options: list[str]) -> None:
         self.stop_runtime()
-        self.runtime = subprocess.Popen([find_plcrt(), *options], cwd=self.folder, stdout=subprocess.PIPE, text=True)
+        self.runtime = subprocess.Popen(
+            ends_with_us([find_plcrt(), *options]), cwd=self.folder, stdout=subprocess.PIPE, text=True
+        )
         assert self.runtime.stdout
         self.port = self.runtime.stdout.readline().removeprefix("serial: ").strip()
 

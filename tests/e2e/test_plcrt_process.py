@@ -8,6 +8,7 @@ import random
 import select
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -172,6 +173,30 @@ def test_it_needs_next_to_no_processor_time_when_idle(plcrt):
     time.sleep(2)
     share = (processor_ns(plcrt.process.pid) - before) / (time.monotonic_ns() - started)
     assert share < IDLE_SHARE
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process runs; one that is a zombie does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def test_it_ends_with_a_test_that_is_killed(tmp_path, eventually):
+    code = """
+import sys, time
+from plctool.testing.plcrt import Plcrt
+with Plcrt(sys.argv[1]) as running:
+    print(running.process.pid, flush=True)
+    time.sleep(60)
+"""
+    command = [sys.executable, "-c", code, str(tmp_path / "flash")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as test:
+        pid = int(test.stdout.readline())
+        assert is_alive(pid)
+        test.kill()
+    eventually(lambda: not is_alive(pid))
 
 
 def test_it_runs_without_any_line(tmp_path):

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from plctool.testing.children import ends_with_us
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent / "runner"
 FIRMWARE = ROOT / "firmware"
@@ -87,9 +89,8 @@ class Runner:
         """The results of a batch, see runner.c."""
         folder.mkdir(exist_ok=True)
         (folder / "batch").write_bytes(batch)
-        done = subprocess.run(
-            [*self.command, self.compile(folder)], cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
-        )
+        command = ends_with_us([*self.command, self.compile(folder)])
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT)
         if done.returncode:
             raise RuntimeError(f"the runner for {self.target} failed: {done.stdout}{done.stderr}")
         return (folder / "results").read_bytes()

@@ -1,4 +1,5 @@
-"""What the runtime costs on a Cortex-M, in instructions, which repeat exactly: a task cycle, a variable read.
+"""What the runtime costs on a Cortex-M, in instructions, which repeat exactly: a task cycle, a task switch,
+a variable read.
 
     overhead.py mps2-an385 build-cm3/firmware/port/baremetal/firmware-standard.elf
 
@@ -100,7 +101,7 @@ def main() -> None:
         more = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names) and None)
     print(f"{args.machine}: instructions of the runtime")
     print(f"{cycle:6}  a task cycle: from the alarm's interrupt back to the main loop")
-    print(f"{until_program:6}    of it until the program begins: clock, switch, statistics")
+    print(f"{until_program:6}    of it the switch to the task: until its program begins")
     print(f"{one:6}  a request that reads one variable")
     print(f"{(more - one) / (VARIABLES - 1):6.0f}  each further variable")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import socket
 import subprocess
 import time
@@ -16,6 +17,7 @@ from elftools.elf.elffile import ELFFile
 
 from plctool.errors import LinkError
 from plctool.link import simplecom
+from plctool.testing.children import ends_with_us
 
 FLASH_SIZE = 16 * 1024 * 1024  # of the file; what is behind the file area holds the serial number in its last 4 KiB
 FACTORY_OFFSET = FLASH_SIZE - 4096
@@ -94,6 +96,15 @@ def _connect(path: Path) -> socket.socket:
             time.sleep(0.005)
 
 
+def _ask_debugger(stub: socket.socket, request: str) -> str:
+    """One exchange in the remote protocol of GDB."""
+    stub.sendall(f"${request}#{sum(request.encode()) % 256:02x}".encode())
+    said = b""
+    while not (answers := re.findall(rb"\$([^T#][^#]*)#..", said)):  # T...: that the processor has stopped
+        said += stub.recv(256)
+    return answers[0].decode()
+
+
 class Board:
     """One board with its firmware. Context manager: power is on inside."""
 
@@ -131,7 +142,7 @@ class Board:
             *(["-plugin", plugin] if plugin else []),
         ]  # fmt: skip
         with (self.folder / "qemu.log").open("ab") as log:
-            self._process = subprocess.Popen(command, cwd=self.folder, stdout=log, stderr=log)
+            self._process = subprocess.Popen(ends_with_us(command), cwd=self.folder, stdout=log, stderr=log)
         end = time.monotonic() + START_TIMEOUT
         while not (self.folder / "qmp").exists():
             if self._process.poll() is not None or time.monotonic() > end:
@@ -171,6 +182,19 @@ class Board:
         file = self.folder / "memory"
         self._qmp("pmemsave", val=address, size=size, filename=str(file))
         return file.read_bytes()
+
+    def patch(self, function: str, code: bytes) -> None:
+        """Overwrites the beginning of a function of the firmware, as a debugger would. Until the next reset.
+
+        Not in the first KiB, which QEMU's debugger takes for as inaccessible as the vectors are.
+        """
+        self._qmp("human-monitor-command", **{"command-line": "gdbserver unix:gdb,server=on,wait=off"})
+        with _connect(self.folder / "gdb") as stub:
+            where = f"{self.address_of(function) & ~1:x},{len(code):x}"
+            answers = [_ask_debugger(stub, request) for request in (f"M{where}:{code.hex()}", "D")]
+        self._qmp("human-monitor-command", **{"command-line": "gdbserver none"})
+        if answers != ["OK", "OK"]:
+            raise RuntimeError(f"QEMU's debugger says {answers}")
 
     @property
     def port(self) -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -16,6 +19,7 @@ from plctool.link.connection import Connection
 from plctool.link.services import AppState
 
 MAIN_WATCHDOG_MS = 20_000  # see main.c
+ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}  # of processes that find what this one does
 
 
 @pytest.mark.parametrize("config", ["minimal", "standard", "full"])
@@ -77,9 +81,75 @@ def test_main_loop_kicks_the_hardware_watchdog(make_board, build):
         assert [entry.text for entry in plc.log() if "Reset" in entry.text] == ["Reset: power on"]
 
 
+LOOP_FOREVER = b"\xfe\xe7"
+RETURN = b"\x70\x47"
+
+
+@pytest.mark.parametrize(
+    ("function", "code"),
+    [
+        ("CmpScheduleTimer_Hook", LOOP_FOREVER),  # the main loop hangs, tasks go on
+        ("SysTickHandler", RETURN),  # time stands still
+        ("TimerIrq", RETURN),  # no task is called
+    ],
+    ids=["main loop", "clock", "tasks"],
+)
+def test_what_hangs_ends_in_a_reset_by_the_watchdog_that_plctool_tells_of(make_board, build, function, code):
+    board = make_board()
+    board.power_on("slow")
+    with Plc(Connection(board.line())) as plc:
+        plc.flash(build(program("VAR n : DINT; END_VAR", "n := n + 1;", "T#20ms")).path)
+        eventually(lambda: plc.read("Main.n") > 10)
+    board.patch(function, code)
+    log = eventually(lambda: [text for text in types_log(board.port) if "hardware watchdog" in text])
+    assert log[0].startswith("Reset: hardware watchdog at 0x")
+    with Plc(Connection(board.line())) as plc:
+        eventually(lambda: plc.read("Main.n") > 10)
+        assert plc.status().state is AppState.RUN
+
+
+def types_log(port: str) -> list[str]:
+    """What `plctool log` prints; nothing while the device does not answer."""
+    command = [sys.executable, "-m", "plctool", "log", "--port", port, "--json"]
+    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    return [entry["text"] for entry in json.loads(done.stdout)["entries"]] if done.returncode == 0 else []
+
+
+def process_status(pid: int) -> list[str]:
+    """The fields of /proc/PID/stat behind the name."""
+    return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+
+
+def has_ended(pid: int) -> bool:
+    try:
+        return process_status(pid)[0] in "ZX"
+    except OSError:
+        return True
+
+
+def test_the_board_goes_off_with_a_test_that_is_killed(tmp_path):
+    code = f"""
+import sys, time
+sys.path.append({str(Path(__file__).parent)!r})
+from pathlib import Path
+from environment import MACHINE, firmware
+from qemu import Board
+with Board(MACHINE, firmware("standard"), Path(sys.argv[1])) as board:
+    print(board.pid, flush=True)
+    time.sleep(60)
+"""
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    with subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True) as test:
+        assert test.stdout
+        pid = int(test.stdout.readline())
+        assert not has_ended(pid)
+        test.kill()
+    eventually(lambda: has_ended(pid))
+
+
 def processor_time(board) -> float:
     """Seconds that QEMU has used of the host's processors."""
-    fields = Path(f"/proc/{board.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    fields = process_status(board.pid)
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 

@@ -118,6 +118,7 @@ FAULTS = {
     "stack overflow, past all stacks": Fault(
         "x := Large(n);", "STACK_OVERFLOW", checks="none", before=FUNCTION.format(last=999)
     ),
+    "endless loop": Fault("WHILE trip DO x := x + 1; END_WHILE", "WATCHDOG"),
 }
 
 
@@ -130,7 +131,7 @@ def test_fault_stops_the_application_and_nothing_else(board, tmp_path: Path, nam
         plc.flash(image)
         eventually(lambda: plc.read("finished") > 1)
         plc.write({"Main.trip": True})
-        eventually(lambda: plc.status().state is AppState.EXCEPTION)
+        eventually(lambda: has_stopped(plc))
 
         exception = plc.status().exception
         assert (exception.name, exception.task) == (fault.exception, "Fast")
@@ -198,6 +199,24 @@ END_CONFIGURATION
         plc.reset("warm")
         plc.start()
         eventually(lambda: plc.read("Main.n") > 1)
+
+
+def test_endless_loops_in_two_tasks_are_both_broken(make_board, build) -> None:
+    loop = "WHILE trip DO x := x + 1; END_WHILE"
+    text = TASKS.format(variables="", fault=loop).replace("END_FOR", f"END_FOR\n{loop}", 1)
+    text = text.replace("    i, x : DINT;", "    i, x : DINT;\n    trip : BOOL;")
+    board = make_board()
+    board.power_on("slow")
+    with Plc(Connection(board.line())) as plc:
+        plc.flash(build(text).path)
+        eventually(lambda: plc.read("finished") > 1)
+        plc.write({"Long.trip": True, "Main.trip": True})
+        eventually(lambda: has_stopped(plc))
+        assert plc.status().exception.task == "Fast", "the one that interrupted the other comes first"
+        assert plc.read("begun") == plc.read("finished") + 1
+        plc.reset("warm")
+        plc.start()
+        eventually(lambda: plc.read("finished") > 1)
 
 
 def has_stopped(plc: Plc) -> bool:

@@ -19,6 +19,8 @@ from pathlib import Path
 import pytest
 from environment import FIRMWARE, MACHINE, ROOT
 
+from plctool.testing.children import ends_with_us
+
 GUIDE = ROOT / "docs" / "porting.md"
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EXACT = ("grep ", "(cd ", "tests/target/run-qemu ")
@@ -100,7 +102,7 @@ class Vendor:
 
     def _starts_board(self, command: str) -> str:
         self.leaves()
-        self.board = subprocess.Popen(command.split(), cwd=self.folder, stdout=subprocess.PIPE, text=True)
+        self.board = subprocess.Popen(ends_with_us(command.split()), cwd=self.folder, stdout=subprocess.PIPE, text=True)
         assert self.board.stdout
         line = self.board.stdout.readline()
         self.port = line.split()[4]

@@ -28,16 +28,16 @@ enum {
     BREAK_SIGNAL_OFFSET = 5,          /* from SIGRTMIN: clear of what debuggers and libraries use */
 };
 
-/* A thread that runs IEC code. The thread itself writes `jump` and `round`; SysExceptBreak reads them from another. */
+/* A thread that runs IEC code. The thread itself writes `jump`, `round` and `arg`; SysExceptBreak reads them from another. */
 typedef struct {
     sigjmp_buf *jump;        /* of the running SysExceptTry, NULL outside of it */
     RTS_UI32 round;          /* counts SysExceptTry, so that a break that comes late does not hit the next one */
     RTS_UI32 break_round;    /* the round to break */
     RTS_UI32 break_code;
+    const void *arg;         /* of the running SysExceptTry */
     RTS_EXCEPTION exception; /* on the way from the handler to SysExceptTry */
     uintptr_t stack_end;     /* lowest address of the stack */
     pthread_t thread;
-    RTS_UI32 generation;
     int used;
 } CONTEXT;
 
@@ -250,7 +250,6 @@ static CONTEXT *take_context(void)
         fatal("too many threads run IEC code");
     }
     context->used = 1;
-    context->generation++;
     context->thread = pthread_self();
     pthread_mutex_unlock(&state.lock);
     return context;
@@ -314,23 +313,18 @@ static CONTEXT *own_context(void)
     return context != NULL && __atomic_load_n(&state.installed, __ATOMIC_RELAXED) ? context : attach();
 }
 
-uintptr_t SysExceptContext(void)
-{
-    CONTEXT *context = own_context();
-    return (uintptr_t)context->generation * MAX_CONTEXTS + (uintptr_t)(context - state.context);
-}
-
 /* ---- the interface ---- */
 
-static void begin_round(CONTEXT *context)
+static void begin_round(CONTEXT *context, const void *arg)
 {
     __atomic_store_n(&context->round, context->round + 1, __ATOMIC_RELEASE);
+    __atomic_store_n(&context->arg, arg, __ATOMIC_RELEASE);
 }
 
 int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     sigjmp_buf jump;
-    begin_round(own_context());
+    begin_round(own_context(), arg);
     if (sigsetjmp(jump, 0) != 0) {
         *exception = self->exception;
         return 1;
@@ -354,17 +348,32 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 
 /* At most one signal per round: a thread that does not get the processor would find all of them stacked on top of each
  * other when it does. */
-void SysExceptBreak(uintptr_t name, RTS_UI32 code)
+static void break_round(CONTEXT *context, RTS_UI32 round, RTS_UI32 code)
 {
-    CONTEXT *context = &state.context[name % MAX_CONTEXTS];
-    pthread_mutex_lock(&state.lock);
-    RTS_UI32 round = __atomic_load_n(&context->round, __ATOMIC_ACQUIRE);
-    int inside = __atomic_load_n(&context->jump, __ATOMIC_ACQUIRE) != NULL;
-    int present = context->used && context->generation == name / MAX_CONTEXTS && state.installed;
-    if (present && inside && context->break_round != round) {
+    if (context->break_round != round) {
         context->break_code = code;
         __atomic_store_n(&context->break_round, round, __ATOMIC_RELEASE);
         pthread_kill(context->thread, SIGRTMIN + BREAK_SIGNAL_OFFSET);
+    }
+}
+
+/* The round is read first: when the thread goes on to its next one meanwhile, the break misses. */
+static void break_if_it_runs(CONTEXT *context, const void *arg, RTS_UI32 code)
+{
+    RTS_UI32 round = __atomic_load_n(&context->round, __ATOMIC_ACQUIRE);
+    if (__atomic_load_n(&context->jump, __ATOMIC_ACQUIRE) != NULL &&
+        __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg) {
+        break_round(context, round, code);
+    }
+}
+
+void SysExceptBreak(const void *arg, RTS_UI32 code)
+{
+    pthread_mutex_lock(&state.lock);
+    for (CONTEXT *context = state.context; state.installed && context < state.context + MAX_CONTEXTS; context++) {
+        if (context->used) {
+            break_if_it_runs(context, arg, code);
+        }
     }
     pthread_mutex_unlock(&state.lock);
 }

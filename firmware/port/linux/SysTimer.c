@@ -11,6 +11,7 @@
 #include "SysTimer.h"
 
 #include "CmpLog.h"
+#include "SysAtomic.h"
 #include "SysExcept.h"
 #include "SysTime.h"
 #include "port.h"
@@ -34,6 +35,7 @@ typedef struct {
     void *param;
     RTS_I64 interval_ns;
     RTS_I64 start_ns;
+    RTS_UI32 overruns; /* atomic */
     int priority;
     int started;
     pthread_t thread;
@@ -69,17 +71,23 @@ static RTS_UI32 count_missed(RTS_I64 due_ns, RTS_I64 now_ns, RTS_I64 interval_ns
     return now_ns <= due_ns ? 0 : (RTS_UI32)((now_ns - due_ns - 1) / interval_ns + 1);
 }
 
+static void do_nothing(void *arg)
+{
+    RTS_UNUSED(arg);
+}
+
 static void *run(void *param)
 {
     TIMER *timer = param;
     RTS_I64 due_ns = timer->start_ns;
-    RTS_UI32 missed = 0;
-    (void)SysExceptContext(); /* takes what catching exceptions needs now, not in the first cycle */
+    RTS_EXCEPTION none;
+    (void)SysExceptTry(do_nothing, NULL, &none); /* takes what catching needs now, not in the first cycle */
     prctl(PR_SET_TIMERSLACK, 1UL); /* matters without SCHED_FIFO only: else 50 us late */
     while (sleep_until(timer, due_ns)) {
-        timer->callback(timer->param, due_ns, missed);
+        timer->callback(timer->param, due_ns);
         due_ns += timer->interval_ns;
-        missed = count_missed(due_ns, SysTimeGetNs(), timer->interval_ns);
+        RTS_UI32 missed = count_missed(due_ns, SysTimeGetNs(), timer->interval_ns);
+        (void)SysAtomicAdd(&timer->overruns, missed);
         due_ns += missed * timer->interval_ns;
     }
     return NULL;
@@ -172,6 +180,7 @@ RTS_RESULT PortTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 in
     state.timer[i].callback = callback;
     state.timer[i].param = param;
     state.timer[i].interval_ns = (RTS_I64)interval_us * 1000;
+    state.timer[i].overruns = 0;
     state.timer[i].priority = fifo_priority;
     state.timer[i].started = 0;
     *timer = i;
@@ -194,6 +203,12 @@ RTS_RESULT SysTimerDelete(RTS_HANDLE handle)
         state.timer[handle].callback = NULL;
     }
     return result;
+}
+
+RTS_UI32 SysTimerGetOverruns(RTS_HANDLE handle)
+{
+    const TIMER *timer = get_timer(handle);
+    return timer != NULL ? SysAtomicLoad(&timer->overruns) : 0;
 }
 
 /* ---- the component ---- */

@@ -12,11 +12,10 @@ static struct {
     RTS_HANDLE timer;
 } state;
 
-static void check(void *param, RTS_I64 due_ns, RTS_UI32 missed)
+static void check(void *param, RTS_I64 due_ns)
 {
     RTS_UNUSED(param);
     RTS_UNUSED(due_ns);
-    RTS_UNUSED(missed);
     SchedWatchdogCheck(SysTimeGetNs());
 }
 

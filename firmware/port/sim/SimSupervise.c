@@ -47,7 +47,7 @@ static void look(RTS_UI32 index, SEEN *seen)
         seen->serial = guard.serial;
         seen->since_ms = real_ms();
     } else if (real_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms)) {
-        SysExceptBreak(guard.context, RTSEXCPT_WATCHDOG);
+        SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
     }
 }
 

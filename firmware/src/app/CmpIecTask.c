@@ -21,7 +21,6 @@ typedef struct {
     RTS_UI32 phase;
     RTS_I64 start_ns;
     RTS_I64 limit_ns;
-    uintptr_t context;
 } GUARD;
 
 typedef struct {
@@ -38,7 +37,6 @@ typedef struct {
     RTS_UI32 min_ns;
     RTS_UI32 max_ns;
     RTS_UI32 jitter_ns;
-    RTS_UI32 overruns;
     RTS_UI64 sum_ns;
 } TASK;
 
@@ -48,6 +46,7 @@ static struct {
     bool time_started;
     RTS_I64 time_zero; /* SysTimeGetNs at which the time of the application is 0 */
     GUARD init_guard;
+    const void *init_arg;
     TASK list[APP_MAX_TASKS];
 } tasks;
 
@@ -67,31 +66,36 @@ static const CMP_EXT_FUNCTION externals[] = {
     {"iecraise", 0x703B892E, 0x00010000, (RTS_PFN)iecraise}, /* iecraise(UDINT) */
 };
 
-/* ---- guards ---- */
+/* ---- guards: a few instructions, shorter than a call ---- */
 
-static void guard_begin(GUARD *guard, RTS_I64 now_ns)
+#define GUARD_INLINE static inline __attribute__((always_inline))
+
+GUARD_INLINE void guard_begin(GUARD *guard, RTS_I64 now_ns)
 {
     guard->start_ns = now_ns;
-    guard->context = SysExceptContext();
     SysAtomicStore(&guard->phase, guard->phase + 1);
     SysAtomicFence(); /* whoever sees a write of the cycle sees that it runs */
 }
 
-static void guard_end(GUARD *guard)
+GUARD_INLINE void guard_end(GUARD *guard)
 {
     SysAtomicStore(&guard->phase, guard->phase + 1);
 }
 
 int IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
 {
-    const GUARD *guard = index < tasks.count ? &tasks.list[index].guard : &tasks.init_guard;
+    const GUARD *guard = &tasks.init_guard;
 
+    out->arg = tasks.init_arg;
+    if (index < tasks.count) {
+        guard = &tasks.list[index].guard;
+        out->arg = &tasks.list[index];
+    }
     out->serial = SysAtomicLoad(&guard->phase);
     if ((out->serial & 1) == 0)
         return 0;
     out->start_ns = guard->start_ns;
     out->limit_ns = guard->limit_ns;
-    out->context = guard->context;
     SysAtomicFence();
     return SysAtomicLoad(&guard->phase) == out->serial;
 }
@@ -115,6 +119,7 @@ int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception
 {
     int failed;
 
+    tasks.init_arg = arg;
     guard_begin(&tasks.init_guard, SysTimeGetNs());
     failed = SysExceptTry(fn, arg, exception);
     guard_end(&tasks.init_guard);
@@ -200,44 +205,38 @@ static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
     return task->exceeded >= task->sensitivity || elapsed_ns > task->guard.limit_ns;
 }
 
-/* The rest of stopping the application is main's. */
-static int report_exception(const TASK *task, RTS_UI32 code, uintptr_t address)
+/* No other cycle starts, which is settled before the guard says that this one is over. The rest of stopping the application
+ * is main's. */
+static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
+    SysAtomicStore(&tasks.running, 0);
+    guard_end(&task->guard);
     AppHandleException((RTS_I32)(task - tasks.list), code, address);
     return 0;
 }
 
 /* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
-static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns, RTS_I64 now_ns)
+static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
 {
+    RTS_I64 start_ns = SysTimeGetNs();
     RTS_EXCEPTION exception;
-    RTS_I64 elapsed;
-    int failed;
+    RTS_I64 elapsed_ns;
 
-    set_time(task, now_ns - tasks.time_zero);
-    guard_begin(&task->guard, now_ns);
-    failed = SysExceptTry(run_entry, task, &exception);
-    if (failed)
-        SysAtomicStore(&tasks.running, 0); /* no other cycle starts; before the guard says that this one is over */
-    elapsed = SysTimeGetNs() - now_ns;
+    set_time(task, start_ns - tasks.time_zero);
+    guard_begin(&task->guard, start_ns);
+    if (SysExceptTry(run_entry, task, &exception))
+        return end_with_exception(task, exception.code, exception.address);
+    elapsed_ns = SysTimeGetNs() - start_ns;
+    account(task, start_ns - due_ns, elapsed_ns);
+    if (watchdog_expired(task, elapsed_ns))
+        return end_with_exception(task, RTSEXCPT_WATCHDOG, 0);
     guard_end(&task->guard);
-    if (failed)
-        return report_exception(task, exception.code, exception.address);
-    account(task, now_ns - due_ns, elapsed);
-    if (!watchdog_expired(task, elapsed))
-        return 1;
-    SysAtomicStore(&tasks.running, 0);
-    return report_exception(task, RTSEXCPT_WATCHDOG, 0);
+    return 1;
 }
 
-int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns, RTS_I64 now_ns)
+int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
-    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], due_ns, now_ns) : 0;
-}
-
-void IecTaskAddOverruns(RTS_UI32 task, RTS_UI32 missed)
-{
-    tasks.list[task].overruns += missed;
+    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], due_ns) : 0;
 }
 
 /* ---- all tasks ---- */
@@ -319,7 +318,7 @@ RTS_RESULT IecTaskGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
     info->min_us = task->min_ns / NS_PER_US;
     info->max_us = task->max_ns / NS_PER_US;
     info->jitter_us = task->jitter_ns / NS_PER_US;
-    info->overruns = task->overruns;
+    info->overruns = SchedGetOverruns(index);
     return ERR_OK;
 }
 

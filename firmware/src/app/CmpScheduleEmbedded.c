@@ -10,12 +10,14 @@
 
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
+#include "SysExcept.h"
 #include "SysTime.h"
 #include "TaskTrigger.h"
 #include "rts_config.h"
 
 typedef struct {
     TRIGGER trigger;
+    RTS_UI32 overruns;
     RTS_I64 due_ns; /* cyclic tasks */
 } SCHEDULED;
 
@@ -31,35 +33,32 @@ static void run_cyclic(RTS_UI32 index)
 {
     SCHEDULED *task = &schedule.task[index];
     RTS_I64 interval_ns = (RTS_I64)task->trigger.record->interval_us * 1000;
-    RTS_I64 now_ns = SysTimeGetNs();
-    RTS_I64 due_ns = task->due_ns;
-    RTS_UI32 missed = 0;
+    RTS_I64 now_ns;
 
-    if (now_ns < due_ns)
+    if (SysTimeGetNs() < task->due_ns)
         return;
-    IecTaskCycle(index, due_ns, now_ns);
+    (void)IecTaskCycle(index, task->due_ns);
     now_ns = SysTimeGetNs();
-    for (due_ns += interval_ns; due_ns < now_ns; due_ns += interval_ns)
-        missed++;
-    task->due_ns = due_ns;
-    if (missed != 0)
-        IecTaskAddOverruns(index, missed);
+    for (task->due_ns += interval_ns; task->due_ns < now_ns; task->due_ns += interval_ns)
+        task->overruns++;
+}
+
+RTS_UI32 SchedGetOverruns(RTS_UI32 task)
+{
+    return schedule.task[task].overruns;
 }
 
 void SchedBackgroundCycle(void)
 {
-    RTS_I64 now_ns;
     RTS_UI32 i;
 
     for (i = 0; i < schedule.count && schedule.started; i++) {
         RTS_UI32 index = schedule.order[i];
         TRIGGER *trigger = &schedule.task[index].trigger;
-        if (trigger->record->kind == KIND_CYCLIC) {
+        if (trigger->record->kind == KIND_CYCLIC)
             run_cyclic(index);
-        } else if (TriggerFired(trigger)) {
-            now_ns = SysTimeGetNs();
-            IecTaskCycle(index, now_ns, now_ns);
-        }
+        else if (TriggerFired(trigger))
+            (void)IecTaskCycle(index, SysTimeGetNs());
     }
 }
 
@@ -74,6 +73,7 @@ static void add_task(const CDL_TASK *record, RTS_UI8 *const *areas)
     RTS_UI32 place;
 
     TriggerInit(&schedule.task[index].trigger, record, areas);
+    schedule.task[index].overruns = 0;
     for (place = index; place > 0; place--) {
         if (schedule.task[schedule.order[place - 1]].trigger.record->priority <= record->priority)
             break;
@@ -108,6 +108,18 @@ RTS_RESULT SchedStart(void)
 void SchedStop(void)
 {
     schedule.started = false;
+}
+
+/* One cycle runs at a time, or none. */
+void SchedWatchdogCheck(RTS_I64 now_ns)
+{
+    IEC_GUARD guard;
+    RTS_UI32 i;
+
+    for (i = 0; i <= IecTaskGetCount(); i++) {
+        if (IecTaskReadGuard(i, &guard) && now_ns - guard.start_ns > guard.limit_ns)
+            SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
+    }
 }
 
 RTS_RESULT CmpScheduleTimer_Hook(CMP_HOOK hook)

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "CmpIecTask.h"
+#include "SysExcept.h"
 #include "SysTime.h"
 #include "SysTimer.h"
 #include "TaskTrigger.h"
@@ -25,17 +26,20 @@ static struct {
     bool started;
     SCHEDULED task[APP_MAX_TASKS];
     RTS_UI8 background[APP_MAX_TASKS]; /* tasks that run in main, highest priority first */
+    RTS_I64 checked_ns;                  /* when the last check of the watchdog was */
+    RTS_I64 since_ns[APP_MAX_TASKS + 1]; /* by guard: start of its cycle plus the time it was held up */
 } schedule;
 
 /* ---- cyclic tasks ---- */
 
-static void on_timer(void *param, RTS_I64 due_ns, RTS_UI32 missed)
+static void on_timer(void *param, RTS_I64 due_ns)
 {
-    RTS_UI32 task = (RTS_UI32)(uintptr_t)param;
+    (void)IecTaskCycle((RTS_UI32)(uintptr_t)param, due_ns);
+}
 
-    if (missed != 0)
-        IecTaskAddOverruns(task, missed);
-    IecTaskCycle(task, due_ns, SysTimeGetNs());
+RTS_UI32 SchedGetOverruns(RTS_UI32 task)
+{
+    return SysTimerGetOverruns(schedule.task[task].timer);
 }
 
 /* ---- tasks in main ---- */
@@ -60,10 +64,8 @@ void SchedBackgroundCycle(void)
         return;
     for (i = 0; i < schedule.background_count; i++) {
         RTS_UI32 task = schedule.background[i];
-        if (TriggerFired(&schedule.task[task].trigger)) {
-            RTS_I64 now_ns = SysTimeGetNs();
-            IecTaskCycle(task, now_ns, now_ns);
-        }
+        if (TriggerFired(&schedule.task[task].trigger))
+            (void)IecTaskCycle(task, SysTimeGetNs());
     }
 }
 
@@ -135,6 +137,47 @@ void SchedStop(void)
     for (i = 0; i < schedule.count; i++) {
         if (schedule.task[i].timer != (RTS_HANDLE)RTS_INVALID_HANDLE)
             (void)SysTimerStop(schedule.task[i].timer);
+    }
+}
+
+/* ---- supervision ---- */
+
+enum { NOTHING_RUNS = -1 };
+
+/* Of the cycles that run; on one core the one that started last is the only one that gets on. */
+static RTS_I64 find_latest_start(void)
+{
+    RTS_I64 latest_ns = NOTHING_RUNS;
+    IEC_GUARD guard;
+    RTS_UI32 i;
+
+    for (i = 0; i <= IecTaskGetCount(); i++) {
+        if (IecTaskReadGuard(i, &guard) && guard.start_ns > latest_ns)
+            latest_ns = guard.start_ns;
+    }
+    return latest_ns;
+}
+
+/* Time stands still for a cycle as long as one that started later, and may have interrupted it, goes on from one check to
+ * the next. Of several tasks that take too long the one that holds up the others is broken first, and they finish. */
+void SchedWatchdogCheck(RTS_I64 now_ns)
+{
+    RTS_I64 latest_ns = find_latest_start();
+    RTS_I64 held_ns = latest_ns < schedule.checked_ns ? now_ns - schedule.checked_ns : 0;
+    IEC_GUARD guard;
+    RTS_UI32 i;
+
+    schedule.checked_ns = now_ns;
+    for (i = 0; latest_ns != NOTHING_RUNS && i <= IecTaskGetCount(); i++) {
+        RTS_I64 *since_ns = &schedule.since_ns[i];
+        if (!IecTaskReadGuard(i, &guard))
+            continue;
+        if (*since_ns < guard.start_ns)
+            *since_ns = guard.start_ns; /* a new cycle */
+        if (guard.start_ns < latest_ns)
+            *since_ns += held_ns;
+        if (now_ns - *since_ns > guard.limit_ns)
+            SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
     }
 }
 

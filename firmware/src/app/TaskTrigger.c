@@ -1,5 +1,5 @@
 /*
- * TaskTrigger.c - events that make a task run; external events; supervision of cycles.
+ * TaskTrigger.c - events that make a task run; external events.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -10,7 +10,6 @@
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
 #include "SysAtomic.h"
-#include "SysExcept.h"
 #include "rts_config.h"
 
 typedef struct {
@@ -51,19 +50,19 @@ void TriggerForget(TRIGGER *trigger)
     const EXTERNAL_EVENT *event;
 
     if (trigger->record->kind == KIND_EVENT)
-        trigger->flag_before = *trigger->flag != 0;
+        trigger->seen = *trigger->flag != 0;
     if (trigger->record->kind == KIND_EXTERNAL) {
         event = find_event(trigger->record->name);
-        trigger->posts_done = event != NULL ? SysAtomicLoad(&event->posts) : 0;
+        trigger->seen = event != NULL ? SysAtomicLoad(&event->posts) : 0;
     }
 }
 
 static bool has_rising_edge(TRIGGER *trigger)
 {
-    RTS_UI8 now = *trigger->flag != 0;
-    bool rising = now && !trigger->flag_before;
+    RTS_UI32 now = *trigger->flag != 0;
+    bool rising = now > trigger->seen;
 
-    trigger->flag_before = now;
+    trigger->seen = now;
     return rising;
 }
 
@@ -72,9 +71,9 @@ static bool has_post(TRIGGER *trigger)
 {
     const EXTERNAL_EVENT *event = find_event(trigger->record->name);
 
-    if (event == NULL || SysAtomicLoad(&event->posts) == trigger->posts_done)
+    if (event == NULL || SysAtomicLoad(&event->posts) == trigger->seen)
         return false;
-    trigger->posts_done++;
+    trigger->seen++;
     return true;
 }
 
@@ -135,18 +134,4 @@ RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event)
         return ERR_INVALID_HANDLE;
     (void)SysAtomicAdd(&events[event].posts, 1);
     return ERR_OK;
-}
-
-/* ---- supervision ---- */
-
-void SchedWatchdogCheck(RTS_I64 now_ns)
-{
-    RTS_UI32 count = IecTaskGetCount();
-    IEC_GUARD guard;
-    RTS_UI32 i;
-
-    for (i = 0; i <= count; i++) {
-        if (IecTaskReadGuard(i, &guard) && now_ns - guard.start_ns > guard.limit_ns)
-            SysExceptBreak(guard.context, RTSEXCPT_WATCHDOG);
-    }
 }

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from plctool.errors import UsageError
+from plctool.testing.children import ends_with_us
 
 
 def find_plcrt() -> str:
@@ -34,7 +35,9 @@ class Plcrt:
     def start(self) -> None:
         """Starts the process and waits for the line that names its pseudo terminal."""
         command = [find_plcrt(), "--flash", str(self.flash), "--serial", "pty", *self.options]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            ends_with_us(command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
         assert self.process.stdout and self.process.stderr
         line = self.process.stdout.readline()
         if not line.startswith("serial: "):

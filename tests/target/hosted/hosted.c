@@ -44,15 +44,10 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
     longjmp(*except.jump, 1);
 }
 
-void SysExceptBreak(uintptr_t context, RTS_UI32 code)
+void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
-    RTS_UNUSED(context);
+    RTS_UNUSED(arg);
     RTS_UNUSED(code);
-}
-
-uintptr_t SysExceptContext(void)
-{
-    return 1;
 }
 
 void SysExceptShutdown(void)

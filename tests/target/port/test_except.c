@@ -104,6 +104,12 @@ static void __attribute__((noinline)) recurse(volatile RTS_UI32 *above)
     sink = here[0];
 }
 
+static void fail_with_interrupts_masked(void *arg)
+{
+    RTS_UNUSED(arg);
+    __asm__ volatile("cpsid i\n\tudf #1" ::: "memory");
+}
+
 static void overflow_the_stack(void *arg)
 {
     RTS_UNUSED(arg);
@@ -178,6 +184,7 @@ static const FAILURE failures[] = {
     {hit_a_breakpoint, RTSEXCPT_BREAKPOINT},
     {raise, RTSEXCPT_ARRAYBOUNDS},
     {raise_with_everything_clobbered, RTSEXCPT_ILLEGAL_INSTRUCTION},
+    {fail_with_interrupts_masked, RTSEXCPT_ILLEGAL_INSTRUCTION},
     {overflow_the_stack, RTSEXCPT_STACK_OVERFLOW},
     {overflow_the_stack_with_large_frames, RTSEXCPT_STACK_OVERFLOW},
     {overflow_past_the_guard, RTSEXCPT_STACK_OVERFLOW},
@@ -273,24 +280,23 @@ static void many_failures_cost_no_stack(void)
 typedef struct {
     void (*function)(void *arg);
     volatile RTS_UI32 calls, caught, passed;
-    volatile uintptr_t context; /* while in the callback */
+    volatile RTS_UI8 running; /* in the callback */
     RTS_EXCEPTION exception;
 } TASK;
 
 static TASK slow, fast;
 
-static void on_timer(void *param, RTS_I64 due, RTS_UI32 missed)
+static void on_timer(void *param, RTS_I64 due)
 {
     TASK *task = param;
     RTS_UNUSED(due);
-    RTS_UNUSED(missed);
     task->calls++;
-    task->context = SysExceptContext();
+    task->running = 1;
     if (SysExceptTry(task->function, task, &task->exception))
         task->caught++;
     else
         task->passed++;
-    task->context = 0;
+    task->running = 0;
 }
 
 static RTS_HANDLE start(TASK *task, void (*function)(void *arg), RTS_UI32 interval_us, RTS_UI32 priority)
@@ -412,10 +418,10 @@ static void guarded_code_in_main_survives_failing_tasks(void)
 static void break_the_slow_task(RTS_I64 now)
 {
     static RTS_I64 since;
-    if (!slow.context)
+    if (!slow.running)
         since = now;
     else if (now - since >= 3000000)
-        SysExceptBreak(slow.context, RTSEXCPT_WATCHDOG);
+        SysExceptBreak(&slow, RTSEXCPT_WATCHDOG);
 }
 
 static void endless_loop_is_broken_by_the_clock(void)
@@ -443,10 +449,25 @@ static void break_reaches_a_task_below_a_running_one(void)
     CHECK_EQUAL(slow.exception.code, RTSEXCPT_WATCHDOG);
 }
 
-static void break_the_slow_task_by_timer(void *param, RTS_I64 due, RTS_UI32 missed)
+static void break_the_slow_task_twice(RTS_I64 now)
+{
+    break_the_slow_task(now);
+    break_the_slow_task(now);
+}
+
+static void second_break_does_not_forget_where_the_loop_was(void)
+{
+    ClockSetCallback(break_the_slow_task_twice);
+    RTS_HANDLE timer = start(&slow, loop_forever, 2000, 0);
+    wait_for(&slow.caught, 3);
+    SysTimerDelete(timer);
+    ClockSetCallback(NULL);
+    CHECK(is_within(slow.exception.address, loop_forever));
+}
+
+static void break_the_slow_task_by_timer(void *param, RTS_I64 due)
 {
     RTS_UNUSED(param);
-    RTS_UNUSED(missed);
     break_the_slow_task(due);
 }
 
@@ -465,19 +486,29 @@ static void endless_loop_is_broken_by_a_timer_above(void)
 static void endless_loop_in_main_is_broken(void)
 {
     RTS_EXCEPTION exception;
-    slow.context = SysExceptContext();
-    CHECK(slow.context != 0);
+    slow.running = 1;
     ClockSetCallback(break_the_slow_task);
-    CHECK_EQUAL(SysExceptTry(loop_forever, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(loop_forever, &slow, &exception), 1);
     ClockSetCallback(NULL);
+    slow.running = 0;
     CHECK_EQUAL(exception.code, RTSEXCPT_WATCHDOG);
 }
 
-static void break_of_a_context_without_application_code_does_nothing(void)
+static void break_something_else(RTS_I64 now)
 {
-    SysExceptBreak(0, RTSEXCPT_WATCHDOG);
-    SysExceptBreak(SysExceptContext(), RTSEXCPT_WATCHDOG);
-    SysExceptBreak(VECTOR_IRQ + BOARD_TASK_IRQ + 1, RTSEXCPT_WATCHDOG);
+    RTS_UNUSED(now);
+    SysExceptBreak(&slow, RTSEXCPT_WATCHDOG);
+}
+
+static void break_of_what_does_not_run_does_nothing(void)
+{
+    RTS_EXCEPTION exception;
+    volatile RTS_UI32 bad = 0;
+    SysExceptBreak(&slow, RTSEXCPT_WATCHDOG);
+    ClockSetCallback(break_something_else);
+    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&bad, &exception), 0);
+    ClockSetCallback(NULL);
+    CHECK_EQUAL(bad, 0);
 }
 
 /* ---- entering compiled code ---- */
@@ -498,7 +529,7 @@ static void compiled_code_finds_its_import_table_in_r9(void)
     IEC_CONTEXT context = {.imports = imports};
     context.area[0] = (RTS_UI8 *)seen;
     __asm__ volatile("mov %0, r9" : "=r"(before));
-    IecCall((uintptr_t)compiled_entry | APP_ENTRY_MODE_BIT, &context, 5);
+    IecCall(&context, 5, (uintptr_t)compiled_entry | APP_ENTRY_MODE_BIT);
     __asm__ volatile("mov %0, r9" : "=r"(after));
     CHECK_EQUAL(seen[0], (uintptr_t)imports);
     CHECK_EQUAL(seen[1], (uintptr_t)&context);
@@ -523,9 +554,10 @@ int main(void)
     TEST_RUN(guarded_code_in_main_survives_failing_tasks);
     TEST_RUN(endless_loop_is_broken_by_the_clock);
     TEST_RUN(break_reaches_a_task_below_a_running_one);
+    TEST_RUN(second_break_does_not_forget_where_the_loop_was);
     TEST_RUN(endless_loop_is_broken_by_a_timer_above);
     TEST_RUN(endless_loop_in_main_is_broken);
-    TEST_RUN(break_of_a_context_without_application_code_does_nothing);
+    TEST_RUN(break_of_what_does_not_run_does_nothing);
     TEST_RUN(compiled_code_finds_its_import_table_in_r9);
     TEST_END();
 }

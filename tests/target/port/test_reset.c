@@ -77,16 +77,20 @@ static void start_by_start(const RESET_RECORD *reset)
         CHECK_EQUAL(reset->cause, RESET_WATCHDOG);
         ResetNow(RESET_SOFTWARE, 0);
         break;
-    default:
+    case 7:
         CHECK_EQUAL(reset->cause, RESET_SOFTWARE);
-        CHECK_EQUAL(start_number, 8);
+        ResetNow(RESET_CAUSE_COUNT, 0); /* a bit of the record that toppled while the power was low */
+        break;
+    default:
+        CHECK_EQUAL(reset->cause, RESET_POWER_ON);
+        CHECK_EQUAL(start_number, 9);
         TEST_END();
     }
 }
 
 int main(void)
 {
-    if (ResetGet()->cause == RESET_POWER_ON)
+    if (ResetGet()->cause == RESET_POWER_ON && start_number != 8)
         start_number = 1;
     start_by_start(ResetGet());
     CHECK(0); /* the fault before should have ended this start */

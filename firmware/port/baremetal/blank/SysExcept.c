@@ -29,18 +29,12 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
         ;
 }
 
-/* Write here: make the SysExceptTry that runs in `context` leave as soon as that context goes on. We run above it. And
+/* Write here: make the SysExceptTry that was called with `arg` leave as soon as its context goes on. We run above it. And
  * let an interrupt above all tasks call SchedWatchdogCheck every millisecond, else nothing ends an endless loop. */
-void SysExceptBreak(uintptr_t context, RTS_UI32 code)
+void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
-    RTS_UNUSED(context);
+    RTS_UNUSED(arg);
     RTS_UNUSED(code);
-}
-
-/* Write here: a number that is not 0 and differs between main and each timer's interrupt. */
-uintptr_t SysExceptContext(void)
-{
-    return 1;
 }
 
 /* Nothing to give back on bare metal. */

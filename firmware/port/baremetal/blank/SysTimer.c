@@ -42,3 +42,10 @@ RTS_RESULT SysTimerDelete(RTS_HANDLE timer)
     RTS_UNUSED(timer);
     return ERR_NOTIMPLEMENTED;
 }
+
+/* Write here: how many due times were skipped. */
+RTS_UI32 SysTimerGetOverruns(RTS_HANDLE timer)
+{
+    RTS_UNUSED(timer);
+    return 0;
+}

@@ -37,9 +37,9 @@ enum { LEVEL_FAULT = 0, LEVEL_DEVICE = 1, LEVEL_TIMER = 2 };
 #define SYST_CVR REG32(0xE000E018u)
 #define NVIC_ISER(n) REG32(0xE000E100u + 4u * (n))
 #define NVIC_ICER(n) REG32(0xE000E180u + 4u * (n))
-#define NVIC_ISPR(n) REG32(0xE000E200u + 4u * (n))
 #define NVIC_ICPR(n) REG32(0xE000E280u + 4u * (n))
 #define NVIC_IPR(n) (*(volatile RTS_UI8 *)(uintptr_t)(0xE000E400u + (n)))
+#define NVIC_STIR REG32(0xE000EF00u) /* an IRQ written here becomes pending */
 #define SCB_ICSR REG32(0xE000ED04u)
 #define SCB_AIRCR REG32(0xE000ED0Cu)
 #define SCB_CCR REG32(0xE000ED14u)
@@ -93,7 +93,7 @@ static inline RTS_UI32 CpuExceptionNumber(void)
 {
     RTS_UI32 ipsr;
     __asm__ volatile("mrs %0, ipsr" : "=r"(ipsr));
-    return ipsr & 0x1FFu;
+    return ipsr;
 }
 
 static inline void CpuBarrier(void)
@@ -127,12 +127,15 @@ void SysExceptInit(void);
 /* To be called by the board's alarm interrupt after it has silenced its timer. */
 void SysTimerAlarm(void);
 
+/* Whether no timer's call is overdue by more than a second, asked by main, which all of them interrupt. */
+int SysTimersWork(void);
+
 /* At the end of each stack, protected by the MPU. */
 enum { STACK_GUARD_LOG2 = 5, STACK_GUARD = 1 << STACK_GUARD_LOG2 };
 
 /* ---- reset ---- */
 
-typedef enum { RESET_POWER_ON, RESET_PIN, RESET_SOFTWARE, RESET_FATAL, RESET_WATCHDOG } RESET_CAUSE;
+typedef enum { RESET_POWER_ON, RESET_PIN, RESET_SOFTWARE, RESET_FATAL, RESET_WATCHDOG, RESET_CAUSE_COUNT } RESET_CAUSE;
 
 /* Why the controller started, and for the last two where it was. In RAM that no start-up clears. */
 typedef struct {

@@ -41,10 +41,10 @@ typedef struct {
 } FRAME;
 
 typedef struct {
+    FRAME *first;         /* on the process stack, at the upper end of the slot of this depth; never changes */
     FRAME *entered;       /* on the main stack */
     FRAME *outer_process; /* process stack pointer of the depth below */
     RTS_UI32 exc_return;
-    uintptr_t context;
 } TRY;
 
 typedef RTS_UI8 IEC_STACK[RTS_IEC_STACK_SIZE];
@@ -73,7 +73,7 @@ static void set_process_stack(FRAME *pointer)
 /* Where the stack of a depth ends. */
 static uintptr_t stack_slot(const TRY *try)
 {
-    return (uintptr_t)stacks[APP_MAX_TASKS - 1 - (try - state.tries)];
+    return (uintptr_t)(try->first + 1) - RTS_IEC_STACK_SIZE;
 }
 
 void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 attributes)
@@ -106,8 +106,10 @@ void SysExceptInit(void)
     state.top = state.tries;
     MpuProtect(MPU_NULL, 0, NULL_LOG2, MPU_NO_ACCESS | behind_vectors);
     MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, STACK_GUARD_LOG2, MPU_NO_ACCESS);
-    for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++)
+    for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++) {
+        state.tries[i].first = (FRAME *)stacks[APP_MAX_TASKS - i] - 1;
         MpuProtect(MPU_IEC_STACK + i, (uintptr_t)stacks[i], STACK_GUARD_LOG2, MPU_NO_ACCESS);
+    }
     if (MPU_TYPE != 0)
         MPU_CTRL = MPU_ENABLE_WITH_BACKGROUND;
     CpuBarrier();
@@ -149,23 +151,16 @@ __attribute__((naked, noinline)) static RTS_UI64 try_enter(void (*fn)(void *arg)
                      "pop {r3-r11, pc}");
 }
 
-/* A context is named by the exception it runs in, plus 1 because main's is 0. */
-static uintptr_t context_of(RTS_UI32 exception_number)
-{
-    return exception_number + 1;
-}
-
 __attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 {
     TRY *try = state.top;
     if (try == state.tries + APP_MAX_TASKS)
         ResetNow(RESET_FATAL, caller->pc);
-    FRAME *frame = (FRAME *)(stack_slot(try) + RTS_IEC_STACK_SIZE) - 1;
+    FRAME *frame = try->first;
     state.top = try + 1;
     try->entered = caller;
     try->outer_process = process_stack();
     try->exc_return = exc_return;
-    try->context = context_of(caller->xpsr & 0x1FFu);
     frame->r0 = caller->r1;
     frame->lr = (RTS_UI32)(uintptr_t)try_return;
     frame->pc = caller->r0 & ~1u;
@@ -179,9 +174,8 @@ __attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 __attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link)
 {
     TRY *try = --state.top;
-    uintptr_t slot = stack_slot(try);
-    if (code != RTSEXCPT_NOEXCEPTION && stack - slot < RTS_IEC_STACK_SIZE)
-        SysExceptTrace(address, (const uintptr_t *)stack, (const uintptr_t *)(slot + RTS_IEC_STACK_SIZE), link);
+    if (code != RTSEXCPT_NOEXCEPTION && stack - stack_slot(try) < RTS_IEC_STACK_SIZE)
+        SysExceptTrace(address, (const uintptr_t *)stack, (const uintptr_t *)(try->first + 1), link);
     try->entered->r0 = code;
     try->entered->r1 = address;
     set_process_stack(try->outer_process);
@@ -264,6 +258,7 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     SCB_HFSR = SCB_HFSR;
     /* What could not be stacked stays pending: it belongs to the function that is left now. */
     SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
+    CpuRestore(0); /* the fault may have been in a place where interrupts are masked */
     if (cfsr & CFSR_STACKING)
         return leave(code, address, 0, 0);
     return leave(code, address, stack_before(frame, !(exc_return & EXC_RETURN_BASIC)), frame->lr);
@@ -315,11 +310,6 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
     try_raise(code, address & ~(uintptr_t)1, stack, 0);
 }
 
-uintptr_t SysExceptContext(void)
-{
-    return in_try() ? state.top[-1].context : context_of(CpuExceptionNumber());
-}
-
 void SysExceptShutdown(void)
 {
 }
@@ -335,33 +325,37 @@ static int has_fpu_registers(const FRAME *frame)
 #endif
 }
 
-/* We run above `context`, so its Try is interrupted, and where it is to go on lies on its process stack. */
-void SysExceptBreak(uintptr_t context, RTS_UI32 code)
+/* The function goes on with raising the exception. Unless it does so already: then where it was must not be forgotten. */
+static void redirect(FRAME *frame, RTS_UI32 code)
+{
+    const RTS_UI32 raise = (RTS_UI32)(uintptr_t)try_raise & ~1u;
+    if (frame->pc == raise)
+        return;
+    frame->r0 = code;
+    frame->r1 = frame->pc;
+    frame->r2 = stack_before(frame, has_fpu_registers(frame));
+    frame->r3 = frame->lr;
+    frame->pc = raise;
+    frame->xpsr = (frame->xpsr & XPSR_ALIGNED) | XPSR_THUMB;
+}
+
+/* We run above the Try, so it is interrupted, and where it is to go on lies on its process stack. */
+void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     FRAME *frame = process_stack();
     for (TRY *try = state.top; try-- > state.tries; frame = try->outer_process) {
-        if (try->context != context)
-            continue;
-        frame->r0 = code;
-        frame->r1 = frame->pc;
-        frame->r2 = stack_before(frame, has_fpu_registers(frame));
-        frame->r3 = frame->lr;
-        frame->pc = (RTS_UI32)(uintptr_t)try_raise & ~1u;
-        frame->xpsr = (frame->xpsr & XPSR_ALIGNED) | XPSR_THUMB;
-        return;
+        if (try->entered->r1 == (uintptr_t)arg)
+            redirect(frame, code);
     }
 }
 
-__attribute__((naked)) void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument)
+__attribute__((naked)) void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry)
 {
-    RTS_UNUSED(entry);
     RTS_UNUSED(context);
     RTS_UNUSED(argument);
+    RTS_UNUSED(entry);
     __asm__ volatile("push {r9, lr}\n\t"
-                     "mov r12, r0\n\t"
-                     "mov r0, r1\n\t"
                      "ldr r9, [r0, %0]\n\t"
-                     "mov r1, r2\n\t"
-                     "blx r12\n\t"
+                     "blx r2\n\t"
                      "pop {r9, pc}" ::"i"(offsetof(IEC_CONTEXT, imports)));
 }

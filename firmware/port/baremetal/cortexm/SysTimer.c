@@ -6,31 +6,31 @@
  * One hardware timer of the board is the alarm for the earliest due time. When it fires, each timer that is due gets
  * its own interrupt line set pending by software, and runs at its own NVIC level: any number of timers from one
  * hardware timer, and due times that never drift. Due times are the alarm's alone: it goes on while callbacks run, and
- * counts what they miss. Rank is by priority, among equals by order of creation.
+ * counts what they miss. Rank is by priority, among equals by place.
  */
 #include "SysTimer.h"
 
 #include "CortexM.h"
 #include "SysTime.h"
 
-enum { ALARM_MAX_NS = 1000000000, NS_PER_US = 1000 };
+enum { ALARM_MAX_NS = 1000000000, OVERDUE_NS = 1000000000, NS_PER_US = 1000 };
 
 typedef enum { TIMER_FREE, TIMER_STOPPED, TIMER_WAITING, TIMER_FIRED } TIMER_STATE;
 
 typedef struct {
     SYS_TIMER_CALLBACK callback;
     void *param;
-    RTS_I64 next_ns;  /* due time to come */
-    RTS_I64 due_ns;   /* for the callback, like `missed` */
+    RTS_I64 next_ns; /* due time to come */
+    RTS_I64 due_ns;  /* that the callback is called for */
     RTS_UI32 interval_us;
-    RTS_UI32 missed;
-    RTS_UI32 skipped; /* due times since the callback began */
+    volatile RTS_UI32 overruns;
     RTS_UI8 priority;
     volatile RTS_UI8 state; /* TIMER_STATE */
 } TIMER;
 
 static struct {
     TIMER timer[SYSTIMER_COUNT];
+    TIMER *end; /* behind the last one in use */
 } state;
 
 void SysTimerInit(void)
@@ -39,18 +39,17 @@ void SysTimerInit(void)
         state.timer[i].state = TIMER_FREE;
         IrqEnable(BOARD_TASK_IRQ + i, LEVEL_TIMER + i);
     }
+    state.end = state.timer;
 }
 
 static void fall_due(TIMER *timer, RTS_UI32 irq)
 {
     if (timer->state == TIMER_FIRED) {
-        timer->skipped++;
+        timer->overruns++;
     } else {
         timer->due_ns = timer->next_ns;
-        timer->missed = timer->skipped;
-        timer->skipped = 0;
         timer->state = TIMER_FIRED;
-        NVIC_ISPR(irq / 32) = 1u << irq % 32;
+        NVIC_STIR = irq;
     }
     timer->next_ns += (RTS_I64)timer->interval_us * NS_PER_US;
 }
@@ -58,19 +57,17 @@ static void fall_due(TIMER *timer, RTS_UI32 irq)
 /* A due time that has passed too is the next alarm's, which comes at once. */
 void SysTimerAlarm(void)
 {
-    RTS_I64 now = SysTimeGetNs();
-    RTS_I32 delay = ALARM_MAX_NS;
+    RTS_I64 now = SysTimeGetNs(), next = now + ALARM_MAX_NS;
     RTS_UI32 irq = BOARD_TASK_IRQ;
-    for (TIMER *timer = state.timer; timer < state.timer + SYSTIMER_COUNT; timer++, irq++) {
+    for (TIMER *timer = state.timer; timer < state.end; timer++, irq++) {
         if (timer->state < TIMER_WAITING)
             continue;
         if (timer->next_ns <= now)
             fall_due(timer, irq);
-        RTS_I64 left = timer->next_ns - now;
-        if (left < delay)
-            delay = left < 0 ? 0 : (RTS_I32)left;
+        if (timer->next_ns < next)
+            next = timer->next_ns;
     }
-    BoardAlarmSet((RTS_UI32)delay);
+    BoardAlarmSet(next > now ? (RTS_UI32)(next - now) : 0);
 }
 
 /* Every timer's interrupt; the number of the running exception says which. */
@@ -78,10 +75,25 @@ void TimerIrq(void);
 void TimerIrq(void)
 {
     TIMER *timer = &state.timer[CpuExceptionNumber() - VECTOR_IRQ - BOARD_TASK_IRQ];
-    if (timer->state != TIMER_FIRED)
-        return;
-    timer->callback(timer->param, timer->due_ns, timer->missed);
+    timer->callback(timer->param, timer->due_ns);
     timer->state = TIMER_WAITING;
+}
+
+/* Since when the timer's next call has been due. */
+static RTS_I64 due_since(const TIMER *timer)
+{
+    return timer->state == TIMER_FIRED ? timer->due_ns : timer->next_ns;
+}
+
+int SysTimersWork(void)
+{
+    RTS_UI32 mask = CpuMask();
+    RTS_I64 overdue = SysTimeGetNs() - OVERDUE_NS;
+    int work = 1;
+    for (const TIMER *timer = state.timer; timer < state.end; timer++)
+        work &= timer->state < TIMER_WAITING || due_since(timer) > overdue;
+    CpuRestore(mask);
+    return work;
 }
 
 static int outranks(RTS_UI32 one, RTS_UI32 other)
@@ -119,6 +131,8 @@ RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 int
                                  .interval_us = interval_us,
                                  .priority = (RTS_UI8)priority,
                                  .state = TIMER_STOPPED};
+        if (state.end <= &state.timer[i])
+            state.end = &state.timer[i + 1];
         assign_levels();
         *timer = i;
         return ERR_OK;
@@ -133,28 +147,35 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
         return ERR_INVALID_HANDLE;
     RTS_UI32 mask = CpuMask();
     timer->next_ns = SysTimeGetNs();
-    timer->skipped = 0;
     timer->state = TIMER_WAITING;
     BoardAlarmSet(0);
     CpuRestore(mask);
     return ERR_OK;
 }
 
-/* Called from main, so no timer's interrupt is active: it is enough that none starts again. */
+/* Called from main, so no timer's interrupt is active: it is enough that none starts again, nor one that is pending. */
 RTS_RESULT SysTimerStop(RTS_HANDLE handle)
 {
     TIMER *timer = find_timer(handle);
     if (timer == NULL)
         return ERR_INVALID_HANDLE;
     timer->state = TIMER_STOPPED;
+    NVIC_ICPR((BOARD_TASK_IRQ + handle) / 32) = 1u << (BOARD_TASK_IRQ + handle) % 32;
     return ERR_OK;
 }
 
 RTS_RESULT SysTimerDelete(RTS_HANDLE handle)
 {
-    TIMER *timer = find_timer(handle);
-    if (timer == NULL)
+    if (SysTimerStop(handle) != ERR_OK)
         return ERR_INVALID_HANDLE;
-    timer->state = TIMER_FREE;
+    state.timer[handle].state = TIMER_FREE;
+    while (state.end > state.timer && state.end[-1].state == TIMER_FREE)
+        state.end--;
     return ERR_OK;
+}
+
+RTS_UI32 SysTimerGetOverruns(RTS_HANDLE handle)
+{
+    const TIMER *timer = find_timer(handle);
+    return timer != NULL ? timer->overruns : 0;
 }

@@ -7,13 +7,14 @@
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "CortexM.h"
+#include "SysTime.h"
 
 /* The communication loop may be kept from running for so long, by tasks that leave it no time. */
 enum { MAIN_WATCHDOG_MS = 20000 };
 
 static void log_reset_cause(void)
 {
-    static const char *const names[] = {"power on", "reset pin", "software", "fault of the runtime",
+    static const char *const names[RESET_CAUSE_COUNT] = {"power on", "reset pin", "software", "fault of the runtime",
                                         "hardware watchdog"};
     const RESET_RECORD *record = ResetGet();
     if (record->cause < RESET_FATAL)
@@ -23,13 +24,24 @@ static void log_reset_cause(void)
                (unsigned)record->pc, (unsigned)record->status);
 }
 
+/* Whatever hangs, the main loop, the clock or the tasks, ends in a reset. Once a millisecond is enough. */
+static void kick_watchdog(void)
+{
+    static RTS_UI32 kicked_ms;
+    RTS_UI32 now_ms = SysTimeGetMs();
+    if (now_ms == kicked_ms || !SysTimersWork())
+        return;
+    kicked_ms = now_ms;
+    BoardWatchdogKick();
+}
+
 /* Sleeps until the next interrupt, unless one has brought work since the loop looked. A pending interrupt ends the
  * sleep although it is masked, so none is missed between the question and the sleep. */
 static void idle(void)
 {
     RTS_UI32 mask = CpuMask();
     if (!BoardHasWork())
-        __asm__ volatile("wfi");
+        __asm__ volatile("dsb\n\twfi");
     CpuRestore(mask);
 }
 
@@ -41,7 +53,7 @@ RTS_NOINLINE int main(void)
         ResetNow(RESET_FATAL, 0);
     log_reset_cause();
     for (;;) {
-        BoardWatchdogKick();
+        kick_watchdog();
         (void)CMCallHook(CH_COMM_CYCLE);
         idle();
     }

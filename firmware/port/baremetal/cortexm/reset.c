@@ -10,13 +10,14 @@
 enum { RECORD_MAGIC = 0x52535430 };
 enum { AIRCR_SYSRESETREQ = 0x05FA0004 };
 
-__attribute__((section(".noinit"))) static RESET_RECORD kept; /* written before a reset */
-static RESET_RECORD last;                                     /* what this start-up found there */
+/* Written before a reset; volatile, because no program reads it after that. */
+__attribute__((section(".noinit"))) static volatile RESET_RECORD kept;
+static RESET_RECORD last; /* what this start-up found there */
 
 void ResetInit(void)
 {
     last = kept;
-    if (last.magic != RECORD_MAGIC)
+    if (last.magic != RECORD_MAGIC || last.cause >= RESET_CAUSE_COUNT)
         last.cause = RESET_POWER_ON;
     kept = (RESET_RECORD){.magic = RECORD_MAGIC, .cause = RESET_PIN};
 }

@@ -9,7 +9,7 @@
 #include "CmpIecAbi.h"
 
 /* Calls an entry of compiled code with r9 holding the import table; `argument` is init_retains or 0. */
-void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
+void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 
 /* The runtime has one core: interrupts and main see each other's writes in order, so only the compiler has to keep it. */
 #define RTS_ONE_CORE
@@ -18,8 +18,8 @@ void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
 #define RTS_STARTS_ONCE 1
 
 #define APP_ENTRY_MODE_BIT 1
-#define APP_CALL_ENTRY(entry, context) IecCall((uintptr_t)(entry), (context), 0)
-#define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((uintptr_t)(entry), (context), (init_retains))
+#define APP_CALL_ENTRY(entry, context) IecCall((context), 0, (uintptr_t)(entry))
+#define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((context), (init_retains), (uintptr_t)(entry))
 
 /* No program of a small controller takes this long for a cycle [us]: an endless loop is an exception soon. A task that does
  * says so, by a watchdog of its own. */

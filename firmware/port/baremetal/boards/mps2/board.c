@@ -21,6 +21,7 @@
 /* What lies below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
 enum { MPU_BELOW_RAM = MPU_BOARD + 1, BELOW_RAM_LOG2 = 16 };
 #define RAM_BASE 0x20000000u
+RTS_STATIC_ASSERT(MPU_BELOW_RAM < 8, the_mpu_has_a_region_left);
 
 enum { TIMER_ENABLE_IRQ = 9, WATCHDOG_INTEN_RESEN = 3, WATCHDOG_KEY = 0x1ACCE551 };
 
@@ -34,7 +35,6 @@ void BoardInit(void)
 
 void BoardAlarmSet(RTS_UI32 ns)
 {
-    TIMER_CTRL = 0;
     TIMER_RELOAD = ns / (1000000000u / BOARD_CLOCK_HZ) + 1;
     TIMER_CTRL = TIMER_ENABLE_IRQ;
 }

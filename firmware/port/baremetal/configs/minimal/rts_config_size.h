@@ -23,7 +23,7 @@
 #define COMM_COUNTERS 0
 #define NS_REPLY_SIZE 196 /* the same in a scan */
 #define SRV_MAX_GROUPS 2
-#define RTS_MAIN_STACK_SIZE 1280 /* no task interrupts main */
+#define RTS_MAIN_STACK_SIZE 1312 /* no task interrupts main */
 
 #define BOARD_UART_COUNT 1
 #define BOARD_UART_RX_SIZE 128
