@@ -524,12 +524,12 @@ const SYS_TARGET *SysTargetGet(void)
     return &target;
 }
 
-/* A xorshift generator: what it gives is the same in every process, so that tests repeat. */
 SYS_STACK SysTargetGetStack(void)
 {
     return (SYS_STACK){0, 0};
 }
 
+/* A xorshift generator: what it gives is the same in every process, so that tests repeat. */
 RTS_UI32 SysTargetRandom(void)
 {
     static RTS_UI32 state = 0x2545F491;
