@@ -7,6 +7,7 @@
 #include "SysTarget.h"
 
 #define SYSCTL_RIS REG32(0x400FE050u)
+#define SYSCTL_RESC REG32(0x400FE05Cu)
 #define SYSCTL_RCC REG32(0x400FE060u)
 #define SYSCTL_RCGC0 REG32(0x400FE100u)
 #define SYSCTL_RCGC1 REG32(0x400FE104u)
@@ -24,7 +25,7 @@
 #define WATCHDOG_ICR REG32(WATCHDOG + 0x0C)
 
 enum { RCC_PWRDN = 1 << 13, RCC_BYPASS = 1 << 11, RCC_USESYSDIV = 1 << 22, RCC_DIV_4 = 3 << 23, RCC_8MHZ = 14 << 6 };
-enum { RIS_PLL_LOCKED = 1 << 6 };
+enum { RIS_PLL_LOCKED = 1 << 6, RESC_WATCHDOG = 1 << 3 };
 enum { RCGC0_WATCHDOG = 1 << 3, RCGC1_UART0_I2C0_TIMER0 = 1 << 0 | 1 << 12 | 1 << 16, RCGC2_PORTS_A_B = 3 };
 enum { TIMER_ONE_SHOT = 1, TIMER_TIME_OUT = 1, WATCHDOG_INTEN_RESEN = 3 };
 
@@ -45,6 +46,9 @@ static void start_clock(void)
 void BoardInit(void)
 {
     start_clock();
+    if ((SYSCTL_RESC & RESC_WATCHDOG) != 0)
+        ResetSetCause(RESET_WATCHDOG);
+    SYSCTL_RESC = 0;
     SYSCTL_RCGC0 |= RCGC0_WATCHDOG;
     SYSCTL_RCGC1 |= RCGC1_UART0_I2C0_TIMER0;
     SYSCTL_RCGC2 |= RCGC2_PORTS_A_B;
