@@ -14,7 +14,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from elftools.elf.elffile import ELFFile
+from elftools.elf.enums import ENUM_DT_FLAGS
 
+from plctool import connect
 from plctool.link import simplecom
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
@@ -235,6 +238,19 @@ def test_it_needs_next_to_no_processor_time_when_idle(plcrt, questions):
     time.sleep(2)
     share = (processor_ns(plcrt.process.pid) - before) / (time.monotonic_ns() - started)
     assert share < IDLE_SHARE
+
+
+def test_a_stack_beyond_its_limit_has_nothing_unused(plcrt):
+    resource.prlimit(plcrt.process.pid, resource.RLIMIT_STACK, (64 * 1024, 64 * 1024))
+    with connect(f"serial:{plcrt.port}") as plc:
+        stack = plc.stack()
+    assert (stack.size, stack.unused) == (64 * 1024, 0)
+
+
+def test_no_function_is_looked_up_by_the_linker_while_it_runs():
+    with open(find_plcrt(), "rb") as file:
+        tags = ELFFile(file).get_section_by_name(".dynamic").iter_tags("DT_FLAGS")
+        assert any(tag.entry.d_val & ENUM_DT_FLAGS["DF_BIND_NOW"] for tag in tags)
 
 
 def test_it_runs_without_any_line(tmp_path):
