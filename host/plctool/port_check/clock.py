@@ -34,8 +34,8 @@ class Reading:
 
 @dataclass(frozen=True)
 class Rate:
-    """`drift` is 0.01 for a clock that is 1 % fast, known to +-`uncertainty`; `lost` are the seconds that the clock
-    stood still besides (negative: leapt forward)."""
+    """`drift` is 0.01 for a clock that is 1 % fast, known to +-`uncertainty`; `lost` is the share of the time that the
+    clock stood still besides (negative: leapt forward)."""
 
     drift: float
     uncertainty: float
@@ -49,9 +49,12 @@ def measure(readings: Sequence[Reading], sharpness: float) -> Rate:
     rates = [rate for window in WINDOWS if (rate := _in_windows(kept, window))]
     sharp = (rate for rate in rates if rate[1] <= sharpness)
     drift, uncertainty = next(sharp, min(rates, key=lambda rate: rate[1], default=(0.0, math.inf)))
-    span = kept[-1].host - kept[0].host if kept else 0.0
-    passed = kept[-1].device - kept[0].device if kept else 0.0
-    return Rate(drift, uncertainty, span * (1 + drift) - passed)
+    return Rate(drift, uncertainty, drift - _slope(kept[0], kept[-1]) if rates else 0.0)
+
+
+def _slope(first: Reading, last: Reading) -> float:
+    """How much faster than the host's the clock went in between."""
+    return (last.device - first.device) / (last.host - first.host) - 1
 
 
 def _quickest(readings: Sequence[Reading]) -> list[Reading]:
@@ -73,8 +76,7 @@ def _in_windows(readings: Sequence[Reading], window: float) -> tuple[float, floa
             end += 1
         if end == len(readings):
             break
-        last = readings[end]
-        drifts.append((last.device - first.device) / (last.host - first.host) - 1)
+        drifts.append(_slope(first, readings[end]))
     if len(drifts) < MIN_WINDOWS or len(usual := _without_outliers(drifts)) < len(drifts) / 2:
         return None
     count = len(usual) / 2  # each reading begins one window and ends another
