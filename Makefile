@@ -11,7 +11,7 @@ MESON := $(BIN)/meson
 export PATH := $(abspath $(BIN)):$(PATH)
 
 # The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
-BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7))
+BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
 
 .PHONY: demo test lint bench size all clean
 
@@ -51,6 +51,9 @@ build-sanitized/build.ninja: $(VENV)/dev
 
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini
+
+build-lm3s6965/build.ninja: $(VENV)/dev
+	$(MESON) setup build-lm3s6965 --cross-file cross/lm3s6965.ini
 
 # What a user gets: the package with its two commands.
 $(VENV)/installed: $(VENV)/bootstrapped pyproject.toml meson.build $(shell find firmware host examples -type f -not -path '*/__pycache__/*')

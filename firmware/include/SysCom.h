@@ -15,7 +15,8 @@
 /* How many serial lines the port has configured (0 when none). */
 RTS_UI32 SysComGetCount(void);
 
-/* Opens line `index` with the port's own settings. ERR_DEVICE when it cannot. */
+/* Opens line `index` with the port's own settings: 8 data bits, no parity, one stop bit, no flow control. What came
+ * before is forgotten. ERR_DEVICE when it cannot. */
 RTS_RESULT SysComOpen(RTS_UI32 index);
 void SysComClose(RTS_UI32 index);
 

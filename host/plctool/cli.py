@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from plctool import output
 from plctool.errors import InternalError, PlcError, UsageError
+from plctool.version import plctool_version
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -132,7 +133,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     port.add_argument("--power-cycle", action="store_true", help="ask for the board to be switched off and on, too")
     port.add_argument(
         "--max-drift", type=_percent, default=0.01, metavar="PERCENT",
-        help="of its clock, default: 1; simulated boards on a busy host need more",
+        help="of its clock, default: 1; a simulated board on a busy host needs more",
     )  # fmt: skip
     _add_link(port)
 
@@ -522,21 +523,12 @@ def _show(args: argparse.Namespace, document: dict[str, Any], text: Callable[[di
     return EXIT_OK
 
 
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("plctool")
-    except PackageNotFoundError:
-        return "(not installed)"
-
-
 def _command(arguments: Sequence[str]) -> int:
     if arguments and arguments[0] in LATER:
         raise UsageError(f"'{arguments[0]}' is not in this version of plctool; {LATER[arguments[0]]}.", "not-yet")
     args = _parser().parse_args(arguments)
     if args.version:
-        print(f"plctool {_version()}")
+        print(f"plctool {plctool_version()}")
         return EXIT_OK
     if "action" not in args:
         raise UsageError("Say what to do; 'plctool --help' lists the commands.", "usage")

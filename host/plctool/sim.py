@@ -18,6 +18,7 @@ from plctool.variables import Reading, Symbol, unreachable
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _SECTOR = 4096
 _PROGRAM_UNIT = 8
+MAX_NS = 2**62  # at once; the clock goes twice as far
 
 
 class Simulator:
@@ -142,8 +143,12 @@ class Simulator:
                 _check(result, "The program does not run")
 
     def run_for(self, ms: float = 0, *, seconds: float = 0) -> None:
-        """Lets virtual time pass: ten times 10 ms are ten cycles of a 10 ms task."""
-        _check(lib.SimRunFor(round(ms * 1e6 + seconds * 1e9)), "Time does not advance")
+        """Lets virtual time pass: ten times 10 ms are ten cycles of a 10 ms task. Raises UsageError for a time that is
+        negative or longer than 146 years."""
+        ns = round(ms * 1e6 + seconds * 1e9)
+        if not 0 <= ns < MAX_NS:
+            raise UsageError(f"Time passes forwards, and for at most {MAX_NS // 10**9} s.", "time")
+        _check(lib.SimRunFor(ns), "Time does not advance")
 
     def bench(self, task: int, cycles: int) -> tuple[float, float]:
         """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""

@@ -14,6 +14,7 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -25,6 +26,15 @@ static void sleep_1ms(void)
 {
     struct timespec time = {.tv_nsec = 1000000};
     nanosleep(&time, NULL);
+}
+
+/* A driver that keeps the speed it has without saying so, as many do: in place of the C library's. */
+static bool speed_is_fixed;
+
+int cfsetspeed(struct termios *settings, speed_t speed)
+{
+    speed_t taken = speed_is_fixed ? B9600 : speed;
+    return cfsetispeed(settings, taken) == 0 ? cfsetospeed(settings, taken) : -1;
 }
 
 /* Reads from the runtime's side until there are `size` bytes, 10 s at most. */
@@ -188,6 +198,36 @@ static void what_cannot_be_opened_is_said(void)
     CHECK(SysComOpen(0) == ERR_DEVICE);
 }
 
+static void a_device_that_keeps_another_speed_is_refused(void)
+{
+    PORT_REASON reason = {""};
+    speed_is_fixed = true;
+    CHECK(!PortComOpen("pty", 115200, &reason));
+    CHECK(strstr(reason.text, "115200 baud") != NULL);
+    CHECK(PortComOpen("pty", 9600, &reason));
+    speed_is_fixed = false;
+    PortComClose();
+}
+
+static void a_device_that_another_program_uses_is_refused(void)
+{
+    PORT_REASON reason = {""};
+    char name[64];
+    int end = posix_openpt(O_RDWR | O_NOCTTY);
+    CHECK(end >= 0 && grantpt(end) == 0 && unlockpt(end) == 0 && ptsname_r(end, name, sizeof(name)) == 0);
+    int user = open(name, O_RDWR | O_NOCTTY);
+    CHECK(flock(user, LOCK_EX | LOCK_NB) == 0);
+    CHECK(!PortComOpen(name, 9600, &reason));
+    CHECK(strstr(reason.text, "busy") != NULL);
+    close(user);
+    CHECK(PortComOpen(name, 9600, &reason));
+    user = open(name, O_RDWR | O_NOCTTY);
+    CHECK(user < 0 || flock(user, LOCK_EX | LOCK_NB) != 0);
+    close(user);
+    PortComClose();
+    close(end);
+}
+
 static void common_speeds_are_known(void)
 {
     CHECK(PortComKnowsBaud(9600) && PortComKnowsBaud(115200) && PortComKnowsBaud(921600));
@@ -217,6 +257,8 @@ int main(void)
     RUN(a_moved_byte_is_counted);
     RUN(a_device_that_goes_away_is_taken_up_again);
     RUN(what_cannot_be_opened_is_said);
+    RUN(a_device_that_keeps_another_speed_is_refused);
+    RUN(a_device_that_another_program_uses_is_refused);
     RUN(common_speeds_are_known);
     RUN(a_line_that_does_not_exist_gives_nothing);
     return test_result();

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 import os
 import random
+import resource
 import select
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from elftools.elf.elffile import ELFFile
+from elftools.elf.enums import ENUM_DT_FLAGS
 
+from plctool import connect
 from plctool.link import simplecom
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
@@ -24,9 +29,11 @@ from plctool.testing.plcrt import Plcrt, find_plcrt
 IDLE_SHARE = 0.05  # of one processor; 0.005 is usual, but machines under load count otherwise
 
 
-def run_plcrt(*options: str) -> subprocess.CompletedProcess[str]:
-    """plcrt with options that make it end by itself."""
-    return subprocess.run([find_plcrt(), *options], capture_output=True, text=True, timeout=20, check=False)
+def run_plcrt(*options: str, prepare: Callable[[], object] | None = None) -> subprocess.CompletedProcess[str]:
+    """plcrt with options that make it end by itself; `prepare` runs in its process before it."""
+    return subprocess.run(
+        [find_plcrt(), *options], capture_output=True, text=True, timeout=20, check=False, preexec_fn=prepare
+    )
 
 
 def device_name(port: str) -> str:
@@ -48,6 +55,7 @@ def processor_ns(pid: int) -> int:
         (["--flash"], "--help"),
         (["--flash", "f", "--nonsense"], "--nonsense"),
         (["--flash", "f", "extra"], "extra"),
+        (["--flash", "f", "-xy"], "-x is not an option"),
         (["--flash", "f", "--baud", "115201"], "115200"),
         (["--flash", "f", "--baud", "fast"], "--baud fast"),
         (["--flash", "f", "--can", "can0"], "--serial"),
@@ -91,6 +99,33 @@ def test_a_file_that_is_no_flash_is_not_touched(tmp_path):
     assert film.read_bytes().strip(b"x") == b"" and film.stat().st_size == 5 * 1024 * 1024
 
 
+def test_a_small_file_of_somebody_else_is_not_touched(tmp_path):
+    notes = tmp_path / "notes"
+    notes.write_text("milk, bread")
+    done = run_plcrt("--flash", str(notes))
+    assert done.returncode == 1 and "not a flash file" in done.stderr
+    assert notes.read_text() == "milk, bread"
+
+
+def test_a_limit_of_file_sizes_is_an_error_and_not_a_signal(tmp_path):
+    limit = 100_000
+    done = run_plcrt(
+        "--flash", str(tmp_path / "flash"), prepare=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    )
+    assert done.returncode == 1 and "too large" in done.stderr
+
+
+def test_a_closed_standard_output_is_not_replaced_by_the_flash_file(tmp_path):
+    flash = tmp_path / "flash"
+    command = [find_plcrt(), "--flash", str(flash), "--serial", "pty"]
+    with subprocess.Popen(command, preexec_fn=lambda: os.close(1)) as process:
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.3)
+        process.terminate()
+        assert process.wait(20) == 0
+    assert b"serial" not in flash.read_bytes()
+
+
 def test_the_device_answers_on_the_terminal_it_names(plcrt):
     assert plcrt.port.startswith("/dev/pts/")
     assert device_name(plcrt.port) == "plcrt"
@@ -121,6 +156,30 @@ def test_replies_that_nobody_reads_do_not_block_it(plcrt, eventually):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_it_ends_in_order_when_asked_to(plcrt, number):
     assert plcrt.stop(number) == 0
+
+
+def test_it_ends_when_asked_to_though_the_signal_was_blocked_before_it_started(tmp_path):
+    command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
+    block = lambda: signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])  # noqa: E731
+    with subprocess.Popen(command, stdout=subprocess.PIPE, preexec_fn=block) as process:
+        assert process.stdout.readline()
+        process.terminate()
+        try:
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize("failed_before", [False, True])
+def test_its_exit_status_says_that_retain_variables_were_not_saved(tool, plcrt, counter, eventually, failed_before):
+    tool.ok("flash", "--port", plcrt.port, str(counter))
+    resource.prlimit(plcrt.process.pid, resource.RLIMIT_FSIZE, (0, 0))  # a disk that takes nothing
+    if failed_before:
+        eventually(lambda: "Retain variables cannot" in tool("log", "--port", plcrt.port).out)
+    plcrt.process.terminate()
+    _, said = plcrt.process.communicate(timeout=20)
+    assert plcrt.process.returncode == 1
+    assert "Retain variables cannot be saved" in said
 
 
 def test_it_does_not_stop_when_its_terminal_closes(plcrt):
@@ -167,7 +226,14 @@ def test_it_starts_again_after_being_killed_at_any_moment_of_its_start(tmp_path)
         assert read_status(Session(connection)).state.value == "none"
 
 
-def test_it_needs_next_to_no_processor_time_when_idle(plcrt):
+@pytest.mark.parametrize("questions", [1, 2000])
+def test_it_needs_next_to_no_processor_time_when_idle(plcrt, questions):
+    """Also when the line is full of answers that nobody reads, and when it was."""
+    transport = SerialTransport(plcrt.port)
+    connection = Connection(transport)
+    for _ in range(questions):
+        connection.scan(0)
+    transport.close()
     device_name(plcrt.port)
     before, started = processor_ns(plcrt.process.pid), time.monotonic_ns()
     time.sleep(2)
@@ -199,6 +265,19 @@ with Plcrt(sys.argv[1]) as running:
     eventually(lambda: not is_alive(pid))
 
 
+def test_a_stack_beyond_its_limit_has_nothing_unused(plcrt):
+    resource.prlimit(plcrt.process.pid, resource.RLIMIT_STACK, (64 * 1024, 64 * 1024))
+    with connect(f"serial:{plcrt.port}") as plc:
+        stack = plc.stack()
+    assert (stack.size, stack.unused) == (64 * 1024, 0)
+
+
+def test_no_function_is_looked_up_by_the_linker_while_it_runs():
+    with open(find_plcrt(), "rb") as file:
+        tags = ELFFile(file).get_section_by_name(".dynamic").iter_tags("DT_FLAGS")
+        assert any(tag.entry.d_val & ENUM_DT_FLAGS["DF_BIND_NOW"] for tag in tags)
+
+
 def test_it_runs_without_any_line(tmp_path):
     command = [find_plcrt(), "--flash", str(tmp_path / "flash")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
@@ -207,6 +286,18 @@ def test_it_runs_without_any_line(tmp_path):
         process.terminate()
         assert process.wait(20) == 0
         assert process.stdout.read() == ""
+
+
+def test_two_do_not_share_a_serial_device(tmp_path):
+    ours, theirs = os.openpty()
+    options = ["--serial", os.ttyname(theirs), "--flash"]
+    with subprocess.Popen([find_plcrt(), *options, str(tmp_path / "a")]) as process:
+        with Connection(Wire(ours)) as connection:
+            assert read_identity(Session(connection)).device_name == "plcrt"
+            done = run_plcrt(*options, str(tmp_path / "b"))
+        os.close(theirs)
+        process.terminate()
+    assert done.returncode == 1 and "busy" in done.stderr
 
 
 class Wire:

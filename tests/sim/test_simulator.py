@@ -62,6 +62,20 @@ def test_time_passes_only_when_it_is_told_to(plc):
     assert plc.read("Main.n") == 7
 
 
+@pytest.mark.parametrize("time", [{"ms": -5}, {"seconds": -1}, {"ms": 10**16}, {"seconds": 2**62 / 1e9}])
+def test_a_time_that_cannot_pass_is_refused(plc, time):
+    with pytest.raises(UsageError):
+        plc.run_for(**time)
+    assert lib.SimNow() == 0
+
+
+@pytest.mark.parametrize("ns", [-1, 2**63 - 1, 2**63 - 2])
+def test_the_clock_does_not_overflow(plc, ns):
+    plc.run_for(ms=10)
+    assert lib.SimAdvance(ns) == lib.SimRunFor(ns) == lib.ERR_PARAMETER
+    assert lib.SimNow() == 10_000_000
+
+
 def test_timers_follow_the_virtual_clock(plc):
     plc.run_for(seconds=1)
     assert plc.read("Main.pulses") == 0

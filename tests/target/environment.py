@@ -11,7 +11,12 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = Path(os.environ["FIRMWARE_DIR"]) if "FIRMWARE_DIR" in os.environ else None
 MACHINE = os.environ.get("QEMU_MACHINE", "")
-TARGETS = {"mps2-an385": "cortex-m3", "mps2-an386": "cortex-m4f", "mps2-an500": "cortex-m7"}
+TARGETS = {
+    "mps2-an385": "cortex-m3",
+    "mps2-an386": "cortex-m4f",
+    "mps2-an500": "cortex-m7",
+    "lm3s6965evb": "cortex-m3",
+}
 TARGET = TARGETS.get(MACHINE, "")
 PATIENCE = 60.0  # [s]; machines under load are slow
 

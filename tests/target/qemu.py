@@ -20,6 +20,7 @@ from plctool.link import simplecom
 from plctool.testing.children import ends_with_us
 
 FLASH_SIZE = 16 * 1024 * 1024  # of the file; what is behind the file area holds the serial number in its last 4 KiB
+EEPROM_SIZE = 64 * 1024
 FACTORY_OFFSET = FLASH_SIZE - 4096
 START_TIMEOUT = 10.0
 LOCALHOST = "127.0.0.1"
@@ -32,6 +33,19 @@ CLOCKS = {
     "slow": "shift=8,sleep=off",  # exact with a processor of 4 MIPS: many seconds of work pass quickly
     "host": None,  # the host's clock: neither repeatable nor, on a busy host, steady
 }
+
+
+def _machine_options(machine: str, flash_file: Path) -> list[str]:
+    """The machine and what keeps its applications: a part of its memory, or an EEPROM beside it."""
+    if machine == "lm3s6965evb":
+        return [
+            "-M", machine, "-drive", f"if=none,id=nv,format=raw,file={flash_file}",
+            "-device", f"at24c-eeprom,address=0x50,rom-size={EEPROM_SIZE},drive=nv",
+        ]  # fmt: skip
+    return [
+        "-M", f"{machine},memory-backend=nv",
+        "-object", f"memory-backend-file,id=nv,size=16M,mem-path={flash_file},share=on",
+    ]  # fmt: skip
 
 
 class SocketSerial:
@@ -115,7 +129,8 @@ class Board:
         self._port = 0
         if not self.flash_file.exists():
             self.flash_file.touch()
-            os.truncate(self.flash_file, FLASH_SIZE)  # a sparse file: flash that nobody has erased yet
+            size = EEPROM_SIZE if machine == "lm3s6965evb" else FLASH_SIZE
+            os.truncate(self.flash_file, size)  # a sparse file: flash that nobody has erased yet
 
     def write_flash(self, offset: int, data: bytes) -> None:
         """What the factory does, while power is off."""
@@ -134,8 +149,7 @@ class Board:
         (self.folder / "qmp").unlink(missing_ok=True)
         icount = CLOCKS[clock]
         command = [
-            "qemu-system-arm", "-M", f"{self.machine},memory-backend=nv",
-            "-object", f"memory-backend-file,id=nv,size=16M,mem-path={self.flash_file},share=on",
+            "qemu-system-arm", *_machine_options(self.machine, self.flash_file),
             "-display", "none", "-monitor", "none", "-kernel", str(self.firmware),
             "-serial", f"tcp:{LOCALHOST}:0,server=on,wait=off,nodelay=on", "-qmp", "unix:qmp,server,nowait",
             *(["-icount", icount] if icount else []),

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from environment import eventually
+from environment import MACHINE, eventually
 from programs import program
 from qemu import FACTORY_OFFSET
 
@@ -20,6 +20,7 @@ from plctool.link.services import AppState
 
 MAIN_WATCHDOG_MS = 20_000  # see main.c
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}  # of processes that find what this one does
+IS_MPS2 = MACHINE.startswith("mps2")
 
 
 @pytest.mark.parametrize("config", ["minimal", "standard", "full"])
@@ -28,18 +29,24 @@ def test_every_configuration_answers_the_name_service(make_board, config):
     board.power_on()
     with Connection(board.line()) as connection:
         (node,) = connection.scan(10, enough=1)
-    assert node.device_name.startswith("MPS2 AN")
+    assert node.device_name.startswith("MPS2 AN" if IS_MPS2 else "LM3S6965")
 
 
 def test_a_fresh_board_has_no_application(plc):
     assert plc.status().state is AppState.NONE
 
 
+@pytest.mark.skipif(not IS_MPS2, reason="the factory writes it elsewhere")
 def test_serial_number_is_what_the_factory_wrote(make_board):
     board = make_board()
     board.write_flash(FACTORY_OFFSET, b"SN-4711\0")
     with board, Plc(Connection(board.line())) as plc:
         assert plc.identity().serial_number == "SN-4711"
+
+
+@pytest.mark.skipif(IS_MPS2, reason="a board without Ethernet")
+def test_serial_number_is_the_ethernet_address(plc):
+    assert plc.identity().serial_number == "525400123456"  # QEMU's, unless told otherwise
 
 
 def test_first_start_is_logged_as_power_on(plc):

@@ -68,6 +68,7 @@ class Vendor:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        folder.mkdir()
         self.board: subprocess.Popen[str] | None = None
         self.port = SHOWN_PORT
         for name in COPIED:
@@ -123,7 +124,7 @@ def _beside_python(tool: str) -> str:
 
 
 def test_the_guide_leads_from_the_blank_port_to_a_running_board(tmp_path):
-    vendor = Vendor(tmp_path)
+    vendor = Vendor(tmp_path / "plctool")
     typed = 0
     try:
         for step in steps():

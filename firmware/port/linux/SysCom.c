@@ -18,6 +18,7 @@
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
@@ -61,10 +62,11 @@ bool PortComKnowsBaud(RTS_UI32 baud)
     return find_speed(baud) != NULL;
 }
 
-/* 8N1, raw, no modem lines. */
+/* 8N1, raw, no modem lines. A device that cannot run at the speed keeps its own without saying so. */
 static bool make_raw(int line)
 {
     struct termios settings;
+    struct termios taken;
     if (tcgetattr(line, &settings) != 0) {
         return false;
     }
@@ -72,7 +74,20 @@ static bool make_raw(int line)
     settings.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS);
     settings.c_cflag |= CLOCAL | CREAD;
     cfsetspeed(&settings, state.speed);
-    return tcsetattr(line, TCSANOW, &settings) == 0;
+    if (tcsetattr(line, TCSANOW, &settings) != 0 || tcgetattr(line, &taken) != 0) {
+        return false;
+    }
+    errno = EINVAL;
+    return cfgetospeed(&taken) == state.speed;
+}
+
+/* TIOCEXCL keeps everybody out but root, the lock keeps other plcrt and plctool out. */
+static bool make_exclusive(int line)
+{
+    (void)ioctl(line, TIOCEXCL);
+    bool locked = flock(line, LOCK_EX | LOCK_NB) == 0;
+    errno = EBUSY;
+    return locked;
 }
 
 static bool open_device(void)
@@ -81,14 +96,13 @@ static bool open_device(void)
     if (state.line < 0) {
         return false;
     }
-    if (!make_raw(state.line)) {
+    if (!make_exclusive(state.line) || !make_raw(state.line)) {
         int error = errno;
         close(state.line);
         state.line = -1;
         errno = error;
         return false;
     }
-    (void)ioctl(state.line, TIOCEXCL);
     (void)tcflush(state.line, TCIOFLUSH);
     return true;
 }
@@ -118,7 +132,7 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
     state.speed = *speed;
     memcpy(state.path, pty ? "" : path, pty ? 1 : strlen(path) + 1);
     if (pty ? !open_pty() : !open_device()) {
-        PortReason(reason, "cannot open serial line %s: %s", path, strerror(errno));
+        PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)baud, strerror(errno));
         PortComClose();
         return false;
     }

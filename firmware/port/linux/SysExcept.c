@@ -174,7 +174,6 @@ static int is_break(const SIGNAL *signal)
 
 static void install(void)
 {
-    state.signal[RTS_COUNT(state.signal) - 1].number = SIGRTMIN + BREAK_SIGNAL_OFFSET;
     for (size_t i = 0; i < RTS_COUNT(state.signal); i++) {
         SIGNAL *signal = &state.signal[i];
         struct sigaction action = {.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_NODEFER | SA_RESTART};
@@ -232,8 +231,9 @@ static void detach(void *param)
     pthread_mutex_unlock(&state.lock);
 }
 
-static void create_key(void)
+static void prepare(void)
 {
+    state.signal[RTS_COUNT(state.signal) - 1].number = SIGRTMIN + BREAK_SIGNAL_OFFSET;
     if (pthread_key_create(&state.key, detach) != 0) {
         fatal("no thread key left in this process");
     }
@@ -292,7 +292,7 @@ static void unblock_signals(void)
 /* Makes the calling thread a context and the handlers ours. */
 static CONTEXT *attach(void)
 {
-    pthread_once(&state.once, create_key);
+    pthread_once(&state.once, prepare);
     pthread_mutex_lock(&state.lock);
     install();
     pthread_mutex_unlock(&state.lock);

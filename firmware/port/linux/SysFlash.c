@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Reading is a shared mapping of the file, writing goes through the file, so what was programmed is in the page cache
- * at once and survives the end of the process; sync makes it survive a power cut.
+ * What was programmed is in the page cache at once and survives the end of the process; sync makes it survive a power
+ * cut. The file is not mapped: a fault of the disk shall be an error that is returned, not a SIGBUS.
  */
 #define _GNU_SOURCE
 #include "SysFlash.h"
@@ -14,6 +14,8 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/mman.h>
@@ -41,6 +43,25 @@ static bool inside(RTS_UI32 offset, RTS_UI32 size)
     return size <= PORT_FLASH_SIZE && offset <= PORT_FLASH_SIZE - size;
 }
 
+static bool read_all(int file, RTS_UI8 *data, size_t size, off_t offset)
+{
+    while (size > 0) {
+        ssize_t done = pread(file, data, size, offset);
+        if (done == 0) {
+            errno = EIO; /* somebody made the file shorter */
+        }
+        if (done == 0 || (done < 0 && errno != EINTR)) {
+            return false;
+        }
+        if (done > 0) {
+            data += done;
+            size -= (size_t)done;
+            offset += done;
+        }
+    }
+    return true;
+}
+
 static bool write_all(int file, const RTS_UI8 *data, size_t size, off_t offset)
 {
     while (size > 0) {
@@ -62,8 +83,24 @@ static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
     if (!inside(offset, size)) {
         return fault("read outside", offset);
     }
-    memcpy(data, state.flash.mapped + offset, size);
-    return ERR_OK;
+    return read_all(state.file, data, size, offset) ? ERR_OK : fault("read failed", offset);
+}
+
+static bool is_erased(int file, off_t from, off_t to)
+{
+    RTS_UI8 block[PORT_FLASH_SECTOR_SIZE];
+    for (; from < to; from += (off_t)sizeof(block)) {
+        size_t size = to - from < (off_t)sizeof(block) ? (size_t)(to - from) : sizeof(block);
+        if (!read_all(file, block, size, from)) {
+            return false;
+        }
+        for (size_t i = 0; i < size; i++) {
+            if (block[i] != ERASED) {
+                return false;
+            }
+        }
+    }
+    return true;
 }
 
 static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size)
@@ -74,10 +111,8 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
     if (offset % PORT_FLASH_PROGRAM_SIZE != 0 || size % PORT_FLASH_PROGRAM_SIZE != 0) {
         return fault("program not aligned", offset);
     }
-    for (RTS_UI32 i = 0; i < size; i++) {
-        if (state.flash.mapped[offset + i] != ERASED) {
-            return fault("programmed without erase", offset + i);
-        }
+    if (!is_erased(state.file, offset, (off_t)offset + size)) {
+        return fault("programmed without erase", offset);
     }
     return write_all(state.file, data, size, offset) ? ERR_OK : fault("write failed", offset);
 }
@@ -113,7 +148,9 @@ const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
     if (mprotect(code, PORT_CODE_SIZE, PROT_READ | PROT_WRITE) != 0) {
         return NULL;
     }
-    memcpy(code, state.flash.mapped + offset, size);
+    if (flash_read(offset, code, size) != ERR_OK) {
+        return NULL;
+    }
     __builtin___clear_cache((char *)code, (char *)code + size);
     return mprotect(code, PORT_CODE_SIZE, PROT_READ | PROT_EXEC) == 0 ? code : NULL;
 }
@@ -142,37 +179,68 @@ static bool fill_erased(int file, off_t from)
     return fsync(file) == 0;
 }
 
-static bool prepare_file(int file, const char *path, PORT_REASON *reason)
+/* Makes the name of a new file survive a power cut. A folder that may not be read, or of a file system that has no such
+ * thing, is left to the system. */
+static bool sync_folder(const char *path)
+{
+    char folder[PATH_MAX];
+    if (realpath(path, folder) == NULL) {
+        return false;
+    }
+    strrchr(folder, '/')[1] = '\0';
+    int entries = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    bool good = entries < 0 || fsync(entries) == 0 || errno == EINVAL;
+    if (entries >= 0) {
+        close(entries);
+    }
+    return good;
+}
+
+static bool lock_file(int file, const char *path, PORT_REASON *reason)
+{
+    if (flock(file, LOCK_EX | LOCK_NB) == 0) {
+        return true;
+    }
+    if (errno == EWOULDBLOCK) {
+        PortReason(reason, "flash file %s is in use by another plcrt: end that one or name another file", path);
+    } else {
+        PortReason(reason, "cannot lock flash file %s: %s", path, strerror(errno));
+    }
+    return false;
+}
+
+/* A flash file, or the beginning of one: what lies there besides belongs to somebody else. */
+static bool is_flash_file(int file)
 {
     struct stat info;
-    if (flock(file, LOCK_EX | LOCK_NB) != 0) {
-        PortReason(reason, "flash file %s is in use by another plcrt: end that one or name another file", path);
+    return fstat(file, &info) == 0 && S_ISREG(info.st_mode) &&
+           (info.st_size == PORT_FLASH_SIZE || (info.st_size < PORT_FLASH_SIZE && is_erased(file, 0, info.st_size)));
+}
+
+static bool prepare_file(int file, const char *path, PORT_REASON *reason)
+{
+    if (!is_flash_file(file)) {
+        PortReason(reason, "%s is not a flash file of plcrt (%d bytes): name another file", path, PORT_FLASH_SIZE);
         return false;
     }
-    if (fstat(file, &info) != 0 || !S_ISREG(info.st_mode) || info.st_size > PORT_FLASH_SIZE) {
-        PortReason(reason, "%s is not a flash file of plcrt (at most %d bytes): name another file", path,
-                   PORT_FLASH_SIZE);
-        return false;
-    }
-    if (!fill_erased(file, info.st_size)) {
+    if (!fill_erased(file, lseek(file, 0, SEEK_END)) || !sync_folder(path)) {
         PortReason(reason, "cannot write flash file %s: %s", path, strerror(errno));
         return false;
     }
     return true;
 }
 
-static bool map_all(PORT_REASON *reason)
+static bool reserve_code(PORT_REASON *reason)
 {
-    state.flash.mapped = mmap(NULL, PORT_FLASH_SIZE, PROT_READ, MAP_SHARED, state.file, 0);
-    bool good = state.flash.mapped != MAP_FAILED;
     for (int i = 0; i < CODE_SLOTS; i++) {
-        state.code[i] = mmap(NULL, PORT_CODE_SIZE, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-        good = good && state.code[i] != MAP_FAILED;
+        void *code = mmap(NULL, PORT_CODE_SIZE, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (code == MAP_FAILED) {
+            PortReason(reason, "not enough memory for the code: %s", strerror(errno));
+            return false;
+        }
+        state.code[i] = code;
     }
-    if (!good) {
-        PortReason(reason, "not enough memory for the flash and the code: %s", strerror(errno));
-    }
-    return good;
+    return true;
 }
 
 bool PortFlashOpen(const char *path, PORT_REASON *reason)
@@ -192,7 +260,7 @@ bool PortFlashOpen(const char *path, PORT_REASON *reason)
         .erase = flash_erase,
         .sync = flash_sync,
     };
-    if (!prepare_file(state.file, path, reason) || !map_all(reason)) {
+    if (!lock_file(state.file, path, reason) || !prepare_file(state.file, path, reason) || !reserve_code(reason)) {
         PortFlashClose();
         return false;
     }
@@ -201,16 +269,12 @@ bool PortFlashOpen(const char *path, PORT_REASON *reason)
 
 void PortFlashClose(void)
 {
-    if (state.flash.mapped != NULL && state.flash.mapped != MAP_FAILED) {
-        munmap((void *)(uintptr_t)state.flash.mapped, PORT_FLASH_SIZE);
-    }
     for (int i = 0; i < CODE_SLOTS; i++) {
-        if (state.code[i] != NULL && state.code[i] != MAP_FAILED) {
+        if (state.code[i] != NULL) {
             munmap(state.code[i], PORT_CODE_SIZE);
         }
         state.code[i] = NULL;
     }
-    state.flash.mapped = NULL;
     if (state.file >= 0) {
         close(state.file);
     }

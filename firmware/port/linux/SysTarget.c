@@ -59,7 +59,7 @@ SYS_STACK SysTargetGetStack(void)
     }
     if (grown_kb != 0 && getrlimit(RLIMIT_STACK, &limit) == 0 && limit.rlim_cur <= INT32_MAX) {
         stack.size = (RTS_UI32)limit.rlim_cur;
-        stack.unused = stack.size - grown_kb * 1024;
+        stack.unused = grown_kb < stack.size / 1024 ? stack.size - grown_kb * 1024 : 0;
     }
     return stack;
 }

@@ -14,13 +14,16 @@
 #include "rts_config.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <getopt.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 enum { EXIT_RUNTIME = 1, EXIT_USAGE = 2, DEFAULT_BAUD = 115200 };
 
@@ -40,7 +43,7 @@ static const char usage[] =
     "  --version       prints the version\n"
     "  --help          prints this\n"
     "\n"
-    "Ends with exit status 0 on SIGTERM or SIGINT; SIGHUP is ignored.\n";
+    "Ends on SIGTERM or SIGINT, with exit status 0 when everything was saved; SIGHUP is ignored.\n";
 
 static volatile sig_atomic_t quit;
 
@@ -124,6 +127,15 @@ static void take_option(OPTIONS *options, int option)
     }
 }
 
+/* Short options come in groups (-xy), so the argument before the next one need not be it. */
+static void refuse_option(const char *argument)
+{
+    if (optopt > 0 && optopt <= UCHAR_MAX) {
+        refuse("-%c is not an option: see plcrt --help", optopt);
+    }
+    refuse("%s is not an option or lacks its value: see plcrt --help", argument);
+}
+
 static OPTIONS parse_options(int argc, char **argv)
 {
     OPTIONS options = {.baud = DEFAULT_BAUD};
@@ -131,7 +143,7 @@ static OPTIONS parse_options(int argc, char **argv)
     opterr = 0;
     while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
         if (option == '?') {
-            refuse("%s is not an option or lacks its value: see plcrt --help", argv[optind - 1]);
+            refuse_option(argv[optind - 1]);
         }
         take_option(&options, option);
     }
@@ -146,14 +158,26 @@ static OPTIONS parse_options(int argc, char **argv)
 
 /* ---- life ---- */
 
+/* Whoever started us may have closed them: what is opened next would take their place, and be written to by printf. */
+static void hold_standard_streams(void)
+{
+    int file;
+    do {
+        file = open("/dev/null", O_RDWR);
+    } while (file >= 0 && file <= STDERR_FILENO);
+    (void)close(file);
+}
+
 static void on_end_signal(int number)
 {
     RTS_UNUSED(number);
     quit = 1;
 }
 
+/* SIGXFSZ (a limit of file sizes) and SIGPIPE are errors of the write that met them. */
 static void take_signals(void)
 {
+    sigset_t ends;
     struct sigaction end = {.sa_handler = on_end_signal, .sa_flags = (int)SA_RESETHAND};
     struct sigaction ignore = {.sa_handler = SIG_IGN};
     sigemptyset(&end.sa_mask);
@@ -162,19 +186,53 @@ static void take_signals(void)
     sigaction(SIGINT, &end, NULL);
     sigaction(SIGHUP, &ignore, NULL);
     sigaction(SIGPIPE, &ignore, NULL);
+    sigaction(SIGXFSZ, &ignore, NULL);
+    sigemptyset(&ends); /* they may have been blocked by whoever started us */
+    sigaddset(&ends, SIGTERM);
+    sigaddset(&ends, SIGINT);
+    sigprocmask(SIG_UNBLOCK, &ends, NULL);
 }
 
-/* The last error in the log is why. */
-static void report_failed_start(RTS_RESULT result)
+/* The handle of the log entry that comes next. */
+static RTS_UI32 next_log_handle(void)
 {
     LOG_ENTRY entry;
-    char why[LOG_TEXT_SIZE] = "Start-up failed";
-    for (RTS_UI32 next = 1; LogGetEntry(next, &entry) == ERR_OK; next = entry.handle + 1) {
+    RTS_UI32 next = 1;
+    while (LogGetEntry(next, &entry) == ERR_OK) {
+        next = entry.handle + 1;
+    }
+    return next;
+}
+
+/* Prints the errors in the log from an entry on; false when there is none. */
+static bool report_errors(RTS_UI32 from)
+{
+    LOG_ENTRY entry;
+    bool found = false;
+    for (; LogGetEntry(from, &entry) == ERR_OK; from = entry.handle + 1) {
         if (entry.log_class == LOG_ERROR) {
-            memcpy(why, entry.text, sizeof(why));
+            fprintf(stderr, "plcrt: %s\n", entry.text);
+            found = true;
         }
     }
-    fprintf(stderr, "plcrt: %s (error 0x%04X)\n", why, (unsigned)result);
+    return found;
+}
+
+static bool start(void)
+{
+    RTS_RESULT result = CMInit();
+    if (result != ERR_OK && !report_errors(1)) {
+        fprintf(stderr, "plcrt: start-up failed with error 0x%04X\n", (unsigned)result);
+    }
+    return result == ERR_OK;
+}
+
+/* Saves what is to be kept; false when some of it is lost. */
+static bool end(void)
+{
+    RTS_UI32 from = next_log_handle();
+    (void)CMExit();
+    return !report_errors(from);
 }
 
 /* No page of the runtime is to be fetched from disk in the middle of a cycle. */
@@ -198,9 +256,7 @@ static void main_loop(void)
 
 static int run(void)
 {
-    RTS_RESULT result = CMInit();
-    if (result != ERR_OK) {
-        report_failed_start(result);
+    if (!start()) {
         return EXIT_RUNTIME;
     }
     lock_memory();
@@ -209,8 +265,7 @@ static int run(void)
         (void)fflush(stdout);
     }
     main_loop();
-    (void)CMExit();
-    return EXIT_SUCCESS;
+    return end() ? EXIT_SUCCESS : EXIT_RUNTIME;
 }
 
 int main(int argc, char **argv)
@@ -218,6 +273,7 @@ int main(int argc, char **argv)
     OPTIONS options = parse_options(argc, argv);
     PORT_REASON reason;
     int status = EXIT_RUNTIME;
+    hold_standard_streams();
     take_signals();
     if (PortFlashOpen(options.flash, &reason) &&
         (options.serial == NULL || PortComOpen(options.serial, options.baud, &reason))) {

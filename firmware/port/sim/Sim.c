@@ -328,10 +328,15 @@ static RTS_RESULT advance(void *arg)
     return ERR_OK;
 }
 
-static RTS_RESULT pass(RTS_I64 end_ns, RTS_I64 limit_ns)
+/* `beyond_ns`: how far behind the end what is due still runs. */
+static RTS_RESULT pass(RTS_I64 ns, RTS_I64 beyond_ns)
 {
-    PASSAGE passage = {end_ns, limit_ns};
+    PASSAGE passage;
 
+    if (ns < 0 || ns >= NEVER - beyond_ns - sim.now_ns)
+        return ERR_PARAMETER;
+    passage.end_ns = sim.now_ns + ns;
+    passage.limit_ns = passage.end_ns + beyond_ns;
     if (sim.power_lost)
         return SIM_POWER_CUT;
     return sim.on ? with_landing(advance, &passage) : (RTS_RESULT)ERR_NOTINITIALIZED;
@@ -339,12 +344,12 @@ static RTS_RESULT pass(RTS_I64 end_ns, RTS_I64 limit_ns)
 
 RTS_RESULT SimAdvance(RTS_I64 ns)
 {
-    return pass(sim.now_ns + ns, sim.now_ns + ns + 1);
+    return pass(ns, 1);
 }
 
 RTS_RESULT SimRunFor(RTS_I64 ns)
 {
-    return pass(sim.now_ns + ns, sim.now_ns + ns);
+    return pass(ns, 0);
 }
 
 static RTS_UI32 cycles_of_first_task(void)
@@ -528,12 +533,12 @@ const SYS_TARGET *SysTargetGet(void)
     return &target;
 }
 
-/* A xorshift generator: what it gives is the same in every process, so that tests repeat. */
 SYS_STACK SysTargetGetStack(void)
 {
     return (SYS_STACK){0, 0};
 }
 
+/* A xorshift generator: what it gives is the same in every process, so that tests repeat. */
 RTS_UI32 SysTargetRandom(void)
 {
     static RTS_UI32 state = 0x2545F491;

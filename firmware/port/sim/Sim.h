@@ -30,7 +30,8 @@ void SimStop(void);
 
 /*
  * Lets `ns` of virtual time pass: each cyclic task runs when it is due (by time, then priority), event tasks follow at once,
- * background work (CH_COMM_CYCLE) runs at least once at the end. ERR_NOTINITIALIZED when power is off.
+ * background work (CH_COMM_CYCLE) runs at least once at the end. ERR_NOTINITIALIZED when power is off, ERR_PARAMETER for a
+ * negative time and when the clock would pass 292 years.
  */
 RTS_RESULT SimAdvance(RTS_I64 ns);
 

@@ -112,6 +112,7 @@ RTS_RESULT RetainSave(bool always)
     if (!HAS_RETAIN || retain.size == 0 || (is_saved() && !always))
         return ERR_OK;
     copy();
+    retain.failed = false; /* a stop that loses them is said, also after saves in between that failed */
     return save_copy();
 }
 

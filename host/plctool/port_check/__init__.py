@@ -46,10 +46,10 @@ def run_port_check(
             bench = Bench(connect, plc, target_of(identity), Path(folder), baud)
             checks = Checks(bench, power_cycle, max_drift)
             outcomes = []
-            for name, check in checks.all():
-                outcomes.append(judge(name, check))
+            for check in checks.all():
+                outcomes.append(judge(check))
                 show(outcomes[-1])
             plc = bench.plc
-        return Report(identity, bench.target, outcomes)
+        return Report(identity, bench.target, baud, outcomes)
     finally:
         plc.close()

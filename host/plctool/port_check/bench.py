@@ -35,8 +35,8 @@ def target_of(identity: Identity) -> str:
     )
 
 
-def program(variables: str, body: str) -> str:
-    """A program Main that counts its cycles in `n`, in a task of 10 ms."""
+def program(variables: str, body: str, interval: str = "T#10ms") -> str:
+    """A program Main that counts its cycles in `n`, in a cyclic task."""
     return f"""
 PROGRAM Main
 VAR
@@ -48,7 +48,7 @@ n := n + 1;
 END_PROGRAM
 CONFIGURATION Config
     RESOURCE Res ON PLC
-        TASK {TASK}(INTERVAL := T#10ms, PRIORITY := 1);
+        TASK {TASK}(INTERVAL := {interval}, PRIORITY := 1);
         PROGRAM Main WITH {TASK} : Main;
     END_RESOURCE
 END_CONFIGURATION

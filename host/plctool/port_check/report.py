@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Any
 
 from plctool.errors import PlcError
 from plctool.link.services import Identity
+from plctool.version import plctool_version
+
+FORMAT = 1  # of the document; grows when something is named or meant otherwise than before
 
 Result = tuple[str, dict[str, Any]]
 
@@ -26,6 +30,15 @@ class NotAvailable(Exception):
 
 
 @dataclass(frozen=True)
+class Check:
+    """Something to be checked. `limits` are those of its figures, by their names: a pair such as ("max", 0.01)."""
+
+    name: str
+    run: Callable[[], Result]
+    limits: Mapping[str, tuple[str, Any]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Outcome:
     """One line of the report: `verdict` is "passed", "failed" or "not available"."""
 
@@ -34,15 +47,23 @@ class Outcome:
     text: str
     seconds: float
     figures: dict[str, Any] = field(default_factory=dict)
+    limits: Mapping[str, tuple[str, Any]] = field(default_factory=dict)
+
+    def document(self) -> dict[str, Any]:
+        limits = {name: dict([limit]) for name, limit in self.limits.items()}
+        return vars(self) | {"limits": limits}
 
 
 @dataclass(frozen=True)
 class Report:
-    """All that a vendor files: who was checked, and how each check went."""
+    """All that a vendor files: who was checked, when and with what, and how each check went."""
 
     identity: Identity
     target: str
+    baud: int
     outcomes: list[Outcome]
+    plctool: str = field(default_factory=plctool_version)
+    date: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def count(self, verdict: str) -> int:
         return sum(outcome.verdict == verdict for outcome in self.outcomes)
@@ -50,8 +71,12 @@ class Report:
     def document(self) -> dict[str, Any]:
         """For --json."""
         return {
+            "format": FORMAT,
+            "date": self.date.isoformat(timespec="seconds"),
+            "plctool": self.plctool,
+            "baud": self.baud,
             "device": vars(self.identity) | {"target": self.target},
-            "checks": [vars(outcome) for outcome in self.outcomes],
+            "checks": [outcome.document() for outcome in self.outcomes],
             "passed": self.count("passed"),
             "failed": self.count("failed"),
             "not_available": self.count("not available"),
@@ -71,19 +96,20 @@ def summary_text(report: Report) -> str:
     return (
         f"{who.device_name} of {who.vendor_name}, version {who.version}, serial number {who.serial_number}, "
         f"runtime {who.runtime_version}, {report.target}\n"
+        f"{report.date:%Y-%m-%d %H:%M} UTC, plctool {report.plctool}, {report.baud} baud\n"
         f"{report.count('passed')} passed, {report.count('failed')} failed{tail}"
     )
 
 
-def judge(name: str, check: Callable[[], Result]) -> Outcome:
+def judge(check: Check) -> Outcome:
     """Runs a check; how it ends is its verdict."""
     begin = time.monotonic()
     try:
-        verdict, (text, figures) = "passed", check()
+        verdict, (text, figures) = "passed", check.run()
     except NotAvailable as reason:
         verdict, text, figures = "not available", str(reason), {}
     except CheckFailed as failure:
         verdict, text, figures = "failed", str(failure), failure.figures
     except PlcError as error:
         verdict, text, figures = "failed", error.message, {}
-    return Outcome(name, verdict, text, round(time.monotonic() - begin, 3), figures)
+    return Outcome(check.name, verdict, text, round(time.monotonic() - begin, 3), figures, check.limits)

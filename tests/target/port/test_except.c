@@ -35,10 +35,12 @@ static void read_from_nowhere(void *arg)
     sink = REG32(0x80000000u);
 }
 
+#define NOWHERE 0x90000000u
+
 static void write_to_nowhere(void *arg)
 {
     RTS_UNUSED(arg);
-    REG32(0x90000000u) = 1;
+    REG32(NOWHERE) = 1;
 }
 
 static void read_from_null(void *arg)
@@ -50,7 +52,8 @@ static void read_from_null(void *arg)
 static void write_to_flash(void *arg)
 {
     RTS_UNUSED(arg);
-    REG32((uintptr_t)SysFlashGet()->mapped + 64) = 1;
+    const RTS_UI8 *mapped = SysFlashGet()->mapped;
+    REG32(mapped != NULL ? (uintptr_t)mapped + 64 : NOWHERE) = 1;
 }
 
 static void unaligned_multiple_load(void *arg)

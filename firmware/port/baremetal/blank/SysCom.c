@@ -11,8 +11,9 @@ RTS_UI32 SysComGetCount(void)
     return 0;
 }
 
-/* Write here: baud rate and pins, empty both ring buffers, switch the receive interrupt on. That interrupt has to be
- * above all tasks, else a long cycle loses bytes. */
+/* Write here: baud rate and pins, empty both ring buffers and the FIFOs of the hardware (bytes that came while nobody
+ * listened may hold back the interrupt of the next one), switch the receive interrupt on. That interrupt has to be above
+ * all tasks, else a long cycle loses bytes. */
 RTS_RESULT SysComOpen(RTS_UI32 index)
 {
     RTS_UNUSED(index);

@@ -21,7 +21,7 @@
  *   BOARD_CLOCK_HZ       clock of core and SysTick, a multiple of 1000, at least 4 MHz
  *   BOARD_IRQ_COUNT      interrupt lines of the chip
  *   BOARD_PRIORITY_BITS  priority bits of the NVIC, 3 or more
- * BOARD_TASK_IRQ       first of SYSTIMER_COUNT lines in a row that no peripheral in use drives: software triggers them
+ *   BOARD_TASK_IRQ       first of SYSTIMER_COUNT lines in a row that no peripheral in use drives: software triggers them
  *   BOARD_VECTORS        initialisers [IRQ_VECTOR(n)] = {handler} for its peripherals, each followed by a comma
  */
 
@@ -148,6 +148,9 @@ typedef struct {
 void ResetInit(void);
 const RESET_RECORD *ResetGet(void);
 
+/* For BoardInit of a chip that has a register for it: why it was reset. The place in the record stays. */
+void ResetSetCause(RESET_CAUSE cause);
+
 /* Records the cause and resets the controller. Does not return. */
 void ResetNow(RESET_CAUSE cause, RTS_UI32 pc) __attribute__((noreturn));
 
@@ -160,8 +163,7 @@ void BoardInit(void);
  * fine, early too. With interrupts masked. */
 void BoardAlarmSet(RTS_UI32 ns);
 
-/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Never stopped.
- * */
+/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Never stopped. */
 void BoardWatchdogStart(RTS_UI32 ms);
 void BoardWatchdogKick(void);
 

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A chip with a reset cause register can tell more; a board that wants it overwrites the record in BoardInit.
+ * A chip with a reset cause register can tell more: its board calls ResetSetCause.
  */
 #include "CortexM.h"
 
@@ -25,6 +25,11 @@ void ResetInit(void)
 const RESET_RECORD *ResetGet(void)
 {
     return &last;
+}
+
+void ResetSetCause(RESET_CAUSE cause)
+{
+    last.cause = cause;
 }
 
 void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)

@@ -6,7 +6,6 @@
 #include "CortexM.h"
 #include "SysFlash.h"
 #include "SysTarget.h"
-#include "SysTime.h"
 
 #define TIMER0 0x40000000u
 #define TIMER_CTRL REG32(TIMER0 + 0x0)
@@ -93,15 +92,4 @@ const SYS_TARGET *SysTargetGet(void)
     if (target.serial_number == NULL)
         target.serial_number = read_serial_number();
     return &target;
-}
-
-/* No random generator here: the time at which the questions come is what varies. */
-RTS_UI32 SysTargetRandom(void)
-{
-    static RTS_UI32 pool = 0x9E3779B9u;
-    pool ^= (RTS_UI32)SysTimeGetNs() + SYST_CVR;
-    pool ^= pool << 13;
-    pool ^= pool >> 17;
-    pool ^= pool << 5;
-    return pool;
 }

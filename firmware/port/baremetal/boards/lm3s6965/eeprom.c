@@ -1,0 +1,145 @@
+/*
+ * eeprom.c - SysFlash on a serial EEPROM (AT24C512 at I2C0), with the rules of NOR flash.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The chip's own flash can only be written while nothing runs from it. The EEPROM cannot be mapped: programs run in RAM
+ * (CodeInRam.c). It needs no erase; a sector is what is filled with the erased value at once.
+ */
+#include "CortexM.h"
+#include "SysFlash.h"
+
+#define I2C0 0x40020000u
+#define I2C_MSA REG32(I2C0 + 0x00)
+#define I2C_MCS REG32(I2C0 + 0x04)
+#define I2C_MDR REG32(I2C0 + 0x08)
+#define I2C_MTPR REG32(I2C0 + 0x0C)
+#define I2C_MCR REG32(I2C0 + 0x20)
+#define PORT_B_AFSEL REG32(0x40005420u)
+#define PORT_B_ODR REG32(0x4000550Cu)
+#define PORT_B_DEN REG32(0x4000551Cu)
+
+enum { PINS = 3 << 2, MASTER_ENABLE = 1 << 4, PERIOD_400KHZ = BOARD_CLOCK_HZ / (20 * 400000) };
+enum { RUN = 1, START = 2, STOP = 4, ACK = 8 };                 /* written to MCS */
+enum { BUSY = 1, ERROR = 2 };                                   /* read from it */
+enum { CHIP_WRITE = 0x50 << 1, CHIP_READ = CHIP_WRITE | 1, PAGE_SIZE = 128 };
+enum { SECTOR_SIZE = 1024, PROGRAM_SIZE = 4, ERASED = 0xFF };
+enum { BUSY_TRIES = 1000 };                                     /* a page takes 5 ms, a refused address 25 us */
+
+static int step(RTS_UI32 what)
+{
+    I2C_MCS = what;
+    while ((I2C_MCS & BUSY) != 0)
+        ;
+    return (I2C_MCS & ERROR) == 0;
+}
+
+/* Sends the address of a byte. While it writes a page the chip answers to nothing. */
+static int select_byte(RTS_UI32 offset, RTS_UI32 then)
+{
+    I2C_MSA = CHIP_WRITE;
+    for (RTS_UI32 i = 0; i < BUSY_TRIES; i++) {
+        I2C_MDR = offset >> 8;
+        if (step(START | RUN)) {
+            I2C_MDR = offset & 0xFF;
+            return step(RUN | then);
+        }
+        (void)step(STOP);
+    }
+    return 0;
+}
+
+static int is_inside(RTS_UI32 offset, RTS_UI32 size)
+{
+    return offset <= BOARD_FLASH_SIZE && size <= BOARD_FLASH_SIZE - offset;
+}
+
+static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
+{
+    RTS_UI8 *to = data;
+    if (!is_inside(offset, size) || !select_byte(offset, STOP))
+        return ERR_DEVICE;
+    I2C_MSA = CHIP_READ;
+    for (RTS_UI32 i = 0; i < size; i++) {
+        if (!step(RUN | (i == 0 ? START : 0) | (i + 1 == size ? STOP : ACK)))
+            return ERR_DEVICE;
+        to[i] = (RTS_UI8)I2C_MDR;
+    }
+    return ERR_OK;
+}
+
+/* Writes within pages; the erased value when there is no data. */
+static RTS_RESULT write(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
+{
+    while (size > 0) {
+        RTS_UI32 count = PAGE_SIZE - offset % PAGE_SIZE;
+        if (count > size)
+            count = size;
+        if (!select_byte(offset, 0))
+            return ERR_DEVICE;
+        for (RTS_UI32 i = 0; i < count; i++) {
+            I2C_MDR = data != NULL ? *data++ : ERASED;
+            if (!step(RUN | (i + 1 == count ? STOP : 0)))
+                return ERR_DEVICE;
+        }
+        offset += count;
+        size -= count;
+    }
+    return ERR_OK;
+}
+
+static int is_erased(RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_UI8 unit[PROGRAM_SIZE];
+    for (RTS_UI32 end = offset + size; offset < end; offset += PROGRAM_SIZE) {
+        if (flash_read(offset, unit, PROGRAM_SIZE) != ERR_OK)
+            return 0;
+        for (RTS_UI32 i = 0; i < PROGRAM_SIZE; i++)
+            if (unit[i] != ERASED)
+                return 0;
+    }
+    return 1;
+}
+
+static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size)
+{
+    if (!is_inside(offset, size) || offset % PROGRAM_SIZE || size % PROGRAM_SIZE || !is_erased(offset, size))
+        return ERR_DEVICE;
+    return write(offset, data, size);
+}
+
+static RTS_RESULT flash_erase(RTS_UI32 offset)
+{
+    return is_inside(offset, SECTOR_SIZE) && offset % SECTOR_SIZE == 0 ? write(offset, NULL, SECTOR_SIZE) : ERR_DEVICE;
+}
+
+/* The chip answers again when it has written the last page. */
+static RTS_RESULT flash_sync(void)
+{
+    return select_byte(0, STOP) ? ERR_OK : ERR_DEVICE;
+}
+
+void EepromInit(void)
+{
+    PORT_B_AFSEL |= PINS;
+    PORT_B_ODR |= PINS;
+    PORT_B_DEN |= PINS;
+    I2C_MCR = MASTER_ENABLE;
+    I2C_MTPR = PERIOD_400KHZ - 1;
+}
+
+const SYS_FLASH *SysFlashGet(void)
+{
+    static const SYS_FLASH flash = {
+        .size = BOARD_FLASH_SIZE,
+        .sector_size = SECTOR_SIZE,
+        .program_size = PROGRAM_SIZE,
+        .erased = ERASED,
+        .mapped = NULL,
+        .read = flash_read,
+        .program = flash_program,
+        .erase = flash_erase,
+        .sync = flash_sync,
+    };
+    return &flash;
+}

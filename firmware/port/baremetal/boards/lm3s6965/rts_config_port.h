@@ -1,0 +1,20 @@
+/*
+ * rts_config_port.h - the LM3S6965 board: who it is. Its sizes are those of the configuration.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_PORT_H
+#define RTS_CONFIG_PORT_H
+
+#include "rts_config_size.h"
+
+#include "rts_config_cortexm.h"
+
+#define BOARD_TARGET_ID TARGET_ID_CORTEX_M3
+#define BOARD_DEVICE_NAME "LM3S6965 board"
+#define BOARD_NODE_NAME "lm3s6965"
+
+/* The EEPROM that applications and files have, bytes. */
+#define BOARD_FLASH_SIZE 0x10000u
+
+#endif
