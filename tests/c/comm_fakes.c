@@ -154,10 +154,12 @@ void AppGetStatus(APP_STATUS *status)
     *status = fakes.status;
 }
 
+#if EXCEPT_MAX_CALLS > 0
 const EXCEPT_TRACE *SysExceptGetTrace(void)
 {
     return &fakes.trace;
 }
+#endif
 
 const char *AppGetInfo(RTS_UI32 index)
 {

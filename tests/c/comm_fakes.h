@@ -31,7 +31,9 @@ typedef struct {
     RTS_UI32 log_added;
 
     APP_STATUS status;
+#if EXCEPT_MAX_CALLS > 0
     EXCEPT_TRACE trace;
+#endif
     RTS_UI64 area[APP_AREA_COUNT][FAKE_AREA_SIZE / 8];
     RTS_UI32 area_size[APP_AREA_COUNT];
     RTS_RESULT control_result;
