@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.rules.block_calls import program_arguments
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.statements import Statements
 from plctool.compiler.semantics.symbols import PouSymbol, ProgramInfo
 from plctool.compiler.semantics.tasks import background, read_task
 from plctool.compiler.semantics.world import World
@@ -132,7 +133,7 @@ class _Builder:
 
     def _connect(self, instance: ast.ProgramInstance, program: ProgramInfo, task: Task, scope: Scope) -> None:
         """`PROGRAM p WITH t : Type(input := x, output => y)`: small programs before and behind do the assignments."""
-        handed = Statements(scope).program_arguments(instance.args, program, instance.pos)
+        handed = program_arguments(Checker(scope), instance.args, program, instance.pos)
         if handed is None:
             return
         (before, behind), pou = handed, program.pou

@@ -11,6 +11,9 @@ from collections.abc import Callable
 
 from plctool.compiler.types import BOOL, ELEMENTARY, Elementary, EnumType, Kind, StringType, SubrangeType, Type, base_of
 
+LIBRARY_STRING = StringType(255)  # STRING without a length, as parameter or result of a library function
+WIDE_LIBRARY_STRING = StringType(255, wide=True)
+
 
 def _of_kind(*kinds: Kind) -> Callable[[Type], bool]:
     def accepts(t: Type) -> bool:

@@ -9,8 +9,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.construction import COPY_CODE, INIT_RETAINS
-from plctool.compiler.semantics.expressions import Expressions
+from plctool.compiler.semantics.rules.arguments import input_value
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.syntax import ast
@@ -29,19 +30,15 @@ class InitialValues:
     def __init__(self, world: World) -> None:
         self.world = world
 
-    def checker(self, scope: Scope) -> Expressions:
-        """Checks expressions in a scope."""
-        return self.world.expressions(scope)
-
     def initial(self, node: ast.Init, t: Type, scope: Scope) -> Initial | None:
         """An initial value, calculated at the start when it is not constant; None after a diagnosis."""
         if isinstance(node, ast.ArrayInit):
             return self._array_initial(node, t, scope)
         if isinstance(node, ast.StructInit):
             return self._struct_initial(node, t, scope)
-        checker = self.checker(scope)
+        c = Checker(scope)
         is_reference = isinstance(t, ReferenceType) and not isinstance(node, ast.Literal)
-        e = checker.input(node, t, "the reference") if is_reference else checker.value(node, t)
+        e = input_value(c, node, t, "the reference") if is_reference else c.value(node, t)
         if e.type is ERROR:
             return None
         if isinstance(e, Const):
@@ -100,7 +97,7 @@ class InitialValues:
     def _repeated(
         self, item: ast.Repeat, counts: list[int], element: Type, scope: Scope
     ) -> list[tuple[int, Initial | None]] | None:
-        count = self.checker(scope).integer(item.count)
+        count = Checker(scope).integer(item.count)
         if count is None:
             return None
         if not 0 <= count <= MAX_SIZE:
@@ -161,6 +158,6 @@ class InitialValues:
         for member in reversed(self.world.classes.initialisers(t)):
             for symbol, _ in self.world.classes.signature(member).parameters:
                 if symbol.name.casefold() == name.casefold():
-                    arguments[name.casefold()] = self.checker(scope).input(node, symbol.type, name)
+                    arguments[name.casefold()] = input_value(Checker(scope), node, symbol.type, name)
                     return True
         return False

@@ -16,12 +16,13 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from plctool.compiler.semantics.addresses import AREAS, located
-from plctool.compiler.semantics.checker import load
+from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.fixed_places import FixedPlace, fixed_place, with_part
+from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.statements import Statements
 from plctool.compiler.semantics.symbols import ERROR, VarSymbol
+from plctool.compiler.semantics.values import load
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Area,
@@ -278,7 +279,7 @@ class InstanceConfig:
     def _find(self, path: ast.Expr, spec: ast.TypeSpec, scope: Scope, use: str) -> tuple[Place, FixedPlace] | None:
         """The variable of a path, which has to be of the type given; None after a diagnosis."""
         wanted, _ = self._world.declarations.type_of(spec, scope)
-        place = Statements(scope).place(path, use)
+        place = named_place(Checker(scope), path, use)
         if place is None or wanted is ERROR:
             return None
         if isinstance(path, ast.BitAccess):

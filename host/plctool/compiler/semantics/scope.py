@@ -38,10 +38,11 @@ class Scope:
     """The surroundings of declarations and statements.
 
     `names` are the local ones by case-folded name; `bindings` the types generic parameters stand for in this instance;
-    `prologue` what has to be done before the body: finding edges; `programs` the PROGRAMs that
-    can be instantiated here, as function blocks: in unit tests; `outer` what a method sees of the unit `cls` around it;
-    `sees_inside`: VAR of instances may be read, as tests and VAR_CONFIG do; `edges` what the body sees in place of
-    inputs with R_EDGE; `path` the namespaces to look into, case-folded, innermost first; `space` the one this is in.
+    `prologue` what has to be done before the body: finding edges; `programs` the PROGRAMs that can be instantiated
+    here, as function blocks: in unit tests; `outer` what a method sees of the unit `cls` around it; `sees_inside`: VAR
+    of instances may be read, as tests and VAR_CONFIG do; `writes_inside`: and all of them written, as tests do; `edges`
+    what the body sees in place of inputs with R_EDGE; `path` the namespaces to look into, case-folded, innermost first;
+    `space` the one this is in.
     """
 
     world: World
@@ -55,6 +56,7 @@ class Scope:
     outer: dict[str, Symbol] = field(default_factory=dict)
     cls: ClassInfo | None = None
     sees_inside: bool = False
+    writes_inside: bool = False
     edges: dict[str, Symbol] = field(default_factory=dict)
     path: tuple[str, ...] = ()
     space: str = ""

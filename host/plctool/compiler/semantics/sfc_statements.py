@@ -5,9 +5,10 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.rules.places import named_place
+from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc import (
     BEFORE,
     FIRES,
@@ -21,9 +22,6 @@ from plctool.compiler.semantics.sfc import (
 )
 from plctool.compiler.semantics.symbols import MemberSymbol, VarSymbol
 from plctool.compiler.syntax import ast
-
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.scope import Scope
 
 
 def statements_of(decl: ast.PouDecl, scope: Scope) -> list[ast.Stmt]:
@@ -175,7 +173,7 @@ class _Execution:
         self._scope = scope
         self._decl = decl
         self._actions = actions_of(decl, chart)
-        self._checker = scope.world.expressions(scope)
+        self._checker = Checker(scope)
         owner = decl if scope.cls is None else scope.cls.symbol.decl
         self._order = {member.name.casefold(): i for i, member in enumerate(owner.members)}
 
@@ -185,7 +183,7 @@ class _Execution:
         calls: list[Action] = []
         for action in self._actions:
             for indicator in (i for _, use in action.uses for i in use.indicators):
-                self._checker.place(indicator, "an indicator")
+                named_place(self._checker, indicator, "an indicator")
             symbol = self._scope.lookup(action.name) if isinstance(action.target, ast.Name) else None
             if isinstance(symbol, MemberSymbol):
                 calls.append(action)

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.statements import Statements
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import BitPlace, Load, Task, TaskKind, VarPlace
@@ -34,7 +34,7 @@ def read_task(decl: ast.TaskDecl, scope: Scope) -> Task:
 class _Reader:
     def __init__(self, decl: ast.TaskDecl, scope: Scope) -> None:
         self.task = background(decl.name)
-        self._checker = Statements(scope)
+        self._checker = Checker(scope)
         for offset, name, value in decl.properties:
             read = self._properties.get(name.upper())
             if read is None or isinstance(value, ast.ArrayInit | ast.StructInit):

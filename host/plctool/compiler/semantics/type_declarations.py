@@ -12,7 +12,7 @@ from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.addresses import is_open
-from plctool.compiler.semantics.expressions import Expressions
+from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.generics import is_group
 from plctool.compiler.semantics.initial_values import InitialValues
 from plctool.compiler.semantics.scope import Scope
@@ -214,7 +214,7 @@ class TypeDeclarations:
         return symbol.type
 
     def _string(self, length: ast.Expr, scope: Scope, *, wide: bool) -> Type:
-        n = self.checker(scope).integer(length)
+        n = Checker(scope).integer(length)
         if n is None:
             return ERROR
         if not 1 <= n <= MAX_STRING:
@@ -222,13 +222,9 @@ class TypeDeclarations:
             return ERROR
         return StringType(n, wide)
 
-    def checker(self, scope: Scope) -> Expressions:
-        """Checks expressions in a scope."""
-        return self.world.expressions(scope)
-
     def _array(self, spec: ast.ArraySpec, scope: Scope) -> tuple[Type, Initial | None]:
         element, default = self.type_of(spec.element, scope)
-        checker, bounds = self.checker(scope), list[tuple[int, int]]()
+        checker, bounds = Checker(scope), list[tuple[int, int]]()
         if None in spec.bounds:
             message = "only VAR_IN_OUT, in functions and methods VAR_INPUT and VAR_OUTPUT too, takes an ARRAY[*]"
             scope.error(spec.pos, "type", f"{message}; give this array its bounds")
@@ -271,7 +267,7 @@ class TypeDeclarations:
             return ERROR, None
         t = EnumType(name or "(" + ", ".join(n for _, n, _ in spec.values) + ")", base, {})
         inner = Scope(self.world, scope.source, scope.library, dict(scope.names), scope.bindings)
-        checker, value, seen = self.checker(inner), -1, set[str]()
+        checker, value, seen = Checker(inner), -1, set[str]()
         for offset, value_name, node in spec.values:
             key = value_name.casefold()
             if key in seen:
@@ -298,7 +294,7 @@ class TypeDeclarations:
 
     def _subrange(self, spec: ast.SubrangeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
         base = self.named_type(spec.pos, spec.base, scope)
-        checker = self.checker(scope)
+        checker = Checker(scope)
         low, high = checker.integer(spec.low), checker.integer(spec.high)
         if base is ERROR or low is None or high is None:
             return ERROR, None

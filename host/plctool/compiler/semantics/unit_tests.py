@@ -20,13 +20,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from plctool.compiler.semantics.checker import load
 from plctool.compiler.semantics.configuration import Application, configure, default_programs
 from plctool.compiler.semantics.declarations import May
 from plctool.compiler.semantics.mocks import Mocks, raising
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
-from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestStatements
+from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestBody
+from plctool.compiler.semantics.values import load
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
@@ -135,7 +135,7 @@ class TestSuite:
     # ---- blocks ----
 
     def _setup(self, world: World, decl: ast.TestDecl, file: _File) -> None:
-        scope, checker = self._begin(world, decl, file, "SETUP")
+        scope = self._begin(world, decl, file, "SETUP")
         if file.setup is not None:
             scope.error(decl.pos, "duplicate", "there is a SETUP in this file already")
             return
@@ -144,24 +144,23 @@ class TestSuite:
         file.names = {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol)}
         for symbol in file.names.values():
             symbol.used = True
-        checker.write_body(decl)
+        self._write(decl, scope)
 
     def _teardown(self, world: World, decl: ast.TestDecl, file: _File) -> None:
-        scope, checker = self._begin(world, decl, file, "TEARDOWN")
+        scope = self._begin(world, decl, file, "TEARDOWN")
         if file.teardown is not None:
             scope.error(decl.pos, "duplicate", "there is a TEARDOWN in this file already")
             return
         file.teardown = scope.pou
         self._declare(decl, scope, None)
-        checker.cleaning = True
-        checker.write_body(decl)
+        self._write(decl, scope, cleaning=True)
 
     def _test(self, world: World, decl: ast.TestDecl, file: _File) -> None:
         number, pos = len(self.cases), decl.source.pos(decl.pos)
         self.cases.append(TestCase(decl.name, pos))
-        scope, checker = self._begin(world, decl, file, f"TEST_{number}")
+        scope = self._begin(world, decl, file, f"TEST_{number}")
         self._declare(decl, scope, None)
-        checker.write_body(decl)
+        self._write(decl, scope)
         assert scope.pou is not None
         body = [_call(scope.pou)]
         if file.setup is not None:
@@ -171,15 +170,17 @@ class TestSuite:
             body.append(_call(file.teardown))
         self._branches.append(([(number, number)], body))
 
-    def _begin(self, world: World, decl: ast.TestDecl, file: _File, name: str) -> tuple[Scope, TestStatements]:
+    def _begin(self, world: World, decl: ast.TestDecl, file: _File, name: str) -> Scope:
         scope = world.scope(decl.source)
         scope.enter(decl.namespace)
-        scope.sees_inside = True
         scope.pou = Pou(name, PouKind.PROGRAM, decl.source.pos(decl.pos))
         scope.programs = self._programs
         scope.names.update(file.names)
+        return scope
+
+    def _write(self, decl: ast.TestDecl, scope: Scope, *, cleaning: bool = False) -> None:
         assert self._bench is not None
-        return scope, TestStatements(scope, self._bench)
+        TestBody(scope, self._bench, cleaning=cleaning).write(decl)
 
     def _declare(self, decl: ast.TestDecl, scope: Scope, shared: _File | None) -> None:
         """The variables: of SETUP (`shared`) in the data area, others on the stack."""

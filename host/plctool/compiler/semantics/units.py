@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler.semantics.declarations import RETAINING, May
 from plctool.compiler.semantics.edges import edge_variables, see_edge
-from plctool.compiler.semantics.generics import is_group
+from plctool.compiler.semantics.generics import LIBRARY_STRING, WIDE_LIBRARY_STRING, is_group
 from plctool.compiler.semantics.open_arrays import bound_parameters, give_bounds
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import (
@@ -52,9 +52,6 @@ from plctool.compiler.types import (
 if TYPE_CHECKING:
     from plctool.compiler.semantics.declarations import Allocation
     from plctool.compiler.semantics.world import World
-
-LIBRARY_STRING = StringType(255)  # STRING without a length, as parameter or result of a library function
-WIDE_LIBRARY_STRING = StringType(255, wide=True)
 
 _KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
 _VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")

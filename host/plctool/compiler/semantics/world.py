@@ -14,18 +14,18 @@ from plctool.compiler.library import Library, without_library
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import sfc
 from plctool.compiler.semantics.call_graph import CallGraph
+from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.class_rules import INITIALISERS
 from plctool.compiler.semantics.classes import Classes
 from plctool.compiler.semantics.construction import construct
 from plctool.compiler.semantics.conversions import Coercion
 from plctool.compiler.semantics.declarations import Allocation, Declarations
-from plctool.compiler.semantics.expressions import Expressions
 from plctool.compiler.semantics.generics import GROUPS
 from plctool.compiler.semantics.instance_config import InstanceConfig
 from plctool.compiler.semantics.programs import Programs
+from plctool.compiler.semantics.rules.bodies import check_body
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc_statements import statements_of
-from plctool.compiler.semantics.statements import Statements
 from plctool.compiler.semantics.symbols import (
     BlockInfo,
     GlobalSymbol,
@@ -99,10 +99,6 @@ class World:
     def scope(self, source: Source, *, library: bool = False) -> Scope:
         """An empty scope in a source."""
         return Scope(self, source, library)
-
-    def expressions(self, scope: Scope) -> Expressions:
-        """Checks expressions in a scope."""
-        return Statements(scope)
 
     # ---- names ----
 
@@ -365,7 +361,7 @@ class World:
         while self._bodies or self._library_bodies:
             scope, decl, pou = (self._bodies or self._library_bodies).popleft()
             try:
-                body = Statements(scope).body(statements_of(decl, scope))
+                body = check_body(Checker(scope), statements_of(decl, scope))
                 pou.body = [*scope.prologue, *body]
             except NestingError as error:
                 self.nested_too_deeply(error)
