@@ -8,17 +8,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from plctool.compiler.semantics.allocation import Allocation
 from plctool.compiler.semantics.conversions import elementary
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Area, Initial, Storage, Variable
 from plctool.compiler.types import BOOL, ELEMENTARY, Elementary, Type, base_of
-
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
 
 MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
 AREAS = {"I": Area.INPUT, "Q": Area.OUTPUT, "M": Area.MEMORY}
@@ -92,8 +89,8 @@ def located(
 class DirectVariables:
     """The variables behind addresses that statements use."""
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(self, allocation: Allocation) -> None:
+        self._allocation = allocation
         self._known: dict[str, VarSymbol] = {}
 
     def find(self, node: ast.DirectAddress, scope: Scope) -> VarSymbol | None:
@@ -106,6 +103,6 @@ class DirectVariables:
         variable = None if address is None else located(key, address.type, None, node, scope, node.pos)
         if address is None or variable is None:
             return None
-        self._world.allocation.add(variable)
+        self._allocation.add(variable)
         symbol = self._known[key] = VarSymbol(key, variable.pos, address.type, Role.GLOBAL, variable)
         return symbol

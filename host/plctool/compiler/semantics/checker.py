@@ -15,6 +15,7 @@ from plctool.compiler.nesting import MAX_DEPTH, NestingError
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, settle
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Pos, Statement
 from plctool.compiler.types import BOOL, Type
@@ -28,10 +29,10 @@ SpecialCalls = Mapping[str, Callable[[ast.Call], list[Statement]]]
 class Checker:
     """The check of the expressions and statements of one scope."""
 
-    def __init__(self, scope: Scope, special_calls: SpecialCalls | None = None) -> None:
+    def __init__(self, world: World, scope: Scope, special_calls: SpecialCalls | None = None) -> None:
+        self.world = world
         self.scope = scope
-        self.world = scope.world
-        self.coerce = scope.world.coerce
+        self.coerce = world.coerce
         self.pos: Callable[[int], Pos] = scope.source.pos
         self.special_calls: SpecialCalls = special_calls or {}
         self.loops = 0  # around the statement

@@ -6,17 +6,23 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.semantics.symbols import ClassInfo, GlobalSymbol, PouSymbol, Symbol, TypeSymbol, Unit
+from plctool.compiler.semantics.names import Names
+from plctool.compiler.semantics.symbols import (
+    ClassInfo,
+    GlobalSymbol,
+    PouSymbol,
+    Role,
+    Symbol,
+    TypeSymbol,
+    Unit,
+    VarSymbol,
+)
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Pos, Pou, Statement
 from plctool.compiler.types import Type
-
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
 
 
 def internal_to(symbol: Symbol) -> str | None:
@@ -45,7 +51,7 @@ class Scope:
     `space` the one this is in.
     """
 
-    world: World
+    globals: Names
     source: Source
     library: bool = False
     names: dict[str, Symbol] = field(default_factory=dict)
@@ -77,7 +83,7 @@ class Scope:
 
     def _namespace(self, offset: int, name: str) -> str | None:
         """The full name of a namespace, written in full or from here on."""
-        spaces, key = self.world.namespaces, name.casefold()
+        spaces, key = self.globals.namespaces, name.casefold()
         parts = self.space.split(".") if self.space else []
         for full_name in (".".join([*parts[:n], key]) for n in range(len(parts), -1, -1)):
             if full_name in spaces:
@@ -99,6 +105,20 @@ class Scope:
         self.error(offset, "access", f"{name} is INTERNAL: only the namespace {owner} may use it")
         return False
 
+    def declare(self, symbol: VarSymbol, offset: int) -> bool:
+        """Makes a local name known; False after a diagnosis when it is taken."""
+        key = symbol.name.casefold()
+        other = self.names.get(key)
+        if not isinstance(other, VarSymbol):
+            self.names[key] = symbol
+            return True
+        if other.role is Role.RESULT:
+            message = f"{symbol.name} is the name of this function"
+        else:
+            message = f"{symbol.name} is declared already: {other.name} in line {other.pos.line}"
+        self.error(offset, "duplicate", message)
+        return False
+
     def lookup(self, name: str) -> Symbol | None:
         """What a name stands for here."""
         key = name.casefold()
@@ -106,10 +126,10 @@ class Scope:
         if symbol is not None:
             return symbol
         for space in self.path:
-            symbol = self.world.lookup(f"{space}.{key}", library=self.library)
+            symbol = self.globals.lookup(f"{space}.{key}", library=self.library)
             if symbol is not None:
                 return symbol
-        return self.world.lookup(key.removeprefix("."), library=self.library)
+        return self.globals.lookup(key.removeprefix("."), library=self.library)
 
     def unit(self, name: str) -> Unit | None:
         """A type, function, function block or program, whatever variables have its name."""
@@ -117,7 +137,7 @@ class Scope:
         if key in self.programs:
             return self.programs[key]
         spaces = (f"{space}.{key}" for space in self.path)
-        found = (self.world.unit(k, library=self.library) for k in (*spaces, key))
+        found = (self.globals.unit(k, library=self.library) for k in (*spaces, key))
         return next((symbol for symbol in found if symbol is not None), None)
 
     def pos(self, offset: int) -> Pos:
@@ -126,8 +146,8 @@ class Scope:
 
     def error(self, offset: int, code: str, message: str) -> None:
         """Reports an error at an offset."""
-        self.world.diagnostics.error(self.source.pos(offset), code, message)
+        self.globals.diagnostics.error(self.source.pos(offset), code, message)
 
     def warning(self, offset: int, code: str, message: str) -> None:
         """Reports a warning at an offset."""
-        self.world.diagnostics.warning(self.source.pos(offset), code, message)
+        self.globals.diagnostics.warning(self.source.pos(offset), code, message)

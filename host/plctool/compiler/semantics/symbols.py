@@ -44,6 +44,10 @@ UNTYPED_REAL = Elementary("real constant", Kind.REAL, 64, True, -1)
 NULL_TYPE = PointerType(ERROR)
 
 
+DIRECTIONS = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VAR_IN_OUT": Direction.IN_OUT}
+"""Of parameters, by the keyword of their section."""
+
+
 class Role(Enum):
     """How a variable was declared."""
 

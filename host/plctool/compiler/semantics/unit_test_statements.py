@@ -12,7 +12,7 @@ from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import mocks
 from plctool.compiler.semantics.checker import Checker, SpecialCalls
 from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, settle, time_to_ltime
-from plctool.compiler.semantics.rules.bodies import check_body
+from plctool.compiler.semantics.rules.bodies import check_body, report_unused
 from plctool.compiler.semantics.rules.common_types import match_literals
 from plctool.compiler.semantics.rules.conversion_calls import convert_explicitly
 from plctool.compiler.semantics.rules.members import bound_member
@@ -75,8 +75,8 @@ class Assertion:
 class Bench:
     """What all tests of a program share: its asserts, numbered from 1, and the hidden variables."""
 
-    def __init__(self, world: World) -> None:
-        self.asserts: list[Assertion] = []
+    def __init__(self, world: World, asserts: list[Assertion]) -> None:
+        self.asserts = asserts
         self._world = world
         self._operands: dict[tuple[str, Type], Variable] = {}
         hidden = ((NUMBER, DINT), (FAILED, DINT), (_TIME, TIME), (_LTIME, LTIME))
@@ -116,9 +116,9 @@ class TestBody:
     """The body of a TEST, SETUP or TEARDOWN. It may write every variable of what it tests. `cleaning`: in TEARDOWN
     only the first failure counts."""
 
-    def __init__(self, scope: Scope, bench: Bench, *, cleaning: bool = False) -> None:
+    def __init__(self, world: World, scope: Scope, bench: Bench, *, cleaning: bool = False) -> None:
         scope.sees_inside = scope.writes_inside = True
-        self._c = Checker(scope, self._special_calls())
+        self._c = Checker(world, scope, self._special_calls())
         self._bench = bench
         self._cleaning = cleaning
         self._kept: dict[tuple[str, Type], Variable] = {}
@@ -149,7 +149,7 @@ class TestBody:
         pou.body = [*scope.prologue, *body]
         world.pous.append(pou)
         if decl.keyword != "SETUP":
-            world.report_unused(scope)
+            report_unused(scope)
 
     def _nodes(self, call: ast.Call, count: int, *, message: bool = True) -> list[ast.Expr] | None:
         """The arguments, perhaps with a message behind them; None after a diagnosis."""
@@ -358,10 +358,10 @@ class TestBody:
         return [Assign(place_of(switch), Const(1, BOOL, pos), pos), Assign(place_of(result), e, pos)]
 
     def _global(self, name: str) -> Expr | None:
-        symbol = self._c.world.lookup(name, library=False)
+        symbol = self._c.world.names.lookup(name, library=False)
         if not isinstance(symbol, GlobalSymbol):
             return None
-        return variable_value(self._c.world.declarations.global_variable(symbol), self._c.pos(0))
+        return variable_value(self._c.world.declared.variable(symbol), self._c.pos(0))
 
     def _verify_called(self, call: ast.Call) -> list[Statement]:
         calls = self._mock_member(call, 1, mocks.CALLS)

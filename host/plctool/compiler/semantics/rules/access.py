@@ -17,7 +17,7 @@ def may_see(c: Checker, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
     plain = not symbol.access
     if plain and (symbol.role is not Role.LOCAL or symbol.constant or c.scope.sees_inside):
         return True
-    cls = c.world.classes.class_of(t)
+    cls = c.world.class_of(t)
     key = symbol.name.casefold()
     while cls is not None and cls.base is not None and cls.base.block is not None:
         if cls.base.block.members.get(key) is not symbol:

@@ -14,7 +14,7 @@ from plctool.compiler.semantics.conversions import elementary, error_value, same
 from plctool.compiler.semantics.generics import is_group
 from plctool.compiler.semantics.open_arrays import handed_bounds
 from plctool.compiler.semantics.rules.places import changeable_place
-from plctool.compiler.semantics.symbols import ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
+from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
 from plctool.compiler.semantics.values import place_of
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -62,7 +62,7 @@ def parameter_names(c: Checker, callee: ast.Expr) -> set[str]:
     """What the function of that name declares, folded; nothing for one that is built in."""
     if not isinstance(callee, ast.Name):
         return set()
-    symbol = c.world.unit(callee.name.casefold(), library=c.scope.library)
+    symbol = c.world.names.unit(callee.name.casefold(), library=c.scope.library)
     if not isinstance(symbol, PouSymbol):
         return set()
     return {name.casefold() for name, _, _ in parameter_lines(symbol.decl)}
@@ -231,14 +231,13 @@ def referenced_place(
 def parameter_lines(decl: ast.PouDecl) -> list[tuple[str, Direction, str | None]]:
     """Name, direction and ANY_... group of each parameter."""
     found = []
-    directions = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VAR_IN_OUT": Direction.IN_OUT}
     for block in decl.blocks:
-        if block.keyword not in directions:
+        if block.keyword not in DIRECTIONS:
             continue
         for line in block.decls:
             group = line.type.name.upper() if isinstance(line.type, ast.NamedType) else ""
             for _, name in line.names:
-                found.append((name, directions[block.keyword], group if is_group(group) else None))
+                found.append((name, DIRECTIONS[block.keyword], group if is_group(group) else None))
     return found
 
 

@@ -6,6 +6,9 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.instances import INITIALISERS
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Case, Const, Continue, Exit, Expr, If, Repeat, Return, Statement, While
 
@@ -27,6 +30,18 @@ def check_body(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
 def report_unreachable(c: Checker, offset: int, why: str = "") -> None:
     """Warns of a statement that is never executed."""
     c.warning(offset, "unreachable", f"this statement is never reached{why}")
+
+
+def report_unused(scope: Scope) -> None:
+    """Warns of variables nobody uses, and of results nobody assigns."""
+    for symbol in scope.names.values():
+        if not isinstance(symbol, VarSymbol) or symbol.used:
+            continue
+        if symbol.role in (Role.LOCAL, Role.TEMP):
+            scope.globals.diagnostics.warning(symbol.pos, "unused", f"{symbol.name} is never used")
+        elif symbol.role is Role.RESULT and symbol.name.casefold() not in INITIALISERS:
+            message = f"{symbol.name} never assigns its result; write {symbol.name} := ..."
+            scope.globals.diagnostics.warning(symbol.pos, "result", message)
 
 
 def _ends(statements: list[Statement]) -> bool:

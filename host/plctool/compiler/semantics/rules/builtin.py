@@ -47,7 +47,7 @@ def function_hint(c: Checker, name: str) -> str:
     """`; did you mean ADD?` for an unknown function, else nothing: what the program has comes first."""
     return (
         conversion_hint(c, name.upper())
-        or did_you_mean(name, c.world.function_names())
+        or did_you_mean(name, c.world.names.function_names())
         or did_you_mean(name, [*_FUNCTIONS, *variable_questions.OF_VARIABLES])
     )
 

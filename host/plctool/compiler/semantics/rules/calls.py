@@ -54,11 +54,11 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
     symbol = c.scope.lookup(name)
     shadow: VarSymbol | None = None  # a variable of this name, which cannot be called
     if isinstance(symbol, GlobalSymbol):
-        symbol = c.world.declarations.global_variable(symbol)
+        symbol = c.world.declared.variable(symbol)
     if isinstance(symbol, VarSymbol):
         if symbol.type in c.world.blocks or symbol.type is ERROR:
             return _call_of_place(c, node)
-        shadow, symbol = symbol, c.world.unit(name.casefold(), library=c.scope.library)
+        shadow, symbol = symbol, c.world.names.unit(name.casefold(), library=c.scope.library)
     is_function = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION"
     if isinstance(symbol, PouSymbol) and is_function and (not symbol.library or c.scope.library):
         return _call_function(c, symbol, node, expected)
@@ -69,7 +69,7 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
         if built_in is not None:
             return built_in
     if isinstance(symbol, PouSymbol) and is_function:
-        if c.world.library.overloads(name.casefold()):
+        if c.world.names.library.overloads(name.casefold()):
             return call_text_function(c, symbol, node)
         return _call_function(c, symbol, node, expected)
     overload = overload_call(c, name, node, expected)
@@ -91,7 +91,7 @@ def _not_callable(c: Checker, symbol: object, name: str) -> str:
     if isinstance(symbol, Namespace) and symbol.program is not None:
         return f"a call of the program {name} is a statement and has no value"
     if isinstance(symbol, PouSymbol) and symbol.keyword == "PROGRAM":
-        listed = " or ".join(f"{instance}()" for instance in c.world.programs.instances(symbol))
+        listed = " or ".join(f"{instance}()" for instance in c.world.names.instances_of(symbol))
         return f"the program {name} has several instances; call {listed}"
     return f"{name} is not a function"
 

@@ -84,9 +84,9 @@ def _conversion_type(c: Checker, name: str) -> Type | None:
         return ELEMENTARY[name]
     if name in ("STRING", "WSTRING"):
         return StringType(255, name == "WSTRING")
-    symbol = c.world.unit(name.casefold(), library=c.scope.library)
+    symbol = c.world.names.unit(name.casefold(), library=c.scope.library)
     if isinstance(symbol, TypeSymbol):
-        t = c.world.declarations.resolve_symbol(symbol)
+        t = c.world.declared.type(symbol)
         return t if isinstance(t, EnumType | SubrangeType) else None
     return None
 

@@ -50,7 +50,7 @@ def attempt(c: Checker, node: ast.Assign) -> list[Statement]:
 
 
 def _takes_instances(c: Checker, t: Type) -> bool:
-    return isinstance(t, PointerType) and c.world.classes.class_of(t.target) is not None
+    return isinstance(t, PointerType) and c.world.class_of(t.target) is not None
 
 
 def _ask(c: Checker, name: str, node: ast.Expr, target: Place | None, pos: Pos) -> Expr:
@@ -60,10 +60,10 @@ def _ask(c: Checker, name: str, node: ast.Expr, target: Place | None, pos: Pos) 
         return error_value(pos)
     if isinstance(source.type, StructType):
         source = AddressOf(place_of(source), PointerType(source.type), source.pos)
-    cls = c.world.classes.class_of(source.type.target) if isinstance(source.type, PointerType) else None
+    cls = c.world.class_of(source.type.target) if isinstance(source.type, PointerType) else None
     if cls is None or not isinstance(source.type, PointerType):
         message = f"{name} asks an instance, an interface or a pointer to a function block, not {source.type}"
         return c.error(node.pos, "type", message)
     assert isinstance(target.type, PointerType)
-    function = c.world.classes.queries.function(cls, source.type, target.type, pos)
+    function = c.world.dispatches.queries.function(cls, source.type, target.type, pos)
     return Call(function, [source, target], BOOL, pos)

@@ -16,6 +16,7 @@ from plctool.compiler.semantics.generics import (
     accepts,
     first_of,
     group_name,
+    is_generic,
     is_group,
 )
 from plctool.compiler.semantics.rules.arguments import Actual, arguments_text, bind, parameter_lines, typed_call
@@ -38,9 +39,9 @@ def call_symbol(c: Checker, symbol: PouSymbol, args: list[ast.Argument], offset:
             assert argument.value is not None
             result = call_checked(c, symbol, [result, c.expr(argument.value, expected)], offset, expected)
         return result
-    if c.world.units.is_generic(symbol):
+    if is_generic(symbol.decl):
         return _call_generic(c, symbol, args, offset, expected)
-    info = c.world.units.function(symbol)
+    info = c.world.declared.function(symbol, {})
     if info is None:
         return c.error(offset, "recursion", f"{symbol.decl.name} is used in its own declaration")
     names = [(s.name, d) for s, d in info.parameters]
@@ -54,9 +55,9 @@ def call_checked(c: Checker, symbol: PouSymbol, values: list[Expr], offset: int,
     """A call with arguments that are checked already."""
     if any(v.type is ERROR for v in values):
         return error_value(c.pos(offset))
-    if c.world.units.is_generic(symbol):
+    if is_generic(symbol.decl):
         return _instantiate(c, symbol, dict(enumerate(values)), offset, expected)
-    info = c.world.units.function(symbol)
+    info = c.world.declared.function(symbol, {})
     if info is None or len(info.parameters) != len(values):
         return c.error(offset, "arguments", f"{symbol.decl.name} does not take {arguments_text(len(values))}")
     return typed_call(c, info, dict(enumerate(values)), offset)
@@ -64,7 +65,7 @@ def call_checked(c: Checker, symbol: PouSymbol, values: list[Expr], offset: int,
 
 def call_by_name(c: Checker, name: str, args: list[Expr], offset: int, expected: Type | None) -> Expr:
     """A call of a library function with checked arguments."""
-    symbol = c.world.unit(name.casefold(), library=True)
+    symbol = c.world.names.unit(name.casefold(), library=True)
     if not isinstance(symbol, PouSymbol):
         symbol = _best_overload(c, name, args, expected)
     if symbol is None:
@@ -79,13 +80,13 @@ def call_text_function(c: Checker, symbol: PouSymbol, node: ast.Call) -> Expr:
         return error_value(c.pos(node.pos))
     wide = any((isinstance(v.type, StringType) and v.type.wide) or v.type is WCHAR for v in values)
     if wide:
-        other = c.world.unit(f"{symbol.decl.name}__wstring".casefold(), library=True)
+        other = c.world.names.unit(f"{symbol.decl.name}__wstring".casefold(), library=True)
         assert isinstance(other, PouSymbol)
         symbol = other
     name = symbol.decl.name.split("__")[0]
     if "extensible" in symbol.decl.attributes and len(values) > 2:
         return _joined(c, symbol, name, node, values)
-    info = c.world.units.function(symbol)
+    info = c.world.declared.function(symbol, {})
     assert info is not None
     args = [replace(a, name=_TEXT_PARAMETERS.get((a.name or "").upper(), a.name)) for a in node.args]
     bound = bind(c, args, [(s.name, d) for s, d in info.parameters], name, node.pos)
@@ -167,7 +168,7 @@ def _instantiate(c: Checker, symbol: PouSymbol, values: dict[int, Actual], offse
         if t is None:
             return error_value(c.pos(offset))
         bindings[result.name.upper()] = t
-    info = c.world.units.function(symbol, bindings)
+    info = c.world.declared.function(symbol, bindings)
     if info is None:
         return c.error(offset, "recursion", f"{name} calls itself, which is not possible on a controller")
     return typed_call(c, info, values, offset)
@@ -193,7 +194,7 @@ def _group_type(
 
 def overload_call(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
     """`SIN` stands for SIN__REAL or SIN__LREAL, as the arguments need it. None when there is no such function."""
-    if not c.world.library.overloads(name.casefold()):
+    if not c.world.names.library.overloads(name.casefold()):
         return None
     values = _argument_values(c, node, expected)
     if values is None:
@@ -202,7 +203,7 @@ def overload_call(c: Checker, name: str, node: ast.Call, expected: Type | None) 
     if symbol is None:
         types = ", ".join(str(settle(v).type) for v in values) or "no arguments"
         return c.error(node.pos, "type", f"there is no {name} for {types}")
-    info = c.world.units.function(symbol)
+    info = c.world.declared.function(symbol, {})
     assert info is not None
     bound = bind(c, node.args, [(s.name, d) for s, d in info.parameters], name.upper(), node.pos)
     if bound is None:
@@ -213,7 +214,7 @@ def overload_call(c: Checker, name: str, node: ast.Call, expected: Type | None) 
 
 def _best_overload(c: Checker, name: str, values: list[Expr], expected: Type | None) -> PouSymbol | None:
     """By the common type of the arguments: an exact suffix, else REAL or LREAL."""
-    suffixes = {o.rpartition("__")[2].upper(): o for o in c.world.library.overloads(name.casefold())}
+    suffixes = {o.rpartition("__")[2].upper(): o for o in c.world.names.library.overloads(name.casefold())}
     typed = [v.type for v in values if not is_untyped(v)]
     wanted: Type | None = typed[0] if typed else settle(values[0], expected).type if values else None
     for t in typed[1:]:
@@ -226,7 +227,7 @@ def _best_overload(c: Checker, name: str, values: list[Expr], expected: Type | N
         candidates += ["REAL", "LREAL"] if prefer_real else ["LREAL", "REAL"]
     for candidate in candidates:
         if candidate in suffixes:
-            symbol = c.world.unit(suffixes[candidate].casefold(), library=True)
+            symbol = c.world.names.unit(suffixes[candidate].casefold(), library=True)
             return symbol if isinstance(symbol, PouSymbol) else None
     return None
 

@@ -77,6 +77,6 @@ def _typed_literal(c: Checker, node: ast.Literal, pos: Pos) -> Expr:
     assert node.type_name is not None
     target: Type | None = ELEMENTARY.get(node.type_name)
     if target is None:
-        target = c.world.declarations.named_type(node.pos, node.type_name, c.scope)
+        target = c.world.declared.type_named(node.pos, node.type_name, c.scope)
     untyped = UNTYPED_INT if node.kind is ast.LiteralKind.INT else UNTYPED_REAL
     return c.coerce(Const(node.value, untyped, pos), target)

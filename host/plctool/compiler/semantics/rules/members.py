@@ -59,7 +59,7 @@ class Bound:
 def bound_member(c: Checker, node: ast.Expr, *, called: bool = False) -> Bound | None:
     """What `m`, `fb.m` or `prog.m` stands for when it is a method, action or property. `called`: the name of the
     method around is not its result."""
-    if not c.world.classes.used:
+    if not c.world.names.has_members:
         return None
     if isinstance(node, ast.Name):
         symbol = c.scope.lookup(node.name)
@@ -74,7 +74,7 @@ def bound_member(c: Checker, node: ast.Expr, *, called: bool = False) -> Bound |
     if isinstance(node.base, ast.Name) and isinstance(c.scope.lookup(node.base.name), TypeSymbol | PouSymbol):
         return None
     dotted = dotted_name(c, node)
-    if dotted is not None and (c.scope.lookup(dotted) is not None or dotted.casefold() in c.world.namespaces):
+    if dotted is not None and (c.scope.lookup(dotted) is not None or dotted.casefold() in c.world.names.namespaces):
         return None
     if isinstance(node.base, ast.Name) and is_namespace(c, node.base.name):
         return None
@@ -104,7 +104,7 @@ def instance_member(c: Checker, base: Expr, node: ast.Member) -> Bound | None:
         place = place_of(base)
     else:
         return None
-    cls = c.world.classes.class_of(place.type)
+    cls = c.world.class_of(place.type)
     if cls is None:
         return None
     bound = Bound(cls, node.name.casefold(), place)

@@ -49,7 +49,7 @@ def _member_call(
     place = bound.place
     if isinstance(place, SelfPlace) and place.exact and member.abstract:
         return c.error(name_offset, "inheritance", f"{member.name} is ABSTRACT and has no body to call")
-    info = c.world.classes.signature(member)
+    info = c.world.declared.member(member)
     dispatch = _dispatch_of(c, bound.cls, _member_key(member), place, info.pou)
     bound_args = bind(c, args, [(s.name, d) for s, d in info.parameters], info.pou.name, offset)
     if bound_args is None:
@@ -59,9 +59,9 @@ def _member_call(
     if isinstance(e, Call):
         e.instance, e.dispatch = place, dispatch
         if dispatch is not None and isinstance(place, SelfPlace):
-            c.world.classes.note_own_call(c.scope.pou, dispatch, e.pos)
+            c.world.dispatches.note_own_call(c.scope.pou, dispatch, e.pos)
         elif elsewhere:
-            c.world.classes.note_other_call(c.scope.pou, info.pou, dispatch, e.pos)
+            c.world.dispatches.note_other_call(c.scope.pou, info.pou, dispatch, e.pos)
     return e
 
 
@@ -74,7 +74,7 @@ def _dispatch_of(c: Checker, cls: ClassInfo, key: str, place: Place | None, func
     """None when the type of the instance is known."""
     if place is None or _is_exact(place):
         return None
-    return c.world.classes.dispatch(cls, key, function)
+    return c.world.dispatches.dispatch(cls, key, function)
 
 
 def body_dispatch(c: Checker, block: BlockInfo, instance: Place) -> Dispatch | None:
@@ -110,7 +110,7 @@ def assigned_property(c: Checker, target: ast.Expr) -> Bound | None:
         return None
     if bound.getter is None or bound.setter is not None:
         return bound
-    refers = isinstance(c.world.classes.signature(bound.getter).result, ReferenceType)
+    refers = isinstance(c.world.declared.member(bound.getter).result, ReferenceType)
     return None if refers else bound  # what it refers to is assigned
 
 

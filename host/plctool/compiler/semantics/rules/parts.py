@@ -76,7 +76,7 @@ def _block_member(c: Checker, base: Expr, members: dict[str, VarSymbol], node: a
     symbol = members.get(node.name.casefold())
     if symbol is None:
         names = [m.name for m in members.values() if m.role in (Role.INPUT, Role.OUTPUT)]
-        cls = c.world.classes.class_of(base.type)
+        cls = c.world.class_of(base.type)
         methods = cls.member_names() if cls is not None else []
         hint = did_you_mean(node.name, names + methods)
         what = "variable or method" if methods else "variable"
@@ -96,7 +96,7 @@ def _bit_number(c: Checker, node: ast.Member, t: Elementary) -> ast.BitAccess | 
     """`word.NAME`: the bit whose number a constant says."""
     symbol = c.scope.lookup(node.name)
     if isinstance(symbol, GlobalSymbol):
-        symbol = c.world.declarations.global_variable(symbol)
+        symbol = c.world.declared.variable(symbol)
     constant = symbol.value if isinstance(symbol, VarSymbol) else None
     if constant is None or not isinstance(constant.value, int):
         c.error(node.name_pos, "type", f"{t} has no members, and {node.name} is no constant that counts its bits")

@@ -60,7 +60,7 @@ def _read_only(c: Checker, node: ast.Expr) -> str | None:
 
 def _symbol_read_only(c: Checker, symbol: object) -> str | None:
     if isinstance(symbol, GlobalSymbol):
-        symbol = c.world.declarations.global_variable(symbol)
+        symbol = c.world.declared.variable(symbol)
     if not isinstance(symbol, VarSymbol):
         return None
     if symbol.constant:

@@ -44,7 +44,7 @@ def namespace_member(c: Checker, namespace: Namespace, node: ast.Member) -> Expr
         hint = did_you_mean(node.name, (m.name for m in namespace.members.values()))
         return c.error(node.name_pos, "unknown", f"{namespace.what} {namespace.name} has no {node.name}{hint}")
     if isinstance(symbol, GlobalSymbol):
-        symbol = c.world.declarations.global_variable(symbol)
+        symbol = c.world.declared.variable(symbol)
     return variable_value(symbol, c.pos(node.pos))
 
 
@@ -60,15 +60,19 @@ def qualified(c: Checker, node: ast.Member) -> Expr | None:
     if isinstance(symbol, GlobalSymbol):
         if not c.scope.may_use(symbol, name, node.name_pos):
             return error_value(c.pos(node.pos))
-        return variable_value(c.world.declarations.global_variable(symbol), c.pos(node.pos))
+        return variable_value(c.world.declared.variable(symbol), c.pos(node.pos))
     if symbol is not None:
         return c.error(node.pos, "name", f"{name} is {describe(symbol)}, not a value")
     space, _, value = name.rpartition(".")
     owner = c.scope.lookup(space)
     if isinstance(owner, TypeSymbol):
         return c.expr(ast.EnumValue(node.pos, space, value))
-    if owner is None and space.casefold() in c.world.namespaces and name.casefold() not in c.world.namespaces:
-        hint = did_you_mean(value, c.world.names_in(space))
+    if (
+        owner is None
+        and space.casefold() in c.world.names.namespaces
+        and name.casefold() not in c.world.names.namespaces
+    ):
+        hint = did_you_mean(value, c.world.names.names_in(space))
         return c.error(node.name_pos, "unknown", f"the namespace {space} has no {value}{hint}")
     return None
 
@@ -88,7 +92,7 @@ def called_program(c: Checker, callee: ast.Expr) -> ProgramInfo | None:
 
 def is_namespace(c: Checker, name: str) -> bool:
     """Whether a name stands for a namespace here."""
-    return name.casefold() in c.world.namespaces and c.scope.lookup(name) is None
+    return name.casefold() in c.world.names.namespaces and c.scope.lookup(name) is None
 
 
 def dotted_name(c: Checker, node: ast.Expr) -> str | None:

@@ -58,7 +58,7 @@ def of_variable(c: Checker, name: str, node: ast.Call) -> Expr:
         symbol = c.scope.lookup(argument.name)
         is_block = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK"
         if argument.name.upper() in ELEMENTARY or is_block or isinstance(symbol, TypeSymbol):
-            t = c.world.declarations.named_type(argument.pos, argument.name, c.scope)
+            t = c.world.declared.type_named(argument.pos, argument.name, c.scope)
             return error_value(c.pos(node.pos)) if t is ERROR else _size(c, t, node)
     e = settle(c.expr(argument))
     if isinstance(e.type, OpenArrayType):

@@ -39,23 +39,35 @@ _OWN = ("THIS", "SUPER")
 def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
     symbol = c.scope.lookup(node.name)
     if isinstance(symbol, GlobalSymbol):
-        choices = c.world.same_named(node.name)
+        choices = c.world.names.same_named(node.name)
         if choices:
             listed = " or ".join(s.full_name for s in choices)
             return c.error(node.pos, "ambiguous", f"{node.name} is in several lists; write {listed}")
         if not c.scope.may_use(symbol, node.name, node.pos):
             return error_value(c.pos(node.pos))
-        symbol = c.world.declarations.global_variable(symbol)
+        symbol = c.world.declared.variable(symbol)
     if isinstance(symbol, VarSymbol):
         return variable_value(symbol, c.pos(node.pos))
     own = _own_name(c, node, symbol)
     if own is not None:
         return own
     if symbol is None or (isinstance(symbol, PouSymbol) and symbol.library):
-        value = c.world.enum_value(node.name, c.scope, node.pos, expected)
+        value = _enumerated(c, node, expected)
         if value is not None or symbol is None:
             return value or _unknown(c, node)
     return c.error(node.pos, "name", f"{node.name} is {describe(symbol)}, not a value")
+
+
+def _enumerated(c: Checker, node: ast.Name, expected: Type | None) -> Expr | None:
+    """The value of an enumeration by its bare name; None when there is none of that name."""
+    symbols = c.world.names.enumerations_with(node.name)
+    types = [t for s in symbols if isinstance(t := c.world.declared.type(s), EnumType)]
+    if len(types) > 1 and expected in types:
+        types = [t for t in types if t is expected]
+    if len(types) > 1:
+        listed = " or ".join(f"{t}#{node.name}" for t in types)
+        c.error(node.pos, "ambiguous", f"{node.name} is a value of several enumerations; write {listed}")
+    return _value_of(c, types[0], node.name, node.pos, node.pos) if types else None
 
 
 def _own_name(c: Checker, node: ast.Name, symbol: object) -> Expr | None:
@@ -88,10 +100,10 @@ def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
 
 
 def _unknown(c: Checker, node: ast.Name) -> Expr:
-    longer = c.world.qualified_names(node.name)
+    longer = c.world.names.qualified_names(node.name)
     if longer:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(longer)}")
-    names = [*(s for s in c.scope.names), *c.world.visible_names()]
+    names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
     hint = did_you_mean(node.name, {_written(c, n) for n in names} - {""})
     return c.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")
 
@@ -103,7 +115,7 @@ def _written(c: Checker, key: str) -> str:
 
 @checks(ast.EnumValue)
 def enum_value(c: Checker, node: ast.EnumValue, expected: Type | None) -> Expr:
-    t = c.world.declarations.named_type(node.pos, node.type_name, c.scope)
+    t = c.world.declared.type_named(node.pos, node.type_name, c.scope)
     if t is ERROR:
         return error_value(c.pos(node.pos))
     if not isinstance(t, EnumType):
@@ -121,7 +133,7 @@ def _value_of(c: Checker, t: EnumType, name: str, offset: int, name_offset: int)
 
 @checks(ast.DirectAddress)
 def direct_address(c: Checker, node: ast.DirectAddress, expected: Type | None) -> Expr:
-    symbol = c.world.declarations.direct.find(node, c.scope)
+    symbol = c.world.direct.find(node, c.scope)
     return error_value(c.pos(node.pos)) if symbol is None else variable_value(symbol, c.pos(node.pos))
 
 
@@ -132,7 +144,7 @@ def member_value(c: Checker, node: ast.Member, expected: Type | None) -> Expr:
         if isinstance(symbol, Namespace):
             return namespace_member(c, symbol, node)
         if isinstance(symbol, TypeSymbol):
-            t = c.world.declarations.resolve_symbol(symbol)
+            t = c.world.declared.type(symbol)
             if isinstance(t, EnumType):
                 return _value_of(c, t, node.name, node.pos, node.name_pos)
             return c.error(node.base.pos, "name", f"{node.base.name} is a type, not a variable")

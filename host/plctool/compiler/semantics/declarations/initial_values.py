@@ -6,20 +6,17 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.construction import COPY_CODE, INIT_RETAINS
+from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, initialisers
 from plctool.compiler.semantics.rules.arguments import input_value
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import ArrayInit, ComputedInit, Const, Expr, Initial, Load, ScalarInit, StructInit, VarPlace
 from plctool.compiler.types import MAX_SIZE, ArrayType, ReferenceType, StructType, Type
-
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
 
 MAX_RUNS = 1_000_000  # of different values that a repetition makes
 
@@ -28,7 +25,7 @@ class InitialValues:
     """Checks initial values."""
 
     def __init__(self, world: World) -> None:
-        self.world = world
+        self._world = world
 
     def initial(self, node: ast.Init, t: Type, scope: Scope) -> Initial | None:
         """An initial value, calculated at the start when it is not constant; None after a diagnosis."""
@@ -36,14 +33,14 @@ class InitialValues:
             return self._array_initial(node, t, scope)
         if isinstance(node, ast.StructInit):
             return self._struct_initial(node, t, scope)
-        c = Checker(scope)
+        c = Checker(self._world, scope)
         is_reference = isinstance(t, ReferenceType) and not isinstance(node, ast.Literal)
         e = input_value(c, node, t, "the reference") if is_reference else c.value(node, t)
         if e.type is ERROR:
             return None
         if isinstance(e, Const):
             return ScalarInit(e.value)
-        if isinstance(t, StructType) and t in self.world.blocks:
+        if isinstance(t, StructType) and t in self._world.blocks:
             scope.error(node.pos, "type", f"an instance of {t} is no value; write (name := value) for its variables")
             return None
         if isinstance(e, Load) and isinstance(e.place, VarPlace) and e.place.var.constant:
@@ -97,7 +94,7 @@ class InitialValues:
     def _repeated(
         self, item: ast.Repeat, counts: list[int], element: Type, scope: Scope
     ) -> list[tuple[int, Initial | None]] | None:
-        count = Checker(scope).integer(item.count)
+        count = Checker(self._world, scope).integer(item.count)
         if count is None:
             return None
         if not 0 <= count <= MAX_SIZE:
@@ -117,7 +114,7 @@ class InitialValues:
         if not isinstance(t, StructType):
             scope.error(node.pos, "type", f"(name := value) does not initialise {t}")
             return None
-        block = self.world.blocks.get(t)
+        block = self._world.blocks.get(t)
         members: dict[str, Initial] = {}
         arguments: dict[str, Expr] = {}
         for offset, name, value in self._named(node, t, scope):
@@ -138,8 +135,8 @@ class InitialValues:
     def _named(self, node: ast.StructInit, t: StructType, scope: Scope) -> list[tuple[int, str, ast.Init]]:
         """The members with names: values without one are for the inputs of FB_Init, in their order."""
         names: list[str] = []
-        for member in self.world.classes.initialisers(t)[-1:]:
-            inputs = [symbol.name for symbol, _ in self.world.classes.signature(member).parameters]
+        for member in initialisers(self._world, t)[-1:]:
+            inputs = [symbol.name for symbol, _ in self._world.declared.member(member).parameters]
             names = [name for name in inputs if name.casefold() not in (INIT_RETAINS, COPY_CODE)]
         found: list[tuple[int, str, ast.Init]] = []
         for offset, name, value in node.members:
@@ -155,9 +152,9 @@ class InitialValues:
         """`fb : MyFB(id := 3)` for an input of FB_Init; False when there is no such input."""
         if isinstance(node, ast.ArrayInit | ast.StructInit):
             return False
-        for member in reversed(self.world.classes.initialisers(t)):
-            for symbol, _ in self.world.classes.signature(member).parameters:
+        for member in reversed(initialisers(self._world, t)):
+            for symbol, _ in self._world.declared.member(member).parameters:
                 if symbol.name.casefold() == name.casefold():
-                    arguments[name.casefold()] = input_value(Checker(scope), node, symbol.type, name)
+                    arguments[name.casefold()] = input_value(Checker(self._world, scope), node, symbol.type, name)
                     return True
         return False

@@ -1,17 +1,17 @@
-"""Variables of all kinds: where each lives and what it starts with.
+"""Variables that exist once: constants, global ones, those of programs; where each lives and what it starts with.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from plctool.compiler.semantics.addresses import DirectVariables, is_open, located
-from plctool.compiler.semantics.classes import instances_in
+from plctool.compiler.semantics.addresses import is_open, located
+from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
+from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
+from plctool.compiler.semantics.instances import instances_in, require_instances
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
-from plctool.compiler.semantics.type_declarations import May, TypeDeclarations
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Area,
@@ -30,41 +30,20 @@ from plctool.compiler.types import (
     StringType,
     StructType,
     Type,
-    align_up,
     base_of,
     is_scalar,
 )  # fmt: skip
 
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
-
-__all__ = ["RETAINING", "Allocation", "Declarations", "May"]
-
 RETAINING = frozenset(("RETAIN", "PERSISTENT"))  # qualifiers that let a variable keep its value over a power cut
 
 
-class Allocation:
-    """Gives variables their place in the areas."""
+class Variables:
+    """Makes variables of declarations."""
 
-    def __init__(self) -> None:
-        self.sizes: dict[Area, int] = {area: 0 for area in Area if area is not Area.CODE}
-        self.variables: list[Variable] = []
-
-    def add(self, variable: Variable) -> None:
-        """Places a variable at the end of its area, or notes one that has an address."""
-        t, area = variable.type, variable.area
-        if variable.offset < 0:
-            variable.offset = align_up(self.sizes[area], t.align)
-        self.sizes[area] = max(self.sizes[area], variable.offset + t.size)
-        self.variables.append(variable)
-
-
-class Declarations(TypeDeclarations):
-    """Turns declarations into types and variables."""
-
-    def __init__(self, world: World) -> None:
-        super().__init__(world)
-        self.direct = DirectVariables(world)
+    def __init__(self, world: World, types: TypeDeclarations, config: InstanceConfig) -> None:
+        self._world = world
+        self._types = types
+        self._config = config
 
     def add(self, scope: Scope, symbol: VarSymbol, offset: int) -> bool:
         """Makes a name known in a scope; False when it is taken."""
@@ -94,7 +73,7 @@ class Declarations(TypeDeclarations):
             zero: int | float | str = "" if isinstance(t, StringType) else 0.0 if _is_real(t) else 0
             symbol.value = Const(init.value if isinstance(init, ScalarInit) else zero, t, pos)
             if not scope.library:
-                self.world.constants[full_name] = symbol.value
+                self._world.constants[full_name] = symbol.value
         elif t is not ERROR:
             symbol.variable = self.shared_variable(full_name, t, init, scope, offset, constant=True)
         return symbol
@@ -112,26 +91,26 @@ class Declarations(TypeDeclarations):
     ) -> Variable:
         """A variable that exists once for all instances of its POU."""
         key = (scope.source.path, offset)
-        variable = self.world.shared.get(key)
+        variable = self._world.shared.get(key)
         if variable is None:
             area = Area.RETAIN if retain or self.is_retain(t) else Area.DATA
             variable = Variable(full_name, t, Storage.AREA, scope.pos(offset), area, initial=init, constant=constant)
-            self.world.shared[key] = variable
-            self.world.allocation.add(variable)
+            self._world.shared[key] = variable
+            self._world.allocation.add(variable)
         return variable
 
     def global_variable(self, symbol: GlobalSymbol) -> VarSymbol:
         """Declares a global when it is first used, so that the order of declarations does not matter."""
         if symbol.symbol is not None:
             return symbol.symbol
-        scope = self.world.scope(symbol.source)
+        scope = self._world.scope(symbol.source)
         scope.enter(symbol.namespace)
         if symbol.busy:
             scope.error(symbol.pos, "recursion", f"the value of {symbol.name} depends on itself")
             return VarSymbol(symbol.name, scope.pos(symbol.pos), ERROR, Role.GLOBAL)
         symbol.busy = True
-        t, init = self.declared_type(symbol.decl, scope, May.HAVE_ADDRESS)
-        self.world.classes.require_instances(t, scope, symbol.pos)
+        t, init = self._types.declared_type(symbol.decl, scope, May.HAVE_ADDRESS)
+        require_instances(self._world, t, scope, symbol.pos)
         owner = symbol.full_name.rpartition(".")[0]
         if "CONSTANT" in symbol.qualifiers:
             result = self.constant_symbol(symbol.pos, symbol.name, t, init, scope, owner, Role.GLOBAL)
@@ -143,7 +122,7 @@ class Declarations(TypeDeclarations):
                     symbol.full_name, t, init, location, symbol.qualifiers, scope, symbol.pos
                 )
                 if result.variable is not None:
-                    self.world.allocation.add(result.variable)
+                    self._world.allocation.add(result.variable)
         symbol.busy = False
         symbol.symbol = result
         return result
@@ -152,7 +131,7 @@ class Declarations(TypeDeclarations):
         """Where a variable with these names lies: for `AT %I*` VAR_CONFIG says it. None: it has no address."""
         if location is None or not is_open(location):
             return location
-        return self.world.instance_config.location(location.text[1], t, pos, *names)
+        return self._config.location(location.text[1], t, pos, *names)
 
     def area_variable(
         self,
@@ -176,13 +155,13 @@ class Declarations(TypeDeclarations):
         return Variable(name, t, Storage.AREA, pos, Area.RETAIN if retain else Area.DATA, initial=init)
 
     def _holds_instances(self, t: Type) -> bool:
-        return any(part in self.world.blocks for part in instances_in(t))
+        return any(part in self._world.blocks for part in instances_in(t))
 
     def is_retain(self, t: Type) -> bool:
         """Whether instances of the type live in the retain area as a whole."""
         while isinstance(t, ArrayType):
             t = t.element
-        block = self.world.blocks.get(t) if isinstance(t, StructType) else None
+        block = self._world.blocks.get(t) if isinstance(t, StructType) else None
         if block is not None:
             return block.retain
         return isinstance(t, StructType) and any(self.is_retain(f.type) for f in t.fields)

@@ -13,16 +13,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING
 
 from plctool.compiler.semantics.addresses import AREAS, located
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import same_type
-from plctool.compiler.semantics.fixed_places import FixedPlace, fixed_place, with_part
+from plctool.compiler.semantics.declarations.fixed_places import FixedPlace, fixed_place, with_part
+from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
 from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, VarSymbol
 from plctool.compiler.semantics.values import load
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Area,
@@ -40,9 +41,6 @@ from plctool.compiler.typed import (
     VarPlace,
 )  # fmt: skip
 from plctool.compiler.types import BOOL, BYTE, ArrayType, StructType, Type, base_of
-
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
 
 
 @dataclass(eq=False)
@@ -82,21 +80,12 @@ class _Copy:
 class InstanceConfig:
     """The entries of all VAR_CONFIG and VAR_ACCESS."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, types: TypeDeclarations) -> None:
         self._world = world
-        self._blocks: list[ast.InstanceBlock] = []
-        self._prefixes: set[str] = set()  # configurations and resources, case-folded
+        self._types = types
         self._missing: dict[Pos, list[tuple[str, str, Type]]] = {}
         self._open_parts: dict[Type, list[tuple[str, VarSymbol]]] = {}
         self.accesses: list[Variable] = []
-
-    def add(self, decl: ast.InstanceBlock | ast.ConfigurationDecl) -> None:
-        """Notes what a declaration holds."""
-        if isinstance(decl, ast.InstanceBlock):
-            self._blocks.append(decl)
-            return
-        self._blocks += decl.instance_blocks
-        self._prefixes |= {name.casefold() for name in (decl.name, *decl.resources)}
 
     # ---- VAR_CONFIG ----
 
@@ -124,7 +113,9 @@ class InstanceConfig:
     @cached_property
     def _places(self) -> set[str]:
         """The names in front of a path that lead to no variable."""
-        return self._prefixes - {name.casefold() for name in self._world.programs.names()}
+        names = self._world.names
+        prefixes = {name.casefold() for decl in names.configurations for name in (decl.name, *decl.resources)}
+        return prefixes - names.planned.keys()
 
     def _has_area(self, entry: Entry, letter: str) -> bool:
         location = entry.line.location
@@ -136,7 +127,7 @@ class InstanceConfig:
 
     def _lines(self) -> list[tuple[ast.ConfigLine | ast.AccessLine, Scope]]:
         lines = []
-        for block in self._blocks:
+        for block in self._world.names.instance_blocks:
             scope = self._world.scope(block.source)
             scope.sees_inside = True
             lines += [(line, scope) for line in block.lines]
@@ -183,7 +174,7 @@ class InstanceConfig:
         initial: Initial | None = None
         if line.init is not None:
             decl = ast.VarDecl(line.pos, [(line.pos, entry.name)], None, line.type, line.init)
-            initial = self._world.declarations.declared_type(decl, scope)[1]
+            initial = self._types.declared_type(decl, scope)[1]
             variable = fixed.variable
             if initial is not None:
                 variable.initial = with_part(
@@ -278,8 +269,8 @@ class InstanceConfig:
 
     def _find(self, path: ast.Expr, spec: ast.TypeSpec, scope: Scope, use: str) -> tuple[Place, FixedPlace] | None:
         """The variable of a path, which has to be of the type given; None after a diagnosis."""
-        wanted, _ = self._world.declarations.type_of(spec, scope)
-        place = named_place(Checker(scope), path, use)
+        wanted, _ = self._types.type_of(spec, scope)
+        place = named_place(Checker(self._world, scope), path, use)
         if place is None or wanted is ERROR:
             return None
         if isinstance(path, ast.BitAccess):

@@ -6,12 +6,9 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from plctool.compiler.semantics.symbols import PouSymbol
-
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
+from plctool.compiler.semantics.world import World
 
 
 class Hierarchy:
@@ -24,7 +21,7 @@ class Hierarchy:
     def _derived(self) -> dict[PouSymbol, list[PouSymbol]]:
         """The blocks derived directly from a block; roots are among the keys."""
         derived: dict[PouSymbol, list[PouSymbol]] = {}
-        todo = [s for s in self._world.pou_symbols() if s.keyword == "FUNCTION_BLOCK"]
+        todo = [s for s in self._world.names.pou_symbols() if s.keyword == "FUNCTION_BLOCK"]
         seen = set(todo)
         while todo:
             symbol = todo.pop(0)
@@ -41,7 +38,7 @@ class Hierarchy:
     def base_of(self, symbol: PouSymbol) -> PouSymbol | None:
         """The block it is derived from directly."""
         for _, name in symbol.decl.bases[:1]:
-            base = self._world.classes.scope_of(symbol).unit(name)
+            base = self._world.scope_of(symbol).unit(name)
             if isinstance(base, PouSymbol) and base.keyword == "FUNCTION_BLOCK":
                 return base
         return None

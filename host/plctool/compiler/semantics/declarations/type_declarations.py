@@ -6,17 +6,18 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from enum import Flag, auto
-from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.addresses import is_open
 from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.declarations.initial_values import InitialValues
 from plctool.compiler.semantics.generics import is_group
-from plctool.compiler.semantics.initial_values import InitialValues
+from plctool.compiler.semantics.instances import require_instances
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbol, VarSymbol
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import ArrayInit, Const, Initial, ScalarInit, StructInit
 from plctool.compiler.types import (
@@ -41,9 +42,6 @@ from plctool.compiler.types import (
     Type,
 )  # fmt: skip
 
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
-
 MAX_STRING = 0xFFFF
 MAX_TYPE_DEPTH = 50  # levels of arrays of structs of arrays ...
 _STRINGS = ("STRING", "WSTRING")
@@ -64,7 +62,7 @@ class TypeDeclarations:
     """Turns declarations into types."""
 
     def __init__(self, world: World) -> None:
-        self.world = world
+        self._world = world
         self._depth = 0
         self._initials = InitialValues(world)
         self._structs: dict[str, StructType] = {}
@@ -178,29 +176,29 @@ class TypeDeclarations:
             if symbol.busy:
                 scope.error(spec.pos, "recursion", f"the type {symbol.decl.name} contains itself")
                 return ERROR, None
-            return self.resolve_symbol(symbol), symbol.default
+            return self.type_of_symbol(symbol), symbol.default
         if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
-            info = self.world.units.block(symbol)
+            info = self._world.declared.block(symbol)
             if info is None:
                 scope.error(spec.pos, "recursion", f"the function block {spec.name} contains itself")
             return (ERROR, None) if info is None else (info.type, self.struct_default(info.type))
         if isinstance(symbol, PouSymbol) and symbol.keyword == "INTERFACE":
-            return self.world.classes.interface(symbol), None
+            return self._world.declared.interface(symbol), None
         if is_group(spec.name):
             scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
         elif symbol is None and scope.lookup(spec.name) is None:
-            hint = did_you_mean(spec.name, [*ELEMENTARY, *_STRINGS, *self.world.type_names()])
+            hint = did_you_mean(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])
             scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
         else:
             scope.error(spec.pos, "type", f"{spec.name} is not a type")
         return ERROR, None
 
-    def resolve_symbol(self, symbol: TypeSymbol) -> Type:
+    def type_of_symbol(self, symbol: TypeSymbol) -> Type:
         """The type of a TYPE declaration."""
         if symbol.type is not None:
             return symbol.type
         decl = symbol.decl
-        scope = self.world.scope(decl.source, library=symbol.library)
+        scope = self._world.scope(decl.source, library=symbol.library)
         scope.enter(decl.namespace)
         if symbol.busy:
             return ERROR
@@ -214,7 +212,7 @@ class TypeDeclarations:
         return symbol.type
 
     def _string(self, length: ast.Expr, scope: Scope, *, wide: bool) -> Type:
-        n = Checker(scope).integer(length)
+        n = Checker(self._world, scope).integer(length)
         if n is None:
             return ERROR
         if not 1 <= n <= MAX_STRING:
@@ -224,7 +222,7 @@ class TypeDeclarations:
 
     def _array(self, spec: ast.ArraySpec, scope: Scope) -> tuple[Type, Initial | None]:
         element, default = self.type_of(spec.element, scope)
-        checker, bounds = Checker(scope), list[tuple[int, int]]()
+        checker, bounds = Checker(self._world, scope), list[tuple[int, int]]()
         if None in spec.bounds:
             message = "only VAR_IN_OUT, in functions and methods VAR_INPUT and VAR_OUTPUT too, takes an ARRAY[*]"
             scope.error(spec.pos, "type", f"{message}; give this array its bounds")
@@ -266,8 +264,8 @@ class TypeDeclarations:
             scope.error(spec.pos, "type", f"an enumeration is based on an integer type, not on {base}")
             return ERROR, None
         t = EnumType(name or "(" + ", ".join(n for _, n, _ in spec.values) + ")", base, {})
-        inner = Scope(self.world, scope.source, scope.library, dict(scope.names), scope.bindings)
-        checker, value, seen = Checker(inner), -1, set[str]()
+        inner = Scope(scope.globals, scope.source, scope.library, dict(scope.names), scope.bindings)
+        checker, value, seen = Checker(self._world, inner), -1, set[str]()
         for offset, value_name, node in spec.values:
             key = value_name.casefold()
             if key in seen:
@@ -294,7 +292,7 @@ class TypeDeclarations:
 
     def _subrange(self, spec: ast.SubrangeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
         base = self.named_type(spec.pos, spec.base, scope)
-        checker = Checker(scope)
+        checker = Checker(self._world, scope)
         low, high = checker.integer(spec.low), checker.integer(spec.high)
         if base is ERROR or low is None or high is None:
             return ERROR, None
@@ -315,7 +313,7 @@ class TypeDeclarations:
     def _pointer(self, spec: ast.PointerSpec, scope: Scope) -> Type:
         symbol = scope.unit(spec.target.name) if isinstance(spec.target, ast.NamedType) else None
         if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
-            target: Type = self.world.units.layout(symbol) or ERROR  # the block itself may hold the pointer
+            target: Type = self._world.declared.layout(symbol) or ERROR  # the block itself may hold the pointer
         elif isinstance(symbol, TypeSymbol) and symbol.busy and symbol.decl.name in self._structs:
             target = self._structs[symbol.decl.name]  # and so may a struct
         else:
@@ -333,7 +331,7 @@ class TypeDeclarations:
         seen.update(f.name.casefold() for f in t.fields)
         for decl in spec.fields:
             field_type, default = self.declared_type(decl, scope)
-            self.world.classes.require_instances(field_type, scope, decl.pos)
+            require_instances(self._world, field_type, scope, decl.pos)
             for offset, field_name in decl.names:
                 if field_name.casefold() in seen:
                     scope.error(offset, "duplicate", f"{name} has a member {field_name} already")
@@ -349,7 +347,7 @@ class TypeDeclarations:
             scope.error(spec.pos, "size", f"a struct of {t.size} bytes is too large")
             return ERROR, None
         if defaults:
-            self.world.defaults[name] = StructInit(defaults)
+            self._world.defaults[name] = StructInit(defaults)
         return t, self.struct_default(t)
 
     def _extend(self, t: StructType, spec: ast.NamedType, defaults: dict[str, Initial], scope: Scope) -> bool:
@@ -357,15 +355,15 @@ class TypeDeclarations:
         base = self._named(spec, scope)[0]
         if base is ERROR:
             return False
-        if not isinstance(base, StructType) or base in self.world.blocks or base.union is not t.union:
+        if not isinstance(base, StructType) or base in self._world.blocks or base.union is not t.union:
             scope.error(spec.pos, "type", f"{spec.name} is not a {'UNION' if t.union else 'STRUCT'}")
             return False
         t.fields += [Field(f.name, f.type) for f in base.fields]
         t.base = base
-        inherited = self.world.defaults.get(base.name)
+        inherited = self._world.defaults.get(base.name)
         defaults.update(inherited.members if isinstance(inherited, StructInit) else {})
         return True
 
     def struct_default(self, t: StructType) -> Initial | None:
         """What a struct or instance starts with: None for all zero."""
-        return StructInit({}) if t.name in self.world.defaults else None
+        return StructInit({}) if t.name in self._world.defaults else None

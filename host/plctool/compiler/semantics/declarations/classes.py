@@ -9,12 +9,13 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.semantics.class_rules import check_class
-from plctool.compiler.semantics.hierarchy import Hierarchy
-from plctool.compiler.semantics.queries import Queries
+from plctool.compiler.semantics.declarations.class_rules import check_class
+from plctool.compiler.semantics.declarations.functions import Functions
+from plctool.compiler.semantics.declarations.hierarchy import Hierarchy
+from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
+from plctool.compiler.semantics.instances import instances_in
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import (
     ERROR,
@@ -27,12 +28,10 @@ from plctool.compiler.semantics.symbols import (
     Role,
     VarSymbol,
 )  # fmt: skip
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Dispatch, Initial, Pos, Pou, PouKind, ScalarInit, Storage, Variable
-from plctool.compiler.types import UDINT, ArrayType, Field, InterfaceType, StructType, Type
-
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
+from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
+from plctool.compiler.types import UDINT, Field, InterfaceType, StructType
 
 _LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
 CLASS_NUMBER = "%class"  # the hidden member; no identifier, so nothing else can have its name
@@ -49,45 +48,25 @@ def _named(interfaces: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
     return ((offset, name) for offset, name in interfaces if name.casefold() != "__system.iqueryinterface")
 
 
-def instances_in(t: Type) -> Iterator[StructType]:
-    """The structs and function blocks that a variable of the type consists of."""
-    while isinstance(t, ArrayType):
-        t = t.element
-    if isinstance(t, StructType):
-        yield t
-        for f in t.fields:
-            yield from instances_in(f.type)
-
-
 class Classes:
     """Declares classes and interfaces when they are first referred to."""
 
-    def __init__(self, world: World) -> None:
-        self.world = world
-        self.interface_infos: dict[StructType, ClassInfo] = {}
-        self.used = False  # whether anything has methods, actions or properties
+    def __init__(self, world: World, types: TypeDeclarations, functions: Functions) -> None:
+        self._world = world
+        self._types = types
+        self._functions = functions
         self._interfaces: dict[PouSymbol, InterfaceType] = {}
         self._programs: list[ClassInfo] = []
         self._complete: set[ClassInfo] = set()
-        self.hierarchy = Hierarchy(world)
-        self.queries = Queries()
+        self._hierarchy = Hierarchy(world)
         self._blocks: dict[PouSymbol, ClassInfo] = {}
-        self._dispatches: dict[tuple[ClassInfo, str], Dispatch] = {}
-        self._own_calls: list[tuple[Pou, Dispatch, Pos]] = []
-        self._other_calls: list[tuple[Pou, Pou, Dispatch | None, Pos]] = []
 
     # ---- declaring ----
-
-    def scope_of(self, symbol: PouSymbol) -> Scope:
-        """The surroundings of a unit: its source and namespace."""
-        scope = self.world.scope(symbol.decl.source, library=symbol.library)
-        scope.enter(symbol.decl.namespace)
-        return scope
 
     def begin_block(self, symbol: PouSymbol, info: BlockInfo, scope: Scope, defaults: dict[str, Initial]) -> None:
         """Gives a block that is being declared what it inherits, and its class number."""
         decl = symbol.decl
-        cls = ClassInfo(symbol, decl.full_name, info.type, info, number=self.hierarchy.numbers.get(symbol, 0))
+        cls = ClassInfo(symbol, decl.full_name, info.type, info, number=self._hierarchy.numbers.get(symbol, 0))
         info.cls = self._blocks[symbol] = scope.cls = cls
         scope.outer = cls.names
         base = self._base(symbol, scope)
@@ -119,9 +98,9 @@ class Classes:
         if base is not None and not scope.may_use(base, name, offset):
             return None
         if isinstance(base, PouSymbol) and base.keyword == "FUNCTION_BLOCK":
-            info = self.world.units.block(base)
+            info = self._world.declared.block(base)
             if info is None:
-                scope.error(offset, "recursion", f"{symbol.decl.name} extends itself: {self.hierarchy.circle(symbol)}")
+                scope.error(offset, "recursion", f"{symbol.decl.name} extends itself: {self._hierarchy.circle(symbol)}")
             elif "FINAL" in base.decl.modifiers:
                 scope.error(offset, "inheritance", f"{name} is FINAL and cannot be extended")
             return info
@@ -133,7 +112,7 @@ class Classes:
 
     def _no_such(self, offset: int, name: str, scope: Scope, what: str, unknown: bool) -> None:
         if unknown:
-            hint = did_you_mean(name, self.world.type_names())
+            hint = did_you_mean(name, self._world.names.type_names())
             scope.error(offset, "unknown", f"unknown {what} {name}{hint}")
         else:
             scope.error(offset, "type", f"{name} is not {'an' if what[0] in 'aeiou' else 'a'} {what}")
@@ -144,7 +123,7 @@ class Classes:
         info.members |= base.members
         info.retain = base.retain
         info.pou.parameters += base.pou.parameters
-        inherited = self.world.defaults.get(base.type.name)
+        inherited = self._world.defaults.get(base.type.name)
         if inherited is not None:
             defaults.update(inherited.members)
         assert info.cls is not None and base.cls is not None
@@ -156,7 +135,7 @@ class Classes:
             key = member_key(decl)
             if key in cls.members:
                 pos = decl.source.pos(decl.pos)
-                self.world.diagnostics.error(pos, "duplicate", f"{cls.name} has a {decl.keyword} {decl.name} already")
+                self._world.diagnostics.error(pos, "duplicate", f"{cls.name} has a {decl.keyword} {decl.name} already")
                 continue
             cls.members[key] = Member(decl, cls)
             cls.names[decl.name.casefold()] = MemberSymbol(decl.name)
@@ -178,7 +157,7 @@ class Classes:
                 role = _LASTING.get(block.keyword)
                 for line in block.decls if role is not None else []:
                     assert role is not None
-                    t, default = self.world.declarations.declared_type(line, scope)
+                    t, default = self._types.declared_type(line, scope)
                     for offset, name in line.names:
                         symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
                         cls.instance_variables.setdefault(key, {})[name.casefold()] = symbol
@@ -201,14 +180,14 @@ class Classes:
         other = cls.names.get(key)
         if isinstance(other, MemberSymbol):
             message = f"{symbol.name} is a variable of {cls.name} and a method, action or property as well"
-            self.world.diagnostics.error(symbol.pos, "duplicate", message)
+            self._world.diagnostics.error(symbol.pos, "duplicate", message)
             return
         if isinstance(other, VarSymbol) and other.pos == symbol.pos:
             return  # inherited; for an input with R_EDGE that is its edge
         if isinstance(other, VarSymbol) and other.role is not Role.TEMP:
             where = f"{other.name} in line {other.pos.line}"
             message = f"{symbol.name} is inherited already: {where}"
-            self.world.diagnostics.error(symbol.pos, "duplicate", message)
+            self._world.diagnostics.error(symbol.pos, "duplicate", message)
         cls.names[key] = symbol
 
     def program(
@@ -236,11 +215,11 @@ class Classes:
         known = self._interfaces.get(symbol)
         if known is not None:
             return known
-        decl, scope = symbol.decl, self.scope_of(symbol)
+        decl, scope = symbol.decl, self._world.scope_of(symbol)
         target = StructType(decl.full_name)
         cls = ClassInfo(symbol, decl.full_name, target)
         t = self._interfaces[symbol] = InterfaceType(target)
-        self.interface_infos[target] = cls
+        self._world.interfaces[target] = cls
         self._add_members(cls)
         for offset, name in _named(decl.bases):
             base = self._interface_named(offset, name, scope)
@@ -256,16 +235,9 @@ class Classes:
         if symbol is not None and not scope.may_use(symbol, name, offset):
             return None
         if isinstance(symbol, PouSymbol) and symbol.keyword == "INTERFACE":
-            return self.interface_infos[self.interface(symbol).target]  # type: ignore[index]
+            return self._world.interfaces[self.interface(symbol).target]  # type: ignore[index]
         self._no_such(offset, name, scope, "interface", symbol is None)
         return None
-
-    def class_of(self, t: Type) -> ClassInfo | None:
-        """The class of instances of a function block type or behind an interface."""
-        if not isinstance(t, StructType):
-            return None
-        block = self.world.blocks.get(t)
-        return block.cls if block is not None else self.interface_infos.get(t)
 
     def signature(self, member: Member) -> FunctionInfo:
         """A member ready to be called; its body is queued for checking."""
@@ -277,99 +249,35 @@ class Classes:
         pou = Pou(member.name + suffix, kind, decl.source.pos(decl.pos), instance=cls.type)
         pou.checks = "no_checks" not in decl.attributes
         info = member.info = FunctionInfo(pou, [], None, decl.attributes)
-        scope = self.scope_of(cls.symbol)
+        scope = self._world.scope_of(cls.symbol)
         scope.pou, scope.cls, scope.outer = pou, cls, cls.names
         if decl.namespace is not None:
             scope.use(decl.namespace.using)
         scope.names.update(cls.instance_variables.get(member_key(decl), {}))
-        self.world.units.signature(info, decl, scope)
+        self._functions.signature(info, decl, scope)
         if not member.abstract:
-            self.world.add_body(scope, decl, pou, cls.symbol.library)
+            self._world.bodies.add(scope, decl, pou)
         elif decl.body:
             scope.error(decl.pos, "inheritance", f"{member.name} has no body, because it is ABSTRACT")
         return info
 
     def declare_members(self) -> None:
         """Declares the members of everything known so far, used or not, so that all of it is checked."""
-        for symbol in self.world.pou_symbols():
+        for symbol in self._world.names.pou_symbols():
             if symbol.keyword == "INTERFACE":
                 self.interface(symbol)
-        classes = [*self.interface_infos.values(), *self._blocks.values(), *self._programs]
+        classes = [*self._world.interfaces.values(), *self._blocks.values(), *self._programs]
         new = [cls for cls in classes if cls not in self._complete]
         self._complete.update(new)
         for cls in new:
             for member in cls.members.values():
                 self.signature(member)
         for cls in new:
-            check_class(self, cls)
+            check_class(self._world, cls)
 
-    # ---- calls of what is only known when it runs ----
-
-    def dispatch(self, cls: ClassInfo, key: str, function: Pou) -> Dispatch | None:
-        """For a call of the member `key`, or of the body for "", of an instance of `cls` or of a class that conforms;
-        None when there is only `cls`."""
-        if not cls.is_interface and not cls.number:
-            return None
-        return self._dispatches.setdefault((cls, key), Dispatch(function))
-
-    def note_own_call(self, caller: Pou | None, dispatch: Dispatch, pos: Pos) -> None:
-        """A call on the own instance, which counts as recursion when it leads back."""
-        if caller is not None:
-            self._own_calls.append((caller, dispatch, pos))
-
-    def note_other_call(self, caller: Pou | None, function: Pou, dispatch: Dispatch | None, pos: Pos) -> None:
-        """A call on an instance behind a pointer, which may be the own one or not."""
-        if caller is not None:
-            self._other_calls.append((caller, function, dispatch, pos))
-
-    def finish(self, variables: Iterable[Variable]) -> None:
-        """Finds the targets of all dispatches: of classes that have instances among the variables."""
+    def find_targets(self, variables: Iterable[Variable]) -> None:
+        """Finds the targets of all calls that depend on a class: of those that have instances among the variables."""
         present = {t for v in variables for t in instances_in(v.type)}
-        self.queries.finish(cls for cls in self._blocks.values() if cls.number and cls.type in present)
-        for (cls, key), dispatch in self._dispatches.items():
-            for other in self._blocks.values():
-                if other.type not in present or cls.type is None or not other.type.conforms(cls.type):
-                    continue
-                assert other.block is not None
-                member = other.find(key) if key else None
-                if not key:
-                    dispatch.targets[other.number] = other.block.pou
-                elif member is not None and not member.abstract:
-                    dispatch.targets[other.number] = self.signature(member).pou
-        for caller, dispatch, pos in self._own_calls:
-            for target in dispatch.targets.values():
-                self.world.calls.add(caller, target, pos)
-        for caller, function, dispatch_of, pos in self._other_calls:
-            targets = [function] if dispatch_of is None else list(dispatch_of.targets.values())
-            if caller in targets:
-                message = f"{caller.name} may call itself here: the calls have to fit the stack of the controller"
-                self.world.diagnostics.warning(pos, "recursion", message)
-
-    # ---- instances ----
-
-    def require_instances(self, t: Type, scope: Scope, offset: int) -> None:
-        """Reports a variable of an ABSTRACT function block."""
-        while isinstance(t, ArrayType):
-            t = t.element
-        cls = self.class_of(t)
-        if cls is not None and cls.abstract:
-            message = f"{cls.name} is ABSTRACT and has no instances; declare one of a function block that extends it"
-            scope.error(offset, "inheritance", message)
-
-    def initialisers(self, t: StructType) -> list[Member]:
-        """The FB_Init methods of a block, that of the base first."""
-        return list(reversed(self._each(t, "fb_init")))
-
-    def finalisers(self, t: StructType) -> list[Member]:
-        """The FB_Exit methods of a block, that of the base last."""
-        return self._each(t, "fb_exit")
-
-    def _each(self, t: StructType, key: str) -> list[Member]:
-        """The methods of that name of a block and of its bases."""
-        found: list[Member] = []
-        cls = self.class_of(t)
-        while cls is not None:
-            if key in cls.members:
-                found.append(cls.members[key])
-            cls = cls.base
-        return found
+        self._world.dispatches.find_targets(
+            (cls for cls in self._blocks.values() if cls.type in present), self.signature
+        )

@@ -5,59 +5,54 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.conversions import same_type
+from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.symbols import ClassInfo, Member
+from plctool.compiler.semantics.world import World
 from plctool.compiler.types import BOOL
 
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.classes import Classes
 
-INITIALISERS = ("fb_init", "fb_reinit", "fb_exit")  # each class may have its own parameters
-
-
-def check_class(classes: Classes, cls: ClassInfo) -> None:
+def check_class(world: World, cls: ClassInfo) -> None:
     """Reports what is wrong with the members of a class and what is missing."""
     for key, member in cls.members.items():
         inherited = cls.base.find(key) if cls.base is not None else None
         if inherited is not None and key not in INITIALISERS:
-            _check_override(classes, member, inherited)
+            _check_override(world, member, inherited)
         elif "OVERRIDE" in member.decl.modifiers and not any(key in i.members for i in cls.all_interfaces()):
             names = cls.base.member_names() if cls.base is not None else []
             hint = did_you_mean(member.decl.name, names)
-            _error(classes, member, f"{member.name} overrides nothing{hint}")
+            _error(world, member, f"{member.name} overrides nothing{hint}")
         if key == "fb_exit":
-            _check_exit(classes, member)
+            _check_exit(world, member)
         if member.abstract and not cls.abstract:
-            _error(classes, member, f"{member.name} is ABSTRACT, so {cls.name} has to be ABSTRACT as well")
+            _error(world, member, f"{member.name} is ABSTRACT, so {cls.name} has to be ABSTRACT as well")
     if not cls.is_interface:
-        _check_interfaces(classes, cls)
+        _check_interfaces(world, cls)
         if not cls.abstract and cls.base is not None:
-            _check_complete(classes, cls)
+            _check_complete(world, cls)
 
 
-def _check_exit(classes: Classes, member: Member) -> None:
+def _check_exit(world: World, member: Member) -> None:
     """The runtime calls it, and tells nothing but whether the instance moves."""
-    parameters = [(symbol.name.casefold(), symbol.type) for symbol, _ in classes.signature(member).parameters]
+    parameters = [(symbol.name.casefold(), symbol.type) for symbol, _ in world.declared.member(member).parameters]
     if parameters not in ([], [("bincopycode", BOOL)]):
-        _error(classes, member, f"{member.name} has bInCopyCode : BOOL as its only input, or none")
+        _error(world, member, f"{member.name} has bInCopyCode : BOOL as its only input, or none")
 
 
-def _check_override(classes: Classes, member: Member, inherited: Member) -> None:
+def _check_override(world: World, member: Member, inherited: Member) -> None:
     if "FINAL" in inherited.decl.modifiers:
-        _error(classes, member, f"{inherited.name} is FINAL and cannot be overridden")
+        _error(world, member, f"{inherited.name} is FINAL and cannot be overridden")
     elif "PRIVATE" in inherited.decl.modifiers:
-        _error(classes, member, f"{inherited.name} is PRIVATE and cannot be overridden; choose another name")
+        _error(world, member, f"{inherited.name} is PRIVATE and cannot be overridden; choose another name")
     else:
-        _check_signature(classes, member, inherited)
+        _check_signature(world, member, inherited)
 
 
-def _check_signature(classes: Classes, member: Member, wanted: Member) -> None:
+def _check_signature(world: World, member: Member, wanted: Member) -> None:
     """The same parameters and result, as calls through the base or interface need it."""
-    own, other = signature_text(classes, member), signature_text(classes, wanted)
-    a, b = classes.signature(member), classes.signature(wanted)
+    own, other = signature_text(world, member), signature_text(world, wanted)
+    a, b = world.declared.member(member), world.declared.member(wanted)
     same = len(a.parameters) == len(b.parameters) and (a.result is None) == (b.result is None)
     if same and a.result is not None and b.result is not None:
         same = same_type(a.result, b.result)
@@ -65,12 +60,12 @@ def _check_signature(classes: Classes, member: Member, wanted: Member) -> None:
         same = same and x.name.casefold() == y.name.casefold()
         same = same and x_direction is y_direction and same_type(x.type, y.type)
     if not same:
-        _error(classes, member, f"{member.name} has to be declared as in {wanted.owner.name}: {other}, not {own}")
+        _error(world, member, f"{member.name} has to be declared as in {wanted.owner.name}: {other}, not {own}")
 
 
-def signature_text(classes: Classes, member: Member) -> str:
+def signature_text(world: World, member: Member) -> str:
     """`m(x : INT; VAR_IN_OUT y : REAL) : BOOL`"""
-    info = classes.signature(member)
+    info = world.declared.member(member)
     words = [
         f"{'' if direction.value == 'VAR_INPUT' else direction.value + ' '}{symbol.name} : {symbol.type}"
         for symbol, direction in info.parameters
@@ -78,7 +73,7 @@ def signature_text(classes: Classes, member: Member) -> str:
     return f"{member.decl.name}({'; '.join(words)})" + (f" : {info.result}" if info.result is not None else "")
 
 
-def _check_interfaces(classes: Classes, cls: ClassInfo) -> None:
+def _check_interfaces(world: World, cls: ClassInfo) -> None:
     for interface in cls.all_interfaces():
         missing = []
         for key, wanted in interface.members.items():
@@ -86,21 +81,21 @@ def _check_interfaces(classes: Classes, cls: ClassInfo) -> None:
             if member is None or member.owner.is_interface:
                 missing.append(_described(wanted))
             elif member.owner is cls or interface in cls.interfaces:
-                _check_implementation(classes, member, wanted)
+                _check_implementation(world, member, wanted)
         if missing and not cls.abstract:
             pos = cls.symbol.decl.source.pos(cls.symbol.decl.pos)
             message = f"{cls.name} does not implement {_listed(missing)} of {interface.name}"
-            classes.world.diagnostics.error(pos, "inheritance", message)
+            world.diagnostics.error(pos, "inheritance", message)
 
 
-def _check_implementation(classes: Classes, member: Member, wanted: Member) -> None:
+def _check_implementation(world: World, member: Member, wanted: Member) -> None:
     hidden = member.decl.modifiers & {"PRIVATE", "PROTECTED"}
     if hidden:
-        _error(classes, member, f"{member.name} implements {wanted.name}, so it cannot be {hidden.pop()}")
-    _check_signature(classes, member, wanted)
+        _error(world, member, f"{member.name} implements {wanted.name}, so it cannot be {hidden.pop()}")
+    _check_signature(world, member, wanted)
 
 
-def _check_complete(classes: Classes, cls: ClassInfo) -> None:
+def _check_complete(world: World, cls: ClassInfo) -> None:
     """What bases leave open has to be there."""
     missing: dict[str, str] = {}
     base = cls.base
@@ -113,7 +108,7 @@ def _check_complete(classes: Classes, cls: ClassInfo) -> None:
     if missing:
         pos = cls.symbol.decl.source.pos(cls.symbol.decl.pos)
         message = f"{cls.name} has to implement {_listed(list(missing.values()))}, or to be ABSTRACT"
-        classes.world.diagnostics.error(pos, "inheritance", message)
+        world.diagnostics.error(pos, "inheritance", message)
 
 
 def _described(member: Member) -> str:
@@ -124,5 +119,5 @@ def _listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _error(classes: Classes, member: Member, message: str) -> None:
-    classes.world.diagnostics.error(member.decl.source.pos(member.decl.pos), "inheritance", message)
+def _error(world: World, member: Member, message: str) -> None:
+    world.diagnostics.error(member.decl.source.pos(member.decl.pos), "inheritance", message)
