@@ -46,7 +46,7 @@ def is_open(location: ast.DirectAddress | None) -> bool:
     return location is not None and location.text.endswith("*")
 
 
-def read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
+def _read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
     """What `%IW2` means; None after a diagnosis."""
     match = _ADDRESS.fullmatch(node.text.upper())
     letter, size, first, second = match.groups() if match is not None else ("", "", "", None)
@@ -66,7 +66,7 @@ def located(
     name: str, t: Type, init: Initial | None, location: ast.DirectAddress, scope: Scope, offset: int
 ) -> Variable | None:
     """A variable with AT, declared at `offset`; None after a diagnosis."""
-    address = read_address(location, scope)
+    address = _read_address(location, scope)
     if address is None:
         return None
     base = elementary(t)
@@ -99,7 +99,7 @@ class DirectVariables:
         symbol = self._known.get(key)
         if symbol is not None:
             return symbol
-        address = read_address(node, scope)
+        address = _read_address(node, scope)
         variable = None if address is None else located(key, address.type, None, node, scope, node.pos)
         if address is None or variable is None:
             return None

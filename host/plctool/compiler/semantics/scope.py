@@ -25,7 +25,7 @@ from plctool.compiler.typed import Pos, Pou, Statement
 from plctool.compiler.types import Type
 
 
-def internal_to(symbol: Symbol) -> str | None:
+def _internal_to(symbol: Symbol) -> str | None:
     """The namespace that alone may use a unit or global; None when everybody may."""
     if isinstance(symbol, GlobalSymbol):
         space, marked = symbol.namespace, "INTERNAL" in symbol.qualifiers
@@ -99,7 +99,7 @@ class Scope:
 
     def may_use(self, symbol: Symbol, name: str, offset: int) -> bool:
         """Whether a unit or global may be used here; reports what is INTERNAL elsewhere."""
-        owner = internal_to(symbol)
+        owner = _internal_to(symbol)
         if owner is None or self.is_within(owner):
             return True
         self.error(offset, "access", f"{name} is INTERNAL: only the namespace {owner} may use it")

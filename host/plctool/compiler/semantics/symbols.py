@@ -206,9 +206,8 @@ class Member:
 
 @dataclass(slots=True, eq=False)
 class ClassInfo:
-    """What a FUNCTION_BLOCK, INTERFACE or PROGRAM has besides variables. `members` are its own; `names` what they
-    see of
-    the unit around them. `number` identifies the class in its instances; 0 when none has to be told from others."""
+    """What a FUNCTION_BLOCK, INTERFACE or PROGRAM has besides variables. `members` are its own; `names` what they see
+    of the unit around them. `number` identifies the class in its instances; 0 when none has to be told from others."""
 
     symbol: PouSymbol
     name: str

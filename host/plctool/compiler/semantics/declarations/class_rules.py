@@ -51,7 +51,7 @@ def _check_override(world: World, member: Member, inherited: Member) -> None:
 
 def _check_signature(world: World, member: Member, wanted: Member) -> None:
     """The same parameters and result, as calls through the base or interface need it."""
-    own, other = signature_text(world, member), signature_text(world, wanted)
+    own, other = _signature_text(world, member), _signature_text(world, wanted)
     a, b = world.declared.member(member), world.declared.member(wanted)
     same = len(a.parameters) == len(b.parameters) and (a.result is None) == (b.result is None)
     if same and a.result is not None and b.result is not None:
@@ -63,7 +63,7 @@ def _check_signature(world: World, member: Member, wanted: Member) -> None:
         _error(world, member, f"{member.name} has to be declared as in {wanted.owner.name}: {other}, not {own}")
 
 
-def signature_text(world: World, member: Member) -> str:
+def _signature_text(world: World, member: Member) -> str:
     """`m(x : INT; VAR_IN_OUT y : REAL) : BOOL`"""
     info = world.declared.member(member)
     words = [

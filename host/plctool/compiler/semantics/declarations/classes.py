@@ -37,7 +37,7 @@ _LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in 
 CLASS_NUMBER = "%class"  # the hidden member; no identifier, so nothing else can have its name
 
 
-def member_key(decl: ast.PouDecl) -> str:
+def _member_key(decl: ast.PouDecl) -> str:
     """Under which a member is found; a property has two."""
     name = decl.name.casefold()
     return f"{name}.{decl.keyword.lower()}" if decl.keyword in ("GET", "SET") else name
@@ -132,7 +132,7 @@ class Classes:
 
     def _add_members(self, cls: ClassInfo) -> None:
         for decl in cls.symbol.decl.members:
-            key = member_key(decl)
+            key = _member_key(decl)
             if key in cls.members:
                 pos = decl.source.pos(decl.pos)
                 self._world.diagnostics.error(pos, "duplicate", f"{cls.name} has a {decl.keyword} {decl.name} already")
@@ -253,7 +253,7 @@ class Classes:
         scope.pou, scope.cls, scope.outer = pou, cls, cls.names
         if decl.namespace is not None:
             scope.use(decl.namespace.using)
-        scope.names.update(cls.instance_variables.get(member_key(decl), {}))
+        scope.names.update(cls.instance_variables.get(_member_key(decl), {}))
         self._functions.signature(info, decl, scope)
         if not member.abstract:
             self._world.bodies.add(scope, decl, pou)

@@ -56,7 +56,7 @@ class Entry:
     @property
     def name(self) -> str:
         """The path as text."""
-        return path_text(self.path)
+        return _path_text(self.path)
 
 
 @dataclass
@@ -277,7 +277,7 @@ class InstanceConfig:
             scope.error(path.pos, "place", f"{use} names variables, not single bits of them")
             return None
         if not same_type(wanted, place.type):
-            scope.error(spec.pos, "type", f"{path_text(path)} is {place.type}, not {wanted}")
+            scope.error(spec.pos, "type", f"{_path_text(path)} is {place.type}, not {wanted}")
             return None
         fixed = fixed_place(place)
         if fixed is None:
@@ -296,11 +296,11 @@ def _example(t: Type) -> str:
     return "X0.0" if base_of(t) is BOOL else {2: "W0", 4: "D0", 8: "L0"}.get(t.align, "B0")
 
 
-def path_text(path: ast.Expr) -> str:
+def _path_text(path: ast.Expr) -> str:
     """`Main.fb[3].x` as written, without spaces."""
     if isinstance(path, ast.Member):
-        return f"{path_text(path.base)}.{path.name}"
+        return f"{_path_text(path.base)}.{path.name}"
     if isinstance(path, ast.Index):
         indices = ",".join(str(e.value) if isinstance(e, ast.Literal) else "?" for e in path.indices)
-        return f"{path_text(path.base)}[{indices}]"
+        return f"{_path_text(path.base)}[{indices}]"
     return path.name if isinstance(path, ast.Name) else path.text if isinstance(path, ast.DirectAddress) else "?"

@@ -45,21 +45,6 @@ class Variables:
         self._types = types
         self._config = config
 
-    def add(self, scope: Scope, symbol: VarSymbol, offset: int) -> bool:
-        """Makes a name known in a scope; False when it is taken."""
-        key = symbol.name.casefold()
-        other = scope.names.get(key)
-        if isinstance(other, VarSymbol):
-            if other.role is Role.RESULT:
-                scope.error(offset, "duplicate", f"{symbol.name} is the name of this function")
-            else:
-                scope.error(
-                    offset, "duplicate", f"{symbol.name} is declared already: {other.name} in line {other.pos.line}"
-                )
-            return False
-        scope.names[key] = symbol
-        return True
-
     def constant_symbol(
         self, offset: int, name: str, t: Type, init: Initial | None, scope: Scope, owner: str, role: Role
     ) -> VarSymbol:

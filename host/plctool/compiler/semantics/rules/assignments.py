@@ -5,7 +5,6 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Container
 from dataclasses import replace
 
 from plctool.compiler.semantics.checker import Checker, checks_statement
@@ -17,11 +16,12 @@ from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Assign, Const, DerefPlace, If, Load, Pos, Statement
-from plctool.compiler.types import BOOL, OpenArrayType, ReferenceType, StructType
+from plctool.compiler.types import BOOL, OpenArrayType, ReferenceType
 
 
 @checks_statement(ast.Assign)
 def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
+    """`a := b := e`, `a S= e`, `a R= e`, `r REF= x`, `i ?= x`"""
     if node.op == "REF=":
         return _assign_reference(c, node)
     if node.op == "?=":
@@ -31,7 +31,7 @@ def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
     if isinstance(node.value, ast.Call):
         declared = parameter_names(c, node.value.callee)
         if has_enable(node.value, declared):
-            return _enabled_assignment(c, node, node.value, declared)
+            return enabled(c, node.value, declared, lambda plain: assignment(c, replace(node, value=plain)))
     result: list[Statement] = []
     source: ast.Expr = node.value
     for target in reversed(node.targets):
@@ -56,8 +56,7 @@ def _assign_one(c: Checker, target: ast.Expr, source: ast.Expr, pos: Pos) -> Sta
     if isinstance(place.type, OpenArrayType):
         c.error(target.pos, "type", "an ARRAY[*] cannot be assigned as a whole; assign its elements in a loop")
         return None
-    block = c.world.blocks.get(place.type) if isinstance(place.type, StructType) else None
-    if block is not None:
+    if place.type in c.world.blocks:
         c.error(target.pos, "type", f"an instance of the function block {place.type} cannot be assigned")
         return None
     return Assign(place, value, pos)
@@ -90,7 +89,3 @@ def _set_or_reset(c: Checker, node: ast.Assign) -> list[Statement]:
     pos = c.pos(node.pos)
     change = Assign(place, Const(int(node.op == "S="), BOOL, pos), pos)
     return [If([(condition, [change])], [], pos)]
-
-
-def _enabled_assignment(c: Checker, node: ast.Assign, call: ast.Call, declared: Container[str]) -> list[Statement]:
-    return enabled(c, call, declared, lambda plain: assignment(c, replace(node, value=plain)))

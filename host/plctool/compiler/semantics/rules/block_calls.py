@@ -94,9 +94,9 @@ def called_instance(c: Checker, call: ast.Call) -> Expr | None:
         symbol = c.scope.lookup(callee.name)
         if symbol is None and callee.name.upper() == "SUPER" and c.scope.cls is not None:
             return c.expr(ast.Deref(callee.pos, callee))
-        if not isinstance(symbol, VarSymbol | GlobalSymbol) or (
-            isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT
-        ):  # fmt: skip
+        if not isinstance(symbol, VarSymbol | GlobalSymbol):
+            return None
+        if isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT:
             return None
     e = c.expr(callee)
     return e if (isinstance(e.type, StructType) and e.type in c.world.blocks) or e.type is ERROR else None
@@ -165,9 +165,7 @@ def _block_in_out(
     if place is None or not isinstance(place.type, StringType) or not isinstance(variable.type, StringType):
         return place
     if place.type.length < variable.type.length:
-        c.error(
-            argument.pos, "type", f"the VAR_IN_OUT {variable.name} is {variable.type}, {place.type} is too short"
-        )  # fmt: skip
+        c.error(argument.pos, "type", f"the VAR_IN_OUT {name} is {variable.type}, {place.type} is too short")
         return None
     return place
 

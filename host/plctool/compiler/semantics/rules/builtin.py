@@ -5,13 +5,11 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-import re
-
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value
 from plctool.compiler.semantics.rules import intrinsics, operator_functions, variable_questions
-from plctool.compiler.semantics.rules.applied import Applied
+from plctool.compiler.semantics.rules.applied import Applied, BuiltIn
 from plctool.compiler.semantics.rules.conversion_calls import conversion, conversion_hint
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
@@ -21,10 +19,6 @@ from plctool.compiler.types import (
     Type,
 )
 
-_FORMAL = {
-    "LOWER_BOUND": ("ARR", "DIM"), "UPPER_BOUND": ("ARR", "DIM"),
-    "SHL": ("IN", "N"), "SHR": ("IN", "N"), "ROL": ("IN", "N"), "ROR": ("IN", "N"), "SEL": ("G", "IN0", "IN1"),
-}  # fmt: skip
 _FUNCTIONS = operator_functions.FUNCTIONS | intrinsics.FUNCTIONS | variable_questions.FUNCTIONS
 
 
@@ -35,7 +29,7 @@ def built_in_call(c: Checker, name: str, node: ast.Call, expected: Type | None) 
     function = _FUNCTIONS.get(name)
     if function is None:
         return conversion(c, name, node, expected)
-    args = _checked_arguments(c, name, node, expected)
+    args = _checked_arguments(c, name, function, node, expected)
     if args is None:
         return error_value(c.pos(node.pos))
     if not function.takes(len(args)):
@@ -52,11 +46,13 @@ def function_hint(c: Checker, name: str) -> str:
     )
 
 
-def _checked_arguments(c: Checker, name: str, node: ast.Call, expected: Type | None) -> list[Expr] | None:
+def _checked_arguments(
+    c: Checker, name: str, function: BuiltIn, node: ast.Call, expected: Type | None
+) -> list[Expr] | None:
     """Checked arguments in order; formal ones by the names of the standard."""
     found: dict[int, Expr] = {}
     for i, argument in enumerate(node.args):
-        at = _index_of(name, argument, i)
+        at = _index_of(function, argument, i)
         if at is None or at in found or argument.value is None:
             c.error(argument.pos, "arguments", f"{name} has no parameter {argument.name or i + 1}")
             return None
@@ -69,17 +65,8 @@ def _checked_arguments(c: Checker, name: str, node: ast.Call, expected: Type | N
     return None if any(a.type is ERROR for a in args) else args
 
 
-def _index_of(name: str, argument: ast.Argument, i: int) -> int | None:
+def _index_of(function: BuiltIn, argument: ast.Argument, i: int) -> int | None:
     """Which argument this is; None when the function has none of that name."""
     if argument.output:
         return None
-    if argument.name is None:
-        return i
-    key = argument.name.upper()
-    if name in _FORMAL:
-        return _FORMAL[name].index(key) if key in _FORMAL[name] else None
-    if name == "MUX":
-        return 0 if key == "K" else int(key[2:]) + 1 if re.fullmatch(r"IN\d{1,3}", key) else None
-    if key == "IN":
-        return 0
-    return int(key[2:]) - 1 if re.fullmatch(r"IN[1-9]\d{0,2}", key) else None
+    return i if argument.name is None else function.index_of(argument.name.upper())

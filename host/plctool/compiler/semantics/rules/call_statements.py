@@ -39,6 +39,7 @@ def call_statement(c: Checker, statement: ast.ExprStmt) -> list[Statement]:
 
 
 def _called(c: Checker, node: ast.Call) -> list[Statement]:
+    """A call of a program, of an instance or of a function."""
     program = called_program(c, node.callee)
     if program is not None:
         names = {symbol.name.casefold() for symbol, _ in program.parameters}

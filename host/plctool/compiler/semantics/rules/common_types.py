@@ -23,6 +23,7 @@ from plctool.compiler.types import BOOL, CHAR, LREAL, REAL, WCHAR, Kind, Pointer
 
 
 def untyped_bits(c: Checker, e: Expr, expected: Type | None) -> Expr:
+    """An untyped constant as the operand of NOT or of a shift: of the type its surroundings would like."""
     base = elementary(expected) if expected is not None else None
     if base is not None and (base.kind in NUMBERS or base is BOOL):
         return c.coerce(e, base)
@@ -73,7 +74,7 @@ def common_of(c: Checker, values: list[Expr], name: str, offset: int, expected: 
         result = None if result is None else common_type(result, t)
     for v in values:
         if result is not None and is_untyped(v):
-            result = literal_common(v, result, expected)
+            result = _literal_common(v, result, expected)
     if result is None:
         listed = " and ".join(dict.fromkeys(str(t) for t in typed))
         c.error(offset, "type", f"{name} cannot combine {listed}")
@@ -81,7 +82,7 @@ def common_of(c: Checker, values: list[Expr], name: str, offset: int, expected: 
     return result.base if isinstance(result, SubrangeType) else result
 
 
-def literal_common(literal: Expr, t: Type, expected: Type | None) -> Type | None:
+def _literal_common(literal: Expr, t: Type, expected: Type | None) -> Type | None:
     """The common type of an untyped constant and a type: the type itself when the constant fits."""
     assert isinstance(literal, Const)
     base = elementary(t)

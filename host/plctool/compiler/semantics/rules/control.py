@@ -56,6 +56,7 @@ def _names_something(node: object) -> bool:
 
 @checks_statement(ast.If)
 def if_statement(c: Checker, node: ast.If) -> list[Statement]:
+    """IF; what a constant condition leaves out is reported."""
     branches = [(c.condition(condition), check_body(c, body)) for condition, body in node.branches]
     bodies = [*(body for _, body in node.branches), node.otherwise]
     for number, (condition, body) in enumerate(node.branches):
@@ -78,6 +79,7 @@ def _constant_condition(node: ast.Expr, condition: Expr) -> bool | None:
 
 @checks_statement(ast.Case)
 def case_statement(c: Checker, node: ast.Case) -> list[Statement]:
+    """CASE; labels are constants, and none is there twice."""
     selector = c.settled(node.selector)
     base = elementary(selector.type)
     if selector.type is not ERROR and (base is None or base.kind not in NUMBERS):
@@ -137,6 +139,7 @@ def _label_value(c: Checker, node: ast.Expr, t: Type) -> int | None:
 
 @checks_statement(ast.For)
 def for_statement(c: Checker, node: ast.For) -> list[Statement]:
+    """FOR; the limits are brought to the type of the variable."""
     place = changeable_place(c, node.var, "the FOR loop", "be the variable of a FOR loop")
     t = None if place is None else elementary(place.type)
     if place is not None and (t is None or t.kind not in NUMBERS):
@@ -174,6 +177,7 @@ def _loop_body(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
 
 @checks_statement(ast.While)
 def while_statement(c: Checker, node: ast.While) -> list[Statement]:
+    """WHILE"""
     condition = c.condition(node.condition)
     if _constant_condition(node.condition, condition) is False and node.body:
         report_unreachable(c, node.body[0].pos, ": the condition is always FALSE")
@@ -182,12 +186,14 @@ def while_statement(c: Checker, node: ast.While) -> list[Statement]:
 
 @checks_statement(ast.RepeatUntil)
 def repeat_statement(c: Checker, node: ast.RepeatUntil) -> list[Statement]:
+    """REPEAT"""
     body = _loop_body(c, node.body)
     return [Repeat(body, c.condition(node.until), c.pos(node.pos))]
 
 
 @checks_statement(ast.Exit)
 def exit_statement(c: Checker, node: ast.Exit) -> list[Statement]:
+    """EXIT"""
     if not c.loops:
         c.error(node.pos, "statement", "EXIT stands outside of a loop")
     return [Exit(c.pos(node.pos))]
@@ -195,6 +201,7 @@ def exit_statement(c: Checker, node: ast.Exit) -> list[Statement]:
 
 @checks_statement(ast.Continue)
 def continue_statement(c: Checker, node: ast.Continue) -> list[Statement]:
+    """CONTINUE"""
     if not c.loops:
         c.error(node.pos, "statement", "CONTINUE stands outside of a loop")
     return [Continue(c.pos(node.pos))]
@@ -202,4 +209,5 @@ def continue_statement(c: Checker, node: ast.Continue) -> list[Statement]:
 
 @checks_statement(ast.Return)
 def return_statement(c: Checker, node: ast.Return) -> list[Statement]:
+    """RETURN"""
     return [Return(c.pos(node.pos))]

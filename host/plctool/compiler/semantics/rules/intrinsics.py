@@ -5,10 +5,12 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
+
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, error_value, settle
-from plctool.compiler.semantics.rules.applied import Applied, BuiltIn
+from plctool.compiler.semantics.rules.applied import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.common_types import common_of, untyped_bits
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.symbols import ERROR
@@ -92,6 +94,11 @@ def _mux(c: Checker, f: Applied) -> Expr:
     return _choose(c, Intrinsic.MUX, convert(selector, base), f)
 
 
+def _mux_index(key: str) -> int | None:
+    """K, IN0, IN1 ..."""
+    return 0 if key == "K" else int(key[2:]) + 1 if re.fullmatch(r"IN\d{1,3}", key) else None
+
+
 def _choose(c: Checker, intrinsic: Intrinsic, selector: Expr, f: Applied) -> Expr:
     """One of the arguments behind the selector."""
     values = f.args[1:]
@@ -126,11 +133,11 @@ def _time(c: Checker, f: Applied) -> Expr:
 
 
 FUNCTIONS: dict[str, BuiltIn] = {
-    **dict.fromkeys(_SHIFTS, BuiltIn(_shift, 2, 2)),
+    **dict.fromkeys(_SHIFTS, BuiltIn(_shift, 2, 2, named("IN", "N"))),
     "ABS": BuiltIn(_abs, 1, 1),
     "SQRT": BuiltIn(_sqrt, 1, 1),
-    "SEL": BuiltIn(_select, 3, 3),
-    "MUX": BuiltIn(_mux, 3),
+    "SEL": BuiltIn(_select, 3, 3, named("G", "IN0", "IN1")),
+    "MUX": BuiltIn(_mux, 3, None, _mux_index),
     "MIN": BuiltIn(_extreme, 2),
     "MAX": BuiltIn(_extreme, 2),
     "TIME": BuiltIn(_time, 0, 0),

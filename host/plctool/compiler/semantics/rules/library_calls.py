@@ -37,7 +37,7 @@ def call_symbol(c: Checker, symbol: PouSymbol, args: list[ast.Argument], offset:
         result = call_symbol(c, symbol, args[:2], offset, expected)
         for argument in args[2:]:
             assert argument.value is not None
-            result = call_checked(c, symbol, [result, c.expr(argument.value, expected)], offset, expected)
+            result = _call_checked(c, symbol, [result, c.expr(argument.value, expected)], offset, expected)
         return result
     if is_generic(symbol.decl):
         return _call_generic(c, symbol, args, offset, expected)
@@ -51,7 +51,7 @@ def call_symbol(c: Checker, symbol: PouSymbol, args: list[ast.Argument], offset:
     return typed_call(c, info, dict(bound), offset)
 
 
-def call_checked(c: Checker, symbol: PouSymbol, values: list[Expr], offset: int, expected: Type | None) -> Expr:
+def _call_checked(c: Checker, symbol: PouSymbol, values: list[Expr], offset: int, expected: Type | None) -> Expr:
     """A call with arguments that are checked already."""
     if any(v.type is ERROR for v in values):
         return error_value(c.pos(offset))
@@ -70,7 +70,7 @@ def call_by_name(c: Checker, name: str, args: list[Expr], offset: int, expected:
         symbol = _best_overload(c, name, args, expected)
     if symbol is None:
         return c.error(offset, "unknown", f"the library has no function {name}")
-    return call_checked(c, symbol, args, offset, expected)
+    return _call_checked(c, symbol, args, offset, expected)
 
 
 def call_text_function(c: Checker, symbol: PouSymbol, node: ast.Call) -> Expr:
@@ -118,7 +118,7 @@ def _joined(c: Checker, symbol: PouSymbol, name: str, node: ast.Call, values: li
         ordered[place] = value
     result = ordered[1]
     for place in range(2, len(values) + 1):
-        result = call_checked(c, symbol, [result, ordered[place]], node.pos, None)
+        result = _call_checked(c, symbol, [result, ordered[place]], node.pos, None)
     return result
 
 
@@ -185,7 +185,7 @@ def _group_type(
     if isinstance(result, StringType):
         result = WIDE_LIBRARY_STRING if result.wide else LIBRARY_STRING
     if group == "ANY_REAL" and not accepts(group, result) and elementary(result) is not None:
-        result = LREAL if is_large(result) else REAL
+        result = LREAL if _is_large(result) else REAL
     if not accepts(group, result):
         c.error(offset, "type", f"{name} takes {group_name(group)}, not {result}")
         return None
@@ -223,7 +223,7 @@ def _best_overload(c: Checker, name: str, values: list[Expr], expected: Type | N
         return None
     candidates = [wanted.keyword if isinstance(wanted, StringType) else str(elementary(wanted) or wanted)]
     if elementary(wanted) is not None:
-        prefer_real = not is_large(wanted) if typed else expected is REAL
+        prefer_real = not _is_large(wanted) if typed else expected is REAL
         candidates += ["REAL", "LREAL"] if prefer_real else ["LREAL", "REAL"]
     for candidate in candidates:
         if candidate in suffixes:
@@ -232,7 +232,7 @@ def _best_overload(c: Checker, name: str, values: list[Expr], expected: Type | N
     return None
 
 
-def is_large(t: Type) -> bool:
+def _is_large(t: Type) -> bool:
     """Whether a number needs LREAL."""
     base = elementary(t)
     return base is not None and base is not REAL and base.bits > 16

@@ -16,6 +16,7 @@ from plctool.compiler.types import BOOL, ELEMENTARY, LTIME, TIME, TOD, StringTyp
 
 @checks(ast.Literal)
 def literal_value(c: Checker, node: ast.Literal, expected: Type | None) -> Expr:
+    """A constant; a number without a type takes the one its surroundings need."""
     pos, value, kind = c.pos(node.pos), node.value, node.kind
     if kind is ast.LiteralKind.INT and node.type_name is None:
         assert isinstance(value, int)

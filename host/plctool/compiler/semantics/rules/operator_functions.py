@@ -44,7 +44,7 @@ def _chain(c: Checker, f: Applied) -> Expr:
     return result
 
 
-def _inverted(c: Checker, f: Applied) -> Expr:
+def _not(c: Checker, f: Applied) -> Expr:
     e = settle(f.args[0], f.expected)
     base = elementary(e.type)
     if base is None or not (base is BOOL or base.kind in NUMBERS):
@@ -68,7 +68,7 @@ FUNCTIONS: dict[str, BuiltIn] = {
     **dict.fromkeys(_PAIRS, BuiltIn(_pair, 2, 2)),
     **dict.fromkeys(_CHAINS, BuiltIn(_chain, 2)),
     **dict.fromkeys(dates.FUNCTIONS, BuiltIn(_dated, 2, 2)),
-    "NOT": BuiltIn(_inverted, 1, 1),
+    "NOT": BuiltIn(_not, 1, 1),
     "MOVE": BuiltIn(_moved, 1, 1),
 }
 COMPARING = frozenset((*_CHAINS, "NE"))

@@ -52,6 +52,7 @@ _UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
 
 @checks(ast.Unary)
 def unary_operator(c: Checker, node: ast.Unary, expected: Type | None) -> Expr:
+    """`NOT a`, `-a`, `+a`"""
     e = c.expr(node.operand, expected)
     base = elementary(e.type)
     if e.type is ERROR:
@@ -71,6 +72,7 @@ def unary_operator(c: Checker, node: ast.Unary, expected: Type | None) -> Expr:
 
 
 def fold_unary(c: Checker, op: UnaryOp, e: Expr, offset: int) -> Expr:
+    """`op e`, folded when e is constant."""
     pos = c.pos(offset)
     if e.type is ERROR:
         return e
@@ -82,6 +84,7 @@ def fold_unary(c: Checker, op: UnaryOp, e: Expr, offset: int) -> Expr:
 
 @checks(ast.Binary)
 def binary_operator(c: Checker, node: ast.Binary, expected: Type | None) -> Expr:
+    """`a op b`"""
     arithmetic = node.op in ("+", "-", "*", "/", "MOD", "AND", "OR", "XOR")
     wanted = expected if arithmetic else None
     left = c.expr(node.left, wanted)

@@ -107,6 +107,7 @@ def _bit_number(c: Checker, node: ast.Member, t: Elementary) -> ast.BitAccess | 
 
 @checks(ast.BitAccess)
 def bit_access(c: Checker, node: ast.BitAccess, expected: Type | None) -> Expr:
+    """`base.3`, `base.%W1`: a bit or a part of a number."""
     base = c.expr(node.base)
     t = elementary(base.type)
     if base.type is ERROR:
@@ -134,6 +135,7 @@ def _part(c: Checker, base: Expr, t: Elementary, node: ast.BitAccess) -> Expr:
 
 @checks(ast.Index)
 def indexed(c: Checker, node: ast.Index, expected: Type | None) -> Expr:
+    """`base[i, j]`: an element of an array, a character of a text, what lies behind a pointer."""
     base = c.expr(node.base)
     indices = node.indices
     while indices and base.type is not ERROR:
@@ -203,6 +205,7 @@ def _subscript(c: Checker, node: ast.Expr) -> Expr:
 
 @checks(ast.Deref)
 def dereferenced(c: Checker, node: ast.Deref, expected: Type | None) -> Expr:
+    """`base^`: what a pointer points to."""
     pointer = c.expr(node.base)
     if pointer.type is ERROR:
         return pointer

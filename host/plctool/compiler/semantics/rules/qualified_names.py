@@ -39,6 +39,7 @@ def variable_value(symbol: VarSymbol, pos: Pos) -> Expr:
 
 
 def namespace_member(c: Checker, namespace: Namespace, node: ast.Member) -> Expr:
+    """`list.name`, `program.name`"""
     symbol = namespace.members.get(node.name.casefold())
     if symbol is None:
         hint = did_you_mean(node.name, (m.name for m in namespace.members.values()))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value, settle
 from plctool.compiler.semantics.open_arrays import bounds_of
-from plctool.compiler.semantics.rules.applied import Applied, BuiltIn
+from plctool.compiler.semantics.rules.applied import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.operators import operate
 from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, PouSymbol, TypeSymbol
@@ -25,7 +25,6 @@ from plctool.compiler.typed import (
     Intrinsic,
     IntrinsicCall,
     Load,
-    ValuePlace,
 )
 from plctool.compiler.types import (
     BOOL,
@@ -101,14 +100,12 @@ def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
 
 
 def _string_size(c: Checker, f: Applied) -> Expr:
-    if not isinstance(f.args[0].type, StringType):
-        return c.error(f.node.pos, "type", f"{f.name} needs a STRING, not {f.args[0].type}")
-    e = (
-        f.args[0]
-        if isinstance(f.args[0], Load)
-        else Load(ValuePlace(f.args[0], f.args[0].type, f.args[0].pos), f.args[0].type, f.args[0].pos)
-    )
-    return IntrinsicCall(Intrinsic.STRING_SIZE, [e], UDINT, c.pos(f.node.pos))
+    """`STRING_SIZE(text)`: the bytes of its variable."""
+    text = f.args[0]
+    if not isinstance(text.type, StringType):
+        return c.error(f.node.pos, "type", f"{f.name} needs a STRING, not {text.type}")
+    loaded = Load(place_of(text), text.type, text.pos)
+    return IntrinsicCall(Intrinsic.STRING_SIZE, [loaded], UDINT, c.pos(f.node.pos))
 
 
 def _bound(c: Checker, f: Applied) -> Expr:
@@ -126,6 +123,6 @@ def _bound(c: Checker, f: Applied) -> Expr:
 
 FUNCTIONS: dict[str, BuiltIn] = {
     "STRING_SIZE": BuiltIn(_string_size, 1, 1),
-    "LOWER_BOUND": BuiltIn(_bound, 2, 2),
-    "UPPER_BOUND": BuiltIn(_bound, 2, 2),
+    "LOWER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
+    "UPPER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
 }

@@ -37,6 +37,7 @@ _OWN = ("THIS", "SUPER")
 
 @checks(ast.Name)
 def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
+    """A variable or constant, a value of an enumeration, a property of the unit around, THIS, SUPER."""
     symbol = c.scope.lookup(node.name)
     if isinstance(symbol, GlobalSymbol):
         choices = c.world.names.same_named(node.name)
@@ -115,6 +116,7 @@ def _written(c: Checker, key: str) -> str:
 
 @checks(ast.EnumValue)
 def enum_value(c: Checker, node: ast.EnumValue, expected: Type | None) -> Expr:
+    """`Color#Red`"""
     t = c.world.declared.type_named(node.pos, node.type_name, c.scope)
     if t is ERROR:
         return error_value(c.pos(node.pos))
@@ -133,12 +135,14 @@ def _value_of(c: Checker, t: EnumType, name: str, offset: int, name_offset: int)
 
 @checks(ast.DirectAddress)
 def direct_address(c: Checker, node: ast.DirectAddress, expected: Type | None) -> Expr:
+    """`%IW2`"""
     symbol = c.world.direct.find(node, c.scope)
     return error_value(c.pos(node.pos)) if symbol is None else variable_value(symbol, c.pos(node.pos))
 
 
 @checks(ast.Member)
 def member_value(c: Checker, node: ast.Member, expected: Type | None) -> Expr:
+    """`a.b`: a name with a namespace, list, program or type in front, or a part of what `a` is."""
     if isinstance(node.base, ast.Name):
         symbol = c.scope.lookup(node.base.name)
         if isinstance(symbol, Namespace):
