@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from plctool.compiler.codegen import lower_stmt
+from plctool.compiler.codegen.lower_frame import STATEMENTS
 from plctool.compiler.semantics.checker import STATEMENT_RULES
 from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Assign
 
 PROGRAM = """PROGRAM Main
 VAR
@@ -70,7 +71,7 @@ def test_bug_in_the_lowering_names_the_place_in_the_program(tool: Any, monkeypat
     def broken(self: object, node: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(lower_stmt.Body, "_assign", broken)
+    monkeypatch.setitem(STATEMENTS, Assign, broken)
     done = tool("build", "main.st")
     assert (done.status, done.out) == (1, "")
     assert done.err.startswith("plctool: Internal error at main.st:6 (AssertionError); please report")
