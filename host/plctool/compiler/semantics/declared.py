@@ -28,7 +28,7 @@ from plctool.compiler.types import InterfaceType, StructType, Type
 class Declared:
     """Who declares what. Each of them says what is wrong the first time, and does nothing the second time."""
 
-    type: Callable[[TypeSymbol], Type]
+    type_of: Callable[[TypeSymbol], Type]
     type_named: Callable[[int, str, Scope], Type]  # ERROR after a diagnosis
     variable: Callable[[GlobalSymbol], VarSymbol]
     function: Callable[[PouSymbol, dict[str, Type]], FunctionInfo | None]  # None while it is being declared

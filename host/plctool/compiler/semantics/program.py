@@ -6,7 +6,6 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.library import Library
-from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.construction import construct
 from plctool.compiler.semantics.declarations.blocks import Blocks
@@ -19,7 +18,7 @@ from plctool.compiler.semantics.declarations.unit_variables import UnitVariables
 from plctool.compiler.semantics.declarations.variables import Variables
 from plctool.compiler.semantics.declared import Declared
 from plctool.compiler.semantics.generics import is_generic
-from plctool.compiler.semantics.rules.bodies import check_body, report_unused
+from plctool.compiler.semantics.rules.bodies import report_unused, write_body
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc_statements import statements_of
 from plctool.compiler.semantics.symbols import TypeSymbol
@@ -44,7 +43,7 @@ class Program:
         self.shutdown: Pou | None = None  # calls FB_Exit
         world.names.declared_instance = self.programs.instance
         world.declared = Declared(
-            type=self.types.type_of_symbol,
+            type_of=self.types.type_of_symbol,
             type_named=self.types.named_type,
             variable=self.variables.global_variable,
             function=self._functions.function,
@@ -94,15 +93,10 @@ class Program:
         world, bodies = self.world, self.world.bodies
         self._classes.declare_members()
         while bodies:
-            body = bodies.next()
-            try:
-                statements = check_body(Checker(world, body.scope), statements_of(world, body.decl, body.scope))
-                body.pou.body = [*body.scope.prologue, *statements]
-            except NestingError as error:
-                world.nested_too_deeply(error)
-            world.pous.append(body.pou)
-            if not body.scope.library:
-                checked.append(body.scope)
+            scope, decl = bodies.next()
+            write_body(Checker(world, scope), statements_of(world, decl, scope))
+            if not scope.library:
+                checked.append(scope)
             if bodies.only_library:
                 self._classes.declare_members()
         return checked

@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import mocks
 from plctool.compiler.semantics.checker import Checker, SpecialCalls
 from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, settle, time_to_ltime
-from plctool.compiler.semantics.rules.bodies import check_body, report_unused
+from plctool.compiler.semantics.rules.bodies import report_unused, write_body
 from plctool.compiler.semantics.rules.common_types import match_literals
 from plctool.compiler.semantics.rules.conversion_calls import convert_explicitly
 from plctool.compiler.semantics.rules.members import bound_member
@@ -138,18 +137,9 @@ class TestBody:
 
     def write(self, decl: ast.TestDecl) -> None:
         """Checks the statements into the unit of the scope."""
-        scope, world = self._c.scope, self._c.world
-        pou = scope.pou
-        assert pou is not None
-        try:
-            body = check_body(self._c, decl.body)
-        except NestingError as error:
-            world.nested_too_deeply(error)
-            return
-        pou.body = [*scope.prologue, *body]
-        world.pous.append(pou)
+        write_body(self._c, decl.body)
         if decl.keyword != "SETUP":
-            report_unused(scope)
+            report_unused(self._c.scope)
 
     def _nodes(self, call: ast.Call, count: int, *, message: bool = True) -> list[ast.Expr] | None:
         """The arguments, perhaps with a message behind them; None after a diagnosis."""

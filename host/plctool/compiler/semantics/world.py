@@ -10,9 +10,9 @@ from plctool.compiler.library import Library
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics.addresses import DirectVariables
 from plctool.compiler.semantics.allocation import Allocation
-from plctool.compiler.semantics.bodies import Bodies
+from plctool.compiler.semantics.body_queue import BodyQueue
 from plctool.compiler.semantics.call_graph import CallGraph
-from plctool.compiler.semantics.conversions import Coercion
+from plctool.compiler.semantics.coercion import Coercion
 from plctool.compiler.semantics.declared import Declared
 from plctool.compiler.semantics.dispatches import Dispatches
 from plctool.compiler.semantics.names import Names
@@ -37,7 +37,7 @@ class World:
         self.dispatches = Dispatches()
         self.allocation = Allocation()
         self.direct = DirectVariables(self.allocation)
-        self.bodies = Bodies()
+        self.bodies = BodyQueue()
         self.blocks: dict[StructType, BlockInfo] = {}
         self.interfaces: dict[StructType, ClassInfo] = {}
         self.defaults: dict[str, StructInit] = {}

@@ -256,7 +256,7 @@ class Classes:
         scope.names.update(cls.instance_variables.get(_member_key(decl), {}))
         self._functions.signature(info, decl, scope)
         if not member.abstract:
-            self._world.bodies.add(scope, decl, pou)
+            self._world.bodies.add(scope, decl)
         elif decl.body:
             scope.error(decl.pos, "inheritance", f"{member.name} has no body, because it is ABSTRACT")
         return info

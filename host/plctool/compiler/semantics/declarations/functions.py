@@ -83,7 +83,7 @@ class Functions:
         if external is not None:
             pou.external = self._external(external, info, scope)
         else:
-            self._world.bodies.add(scope, decl, pou)
+            self._world.bodies.add(scope, decl)
         return info
 
     def signature(self, info: FunctionInfo, decl: ast.PouDecl, scope: Scope) -> None:

@@ -115,7 +115,7 @@ class Programs:
             return placed
 
         self._classes.program(symbol, scope, place)
-        self._world.bodies.add(scope, decl, pou)
+        self._world.bodies.add(scope, decl)
         return info, scope
 
     def _program_variables(

@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.scope import Scope
@@ -25,6 +26,17 @@ def check_body(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
         ended = not reported and _ends(found)
         result += found
     return result
+
+
+def write_body(c: Checker, nodes: list[ast.Stmt]) -> None:
+    """Checks the statements into the unit of the scope."""
+    pou = c.scope.pou
+    assert pou is not None
+    try:
+        pou.body = [*c.scope.prologue, *check_body(c, nodes)]
+    except NestingError as error:
+        c.world.nested_too_deeply(error)
+    c.world.pous.append(pou)
 
 
 def report_unreachable(c: Checker, offset: int, why: str = "") -> None:

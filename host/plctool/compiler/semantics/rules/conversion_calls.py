@@ -86,7 +86,7 @@ def _conversion_type(c: Checker, name: str) -> Type | None:
         return StringType(255, name == "WSTRING")
     symbol = c.world.names.unit(name.casefold(), library=c.scope.library)
     if isinstance(symbol, TypeSymbol):
-        t = c.world.declared.type(symbol)
+        t = c.world.declared.type_of(symbol)
         return t if isinstance(t, EnumType | SubrangeType) else None
     return None
 

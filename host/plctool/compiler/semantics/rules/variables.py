@@ -62,7 +62,7 @@ def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
 def _enumerated(c: Checker, node: ast.Name, expected: Type | None) -> Expr | None:
     """The value of an enumeration by its bare name; None when there is none of that name."""
     symbols = c.world.names.enumerations_with(node.name)
-    types = [t for s in symbols if isinstance(t := c.world.declared.type(s), EnumType)]
+    types = [t for s in symbols if isinstance(t := c.world.declared.type_of(s), EnumType)]
     if len(types) > 1 and expected in types:
         types = [t for t in types if t is expected]
     if len(types) > 1:
@@ -148,7 +148,7 @@ def member_value(c: Checker, node: ast.Member, expected: Type | None) -> Expr:
         if isinstance(symbol, Namespace):
             return namespace_member(c, symbol, node)
         if isinstance(symbol, TypeSymbol):
-            t = c.world.declared.type(symbol)
+            t = c.world.declared.type_of(symbol)
             if isinstance(t, EnumType):
                 return _value_of(c, t, node.name, node.pos, node.name_pos)
             return c.error(node.base.pos, "name", f"{node.base.name} is a type, not a variable")

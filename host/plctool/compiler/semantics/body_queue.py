@@ -6,34 +6,24 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pou
 
 
-@dataclass(frozen=True)
-class Body:
-    """What is written in a unit, and the unit it becomes part of."""
-
-    scope: Scope
-    decl: ast.PouDecl
-    pou: Pou
-
-
-class Bodies:
-    """Those still to be checked: of the program first, then of the library."""
+class BodyQueue:
+    """Those still to be checked, each with the scope of its unit: of the program first, then of the library."""
 
     def __init__(self) -> None:
-        self._own: deque[Body] = deque()
-        self._library: deque[Body] = deque()
+        self._own: deque[tuple[Scope, ast.PouDecl]] = deque()
+        self._library: deque[tuple[Scope, ast.PouDecl]] = deque()
 
-    def add(self, scope: Scope, decl: ast.PouDecl, pou: Pou) -> None:
-        """Queues a body."""
+    def add(self, scope: Scope, decl: ast.PouDecl) -> None:
+        """Queues what is written in the unit of a scope."""
         if scope.edges:
             scope = replace(scope, names=scope.names | scope.edges)
-        (self._library if scope.library else self._own).append(Body(scope, decl, pou))
+        (self._library if scope.library else self._own).append((scope, decl))
 
     def __bool__(self) -> bool:
         return bool(self._own or self._library)
@@ -43,6 +33,6 @@ class Bodies:
         """Whether all of the program itself is checked."""
         return not self._own
 
-    def next(self) -> Body:
+    def next(self) -> tuple[Scope, ast.PouDecl]:
         """Takes one out."""
         return (self._own or self._library).popleft()
