@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from plctool.compiler.codegen import lower_stmt
-from plctool.compiler.semantics.statements import Statements
+from plctool.compiler.codegen.lower_frame import STATEMENTS
+from plctool.compiler.semantics.checker import STATEMENT_RULES
 from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Assign
 
 PROGRAM = """PROGRAM Main
 VAR
@@ -59,7 +60,7 @@ def test_unknown_warning_exits_2_and_lists_the_names(tool: Any, command: str) ->
 def test_bug_in_the_front_end_names_the_place_in_the_program(
     tool: Any, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
-    monkeypatch.setitem(Statements._statements, ast.Return, lambda self, node: 1 / 0)
+    monkeypatch.setitem(STATEMENT_RULES, ast.Return, lambda c, node: 1 / 0)
     done = tool(command, "main.st")
     assert (done.status, done.out) == (1, "")
     assert done.err.startswith("plctool: Internal error at main.st:7 (ZeroDivisionError: division by zero); please")
@@ -70,7 +71,7 @@ def test_bug_in_the_lowering_names_the_place_in_the_program(tool: Any, monkeypat
     def broken(self: object, node: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(lower_stmt.Body, "_assign", broken)
+    monkeypatch.setitem(STATEMENTS, Assign, broken)
     done = tool("build", "main.st")
     assert (done.status, done.out) == (1, "")
     assert done.err.startswith("plctool: Internal error at main.st:6 (AssertionError); please report")
@@ -78,7 +79,7 @@ def test_bug_in_the_lowering_names_the_place_in_the_program(tool: Any, monkeypat
 
 def test_bug_shows_its_traceback_on_demand(tool: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PLCTOOL_DEBUG", "1")
-    monkeypatch.setitem(Statements._statements, ast.Return, lambda self, node: 1 / 0)
+    monkeypatch.setitem(STATEMENT_RULES, ast.Return, lambda c, node: 1 / 0)
     done = tool("check", "main.st")
     assert "Traceback" in done.err
     assert done.err.splitlines()[-1].startswith("plctool: Internal error at main.st:7")

@@ -453,7 +453,7 @@ def test_initial_values_of_all_kinds() -> None:
     p.variable("mixed", ArrayType(DINT, ((0, 9),)), ArrayInit([(2, None), *((1, ScalarInit(i)) for i in range(1, 7))]))
     p.variable("few", ArrayType(REAL, ((0, 9),)), ArrayInit([(5, None), (1, ScalarInit(1.5))]))
     p.variable("plain", s)
-    p.variable("given", s, StructInit({"B": ScalarInit(2.5)}))
+    p.variable("given", s, StructInit({"b": ScalarInit(2.5)}))
     p.variable("many", ArrayType(s, ((0, 9),)), ArrayInit([(1, StructInit({"d": ScalarInit(9)}))]))
     p.variable(
         "grid", ArrayType(ArrayType(INT, ((0, 2),)), ((0, 1),)), ArrayInit([(2, ArrayInit([(3, ScalarInit(4))]))])

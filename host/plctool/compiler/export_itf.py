@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from plctool.compiler.semantics.units import interface_text
+from plctool.compiler.semantics.declarations.functions import interface_text
 from plctool.compiler.typed import Direction, Parameter, Pou
 from plctool.compiler.types import (
     ArrayType,

@@ -15,6 +15,7 @@ from plctool.compiler.library import Library, standard_library
 from plctool.compiler.nesting import NestingError, room_for_nesting
 from plctool.compiler.semantics.configuration import configure
 from plctool.compiler.semantics.overlaps import report_overlaps
+from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.parser import parse
@@ -58,52 +59,57 @@ def check_sources(
     exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
-    world = World(chosen)
-    world.diagnostics.options = warnings
+    program = Program(chosen)
+    diagnostics = program.world.diagnostics
+    diagnostics.options = warnings
     with no_collection(), room_for_nesting():
-        program = _guarded(world, sources, tests)
-    diagnostics = world.diagnostics
-    return CheckResult(None if diagnostics.errors else program, diagnostics.sorted(), bool(world.tests))
+        typed = _guarded(program, sources, tests)
+    has_tests = bool(program.world.names.tests)
+    return CheckResult(None if diagnostics.errors else typed, diagnostics.sorted(), has_tests)
 
 
-def _guarded(world: World, sources: Sequence[Source], tests: TestSuite | None) -> TypedProgram | None:
+def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | None) -> TypedProgram | None:
     """The check, with an end to errors and to nesting."""
     try:
         try:
-            return _check(world, sources, tests)
+            return _check(program, sources, tests)
         except NestingError as error:
-            world.nested_too_deeply(error)
+            program.world.nested_too_deeply(error)
         except RecursionError:
-            world.diagnostics.error(sources[0].pos(0), "nesting", "something in the program is nested too deeply")
+            program.world.diagnostics.error(
+                sources[0].pos(0), "nesting", "something in the program is nested too deeply"
+            )
     except TooManyErrors:
         pass
     return None
 
 
-def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> TypedProgram | None:
+def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
+    world = program.world
     parsed = [(source, parse(source, world.diagnostics.at(source))) for source in sources]
     if world.diagnostics.errors:
         return None
+    tests = None if suite is None else suite.begin(program)
     if tests is not None:
-        parsed = tests.prepare(parsed, world)
+        parsed = tests.prepare(parsed)
     for source, declarations in parsed:
         world.diagnostics.mute(source)
-        world.register(declarations)
-        world.register_globals(declarations, source)
-    world.declare_all()
+        world.names.register(declarations)
+        world.names.register_globals(declarations, source)
+    program.declare_all()
     if tests is None:
-        application = configure(world)
+        application = configure(world, program.config)
     else:
-        application = tests.configure(world)
-        tests.add(world)
-    world.check_bodies()
+        application = tests.configure()
+        tests.add()
+    program.check_bodies()
     if tests is None and application.tasks:
-        world.programs.report_unused()
+        program.programs.report_unused()
     world.calls.report_shared(application.tasks)
     allocation = world.allocation
     _check_sizes(world, sources)
     report_overlaps(allocation.variables, world.diagnostics)
-    if not application.tasks and not world.tests and not world.diagnostics.errors and sources:
+    if not application.tasks and not world.names.tests and not world.diagnostics.errors and sources:
         world.diagnostics.warning(sources[0].pos(0), "no-program", "there is no PROGRAM, so nothing would run")
     return TypedProgram(
         pous=world.pous,
@@ -111,13 +117,13 @@ def _check(world: World, sources: Sequence[Source], tests: TestSuite | None) -> 
         tasks=application.tasks,
         area_sizes={area: allocation.sizes.get(area, 0) for area in Area},
         defaults=world.defaults,
-        programs=world.programs.declared(),
-        startup=world.startup,
-        shutdown=world.shutdown,
-        aliases=world.aliases(),
-        accesses=world.instance_config.accesses,
+        programs=program.programs.declared(),
+        startup=program.startup,
+        shutdown=program.shutdown,
+        aliases=world.names.aliases(),
+        accesses=program.config.accesses,
         constants=world.constants,
-        externals=world.external_functions(),
+        externals=program.external_functions(),
     )
 
 

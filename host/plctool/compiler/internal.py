@@ -33,10 +33,10 @@ def position_of(error: BaseException) -> Pos | None:
     nothing has to be noted while all is well."""
     frames = [frame.f_locals for frame, _ in traceback.walk_tb(error.__traceback__)]
     for variables in reversed(frames):
-        source = _source_of(variables.get("self"))
+        source = _source_of(variables.get("c") or variables.get("self"))
         for name, value in variables.items():
             pos = value if isinstance(value, Pos) else getattr(value, "pos", None)
-            if name != "self" and isinstance(pos, int) and not isinstance(value, int) and source is not None:
+            if name not in ("c", "self") and isinstance(pos, int) and not isinstance(value, int) and source is not None:
                 pos = source.pos(pos)
             if isinstance(pos, Pos) and pos.file:
                 return pos

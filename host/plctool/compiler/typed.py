@@ -83,7 +83,7 @@ class ArrayInit:
 
 @dataclass
 class StructInit:
-    """Only the members given; the rest take the defaults of the type (`TypedProgram.defaults`). `arguments`: what the
+    """Only the members given, as the type spells them; the rest take the defaults of the type (`TypedProgram.defaults`). `arguments`: what the
     FB_Init of an instance gets besides."""
 
     members: dict[str, Initial]

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from plctool.compiler.codegen.analysis import Effects
 from plctool.compiler.codegen.ir import Function
+from plctool.compiler.codegen.lower_body import write_body, write_calls
 from plctool.compiler.codegen.lower_classes import renumber, write_dispatcher
-from plctool.compiler.codegen.lower_frame import Ref, string_capacity
+from plctool.compiler.codegen.lower_frame import Body, Frame, Ref, string_capacity
 from plctool.compiler.codegen.lower_helpers import MEMORY_FUNCTIONS, memory_functions, string_helper
-from plctool.compiler.codegen.lower_init import Initialising
-from plctool.compiler.codegen.lower_stmt import Body
+from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
 from plctool.compiler.codegen.partition import texts
 from plctool.compiler.codegen.sections import sections
@@ -85,15 +85,15 @@ def _pou(unit: Unit, pou: Pou, effects: Effects) -> None:
     body.open_scope(pou.name, pou.pos)
     parts = sections(pou)
     if len(parts) > 1:
-        body.write_calls([unit.section(part) for part in parts])
+        write_calls(body, [unit.section(part) for part in parts])
     else:
-        body.write()
+        write_body(body)
     unit.module.add(unit.symbol(pou), fn)
 
 
 def _global_init(unit: Unit, variables: list[Variable], startup: Pou | None) -> None:
     fn = Function(f"void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains)", unit.plain)
-    frame = Initialising(unit, fn, None)
+    frame = Frame(unit, fn, None)
     _initialise_area(frame, variables, (Area.DATA, Area.OUTPUT, Area.MEMORY, Area.INPUT))
     if any(v.area is Area.RETAIN for v in variables):
         retains, kept, end = fn.label("retains"), fn.label("kept"), fn.label("end")
@@ -122,11 +122,11 @@ def _global_exit(unit: Unit, shutdown: Pou) -> None:
     unit.module.add(GLOBAL_EXIT, fn, linkage="")
 
 
-def _initialise_area(frame: Initialising, variables: list[Variable], areas: tuple[Area, ...]) -> None:
+def _initialise_area(frame: Frame, variables: list[Variable], areas: tuple[Area, ...]) -> None:
     for var in variables:
         if var.area in areas:
             ref = Ref(frame.area_base(var.area), var.offset, var.type, direct=True, capacity=string_capacity(var.type))
-            frame.initialise(ref, var.initial)
+            initialise(frame, ref, var.initial)
 
 
 def _struct_initialisers(unit: Unit) -> None:
@@ -134,8 +134,8 @@ def _struct_initialisers(unit: Unit) -> None:
     while done < len(unit.structs):
         name, struct = list(unit.structs.items())[done]
         fn = Function(f"void @{name}(ptr nonnull %self)", unit.plain)
-        frame = Initialising(unit, fn, None)
-        frame.initialise_members(Ref("%self", 0, struct, direct=True), struct, None)
+        frame = Frame(unit, fn, None)
+        initialise_members(frame, Ref("%self", 0, struct, direct=True), struct, None)
         fn.terminate("ret void")
         unit.module.add(name, fn)
         done += 1

@@ -55,195 +55,209 @@ def constant(value: int | float | str, t: Type) -> str:
     return str(int(value))
 
 
-class Arithmetic(Frame):
-    """Scalar operations of the function being written."""
+def compare(frame: Frame, op: BinaryOp, left: str, right: str, t: Type) -> str:
+    """The i1 of a comparison of two values of `t`."""
+    integer, real = _COMPARE[op]
+    text = value_type(t)
+    if is_bool(t):
+        left, right = lowest_bit(frame, left), lowest_bit(frame, right)
+    if text in ("float", "double"):
+        return frame.fn.value(f"fcmp {real} {text} {left}, {right}")
+    if op not in (BinaryOp.EQ, BinaryOp.NE):
+        integer = ("s" if is_signed(t) else "u") + integer
+    return frame.fn.value(f"icmp {integer} {text} {left}, {right}")
 
-    def compare(self, op: BinaryOp, left: str, right: str, t: Type) -> str:
-        """The i1 of a comparison of two values of `t`."""
-        integer, real = _COMPARE[op]
-        text = value_type(t)
-        if is_bool(t):
-            left, right = self.lowest_bit(left), self.lowest_bit(right)
-        if text in ("float", "double"):
-            return self.fn.value(f"fcmp {real} {text} {left}, {right}")
-        if op not in (BinaryOp.EQ, BinaryOp.NE):
-            integer = ("s" if is_signed(t) else "u") + integer
-        return self.fn.value(f"icmp {integer} {text} {left}, {right}")
 
-    def binary(self, op: BinaryOp, left: str, right: str, t: Type) -> str:
-        """An operator that cannot fail. `t`: type of both operands and of the result."""
-        text = value_type(t)
-        table = _REAL if text in ("float", "double") else _INTEGER
-        return self.fn.value(f"{table[op]} {text} {left}, {right}")
+def binary(frame: Frame, op: BinaryOp, left: str, right: str, t: Type) -> str:
+    """An operator that cannot fail. `t`: type of both operands and of the result."""
+    text = value_type(t)
+    table = _REAL if text in ("float", "double") else _INTEGER
+    return frame.fn.value(f"{table[op]} {text} {left}, {right}")
 
-    def divide(self, op: BinaryOp, left: str, right: str, t: Type, pos: Pos, divisor: int | None) -> str:
-        """DIV or MOD of integers. `divisor`: its value when it is constant."""
-        checked = Check.DIV in self.checks and (divisor is None or divisor == 0)
-        if checked:
-            nonzero = self.fn.value(f"icmp ne {value_type(t)} {right}, 0")
-            self.require(nonzero, DIVIDE_BY_ZERO, pos)
-        if not is_signed(t):
-            return self._divide_unsigned(op, left, right, t, safe=checked or bool(divisor))
-        if bits_of(t) < 32:
-            return self._divide_narrow(op, left, right, t, safe=checked or bool(divisor))
-        return self._divide_signed(op, left, right, t, checked, divisor)
 
-    def _divide_unsigned(self, op: BinaryOp, left: str, right: str, t: Type, *, safe: bool) -> str:
-        text = value_type(t)
-        if not safe:
-            right = self.fn.value(f"call {text} @llvm.umax.{text}({text} {right}, {text} 1)")
-        return self.fn.value(f"{'udiv' if op is BinaryOp.DIV else 'urem'} {text} {left}, {right}")
+def divide(frame: Frame, op: BinaryOp, left: str, right: str, t: Type, pos: Pos, divisor: int | None) -> str:
+    """DIV or MOD of integers. `divisor`: its value when it is constant."""
+    checked = Check.DIV in frame.checks and (divisor is None or divisor == 0)
+    if checked:
+        nonzero = frame.fn.value(f"icmp ne {value_type(t)} {right}, 0")
+        frame.require(nonzero, DIVIDE_BY_ZERO, pos)
+    if not is_signed(t):
+        return _divide_unsigned(frame, op, left, right, t, safe=checked or bool(divisor))
+    if bits_of(t) < 32:
+        return _divide_narrow(frame, op, left, right, t, safe=checked or bool(divisor))
+    return _divide_signed(frame, op, left, right, t, checked, divisor)
 
-    def _divide_narrow(self, op: BinaryOp, left: str, right: str, t: Type, *, safe: bool) -> str:
-        """In 32 bits, where MIN / -1 does not overflow."""
-        fn, text = self.fn, value_type(t)
-        wide_left = fn.value(f"sext {text} {left} to i32")
-        wide_right = fn.value(f"sext {text} {right} to i32")
-        if not safe:
-            is_zero = fn.value(f"icmp eq i32 {wide_right}, 0")
-            wide_right = fn.value(f"select i1 {is_zero}, i32 1, i32 {wide_right}")
-        result = fn.value(f"{'sdiv' if op is BinaryOp.DIV else 'srem'} i32 {wide_left}, {wide_right}")
-        return fn.value(f"trunc i32 {result} to {text}")
 
-    def _divide_signed(self, op: BinaryOp, left: str, right: str, t: Type, checked: bool, divisor: int | None) -> str:
-        """32 and 64 bits: divisors that LLVM does not define (-1 with MIN, 0 unchecked) are replaced by 1."""
-        fn, text = self.fn, value_type(t)
-        word = "sdiv" if op is BinaryOp.DIV else "srem"
-        if divisor is not None and divisor not in (0, -1):
-            return fn.value(f"{word} {text} {left}, {right}")
-        minus_one = fn.value(f"icmp eq {text} {right}, -1")
-        special = minus_one
-        if not checked:
-            special = fn.value(f"icmp ult {text} {fn.value(f'add {text} {right}, 1')}, 2")
-        safe = fn.value(f"select i1 {special}, {text} 1, {text} {right}")
-        result = fn.value(f"{word} {text} {left}, {safe}")
-        if op is BinaryOp.MOD:
-            return result
-        negated = fn.value(f"sub {text} 0, {left}")
-        return fn.value(f"select i1 {minus_one}, {text} {negated}, {text} {result}")
+def _divide_unsigned(frame: Frame, op: BinaryOp, left: str, right: str, t: Type, *, safe: bool) -> str:
+    text = value_type(t)
+    if not safe:
+        right = frame.fn.value(f"call {text} @llvm.umax.{text}({text} {right}, {text} 1)")
+    return frame.fn.value(f"{'udiv' if op is BinaryOp.DIV else 'urem'} {text} {left}, {right}")
 
-    def unary(self, op: UnaryOp, operand: str, t: Type) -> str:
-        text = value_type(t)
-        if op is UnaryOp.NOT:
-            return self.fn.value(f"xor {text} {operand}, {1 if is_bool(t) else -1}")
-        if text in ("float", "double"):
-            return self.fn.value(f"fneg {text} {operand}")
-        return self.fn.value(f"sub {text} 0, {operand}")
 
-    # ---- conversions ----
+def _divide_narrow(frame: Frame, op: BinaryOp, left: str, right: str, t: Type, *, safe: bool) -> str:
+    """In 32 bits, where MIN / -1 does not overflow."""
+    fn, text = frame.fn, value_type(t)
+    wide_left = fn.value(f"sext {text} {left} to i32")
+    wide_right = fn.value(f"sext {text} {right} to i32")
+    if not safe:
+        is_zero = fn.value(f"icmp eq i32 {wide_right}, 0")
+        wide_right = fn.value(f"select i1 {is_zero}, i32 1, i32 {wide_right}")
+    result = fn.value(f"{'sdiv' if op is BinaryOp.DIV else 'srem'} i32 {wide_left}, {wide_right}")
+    return fn.value(f"trunc i32 {result} to {text}")
 
-    def convert(self, value: str, source: Type, target: Type, *, truncate: bool = False) -> str:
-        """A scalar conversion as typed.Convert defines it."""
-        old, new = value_type(source), value_type(target)
-        fn = self.fn
-        if is_bool(target):
-            return value if is_bool(source) else fn.value(f"zext i1 {self.is_not_zero(value, source)} to i8")
-        if is_bool(source):
-            value = self.lowest_bit(value)
-        if old == new:
-            return value
-        if old == "ptr" or new == "ptr":
-            word = "ptrtoint" if old == "ptr" else "inttoptr"
-        elif is_real(source) and is_real(target):
-            word = "fptrunc" if new == "float" else "fpext"
-        elif is_real(source):
-            return self._to_integer(value, source, target, truncate)
-        elif is_real(target):
-            word = "sitofp" if is_signed(source) else "uitofp"
-        elif bits_of(source) > bits_of(target):
-            word = "trunc"
-        else:
-            word = "sext" if is_signed(source) else "zext"
-        return fn.value(f"{word} {old} {value} to {new}")
 
-    def lowest_bit(self, value: str) -> str:
-        """A BOOL as 0 or 1."""
-        return value if value in ("0", "1") else self.fn.value(f"and i8 {value}, 1")
+def _divide_signed(
+    frame: Frame, op: BinaryOp, left: str, right: str, t: Type, checked: bool, divisor: int | None
+) -> str:
+    """32 and 64 bits: divisors that LLVM does not define (-1 with MIN, 0 unchecked) are replaced by 1."""
+    fn, text = frame.fn, value_type(t)
+    word = "sdiv" if op is BinaryOp.DIV else "srem"
+    if divisor is not None and divisor not in (0, -1):
+        return fn.value(f"{word} {text} {left}, {right}")
+    minus_one = fn.value(f"icmp eq {text} {right}, -1")
+    special = minus_one
+    if not checked:
+        special = fn.value(f"icmp ult {text} {fn.value(f'add {text} {right}, 1')}, 2")
+    safe = fn.value(f"select i1 {special}, {text} 1, {text} {right}")
+    result = fn.value(f"{word} {text} {left}, {safe}")
+    if op is BinaryOp.MOD:
+        return result
+    negated = fn.value(f"sub {text} 0, {left}")
+    return fn.value(f"select i1 {minus_one}, {text} {negated}, {text} {result}")
 
-    def is_not_zero(self, value: str, t: Type) -> str:
-        """The i1 of a conversion to BOOL."""
-        text = value_type(t)
-        return self.fn.value(f"{'fcmp une' if is_real(t) else 'icmp ne'} {text} {value}, {zero(t)}")
 
-    def _to_integer(self, value: str, source: Type, target: Type, truncate: bool) -> str:
-        text, integer = value_type(source), value_type(target)
-        if not truncate:
-            value = self._round_to_even(value, text)
-        word = "fptosi" if is_signed(target) else "fptoui"
-        suffix = "f32" if text == "float" else "f64"
-        return self.fn.value(f"call {integer} @llvm.{word}.sat.{integer}.{suffix}({text} {value})")
+def unary(frame: Frame, op: UnaryOp, operand: str, t: Type) -> str:
+    text = value_type(t)
+    if op is UnaryOp.NOT:
+        return frame.fn.value(f"xor {text} {operand}, {1 if is_bool(t) else -1}")
+    if text in ("float", "double"):
+        return frame.fn.value(f"fneg {text} {operand}")
+    return frame.fn.value(f"sub {text} 0, {operand}")
 
-    def _round_to_even(self, value: str, text: str) -> str:
-        """Adding and taking away 2^23 (2^52) with the sign of the value leaves no room for a fraction; larger values
-        have none. LLVM's own rounding would be a library call on most targets."""
-        fn = self.fn
-        suffix, magic = ("f32", 2.0**23) if text == "float" else ("f64", 2.0**52)
-        literal = float_literal(magic, 64)
-        size = fn.value(f"call {text} @llvm.fabs.{suffix}({text} {value})")
-        bias = fn.value(f"call {text} @llvm.copysign.{suffix}({text} {literal}, {text} {value})")
-        rounded = fn.value(f"fsub {text} {fn.value(f'fadd {text} {value}, {bias}')}, {bias}")
-        small = fn.value(f"fcmp olt {text} {size}, {literal}")
-        return fn.value(f"select i1 {small}, {text} {rounded}, {text} {value}")
 
-    # ---- intrinsics ----
+def convert(frame: Frame, value: str, source: Type, target: Type, *, truncate: bool = False) -> str:
+    """A scalar conversion as typed.Convert defines it."""
+    old, new = value_type(source), value_type(target)
+    fn = frame.fn
+    if is_bool(target):
+        return value if is_bool(source) else fn.value(f"zext i1 {is_not_zero(frame, value, source)} to i8")
+    if is_bool(source):
+        value = lowest_bit(frame, value)
+    if old == new:
+        return value
+    if old == "ptr" or new == "ptr":
+        word = "ptrtoint" if old == "ptr" else "inttoptr"
+    elif is_real(source) and is_real(target):
+        word = "fptrunc" if new == "float" else "fpext"
+    elif is_real(source):
+        return _to_integer(frame, value, source, target, truncate)
+    elif is_real(target):
+        word = "sitofp" if is_signed(source) else "uitofp"
+    elif bits_of(source) > bits_of(target):
+        word = "trunc"
+    else:
+        word = "sext" if is_signed(source) else "zext"
+    return fn.value(f"{word} {old} {value} to {new}")
 
-    def shift(self, op: Intrinsic, value: str, t: Type, count: str, count_type: Type, known: int | None) -> str:
-        """SHL, SHR. `known`: the count when it is constant."""
-        fn, text, width = self.fn, value_type(t), bits_of(t)
-        word = "shl" if op is Intrinsic.SHL else "ashr" if is_signed(t) else "lshr"
-        if known is not None:
-            return fn.value(f"{word} {text} {value}, {known}") if 0 <= known < width else "0"
-        count_text = value_type(count_type)
-        fits = fn.value(f"icmp ult {count_text} {count}, {width}")
-        shifted = fn.value(f"{word} {text} {value}, {self._resize(count, count_type, width)}")
-        return fn.value(f"select i1 {fits}, {text} {shifted}, {text} 0")
 
-    def rotate(self, op: Intrinsic, value: str, t: Type, count: str, count_type: Type) -> str:
-        text = value_type(t)
-        word = "fshl" if op is Intrinsic.ROL else "fshr"
-        amount = self._resize(count, count_type, bits_of(t))
-        return self.fn.value(f"call {text} @llvm.{word}.{text}({text} {value}, {text} {value}, {text} {amount})")
+def lowest_bit(frame: Frame, value: str) -> str:
+    """A BOOL as 0 or 1."""
+    return value if value in ("0", "1") else frame.fn.value(f"and i8 {value}, 1")
 
-    def _resize(self, value: str, t: Type, width: int) -> str:
-        """An integer in `width` bits, extended by its own sign."""
-        bits = bits_of(t)
-        if bits == width or value.lstrip("-").isdigit():
-            return value
-        word = "trunc" if bits > width else "sext" if is_signed(t) else "zext"
-        return self.fn.value(f"{word} i{bits} {value} to i{width}")
 
-    def absolute(self, value: str, t: Type) -> str:
-        text = value_type(t)
-        if is_real(t):
-            return self.fn.value(f"call {text} @llvm.fabs.f{bits_of(t)}({text} {value})")
-        if not is_signed(t):
-            return value
-        return self.fn.value(f"call {text} @llvm.abs.{text}({text} {value}, i1 false)")
+def is_not_zero(frame: Frame, value: str, t: Type) -> str:
+    """The i1 of a conversion to BOOL."""
+    text = value_type(t)
+    return frame.fn.value(f"{'fcmp une' if is_real(t) else 'icmp ne'} {text} {value}, {zero(t)}")
 
-    def square_root(self, value: str, t: Type) -> str:
-        text = value_type(t)
-        return self.fn.value(f"call {text} @llvm.sqrt.f{bits_of(t)}({text} {value})")
 
-    def select(self, condition: str, then: str, otherwise: str, t: Type) -> str:
-        text = value_type(t)
-        return self.fn.value(f"select i1 {condition}, {text} {then}, {text} {otherwise}")
+def _to_integer(frame: Frame, value: str, source: Type, target: Type, truncate: bool) -> str:
+    text, integer = value_type(source), value_type(target)
+    if not truncate:
+        value = _round_to_even(frame, value, text)
+    word = "fptosi" if is_signed(target) else "fptoui"
+    suffix = "f32" if text == "float" else "f64"
+    return frame.fn.value(f"call {integer} @llvm.{word}.sat.{integer}.{suffix}({text} {value})")
 
-    def extreme(self, op: Intrinsic, left: str, right: str, t: Type) -> str:
-        """MIN, MAX of two scalars."""
-        text = value_type(t)
-        if is_bool(t):
-            return self.binary(BinaryOp.AND if op is Intrinsic.MIN else BinaryOp.OR, left, right, t)
-        if text in ("float", "double"):
-            first = self.compare(BinaryOp.LT if op is Intrinsic.MIN else BinaryOp.GT, left, right, t)
-            return self.select(first, left, right, t)
-        word = ("s" if is_signed(t) else "u") + op.value.lower()
-        return self.fn.value(f"call {text} @llvm.{word}.{text}({text} {left}, {text} {right})")
 
-    def bitcast(self, value: str, source: Type, target: Type) -> str:
-        old, new = value_type(source), value_type(target)
-        if old == new:
-            return value
-        return self.fn.value(f"bitcast {old} {value} to {new}")
+def _round_to_even(frame: Frame, value: str, text: str) -> str:
+    """Adding and taking away 2^23 (2^52) with the sign of the value leaves no room for a fraction; larger values
+    have none. LLVM's own rounding would be a library call on most targets."""
+    fn = frame.fn
+    suffix, magic = ("f32", 2.0**23) if text == "float" else ("f64", 2.0**52)
+    literal = float_literal(magic, 64)
+    size = fn.value(f"call {text} @llvm.fabs.{suffix}({text} {value})")
+    bias = fn.value(f"call {text} @llvm.copysign.{suffix}({text} {literal}, {text} {value})")
+    rounded = fn.value(f"fsub {text} {fn.value(f'fadd {text} {value}, {bias}')}, {bias}")
+    small = fn.value(f"fcmp olt {text} {size}, {literal}")
+    return fn.value(f"select i1 {small}, {text} {rounded}, {text} {value}")
+
+
+def shift(frame: Frame, op: Intrinsic, value: str, t: Type, count: str, count_type: Type, known: int | None) -> str:
+    """SHL, SHR. `known`: the count when it is constant."""
+    fn, text, width = frame.fn, value_type(t), bits_of(t)
+    word = "shl" if op is Intrinsic.SHL else "ashr" if is_signed(t) else "lshr"
+    if known is not None:
+        return fn.value(f"{word} {text} {value}, {known}") if 0 <= known < width else "0"
+    count_text = value_type(count_type)
+    fits = fn.value(f"icmp ult {count_text} {count}, {width}")
+    shifted = fn.value(f"{word} {text} {value}, {resize(frame, count, count_type, width)}")
+    return fn.value(f"select i1 {fits}, {text} {shifted}, {text} 0")
+
+
+def rotate(frame: Frame, op: Intrinsic, value: str, t: Type, count: str, count_type: Type) -> str:
+    text = value_type(t)
+    word = "fshl" if op is Intrinsic.ROL else "fshr"
+    amount = resize(frame, count, count_type, bits_of(t))
+    return frame.fn.value(f"call {text} @llvm.{word}.{text}({text} {value}, {text} {value}, {text} {amount})")
+
+
+def resize(frame: Frame, value: str, t: Type, width: int) -> str:
+    """An integer in `width` bits, extended by its own sign."""
+    bits = bits_of(t)
+    if bits == width or value.lstrip("-").isdigit():
+        return value
+    word = "trunc" if bits > width else "sext" if is_signed(t) else "zext"
+    return frame.fn.value(f"{word} i{bits} {value} to i{width}")
+
+
+def absolute(frame: Frame, value: str, t: Type) -> str:
+    text = value_type(t)
+    if is_real(t):
+        return frame.fn.value(f"call {text} @llvm.fabs.f{bits_of(t)}({text} {value})")
+    if not is_signed(t):
+        return value
+    return frame.fn.value(f"call {text} @llvm.abs.{text}({text} {value}, i1 false)")
+
+
+def square_root(frame: Frame, value: str, t: Type) -> str:
+    text = value_type(t)
+    return frame.fn.value(f"call {text} @llvm.sqrt.f{bits_of(t)}({text} {value})")
+
+
+def select(frame: Frame, condition: str, then: str, otherwise: str, t: Type) -> str:
+    text = value_type(t)
+    return frame.fn.value(f"select i1 {condition}, {text} {then}, {text} {otherwise}")
+
+
+def extreme(frame: Frame, op: Intrinsic, left: str, right: str, t: Type) -> str:
+    """MIN, MAX of two scalars."""
+    text = value_type(t)
+    if is_bool(t):
+        return binary(frame, BinaryOp.AND if op is Intrinsic.MIN else BinaryOp.OR, left, right, t)
+    if text in ("float", "double"):
+        first = compare(frame, BinaryOp.LT if op is Intrinsic.MIN else BinaryOp.GT, left, right, t)
+        return select(frame, first, left, right, t)
+    word = ("s" if is_signed(t) else "u") + op.value.lower()
+    return frame.fn.value(f"call {text} @llvm.{word}.{text}({text} {left}, {text} {right})")
+
+
+def bitcast(frame: Frame, value: str, source: Type, target: Type) -> str:
+    old, new = value_type(source), value_type(target)
+    if old == new:
+        return value
+    return frame.fn.value(f"bitcast {old} {value} to {new}")
 
 
 def known_integer(e: object) -> int | None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from plctool.compiler.codegen.analysis import walk
-from plctool.compiler.codegen.lower_arith import is_real
-from plctool.compiler.codegen.lower_frame import Ref
-from plctool.compiler.codegen.lower_init import Initialising
+from plctool.compiler.codegen.lower_arith import convert, is_real
+from plctool.compiler.codegen.lower_frame import STATEMENTS, Frame, Ref, rule
+from plctool.compiler.codegen.lower_string import copy_literal, copy_string
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.typed import (
     Binary,
@@ -31,94 +31,101 @@ from plctool.compiler.types import BOOL, PointerType, StringType, StructType, is
 _POINTER = PointerType(BOOL)  # what an instance stores for a VAR_IN_OUT
 
 
-class BlockCalls(Initialising):
-    """Calls of function blocks in the function being written."""
+@rule(STATEMENTS, FbCall)
+def fb_call(frame: Frame, s: FbCall) -> None:
+    """A call of an instance: inputs, the body, outputs."""
+    instance = frame.ref(s.instance)
+    base = frame.address(instance)
+    instance = replace(instance, pointer=base, offset=0)
+    arguments = _inputs(frame, s, instance)
+    for variable, place in s.in_outs:
+        slot = Ref(base, variable.offset, _POINTER)
+        frame.store(slot, frame.address(frame.ref(place)))
+    if s.block.external:
+        target = frame.import_function(frame.unit.import_slot(s.block.external))
+        frame.fn.do(f"call void {target}(ptr {base}) {frame.unit.external_call}")
+    else:
+        words = ["ptr %ctx", f"ptr {base}", *arguments]
+        frame.fn.do(f"call void @{frame.unit.target_of(s.block, s.dispatch)}({', '.join(words)})")
+    for variable, place in s.outputs:
+        _copy_out(frame, _member(frame, s.block, instance, variable), frame.ref(place))
 
-    def fb_call(self, s: FbCall) -> None:
-        instance = self.ref(s.instance)
-        base = self.address(instance)
-        instance = replace(instance, pointer=base, offset=0)
-        arguments = self._inputs(s, instance)
-        for variable, place in s.in_outs:
-            slot = Ref(base, variable.offset, _POINTER)
-            self.store(slot, self.address(self.ref(place)))
-        if s.block.external:
-            target = self.import_function(self.unit.import_slot(s.block.external))
-            self.fn.do(f"call void {target}(ptr {base}) {self.unit.external_call}")
+
+def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:
+    """Stores the inputs in the instance. Returns the values of those that the block stores itself; they must be
+    stored here as well in front of an expression that could see it."""
+    handed = frame.unit.handed.get(s.block, [])
+    values: dict[Variable, str] = {}
+    arguments = [argument for _, argument in s.inputs + s.in_outs]
+    last = max((n for n, argument in enumerate(arguments) if not _is_plain(frame, argument, s.block)), default=0)
+    for number, (variable, value) in enumerate(s.inputs):
+        if variable in handed and number >= last:
+            values[variable] = frame.value(value)
         else:
-            words = ["ptr %ctx", f"ptr {base}", *arguments]
-            self.fn.do(f"call void @{self.unit.target_of(s.block, s.dispatch)}({', '.join(words)})")
-        for variable, place in s.outputs:
-            self._copy_out(self._member(s.block, instance, variable), self.ref(place))
+            _assign_member(frame, _member(frame, s.block, instance, variable), value)
+    for variable in handed:
+        if variable not in values:
+            values[variable] = frame.load(_member(frame, s.block, instance, variable))
+    return [f"{value_type(variable.type)} {values[variable]}" for variable in handed]
 
-    def _inputs(self, s: FbCall, instance: Ref) -> list[str]:
-        """Stores the inputs in the instance. Returns the values of those that the block stores itself; they must be
-        stored here as well in front of an expression that could see it."""
-        handed = self.unit.handed.get(s.block, [])
-        values: dict[Variable, str] = {}
-        arguments = [argument for _, argument in s.inputs + s.in_outs]
-        last = max((n for n, argument in enumerate(arguments) if not self._is_plain(argument, s.block)), default=0)
-        for number, (variable, value) in enumerate(s.inputs):
-            if variable in handed and number >= last:
-                values[variable] = self.value(value)
-            else:
-                self._assign_member(self._member(s.block, instance, variable), value)
-        for variable in handed:
-            if variable not in values:
-                values[variable] = self.load(self._member(s.block, instance, variable))
-        return [f"{value_type(variable.type)} {values[variable]}" for variable in handed]
 
-    def _is_plain(self, argument: Expr | Place, block: Pou) -> bool:
-        """Whether an argument neither fails nor calls anything, nor reads an input of such a block."""
-        return all(self._is_plain_node(node, block) for node in walk(argument))
+def _is_plain(frame: Frame, argument: Expr | Place, block: Pou) -> bool:
+    """Whether an argument neither fails nor calls anything, nor reads an input of such a block."""
+    return all(_is_plain_node(frame, node, block) for node in walk(argument))
 
-    def _is_plain_node(self, node: object, block: Pou) -> bool:
+
+def _is_plain_node(frame: Frame, node: object, block: Pou) -> bool:
+    assert block.instance is not None
+    root = block.instance.root
+    if isinstance(node, Binary):
+        return node.op not in (BinaryOp.DIV, BinaryOp.MOD) or is_real(node.type)
+    if isinstance(node, Convert):
+        return node.check is None
+    if isinstance(node, VarPlace):
+        own = frame.pou.instance.root if frame.pou is not None and frame.pou.instance is not None else None
+        storage = node.var.storage
+        return storage is not Storage.REFERENCE and (storage is not Storage.SELF or own is not root)
+    if isinstance(node, MemberPlace) and isinstance(node.base.type, StructType) and node.base.type.root is root:
+        return all(node.offset != variable.offset for variable in frame.unit.handed.get(block, []))
+    return isinstance(node, Const | Load | Unary | IntrinsicCall | MemberPlace)
+
+
+def take_inputs(frame: Frame, block: Pou) -> None:
+    """Stores the inputs that the block was handed."""
+    for number, variable in enumerate(frame.unit.handed.get(block, [])):
+        frame.store(frame.ref(VarPlace(variable, variable.type, block.pos)), f"%p{number}")
+
+
+def _member(frame: Frame, block: Pou, instance: Ref, variable: Variable) -> Ref:
+    tag = ""
+    if instance.direct and (instance.tag or instance.pointer == "%self"):
         assert block.instance is not None
-        root = block.instance.root
-        if isinstance(node, Binary):
-            return node.op not in (BinaryOp.DIV, BinaryOp.MOD) or is_real(node.type)
-        if isinstance(node, Convert):
-            return node.check is None
-        if isinstance(node, VarPlace):
-            own = self.pou.instance.root if self.pou is not None and self.pou.instance is not None else None
-            storage = node.var.storage
-            return storage is not Storage.REFERENCE and (storage is not Storage.SELF or own is not root)
-        if isinstance(node, MemberPlace) and isinstance(node.base.type, StructType) and node.base.type.root is root:
-            return all(node.offset != variable.offset for variable in self.unit.handed.get(block, []))
-        return isinstance(node, Const | Load | Unary | IntrinsicCall | MemberPlace)
+        tag = frame.unit.tag((block.instance.root.name, variable.offset))
+    return instance.member(variable.offset, variable.type, tag)
 
-    def take_inputs(self, block: Pou) -> None:
-        """Stores the inputs that the block was handed."""
-        for number, variable in enumerate(self.unit.handed.get(block, [])):
-            self.store(self.ref(VarPlace(variable, variable.type, block.pos)), f"%p{number}")
 
-    def _member(self, block: Pou, instance: Ref, variable: Variable) -> Ref:
-        tag = ""
-        if instance.direct and (instance.tag or instance.pointer == "%self"):
-            assert block.instance is not None
-            tag = self.unit.tag((block.instance.root.name, variable.offset))
-        return instance.member(variable.offset, variable.type, tag)
+def _assign_member(frame: Frame, target: Ref, value: Expr) -> None:
+    if is_scalar(target.type):
+        frame.store(target, frame.value(value))
+    else:
+        assign_aggregate(frame, target, value)
 
-    def _assign_member(self, target: Ref, value: Expr) -> None:
-        if is_scalar(target.type):
-            self.store(target, self.value(value))
-        else:
-            self.assign_aggregate(target, value)
 
-    def assign_aggregate(self, target: Ref, value: Expr) -> None:
-        """target := string, array or struct."""
-        if not isinstance(target.type, StringType):
-            self.copy(target, self.aggregate(value), target.type.size)
-        elif isinstance(value, Const):
-            self.copy_literal(target, str(value.value))
-        else:
-            self.copy_string(target, self.aggregate(value))
+def assign_aggregate(frame: Frame, target: Ref, value: Expr) -> None:
+    """target := string, array or struct."""
+    if not isinstance(target.type, StringType):
+        frame.copy(target, frame.aggregate(value), target.type.size)
+    elif isinstance(value, Const):
+        copy_literal(frame, target, str(value.value))
+    else:
+        copy_string(frame, target, frame.aggregate(value))
 
-    def _copy_out(self, source: Ref, target: Ref) -> None:
-        if target.bit >= 0 or is_scalar(target.type):
-            wanted = BOOL if target.bit >= 0 else target.type
-            self.store(target, self.convert(self.load(source), source.type, wanted))
-        elif isinstance(target.type, StringType):
-            self.copy_string(target, source)
-        else:
-            self.copy(target, source, target.type.size)
+
+def _copy_out(frame: Frame, source: Ref, target: Ref) -> None:
+    if target.bit >= 0 or is_scalar(target.type):
+        wanted = BOOL if target.bit >= 0 else target.type
+        frame.store(target, convert(frame, frame.load(source), source.type, wanted))
+    elif isinstance(target.type, StringType):
+        copy_string(frame, target, source)
+    else:
+        frame.copy(target, source, target.type.size)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame, Ref
-from plctool.compiler.codegen.lower_init import Initialising, struct_members
+from plctool.compiler.codegen.lower_init import struct_members
 from plctool.compiler.codegen.lower_unit import Unit, value_type
 from plctool.compiler.codegen.signatures import parameter_list
 from plctool.compiler.typed import Dispatch, ScalarInit
@@ -55,7 +55,7 @@ def _arguments(parameters: str) -> str:
     return ", ".join(f"{w[0]} {w[-1]}" for w in words)
 
 
-def renumber(frame: Initialising, ref: Ref) -> None:
+def renumber(frame: Frame, ref: Ref) -> None:
     """Writes the class numbers of all instances in a variable that keeps its other values: a new program may have
     numbered its classes anew."""
     t = ref.type

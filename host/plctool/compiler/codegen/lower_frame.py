@@ -1,17 +1,27 @@
-"""The function being written: its context, its memory, its run-time checks."""
+"""The function being written: its context, its memory, its run-time checks.
+
+How each kind of expression, place and statement is written say the modules `lower_...`: a function for each kind, which
+registers here with `rule`. So they have the parts of a node written without knowing who does it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
+from plctool.compiler.codegen.analysis import Effects
 from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_unit import RAISE, Check, Unit, value_type
-from plctool.compiler.typed import Area, Pos, Pou, Variable
+from plctool.compiler.typed import Area, Expr, Place, Pos, Pou, Statement, Variable
 from plctool.compiler.types import Elementary, StringType, Type, base_of, is_scalar
 from plctool.core import ffi, lib
 
 _FUNCTION_WIDE = ("%self", "%result", "%p", "%m", "%s")  # parameters and stack memory, by the names `ir` and we give
 TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)
+FrameType = TypeVar("FrameType", bound="Frame")
+Node = TypeVar("Node")
+Written = TypeVar("Written")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +69,7 @@ class Frame:
         self._raises: dict[tuple[int, str], str] = {}
         self._free: dict[tuple[int, int], list[str]] = {}
         self._busy: list[tuple[tuple[int, int], str]] = []
-        self._pointer_int = f"i{8 * unit.target.pointer_size}"
+        self.pointer_int = f"i{8 * unit.target.pointer_size}"
 
     def open_scope(self, name: str, pos: Pos) -> None:
         """Starts line information."""
@@ -70,6 +80,20 @@ class Frame:
         """What is written from now on belongs to the line of `pos`."""
         if self.fn.scope >= 0:
             self.fn.debug = self.unit.location(pos.line, self.fn.scope)
+
+    # ---- what is written for each kind of node ----
+
+    def value(self, e: Expr) -> str:
+        """The operand that holds the value of a scalar expression."""
+        return VALUES[type(e)](self, e)
+
+    def ref(self, place: Place) -> Ref:
+        """The address of a place; writes the instructions and checks that it takes."""
+        return REFS[type(place)](self, place)
+
+    def aggregate(self, e: Expr) -> Ref:
+        """Where the value of a string, array or struct expression lies; valid until the end of the statement."""
+        return AGGREGATES[type(e)](self, e)
 
     # ---- context ----
 
@@ -136,7 +160,7 @@ class Frame:
         if known is None:
             sure = ref.pointer in self._fixed or ref.pointer.startswith(_FUNCTION_WIDE)
             flag = "inbounds " if sure else ""
-            known = self.fn.value(f"getelementptr {flag}i8, ptr {ref.pointer}, {self._pointer_int} {ref.offset}")
+            known = self.fn.value(f"getelementptr {flag}i8, ptr {ref.pointer}, {self.pointer_int} {ref.offset}")
             self._addresses[key] = known
         return known
 
@@ -144,7 +168,7 @@ class Frame:
         """Element `index` (pointer-sized integer) of the array of `t` at `ref`. `counted`: it is known to be within."""
         flags = "inbounds nuw " if counted and ref.offset >= 0 else ""
         pointer = self.fn.value(
-            f"getelementptr {flags}[{t.size} x i8], ptr {self.address(ref)}, {self._pointer_int} {index}"
+            f"getelementptr {flags}[{t.size} x i8], ptr {self.address(ref)}, {self.pointer_int} {index}"
         )
         return replace(ref, pointer=pointer, offset=0, type=t, capacity=string_capacity(t))
 
@@ -193,7 +217,7 @@ class Frame:
         """Copies `size` bytes between places that are the same or do not overlap."""
         if size:
             align = min(target.type.align, source.type.align)
-            name, size_type = "memcpy" if target.direct and source.direct else "memmove", self._pointer_int
+            name, size_type = "memcpy" if target.direct and source.direct else "memmove", self.pointer_int
             self.fn.do(
                 f"call void @llvm.{name}.p0.p0.{size_type}(ptr align {align} {self.address(target)}, "
                 f"ptr align {align} {self.address(source)}, {size_type} {size}, i1 false)"
@@ -204,7 +228,7 @@ class Frame:
         if is_scalar(ref.type):
             self.store(ref, zero(ref.type))
             return
-        size_type = self._pointer_int
+        size_type = self.pointer_int
         self.fn.do(
             f"call void @llvm.memset.p0.{size_type}(ptr align {ref.type.align} {self.address(ref)}, i8 0, "
             f"{size_type} {ref.type.size}, i1 false)"
@@ -227,6 +251,41 @@ class Frame:
         for key, pointer in self._busy:
             self._free[key].append(pointer)
         self._busy.clear()
+
+
+class Body(Frame):
+    """The body of one POU."""
+
+    def __init__(self, unit: Unit, fn: Function, pou: Pou, effects: Effects) -> None:
+        super().__init__(unit, fn, pou)
+        self.effects = effects
+        self.on_return = "return"
+        self.loops: list[tuple[str, str]] = []  # labels for CONTINUE and EXIT
+
+    def statements(self, body: list[Statement]) -> None:
+        """Statements in their order."""
+        for statement in body:
+            self.release_temporaries()
+            self.at(statement.pos)
+            STATEMENTS[type(statement)](self, statement)
+
+
+VALUES: dict[type, Callable[[Frame, Any], str]] = {}
+REFS: dict[type, Callable[[Frame, Any], Ref]] = {}
+AGGREGATES: dict[type, Callable[[Frame, Any], Ref]] = {}
+STATEMENTS: dict[type, Callable[[Body, Any], None]] = {}
+
+
+def rule(
+    table: dict[type, Callable[[FrameType, Any], Written]], kind: type[Node]
+) -> Callable[[Callable[[FrameType, Node], Written]], Callable[[FrameType, Node], Written]]:
+    """Makes a function the one that writes a kind of node."""
+
+    def register(function: Callable[[FrameType, Node], Written]) -> Callable[[FrameType, Node], Written]:
+        table[kind] = function
+        return function
+
+    return register
 
 
 def zero(t: Type) -> str:

@@ -12,9 +12,8 @@ from collections.abc import Iterator
 
 from plctool.compiler.codegen.ir import round_to_single
 from plctool.compiler.codegen.lower_arith import constant
-from plctool.compiler.codegen.lower_expr import Expressions
-from plctool.compiler.codegen.lower_frame import Ref
-from plctool.compiler.codegen.lower_string import encode_text
+from plctool.compiler.codegen.lower_frame import Frame, Ref
+from plctool.compiler.codegen.lower_string import copy_literal, encode_text
 from plctool.compiler.codegen.lower_unit import Unit
 from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, StructInit, overlay
 from plctool.compiler.types import ArrayType, Elementary, Field, Kind, StringType, StructType, Type, base_of, is_scalar
@@ -69,90 +68,92 @@ def image_of(unit: Unit, t: Type, initial: Initial | None) -> bytes:
     return bytes(data)
 
 
-class Initialising(Expressions):
-    """Writes initial values in the function being written."""
+def initialise(frame: Frame, ref: Ref, initial: Initial | None) -> None:
+    """Gives zeroed memory its initial value; None is the default of the type."""
+    t = ref.type
+    if isinstance(initial, ScalarInit):
+        _initialise_scalar(frame, ref, initial)
+    elif isinstance(t, ArrayType):
+        _initialise_array(frame, ref, t, initial)
+    elif isinstance(t, StructType):
+        _initialise_struct(frame, ref, t, initial)
 
-    def initialise(self, ref: Ref, initial: Initial | None) -> None:
-        """Gives zeroed memory its initial value; None is the default of the type."""
-        t = ref.type
-        if isinstance(initial, ScalarInit):
-            self._initialise_scalar(ref, initial)
-        elif isinstance(t, ArrayType):
-            self._initialise_array(ref, t, initial)
-        elif isinstance(t, StructType):
-            self._initialise_struct(ref, t, initial)
 
-    def _initialise_scalar(self, ref: Ref, initial: ScalarInit) -> None:
-        if isinstance(ref.type, StringType):
-            if initial.value:
-                self.copy_literal(ref, str(initial.value))
-        elif any(encode_scalar(initial.value, ref.type)):
-            self.store(ref, constant(initial.value, ref.type))
+def _initialise_scalar(frame: Frame, ref: Ref, initial: ScalarInit) -> None:
+    if isinstance(ref.type, StringType):
+        if initial.value:
+            copy_literal(frame, ref, str(initial.value))
+    elif any(encode_scalar(initial.value, ref.type)):
+        frame.store(ref, constant(initial.value, ref.type))
 
-    def _initialise_struct(self, ref: Ref, t: StructType, initial: Initial | None) -> None:
-        if initial is None:
-            if any(image_of(self.unit, t, None)):
-                self.fn.do(f"call void @{self.unit.initialiser(t)}(ptr {self.address(ref)})")
-            return
-        self.initialise_members(ref, t, initial)
 
-    def initialise_members(self, ref: Ref, t: StructType, initial: Initial | None) -> None:
-        for f, value in struct_members(self.unit, t, initial):
-            self.initialise(ref.member(f.offset, f.type), value)
+def _initialise_struct(frame: Frame, ref: Ref, t: StructType, initial: Initial | None) -> None:
+    if initial is None:
+        if any(image_of(frame.unit, t, None)):
+            frame.fn.do(f"call void @{frame.unit.initialiser(t)}(ptr {frame.address(ref)})")
+        return
+    initialise_members(frame, ref, t, initial)
 
-    def _initialise_array(self, ref: Ref, t: ArrayType, initial: Initial | None) -> None:
-        if is_scalar(t.element):
-            self._initialise_scalars(ref, t, initial)
-            return
-        offset = 0
-        for count, value in array_runs(t, initial):
-            if any(image_of(self.unit, t.element, value)):
-                self._repeat(ref.member(offset, t), t.element, count, value)
-            offset += count * t.element.size
 
-    def _initialise_scalars(self, ref: Ref, t: ArrayType, initial: Initial | None) -> None:
-        data, size = image_of(self.unit, t, initial), t.element.size
-        used = [i for i in range(t.count) if any(data[i * size : (i + 1) * size])]
-        if not used:
-            return
-        first, last = used[0], used[-1] + 1
-        part = data[first * size : last * size]
-        if last - first >= _LOOP_FROM and part == part[:size] * (last - first):
-            value = next(
-                v
-                for n, v in array_runs(t, initial)
-                if isinstance(v, ScalarInit) and any(encode_scalar(v.value, t.element))
-            )
-            self._repeat(ref.member(first * size, t), t.element, last - first, value)
-        elif len(used) >= _CONSTANT_FROM:
-            pointer = self.unit.module.constant(part, t.element.align)
-            source = Ref(pointer, 0, t.element, direct=True)
-            self.copy(ref.member(first * size, t.element), source, len(part))
-        else:
-            for i in used:
-                element = ref.member(i * size, t.element)
-                self.store(element, self._constant_at(data, i * size, t.element))
+def initialise_members(frame: Frame, ref: Ref, t: StructType, initial: Initial | None) -> None:
+    for f, value in struct_members(frame.unit, t, initial):
+        initialise(frame, ref.member(f.offset, f.type), value)
 
-    def _constant_at(self, data: bytes, offset: int, t: Type) -> str:
-        raw = data[offset : offset + t.size]
-        base = base_of(t)
-        if isinstance(base, Elementary) and base.kind is Kind.REAL:
-            return constant(struct.unpack("<f" if base.bits == 32 else "<d", raw)[0], t)
-        return constant(int.from_bytes(raw, "little"), t)
 
-    def _repeat(self, ref: Ref, element: Type, count: int, initial: Initial | None) -> None:
-        """The same initial value in `count` elements from `ref` on."""
-        if count == 1:
-            self.initialise(ref.member(0, element), initial)
-            return
-        fn, width = self.fn, self._pointer_int
-        base, loop, end = self.address(ref), fn.label("fill"), fn.label("filled")
-        counter = fn.slot(width)
-        fn.do(f"store {width} 0, ptr {counter}")
-        fn.begin(loop)
-        index = fn.value(f"load {width}, ptr {counter}")
-        self.initialise(self.element(Ref(base, 0, element), index, element, counted=True), initial)
-        following = fn.value(f"add {width} {index}, 1")
-        fn.do(f"store {width} {following}, ptr {counter}")
-        fn.branch_if(fn.value(f"icmp ult {width} {following}, {count}"), loop, end)
-        fn.begin(end)
+def _initialise_array(frame: Frame, ref: Ref, t: ArrayType, initial: Initial | None) -> None:
+    if is_scalar(t.element):
+        _initialise_scalars(frame, ref, t, initial)
+        return
+    offset = 0
+    for count, value in array_runs(t, initial):
+        if any(image_of(frame.unit, t.element, value)):
+            _repeat(frame, ref.member(offset, t), t.element, count, value)
+        offset += count * t.element.size
+
+
+def _initialise_scalars(frame: Frame, ref: Ref, t: ArrayType, initial: Initial | None) -> None:
+    data, size = image_of(frame.unit, t, initial), t.element.size
+    used = [i for i in range(t.count) if any(data[i * size : (i + 1) * size])]
+    if not used:
+        return
+    first, last = used[0], used[-1] + 1
+    part = data[first * size : last * size]
+    if last - first >= _LOOP_FROM and part == part[:size] * (last - first):
+        value = next(
+            v for n, v in array_runs(t, initial) if isinstance(v, ScalarInit) and any(encode_scalar(v.value, t.element))
+        )
+        _repeat(frame, ref.member(first * size, t), t.element, last - first, value)
+    elif len(used) >= _CONSTANT_FROM:
+        pointer = frame.unit.module.constant(part, t.element.align)
+        source = Ref(pointer, 0, t.element, direct=True)
+        frame.copy(ref.member(first * size, t.element), source, len(part))
+    else:
+        for i in used:
+            element = ref.member(i * size, t.element)
+            frame.store(element, _constant_at(data, i * size, t.element))
+
+
+def _constant_at(data: bytes, offset: int, t: Type) -> str:
+    raw = data[offset : offset + t.size]
+    base = base_of(t)
+    if isinstance(base, Elementary) and base.kind is Kind.REAL:
+        return constant(struct.unpack("<f" if base.bits == 32 else "<d", raw)[0], t)
+    return constant(int.from_bytes(raw, "little"), t)
+
+
+def _repeat(frame: Frame, ref: Ref, element: Type, count: int, initial: Initial | None) -> None:
+    """The same initial value in `count` elements from `ref` on."""
+    if count == 1:
+        initialise(frame, ref.member(0, element), initial)
+        return
+    fn, width = frame.fn, frame.pointer_int
+    base, loop, end = frame.address(ref), fn.label("fill"), fn.label("filled")
+    counter = fn.slot(width)
+    fn.do(f"store {width} 0, ptr {counter}")
+    fn.begin(loop)
+    index = fn.value(f"load {width}, ptr {counter}")
+    initialise(frame, frame.element(Ref(base, 0, element), index, element, counted=True), initial)
+    following = fn.value(f"add {width} {index}, 1")
+    fn.do(f"store {width} {following}, ptr {counter}")
+    fn.branch_if(fn.value(f"icmp ult {width} {following}, {count}"), loop, end)
+    fn.begin(end)

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from plctool.compiler.semantics.allocation import Allocation
 from plctool.compiler.semantics.conversions import elementary
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import GlobalSymbol, Role, VarSymbol
+from plctool.compiler.semantics.symbols import Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Area, Initial, Storage, Variable
 from plctool.compiler.types import BOOL, ELEMENTARY, Elementary, Type, base_of
-
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
 
 MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
 AREAS = {"I": Area.INPUT, "Q": Area.OUTPUT, "M": Area.MEMORY}
@@ -49,7 +46,7 @@ def is_open(location: ast.DirectAddress | None) -> bool:
     return location is not None and location.text.endswith("*")
 
 
-def read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
+def _read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
     """What `%IW2` means; None after a diagnosis."""
     match = _ADDRESS.fullmatch(node.text.upper())
     letter, size, first, second = match.groups() if match is not None else ("", "", "", None)
@@ -69,7 +66,7 @@ def located(
     name: str, t: Type, init: Initial | None, location: ast.DirectAddress, scope: Scope, offset: int
 ) -> Variable | None:
     """A variable with AT, declared at `offset`; None after a diagnosis."""
-    address = read_address(location, scope)
+    address = _read_address(location, scope)
     if address is None:
         return None
     base = elementary(t)
@@ -92,23 +89,20 @@ def located(
 class DirectVariables:
     """The variables behind addresses that statements use."""
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(self, allocation: Allocation) -> None:
+        self._allocation = allocation
         self._known: dict[str, VarSymbol] = {}
 
     def find(self, node: ast.DirectAddress, scope: Scope) -> VarSymbol | None:
         """The variable at an address; None after a diagnosis."""
         key = node.text.upper()
-        declared = scope.lookup(key)  # AT %MW1 : INT, without a name
-        if isinstance(declared, GlobalSymbol):
-            return self._world.declarations.global_variable(declared)
-        symbol = declared if isinstance(declared, VarSymbol) else self._known.get(key)
+        symbol = self._known.get(key)
         if symbol is not None:
             return symbol
-        address = read_address(node, scope)
+        address = _read_address(node, scope)
         variable = None if address is None else located(key, address.type, None, node, scope, node.pos)
         if address is None or variable is None:
             return None
-        self._world.allocation.add(variable)
+        self._allocation.add(variable)
         symbol = self._known[key] = VarSymbol(key, variable.pos, address.type, Role.GLOBAL, variable)
         return symbol

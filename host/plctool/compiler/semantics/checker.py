@@ -1,81 +1,61 @@
-"""What all checks of expressions have in common: the ways in, errors, values and places.
+"""What every check of an expression or statement gets: where it stands, whom to ask, how to report.
+
+The rules themselves are functions, one for each kind of node of the syntax tree (package `rules`). They register here
+for the kind they check; so a rule has its parts checked by `expr` and `statement` without knowing who does it.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 from plctool.compiler.nesting import MAX_DEPTH, NestingError
-from plctool.compiler.semantics.conversions import (
-    NUMBERS,
-    elementary,
-    error_value,
-    settle,
-)  # fmt: skip
+from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, settle
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import (
-    ERROR,
-    UNTYPED_INT,
-    UNTYPED_REAL,
-    VarSymbol,
-)  # fmt: skip
+from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
-    Const,
-    DerefPlace,
-    Expr,
-    Load,
-    Place,
-    Pos,
-    SelfPlace,
-    ValuePlace,
-    VarPlace,
-)  # fmt: skip
-from plctool.compiler.types import (
-    BOOL,
-    ReferenceType,
-    Type,
-)  # fmt: skip
+from plctool.compiler.typed import Const, Expr, Pos, Statement
+from plctool.compiler.types import BOOL, Type
+
+ExprNode = TypeVar("ExprNode", bound=ast.Expr)
+StmtNode = TypeVar("StmtNode", bound=ast.Stmt)
+SpecialCalls = Mapping[str, Callable[[ast.Call], list[Statement]]]
+"""Calls that are statements of their own, by name in upper case."""
 
 
-def is_untyped(e: Expr) -> bool:
-    """Whether the expression is a constant that takes the type its surroundings need."""
-    return e.type is UNTYPED_INT or e.type is UNTYPED_REAL
+class Checker:
+    """The check of the expressions and statements of one scope."""
 
-
-def place_of(e: Expr) -> Place:
-    """The place a value was loaded from, or a temporary one."""
-    return e.place if isinstance(e, Load) else ValuePlace(e, e.type, e.pos)
-
-
-def is_temporary(place: Place) -> bool:
-    """Whether a place is (part of) a value that nobody else sees."""
-    while not isinstance(place, VarPlace | DerefPlace | ValuePlace | SelfPlace):
-        place = place.base
-    return isinstance(place, ValuePlace)
-
-
-def load(place: Place) -> Load:
-    """The value of a place; of a reference, the value it refers to."""
-    if isinstance(place.type, ReferenceType):
-        place = DerefPlace(Load(place, place.type, place.pos), place.type.target, place.pos)
-    return Load(place, place.type, place.pos)
-
-
-class Checker(ABC):
-    """Checks the expressions of one scope. What it needs is provided by the classes built on it."""
-
-    def __init__(self, scope: Scope) -> None:
+    def __init__(self, world: World, scope: Scope, special_calls: SpecialCalls | None = None) -> None:
+        self.world = world
         self.scope = scope
-        self.world = scope.world
-        self.coerce = scope.world.coerce
+        self.coerce = world.coerce
         self.pos: Callable[[int], Pos] = scope.source.pos
-        self._depth = 0
+        self.special_calls: SpecialCalls = special_calls or {}
+        self.loops = 0  # around the statement
+        self._expressions = 0
+        self._statements = 0
 
-    # ---- entry points ----
+    def expr(self, node: ast.Expr, expected: Type | None = None) -> Expr:
+        """The typed expression; `expected` is the type the surroundings would like. Untyped constants stay untyped."""
+        self._expressions += 1
+        if self._expressions > MAX_DEPTH:
+            raise NestingError(self.pos(node.pos))
+        e = EXPRESSION_RULES[type(node)](self, node, expected)
+        self._expressions -= 1
+        return e
+
+    def statement(self, node: ast.Stmt) -> list[Statement]:
+        """What a statement becomes; nothing after a diagnosis."""
+        self._statements += 1
+        if self._statements > MAX_DEPTH:
+            raise NestingError(self.pos(node.pos))
+        statements = STATEMENT_RULES[type(node)](self, node)
+        self._statements -= 1
+        return statements
 
     def value(self, node: ast.Expr, target: Type) -> Expr:
         """The expression as a value of `target`."""
@@ -87,10 +67,7 @@ class Checker(ABC):
 
     def condition(self, node: ast.Expr) -> Expr:
         """The expression as a BOOL."""
-        e = self.expr(node, BOOL)
-        if e.type is BOOL:
-            return e
-        return self.coerce(e, BOOL)
+        return self.value(node, BOOL)
 
     def constant(self, node: ast.Expr, expected: Type | None = None) -> Const | None:
         """The value of a constant expression; anything else is reported."""
@@ -113,60 +90,38 @@ class Checker(ABC):
         self.error(node.pos, "type", "an integer constant is needed here")
         return None
 
-    def place(self, node: ast.Expr, use: str) -> Place | None:
-        """The variable (or part of one) an expression names; `use` says what for."""
-        e = self.expr(node)
-        if e.type is ERROR:
-            return None
-        if isinstance(e, Load) and not is_temporary(e.place):
-            return e.place
-        self.error(node.pos, "place", f"{use} needs a variable")
-        return None
-
     def error(self, offset: int, code: str, message: str) -> Expr:
         """Reports an error; the value that stands for the expression."""
         self.scope.error(offset, code, message)
         return error_value(self.pos(offset))
 
-    def _deeper(self, offset: int) -> None:
-        self._depth += 1
-        if self._depth > MAX_DEPTH:
-            raise NestingError(self.pos(offset))
+    def warning(self, offset: int, code: str, message: str) -> None:
+        """Reports a warning."""
+        self.scope.warning(offset, code, message)
 
-    # ---- what the classes built on this one provide ----
 
-    @abstractmethod
-    def expr(self, node: ast.Expr, expected: Type | None = None) -> Expr:
-        """The typed expression; `expected` is the type the surroundings would like. Untyped constants stay untyped."""
+ExprRule = Callable[[Checker, ExprNode, Type | None], Expr]
+StmtRule = Callable[[Checker, StmtNode], list[Statement]]
 
-    @abstractmethod
-    def call_by_name(self, name: str, args: list[Expr], offset: int, expected: Type | None) -> Expr:
-        """A call of a library function with checked arguments."""
+EXPRESSION_RULES: dict[type, ExprRule[Any]] = {}
+STATEMENT_RULES: dict[type, StmtRule[Any]] = {}
 
-    @abstractmethod
-    def call(self, node: ast.Call, expected: Type | None) -> Expr:
-        """A call as a value."""
 
-    @abstractmethod
-    def input(self, node: ast.Expr, t: Type, name: str) -> Expr:
-        """The value of an input."""
+def checks(kind: type[ExprNode]) -> Callable[[ExprRule[ExprNode]], ExprRule[ExprNode]]:
+    """Makes a function the rule for a kind of expression."""
 
-    @abstractmethod
-    def own_name(self, node: ast.Name, symbol: object) -> Expr | None:
-        """THIS, SUPER or a property by its bare name."""
+    def register(rule: ExprRule[ExprNode]) -> ExprRule[ExprNode]:
+        EXPRESSION_RULES[kind] = rule
+        return rule
 
-    @abstractmethod
-    def member_of(self, base: Expr, node: ast.Member) -> Expr | None:
-        """A property of an instance."""
+    return register
 
-    @abstractmethod
-    def qualified(self, node: ast.Member) -> Expr | None:
-        """What is in a namespace."""
 
-    @abstractmethod
-    def followed(self, e: Expr) -> Expr:
-        """The result of a call, or what it refers to."""
+def checks_statement(kind: type[StmtNode]) -> Callable[[StmtRule[StmtNode]], StmtRule[StmtNode]]:
+    """Makes a function the rule for a kind of statement."""
 
-    @abstractmethod
-    def may_see(self, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
-        """Whether a variable that is not PUBLIC may be used here; reports it when not."""
+    def register(rule: StmtRule[StmtNode]) -> StmtRule[StmtNode]:
+        STATEMENT_RULES[kind] = rule
+        return rule
+
+    return register

@@ -8,8 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
+from plctool.compiler.semantics.rules.block_calls import program_arguments
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.statements import Statements
 from plctool.compiler.semantics.symbols import PouSymbol, ProgramInfo
 from plctool.compiler.semantics.tasks import background, read_task
 from plctool.compiler.semantics.world import World
@@ -28,22 +30,22 @@ class Application:
     tasks: list[Task] = field(default_factory=list)
 
 
-def configure(world: World) -> Application:
+def configure(world: World, config: InstanceConfig) -> Application:
     """Instantiates the programs that tasks run."""
     application = Application()
     builder = _Builder(world, application)
-    if world.configurations:
-        for decl in world.configurations:
+    if world.names.configurations:
+        for decl in world.names.configurations:
             builder.configuration(decl)
     else:
         builder.default()
-    world.instance_config.apply(application.tasks)
+    config.apply(application.tasks)
     return application
 
 
 def default_programs(world: World) -> list[PouSymbol]:
     """What runs without a CONFIGURATION when it is just one: that with a usual name, else all there are."""
-    programs = world.program_symbols()
+    programs = world.names.program_symbols()
     for name in DEFAULT_PROGRAMS:
         for symbol in programs:
             if symbol.decl.name.upper() == name:
@@ -75,7 +77,7 @@ class _Builder:
         self._application.tasks.append(Task(DEFAULT_TASK, TaskKind.CYCLIC, 1, DEFAULT_INTERVAL_US, [program.pou]))
 
     def _instance(self, name: str) -> ProgramInfo:
-        instance = self._world.programs.find(name.casefold())
+        instance = self._world.names.instance(name.casefold())
         assert instance is not None and instance.program is not None
         return instance.program
 
@@ -88,7 +90,7 @@ class _Builder:
             if task_decl.name.casefold() in tasks:
                 scope.error(task_decl.pos, "duplicate", f"there is a task {task_decl.name} already")
                 continue
-            tasks[task_decl.name.casefold()] = read_task(task_decl, scope)
+            tasks[task_decl.name.casefold()] = read_task(self._world, task_decl, scope)
         self._application.tasks += tasks.values()
         freewheeling: Task | None = None
         for instance in decl.programs:
@@ -116,9 +118,9 @@ class _Builder:
         return task
 
     def _program(self, instance: ast.ProgramInstance, task: Task, scope: Scope) -> None:
-        symbol = self._world.lookup_program(instance.type_name)
+        symbol = self._world.names.lookup_program(instance.type_name)
         if symbol is None:
-            hint = did_you_mean(instance.type_name, (p.decl.name for p in self._world.program_symbols()))
+            hint = did_you_mean(instance.type_name, (p.decl.name for p in self._world.names.program_symbols()))
             scope.error(instance.type_pos, "unknown", f"there is no program {instance.type_name}{hint}")
             return
         if instance.name.casefold() in self._names:
@@ -132,7 +134,7 @@ class _Builder:
 
     def _connect(self, instance: ast.ProgramInstance, program: ProgramInfo, task: Task, scope: Scope) -> None:
         """`PROGRAM p WITH t : Type(input := x, output => y)`: small programs before and behind do the assignments."""
-        handed = Statements(scope).program_arguments(instance.args, program, instance.pos)
+        handed = program_arguments(Checker(self._world, scope), instance.args, program, instance.pos)
         if handed is None:
             return
         (before, behind), pou = handed, program.pou

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from plctool.compiler.semantics.classes import instances_in
+from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, finalisers, initialisers, instances_in
 from plctool.compiler.semantics.symbols import Member
+from plctool.compiler.semantics.world import World
 from plctool.compiler.typed import (
     Area,
     ArrayInit,
@@ -44,16 +45,12 @@ from plctool.compiler.typed import (
 )
 from plctool.compiler.types import BOOL, DINT, ArrayType, PointerType, StringType, StructType, Type
 
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
-
-INIT_RETAINS, COPY_CODE = "binitretains", "bincopycode"  # what every FB_Init is told
 _LOOP_FROM = 4  # equal elements that are worth a loop
 
 
-def construct(world: World) -> None:
-    """Makes the routines `world.startup` and `world.shutdown` of all global instances, and lets units begin with the
-    FB_Init of instances among their own variables, which live for one call."""
+def construct(world: World) -> tuple[Pou | None, Pou | None]:
+    """Makes the routines that begin and end the life of all global instances, where there is something to do, and lets
+    units begin with the FB_Init of instances among their own variables, which live for one call."""
     start = Pou("FB_Init", PouKind.FUNCTION, Pos("", 1, 1))
     flag = Variable("init_retains", BOOL, Storage.LOCAL, start.pos)
     start.parameters.append(Parameter(flag, Direction.INPUT))
@@ -61,7 +58,6 @@ def construct(world: World) -> None:
     for variable in world.allocation.variables:
         start.body += builder.variable(variable)
     if start.body:
-        world.startup = start
         world.pous.append(start)
     for pou in world.pous:
         if pou is not start:
@@ -71,8 +67,8 @@ def construct(world: World) -> None:
     exits = _Destruction(world, end)
     end.body = [s for v in reversed(world.allocation.variables) for s in exits.variable(v)]
     if end.body:
-        world.shutdown = end
         world.pous.append(end)
+    return start if start.body else None, end if end.body else None
 
 
 class _Construction:
@@ -95,7 +91,7 @@ class _Construction:
             return False
         known = self._needed.get(t)
         if known is None:
-            known = bool(self._world.classes.initialisers(t)) or any(self._needs(f.type) for f in t.fields)
+            known = bool(initialisers(self._world, t)) or any(self._needs(f.type) for f in t.fields)
             known = known or _is_computed(self._world.defaults.get(t.name))
             self._needed[t] = known
         return known
@@ -117,7 +113,7 @@ class _Construction:
         statements: list[Statement] = []
         for f in t.fields:
             statements += self._place(MemberPlace(place, f.offset, f.type, pos), complete.members.get(f.name), pos)
-        for member in self._world.classes.initialisers(t):
+        for member in initialisers(self._world, t):
             statements.append(self._call(member, place, complete.arguments, pos))
         return statements
 
@@ -140,7 +136,7 @@ class _Construction:
         return statements
 
     def _call(self, member: Member, place: Place, arguments: Mapping[str, Expr], pos: Pos) -> Statement:
-        info = self._world.classes.signature(member)
+        info = self._world.declared.member(member)
         args: list[Expr | Place | None] = []
         for symbol, direction in info.parameters:
             key = symbol.name.casefold()
@@ -177,20 +173,20 @@ class _Destruction:
 
     def _place(self, place: Place) -> list[Statement]:
         t, pos = place.type, place.pos
-        if not any(self._world.classes.finalisers(instance) for instance in instances_in(t)):
+        if not any(finalisers(self._world, instance) for instance in instances_in(t)):
             return []
         if isinstance(t, ArrayType):
             loop, element = _loop(self._pou, _flat(place, t, pos), t.element, t.count - 1, 0)
             loop.body = self._place(element)
             return [loop]
         assert isinstance(t, StructType)
-        statements = [self._call(member, place) for member in self._world.classes.finalisers(t)]
+        statements = [self._call(member, place) for member in finalisers(self._world, t)]
         for f in reversed(t.fields):
             statements += self._place(MemberPlace(place, f.offset, f.type, pos))
         return statements
 
     def _call(self, member: Member, place: Place) -> Statement:
-        info, pos = self._world.classes.signature(member), place.pos
+        info, pos = self._world.declared.member(member), place.pos
         args: list[Expr | Place | None] = [Const(0, symbol.type, pos) for symbol, _ in info.parameters]
         return CallStatement(Call(info.pou, args, info.result or BOOL, pos, instance=place), pos)
 

@@ -9,7 +9,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from plctool.compiler.semantics.symbols import DIRECTIONS
+from plctool.compiler.syntax import ast
 from plctool.compiler.types import BOOL, ELEMENTARY, Elementary, EnumType, Kind, StringType, SubrangeType, Type, base_of
+
+LIBRARY_STRING = StringType(255)  # STRING without a length, as parameter or result of a library function
+WIDE_LIBRARY_STRING = StringType(255, wide=True)
 
 
 def _of_kind(*kinds: Kind) -> Callable[[Type], bool]:
@@ -73,6 +78,12 @@ def is_group(name: str) -> bool:
 def accepts(name: str, t: Type) -> bool:
     """Whether a type belongs to a group."""
     return GROUPS[group_name(name)](t)
+
+
+def is_generic(decl: ast.PouDecl) -> bool:
+    """Whether parameters of a function are of a type ANY_..."""
+    parameters = (line.type for b in decl.blocks if b.keyword in DIRECTIONS for line in b.decls)
+    return any(isinstance(spec, ast.NamedType) and is_group(spec.name) for spec in parameters)
 
 
 def first_of(name: str) -> Type:

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.semantics.class_rules import INITIALISERS
+from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.core import lib

@@ -6,20 +6,26 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.semantics.symbols import ClassInfo, GlobalSymbol, PouSymbol, Symbol, TypeSymbol, Unit
+from plctool.compiler.semantics.names import Names
+from plctool.compiler.semantics.symbols import (
+    ClassInfo,
+    GlobalSymbol,
+    PouSymbol,
+    Role,
+    Symbol,
+    TypeSymbol,
+    Unit,
+    VarSymbol,
+)
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Pos, Pou, Statement
 from plctool.compiler.types import Type
 
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.world import World
 
-
-def internal_to(symbol: Symbol) -> str | None:
+def _internal_to(symbol: Symbol) -> str | None:
     """The namespace that alone may use a unit or global; None when everybody may."""
     if isinstance(symbol, GlobalSymbol):
         space, marked = symbol.namespace, "INTERNAL" in symbol.qualifiers
@@ -38,13 +44,14 @@ class Scope:
     """The surroundings of declarations and statements.
 
     `names` are the local ones by case-folded name; `bindings` the types generic parameters stand for in this instance;
-    `prologue` what has to be done before the body: finding edges; `programs` the PROGRAMs that
-    can be instantiated here, as function blocks: in unit tests; `outer` what a method sees of the unit `cls` around it;
-    `sees_inside`: VAR of instances may be read, as tests and VAR_CONFIG do; `edges` what the body sees in place of
-    inputs with R_EDGE; `path` the namespaces to look into, case-folded, innermost first; `space` the one this is in.
+    `prologue` what has to be done before the body: finding edges; `programs` the PROGRAMs that can be instantiated
+    here, as function blocks: in unit tests; `outer` what a method sees of the unit `cls` around it; `sees_inside`: VAR
+    of instances may be read, as tests and VAR_CONFIG do; `writes_inside`: and all of them written, as tests do; `edges`
+    what the body sees in place of inputs with R_EDGE; `path` the namespaces to look into, case-folded, innermost first;
+    `space` the one this is in.
     """
 
-    world: World
+    globals: Names
     source: Source
     library: bool = False
     names: dict[str, Symbol] = field(default_factory=dict)
@@ -55,6 +62,7 @@ class Scope:
     outer: dict[str, Symbol] = field(default_factory=dict)
     cls: ClassInfo | None = None
     sees_inside: bool = False
+    writes_inside: bool = False
     edges: dict[str, Symbol] = field(default_factory=dict)
     path: tuple[str, ...] = ()
     space: str = ""
@@ -75,7 +83,7 @@ class Scope:
 
     def _namespace(self, offset: int, name: str) -> str | None:
         """The full name of a namespace, written in full or from here on."""
-        spaces, key = self.world.namespaces, name.casefold()
+        spaces, key = self.globals.namespaces, name.casefold()
         parts = self.space.split(".") if self.space else []
         for full_name in (".".join([*parts[:n], key]) for n in range(len(parts), -1, -1)):
             if full_name in spaces:
@@ -91,10 +99,24 @@ class Scope:
 
     def may_use(self, symbol: Symbol, name: str, offset: int) -> bool:
         """Whether a unit or global may be used here; reports what is INTERNAL elsewhere."""
-        owner = internal_to(symbol)
+        owner = _internal_to(symbol)
         if owner is None or self.is_within(owner):
             return True
         self.error(offset, "access", f"{name} is INTERNAL: only the namespace {owner} may use it")
+        return False
+
+    def declare(self, symbol: VarSymbol, offset: int) -> bool:
+        """Makes a local name known; False after a diagnosis when it is taken."""
+        key = symbol.name.casefold()
+        other = self.names.get(key)
+        if not isinstance(other, VarSymbol):
+            self.names[key] = symbol
+            return True
+        if other.role is Role.RESULT:
+            message = f"{symbol.name} is the name of this function"
+        else:
+            message = f"{symbol.name} is declared already: {other.name} in line {other.pos.line}"
+        self.error(offset, "duplicate", message)
         return False
 
     def lookup(self, name: str) -> Symbol | None:
@@ -104,10 +126,10 @@ class Scope:
         if symbol is not None:
             return symbol
         for space in self.path:
-            symbol = self.world.lookup(f"{space}.{key}", library=self.library)
+            symbol = self.globals.lookup(f"{space}.{key}", library=self.library)
             if symbol is not None:
                 return symbol
-        return self.world.lookup(key.removeprefix("."), library=self.library)
+        return self.globals.lookup(key.removeprefix("."), library=self.library)
 
     def unit(self, name: str) -> Unit | None:
         """A type, function, function block or program, whatever variables have its name."""
@@ -115,7 +137,7 @@ class Scope:
         if key in self.programs:
             return self.programs[key]
         spaces = (f"{space}.{key}" for space in self.path)
-        found = (self.world.unit(k, library=self.library) for k in (*spaces, key))
+        found = (self.globals.unit(k, library=self.library) for k in (*spaces, key))
         return next((symbol for symbol in found if symbol is not None), None)
 
     def pos(self, offset: int) -> Pos:
@@ -124,8 +146,8 @@ class Scope:
 
     def error(self, offset: int, code: str, message: str) -> None:
         """Reports an error at an offset."""
-        self.world.diagnostics.error(self.source.pos(offset), code, message)
+        self.globals.diagnostics.error(self.source.pos(offset), code, message)
 
     def warning(self, offset: int, code: str, message: str) -> None:
         """Reports a warning at an offset."""
-        self.world.diagnostics.warning(self.source.pos(offset), code, message)
+        self.globals.diagnostics.warning(self.source.pos(offset), code, message)

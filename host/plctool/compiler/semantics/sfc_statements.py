@@ -5,9 +5,10 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.rules.places import named_place
+from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc import (
     BEFORE,
     FIRES,
@@ -20,19 +21,17 @@ from plctool.compiler.semantics.sfc import (
     keys,
 )
 from plctool.compiler.semantics.symbols import MemberSymbol, VarSymbol
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 
-if TYPE_CHECKING:
-    from plctool.compiler.semantics.scope import Scope
 
-
-def statements_of(decl: ast.PouDecl, scope: Scope) -> list[ast.Stmt]:
+def statements_of(world: World, decl: ast.PouDecl, scope: Scope) -> list[ast.Stmt]:
     """The body of a unit; of a chart what it does in a cycle."""
     if decl.chart is None:
         return decl.body
     if not decl.chart.valid:
         return []
-    evolution, execution = _Evolution(decl, decl.chart), _Execution(decl, decl.chart, scope)
+    evolution, execution = _Evolution(decl, decl.chart), _Execution(world, decl, decl.chart, scope)
     return [*decl.body, *evolution.statements(), *execution.statements()]
 
 
@@ -170,12 +169,12 @@ def _label(pos: int, value: int) -> ast.CaseLabel:
 class _Execution:
     """What the active steps do."""
 
-    def __init__(self, decl: ast.PouDecl, chart: ast.Chart, scope: Scope) -> None:
+    def __init__(self, world: World, decl: ast.PouDecl, chart: ast.Chart, scope: Scope) -> None:
         self._chart = chart
         self._scope = scope
         self._decl = decl
         self._actions = actions_of(decl, chart)
-        self._checker = scope.world.expressions(scope)
+        self._checker = Checker(world, scope)
         owner = decl if scope.cls is None else scope.cls.symbol.decl
         self._order = {member.name.casefold(): i for i, member in enumerate(owner.members)}
 
@@ -185,7 +184,7 @@ class _Execution:
         calls: list[Action] = []
         for action in self._actions:
             for indicator in (i for _, use in action.uses for i in use.indicators):
-                self._checker.place(indicator, "an indicator")
+                named_place(self._checker, indicator, "an indicator")
             symbol = self._scope.lookup(action.name) if isinstance(action.target, ast.Name) else None
             if isinstance(symbol, MemberSymbol):
                 calls.append(action)

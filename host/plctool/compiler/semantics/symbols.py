@@ -44,6 +44,10 @@ UNTYPED_REAL = Elementary("real constant", Kind.REAL, 64, True, -1)
 NULL_TYPE = PointerType(ERROR)
 
 
+DIRECTIONS = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VAR_IN_OUT": Direction.IN_OUT}
+"""Of parameters, by the keyword of their section."""
+
+
 class Role(Enum):
     """How a variable was declared."""
 
@@ -202,9 +206,8 @@ class Member:
 
 @dataclass(slots=True, eq=False)
 class ClassInfo:
-    """What a FUNCTION_BLOCK, INTERFACE or PROGRAM has besides variables. `members` are its own; `names` what they
-    see of
-    the unit around them. `number` identifies the class in its instances; 0 when none has to be told from others."""
+    """What a FUNCTION_BLOCK, INTERFACE or PROGRAM has besides variables. `members` are its own; `names` what they see
+    of the unit around them. `number` identifies the class in its instances; 0 when none has to be told from others."""
 
     symbol: PouSymbol
     name: str

@@ -9,9 +9,10 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.statements import Statements
 from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import BitPlace, Load, Task, TaskKind, VarPlace
 from plctool.compiler.types import BOOL, LTIME, TIME
@@ -26,15 +27,15 @@ def background(name: str) -> Task:
     return Task(name, TaskKind.FREEWHEELING, LOWEST_PRIORITY, 0, [])
 
 
-def read_task(decl: ast.TaskDecl, scope: Scope) -> Task:
+def read_task(world: World, decl: ast.TaskDecl, scope: Scope) -> Task:
     """The task that is declared; without INTERVAL and SINGLE it runs when there is time."""
-    return _Reader(decl, scope).task
+    return _Reader(world, decl, scope).task
 
 
 class _Reader:
-    def __init__(self, decl: ast.TaskDecl, scope: Scope) -> None:
+    def __init__(self, world: World, decl: ast.TaskDecl, scope: Scope) -> None:
         self.task = background(decl.name)
-        self._checker = Statements(scope)
+        self._checker = Checker(world, scope)
         for offset, name, value in decl.properties:
             read = self._properties.get(name.upper())
             if read is None or isinstance(value, ast.ArrayInit | ast.StructInit):

@@ -7,15 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
-from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import mocks
-from plctool.compiler.semantics.checker import is_untyped, load, place_of
+from plctool.compiler.semantics.checker import Checker, SpecialCalls
 from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, settle, time_to_ltime
+from plctool.compiler.semantics.rules.bodies import report_unused, write_body
+from plctool.compiler.semantics.rules.common_types import match_literals
+from plctool.compiler.semantics.rules.conversion_calls import convert_explicitly
+from plctool.compiler.semantics.rules.members import bound_member
+from plctool.compiler.semantics.rules.operators import operate
+from plctool.compiler.semantics.rules.parts import member_of
+from plctool.compiler.semantics.rules.qualified_names import variable_value
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.statements import Statements
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol
+from plctool.compiler.semantics.values import is_untyped, load, place_of
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -69,8 +74,8 @@ class Assertion:
 class Bench:
     """What all tests of a program share: its asserts, numbered from 1, and the hidden variables."""
 
-    def __init__(self, world: World) -> None:
-        self.asserts: list[Assertion] = []
+    def __init__(self, world: World, asserts: list[Assertion]) -> None:
+        self.asserts = asserts
         self._world = world
         self._operands: dict[tuple[str, Type], Variable] = {}
         hidden = ((NUMBER, DINT), (FAILED, DINT), (_TIME, TIME), (_LTIME, LTIME))
@@ -106,39 +111,35 @@ _OPERATORS = {
 }  # fmt: skip
 
 
-class TestStatements(Statements):
-    """Checks the body of a TEST, SETUP or TEARDOWN. It may write every variable of what it tests."""
+class TestBody:
+    """The body of a TEST, SETUP or TEARDOWN. It may write every variable of what it tests. `cleaning`: in TEARDOWN
+    only the first failure counts."""
 
-    def __init__(self, scope: Scope, bench: Bench) -> None:
-        super().__init__(scope)
-        self.cleaning = False  # in TEARDOWN only the first failure counts
+    def __init__(self, world: World, scope: Scope, bench: Bench, *, cleaning: bool = False) -> None:
+        scope.sees_inside = scope.writes_inside = True
+        self._c = Checker(world, scope, self._special_calls())
         self._bench = bench
+        self._cleaning = cleaning
         self._kept: dict[tuple[str, Type], Variable] = {}
 
-    def write_body(self, decl: ast.TestDecl) -> None:
+    def _special_calls(self) -> SpecialCalls:
+        return {
+            **dict.fromkeys(_OPERATORS, self._compared),
+            "ASSERT_TRUE": self._truth,
+            "ASSERT_FALSE": self._truth,
+            "ASSERT_NEAR": self._near,
+            "ADVANCE_TIME": self._advance_time,
+            "MOCK": self._mock,
+            "MOCK_FUNCTION": self._mock_function,
+            "MOCK_VERIFY_CALLED": self._verify_called,
+            "MOCK_VERIFY_CALL_COUNT": self._verify_call_count,
+        }
+
+    def write(self, decl: ast.TestDecl) -> None:
         """Checks the statements into the unit of the scope."""
-        pou = self.scope.pou
-        assert pou is not None
-        try:
-            body = self.body(decl.body)
-        except NestingError as error:
-            self.world.nested_too_deeply(error)
-            return
-        pou.body = [*self.scope.prologue, *body]
-        self.world.pous.append(pou)
+        write_body(self._c, decl.body)
         if decl.keyword != "SETUP":
-            self.world.report_unused(self.scope)
-
-    def _member_read_only(self, node: ast.Member) -> str | None:
-        return self._read_only(node.base)
-
-    def _test_statement(self, node: ast.ExprStmt) -> list[Statement]:
-        call = node.value
-        if isinstance(call, ast.Call) and isinstance(call.callee, ast.Name):
-            handler = self._special.get(call.callee.name.upper())
-            if handler is not None:
-                return handler(self, call)
-        return super()._call_statement(node)
+            report_unused(self._c.scope)
 
     def _nodes(self, call: ast.Call, count: int, *, message: bool = True) -> list[ast.Expr] | None:
         """The arguments, perhaps with a message behind them; None after a diagnosis."""
@@ -146,13 +147,13 @@ class TestStatements(Statements):
         name = call.callee.name.upper()
         nodes = [a.value for a in call.args if a.name is None and a.value is not None]
         if len(nodes) < len(call.args):
-            self.error(call.pos, "arguments", f"the arguments of {name} have no names")
+            self._c.error(call.pos, "arguments", f"the arguments of {name} have no names")
         elif len(nodes) == count or (message and len(nodes) == count + 1):
             return nodes
         else:
             more = " and perhaps a message" if message else ""
             plural = "" if count == 1 else "s"
-            self.error(call.pos, "arguments", f"{name} takes {count} argument{plural}{more}, not {len(nodes)}")
+            self._c.error(call.pos, "arguments", f"{name} takes {count} argument{plural}{more}, not {len(nodes)}")
         return None
 
     # ---- asserts ----
@@ -162,7 +163,7 @@ class TestStatements(Statements):
         e = settle(e)
         if isinstance(e, Const) or isinstance(e.type, StructType | ArrayType):
             return e
-        pou = self.scope.pou
+        pou = self._c.scope.pou
         assert pou is not None
         variable = self._kept.get((role, e.type))
         if variable is None:
@@ -180,23 +181,23 @@ class TestStatements(Statements):
             return []
         assert isinstance(call.callee, ast.Name)
         name, before = call.callee.name.upper(), list[Statement]()
-        left = self.expr(nodes[0])
-        right = self.expr(nodes[1], None if is_untyped(left) else left.type)
+        left = self._c.expr(nodes[0])
+        right = self._c.expr(nodes[1], None if is_untyped(left) else left.type)
         if left.type is ERROR or right.type is ERROR:
             return []
-        left, right = self._match_literals(left, right, None)
+        left, right = match_literals(self._c, left, right, None)
         left, right = self._keep("actual", left, before), self._keep("expected", right, before)
-        holds = self.operate(_OPERATORS[name], left, right, call.pos)
+        holds = operate(self._c, _OPERATORS[name], left, right, call.pos)
         return self._assertion(call, holds, before, [("actual", left), ("expected", right)], nodes[2:])
 
     def _truth(self, call: ast.Call) -> list[Statement]:
         """ASSERT_TRUE, ASSERT_FALSE."""
         nodes = self._nodes(call, 1)
-        condition = None if nodes is None else self.condition(nodes[0])
+        condition = None if nodes is None else self._c.condition(nodes[0])
         if nodes is None or condition is None or condition.type is ERROR:
             return []
         assert isinstance(call.callee, ast.Name)
-        wanted, pos = call.callee.name.upper() == "ASSERT_TRUE", self.pos(call.pos)
+        wanted, pos = call.callee.name.upper() == "ASSERT_TRUE", self._c.pos(call.pos)
         holds = condition if wanted else Unary(UnaryOp.NOT, condition, BOOL, pos)
         operands: list[tuple[str, Expr]] = [
             ("actual", Const(int(not wanted), BOOL, pos)),
@@ -210,19 +211,19 @@ class TestStatements(Statements):
         if nodes is None:
             return []
         before = list[Statement]()
-        actual = self.expr(nodes[0])
+        actual = self._c.expr(nodes[0])
         wanted = None if is_untyped(actual) else actual.type
-        expected, tolerance = self.expr(nodes[1], wanted), self.expr(nodes[2], wanted)
+        expected, tolerance = self._c.expr(nodes[1], wanted), self._c.expr(nodes[2], wanted)
         if ERROR in (actual.type, expected.type, tolerance.type):
             return []
-        actual, expected = self._match_literals(actual, expected, None)
-        tolerance = self._match_literals(actual, tolerance, None)[1]
+        actual, expected = match_literals(self._c, actual, expected, None)
+        tolerance = match_literals(self._c, actual, tolerance, None)[1]
         roles = ("actual", "expected", "tolerance")
         kept = [self._keep(r, e, before) for r, e in zip(roles, (actual, expected, tolerance), strict=True)]
         a, e, t = (_as_real(v) for v in kept)
-        below = self.operate(BinaryOp.LE, self.operate(BinaryOp.SUB, a, e, call.pos), t, call.pos)
-        above = self.operate(BinaryOp.LE, self.operate(BinaryOp.SUB, e, a, call.pos), t, call.pos)
-        holds = self.operate(BinaryOp.AND, below, above, call.pos)
+        below = operate(self._c, BinaryOp.LE, operate(self._c, BinaryOp.SUB, a, e, call.pos), t, call.pos)
+        above = operate(self._c, BinaryOp.LE, operate(self._c, BinaryOp.SUB, e, a, call.pos), t, call.pos)
+        holds = operate(self._c, BinaryOp.AND, below, above, call.pos)
         return self._assertion(call, holds, before, list(zip(roles, kept, strict=True)), nodes[3:])
 
     def _assertion(
@@ -237,20 +238,20 @@ class TestStatements(Statements):
         if holds.type is ERROR:
             return []
         if message:
-            text = self.expr(message[0])
+            text = self._c.expr(message[0])
             if isinstance(text, Const) and isinstance(text.value, str):  # "..." is a WSTRING elsewhere
                 text = Const(text.value, StringType(len(text.value)), text.pos)
             if not isinstance(text.type, StringType) or text.type.wide:
-                self.error(message[0].pos, "type", f"the message of an assert is a STRING, not {text.type}")
+                self._c.error(message[0].pos, "type", f"the message of an assert is a STRING, not {text.type}")
                 return []
             operands = [*operands, ("message", text)]
         assert isinstance(call.callee, ast.Name)
-        pos, store = self.pos(call.pos), list[Statement]()
+        pos, store = self._c.pos(call.pos), list[Statement]()
         told = {role: self._store(role, e, store) for role, e in operands}
         number = len(self._bench.asserts) + 1
         self._bench.asserts.append(Assertion(pos, call.callee.name.upper(), **told))
         store.append(Assign(self._bench.place(FAILED, pos), Const(number, DINT, pos), pos))
-        if self.cleaning:
+        if self._cleaning:
             store = [If([(self._bench.passed(pos), store)], [], pos)]
         return [*before, If([(Unary(UnaryOp.NOT, holds, BOOL, pos), [*store, Return(pos)])], [], pos)]
 
@@ -266,24 +267,24 @@ class TestStatements(Statements):
 
     def _advance_time(self, call: ast.Call) -> list[Statement]:
         nodes = self._nodes(call, 1, message=False)
-        e = None if nodes is None else self.settled(nodes[0])
+        e = None if nodes is None else self._c.settled(nodes[0])
         if e is None or e.type is ERROR:
             return []
         if e.type not in (TIME, LTIME):
             base = elementary(e.type)
             if base is None or base.kind is not Kind.INT:
                 message = f"ADVANCE_TIME takes a duration such as T#10ms, or a number of nanoseconds, not {e.type}"
-                self.error(call.pos, "type", message)
+                self._c.error(call.pos, "type", message)
                 return []
             e = convert(e, LTIME)
         if isinstance(e, Const) and isinstance(e.value, int) and e.value < 0:
-            self.error(call.pos, "range", "time does not go back")
+            self._c.error(call.pos, "range", "time does not go back")
             return []
-        pos = self.pos(call.pos)
+        pos = self._c.pos(call.pos)
         long, short = self._bench.place(_LTIME, pos), self._bench.place(_TIME, pos)
         step = time_to_ltime(e) if e.type is TIME else e
         total = Binary(BinaryOp.ADD, Load(long, LTIME, pos), step, LTIME, pos)
-        milliseconds = self.convert_explicitly(Load(long, LTIME, pos), TIME)
+        milliseconds = convert_explicitly(self._c, Load(long, LTIME, pos), TIME)
         assert milliseconds is not None
         return [Assign(long, total, pos), Assign(short, milliseconds, pos)]
 
@@ -302,29 +303,31 @@ class TestStatements(Statements):
         method = self._hidden_of(nodes[0], mocks.calls_of) if name == mocks.CALLS else None
         if method is not None:
             return method
-        if isinstance(nodes[0], ast.Member) and self.bound_member(nodes[0]) is not None:
+        if isinstance(nodes[0], ast.Member) and bound_member(self._c, nodes[0]) is not None:
             message = "this is no instance; for a method write MOCK_FUNCTION instance.m RETURNS ..."
-            self.error(nodes[0].pos, "mock", message)
+            self._c.error(nodes[0].pos, "mock", message)
             return None
-        instance = self.expr(nodes[0])
+        instance = self._c.expr(nodes[0])
         if instance.type is ERROR:
             return None
-        block = self.world.blocks.get(instance.type) if isinstance(instance.type, StructType) else None
+        block = self._c.world.blocks.get(instance.type) if isinstance(instance.type, StructType) else None
         if block is None or name not in block.members:
-            self.error(nodes[0].pos, "mock", "MOCK needs an instance of a function block")
+            self._c.error(nodes[0].pos, "mock", "MOCK needs an instance of a function block")
             return None
-        return self.member(instance, ast.Member(nodes[0].pos, nodes[0], name, nodes[0].pos))
+        return member_of(self._c, instance, ast.Member(nodes[0].pos, nodes[0], name, nodes[0].pos))
 
     def _hidden_of(self, node: ast.Expr, name: Callable[[str], str]) -> Expr | None:
         """A hidden variable of the method or property `instance.m`; None when there is none."""
-        bound = self.bound_member(node) if isinstance(node, ast.Member) else None
+        bound = bound_member(self._c, node) if isinstance(node, ast.Member) else None
         if bound is None or bound.place is None or not isinstance(node, ast.Member):
             return None
         member = bound.cls.find(bound.key) or bound.cls.find(f"{bound.key}.get")
         block = member.owner.block if member is not None else None
         if member is None or block is None or name(member.name) not in block.members:
             return None
-        return self.member(self.expr(node.base), ast.Member(node.pos, node.base, name(member.name), node.name_pos))
+        return member_of(
+            self._c, self._c.expr(node.base), ast.Member(node.pos, node.base, name(member.name), node.name_pos)
+        )
 
     def _mock_function(self, call: ast.Call) -> list[Statement]:
         """`MOCK_FUNCTION name RETURNS value`, `MOCK_FUNCTION instance.method RETURNS value`"""
@@ -337,18 +340,18 @@ class TestStatements(Statements):
             switch, result = (self._hidden_of(target, name) for name in (mocks.switch_of, mocks.value_of))
             what = "MOCK_FUNCTION needs a function, or a method of an instance, that returns something"
         if switch is None or result is None:
-            self.error(target.pos, "mock", what)
+            self._c.error(target.pos, "mock", what)
             return []
-        e, pos = self.value(value, result.type), self.pos(call.pos)
+        e, pos = self._c.value(value, result.type), self._c.pos(call.pos)
         if e.type is ERROR:
             return []
         return [Assign(place_of(switch), Const(1, BOOL, pos), pos), Assign(place_of(result), e, pos)]
 
     def _global(self, name: str) -> Expr | None:
-        symbol = self.world.lookup(name, library=False)
+        symbol = self._c.world.names.lookup(name, library=False)
         if not isinstance(symbol, GlobalSymbol):
             return None
-        return self.variable(self.world.declarations.global_variable(symbol), self.pos(0))
+        return variable_value(self._c.world.declared.variable(symbol), self._c.pos(0))
 
     def _verify_called(self, call: ast.Call) -> list[Statement]:
         calls = self._mock_member(call, 1, mocks.CALLS)
@@ -361,30 +364,14 @@ class TestStatements(Statements):
         count = call.args[1].value if len(call.args) > 1 else None
         if calls is None or count is None:
             return []
-        return self._verify(call, BinaryOp.EQ, calls, self.value(count, UDINT), 2)
+        return self._verify(call, BinaryOp.EQ, calls, self._c.value(count, UDINT), 2)
 
     def _verify(self, call: ast.Call, op: BinaryOp, calls: Expr, wanted: Expr, count: int) -> list[Statement]:
         before: list[Statement] = []
         actual, expected = self._keep("actual", calls, before), self._keep("expected", wanted, before)
-        holds = self.operate(op, actual, expected, call.pos)
+        holds = operate(self._c, op, actual, expected, call.pos)
         message = [a.value for a in call.args[count:] if a.value is not None]
         return self._assertion(call, holds, before, [("actual", actual), ("expected", expected)], message)
-
-    _special: ClassVar[dict[str, Callable[[Any, ast.Call], list[Statement]]]] = {
-        **dict.fromkeys(_OPERATORS, _compared),
-        "ASSERT_TRUE": _truth,
-        "ASSERT_FALSE": _truth,
-        "ASSERT_NEAR": _near,
-        "ADVANCE_TIME": _advance_time,
-        "MOCK": _mock,
-        "MOCK_FUNCTION": _mock_function,
-        "MOCK_VERIFY_CALLED": _verify_called,
-        "MOCK_VERIFY_CALL_COUNT": _verify_call_count,
-    }
-    _statements: ClassVar[dict[type, Callable[[Any, Any], list[Statement]]]] = {
-        **Statements._statements,
-        ast.ExprStmt: _test_statement,
-    }
 
 
 def _as_real(e: Expr) -> Expr:

@@ -20,14 +20,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from plctool.compiler.semantics.checker import load
 from plctool.compiler.semantics.configuration import Application, configure, default_programs
-from plctool.compiler.semantics.declarations import May
+from plctool.compiler.semantics.declarations.type_declarations import May
 from plctool.compiler.semantics.mocks import Mocks, raising
+from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
-from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestStatements
-from plctool.compiler.semantics.world import World
+from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestBody
+from plctool.compiler.semantics.values import load
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -74,68 +74,76 @@ class TestSuite:
 
     def __init__(self) -> None:
         self.cases: list[TestCase] = []
-        self._teardowns: dict[str, int] = {}  # by file
-        self._bench: Bench | None = None
-        self._branches: list[tuple[list[tuple[int, int]], list[Statement]]] = []
-        self._programs: dict[str, PouSymbol] = {}
-
-    @property
-    def asserts(self) -> list[Assertion]:
-        """All asserts; the first one has number 1."""
-        return self._bench.asserts if self._bench else []
+        self.asserts: list[Assertion] = []  # the first one has number 1
+        self.teardowns: dict[str, int] = {}  # by file
 
     def teardown_of(self, case: TestCase) -> int | None:
         """The number that runs just the TEARDOWN behind a test."""
-        return self._teardowns.get(case.pos.file)
+        return self.teardowns.get(case.pos.file)
+
+    def begin(self, program: Program) -> TestProgram:
+        """The tests of this program are wanted."""
+        return TestProgram(self, program)
+
+
+class TestProgram:
+    """Makes the tests a part of a program that is being checked, and notes in `suite` what they are."""
+
+    def __init__(self, suite: TestSuite, program: Program) -> None:
+        self._suite = suite
+        self._program = program
+        self._world = program.world
+        self._bench = Bench(program.world, suite.asserts)
+        self._branches: list[tuple[list[tuple[int, int]], list[Statement]]] = []
+        self._blocks: dict[str, PouSymbol] = {}  # PROGRAMs as function blocks
 
     # ---- the steps of the check ----
 
-    def prepare(
-        self, parsed: list[tuple[Source, list[ast.Declaration]]], world: World
-    ) -> list[tuple[Source, list[ast.Declaration]]]:
-        """Sets the hidden variables up, and adds to the syntax tree what MOCK needs."""
-        self._bench = Bench(world)
-        world.register([raising()])
+    def prepare(self, parsed: list[tuple[Source, list[ast.Declaration]]]) -> list[tuple[Source, list[ast.Declaration]]]:
+        """Adds to the syntax tree what MOCK needs."""
+        names = self._world.names
+        names.register([raising()])
         everything = [decl for _, declarations in parsed for decl in declarations]
-        world.rewritten = Mocks((d for d in everything if isinstance(d, ast.TestDecl)), world.diagnostics).rewritten
-        return [(source, world.rewritten(declarations)) for source, declarations in parsed]
+        mocks = Mocks((d for d in everything if isinstance(d, ast.TestDecl)), self._world.diagnostics)
+        names.rewritten = mocks.rewritten
+        return [(source, mocks.rewritten(declarations)) for source, declarations in parsed]
 
-    def configure(self, world: World) -> Application:
+    def configure(self) -> Application:
         """The programs as the CONFIGURATION has them, so that their names are known; no task runs them. Without a
         CONFIGURATION there may be any number."""
-        alone = len(default_programs(world)) == 1
-        application = configure(world) if world.configurations or alone else Application()
-        application.tasks = [self._task(world)]
+        alone = len(default_programs(self._world)) == 1
+        wanted = alone or self._world.names.configurations
+        application = configure(self._world, self._program.config) if wanted else Application()
+        application.tasks = [self._task()]
         return application
 
-    def _task(self, world: World) -> Task:
-        assert self._bench is not None
-        pos = next((t.source.pos(t.pos) for t in world.tests), Pos("", 1, 1))
+    def _task(self) -> Task:
+        pos = next((t.source.pos(t.pos) for t in self._world.names.tests), Pos("", 1, 1))
         runner = Pou("Tests", PouKind.PROGRAM, pos)
         runner.body = [Case(load(self._bench.place(NUMBER, pos)), self._branches, [], pos)]
         return Task("Tests", TaskKind.CYCLIC, 1, 10_000, [runner])
 
-    def add(self, world: World) -> None:
+    def add(self) -> None:
         """Checks the tests."""
-        self._programs = {p.decl.name.casefold(): _as_block(p) for p in world.program_symbols()}
-        for symbol in self._programs.values():
-            world.units.block(symbol)
+        self._blocks = {p.decl.name.casefold(): _as_block(p) for p in self._world.names.program_symbols()}
+        for symbol in self._blocks.values():
+            self._world.declared.block(symbol)
         files: dict[str, _File] = {}
-        for decl in (t for t in world.tests if t.keyword == "SETUP"):
-            self._setup(world, decl, files.setdefault(decl.source.path, _File()))
-        for decl in (t for t in world.tests if t.keyword == "TEARDOWN"):
-            self._teardown(world, decl, files.setdefault(decl.source.path, _File()))
-        for decl in (t for t in world.tests if t.keyword == "TEST"):
-            self._test(world, decl, files.get(decl.source.path, _File()))
+        for decl in (t for t in self._world.names.tests if t.keyword == "SETUP"):
+            self._setup(decl, files.setdefault(decl.source.path, _File()))
+        for decl in (t for t in self._world.names.tests if t.keyword == "TEARDOWN"):
+            self._teardown(decl, files.setdefault(decl.source.path, _File()))
+        for decl in (t for t in self._world.names.tests if t.keyword == "TEST"):
+            self._test(decl, files.get(decl.source.path, _File()))
         for path, file in files.items():
             if file.teardown is not None:
-                number = self._teardowns[path] = len(self.cases) + len(self._teardowns)
+                number = self._suite.teardowns[path] = len(self._suite.cases) + len(self._suite.teardowns)
                 self._branches.append(([(number, number)], [_call(file.teardown)]))
 
     # ---- blocks ----
 
-    def _setup(self, world: World, decl: ast.TestDecl, file: _File) -> None:
-        scope, checker = self._begin(world, decl, file, "SETUP")
+    def _setup(self, decl: ast.TestDecl, file: _File) -> None:
+        scope = self._begin(decl, file, "SETUP")
         if file.setup is not None:
             scope.error(decl.pos, "duplicate", "there is a SETUP in this file already")
             return
@@ -144,42 +152,41 @@ class TestSuite:
         file.names = {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol)}
         for symbol in file.names.values():
             symbol.used = True
-        checker.write_body(decl)
+        self._write(decl, scope)
 
-    def _teardown(self, world: World, decl: ast.TestDecl, file: _File) -> None:
-        scope, checker = self._begin(world, decl, file, "TEARDOWN")
+    def _teardown(self, decl: ast.TestDecl, file: _File) -> None:
+        scope = self._begin(decl, file, "TEARDOWN")
         if file.teardown is not None:
             scope.error(decl.pos, "duplicate", "there is a TEARDOWN in this file already")
             return
         file.teardown = scope.pou
         self._declare(decl, scope, None)
-        checker.cleaning = True
-        checker.write_body(decl)
+        self._write(decl, scope, cleaning=True)
 
-    def _test(self, world: World, decl: ast.TestDecl, file: _File) -> None:
-        number, pos = len(self.cases), decl.source.pos(decl.pos)
-        self.cases.append(TestCase(decl.name, pos))
-        scope, checker = self._begin(world, decl, file, f"TEST_{number}")
+    def _test(self, decl: ast.TestDecl, file: _File) -> None:
+        number, pos = len(self._suite.cases), decl.source.pos(decl.pos)
+        self._suite.cases.append(TestCase(decl.name, pos))
+        scope = self._begin(decl, file, f"TEST_{number}")
         self._declare(decl, scope, None)
-        checker.write_body(decl)
+        self._write(decl, scope)
         assert scope.pou is not None
         body = [_call(scope.pou)]
         if file.setup is not None:
-            assert self._bench is not None
             body = [_call(file.setup), If([(self._bench.passed(pos), body)], [], pos)]
         if file.teardown is not None:
             body.append(_call(file.teardown))
         self._branches.append(([(number, number)], body))
 
-    def _begin(self, world: World, decl: ast.TestDecl, file: _File, name: str) -> tuple[Scope, TestStatements]:
-        scope = world.scope(decl.source)
+    def _begin(self, decl: ast.TestDecl, file: _File, name: str) -> Scope:
+        scope = self._world.scope(decl.source)
         scope.enter(decl.namespace)
-        scope.sees_inside = True
         scope.pou = Pou(name, PouKind.PROGRAM, decl.source.pos(decl.pos))
-        scope.programs = self._programs
+        scope.programs = self._blocks
         scope.names.update(file.names)
-        assert self._bench is not None
-        return scope, TestStatements(scope, self._bench)
+        return scope
+
+    def _write(self, decl: ast.TestDecl, scope: Scope, *, cleaning: bool = False) -> None:
+        TestBody(self._world, scope, self._bench, cleaning=cleaning).write(decl)
 
     def _declare(self, decl: ast.TestDecl, scope: Scope, shared: _File | None) -> None:
         """The variables: of SETUP (`shared`) in the data area, others on the stack."""
@@ -195,33 +202,37 @@ class TestSuite:
             elif block.keyword != "VAR_EXTERNAL":  # globals are known anyway
                 for line in block.decls:
                     if "CONSTANT" in block.qualifiers:
-                        _constant(line, scope, pou.name)
+                        self._constant(line, scope, pou.name)
                     else:
                         self._line(line, scope, shared)
 
     def _line(self, line: ast.VarDecl, scope: Scope, shared: _File | None) -> None:
-        world, pou = scope.world, scope.pou
+        variables, pou = self._program.variables, scope.pou
         assert pou is not None
-        t, default = world.declarations.declared_type(line, scope, May.HAVE_ADDRESS)
+        t, default = self._program.types.declared_type(line, scope, May.HAVE_ADDRESS)
         computed = default.value if isinstance(default, ComputedInit) else None
         default = None if computed is not None else default
         for offset, name in line.names:
             symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
             if t is not ERROR:
                 if line.location is not None:
-                    symbol.variable = world.declarations.area_variable(
-                        name, t, default, line.location, set(), scope, offset
-                    )
+                    symbol.variable = variables.area_variable(name, t, default, line.location, set(), scope, offset)
                 else:
                     symbol.variable = self._instance(symbol, default, pou, shared is not None)
             variable = symbol.variable
             if variable is not None and variable.storage is Storage.AREA:
-                world.allocation.add(variable)
+                self._world.allocation.add(variable)
             elif variable is not None:
                 pou.locals.append(variable)
             if variable is not None and computed is not None:
                 scope.prologue.append(Assign(VarPlace(variable, t, variable.pos), computed, variable.pos))
-            world.declarations.add(scope, symbol, offset)
+            scope.declare(symbol, offset)
+
+    def _constant(self, line: ast.VarDecl, scope: Scope, owner: str) -> None:
+        t, init = self._program.types.declared_type(line, scope)
+        for offset, name in line.names:
+            symbol = self._program.variables.constant_symbol(offset, name, t, init, scope, owner, Role.LOCAL)
+            scope.declare(symbol, offset)
 
     def _instance(self, symbol: VarSymbol, default: Initial | None, pou: Pou, shared: bool) -> Variable:
         t = symbol.type
@@ -236,14 +247,6 @@ def _as_block(program: PouSymbol) -> PouSymbol:
     decl = program.decl
     blocks = [replace(b, decls=[replace(line, location=None) for line in b.decls]) for b in decl.blocks]
     return PouSymbol(replace(decl, keyword="FUNCTION_BLOCK", blocks=blocks), library=False)
-
-
-def _constant(line: ast.VarDecl, scope: Scope, owner: str) -> None:
-    declarations = scope.world.declarations
-    t, init = declarations.declared_type(line, scope)
-    for offset, name in line.names:
-        symbol = declarations.constant_symbol(offset, name, t, init, scope, owner, Role.LOCAL)
-        declarations.add(scope, symbol, offset)
 
 
 def _call(pou: Pou) -> Statement:

@@ -1,0 +1,72 @@
+"""The bodies of POUs, from the first local variable to the return."""
+
+from __future__ import annotations
+
+from plctool.compiler.codegen import lower_expr, lower_loops, lower_places, lower_stmt  # noqa: F401  their rules
+from plctool.compiler.codegen.lower_blocks import take_inputs
+from plctool.compiler.codegen.lower_frame import Body, Ref, string_capacity
+from plctool.compiler.codegen.lower_init import initialise
+from plctool.compiler.codegen.lower_string import copy_string
+from plctool.compiler.codegen.lower_unit import value_type
+from plctool.compiler.codegen.signatures import result_in_memory
+from plctool.compiler.typed import Pou, PouKind, Variable
+from plctool.compiler.types import StringType, is_scalar
+
+
+def write_body(frame: Body) -> None:
+    """Writes everything from the first local variable to the return."""
+    pou, fn = frame.pou, frame.fn
+    assert pou is not None
+    if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
+        _take_parameters(frame, pou)
+    take_inputs(frame, pou)
+    if pou.result is not None and result_in_memory(pou):
+        capacity = "%result.capacity" if pou.cuts_result else string_capacity(pou.result.type)
+        frame.locals[pou.result] = Ref("%result", 0, pou.result.type, direct=True, capacity=capacity)
+    for var in pou.locals:
+        if var not in frame.locals:
+            frame.locals[var] = _stack_memory(frame, var)
+        if not (pou.no_init or (pou.cuts_result and var is pou.result)):  # whose size is the caller's
+            frame.clear(frame.locals[var])
+        initialise(frame, frame.locals[var], var.initial)
+    frame.statements(pou.body)
+    fn.begin(frame.on_return)
+    if pou.result is not None and is_scalar(pou.result.type):
+        fn.terminate(f"ret {value_type(pou.result.type)} {frame.load(frame.locals[pou.result])}")
+    else:
+        fn.terminate("ret void")
+    frame.write_raises()
+
+
+def write_calls(frame: Body, parts: list[str]) -> None:
+    """Writes calls of the parts that the body was cut into."""
+    assert frame.pou is not None
+    take_inputs(frame, frame.pou)
+    instance = ", ptr %self" if frame.pou.kind is PouKind.FUNCTION_BLOCK else ""
+    for symbol in parts:
+        frame.fn.do(f"call void @{symbol}(ptr %ctx{instance})")
+    frame.fn.terminate("ret void")
+
+
+def _stack_memory(frame: Body, var: Variable) -> Ref:
+    t = var.type
+    if is_scalar(t):
+        return Ref(frame.fn.slot(value_type(t)), 0, t, direct=True)
+    return Ref(frame.fn.alloca(t.size, t.align), 0, t, direct=True, capacity=string_capacity(t))
+
+
+def _take_parameters(frame: Body, pou: Pou) -> None:
+    for number, parameter in enumerate(pou.parameters):
+        var, name = parameter.variable, f"%p{number}"
+        if parameter.by_reference:
+            capacity = f"{name}.capacity" if isinstance(var.type, StringType) else ""
+            frame.locals[var] = Ref(name, 0, var.type, capacity=capacity)
+            continue
+        ref = _stack_memory(frame, var)
+        frame.locals[var] = ref
+        if is_scalar(var.type):
+            frame.store(ref, name)
+        elif isinstance(var.type, StringType):
+            copy_string(frame, ref, Ref(name, 0, var.type, capacity=f"{name}.capacity"))
+        else:
+            frame.copy(ref, Ref(name, 0, var.type), var.type.size)

@@ -1,0 +1,157 @@
+"""Loops."""
+
+from __future__ import annotations
+
+from plctool.compiler.codegen.lower_arith import compare, is_signed, known_integer
+from plctool.compiler.codegen.lower_expr import truth
+from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, STATEMENTS, Body, rule
+from plctool.compiler.codegen.lower_unit import Check, value_type
+from plctool.compiler.codegen.ranges import type_range, value_range
+from plctool.compiler.typed import BinaryOp, For, Repeat, Statement, Variable, While
+
+
+@rule(STATEMENTS, While)
+def while_loop(frame: Body, s: While) -> None:
+    """The test comes before each round."""
+    fn = frame.fn
+    again, body, end = fn.label("while"), fn.label("do"), fn.label("endwhile")
+    fn.begin(again)
+    frame.at(s.condition.pos)
+    fn.branch_if(truth(frame, s.condition), body, end)
+    fn.begin(body)
+    _loop_body(frame, s.body, again, end)
+    fn.branch(again)
+    fn.begin_detached(end)
+
+
+@rule(STATEMENTS, Repeat)
+def repeat_loop(frame: Body, s: Repeat) -> None:
+    """The test comes behind each round."""
+    fn = frame.fn
+    again, test, end = fn.label("repeat"), fn.label("until"), fn.label("endrepeat")
+    fn.begin(again)
+    _loop_body(frame, s.body, test, end)
+    fn.begin(test)
+    frame.at(s.until.pos)
+    fn.branch_if(truth(frame, s.until), end, again)
+    fn.begin_detached(end)
+
+
+def _loop_body(frame: Body, body: list[Statement], on_continue: str, on_exit: str) -> None:
+    frame.loops.append((on_continue, on_exit))
+    frame.statements(body)
+    frame.loops.pop()
+    frame.release_temporaries()
+
+
+@rule(STATEMENTS, For)
+def for_loop(frame: Body, s: For) -> None:
+    """The test in front of the increment keeps the variable from wrapping; it ends at the first value behind
+    `stop`, or at the limit of its type."""
+    fn = frame.fn
+    start, stop, step = frame.value(s.start), frame.value(s.stop), frame.value(s.step)
+    known_step = known_integer(s.step)
+    if known_step is None and Check.DIV in frame.checks:
+        frame.require(fn.value(f"icmp ne {value_type(s.step.type)} {step}, 0"), DIVIDE_BY_ZERO, s.step.pos)
+    var = frame.effects.owns_loop_variable(s, frame.pou) if frame.pou else None
+    loop = _Loop(frame, s, stop, step, known_step, var)
+    loop.set(start)
+    body, following, end = fn.label("for"), fn.label("next"), fn.label("endfor")
+    fn.branch_if(loop.enters(start), body, end)
+    fn.begin_detached(body)
+    with_range = loop.limits()
+    if var is not None and with_range is not None:
+        frame.ranges[var] = with_range
+    _loop_body(frame, s.body, following, end)
+    fn.begin(following)
+    frame.at(s.pos)
+    again, last = fn.label("again"), fn.label("last")
+    current = loop.current()
+    fn.branch_if(loop.goes_on(current), again, last)
+    fn.begin_detached(again)
+    loop.set(fn.value(f"add {loop.text} {current}, {step}"))
+    fn.branch(body)
+    fn.begin_detached(last)
+    word = "sadd" if is_signed(s.var.type) else "uadd"
+    if known_step is not None and known_step < 0 and word == "uadd":
+        word, step = "usub", str(-known_step)
+    loop.set(fn.value(f"call {loop.text} @llvm.{word}.sat.{loop.text}({loop.text} {current}, {loop.text} {step})"))
+    fn.begin(end)
+    if var is not None:
+        frame.shadows.pop(var, None)
+        frame.ranges.pop(var, None)
+
+
+class _Loop:
+    """The control variable of a FOR loop. When only the loop writes it, its value is kept in a register as well."""
+
+    def __init__(self, body: Body, s: For, stop: str, step: str, known_step: int | None, var: Variable | None) -> None:
+        self._body, self._s, self._stop, self._step, self._known_step = body, s, stop, step, known_step
+        self.text = value_type(s.var.type)
+        self._shadow = body.fn.slot(self.text) if var is not None else ""
+        if var is not None:
+            body.shadows[var] = self._shadow
+
+    def set(self, value: str) -> None:
+        body = self._body
+        body.store(body.ref(self._s.var), value)
+        if self._shadow:
+            body.fn.do(f"store {self.text} {value}, ptr {self._shadow}")
+
+    def current(self) -> str:
+        body = self._body
+        if self._shadow:
+            return body.fn.value(f"load {self.text}, ptr {self._shadow}")
+        return body.load(body.ref(self._s.var))
+
+    def enters(self, start: str) -> str:
+        return self._reaches(start)
+
+    def goes_on(self, current: str) -> str:
+        """Whether another round follows: `current` + step neither passes `stop` nor wraps."""
+        body, fn, t = self._body, self._body.fn, self._s.var.type
+        if self._known_step in (1, -1):
+            op = BinaryOp.LT if self._known_step == 1 else BinaryOp.GT
+            return compare(body, op, current, self._stop, t)
+        if self._shadow and self._next_fits():
+            return self._reaches(fn.value(f"add {self.text} {current}, {self._step}"))
+        room = self._by_direction(
+            fn.value(f"sub {self.text} {self._stop}, {current}"), fn.value(f"sub {self.text} {current}, {self._stop}")
+        )
+        size = self._by_direction(self._step, fn.value(f"sub {self.text} 0, {self._step}"))
+        enough = fn.value(f"icmp uge {self.text} {room}, {size}")
+        return fn.value(f"and i1 {self._reaches(current)}, {enough}")
+
+    def limits(self) -> tuple[int, int] | None:
+        """The values the variable can have in the body."""
+        start = value_range(self._s.start, self._body.ranges)
+        stop = value_range(self._s.stop, self._body.ranges)
+        if start is None or stop is None or self._known_step is None:
+            return None
+        return (start[0], stop[1]) if self._known_step > 0 else (stop[0], start[1])
+
+    def _next_fits(self) -> bool:
+        """Whether stop + step is a value of the variable's type."""
+        stop, whole = value_range(self._s.stop, {}), type_range(self._s.var.type)
+        if stop is None or whole is None or self._known_step is None:
+            return False
+        return whole[0] <= stop[0] + self._known_step and stop[1] + self._known_step <= whole[1]
+
+    def _reaches(self, value: str) -> str:
+        """Whether `value` is not beyond `stop`."""
+        body, t = self._body, self._s.var.type
+        if self._known_step is not None:
+            op = BinaryOp.LE if self._known_step > 0 else BinaryOp.GE
+            return compare(body, op, value, self._stop, t)
+        up, down = (compare(body, op, value, self._stop, t) for op in (BinaryOp.LE, BinaryOp.GE))
+        return body.fn.value(f"select i1 {self._upwards()}, i1 {up}, i1 {down}")
+
+    def _by_direction(self, up: str, down: str) -> str:
+        if self._known_step is not None:
+            return up if self._known_step > 0 else down
+        return self._body.fn.value(f"select i1 {self._upwards()}, {self.text} {up}, {self.text} {down}")
+
+    def _upwards(self) -> str:
+        if not is_signed(self._s.step.type):
+            return "true"
+        return self._body.fn.value(f"icmp sgt {self.text} {self._step}, 0")

@@ -1,0 +1,1 @@
+"""What declarations mean: types, variables, functions, classes and instances of programs."""

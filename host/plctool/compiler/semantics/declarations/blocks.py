@@ -1,0 +1,153 @@
+"""Function blocks: the layout of their instances.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics.declarations.classes import Classes
+from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
+from plctool.compiler.semantics.declarations.unit_variables import ROLES, UnitVariables, new_pou
+from plctool.compiler.semantics.declarations.variables import RETAINING, Variables
+from plctool.compiler.semantics.edges import edge_variables, see_edge
+from plctool.compiler.semantics.instances import require_instances
+from plctool.compiler.semantics.open_arrays import give_bounds
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import (
+    DIRECTIONS,
+    ERROR,
+    BlockInfo,
+    PouSymbol,
+    Role,
+    VarSymbol,
+)
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    Initial,
+    Parameter,
+    Storage,
+    StructInit,
+    Variable,
+)  # fmt: skip
+from plctool.compiler.types import (
+    Field,
+    ReferenceType,
+    StructType,
+)  # fmt: skip
+
+_ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
+_MEMBER_MAY = {
+    Role.INPUT: May.BE_EDGE | May.HAVE_OPEN_ADDRESS, Role.OUTPUT: May.HAVE_OPEN_ADDRESS,
+    Role.IN_OUT: May.BE_OPEN_ARRAY, Role.LOCAL: May.HAVE_OPEN_ADDRESS, Role.STEP: May.BE_PLAIN,
+}  # fmt: skip
+
+
+class Blocks:
+    """Declares function blocks when they are first referred to."""
+
+    def __init__(
+        self, world: World, types: TypeDeclarations, variables: Variables, units: UnitVariables, classes: Classes
+    ) -> None:
+        self._world = world
+        self._types = types
+        self._variables = variables
+        self._units = units
+        self._classes = classes
+        self._blocks: dict[PouSymbol, BlockInfo] = {}
+        self._layouts: dict[PouSymbol, StructType] = {}
+        self._busy: set[PouSymbol] = set()
+
+    def block(self, symbol: PouSymbol) -> BlockInfo | None:
+        """A function block ready to be instantiated; None when it contains itself."""
+        info = self._blocks.get(symbol)
+        if info is not None:
+            return info
+        if symbol in self._busy:
+            return None
+        self._busy.add(symbol)
+        try:
+            info = self._declare_block(symbol)
+        finally:
+            self._busy.discard(symbol)
+        self._blocks[symbol] = info
+        return info
+
+    def _declare_block(self, symbol: PouSymbol) -> BlockInfo:
+        decl = symbol.decl
+        hidden = symbol.library and self._world.names.is_user_name(decl.name)
+        pou = new_pou(symbol, f"Standard.{decl.name}" if hidden else decl.full_name)
+        scope = self._world.scope_of(symbol)
+        scope.pou = pou
+        layout = StructType(pou.name)
+        info = BlockInfo(pou, layout, {})
+        pou.instance = layout
+        defaults: dict[str, Initial] = {}
+        self._layouts[symbol] = layout
+        self._classes.begin_block(symbol, info, scope, defaults)
+        for block in self._units.declare_alike(decl, pou, scope):
+            self._members(block, info, defaults, scope)
+        self._classes.instance_variables(info, defaults, scope)
+        layout.fields = [f for f in layout.fields if f.type is not ERROR]
+        layout.lay_out()
+        for field in layout.fields:
+            symbol_of = info.members.get(field.name.casefold())
+            if symbol_of is not None and symbol_of.variable is not None:
+                symbol_of.variable.offset = field.offset
+        if defaults:
+            self._world.defaults[layout.name] = StructInit(defaults)
+        info.members |= {k: s for k, s in scope.names.items() if isinstance(s, VarSymbol) and s.role is not Role.TEMP}
+        self._world.blocks[layout] = info
+        self._classes.end_block(info, scope)
+        self._world.bodies.add(scope, decl)
+        return info
+
+    def layout(self, symbol: PouSymbol) -> StructType | None:
+        """The type of instances, also while the block is being declared: what points to it may be part of it."""
+        if symbol not in self._layouts:
+            self.block(symbol)
+        return self._layouts.get(symbol)
+
+    def _members(self, block: ast.VarBlock, info: BlockInfo, defaults: dict[str, Initial], scope: Scope) -> None:
+        role, direction = ROLES[block.keyword], DIRECTIONS.get(block.keyword)
+        info.retain = info.retain or bool(block.qualifiers & RETAINING)
+        for line in block.decls:
+            t, default = self._types.declared_type(line, scope, _MEMBER_MAY[role])
+            if role is not Role.IN_OUT:
+                require_instances(self._world, t, scope, line.pos)
+            info.retain = info.retain or (role is not Role.IN_OUT and self._variables.is_retain(t))
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
+                symbol.given, symbol.used = line.init is not None, direction is not None
+                symbol.access = next(iter(block.qualifiers & _ACCESS), "")
+                symbol.open_area = line.location.text[1] if line.location is not None else ""
+                symbol.constant = "CONSTANT" in block.qualifiers
+                if not scope.declare(symbol, offset):
+                    continue
+                info.members[name.casefold()] = symbol
+                alias = line.attributes.get("alias", "") if scope.library else ""
+                if alias:
+                    info.members[alias.casefold()] = symbol
+                if t is ERROR:
+                    continue
+                reference = role is Role.IN_OUT
+                storage = Storage.REFERENCE if reference else Storage.SELF
+                symbol.variable = Variable(name, t, storage, symbol.pos, initial=None if reference else default)
+                info.type.fields.append(Field(name, ReferenceType(t) if reference else t, alias=alias))
+                if default is not None and not reference:
+                    defaults[name] = default
+                if direction is not None:
+                    info.pou.parameters.append(Parameter(symbol.variable, direction, reference))
+                for bound in give_bounds(symbol.variable, Storage.SELF):
+                    self._hidden_member(bound, info)
+                if line.edge:
+                    last, edge = edge_variables(symbol.variable)
+                    self._hidden_member(last, info)
+                    self._hidden_member(edge, info)
+                    see_edge(symbol, line.edge, last, edge, scope)
+
+    def _hidden_member(self, variable: Variable, info: BlockInfo) -> None:
+        """A member that has no name in the program."""
+        symbol = VarSymbol(variable.name, variable.pos, variable.type, Role.LOCAL, variable)
+        info.members[variable.name.casefold()] = symbol
+        info.type.fields.append(Field(variable.name, variable.type))

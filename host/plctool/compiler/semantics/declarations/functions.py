@@ -1,0 +1,169 @@
+"""Functions: their parameters, results and variables; those in C.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+
+from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
+from plctool.compiler.semantics.declarations.unit_variables import ROLES, UnitVariables, new_pou
+from plctool.compiler.semantics.generics import LIBRARY_STRING, WIDE_LIBRARY_STRING
+from plctool.compiler.semantics.instances import is_instance
+from plctool.compiler.semantics.open_arrays import bound_parameters
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import (
+    DIRECTIONS,
+    ERROR,
+    FunctionInfo,
+    PouSymbol,
+    Role,
+    VarSymbol,
+)
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    ComputedInit,
+    Direction,
+    External,
+    Initial,
+    Parameter,
+    Pou,
+    Storage,
+    Variable,
+)  # fmt: skip
+from plctool.compiler.types import (
+    ArrayType,
+    OpenArrayType,
+    StringType,
+    StructType,
+    Type,
+)  # fmt: skip
+
+_VERSION = re.compile(r"(\d{1,5})\.(\d{1,5})")
+
+
+class Functions:
+    """Declares functions when they are first referred to."""
+
+    def __init__(self, world: World, types: TypeDeclarations, units: UnitVariables) -> None:
+        self._world = world
+        self._types = types
+        self._units = units
+        self._functions: dict[tuple[PouSymbol, tuple[tuple[str, Type], ...]], FunctionInfo] = {}
+        self._busy: set[PouSymbol] = set()
+
+    def function(self, symbol: PouSymbol, bindings: dict[str, Type]) -> FunctionInfo | None:
+        """A function ready to be called; `bindings` for a generic one. None while it is being declared."""
+        key = (symbol, tuple(sorted(bindings.items(), key=lambda item: item[0])))
+        info = self._functions.get(key)
+        if info is not None:
+            return info
+        if symbol in self._busy:
+            return None
+        self._busy.add(symbol)
+        try:
+            info = self._declare_function(symbol, bindings)
+        finally:
+            self._busy.discard(symbol)
+        self._functions[key] = info
+        return info
+
+    def _declare_function(self, symbol: PouSymbol, bindings: dict[str, Type]) -> FunctionInfo:
+        decl = symbol.decl
+        name = f"{decl.full_name}({','.join(t.name for t in bindings.values())})" if bindings else decl.full_name
+        pou = new_pou(symbol, name)
+        scope = self._world.scope_of(symbol)
+        scope.pou, scope.bindings = pou, bindings
+        info = FunctionInfo(pou, [], None, decl.attributes)
+        self.signature(info, decl, scope)
+        external = decl.attributes.get("external")
+        if external is not None:
+            pou.external = self._external(external, info, scope)
+        else:
+            self._world.bodies.add(scope, decl)
+        return info
+
+    def signature(self, info: FunctionInfo, decl: ast.PouDecl, scope: Scope) -> None:
+        """Declares result, parameters and variables of a function or method."""
+        if decl.result is not None:
+            self._declare_result(info, decl, decl.result, scope)
+        for block in self._units.declare_alike(decl, info.pou, scope):
+            if block.keyword in DIRECTIONS:
+                self._parameters(block, info, scope)
+            elif block.keyword not in ("VAR_INST", "STEP"):
+                self._units.declare_stack_variables(block, info.pou, scope)
+        info.pou.parameters += bound_parameters(info.pou.parameters)
+
+    def _declare_result(self, info: FunctionInfo, decl: ast.PouDecl, spec: ast.TypeSpec, scope: Scope) -> None:
+        t, default = self._parameter_type(spec, scope)
+        if is_instance(self._world, t):
+            scope.error(spec.pos, "type", f"a function cannot return the function block {t}")
+            t = ERROR
+        info.result = t
+        symbol = VarSymbol(decl.name, scope.pos(decl.pos), t, Role.RESULT)
+        if t is not ERROR:
+            info.pou.result = symbol.variable = Variable(decl.name, t, Storage.LOCAL, symbol.pos, initial=default)
+            info.pou.locals.append(symbol.variable)
+        scope.names[decl.name.casefold()] = symbol
+
+    def _parameter_type(self, spec: ast.TypeSpec, scope: Scope) -> tuple[Type, Initial | None]:
+        if scope.library and isinstance(spec, ast.NamedType) and spec.length is None:
+            text = {"STRING": LIBRARY_STRING, "WSTRING": WIDE_LIBRARY_STRING}.get(spec.name.upper())
+            if text is not None:
+                return text, None
+        return self._types.type_of(spec, scope)
+
+    def _parameters(self, block: ast.VarBlock, info: FunctionInfo, scope: Scope) -> None:
+        direction = DIRECTIONS[block.keyword]
+        for line in block.decls:
+            if scope.library and line.init is None and isinstance(line.type, ast.NamedType):
+                t, default = self._parameter_type(line.type, scope)
+            else:
+                t, default = self._types.declared_type(line, scope, May.BE_OPEN_ARRAY)
+            if isinstance(default, ComputedInit):
+                scope.error(line.pos, "constant", "the default of a parameter has to be constant")
+            by_reference = direction is not Direction.INPUT or self._passes_reference(line, info.attributes, t)
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=default)
+                symbol.given, symbol.by_reference, symbol.used = line.init is not None, by_reference, True
+                symbol.constant = "CONSTANT" in block.qualifiers
+                if not scope.declare(symbol, offset):
+                    continue
+                if direction is not Direction.IN_OUT and is_instance(self._world, t):
+                    scope.error(offset, "type", f"pass the function block {name} as VAR_IN_OUT")
+                    symbol.type = ERROR
+                storage = Storage.REFERENCE if by_reference else Storage.LOCAL
+                symbol.variable = Variable(name, t, storage, symbol.pos)
+                info.parameters.append((symbol, direction))
+                info.pou.parameters.append(Parameter(symbol.variable, direction, by_reference))
+
+    def _passes_reference(self, line: ast.VarDecl, attributes: dict[str, str], t: Type) -> bool:
+        """A read-only string, array or struct input, which the library passes without a copy; an ARRAY[*]."""
+        wanted = isinstance(t, OpenArrayType) or "by_reference" in line.attributes or "by_reference" in attributes
+        return wanted and isinstance(t, StringType | ArrayType | StructType)
+
+    def _external(self, name: str, info: FunctionInfo, scope: Scope) -> External:
+        """The C function: its interface text is `name(TYPE,&TYPE):RESULT`."""
+        version = _VERSION.fullmatch(info.attributes.get("version", "1.0"))
+        if version is None:
+            self._world.diagnostics.error(info.pou.pos, "attribute", "the attribute version is written '1.0'")
+            return External(name, 0, 0)
+        major, minor = (int(part) for part in version.groups())
+        text = interface_text(name.lower(), info.pou)
+        return External(name.lower(), zlib.crc32(text.encode("latin-1", "replace")), major << 16 | minor)
+
+
+def interface_text(name: str, pou: Pou) -> str:
+    """What the signature of a C function is made of: `name(TYPE,&TYPE):RESULT`."""
+    types = (("&" if p.by_reference else "") + _interface_name(p.variable.type) for p in pou.parameters)
+    result = "" if pou.result is None else ":" + _interface_name(pou.result.type)
+    return f"{name}({','.join(types)}){result}"
+
+
+def _interface_name(t: Type) -> str:
+    if isinstance(t, StringType):
+        return "STRING"
+    return t.name.upper()

@@ -1,0 +1,160 @@
+"""Initial values of declarations: numbers, `[...]` of arrays, `(name := value)` of structs and instances.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, initialisers
+from plctool.compiler.semantics.rules.arguments import input_value
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import ArrayInit, ComputedInit, Const, Expr, Initial, Load, ScalarInit, StructInit, VarPlace
+from plctool.compiler.types import MAX_SIZE, ArrayType, ReferenceType, StructType, Type
+
+MAX_RUNS = 1_000_000  # of different values that a repetition makes
+
+
+class InitialValues:
+    """Checks initial values."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def initial(self, node: ast.Init, t: Type, scope: Scope) -> Initial | None:
+        """An initial value, calculated at the start when it is not constant; None after a diagnosis."""
+        if isinstance(node, ast.ArrayInit):
+            return self._array_initial(node, t, scope)
+        if isinstance(node, ast.StructInit):
+            return self._struct_initial(node, t, scope)
+        c = Checker(self._world, scope)
+        is_reference = isinstance(t, ReferenceType) and not isinstance(node, ast.Literal)
+        e = input_value(c, node, t, "the reference") if is_reference else c.value(node, t)
+        if e.type is ERROR:
+            return None
+        if isinstance(e, Const):
+            return ScalarInit(e.value)
+        if isinstance(t, StructType) and t in self._world.blocks:
+            scope.error(node.pos, "type", f"an instance of {t} is no value; write (name := value) for its variables")
+            return None
+        if isinstance(e, Load) and isinstance(e.place, VarPlace) and e.place.var.constant:
+            return e.place.var.initial or (ArrayInit([]) if isinstance(t, ArrayType) else StructInit({}))
+        return ComputedInit(e)
+
+    def _array_initial(self, node: ast.ArrayInit, t: Type, scope: Scope) -> Initial | None:
+        if not isinstance(t, ArrayType):
+            scope.error(node.pos, "type", f"[...] does not initialise {t}")
+            return None
+        counts = [high - low + 1 for low, high in t.bounds]
+        runs = self._runs(node.items, counts, t.element, scope)
+        if runs is None:
+            return None
+        total = sum(count for count, _ in runs)
+        if total > t.count:
+            scope.error(node.pos, "range", f"{total} initial values for the {t.count} elements of {t}")
+            return None
+        return ArrayInit(runs)
+
+    def _runs(
+        self, items: Iterable[ast.Init | ast.Repeat], counts: list[int], element: Type, scope: Scope
+    ) -> list[tuple[int, Initial | None]] | None:
+        """Runs of values in element order. A nested [...] fills one step of the first index."""
+        runs: list[tuple[int, Initial | None]] = []
+        inner = 1
+        for count in counts[1:]:
+            inner *= count
+        for item in items:
+            if isinstance(item, ast.Call) and isinstance(item.callee, ast.Name) and self._is_repeat(item, scope):
+                item = ast.Repeat(item.pos, item.callee, [a.value for a in item.args if a.value is not None])
+            if isinstance(item, ast.Repeat):
+                more = self._repeated(item, counts, element, scope)
+            elif isinstance(item, ast.ArrayInit) and len(counts) > 1:
+                more = self._runs(item.items, counts[1:], element, scope)
+                if more is not None and (given := sum(c for c, _ in more)) < inner:
+                    more.append((inner - given, None))
+            else:
+                value = self.initial(item, element, scope)
+                more = None if value is None else [(1, value)]
+            if more is None:
+                return None
+            runs += more
+        return runs
+
+    def _is_repeat(self, item: ast.Call, scope: Scope) -> bool:
+        assert isinstance(item.callee, ast.Name)
+        symbol = scope.lookup(item.callee.name)
+        return isinstance(symbol, VarSymbol | GlobalSymbol)
+
+    def _repeated(
+        self, item: ast.Repeat, counts: list[int], element: Type, scope: Scope
+    ) -> list[tuple[int, Initial | None]] | None:
+        count = Checker(self._world, scope).integer(item.count)
+        if count is None:
+            return None
+        if not 0 <= count <= MAX_SIZE:
+            scope.error(item.pos, "range", f"{count} is not a number of elements")
+            return None
+        if not item.values:
+            return [(count, None)]
+        runs = self._runs(item.values, counts, element, scope)
+        if runs is None or len(runs) == 1:
+            return runs and [(runs[0][0] * count, runs[0][1])]
+        if count * len(runs) > MAX_RUNS:
+            scope.error(item.pos, "size", "this initial value is too large")
+            return None
+        return runs * count
+
+    def _struct_initial(self, node: ast.StructInit, t: Type, scope: Scope) -> Initial | None:
+        if not isinstance(t, StructType):
+            scope.error(node.pos, "type", f"(name := value) does not initialise {t}")
+            return None
+        block = self._world.blocks.get(t)
+        members: dict[str, Initial] = {}
+        arguments: dict[str, Expr] = {}
+        for offset, name, value in self._named(node, t, scope):
+            field = t.member(name)
+            if field is None and self._initialiser_argument(name, value, t, arguments, scope):
+                continue
+            if field is None or (block is not None and block.members[name.casefold()].role is Role.IN_OUT):
+                hint = did_you_mean(name, (f.name for f in t.fields))
+                scope.error(offset, "unknown", f"{t} has no member {name} to initialise{hint}")
+                continue
+            if field.name in members:
+                scope.error(offset, "duplicate", f"{name} is initialised twice")
+            given = self.initial(value, field.type, scope)
+            if given is not None:
+                members[field.name] = given
+        return StructInit(members, arguments)
+
+    def _named(self, node: ast.StructInit, t: StructType, scope: Scope) -> list[tuple[int, str, ast.Init]]:
+        """The members with names: values without one are for the inputs of FB_Init, in their order."""
+        names: list[str] = []
+        for member in initialisers(self._world, t)[-1:]:
+            inputs = [symbol.name for symbol, _ in self._world.declared.member(member).parameters]
+            names = [name for name in inputs if name.casefold() not in (INIT_RETAINS, COPY_CODE)]
+        found: list[tuple[int, str, ast.Init]] = []
+        for offset, name, value in node.members:
+            if not name and not names:
+                scope.error(offset, "arguments", f"{t} has no FB_Init that takes this value; give the value a name")
+                continue
+            found.append((offset, name or names.pop(0), value))
+        return found
+
+    def _initialiser_argument(
+        self, name: str, node: ast.Init, t: StructType, arguments: dict[str, Expr], scope: Scope
+    ) -> bool:
+        """`fb : MyFB(id := 3)` for an input of FB_Init; False when there is no such input."""
+        if isinstance(node, ast.ArrayInit | ast.StructInit):
+            return False
+        for member in reversed(initialisers(self._world, t)):
+            for symbol, _ in self._world.declared.member(member).parameters:
+                if symbol.name.casefold() == name.casefold():
+                    arguments[name.casefold()] = input_value(Checker(self._world, scope), node, symbol.type, name)
+                    return True
+        return False

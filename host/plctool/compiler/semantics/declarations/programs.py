@@ -1,0 +1,145 @@
+"""Instances of PROGRAMs: those that a CONFIGURATION names, and one by its own name of every other PROGRAM.
+
+The instance is declared when a task or a name needs it first, as everything else is. A PROGRAM that nobody needs is
+checked with variables that go nowhere.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics.allocation import Allocation
+from plctool.compiler.semantics.declarations.classes import Classes
+from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
+from plctool.compiler.semantics.declarations.unit_variables import ROLES, UnitVariables, new_pou
+from plctool.compiler.semantics.declarations.variables import Variables
+from plctool.compiler.semantics.edges import edge_variables, see_edge
+from plctool.compiler.semantics.instances import require_instances
+from plctool.compiler.semantics.names import PlannedInstance
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import (
+    DIRECTIONS,
+    ERROR,
+    Namespace,
+    PouSymbol,
+    ProgramInfo,
+    Role,
+    VarSymbol,
+)
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    Direction,
+    Pou,
+    Variable,
+)  # fmt: skip
+
+_PROGRAM_MAY = {
+    Direction.INPUT: May.HAVE_ADDRESS | May.BE_EDGE, Direction.OUTPUT: May.HAVE_ADDRESS, None: May.HAVE_ADDRESS,
+}  # fmt: skip
+
+
+class Programs:
+    """The instances, each declared when it is first asked for."""
+
+    def __init__(
+        self, world: World, types: TypeDeclarations, variables: Variables, units: UnitVariables, classes: Classes
+    ) -> None:
+        self._world = world
+        self._types = types
+        self._variables = variables
+        self._units = units
+        self._classes = classes
+        self._declared: dict[str, Namespace] = {}
+        self._checked: set[PouSymbol] = set()
+
+    def instance(self, planned: PlannedInstance) -> Namespace:
+        """The instance with its variables placed; its body is queued for checking."""
+        key = planned.name.casefold()
+        known = self._declared.get(key)
+        if known is not None:
+            return known
+        instance = self._declared[key] = Namespace(planned.name, "program", {})
+        info, scope = self._declare(planned, self._world.allocation)
+        instance.program, instance.cls = info, scope.cls
+        for member, variable in scope.names.items():
+            if isinstance(variable, VarSymbol) and variable.role is not Role.TEMP:
+                instance.members[member] = variable
+        self._checked.add(planned.symbol)
+        return instance
+
+    def declared(self) -> dict[str, Pou]:
+        """The instances that something needs."""
+        return {space.name: space.program.pou for space in self._declared.values() if space.program is not None}
+
+    def declare_others(self) -> bool:
+        """Queues the PROGRAMs nobody needs for checking; whether there are any."""
+        others = [s for s in self._world.names.program_symbols() if s not in self._checked]
+        for symbol in others:
+            self._declare(PlannedInstance(symbol.decl.full_name, symbol), Allocation())
+        self._checked.update(others)
+        return bool(others)
+
+    def report_unused(self) -> None:
+        """Warns of the programs that nobody runs."""
+        names = self._world.names
+        for symbol in names.program_symbols():
+            if not any(name.casefold() in self._declared for name in names.instances_of(symbol)):
+                message = f"the program {symbol.decl.name} is never run: no task does, and nothing calls it"
+                self._world.diagnostics.warning(symbol.decl.source.pos(symbol.decl.pos), "unused", message)
+
+    # ---- declaring ----
+
+    def _declare(self, planned: PlannedInstance, allocation: Allocation) -> tuple[ProgramInfo, Scope]:
+        """An instance whose variables go into `allocation`. Its qualifiers, such as RETAIN, are for all variables that
+        have none."""
+        symbol, name, qualifiers = planned.symbol, planned.name, set(planned.qualifiers)
+        decl = symbol.decl
+        pou = new_pou(symbol, name)
+        info = ProgramInfo(name, pou, [])
+        scope = self._world.scope_of(symbol)
+        scope.pou = pou
+        for block in self._units.declare_alike(decl, pou, scope):
+            if block.keyword == "VAR_IN_OUT":
+                scope.error(
+                    block.pos, "unsupported", "a PROGRAM has no VAR_IN_OUT; use VAR_EXTERNAL or a global variable"
+                )
+            else:
+                self._program_variables(block, info, scope, allocation, block.qualifiers or qualifiers)
+
+        def place(member: str, variable: VarSymbol) -> Variable | None:
+            full_name, t = f"{name}.{member}", variable.type
+            placed = self._variables.area_variable(full_name, t, variable.default, None, qualifiers, scope, 0)
+            if placed is not None:
+                allocation.add(placed)
+            return placed
+
+        self._classes.program(symbol, scope, place)
+        self._world.bodies.add(scope, decl)
+        return info, scope
+
+    def _program_variables(
+        self, block: ast.VarBlock, info: ProgramInfo, scope: Scope, allocation: Allocation, qualifiers: set[str]
+    ) -> None:
+        direction = DIRECTIONS.get(block.keyword)
+        for line in block.decls:
+            t, init = self._types.declared_type(line, scope, _PROGRAM_MAY[direction])
+            require_instances(self._world, t, scope, line.pos)
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=init)
+                symbol.used = direction is not None or line.location is not None
+                if not scope.declare(symbol, offset) or t is ERROR:
+                    continue
+                full_name = f"{info.name}.{name}"
+                location = self._variables.address(line.location, t, symbol.pos, full_name)
+                symbol.variable = self._variables.area_variable(full_name, t, init, location, qualifiers, scope, offset)
+                if symbol.variable is None:
+                    continue
+                allocation.add(symbol.variable)
+                if direction is not None:
+                    info.parameters.append((symbol, direction))
+                if line.edge:
+                    last, edge = edge_variables(symbol.variable)
+                    allocation.add(last)
+                    allocation.add(edge)
+                    see_edge(symbol, line.edge, last, edge, scope)

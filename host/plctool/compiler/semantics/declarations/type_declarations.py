@@ -1,0 +1,373 @@
+"""Types: from what is written to types with a layout, and what variables of them start with.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from enum import Flag, auto
+
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.nesting import NestingError
+from plctool.compiler.semantics import constants
+from plctool.compiler.semantics.addresses import is_open
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.declarations.initial_values import InitialValues
+from plctool.compiler.semantics.generics import is_group
+from plctool.compiler.semantics.instances import require_instances
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbol, VarSymbol
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import ArrayInit, Const, Initial, ScalarInit, StructInit, overlay
+from plctool.compiler.types import (
+    BOOL,
+    BYTE,
+    DEFAULT_STRING_LENGTH,
+    ELEMENTARY,
+    INT,
+    MAX_SIZE,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Field,
+    Kind,
+    OpenArrayType,
+    PointerType,
+    RawPointerType,
+    ReferenceType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+)  # fmt: skip
+
+MAX_STRING = 0xFFFF
+MAX_TYPE_DEPTH = 50  # levels of arrays of structs of arrays ...
+_STRINGS = ("STRING", "WSTRING")
+_DIALECT: dict[str, Type] = {"BIT": BOOL, "PVOID": RawPointerType(BYTE)}
+
+
+class May(Flag):
+    """What a declaration line may have where it stands."""
+
+    BE_PLAIN = 0
+    HAVE_ADDRESS = auto()  # AT %IX0.3
+    HAVE_OPEN_ADDRESS = auto()  # AT %I*
+    BE_EDGE = auto()  # BOOL R_EDGE
+    BE_OPEN_ARRAY = auto()  # ARRAY[*]
+
+
+class TypeDeclarations:
+    """Turns declarations into types."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._depth = 0
+        self._initials = InitialValues(world)
+        self._structs: dict[str, StructType] = {}
+
+    # ---- declaration lines ----
+
+    def declared_type(self, decl: ast.VarDecl, scope: Scope, may: May = May.BE_PLAIN) -> tuple[Type, Initial | None]:
+        """Type and initial value of a declaration line; None for all zero."""
+        self._check_extras(decl, may, scope)
+        spec, init = self._with_arguments(decl, scope)
+        if isinstance(spec, ast.ArraySpec) and None in spec.bounds and May.BE_OPEN_ARRAY in may:
+            return self._open_array(spec, scope), None
+        t, default = self.type_of(spec, scope)
+        if decl.edge and t is not BOOL and t is not ERROR:
+            scope.error(spec.pos, "type", f"{decl.edge} is for a BOOL, not for {t}")
+        if init is None or t is ERROR:
+            return t, default
+        given = self._initials.initial(init, t, scope)
+        if given is None or (default is None and given == ScalarInit(0) and str(given.value) != "-0.0"):
+            return t, default if given is None else None
+        return t, overlay(given, default)
+
+    def _with_arguments(self, decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
+        """Type and initial value with what stands behind the name of a type: `TON(PT := T#1s)` and `TON[(PT := T#1s)]`
+        are initial values."""
+        spec, init = decl.type, decl.init
+        given: ast.Init | None = None
+        if isinstance(spec, ast.EnumSpec) and isinstance(scope.unit(spec.base or ""), PouSymbol | TypeSymbol):
+            members = [(o, name, v) if v is not None else (o, "", ast.Name(o, name)) for o, name, v in spec.values]
+            given, spec = ast.StructInit(spec.pos, members), ast.NamedType(spec.pos, spec.base or "")
+            if isinstance(init, ast.StructInit):
+                return spec, ast.StructInit(init.pos, [*given.members, *init.members])
+        elif isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
+            element = spec.element
+            given = element.inits
+            if given is not None:
+                spec = ast.ArraySpec(spec.pos, spec.bounds, ast.NamedType(element.pos, element.name))
+        if given is not None and init is not None:
+            scope.error(init.pos, "duplicate", "there are two initial values; write the second one into the first")
+        return spec, given or init
+
+    def _check_extras(self, decl: ast.VarDecl, may: May, scope: Scope) -> None:
+        location = decl.location
+        if location is not None and May.HAVE_ADDRESS not in may:
+            if May.HAVE_OPEN_ADDRESS not in may:
+                message = "only variables of a PROGRAM and global ones have an address"
+                scope.error(location.pos, "location", message)
+            elif not is_open(location):
+                start = location.text[:2]
+                message = f"this has one address for each instance; write AT {start}*, and the addresses in VAR_CONFIG"
+                scope.error(location.pos, "location", message)
+        if decl.edge and May.BE_EDGE not in may:
+            message = f"{decl.edge} is for VAR_INPUT of a FUNCTION_BLOCK or PROGRAM only"
+            scope.error(decl.pos, "edge", message)
+
+    # ---- types ----
+
+    def type_of(self, spec: ast.TypeSpec, scope: Scope, name: str | None = None) -> tuple[Type, Initial | None]:
+        """The type, and what variables of it start with. `name`: of the declared type, if it is one."""
+        self._depth += 1
+        if self._depth > MAX_TYPE_DEPTH:
+            raise NestingError(scope.pos(spec.pos))
+        try:
+            return self._type_of(spec, scope, name)
+        finally:
+            self._depth -= 1
+
+    def _type_of(self, spec: ast.TypeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
+        if isinstance(spec, ast.NamedType):
+            return self._named(spec, scope)
+        if isinstance(spec, ast.ArraySpec):
+            return self._array(spec, scope)
+        if isinstance(spec, ast.EnumSpec):
+            return self._enum(spec, scope, name)
+        if isinstance(spec, ast.SubrangeSpec):
+            return self._subrange(spec, scope, name)
+        if isinstance(spec, ast.PointerSpec):
+            return self._pointer(spec, scope), None
+        if name is None:
+            scope.error(spec.pos, "type", "a STRUCT is declared in a TYPE block")
+            return ERROR, None
+        return self._struct(spec, scope, name)
+
+    def named_type(self, offset: int, name: str, scope: Scope) -> Type:
+        """The type of that name; ERROR after a diagnosis when there is none."""
+        return self._named(ast.NamedType(offset, name), scope)[0]
+
+    def _named(self, spec: ast.NamedType, scope: Scope) -> tuple[Type, Initial | None]:
+        upper = spec.name.upper()
+        if upper in _STRINGS:
+            wide = upper == "WSTRING"
+            if spec.length is None:
+                return StringType(DEFAULT_STRING_LENGTH, wide), None
+            return self._string(spec.length, scope, wide=wide), None
+        if upper == "BIT":
+            scope.warning(spec.pos, "layout", "a BIT takes a byte here, as a BOOL does")
+        if spec.inits is not None:
+            message = f"only a STRING has a length, not {spec.name}; an array is written ARRAY[0..9] OF {spec.name}"
+            scope.error(spec.pos, "type", message)
+            return ERROR, None
+        known = _DIALECT.get(upper) or ELEMENTARY.get(upper) or scope.bindings.get(upper)
+        if known is not None:
+            return known, None
+        return self._declared(spec, scope)
+
+    def _declared(self, spec: ast.NamedType, scope: Scope) -> tuple[Type, Initial | None]:
+        symbol = scope.unit(spec.name)
+        if symbol is not None and not scope.may_use(symbol, spec.name, spec.pos):
+            return ERROR, None
+        if isinstance(symbol, TypeSymbol):
+            if symbol.busy:
+                scope.error(spec.pos, "recursion", f"the type {symbol.decl.name} contains itself")
+                return ERROR, None
+            return self.type_of_symbol(symbol), symbol.default
+        if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+            info = self._world.declared.block(symbol)
+            if info is None:
+                scope.error(spec.pos, "recursion", f"the function block {spec.name} contains itself")
+            return (ERROR, None) if info is None else (info.type, self.struct_default(info.type))
+        if isinstance(symbol, PouSymbol) and symbol.keyword == "INTERFACE":
+            return self._world.declared.interface(symbol), None
+        if is_group(spec.name):
+            scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
+        elif symbol is None and scope.lookup(spec.name) is None:
+            hint = did_you_mean(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])
+            scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
+        else:
+            scope.error(spec.pos, "type", f"{spec.name} is not a type")
+        return ERROR, None
+
+    def type_of_symbol(self, symbol: TypeSymbol) -> Type:
+        """The type of a TYPE declaration."""
+        if symbol.type is not None:
+            return symbol.type
+        decl = symbol.decl
+        scope = self._world.scope(decl.source, library=symbol.library)
+        scope.enter(decl.namespace)
+        if symbol.busy:
+            return ERROR
+        symbol.busy = True
+        t, default = self.type_of(decl.spec, scope, decl.name)
+        if symbol.type is None:
+            symbol.type, symbol.default = t, default
+        if decl.init is not None and t is not ERROR:  # it may name a value of this very enumeration
+            given = self._initials.initial(decl.init, t, scope)
+            symbol.default = default if given is None else overlay(given, default)
+        symbol.busy = False
+        return symbol.type
+
+    def _string(self, length: ast.Expr, scope: Scope, *, wide: bool) -> Type:
+        n = Checker(self._world, scope).integer(length)
+        if n is None:
+            return ERROR
+        if not 1 <= n <= MAX_STRING:
+            scope.error(length.pos, "range", f"the length of a STRING is 1..{MAX_STRING}, not {n}")
+            return ERROR
+        return StringType(n, wide)
+
+    def _array(self, spec: ast.ArraySpec, scope: Scope) -> tuple[Type, Initial | None]:
+        element, default = self.type_of(spec.element, scope)
+        checker, bounds = Checker(self._world, scope), list[tuple[int, int]]()
+        if None in spec.bounds:
+            message = "only VAR_IN_OUT, in functions and methods VAR_INPUT and VAR_OUTPUT too, takes an ARRAY[*]"
+            scope.error(spec.pos, "type", f"{message}; give this array its bounds")
+            return ERROR, None
+        for low_node, high_node in (b for b in spec.bounds if b is not None):
+            low, high = checker.integer(low_node), checker.integer(high_node)
+            if low is None or high is None:
+                return ERROR, None
+            if low > high:
+                scope.error(low_node.pos, "range", f"the lower bound {low} is above the upper bound {high}")
+                return ERROR, None
+            if not (constants.fits(low, ELEMENTARY["DINT"]) and constants.fits(high, ELEMENTARY["DINT"])):
+                scope.error(low_node.pos, "range", "array bounds have to fit DINT")
+                return ERROR, None
+            bounds.append((low, high))
+        if element is ERROR:
+            return ERROR, None
+        t = ArrayType(element, tuple(bounds))
+        if t.size > MAX_SIZE:
+            scope.error(spec.pos, "size", f"an array of {t.size} bytes is too large")
+            return ERROR, None
+        return t, None if default is None else ArrayInit([(t.count, default)])
+
+    def _open_array(self, spec: ast.ArraySpec, scope: Scope) -> Type:
+        """The type of a parameter that takes arrays of any size."""
+        element, _ = self.type_of(spec.element, scope)
+        if any(b is not None for b in spec.bounds):
+            scope.error(spec.pos, "type", "an array has either bounds in all dimensions or * in all")
+            return ERROR
+        return ERROR if element is ERROR else OpenArrayType(element, ((0, -1),) * len(spec.bounds))
+
+    def _enum(self, spec: ast.EnumSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
+        base: Type = INT
+        if spec.base is not None:
+            base = self.named_type(spec.pos, spec.base, scope)
+            if base is ERROR:
+                return ERROR, None
+        if not isinstance(base, Elementary) or base.kind not in (Kind.INT, Kind.BIT):
+            scope.error(spec.pos, "type", f"an enumeration is based on an integer type, not on {base}")
+            return ERROR, None
+        t = EnumType(name or "(" + ", ".join(n for _, n, _ in spec.values) + ")", base, {})
+        inner = Scope(scope.globals, scope.source, scope.library, dict(scope.names), scope.bindings)
+        checker, value, seen = Checker(self._world, inner), -1, set[str]()
+        for offset, value_name, node in spec.values:
+            key = value_name.casefold()
+            if key in seen:
+                scope.error(offset, "duplicate", f"{value_name} is in this enumeration already")
+                continue
+            if not value_name:
+                scope.error(offset, "syntax", f"the values of an enumeration have names; {base} has no arguments")
+                return ERROR, None
+            seen.add(key)
+            given = None if node is None or isinstance(node, ast.ArrayInit | ast.StructInit) else checker.integer(node)
+            value = value + 1 if given is None else given
+            if not constants.fits(value, base):
+                scope.error(offset, "range", f"{value} does not fit {base}")
+                value = 0
+            t.values[value_name] = value
+            constant = Const(value, t, scope.pos(offset))
+            inner.names[key] = VarSymbol(
+                value_name, constant.pos, t, Role.LOCAL, value=constant, constant=True, used=True
+            )
+            if name is None:
+                scope.names.setdefault(key, inner.names[key])
+        first = next(iter(t.values.values()), 0)
+        return t, ScalarInit(first) if first else None
+
+    def _subrange(self, spec: ast.SubrangeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
+        base = self.named_type(spec.pos, spec.base, scope)
+        checker = Checker(self._world, scope)
+        low, high = checker.integer(spec.low), checker.integer(spec.high)
+        if base is ERROR or low is None or high is None:
+            return ERROR, None
+        limits: tuple[int, int] | None = None
+        if isinstance(base, SubrangeType):
+            limits, number = (base.low, base.high), base.base
+        elif isinstance(base, Elementary) and base.kind in (Kind.INT, Kind.BIT):
+            limits, number = constants.limits(base), base
+        if limits is None:
+            scope.error(spec.pos, "type", f"a subrange is one of an integer type, not of {base}")
+            return ERROR, None
+        if not limits[0] <= low <= high <= limits[1]:
+            scope.error(spec.low.pos, "range", f"{low}..{high} is not a range of {base}")
+            return ERROR, None
+        t = SubrangeType(name or f"{base}({low}..{high})", number, low, high)
+        return t, ScalarInit(low) if low else None
+
+    def _pointer(self, spec: ast.PointerSpec, scope: Scope) -> Type:
+        symbol = scope.unit(spec.target.name) if isinstance(spec.target, ast.NamedType) else None
+        if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+            target: Type = self._world.declared.layout(symbol) or ERROR  # the block itself may hold the pointer
+        elif isinstance(symbol, TypeSymbol) and symbol.busy and symbol.decl.name in self._structs:
+            target = self._structs[symbol.decl.name]  # and so may a struct
+        else:
+            target, _ = self.type_of(spec.target, scope)
+        if target is ERROR:
+            return ERROR
+        if spec.keyword == "REFERENCE" and isinstance(target, ReferenceType):
+            scope.error(spec.pos, "type", f"there is no REFERENCE to a REFERENCE; write {target}")
+            return ERROR
+        kinds = {"REFERENCE": ReferenceType, "POINTER": RawPointerType}
+        return kinds.get(spec.keyword, PointerType)(target)
+
+    def _struct(self, spec: ast.StructSpec, scope: Scope, name: str) -> tuple[Type, Initial | None]:
+        t, defaults, seen = StructType(name, union=spec.union), dict[str, Initial](), set[str]()
+        self._structs[name] = t
+        if spec.base is not None and not self._extend(t, spec.base, defaults, scope):
+            return ERROR, None
+        seen.update(f.name.casefold() for f in t.fields)
+        for decl in spec.fields:
+            field_type, default = self.declared_type(decl, scope)
+            require_instances(self._world, field_type, scope, decl.pos)
+            for offset, field_name in decl.names:
+                if field_name.casefold() in seen:
+                    scope.error(offset, "duplicate", f"{name} has a member {field_name} already")
+                    continue
+                seen.add(field_name.casefold())
+                t.fields.append(Field(field_name, field_type))
+                if default is not None and not (spec.union and defaults):  # of a union the first one counts
+                    defaults[field_name] = default
+        if any(f.type is ERROR for f in t.fields):
+            return ERROR, None
+        t.lay_out(behind_base=True)
+        if t.size > MAX_SIZE:
+            scope.error(spec.pos, "size", f"a struct of {t.size} bytes is too large")
+            return ERROR, None
+        if defaults:
+            self._world.defaults[name] = StructInit(defaults)
+        return t, self.struct_default(t)
+
+    def _extend(self, t: StructType, spec: ast.NamedType, defaults: dict[str, Initial], scope: Scope) -> bool:
+        """Begins a struct with the members of the one it EXTENDS."""
+        base = self._named(spec, scope)[0]
+        if base is ERROR:
+            return False
+        if not isinstance(base, StructType) or base in self._world.blocks or base.union is not t.union:
+            scope.error(spec.pos, "type", f"{spec.name} is not a {'UNION' if t.union else 'STRUCT'}")
+            return False
+        t.fields += [Field(f.name, f.type) for f in base.fields]
+        t.base = base
+        inherited = self._world.defaults.get(base.name)
+        defaults.update(inherited.members if isinstance(inherited, StructInit) else {})
+        return True
+
+    def struct_default(self, t: StructType) -> Initial | None:
+        """What a struct or instance starts with: None for all zero."""
+        return StructInit({}) if t.name in self._world.defaults else None

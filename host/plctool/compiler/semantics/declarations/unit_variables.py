@@ -1,0 +1,153 @@
+"""What all program organisation units declare alike: constants, VAR_EXTERNAL, VAR_STAT, variables of a call.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass, replace
+
+from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
+from plctool.compiler.semantics.declarations.variables import RETAINING, Variables
+from plctool.compiler.semantics.instances import is_instance, require_instances
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, GlobalSymbol, PouSymbol, Role, VarSymbol
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Pou, PouKind, Storage, Variable
+
+ROLES = {
+    "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,
+    "VAR_TEMP": Role.TEMP,
+    "VAR_STAT": Role.LOCAL, "VAR_INST": Role.LOCAL, "STEP": Role.STEP,
+}  # fmt: skip
+_KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
+_KEEPING = {
+    PouKind.FUNCTION: "a FUNCTION_BLOCK", PouKind.METHOD: "VAR_INST", PouKind.FUNCTION_BLOCK: "VAR",
+    PouKind.PROGRAM: "VAR",
+}  # fmt: skip
+
+
+def _holds_constants(block: ast.VarBlock) -> bool:
+    """Whether what a block declares has one value for ever. CONSTANT parameters are only read-only."""
+    return "CONSTANT" in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL")
+
+
+def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.VarDecl, Role]]:
+    """Declarations of constants, each behind those that it uses. What uses itself stays where it is."""
+    ordered: list[tuple[ast.VarDecl, Role]] = []
+    pending = list(lines)
+    while pending:
+        undeclared = {name.casefold() for line, _ in pending for _, name in line.names}
+        ready = [pair for pair in pending if not undeclared & _names_used(pair[0])] or pending
+        ordered += ready
+        pending = [pair for pair in pending if pair not in ready]
+    return ordered
+
+
+def _names_used(node: object) -> set[str]:
+    """The names, case-folded, in the type and the initial value of a declaration."""
+    if isinstance(node, ast.Name):
+        return {node.name.casefold()}
+    if isinstance(node, list | tuple):
+        return set().union(*map(_names_used, node))
+    if is_dataclass(node):
+        return set().union(*(_names_used(getattr(node, f.name)) for f in fields(node)))
+    return set()
+
+
+def new_pou(symbol: PouSymbol, name: str) -> Pou:
+    """The unit that a declaration becomes, still empty."""
+    decl = symbol.decl
+    checks = "no_checks" not in decl.attributes
+    pou = Pou(name, _KINDS[decl.keyword], decl.source.pos(decl.pos), checks=checks)
+    pou.no_init = "no_init" in decl.attributes
+    pou.cuts_result = "cuts_result" in decl.attributes
+    pou.in_place = "in_place" in decl.attributes
+    return pou
+
+
+class UnitVariables:
+    """Declares them in the scope of a unit."""
+
+    def __init__(self, world: World, types: TypeDeclarations, variables: Variables) -> None:
+        self._world = world
+        self._types = types
+        self._variables = variables
+
+    def declare_alike(self, decl: ast.PouDecl, pou: Pou, scope: Scope) -> Iterator[ast.VarBlock]:
+        """Declares constants, VAR_EXTERNAL, VAR_STAT and VAR_TEMP; gives the other sections, each in its turn."""
+        self._declare_constants(decl, scope)
+        for block in decl.blocks:
+            if _holds_constants(block):
+                continue
+            if block.keyword == "VAR_EXTERNAL":
+                self._declare_externals(block, scope)
+            elif block.keyword == "VAR_STAT":
+                self._declare_statics(block, decl, scope)
+            elif block.keyword == "VAR_TEMP":
+                self.declare_stack_variables(block, pou, scope)
+            else:
+                yield block
+
+    def _declare_constants(self, decl: ast.PouDecl, scope: Scope) -> None:
+        """VAR CONSTANT comes first, wherever it stands: array bounds and initial values may use it."""
+        lines = [(line, ROLES[b.keyword]) for b in decl.blocks if _holds_constants(b) for line in b.decls]
+        for line, role in _in_order_of_use(lines):
+            t, init = self._types.declared_type(line, scope)
+            for offset, name in line.names:
+                symbol = self._variables.constant_symbol(offset, name, t, init, scope, decl.name, role)
+                symbol.given = line.init is not None
+                scope.declare(symbol, offset)
+
+    def _declare_externals(self, block: ast.VarBlock, scope: Scope) -> None:
+        """VAR_EXTERNAL only repeats what is declared elsewhere."""
+        for line in block.decls:
+            t, _ = self._types.declared_type(line, scope)
+            for offset, name in line.names:
+                keys = [f"{space}.{name}".casefold() for space in scope.path] + [name.casefold()]
+                named = (self._world.names.lookup(key, library=scope.library) for key in keys)
+                found = next((symbol for symbol in named if isinstance(symbol, GlobalSymbol)), None)
+                if found is None:
+                    scope.error(offset, "unknown", f"there is no VAR_GLOBAL {name}")
+                    continue
+                if self._world.names.same_named(name):
+                    listed = " or ".join(s.full_name for s in self._world.names.same_named(name))
+                    scope.error(offset, "ambiguous", f"{name} is in several lists; write {listed} in the statements")
+                    continue
+                symbol = self._world.declared.variable(found)
+                if ERROR not in (t, symbol.type) and t != symbol.type:
+                    scope.error(offset, "type", f"the VAR_GLOBAL {name} is of type {symbol.type}, not {t}")
+                if "CONSTANT" in block.qualifiers:
+                    symbol = replace(symbol, constant=True)
+                scope.names[name.casefold()] = symbol
+
+    def _declare_statics(self, block: ast.VarBlock, decl: ast.PouDecl, scope: Scope) -> None:
+        """VAR_STAT exists once, whatever calls or has the unit."""
+        for line in block.decls:
+            t, init = self._types.declared_type(line, scope)
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
+                if t is not ERROR:
+                    owner = scope.pou.name if scope.pou is not None and decl.keyword == "METHOD" else decl.name
+                    full_name = f"{owner}.{name}"
+                    symbol.variable = self._variables.shared_variable(
+                        full_name, t, init, scope, offset, retain=bool(block.qualifiers & RETAINING)
+                    )
+                scope.declare(symbol, offset)
+
+    def declare_stack_variables(self, block: ast.VarBlock, pou: Pou, scope: Scope) -> None:
+        """VAR of a function, VAR_TEMP: they live during the call."""
+        for line in block.decls:
+            t, init = self._types.declared_type(line, scope)
+            for offset, name in line.names:
+                symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword])
+                if is_instance(self._world, t):
+                    require_instances(self._world, t, scope, offset)
+                    message = f"the instance {name} starts anew at every call; {_KEEPING[pou.kind]} would keep it"
+                    scope.warning(offset, "lifetime", message)
+                if t is not ERROR:
+                    symbol.variable = Variable(name, t, Storage.LOCAL, symbol.pos, initial=init)
+                    pou.locals.append(symbol.variable)
+                scope.declare(symbol, offset)

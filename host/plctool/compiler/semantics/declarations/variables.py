@@ -1,0 +1,159 @@
+"""Variables that exist once: constants, global ones, those of programs; where each lives and what it starts with.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics.addresses import is_open, located
+from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
+from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
+from plctool.compiler.semantics.instances import instances_in, require_instances
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    Area,
+    ComputedInit,
+    Const,
+    Initial,
+    Pos,
+    ScalarInit,
+    Storage,
+    Variable,
+)
+from plctool.compiler.types import (
+    ArrayType,
+    Elementary,
+    Kind,
+    StringType,
+    StructType,
+    Type,
+    base_of,
+    is_scalar,
+)  # fmt: skip
+
+RETAINING = frozenset(("RETAIN", "PERSISTENT"))  # qualifiers that let a variable keep its value over a power cut
+
+
+class Variables:
+    """Makes variables of declarations."""
+
+    def __init__(self, world: World, types: TypeDeclarations, config: InstanceConfig) -> None:
+        self._world = world
+        self._types = types
+        self._config = config
+
+    def constant_symbol(
+        self, offset: int, name: str, t: Type, init: Initial | None, scope: Scope, owner: str, role: Role
+    ) -> VarSymbol:
+        """A constant: scalars and strings are folded, arrays and structs get memory once, however many instances there
+        are."""
+        pos, full_name = scope.pos(offset), f"{owner}.{name}" if owner else name
+        if isinstance(init, ComputedInit):
+            scope.error(offset, "constant", f"the value of the constant {name} is not known before the program runs")
+        if any(instance in self._world.blocks for instance in instances_in(t)):
+            scope.error(offset, "constant", f"{name} changes when it is called; declare it without CONSTANT")
+        symbol = VarSymbol(name, pos, t, role, constant=True, default=init)
+        if is_scalar(t) or isinstance(t, StringType):
+            zero: int | float | str = "" if isinstance(t, StringType) else 0.0 if _is_real(t) else 0
+            symbol.value = Const(init.value if isinstance(init, ScalarInit) else zero, t, pos)
+            if not scope.library:
+                self._world.constants[full_name] = symbol.value
+        elif t is not ERROR:
+            symbol.variable = self.shared_variable(full_name, t, init, scope, offset, constant=True)
+        return symbol
+
+    def shared_variable(
+        self,
+        full_name: str,
+        t: Type,
+        init: Initial | None,
+        scope: Scope,
+        offset: int,
+        *,
+        constant: bool = False,
+        retain: bool = False,
+    ) -> Variable:
+        """A variable that exists once for all instances of its POU."""
+        key = (scope.source.path, offset)
+        variable = self._world.shared.get(key)
+        if variable is None:
+            area = Area.RETAIN if retain or self.is_retain(t) else Area.DATA
+            variable = Variable(full_name, t, Storage.AREA, scope.pos(offset), area, initial=init, constant=constant)
+            self._world.shared[key] = variable
+            self._world.allocation.add(variable)
+        return variable
+
+    def global_variable(self, symbol: GlobalSymbol) -> VarSymbol:
+        """Declares a global when it is first used, so that the order of declarations does not matter."""
+        if symbol.symbol is not None:
+            return symbol.symbol
+        scope = self._world.scope(symbol.source)
+        scope.enter(symbol.namespace)
+        if symbol.busy:
+            scope.error(symbol.pos, "recursion", f"the value of {symbol.name} depends on itself")
+            return VarSymbol(symbol.name, scope.pos(symbol.pos), ERROR, Role.GLOBAL)
+        symbol.busy = True
+        t, init = self._types.declared_type(symbol.decl, scope, May.HAVE_ADDRESS)
+        require_instances(self._world, t, scope, symbol.pos)
+        owner = symbol.full_name.rpartition(".")[0]
+        if "CONSTANT" in symbol.qualifiers:
+            result = self.constant_symbol(symbol.pos, symbol.name, t, init, scope, owner, Role.GLOBAL)
+        else:
+            result = VarSymbol(symbol.name, scope.pos(symbol.pos), t, Role.GLOBAL, default=init)
+            if t is not ERROR:
+                location = self.address(symbol.decl.location, t, result.pos, symbol.full_name, symbol.name)
+                result.variable = self.area_variable(
+                    symbol.full_name, t, init, location, symbol.qualifiers, scope, symbol.pos
+                )
+                if result.variable is not None:
+                    self._world.allocation.add(result.variable)
+        symbol.busy = False
+        symbol.symbol = result
+        return result
+
+    def address(self, location: ast.DirectAddress | None, t: Type, pos: Pos, *names: str) -> ast.DirectAddress | None:
+        """Where a variable with these names lies: for `AT %I*` VAR_CONFIG says it. None: it has no address."""
+        if location is None or not is_open(location):
+            return location
+        return self._config.location(location.text[1], t, pos, *names)
+
+    def area_variable(
+        self,
+        name: str,
+        t: Type,
+        init: Initial | None,
+        location: ast.DirectAddress | None,
+        qualifiers: set[str],
+        scope: Scope,
+        offset: int,
+    ) -> Variable | None:
+        """A variable of a program or a global one; not allocated yet."""
+        pos = scope.pos(offset)
+        if location is not None and self._holds_instances(t):
+            message = f"{t} has instances of function blocks, which have no address; give one to their variables"
+            scope.error(location.pos, "location", message)
+            return None
+        if location is not None:
+            return located(name, t, init, location, scope, offset)
+        retain = bool(qualifiers & RETAINING) or self.is_retain(t)
+        return Variable(name, t, Storage.AREA, pos, Area.RETAIN if retain else Area.DATA, initial=init)
+
+    def _holds_instances(self, t: Type) -> bool:
+        return any(part in self._world.blocks for part in instances_in(t))
+
+    def is_retain(self, t: Type) -> bool:
+        """Whether instances of the type live in the retain area as a whole."""
+        while isinstance(t, ArrayType):
+            t = t.element
+        block = self._world.blocks.get(t) if isinstance(t, StructType) else None
+        if block is not None:
+            return block.retain
+        return isinstance(t, StructType) and any(self.is_retain(f.type) for f in t.fields)
+
+
+def _is_real(t: Type) -> bool:
+    base = base_of(t)
+    return isinstance(base, Elementary) and base.kind is Kind.REAL

@@ -1,0 +1,316 @@
+"""The names of a program, in front of those of the library: which declaration each stands for.
+
+Nothing is declared here; a declaration of the library is parsed when its name is first asked for.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.library import Library, without_library
+from plctool.compiler.semantics import sfc
+from plctool.compiler.semantics.generics import GROUPS
+from plctool.compiler.semantics.symbols import GlobalSymbol, Namespace, PouSymbol, Symbol, TypeSymbol, Unit
+from plctool.compiler.source import Source
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Pos
+from plctool.compiler.types import ELEMENTARY
+
+_RESERVED = {*ELEMENTARY, "STRING", "WSTRING", *GROUPS}
+
+
+def _enum_names(symbol: TypeSymbol) -> list[str]:
+    spec = symbol.decl.spec
+    return [name for _, name, _ in spec.values] if isinstance(spec, ast.EnumSpec) else []
+
+
+def _is_in_namespace(decl: ast.GlobalBlock) -> bool:
+    return decl.namespace is not None and decl.namespace.name != ""
+
+
+def enclosing(full_name: str) -> list[str]:
+    """The namespaces a dotted name lies in: `a.b` and `a` for `a.b.c`."""
+    parts = full_name.split(".")
+    return [".".join(parts[:n]) for n in range(len(parts) - 1, 0, -1)]
+
+
+@dataclass(frozen=True)
+class PlannedInstance:
+    """An instance of a PROGRAM that a CONFIGURATION names, or the one by its own name of any other PROGRAM."""
+
+    name: str
+    symbol: PouSymbol
+    qualifiers: frozenset[str] = frozenset()
+
+
+class Names:
+    """What is declared under which name. Keys are case-folded."""
+
+    declared_instance: Callable[[PlannedInstance], Namespace]
+    """Declares an instance of a PROGRAM; set by what declares them."""
+
+    def __init__(self, library: Library, diagnostics: Diagnostics) -> None:
+        self.library = library
+        self.diagnostics = diagnostics
+        self.namespaces: dict[str, str] = {}  # as written, by case-folded name
+        self.configurations: list[ast.ConfigurationDecl] = []
+        self.instance_blocks: list[ast.InstanceBlock] = []  # VAR_CONFIG and VAR_ACCESS
+        self.tests: list[ast.TestDecl] = []
+        self.has_members = False  # whether anything has methods, actions or properties
+        self.rewritten: Callable[[list[ast.Declaration]], list[ast.Declaration]] = list  # what unit tests replace
+        self._units: dict[str, Unit] = {}
+        self._globals: dict[str, GlobalSymbol] = {}
+        self._lists: dict[str, Namespace] = {}
+        self._library_names: dict[str, Unit | GlobalSymbol | None] = {}
+        self._ambiguous: dict[str, list[GlobalSymbol]] = {}
+        self._enum_values: dict[str, list[TypeSymbol]] = {}
+
+    # ---- making names known ----
+
+    def register(self, declarations: Iterable[ast.Declaration], *, library: bool = False) -> None:
+        """Makes the names of declarations known."""
+        for decl in declarations:
+            if isinstance(decl, ast.PouDecl):
+                self.has_members = self.has_members or bool(decl.members) or decl.keyword == "INTERFACE"
+                sfc.declare(decl, self.diagnostics)
+                self._add(PouSymbol(decl, library), library=library, full_name=decl.full_name)
+            elif isinstance(decl, ast.TypeDecl):
+                symbol = TypeSymbol(decl, library)
+                self._add(symbol, library=library, full_name=symbol.full_name)
+                for name in _enum_names(symbol) if not decl.qualified else ():
+                    self._enum_values.setdefault(name.casefold(), []).append(symbol)
+            elif isinstance(decl, ast.TestDecl):
+                self.tests.append(decl)
+            elif isinstance(decl, ast.GlobalBlock) and library:
+                self._add_globals(decl.block, decl.source, prefix="", library=True)
+            elif isinstance(decl, ast.InstanceBlock):
+                self.instance_blocks.append(decl)
+            elif isinstance(decl, ast.ConfigurationDecl):
+                self.configurations.append(decl)
+                self.instance_blocks += decl.instance_blocks
+                for block in decl.globals:
+                    self._add_globals(block, decl.source, prefix="", library=library)
+
+    def register_globals(self, declarations: Sequence[ast.Declaration], source: Source) -> None:
+        """The VAR_GLOBAL of a file are known as `x` and as `<file>.x`. A file with nothing else is a named list: there
+        `<file>.x` is the full name, and with {attribute 'qualified_only'} the only one."""
+        for decl in declarations:
+            if isinstance(decl, ast.GlobalBlock) and decl.namespace is not None and decl.namespace.name:
+                self._add_globals(decl.block, source, prefix=f"{decl.namespace.name}.", namespace=decl.namespace)
+        blocks = [d for d in declarations if isinstance(d, ast.GlobalBlock) and not _is_in_namespace(d)]
+        if not blocks:
+            return
+        qualified = any(d.qualified for d in blocks)
+        alone = all(isinstance(d, ast.GlobalBlock | ast.InstanceBlock | ast.TestDecl) for d in declarations)
+        namespace = Namespace(source.stem, "list of globals", {})
+        for block in blocks:
+            prefix = f"{source.stem}." if alone or qualified else ""
+            for symbol in self._add_globals(block.block, source, prefix=prefix, qualified=qualified):
+                namespace.members.setdefault(symbol.name.casefold(), symbol)
+        self._lists.setdefault(source.stem.casefold(), namespace)
+
+    def _add_globals(
+        self,
+        block: ast.VarBlock,
+        source: Source,
+        *,
+        prefix: str,
+        library: bool = False,
+        namespace: ast.Namespace | None = None,
+        qualified: bool = False,
+    ) -> list[GlobalSymbol]:
+        added = []
+        for line in block.decls:
+            for offset, name in line.names:
+                symbol = GlobalSymbol(name, prefix + name, offset, line, block.qualifiers, source)
+                key = (symbol.full_name if qualified or namespace is not None else name).casefold()
+                if namespace is not None:
+                    symbol.namespace = namespace
+                    self._add_namespaces(symbol.full_name)
+                other = self._globals.get(key)
+                if library:
+                    self._library_names[key] = symbol
+                elif other is None:
+                    self._globals[key] = symbol
+                elif other.full_name.casefold() != symbol.full_name.casefold():
+                    self._ambiguous.setdefault(key, [other]).append(symbol)
+                else:
+                    self._duplicate(name, source.pos(offset), other.source.pos(other.pos))
+                added.append(symbol)
+        return added
+
+    def _add(self, symbol: Unit, *, library: bool, full_name: str) -> None:
+        decl = symbol.decl
+        key = full_name.casefold()
+        if decl.namespace is not None:
+            self._add_namespaces(full_name)
+        if library:
+            self._library_names[key] = symbol
+            return
+        pos = decl.source.pos(decl.pos)
+        if decl.name.upper() in _RESERVED:
+            self.diagnostics.error(pos, "duplicate", f"{decl.name} is the name of an elementary type")
+            return
+        other = self._units.setdefault(key, symbol)
+        if other is not symbol:
+            self._duplicate(decl.name, pos, other.decl.source.pos(other.decl.pos))
+
+    def _add_namespaces(self, full_name: str) -> None:
+        for space in enclosing(full_name):
+            self.namespaces.setdefault(space.casefold(), space)
+
+    def _duplicate(self, name: str, pos: Pos, first: Pos) -> None:
+        where = f"in line {first.line}" if first.file == pos.file else f"in {first.file}"
+        self.diagnostics.error(pos, "duplicate", f"{name} is declared already {where}")
+
+    # ---- finding them ----
+
+    def lookup(self, key: str, *, library: bool) -> Symbol | None:
+        """A global name: the program's own before the library's; inside the library the other way round. Variables come
+        before types, so that `motor : Motor` hides nothing that is needed (see `unit`)."""
+        if library and (symbol := self._library_symbol(key)) is not None:
+            return symbol
+        return (
+            self._globals.get(key)
+            or self.instance(key, self._units.get(key))
+            or self._units.get(key)
+            or self._lists.get(key)
+            or self._library_symbol(key)
+        )
+
+    def unit(self, key: str, *, library: bool) -> Unit | None:
+        """A type, function, function block or program by its name."""
+        own = self._units.get(key)
+        if own is not None and not library:
+            return own
+        other = self._library_symbol(key)
+        return own if other is None or isinstance(other, GlobalSymbol) else other
+
+    def _library_symbol(self, key: str) -> Unit | GlobalSymbol | None:
+        key = without_library(key)
+        if key not in self._library_names:
+            self._library_names[key] = None
+            self.register(self.rewritten(self.library.parse(key, self.diagnostics)), library=True)
+        return self._library_names[key]
+
+    def same_named(self, name: str) -> list[GlobalSymbol]:
+        """The globals of that name when there are several."""
+        return self._ambiguous.get(name.casefold(), [])
+
+    def is_user_name(self, name: str) -> bool:
+        """Whether the program itself declares a global name."""
+        return name.casefold() in self._units
+
+    def enumerations_with(self, name: str) -> list[TypeSymbol]:
+        """The enumerations that have a value of that name."""
+        return self._enum_values.get(name.casefold(), [])
+
+    # ---- all of a kind ----
+
+    def units(self) -> list[Unit]:
+        """All types, POUs and interfaces the program itself declares."""
+        return list(self._units.values())
+
+    def pou_symbols(self) -> list[PouSymbol]:
+        """All POUs and interfaces the program itself declares."""
+        return [s for s in self._units.values() if isinstance(s, PouSymbol)]
+
+    def functions(self) -> list[PouSymbol]:
+        """The FUNCTION declarations in order."""
+        return [s for s in self.pou_symbols() if s.keyword == "FUNCTION"]
+
+    def program_symbols(self) -> list[PouSymbol]:
+        """The PROGRAM declarations in order."""
+        return [s for s in self.pou_symbols() if s.keyword == "PROGRAM"]
+
+    def globals(self) -> list[GlobalSymbol]:
+        """All global variables the program itself declares; those with a name that others have too, twice."""
+        return [*self._globals.values(), *(symbol for same in self._ambiguous.values() for symbol in same)]
+
+    def aliases(self) -> dict[str, str]:
+        """Other names of globals: `x` for `GVL.x` and the other way round, where they are unambiguous."""
+        found: dict[str, str] = {}
+        for namespace in self._lists.values():
+            for symbol in namespace.members.values():
+                assert isinstance(symbol, GlobalSymbol)
+                key = symbol.name.casefold()
+                bare = self._globals.get(key) is symbol and key not in self._ambiguous
+                for other in (*((symbol.name,) if bare else ()), f"{namespace.name}.{symbol.name}"):
+                    if other != symbol.full_name:
+                        found[other] = symbol.full_name
+        return found
+
+    # ---- instances of programs ----
+
+    def lookup_program(self, name: str) -> PouSymbol | None:
+        """The PROGRAM of that name, perhaps with its namespace in front."""
+        key = name.casefold()
+        named = (p for p in self.program_symbols() if key in (p.decl.name.casefold(), p.decl.full_name.casefold()))
+        return next(named, None)
+
+    @cached_property
+    def planned(self) -> dict[str, PlannedInstance]:
+        """Every instance by its name; the sources are known before anybody asks."""
+        planned: dict[str, PlannedInstance] = {}
+        for instance in (i for decl in self.configurations for i in decl.programs):
+            symbol = self.lookup_program(instance.type_name)
+            if symbol is not None:
+                made = PlannedInstance(instance.name, symbol, frozenset(instance.qualifiers))
+                planned.setdefault(instance.name.casefold(), made)
+        configured = {instance.symbol for instance in planned.values()}
+        for symbol in self.program_symbols():
+            if symbol not in configured:
+                name = symbol.decl.full_name
+                planned.setdefault(name.casefold(), PlannedInstance(name, symbol))
+        return planned
+
+    def instances_of(self, symbol: PouSymbol) -> list[str]:
+        """The names of the instances of a PROGRAM."""
+        return [instance.name for instance in self.planned.values() if instance.symbol is symbol]
+
+    def instance(self, key: str, symbol: Unit | None = None) -> Namespace | None:
+        """The instance of that name, or the only one of the PROGRAM `symbol`; None when there is none, or several."""
+        if key not in self.planned:
+            if not isinstance(symbol, PouSymbol) or symbol.keyword != "PROGRAM":
+                return None
+            names = self.instances_of(symbol)
+            if len(names) != 1:
+                return None
+            key = names[0].casefold()
+        return self.declared_instance(self.planned[key])
+
+    # ---- suggestions ----
+
+    def names_in(self, namespace: str) -> list[str]:
+        """The bare names of what a namespace holds, for suggestions."""
+        prefix = namespace.casefold() + "."
+        keys = [key for key in (*self._units, *self._globals, *self.namespaces) if key.startswith(prefix)]
+        return [key.removeprefix(prefix) for key in keys if "." not in key.removeprefix(prefix)]
+
+    def qualified_names(self, name: str) -> list[str]:
+        """What a name could mean that needs that of its list or enumeration in front."""
+        key = name.casefold()
+        found = [f"{s.name}.{m.name}" for s in self._lists.values() if (m := s.members.get(key)) is not None]
+        types = [s for s in self._units.values() if isinstance(s, TypeSymbol) and s.decl.qualified]
+        return found + [f"{t.decl.name}.{v}" for t in types for v in _enum_names(t) if v.casefold() == key]
+
+    def visible_names(self) -> list[str]:
+        """Names of globals, functions and enumeration values, for suggestions."""
+        values = [name for s in self._units.values() if isinstance(s, TypeSymbol) for name in _enum_names(s)]
+        units = [s.decl.name for s in self._units.values()]
+        named = [s.name for s in self._globals.values()]
+        named += [s.name for s in self._lists.values()] + [instance.name for instance in self.planned.values()]
+        return units + named + values + self.library.names()
+
+    def type_names(self) -> list[str]:
+        """Names of types and function blocks, for suggestions."""
+        return [s.decl.name for s in self._units.values()] + self.library.names()
+
+    def function_names(self) -> list[str]:
+        """Names of functions, for suggestions."""
+        return [s.decl.name for s in self.functions()] + self.library.names()

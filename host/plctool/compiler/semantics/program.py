@@ -1,0 +1,102 @@
+"""The check of one program: who declares what, and the order in which all of it is declared and checked.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.library import Library
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.construction import construct
+from plctool.compiler.semantics.declarations.blocks import Blocks
+from plctool.compiler.semantics.declarations.classes import Classes
+from plctool.compiler.semantics.declarations.functions import Functions
+from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
+from plctool.compiler.semantics.declarations.programs import Programs
+from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
+from plctool.compiler.semantics.declarations.unit_variables import UnitVariables
+from plctool.compiler.semantics.declarations.variables import Variables
+from plctool.compiler.semantics.declared import Declared
+from plctool.compiler.semantics.generics import is_generic
+from plctool.compiler.semantics.rules.bodies import report_unused, write_body
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.sfc_statements import statements_of
+from plctool.compiler.semantics.symbols import TypeSymbol
+from plctool.compiler.semantics.world import World
+from plctool.compiler.typed import Pou
+
+
+class Program:
+    """All parts of the check."""
+
+    def __init__(self, library: Library) -> None:
+        self.world = world = World(library)
+        self.types = TypeDeclarations(world)
+        self.config = InstanceConfig(world, self.types)
+        self.variables = Variables(world, self.types, self.config)
+        units = UnitVariables(world, self.types, self.variables)
+        self._functions = Functions(world, self.types, units)
+        self._classes = Classes(world, self.types, self._functions)
+        self._blocks = Blocks(world, self.types, self.variables, units, self._classes)
+        self.programs = Programs(world, self.types, self.variables, units, self._classes)
+        self.startup: Pou | None = None  # calls FB_Init
+        self.shutdown: Pou | None = None  # calls FB_Exit
+        world.names.declared_instance = self.programs.instance
+        world.declared = Declared(
+            type_of=self.types.type_of_symbol,
+            type_named=self.types.named_type,
+            variable=self.variables.global_variable,
+            function=self._functions.function,
+            member=self._classes.signature,
+            block=self._blocks.block,
+            layout=self._blocks.layout,
+            interface=self._classes.interface,
+        )
+
+    def declare_all(self) -> None:
+        """Declares what the program itself has, used or not, so that all of it is checked."""
+        for symbol in self.world.names.units():
+            if isinstance(symbol, TypeSymbol):
+                self.types.type_of_symbol(symbol)
+            elif symbol.keyword == "FUNCTION_BLOCK":
+                self._blocks.block(symbol)
+            elif symbol.keyword == "FUNCTION" and not is_generic(symbol.decl):
+                self._functions.function(symbol, {})
+        for variable in self.world.names.globals():
+            self.variables.global_variable(variable)
+
+    def external_functions(self) -> list[Pou]:
+        """The functions the program declares that are implemented in C, in order."""
+        functions = [s for s in self.world.names.functions() if not is_generic(s.decl)]
+        declared = [self._functions.function(s, {}) for s in functions]
+        return [info.pou for info in declared if info is not None and info.pou.external is not None]
+
+    def check_bodies(self) -> None:
+        """Checks all bodies, and those of the library and of the programs they need; what is left over at the end."""
+        world = self.world
+        checked = self._check_queue()
+        while self.programs.declare_others():
+            checked += self._check_queue()
+        for scope in checked:
+            report_unused(scope)
+        self.startup, self.shutdown = construct(world)
+        world.pous += world.dispatches.queries.pous()
+        self._classes.find_targets(
+            v for vs in (world.allocation.variables, *(p.locals for p in world.pous)) for v in vs
+        )
+        world.dispatches.report_calls(world.calls, world.diagnostics)
+        world.calls.report_recursion()
+
+    def _check_queue(self) -> list[Scope]:
+        """Checks what is queued and what that needs; the scopes to look into for what is not used."""
+        checked: list[Scope] = []
+        world, bodies = self.world, self.world.bodies
+        self._classes.declare_members()
+        while bodies:
+            scope, decl = bodies.next()
+            write_body(Checker(world, scope), statements_of(world, decl, scope))
+            if not scope.library:
+                checked.append(scope)
+            if bodies.only_library:
+                self._classes.declare_members()
+        return checked

@@ -1,0 +1,246 @@
+"""The arguments of calls: which parameter each is for, and what the parameter needs.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from dataclasses import dataclass, replace
+
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.conversions import elementary, error_value, same_type, takes_array
+from plctool.compiler.semantics.generics import is_group
+from plctool.compiler.semantics.open_arrays import handed_bounds
+from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
+from plctool.compiler.semantics.values import place_of
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    AddressOf,
+    BitPlace,
+    Call,
+    Const,
+    DerefPlace,
+    Direction,
+    Expr,
+    Load,
+    Parameter,
+    Place,
+    ScalarInit,
+    ValuePlace,
+)
+from plctool.compiler.types import LREAL, REAL, ReferenceType, StringType, StructType, SubrangeType, Type, is_scalar
+
+Actual = ast.Argument | Expr | None  # as written, or checked already
+
+
+@dataclass
+class Enable:
+    """EN and ENO of a call."""
+
+    en: ast.Expr | None = None
+    eno: ast.Expr | None = None
+
+
+def split_enable(node: ast.Call, declared: Container[str] = ()) -> tuple[list[ast.Argument], Enable]:
+    """Takes EN and ENO out of the arguments, unless they are among the names that the callee declares itself."""
+    enable, rest = Enable(), list[ast.Argument]()
+    for argument in node.args:
+        key = (argument.name or "").casefold()
+        if key == "en" and key not in declared and not argument.output:
+            enable.en = argument.value
+        elif key == "eno" and key not in declared and argument.output:
+            enable.eno = argument.value
+        else:
+            rest.append(argument)
+    return rest, enable
+
+
+def parameter_names(c: Checker, callee: ast.Expr) -> set[str]:
+    """What the function of that name declares, folded; nothing for one that is built in."""
+    if not isinstance(callee, ast.Name):
+        return set()
+    symbol = c.world.names.unit(callee.name.casefold(), library=c.scope.library)
+    if not isinstance(symbol, PouSymbol):
+        return set()
+    return {name.casefold() for name, _, _ in parameter_lines(symbol.decl)}
+
+
+def plain_arguments(c: Checker, node: ast.Call, declared: Container[str] = ()) -> list[ast.Argument] | None:
+    """The arguments of a call that is part of an expression; None after a diagnosis."""
+    args, enable = split_enable(node, declared)
+    if enable.en is None and enable.eno is None:
+        return args
+    c.error(node.pos, "arguments", "EN and ENO need the call to be a statement or the whole right side of :=")
+    return None
+
+
+def bind(
+    c: Checker, args: list[ast.Argument], names: list[tuple[str, Direction]], what: str, offset: int
+) -> dict[int, ast.Argument] | None:
+    """Arguments by index of their parameter; None after a diagnosis."""
+    if not args:
+        return {}
+    if all(a.name is None for a in args):
+        positional = [i for i, (_, direction) in enumerate(names) if direction is not Direction.OUTPUT]
+        if len(args) == len(names):
+            positional = list(range(len(names)))
+        if len(args) > len(positional):
+            takes = arguments_text(len(positional))
+            c.error(args[len(positional)].pos, "arguments", f"{what} takes {takes}, not {len(args)}")
+            return None
+        return dict(zip(positional, args, strict=False))
+    bound: dict[int, ast.Argument] = {}
+    index = {name.casefold(): i for i, (name, _) in enumerate(names)}
+    inputs = [i for i, (_, direction) in enumerate(names) if direction is not Direction.OUTPUT]
+    for position, argument in enumerate(args):
+        if argument.name is None:  # arguments without a name come first
+            if position >= len(inputs) or any(a.name is not None for a in args[:position]):
+                c.error(argument.pos, "arguments", "arguments without a name come before those with one")
+                return None
+            bound[inputs[position]] = argument
+            continue
+        i = index.get(argument.name.casefold())
+        if i is None:
+            hint = did_you_mean(argument.name, (n for n, _ in names))
+            c.error(argument.pos, "arguments", f"{what} has no parameter {argument.name}{hint}")
+            return None
+        if i in bound:
+            c.error(argument.pos, "arguments", f"{argument.name} is given twice")
+            return None
+        is_output = names[i][1] is Direction.OUTPUT
+        if argument.output is not is_output:
+            arrow = "=>" if is_output else ":="
+            c.error(argument.pos, "arguments", f"{argument.name} is given with {arrow}")
+            return None
+        bound[i] = argument
+    return bound
+
+
+def typed_call(c: Checker, info: FunctionInfo, actuals: dict[int, Actual], offset: int, *, noted: bool = True) -> Expr:
+    """The call node: arguments in order of the parameters, defaults filled in. `noted`: a call that leads back is
+    recursion."""
+    pos, name, ok = c.pos(offset), info.pou.name, True
+    args: list[Expr | Place | None] = []
+    formal = any(isinstance(a, ast.Argument) and a.name is not None for a in actuals.values())
+    parameters = list(zip(info.parameters, info.pou.parameters, strict=False))
+    for i, ((symbol, direction), parameter) in enumerate(parameters):
+        actual = actuals.get(i)
+        if actual is None and direction is not Direction.OUTPUT:
+            if direction is Direction.IN_OUT or not (formal or symbol.given):
+                c.error(offset, "arguments", f"the argument {symbol.name} of {name} is missing")
+                ok = False
+                continue
+            args.append(_default_value(c, symbol, parameter, offset))
+            continue
+        argument = None if actual is None else _actual_argument(c, actual, symbol, direction, parameter)
+        ok = ok and (actual is None or argument is not None)
+        args.append(argument)
+    if not ok or (info.result is ERROR):
+        return error_value(pos)
+    for parameter, argument in zip(info.pou.parameters, list(args), strict=False):
+        args += [bound for _, bound in handed_bounds(parameter.variable, argument, pos)]
+    if noted:
+        c.world.calls.add(c.scope.pou, info.pou, pos)
+    return Call(info.pou, args, info.result if info.result is not None else NOTHING, pos)
+
+
+def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
+    pos, t = c.pos(offset), symbol.type
+    value: int | float | str = "" if isinstance(t, StringType) else 0
+    if isinstance(symbol.default, ScalarInit):
+        value = symbol.default.value
+    elif not (is_scalar(t) or isinstance(t, StringType)):
+        c.error(offset, "arguments", f"the argument {symbol.name} is missing")
+        return error_value(pos)
+    if elementary(t) in (REAL, LREAL):
+        value = float(value)
+    constant = Const(value, t, pos)
+    return ValuePlace(constant, t, pos) if parameter.by_reference else constant
+
+
+def _actual_argument(
+    c: Checker, actual: Actual, symbol: VarSymbol, direction: Direction, parameter: Parameter
+) -> Expr | Place | None:
+    """One argument as its parameter needs it; None after a diagnosis."""
+    t = symbol.type
+    if isinstance(actual, ast.Argument):
+        if actual.value is None:
+            return None
+        if direction is not Direction.INPUT:
+            output = direction is Direction.OUTPUT
+            return referenced_place(c, actual.value, t, symbol.name, output=output, constant=symbol.constant)
+        e = input_value(c, actual.value, t, symbol.name)
+    else:
+        assert actual is not None
+        e = c.coerce(actual, t)
+    if e.type is ERROR:
+        return None
+    return place_of(e) if parameter.by_reference else e
+
+
+def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
+    """The value of an input; a REFERENCE TO gets the address."""
+    if not isinstance(t, ReferenceType):
+        e = c.expr(node, t)
+        return e if takes_array(t, e.type) else c.coerce(e, t)
+    place = referenced_place(c, node, t.target, name, output=False)
+    return error_value(c.pos(node.pos)) if place is None else refer(place, t)
+
+
+def refer(place: Place, t: ReferenceType) -> Expr:
+    """What a reference to a place holds."""
+    if isinstance(place, DerefPlace) and isinstance(place.pointer, Load):
+        return replace(place.pointer, type=t)
+    return AddressOf(place, t, place.pos)
+
+
+def referenced_place(
+    c: Checker, node: ast.Expr, t: Type, name: str, *, output: bool, constant: bool = False
+) -> Place | None:
+    """A variable handed over by reference; a value will do when it is `constant`. Strings may have any length."""
+    what = "the output" if output else "the VAR_IN_OUT"
+    if constant:
+        e = c.expr(node, t)
+        place: Place | None = e.place if isinstance(e, Load) else place_of(c.coerce(e, t))
+    else:
+        place = changeable_place(c, node, f"{what} {name}", f"be given to {what} {name}")
+    if place is None:
+        return None
+    if isinstance(place, BitPlace):
+        c.error(node.pos, "type", f"a single bit has no address, so it cannot be given to {what} {name}")
+        return None
+    if isinstance(place.type, StringType) and isinstance(t, StringType):
+        return place
+    if t is ERROR or place.type is ERROR:
+        return None
+    if takes_array(t, place.type):
+        return place
+    if isinstance(place.type, StructType) and not output and place.type.conforms(t):
+        return place
+    if not same_type(place.type, t) and not (
+        isinstance(place.type, SubrangeType) and place.type.base is t and not output
+    ):
+        c.error(node.pos, "type", f"{what} {name} is {t} and needs a variable of this type, not {place.type}")
+        return None
+    return place
+
+
+def parameter_lines(decl: ast.PouDecl) -> list[tuple[str, Direction, str | None]]:
+    """Name, direction and ANY_... group of each parameter."""
+    found = []
+    for block in decl.blocks:
+        if block.keyword not in DIRECTIONS:
+            continue
+        for line in block.decls:
+            group = line.type.name.upper() if isinstance(line.type, ast.NamedType) else ""
+            for _, name in line.names:
+                found.append((name, DIRECTIONS[block.keyword], group if is_group(group) else None))
+    return found
+
+
+def arguments_text(n: int) -> str:
+    """`1 argument`, `2 arguments`"""
+    return "no arguments" if n == 0 else "1 argument" if n == 1 else f"{n} arguments"

@@ -1,0 +1,91 @@
+"""Assignments.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from plctool.compiler.semantics.checker import Checker, checks_statement
+from plctool.compiler.semantics.rules.arguments import input_value, parameter_names
+from plctool.compiler.semantics.rules.call_statements import enabled, has_enable
+from plctool.compiler.semantics.rules.instance_queries import attempt
+from plctool.compiler.semantics.rules.methods import assign_property, assigned_property
+from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Assign, Const, DerefPlace, If, Load, Pos, Statement
+from plctool.compiler.types import BOOL, OpenArrayType, ReferenceType
+
+
+@checks_statement(ast.Assign)
+def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
+    """`a := b := e`, `a S= e`, `a R= e`, `r REF= x`, `i ?= x`"""
+    if node.op == "REF=":
+        return _assign_reference(c, node)
+    if node.op == "?=":
+        return attempt(c, node)
+    if node.op != ":=":
+        return _set_or_reset(c, node)
+    if isinstance(node.value, ast.Call):
+        declared = parameter_names(c, node.value.callee)
+        if has_enable(node.value, declared):
+            return enabled(c, node.value, declared, lambda plain: assignment(c, replace(node, value=plain)))
+    result: list[Statement] = []
+    source: ast.Expr = node.value
+    for target in reversed(node.targets):
+        statement = _assign_one(c, target, source, c.pos(node.pos))
+        if statement is not None:
+            result.append(statement)
+        source = target
+    return result
+
+
+def _assign_one(c: Checker, target: ast.Expr, source: ast.Expr, pos: Pos) -> Statement | None:
+    bound = assigned_property(c, target)
+    if bound is not None:
+        return assign_property(c, bound, target, source, pos)
+    place = changeable_place(c, target, "the left side of :=", "be assigned to")
+    if place is None:
+        c.expr(source)
+        return None
+    value = c.coerce(c.expr(source, place.type), place.type)
+    if value.type is ERROR:
+        return None
+    if isinstance(place.type, OpenArrayType):
+        c.error(target.pos, "type", "an ARRAY[*] cannot be assigned as a whole; assign its elements in a loop")
+        return None
+    if place.type in c.world.blocks:
+        c.error(target.pos, "type", f"an instance of the function block {place.type} cannot be assigned")
+        return None
+    return Assign(place, value, pos)
+
+
+def _assign_reference(c: Checker, node: ast.Assign) -> list[Statement]:
+    """`r REF= x` lets r refer to x; `r REF= NULL` to nothing."""
+    target, pos = node.targets[0], c.pos(node.pos)
+    place = changeable_place(c, target, "the left side of REF=", "be assigned to")
+    pointer = place.pointer if isinstance(place, DerefPlace) else None
+    if not isinstance(pointer, Load) or not isinstance(pointer.type, ReferenceType):
+        if place is not None:
+            c.error(target.pos, "type", f"the left side of REF= is a REFERENCE TO, not {place.type}")
+        return []
+    if isinstance(node.value, ast.Literal) and node.value.kind is ast.LiteralKind.NULL:
+        return [Assign(pointer.place, Const(0, pointer.type, pos), pos)]
+    value = input_value(c, node.value, pointer.type, "reference")
+    return [] if value.type is ERROR else [Assign(pointer.place, value, pos)]
+
+
+def _set_or_reset(c: Checker, node: ast.Assign) -> list[Statement]:
+    """`x S= condition` sets x and never resets it."""
+    place = changeable_place(c, node.targets[0], f"the left side of {node.op}", "be assigned to")
+    condition = c.condition(node.value)
+    if place is None or condition.type is ERROR:
+        return []
+    if place.type is not BOOL:
+        c.error(node.targets[0].pos, "type", f"{node.op} needs a BOOL variable, not {place.type}")
+        return []
+    pos = c.pos(node.pos)
+    change = Assign(place, Const(int(node.op == "S="), BOOL, pos), pos)
+    return [If([(condition, [change])], [], pos)]

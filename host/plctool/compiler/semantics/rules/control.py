@@ -1,0 +1,213 @@
+"""Control structures.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics import constants
+from plctool.compiler.semantics.checker import Checker, checks_statement
+from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary
+from plctool.compiler.semantics.rules.bodies import check_body, report_unreachable
+from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.semantics.values import is_untyped
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Case, Const, Continue, Exit, Expr, For, If, Repeat, Return, Statement, While
+from plctool.compiler.types import EnumType, Type
+
+
+class _Labels:
+    """The labels of a CASE so far, with their lines."""
+
+    def __init__(self) -> None:
+        self._values: dict[int, int] = {}
+        self._ranges: list[tuple[int, int, int]] = []
+
+    def overlap(self, low: int, high: int) -> tuple[int, int] | None:
+        """A value between `low` and `high` that is taken already, and the line where."""
+        if low == high and low in self._values:
+            return low, self._values[low]
+        if low < high:
+            for value, line in self._values.items():
+                if low <= value <= high:
+                    return value, line
+        for other_low, other_high, line in self._ranges:
+            if low <= other_high and other_low <= high:
+                return max(low, other_low), line
+        return None
+
+    def add(self, low: int, high: int, line: int) -> None:
+        """Notes a label."""
+        if low == high:
+            self._values[low] = line
+        else:
+            self._ranges.append((low, high, line))
+
+
+def _names_something(node: object) -> bool:
+    """Whether a constant expression names a constant."""
+    if isinstance(node, ast.Binary):
+        return _names_something(node.left) or _names_something(node.right)
+    if isinstance(node, ast.Unary):
+        return _names_something(node.operand)
+    return not isinstance(node, ast.Literal)
+
+
+@checks_statement(ast.If)
+def if_statement(c: Checker, node: ast.If) -> list[Statement]:
+    """IF; what a constant condition leaves out is reported."""
+    branches = [(c.condition(condition), check_body(c, body)) for condition, body in node.branches]
+    bodies = [*(body for _, body in node.branches), node.otherwise]
+    for number, (condition, body) in enumerate(node.branches):
+        always = _constant_condition(condition, branches[number][0])
+        if always is False and body:
+            report_unreachable(c, body[0].pos, ": the condition is always FALSE")
+        elif always:
+            for skipped in filter(None, bodies[number + 1 :]):
+                report_unreachable(c, skipped[0].pos, ": a condition before is always TRUE")
+            break
+    return [If(branches, check_body(c, node.otherwise), c.pos(node.pos))]
+
+
+def _constant_condition(node: ast.Expr, condition: Expr) -> bool | None:
+    """What a condition always is; None when that depends, if only on a constant with a name: a switch."""
+    if not isinstance(condition, Const) or condition.type is ERROR or _names_something(node):
+        return None
+    return bool(condition.value)
+
+
+@checks_statement(ast.Case)
+def case_statement(c: Checker, node: ast.Case) -> list[Statement]:
+    """CASE; labels are constants, and none is there twice."""
+    selector = c.settled(node.selector)
+    base = elementary(selector.type)
+    if selector.type is not ERROR and (base is None or base.kind not in NUMBERS):
+        selector = c.error(node.selector.pos, "type", f"CASE needs an integer or an enumeration, not {selector.type}")
+    seen = _Labels()
+    branches = []
+    for labels, body in node.branches:
+        ranges = [r for label in labels if (r := _label_range(c, label, selector.type, seen)) is not None]
+        branches.append((ranges, check_body(c, body)))
+    otherwise = check_body(c, node.otherwise)
+    if selector.type is ERROR:
+        return []
+    if isinstance(selector.type, EnumType) and not node.has_else:
+        _report_missing(c, selector.type, seen, node)
+    return [Case(selector, branches, otherwise, c.pos(node.pos))]
+
+
+def _report_missing(c: Checker, t: EnumType, seen: _Labels, node: ast.Case) -> None:
+    missing = [name for name, value in t.values.items() if seen.overlap(value, value) is None]
+    if missing:
+        listed = ", ".join(missing[:-1]) + " and " * (len(missing) > 1) + missing[-1]
+        c.warning(node.pos, "case", f"this CASE misses {listed} of {t}; add what is missing, or an ELSE")
+
+
+def _label_range(c: Checker, label: ast.CaseLabel, t: Type, seen: _Labels) -> tuple[int, int] | None:
+    low = _label_value(c, label.low, t)
+    high = low if label.high is None else _label_value(c, label.high, t)
+    if low is None or high is None:
+        return None
+    if low > high:
+        c.error(label.pos, "range", f"the range {low}..{high} is empty")
+        return None
+    other = seen.overlap(low, high)
+    if other is not None:
+        value, line = other
+        c.error(label.pos, "duplicate", f"{constants.describe(value, t)} is a label in line {line} already")
+        return None
+    seen.add(low, high, c.pos(label.pos).line)
+    return low, high
+
+
+def _label_value(c: Checker, node: ast.Expr, t: Type) -> int | None:
+    e = c.constant(node, t)
+    if e is None:
+        return None
+    if not is_untyped(e) and isinstance(t, EnumType) and e.type is not t and isinstance(e.type, EnumType):
+        c.error(node.pos, "type", f"this is a value of {e.type}, CASE is about {t}")
+        return None
+    if isinstance(t, EnumType) and is_untyped(e) and isinstance(e.value, int):
+        return e.value
+    target = elementary(t)
+    value = c.coerce(e, target) if target is not None else e
+    return (
+        value.value if value.type is not ERROR and isinstance(value, Const) and isinstance(value.value, int) else None
+    )
+
+
+@checks_statement(ast.For)
+def for_statement(c: Checker, node: ast.For) -> list[Statement]:
+    """FOR; the limits are brought to the type of the variable."""
+    place = changeable_place(c, node.var, "the FOR loop", "be the variable of a FOR loop")
+    t = None if place is None else elementary(place.type)
+    if place is not None and (t is None or t.kind not in NUMBERS):
+        c.error(node.var.pos, "type", f"a FOR loop counts with an integer, not with {place.type}")
+        place = None
+    elif place is not None and isinstance(place.type, EnumType):
+        c.warning(node.var.pos, "enum", f"the loop takes {place.type} for a number, beyond its last value")
+    target = t if place is not None and t is not None else ERROR
+    pos = c.pos(node.pos)
+    start, stop = c.value(node.start, target), c.value(node.stop, target)
+    step: Expr = Const(1, target, pos) if node.step is None else _step_value(c, node.step, target)
+    if isinstance(step, Const) and step.value == 0 and step.type is not ERROR:
+        c.error(node.pos if node.step is None else node.step.pos, "range", "a FOR loop with a step of zero never ends")
+        place = None
+    body = _loop_body(c, node.body)
+    if place is None or ERROR in (start.type, stop.type, step.type):
+        return []
+    return [For(place, start, stop, step, body, pos)]
+
+
+def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:
+    """The step of a FOR loop. A constant one may lead downwards, whatever counts."""
+    e, counter = c.expr(node, target), elementary(target)
+    if isinstance(e, Const) and isinstance(e.value, int) and e.value < 0 and counter is not None:
+        target = SIGNED[counter.bits]
+    return c.coerce(e, target)
+
+
+def _loop_body(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
+    c.loops += 1
+    body = check_body(c, nodes)
+    c.loops -= 1
+    return body
+
+
+@checks_statement(ast.While)
+def while_statement(c: Checker, node: ast.While) -> list[Statement]:
+    """WHILE"""
+    condition = c.condition(node.condition)
+    if _constant_condition(node.condition, condition) is False and node.body:
+        report_unreachable(c, node.body[0].pos, ": the condition is always FALSE")
+    return [While(condition, _loop_body(c, node.body), c.pos(node.pos))]
+
+
+@checks_statement(ast.RepeatUntil)
+def repeat_statement(c: Checker, node: ast.RepeatUntil) -> list[Statement]:
+    """REPEAT"""
+    body = _loop_body(c, node.body)
+    return [Repeat(body, c.condition(node.until), c.pos(node.pos))]
+
+
+@checks_statement(ast.Exit)
+def exit_statement(c: Checker, node: ast.Exit) -> list[Statement]:
+    """EXIT"""
+    if not c.loops:
+        c.error(node.pos, "statement", "EXIT stands outside of a loop")
+    return [Exit(c.pos(node.pos))]
+
+
+@checks_statement(ast.Continue)
+def continue_statement(c: Checker, node: ast.Continue) -> list[Statement]:
+    """CONTINUE"""
+    if not c.loops:
+        c.error(node.pos, "statement", "CONTINUE stands outside of a loop")
+    return [Continue(c.pos(node.pos))]
+
+
+@checks_statement(ast.Return)
+def return_statement(c: Checker, node: ast.Return) -> list[Statement]:
+    """RETURN"""
+    return [Return(c.pos(node.pos))]

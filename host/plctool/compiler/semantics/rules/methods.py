@@ -1,0 +1,146 @@
+"""Calls of methods and actions, and what properties stand for.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.conversions import error_value
+from plctool.compiler.semantics.rules.arguments import bind, split_enable, typed_call
+from plctool.compiler.semantics.rules.members import Bound, bound_member, instance_member, usable
+from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, Member
+from plctool.compiler.semantics.values import load
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    Call,
+    CallStatement,
+    DerefPlace,
+    Dispatch,
+    Expr,
+    Place,
+    Pos,
+    Pou,
+    SelfPlace,
+    Statement,
+    Storage,
+    VarPlace,
+)
+from plctool.compiler.types import ReferenceType
+
+
+def method_call(c: Checker, bound: Bound, node: ast.Call) -> Expr:
+    """A call of a method or action."""
+    args, enable = split_enable(node)
+    offset = node.callee.name_pos if isinstance(node.callee, ast.Member) else node.pos
+    if enable.en is not None or enable.eno is not None:
+        return c.error(node.pos, "arguments", "EN and ENO need the call to be a statement")
+    if bound.callable is None and bound.getter is not None:
+        return c.error(offset, "call", f"{bound.cls.name}.{bound.key} is a property and is used without ()")
+    member = usable(c, bound, bound.callable, offset)
+    if member is None:
+        return error_value(c.pos(node.pos))
+    return _member_call(c, bound, member, args, node.pos, offset)
+
+
+def _member_call(
+    c: Checker, bound: Bound, member: Member, args: list[ast.Argument], offset: int, name_offset: int
+) -> Expr:
+    place = bound.place
+    if isinstance(place, SelfPlace) and place.exact and member.abstract:
+        return c.error(name_offset, "inheritance", f"{member.name} is ABSTRACT and has no body to call")
+    info = c.world.declared.member(member)
+    dispatch = _dispatch_of(c, bound.cls, _member_key(member), place, info.pou)
+    bound_args = bind(c, args, [(s.name, d) for s, d in info.parameters], info.pou.name, offset)
+    if bound_args is None:
+        return error_value(c.pos(offset))
+    elsewhere = dispatch is not None or isinstance(place, DerefPlace)
+    e = typed_call(c, info, dict(bound_args), offset, noted=not elsewhere)
+    if isinstance(e, Call):
+        e.instance, e.dispatch = place, dispatch
+        if dispatch is not None and isinstance(place, SelfPlace):
+            c.world.dispatches.note_own_call(c.scope.pou, dispatch, e.pos)
+        elif elsewhere:
+            c.world.dispatches.note_other_call(c.scope.pou, info.pou, dispatch, e.pos)
+    return e
+
+
+def _member_key(member: Member) -> str:
+    suffix = f".{member.decl.keyword.lower()}" if member.is_property else ""
+    return member.decl.name.casefold() + suffix
+
+
+def _dispatch_of(c: Checker, cls: ClassInfo, key: str, place: Place | None, function: Pou) -> Dispatch | None:
+    """None when the type of the instance is known."""
+    if place is None or _is_exact(place):
+        return None
+    return c.world.dispatches.dispatch(cls, key, function)
+
+
+def body_dispatch(c: Checker, block: BlockInfo, instance: Place) -> Dispatch | None:
+    """How the body of a function block is found when the instance may be of a derived one."""
+    return None if block.cls is None else _dispatch_of(c, block.cls, "", instance, block.pou)
+
+
+def property_value(c: Checker, bound: Bound, offset: int, name_offset: int) -> Expr:
+    """The value of a property."""
+    if bound.getter is None and bound.callable is not None:
+        return c.error(name_offset, "call", f"{bound.key} is a method and is called with ()")
+    if bound.getter is None and bound.setter is not None:
+        return c.error(name_offset, "access", f"the property {bound.key} has no GET, it can only be written")
+    member = usable(c, bound, bound.getter, name_offset)
+    if member is None:
+        return error_value(c.pos(offset))
+    return followed(_member_call(c, bound, member, [], offset, name_offset))
+
+
+def followed(e: Expr) -> Expr:
+    """A result that is a REFERENCE TO stands for what it refers to."""
+    if isinstance(e, Call) and isinstance(e.type, ReferenceType):
+        return load(DerefPlace(e, e.type.target, e.pos))
+    return e
+
+
+def assigned_property(c: Checker, target: ast.Expr) -> Bound | None:
+    """The property that an assignment is about; None when it is a variable."""
+    if not isinstance(target, ast.Name | ast.Member):
+        return None
+    bound = bound_member(c, target)
+    if bound is None or bound.callable is not None:
+        return None
+    if bound.getter is None or bound.setter is not None:
+        return bound
+    refers = isinstance(c.world.declared.member(bound.getter).result, ReferenceType)
+    return None if refers else bound  # what it refers to is assigned
+
+
+def assign_property(c: Checker, bound: Bound, target: ast.Expr, source: ast.Expr, pos: Pos) -> Statement | None:
+    """Calls the SET of a property."""
+    offset = target.name_pos if isinstance(target, ast.Member) else target.pos
+    if bound.setter is None and bound.getter is not None:
+        c.error(offset, "access", f"the property {bound.key} has no SET, it can only be read")
+        return None
+    member = usable(c, bound, bound.setter, offset)
+    if member is None:
+        return None
+    e = _member_call(c, bound, member, [ast.Argument(source.pos, None, source)], target.pos, offset)
+    return CallStatement(e, pos) if isinstance(e, Call) else None
+
+
+def property_of(c: Checker, base: Expr, node: ast.Member) -> Expr | None:
+    """`base.name` when it is a property; None when it is a variable. Methods need to be called."""
+    bound = instance_member(c, base, node)
+    if bound is None:
+        return None
+    if bound.callable is not None:
+        return c.error(node.name_pos, "call", f"{bound.cls.name}.{node.name} is called with ()")
+    return property_value(c, bound, node.pos, node.name_pos)
+
+
+def _is_exact(place: Place) -> bool:
+    """Whether an instance is of just the type it is declared with: it is not reached through a reference."""
+    if isinstance(place, VarPlace):
+        return place.var.storage is not Storage.REFERENCE
+    if isinstance(place, SelfPlace):
+        return place.exact
+    return not isinstance(place, DerefPlace)

@@ -1,0 +1,275 @@
+"""Operators: the type they are calculated in, and folding of constants.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics import constants, dates, pointers
+from plctool.compiler.semantics.checker import Checker, checks
+from plctool.compiler.semantics.conversions import (
+    BITS,
+    NUMBERS,
+    SIGNED,
+    character,
+    common_number,
+    common_type,
+    convert,
+    elementary,
+    error_value,
+    scaled,
+)
+from plctool.compiler.semantics.rules.common_types import match_literals, untyped_bits
+from plctool.compiler.semantics.rules.library_calls import call_by_name
+from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.semantics.values import is_untyped
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Unary, UnaryOp
+from plctool.compiler.types import (
+    BOOL,
+    DT,
+    LREAL,
+    LTIME,
+    TIME,
+    TOD,
+    ArrayType,
+    Elementary,
+    InterfaceType,
+    Kind,
+    PointerType,
+    StringType,
+    StructType,
+    Type,
+    base_of,
+)
+
+_OPERATORS = {op.value: op for op in BinaryOp}
+_COMPARISONS = {BinaryOp.EQ, BinaryOp.NE, BinaryOp.LT, BinaryOp.LE, BinaryOp.GT, BinaryOp.GE}
+_LOGIC = {BinaryOp.AND, BinaryOp.OR, BinaryOp.XOR}
+_LAZY = {BinaryOp.AND_THEN, BinaryOp.OR_ELSE}
+_UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
+
+
+@checks(ast.Unary)
+def unary_operator(c: Checker, node: ast.Unary, expected: Type | None) -> Expr:
+    """`NOT a`, `-a`, `+a`"""
+    e = c.expr(node.operand, expected)
+    base = elementary(e.type)
+    if e.type is ERROR:
+        return e
+    if node.op == "NOT":
+        if base is None or not (base is BOOL or base.kind in NUMBERS):
+            return c.error(node.pos, "type", f"NOT needs a BOOL or a bit string, not {e.type}")
+        e = untyped_bits(c, e, expected) if is_untyped(e) else convert(e, base)
+        return fold_unary(c, UnaryOp.NOT, e, node.pos)
+    if base is None or base.kind not in (Kind.INT, Kind.BIT, Kind.REAL, Kind.TIME):
+        return c.error(node.pos, "type", f"{node.op} needs a number, not {e.type}")
+    if node.op == "+":
+        return e
+    if not base.signed and base.bits < 64 and not isinstance(e, Const):
+        base = SIGNED[base.bits * 2]
+    return fold_unary(c, UnaryOp.NEG, convert(e, base), node.pos)
+
+
+def fold_unary(c: Checker, op: UnaryOp, e: Expr, offset: int) -> Expr:
+    """`op e`, folded when e is constant."""
+    pos = c.pos(offset)
+    if e.type is ERROR:
+        return e
+    if isinstance(e, Const):
+        fold = constants.negate if op is UnaryOp.NEG else constants.invert
+        return Const(fold(e.value, e.type), e.type, pos)
+    return Unary(op, e, e.type, pos)
+
+
+@checks(ast.Binary)
+def binary_operator(c: Checker, node: ast.Binary, expected: Type | None) -> Expr:
+    """`a op b`"""
+    arithmetic = node.op in ("+", "-", "*", "/", "MOD", "AND", "OR", "XOR")
+    wanted = expected if arithmetic else None
+    left = c.expr(node.left, wanted)
+    right = c.expr(node.right, wanted)
+    if node.op == "**":
+        return _power(c, left, right, node.pos, expected)
+    return operate(c, _OPERATORS[node.op], left, right, node.pos, expected)
+
+
+def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expected: Type | None = None) -> Expr:
+    """`left op right` with implicit conversions, folded when both are constant."""
+    if left.type is ERROR or right.type is ERROR:
+        return error_value(c.pos(offset))
+    if pointers.is_address(left) or pointers.is_address(right):
+        moved = pointers.moved(op, left, right, c.pos(offset))
+        if moved is not None:
+            return moved
+        left, right = pointers.as_number(left), pointers.as_number(right)
+    if op in _COMPARISONS:
+        return _compare(c, op, left, right, offset)
+    if op in _LAZY:
+        return _build(c, op, c.coerce(left, BOOL), c.coerce(right, BOOL), BOOL, offset)
+    left, right = match_literals(c, left, right, expected)
+    if op in _LOGIC:
+        t = _logic_type(left.type, right.type)
+    else:
+        duration = _date_arithmetic(c, op, left, right, offset, expected)
+        if duration is None:
+            duration = _duration_arithmetic(c, op, left, right, offset)
+        if duration is not None:
+            return duration
+        t = _number_type(left.type, right.type)
+        if t is not None and op is BinaryOp.MOD and t.kind is Kind.REAL:
+            t = None
+    if t is None:
+        return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
+    if t in _UNTYPED:
+        return _build(c, op, left, right, t, offset)
+    return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), t, offset)
+
+
+def _as_operand(c: Checker, e: Expr, t: Type) -> Expr:
+    """The operand in the common type. Half of an integer type's values may change sign: that is how dialects mix
+    them."""
+    source = elementary(e.type)
+    if (
+        isinstance(t, Elementary)
+        and source is not None
+        and source.kind in NUMBERS
+        and t.kind in NUMBERS
+        and source.bits == t.bits
+    ):
+        return convert(e, t)
+    return c.coerce(e, t)
+
+
+def _number_type(a: Type, b: Type) -> Elementary | None:
+    x, y = elementary(a), elementary(b)
+    groups = (Kind.INT, Kind.BIT, Kind.REAL)
+    if x is None or y is None or x.kind not in groups or y.kind not in groups:
+        return None
+    if a in _UNTYPED and b in _UNTYPED:
+        return x if x is y else UNTYPED_REAL
+    return common_number(x, y)
+
+
+def _logic_type(a: Type, b: Type) -> Elementary | None:
+    x, y = elementary(a), elementary(b)
+    if x is None or y is None:
+        return None
+    if x is BOOL and y is BOOL:
+        return BOOL
+    if x.kind in NUMBERS and y.kind in NUMBERS:
+        if Kind.BIT in (x.kind, y.kind) and x.kind is not y.kind:
+            return BITS[max(x.bits, y.bits)]
+        return common_number(x, y)
+    return None
+
+
+def _date_arithmetic(
+    c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expected: Type | None
+) -> Expr | None:
+    """Dates: + and - a duration, and the difference of two of a kind. None when neither operand is one."""
+    x, y = elementary(left.type), elementary(right.type)
+    if x is None or y is None or Kind.DATE not in (x.kind, y.kind):
+        return None
+    if op is BinaryOp.ADD and x.kind is Kind.TIME:
+        left, right, x, y = right, left, y, x
+    if op is BinaryOp.SUB and dates.same_meaning(x, y):
+        t = common_type(x, y)
+        assert isinstance(t, Elementary)
+        difference = _build(c, op, c.coerce(left, t), c.coerce(right, t), t, offset)
+        result = LTIME if t.bits == 64 or expected is LTIME else TIME
+        amount = convert(convert(difference, SIGNED[t.bits]), result)
+        factor = dates.UNIT_NS[t] // dates.UNIT_NS[result]
+        return amount if factor == 1 else scaled(amount, BinaryOp.MUL, factor)
+    if y.kind is Kind.TIME and x.kind is Kind.DATE and op in (BinaryOp.ADD, BinaryOp.SUB):
+        if dates.same_meaning(x, TOD):
+            return _move_clock(c, op, left, right, x, offset)
+        if dates.same_meaning(x, DT):
+            return _build(c, op, left, dates.rescale(right, x), x, offset)
+    return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
+
+
+def _move_clock(c: Checker, op: BinaryOp, left: Expr, right: Expr, t: Elementary, offset: int) -> Expr:
+    """A time of day plus or minus a duration: it stays within the day."""
+    number, day = SIGNED[t.bits], dates.day(t)
+    moved = scaled(right, BinaryOp.MOD, dates.day(right.type))
+    moved = convert(dates.rescale(moved, LTIME if t.bits == 64 else TIME), number)
+    total = _build(c, op, convert(left, number), moved, number, offset)
+    return convert(scaled(scaled(total, BinaryOp.ADD, day), BinaryOp.MOD, day), t)
+
+
+def _duration_arithmetic(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr | None:
+    """Durations: + and - with durations, * and / with numbers. None when neither operand is one."""
+    x, y = elementary(left.type), elementary(right.type)
+    if x is None or y is None or Kind.TIME not in (x.kind, y.kind):
+        return None
+    if x.kind is y.kind and op in (BinaryOp.ADD, BinaryOp.SUB):
+        t = x if x is y else LTIME
+        return _build(c, op, c.coerce(left, t), c.coerce(right, t), t, offset)
+    if y.kind is Kind.TIME and op is BinaryOp.MUL:
+        left, right, x, y = right, left, y, x
+    if x.kind is Kind.TIME and op in (BinaryOp.MUL, BinaryOp.DIV) and y.kind in (Kind.INT, Kind.BIT, Kind.REAL):
+        number = SIGNED[x.bits]
+        if y.kind is Kind.REAL:
+            product = _build(c, op, convert(convert(left, number), LREAL), c.coerce(right, LREAL), LREAL, offset)
+            return convert(convert(product, number), x)
+        if y.bits > x.bits or (y.bits == x.bits and not y.signed):
+            right = convert(right, number)
+        return _build(c, op, left, convert(convert(right, number), x), x, offset)
+    return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
+
+
+def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
+    left, right = match_literals(c, left, right, None)
+    if isinstance(left.type, InterfaceType) and isinstance(right.type, StructType):
+        right = c.coerce(right, left.type)
+    elif isinstance(right.type, InterfaceType) and isinstance(left.type, StructType):
+        left = c.coerce(left, right.type)
+    left, right = character(left, right.type) or left, character(right, left.type) or right
+    if is_untyped(left):
+        t: Type | None = left.type if left.type is right.type else UNTYPED_REAL
+    else:
+        t = common_type(left.type, right.type)
+    if isinstance(t, StructType | ArrayType) or (isinstance(t, PointerType) and op not in (BinaryOp.EQ, BinaryOp.NE)):
+        t = None
+    if t is None:
+        return c.error(offset, "type", f"{op.value} cannot compare {left.type} with {right.type}")
+    if isinstance(t, StringType):
+        return _build(c, op, c.coerce(left, t), c.coerce(right, t), BOOL, offset)
+    if t in _UNTYPED:
+        return _build(c, op, left, right, BOOL, offset)
+    t = base_of(t)
+    return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), BOOL, offset)
+
+
+def _build(c: Checker, op: BinaryOp, left: Expr, right: Expr, t: Type, offset: int) -> Expr:
+    pos = c.pos(offset)
+    if left.type is ERROR or right.type is ERROR:
+        return error_value(pos)
+    if isinstance(right, Const) and op in (BinaryOp.DIV, BinaryOp.MOD) and right.value == 0:
+        return c.error(offset, "division-by-zero", "division by zero")
+    if isinstance(left, Const) and isinstance(right, Const):
+        try:
+            return Const(constants.binary(op, left.value, right.value, t), t, pos)
+        except constants.ConstantError as error:
+            return c.error(offset, "constant", str(error))
+    return Binary(op, left, right, t, pos)
+
+
+def _power(c: Checker, base: Expr, exponent: Expr, offset: int, expected: Type | None) -> Expr:
+    """`base ** exponent`: folded, or a call of EXPT."""
+    if base.type is ERROR or exponent.type is ERROR:
+        return error_value(c.pos(offset))
+    if (
+        isinstance(base, Const)
+        and isinstance(exponent, Const)
+        and not isinstance(base.value, str)
+        and not isinstance(exponent.value, str)
+    ):
+        try:
+            value = constants.power(base.value, exponent.value)
+        except constants.ConstantError as error:
+            return c.error(offset, "constant", str(error))
+        t = UNTYPED_INT if isinstance(value, int) else UNTYPED_REAL
+        return Const(value, t, c.pos(offset))
+    return call_by_name(c, "EXPT", [base, exponent], offset, expected)

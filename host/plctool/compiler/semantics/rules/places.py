@@ -1,0 +1,94 @@
+"""What may be read and what may be changed: the variables that expressions name.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.rules.members import Bound, bound_member
+from plctool.compiler.semantics.rules.qualified_names import space_of
+from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.semantics.values import is_temporary
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import AddressOf, DerefPlace, Load, Place, SelfPlace
+from plctool.compiler.types import StructType
+
+
+def named_place(c: Checker, node: ast.Expr, use: str) -> Place | None:
+    """The variable an expression names; a property is none."""
+    if isinstance(node, ast.Name | ast.Member):
+        bound = bound_member(c, node)
+        if bound is not None and bound.callable is None and bound.getter is not None:
+            return _referred_place(c, node, bound, use)
+    e = c.expr(node)
+    if e.type is ERROR:
+        return None
+    if isinstance(e, Load) and not is_temporary(e.place):
+        return e.place
+    c.error(node.pos, "place", f"{use} needs a variable")
+    return None
+
+
+def _referred_place(c: Checker, node: ast.Expr, bound: Bound, use: str) -> Place | None:
+    """What a property that is a REFERENCE TO refers to."""
+    e = c.expr(node)
+    if isinstance(e, Load) and isinstance(e.place, DerefPlace):
+        return e.place
+    c.error(node.pos, "place", f"{use} needs a variable; {bound.cls.name}.{bound.key} is a property")
+    return None
+
+
+def changeable_place(c: Checker, node: ast.Expr, what: str, use: str) -> Place | None:
+    """The variable an expression names when it may be changed. Else reports: `what` needs one, it cannot `use`."""
+    reason = _read_only(c, node)
+    if reason is not None:
+        c.error(node.pos, "read-only", f"{reason} and cannot {use}")
+        return None
+    return named_place(c, node, what)
+
+
+def _read_only(c: Checker, node: ast.Expr) -> str | None:
+    if isinstance(node, ast.Name):
+        return _symbol_read_only(c, c.scope.lookup(node.name))
+    if isinstance(node, ast.Index | ast.BitAccess):
+        return _read_only(c, node.base)
+    if isinstance(node, ast.Member):
+        return _member_read_only(c, node)
+    return None
+
+
+def _symbol_read_only(c: Checker, symbol: object) -> str | None:
+    if isinstance(symbol, GlobalSymbol):
+        symbol = c.world.declared.variable(symbol)
+    if not isinstance(symbol, VarSymbol):
+        return None
+    if symbol.constant:
+        return f"{symbol.name} is a {'VAR_IN_OUT CONSTANT' if symbol.role is Role.IN_OUT else 'constant'}"
+    if symbol.by_reference and symbol.role is Role.INPUT:
+        return f"{symbol.name} is an input passed by reference"
+    if symbol.role is Role.STEP and c.scope.names.get(symbol.name.casefold()) is not symbol:
+        return f"{symbol.name} is a step"  # only the chart itself changes it
+    return None
+
+
+def _member_read_only(c: Checker, node: ast.Member) -> str | None:
+    if c.scope.writes_inside:
+        return _read_only(c, node.base)
+    space = space_of(c, node.base)
+    if space is not None:
+        variable = space.members.get(node.name.casefold())
+        if isinstance(variable, VarSymbol) and variable.role is Role.OUTPUT:
+            return f"{node.name} is an output of {space.name}"
+        return _symbol_read_only(c, variable)
+    base = c.expr(node.base)
+    own = base.place if isinstance(base, AddressOf | Load) and isinstance(base.place, SelfPlace) else None
+    block = c.world.blocks.get(base.type) if isinstance(base.type, StructType) else None
+    if own is not None:
+        return None
+    if block is not None:
+        member = block.members.get(node.name.casefold())
+        if member is not None and member.role is not Role.INPUT and member.access != "PUBLIC":
+            article = "an" if member.role is Role.OUTPUT else "a"
+            return f"{node.name} is {article} {member.role.value} of {base.type}"
+    return _read_only(c, node.base)

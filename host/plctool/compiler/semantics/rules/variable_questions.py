@@ -1,0 +1,128 @@
+"""What the compiler knows of variables: SIZEOF, ADR, REF, __ISVALIDREF, LOWER_BOUND, UPPER_BOUND, STRING_SIZE.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.conversions import error_value, settle
+from plctool.compiler.semantics.open_arrays import bounds_of
+from plctool.compiler.semantics.rules.applied import Applied, BuiltIn, named
+from plctool.compiler.semantics.rules.operators import operate
+from plctool.compiler.semantics.rules.places import named_place
+from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, PouSymbol, TypeSymbol
+from plctool.compiler.semantics.values import place_of
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import (
+    AddressOf,
+    Binary,
+    BinaryOp,
+    BitPlace,
+    Const,
+    DerefPlace,
+    Expr,
+    Intrinsic,
+    IntrinsicCall,
+    Load,
+)
+from plctool.compiler.types import (
+    BOOL,
+    DINT,
+    ELEMENTARY,
+    UDINT,
+    ArrayType,
+    OpenArrayType,
+    PointerType,
+    RawPointerType,
+    ReferenceType,
+    StringType,
+    Type,
+)
+
+OF_VARIABLES = ("SIZEOF", "XSIZEOF", "ADR", "REF", "__ISVALIDREF")
+"""Functions whose argument is a variable or a type, not a value."""
+
+
+def of_variable(c: Checker, name: str, node: ast.Call) -> Expr:
+    """The call of one of OF_VARIABLES."""
+    if len(node.args) != 1 or node.args[0].value is None:
+        return c.error(node.pos, "arguments", f"{name} takes 1 argument, not {len(node.args)}")
+    argument = node.args[0].value
+    if name == "__ISVALIDREF":
+        return _is_valid(c, argument)
+    if name not in ("SIZEOF", "XSIZEOF"):
+        return _address_of(c, argument, RawPointerType if name == "ADR" else PointerType)
+    if isinstance(argument, ast.Name):
+        symbol = c.scope.lookup(argument.name)
+        is_block = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK"
+        if argument.name.upper() in ELEMENTARY or is_block or isinstance(symbol, TypeSymbol):
+            t = c.world.declared.type_named(argument.pos, argument.name, c.scope)
+            return error_value(c.pos(node.pos)) if t is ERROR else _size(c, t, node)
+    e = settle(c.expr(argument))
+    if isinstance(e.type, OpenArrayType):
+        return _open_size(c, e, e.type, node.pos)
+    return e if e.type is ERROR else _size(c, e.type, node)
+
+
+def _open_size(c: Checker, e: Expr, t: OpenArrayType, offset: int) -> Expr:
+    """The bytes of an ARRAY[*], which are known when it runs."""
+    size: Expr = Const(t.element.size, DINT, e.pos)
+    for low, high in bounds_of(place_of(e)):
+        last = operate(c, BinaryOp.SUB, high, low, offset)
+        count = operate(c, BinaryOp.ADD, last, Const(1, DINT, e.pos), offset)
+        size = operate(c, BinaryOp.MUL, size, count, offset)
+    return size
+
+
+def _is_valid(c: Checker, node: ast.Expr) -> Expr:
+    """Whether a reference refers to something."""
+    e, pos = c.expr(node), c.pos(node.pos)
+    pointer = e.place.pointer if isinstance(e, Load) and isinstance(e.place, DerefPlace) else None
+    if pointer is None or not isinstance(pointer.type, ReferenceType):
+        return e if e.type is ERROR else c.error(node.pos, "type", f"{e.type} is not a REFERENCE TO")
+    return Binary(BinaryOp.NE, pointer, Const(0, pointer.type, pos), BOOL, pos)
+
+
+def _size(c: Checker, t: Type, node: ast.Call) -> Expr:
+    return Const(t.size, UNTYPED_INT, c.pos(node.pos))
+
+
+def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
+    """ADR(x), REF(x)"""
+    place = named_place(c, node, "an address")
+    if place is None:
+        return error_value(c.pos(node.pos))
+    if isinstance(place, BitPlace):
+        return c.error(node.pos, "type", "a single bit has no address")
+    t = place.type.element if isinstance(place.type, OpenArrayType) else place.type
+    return AddressOf(place, kind(t), c.pos(node.pos))
+
+
+def _string_size(c: Checker, f: Applied) -> Expr:
+    """`STRING_SIZE(text)`: the bytes of its variable."""
+    text = f.args[0]
+    if not isinstance(text.type, StringType):
+        return c.error(f.node.pos, "type", f"{f.name} needs a STRING, not {text.type}")
+    loaded = Load(place_of(text), text.type, text.pos)
+    return IntrinsicCall(Intrinsic.STRING_SIZE, [loaded], UDINT, c.pos(f.node.pos))
+
+
+def _bound(c: Checker, f: Applied) -> Expr:
+    """`LOWER_BOUND(array, dimension)`"""
+    array, dimension = f.args
+    if not isinstance(array.type, ArrayType):
+        return c.error(f.node.pos, "type", f"{f.name} needs an array, not {array.type}")
+    count = len(array.type.bounds)
+    number = dimension.value if isinstance(dimension, Const) else None
+    if not isinstance(number, int) or not 1 <= number <= count:
+        which = "the constant 1" if count == 1 else f"a constant from 1 to {count}"
+        return c.error(f.node.args[1].pos, "range", f"the dimension of {array.type} is {which}")
+    return bounds_of(place_of(array))[number - 1][f.name == "UPPER_BOUND"]
+
+
+FUNCTIONS: dict[str, BuiltIn] = {
+    "STRING_SIZE": BuiltIn(_string_size, 1, 1),
+    "LOWER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
+    "UPPER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
+}

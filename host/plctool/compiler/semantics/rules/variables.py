@@ -1,0 +1,167 @@
+"""Names as values: variables, constants, enumerations, THIS and SUPER.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.checker import Checker, checks
+from plctool.compiler.semantics.conversions import error_value
+from plctool.compiler.semantics.rules.chart_flags import action_flag
+from plctool.compiler.semantics.rules.members import own_member
+from plctool.compiler.semantics.rules.methods import property_value
+from plctool.compiler.semantics.rules.parts import member_of
+from plctool.compiler.semantics.rules.qualified_names import (
+    describe,
+    is_namespace,
+    namespace_member,
+    qualified,
+    variable_value,
+)
+from plctool.compiler.semantics.symbols import (
+    ERROR,
+    GlobalSymbol,
+    MemberSymbol,
+    Namespace,
+    PouSymbol,
+    TypeSymbol,
+    VarSymbol,
+)
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import AddressOf, Const, Expr, SelfPlace
+from plctool.compiler.types import EnumType, PointerType, Type
+
+_OWN = ("THIS", "SUPER")
+
+
+@checks(ast.Name)
+def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
+    """A variable or constant, a value of an enumeration, a property of the unit around, THIS, SUPER."""
+    symbol = c.scope.lookup(node.name)
+    if isinstance(symbol, GlobalSymbol):
+        choices = c.world.names.same_named(node.name)
+        if choices:
+            listed = " or ".join(s.full_name for s in choices)
+            return c.error(node.pos, "ambiguous", f"{node.name} is in several lists; write {listed}")
+        if not c.scope.may_use(symbol, node.name, node.pos):
+            return error_value(c.pos(node.pos))
+        symbol = c.world.declared.variable(symbol)
+    if isinstance(symbol, VarSymbol):
+        return variable_value(symbol, c.pos(node.pos))
+    own = _own_name(c, node, symbol)
+    if own is not None:
+        return own
+    if symbol is None or (isinstance(symbol, PouSymbol) and symbol.library):
+        value = _enumerated(c, node, expected)
+        if value is not None or symbol is None:
+            return value or _unknown(c, node)
+    return c.error(node.pos, "name", f"{node.name} is {describe(symbol)}, not a value")
+
+
+def _enumerated(c: Checker, node: ast.Name, expected: Type | None) -> Expr | None:
+    """The value of an enumeration by its bare name; None when there is none of that name."""
+    symbols = c.world.names.enumerations_with(node.name)
+    types = [t for s in symbols if isinstance(t := c.world.declared.type_of(s), EnumType)]
+    if len(types) > 1 and expected in types:
+        types = [t for t in types if t is expected]
+    if len(types) > 1:
+        listed = " or ".join(f"{t}#{node.name}" for t in types)
+        c.error(node.pos, "ambiguous", f"{node.name} is a value of several enumerations; write {listed}")
+    return _value_of(c, types[0], node.name, node.pos, node.pos) if types else None
+
+
+def _own_name(c: Checker, node: ast.Name, symbol: object) -> Expr | None:
+    """THIS, SUPER, or a property of the unit around; None when the name is nothing of the kind."""
+    if isinstance(symbol, MemberSymbol):
+        bound = own_member(c, node.name)
+        return None if bound is None else property_value(c, bound, node.pos, node.pos)
+    if symbol is None and is_namespace(c, node.name):
+        return c.error(node.pos, "name", f"{node.name} is a namespace, not a value")
+    if symbol is None and node.name.upper() in _OWN:
+        place = _own_instance(c, node)
+        if place is None:
+            return error_value(c.pos(node.pos))
+        return AddressOf(place, PointerType(place.type), place.pos)
+    return None
+
+
+def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
+    """The instance THIS or SUPER stands for; None after a diagnosis."""
+    cls, name = c.scope.cls, node.name.upper()
+    if cls is None or cls.type is None:
+        c.error(node.pos, "name", f"{name} stands for the instance, which only a function block has")
+        return None
+    if name == "THIS":
+        return SelfPlace(cls.type, c.pos(node.pos))
+    if cls.base is None or cls.base.type is None:
+        c.error(node.pos, "name", f"SUPER stands for the base, but {cls.name} extends nothing")
+        return None
+    return SelfPlace(cls.base.type, c.pos(node.pos), exact=True)
+
+
+def _unknown(c: Checker, node: ast.Name) -> Expr:
+    longer = c.world.names.qualified_names(node.name)
+    if longer:
+        return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(longer)}")
+    names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
+    hint = did_you_mean(node.name, {_written(c, n) for n in names} - {""})
+    return c.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")
+
+
+def _written(c: Checker, key: str) -> str:
+    symbol = c.scope.names.get(key)
+    return symbol.name if isinstance(symbol, VarSymbol | GlobalSymbol) else key
+
+
+@checks(ast.EnumValue)
+def enum_value(c: Checker, node: ast.EnumValue, expected: Type | None) -> Expr:
+    """`Color#Red`"""
+    t = c.world.declared.type_named(node.pos, node.type_name, c.scope)
+    if t is ERROR:
+        return error_value(c.pos(node.pos))
+    if not isinstance(t, EnumType):
+        return c.error(node.pos, "type", f"{node.type_name} is not an enumeration")
+    return _value_of(c, t, node.name, node.pos, node.pos)
+
+
+def _value_of(c: Checker, t: EnumType, name: str, offset: int, name_offset: int) -> Expr:
+    key = name.casefold()
+    for value_name, value in t.values.items():
+        if value_name.casefold() == key:
+            return Const(value, t, c.pos(offset))
+    return c.error(name_offset, "unknown", f"{t} has no value {name}{did_you_mean(name, t.values)}")
+
+
+@checks(ast.DirectAddress)
+def direct_address(c: Checker, node: ast.DirectAddress, expected: Type | None) -> Expr:
+    """`%IW2`"""
+    symbol = c.scope.lookup(node.text.upper())  # `AT %IW2 : INT` without a name
+    if isinstance(symbol, GlobalSymbol):
+        symbol = c.world.declared.variable(symbol)
+    if not isinstance(symbol, VarSymbol):
+        symbol = c.world.direct.find(node, c.scope)
+    return error_value(c.pos(node.pos)) if symbol is None else variable_value(symbol, c.pos(node.pos))
+
+
+@checks(ast.Member)
+def member_value(c: Checker, node: ast.Member, expected: Type | None) -> Expr:
+    """`a.b`: a name with a namespace, list, program or type in front, or a part of what `a` is."""
+    if isinstance(node.base, ast.Name):
+        symbol = c.scope.lookup(node.base.name)
+        if isinstance(symbol, Namespace):
+            return namespace_member(c, symbol, node)
+        if isinstance(symbol, TypeSymbol):
+            t = c.world.declared.type_of(symbol)
+            if isinstance(t, EnumType):
+                return _value_of(c, t, node.name, node.pos, node.name_pos)
+            return c.error(node.base.pos, "name", f"{node.base.name} is a type, not a variable")
+    named = action_flag(c, node) or qualified(c, node)
+    if named is not None:
+        return named
+    base = c.expr(node.base)
+    if base.type is ERROR:
+        return base
+    if isinstance(base.type, EnumType) and isinstance(node.base, ast.Name):
+        return _value_of(c, base.type, node.name, node.pos, node.name_pos)  # color : Color; Color.Red
+    return member_of(c, base, node)

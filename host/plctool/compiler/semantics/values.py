@@ -1,0 +1,34 @@
+"""What is known of a typed expression by itself, and the place it was loaded from.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from plctool.compiler.semantics.symbols import UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.typed import DerefPlace, Expr, Load, Place, SelfPlace, ValuePlace, VarPlace
+from plctool.compiler.types import ReferenceType
+
+
+def is_untyped(e: Expr) -> bool:
+    """Whether the expression is a constant that takes the type its surroundings need."""
+    return e.type is UNTYPED_INT or e.type is UNTYPED_REAL
+
+
+def place_of(e: Expr) -> Place:
+    """The place a value was loaded from, or a temporary one."""
+    return e.place if isinstance(e, Load) else ValuePlace(e, e.type, e.pos)
+
+
+def is_temporary(place: Place) -> bool:
+    """Whether a place is (part of) a value that nobody else sees."""
+    while not isinstance(place, VarPlace | DerefPlace | ValuePlace | SelfPlace):
+        place = place.base
+    return isinstance(place, ValuePlace)
+
+
+def load(place: Place) -> Load:
+    """The value of a place; of a reference, the value it refers to."""
+    if isinstance(place.type, ReferenceType):
+        place = DerefPlace(Load(place, place.type, place.pos), place.type.target, place.pos)
+    return Load(place, place.type, place.pos)
