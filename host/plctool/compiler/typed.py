@@ -83,8 +83,8 @@ class ArrayInit:
 
 @dataclass
 class StructInit:
-    """Only the members given, as the type spells them; the rest take the defaults of the type (`TypedProgram.defaults`). `arguments`: what the
-    FB_Init of an instance gets besides."""
+    """Only the members given, spelt as in the type; the rest take its defaults (`TypedProgram.defaults`). `arguments`:
+    what the FB_Init of an instance gets besides."""
 
     members: dict[str, Initial]
     arguments: dict[str, Expr] = field(default_factory=dict)
