@@ -52,7 +52,7 @@ class Builder:
         self.source = Source("", "")
         self.attributes: dict[int, dict[str, str]] = {}
         self.report: Report = lambda pos, code, message: None
-        self.units = Arrangement(self)
+        self.units = Arrangement(lambda pos, code, message: self.report(pos, code, message), self.pou)
 
     # ---- types ----
 

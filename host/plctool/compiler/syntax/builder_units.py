@@ -5,14 +5,11 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 from plctool.compiler.syntax import ast
-
-if TYPE_CHECKING:
-    from plctool.compiler.syntax.builder import Builder
-    from plctool.compiler.syntax.lexer import Token
+from plctool.compiler.syntax.lexer import Report, Token
 
 MEMBERS = frozenset(("METHOD", "ACTION", "GET", "SET"))
 """Keywords of PouDecls that stand in another unit, or behind it."""
@@ -31,10 +28,11 @@ def _flat(units: Iterable[Any]) -> list[Any]:
 
 
 class Arrangement:
-    """What the tree builder does with whole units."""
+    """What the tree builder does with whole units. `pou` makes one of its parts."""
 
-    def __init__(self, builder: Builder) -> None:
-        self._builder = builder
+    def __init__(self, report: Report, pou: Callable[..., ast.PouDecl]) -> None:
+        self._report = report
+        self._pou = pou
 
     def arrange(self, units: Iterable[Any]) -> list[Any]:
         """The units of a file or namespace. A METHOD or ACTION between units belongs to the one in front of it."""
@@ -58,7 +56,7 @@ class Arrangement:
             owner.members.append(member)
             return
         message = f"the {member.keyword} {member.name} has no FUNCTION_BLOCK or PROGRAM in front of it"
-        self._builder.report(member.pos, "syntax", message)
+        self._report(member.pos, "syntax", message)
 
     def complete(self, decl: ast.PouDecl, bases: Any, interfaces: Any, parts: Sequence[Any]) -> None:
         """Adds what a unit extends, implements and holds."""
@@ -80,7 +78,7 @@ class Arrangement:
             return None, parts
         if decl.body:
             message = f"{decl.name} has statements and steps; put the statements into an ACTION"
-            self._builder.report(decl.body[0].pos, "syntax", message)
+            self._report(decl.body[0].pos, "syntax", message)
         return ast.Chart(steps, transitions), [p for p in parts if not isinstance(p, ast.Step | ast.Transition)]
 
     def property(self, keyword: Token, rest: Sequence[Any]) -> list[ast.PouDecl]:
@@ -95,16 +93,16 @@ class Arrangement:
                 continue
             token, more, own_blocks, body = accessor
             all_blocks = [*(blocks or []), *(own_blocks or [])]
-            decl = self._builder.pou(keyword, [*modifiers, *more, name], None, all_blocks, body)
+            decl = self._pou(keyword, [*modifiers, *more, name], None, all_blocks, body)
             found.append(self._accessor(decl, token.type, spec, name))
         if not found:
-            self._builder.report(name.pos, "syntax", f"the property {name.text} needs a GET or a SET")
+            self._report(name.pos, "syntax", f"the property {name.text} needs a GET or a SET")
         return found
 
     def single_accessor(self, keyword: Token, rest: Sequence[Any]) -> ast.PouDecl:
         """PROPERTY_GET and PROPERTY_SET of the fourth edition."""
         *head, spec, blocks, body = rest
-        decl = self._builder.pou(keyword, head, None, blocks, body)
+        decl = self._pou(keyword, head, None, blocks, body)
         return self._accessor(decl, keyword.type.removeprefix("PROPERTY_"), spec, head[-1])
 
     def _accessor(self, decl: ast.PouDecl, kind: str, spec: ast.TypeSpec, name: Token) -> ast.PouDecl:

@@ -5,12 +5,12 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.automaton import Parser, Reducer
 from plctool.compiler.syntax.builder import Builder
 from plctool.compiler.syntax.lexer import (
     OPENING,
@@ -24,51 +24,7 @@ from plctool.compiler.syntax.lexer import (
     meant,
 )
 from plctool.compiler.syntax.syntax_errors import Recovery
-from plctool.compiler.syntax.tables import END, Rule, Tables, load_tables
-
-Reducer = Callable[[list[Any]], Any]
-
-
-class Parser:
-    """The state of one parse. `states` and `values` are the stacks; they are repaired by `Recovery`."""
-
-    def __init__(self, tables: Tables, reducers: list[Reducer | None]) -> None:
-        self.tables = tables
-        self.states = [tables.start]
-        self.values: list[Any] = []
-        self._reducers = reducers
-
-    def feed(self, token: Token) -> bool:
-        """Takes a token; False when it does not fit. The stacks then are as if it had not been there, but for
-        reductions that were due."""
-        states, values, actions = self.states, self.values, self.tables.actions
-        kind = token.type
-        while True:
-            action = actions[states[-1]].get(kind)
-            if action is None:
-                return False
-            if action >= 0:
-                states.append(action)
-                values.append(token)
-                return True
-            self.reduce(-1 - action)
-            if kind == END and states[-1] == self.tables.end:
-                return True
-
-    def reduce(self, number: int) -> None:
-        """Replaces the symbols of a rule by what it stands for."""
-        states, values = self.states, self.values
-        rule, reducer = self.tables.rules[number], self._reducers[number]
-        size = rule.size
-        if reducer is None:
-            del states[-1]
-        elif size:
-            children = values[-size:]
-            del states[-size:], values[-size:]
-            values.append(reducer(children))
-        else:
-            values.append(reducer([]))
-        states.append(self.tables.gotos[states[-1]][rule.origin])
+from plctool.compiler.syntax.tables import Rule, Tables, load_tables
 
 
 def _reducer(rule: Rule, builder: Builder) -> Reducer | None:

@@ -9,15 +9,11 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import slips
+from plctool.compiler.syntax.automaton import Parser
 from plctool.compiler.syntax.lexer import KEYWORDS, Report, Token
 from plctool.compiler.syntax.tables import END
-
-if TYPE_CHECKING:
-    from plctool.compiler.syntax.parser import Parser
 
 _CLOSERS = {
     "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT",
