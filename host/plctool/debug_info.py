@@ -67,8 +67,9 @@ class DebugInfo:
 
     def callers(self, offset: int | None, trace: Trace) -> list[int]:
         """Offsets of the calls on the stack that led to `offset`, the innermost first. `offset` is None when the
-        program stopped in a function that is not its own; then those are taken that lead furthest."""
-        if offset is not None:
+        program stopped in a function that is not its own. Then, and on the way there, those are taken that lead
+        furthest."""
+        if offset is not None and self._frame(offset) is not None:
             return self._unwind(offset, 0, trace)
         starts = [(at + self._word, target) for at, target in sorted(trace.words.items())]
         if trace.link is not None:  # a function that calls no other; how much it has pushed is not known

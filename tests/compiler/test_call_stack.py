@@ -9,6 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler import Level, compile_sources
+from plctool.image import parse_image
+from plctool.link.services import Trace
 from plctool.sim import Simulator
 from plctool.symbols import SymbolTable
 
@@ -103,3 +105,14 @@ def test_each_call_is_told(tmp_path_factory, level: Level, units: list[Unit]) ->
     with Simulator(built.image, built.symbols) as plc:
         plc.run_cycles(4)
         assert places(plc, built.symbols) == program.places
+
+
+def test_a_function_of_the_runtime_and_the_jump_to_it_are_told_by_their_caller(tmp_path) -> None:
+    path = tmp_path / "product.st"
+    path.write_text("PROGRAM Main\nVAR a, b : REAL; END_VAR\na := a * b;\nb := a + 1.0;\nEND_PROGRAM\n")
+    built = compile_sources([path], target="cortex-m3")
+    after_call = next(offset for offset, _, line in built.symbols.lines if line == 4)
+    jump = len(parse_image(built.image).code) - 2  # calls of soft-float functions go through jumps at the end
+    for stopped in (None, jump):
+        (place,) = built.symbols.call_stack(stopped, Trace(link=after_call))
+        assert (place.pou, place.line) == ("Main", 3)
