@@ -174,7 +174,8 @@ static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagAppend32(reply, status.op_state);
     BTagClose(reply);
     write_exception(reply, &status.exception);
-    write_calls(reply);
+    if (status.exception.code != RTSEXCPT_NOEXCEPTION) /* else a task may have one just now */
+        write_calls(reply);
     BTagOpen(reply, TAG_APP_IMAGE, BTAG_ALIGN_0);
     BTagAppend32(reply, status.image_crc);
     BTagAppend32(reply, status.image_size);
@@ -308,10 +309,7 @@ static RTS_RESULT write_new_part(const DOWNLOAD_BLOCK *block)
     RTS_UI32 known = next - block->offset;
     if (known >= block->size)
         return ERR_OK;
-    RTS_RESULT result = AppDownloadWrite(next, block->data + known, block->size - known);
-    if (result != ERR_OK)
-        AppDownloadAbort();
-    return result;
+    return AppDownloadWrite(next, block->data + known, block->size - known);
 }
 
 static RTS_RESULT take_block(const DOWNLOAD_BLOCK *block)
