@@ -74,12 +74,13 @@ typedef struct {
 
 /*
  * Download. Begin opens the idle slot (erases lazily, sector by sector), Write appends, End checks everything
- * and, only when all is well, stops the old application, commits the slot and loads the new one (state AS_STOP).
+ * and, only when all is well, commits the slot, stops the old application and loads the new one (state AS_STOP).
  * On any error the old application runs on, untouched; except that when the tasks of the new one cannot be created, it is
  * loaded again, with its retain variables, and started if it ran.
  *
  * Begin: ERR_NOMEMORY too large for the slot. Write: ERR_INVALID_SEQUENCE not begun or `offset` is not what
- * AppDownloadOffset says; ERR_DEVICE flash fault. End: the reason as ERR_* and in *refusal (never NULL).
+ * AppDownloadOffset says; ERR_DEVICE flash fault, which ends the download. End: the reason as ERR_* and in *refusal
+ * (never NULL).
  */
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc);
 RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size);

@@ -42,8 +42,9 @@ RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event);
 
 /*
  * Breaks IEC code that runs for too long: longer than watchdog time * sensitivity of its task, or than
- * APP_DEFAULT_WATCHDOG_US when it has no watchdog. The port calls it about every millisecond from a context that preempts
- * every task and main (a timer interrupt of the highest priority, a thread); `now_ns` is SysTimeGetNs.
+ * APP_DEFAULT_WATCHDOG_US when it has no watchdog. The port calls it every few milliseconds from a context that preempts
+ * every task and main (a timer interrupt above all tasks, a thread); `now_ns` is SysTimeGetNs. A cycle that another one holds
+ * up is not charged for that time, as far as these calls can tell.
  */
 void SchedWatchdogCheck(RTS_I64 now_ns);
 

@@ -204,7 +204,7 @@ enum {
  * RESET L           as START, the container also with TAG_APP_OPTION u32 RESET_OPTION_*.
  * READ_STATUS       request: anything. Reply: TAG_APP_STATUS {TAG_APP_STATE u16 result OK, u32 AS_*, u32 OS_*;
  *   TAG_APP_EXECUTION_POSITION u16 area, u32 offset (only after an exception in the code); TAG_APP_LAST_EXCEPTION;
- *   TAG_APP_CALLS, when something is known; TAG_APP_IMAGE}.
+ *   TAG_APP_IMAGE; TAG_APP_CALLS, after an exception, when something is known, as many as fit}.
  * READ_APPLICATION_LIST  request: [TAG_APP_LIST_RANGE u32 start, u32 max, 8 or 9 bytes]. Reply: TAG_APP_LIST
  *   {TAG_APP_LIST_START u32, one TAG_APP_LIST_NAME text per application}.
  * READ_APPLICATION_INFO  request: anything. Reply: TAG_APP_INFO_* texts, NUL-terminated and zero-padded; TAG_ERROR

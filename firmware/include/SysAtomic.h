@@ -17,7 +17,7 @@
 /* Shorter than a call also where the compiler looks at size. */
 #define SYSATOMIC_INLINE static inline __attribute__((always_inline))
 
-#ifdef RTS_ONE_CORE
+#if RTS_ONE_CORE
 #define SysAtomicFence() __atomic_signal_fence(__ATOMIC_ACQ_REL)
 #else
 #define SysAtomicFence() __atomic_thread_fence(__ATOMIC_ACQ_REL)
@@ -25,7 +25,7 @@
 
 SYSATOMIC_INLINE RTS_UI32 SysAtomicLoad(const RTS_UI32 *object)
 {
-#ifdef RTS_ONE_CORE
+#if RTS_ONE_CORE
     RTS_UI32 value = __atomic_load_n(object, __ATOMIC_RELAXED);
 
     SysAtomicFence();
@@ -37,7 +37,7 @@ SYSATOMIC_INLINE RTS_UI32 SysAtomicLoad(const RTS_UI32 *object)
 
 SYSATOMIC_INLINE void SysAtomicStore(RTS_UI32 *object, RTS_UI32 value)
 {
-#ifdef RTS_ONE_CORE
+#if RTS_ONE_CORE
     SysAtomicFence();
     __atomic_store_n(object, value, __ATOMIC_RELAXED);
 #else
@@ -47,7 +47,7 @@ SYSATOMIC_INLINE void SysAtomicStore(RTS_UI32 *object, RTS_UI32 value)
 
 SYSATOMIC_INLINE RTS_UI32 SysAtomicAdd(RTS_UI32 *object, RTS_UI32 value)
 {
-#ifdef RTS_ONE_CORE
+#if RTS_ONE_CORE
     RTS_UI32 before;
 
     SysAtomicFence();

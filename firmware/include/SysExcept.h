@@ -118,8 +118,11 @@ void SysExceptShutdown(void);
 /* ---- SysExceptTrace.c, for all ports ---- */
 
 /* Where the code of the application lies; size 0: there is none. From main, while no IEC code runs. */
-void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size);
+void SysExceptCodeRange(const RTS_UI8 *start, RTS_UI32 size);
 bool SysExceptIsCode(uintptr_t address);
+
+/* Whether a word may be an address that a call in the application's code returns to. */
+bool SysExceptIsReturn(uintptr_t word);
 
 #if EXCEPT_MAX_CALLS > 0
 /*
@@ -130,11 +133,14 @@ bool SysExceptIsCode(uintptr_t address);
  */
 void SysExceptTrace(uintptr_t address, const uintptr_t *stack, const uintptr_t *end, uintptr_t link);
 
-/* Forgets what was noted, if it is not of the exception at `address`; 0: in any case. From main, while no IEC code runs. */
+/* Forgets what was noted, the first one when it is not of the exception at `address`, which may be 0: a call by a pointer that
+ * is NULL. From main, while no IEC code runs. */
 void SysExceptKeepTrace(uintptr_t address);
+void SysExceptForgetTrace(void);
 #else
 #define SysExceptTrace(address, stack, end, link) ((void)(address), (void)(stack), (void)(end), (void)(link))
 #define SysExceptKeepTrace(address) ((void)(address))
+#define SysExceptForgetTrace() ((void)0)
 #endif
 
 #endif

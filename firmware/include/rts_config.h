@@ -84,7 +84,13 @@
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) (entry)(context, init_retains)
 #endif
 
-/* 1: the runtime starts only after a reset that has set all variables to zero, so that no component clears its own; 150
+/* 1: the runtime has one core, where interrupts and main see each other's writes in order, so only the compiler has to keep
+ * it. 0: several, or threads. */
+#ifndef RTS_ONE_CORE
+#define RTS_ONE_CORE 0
+#endif
+
+/* 1: the runtime starts only after a reset that has set all variables to zero, so that no component clears its own; 260
  * bytes of flash. 0: it may be started again in the same process. */
 #ifndef RTS_STARTS_ONCE
 #define RTS_STARTS_ONCE 0

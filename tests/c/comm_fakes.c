@@ -227,8 +227,11 @@ RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
 {
     if (offset != fakes.download_offset || size > fakes.download_total - offset)
         return ERR_INVALID_SEQUENCE;
-    if (fakes.write_result != ERR_OK)
+    if (fakes.write_result != ERR_OK) {
+        fakes.download_open = false;
+        fakes.download_offset = 0;
         return fakes.write_result;
+    }
     fakes.download_writes++;
     memcpy(fakes.image + offset, data, size);
     fakes.download_offset += size;
@@ -256,13 +259,6 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
         fakes.status.state = AS_STOP;
     }
     return fakes.end_result;
-}
-
-void AppDownloadAbort(void)
-{
-    fakes.download_aborts++;
-    fakes.download_open = false;
-    fakes.download_offset = 0;
 }
 
 /* ---- start ---- */

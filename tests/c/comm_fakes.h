@@ -50,7 +50,6 @@ typedef struct {
     RTS_UI32 download_offset;
     RTS_UI32 download_begins;
     RTS_UI32 download_writes;
-    RTS_UI32 download_aborts;
     RTS_UI32 download_ends;
     RTS_RESULT write_result;
     RTS_RESULT end_result;

@@ -254,18 +254,35 @@ static void status_tells_where_the_exception_was(void)
     CHECK(BTagFind(&status, TAG_APP_EXECUTION_POSITION, 0, 99, &tag) == ERR_L7_TAG_MISSING);
 }
 
-static void status_tells_what_the_stack_had(void)
+static void status_tells_what_the_stack_had_when_there_is_an_exception(void)
 {
     BTAG_READER status;
     BTAG tag;
 
     setup();
+    fakes.trace = (EXCEPT_TRACE){.count = 2, .call = {{0x1234, EXCEPT_LINK}, {0x5678, 12}}};
     CHECK(take_status(&status));
     CHECK(BTagFind(&status, TAG_APP_CALLS, 0, 99, &tag) == ERR_L7_TAG_MISSING);
-    fakes.trace = (EXCEPT_TRACE){.count = 2, .call = {{0x1234, EXCEPT_LINK}, {0x5678, 12}}};
+    fakes.status.exception.code = RTSEXCPT_DIVIDEBYZERO;
     CHECK(take_status(&status));
     CHECK(BTagFind(&status, TAG_APP_CALLS, 16, 16, &tag) == ERR_OK);
     CHECK(memcmp(tag.data, "\x34\x12\0\0\xFF\xFF\xFF\0\x78\x56\0\0\x0C\0\0\0", 16) == 0);
+}
+
+static void status_fits_the_smallest_message_with_the_calls_it_has_room_for(void)
+{
+    BTAG_READER status;
+    BTAG tag;
+
+    fakes_start();
+    client_init(&client, 1);
+    client_send_open(&client, 1, CHANNEL_MIN_MESSAGE);
+    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    fakes.status.exception = (APP_EXCEPTION){RTSEXCPT_DIVIDEBYZERO, 0x1234, 0};
+    fakes.trace.count = EXCEPT_MAX_CALLS;
+    CHECK(take_status(&status));
+    CHECK(BTagFind(&status, TAG_APP_IMAGE, 8, 8, &tag) == ERR_OK);
+    CHECK(BTagFind(&status, TAG_APP_CALLS, 8, 8 * EXCEPT_MAX_CALLS - 1, &tag) == ERR_OK && tag.size % 8 == 0);
 }
 
 static bool list_has_application(const RTS_UI8 *range, RTS_UI32 size)
@@ -580,7 +597,6 @@ static void flash_fault_ends_the_transfer(void)
     CHECK(put(0, 300, &next) == ERR_OK);
     fakes.write_result = ERR_DEVICE;
     CHECK(put(300, 300, &next) == ERR_DEVICE && next == 0);
-    CHECK(fakes.download_aborts == 1);
     CHECK(put(300, 300, &next) == ERR_INVALID_SEQUENCE && next == 0);
 }
 
@@ -657,7 +673,8 @@ int main(void)
     RUN(reset_passes_its_option);
     RUN(status_needs_no_login_and_tells_state_and_image);
     RUN(status_tells_where_the_exception_was);
-    RUN(status_tells_what_the_stack_had);
+    RUN(status_tells_what_the_stack_had_when_there_is_an_exception);
+    RUN(status_fits_the_smallest_message_with_the_calls_it_has_room_for);
     RUN(list_names_the_application);
     RUN(info_tells_the_texts_of_the_image);
     RUN(tasks_are_told_with_their_times);

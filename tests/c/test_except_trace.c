@@ -14,7 +14,7 @@ static uintptr_t stack[EXCEPT_MAX_CALLS + 4];
 
 static void setup(void)
 {
-    SysExceptKeepTrace(0);
+    SysExceptForgetTrace();
     SysExceptCodeRange(code, sizeof code);
     memset(stack, 0, sizeof stack);
 }
@@ -71,7 +71,7 @@ static void the_first_exception_counts_until_it_is_forgotten(void)
     CHECK(trace->count == 1 && trace->call[0].target == 7);
     SysExceptKeepTrace(in_code(5));
     CHECK(trace->count == 1);
-    SysExceptKeepTrace(0);
+    SysExceptForgetTrace();
     CHECK(trace->count == 0);
     SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
     CHECK(trace->count == 1 && trace->call[0].target == 8);
@@ -83,6 +83,21 @@ static void the_trace_of_another_exception_is_not_kept(void)
     SysExceptTrace(in_code(5), NULL, NULL, in_code(7));
     SysExceptKeepTrace(in_code(6));
     CHECK(SysExceptGetTrace()->count == 0);
+}
+
+/* A call by a pointer that is NULL: the address of the exception is 0. */
+static void an_exception_at_null_is_kept_and_forgotten_like_any_other(void)
+{
+    const EXCEPT_TRACE *trace = SysExceptGetTrace();
+
+    setup();
+    SysExceptTrace(0, NULL, NULL, in_code(7));
+    SysExceptKeepTrace(0);
+    CHECK(trace->count == 1);
+    SysExceptForgetTrace();
+    CHECK(trace->count == 0);
+    SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
+    CHECK(trace->count == 1);
 }
 
 static void without_code_there_are_no_calls(void)
@@ -101,6 +116,7 @@ int main(void)
     RUN(a_full_trace_keeps_the_nearest);
     RUN(the_first_exception_counts_until_it_is_forgotten);
     RUN(the_trace_of_another_exception_is_not_kept);
+    RUN(an_exception_at_null_is_kept_and_forgotten_like_any_other);
     RUN(without_code_there_are_no_calls);
     return test_result();
 }

@@ -85,7 +85,7 @@ const APP_EXCEPTION *AppExceptionGet(void)
 void AppExceptionClear(void)
 {
     memset(&state.current, 0, sizeof state.current);
-    SysExceptKeepTrace(0);
+    SysExceptForgetTrace();
     SysAtomicStore(&state.pending, 0);
     SysAtomicStore(&state.claims, 0);
 }

@@ -61,6 +61,7 @@ static bool is_proven(void)
 
 /* ---- exceptions ---- */
 
+/* No IEC code runs. */
 static void record_exception(const APP_RAISED *raised)
 {
     APP_EXCEPTION exception = {raised->code, APP_NO_CODE_OFFSET, raised->task};
@@ -71,11 +72,10 @@ static void record_exception(const APP_RAISED *raised)
     AppExceptionSet(&exception, raised->task < 0 ? "Initialisation" : app.tables.tasks[raised->task].name);
 }
 
-/* The safe state after an exception: no task runs, outputs are zero (again, since other tasks have finished their
- * cycle), and an application that is new will not be booted. */
+/* The safe state after an exception: outputs are zero (again, since other tasks have finished their cycle), and an application
+ * that is new will not be booted. */
 static void enter_exception_state(void)
 {
-    IecTaskStopAll();
     AppAreasClearOutputs();
     app.state = AS_STOP;
     (void)AppCommitSetState(app.image.file, SLOT_FAILED, 0);
@@ -88,6 +88,7 @@ void AppHandlePendingException(void)
 
     if (!AppExceptionTake(&raised))
         return;
+    IecTaskStopAll();
     record_exception(&raised);
     enter_exception_state();
     (void)RetainSave(false);
@@ -385,8 +386,10 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
     case CH_INIT:
         CMP_CLEAR(app);
         AppExceptionClear();
-        if (!RTS_STARTS_ONCE)
+        if (!RTS_STARTS_ONCE) {
             AppAreasClear(true);
+            SysExceptCodeRange(NULL, 0);
+        }
         AppDownloadAbort();
         break;
     case CH_INIT_TASKS:

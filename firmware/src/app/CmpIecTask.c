@@ -334,7 +334,7 @@ RTS_RESULT IecTaskGetEntry(RTS_UI32 index, IEC_ENTRY *entry, IEC_CONTEXT **conte
 RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT) {
-        memset(&tasks, 0, sizeof tasks);
+        CMP_CLEAR(tasks);
         tasks.init_guard.limit_ns = (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
     }
     return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;

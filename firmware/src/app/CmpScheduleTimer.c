@@ -184,7 +184,7 @@ void SchedWatchdogCheck(RTS_I64 now_ns)
 RTS_RESULT CmpScheduleTimer_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT) {
-        memset(&schedule, 0, sizeof schedule);
+        CMP_CLEAR(schedule);
         TriggerReset();
     }
     if (hook == CH_COMM_CYCLE)

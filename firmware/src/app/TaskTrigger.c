@@ -23,7 +23,7 @@ static EXTERNAL_EVENT events[PLACES];
 void TriggerReset(void)
 {
     if (SCHED_MAX_EXTERNAL_EVENTS > 0)
-        memset(events, 0, sizeof events);
+        CMP_CLEAR(events);
 }
 
 static EXTERNAL_EVENT *find_event(const char *name)

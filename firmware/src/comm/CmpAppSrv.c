@@ -142,13 +142,17 @@ static void write_exception(BTAG_WRITER *reply, const APP_EXCEPTION *exception)
 }
 
 #if EXCEPT_MAX_CALLS > 0
+/* As many as the message has room for, the nearest first. */
 static void write_calls(BTAG_WRITER *reply)
 {
+    enum { CALL_SIZE = 8 };
     const EXCEPT_TRACE *trace = SysExceptGetTrace();
-    RTS_UI32 i;
+    RTS_UI32 room = BTagGetRoom(reply) / CALL_SIZE; /* one is for the head of the element */
 
+    if (room == 0)
+        return;
     BTagOpen(reply, TAG_APP_CALLS, BTAG_ALIGN_0);
-    for (i = 0; i < trace->count; i++) {
+    for (RTS_UI32 i = 0; i < trace->count && i + 1 < room; i++) {
         BTagAppend32(reply, trace->call[i].target);
         BTagAppend32(reply, trace->call[i].distance);
     }
@@ -174,11 +178,12 @@ static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagAppend32(reply, status.op_state);
     BTagClose(reply);
     write_exception(reply, &status.exception);
-    write_calls(reply);
     BTagOpen(reply, TAG_APP_IMAGE, BTAG_ALIGN_0);
     BTagAppend32(reply, status.image_crc);
     BTagAppend32(reply, status.image_size);
     BTagClose(reply);
+    if (status.exception.code != RTSEXCPT_NOEXCEPTION) /* else a task may have one just now */
+        write_calls(reply);
     BTagClose(reply);
     return ERR_OK;
 }
@@ -308,10 +313,7 @@ static RTS_RESULT write_new_part(const DOWNLOAD_BLOCK *block)
     RTS_UI32 known = next - block->offset;
     if (known >= block->size)
         return ERR_OK;
-    RTS_RESULT result = AppDownloadWrite(next, block->data + known, block->size - known);
-    if (result != ERR_OK)
-        AppDownloadAbort();
-    return result;
+    return AppDownloadWrite(next, block->data + known, block->size - known);
 }
 
 static RTS_RESULT take_block(const DOWNLOAD_BLOCK *block)

@@ -244,9 +244,9 @@ static void transmit(COM_LINE *line)
 
 static void reset_lines(void)
 {
-    memset(lines, 0, sizeof(lines));
+    CMP_CLEAR(lines);
     if (COMM_COUNTERS)
-        memset(counters, 0, sizeof(counters));
+        CMP_CLEAR(counters);
 }
 
 static void open_lines(void)

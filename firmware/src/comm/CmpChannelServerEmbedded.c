@@ -544,10 +544,10 @@ const CHANNEL_COUNTERS *ChannelGetCounters(void)
 
 static void reset_all(void)
 {
-    memset(&channel, 0, sizeof(channel));
-    memset(&server, 0, sizeof(server));
+    CMP_CLEAR(channel);
+    CMP_CLEAR(server);
     if (COMM_COUNTERS)
-        memset(&counters, 0, sizeof(counters));
+        CMP_CLEAR(counters);
 }
 
 RTS_RESULT CmpChannelServerEmbedded_Hook(CMP_HOOK hook)

@@ -154,6 +154,6 @@ const ROUTER_COUNTERS *RouterGetCounters(void)
 RTS_RESULT CmpRouterEmbedded_Hook(CMP_HOOK hook)
 {
     if (COMM_COUNTERS && hook == CH_INIT)
-        memset(&counters, 0, sizeof(counters));
+        CMP_CLEAR(counters);
     return ERR_OK;
 }

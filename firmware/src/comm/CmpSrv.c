@@ -195,6 +195,6 @@ RTS_NOINLINE RTS_UI32 SrvHandleMessage(const RTS_UI8 *message, RTS_UI32 size, RT
 RTS_RESULT CmpSrv_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT)
-        memset(&srv, 0, sizeof(srv));
+        CMP_CLEAR(srv);
     return ERR_OK;
 }

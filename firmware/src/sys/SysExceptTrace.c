@@ -13,18 +13,26 @@
 #include "SysAtomic.h"
 #include "rts_config.h"
 
-static uintptr_t code_start;
-static RTS_UI32 code_size;
+/* Set before code runs, and not changed while it does. */
+static struct {
+    uintptr_t start;
+    RTS_UI32 size;
+} code;
 
-void SysExceptCodeRange(const RTS_UI8 *code, RTS_UI32 size)
+void SysExceptCodeRange(const RTS_UI8 *start, RTS_UI32 size)
 {
-    code_start = (uintptr_t)code;
-    code_size = size;
+    code.start = (uintptr_t)start;
+    code.size = size;
 }
 
 bool SysExceptIsCode(uintptr_t address)
 {
-    return address - code_start < code_size;
+    return address - code.start < code.size;
+}
+
+bool SysExceptIsReturn(uintptr_t word)
+{
+    return SysExceptIsCode(word) && (word & APP_ENTRY_MODE_BIT) == APP_ENTRY_MODE_BIT;
 }
 
 #if EXCEPT_MAX_CALLS > 0
@@ -38,9 +46,9 @@ static void add_call(uintptr_t target, uintptr_t distance)
 {
     EXCEPT_CALL *call = &state.trace.call[state.trace.count];
 
-    if (!SysExceptIsCode(target))
+    if (!SysExceptIsReturn(target))
         return;
-    call->target = (RTS_UI32)(target - code_start);
+    call->target = (RTS_UI32)(target - APP_ENTRY_MODE_BIT - code.start);
     call->distance = (RTS_UI32)distance;
     state.trace.count++;
 }
@@ -67,7 +75,12 @@ const EXCEPT_TRACE *SysExceptGetTrace(void)
 void SysExceptKeepTrace(uintptr_t address)
 {
     if (state.trace.address != address)
-        memset(&state, 0, sizeof state);
+        SysExceptForgetTrace();
+}
+
+void SysExceptForgetTrace(void)
+{
+    memset(&state, 0, sizeof state);
 }
 
 #endif

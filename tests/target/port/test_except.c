@@ -514,6 +514,76 @@ static void break_of_what_does_not_run_does_nothing(void)
     CHECK_EQUAL(bad, 0);
 }
 
+/* ---- what the stack tells ---- */
+
+static const RTS_UI8 program[64] __attribute__((aligned(16)));
+enum { RETURN_OFFSET = 8 };
+
+/* Pushes three words, so that the frame of an exception is moved to a multiple of 8, with a return address into `program` as
+ * the lowest; goes on with `then`. */
+#ifdef __ARM_FP
+#define USE_FPU "vmov.f32 s0, #1.0\n\t"
+#else
+#define USE_FPU ""
+#endif
+#define PUSH_RETURN_ADDRESS(then)                                                                                      \
+    __asm__ volatile(USE_FPU "mov r1, %0\n\tpush {r1, r2, lr}\n\t" then ::"r"(                                         \
+                         (uintptr_t)program + RETURN_OFFSET + APP_ENTRY_MODE_BIT)                                      \
+                     : "r1", "memory")
+
+static void fail_below_a_return_address(void *arg)
+{
+    RTS_UNUSED(arg);
+    PUSH_RETURN_ADDRESS("udf #1");
+}
+
+static void loop_below_a_return_address(void *arg)
+{
+    RTS_UNUSED(arg);
+    PUSH_RETURN_ADDRESS("1:\tb 1b");
+}
+
+static void expect_return_address(void)
+{
+    const EXCEPT_TRACE *trace = SysExceptGetTrace();
+    CHECK_EQUAL(trace->count, 1);
+    CHECK_EQUAL(trace->call[0].target, RETURN_OFFSET);
+    CHECK_EQUAL(trace->call[0].distance, 0);
+    SysExceptForgetTrace();
+    SysExceptCodeRange(NULL, 0);
+}
+
+static void trace_of_a_fault_starts_at_its_stack_pointer(void)
+{
+    RTS_EXCEPTION exception;
+    SysExceptForgetTrace();
+    SysExceptCodeRange(program, sizeof(program));
+    CHECK_EQUAL(SysExceptTry(fail_below_a_return_address, NULL, &exception), 1);
+    expect_return_address();
+}
+
+static void break_the_task_below(void *arg)
+{
+    RTS_UI32 from = SysTimeGetMs();
+    RTS_UNUSED(arg);
+    __asm__ volatile(USE_FPU); /* the clock's interrupt stacks its registers, too */
+    while (SysTimeGetMs() - from < 2)
+        ;
+    SysExceptBreak(&slow, RTSEXCPT_WATCHDOG);
+}
+
+static void trace_of_a_broken_task_below_another_starts_at_its_stack_pointer(void)
+{
+    SysExceptForgetTrace();
+    SysExceptCodeRange(program, sizeof(program));
+    RTS_HANDLE high = start(&fast, break_the_task_below, 6000, 3);
+    RTS_HANDLE low = start(&slow, loop_below_a_return_address, 20000, 20);
+    wait_for(&slow.caught, 1);
+    SysTimerDelete(low);
+    SysTimerDelete(high);
+    expect_return_address();
+}
+
 /* ---- entering compiled code ---- */
 
 static RTS_PFN imports[2];
@@ -561,6 +631,8 @@ int main(void)
     TEST_RUN(endless_loop_is_broken_by_a_timer_above);
     TEST_RUN(endless_loop_in_main_is_broken);
     TEST_RUN(break_of_what_does_not_run_does_nothing);
+    TEST_RUN(trace_of_a_fault_starts_at_its_stack_pointer);
+    TEST_RUN(trace_of_a_broken_task_below_another_starts_at_its_stack_pointer);
     TEST_RUN(compiled_code_finds_its_import_table_in_r9);
     TEST_END();
 }

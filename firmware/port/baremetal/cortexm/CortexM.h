@@ -46,7 +46,6 @@ enum { LEVEL_FAULT = 0, LEVEL_DEVICE = 1, LEVEL_TIMER = 2 };
 #define SCB_SHPR(n) (*(volatile RTS_UI8 *)(uintptr_t)(0xE000ED18u + (n) - 4u)) /* n: exception number */
 #define SCB_SHCSR REG32(0xE000ED24u)
 #define SCB_CFSR REG32(0xE000ED28u)
-#define FPU_FPCAR REG32(0xE000EF38u) /* where the FPU registers of the last exception frame go */
 #define SCB_HFSR REG32(0xE000ED2Cu)
 #define SCB_MMFAR REG32(0xE000ED34u)
 #define SCB_CPACR REG32(0xE000ED88u)

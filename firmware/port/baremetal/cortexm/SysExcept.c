@@ -196,12 +196,13 @@ void SvcHandler(void)
 }
 
 /* The stack pointer before the exception pushed its frame, with or without the FPU's registers; for the trace alone. */
-static uintptr_t stack_before(const FRAME *frame, int has_fpu)
+static uintptr_t stack_before(const FRAME *frame, RTS_UI32 exc_return)
 {
     enum { FPU_SIZE = 18 * 4 };
     if (EXCEPT_MAX_CALLS == 0)
         return 0;
-    return (uintptr_t)(frame + 1) + (has_fpu ? FPU_SIZE : 0) + (frame->xpsr & XPSR_ALIGNED ? 4 : 0);
+    uintptr_t end = (uintptr_t)(frame + 1) + (exc_return & EXC_RETURN_BASIC ? 0 : FPU_SIZE);
+    return end + (frame->xpsr & XPSR_ALIGNED ? 4 : 0);
 }
 
 /* ---- faults ---- */
@@ -211,7 +212,7 @@ static uintptr_t find_caller(uintptr_t slot)
 {
     const RTS_UI32 *end = (const RTS_UI32 *)(slot + RTS_IEC_STACK_SIZE);
     for (const RTS_UI32 *word = (const RTS_UI32 *)(slot + STACK_GUARD); word < end; word++)
-        if ((*word & 1u) && SysExceptIsCode(*word))
+        if (SysExceptIsReturn(*word))
             return (*word & ~1u) - 2;
     return 0;
 }
@@ -261,7 +262,7 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     CpuRestore(0); /* the fault may have been in a place where interrupts are masked */
     if (cfsr & CFSR_STACKING)
         return leave(code, address, 0, 0);
-    return leave(code, address, stack_before(frame, !(exc_return & EXC_RETURN_BASIC)), frame->lr);
+    return leave(code, address, stack_before(frame, exc_return), frame->lr);
 }
 
 /* A fault on the main stack is one of the runtime; that stack may be at its end, so it is given up. */
@@ -314,28 +315,33 @@ void SysExceptShutdown(void)
 {
 }
 
-/* Whether the frame of a thread that is interrupted is followed by the FPU's registers: by where they were to be saved. */
-static int has_fpu_registers(const FRAME *frame)
+/* Where a function that is broken goes on: it leaves the running Try. By then the processor has taken its frame back, so
+ * that the stack pointer is as it was. */
+__attribute__((naked, noreturn)) static void try_break(RTS_UI32 code, uintptr_t address, RTS_UI32 unused, uintptr_t link)
 {
-#ifdef __ARM_FP
-    return FPU_FPCAR == (uintptr_t)(frame + 1);
-#else
-    RTS_UNUSED(frame);
-    return 0;
-#endif
+    RTS_UNUSED(code);
+    RTS_UNUSED(address);
+    RTS_UNUSED(unused);
+    RTS_UNUSED(link);
+    __asm__ volatile("mov r2, sp\n\tsvc 0");
 }
 
-/* The function goes on with raising the exception. Unless it does so already: then where it was must not be forgotten. */
+/* Whether it is about to raise an exception: then where it was must not be forgotten. */
+static int is_raising(const FRAME *frame)
+{
+    enum { BREAK_SIZE = 4 };
+    return frame->pc == ((RTS_UI32)(uintptr_t)try_raise & ~1u) ||
+           frame->pc - ((RTS_UI32)(uintptr_t)try_break & ~1u) < BREAK_SIZE;
+}
+
 static void redirect(FRAME *frame, RTS_UI32 code)
 {
-    const RTS_UI32 raise = (RTS_UI32)(uintptr_t)try_raise & ~1u;
-    if (frame->pc == raise)
+    if (is_raising(frame))
         return;
     frame->r0 = code;
     frame->r1 = frame->pc;
-    frame->r2 = stack_before(frame, has_fpu_registers(frame));
     frame->r3 = frame->lr;
-    frame->pc = raise;
+    frame->pc = (RTS_UI32)(uintptr_t)try_break & ~1u;
     frame->xpsr = (frame->xpsr & XPSR_ALIGNED) | XPSR_THUMB;
 }
 
@@ -343,7 +349,8 @@ static void redirect(FRAME *frame, RTS_UI32 code)
 void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     FRAME *frame = process_stack();
-    for (TRY *try = state.top; try-- > state.tries; frame = try->outer_process) {
+    for (const TRY *try = state.top; try != state.tries; frame = try->outer_process) {
+        try--;
         if (try->entered->r1 == (uintptr_t)arg)
             redirect(frame, code);
     }

@@ -11,8 +11,7 @@
 /* Calls an entry of compiled code with r9 holding the import table; `argument` is init_retains or 0. */
 void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 
-/* The runtime has one core: interrupts and main see each other's writes in order, so only the compiler has to keep it. */
-#define RTS_ONE_CORE
+#define RTS_ONE_CORE 1
 
 /* startup.c clears all variables, and whatever ends the runtime is a reset. */
 #define RTS_STARTS_ONCE 1
