@@ -540,6 +540,8 @@ def _report(error: PlcError, as_json: bool) -> int:
         document: dict[str, Any] = {"error": {"code": error.code, "message": error.message}}
         if diagnostics := getattr(error, "diagnostics", None):
             document["diagnostics"] = [vars(d) for d in diagnostics]
+        if exception := getattr(error, "exception", None):
+            document["exception"] = exception
         print(output.as_json(document))
     else:
         prefix = "" if hasattr(error, "diagnostics") else "plctool: "  # diagnoses begin with their place

@@ -11,6 +11,8 @@ from typing import Any
 
 from plctool.core import error_name, ffi, lib
 from plctool.errors import DeviceError, UsageError
+from plctool.files import read_image
+from plctool.image import parse_image
 from plctool.link.services import AppException, AppState, Status, TaskInfo, Trace
 from plctool.symbols import SymbolTable, find_symbols
 from plctool.variables import Reading, Symbol, unreachable
@@ -48,12 +50,8 @@ class Simulator:
     def from_file(cls, path: Path | str, *, start: bool = True) -> Simulator:
         """The program in `app.cdl` with its symbols (`app.sym` beside it)."""
         file = Path(path)
-        try:
-            image = file.read_bytes()
-        except OSError as error:
-            raise UsageError(f"The image {file} cannot be read: {error.strerror}.", "no-image") from None
-        crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
-        return cls(image, find_symbols(crc, file), start=start)
+        image = read_image(file)
+        return cls(image, find_symbols(parse_image(image).crc, file), start=start)
 
     def __enter__(self) -> Simulator:
         return self
@@ -79,7 +77,7 @@ class Simulator:
         result = lib.AppDownloadEnd(refusal)
         if result != lib.ERR_OK:
             text = ffi.string(refusal.text).decode("latin-1")
-            raise DeviceError(f"The image is refused: {text} ({error_name(result)}).", "refused", result)
+            raise DeviceError(f"The image is refused: {text.rstrip('.')} ({error_name(result)}).", "refused", result)
 
     def start(self) -> None:
         """Starts the program; the first cycle of each task is due at once."""

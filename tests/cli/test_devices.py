@@ -82,7 +82,7 @@ def test_status_after_an_exception_names_task_pou_file_and_line(tool: Any, runni
     document = tool("status", *PORT, "--json").json
     assert document["state"] == "exception"
     what = {"code": lib.RTSEXCPT_DIVIDEBYZERO, "name": "DIVIDEBYZERO", "task": "Main"}
-    assert document["exception"] == what | {"pou": "Main", "file": "main.st", "line": 8}
+    assert document["exception"] == what | {"pou": "Main", "file": "main.st", "line": 8, "calls": []}
     assert "DIVIDEBYZERO in task Main, Main, main.st:8" in tool("status", *PORT).out
 
 
@@ -264,6 +264,13 @@ def test_every_device_command_on_a_missing_port_exits_3(tool: Any, image: Path, 
     assert (people.status, people.out) == (3, "")
     assert people.err.count("\n") == 1
     assert "no such port" in people.err
+
+
+@pytest.mark.parametrize("port", ["/dev/null", "/tmp"])
+def test_what_is_no_serial_port_is_told(tool: Any, port: str) -> None:
+    done = tool("scan", "--port", port)
+    assert (done.status, done.out) == (3, "")
+    assert "it is no serial port" in done.err
 
 
 @pytest.mark.parametrize("link", [("--can", "socketcan:can0"), ("--udp", "localhost"), ("--tcp", "localhost:11740")])

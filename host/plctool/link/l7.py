@@ -69,7 +69,7 @@ def check_result(result: int, action: str, reason: str = "") -> None:
     """Raises DeviceError unless `result` is ERR_OK. `action`: what was asked for; `reason`: the device's own words."""
     if result != lib.ERR_OK:
         name = error_name(result)
-        why = reason or _ADVICE.get(result, "")
+        why = reason.rstrip(".") or _ADVICE.get(result, "")
         raise DeviceError(f"The device refused the {action}: {f'{why} ({name})' if why else name}.", slug(name), result)
 
 
