@@ -64,12 +64,12 @@ def build(
 def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, list[str]]:
     """Every diagnosis of a program; the texts are as people read them."""
     from plctool.compiler import check_with_tests, load_sources
-    from plctool.compiler.diagnostics import render
+    from plctool.compiler.diagnostics import render_all
 
     sources = load_sources(paths)
     result = check_with_tests(sources, warnings)
-    texts = [render(d, sources) for d in result.diagnostics]
-    return {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}, texts
+    document = {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}
+    return document, render_all(result.diagnostics, sources)
 
 
 def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:

@@ -13,6 +13,7 @@ from plctool.core import error_name, ffi, lib
 from plctool.errors import DeviceError, UsageError
 from plctool.files import read_image
 from plctool.image import parse_image
+from plctool.link.l7 import why
 from plctool.link.services import AppException, AppState, Status, TaskInfo, Trace
 from plctool.symbols import SymbolTable, find_symbols
 from plctool.variables import Reading, Symbol, unreachable
@@ -77,7 +78,7 @@ class Simulator:
         result = lib.AppDownloadEnd(refusal)
         if result != lib.ERR_OK:
             text = ffi.string(refusal.text).decode("latin-1")
-            raise DeviceError(f"The image is refused: {text.rstrip('.')} ({error_name(result)}).", "refused", result)
+            raise DeviceError(f"The image is refused: {why(result, text)}.", "refused", result)
 
     def start(self) -> None:
         """Starts the program; the first cycle of each task is due at once."""
@@ -217,4 +218,4 @@ class Simulator:
 
 def _check(result: int, what: str) -> None:
     if result != lib.ERR_OK:
-        raise DeviceError(f"{what} ({error_name(result)}).", error_name(result), result)
+        raise DeviceError(f"{what}: {why(result)}.", error_name(result), result)

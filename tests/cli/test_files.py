@@ -378,6 +378,17 @@ def test_tables_align_numbers_right() -> None:
     assert output.table(rows, ["name", "n"]) == "name     n\na        5\nlong  1234"
 
 
+def test_characters_that_the_output_cannot_hold_are_escaped(tool: Any, scratch: Path) -> None:
+    (scratch / "names.st").write_text("PROGRAM Main\nVAR\n  größe : INT;\nEND_VAR\ngröße := 1;\nEND_PROGRAM\n")
+    tool("build", "names.st", "-o", "names.cdl")
+    done = subprocess.run(
+        [sys.executable, "-m", "plctool", "symbols", "names.cdl"], env=os.environ | {"PYTHONIOENCODING": "ascii"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert r"Main.gr\xf6\xdfe  INT" in done.stdout
+
+
 def test_calls_stand_below_the_text_of_their_log_entry() -> None:
     call = {"pou": "Main", "file": "main.st", "line": 8}
     entry = {"time_s": 1.5, "class": "exception", "component": "C", "text": "oops", "calls": [call]}
