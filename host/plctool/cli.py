@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 import traceback
@@ -540,6 +541,8 @@ def _report(error: PlcError, as_json: bool) -> int:
         document: dict[str, Any] = {"error": {"code": error.code, "message": error.message}}
         if diagnostics := getattr(error, "diagnostics", None):
             document["diagnostics"] = [vars(d) for d in diagnostics]
+        if exception := getattr(error, "exception", None):
+            document["exception"] = exception
         print(output.as_json(document))
     else:
         prefix = "" if hasattr(error, "diagnostics") else "plctool: "  # diagnoses begin with their place
@@ -553,10 +556,17 @@ def _internal_error(error: Exception, as_json: bool) -> int:
     return _report(error if isinstance(error, InternalError) else InternalError(error), as_json)
 
 
+def _show_every_character() -> None:
+    """What the terminal or a pipe has no character for is shown as an escape, like `\\u65e5`, and is no error."""
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status of the process."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     as_json = "--json" in words
+    _show_every_character()
     try:
         status = _run_reported(words, as_json)
         sys.stdout.flush()

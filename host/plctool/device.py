@@ -13,6 +13,7 @@ from typing import Any, overload
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError, UsageError
+from plctool.files import read_image
 from plctool.image import parse_image
 from plctool.link import services
 from plctool.link.connection import Connection
@@ -155,7 +156,7 @@ class Plc:
         `force`: also when the controller has this very image already. `unchecked`: without a look at the image here;
         the controller checks it anyway. `progress` gets the bytes that have arrived and their total.
         """
-        data = self._load(image)
+        data = image if isinstance(image, bytes) else read_image(Path(image))
         if not unchecked:
             parse_image(data)
         crc = int.from_bytes(data[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
@@ -173,15 +174,6 @@ class Plc:
         if start and not (skipped and status.state is AppState.RUN):
             services.start(self._session)
         return FlashResult(len(data), seconds, skipped, services.read_status(self._session).state)
-
-    def _load(self, image: Path | str | bytes) -> bytes:
-        if isinstance(image, bytes):
-            return image
-        path = Path(image)
-        try:
-            return path.read_bytes()
-        except OSError as error:
-            raise UsageError(f"The image {path} cannot be read: {error.strerror}.", "no-image") from None
 
     def _verify(self, crc: int) -> None:
         found = services.read_status(self._session).image_crc

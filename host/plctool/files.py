@@ -12,16 +12,21 @@ from plctool.errors import UsageError
 def write_atomically(path: Path, data: bytes) -> None:
     """The file has the old or the new content, whatever happens on the way."""
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-            file.write(data)
-        os.chmod(file.name, 0o644)
-        os.replace(file.name, path)
+        file = tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False)  # noqa: SIM115
+        try:
+            with file:
+                file.write(data)
+            os.chmod(file.name, 0o644)
+            os.replace(file.name, path)
+        except BaseException:
+            os.unlink(file.name)
+            raise
     except OSError as error:
         raise UsageError(f"{path} cannot be written: {error.strerror}.", "cannot-write") from None
 
 
 def read_image(path: Path) -> bytes:
-    """The bytes of an image file."""
+    """The bytes of an image file, whatever they are."""
     try:
         return path.read_bytes()
     except OSError as error:

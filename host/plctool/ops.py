@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from plctool.errors import DeviceError, UsageError
+from plctool.files import read_image
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -18,6 +19,14 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 Texts = dict[str, str]
 """Values of variables by name, as ST writes them."""
+
+
+class ProgramStopped(DeviceError):
+    """The program ended with an exception. `exception` is for machines, in the words of `plctool status --json`."""
+
+    def __init__(self, exception: ExceptionInfo) -> None:
+        super().__init__(f"The program stopped: {exception}.", "exception")
+        self.exception = _exception_document(exception)
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -55,12 +64,12 @@ def build(
 def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, list[str]]:
     """Every diagnosis of a program; the texts are as people read them."""
     from plctool.compiler import check_with_tests, load_sources
-    from plctool.compiler.diagnostics import render
+    from plctool.compiler.diagnostics import render_all
 
     sources = load_sources(paths)
     result = check_with_tests(sources, warnings)
-    texts = [render(d, sources) for d in result.diagnostics]
-    return {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}, texts
+    document = {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}
+    return document, render_all(result.diagnostics, sources)
 
 
 def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:
@@ -144,13 +153,6 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
     }
 
 
-def read_image(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"The image {path} cannot be read: {error.strerror}.", "no-image") from None
-
-
 # ---- in this process -------------------------------------------------------------------------------------------------
 
 
@@ -192,7 +194,7 @@ def _raise_exception(plc: Simulator) -> None:
         return
     tasks = plc.tasks()
     task = tasks[exception.task].name if 0 <= exception.task < len(tasks) else None
-    raise DeviceError(f"The program stopped: {explain_exception(exception, task, plc.symbols)}.", "exception")
+    raise ProgramStopped(explain_exception(exception, task, plc.symbols))
 
 
 def bench(path: Path, cycles: int) -> Document:

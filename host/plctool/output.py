@@ -6,6 +6,8 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+_LOG_COLUMN = 27  # where the text of a log entry begins
+
 
 def as_json(document: Any) -> str:
     """One line of JSON."""
@@ -37,9 +39,11 @@ def place_text(place: dict[str, Any]) -> str:
     return f", {place['pou']}, {place['file']}:{place['line']}" if place.get("file") else ""
 
 
-def calls_text(place: dict[str, Any]) -> str:
-    """A line for each call that led to a place."""
-    return "".join(f"\n  called from {call['pou']}, {call['file']}:{call['line']}" for call in place.get("calls", []))
+def calls_text(place: dict[str, Any], column: int = 2) -> str:
+    """A line for each call that led to a place, from a column on."""
+    return "".join(
+        f"\n{'':{column}}called from {call['pou']}, {call['file']}:{call['line']}" for call in place.get("calls", [])
+    )
 
 
 def status_text(document: dict[str, Any]) -> str:
@@ -54,7 +58,8 @@ def status_text(document: dict[str, Any]) -> str:
 
 def log_text(document: dict[str, Any]) -> str:
     return "\n".join(
-        f"{e['time_s']:12.6f} s  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}{calls_text(e)}"
+        f"{e['time_s']:12.6f} s  {e['class']:<9}  {e['component']}: {e['text']}{place_text(e)}"
+        f"{calls_text(e, _LOG_COLUMN)}"
         for e in document["entries"]
     )
 

@@ -11,6 +11,9 @@ from typing import Any
 
 from plctool.core import error_name, ffi, lib
 from plctool.errors import DeviceError, UsageError
+from plctool.files import read_image
+from plctool.image import parse_image
+from plctool.link.l7 import why
 from plctool.link.services import AppException, AppState, Status, TaskInfo, Trace
 from plctool.symbols import SymbolTable, find_symbols
 from plctool.variables import Reading, Symbol, unreachable
@@ -48,12 +51,8 @@ class Simulator:
     def from_file(cls, path: Path | str, *, start: bool = True) -> Simulator:
         """The program in `app.cdl` with its symbols (`app.sym` beside it)."""
         file = Path(path)
-        try:
-            image = file.read_bytes()
-        except OSError as error:
-            raise UsageError(f"The image {file} cannot be read: {error.strerror}.", "no-image") from None
-        crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
-        return cls(image, find_symbols(crc, file), start=start)
+        image = read_image(file)
+        return cls(image, find_symbols(parse_image(image).crc, file), start=start)
 
     def __enter__(self) -> Simulator:
         return self
@@ -79,7 +78,7 @@ class Simulator:
         result = lib.AppDownloadEnd(refusal)
         if result != lib.ERR_OK:
             text = ffi.string(refusal.text).decode("latin-1")
-            raise DeviceError(f"The image is refused: {text} ({error_name(result)}).", "refused", result)
+            raise DeviceError(f"The image is refused: {why(result, text)}.", "refused", result)
 
     def start(self) -> None:
         """Starts the program; the first cycle of each task is due at once."""
@@ -219,4 +218,4 @@ class Simulator:
 
 def _check(result: int, what: str) -> None:
     if result != lib.ERR_OK:
-        raise DeviceError(f"{what} ({error_name(result)}).", error_name(result), result)
+        raise DeviceError(f"{what}: {why(result)}.", error_name(result), result)

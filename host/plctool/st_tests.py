@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,15 +25,18 @@ from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.typed import Area
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.core import ffi, lib
-from plctool.device import explain_exception
+from plctool.device import ExceptionInfo, explain_exception
 from plctool.errors import UsageError
 from plctool.sim import Simulator
+from plctool.symbols import SourceLine
 from plctool.value_texts import literal
 from plctool.values import decode
 
 if TYPE_CHECKING:
     from plctool.compiler.source import Source
 
+_TEST = re.compile(r"TEST_\d+")  # names that `unit_tests.py` gives
+_IN_TEST = re.compile(r"TEST_\d+|SETUP|TEARDOWN")
 _COMPARED = {"ASSERT_GT": "> ", "ASSERT_GE": ">= ", "ASSERT_LT": "< ", "ASSERT_LE": "<= "}
 _EXCEPTIONS = {
     lib.RTSEXCPT_DIVIDEBYZERO: "division by zero",
@@ -57,6 +61,11 @@ class Failure:
     expected: Any = None
     is_exception: bool = False
     pou: str | None = None  # where an exception happened
+    calls: Sequence[SourceLine] = ()  # led there, the nearest first
+
+    def document(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {**vars(self), "calls": [vars(call) for call in self.calls]}
 
 
 @dataclass(frozen=True)
@@ -91,7 +100,7 @@ class Report:
         """What `--json` prints."""
         tests = []
         for outcome in self.outcomes:
-            failure = vars(outcome.failure) if outcome.failure else None
+            failure = outcome.failure.document() if outcome.failure else None
             tests.append({**vars(outcome), "passed": failure is None, "failure": failure})
         passed = len(tests) - self.failed
         return {
@@ -188,10 +197,10 @@ class _Bench:
         if exception is None:
             return None
         info = explain_exception(exception, None, self._built.symbols)
-        where = f" in {info.pou}" if info.pou and not info.pou.startswith("TEST_") else ""
+        where = f" in {info.pou}" if info.pou and not _TEST.fullmatch(info.pou) else ""
         text = _EXCEPTIONS.get(exception.code, "run-time exception") + where
         place = (info.file, info.line) if info.file and info.line else (case.pos.file, case.pos.line)
-        return Failure(info.name, text, *place, is_exception=True, pou=info.pou)
+        return Failure(info.name, text, *place, is_exception=True, pou=info.pou, calls=_calls(info))
 
     def _assert(self) -> Failure | None:
         number = self._plc.read(FAILED)
@@ -220,6 +229,14 @@ class _Bench:
         if assertion.tolerance is not None:
             wanted += f" +- {literal(assertion.tolerance.type, self._value(assertion.tolerance))}"
         return f"expected {wanted}, got {got}"
+
+
+def _calls(exception: ExceptionInfo) -> list[SourceLine]:
+    """The calls between the test and the exception. What calls the test is ours."""
+    if _IN_TEST.fullmatch(exception.pou or ""):
+        return []
+    first = next((i for i, call in enumerate(exception.calls) if _IN_TEST.fullmatch(call.pou)), len(exception.calls))
+    return exception.calls[: first + 1]
 
 
 # ---- for people ------------------------------------------------------------------------------------------------------
@@ -251,6 +268,9 @@ def _failure_lines(failure: Failure, sources: Sequence[Source]) -> Iterator[str]
     source = next((s for s in sources if s.path == failure.file), None)
     if source is not None:
         yield f"    {source.line_text(failure.line).strip()}"
+    for call in failure.calls:
+        unit = "" if _TEST.fullmatch(call.pou) else f"{call.pou}, "
+        yield f"called from {unit}{call.file}:{call.line}"
 
 
 # ---- for continuous integration --------------------------------------------------------------------------------------

@@ -126,7 +126,8 @@ def _encode_struct(t: StructType, value: Any) -> bytes:
     data = bytearray(t.size)
     for f in t.fields:
         if f.name not in value:
-            raise bad_value(value, t, f"the member {f.name} is missing")
+            hint = "give all members one, or write single ones"
+            raise UsageError(f"The member {f.name} of {t} has no value; {hint}.", "bad-value")
         data[f.offset : f.offset + f.type.size] = encode(f.type, value[f.name])
     return bytes(data)
 

@@ -266,6 +266,13 @@ def test_every_device_command_on_a_missing_port_exits_3(tool: Any, image: Path, 
     assert "no such port" in people.err
 
 
+@pytest.mark.parametrize("port", ["/dev/null", "/tmp"])
+def test_what_is_no_serial_port_is_told(tool: Any, port: str) -> None:
+    done = tool("scan", "--port", port)
+    assert (done.status, done.out) == (3, "")
+    assert "it is no serial port" in done.err
+
+
 @pytest.mark.parametrize("link", [("--can", "socketcan:can0"), ("--udp", "localhost"), ("--tcp", "localhost:11740")])
 def test_links_of_later_versions_exit_2(tool: Any, link: tuple[str, str]) -> None:
     done = tool("status", *link, "--json")

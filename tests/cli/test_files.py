@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -233,6 +234,52 @@ def test_run_of_a_program_that_fails_exits_1_and_names_the_line(tool: Any, scrat
     assert "zero.st:6" in done.json["error"]["message"]
 
 
+def test_run_of_a_program_that_fails_gives_machines_what_status_gives(tool: Any, scratch: Path) -> None:
+    (scratch / "zero.st").write_text("PROGRAM Main\nVAR\n  a, b : INT;\nEND_VAR\na := 1;\na := a / b;\nEND_PROGRAM\n")
+    tool("build", "zero.st", "-o", "zero.cdl")
+    exception = tool("run", "zero.cdl", "--json").json["exception"]
+    assert (exception["name"], exception["pou"], exception["line"]) == ("DIVIDEBYZERO", "Main", 6)
+    assert exception["calls"] == []
+
+
+def test_run_of_what_is_no_image_says_so(tool: Any, counter: Path) -> None:
+    done = tool("run", "counter.st")
+    assert (done.status, done.out) == (2, "")
+    assert "not a valid application image" in done.err
+
+
+def test_a_refused_image_is_told_in_one_sentence(tool: Any, counter: Path) -> None:
+    tool("build", "counter.st", "-o", "m3.cdl", "--target", "cortex-m3")
+    done = tool("run", "m3.cdl")
+    assert done.status == 1
+    assert done.err.endswith("build it for this target (ERR_ID_MISMATCH).\n")
+
+
+def test_a_structure_in_part_names_the_member_that_has_no_value(tool: Any, scratch: Path) -> None:
+    (scratch / "point.st").write_text(
+        "TYPE Point : STRUCT\n  x, y : INT;\nEND_STRUCT; END_TYPE\n"
+        "PROGRAM Main\nVAR\n  p : Point;\nEND_VAR\np.x := p.y;\nEND_PROGRAM\n"
+    )
+    tool("build", "point.st", "-o", "point.cdl")
+    done = tool("run", "point.cdl", "--set", "Main.p=(x := 1)")
+    assert done.status == 2
+    assert "The member y " in done.err
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing_behind(
+    tool: Any, counter: Path, scratch: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*paths: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "replace", full)
+    before = set(scratch.iterdir())
+    done = tool("build", "counter.st", "-o", "new.cdl")
+    assert done.status == 2
+    assert "No space left" in done.err
+    assert set(scratch.iterdir()) == before
+
+
 def test_run_of_a_missing_image_exits_2(tool: Any) -> None:
     assert tool("run", "nothing.cdl", "--json").status == 2
 
@@ -329,3 +376,21 @@ def test_a_reader_that_goes_away_is_no_error(image: Path) -> None:
 def test_tables_align_numbers_right() -> None:
     rows = [{"name": "a", "n": 5}, {"name": "long", "n": 1234}]
     assert output.table(rows, ["name", "n"]) == "name     n\na        5\nlong  1234"
+
+
+def test_characters_that_the_output_cannot_hold_are_escaped(tool: Any, scratch: Path) -> None:
+    (scratch / "names.st").write_text("PROGRAM Main\nVAR\n  größe : INT;\nEND_VAR\ngröße := 1;\nEND_PROGRAM\n")
+    tool("build", "names.st", "-o", "names.cdl")
+    done = subprocess.run(
+        [sys.executable, "-m", "plctool", "symbols", "names.cdl"], env=os.environ | {"PYTHONIOENCODING": "ascii"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert r"Main.gr\xf6\xdfe  INT" in done.stdout
+
+
+def test_calls_stand_below_the_text_of_their_log_entry() -> None:
+    call = {"pou": "Main", "file": "main.st", "line": 8}
+    entry = {"time_s": 1.5, "class": "exception", "component": "C", "text": "oops", "calls": [call]}
+    first, second = output.log_text({"entries": [entry]}).splitlines()
+    assert second.index("called from Main, main.st:8") == first.index("C: oops")

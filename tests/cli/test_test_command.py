@@ -201,6 +201,25 @@ def test_an_exception_tells_the_unit_it_happened_in(tool: Tool) -> None:
     assert (found["pou"], found["line"], found["text"]) == ("B.m", 3, "division by zero in B.m")
 
 
+@pytest.mark.parametrize("level", range(4))
+def test_an_exception_tells_the_calls_from_the_test_to_it(tool: Tool, level: int) -> None:
+    path = write(
+        "FUNCTION Half : INT\nVAR_INPUT x : INT; END_VAR\nHalf := 10 / x;\nEND_FUNCTION\n"
+        "FUNCTION_BLOCK B\nVAR_INPUT x : INT; END_VAR\nx := Half(x) + 1;\nEND_FUNCTION_BLOCK\n"
+        "TEST 't'\nVAR b : B; END_VAR\nb(x := 0);\nASSERT_EQ(b.x, 1);\nEND_TEST\n"
+    )
+    (outcome,) = tool("test", str(path), f"-O{level}", "--json").json["tests"]
+    calls = outcome["failure"]["calls"]
+    assert [call["line"] for call in calls] == [7, 11]
+    assert calls[0]["pou"] == "B"
+    lines = tool("test", str(path), f"-O{level}").out.splitlines()
+    assert lines[4:6] == [f"        called from B, {path}:7", f"        called from {path}:11"]
+
+
+def test_an_exception_in_the_test_itself_was_called_by_nobody(tool: Tool) -> None:
+    assert failure(tool, "VAR i : INT; END_VAR i := 1 / i;")["calls"] == []
+
+
 def test_a_failing_setup_keeps_the_test_from_running(tool: Tool) -> None:
     before = "SETUP\nASSERT_TRUE(FALSE, 'setup');\nEND_SETUP\n"
     assert failure(tool, "ASSERT_TRUE(FALSE, 'test');", before)["message"] == "setup"

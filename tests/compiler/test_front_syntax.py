@@ -9,7 +9,7 @@ import pytest
 from front_support import body_of, check, main, messages, program
 
 from plctool.compiler import typed
-from plctool.compiler.diagnostics import MAX_ERRORS, render
+from plctool.compiler.diagnostics import MAX_ERRORS, MAX_LINE, render, render_all
 from plctool.compiler.front import Source, check_sources
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.parser import parse
@@ -192,6 +192,23 @@ def test_diagnosis_is_shown_with_its_line_and_a_caret() -> None:
     source = Source("dir/f.st", "PROGRAM Main\nVAR x : INT; END_VAR\n\tx := ;\nEND_PROGRAM")
     (diagnostic,) = check_sources([source]).diagnostics
     assert render(diagnostic, [source]) == "dir/f.st:3:7: error: expected a value before ;\n\tx := ;\n\t     ^"
+
+
+def test_of_a_very_long_line_the_part_around_the_finding_is_shown() -> None:
+    sum_of_all = f"{'1 + ' * 100} nix {' + 1' * 100}"
+    source = Source("f.st", f"PROGRAM Main\nVAR x : INT; END_VAR\n\tx := {sum_of_all};\nEND_PROGRAM")
+    (diagnostic,) = check_sources([source]).diagnostics
+    _, line, caret = render(diagnostic, [source]).split("\n")
+    assert len(line) == MAX_LINE + 2 * len("...")
+    assert line[caret.index("^") :].startswith("nix")
+    assert line.startswith("...") and line.endswith("...")
+
+
+def test_many_errors_may_be_followed_by_more() -> None:
+    source = Source("f.st", "PROGRAM Main\n" + "".join(f"x{i} := 1;\n" for i in range(MAX_ERRORS + 1)) + "END_PROGRAM")
+    texts = render_all(check_sources([source]).diagnostics, [source])
+    assert len(texts) == MAX_ERRORS + 1
+    assert texts[-1].startswith("There may be more")
 
 
 def test_positions_count_lines_of_crlf_files() -> None:

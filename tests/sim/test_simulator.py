@@ -113,7 +113,7 @@ def test_an_exception_stops_the_program_and_a_reset_lets_it_start_again(plc):
     plc.write("Main.divisor", 0)
     plc.run_cycles(3)
     assert plc.status().exception.name == "DIVIDEBYZERO"
-    with pytest.raises(DeviceError):
+    with pytest.raises(DeviceError, match="reset it first"):
         plc.start()
     plc.reset(lib.RESET_OPTION_WARM)
     plc.start()

@@ -29,9 +29,9 @@ class CompileError(UsageError):
     """The program has errors. The message holds all diagnoses as people read them; `diagnostics` is for machines."""
 
     def __init__(self, diagnostics: Sequence[Diagnostic], sources: Sequence[Source]) -> None:
-        from plctool.compiler.diagnostics import render
+        from plctool.compiler.diagnostics import render_all
 
-        super().__init__("\n".join(render(d, sources) for d in diagnostics), "compile")
+        super().__init__("\n".join(render_all(diagnostics, sources)), "compile")
         self.diagnostics = list(diagnostics)
 
 

@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Literal
@@ -18,6 +18,7 @@ Severity = Literal["error", "warning"]
 
 MAX_ERRORS = 20  # what follows is seldom news
 MAX_MESSAGE = 300  # characters; names may be of any length
+MAX_LINE = 160  # characters of a source line that are shown with a finding
 
 
 @dataclass(frozen=True)
@@ -94,9 +95,26 @@ def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
     source = next((s for s in sources if s.path == d.file), None)
     if source is None:
         return head
-    line = source.line_text(d.line)
-    indent = "".join("\t" if c == "\t" else " " for c in line[: d.column - 1])
+    line, column = _part_of(source.line_text(d.line), d.column - 1)
+    indent = "".join("\t" if c == "\t" else " " for c in line[:column])
     return f"{head}\n{line}\n{indent}^"
+
+
+def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> list[str]:
+    """All findings as people read them, and whether there may be more."""
+    texts = [render(d, sources) for d in diagnostics]
+    if sum(d.severity == "error" for d in diagnostics) >= MAX_ERRORS:
+        texts.append(f"There may be more than these {MAX_ERRORS} errors; correct some and check again.")
+    return texts
+
+
+def _part_of(line: str, column: int) -> tuple[str, int]:
+    """What is shown of a line, and the place of its column in that: all, or what fits a terminal around the column."""
+    if len(line) <= MAX_LINE:
+        return line, column
+    begin = max(0, min(column - MAX_LINE // 2, len(line) - MAX_LINE))
+    before, behind = "..." * (begin > 0), "..." * (begin + MAX_LINE < len(line))
+    return before + line[begin : begin + MAX_LINE] + behind, column - begin + len(before)
 
 
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:

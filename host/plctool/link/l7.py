@@ -69,8 +69,13 @@ def check_result(result: int, action: str, reason: str = "") -> None:
     """Raises DeviceError unless `result` is ERR_OK. `action`: what was asked for; `reason`: the device's own words."""
     if result != lib.ERR_OK:
         name = error_name(result)
-        why = reason or _ADVICE.get(result, "")
-        raise DeviceError(f"The device refused the {action}: {f'{why} ({name})' if why else name}.", slug(name), result)
+        raise DeviceError(f"The device refused the {action}: {why(result, reason)}.", slug(name), result)
+
+
+def why(result: int, reason: str = "") -> str:
+    """The end of a sentence about an error, with its name. `reason`: the device's own words."""
+    known = reason.rstrip(".") or _ADVICE.get(result, "")
+    return f"{known} ({error_name(result)})" if known else error_name(result)
 
 
 def monitoring_error_name(error: int) -> str:

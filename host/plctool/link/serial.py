@@ -84,5 +84,13 @@ def _advice(error: OSError) -> str:
         errno.EACCES: "permission denied; add yourself to the port's group (often dialout) and log in again.",
         errno.EBUSY: "another program uses it; close that one first.",
         errno.EAGAIN: "another program uses it; close that one first.",
+        errno.EISDIR: "it is no serial port; name one such as /dev/ttyS0.",
+        errno.ENOTTY: "it is no serial port; name one such as /dev/ttyS0.",
     }
-    return advice.get(error.errno or 0, f"{error}.")
+    return advice.get(_errno(error), f"{error}.")
+
+
+def _errno(error: OSError) -> int:
+    """The number of what went wrong. When a port cannot be set up, pyserial has it only in the cause of its error."""
+    cause = error.__context__
+    return error.errno or (cause.args[0] if cause and cause.args and isinstance(cause.args[0], int) else 0)
