@@ -66,7 +66,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build.add_argument(
         "-O", dest="level", type=_level, metavar="0..3|s", default=2, help="optimisation, s for small code; default: 2"
     )
-    build.add_argument("--checks", default="all", metavar="all|none|LIST", help="run-time checks; default: all")
+    build.add_argument(
+        "--checks",
+        default="all",
+        metavar="all|none|LIST",
+        help="run-time checks: div, bounds, subrange, null; default: all",
+    )
     build.add_argument("--debug", action="store_true", help="keep the code close to its source")
     _add_warnings(build)
 
@@ -75,19 +80,21 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_warnings(check)
 
     info = command("info", _info, "describe an image")
-    info.add_argument("image", type=Path)
+    _add_image(info)
 
     symbols = command("symbols", _symbols, "list the variables of an image with their types")
-    symbols.add_argument("image", type=Path)
+    _add_image(symbols)
     symbols.add_argument("patterns", nargs="*", metavar="PATTERN", help="names with * and ?: 'Main.pump.*'")
 
     run = command("run", _run, "run an image in this process, on a virtual clock")
-    run.add_argument("image", type=Path)
+    _add_image(run)
     length = run.add_mutually_exclusive_group()
     length.add_argument("--cycles", type=_count, metavar="N", help="cycles of the first task; default: 1")
     length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="virtual time instead")
-    run.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="before the first cycle")
-    run.add_argument("--get", action="append", default=[], metavar="NAME", help="after the last cycle")
+    run.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="before the first cycle; may be repeated"
+    )
+    run.add_argument("--get", action="append", default=[], metavar="NAME", help="after the last cycle; may be repeated")
 
     test = command("test", _test, "run the unit tests of a program in this process, on a virtual clock")
     _add_sources(test)
@@ -108,13 +115,13 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
 
     bench = command("bench", _bench, "measure the time of a cycle on this machine")
-    bench.add_argument("image", type=Path)
+    _add_image(bench)
     bench.add_argument("--cycles", type=_count, default=BENCH_CYCLES, metavar="N", help=f"default: {BENCH_CYCLES}")
 
 
 def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     flash = command("flash", _flash, "bring an image onto a device and start it")
-    flash.add_argument("image", type=Path)
+    _add_image(flash)
     flash.add_argument("--no-start", action="store_true", help="leave the program stopped")
     flash.add_argument("--force", action="store_true", help="also when the device has this image already")
     _add_link(flash)
@@ -124,7 +131,10 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(command("start", _start, "start the program"))
     _add_link(command("stop", _stop, "stop the program"))
     reset = command("reset", _reset, "reset the program; it is stopped afterwards")
-    reset.add_argument("option", choices=["warm", "cold", "origin"], help="origin deletes the program")
+    reset.add_argument(
+        "option", choices=["warm", "cold", "origin"],
+        help="warm keeps RETAIN variables, cold initialises them too, origin deletes the program",
+    )  # fmt: skip
     _add_link(reset)
     _add_link(command("tasks", _tasks, "show the times of the tasks"))
     _add_link(command("log", _log, "print the log of a device"))
@@ -139,20 +149,30 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(port)
 
     read = command("read", _read, "print values of variables")
-    read.add_argument("names", nargs="+", metavar="NAME")
+    _add_names(read)
     _add_link(read, symbols=True)
     write = command("write", _write, "set variables")
-    write.add_argument("values", nargs="+", metavar="NAME=VALUE")
+    write.add_argument("values", nargs="+", metavar="NAME=VALUE", help="value as 'read' shows it: Main.pause=T#2s")
     _add_link(write, symbols=True)
     watch = command("watch", _watch, "print values of variables again and again")
-    watch.add_argument("names", nargs="+", metavar="NAME")
+    _add_names(watch)
     watch.add_argument("--interval", type=_seconds, default=DEFAULT_INTERVAL, metavar="S", help="seconds; default: 0.5")
     watch.add_argument("--count", type=_count, metavar="N", help="readings; default: until Ctrl-C")
     _add_link(watch, symbols=True)
 
 
 def _add_sources(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("sources", nargs="+", type=Path, metavar="FILE.st|DIR")
+    parser.add_argument(
+        "sources", nargs="+", type=Path, metavar="FILE.st|DIR", help="of a folder all sources are taken"
+    )
+
+
+def _add_image(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("image", type=Path, help="what 'plctool build' wrote")
+
+
+def _add_names(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("names", nargs="+", metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.level")
 
 
 def _add_warnings(parser: argparse.ArgumentParser) -> None:
@@ -320,8 +340,8 @@ def _demo(args: argparse.Namespace) -> int:
 
 def _link(args: argparse.Namespace) -> str:
     """The link the arguments name."""
-    for kind in ("can", "udp", "tcp"):
-        if getattr(args, kind):
+    for kind in ("can", "udp", "tcp", "node"):
+        if getattr(args, kind) is not None:
             raise UsageError(f"--{kind} is not in this version; use a serial line (--port).", "no-such-link")
     if not args.port:
         raise UsageError("Say where the device is: --port /dev/ttyS0, for example.", "no-link")

@@ -43,11 +43,13 @@ def build(
 ) -> tuple[Document, list[str]]:
     """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as people read them.
 
-    Raises CompileError when the program has errors. Files appear complete or not at all.
+    Raises CompileError when the program has errors, UsageError when `output` would overwrite a source. Files appear
+    complete or not at all.
     """
     from plctool.compiler import compile_sources
     from plctool.symbols import symbol_path
 
+    _check_output(output, paths)
     result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug, warnings=warnings)
     result.write(output)
     document = {
@@ -59,6 +61,16 @@ def build(
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
     return document, result.rendered_warnings
+
+
+def _check_output(output: Path, sources: Sequence[Path]) -> None:
+    """An image takes the place of no source and of no symbol file."""
+    from plctool.compiler.source_files import SUFFIXES
+
+    is_source = output.suffix.lower() in SUFFIXES or output.resolve() in {source.resolve() for source in sources}
+    if is_source or output.suffix == ".sym":
+        kind = "source" if is_source else "symbol file"
+        raise UsageError(f"{output} has the name of a {kind}; write for example -o {output.stem}.cdl.", "bad-output")
 
 
 def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, list[str]]:

@@ -259,8 +259,10 @@ def load_symbols(path: Path) -> SymbolTable:
     """Raises UsageError when the file is missing or not a symbol file."""
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"The symbol file {path} cannot be read: {error}.", "no-symbols") from None
+    except OSError as error:
+        raise UsageError(f"The symbol file {path} cannot be read: {error.strerror}.", "no-symbols") from None
+    except UnicodeDecodeError:
+        raise UsageError(f"{path} is no symbol file; name the .sym that build wrote.", "bad-symbols") from None
     return SymbolTable.from_json(text)
 
 

@@ -185,6 +185,14 @@ def test_read_with_the_symbols_of_another_image_exits_2(tool: Any, running: Fake
     assert done.json["error"]["code"] == "wrong-symbols"
 
 
+def test_what_is_no_symbol_file_exits_2(tool: Any, running: FakePlc, scratch: Path) -> None:
+    (scratch / "bytes.sym").write_bytes(b"\xff")
+    for name, words in (("bytes.sym", "is no symbol file"), ("none.sym", "cannot be read: No such file or directory.")):
+        done = tool("read", *PORT, "Main.count", "--symbols", name)
+        assert done.status == 2
+        assert words in done.err
+
+
 def test_write_understands_texts_and_shows_the_values_after(tool: Any, running: FakePlc) -> None:
     done = tool("write", *PORT, "Main.count=16#2A", "Main.pause=T#1s", "Main.name=a=b", "Main.ok=TRUE", "--json")
     assert done.json == {"values": {"Main.count": 42, "Main.pause": "T#1s", "Main.name": "a=b", "Main.ok": True}}
@@ -273,7 +281,9 @@ def test_what_is_no_serial_port_is_told(tool: Any, port: str) -> None:
     assert "it is no serial port" in done.err
 
 
-@pytest.mark.parametrize("link", [("--can", "socketcan:can0"), ("--udp", "localhost"), ("--tcp", "localhost:11740")])
+@pytest.mark.parametrize(
+    "link", [("--can", "socketcan:can0"), ("--udp", "localhost"), ("--tcp", "localhost:11740"), ("--node", "0")]
+)
 def test_links_of_later_versions_exit_2(tool: Any, link: tuple[str, str]) -> None:
     done = tool("status", *link, "--json")
     assert done.status == 2

@@ -69,6 +69,17 @@ def test_build_writes_app_cdl_when_nothing_else_is_said(tool: Any, scratch: Path
     assert (scratch / "app.sym").exists()
 
 
+@pytest.mark.parametrize("output", ["counter.st", "other.ST", "text", "counter.sym"])
+def test_build_overwrites_no_source_and_no_symbols(tool: Any, scratch: Path, output: str) -> None:
+    for name in ("counter.st", "text"):
+        (scratch / name).write_text(COUNTER)
+    done = tool("build", "text" if output == "text" else "counter.st", "-o", output)
+    assert done.status == 2
+    assert "has the name of a" in done.err
+    assert sorted(path.name for path in scratch.iterdir() if path.is_file()) == ["counter.st", "text"]
+    assert (scratch / "counter.st").read_text() == (scratch / "text").read_text() == COUNTER
+
+
 def test_build_takes_folders(tool: Any, scratch: Path) -> None:
     (scratch / "src").mkdir()
     (scratch / "src" / "counter.st").write_text(COUNTER)

@@ -26,6 +26,9 @@
 #define PORT_FLASH_SECTOR_SIZE 4096
 #define PORT_FLASH_PROGRAM_SIZE 8
 
+/* Holds the longest reason why an image was refused. */
+#define LOG_TEXT_SIZE 240
+
 /* The largest code segment that can be made executable, per slot [bytes]: a slot is less than half of the flash. */
 #define PORT_CODE_SIZE (PORT_FLASH_SIZE / 2)
 
