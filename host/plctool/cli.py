@@ -293,9 +293,11 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _test(args: argparse.Namespace) -> int:
-    from plctool import st_tests
+    from plctool import ops, st_tests
     from plctool.files import write_atomically
 
+    if args.junit:
+        ops.check_output(args.junit, args.sources, "--junit report.xml")
     report = st_tests.run_tests(args.sources, pattern=args.filter, level=args.level, warnings=_warnings(args))
     if args.junit:
         write_atomically(args.junit, st_tests.junit_xml(report))

@@ -49,7 +49,7 @@ def build(
     from plctool.compiler import compile_sources
     from plctool.symbols import symbol_path
 
-    _check_output(output, paths)
+    check_output(output, paths, f"-o {output.stem}.cdl")
     result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug, warnings=warnings)
     result.write(output)
     document = {
@@ -63,14 +63,14 @@ def build(
     return document, result.rendered_warnings
 
 
-def _check_output(output: Path, sources: Sequence[Path]) -> None:
-    """An image takes the place of no source and of no symbol file."""
+def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
+    """A file that is written takes the place of no source and of no symbol file. `better`: what to type instead."""
     from plctool.compiler.source_files import SUFFIXES
 
     is_source = output.suffix.lower() in SUFFIXES or output.resolve() in {source.resolve() for source in sources}
     if is_source or output.suffix == ".sym":
         kind = "source" if is_source else "symbol file"
-        raise UsageError(f"{output} has the name of a {kind}; write for example -o {output.stem}.cdl.", "bad-output")
+        raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
 
 
 def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, list[str]]:

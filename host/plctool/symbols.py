@@ -187,13 +187,13 @@ class SymbolTable:
         return json.dumps(document, separators=(",", ":"))
 
     @staticmethod
-    def from_json(text: str) -> SymbolTable:
-        """Raises UsageError when it is not a symbol file."""
+    def from_json(text: str, name: str = "The symbol file") -> SymbolTable:
+        """Raises UsageError, which calls it `name`, when it is not a symbol file."""
         try:
             document = json.loads(text)
             if document["format"] != FORMAT:
                 raise UsageError(
-                    f"The symbol file has format {document['format']}, this plctool knows {FORMAT}; build again.",
+                    f"{name} has format {document['format']}, this plctool knows {FORMAT}; build again.",
                     "bad-symbols",
                 )
             types = DescribedTypes(document["types"])
@@ -212,7 +212,7 @@ class SymbolTable:
                 [zlib.decompress(base64.b64decode(text)) for text in document["debug"]],
             )
         except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
-            raise UsageError("The symbol file cannot be read; build again.", "bad-symbols") from None
+            raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None
 
     def save(self, path: Path) -> None:
         """Writes the file, and a copy into the cache from where `find_symbols` gets it."""

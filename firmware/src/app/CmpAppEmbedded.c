@@ -380,17 +380,22 @@ bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
 
 /* ---- life ---- */
 
+/* The state of all parts, as after a reset. */
+static void forget_all(void)
+{
+    CMP_CLEAR(app);
+    AppExceptionClear();
+    AppAreasClear(true);
+    AppDownloadAbort();
+    SysExceptCodeRange(NULL, 0);
+}
+
 RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
 {
     switch (hook) {
     case CH_INIT:
-        CMP_CLEAR(app);
-        AppExceptionClear();
-        if (!RTS_STARTS_ONCE) {
-            AppAreasClear(true);
-            SysExceptCodeRange(NULL, 0);
-        }
-        AppDownloadAbort();
+        if (!RTS_STARTS_ONCE)
+            forget_all();
         break;
     case CH_INIT_TASKS:
         AppBoot();

@@ -15,6 +15,12 @@ static volatile RTS_UI32 zero, sink;
 
 /* ---- ways to fail ---- */
 
+#ifdef __ARM_FP
+#define USE_FPU "vmov.f32 s0, #1.0\n\t"
+#else
+#define USE_FPU ""
+#endif
+
 static void divide_by_zero(void *arg)
 {
     RTS_UNUSED(arg);
@@ -149,12 +155,21 @@ static void overflow_the_stack_with_fpu(void *arg)
     overflow_the_stack(arg);
 }
 
-/* The SVC that leaves finds 16 bytes above the guard (stack slots are as aligned as large). */
+/* Moves the stack pointer to the bottom of the stack of this depth (stack slots are as aligned as large). */
+#define GO_TO_THE_BOTTOM "mov r0, sp\n\tsubs r0, #1\n\tldr r1, =%0\n\tbic r0, r0, r1\n\tmov sp, r0\n\t"
+
+/* The SVC that leaves finds 16 bytes above the guard. */
 static void leave_near_the_end_of_the_stack(void *arg)
 {
     RTS_UNUSED(arg);
-    __asm__ volatile("mov r0, sp\n\tldr r1, =%0\n\tbic r0, r0, r1\n\tadd r0, #48\n\tmov sp, r0\n\t"
-                     "mov r0, #1\n\tsvc 0" ::"i"(RTS_IEC_STACK_SIZE - 1));
+    __asm__ volatile(GO_TO_THE_BOTTOM "add sp, #48\n\tmov r0, #1\n\tsvc 0" ::"i"(RTS_IEC_STACK_SIZE - 1));
+}
+
+/* A large frame that ends at the bottom of the guard. What the fault pushes lies below, on a stack that is idle. */
+static void use_a_frame_that_ends_in_the_guard(void *arg)
+{
+    RTS_UNUSED(arg);
+    __asm__ volatile(USE_FPU GO_TO_THE_BOTTOM "str r0, [sp]" ::"i"(RTS_IEC_STACK_SIZE - 1));
 }
 
 static void loop_forever(void *arg)
@@ -192,6 +207,7 @@ static const FAILURE failures[] = {
     {overflow_the_stack_with_large_frames, RTSEXCPT_STACK_OVERFLOW},
     {overflow_past_the_guard, RTSEXCPT_STACK_OVERFLOW},
     {overflow_the_stack_with_fpu, RTSEXCPT_STACK_OVERFLOW},
+    {use_a_frame_that_ends_in_the_guard, RTSEXCPT_STACK_OVERFLOW},
 };
 
 /* An address in a small function: all ours are. */
@@ -223,6 +239,7 @@ static void every_failure_in_main_is_caught_with_its_code(void)
 {
     for (RTS_UI32 i = 0; i < RTS_COUNT(failures); i++) {
         RTS_EXCEPTION exception = {0, 0};
+        SysExceptForgetTrace(); /* so that the stack of each is read */
         CHECK_EQUAL(SysExceptTry(failures[i].function, NULL, &exception), 1);
         CHECK_EQUAL(exception.code, failures[i].code);
     }
@@ -521,11 +538,6 @@ enum { RETURN_OFFSET = 8 };
 
 /* Pushes three words, so that the frame of an exception is moved to a multiple of 8, with a return address into `program` as
  * the lowest; goes on with `then`. */
-#ifdef __ARM_FP
-#define USE_FPU "vmov.f32 s0, #1.0\n\t"
-#else
-#define USE_FPU ""
-#endif
 #define PUSH_RETURN_ADDRESS(then)                                                                                      \
     __asm__ volatile(USE_FPU "mov r1, %0\n\tpush {r1, r2, lr}\n\t" then ::"r"(                                         \
                          (uintptr_t)program + RETURN_OFFSET + APP_ENTRY_MODE_BIT)                                      \

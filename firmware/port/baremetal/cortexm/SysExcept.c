@@ -169,12 +169,18 @@ __attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
     return (RTS_UI32)EXC_RETURN_THREAD_PSP;
 }
 
+/* Whether the stack can be read from there on: it may be in the guard, below it, or not known. */
+static int is_readable(const TRY *try, uintptr_t stack)
+{
+    return stack - (stack_slot(try) + STACK_GUARD) < RTS_IEC_STACK_SIZE - STACK_GUARD;
+}
+
 /* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return,
  * because try_enter used the FPU, so that the frame returned to has one too. */
 __attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link)
 {
     TRY *try = --state.top;
-    if (code != RTSEXCPT_NOEXCEPTION && stack - stack_slot(try) < RTS_IEC_STACK_SIZE)
+    if (code != RTSEXCPT_NOEXCEPTION && is_readable(try, stack))
         SysExceptTrace(address, (const uintptr_t *)stack, (const uintptr_t *)(try->first + 1), link);
     try->entered->r0 = code;
     try->entered->r1 = address;
