@@ -263,7 +263,7 @@ def load_symbols(path: Path) -> SymbolTable:
         raise UsageError(f"The symbol file {path} cannot be read: {error.strerror}.", "no-symbols") from None
     except UnicodeDecodeError:
         raise UsageError(f"{path} is no symbol file; name the .sym that build wrote.", "bad-symbols") from None
-    return SymbolTable.from_json(text)
+    return SymbolTable.from_json(text, f"The symbol file {path}")
 
 
 def symbol_path(image: Path) -> Path:

@@ -371,6 +371,14 @@ def test_a_report_that_cannot_be_written_is_told(tool: Tool) -> None:
     assert tool("test", str(write(TWO)), "--junit", "nowhere/report.xml").status == 2
 
 
+def test_a_report_takes_the_place_of_no_source(tool: Tool) -> None:
+    path = write(TWO)
+    done = tool("test", str(path), "--junit", str(path))
+    assert done.status == 2
+    assert "--junit report.xml" in done.err
+    assert path.read_text() == TWO
+
+
 def test_hundreds_of_tests_take_seconds(tool: Tool) -> None:
     test = (
         "TEST 'number %d'\nVAR c : Counter; END_VAR\nc(); ADVANCE_TIME(T#1s); c();\nASSERT_EQ(c.value, 2);\nEND_TEST\n"
