@@ -1,5 +1,6 @@
 /*
- * tanks_main.c - times the C twin of the tanks example: prints ns per control cycle and plant cycle, and the checksum of the levels.
+ * tanks_main.c - times the C twin of the tanks example: prints ns per control cycle and plant cycle, and the checksum
+ * of the levels.
  *
  * SPDX-License-Identifier: Apache-2.0
  *

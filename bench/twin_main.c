@@ -1,5 +1,6 @@
 /*
- * twin_main.c - times a C twin: prints its checksum after CYCLES cycles and the ns of one cycle, the best of several batches.
+ * twin_main.c - times a C twin: prints its checksum after CYCLES cycles and the ns of one cycle, the best of several
+ * batches.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * One instruction is 1 ns of virtual time, a tick of the 25 MHz clock 40 instructions. The counter has 24 bits, enough for 670
- * million instructions.
+ * One instruction is 1 ns of virtual time, a tick of the 25 MHz clock 40 instructions. The counter has 24 bits, enough
+ * for 670 million instructions.
  */
 #ifndef CLOCK_H
 #define CLOCK_H

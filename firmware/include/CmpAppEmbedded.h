@@ -4,8 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * There is one application. It lies in one of two flash slots; a download goes to the other one while the application
- * runs, and takes over only after every check has passed. Manual 3.3, 2.3.1; design: two slots, one atomic commit record.
- * All functions are called from main only, unless said otherwise. (Shared with the host.)
+ * runs, and takes over only after every check has passed. Manual 3.3, 2.3.1; design: two slots, one atomic commit
+ * record. All functions are called from main only, unless said otherwise. (Shared with the host.)
  */
 #ifndef CMPAPPEMBEDDED_H
 #define CMPAPPEMBEDDED_H
@@ -18,7 +18,8 @@
 #include "CmpItf.h"
 #endif
 
-/* Application states (codesys-v3-protocol 4.6). An exception is AS_STOP with OS_EXCEPTION set in the operating state. */
+/* Application states (codesys-v3-protocol 4.6). An exception is AS_STOP with OS_EXCEPTION set in the operating
+ * state. */
 enum { AS_NONE = 0, AS_RUN = 1, AS_STOP = 2, AS_HALT_ON_BP = 3, AS_SINGLE_CYCLE = 5 };
 
 /* Operating state bits (5.6). */
@@ -75,8 +76,8 @@ typedef struct {
 /*
  * Download. Begin opens the idle slot (erases lazily, sector by sector), Write appends, End checks everything
  * and, only when all is well, commits the slot, stops the old application and loads the new one (state AS_STOP).
- * On any error the old application runs on, untouched; except that when the tasks of the new one cannot be created, it is
- * loaded again, with its retain variables, and started if it ran.
+ * On any error the old application runs on, untouched; except that when the tasks of the new one cannot be created, it
+ * is loaded again, with its retain variables, and started if it ran.
  *
  * Begin: ERR_NOMEMORY too large for the slot. Write: ERR_INVALID_SEQUENCE not begun or `offset` is not what
  * AppDownloadOffset says; ERR_DEVICE flash fault, which ends the download. End: the reason as ERR_* and in *refusal
@@ -94,13 +95,13 @@ void AppDownloadAbort(void);
 RTS_RESULT AppStartApplication(void);
 /* Returns when no task is in its cycle any more; outputs are set to zero, retain variables saved. */
 RTS_RESULT AppStopApplication(void);
-/* Warm keeps retain variables, cold initialises them too, origin deletes the application and its boot project. After warm
- * and cold the application is in AS_STOP. */
+/* Warm keeps retain variables, cold initialises them too, origin deletes the application and its boot project. After
+ * warm and cold the application is in AS_STOP. */
 RTS_RESULT AppReset(RTS_UI32 option);
 
 void AppGetStatus(APP_STATUS *status);
-/* Project name etc. from the application info segment; "" when absent. index: 0 project, 1 author, 2 version, 3 description,
- * 4 profile. Valid until the next call; cut to APP_NAME_SIZE. */
+/* Project name etc. from the application info segment; "" when absent. index: 0 project, 1 author, 2 version, 3
+ * description, 4 profile. Valid until the next call; cut to APP_NAME_SIZE. */
 const char *AppGetInfo(RTS_UI32 index);
 
 /*
@@ -114,9 +115,9 @@ RTS_UI32 AppGetAreaSize(RTS_UI32 index); /* bytes, as the image asked for */
 bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset);
 
 #ifndef RTS_CFFI
-/* Called by CmpIecTask in the context of the task whose cycle failed, when no task starts another cycle: sets the outputs
- * to zero and records the exception. The rest (log, outputs that other tasks have written meanwhile, events) follows in
- * CH_COMM_CYCLE. */
+/* Called by CmpIecTask in the context of the task whose cycle failed, when no task starts another cycle: sets the
+ * outputs to zero and records the exception. The rest (log, outputs that other tasks have written meanwhile, events)
+ * follows in CH_COMM_CYCLE. */
 void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address);
 
 /* The words for an RTSEXCPT_* code, for the log. From any context. */

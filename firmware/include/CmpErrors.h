@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * They travel on the wire and vendors look for them: codesys-v3-protocol appendix A1 and A2. 0x8000..0xFFFF are free for
- * vendors; ours are at the end.
+ * They travel on the wire and vendors look for them: codesys-v3-protocol appendix A1 and A2. 0x8000..0xFFFF are free
+ * for vendors; ours are at the end.
  */
 #ifndef CMPERRORS_H
 #define CMPERRORS_H

@@ -3,9 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Compiled code holds no absolute address and no writable global. Each entry gets one pointer to an IEC_CONTEXT and reaches
- * everything through it. The layout is the binary interface between plctool's compiler and the runtime: change it only
- * together with CDL_HEADER_VERSION.
+ * Compiled code holds no absolute address and no writable global. Each entry gets one pointer to an IEC_CONTEXT and
+ * reaches everything through it. The layout is the binary interface between plctool's compiler and the runtime: change
+ * it only together with CDL_HEADER_VERSION.
  */
 #ifndef CMPIECABI_H
 #define CMPIECABI_H

@@ -3,7 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A cycle is: read inputs, IEC code, write outputs, statistics, watchdog (manual 3.4, 3.5). CmpScheduleTimer decides when.
+ * A cycle is: read inputs, IEC code, write outputs, statistics, watchdog (manual 3.4, 3.5). CmpScheduleTimer decides
+ * when.
  */
 #ifndef CMPIECTASK_H
 #define CMPIECTASK_H
@@ -32,16 +33,17 @@ typedef struct {
     RTS_UI32 overruns; /* due times missed because the cycle before took too long */
 } IEC_TASK_INFO;
 
-/* Replaces all tasks by the `count` given (0 deletes them); called by the loader from main while no task runs. The records
- * have been validated; they stay valid until the next call. ERR_NOMEMORY above APP_MAX_TASKS or without a free timer. */
+/* Replaces all tasks by the `count` given (0 deletes them); called by the loader from main while no task runs. The
+ * records have been validated; they stay valid until the next call. ERR_NOMEMORY above APP_MAX_TASKS or without a free
+ * timer. */
 RTS_RESULT IecTaskCreateAll(const CDL_TASK *tasks, RTS_UI32 count, const IEC_CONTEXT *prototype);
 
 /* Starts and stops the scheduling of all tasks, from main. Stop returns when no task is in its cycle. */
 RTS_RESULT IecTaskStartAll(void);
 void IecTaskStopAll(void);
 
-/* One cycle of a task that is due since `due_ns` (SysTimeGetNs). Called by the scheduler in the context of the task. Returns 0
- * when the task must not be scheduled again (exception), 1 otherwise. */
+/* One cycle of a task that is due since `due_ns` (SysTimeGetNs). Called by the scheduler in the context of the task.
+ * Returns 0 when the task must not be scheduled again (exception), 1 otherwise. */
 int IecTaskCycle(RTS_UI32 task, RTS_I64 due_ns);
 
 RTS_UI32 IecTaskGetCount(void);
@@ -53,8 +55,8 @@ RTS_RESULT IecTaskGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
  * Returns as SysExceptTry. */
 int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
 
-/* Counts starts and ends of cycles of all tasks, so that a reader can tell whether one ran meanwhile. *busy: a task is in its
- * cycle now. From any context. */
+/* Counts starts and ends of cycles of all tasks, so that a reader can tell whether one ran meanwhile. *busy: a task is
+ * in its cycle now. From any context. */
 RTS_UI32 IecTaskGetActivity(bool *busy);
 
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
@@ -69,8 +71,8 @@ typedef struct {
     const void *arg;   /* for SysExceptBreak */
 } IEC_GUARD;
 
-/* Reads guard `index`: one for each task, and one at IecTaskGetCount() for code that IecTaskRunGuarded runs. Returns 0 when
- * it does not run. From any context. */
+/* Reads guard `index`: one for each task, and one at IecTaskGetCount() for code that IecTaskRunGuarded runs. Returns 0
+ * when it does not run. From any context. */
 int IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *guard);
 
 RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook);

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A component is one hook function in the static list of the port (cmp_list.c). The manager calls it with CH_INIT_* in order
- * of the list, CH_EXIT_* in reverse, CH_COMM_CYCLE in the main loop. Manual 3.1, 3.2. All in the context of main.
+ * A component is one hook function in the static list of the port (cmp_list.c). The manager calls it with CH_INIT_* in
+ * order of the list, CH_EXIT_* in reverse, CH_COMM_CYCLE in the main loop. Manual 3.1, 3.2. All in the context of main.
  */
 #ifndef CMPITF_H
 #define CMPITF_H

@@ -27,8 +27,8 @@ typedef struct {
     char text[LOG_TEXT_SIZE];
 } LOG_ENTRY;
 
-/* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. Without log its
- * arguments are not evaluated, and the texts take no flash. */
+/* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. Without log
+ * its arguments are not evaluated, and the texts take no flash. */
 #define LogAdd(...)                                                                                                    \
     do {                                                                                                               \
         if (LOG_MAX_ENTRIES > 0)                                                                                       \

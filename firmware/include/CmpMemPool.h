@@ -22,8 +22,8 @@ typedef struct {
 
 enum { MEMPOOL_ALIGN = sizeof(RTS_I64) };
 
-/* Makes a pool of size / block_size blocks; block_size is rounded up to MEMPOOL_ALIGN. `memory` is aligned to it (ERR_ALIGNMENT).
- * ERR_NOMEMORY when not even one block fits. */
+/* Makes a pool of size / block_size blocks; block_size is rounded up to MEMPOOL_ALIGN. `memory` is aligned to it
+ * (ERR_ALIGNMENT). ERR_NOMEMORY when not even one block fits. */
 RTS_RESULT MemPoolCreateStatic(MEM_POOL *pool, void *memory, RTS_UI32 size, RTS_UI32 block_size);
 
 /* A block with undefined content, NULL when all are in use. */

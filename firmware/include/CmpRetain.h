@@ -23,15 +23,15 @@ void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout);
 /* Number of the newest record. */
 RTS_UI32 RetainGetSequence(void);
 
-/* Fills the area with what was saved last for this layout, in a record after number `after`, up to `until`. ERR_NO_OBJECT: there is
- * none, the area is as it was. */
+/* Fills the area with what was saved last for this layout, in a record after number `after`, up to `until`.
+ * ERR_NO_OBJECT: there is none, the area is as it was. */
 RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until);
 
 /* Saves the area when it is not what was saved last, or always; no task runs. ERR_DEVICE flash fault. */
 RTS_RESULT RetainSave(bool always);
 
-/* From now on the record numbered `until`, or the newest before it, is kept in flash, whatever is saved. It is that of the
- * application before, as long as the device may go back to it. */
+/* From now on the record numbered `until`, or the newest before it, is kept in flash, whatever is saved. It is that of
+ * the application before, as long as the device may go back to it. */
 void RetainKeep(RTS_UI32 until);
 void RetainKeepNone(void);
 

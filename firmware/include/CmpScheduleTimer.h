@@ -3,9 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A cyclic task runs in the context of its own SysTimer. Event tasks (rising edge of their BOOL), external event tasks and
- * freewheeling tasks run in main, in CH_COMM_CYCLE, in the order of their priority. With CmpScheduleEmbedded.c in place of
- * CmpScheduleTimer.c cyclic tasks do so too: the super loop of a device without a timer to spare.
+ * A cyclic task runs in the context of its own SysTimer. Event tasks (rising edge of their BOOL), external event tasks
+ * and freewheeling tasks run in main, in CH_COMM_CYCLE, in the order of their priority. With CmpScheduleEmbedded.c in
+ * place of CmpScheduleTimer.c cyclic tasks do so too: the super loop of a device without a timer to spare.
  */
 #ifndef CMPSCHEDULETIMER_H
 #define CMPSCHEDULETIMER_H
@@ -33,7 +33,8 @@ bool SchedHasBackgroundTasks(void);
 
 /*
  * External events. A KIND_EXTERNAL task runs once for each post of the event that has the task's name. Register and
- * unregister from main (CH_INIT3, CH_EXIT3); `result` may be NULL. RTS_INVALID_HANDLE with ERR_NOMEMORY or ERR_DUPLICATE.
+ * unregister from main (CH_INIT3, CH_EXIT3); `result` may be NULL. RTS_INVALID_HANDLE with ERR_NOMEMORY or
+ * ERR_DUPLICATE.
  */
 RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result);
 RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE event);
@@ -42,9 +43,9 @@ RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event);
 
 /*
  * Breaks IEC code that runs for too long: longer than watchdog time * sensitivity of its task, or than
- * APP_DEFAULT_WATCHDOG_US when it has no watchdog. The port calls it every few milliseconds from a context that preempts
- * every task and main (a timer interrupt above all tasks, a thread); `now_ns` is SysTimeGetNs. A cycle that another one holds
- * up is not charged for that time, as far as these calls can tell.
+ * APP_DEFAULT_WATCHDOG_US when it has no watchdog. The port calls it every few milliseconds from a context that
+ * preempts every task and main (a timer interrupt above all tasks, a thread); `now_ns` is SysTimeGetNs. A cycle that
+ * another one holds up is not charged for that time, as far as these calls can tell.
  */
 void SchedWatchdogCheck(RTS_I64 now_ns);
 

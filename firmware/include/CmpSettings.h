@@ -3,7 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The port lists its values in rts_config_port.h: #define SETTINGS_TABLE {"CmpXxx", "Key", 1, NULL}, {"CmpXxx", "Name", 0, "text"},
+ * The port lists its values in rts_config_port.h: #define SETTINGS_TABLE {"CmpXxx", "Key", 1, NULL}, {"CmpXxx", "Name",
+ * 0, "text"},
  */
 #ifndef CMPSETTINGS_H
 #define CMPSETTINGS_H

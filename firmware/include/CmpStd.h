@@ -4,7 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Headers marked "shared with the host" are read twice: by the C compiler, and (through the preprocessor with RTS_CFFI
- * defined) by the host tool. They hold only typedefs, structs, enums and prototypes, so that both sides have one definition.
+ * defined) by the host tool. They hold only typedefs, structs, enums and prototypes, so that both sides have one
+ * definition.
  */
 #ifndef CMPSTD_H
 #define CMPSTD_H

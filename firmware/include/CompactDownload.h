@@ -3,8 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Layout of manual 2.3.1 and codesys-v3-protocol 5.1..5.4. All little-endian; table entries start at multiples of 4, the
- * code segment at a multiple of APP_CODE_ALIGN. Where the field's format says nothing (tasks), a typed blob carries it.
+ * Layout of manual 2.3.1 and codesys-v3-protocol 5.1..5.4. All little-endian; table entries start at multiples of 4,
+ * the code segment at a multiple of APP_CODE_ALIGN. Where the field's format says nothing (tasks), a typed blob carries
+ * it.
  */
 #ifndef COMPACTDOWNLOAD_H
 #define COMPACTDOWNLOAD_H
@@ -97,8 +98,9 @@ enum {
     CDL_FUNCTION_COUNT = 6,
 };
 
-/* Entry of the external function table, followed by the lower-case name and a NUL, padded to a multiple of 4. `offset` is
- * the byte offset of the function's slot in the import table (area APP_AREA_NONE: the import table belongs to the loader). */
+/* Entry of the external function table, followed by the lower-case name and a NUL, padded to a multiple of 4. `offset`
+ * is the byte offset of the function's slot in the import table (area APP_AREA_NONE: the import table belongs to the
+ * loader). */
 typedef struct {
     RTS_UI32 signature_id; /* CRC of the interface text */
     RTS_UI32 identifier;
@@ -127,7 +129,7 @@ typedef struct {
 
 enum {
     CDL_BLOB_TASKS = 1,  /* array of CDL_TASK */
-    CDL_BLOB_RETAIN = 2, /* u32: CRC of the layout of the retain area; without it retain data belong to one image only */
+    CDL_BLOB_RETAIN = 2, /* u32: CRC of the retain area's layout; without it retain data belong to one image only */
 };
 
 enum { CDL_TASK_NAME_SIZE = 32 };

@@ -5,8 +5,8 @@
  *
  * Objects of type RTS_UI32. Load acquires, Store releases: what was written before a Store is seen after the Load that
  * reads it. Add returns the value before; a core without exclusive access instructions (Cortex-M0) supplies
- * __atomic_fetch_add_4 with interrupts masked. Fence keeps reads and writes before it from mixing with those after it, for
- * a number that is changed, or looked at, both before and after the data it stands for.
+ * __atomic_fetch_add_4 with interrupts masked. Fence keeps reads and writes before it from mixing with those after it,
+ * for a number that is changed, or looked at, both before and after the data it stands for.
  */
 #ifndef SYSATOMIC_H
 #define SYSATOMIC_H

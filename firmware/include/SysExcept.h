@@ -72,8 +72,8 @@ typedef struct {
 } RTS_EXCEPTION;
 
 #if EXCEPT_MAX_CALLS > 0
-/* A word that may be a return address: `target`, an offset in the application's code, was found `distance` bytes above the
- * stack pointer of the exception, or in the link register of processors that have one. */
+/* A word that may be a return address: `target`, an offset in the application's code, was found `distance` bytes above
+ * the stack pointer of the exception, or in the link register of processors that have one. */
 enum { EXCEPT_LINK = 0xFFFFFF };
 typedef struct {
     RTS_UI32 target;
@@ -101,8 +101,8 @@ const EXCEPT_TRACE *SysExceptGetTrace(void);
  */
 int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
 
-/* Leaves the running SysExceptTry of this context with RTSEXCPT_* `code`. `address`: where the error was seen; `stack`: the
- * stack pointer there. Does not return. Outside a SysExceptTry it is a fatal error of the runtime. */
+/* Leaves the running SysExceptTry of this context with RTSEXCPT_* `code`. `address`: where the error was seen; `stack`:
+ * the stack pointer there. Does not return. Outside a SysExceptTry it is a fatal error of the runtime. */
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack);
 
 /*
@@ -128,13 +128,13 @@ bool SysExceptIsReturn(uintptr_t word);
 /*
  * Notes which calls may have led to the exception at `address`. A port calls it before it leaves SysExceptTry, in the
  * context of the exception: interrupt, fault or signal handler. `stack` .. `end`: what the stack holds of the code that
- * ran, from the stack pointer on; empty when it cannot be read. `link`: the link register, 0 without. The first exception
- * counts, until it is forgotten.
+ * ran, from the stack pointer on; empty when it cannot be read. `link`: the link register, 0 without. The first
+ * exception counts, until it is forgotten.
  */
 void SysExceptTrace(uintptr_t address, const uintptr_t *stack, const uintptr_t *end, uintptr_t link);
 
-/* Forgets what was noted, the first one when it is not of the exception at `address`, which may be 0: a call by a pointer that
- * is NULL. From main, while no IEC code runs. */
+/* Forgets what was noted, the first one when it is not of the exception at `address`, which may be 0: a call by a
+ * pointer that is NULL. From main, while no IEC code runs. */
 void SysExceptKeepTrace(uintptr_t address);
 void SysExceptForgetTrace(void);
 #else

@@ -3,8 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Where the files lie: FILE_MAP of rts_config_port.h, or computed from the size of the flash. A file is written in sequence, in
- * units of FILE_ALIGN bytes; sectors are erased when the first unit of them is due, no byte is programmed twice. All from main.
+ * Where the files lie: FILE_MAP of rts_config_port.h, or computed from the size of the flash. A file is written in
+ * sequence, in units of FILE_ALIGN bytes; sectors are erased when the first unit of them is due, no byte is programmed
+ * twice. All from main.
  */
 #ifndef SYSFILEFLASH_H
 #define SYSFILEFLASH_H

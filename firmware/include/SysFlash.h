@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * NOR rules: a byte is programmed once after an erase; an erase sets whole sectors to `erased`. Only SysFileFlash and the
- * loader call these, from main, never from an interrupt.
+ * NOR rules: a byte is programmed once after an erase; an erase sets whole sectors to `erased`. Only SysFileFlash and
+ * the loader call these, from main, never from an interrupt.
  */
 #ifndef SYSFLASH_H
 #define SYSFLASH_H
@@ -15,7 +15,7 @@
 typedef struct {
     RTS_UI32 size;         /* bytes, a multiple of sector_size */
     RTS_UI32 sector_size;  /* smallest erasable unit, bytes; a power of two */
-    RTS_UI32 program_size; /* smallest programmable unit, bytes: 1, 2, 4, 8 or 16; offsets and sizes are multiples of it */
+    RTS_UI32 program_size; /* smallest programmable unit, bytes: 1, 2, 4, 8, 16; offsets and sizes are multiples of it */
     RTS_UI8 erased;        /* value of an erased byte, usually 0xFF */
 
     /* The flash as memory for reading, size bytes; NULL when it cannot be mapped. */
@@ -32,9 +32,10 @@ typedef struct {
 const SYS_FLASH *SysFlashGet(void);
 
 /*
- * Makes `size` bytes of application code at flash `offset` executable for slot `slot` (0 or 1) and returns where they run: the
- * flash itself (execute in place), or RAM the port copies them to. 16-aligned. NULL when it is not possible. Until
- * SysFlashReleaseCode of that slot the code stays valid; the other slot may be mapped at the same time. From main.
+ * Makes `size` bytes of application code at flash `offset` executable for slot `slot` (0 or 1) and returns where they
+ * run: the flash itself (execute in place), or RAM the port copies them to. 16-aligned. NULL when it is not possible.
+ * Until SysFlashReleaseCode of that slot the code stays valid; the other slot may be mapped at the same time. From
+ * main.
  */
 const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size);
 void SysFlashReleaseCode(RTS_UI32 slot); /* does nothing when it is not mapped */

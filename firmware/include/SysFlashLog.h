@@ -4,8 +4,9 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * The file is two halves. Records are appended to one half until it is full; then the other is erased and takes over. A
- * record counts when its CRC is right, the one with the newest sequence number wins: a cut leaves the old or the new one,
- * never a mix. Whoever uses it puts all it needs into each record, for the records before may be erased. All from main.
+ * record counts when its CRC is right, the one with the newest sequence number wins: a cut leaves the old or the new
+ * one, never a mix. Whoever uses it puts all it needs into each record, for the records before may be erased. All from
+ * main.
  */
 #ifndef SYSFLASHLOG_H
 #define SYSFLASHLOG_H
@@ -37,8 +38,8 @@ typedef struct {
     RTS_UI32 until;
 } FLASH_LOG_RANGE;
 
-/* Reads the newest record of the range with this tag and size into `data`; ERR_NO_OBJECT when there is none, `data` is as it
- * was then. */
+/* Reads the newest record of the range with this tag and size into `data`; ERR_NO_OBJECT when there is none, `data` is
+ * as it was then. */
 RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size);
 
 /* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault,
@@ -46,8 +47,8 @@ RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 ta
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);
 
 /*
- * From now on the newest record up to number `until` is kept: when there is no room, it is the other half that is erased, even
- * with the newest record. FlashLogKeepNone ends that. ERR_DEVICE flash fault.
+ * From now on the newest record up to number `until` is kept: when there is no room, it is the other half that is
+ * erased, even with the newest record. FlashLogKeepNone ends that. ERR_DEVICE flash fault.
  */
 RTS_RESULT FlashLogKeep(FLASH_LOG *log, RTS_UI32 until);
 void FlashLogKeepNone(FLASH_LOG *log);

@@ -11,7 +11,8 @@
 
 #include "rts_config_port.h"
 
-/* Tasks of an application. Each costs one IEC_CONTEXT, one task record (about 150 bytes on 32-bit targets) and a timer. */
+/* Tasks of an application. Each costs one IEC_CONTEXT, one task record (about 150 bytes on 32-bit targets) and a
+ * timer. */
 #ifndef APP_MAX_TASKS
 #define APP_MAX_TASKS 3
 #endif
@@ -21,14 +22,14 @@
 #define APP_MAX_IMPORTS 32
 #endif
 
-/* Longest sentence that says why an image was refused, with NUL: bytes on the main stack. It names the functions that are
- * missing. 1: no sentences, only codes, which saves 2 KiB of flash. */
+/* Longest sentence that says why an image was refused, with NUL: bytes on the main stack. It names the functions that
+ * are missing. 1: no sentences, only codes, which saves 2 KiB of flash. */
 #ifndef APP_REFUSAL_TEXT_SIZE
 #define APP_REFUSAL_TEXT_SIZE (64 + 6 * APP_MAX_IMPORTS)
 #endif
 
-/* Words of the stack that are kept of an exception, from which the host tells the calls that led there; 8 bytes each. 0: only
- * the place is known. */
+/* Words of the stack that are kept of an exception, from which the host tells the calls that led there; 8 bytes each.
+ * 0: only the place is known. */
 #ifndef EXCEPT_MAX_CALLS
 #define EXCEPT_MAX_CALLS 16
 #endif
@@ -56,17 +57,17 @@
 #define APP_PROVE_US 3000000
 #endif
 
-/* A cycle of a task without watchdog, and initialisation code, is broken out of after this long [us], so that an endless
- * loop never takes the device away. */
+/* A cycle of a task without watchdog, and initialisation code, is broken out of after this long [us], so that an
+ * endless loop never takes the device away. */
 #ifndef APP_DEFAULT_WATCHDOG_US
 #define APP_DEFAULT_WATCHDOG_US 10000000
 #endif
 
-/* Changed retain variables are saved at most this often [us]: what a power cut may lose against the wear of the flash. A
- * save takes the size of the area and 20 bytes, rounded up to 16, of one half of the retain log; a half is erased when it
- * is full. So 500 bytes that change all the time, saved every second in two halves of 8 KiB, erase each sector once in 30 s
- * (100 000 erases: 35 days); every 60 s it is almost six years. The retain area is in RAM twice, because what was saved last is
- * compared with. */
+/* Changed retain variables are saved at most this often [us]: what a power cut may lose against the wear of the flash.
+ * A save takes the size of the area and 20 bytes, rounded up to 16, of one half of the retain log; a half is erased
+ * when it is full. So 500 bytes that change all the time, saved every second in two halves of 8 KiB, erase each sector
+ * once in 30 s (100 000 erases: 35 days); every 60 s it is almost six years. The retain area is in RAM twice, because
+ * what was saved last is compared with. */
 #ifndef APP_RETAIN_SAVE_US
 #define APP_RETAIN_SAVE_US 1000000
 #endif
@@ -84,8 +85,8 @@
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) (entry)(context, init_retains)
 #endif
 
-/* 1: the runtime has one core, where interrupts and main see each other's writes in order, so only the compiler has to keep
- * it. 0: several, or threads. */
+/* 1: the runtime has one core, where interrupts and main see each other's writes in order, so only the compiler has to
+ * keep it. 0: several, or threads. */
 #ifndef RTS_ONE_CORE
 #define RTS_ONE_CORE 0
 #endif
@@ -124,21 +125,21 @@
 /* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log lie in flash, if not where
  * SysFileFlash computes it. No default. */
 
-/* Receive and send buffer of the communication channel, bytes each; the largest L7 message. The field's compact template
- * uses 2048; larger ones raise the flash rate because there is one reply per message. */
+/* Receive and send buffer of the communication channel, bytes each; the largest L7 message. The field's compact
+ * template uses 2048; larger ones raise the flash rate because there is one reply per message. */
 #ifndef NETSERVER_MESSAGE_SIZE
 #define NETSERVER_MESSAGE_SIZE 2048
 #endif
 
-/* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is below
- * 424), COM_QUEUE_SIZE and about 150 bytes. */
+/* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is
+ * below 424), COM_QUEUE_SIZE and about 150 bytes. */
 #ifndef COM_MAX_LINES
 #define COM_MAX_LINES 1
 #endif
 
 /* Queue of outgoing packets per serial line, bytes: one largest packet (516 with length and CRC, or
- * NETSERVER_MESSAGE_SIZE + 92 if that is less) and a few small ones. A second large one is made when the first is on the
- * line. */
+ * NETSERVER_MESSAGE_SIZE + 92 if that is less) and a few small ones. A second large one is made when the first is on
+ * the line. */
 #ifndef COM_QUEUE_SIZE
 #define COM_QUEUE_SIZE 640
 #endif
@@ -154,8 +155,8 @@
 #define SRV_MAX_GROUPS 8
 #endif
 
-/* Services that only tell about the application (its name and list, its tasks), the room on the stack, and the echo service;
- * 1.3 KiB of flash. 0: none. */
+/* Services that only tell about the application (its name and list, its tasks), the room on the stack, and the echo
+ * service; 1.3 KiB of flash. 0: none. */
 #ifndef SRV_INFORMATION
 #define SRV_INFORMATION 1
 #endif

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A test fills an APP_SPEC, adds code to it and builds the image. On other machines there is nothing to run: a test that
- * includes this starts main with NEEDS_X86_64.
+ * A test fills an APP_SPEC, adds code to it and builds the image. On other machines there is nothing to run: a test
+ * that includes this starts main with NEEDS_X86_64.
  */
 #ifndef APP_IMAGE_H
 #define APP_IMAGE_H

@@ -3,7 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A test program is a main that RUNs its tests and returns test_result(). A failed CHECK is printed and the test goes on.
+ * A test program is a main that RUNs its tests and returns test_result(). A failed CHECK is printed and the test goes
+ * on.
  */
 #ifndef TEST_H
 #define TEST_H

@@ -219,8 +219,8 @@ static void begin_again_starts_anew(void)
     CHECK(SimFlashViolations() == 0);
 }
 
-/* The application before fails as well, when it comes back with the retain variables it had: both are known to fail then, and
- * later start-ups write nothing. */
+/* The application before fails as well, when it comes back with the retain variables it had: both are known to fail
+ * then, and later start-ups write nothing. */
 static void a_rollback_to_an_application_that_fails_too_is_written_down(void)
 {
     APP_BYTES image;
@@ -292,7 +292,7 @@ static void a_start_that_fails_leaves_no_outputs(void)
     for (timer = 0; SysTimerDelete(timer) == ERR_OK; timer++)
         ;
     CHECK(timer > 0);
-    *AppGetAreaAddress(APP_AREA_OUTPUT, OUTPUT_OFFSET, 1) = 1; /* as if a task had run before the next one failed to start */
+    *AppGetAreaAddress(APP_AREA_OUTPUT, OUTPUT_OFFSET, 1) = 1; /* as if a task had run and the next failed to start */
     CHECK(AppStartApplication() != ERR_OK);
     CHECK(app_state() == AS_STOP);
     CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 0);

@@ -3,9 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A device runs application 1 (proven). Then application 2 is downloaded, started, proves itself, saves its retain variables, is
- * stopped and started again. Each run of this story is cut at another operation. After it the device must run 1 or 2, never
- * nothing and never a mix, and must accept application 3.
+ * A device runs application 1 (proven). Then application 2 is downloaded, started, proves itself, saves its retain
+ * variables, is stopped and started again. Each run of this story is cut at another operation. After it the device must
+ * run 1 or 2, never nothing and never a mix, and must accept application 3.
  */
 #include "app_image.h"
 #include "test.h"
@@ -179,7 +179,8 @@ static void a_second_cut_during_recovery_changes_nothing(void)
     }
 }
 
-/* A fault is no power cut: the operation fails and the device goes on. The old application must run on, or the new one. */
+/* A fault is no power cut: the operation fails and the device goes on. The old application must run on, or the new
+ * one. */
 static void fault_at_any_operation(const GEOMETRY *g)
 {
     RTS_UI32 operations;

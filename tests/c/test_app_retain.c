@@ -200,8 +200,8 @@ static void download_image(void *arg)
     (void)download(&image);
 }
 
-/* Power fails at some time during the download of image 2, while application 1 runs and changes its values. Those are of the
- * same layout, but never become those of application 2. */
+/* Power fails at some time during the download of image 2, while application 1 runs and changes its values. Those are
+ * of the same layout, but never become those of application 2. */
 static void values_of_the_application_before_are_not_taken_over(void)
 {
     RTS_UI32 taken_over = 0;
@@ -228,7 +228,8 @@ static void values_of_the_application_before_are_not_taken_over(void)
     CHECK(k < 1000 && taken_over > 3); /* cuts after the commit: in the last save of 1, in the first of 2 */
 }
 
-/* Application 2, of the same layout, runs for a moment, saves, and dies: application 1 goes on with what it had itself. */
+/* Application 2, of the same layout, runs for a moment, saves, and dies: application 1 goes on with what it had
+ * itself. */
 static void a_rollback_brings_back_the_values_of_its_application(void)
 {
     CDL_TASK *task;
@@ -257,7 +258,8 @@ static void a_rollback_brings_back_the_values_of_its_application(void)
     CHECK(retain_value() > 700);
 }
 
-/* The same when application 1 ran until application 2 took over: what it had then, not what was saved some time before. */
+/* The same when application 1 ran until application 2 took over: what it had then, not what was saved some time
+ * before. */
 static void a_rollback_brings_back_the_last_values_of_an_application_that_ran(void)
 {
     start_with_counter(1);
@@ -280,7 +282,8 @@ static void start_up(void *unused)
     (void)CMInit();
 }
 
-/* The same when a half of the log holds one record only, and power fails at any operation of the start-up that goes back. */
+/* The same when a half of the log holds one record only, and power fails at any operation of the start-up that goes
+ * back. */
 static void a_rollback_brings_back_large_values_too(void)
 {
     CDL_TASK *task;

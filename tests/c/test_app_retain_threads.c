@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * CmpRetain is compiled a second time here, with a flash log and a task that are fakes: a thread that fills the whole area with
- * one number per cycle. A copy taken within a cycle would hold two numbers.
+ * CmpRetain is compiled a second time here, with a flash log and a task that are fakes: a thread that fills the whole
+ * area with one number per cycle. A copy taken within a cycle would hold two numbers.
  */
 #define _GNU_SOURCE
 #include <pthread.h>

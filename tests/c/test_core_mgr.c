@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The manager is compiled a second time here, under other names, with a list of three components that write down what they are
- * asked to do.
+ * The manager is compiled a second time here, under other names, with a list of three components that write down what
+ * they are asked to do.
  */
 #include <string.h>
 

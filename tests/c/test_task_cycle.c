@@ -33,7 +33,8 @@ static void burn_cycle(RTS_UI32 unused)
 
 static const CMP_EXT_FUNCTION burner[] = {{"burncycle", 1, 0x00010000, (RTS_PFN)burn_cycle}};
 
-/* An application with one task that counts, stores its time, and whose cycles take `burn_us` until a test changes that. */
+/* An application with one task that counts, stores its time, and whose cycles take `burn_us` until a test changes
+ * that. */
 static CDL_TASK *begin(RTS_UI32 interval_us, RTS_UI32 burn_us)
 {
     CDL_TASK *task;
@@ -375,8 +376,8 @@ static void *look(void *unused)
     return NULL;
 }
 
-/* The cycle waits here until a supervisor in another thread has looked, at a time `us` after its start; and, when it is to be
- * broken, for that (10 s at most). */
+/* The cycle waits here until a supervisor in another thread has looked, at a time `us` after its start; and, when it is
+ * to be broken, for that (10 s at most). */
 static void supervise(RTS_UI32 us)
 {
     time_t start = time(NULL);

@@ -28,7 +28,8 @@ enum {
     BREAK_SIGNAL_OFFSET = 5,          /* from SIGRTMIN: clear of what debuggers and libraries use */
 };
 
-/* A thread that runs IEC code. The thread itself writes `jump`, `round` and `arg`; SysExceptBreak reads them from another. */
+/* A thread that runs IEC code. The thread itself writes `jump`, `round` and `arg`; SysExceptBreak reads them from
+ * another. */
 typedef struct {
     sigjmp_buf *jump;        /* of the running SysExceptTry, NULL outside of it */
     RTS_UI32 round;          /* counts SysExceptTry, so that a break that comes late does not hit the next one */

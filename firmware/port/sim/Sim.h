@@ -3,11 +3,11 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Time passes only in SimAdvance and SimRunCycles. Everything but one supervising thread runs in the caller's thread: call from
- * one thread only. What lies in flash survives SimStart; all else is lost, as it is when power comes back.
+ * Time passes only in SimAdvance and SimRunCycles. Everything but one supervising thread runs in the caller's thread:
+ * call from one thread only. What lies in flash survives SimStart; all else is lost, as it is when power comes back.
  *
- * A function that runs the runtime returns SIM_POWER_CUT when a planned power cut hit it, and does nothing but return that
- * until SimStart.
+ * A function that runs the runtime returns SIM_POWER_CUT when a planned power cut hit it, and does nothing but return
+ * that until SimStart.
  */
 #ifndef SIM_H
 #define SIM_H
@@ -19,8 +19,8 @@ enum { SIM_POWER_CUT = 0x8001 };
 
 /* ---- power ---- */
 
-/* Power on; when it is on already, it was off for a moment. Time starts at 0, the boot project runs. ERR_* of the component that
- * does not start up. */
+/* Power on; when it is on already, it was off for a moment. Time starts at 0, the boot project runs. ERR_* of the
+ * component that does not start up. */
 RTS_RESULT SimStart(void);
 
 /* Shuts down in good order. Does nothing when it is off. */
@@ -29,17 +29,18 @@ void SimStop(void);
 /* ---- time ---- */
 
 /*
- * Lets `ns` of virtual time pass: each cyclic task runs when it is due (by time, then priority), event tasks follow at once,
- * background work (CH_COMM_CYCLE) runs at least once at the end. ERR_NOTINITIALIZED when power is off, ERR_PARAMETER for a
- * negative time and when the clock would pass 292 years.
+ * Lets `ns` of virtual time pass: each cyclic task runs when it is due (by time, then priority), event tasks follow at
+ * once, background work (CH_COMM_CYCLE) runs at least once at the end. ERR_NOTINITIALIZED when power is off,
+ * ERR_PARAMETER for a negative time and when the clock would pass 292 years.
  */
 RTS_RESULT SimAdvance(RTS_I64 ns);
 
 /* The same, but what is due at the very end does not run yet: ten times 10 ms are ten cycles of a 10 ms task. */
 RTS_RESULT SimRunFor(RTS_I64 ns);
 
-/* Lets time pass until the first task of the application has run `cycles` more cycles. ERR_INVALID_STATE when the application does not
- * run, ERR_EXCEPTION when it stopped on the way, ERR_TIMEOUT when the task did not run for an hour of virtual time. */
+/* Lets time pass until the first task of the application has run `cycles` more cycles. ERR_INVALID_STATE when the
+ * application does not run, ERR_EXCEPTION when it stopped on the way, ERR_TIMEOUT when the task did not run for an hour
+ * of virtual time. */
 RTS_RESULT SimRunCycles(RTS_UI32 cycles);
 
 /* One round of background work (communication, exceptions, event tasks); no time passes. */
@@ -48,7 +49,8 @@ RTS_RESULT SimCommCycle(void);
 /* Virtual time since SimStart [ns]. */
 RTS_I64 SimNow(void);
 
-/* Cycles that take longer than this in real time [ms] are broken out of as endless; the default is SIM_CYCLE_LIMIT_MS. */
+/* Cycles that take longer than this in real time [ms] are broken out of as endless; the default is
+ * SIM_CYCLE_LIMIT_MS. */
 void SimSetCycleLimit(RTS_UI32 ms);
 
 /* ---- the device ---- */
@@ -61,15 +63,16 @@ void SimSetNodeName(const char *name); /* at most 31 characters are kept */
 int SimHasExternal(const char *name);
 
 /*
- * Real time one call of a task takes [ns], both the best of several batches: its code alone, called back to back with the
- * time of the task advancing by its interval; and a complete IecTaskCycle with the clock readings around it. Starts the
- * application; its timers go on from the virtual time reached. ERR_INVALIDID no such task, ERR_EXCEPTION it failed.
+ * Real time one call of a task takes [ns], both the best of several batches: its code alone, called back to back with
+ * the time of the task advancing by its interval; and a complete IecTaskCycle with the clock readings around it. Starts
+ * the application; its timers go on from the virtual time reached. ERR_INVALIDID no such task, ERR_EXCEPTION it failed.
  */
 RTS_RESULT SimBench(RTS_UI32 task, RTS_UI32 cycles, double *code_ns, double *cycle_ns);
 
 /* ---- flash ---- */
 
-/* When power is cut, relative to a flash operation (program or erase): it did not happen; it did; half of its bytes did. */
+/* When power is cut, relative to a flash operation (program or erase): it did not happen; it did; half of its bytes
+ * did. */
 enum { SIM_CUT_BEFORE = 0, SIM_CUT_AFTER = 1, SIM_CUT_TORN = 2, SIM_FAULT = 3 };
 /* SIM_FAULT is no cut: half of the bytes are done, the operation returns ERR_DEVICE, power stays. */
 
@@ -93,7 +96,8 @@ void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode);
 /* Flash operations (programs and erases) since SimStart. */
 RTS_UI32 SimFlashOps(void);
 
-/* Operations that broke the rules of SysFlash.h since SimFlashConfigure, and what the first one was ("" without one). */
+/* Operations that broke the rules of SysFlash.h since SimFlashConfigure, and what the first one was ("" without
+ * one). */
 RTS_UI32 SimFlashViolations(void);
 const char *SimFlashViolation(void);
 

@@ -65,7 +65,8 @@ static bool was_programmed(RTS_UI32 offset, RTS_UI32 size)
 
 /* ---- cuts ---- */
 
-/* Counts an operation on `size` bytes; returns how many of them happen. *after: what follows, SIM_CUT_* or SIM_FAULT. */
+/* Counts an operation on `size` bytes; returns how many of them happen. *after: what follows, SIM_CUT_* or
+ * SIM_FAULT. */
 static RTS_UI32 begin_operation(RTS_UI32 size, int *after)
 {
     *after = -1;

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * In an endless loop virtual time stands still, so the watchdog of the runtime never expires. A thread looks, in real time, whether one
- * and the same cycle has been running for too long.
+ * In an endless loop virtual time stands still, so the watchdog of the runtime never expires. A thread looks, in real
+ * time, whether one and the same cycle has been running for too long.
  */
 #define _GNU_SOURCE
 #include <pthread.h>

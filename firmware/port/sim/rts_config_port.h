@@ -21,7 +21,8 @@
 #define EVENT_MAX_CALLBACKS 16
 #define SCHED_MAX_EXTERNAL_EVENTS 4
 
-/* What SimFlashConfigure starts with: geometry of a common serial NOR flash, programmed in the units of an STM32's [bytes]. */
+/* What SimFlashConfigure starts with: geometry of a common serial NOR flash, programmed in the units of an STM32's
+ * [bytes]. */
 #define SIM_FLASH_SIZE (4 * 1024 * 1024)
 #define SIM_FLASH_SECTOR_SIZE 4096
 #define SIM_FLASH_PROGRAM_SIZE 8
@@ -30,7 +31,8 @@
 /* Bytes the simulated serial line holds in each direction. */
 #define SIM_COM_SIZE (64 * 1024)
 
-/* A cycle that takes longer than this in real time is broken out of [ms]: virtual time stands still in an endless loop. */
+/* A cycle that takes longer than this in real time is broken out of [ms]: virtual time stands still in an endless
+ * loop. */
 #define SIM_CYCLE_LIMIT_MS 2000
 
 #endif

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * CmpAppEmbedded.c is its life: load, start, stop, reset, exceptions. AppDownload.c puts another one in its place, AppBoot.c
- * loads what is in flash; both call the life. All from main.
+ * CmpAppEmbedded.c is its life: load, start, stop, reset, exceptions. AppDownload.c puts another one in its place,
+ * AppBoot.c loads what is in flash; both call the life. All from main.
  */
 #ifndef APP_H
 #define APP_H
@@ -20,8 +20,8 @@ bool AppHasException(void);
 /* Makes the code of a checked image executable and returns where; NULL when the port cannot. */
 const RTS_UI8 *AppMapCode(const APP_IMAGE *image);
 
-/* Takes over a checked image with its code mapped at `code`, when nothing is loaded. Retain variables come from a record
- * up to number `retain_until`. The application is in AS_STOP then, perhaps with an exception. */
+/* Takes over a checked image with its code mapped at `code`, when nothing is loaded. Retain variables come from a
+ * record up to number `retain_until`. The application is in AS_STOP then, perhaps with an exception. */
 RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until);
 void AppUnload(void);
 

@@ -47,7 +47,8 @@ const COMMIT *AppCommitGet(void);
 RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
 
 /*
- * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the one before stays.
+ * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the one before
+ * stays.
  */
 
 /* The image in `slot` is what boots: a trial. */

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * An image is written to the idle slot, checked there, mapped, committed (from here on it is what boots), and only then is the
- * old application stopped and this one loaded.
+ * An image is written to the idle slot, checked there, mapped, committed (from here on it is what boots), and only then
+ * is the old application stopped and this one loaded.
  */
 #include "App.h"
 #include "AppCommit.h"

@@ -72,8 +72,8 @@ static void record_exception(const APP_RAISED *raised)
     AppExceptionSet(&exception, raised->task < 0 ? "Initialisation" : app.tables.tasks[raised->task].name);
 }
 
-/* The safe state after an exception: outputs are zero (again, since other tasks have finished their cycle), and an application
- * that is new will not be booted. */
+/* The safe state after an exception: outputs are zero (again, since other tasks have finished their cycle), and an
+ * application that is new will not be booted. */
 static void enter_exception_state(void)
 {
     AppAreasClearOutputs();
@@ -150,8 +150,8 @@ static void unload(void)
     memset(&app.image, 0, sizeof app.image);
 }
 
-/* Initial values and fresh tasks; the application is in AS_STOP then, perhaps with an exception. It is given up when its
- * tasks cannot be created. */
+/* Initial values and fresh tasks; the application is in AS_STOP then, perhaps with an exception. It is given up when
+ * its tasks cannot be created. */
 static RTS_RESULT initialise(bool init_retains)
 {
     RTS_RESULT result;

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A task record is written by the context the task runs in; main, monitoring and the supervisor read it. Times are kept in ns
- * and 32 bits, which saturate at 4.29 s: no division in a cycle.
+ * A task record is written by the context the task runs in; main, monitoring and the supervisor read it. Times are kept
+ * in ns and 32 bits, which saturate at 4.29 s: no division in a cycle.
  */
 #include "CmpIecTask.h"
 
@@ -205,8 +205,8 @@ static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
     return task->exceeded >= task->sensitivity || elapsed_ns > task->guard.limit_ns;
 }
 
-/* No other cycle starts, which is settled before the guard says that this one is over. The rest of stopping the application
- * is main's. */
+/* No other cycle starts, which is settled before the guard says that this one is over. The rest of stopping the
+ * application is main's. */
 static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
     SysAtomicStore(&tasks.running, 0);

@@ -3,8 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The area is copied in main while tasks may preempt or run beside it. A copy counts when no cycle ran meanwhile, so that what is
- * saved is the state between two cycles; only when that cannot be had for a whole save interval, the copy is taken as it is.
+ * The area is copied in main while tasks may preempt or run beside it. A copy counts when no cycle ran meanwhile, so
+ * that what is saved is the state between two cycles; only when that cannot be had for a whole save interval, the copy
+ * is taken as it is.
  */
 #include "CmpRetain.h"
 

@@ -158,8 +158,9 @@ static RTS_I64 find_latest_start(void)
     return latest_ns;
 }
 
-/* Time stands still for a cycle as long as one that started later, and may have interrupted it, goes on from one check to
- * the next. Of several tasks that take too long the one that holds up the others is broken first, and they finish. */
+/* Time stands still for a cycle as long as one that started later, and may have interrupted it, goes on from one check
+ * to the next. Of several tasks that take too long the one that holds up the others is broken first, and they
+ * finish. */
 void SchedWatchdogCheck(RTS_I64 now_ns)
 {
     RTS_I64 latest_ns = find_latest_start();

@@ -12,7 +12,7 @@
 typedef struct {
     const CDL_TASK *record;
     const volatile RTS_UI8 *flag; /* event tasks: their BOOL */
-    RTS_UI32 seen; /* event tasks: that BOOL at the last look; external event tasks: posts of their event that were answered */
+    RTS_UI32 seen; /* event tasks: that BOOL at the last look; external event tasks: posts that were answered */
 } TRIGGER;
 
 void TriggerInit(TRIGGER *trigger, const CDL_TASK *record, RTS_UI8 *const *areas);

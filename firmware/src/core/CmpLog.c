@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Writers may be main, tasks and interrupts at once: each takes a number of its own and with it a place, and nobody waits. An entry
- * is valid while its place holds its number; a reader looks before and after the copy.
+ * Writers may be main, tasks and interrupts at once: each takes a number of its own and with it a place, and nobody
+ * waits. An entry is valid while its place holds its number; a reader looks before and after the copy.
  */
 #include "CmpLog.h"
 

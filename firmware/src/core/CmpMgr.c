@@ -21,8 +21,8 @@ static struct {
 } manager;
 
 /*
- * Start-up is a row of calls: each hook before CH_INIT_FINISHED for each component, the components of a hook in the order of
- * the list. Shutdown is the same row backwards, with the hooks that undo.
+ * Start-up is a row of calls: each hook before CH_INIT_FINISHED for each component, the components of a hook in the
+ * order of the list. Shutdown is the same row backwards, with the hooks that undo.
  */
 static RTS_SIZE row_length(void)
 {

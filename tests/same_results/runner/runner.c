@@ -7,9 +7,11 @@
  * with semihosting, or a Linux process. Reads `batch` and writes `results` in the current folder. All numbers are
  * little-endian and 32 bits:
  *
- *   batch    target, number of applications; each: image size, image (padded to 4), number of steps; each step: kind, amount,
+ *   batch    target, number of applications; each: image size, image (padded to 4), number of steps; each step: kind,
+ * amount,
  *            number of writes; each write: area, offset, size, bytes (padded to 4)
- *   results  for each application: result of the download; if it is ERR_OK, for each step: exception code, its code offset,
+ *   results  for each application: result of the download; if it is ERR_OK, for each step: exception code, its code
+ * offset,
  *            its task, then the bytes of data, retain, output and memory
  */
 #include <stdio.h>

@@ -536,8 +536,8 @@ static void break_of_what_does_not_run_does_nothing(void)
 static const RTS_UI8 program[64] __attribute__((aligned(16)));
 enum { RETURN_OFFSET = 8 };
 
-/* Pushes three words, so that the frame of an exception is moved to a multiple of 8, with a return address into `program` as
- * the lowest; goes on with `then`. */
+/* Pushes three words, so that the frame of an exception is moved to a multiple of 8, with a return address into
+ * `program` as the lowest; goes on with `then`. */
 #define PUSH_RETURN_ADDRESS(then)                                                                                      \
     __asm__ volatile(USE_FPU "mov r1, %0\n\tpush {r1, r2, lr}\n\t" then ::"r"(                                         \
                          (uintptr_t)program + RETURN_OFFSET + APP_ENTRY_MODE_BIT)                                      \

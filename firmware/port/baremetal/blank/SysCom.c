@@ -12,8 +12,8 @@ RTS_UI32 SysComGetCount(void)
 }
 
 /* Write here: baud rate and pins, empty both ring buffers and the FIFOs of the hardware (bytes that came while nobody
- * listened may hold back the interrupt of the next one), switch the receive interrupt on. That interrupt has to be above
- * all tasks, else a long cycle loses bytes. */
+ * listened may hold back the interrupt of the next one), switch the receive interrupt on. That interrupt has to be
+ * above all tasks, else a long cycle loses bytes. */
 RTS_RESULT SysComOpen(RTS_UI32 index)
 {
     RTS_UNUSED(index);

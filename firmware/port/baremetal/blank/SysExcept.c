@@ -18,8 +18,8 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     return 0;
 }
 
-/* Write here: leave the SysExceptTry of this context, after a call of SysExceptTrace, as from the fault handlers, for the
- * calls that led there. Outside of a SysExceptTry: reset, with the reason kept for the log. */
+/* Write here: leave the SysExceptTry of this context, after a call of SysExceptTrace, as from the fault handlers, for
+ * the calls that led there. Outside of a SysExceptTry: reset, with the reason kept for the log. */
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     RTS_UNUSED(code);
@@ -29,8 +29,8 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
         ;
 }
 
-/* Write here: make the SysExceptTry that was called with `arg` leave as soon as its context goes on. We run above it. And
- * let an interrupt above all tasks call SchedWatchdogCheck every millisecond, else nothing ends an endless loop. */
+/* Write here: make the SysExceptTry that was called with `arg` leave as soon as its context goes on. We run above it.
+ * And let an interrupt above all tasks call SchedWatchdogCheck every millisecond, else nothing ends an endless loop. */
 void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     RTS_UNUSED(arg);

@@ -262,8 +262,9 @@ static BASE_CALL RTS_REAL64 lreal_sqrt(RTS_REAL64 value)
 
 #if defined(__arm__) && !defined(__ARM_ARCH_6M__)
 /*
- * The sum in libgcc of Armv7-M loses a bit when the signs differ, the exponents are FAR apart, and the result has a smaller
- * exponent than the larger operand: 4294967295.5 - 18446744073709551616.0 is one unit off. Here that case is right.
+ * The sum in libgcc of Armv7-M loses a bit when the signs differ, the exponents are FAR apart, and the result has a
+ * smaller exponent than the larger operand: 4294967295.5 - 18446744073709551616.0 is one unit off. Here that case is
+ * right.
  */
 enum { FAR = 33, MANTISSA_BITS = 52, GUARD_BITS = 3, EXPONENTS = 0x7FF };
 

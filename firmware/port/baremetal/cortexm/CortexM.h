@@ -21,7 +21,8 @@
  *   BOARD_CLOCK_HZ       clock of core and SysTick, a multiple of 1000, at least 4 MHz
  *   BOARD_IRQ_COUNT      interrupt lines of the chip
  *   BOARD_PRIORITY_BITS  priority bits of the NVIC, 3 or more
- *   BOARD_TASK_IRQ       first of SYSTIMER_COUNT lines in a row that no peripheral in use drives: software triggers them
+ *   BOARD_TASK_IRQ       first of SYSTIMER_COUNT lines in a row that no peripheral in use drives: software triggers
+ * them
  *   BOARD_VECTORS        initialisers [IRQ_VECTOR(n)] = {handler} for its peripherals, each followed by a comma
  */
 
@@ -162,7 +163,8 @@ void BoardInit(void);
  * fine, early too. With interrupts masked. */
 void BoardAlarmSet(RTS_UI32 ns);
 
-/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Never stopped. */
+/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Never
+ * stopped. */
 void BoardWatchdogStart(RTS_UI32 ms);
 void BoardWatchdogKick(void);
 

@@ -125,7 +125,8 @@ __attribute__((naked)) static void try_return(void)
 }
 
 /* Leaves the running Try. */
-__attribute__((naked, noreturn)) static void try_raise(RTS_UI32 code, uintptr_t address, const void *stack, uintptr_t link)
+__attribute__((naked, noreturn)) static void
+try_raise(RTS_UI32 code, uintptr_t address, const void *stack, uintptr_t link)
 {
     RTS_UNUSED(code);
     RTS_UNUSED(address);
@@ -321,9 +322,10 @@ void SysExceptShutdown(void)
 {
 }
 
-/* Where a function that is broken goes on: it leaves the running Try. By then the processor has taken its frame back, so
- * that the stack pointer is as it was. */
-__attribute__((naked, noreturn)) static void try_break(RTS_UI32 code, uintptr_t address, RTS_UI32 unused, uintptr_t link)
+/* Where a function that is broken goes on: it leaves the running Try. By then the processor has taken its frame back,
+ * so that the stack pointer is as it was. */
+__attribute__((naked, noreturn)) static void
+try_break(RTS_UI32 code, uintptr_t address, RTS_UI32 unused, uintptr_t link)
 {
     RTS_UNUSED(code);
     RTS_UNUSED(address);

@@ -20,8 +20,8 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #define APP_CALL_ENTRY(entry, context) IecCall((context), 0, (uintptr_t)(entry))
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((context), (init_retains), (uintptr_t)(entry))
 
-/* No program of a small controller takes this long for a cycle [us]: an endless loop is an exception soon. A task that does
- * says so, by a watchdog of its own. */
+/* No program of a small controller takes this long for a cycle [us]: an endless loop is an exception soon. A task that
+ * does says so, by a watchdog of its own. */
 #ifndef APP_DEFAULT_WATCHDOG_US
 #define APP_DEFAULT_WATCHDOG_US 2000000
 #endif
@@ -36,8 +36,8 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #define RTS_CODE_RAM_SIZE 8192
 #endif
 
-/* The main stack, bytes, a multiple of 32, without what an FPU adds. It holds the check of a new application's image, and
- * on top of it about 210 for each task and 140 for an interrupt above them. */
+/* The main stack, bytes, a multiple of 32, without what an FPU adds. It holds the check of a new application's image,
+ * and on top of it about 210 for each task and 140 for an interrupt above them. */
 #ifndef RTS_MAIN_STACK_SIZE
 #define RTS_MAIN_STACK_SIZE 2560
 #endif

@@ -16,8 +16,8 @@ enum { STACK_PAINT = 0x5A };
 /* Of the linker script. */
 extern RTS_UI8 data_start[], data_end[], data_load[], bss_start[], bss_end[], stack_bottom[], stack_top[];
 
-/* What an FPU adds to the main stack: main and each task that is interrupted leave a context of 64 bytes that SysExceptTry
- * saves and 72 that the processor does. */
+/* What an FPU adds to the main stack: main and each task that is interrupted leave a context of 64 bytes that
+ * SysExceptTry saves and 72 that the processor does. */
 #ifdef __ARM_FP
 enum { FPU_CONTEXTS_SIZE = (APP_MAX_TASKS + 1) * (64 + 72) };
 #else

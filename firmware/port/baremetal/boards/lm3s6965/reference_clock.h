@@ -1,6 +1,6 @@
 /*
- * reference_clock.h - a second clock, for the test of the first one: the counter of the watchdog. (QEMU does not let the
- * timers be read.)
+ * reference_clock.h - a second clock, for the test of the first one: the counter of the watchdog. (QEMU does not let
+ * the timers be read.)
  *
  * SPDX-License-Identifier: Apache-2.0
  */
