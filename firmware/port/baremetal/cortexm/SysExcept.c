@@ -117,8 +117,7 @@ void SysExceptInit(void)
 
 /* ---- entering and leaving ---- */
 
-/* The function given to SysExceptTry returned. A store that is still on its way and fails is to fail before we leave.
- * */
+/* The function given to SysExceptTry returned. A store that is on its way and fails is to fail before we leave. */
 __attribute__((naked)) static void try_return(void)
 {
     __asm__ volatile("dsb\n\tisb\n\tmovs r0, #0\n\tsvc 0");
