@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -70,24 +70,22 @@ class DebugInfo:
         program stopped in a function that is not its own. Then, and on the way there, those are taken that lead
         furthest."""
         if offset is not None and self._frame(offset) is not None:
-            return self._unwind(offset, 0, trace)
+            return self._unwind(offset, 0, trace.words, trace.link)
         starts = [(at + self._word, target) for at, target in sorted(trace.words.items())]
         if trace.link is not None:  # a function that calls no other; how much it has pushed is not known
             starts += [(pushed, trace.link) for pushed in range(0, _MOST_PUSHED, self._word)]
-        chains = ([target - 1, *self._unwind(target - 1, pointer, trace)] for pointer, target in starts)
+        chains = ([target - 1, *self._unwind(target - 1, pointer, trace.words)] for pointer, target in starts)
         return max(chains, key=len, default=[])
 
-    def _unwind(self, offset: int, pointer: int, trace: Trace) -> list[int]:
+    def _unwind(self, offset: int, pointer: int, words: Mapping[int, int], link: int | None = None) -> list[int]:
+        """`link`: where the function at `offset` returns to, if it has not saved that."""
         calls: list[int] = []
         while len(calls) < _MOST_CALLS and (frame := self._frame(offset)) is not None:
             pointer += frame.size
-            if frame.return_address is not None:
-                target = trace.words.get(pointer + frame.return_address)
-            else:
-                target = trace.link if not calls else None
+            target = link if frame.return_address is None else words.get(pointer + frame.return_address)
             if target is None:
                 break
-            offset = target - 1
+            offset, link = target - 1, None
             calls.append(offset)
         return calls
 

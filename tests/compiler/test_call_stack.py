@@ -116,3 +116,13 @@ def test_a_function_of_the_runtime_and_the_jump_to_it_are_told_by_their_caller(t
     for stopped in (None, jump):
         (place,) = built.symbols.call_stack(stopped, Trace(link=after_call))
         assert (place.pou, place.line) == ("Main", 3)
+
+
+def test_a_function_that_never_returns_is_told_once(tmp_path) -> None:
+    """It has no need to save where it would return to."""
+    path = tmp_path / "loop.st"
+    path.write_text("PROGRAM Main\nVAR x : REAL; END_VAR\nWHILE TRUE DO\nx := x * 1.5;\nEND_WHILE\nEND_PROGRAM\n")
+    built = compile_sources([path], target="cortex-m3")
+    after_call = next(offset for offset, _, line in built.symbols.lines if line == 4) + 2
+    (place,) = built.symbols.call_stack(None, Trace(link=after_call))
+    assert (place.pou, place.line) == ("Main", 4)
