@@ -3,19 +3,11 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CmpLog.h"
 #include "SysFileFlash.h"
-#include "app_image.h"
-#include "test.h"
+#include "app_device.h"
 
 static APP_SPEC spec;
 static APP_BYTES image;
-
-static void start_blank(void)
-{
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-}
 
 static void load(void)
 {
@@ -24,11 +16,29 @@ static void load(void)
     CHECK(AppStartApplication() == ERR_OK);
 }
 
-static void start_with_counter(RTS_UI32 step)
+/* The counter, as `spec`, which a test may go on from. */
+static void start_and_load(RTS_UI32 step)
 {
     start_blank();
     spec_counter(&spec, step);
     load();
+}
+
+enum { TRIP_OFFSET = 32 };
+
+/* A task that divides by zero, to be triggered by trip(). */
+static void add_trip(void)
+{
+    CDL_TASK *task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
+
+    task->event_area = APP_AREA_DATA;
+    task->event_offset = TRIP_OFFSET;
+    emit_divide_by_zero(&spec);
+}
+
+static void trip(void)
+{
+    *AppGetAreaAddress(APP_AREA_DATA, TRIP_OFFSET, 1) = 1;
 }
 
 static RTS_UI32 retain_value(void)
@@ -39,22 +49,11 @@ static RTS_UI32 retain_value(void)
     return a;
 }
 
-static bool log_has(const char *text)
-{
-    LOG_ENTRY entry = {0};
-
-    while (LogGetEntry(entry.handle + 1, &entry) == ERR_OK) {
-        if (strstr(entry.text, text) != NULL)
-            return true;
-    }
-    return false;
-}
-
 static void a_power_cut_loses_at_most_a_second(void)
 {
     RTS_UI32 before;
 
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(7350)) == ERR_OK);
     before = retain_value();
     CHECK(SimStart() == ERR_OK);
@@ -65,7 +64,7 @@ static void a_power_cut_loses_at_most_a_second(void)
 
 static void stop_saves_at_once(void)
 {
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(330)) == ERR_OK);
     CHECK(AppStopApplication() == ERR_OK);
     CHECK(SimStart() == ERR_OK);
@@ -74,7 +73,7 @@ static void stop_saves_at_once(void)
 
 static void shutdown_saves(void)
 {
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(330)) == ERR_OK);
     SimStop();
     CHECK(SimStart() == ERR_OK);
@@ -83,17 +82,12 @@ static void shutdown_saves(void)
 
 static void an_exception_saves(void)
 {
-    CDL_TASK *task;
-
     start_blank();
     spec_counter(&spec, 1);
-    task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
-    task->event_area = APP_AREA_DATA;
-    task->event_offset = 32;
-    emit_divide_by_zero(&spec);
+    add_trip();
     load();
     CHECK(SimAdvance(ms(5330)) == ERR_OK);
-    *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
+    trip();
     CHECK(SimAdvance(ms(9)) == ERR_OK);
     CHECK(app_exception() != RTSEXCPT_NOEXCEPTION);
     CHECK(SimStart() == ERR_OK);
@@ -119,7 +113,7 @@ static void changing_variables_are_saved_once_per_second(void)
 {
     RTS_UI32 operations;
 
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     operations = SimFlashOps();
     CHECK(SimAdvance(ms(10000)) == ERR_OK);
@@ -150,7 +144,7 @@ static void values_go_on_over_many_power_cuts(void)
     RTS_UI32 before = 100;
     int i;
 
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(4100)) == ERR_OK);
     for (i = 0; i < 300; i++) {
         CHECK(retain_value() >= before);
@@ -164,7 +158,7 @@ static void values_go_on_over_many_power_cuts(void)
 
 static void a_download_gives_initial_values(void)
 {
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     load();
     CHECK(retain_value() == 100);
@@ -174,7 +168,7 @@ static void a_download_gives_initial_values(void)
 
 static void a_cold_reset_gives_initial_values_for_good(void)
 {
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
     CHECK(SimStart() == ERR_OK);
@@ -183,7 +177,7 @@ static void a_cold_reset_gives_initial_values_for_good(void)
 
 static void another_layout_is_not_restored(void)
 {
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     spec_counter(&spec, 2);
     spec.retain_layout++;
@@ -207,7 +201,7 @@ static void values_of_the_application_before_are_not_taken_over(void)
     RTS_UI32 taken_over = 0;
     RTS_UI32 k;
 
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     CHECK(SimFlashSave() == ERR_OK);
     spec_counter(&spec, 2);
@@ -232,21 +226,17 @@ static void values_of_the_application_before_are_not_taken_over(void)
  * itself. */
 static void a_rollback_brings_back_the_values_of_its_application(void)
 {
-    CDL_TASK *task;
     int i;
 
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     CHECK(AppStopApplication() == ERR_OK);
     CHECK(retain_value() == 601);
     spec_counter(&spec, 2);
-    task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
-    task->event_area = APP_AREA_DATA;
-    task->event_offset = 32;
-    emit_divide_by_zero(&spec);
+    add_trip();
     load();
     CHECK(SimAdvance(ms(2500)) == ERR_OK);
-    *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
+    trip();
     CHECK(SimAdvance(ms(10)) == ERR_OK);
     for (i = 0; i < 3; i++) {
         CHECK(SimStart() == ERR_OK);
@@ -262,7 +252,7 @@ static void a_rollback_brings_back_the_values_of_its_application(void)
  * before. */
 static void a_rollback_brings_back_the_last_values_of_an_application_that_ran(void)
 {
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5330)) == ERR_OK);
     CHECK(retain_value() == 634);
     spec_counter(&spec, 2);
@@ -286,7 +276,6 @@ static void start_up(void *unused)
  * back. */
 static void a_rollback_brings_back_large_values_too(void)
 {
-    CDL_TASK *task;
     RTS_UI32 k;
     int i;
 
@@ -298,13 +287,10 @@ static void a_rollback_brings_back_large_values_too(void)
     CHECK(SimAdvance(ms(5330)) == ERR_OK);
     spec_counter(&spec, 2);
     spec.areas[APP_AREA_RETAIN] = APP_RETAIN_SIZE;
-    task = add_task(&spec, "Trip", KIND_EVENT, 0, here(&spec));
-    task->event_area = APP_AREA_DATA;
-    task->event_offset = 32;
-    emit_divide_by_zero(&spec);
+    add_trip();
     load();
     CHECK(SimAdvance(ms(2500)) == ERR_OK);
-    *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
+    trip();
     CHECK(SimAdvance(ms(10)) == ERR_OK);
     CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
     CHECK(SimFlashSave() == ERR_OK);
@@ -328,7 +314,7 @@ static void a_lost_log_costs_its_values_only(void)
 {
     const FILE_AREA *area = SysFileGetArea(FILE_RETAIN);
 
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     load(); /* the records of this download are numbered from six or so */
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
@@ -345,7 +331,7 @@ static void damaged_values_give_way_to_initial_ones(void)
     const FILE_AREA *area = SysFileGetArea(FILE_RETAIN);
     RTS_UI32 i;
 
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     for (i = 0; i < area->size; i += 4) {
         RTS_UI32 word;
@@ -374,7 +360,7 @@ static void without_a_layout_only_the_same_image_gets_its_values_back(void)
 
 static void a_flash_fault_does_not_stop_the_application(void)
 {
-    start_with_counter(1);
+    start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     SimFlashCut(1, SIM_FAULT);
     CHECK(SimAdvance(ms(10000)) == ERR_OK);
