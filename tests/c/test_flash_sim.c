@@ -3,7 +3,10 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#define _GNU_SOURCE
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "Sim.h"
 #include "SysFlash.h"
@@ -216,6 +219,78 @@ static void code_is_mapped_per_slot_and_aligned(void)
     SysFlashReleaseCode(2);
 }
 
+static void planned_calls_fail_and_do_nothing(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+    RTS_UI8 byte = 0;
+
+    SimFlashFail(SIM_CALL_PROGRAM, 2, 2);
+    CHECK(flash->program(0, ones, 1) == ERR_OK);
+    CHECK(flash->program(1, ones, 1) == ERR_DEVICE);
+    CHECK(flash->program(1, ones, 1) == ERR_DEVICE);
+    CHECK(flash->read(1, &byte, 1) == ERR_OK && byte == 0xFF);
+    CHECK(flash->program(1, ones, 1) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+    CHECK(SimFlashCalls(SIM_CALL_PROGRAM) == 4);
+    SimFlashFail(SIM_CALL_READ, 1, 1);
+    CHECK(flash->read(1, &byte, 1) == ERR_DEVICE);
+    SimFlashFail(SIM_CALL_ERASE, 1, 1);
+    CHECK(flash->erase(0) == ERR_DEVICE);
+    SimFlashFail(SIM_CALL_SYNC, 1, 1);
+    CHECK(flash->sync() == ERR_DEVICE && flash->sync() == ERR_OK);
+    SimFlashFail(SIM_CALL_MAP, 1, 1);
+    CHECK(SysFlashMapCode(0, 0, 16) == NULL && SysFlashMapCode(0, 0, 16) != NULL);
+    SimFlashFail(SIM_CALL_SYNC, 1, 1);
+    SimFlashFail(SIM_CALL_SYNC, 0, 0);
+    CHECK(flash->sync() == ERR_OK);
+}
+
+static void a_plan_made_while_power_is_off_is_for_the_next_start(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    SimFlashFail(SIM_CALL_SYNC, 1, 1);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(flash->sync() == ERR_OK);
+    SimStop();
+    SimFlashFail(SIM_CALL_SYNC, 1, 1);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(flash->sync() == ERR_DEVICE);
+}
+
+static void what_is_loaded_counts_as_programmed(void)
+{
+    static RTS_UI8 content[16 * 1024];
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    memset(content, 0xFF, sizeof content);
+    content[5] = 1;
+    CHECK(SimFlashLoad(content, 100) == ERR_PARAMETER);
+    CHECK(SimFlashLoad(content, sizeof content) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(flash->program(4, ones, 1) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+    CHECK(flash->program(5, ones, 1) == ERR_OK);
+    CHECK(SimFlashViolations() == 1);
+}
+
+/* What a process programmed is there after it died; a store of its own into the flash is what it dies of. */
+static void cells_survive_the_process_and_are_not_written_by_stores(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+    int status = 0;
+    pid_t child = fork();
+
+    if (child == 0) {
+        (void)flash->program(0, ones, 1);
+        *(volatile RTS_UI8 *)(uintptr_t)flash->mapped = 7;
+        _exit(0);
+    }
+    CHECK(child > 0 && waitpid(child, &status, 0) == child);
+    CHECK(!WIFEXITED(status) || WEXITSTATUS(status) != 0);
+    CHECK(SimFlashData()[0] == 1);
+}
+
 int main(void)
 {
     RUN(only_possible_geometries_are_accepted);
@@ -229,5 +304,9 @@ int main(void)
     RUN(outside_of_a_call_a_cut_leaves_the_flash_dead_until_power_on);
     RUN(content_is_kept_and_brought_back_with_what_was_programmed);
     RUN(code_is_mapped_per_slot_and_aligned);
+    RUN(planned_calls_fail_and_do_nothing);
+    RUN(a_plan_made_while_power_is_off_is_for_the_next_start);
+    RUN(what_is_loaded_counts_as_programmed);
+    RUN(cells_survive_the_process_and_are_not_written_by_stores);
     return test_result();
 }

@@ -124,6 +124,7 @@ void SimStop(void)
     if (sim.on)
         (void)with_landing(shut_down, NULL);
     sim.on = false;
+    SimFlashPowerOff();
     SysExceptShutdown();
 }
 

@@ -82,16 +82,39 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
 /* 0: the flash is read through its read function only. From power off; the default is 1. */
 void SimFlashSetMapped(int mapped);
 
-/* The content, to look at or to spoil. */
+/* The content, to look at or to spoil: writable until the next SimStart. It is shared with child processes. */
 RTS_UI8 *SimFlashData(void);
 RTS_UI32 SimFlashSize(void);
+
+/* Sets the whole content, e.g. of a flash file; what is not erased counts as programmed. From power off.
+ * ERR_PARAMETER for another size than SimFlashConfigure was told. */
+RTS_RESULT SimFlashLoad(const RTS_UI8 *data, RTS_UI32 size);
 
 /* Keeps the content, and brings back what was kept (nothing, when the geometry changed since). From power off. */
 RTS_RESULT SimFlashSave(void);
 RTS_RESULT SimFlashRestore(void);
 
-/* Plans a cut or fault at the `operation`-th flash operation from now, 1 being the next; 0 forgets the plan. */
+/* Plans a cut or fault at the `operation`-th flash operation from now, 1 being the next; 0 forgets the plan. Plans of
+ * these functions are kept by SimStart when they are made while power is off, and are forgotten by it otherwise. */
 void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode);
+
+/* Calls of the port by the runtime. SIM_CALL_READ: only of a flash that is not mapped. SIM_CALL_MAP: SysFlashMapCode,
+ * as for want of memory. */
+enum {
+    SIM_CALL_READ = 0,
+    SIM_CALL_PROGRAM = 1,
+    SIM_CALL_ERASE = 2,
+    SIM_CALL_SYNC = 3,
+    SIM_CALL_MAP = 4,
+    SIM_CALL_KINDS = 5,
+};
+
+/* Plans that `count` calls of a kind fail without doing anything, from the `call`-th from now on, 1 being the next;
+ * 0 forgets the plan. */
+void SimFlashFail(RTS_UI32 kind, RTS_UI32 call, RTS_UI32 count);
+
+/* Calls of a kind since SimStart. */
+RTS_UI32 SimFlashCalls(RTS_UI32 kind);
 
 /* Flash operations (programs and erases) since SimStart. */
 RTS_UI32 SimFlashOps(void);

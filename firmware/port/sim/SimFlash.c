@@ -4,13 +4,15 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A byte may be programmed once after an erase, also with the value it has. What breaks a rule is counted, and happens
- * as it would on a chip.
+ * as it would on a chip. The cells survive the end of a child process that ran the runtime, as they survive power off,
+ * and while power is on a store into them is a fault, as it is on a chip.
  */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include "Sim.h"
 #include "SysFlash.h"
@@ -24,10 +26,12 @@ typedef struct {
     RTS_UI32 size;
 } MAPPING;
 
-/* The cells, and which of them were programmed since they were erased. */
+/* The cells, and which of them were programmed since they were erased; shared with child processes. */
 typedef struct {
-    RTS_UI8 *data;
+    int file;      /* memory with the cells, by which they are changed */
+    RTS_UI8 *data; /* the same, for reading */
     RTS_UI8 *programmed;
+    RTS_UI32 size;
 } CELLS;
 
 static struct {
@@ -39,6 +43,12 @@ static struct {
     RTS_UI32 cut_at; /* value of `operations` at which it happens, 0: never */
     RTS_UI32 cut_mode;
     bool power_lost;
+    bool on;
+    RTS_UI32 calls[SIM_CALL_KINDS];
+    struct {
+        RTS_UI32 in; /* how many calls until the first one that fails, that one included; 0: it is due or past */
+        RTS_UI32 count; /* that are still to fail */
+    } failing[SIM_CALL_KINDS];
     RTS_UI32 violations;
     char violation[80];
     MAPPING mapping[CODE_SLOTS];
@@ -63,7 +73,37 @@ static bool was_programmed(RTS_UI32 offset, RTS_UI32 size)
     return memchr(chip.cells.programmed + offset, 1, size) != NULL;
 }
 
-/* ---- cuts ---- */
+/* Whether tests may store into the cells. */
+static void set_writable(bool writable)
+{
+    (void)mprotect(chip.cells.data, chip.cells.size, writable ? PROT_READ | PROT_WRITE : PROT_READ);
+}
+
+static void set_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
+{
+    if (pwrite(chip.cells.file, data, size, (off_t)offset) != (ssize_t)size)
+        violate("the simulator's memory failed", offset);
+}
+
+/* ---- failing calls and cuts ---- */
+
+/* Counts a call; true when it was planned to fail. */
+static bool call_fails(RTS_UI32 kind)
+{
+    chip.calls[kind]++;
+    if (chip.failing[kind].in > 0)
+        chip.failing[kind].in--;
+    if (chip.failing[kind].in > 0 || chip.failing[kind].count == 0)
+        return false;
+    chip.failing[kind].count--;
+    return true;
+}
+
+static void forget_plans(void)
+{
+    chip.cut_at = 0;
+    memset(chip.failing, 0, sizeof chip.failing);
+}
 
 /* Counts an operation on `size` bytes; returns how many of them happen. *after: what follows, SIM_CUT_* or
  * SIM_FAULT. */
@@ -96,21 +136,45 @@ static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 {
     if (!is_inside(offset, size))
         return violate("read outside", offset);
+    if (call_fails(SIM_CALL_READ))
+        return ERR_DEVICE;
     memcpy(data, chip.cells.data + offset, size);
     return ERR_OK;
+}
+
+/* What a cell holds after `value` was programmed into it: bits only change away from erased. */
+static RTS_UI8 programmed_cell(RTS_UI8 old, RTS_UI8 value)
+{
+    return chip.flash.erased == 0xFF ? old & value : old | value;
 }
 
 /* A half programmed unit counts as programmed. */
 static void program_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 unit = chip.flash.program_size;
-    RTS_UI32 i;
+    RTS_UI8 part[64];
+    RTS_UI32 done;
+    RTS_UI32 count;
 
-    for (i = 0; i < size; i++) {
-        RTS_UI8 *cell = chip.cells.data + offset + i;
-        *cell = chip.flash.erased == 0xFF ? *cell & data[i] : *cell | data[i];
+    for (done = 0; done < size; done += count) {
+        RTS_UI32 i;
+        count = size - done < sizeof part ? size - done : (RTS_UI32)sizeof part;
+        for (i = 0; i < count; i++)
+            part[i] = programmed_cell(chip.cells.data[offset + done + i], data[done + i]);
+        set_cells(offset + done, part, count);
     }
     memset(chip.cells.programmed + offset, 1, (size + unit - 1) / unit * unit);
+}
+
+static void erase_cells(RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_UI8 part[64];
+    RTS_UI32 done;
+
+    memset(part, chip.flash.erased, sizeof part);
+    for (done = 0; done < size; done += (RTS_UI32)sizeof part)
+        set_cells(offset + done, part, size - done < sizeof part ? size - done : (RTS_UI32)sizeof part);
+    memset(chip.cells.programmed + offset, 0, size);
 }
 
 static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size)
@@ -124,6 +188,8 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
         return violate("program outside", offset);
     if (offset % unit != 0 || size % unit != 0)
         return violate("program misaligned", offset);
+    if (call_fails(SIM_CALL_PROGRAM))
+        return ERR_DEVICE;
     if (was_programmed(offset, size))
         violate("programmed twice", offset);
     program_cells(offset, data, begin_operation(size, &after));
@@ -141,15 +207,16 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
         return violate("erase outside", offset);
     if (offset % size != 0)
         return violate("erase misaligned", offset);
+    if (call_fails(SIM_CALL_ERASE))
+        return ERR_DEVICE;
     size = begin_operation(size, &after);
-    memset(chip.cells.data + offset, chip.flash.erased, size);
-    memset(chip.cells.programmed + offset, 0, size);
+    erase_cells(offset, size);
     return end_operation(after);
 }
 
 static RTS_RESULT flash_sync(void)
 {
-    return chip.power_lost ? ERR_DEVICE : ERR_OK;
+    return chip.power_lost || call_fails(SIM_CALL_SYNC) ? ERR_DEVICE : ERR_OK;
 }
 
 const SYS_FLASH *SysFlashGet(void)
@@ -166,6 +233,8 @@ const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
     if (slot >= CODE_SLOTS || size == 0 || !is_inside(offset, size))
         return NULL;
     SysFlashReleaseCode(slot);
+    if (call_fails(SIM_CALL_MAP))
+        return NULL;
     code = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (code == MAP_FAILED)
         return NULL;
@@ -195,16 +264,31 @@ static bool is_power_of_two(RTS_UI32 n)
 
 static void free_cells(CELLS *cells)
 {
-    free(cells->data);
-    free(cells->programmed);
-    cells->data = NULL;
-    cells->programmed = NULL;
+    if (cells->data != NULL)
+        munmap(cells->data, cells->size);
+    if (cells->programmed != NULL)
+        munmap(cells->programmed, cells->size);
+    if (cells->size != 0)
+        close(cells->file);
+    memset(cells, 0, sizeof *cells);
+}
+
+static RTS_UI8 *map_shared(int file, RTS_UI32 size)
+{
+    int flags = file < 0 ? MAP_SHARED | MAP_ANONYMOUS : MAP_SHARED;
+    void *memory = mmap(NULL, size, PROT_READ | PROT_WRITE, flags, file, 0);
+
+    return memory == MAP_FAILED ? NULL : memory;
 }
 
 static bool allocate_cells(CELLS *cells, RTS_UI32 size)
 {
-    cells->data = malloc(size);
-    cells->programmed = calloc(size, 1);
+    cells->file = memfd_create("flash", MFD_CLOEXEC);
+    if (cells->file < 0)
+        return false;
+    cells->size = size;
+    cells->programmed = map_shared(-1, size);
+    cells->data = ftruncate(cells->file, (off_t)size) == 0 ? map_shared(cells->file, size) : NULL;
     if (cells->data != NULL && cells->programmed != NULL)
         return true;
     free_cells(cells);
@@ -242,16 +326,28 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
 
 RTS_RESULT SimFlashPowerOn(void)
 {
+    RTS_RESULT result = ERR_OK;
     RTS_UI32 slot;
 
     for (slot = 0; slot < CODE_SLOTS; slot++)
         SysFlashReleaseCode(slot);
+    if (chip.on)
+        forget_plans();
+    chip.on = true;
     chip.operations = 0;
-    chip.cut_at = 0;
     chip.power_lost = false;
-    if (chip.cells.data != NULL)
-        return ERR_OK;
-    return SimFlashConfigure(SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED);
+    memset(chip.calls, 0, sizeof chip.calls);
+    if (chip.cells.data == NULL)
+        result = SimFlashConfigure(SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED);
+    if (result == ERR_OK)
+        set_writable(false);
+    return result;
+}
+
+void SimFlashPowerOff(void)
+{
+    chip.on = false;
+    forget_plans();
 }
 
 void SimFlashSetMapped(int mapped)
@@ -262,7 +358,22 @@ void SimFlashSetMapped(int mapped)
 
 RTS_UI8 *SimFlashData(void)
 {
+    if (chip.cells.data != NULL)
+        set_writable(true);
     return chip.cells.data;
+}
+
+RTS_RESULT SimFlashLoad(const RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 i;
+
+    if (chip.cells.data == NULL || size != chip.flash.size)
+        return ERR_PARAMETER;
+    set_writable(true);
+    memcpy(chip.cells.data, data, size);
+    for (i = 0; i < size; i++)
+        chip.cells.programmed[i] = data[i] != chip.flash.erased;
+    return ERR_OK;
 }
 
 RTS_UI32 SimFlashSize(void)
@@ -290,6 +401,7 @@ RTS_RESULT SimFlashRestore(void)
 {
     if (chip.kept.data == NULL)
         return ERR_NO_OBJECT;
+    set_writable(true);
     copy_cells(&chip.cells, &chip.kept);
     return ERR_OK;
 }
@@ -298,6 +410,19 @@ void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode)
 {
     chip.cut_at = operation == 0 ? 0 : chip.operations + operation;
     chip.cut_mode = mode;
+}
+
+void SimFlashFail(RTS_UI32 kind, RTS_UI32 call, RTS_UI32 count)
+{
+    if (kind >= SIM_CALL_KINDS)
+        return;
+    chip.failing[kind].in = call;
+    chip.failing[kind].count = call == 0 ? 0 : count;
+}
+
+RTS_UI32 SimFlashCalls(RTS_UI32 kind)
+{
+    return kind < SIM_CALL_KINDS ? chip.calls[kind] : 0;
 }
 
 RTS_UI32 SimFlashOps(void)
