@@ -1,0 +1,149 @@
+"""Attacks the promise "no power cut, bad program or bad packet can lose the program".
+
+    tests/attack/run.py                  all campaigns
+    tests/attack/run.py --short          some cases of each, in less than a minute
+    tests/attack/run.py --only cut,call  these campaigns
+    tests/attack/run.py --replay cut:17  one case, with everything that is said on the way
+    tests/attack/run.py --seed 5         other random cases
+
+Each case ends with a look at the device: the newest good program runs, or the one before where the new one died
+before it proved itself, or it is stopped with communication up and the cause in the log. Anything else is a failure,
+and the line that replays it is printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import sys
+import time
+import traceback
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+
+from campaign import OUTCOMES, Campaign, Case, Fallen
+from cuts import Calls, Cuts
+from images import Images
+from sectors import Sectors
+from workshop import Workshop, open_workshop
+
+CAMPAIGNS: tuple[type[Campaign], ...] = (Cuts, Calls, Images, Sectors)
+SHOWN = 10  # failures of a campaign that are printed
+
+
+@dataclass
+class Result:
+    """What came of a campaign. `fallen`: numbers of cases and why."""
+
+    campaign: Campaign
+    outcomes: Counter[str] = field(default_factory=Counter)
+    fallen: dict[int, str] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def count(self) -> int:
+        return sum(self.outcomes.values()) + len(self.fallen)
+
+
+_at_work: Campaign | None = None  # of this process and those it forks
+_cases: list[Case] = []
+
+
+def attempt(number: int) -> tuple[int, str, str]:
+    """Runs a case; its number, its outcome, and why the promise fell, if it did."""
+    assert _at_work
+    try:
+        return number, _at_work.run(_cases[number]), ""
+    except Fallen as reason:
+        return number, "", str(reason)
+    except Exception:
+        return number, "", "the campaign itself failed:\n" + traceback.format_exc()
+
+
+def run_campaign(campaign: Campaign, short: bool, jobs: int) -> Result:
+    """Its cases, side by side."""
+    global _at_work, _cases
+    begin = time.monotonic()
+    _at_work, _cases = campaign, campaign.cases()
+    numbers = list(range(len(_cases)))
+    if short and campaign.short < len(numbers):
+        numbers = sorted(random.Random(campaign.shop.seed).sample(numbers, campaign.short))
+    result = Result(campaign)
+    with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
+        for number, outcome, reason in pool.map(attempt, numbers, chunksize=4):
+            if outcome:
+                result.outcomes[outcome] += 1
+            else:
+                result.fallen[number] = reason
+    result.seconds = time.monotonic() - begin
+    return result
+
+
+def report(results: list[Result], replay: str) -> None:
+    """One table, and each failure with the line that replays it."""
+    for result in results:
+        for number, reason in list(result.fallen.items())[:SHOWN]:
+            print(f"\n{_cases_of(result)[number].title}\n  {reason}\n  {replay} --replay {result.campaign.name}:{number}")
+        if len(result.fallen) > SHOWN:
+            print(f"\n... and {len(result.fallen) - SHOWN} more of {result.campaign.name}: ", end="")
+            print(" ".join(str(number) for number in list(result.fallen)[SHOWN:]))
+    heads = ("campaign", "cases", *OUTCOMES, "fell", "seconds")
+    rows = [
+        (r.campaign.name, str(r.count), *(str(r.outcomes[o]) for o in OUTCOMES), str(len(r.fallen)), f"{r.seconds:.0f}")
+        for r in results
+    ]
+    widths = [max(len(row[i]) for row in (heads, *rows)) for i in range(len(heads))]
+    print()
+    for row in (heads, *rows):
+        print("  ".join(cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths))))
+    cases, fallen = sum(r.count for r in results), sum(len(r.fallen) for r in results)
+    print(f"\n{cases} attacks: the promise {f'fell {fallen} times' if fallen else 'held'}.")
+
+
+def _cases_of(result: Result) -> list[Case]:
+    return result.campaign.cases()
+
+
+def replay_case(shop: Workshop, name: str) -> int:
+    kind, _, number = name.partition(":")
+    campaign = next(c for c in CAMPAIGNS if c.name == kind)(shop)
+    case = campaign.cases()[int(number)]
+    print(case.title)
+    try:
+        print(campaign.run(case))
+    except Fallen as reason:
+        print(f"FELL: {reason}")
+        return 1
+    return 0
+
+
+def parse(argv: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--short", action="store_true")
+    parser.add_argument("--only", help="campaigns, separated by commas")
+    parser.add_argument("--replay", metavar="ID")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1))
+    parser.add_argument("--plcrt", type=Path, default=os.environ.get("PLCRT"), help="default: $PLCRT")
+    return parser.parse_args(argv)
+
+
+def main(argv: list[str]) -> int:
+    args = parse(argv)
+    shop, folder = open_workshop(args.plcrt, args.jobs, args.seed)
+    with folder:
+        if args.replay:
+            return replay_case(shop, args.replay)
+        chosen = args.only.split(",") if args.only else [c.name for c in CAMPAIGNS]
+        results = [run_campaign(c(shop), args.short, args.jobs) for c in CAMPAIGNS if c.name in chosen]
+        seed = f" --seed {args.seed}" if args.seed != 1 else ""
+        report(results, f"{sys.argv[0]}{seed}")
+    return 1 if any(r.fallen for r in results) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
