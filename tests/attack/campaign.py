@@ -44,6 +44,9 @@ class Campaign(ABC):
     def cases(self) -> list[Case]:
         """All cases, the same ones in the same order for one seed."""
 
+    def prepare(self, cases: list[Case]) -> None:  # noqa: B027 (most need nothing)
+        """Makes what the cases that will be run need, before workers are forked."""
+
     @abstractmethod
     def run(self, case: Case) -> str:
         """One of OUTCOMES. Raises Fallen."""

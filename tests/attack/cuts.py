@@ -125,9 +125,7 @@ class Cuts(Campaign):
         name, geometry, operation, mode = case.data
         story = STORIES[name]
         flash = load(self.shop, story, geometry)
-        ended = flash.power(
-            partial(_live, self.shop, story), plan=partial(lib.SimFlashCut, operation, MODES[mode])
-        )
+        ended = flash.power(partial(_live, self.shop, story), plan=partial(lib.SimFlashCut, operation, MODES[mode]))
         if ended.how not in ("cut", "used"):
             raise Fallen(f"the runtime {ended.how} {ended.signal}".strip())
         marks = ended.value or [""]

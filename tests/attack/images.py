@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import random
-import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 
-from campaign import ITSELF, NEWEST, REFUSED, STOPPED, BEFORE, Campaign, Case, Fallen
+from campaign import BEFORE, ITSELF, REFUSED, STOPPED, Campaign, Case, Fallen
+from faults import with_crc
 from look import Seen, expect_running
 from simulated import Device, Ended, Flash, Geometry, violation
 from verdict import check_can_be_flashed, look_again, look_at
@@ -185,19 +186,13 @@ def hostile(shop: Workshop, base: str, kind: str, number: int) -> bytes:
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         if len(image) >= lib.CDL_HEADER_SIZE + 64:
             mutate(rng, image)
-    image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4] = bytes(4)
-    image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4] = zlib.crc32(image).to_bytes(4, "little")
-    return bytes(image)
+    return with_crc(image)
 
 
 class Images(Campaign):
     name = "image"
     promise = "an image may hold anything: it is refused, or runs, or dies and is rolled back"
     short = 300
-
-    def __init__(self, shop: Workshop) -> None:
-        super().__init__(shop)
-        shop.add({"rich": RICH})
 
     def cases(self) -> list[Case]:
         kinds = list(MUTATIONS)
@@ -206,6 +201,9 @@ class Images(Campaign):
             for number in range(COUNT)
             for base, kind in [(BASES[number % len(BASES)], kinds[number // len(BASES) % len(kinds)])]
         ]
+
+    def prepare(self, cases: list[Case]) -> None:
+        self.shop.add({"rich": RICH})
 
     def run(self, case: Case) -> str:
         image = hostile(self.shop, *case.data)
@@ -218,13 +216,23 @@ class Images(Campaign):
         if ended.how == "used" and ended.value is None:
             expect_running(look_again(self.shop, flash), self.shop, ("good1",))
             return REFUSED
-        outcome = self._judge(flash, ended, int.from_bytes(image[100:104], "little"))
+        crc = int.from_bytes(image[lib.CDL_CRC_OFFSET :][:4], "little")
+        if ended.how == "died" and case.data[2] % 2:
+            self._check_stays_stopped(flash, ended, crc)
+            ended = Ended("used")
+        outcome = self._judge(flash, ended, crc)
         check_can_be_flashed(self.shop, flash)
         return outcome
 
+    def _check_stays_stopped(self, flash: Flash, ended: Ended, crc: int) -> None:
+        """After a death plcrt is there, with the program that died, stopped, and with the reason."""
+        seen = look_again(self.shop, flash, after=ended, stay_stopped=True)
+        if seen.state in (AppState.RUN, AppState.NONE) or seen.crc != crc or not seen.causes:
+            raise Fallen(f"after its death the image is not there, stopped, with the reason: {seen}")
+
     def _judge(self, flash: Flash, ended: Ended, crc: int) -> str:
         """The image was taken. It may run if it did, or be given up for the program before."""
-        seen = look_again(self.shop, flash, after=ended if ended.how == "died" else None)
+        seen = look_again(self.shop, flash, after=ended)
         if seen.crc == crc and seen.state is AppState.RUN:
             return ITSELF
         if seen.crc == crc and seen.state is not AppState.NONE and (seen.causes or seen.exception):
@@ -242,10 +250,8 @@ def _take(shop: Workshop, image: bytes, device: Device) -> Seen | None:
         expect_running(look_at(shop, device), shop, ("good1",))
         _check_rules()
         return None
-    try:
+    with suppress(DeviceError):  # it had an exception in its initialisation
         device.plc.start()
-    except DeviceError:
-        pass  # it had an exception in its initialisation
     device.run(PROVING_MS)
     seen = look_at(shop, device)
     _check_rules()

@@ -67,7 +67,9 @@ def expect_running(seen: Seen, shop: Workshop, names: tuple[str, ...]) -> str:
     if seen.state is not AppState.RUN:
         raise Fallen(f"no program runs: {seen}")
     if program is None or program.name not in names:
-        raise Fallen(f"{program.name if program else 'an unknown program'} runs instead of {' or '.join(names)}: {seen}")
+        raise Fallen(
+            f"{program.name if program else 'an unknown program'} runs instead of {' or '.join(names)}: {seen}"
+        )
     if seen.cycles == 0:
         raise Fallen(f"{program.name} is said to run, but has no cycles: {seen}")
     if seen.fault:

@@ -25,23 +25,26 @@ from dataclasses import dataclass, field
 from multiprocessing import get_context
 from pathlib import Path
 
+from bad_programs import BadPrograms
 from campaign import OUTCOMES, Campaign, Case, Fallen
 from cuts import Calls, Cuts
 from images import Images
+from kills import Kills
 from sectors import Sectors
 from workshop import Workshop, open_workshop
 
-CAMPAIGNS: tuple[type[Campaign], ...] = (Cuts, Calls, Images, Sectors)
+CAMPAIGNS: tuple[type[Campaign], ...] = (Kills, Cuts, Calls, BadPrograms, Images, Sectors)
 SHOWN = 10  # failures of a campaign that are printed
 
 
 @dataclass
 class Result:
-    """What came of a campaign. `fallen`: numbers of cases and why."""
+    """What came of a campaign. `fallen`: why, and `titles`: what was done, by number of the case."""
 
     campaign: Campaign
     outcomes: Counter[str] = field(default_factory=Counter)
     fallen: dict[int, str] = field(default_factory=dict)
+    titles: dict[int, str] = field(default_factory=dict)
     seconds: float = 0.0
 
     @property
@@ -72,6 +75,7 @@ def run_campaign(campaign: Campaign, short: bool, jobs: int) -> Result:
     numbers = list(range(len(_cases)))
     if short and campaign.short < len(numbers):
         numbers = sorted(random.Random(campaign.shop.seed).sample(numbers, campaign.short))
+    campaign.prepare([_cases[number] for number in numbers])
     result = Result(campaign)
     with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
         for number, outcome, reason in pool.map(attempt, numbers, chunksize=4):
@@ -79,6 +83,7 @@ def run_campaign(campaign: Campaign, short: bool, jobs: int) -> Result:
                 result.outcomes[outcome] += 1
             else:
                 result.fallen[number] = reason
+                result.titles[number] = _cases[number].title
     result.seconds = time.monotonic() - begin
     return result
 
@@ -87,7 +92,7 @@ def report(results: list[Result], replay: str) -> None:
     """One table, and each failure with the line that replays it."""
     for result in results:
         for number, reason in list(result.fallen.items())[:SHOWN]:
-            print(f"\n{_cases_of(result)[number].title}\n  {reason}\n  {replay} --replay {result.campaign.name}:{number}")
+            print(f"\n{result.titles[number]}\n  {reason}\n  {replay} --replay {result.campaign.name}:{number}")
         if len(result.fallen) > SHOWN:
             print(f"\n... and {len(result.fallen) - SHOWN} more of {result.campaign.name}: ", end="")
             print(" ".join(str(number) for number in list(result.fallen)[SHOWN:]))
@@ -99,13 +104,10 @@ def report(results: list[Result], replay: str) -> None:
     widths = [max(len(row[i]) for row in (heads, *rows)) for i in range(len(heads))]
     print()
     for row in (heads, *rows):
-        print("  ".join(cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths))))
+        cells = zip(row, widths, strict=True)
+        print("  ".join(cell.rjust(width) if i else cell.ljust(width) for i, (cell, width) in enumerate(cells)))
     cases, fallen = sum(r.count for r in results), sum(len(r.fallen) for r in results)
     print(f"\n{cases} attacks: the promise {f'fell {fallen} times' if fallen else 'held'}.")
-
-
-def _cases_of(result: Result) -> list[Case]:
-    return result.campaign.cases()
 
 
 def replay_case(shop: Workshop, name: str) -> int:
@@ -113,6 +115,7 @@ def replay_case(shop: Workshop, name: str) -> int:
     campaign = next(c for c in CAMPAIGNS if c.name == kind)(shop)
     case = campaign.cases()[int(number)]
     print(case.title)
+    campaign.prepare([case])
     try:
         print(campaign.run(case))
     except Fallen as reason:

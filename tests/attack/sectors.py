@@ -8,7 +8,6 @@ from campaign import BEFORE, NEWEST, STOPPED, Campaign, Case, Fallen
 from look import expect_running
 from simulated import PLCRT, Flash, Geometry
 from verdict import check_can_be_flashed, look_again
-from workshop import Workshop
 
 from plctool.link.services import AppState
 

@@ -104,15 +104,19 @@ class Flash:
         return bytes(ffi.buffer(lib.SimFlashData(), self.geometry.size))
 
     def power(
-        self, use: Callable[[Device], Any], plan: Callable[[], None] = lambda: None, after: Ended | None = None
+        self,
+        use: Callable[[Device], Any],
+        plan: Callable[[], None] = lambda: None,
+        after: Ended | None = None,
+        stay_stopped: bool = False,
     ) -> Ended:
         """One life: power on, `use`, power off. `plan` comes before power on, e.g. a cut. `after`: the life before,
-        whose death is the reason of this start."""
+        whose death is the reason of this start; `stay_stopped`: as plcrt starts then."""
         reading, writing = os.pipe()
         child = os.fork()
         if child == 0:
             os.close(reading)
-            _live(writing, use, plan, after)
+            _live(writing, use, plan, after, stay_stopped)
         os.close(writing)
         return _await(child, reading)
 
@@ -122,12 +126,14 @@ def violation() -> str:
     return bytes(ffi.string(lib.SimFlashViolation())).decode()
 
 
-def _live(writing: int, use: Callable[[Device], Any], plan: Callable[[], None], after: Ended | None) -> None:
+def _live(
+    writing: int, use: Callable[[Device], Any], plan: Callable[[], None], after: Ended | None, stay: bool
+) -> None:
     """The child; does not return."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT + 5))
     try:
-        ended: Any = _use(use, plan, after)
+        ended: Any = _use(use, plan, after, stay)
     except BaseException as error:
         ended = error
     with os.fdopen(writing, "wb") as pipe:
@@ -135,9 +141,9 @@ def _live(writing: int, use: Callable[[Device], Any], plan: Callable[[], None], 
     os._exit(0)
 
 
-def _use(use: Callable[[Device], Any], plan: Callable[[], None], after: Ended | None) -> Ended:
+def _use(use: Callable[[Device], Any], plan: Callable[[], None], after: Ended | None, stay: bool) -> Ended:
     plan()
-    tell_cause(after)
+    _tell_cause(after, stay)
     result = lib.SimStart()
     if result == lib.SIM_POWER_CUT:
         return Ended("cut", [])
@@ -152,8 +158,16 @@ def _use(use: Callable[[Device], Any], plan: Callable[[], None], after: Ended | 
         return Ended("cut", device.marks)
 
 
-def tell_cause(after: Ended | None) -> None:
+def _tell_cause(after: Ended | None, stay_stopped: bool) -> None:
     """Tells the runtime that it starts because it died, as a port does."""
+    if after is None or after.how != "died":
+        return
+    text = ffi.new("char[]", f"signal {after.signal}".encode())
+    start = ffi.new("SYS_START *")
+    start.cause, start.stay_stopped = lib.SYS_START_CRASH, stay_stopped
+    start.exception, start.task, start.code_offset = lib.RTSEXCPT_NOEXCEPTION, -1, lib.APP_NO_CODE_OFFSET
+    start.text = text
+    lib.SimSetStart(start)
 
 
 def _await(child: int, reading: int) -> Ended:

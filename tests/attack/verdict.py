@@ -17,9 +17,9 @@ def look_at(shop: Workshop, device: Device) -> Seen:
     return look(device.plc, lambda program: device.named(program.symbols), shop, lambda: device.run(LOOK_MS))
 
 
-def look_again(shop: Workshop, flash: Flash, after: Ended | None = None) -> Seen:
+def look_again(shop: Workshop, flash: Flash, after: Ended | None = None, stay_stopped: bool = False) -> Seen:
     """What it says after power came back, or after its death. Raises Fallen when it does not come back."""
-    ended = flash.power(partial(look_at, shop), after=after)
+    ended = flash.power(partial(look_at, shop), after=after, stay_stopped=stay_stopped)
     if ended.how != "used":
         raise Fallen(f"after the attack the runtime {ended.how} {ended.signal}".strip())
     seen: Seen = ended.value

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import platform
 import tempfile
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -34,6 +34,7 @@ FOR i := 0 TO 19 DO
     kept[i] := first;
 END_FOR
 last := first;
+{more}
 END_PROGRAM
 """
 
@@ -51,8 +52,13 @@ END_IF
 END_PROGRAM
 """
 
-GOOD_NAMES = ("good1", "good2", "good3")
-SOURCES = {name: GOOD.format(number=number) for number, name in enumerate(GOOD_NAMES, 1)} | {"dying": DYING}
+# Takes a while to download.
+MORE = "\n".join(f"i := i * {number} + n;" for number in range(3, 3000))
+
+GOOD_NAMES = ("good1", "good2", "good3", "large")
+SOURCES = {
+    name: GOOD.format(number=number, more=MORE if name == "large" else "") for number, name in enumerate(GOOD_NAMES, 1)
+} | {"dying": DYING}
 
 
 @dataclass(frozen=True)
@@ -77,7 +83,7 @@ def _compile(job: tuple[str, str, str, Path]) -> tuple[str, bytes, str]:
     source = folder / f"{name}.st"
     source.write_text(text)
     try:
-        built = compile_sources([source], checks=checks)
+        built = compile_sources([source], target=f"{platform.machine()}-linux", checks=checks)
     except CompileError as error:
         return name, b"", str(error)
     built.symbols.save(symbol_path(source.with_suffix(".cdl")))

@@ -125,6 +125,7 @@ static RTS_RESULT end_operation(int after)
         return ERR_OK;
     if (after != SIM_FAULT) {
         chip.power_lost = true;
+        chip.on = false;
         SimPowerCut();
     }
     return ERR_DEVICE;
