@@ -30,10 +30,11 @@ from campaign import OUTCOMES, Campaign, Case, Fallen
 from cuts import Calls, Cuts
 from images import Images
 from kills import Kills
+from records import Records
 from sectors import Sectors
 from workshop import Workshop, open_workshop
 
-CAMPAIGNS: tuple[type[Campaign], ...] = (Kills, Cuts, Calls, BadPrograms, Images, Sectors)
+CAMPAIGNS: tuple[type[Campaign], ...] = (Kills, Cuts, Calls, BadPrograms, Images, Records, Sectors)
 SHOWN = 10  # failures of a campaign that are printed
 
 
