@@ -87,6 +87,13 @@ def _two_downloads(shop: Workshop, device: Device) -> None:
     device.run(PROVING_MS)
 
 
+def _dead_and_replaced(shop: Workshop, device: Device) -> None:
+    """The newest program died, and another one comes before power was off."""
+    device.plc.flash(shop["dying"].image, unchecked=True)
+    device.run(PROVING_MS)
+    _flash(shop, device, "good3")
+
+
 STORIES = {
     "download": Story(
         ("good1",), _download, {"": ("good1", "good2"), "flashed": ("good2",)}
@@ -96,6 +103,9 @@ STORIES = {
         ("good1",),
         _two_downloads,
         {"": ("good1", "good2"), "first": ("good2", "good3"), "flashed": ("good3",)},
+    ),
+    "download after a death": Story(
+        ("good1",), _dead_and_replaced, {"": ("good1", "good3"), "flashed": ("good3",)}
     ),
     "start": Story(("good1", "good2"), _boot, {"": ("good2",)}),
     "rollback": Story(("good1", "dying"), _boot, {"": ("good1",)}),

@@ -11,6 +11,7 @@ from campaign import BEFORE, NEWEST, STOPPED, Campaign, Case, Fallen
 from look import Seen
 from simulated import Flash, Geometry
 from verdict import check_can_be_flashed, look_again
+from workshop import GOOD_NAMES
 
 from plctool.core import ffi, lib
 from plctool.link.services import AppState
@@ -75,12 +76,18 @@ class Records(Campaign):
         log, number = case.data
         geometry = Geometry()
         content = bytearray(self.shop.history(geometry, "good1", "good2"))
-        _spoil(random.Random(f"{self.shop.seed} {number}"), content, log)
+        _spoil(random.Random(f"{self.shop.seed} {number}"), content, self._newest(content, log))
         flash = Flash(geometry)
         flash.load(bytes(content))
         outcome = self._judge(look_again(self.shop, flash), log)
         check_can_be_flashed(self.shop, flash)
         return outcome
+
+    def _newest(self, content: bytearray, log: str) -> Record:
+        """The newest record of a log: those of commits name images by their CRC."""
+        crcs = [self.shop[name].crc.to_bytes(4, "little") for name in GOOD_NAMES]
+        found = [r for r in records(bytes(content)) if any(crc in r.data for crc in crcs) == (log == "commit")]
+        return max(found, key=lambda r: r.sequence)
 
     def _judge(self, seen: Seen, log: str) -> str:
         """Values of retain variables may be anything then, so they are not looked at."""
@@ -95,11 +102,8 @@ class Records(Campaign):
         raise Fallen(f"after a hostile record: {seen}")
 
 
-def _spoil(rng: random.Random, content: bytearray, log: str) -> None:
+def _spoil(rng: random.Random, content: bytearray, newest: Record) -> None:
     """Puts hostile records in place of the newest one of a log, or after it."""
-    found = list(records(bytes(content)))
-    commit_tag = found[0].tag  # its log lies before that of retain variables
-    newest = max((r for r in found if (r.tag == commit_tag) == (log == "commit")), key=lambda r: r.sequence)
     at = newest.offset if rng.random() < 0.3 else newest.end
     for _ in range(rng.choice((1, 1, 1, 2, 5))):
         record = replace(newest, offset=at, sequence=_sequence(rng, newest.sequence), data=_data(rng, newest.data))
@@ -107,6 +111,8 @@ def _spoil(rng: random.Random, content: bytearray, log: str) -> None:
             record = replace(record, tag=rng.choice((0, record.tag + 1, rng.getrandbits(32))) & 0xFFFFFFFF)
         size = rng.choice((None, None, None, None, rng.choice(WORDS)))
         encoded = record.encode(size)
+        if record.end > len(content):
+            return
         content[at : at + len(encoded)] = encoded
         at = record.end
 
