@@ -49,8 +49,10 @@ def main() -> None:
     build = args.build or ROOT / ("build-sanitized" if args.sanitized else "build")
     if not list((build / "host").glob("_plccore.*.so")):
         sys.exit(f"{build} has no module for Python; `make attack{' ARGS=--sanitized' * args.sanitized}` builds it.")
-    command = [sys.executable, str(HERE / "attack.py"), *sys.argv[1:]]
-    os.execve(sys.executable, command, environment(build.resolve(), args.sanitized))
+    developers = ROOT / ".venv/bin/python"
+    python = str(developers) if developers.exists() else sys.executable
+    command = [python, str(HERE / "attack.py"), *sys.argv[1:]]
+    os.execve(python, command, environment(build.resolve(), args.sanitized))
 
 
 if __name__ == "__main__":
