@@ -19,6 +19,7 @@ enum { FILE_SLOT_A = 0, FILE_SLOT_B = 1, FILE_COMMIT = 2, FILE_RETAIN = 3, FILE_
 
 /* Bytes that are programmed at a time; all program sizes divide it. */
 enum { FILE_ALIGN = 16 };
+#define SysFileAlign(size) (((size) + FILE_ALIGN - 1) & ~(RTS_UI32)(FILE_ALIGN - 1))
 
 /* Where a file lies in flash: both multiples of the sector size. */
 typedef struct {
@@ -27,6 +28,13 @@ typedef struct {
 } FILE_AREA;
 
 const FILE_AREA *SysFileGetArea(RTS_UI32 file);
+
+/*
+ * The layout of the files as a number; and the layout to use from now on, before slots or retain log are: false when it
+ * is not possible here. Both layouts have the commit log at the same place, which is where their number is kept.
+ */
+RTS_UI32 SysFileGetMap(void);
+bool SysFileUseMap(RTS_UI32 map);
 
 /* Opens for writing from the start; erases as it goes. */
 void SysFileCreate(RTS_UI32 file);

@@ -25,6 +25,7 @@ const char *AppExceptionName(RTS_UI32 code)
         RTS_UI32 code;
         const char *name;
     } names[] = {
+        {RTSEXCPT_BOOTPROJECT_CRASH, "crash"},
         {RTSEXCPT_WATCHDOG, "watchdog expired"},
         {RTSEXCPT_DIVIDEBYZERO, "division by zero"},
         {RTSEXCPT_ARRAYBOUNDS, "index out of range"},

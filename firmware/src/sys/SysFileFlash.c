@@ -64,6 +64,18 @@ static bool map_files(void)
     return valid;
 }
 
+RTS_UI32 SysFileGetMap(void)
+{
+    static const FILE_AREA map[FILE_COUNT] = {FILE_MAP};
+
+    return CRC32Update(0, map, sizeof map);
+}
+
+bool SysFileUseMap(RTS_UI32 map)
+{
+    return map == SysFileGetMap();
+}
+
 #else
 
 /* Sectors of one half of the retain log: enough for the largest record, but at most an eighth of the flash. */
@@ -78,24 +90,41 @@ static RTS_UI32 retain_half_sectors(const SYS_FLASH *flash)
     return wanted < most ? wanted : most;
 }
 
-/* Both logs lie behind the slots, which share what is left. False when nothing is left for them. */
+static void set_area(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size)
+{
+    files[file].area.offset = offset;
+    files[file].area.size = size;
+}
+
+/*
+ * The slots, then the retain log, and at the end, where it is in every layout, the commit log. The size of the slots is
+ * the layout: 0 when there is no room for two and the retain log.
+ */
+bool SysFileUseMap(RTS_UI32 slot)
+{
+    RTS_UI32 pair = 2 * SysFlashGet()->sector_size;
+    RTS_UI32 commit = SysFlashGet()->size - pair;
+
+    if (slot == 0 || slot % (pair / 2) != 0 || slot > (commit - pair) / 2)
+        return false;
+    set_area(FILE_SLOT_A, 0, slot);
+    set_area(FILE_SLOT_B, slot, slot);
+    set_area(FILE_RETAIN, 2 * slot, (commit - 2 * slot) / pair * pair);
+    set_area(FILE_COMMIT, commit, pair);
+    return true;
+}
+
+RTS_UI32 SysFileGetMap(void)
+{
+    return files[FILE_SLOT_A].area.size;
+}
+
 static bool map_files(void)
 {
     const SYS_FLASH *flash = SysFlashGet();
-    RTS_UI32 commit = 2 * flash->sector_size;
-    RTS_UI32 retain = 2 * flash->sector_size * retain_half_sectors(flash);
-    RTS_UI32 rest = flash->size > commit + retain ? flash->size - commit - retain : 0;
-    RTS_UI32 slot = rest / 2 / flash->sector_size * flash->sector_size;
-    const RTS_UI32 sizes[FILE_COUNT] = {slot, slot, commit, retain};
-    RTS_UI32 offset = 0;
-    RTS_UI32 i;
+    RTS_UI32 logs = 2 * flash->sector_size * (1 + retain_half_sectors(flash));
 
-    for (i = 0; i < FILE_COUNT; i++) {
-        files[i].area.offset = offset;
-        files[i].area.size = sizes[i];
-        offset += sizes[i];
-    }
-    return slot > 0;
+    return flash->size > logs && SysFileUseMap((flash->size - logs) / 2 / flash->sector_size * flash->sector_size);
 }
 
 #endif

@@ -44,16 +44,16 @@ void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
 }
 
 /* What nobody announced may have been the reset pin, or the watchdog of a chip that does not tell. */
+#define START(cause, text) {cause, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, LOG_MAX_ENTRIES > 0 ? (text) : ""}
+
 const SYS_START *SysStartGet(void)
 {
-    static const char *const texts[RESET_CAUSE_COUNT] = {"power on", "reset pin", "software", "fault of the runtime",
-                                        "hardware watchdog"};
-    static SYS_START start = {SYS_START_POWER, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
-    if (last.cause >= RESET_FATAL)
-        start.cause = SYS_START_CRASH;
-    else if (last.cause == RESET_PIN)
-        start.cause = SYS_START_UNKNOWN;
-    if (LOG_MAX_ENTRIES > 0)
-        start.text = texts[last.cause];
-    return &start;
+    static const SYS_START starts[RESET_CAUSE_COUNT] = {
+        [RESET_POWER_ON] = START(SYS_START_POWER, "power on"),
+        [RESET_PIN] = START(SYS_START_UNKNOWN, "reset pin"),
+        [RESET_SOFTWARE] = START(SYS_START_POWER, "software"),
+        [RESET_FATAL] = START(SYS_START_CRASH, "fault of the runtime"),
+        [RESET_WATCHDOG] = START(SYS_START_CRASH, "hardware watchdog"),
+    };
+    return &starts[last.cause];
 }
