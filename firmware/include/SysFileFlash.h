@@ -29,13 +29,6 @@ typedef struct {
 
 const FILE_AREA *SysFileGetArea(RTS_UI32 file);
 
-/*
- * The layout of the files as a number; and the layout to use from now on, before slots or retain log are: false when it
- * is not possible here. Both layouts have the commit log at the same place, which is where their number is kept.
- */
-RTS_UI32 SysFileGetMap(void);
-bool SysFileUseMap(RTS_UI32 map);
-
 /* Opens for writing from the start; erases as it goes. */
 void SysFileCreate(RTS_UI32 file);
 

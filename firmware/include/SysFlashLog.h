@@ -14,7 +14,7 @@
 #include "SysFileFlash.h"
 
 typedef struct {
-    RTS_UI32 file;
+    RTS_UI32 file;     /* not 0 */
     RTS_RESULT opened; /* nothing is appended to a log that cannot be read */
     RTS_UI32 start;    /* of the half in use */
     RTS_UI32 used;     /* bytes of that half that may have been programmed */
@@ -47,8 +47,8 @@ RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 ta
  * may not survive a power cut. */
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);
 
-/* Marks the newest record, when nothing was appended after it; ERR_DISK_FULL without room for the mark, which takes one
- * unit of flash and is not synced. And whether the newest record, of `size` bytes, was marked. */
+/* Marks the newest record; ERR_DISK_FULL without room for the mark, which takes one unit of flash and is not synced.
+ * And whether the newest record, of `size` bytes, is followed by a mark, or by one that was cut off. */
 RTS_RESULT FlashLogMark(FLASH_LOG *log);
 bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size);
 

@@ -29,7 +29,8 @@ enum {
 typedef struct {
     RTS_UI8 cause; /* SYS_START_* */
     /* Not 0: the boot project is loaded but not called, until it is started by a user, or until the next start. For a
-     * port whose restart after a crash is no decision of the user's (Linux), and for a button that says so. */
+     * port whose restart after a crash is no decision of the user's (Linux), and for a button that says so; with
+     * APP_MAY_STAY_STOPPED. */
     RTS_UI8 stay_stopped;
     /* The rest tells of a crash. */
     RTS_I16 task;         /* index of the task, -1: in none, but in initialisation or the runtime itself */

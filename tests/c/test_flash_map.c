@@ -7,8 +7,6 @@
  */
 #define FILE_MAP {0x4000, 0x2000}, {0x8000, 0x4000}, {0x0000, 0x0400}, {0x1000, 0x1000}
 #define SysFileGetArea test_area
-#define SysFileGetMap test_get_map
-#define SysFileUseMap test_use_map
 #define SysFileCreate test_create
 #define SysFileAppend test_append
 #define SysFileWrite test_write

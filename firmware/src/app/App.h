@@ -49,8 +49,8 @@ bool AppDownloadIsOpen(void);
 /* Loads what is in flash, and starts it unless it died before. */
 void AppBoot(void);
 
-/* The same for a user who asks for it: what died before is started too, when there is none to go back to.
- * ERR_APP_NOT_LOADED: there is nothing. */
+/* Starts what was loaded and not started, because a user asks for it: also what died before, when there is none to go
+ * back to. */
 RTS_RESULT AppBootByHand(void);
 
 /*

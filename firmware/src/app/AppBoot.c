@@ -60,26 +60,14 @@ bool AppRollBack(RTS_UI32 failed)
     return true;
 }
 
-static bool is_dead(void)
-{
-    RTS_UI8 state = AppCommitGet()->state[AppCommitGet()->active];
-
-    return state == SLOT_FAILED || state == SLOT_HALTED;
-}
-
-/* The application is in the exception that ended an earlier run; `text` is what the port said of it. */
-static void enter_exception(const APP_EXCEPTION *exception, const char *text)
-{
-    AppExceptionSet(exception, text[0] != '\0' ? text : "Before this start");
-}
-
+/* The application is in the exception that ended the run before this start. */
 static void take_exception(const SYS_START *start)
 {
     APP_EXCEPTION exception = {start->exception, start->code_offset, start->task};
 
     if (exception.code == RTSEXCPT_NOEXCEPTION)
         exception.code = RTSEXCPT_BOOTPROJECT_CRASH;
-    enter_exception(&exception, start->text);
+    AppExceptionSet(&exception, start->text);
 }
 
 /* Whether the active application was what ended the run before this start. */
@@ -104,57 +92,56 @@ static RTS_RESULT load_boot_project(bool may_go_back)
     return result == ERR_CRC_FAILED && may_go_back && AppRollBack(active) ? (RTS_RESULT)ERR_OK : result;
 }
 
-/* The exception in force becomes the one that an application died of, before this start or an earlier one. */
-static bool take_death(const SYS_START *start)
+static bool stays_stopped(void)
 {
-    COMMIT_CAUSE cause;
+    return APP_MAY_STAY_STOPPED && SysStartGet()->stay_stopped != 0;
+}
+
+/* Notes that the application was what ended the run before this start. */
+static void take_death(void)
+{
+    const SYS_START *start = SysStartGet();
     bool died = has_died(start->cause);
 
-    if (died || (start->cause == SYS_START_CRASH && start->stay_stopped))
+    if (LOG_MAX_ENTRIES > 0 && (died || (start->cause == SYS_START_CRASH && stays_stopped())))
         take_exception(start);
     if (died)
-        (void)AppCommitSetDead(start->text);
-    else if (is_dead() && AppCommitGetCause(&cause))
-        enter_exception(&cause.exception, cause.text);
-    return died || is_dead();
+        AppCommitSetDead(start->text);
 }
 
 /* A boot project starts by itself, unless it died. */
-static void run_boot_project(RTS_UI32 active)
+static void run_boot_project(void)
 {
-    const SYS_START *start = SysStartGet();
-    bool died = take_death(start);
-
-    if (load_boot_project(!start->stay_stopped) != ERR_OK)
+    take_death();
+    if (load_boot_project(!stays_stopped()) != ERR_OK)
         return;
-    if (start->stay_stopped || (died && AppGetSlot() == active))
-        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Boot project not started%s", died ? ": it died before" : "");
+    if (stays_stopped() || AppCommitIsDead())
+        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Boot project not started%s",
+               AppCommitIsDead() ? ": it failed before" : "");
     else
         (void)AppStart();
 }
 
 void AppBoot(void)
 {
-    RTS_UI32 active = AppCommitGet()->active;
-
     if (AppCommitResult() != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, AppCommitResult(), "The commit record cannot be read");
-    else if (active == SLOT_NONE)
+    else if (AppCommitGet()->active == SLOT_NONE)
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "No boot project");
     else
-        run_boot_project(active);
+        run_boot_project();
 }
 
 RTS_RESULT AppBootByHand(void)
 {
     RTS_UI32 active = AppCommitGet()->active;
-    RTS_RESULT result = AppCommitResult();
+    RTS_RESULT result;
 
-    if (result == ERR_OK && active == SLOT_NONE)
-        result = ERR_APP_NOT_LOADED;
-    if (result == ERR_OK && (AppGetSlot() == SLOT_NONE || AppCommitGet()->state[active] == SLOT_FAILED)) {
+    if (APP_MAY_STAY_STOPPED && active != SLOT_NONE && AppCommitGet()->state[active] == SLOT_FAILED) {
         AppUnload();
         result = load_boot_project(true);
+        if (result != ERR_OK)
+            return result;
     }
-    return result == ERR_OK ? AppStart() : result;
+    return AppStart();
 }

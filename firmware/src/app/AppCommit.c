@@ -20,12 +20,14 @@ RTS_STATIC_ASSERT(sizeof(COMMIT) == 32, commit_is_32_bytes);
 
 enum { COMMIT_TAG = 0x324D4D43, BEGUN_MAX = 0xFE };
 
-/* What the log holds. */
+/* What the log holds: the commit, and with it why the application is dead, which nobody would read without a log. */
 typedef struct {
     COMMIT commit;
-    RTS_UI32 map; /* of the flash: SysFileGetMap */
-    COMMIT_CAUSE cause;
+    APP_EXCEPTION exception;        /* that the active application is in */
+    char text[APP_CRASH_TEXT_SIZE]; /* the port's words, "" without */
 } RECORD;
+
+enum { HAS_CAUSE = LOG_MAX_ENTRIES > 0, RECORD_SIZE = HAS_CAUSE ? sizeof(RECORD) : sizeof(COMMIT) };
 
 /* The first unit after an image. */
 typedef struct {
@@ -38,14 +40,13 @@ typedef struct {
 RTS_STATIC_ASSERT(sizeof(SEAL) == FILE_ALIGN, a_seal_is_programmed_at_once);
 
 static struct {
-    FLASH_LOG log;
-    RTS_RESULT opened;
-    COMMIT commit;
+    FLASH_LOG log; /* its `opened` says whether anything is known */
+    COMMIT commit; /* what is in flash, or should be and could not be written */
 } state;
 
 RTS_RESULT AppCommitResult(void)
 {
-    return state.opened;
+    return state.log.opened;
 }
 
 const COMMIT *AppCommitGet(void)
@@ -53,9 +54,21 @@ const COMMIT *AppCommitGet(void)
     return &state.commit;
 }
 
+bool AppCommitIsDead(void)
+{
+    RTS_UI8 active = state.commit.active;
+
+    return active < SLOT_COUNT && state.commit.state[active] >= SLOT_FAILED;
+}
+
 RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot)
 {
     return slot == FILE_SLOT_A ? FILE_SLOT_B : FILE_SLOT_A;
+}
+
+void AppCommitWipe(RTS_UI32 slot)
+{
+    (void)SysFileErase(slot, 0, SysFlashGet()->sector_size);
 }
 
 /* ---- seals ---- */
@@ -65,59 +78,39 @@ static RTS_UI32 seal_check(const SEAL *seal)
     return CRC32Update(0, seal, offsetof(SEAL, check));
 }
 
-/* Reads the seal of the image that the header in `slot` tells of; false when there is none. */
-static bool read_seal(RTS_UI32 slot, SEAL *seal, RTS_UI32 *size)
+/* Takes over a slot when the image that its header tells of has a seal with a number above `known`. */
+static void take_seal(RTS_UI32 slot, RTS_UI32 known)
 {
     CDL_HEADER header;
-
-    if (SysFileRead(slot, 0, &header, sizeof header) != ERR_OK)
-        return false;
-    *size = header.total_size;
-    return SysFileRead(slot, SysFileAlign(header.total_size), seal, sizeof *seal) == ERR_OK &&
-           seal->check == seal_check(seal) && seal->crc == header.crc;
-}
-
-static bool is_newer(RTS_UI32 a, RTS_UI32 b)
-{
-    return (RTS_I32)(a - b) > 0;
-}
-
-/* Takes over the slots whose seal is newer than what is known. */
-static void take_seals(void)
-{
-    RTS_UI32 known = state.commit.number;
-    RTS_UI32 slot;
-    RTS_UI32 size;
     SEAL seal;
 
-    for (slot = 0; slot < SLOT_COUNT; slot++) {
-        if (!read_seal(slot, &seal, &size) || !is_newer(seal.number, known))
-            continue;
-        state.commit.slot[slot] = (COMMIT_SLOT){size, seal.crc, seal.retain_after};
-        state.commit.state[slot] = SLOT_TRIAL;
-        if (is_newer(seal.number, state.commit.number)) {
-            state.commit.number = seal.number;
-            state.commit.active = (RTS_UI8)slot;
-            state.commit.begun = 0;
-        }
+    if (SysFileRead(slot, 0, &header, sizeof header) != ERR_OK ||
+        SysFileRead(slot, SysFileAlign(header.total_size), &seal, sizeof seal) != ERR_OK ||
+        seal.check != seal_check(&seal) || seal.crc != header.crc || (RTS_I32)(seal.number - known) <= 0)
+        return;
+    state.commit.slot[slot] = (COMMIT_SLOT){header.total_size, seal.crc, seal.retain_after};
+    state.commit.state[slot] = SLOT_TRIAL;
+    if ((RTS_I32)(seal.number - state.commit.number) > 0) {
+        state.commit.number = seal.number;
+        state.commit.active = (RTS_UI8)slot;
+        state.commit.begun = 0;
     }
 }
 
-void AppCommitWipe(RTS_UI32 slot)
+static void take_seals(void)
 {
-    (void)SysFileErase(slot, 0, SysFlashGet()->sector_size);
+    RTS_UI32 known = state.commit.number;
+
+    take_seal(FILE_SLOT_A, known);
+    take_seal(FILE_SLOT_B, known);
 }
 
 RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
 {
     SEAL seal = {state.commit.number + 1, crc, retain_after, 0};
-    RTS_RESULT result;
 
     seal.check = seal_check(&seal);
-    result = SysFileWrite(slot, &seal, sizeof seal);
-    if (result == ERR_OK)
-        result = SysFileClose(slot);
-    if (result == ERR_OK)
+    if (SysFileWrite(slot, &seal, sizeof seal) == ERR_OK && SysFileClose(slot) == ERR_OK)
         take_seals();
     if (state.commit.active == slot)
         return ERR_OK;
@@ -127,87 +120,80 @@ RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
 
 /* ---- records ---- */
 
-static RTS_RESULT read_record(RECORD *record)
+static void clear(void)
 {
-    return FlashLogReadNewest(&state.log, COMMIT_TAG, record, sizeof *record);
+    RTS_UI32 number = state.commit.number;
+
+    memset(&state.commit, 0, sizeof state.commit);
+    state.commit.number = number;
+    state.commit.active = SLOT_NONE;
 }
 
-static void set_blank(COMMIT *commit)
+/* Another layout of the flash is another kind of record, because it would mean other places. */
+static RTS_UI32 record_tag(void)
 {
-    RTS_UI32 number = commit->number;
-
-    memset(commit, 0, sizeof *commit);
-    commit->active = SLOT_NONE;
-    commit->number = number;
+    return COMMIT_TAG + SysFileGetArea(FILE_SLOT_B)->offset;
 }
 
-/* Takes a record over, and the layout of the flash it was written with, unless nothing lies there. */
-static void take_record(const RECORD *record)
-{
-    const COMMIT *commit = &record->commit;
-    RTS_UI32 own = SysFileGetMap();
-
-    if (commit->active >= SLOT_COUNT)
-        state.commit.number = commit->number;
-    else if (!SysFileUseMap(record->map))
-        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, ERR_VERSION_MISMATCH,
-               "The flash has the layout of another firmware: programs may not be found");
-    else
-        state.commit = *commit;
-    if (own != SysFileGetMap())
-        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_VERSION_MISMATCH,
-               "The flash keeps the layout of another firmware: slots of %u bytes, not %u", (unsigned)record->map,
-               (unsigned)own);
-    if (state.commit.begun != 0 && FlashLogIsMarked(&state.log, sizeof *record))
-        state.commit.begun = 0;
-}
-
-RTS_RESULT AppCommitOpen(void)
+static RTS_RESULT read_record(void)
 {
     RECORD record;
+    void *data = HAS_CAUSE ? (void *)&record : (void *)&state.commit;
+    RTS_RESULT result = FlashLogReadNewest(&state.log, record_tag(), data, RECORD_SIZE);
+
+    if (HAS_CAUSE && result == ERR_OK) {
+        state.commit = record.commit;
+        if (AppCommitIsDead())
+            AppExceptionSet(&record.exception, record.text);
+    }
+    return result;
+}
+
+/* Without a record of ours the seals are all there is. */
+static void report_loss(void)
+{
+    if (state.log.sequence != 0)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, ERR_VERSION_MISMATCH, "Flash was laid out by another firmware");
+    if (state.commit.active != SLOT_NONE)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT, "No commit record: the newest program is taken");
+}
+
+void AppCommitOpen(void)
+{
+    RTS_RESULT result = FlashLogOpen(&state.log, FILE_COMMIT);
 
     state.commit.number = 0;
-    set_blank(&state.commit);
-    state.opened = FlashLogOpen(&state.log, FILE_COMMIT);
-    if (state.opened == ERR_OK)
-        state.opened = read_record(&record);
-    if (state.opened == ERR_OK)
-        take_record(&record);
-    else if (state.opened != ERR_NO_OBJECT)
-        return state.opened;
+    clear();
+    if (result == ERR_OK)
+        result = read_record();
+    if (result == ERR_OK && FlashLogIsMarked(&state.log, RECORD_SIZE))
+        state.commit.begun = 0;
+    if (result != ERR_OK && result != ERR_NO_OBJECT) {
+        state.log.opened = result;
+        return;
+    }
+    if (state.commit.active >= SLOT_COUNT)
+        state.commit.active = SLOT_NONE;
     take_seals();
-    if (state.opened == ERR_NO_OBJECT && state.commit.active != SLOT_NONE)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT, "No commit record: the newest application boots");
-    state.opened = ERR_OK;
-    return ERR_OK;
+    if (result != ERR_OK)
+        report_loss();
 }
 
-bool AppCommitGetCause(COMMIT_CAUSE *cause)
+/* Writes what has been changed. */
+static RTS_RESULT write_record(const char *text)
 {
     RECORD record;
-
-    if (read_record(&record) != ERR_OK)
-        return false;
-    *cause = record.cause;
-    cause->text[sizeof cause->text - 1] = '\0';
-    return cause->exception.code != RTSEXCPT_NOEXCEPTION;
-}
-
-/* It is in force when it can be read, whatever failed. */
-static RTS_RESULT write_record(const COMMIT *commit, const char *text)
-{
-    RTS_UI32 newest = state.log.newest;
-    RECORD record;
+    const void *data = HAS_CAUSE ? (void *)&record : (void *)&state.commit;
     RTS_RESULT result;
 
-    memset(&record, 0, sizeof record);
-    record.commit = *commit;
-    record.map = SysFileGetMap();
-    record.cause.exception = *AppExceptionGet();
-    memcpy(record.cause.text, text, CMUtlStrNLen(text, sizeof record.cause.text - 1));
-    result = FlashLogAppend(&state.log, COMMIT_TAG, &record, sizeof record);
-    if (result == ERR_OK || state.log.newest != newest)
-        state.commit = *commit;
+    if (HAS_CAUSE) {
+        memset(&record, 0, sizeof record);
+        record.commit = state.commit;
+        record.exception = *AppExceptionGet();
+        if (APP_CRASH_TEXT_SIZE > 1)
+            memcpy(record.text, text, CMUtlStrNLen(text, sizeof record.text - 1));
+    }
+    result = FlashLogAppend(&state.log, record_tag(), data, RECORD_SIZE);
     if (result != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "The commit record cannot be written");
     return result;
@@ -215,69 +201,63 @@ static RTS_RESULT write_record(const COMMIT *commit, const char *text)
 
 RTS_RESULT AppCommitErase(void)
 {
-    COMMIT commit = state.commit;
-
-    set_blank(&commit);
-    return write_record(&commit, "");
+    clear();
+    return write_record("");
 }
 
 RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after)
 {
-    COMMIT commit = state.commit;
     RTS_UI32 other = AppCommitOtherSlot(failed);
     RTS_RESULT result;
 
-    commit.active = (RTS_UI8)other;
-    commit.begun = 0;
-    commit.state[failed] = SLOT_FAILED;
-    commit.slot[other].retain_after = retain_after;
-    result = write_record(&commit, "");
+    state.commit.active = (RTS_UI8)other;
+    state.commit.begun = 0;
+    state.commit.state[failed] = SLOT_FAILED;
+    state.commit.slot[other].retain_after = retain_after;
+    result = write_record("");
     if (result == ERR_OK)
         AppCommitWipe(failed);
     return result;
 }
 
-RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 new_state)
+RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 changed)
 {
-    COMMIT commit = state.commit;
+    RTS_UI8 before = state.commit.state[slot];
+    RTS_RESULT result;
 
-    if (commit.state[slot] == SLOT_PROVEN || commit.state[slot] == new_state)
+    if (before == SLOT_PROVEN || before == changed)
         return ERR_OK;
-    commit.state[slot] = new_state;
-    return write_record(&commit, "");
+    state.commit.state[slot] = changed;
+    result = write_record("");
+    if (result != ERR_OK)
+        state.commit.state[slot] = before; /* tried again */
+    return result;
 }
 
-RTS_RESULT AppCommitSetDead(const char *text)
+void AppCommitSetDead(const char *text)
 {
-    COMMIT commit = state.commit;
-    RTS_UI8 *dead = &commit.state[commit.active];
+    RTS_UI8 *dead = &state.commit.state[state.commit.active];
 
     *dead = *dead == SLOT_PROVEN ? SLOT_HALTED : SLOT_FAILED;
-    commit.begun = 0;
-    return write_record(&commit, text);
+    state.commit.begun = 0;
+    (void)write_record(text);
 }
 
 void AppCommitBegin(void)
 {
-    COMMIT commit = state.commit;
+    RTS_UI8 *begun = &state.commit.state[state.commit.active];
 
-    if (commit.begun < BEGUN_MAX)
-        commit.begun++;
-    if (commit.state[commit.active] == SLOT_HALTED)
-        commit.state[commit.active] = SLOT_PROVEN;
-    (void)write_record(&commit, "");
+    if (*begun == SLOT_HALTED)
+        *begun = SLOT_PROVEN;
+    if (state.commit.begun < BEGUN_MAX)
+        state.commit.begun++;
+    (void)write_record("");
 }
 
-/* A unit that is programmed after the record says so; without room for it, another record does. */
+/* A mark after the record says so; without room for it, another record does. */
 void AppCommitDone(void)
 {
-    COMMIT commit = state.commit;
-
-    commit.begun = 0;
-    if (state.commit.begun == 0)
-        return;
-    if (FlashLogMark(&state.log) == ERR_OK)
-        state.commit = commit;
-    else
-        (void)write_record(&commit, "");
+    state.commit.begun = 0;
+    if (FlashLogMark(&state.log) != ERR_OK)
+        (void)write_record("");
 }

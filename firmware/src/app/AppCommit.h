@@ -41,23 +41,17 @@ typedef struct {
     COMMIT_SLOT slot[SLOT_COUNT];
 } COMMIT;
 
-/* Finds out what is in flash, and takes over the layout it was written with. ERR_DEVICE flash fault: nothing is known,
- * and nothing may be written. */
-RTS_RESULT AppCommitOpen(void);
+/* Finds out what is in flash. When the application died, it is in that exception again. */
+void AppCommitOpen(void);
 
-/* What AppCommitOpen returned. */
+/* ERR_OK, or ERR_DEVICE: the flash could not be read, nothing is known, and nothing is written. */
 RTS_RESULT AppCommitResult(void);
 
 /* The record in force. */
 const COMMIT *AppCommitGet(void);
 
-/* Why the application was given up, as the newest record has it, and the port's words for it, "" without; in flash only.
- * False when it does not say. */
-typedef struct {
-    APP_EXCEPTION exception;
-    char text[APP_CRASH_TEXT_SIZE];
-} COMMIT_CAUSE;
-bool AppCommitGetCause(COMMIT_CAUSE *cause);
+/* Whether the active application died, and is not to be run without being asked to. */
+bool AppCommitIsDead(void);
 
 /* The slot that is not `slot`; of SLOT_NONE the first. */
 RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
@@ -82,7 +76,7 @@ RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after);
 RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state);
 
 /* The active one died, of the exception it is in: SLOT_FAILED, or SLOT_HALTED when it has proven itself. */
-RTS_RESULT AppCommitSetDead(const char *text);
+void AppCommitSetDead(const char *text);
 
 /* The initialisation of the active one begins, and has ended. */
 void AppCommitBegin(void);

@@ -22,11 +22,11 @@ static struct {
 
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
 {
-    RTS_UI32 slot = AppCommitOtherSlot(AppCommitGet()->active);
+    RTS_UI32 slot = AppCommitOtherSlot(AppGetSlot() != SLOT_NONE ? AppGetSlot() : AppCommitGet()->active);
 
     AppDownloadAbort();
-    if (AppCommitResult() != ERR_OK || slot == AppGetSlot())
-        return ERR_DEVICE; /* what is worth keeping is not known, or its record could not be written */
+    if (AppCommitResult() != ERR_OK)
+        return ERR_DEVICE; /* what is worth keeping is not known */
     if (total_size > SysFileGetArea(slot)->size - FILE_ALIGN) /* the seal follows */
         return ERR_NOMEMORY;
     download.open = true;

@@ -70,6 +70,9 @@ void AppExceptionSet(const APP_EXCEPTION *exception, const char *where)
 {
     const char *name = AppExceptionName(exception->code);
 
+    if (where[0] == '\0')
+        where = "Before this start";
+
     state.current = *exception;
     if (exception->code_offset == APP_NO_CODE_OFFSET)
         LogAdd(CMPID_CmpAppEmbedded, LOG_EXCEPTION, exception->code, "%s: %s", where, name);

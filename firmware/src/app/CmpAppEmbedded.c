@@ -22,7 +22,7 @@
 #include "SysFlash.h"
 #include "SysTime.h"
 
-#define PROVE_NS ((RTS_I64)APP_PROVE_US * 1000)
+#define PROVE_MS (APP_PROVE_US / 1000)
 
 /* What a loaded application waits for: nothing, its initial values, those of retain variables too. */
 enum { INIT_DONE = 0, INIT_WARM = 1, INIT_COLD = 2 };
@@ -34,7 +34,7 @@ static struct {
     APP_IMAGE image;
     APP_TABLES tables;
     IEC_CONTEXT context; /* what every task starts from */
-    RTS_I64 run_since_ns;
+    RTS_UI32 run_since_ms;
 } app;
 
 void AppPostEvent(RTS_UI32 event)
@@ -227,7 +227,6 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     app.state = AS_STOP;
     SysExceptCodeRange(code, image->code.size);
     set_context();
-    AppAreasClear(true);
     attach_retain(retain_size);
     restored = RetainRestore(retain_after, retain_until);
     if (restored != ERR_OK && retain_size != 0 && retain_until != retain_after)
@@ -273,7 +272,7 @@ RTS_RESULT AppStart(void)
         return result;
     AppPostEvent(EVT_PrepareStart);
     (void)AppCommitSetState(app.image.file, SLOT_STARTED);
-    app.run_since_ns = SysTimeGetNs();
+    app.run_since_ms = SysTimeGetMs();
     result = IecTaskStartAll();
     if (result != ERR_OK) {
         IecTaskStopAll();
@@ -289,7 +288,9 @@ RTS_RESULT AppStart(void)
 RTS_RESULT AppStartApplication(void)
 {
     AppHandlePendingException();
-    if (!is_loaded() || app.pending != INIT_DONE)
+    if (!is_loaded())
+        return ERR_APP_NOT_LOADED;
+    if (app.pending != INIT_DONE)
         return AppBootByHand();
     if (AppHasException())
         return ERR_INVALID_STATE;
@@ -309,12 +310,12 @@ RTS_RESULT AppStopApplication(void)
 
 static void check_proof(void)
 {
-    if (app.state != AS_RUN || is_proven() || SysTimeGetNs() - app.run_since_ns < PROVE_NS)
+    if (app.state != AS_RUN || is_proven() || SysTimeGetMs() - app.run_since_ms < PROVE_MS)
         return;
     if (AppCommitSetState(app.image.file, SLOT_PROVEN) == ERR_OK)
         RetainKeepNone();
     else
-        app.run_since_ns = SysTimeGetNs(); /* try again later, not in every pass */
+        app.run_since_ms = SysTimeGetMs(); /* try again later, not in every pass */
 }
 
 /* ---- reset ---- */
@@ -430,7 +431,7 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
     case CH_INIT:
         if (!RTS_STARTS_ONCE)
             forget_all();
-        (void)AppCommitOpen(); /* before the retain log, whose place it may tell */
+        AppCommitOpen(); /* before the retain log, whose place it may tell */
         break;
     case CH_INIT_TASKS:
         AppBoot();

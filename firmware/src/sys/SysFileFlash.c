@@ -64,67 +64,31 @@ static bool map_files(void)
     return valid;
 }
 
-RTS_UI32 SysFileGetMap(void)
-{
-    static const FILE_AREA map[FILE_COUNT] = {FILE_MAP};
-
-    return CRC32Update(0, map, sizeof map);
-}
-
-bool SysFileUseMap(RTS_UI32 map)
-{
-    return map == SysFileGetMap();
-}
-
 #else
 
-/* Sectors of one half of the retain log: enough for the largest record, but at most an eighth of the flash. */
-static RTS_UI32 retain_half_sectors(const SYS_FLASH *flash)
-{
-    RTS_UI32 sector = flash->sector_size;
-    RTS_UI32 most = flash->size / 8 / sector;
-    RTS_UI32 wanted = (FLASH_LOG_HEAD_SIZE + APP_RETAIN_SIZE + FILE_ALIGN + sector - 1) / sector;
-
-    if (most == 0)
-        return 1;
-    return wanted < most ? wanted : most;
-}
-
-static void set_area(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size)
-{
-    files[file].area.offset = offset;
-    files[file].area.size = size;
-}
-
 /*
- * The slots, then the retain log, and at the end, where it is in every layout, the commit log. The size of the slots is
- * the layout: 0 when there is no room for two and the retain log.
+ * Both logs lie behind the slots, which share what is left. A half of the retain log is a sixteenth of the flash and
+ * a sector. Nothing else has a say, so that firmware of other sizes finds what this one has written. False when
+ * nothing is left for the slots.
  */
-bool SysFileUseMap(RTS_UI32 slot)
-{
-    RTS_UI32 pair = 2 * SysFlashGet()->sector_size;
-    RTS_UI32 commit = SysFlashGet()->size - pair;
-
-    if (slot == 0 || slot % (pair / 2) != 0 || slot > (commit - pair) / 2)
-        return false;
-    set_area(FILE_SLOT_A, 0, slot);
-    set_area(FILE_SLOT_B, slot, slot);
-    set_area(FILE_RETAIN, 2 * slot, (commit - 2 * slot) / pair * pair);
-    set_area(FILE_COMMIT, commit, pair);
-    return true;
-}
-
-RTS_UI32 SysFileGetMap(void)
-{
-    return files[FILE_SLOT_A].area.size;
-}
-
 static bool map_files(void)
 {
     const SYS_FLASH *flash = SysFlashGet();
-    RTS_UI32 logs = 2 * flash->sector_size * (1 + retain_half_sectors(flash));
+    RTS_UI32 sector = flash->sector_size;
+    RTS_UI32 commit = 2 * sector;
+    RTS_UI32 retain = commit * (flash->size / 16 / sector + 1);
+    RTS_UI32 rest = flash->size > commit + retain ? flash->size - commit - retain : 0;
+    RTS_UI32 slot = rest / 2 / sector * sector;
+    const RTS_UI32 sizes[FILE_COUNT] = {slot, slot, commit, retain};
+    RTS_UI32 offset = 0;
+    RTS_UI32 i;
 
-    return flash->size > logs && SysFileUseMap((flash->size - logs) / 2 / flash->sector_size * flash->sector_size);
+    for (i = 0; i < FILE_COUNT; i++) {
+        files[i].area.offset = offset;
+        files[i].area.size = sizes[i];
+        offset += sizes[i];
+    }
+    return slot > 0;
 }
 
 #endif

@@ -19,6 +19,7 @@ typedef struct {
 } RECORD_HEAD;
 
 RTS_STATIC_ASSERT(sizeof(RECORD_HEAD) == FLASH_LOG_HEAD_SIZE, record_head_size);
+RTS_STATIC_ASSERT(sizeof(FLASH_LOG) >= FILE_ALIGN, a_mark_is_the_beginning_of_a_log);
 
 enum { RECORD_MAGIC = 0x474F4C52 };
 
@@ -242,12 +243,6 @@ static RTS_RESULT write_record(RTS_UI32 file, RTS_UI32 position, const RECORD_HE
     return result;
 }
 
-/* What no erased byte is, and no record starts with. */
-static RTS_UI8 mark_byte(void)
-{
-    return (RTS_UI8)~SysFlashGet()->erased;
-}
-
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size)
 {
     RECORD_HEAD head = {RECORD_MAGIC, log->sequence + 1, tag, size, 0};
@@ -274,21 +269,16 @@ RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI
 
 RTS_RESULT FlashLogMark(FLASH_LOG *log)
 {
-    RTS_UI8 unit[FILE_ALIGN];
-
     if (log->used >= half_size(log))
         return ERR_DISK_FULL;
-    memset(unit, mark_byte(), sizeof unit);
     SysFileAppend(log->file, log->start + log->used);
     log->used += FILE_ALIGN;
-    return SysFileWrite(log->file, unit, sizeof unit);
+    return SysFileWrite(log->file, log, FILE_ALIGN); /* whatever is not erased and starts no record */
 }
 
 bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size)
 {
-    RTS_UI8 first;
-
-    return SysFileRead(log->file, log->newest + record_length(size), &first, 1) == ERR_OK && first == mark_byte();
+    return log->start + log->used > log->newest + record_length(size);
 }
 
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log)

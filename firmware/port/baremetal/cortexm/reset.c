@@ -44,16 +44,13 @@ void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
 }
 
 /* What nobody announced may have been the reset pin, or the watchdog of a chip that does not tell. */
-#define START(cause, text) {cause, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, LOG_MAX_ENTRIES > 0 ? (text) : ""}
-
 const SYS_START *SysStartGet(void)
 {
-    static const SYS_START starts[RESET_CAUSE_COUNT] = {
-        [RESET_POWER_ON] = START(SYS_START_POWER, "power on"),
-        [RESET_PIN] = START(SYS_START_UNKNOWN, "reset pin"),
-        [RESET_SOFTWARE] = START(SYS_START_POWER, "software"),
-        [RESET_FATAL] = START(SYS_START_CRASH, "fault of the runtime"),
-        [RESET_WATCHDOG] = START(SYS_START_CRASH, "hardware watchdog"),
-    };
-    return &starts[last.cause];
+    static const SYS_START power = {SYS_START_POWER, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
+    static const SYS_START crash = {SYS_START_CRASH, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
+    static const SYS_START unknown = {SYS_START_UNKNOWN, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
+
+    if (last.cause >= RESET_FATAL)
+        return &crash; /* which one, and where, main has put into the log */
+    return last.cause == RESET_PIN ? &unknown : &power;
 }
