@@ -102,7 +102,8 @@ void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode);
 enum { SIM_READ = 0, SIM_PROGRAM = 1, SIM_ERASE = 2, SIM_SYNC = 3, SIM_MAP_CODE = 4, SIM_CALLS = 5 };
 
 /* Plans that the `call`-th call of a kind from now, 1 being the next, fails; 0 forgets the plan. Nothing is read,
- * programmed, erased; with SIM_SYNC all is in flash, but nobody promises that it stays. */
+ * programmed, erased. With SIM_SYNC all is in flash, but what came after the sync before is lost with power, unless
+ * another sync succeeds. */
 void SimFlashFail(RTS_UI32 kind, RTS_UI32 call);
 
 /* What is planned now is for the next SimStart, and counts from there; other plans end with power. */

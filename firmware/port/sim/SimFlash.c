@@ -40,7 +40,9 @@ typedef struct {
 static struct {
     SYS_FLASH flash;
     CELLS cells;
-    CELLS kept; /* by SimFlashSave */
+    CELLS kept;   /* by SimFlashSave */
+    CELLS synced; /* by the last sync, when one is planned to fail */
+    bool sync_failed;
     bool unmapped;
     RTS_UI32 operations;
     RTS_UI32 calls[SIM_CALLS];
@@ -163,9 +165,18 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
     return end_operation(after);
 }
 
+static void copy_cells(CELLS *to, const CELLS *from)
+{
+    memcpy(to->data, from->data, chip.flash.size);
+    memcpy(to->programmed, from->programmed, chip.flash.size);
+}
+
 static RTS_RESULT flash_sync(void)
 {
-    return fails(SIM_SYNC) ? ERR_DEVICE : ERR_OK;
+    chip.sync_failed = fails(SIM_SYNC);
+    if (!chip.sync_failed && chip.synced.data != NULL)
+        copy_cells(&chip.synced, &chip.cells);
+    return chip.sync_failed ? ERR_DEVICE : ERR_OK;
 }
 
 const SYS_FLASH *SysFlashGet(void)
@@ -243,6 +254,7 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
         return ERR_PARAMETER;
     free_cells(&chip.cells);
     free_cells(&chip.kept);
+    free_cells(&chip.synced);
     if (!allocate_cells(&chip.cells, size))
         return ERR_NOMEMORY;
     memset(chip.cells.data, erased, size);
@@ -267,6 +279,11 @@ RTS_RESULT SimFlashPowerOn(void)
     chip.plan = chip.next_plan;
     memset(&chip.next_plan, 0, sizeof chip.next_plan);
     chip.power_lost = false;
+    if (chip.sync_failed)
+        copy_cells(&chip.cells, &chip.synced);
+    chip.sync_failed = false;
+    if (chip.plan.fail_at[SIM_SYNC] == 0)
+        free_cells(&chip.synced);
     if (chip.cells.data != NULL)
         return ERR_OK;
     return SimFlashConfigure(SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED);
@@ -286,12 +303,6 @@ RTS_UI8 *SimFlashData(void)
 RTS_UI32 SimFlashSize(void)
 {
     return chip.flash.size;
-}
-
-static void copy_cells(CELLS *to, const CELLS *from)
-{
-    memcpy(to->data, from->data, chip.flash.size);
-    memcpy(to->programmed, from->programmed, chip.flash.size);
 }
 
 RTS_RESULT SimFlashSave(void)
@@ -320,8 +331,14 @@ void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode)
 
 void SimFlashFail(RTS_UI32 kind, RTS_UI32 call)
 {
-    if (kind < SIM_CALLS)
-        chip.plan.fail_at[kind] = call == 0 ? 0 : chip.calls[kind] + call;
+    if (kind >= SIM_CALLS)
+        return;
+    if (kind == SIM_SYNC && chip.synced.data == NULL) {
+        if (!allocate_cells(&chip.synced, chip.flash.size))
+            return;
+        copy_cells(&chip.synced, &chip.cells);
+    }
+    chip.plan.fail_at[kind] = call == 0 ? 0 : chip.calls[kind] + call;
 }
 
 static RTS_UI32 count_from_zero(RTS_UI32 at, RTS_UI32 now)
