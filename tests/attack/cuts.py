@@ -22,14 +22,13 @@ GEOMETRIES = (Geometry(), Geometry(erased=0x00, unit=1), Geometry(sector=512, un
 FAILING = Geometry(mapped=False)  # reads can fail
 MODES = {"before": lib.SIM_CUT_BEFORE, "after": lib.SIM_CUT_AFTER, "torn": lib.SIM_CUT_TORN}
 CALLS = {
-    "read": lib.SIM_CALL_READ,
-    "program": lib.SIM_CALL_PROGRAM,
-    "erase": lib.SIM_CALL_ERASE,
-    "sync": lib.SIM_CALL_SYNC,
-    "map": lib.SIM_CALL_MAP,
+    "read": lib.SIM_READ,
+    "program": lib.SIM_PROGRAM,
+    "erase": lib.SIM_ERASE,
+    "sync": lib.SIM_SYNC,
+    "map": lib.SIM_MAP_CODE,
 }
 READS = 250  # failing reads tried in a story, of the thousands there are
-FOREVER = 1 << 30
 BRIEFLY_MS = 500  # less than the proving time
 
 
@@ -156,18 +155,19 @@ class Calls(Campaign):
                 calls = range(1, counts[number] + 1)
                 tried = sorted(chooser.sample(calls, READS)) if len(calls) > READS and kind == "read" else calls
                 cases += [
-                    Case(f"{name}: {kind} {call} fails{' for ever' if count > 1 else ''}", (name, kind, call, count))
+                    Case(f"{name}: {kind} {call}{' and all after it' if on else ''} fails", (name, kind, call, on))
                     for call in tried
-                    for count in (1, FOREVER)
+                    for on in (False, True)
                 ]
         return cases
 
     def run(self, case: Case) -> str:
-        name, kind, call, count = case.data
+        name, kind, call, on = case.data
         story = STORIES[name]
         flash = load(self.shop, story, FAILING)
         ended = flash.power(
-            partial(_live_with_faults, self.shop, story), plan=partial(lib.SimFlashFail, CALLS[kind], call, count)
+            partial(_live_with_faults, self.shop, story),
+            plan=partial(lib.SimFlashFailFrom if on else lib.SimFlashFail, CALLS[kind], call),
         )
         if ended.how != "used":
             raise Fallen(f"the runtime {ended.how} {ended.signal}".strip())
@@ -220,7 +220,7 @@ def measure(shop: Workshop, story: Story, geometry: Geometry) -> tuple[int, list
 
     def live(device: Device) -> tuple[int, list[int]]:
         story.live(shop, device)
-        return lib.SimFlashOps(), [lib.SimFlashCalls(kind) for kind in range(lib.SIM_CALL_KINDS)]
+        return lib.SimFlashOps(), [lib.SimFlashCalls(kind) for kind in range(lib.SIM_CALLS)]
 
     ended = load(shop, story, geometry).power(live)
     assert ended.how == "used", f"the story itself fails: {ended}"

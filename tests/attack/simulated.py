@@ -143,6 +143,7 @@ def _live(
 
 def _use(use: Callable[[Device], Any], plan: Callable[[], None], after: Ended | None, stay: bool) -> Ended:
     plan()
+    lib.SimFlashAtStart()
     _tell_cause(after, stay)
     result = lib.SimStart()
     if result == lib.SIM_POWER_CUT:
@@ -151,7 +152,9 @@ def _use(use: Callable[[Device], Any], plan: Callable[[], None], after: Ended | 
         return Ended("died", None, f"start-up failed with error {result}")
     device = Device()
     try:
-        return Ended("used", use(device))
+        ended = Ended("used", use(device))
+        lib.SimFlashPowerOff()
+        return ended
     except (PowerCut, PlcError):
         if lib.SimCommCycle() != lib.SIM_POWER_CUT:
             raise

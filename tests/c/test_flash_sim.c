@@ -224,38 +224,50 @@ static void planned_calls_fail_and_do_nothing(void)
     const SYS_FLASH *flash = blank(1, 0xFF);
     RTS_UI8 byte = 0;
 
-    SimFlashFail(SIM_CALL_PROGRAM, 2, 2);
+    SimFlashFail(SIM_PROGRAM, 2);
     CHECK(flash->program(0, ones, 1) == ERR_OK);
-    CHECK(flash->program(1, ones, 1) == ERR_DEVICE);
     CHECK(flash->program(1, ones, 1) == ERR_DEVICE);
     CHECK(flash->read(1, &byte, 1) == ERR_OK && byte == 0xFF);
     CHECK(flash->program(1, ones, 1) == ERR_OK);
     CHECK(SimFlashViolations() == 0);
-    CHECK(SimFlashCalls(SIM_CALL_PROGRAM) == 4);
-    SimFlashFail(SIM_CALL_READ, 1, 1);
+    CHECK(SimFlashCalls(SIM_PROGRAM) == 3);
+    SimFlashFail(SIM_READ, 1);
     CHECK(flash->read(1, &byte, 1) == ERR_DEVICE);
-    SimFlashFail(SIM_CALL_ERASE, 1, 1);
+    SimFlashFail(SIM_ERASE, 1);
     CHECK(flash->erase(0) == ERR_DEVICE);
-    SimFlashFail(SIM_CALL_SYNC, 1, 1);
-    CHECK(flash->sync() == ERR_DEVICE && flash->sync() == ERR_OK);
-    SimFlashFail(SIM_CALL_MAP, 1, 1);
+    SimFlashFail(SIM_MAP_CODE, 1);
     CHECK(SysFlashMapCode(0, 0, 16) == NULL && SysFlashMapCode(0, 0, 16) != NULL);
-    SimFlashFail(SIM_CALL_SYNC, 1, 1);
-    SimFlashFail(SIM_CALL_SYNC, 0, 0);
-    CHECK(flash->sync() == ERR_OK);
+    SimFlashFailFrom(SIM_PROGRAM, 2);
+    CHECK(flash->program(8, ones, 1) == ERR_OK);
+    CHECK(flash->program(9, ones, 1) == ERR_DEVICE && flash->program(9, ones, 1) == ERR_DEVICE);
+    SimFlashFail(SIM_PROGRAM, 0);
+    CHECK(flash->program(9, ones, 1) == ERR_OK);
 }
 
-static void a_plan_made_while_power_is_off_is_for_the_next_start(void)
+static void a_plan_for_the_start_counts_from_there(void)
 {
     const SYS_FLASH *flash = blank(1, 0xFF);
 
-    SimFlashFail(SIM_CALL_SYNC, 1, 1);
+    SimFlashFail(SIM_PROGRAM, 1);
     CHECK(SimStart() == ERR_OK);
-    CHECK(flash->sync() == ERR_OK);
-    SimStop();
-    SimFlashFail(SIM_CALL_SYNC, 1, 1);
+    CHECK(flash->program(0, ones, 1) == ERR_OK);
+    SimFlashFailFrom(SIM_PROGRAM, 1);
+    SimFlashAtStart();
+    CHECK(flash->program(1, ones, 1) == ERR_OK);
     CHECK(SimStart() == ERR_OK);
+    CHECK(flash->program(2, ones, 1) == ERR_DEVICE && flash->program(2, ones, 1) == ERR_DEVICE);
+}
+
+static void what_was_not_synced_is_lost_with_power(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    SimFlashFail(SIM_SYNC, 1);
+    CHECK(flash->program(0, ones, 1) == ERR_OK);
     CHECK(flash->sync() == ERR_DEVICE);
+    CHECK(flash->mapped[0] == 1);
+    SimFlashPowerOff();
+    CHECK(SimFlashData()[0] == 0xFF);
 }
 
 static void what_is_loaded_counts_as_programmed(void)
@@ -305,7 +317,8 @@ int main(void)
     RUN(content_is_kept_and_brought_back_with_what_was_programmed);
     RUN(code_is_mapped_per_slot_and_aligned);
     RUN(planned_calls_fail_and_do_nothing);
-    RUN(a_plan_made_while_power_is_off_is_for_the_next_start);
+    RUN(a_plan_for_the_start_counts_from_there);
+    RUN(what_was_not_synced_is_lost_with_power);
     RUN(what_is_loaded_counts_as_programmed);
     RUN(cells_survive_the_process_and_are_not_written_by_stores);
     return test_result();

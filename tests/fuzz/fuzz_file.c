@@ -190,7 +190,7 @@ static void operate(uint8_t what, RTS_UI32 number)
         erase(file, number);
         break;
     case 5:
-        SimFlashFail(file, number % 64, 1 + number / 64 % 4);
+        SimFlashFail(file, number % 64);
         break;
     default:
         read_part(file, number);
@@ -207,8 +207,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     FUZZ_CHECK(SimStart() == ERR_OK);
     for (size_t i = 0; i + OPERATION_SIZE <= size; i += OPERATION_SIZE)
         operate(data[i], data[i + 1] | (RTS_UI32)data[i + 2] << 8);
-    for (RTS_UI32 kind = 0; kind < SIM_CALL_KINDS; kind++)
-        SimFlashFail(kind, 0, 0);
+    for (RTS_UI32 kind = 0; kind < SIM_CALLS; kind++)
+        SimFlashFail(kind, 0);
     check_all();
     return 0;
 }

@@ -99,24 +99,25 @@ RTS_RESULT SimFlashLoad(const RTS_UI8 *data, RTS_UI32 size);
 RTS_RESULT SimFlashSave(void);
 RTS_RESULT SimFlashRestore(void);
 
-/* Plans a cut or fault at the `operation`-th flash operation from now, 1 being the next; 0 forgets the plan. Plans of
- * these functions are kept by SimStart when they are made while power is off, and are forgotten by it otherwise. */
+/* Plans a cut or fault at the `operation`-th flash operation from now, 1 being the next; 0 forgets the plan. */
 void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode);
 
-/* Calls of the port by the runtime. SIM_CALL_READ: only of a flash that is not mapped. SIM_CALL_MAP: SysFlashMapCode,
- * as for want of memory. */
-enum {
-    SIM_CALL_READ = 0,
-    SIM_CALL_PROGRAM = 1,
-    SIM_CALL_ERASE = 2,
-    SIM_CALL_SYNC = 3,
-    SIM_CALL_MAP = 4,
-    SIM_CALL_KINDS = 5,
-};
+/* Calls of the flash that can fail: a read (none while the flash is mapped), program, erase, sync, mapping of code. */
+enum { SIM_READ = 0, SIM_PROGRAM = 1, SIM_ERASE = 2, SIM_SYNC = 3, SIM_MAP_CODE = 4, SIM_CALLS = 5 };
 
-/* Plans that `count` calls of a kind fail without doing anything, from the `call`-th from now on, 1 being the next;
- * 0 forgets the plan. */
-void SimFlashFail(RTS_UI32 kind, RTS_UI32 call, RTS_UI32 count);
+/* Plans that the `call`-th call of a kind from now, 1 being the next, fails; 0 forgets the plan. Nothing is read,
+ * programmed, erased. With SIM_SYNC all is in flash, but what came after the sync before is lost with power, unless
+ * another sync succeeds. */
+void SimFlashFail(RTS_UI32 kind, RTS_UI32 call);
+
+/* The same, and all calls of that kind after it. */
+void SimFlashFailFrom(RTS_UI32 kind, RTS_UI32 call);
+
+/* Power is off: what was not synced when a sync failed is lost. SimStart does it, too; for a process that ends. */
+void SimFlashPowerOff(void);
+
+/* What is planned now is for the next SimStart, and counts from there; other plans end with power. */
+void SimFlashAtStart(void);
 
 /* Calls of a kind since SimStart. */
 RTS_UI32 SimFlashCalls(RTS_UI32 kind);

@@ -34,21 +34,26 @@ typedef struct {
     RTS_UI32 size;
 } CELLS;
 
+/* When something happens, as values of the counters; 0: never. */
+typedef struct {
+    RTS_UI32 cut_at;
+    RTS_UI32 cut_mode;
+    RTS_UI32 fail_at[SIM_CALLS];
+    bool fail_on[SIM_CALLS]; /* all calls after that one, too */
+} PLAN;
+
 static struct {
     SYS_FLASH flash;
     CELLS cells;
-    CELLS kept; /* by SimFlashSave */
+    CELLS kept;   /* by SimFlashSave */
+    CELLS synced; /* by the last sync, when one is planned to fail */
+    bool sync_failed;
     bool unmapped;
     RTS_UI32 operations;
-    RTS_UI32 cut_at; /* value of `operations` at which it happens, 0: never */
-    RTS_UI32 cut_mode;
+    RTS_UI32 calls[SIM_CALLS];
+    PLAN plan;
+    PLAN next_plan; /* from the next power on */
     bool power_lost;
-    bool on;
-    RTS_UI32 calls[SIM_CALL_KINDS];
-    struct {
-        RTS_UI32 in; /* how many calls until the first one that fails, that one included; 0: it is due or past */
-        RTS_UI32 count; /* that are still to fail */
-    } failing[SIM_CALL_KINDS];
     RTS_UI32 violations;
     char violation[80];
     MAPPING mapping[CODE_SLOTS];
@@ -85,38 +90,31 @@ static void set_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
         violate("the simulator's memory failed", offset);
 }
 
-/* ---- failing calls and cuts ---- */
-
-/* Counts a call; true when it was planned to fail. */
-static bool call_fails(RTS_UI32 kind)
-{
-    chip.calls[kind]++;
-    if (chip.failing[kind].in > 0)
-        chip.failing[kind].in--;
-    if (chip.failing[kind].in > 0 || chip.failing[kind].count == 0)
-        return false;
-    chip.failing[kind].count--;
-    return true;
-}
-
-static void forget_plans(void)
-{
-    chip.cut_at = 0;
-    memset(chip.failing, 0, sizeof chip.failing);
-}
+/* ---- cuts ---- */
 
 /* Counts an operation on `size` bytes; returns how many of them happen. *after: what follows, SIM_CUT_* or
  * SIM_FAULT. */
 static RTS_UI32 begin_operation(RTS_UI32 size, int *after)
 {
     *after = -1;
-    if (++chip.operations != chip.cut_at)
+    if (++chip.operations != chip.plan.cut_at)
         return size;
-    chip.cut_at = 0;
-    *after = (int)chip.cut_mode;
-    if (chip.cut_mode == SIM_CUT_AFTER)
+    chip.plan.cut_at = 0;
+    *after = (int)chip.plan.cut_mode;
+    if (chip.plan.cut_mode == SIM_CUT_AFTER)
         return size;
-    return chip.cut_mode == SIM_CUT_BEFORE ? 0 : size / 2;
+    return chip.plan.cut_mode == SIM_CUT_BEFORE ? 0 : size / 2;
+}
+
+/* Counts a call; whether it fails. */
+static bool fails(RTS_UI32 kind)
+{
+    RTS_UI32 at = chip.plan.fail_at[kind];
+
+    if (chip.power_lost)
+        return true;
+    chip.calls[kind]++;
+    return chip.calls[kind] == at || (chip.plan.fail_on[kind] && chip.calls[kind] > at);
 }
 
 static RTS_RESULT end_operation(int after)
@@ -125,7 +123,6 @@ static RTS_RESULT end_operation(int after)
         return ERR_OK;
     if (after != SIM_FAULT) {
         chip.power_lost = true;
-        chip.on = false;
         SimPowerCut();
     }
     return ERR_DEVICE;
@@ -135,10 +132,10 @@ static RTS_RESULT end_operation(int after)
 
 static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 {
+    if (fails(SIM_READ))
+        return ERR_DEVICE;
     if (!is_inside(offset, size))
         return violate("read outside", offset);
-    if (call_fails(SIM_CALL_READ))
-        return ERR_DEVICE;
     memcpy(data, chip.cells.data + offset, size);
     return ERR_OK;
 }
@@ -183,14 +180,12 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
     RTS_UI32 unit = chip.flash.program_size;
     int after;
 
-    if (chip.power_lost)
+    if (fails(SIM_PROGRAM))
         return ERR_DEVICE;
     if (!is_inside(offset, size) || size == 0)
         return violate("program outside", offset);
     if (offset % unit != 0 || size % unit != 0)
         return violate("program misaligned", offset);
-    if (call_fails(SIM_CALL_PROGRAM))
-        return ERR_DEVICE;
     if (was_programmed(offset, size))
         violate("programmed twice", offset);
     program_cells(offset, data, begin_operation(size, &after));
@@ -202,22 +197,29 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
     RTS_UI32 size = chip.flash.sector_size;
     int after;
 
-    if (chip.power_lost)
+    if (fails(SIM_ERASE))
         return ERR_DEVICE;
     if (!is_inside(offset, size))
         return violate("erase outside", offset);
     if (offset % size != 0)
         return violate("erase misaligned", offset);
-    if (call_fails(SIM_CALL_ERASE))
-        return ERR_DEVICE;
     size = begin_operation(size, &after);
     erase_cells(offset, size);
     return end_operation(after);
 }
 
+static void copy_cells(CELLS *to, const CELLS *from)
+{
+    memcpy(to->data, from->data, chip.flash.size);
+    memcpy(to->programmed, from->programmed, chip.flash.size);
+}
+
 static RTS_RESULT flash_sync(void)
 {
-    return chip.power_lost || call_fails(SIM_CALL_SYNC) ? ERR_DEVICE : ERR_OK;
+    chip.sync_failed = fails(SIM_SYNC);
+    if (!chip.sync_failed && chip.synced.data != NULL)
+        copy_cells(&chip.synced, &chip.cells);
+    return chip.sync_failed ? ERR_DEVICE : ERR_OK;
 }
 
 const SYS_FLASH *SysFlashGet(void)
@@ -231,11 +233,9 @@ const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
 {
     void *code;
 
-    if (slot >= CODE_SLOTS || size == 0 || !is_inside(offset, size))
+    if (slot >= CODE_SLOTS || size == 0 || !is_inside(offset, size) || fails(SIM_MAP_CODE))
         return NULL;
     SysFlashReleaseCode(slot);
-    if (call_fails(SIM_CALL_MAP))
-        return NULL;
     code = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (code == MAP_FAILED)
         return NULL;
@@ -312,6 +312,7 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
         return ERR_PARAMETER;
     free_cells(&chip.cells);
     free_cells(&chip.kept);
+    free_cells(&chip.synced);
     if (!allocate_cells(&chip.cells, size))
         return ERR_NOMEMORY;
     memset(chip.cells.data, erased, size);
@@ -325,6 +326,15 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
     return ERR_OK;
 }
 
+void SimFlashPowerOff(void)
+{
+    if (chip.sync_failed && chip.synced.data != NULL) {
+        set_writable(true);
+        copy_cells(&chip.cells, &chip.synced);
+    }
+    chip.sync_failed = false;
+}
+
 RTS_RESULT SimFlashPowerOn(void)
 {
     RTS_RESULT result = ERR_OK;
@@ -332,23 +342,19 @@ RTS_RESULT SimFlashPowerOn(void)
 
     for (slot = 0; slot < CODE_SLOTS; slot++)
         SysFlashReleaseCode(slot);
-    if (chip.on)
-        forget_plans();
-    chip.on = true;
+    SimFlashPowerOff();
     chip.operations = 0;
-    chip.power_lost = false;
     memset(chip.calls, 0, sizeof chip.calls);
+    chip.plan = chip.next_plan;
+    memset(&chip.next_plan, 0, sizeof chip.next_plan);
+    chip.power_lost = false;
+    if (chip.plan.fail_at[SIM_SYNC] == 0)
+        free_cells(&chip.synced);
     if (chip.cells.data == NULL)
         result = SimFlashConfigure(SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED);
     if (result == ERR_OK)
         set_writable(false);
     return result;
-}
-
-void SimFlashPowerOff(void)
-{
-    chip.on = false;
-    forget_plans();
 }
 
 void SimFlashSetMapped(int mapped)
@@ -382,12 +388,6 @@ RTS_UI32 SimFlashSize(void)
     return chip.flash.size;
 }
 
-static void copy_cells(CELLS *to, const CELLS *from)
-{
-    memcpy(to->data, from->data, chip.flash.size);
-    memcpy(to->programmed, from->programmed, chip.flash.size);
-}
-
 RTS_RESULT SimFlashSave(void)
 {
     if (chip.cells.data == NULL)
@@ -409,21 +409,54 @@ RTS_RESULT SimFlashRestore(void)
 
 void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode)
 {
-    chip.cut_at = operation == 0 ? 0 : chip.operations + operation;
-    chip.cut_mode = mode;
+    chip.plan.cut_at = operation == 0 ? 0 : chip.operations + operation;
+    chip.plan.cut_mode = mode;
 }
 
-void SimFlashFail(RTS_UI32 kind, RTS_UI32 call, RTS_UI32 count)
+static void plan_failure(RTS_UI32 kind, RTS_UI32 call, bool all_after)
 {
-    if (kind >= SIM_CALL_KINDS)
+    if (kind >= SIM_CALLS)
         return;
-    chip.failing[kind].in = call;
-    chip.failing[kind].count = call == 0 ? 0 : count;
+    chip.plan.fail_on[kind] = all_after && call != 0;
+    if (kind == SIM_SYNC && chip.synced.data == NULL) {
+        if (!allocate_cells(&chip.synced, chip.flash.size))
+            return;
+        copy_cells(&chip.synced, &chip.cells);
+    }
+    chip.plan.fail_at[kind] = call == 0 ? 0 : chip.calls[kind] + call;
+}
+
+void SimFlashFail(RTS_UI32 kind, RTS_UI32 call)
+{
+    plan_failure(kind, call, false);
+}
+
+void SimFlashFailFrom(RTS_UI32 kind, RTS_UI32 call)
+{
+    plan_failure(kind, call, true);
+}
+
+static RTS_UI32 count_from_zero(RTS_UI32 at, RTS_UI32 now)
+{
+    return at > now ? at - now : 0;
+}
+
+void SimFlashAtStart(void)
+{
+    RTS_UI32 kind;
+
+    chip.next_plan.cut_at = count_from_zero(chip.plan.cut_at, chip.operations);
+    chip.next_plan.cut_mode = chip.plan.cut_mode;
+    for (kind = 0; kind < SIM_CALLS; kind++) {
+        chip.next_plan.fail_at[kind] = count_from_zero(chip.plan.fail_at[kind], chip.calls[kind]);
+        chip.next_plan.fail_on[kind] = chip.plan.fail_on[kind];
+    }
+    memset(&chip.plan, 0, sizeof chip.plan);
 }
 
 RTS_UI32 SimFlashCalls(RTS_UI32 kind)
 {
-    return kind < SIM_CALL_KINDS ? chip.calls[kind] : 0;
+    return kind < SIM_CALLS ? chip.calls[kind] : 0;
 }
 
 RTS_UI32 SimFlashOps(void)

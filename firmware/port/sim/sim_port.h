@@ -14,7 +14,6 @@ void SimPowerCut(void);
 
 /* Power on: forget what RAM and pins held. */
 RTS_RESULT SimFlashPowerOn(void);
-void SimFlashPowerOff(void);
 void SimComPowerOn(void);
 
 /* Starts the thread that breaks endless loops, once per process. */
