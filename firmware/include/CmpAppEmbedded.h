@@ -13,6 +13,7 @@
 #include "CmpErrors.h"
 #include "CmpIecAbi.h"
 #include "CmpStd.h"
+#include "SysStart.h"
 #include "rts_config.h"
 #ifndef RTS_CFFI
 #include "CmpItf.h"
@@ -48,8 +49,6 @@ enum {
 };
 
 enum { APP_NAME_SIZE = 60 }; /* with NUL */
-
-#define APP_NO_CODE_OFFSET 0xFFFFFFFFu
 
 /* The last exception; code RTSEXCPT_NOEXCEPTION when there is none. */
 typedef struct {
