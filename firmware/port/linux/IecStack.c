@@ -20,11 +20,13 @@
 #define GUARD_SIZE ((size_t)16 * 1024 * 1024)
 #define SIGNAL_SIZE ((size_t)64 * 1024) /* a signal frame with all vector registers takes up to 20 KiB */
 
-int IecStackSwitch(void (*fn)(void *arg), void *arg, IEC_STACK *stack);
+int IecStackSwitch(void (*fn)(void *arg), void *arg, IEC_STACK *stack, RTS_UI32 running);
 void IecStackSwitchBack(IEC_STACK *stack) __attribute__((noreturn));
 
 RTS_STATIC_ASSERT(offsetof(IEC_STACK, back) == 0 && offsetof(IEC_STACK, top) == 8 && offsetof(IEC_STACK, running) == 16,
                   layout_is_what_the_switch_knows);
+
+__thread IEC_STACK *IecStackOfThread;
 
 bool IecStackReserve(IEC_STACK *stack)
 {
@@ -59,7 +61,7 @@ bool IecStackIsOverflow(const IEC_STACK *stack, uintptr_t address)
     return stack->bottom - address - 1 < GUARD_SIZE;
 }
 
-/* ---- the address sanitizer has to be told which stack is in use ---- */
+/* ---- the address sanitizer has to be told which stack is in use: nothing may be left in the middle of that ---- */
 
 #if defined(__SANITIZE_ADDRESS__)
 
@@ -81,7 +83,10 @@ static void call(void *arg)
     CALL *call = arg;
     IEC_STACK *stack = call->stack;
     __sanitizer_finish_switch_fiber(NULL, (const void **)&stack->sanitizer.own_bottom, &stack->sanitizer.own_size);
+    __atomic_store_n(&stack->running, 1, __ATOMIC_RELEASE);
     call->fn(call->arg);
+    stack = IecStackOfThread; /* the register that held it may have been destroyed */
+    __atomic_store_n(&stack->running, 0, __ATOMIC_RELEASE);
     before_back(stack);
 }
 
@@ -89,15 +94,16 @@ int IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
     CALL arguments = {stack, fn, arg};
     __sanitizer_start_switch_fiber(&stack->sanitizer.own_state, (void *)stack->bottom, STACK_SIZE);
-    int left = IecStackSwitch(call, &arguments, stack);
+    int left = IecStackSwitch(call, &arguments, stack, 0);
     __sanitizer_finish_switch_fiber(stack->sanitizer.own_state, NULL, NULL);
     return left;
 }
 
-/* The order matters: what the frames that are given up have poisoned is cleared while their stack is still known. */
+/* The frames that are given up have poisoned what lies between their variables: here, and where handlers run. */
 NOT_CHECKED void IecStackLeave(IEC_STACK *stack)
 {
     __asan_handle_no_return();
+    __asan_unpoison_memory_region((void *)stack->bottom, STACK_SIZE);
     before_back(stack);
     IecStackSwitchBack(stack);
 }
@@ -106,7 +112,7 @@ NOT_CHECKED void IecStackLeave(IEC_STACK *stack)
 
 int IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
-    return IecStackSwitch(fn, arg, stack);
+    return IecStackSwitch(fn, arg, stack, 1);
 }
 
 void IecStackLeave(IEC_STACK *stack)

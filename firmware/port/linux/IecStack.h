@@ -37,7 +37,8 @@ int IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
 /* Ends the running IecStackRun of this thread, from the IEC stack or from a signal handler. */
 void IecStackLeave(IEC_STACK *stack) __attribute__((noreturn));
 
-/* Written by SysExcept.c: the record of the calling thread, wherever its registers point. */
-IEC_STACK *IecStackOfThread(void);
+/* The record of the calling thread, NULL without: found whatever its registers hold. Reading it in a handler never
+ * allocates. */
+extern __thread IEC_STACK *IecStackOfThread __attribute__((tls_model("initial-exec"), visibility("hidden")));
 
 #endif

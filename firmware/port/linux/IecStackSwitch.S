@@ -3,12 +3,12 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- *   int IecStackSwitch(void (*fn)(void *arg), void *arg, IEC_STACK *stack);
+ *   int IecStackSwitch(void (*fn)(void *arg), void *arg, IEC_STACK *stack, RTS_UI32 running);
  *   void IecStackSwitchBack(IEC_STACK *stack);
  *
  * All registers that a function preserves are saved on the stack of the thread, so that nothing that IEC code may have
- * destroyed is used after it: neither its stack nor a register it should have preserved. `running` is set once the way
- * back is known, and cleared once it has been taken. The copy of the saved stack pointer on the IEC stack is for
+ * destroyed is used after it: neither its stack nor a register it should have preserved. The record's `running` is set once
+ * the way back is known, and cleared once it has been taken. The copy of the saved stack pointer on the IEC stack is for
  * debuggers only.
  */
 #define BACK 0
@@ -52,11 +52,12 @@ IecStackSwitch:
     leaq -16(%rax), %rsp
     .cfi_remember_state
     .cfi_escape 0x0f, 5, 0x77, 0, 0x06, 0x23, 56 /* frame: what is at the stack pointer, plus 56 */
-    movl $1, RUNNING(%rdx)
+    movl %ecx, RUNNING(%rdx)
     movq %rdi, %rax
     movq %rsi, %rdi
     call *%rax
-    call IecStackOfThread
+    movq IecStackOfThread@gottpoff(%rip), %rax
+    movq %fs:(%rax), %rax
     xorl %ecx, %ecx
 go_back:
     movq BACK(%rax), %rsp
@@ -118,19 +119,21 @@ IecStackSwitch:
     stp d10, d11, [sp, #112]
     stp d12, d13, [sp, #128]
     stp d14, d15, [sp, #144]
-    mov x3, sp
-    str x3, [x2, #BACK]
+    mov x5, sp
+    str x5, [x2, #BACK]
     ldr x4, [x2, #TOP]
-    str x3, [x4, #-16]!
+    str x5, [x4, #-16]!
     mov sp, x4
     .cfi_remember_state
     .cfi_escape 0x0f, 6, 0x8f, 0, 0x06, 0x23, 160, 1 /* frame: what is at the stack pointer, plus 160 */
-    mov w5, #1
-    str w5, [x2, #RUNNING]
+    str w3, [x2, #RUNNING]
     mov x9, x0
     mov x0, x1
     blr x9
-    bl IecStackOfThread
+    mrs x0, tpidr_el0
+    adrp x1, :gottprel:IecStackOfThread
+    ldr x1, [x1, :gottprel_lo12:IecStackOfThread]
+    ldr x0, [x0, x1]
     mov w1, #0
 go_back:
     ldr x2, [x0, #BACK]

@@ -30,7 +30,7 @@ enum {
 /* A thread that runs IEC code. The thread itself writes `stack.running`, `round` and `arg`; SysExceptBreak reads them
  * from another. */
 typedef struct {
-    IEC_STACK stack;         /* stays when the thread ends, for the next one */
+    IEC_STACK stack;         /* the first member; stays when the thread ends, for the next one */
     RTS_UI32 round;          /* counts SysExceptTry, so that a break that comes late does not hit the next one */
     RTS_UI32 break_round;    /* the round to break */
     RTS_UI32 break_code;
@@ -67,18 +67,16 @@ static struct {
     },
 };
 
-/* The static TLS model: reading it in a handler never allocates. */
-static __thread CONTEXT *self __attribute__((tls_model("initial-exec")));
+/* That of the calling thread, NULL without. */
+static CONTEXT *self(void)
+{
+    return (CONTEXT *)IecStackOfThread;
+}
 
 static void fatal(const char *message)
 {
     fprintf(stderr, "SysExcept: %s\n", message);
     abort();
-}
-
-IEC_STACK *IecStackOfThread(void)
-{
-    return &self->stack;
 }
 
 static bool runs_iec_code(const CONTEXT *context)
@@ -159,7 +157,7 @@ static void chain(const SIGNAL *signal, siginfo_t *info, void *ucontext)
 
 static void on_fault(int number, siginfo_t *info, void *ucontext)
 {
-    CONTEXT *context = self;
+    CONTEXT *context = self();
     SIGNAL *signal = find_signal(number);
     if (runs_iec_code(context)) {
         leave(context, fault_code(context, signal, info), place_of(ucontext));
@@ -169,7 +167,7 @@ static void on_fault(int number, siginfo_t *info, void *ucontext)
 
 static void on_break(int number, siginfo_t *info, void *ucontext)
 {
-    CONTEXT *context = self;
+    CONTEXT *context = self();
     RTS_UNUSED(number);
     RTS_UNUSED(info);
     if (runs_iec_code(context) && __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round) {
@@ -238,7 +236,7 @@ static void detach(void *param)
         stack_t none = {.ss_flags = SS_DISABLE};
         sigaltstack(&none, NULL);
     }
-    self = NULL;
+    IecStackOfThread = NULL;
     pthread_mutex_lock(&state.lock);
     context->used = 0;
     pthread_mutex_unlock(&state.lock);
@@ -296,22 +294,22 @@ static CONTEXT *attach(void)
     pthread_mutex_lock(&state.lock);
     install();
     pthread_mutex_unlock(&state.lock);
-    if (self == NULL) {
+    if (self() == NULL) {
         CONTEXT *context = take_context();
         if (!IecStackReserve(&context->stack)) {
             fatal("no address space is left for the stack of a task: raise the limit (ulimit -v)");
         }
         give_signal_stack(context);
         pthread_setspecific(state.key, context);
-        self = context;
+        IecStackOfThread = &context->stack;
     }
     unblock_signals();
-    return self;
+    return self();
 }
 
 static CONTEXT *own_context(void)
 {
-    CONTEXT *context = self;
+    CONTEXT *context = self();
     return context != NULL && __atomic_load_n(&state.installed, __ATOMIC_RELAXED) ? context : attach();
 }
 
@@ -338,7 +336,7 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
-    CONTEXT *context = self;
+    CONTEXT *context = self();
     if (!runs_iec_code(context)) {
         fatal("an exception was raised outside of IEC code");
     }
