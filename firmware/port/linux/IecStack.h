@@ -41,4 +41,9 @@ void IecStackLeave(IEC_STACK *stack) __attribute__((noreturn));
  * allocates. */
 extern __thread IEC_STACK *IecStackOfThread __attribute__((tls_model("initial-exec"), visibility("hidden")));
 
+/* In SysExcept.c, for the handler of a signal that ends the process: the last address of the application's code that the
+ * calling thread was at, 0 when it is not in IEC code. *arg: what its latest SysExceptTry was called with, NULL when it
+ * called none. */
+uintptr_t IecStackLastPlace(const void *ucontext, const void **arg);
+
 #endif

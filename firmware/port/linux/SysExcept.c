@@ -124,6 +124,29 @@ static void leave(CONTEXT *context, RTS_UI32 code, PLACE place)
     IecStackLeave(&context->stack);
 }
 
+/* C code that IEC code called: the call that is nearest on the stack. */
+static uintptr_t last_return(const uintptr_t *word, const uintptr_t *end)
+{
+    while (word < end && !SysExceptIsReturn(*word)) {
+        word++;
+    }
+    return word < end ? *word - 1 : 0;
+}
+
+uintptr_t IecStackLastPlace(const void *ucontext, const void **arg)
+{
+    const CONTEXT *context = self();
+    PLACE place = place_of(ucontext);
+    *arg = context != NULL ? context->arg : NULL;
+    if (!runs_iec_code(context)) {
+        return 0;
+    }
+    if (SysExceptIsCode(place.address)) {
+        return place.address;
+    }
+    return last_return(readable(&context->stack, place.stack), (const uintptr_t *)context->stack.top);
+}
+
 static SIGNAL *find_signal(int number)
 {
     SIGNAL *found = state.signal;
