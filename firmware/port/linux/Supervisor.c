@@ -32,6 +32,7 @@ typedef struct {
     bool announced;      /* one was up; stays */
     bool up;             /* it serves its line */
     bool ended;          /* in order */
+    int number;          /* of the signal that it met, 0: none */
     bool ran;            /* the thread that died has run IEC code */
     RTS_I16 task;        /* whose cycle that thread was in, -1: none */
     RTS_UI32 code_offset;
@@ -92,6 +93,7 @@ static void on_death(int number, siginfo_t *info, void *ucontext)
     for (size_t i = 0; i < RTS_COUNT(deadly); i++) {
         sigaction(deadly[i].number, &deadly[i].previous, NULL);
     }
+    state.life->number = number;
     place = IecStackLastPlace(ucontext, &arg);
     if (place != 0) {
         state.life->code_offset = SysExceptCodeOffset(place);
@@ -179,7 +181,7 @@ static RTS_UI32 describe_signal(int number)
 /* SIGKILL comes from outside (a user, the system when memory is short): it is told, and does not count. */
 static void note_death(int status)
 {
-    int number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+    int number = WIFSIGNALED(status) ? WTERMSIG(status) : state.life->number; /* a sanitizer exits */
     RTS_UI32 exception = RTSEXCPT_NOEXCEPTION;
     if (number != 0) {
         exception = describe_signal(number);
@@ -224,6 +226,7 @@ static void end_at_once(int number)
 {
     sigset_t set;
     signal_worker(SIGKILL);
+    (void)waitpid(-1, NULL, 0);
     sigemptyset(&set);
     sigaddset(&set, number);
     (void)signal(number, SIG_DFL);
