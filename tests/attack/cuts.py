@@ -90,6 +90,8 @@ def _dead_and_replaced(shop: Workshop, device: Device) -> None:
     """The newest program died, and another one comes before power was off."""
     device.plc.flash(shop["dying"].image, unchecked=True)
     device.run(PROVING_MS)
+    if device.plc.status().state is AppState.EXCEPTION:
+        device.mark("died")
     _flash(shop, device, "good3")
 
 
@@ -104,7 +106,9 @@ STORIES = {
         {"": ("good1", "good2"), "first": ("good2", "good3"), "flashed": ("good3",)},
     ),
     "download after a death": Story(
-        ("good1",), _dead_and_replaced, {"": ("good1", "good3"), "flashed": ("good3",)}
+        ("good1",),
+        _dead_and_replaced,
+        {"": ("good1", "dying"), "died": ("good1", "good3"), "flashed": ("good3",)},
     ),
     "start": Story(("good1", "good2"), _boot, {"": ("good2",)}),
     "rollback": Story(("good1", "dying"), _boot, {"": ("good1",)}),
@@ -203,6 +207,8 @@ def _live_with_faults(shop: Workshop, story: Story, device: Device) -> tuple[str
         device.mark((device.marks or [""])[-1])
     seen = look_at(shop, device)
     last = device.marks[-1] if device.marks else ""
+    if last == "died" and any("cannot be written" in cause for cause in seen.causes):
+        last = ""  # nothing is left of the death
     if last == "flashed" and story.survivors[last] and seen.state is AppState.NONE:
         raise Fallen(f"flash said ok, but there is no program: {seen}")
     damaged = shop["good3"].image[:-1] + b"\x55"

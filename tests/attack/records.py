@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from campaign import BEFORE, NEWEST, STOPPED, Campaign, Case, Fallen
+from campaign import BEFORE, NEWEST, NOTHING, STOPPED, Campaign, Case, Fallen
 from look import Seen
 from simulated import Flash, Geometry
 from verdict import check_can_be_flashed, look_again
@@ -20,6 +20,7 @@ COUNT = 300
 ALIGN = 16  # FILE_ALIGN: where records begin
 WORDS = (0, 1, 2, 3, 0xFE, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFF0, 0xFFFFFFFF)
 LOGS = ("commit", "retain")
+NO_SLOT = 0xFF  # as the first byte of a commit record: there is no program, by the user's will
 
 
 @dataclass(frozen=True)
@@ -76,10 +77,11 @@ class Records(Campaign):
         log, number = case.data
         geometry = Geometry()
         content = bytearray(self.shop.history(geometry, "good1", "good2"))
-        _spoil(random.Random(f"{self.shop.seed} {number}"), content, self._newest(content, log))
+        hostile = _spoil(random.Random(f"{self.shop.seed} {number}"), content, self._newest(content, log))
+        may_be_none = log == "commit" and any(record.data[0] == NO_SLOT for record in hostile)
         flash = Flash(geometry)
         flash.load(bytes(content))
-        outcome = self._judge(look_again(self.shop, flash), log)
+        outcome = self._judge(look_again(self.shop, flash), log, may_be_none)
         check_can_be_flashed(self.shop, flash)
         return outcome
 
@@ -89,8 +91,10 @@ class Records(Campaign):
         found = [r for r in records(bytes(content)) if any(crc in r.data for crc in crcs) == (log == "commit")]
         return max(found, key=lambda r: r.sequence)
 
-    def _judge(self, seen: Seen, log: str) -> str:
+    def _judge(self, seen: Seen, log: str, may_be_none: bool) -> str:
         """Values of retain variables may be anything then, so they are not looked at."""
+        if may_be_none and seen.state is AppState.NONE:
+            return NOTHING
         program = self.shop.by_crc(seen.crc)
         if seen.state is AppState.RUN and program and seen.cycles:
             if program.name == "good2":
@@ -102,8 +106,9 @@ class Records(Campaign):
         raise Fallen(f"after a hostile record: {seen}")
 
 
-def _spoil(rng: random.Random, content: bytearray, newest: Record) -> None:
-    """Puts hostile records in place of the newest one of a log, or after it."""
+def _spoil(rng: random.Random, content: bytearray, newest: Record) -> list[Record]:
+    """Puts hostile records in place of the newest one of a log, or after it; returns them."""
+    hostile: list[Record] = []
     at = newest.offset if rng.random() < 0.3 else newest.end
     for _ in range(rng.choice((1, 1, 1, 2, 5))):
         record = replace(newest, offset=at, sequence=_sequence(rng, newest.sequence), data=_data(rng, newest.data))
@@ -112,9 +117,11 @@ def _spoil(rng: random.Random, content: bytearray, newest: Record) -> None:
         size = rng.choice((None, None, None, None, rng.choice(WORDS)))
         encoded = record.encode(size)
         if record.end > len(content):
-            return
+            break
+        hostile.append(record)
         content[at : at + len(encoded)] = encoded
         at = record.end
+    return hostile
 
 
 def _sequence(rng: random.Random, newest: int) -> int:
