@@ -40,10 +40,6 @@ void AppHandlePendingException(void);
 
 void AppPostEvent(RTS_UI32 event);
 
-/* ---- download ---- */
-
-bool AppDownloadIsOpen(void);
-
 /* ---- boot project ---- */
 
 /* Loads what is in flash, and starts it unless it died before. */
