@@ -2,94 +2,153 @@
  * TaskTrigger.c - events that make a task run; external events.
  *
  * SPDX-License-Identifier: Apache-2.0
+ *
+ * Events are counted where they happen and answered where the task runs, each by one cycle. The count is a single
+ * number: how often the variable was found changed, which is odd while it is TRUE. Whoever looks at the variable looks
+ * again when another context has counted meanwhile, so that looks of several tasks come in an order, and no edge that a
+ * task left behind at the end of its cycle is counted twice or not at all.
  */
 #include "TaskTrigger.h"
 
 #include <string.h>
 
+#include "CmpChecksum.h"
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
 #include "SysAtomic.h"
 #include "rts_config.h"
 
 typedef struct {
-    const char *name; /* NULL: free */
-    RTS_UI32 posts;
-} EXTERNAL_EVENT;
+    RTS_UI32 changes;  /* of the variable, odd: it is TRUE; two for each post of an external event */
+    RTS_UI32 answered; /* events that a cycle was for, and those lost; modulo EVENT_COUNTS */
+    RTS_UI32 lost;
+} TRIGGER;
+
+enum { EVENT_COUNTS = 0x7FFFFFFF };
+
+static struct {
+    const CDL_TASK *tasks;
+    RTS_UI8 *const *areas;
+    RTS_UI32 count;
+    RTS_UI32 variables; /* how many tasks wait for one */
+    TRIGGER list[APP_MAX_TASKS];
+} triggers;
 
 enum { PLACES = SCHED_MAX_EXTERNAL_EVENTS > 0 ? SCHED_MAX_EXTERNAL_EVENTS : 1 };
-static EXTERNAL_EVENT events[PLACES];
+static RTS_UI32 events[PLACES]; /* CRC of the name, 0: free */
 
 void TriggerReset(void)
 {
+    CMP_CLEAR(triggers);
     if (SCHED_MAX_EXTERNAL_EVENTS > 0)
         CMP_CLEAR(events);
 }
 
-static EXTERNAL_EVENT *find_event(const char *name)
+/* ---- counting ---- */
+
+static RTS_UI32 is_true(const CDL_TASK *task)
+{
+    const volatile RTS_UI8 *byte = triggers.areas[task->event_area] + task->event_offset;
+
+    return (task->event_mask != 0 ? *byte & task->event_mask : *byte) != 0;
+}
+
+static void note(RTS_UI32 task)
+{
+    RTS_UI32 *changes = &triggers.list[task].changes;
+    RTS_UI32 before = SysAtomicLoad(changes);
+
+    for (; is_true(&triggers.tasks[task]) != (before & 1); before = SysAtomicLoad(changes)) {
+        if (SysAtomicReplace(changes, before, before + 1) && (before & 1) == 0)
+            SchedWake(task);
+    }
+}
+
+void SchedNoteEvents(void)
 {
     RTS_UI32 i;
 
-    for (i = 0; SCHED_MAX_EXTERNAL_EVENTS > 0 && i < PLACES; i++) {
-        if (events[i].name != NULL && strcmp(events[i].name, name) == 0)
-            return &events[i];
-    }
-    return NULL;
-}
-
-void TriggerInit(TRIGGER *trigger, const CDL_TASK *record, RTS_UI8 *const *areas)
-{
-    memset(trigger, 0, sizeof *trigger);
-    trigger->record = record;
-    if (record->kind == KIND_EVENT)
-        trigger->flag = areas[record->event_area] + record->event_offset;
-}
-
-void TriggerForget(TRIGGER *trigger)
-{
-    const EXTERNAL_EVENT *event;
-
-    if (trigger->record->kind == KIND_EVENT)
-        trigger->seen = *trigger->flag != 0;
-    if (trigger->record->kind == KIND_EXTERNAL) {
-        event = find_event(trigger->record->name);
-        trigger->seen = event != NULL ? SysAtomicLoad(&event->posts) : 0;
+    for (i = 0; triggers.variables != 0 && i < triggers.count; i++) {
+        if (triggers.tasks[i].kind == KIND_EVENT)
+            note(i);
     }
 }
 
-static bool has_rising_edge(TRIGGER *trigger)
+/* Events so far: a variable that is TRUE has risen once more than it fell. */
+static RTS_UI32 count_events(const TRIGGER *trigger)
 {
-    RTS_UI32 now = *trigger->flag != 0;
-    bool rising = now > trigger->seen;
-
-    trigger->seen = now;
-    return rising;
+    return (SysAtomicLoad(&trigger->changes) + 1) / 2;
 }
 
-/* One post, one cycle; posts that come while the task runs are answered in the next passes. */
-static bool has_post(TRIGGER *trigger)
+bool TriggerTake(RTS_UI32 task)
 {
-    const EXTERNAL_EVENT *event = find_event(trigger->record->name);
+    TRIGGER *trigger = &triggers.list[task];
+    RTS_UI32 waiting = (count_events(trigger) - trigger->answered) & EVENT_COUNTS;
 
-    if (event == NULL || SysAtomicLoad(&event->posts) == trigger->seen)
+    if (waiting == 0)
         return false;
-    trigger->seen++;
+    if (waiting > SCHED_MAX_WAITING_EVENTS) {
+        waiting -= SCHED_MAX_WAITING_EVENTS;
+        SysAtomicStore(&trigger->lost, trigger->lost + waiting);
+        trigger->answered += waiting;
+    }
+    trigger->answered++;
     return true;
 }
 
-bool TriggerFired(TRIGGER *trigger)
+RTS_UI32 TriggerGetLost(RTS_UI32 task)
 {
-    switch (trigger->record->kind) {
-    case KIND_EVENT:
-        return has_rising_edge(trigger);
-    case KIND_EXTERNAL:
-        return has_post(trigger);
-    default:
-        return true;
+    return SysAtomicLoad(&triggers.list[task].lost);
+}
+
+/* ---- the tasks ---- */
+
+void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas)
+{
+    RTS_UI32 i;
+
+    triggers.count = 0; /* nobody looks while it changes */
+    triggers.variables = 0;
+    triggers.tasks = tasks;
+    triggers.areas = areas;
+    memset(triggers.list, 0, sizeof triggers.list);
+    for (i = 0; i < count; i++)
+        triggers.variables += tasks[i].kind == KIND_EVENT;
+    triggers.count = count;
+}
+
+void TriggerForget(void)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < triggers.count; i++) {
+        TRIGGER *trigger = &triggers.list[i];
+        SysAtomicStore(&trigger->changes, triggers.tasks[i].kind == KIND_EVENT ? is_true(&triggers.tasks[i]) : 0);
+        trigger->answered = count_events(trigger);
     }
 }
 
 /* ---- external events ---- */
+
+static RTS_UI32 id_of(const char *name)
+{
+    return CRC32Update(0, name, (RTS_SIZE)strlen(name));
+}
+
+/* The place of an event, or the first free one for 0; PLACES when there is none. */
+static RTS_UI32 find_event(RTS_UI32 id)
+{
+    RTS_UI32 i = 0;
+
+    while (i < PLACES && events[i] != id)
+        i++;
+    return i;
+}
+
+bool SchedHasExternalEvent(RTS_UI32 id)
+{
+    return SCHED_MAX_EXTERNAL_EVENTS > 0 && id != 0 && find_event(id) < PLACES;
+}
 
 static RTS_HANDLE no_event(RTS_RESULT *result, RTS_RESULT reason)
 {
@@ -100,38 +159,43 @@ static RTS_HANDLE no_event(RTS_RESULT *result, RTS_RESULT reason)
 
 RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result)
 {
-    RTS_UI32 i;
+    RTS_UI32 place = find_event(0);
 
-    if (find_event(name) != NULL)
+    if (SchedHasExternalEvent(id_of(name)))
         return no_event(result, ERR_DUPLICATE);
-    for (i = 0; SCHED_MAX_EXTERNAL_EVENTS > 0 && i < PLACES; i++) {
-        if (events[i].name == NULL) {
-            events[i].name = name;
-            if (result != NULL)
-                *result = ERR_OK;
-            return i;
-        }
-    }
-    return no_event(result, ERR_NOMEMORY);
+    if (SCHED_MAX_EXTERNAL_EVENTS == 0 || place == PLACES)
+        return no_event(result, ERR_NOMEMORY);
+    events[place] = id_of(name);
+    if (result != NULL)
+        *result = ERR_OK;
+    return place;
 }
 
 static bool is_event(RTS_HANDLE event)
 {
-    return SCHED_MAX_EXTERNAL_EVENTS > 0 && event < PLACES && events[event].name != NULL;
+    return SCHED_MAX_EXTERNAL_EVENTS > 0 && event < PLACES && events[event] != 0;
 }
 
 RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE event)
 {
     if (!is_event(event))
         return ERR_INVALID_HANDLE;
-    events[event].name = NULL;
+    events[event] = 0;
     return ERR_OK;
 }
 
 RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event)
 {
+    RTS_UI32 i;
+
     if (!is_event(event))
         return ERR_INVALID_HANDLE;
-    (void)SysAtomicAdd(&events[event].posts, 1);
+    for (i = 0; i < triggers.count; i++) {
+        const CDL_TASK *task = &triggers.tasks[i];
+        if (task->kind == KIND_EXTERNAL && task->event_offset == events[event]) {
+            (void)SysAtomicAdd(&triggers.list[i].changes, 2);
+            SchedWake(i);
+        }
+    }
     return ERR_OK;
 }
