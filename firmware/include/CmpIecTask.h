@@ -18,8 +18,7 @@
 
 enum { KIND_CYCLIC = 0, KIND_EVENT = 1, KIND_EXTERNAL = 2, KIND_FREEWHEELING = 3 };
 
-/* Statistics of a task; times in us. Jitter is the largest deviation of a start from its due
- * time, or from the event. */
+/* Statistics of a task; times in us. Jitter is the largest deviation of a start from its due time. */
 typedef struct {
     char name[CDL_TASK_NAME_SIZE];
     RTS_UI32 kind;

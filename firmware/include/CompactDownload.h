@@ -135,8 +135,8 @@ enum {
 
 enum { CDL_TASK_NAME_SIZE = 32 };
 
-/* A task. `kind` is KIND_* of CmpIecTask.h. A KIND_EVENT task runs when one of the bits of `event_mask` (0: all) becomes
- * the first that is set in the byte at `event_offset` of `event_area`; a KIND_EXTERNAL task on the external event whose
+/* A task. `kind` is KIND_* of CmpIecTask.h. A KIND_EVENT task runs when the byte at `event_offset` of `event_area`, without
+ * the bits `event_ignored`, was 0 and is so no more; a KIND_EXTERNAL task on the external event whose
  * name has the CRC-32 `event_offset`. */
 typedef struct {
     RTS_UI32 interval_us; /* cyclic tasks */
@@ -146,7 +146,7 @@ typedef struct {
     RTS_UI8 kind;
     RTS_UI32 entry_offset; /* of the task's code in the code segment */
     RTS_UI16 event_area;   /* event tasks; APP_AREA_NONE otherwise */
-    RTS_UI8 event_mask;
+    RTS_UI8 event_ignored; /* the other bits of the byte, when the event is one of them */
     RTS_UI8 reserved;
     RTS_UI32 event_offset;
     char name[CDL_TASK_NAME_SIZE]; /* NUL-terminated */

@@ -18,7 +18,7 @@
 /*
  * Called once per period, in the timer's own context. `due_ns`: when it should have been called (SysTimeGetNs), start
  * + n * interval exactly. Due times that pass while a callback runs are skipped and counted. Without an interval:
- * called after SysTimerTrigger, with the time given there.
+ * called after SysTimerTrigger, `due_ns` has no meaning.
  */
 typedef void (*SYS_TIMER_CALLBACK)(void *param, RTS_I64 due_ns);
 
@@ -27,7 +27,8 @@ typedef void (*SYS_TIMER_CALLBACK)(void *param, RTS_I64 due_ns);
 RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
                           RTS_HANDLE *timer);
 
-/* First call at once (due now), then once per interval; without an interval none before a trigger. From main. */
+/* First call at once (due now), then once per interval, or trigger; without an interval a needless call now and then does
+ * no harm. From main. */
 RTS_RESULT SysTimerStart(RTS_HANDLE timer);
 
 /* After it returns the callback is not running and is not called again; a callback that does not come to an end is the

@@ -180,13 +180,12 @@ static void without_an_interval_each_trigger_is_one_call(void)
     RTS_HANDLE timer = create(0, 0);
     SysTimerTrigger(timer, 0); /* not started: nothing happens */
     CHECK(SysTimerStart(timer) == ERR_OK);
-    for (RTS_UI32 i = 1; i <= 20; i++) {
-        RTS_I64 due_ns = SysTimeGetNs();
-        SysTimerTrigger(timer, due_ns);
+    for (RTS_UI32 i = 1; i <= 20; i++) { /* the first comes by itself */
         wait_for_calls(i);
         CHECK(record.count == i);
-        CHECK(record.call[i - 1].due_ns == due_ns && record.call[i - 1].called_ns >= due_ns);
+        SysTimerTrigger(timer, 0);
     }
+    wait_for_calls(21);
     CHECK(SysTimerGetOverruns(timer) == 0);
     CHECK(SysTimerDelete(timer) == ERR_OK);
     SysTimerTrigger(timer, 0);
@@ -197,23 +196,23 @@ static void a_trigger_may_be_for_later_and_the_earliest_counts(void)
     RTS_HANDLE timer = create(0, 0);
     RTS_I64 start_ns = SysTimeGetNs();
     CHECK(SysTimerStart(timer) == ERR_OK);
+    wait_for_calls(1);
     SysTimerTrigger(timer, start_ns + 3600000000000);
     SysTimerTrigger(timer, start_ns + 30000000);
     SysTimerTrigger(timer, start_ns + 60000000000);
-    wait_for_calls(1);
-    CHECK(record.call[0].due_ns == start_ns + 30000000 && record.call[0].called_ns >= start_ns + 30000000);
+    wait_for_calls(2);
+    CHECK(record.call[1].called_ns >= start_ns + 30000000);
     SysTimerTrigger(timer, start_ns + 3600000000000);
     CHECK(SysTimerDelete(timer) == ERR_OK);
-    CHECK(record.count == 1);
+    CHECK(record.count == 2);
 }
 
 static void a_trigger_while_the_callback_runs_has_it_run_again(void)
 {
     RTS_HANDLE timer = create(0, 30);
     CHECK(SysTimerStart(timer) == ERR_OK);
-    SysTimerTrigger(timer, 0);
     wait_for_calls(1);
-    while (record.count < 2) {
+    while (__atomic_load_n(&record.count, __ATOMIC_SEQ_CST) < 2) {
         SysTimerTrigger(timer, 0);
         sleep_ms(1);
     }

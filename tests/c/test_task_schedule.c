@@ -133,7 +133,7 @@ static void an_event_task_runs_as_soon_as_the_cycle_that_set_its_variable_is_ove
 static void an_event_may_be_one_bit_of_a_byte(void)
 {
     begin();
-    add_event_task()->event_mask = 1 << 3;
+    add_event_task()->event_ignored = 0xFF ^ 1 << 3;
     load();
     set_event(0xF7);
     CHECK(SimAdvance(ms(1)) == ERR_OK);

@@ -156,7 +156,7 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     }
     pthread_mutex_lock(&timer->lock);
     timer->stop = 0;
-    timer->due_ns = timer->interval_ns != 0 ? SysTimeGetNs() : NEVER;
+    timer->due_ns = SysTimeGetNs();
     pthread_mutex_unlock(&timer->lock);
     int error = create_thread(timer, state.realtime);
     if (error == EPERM && state.realtime) {

@@ -205,7 +205,7 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
 
     if (timer == NULL)
         return ERR_INVALID_HANDLE;
-    timer->due_ns = timer->interval_ns != 0 ? sim.now_ns : NEVER;
+    timer->due_ns = sim.now_ns;
     timer->started = true;
     return ERR_OK;
 }

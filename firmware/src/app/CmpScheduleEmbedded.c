@@ -21,7 +21,6 @@ typedef struct {
 } SCHEDULED;
 
 static struct {
-    const CDL_TASK *tasks;
     RTS_UI32 count;
     bool started;
     SCHEDULED task[APP_MAX_TASKS];
@@ -32,7 +31,7 @@ static struct {
 static void run_cyclic(RTS_UI32 index)
 {
     SCHEDULED *task = &schedule.task[index];
-    RTS_I64 interval_ns = (RTS_I64)schedule.tasks[index].interval_us * 1000;
+    RTS_I64 interval_ns = (RTS_I64)TriggerGetTask(index)->interval_us * 1000;
     RTS_I64 now_ns;
 
     if (SysTimeGetNs() < task->due_ns)
@@ -62,7 +61,7 @@ void SchedBackgroundCycle(void)
         SchedNoteEvents(); /* of variables that were written from outside */
     for (i = 0; i < schedule.count && schedule.started; i++) {
         RTS_UI32 index = schedule.order[i];
-        RTS_UI32 kind = schedule.tasks[index].kind;
+        RTS_UI32 kind = TriggerGetTask(index)->kind;
         if (kind == KIND_CYCLIC)
             run_cyclic(index);
         else if (kind == KIND_FREEWHEELING || TriggerTake(index))
@@ -94,7 +93,6 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
     RTS_UI32 i;
 
     TriggerCreate(tasks, count, areas);
-    schedule.tasks = tasks;
     schedule.count = 0;
     for (i = 0; i < count; i++)
         add_task(tasks);

@@ -16,12 +16,10 @@
 #include "rts_config.h"
 
 static struct {
-    const CDL_TASK *tasks;
     RTS_UI32 count;
-    RTS_UI32 background_count;
+    RTS_UI32 background_count; /* tasks that run in main */
     bool started;
     RTS_HANDLE timer[APP_MAX_TASKS];
-    RTS_UI8 background[APP_MAX_TASKS];   /* tasks that run in main, highest priority first */
     RTS_I64 checked_ns;                  /* when the last check of the watchdog was */
     RTS_I64 since_ns[APP_MAX_TASKS + 1]; /* by guard: when what its cycle is charged with began */
 } schedule;
@@ -40,8 +38,9 @@ static void run_events(void *param, RTS_I64 due_ns)
 {
     RTS_UI32 task = (RTS_UI32)(uintptr_t)param;
 
-    while (TriggerTake(task) && IecTaskCycle(task, due_ns))
-        due_ns = SysTimeGetNs();
+    RTS_UNUSED(due_ns);
+    while (TriggerTake(task) && IecTaskCycle(task, SysTimeGetNs()))
+        ;
 }
 
 /* Manual 3.5: after its cycle it leaves the processor to others. */
@@ -54,7 +53,8 @@ static void run_freewheeling(void *param, RTS_I64 due_ns)
     RTS_I64 end_ns;
     RTS_I64 pause_ns;
 
-    if (!IecTaskCycle(task, due_ns))
+    RTS_UNUSED(due_ns);
+    if (!IecTaskCycle(task, start_ns))
         return;
     end_ns = SysTimeGetNs();
     pause_ns = (end_ns - start_ns) / PAUSE_DIVISOR;
@@ -74,7 +74,7 @@ static SYS_TIMER_CALLBACK callback_of(RTS_UI32 kind)
 void SchedWake(RTS_UI32 task)
 {
     if (SCHED_EVENTS_IN_TIMERS)
-        SysTimerTrigger(schedule.timer[task], SysTimeGetNs());
+        SysTimerTrigger(schedule.timer[task], 0);
 }
 
 RTS_UI32 SchedGetOverruns(RTS_UI32 task)
@@ -84,28 +84,28 @@ RTS_UI32 SchedGetOverruns(RTS_UI32 task)
 
 /* ---- tasks in main ---- */
 
-static void add_background(RTS_UI32 task)
+static void run_background(RTS_UI32 task)
 {
-    RTS_UI32 place = schedule.background_count++;
-
-    while (place > 0 && schedule.tasks[schedule.background[place - 1]].priority > schedule.tasks[task].priority) {
-        schedule.background[place] = schedule.background[place - 1];
-        place--;
-    }
-    schedule.background[place] = (RTS_UI8)task;
+    if (TriggerGetTask(task)->kind == KIND_FREEWHEELING || TriggerTake(task))
+        (void)IecTaskCycle(task, SysTimeGetNs());
 }
 
 void SchedBackgroundCycle(void)
 {
+    RTS_UI32 left = schedule.background_count;
+    RTS_UI32 priority;
     RTS_UI32 i;
 
     if (!schedule.started)
         return;
     SchedNoteEvents(); /* of variables that were written from outside */
-    for (i = 0; i < schedule.background_count; i++) {
-        RTS_UI32 task = schedule.background[i];
-        if (schedule.tasks[task].kind == KIND_FREEWHEELING || TriggerTake(task))
-            (void)IecTaskCycle(task, SysTimeGetNs());
+    for (priority = 0; left > 0; priority++) {
+        for (i = 0; i < schedule.count; i++) {
+            if (TriggerGetTask(i)->priority == priority && callback_of(TriggerGetTask(i)->kind) == NULL) {
+                run_background(i);
+                left--;
+            }
+        }
     }
 }
 
@@ -135,7 +135,7 @@ static RTS_RESULT add_task(const CDL_TASK *task)
     if (callback != NULL)
         return SysTimerCreate(callback, (void *)(uintptr_t)index, task->kind == KIND_CYCLIC ? task->interval_us : 0,
                               task->priority, &schedule.timer[index]);
-    add_background(index);
+    schedule.background_count++;
     return ERR_OK;
 }
 
@@ -146,7 +146,6 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
 
     delete_timers();
     TriggerCreate(tasks, count, areas);
-    schedule.tasks = tasks;
     for (i = 0; i < count && result == ERR_OK; i++)
         result = add_task(&tasks[i]);
     if (result != ERR_OK)
@@ -154,17 +153,7 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
     return result;
 }
 
-/* Freewheeling tasks begin, and so do those whose event came while not all timers had started. */
-static void trigger_timers(void)
-{
-    RTS_UI32 i;
-
-    for (i = 0; SCHED_EVENTS_IN_TIMERS && i < schedule.count; i++) {
-        if (schedule.tasks[i].kind != KIND_CYCLIC)
-            SysTimerTrigger(schedule.timer[i], SysTimeGetNs());
-    }
-}
-
+/* Each timer calls at once: so no event is missed that comes before the timer of its task starts. */
 RTS_RESULT SchedStart(void)
 {
     RTS_RESULT result = ERR_OK;
@@ -176,7 +165,6 @@ RTS_RESULT SchedStart(void)
         if (schedule.timer[i] != (RTS_HANDLE)RTS_INVALID_HANDLE)
             result = SysTimerStart(schedule.timer[i]);
     }
-    trigger_timers();
     return result;
 }
 

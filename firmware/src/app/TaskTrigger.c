@@ -18,19 +18,18 @@
 #include "SysAtomic.h"
 #include "rts_config.h"
 
+/* Events are counted modulo 65536: fewer may wait. */
 typedef struct {
     RTS_UI32 changes;  /* of the variable, odd: it is TRUE; two for each post of an external event */
-    RTS_UI32 answered; /* events that a cycle was for, and those lost; modulo EVENT_COUNTS */
-    RTS_UI32 lost;
+    RTS_UI16 answered; /* events that a cycle was for, and those lost */
+    RTS_UI16 lost;
 } TRIGGER;
-
-enum { EVENT_COUNTS = 0x7FFFFFFF };
 
 static struct {
     const CDL_TASK *tasks;
     RTS_UI8 *const *areas;
     RTS_UI32 count;
-    RTS_UI32 variables; /* how many tasks wait for one */
+    RTS_UI32 watched; /* tasks up to the last one that waits for a variable */
     TRIGGER list[APP_MAX_TASKS];
 } triggers;
 
@@ -50,7 +49,7 @@ static RTS_UI32 is_true(const CDL_TASK *task)
 {
     const volatile RTS_UI8 *byte = triggers.areas[task->event_area] + task->event_offset;
 
-    return (task->event_mask != 0 ? *byte & task->event_mask : *byte) != 0;
+    return (*byte & ~(RTS_UI32)task->event_ignored) != 0;
 }
 
 static void note(RTS_UI32 task)
@@ -59,7 +58,8 @@ static void note(RTS_UI32 task)
     RTS_UI32 before = SysAtomicLoad(changes);
 
     for (; is_true(&triggers.tasks[task]) != (before & 1); before = SysAtomicLoad(changes)) {
-        if (SysAtomicReplace(changes, before, before + 1) && (before & 1) == 0)
+        (void)SysAtomicReplace(changes, before, before + 1); /* or another context did; and may not have woken it yet */
+        if ((before & 1) == 0)
             SchedWake(task);
     }
 }
@@ -68,37 +68,37 @@ void SchedNoteEvents(void)
 {
     RTS_UI32 i;
 
-    for (i = 0; triggers.variables != 0 && i < triggers.count; i++) {
+    for (i = 0; i < triggers.watched; i++) {
         if (triggers.tasks[i].kind == KIND_EVENT)
             note(i);
     }
 }
 
 /* Events so far: a variable that is TRUE has risen once more than it fell. */
-static RTS_UI32 count_events(const TRIGGER *trigger)
+static RTS_UI16 count_events(const TRIGGER *trigger)
 {
-    return (SysAtomicLoad(&trigger->changes) + 1) / 2;
+    return (RTS_UI16)((SysAtomicLoad(&trigger->changes) + 1) / 2);
 }
 
 bool TriggerTake(RTS_UI32 task)
 {
     TRIGGER *trigger = &triggers.list[task];
-    RTS_UI32 waiting = (count_events(trigger) - trigger->answered) & EVENT_COUNTS;
+    RTS_UI16 waiting = (RTS_UI16)(count_events(trigger) - trigger->answered);
 
     if (waiting == 0)
         return false;
-    if (waiting > SCHED_MAX_WAITING_EVENTS) {
-        waiting -= SCHED_MAX_WAITING_EVENTS;
-        SysAtomicStore(&trigger->lost, trigger->lost + waiting);
-        trigger->answered += waiting;
-    }
     trigger->answered++;
+    if (waiting > SCHED_MAX_WAITING_EVENTS) {
+        waiting = (RTS_UI16)(waiting - SCHED_MAX_WAITING_EVENTS);
+        trigger->answered = (RTS_UI16)(trigger->answered + waiting);
+        trigger->lost = (RTS_UI16)(trigger->lost + waiting);
+    }
     return true;
 }
 
 RTS_UI32 TriggerGetLost(RTS_UI32 task)
 {
-    return SysAtomicLoad(&triggers.list[task].lost);
+    return triggers.list[task].lost;
 }
 
 /* ---- the tasks ---- */
@@ -107,25 +107,28 @@ void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas)
 {
     RTS_UI32 i;
 
-    triggers.count = 0; /* nobody looks while it changes */
-    triggers.variables = 0;
+    memset(&triggers, 0, sizeof triggers);
     triggers.tasks = tasks;
     triggers.areas = areas;
-    memset(triggers.list, 0, sizeof triggers.list);
-    for (i = 0; i < count; i++)
-        triggers.variables += tasks[i].kind == KIND_EVENT;
     triggers.count = count;
+    for (i = 0; i < count; i++) {
+        if (tasks[i].kind == KIND_EVENT)
+            triggers.watched = i + 1;
+    }
+}
+
+const CDL_TASK *TriggerGetTask(RTS_UI32 task)
+{
+    return &triggers.tasks[task];
 }
 
 void TriggerForget(void)
 {
     RTS_UI32 i;
 
-    for (i = 0; i < triggers.count; i++) {
-        TRIGGER *trigger = &triggers.list[i];
-        SysAtomicStore(&trigger->changes, triggers.tasks[i].kind == KIND_EVENT ? is_true(&triggers.tasks[i]) : 0);
-        trigger->answered = count_events(trigger);
-    }
+    SchedNoteEvents();
+    for (i = 0; i < triggers.count; i++)
+        triggers.list[i].answered = count_events(&triggers.list[i]);
 }
 
 /* ---- external events ---- */

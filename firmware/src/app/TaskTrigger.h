@@ -13,6 +13,8 @@
  * APP_AREA_*) stay valid until the next call. From main, while no task runs. */
 void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas);
 
+const CDL_TASK *TriggerGetTask(RTS_UI32 task);
+
 /* Events that happened before the start do not count, nor does a BOOL that is TRUE already. From main, while no task
  * runs. */
 void TriggerForget(void);

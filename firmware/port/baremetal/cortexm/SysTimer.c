@@ -6,8 +6,8 @@
  * One hardware timer of the board is the alarm for the earliest due time. When it fires, each timer that is due gets
  * its own interrupt line set pending by software, and runs at its own NVIC level: any number of timers from one
  * hardware timer, and due times that never drift. Due times are the alarm's alone: it goes on while callbacks run, and
- * counts what they miss. Rank is by priority, among equals by place. Timers without an interval are set pending by
- * SysTimerTrigger instead.
+ * counts what they miss. Rank is by priority, among equals by place. A timer without an interval is set pending by
+ * SysTimerTrigger; that it is due every 71 minutes too costs less than an exception from the rule.
  */
 #include "SysTimer.h"
 
@@ -15,14 +15,13 @@
 #include "SysTime.h"
 
 enum { ALARM_MAX_NS = 1000000000, OVERDUE_NS = 1000000000, NS_PER_US = 1000 };
-#define NEVER INT64_MAX
 
 typedef enum { TIMER_FREE, TIMER_STOPPED, TIMER_WAITING, TIMER_FIRED } TIMER_STATE;
 
 typedef struct {
     SYS_TIMER_CALLBACK callback;
     void *param;
-    RTS_I64 next_ns; /* due time to come; NEVER without an interval */
+    RTS_I64 next_ns; /* due time to come */
     RTS_I64 due_ns;  /* that the callback is called for */
     RTS_UI32 interval_us;
     volatile RTS_UI32 overruns;
@@ -130,7 +129,7 @@ RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 int
             continue;
         state.timer[i] = (TIMER){.callback = callback,
                                  .param = param,
-                                 .interval_us = interval_us,
+                                 .interval_us = interval_us != 0 ? interval_us : UINT32_MAX,
                                  .priority = (RTS_UI8)priority,
                                  .state = TIMER_STOPPED};
         if (state.end <= &state.timer[i])
@@ -148,7 +147,7 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     if (timer == NULL)
         return ERR_INVALID_HANDLE;
     RTS_UI32 mask = CpuMask();
-    timer->next_ns = timer->interval_us != 0 ? SysTimeGetNs() : NEVER;
+    timer->next_ns = SysTimeGetNs();
     timer->state = TIMER_WAITING;
     BoardAlarmSet(0);
     CpuRestore(mask);
@@ -158,13 +157,9 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
 /* While the interrupt is active, it is left pending, and comes again. */
 void SysTimerTrigger(RTS_HANDLE handle, RTS_I64 due_ns)
 {
-    TIMER *timer = find_timer(handle);
-    if (timer == NULL || timer->state == TIMER_STOPPED)
-        return;
-    RTS_UI32 mask = CpuMask();
-    timer->due_ns = due_ns;
-    CpuRestore(mask);
-    NVIC_STIR = BOARD_TASK_IRQ + handle;
+    RTS_UNUSED(due_ns);
+    if (handle < SYSTIMER_COUNT && state.timer[handle].state >= TIMER_WAITING)
+        NVIC_STIR = BOARD_TASK_IRQ + handle;
 }
 
 /* Called from main, so no timer's interrupt is active: it is enough that none starts again, nor one that is pending. */
