@@ -123,11 +123,36 @@ static void an_event_task_runs_as_soon_as_the_cycle_that_set_its_variable_is_ove
     add_task(&spec, "Later", KIND_CYCLIC, 1000, here(&spec))->priority = 4;
     emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 100);
     emit_ret(&spec);
-    add_task(&spec, "Seen", KIND_CYCLIC, 1000, here(&spec))->priority = 2; /* does not come between them */
-    emit_ret(&spec);
     load();
     CHECK(SimAdvance(0) == ERR_OK);
     CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == 111);
+}
+
+/* Though Set takes 2 ms, what was due with it comes by priority. */
+static void an_event_task_takes_its_turn_by_priority(void)
+{
+    static const RTS_UI8 priority[2] = {20, 6};
+    enum { BY_EVENT = 1, BY_OTHER = 2 };
+    RTS_UI32 i;
+
+    for (i = 0; i < 2; i++) {
+        begin();
+        add_event_task()->priority = priority[i];
+        spec.tasks[0].entry_offset = here(&spec);
+        emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, BY_EVENT);
+        emit_ret(&spec);
+        add_import(&spec, "simburn", 0x76DDCD81, 0x00010000);
+        add_task(&spec, "Set", KIND_CYCLIC, 10000, here(&spec))->priority = 3;
+        emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 1);
+        emit_call(&spec, 0, 2000);
+        emit_ret(&spec);
+        add_task(&spec, "Other", KIND_CYCLIC, 10000, here(&spec))->priority = 10;
+        emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, BY_OTHER);
+        emit_ret(&spec);
+        load();
+        CHECK(SimAdvance(0) == ERR_OK);
+        CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == (i == 0 ? BY_EVENT : BY_OTHER)); /* who came last */
+    }
 }
 
 static void an_event_may_be_one_bit_of_a_byte(void)
@@ -386,6 +411,7 @@ int main(void)
     RUN(an_edge_counts_however_short_the_variable_was_clear_between_cycles);
     RUN(what_one_cycle_sets_and_clears_is_no_edge);
     RUN(an_event_task_runs_as_soon_as_the_cycle_that_set_its_variable_is_over);
+    RUN(an_event_task_takes_its_turn_by_priority);
     RUN(an_event_may_be_one_bit_of_a_byte);
     RUN(several_tasks_may_wait_for_one_variable);
     RUN(an_edge_of_one_interval_is_not_missed);

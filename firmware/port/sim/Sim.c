@@ -49,6 +49,7 @@ static struct {
     jmp_buf jump;
     RTS_I64 now_ns;
     RTS_I64 next_comm_ns;
+    RTS_I64 group_ns; /* when the timers that run now were due; NEVER when none run */
     bool real_clock; /* reading the clock costs what it costs on Linux */
     TIMER timer[MAX_TIMERS];
 } sim;
@@ -107,6 +108,7 @@ RTS_RESULT SimStart(void)
     sim.power_lost = false;
     sim.now_ns = 0;
     sim.next_comm_ns = 0;
+    sim.group_ns = NEVER;
     forget_timers();
     SimComPowerOn();
     SimLinkReset();
@@ -210,10 +212,19 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     return ERR_OK;
 }
 
+/* What was due before is due with what runs now, also when that took its time: so priority decides what comes next. */
+static RTS_I64 not_before_now(RTS_I64 due_ns)
+{
+    RTS_I64 now_ns = sim.group_ns < sim.now_ns ? sim.group_ns : sim.now_ns;
+
+    return due_ns > now_ns ? due_ns : now_ns;
+}
+
 void SysTimerTrigger(RTS_HANDLE handle, RTS_I64 due_ns)
 {
     TIMER *timer = get_timer(handle);
 
+    due_ns = not_before_now(due_ns);
     if (timer != NULL && timer->started && timer->interval_ns == 0 && due_ns < timer->due_ns)
         timer->due_ns = due_ns;
 }
@@ -303,8 +314,10 @@ static void run_group(TIMER *timer)
 {
     RTS_I64 due_ns = timer->due_ns;
 
+    sim.group_ns = due_ns;
     for (; timer != NULL && timer->due_ns == due_ns; timer = next_timer())
         run_timer(timer);
+    sim.group_ns = NEVER;
     if (SchedHasBackgroundTasks())
         SchedBackgroundCycle();
 }
