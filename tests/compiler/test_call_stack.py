@@ -126,3 +126,27 @@ def test_a_function_that_never_returns_is_told_once(tmp_path) -> None:
     after_call = next(offset for offset, _, line in built.symbols.lines if line == 4) + 2
     (place,) = built.symbols.call_stack(None, Trace(link=after_call))
     assert (place.pou, place.line) == ("Main", 4)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_frame_that_finds_no_room_names_the_unit_that_takes_it(tmp_path, level: Level) -> None:
+    """The exception comes while the unit makes room, before its first line: at its declaration."""
+    path = tmp_path / "far.st"
+    path.write_text(
+        """FUNCTION Far : DINT
+VAR_INPUT i : DINT; END_VAR
+VAR field : ARRAY[0..4259839] OF DINT; END_VAR
+field[i] := i;
+Far := field[i + 1];
+END_FUNCTION
+PROGRAM Main
+VAR n, i : DINT; END_VAR
+n := Far(i);
+i := n;
+END_PROGRAM
+"""
+    )
+    built = compile_sources([path], level=level, checks="none")
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        assert places(plc, built.symbols) in ([("Far", 1), ("Main", 9)], [("Main", 7)])  # the latter when inlined

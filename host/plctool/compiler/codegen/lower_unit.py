@@ -18,6 +18,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError
 
 _ALWAYS = 'nounwind "no-builtins"'
+_PROBES = ' "probe-stack"="inline-asm"'
 _INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
 
 
@@ -112,10 +113,11 @@ class Unit:
         self._tag_root = module.metadata(f'!{{!"any", !{tree}, i64 0}}')
         self._tags: dict[object, str] = {}
         # An access through NULL that is not checked is left to the processor, which faults.
-        always = _ALWAYS if Check.NULL in options.checks else f"{_ALWAYS} null_pointer_is_valid"
-        self.smallest = module.attributes(f"minsize optsize {_ALWAYS}")
+        base = _ALWAYS + (_PROBES if self.target.probes else "")
+        always = base if Check.NULL in options.checks else f"{base} null_pointer_is_valid"
+        self.smallest = module.attributes(f"minsize optsize {base}")
         self.plain = module.attributes(f"{'optsize ' if options.compact else ''}{always}")
-        self.strings = module.attributes(f"{'optsize ' if options.size else ''}{_ALWAYS}")
+        self.strings = module.attributes(f"{'optsize ' if options.size else ''}{base}")
         self._program = self.plain
         if options.compact and not options.size:
             self._program = module.attributes(f'optsize {always} "function-inline-threshold"="{_INLINED}"')
@@ -246,7 +248,7 @@ class Unit:
             flags = ('!{i32 7, !"Dwarf Version", i32 4}', '!{i32 2, !"Debug Info Version", i32 3}')
             module.named_metadata("llvm.module.flags", [module.metadata(flag) for flag in flags])
         return module.distinct_metadata(
-            f'!DISubprogram(name: "{name}", scope: !{file}, file: !{file}, line: {pos.line}, '
+            f'!DISubprogram(name: "{name}", scope: !{file}, file: !{file}, line: {pos.line}, scopeLine: {pos.line}, '
             f"type: !{self._subroutine_type}, spFlags: DISPFlagDefinition, unit: !{self._compile_unit})"
         )
 
