@@ -378,12 +378,16 @@ static void break_round(CONTEXT *context, RTS_UI32 round, RTS_UI32 code)
     }
 }
 
+static bool runs(const CONTEXT *context, const void *arg)
+{
+    return context->used && runs_iec_code(context) && __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg;
+}
+
 /* The round is read first: when the thread goes on to its next one meanwhile, the break misses. */
 static void break_if_it_runs(CONTEXT *context, const void *arg, RTS_UI32 code)
 {
     RTS_UI32 round = __atomic_load_n(&context->round, __ATOMIC_ACQUIRE);
-    if (runs_iec_code(context) &&
-        __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg) {
+    if (runs(context, arg)) {
         break_round(context, round, code);
     }
 }
@@ -396,12 +400,6 @@ static RTS_I64 used_ns(const CONTEXT *context)
         return -1;
     }
     return (RTS_I64)used.tv_sec * 1000000000 + used.tv_nsec;
-}
-
-static int runs(const CONTEXT *context, const void *arg)
-{
-    return context->used && __atomic_load_n(&context->jump, __ATOMIC_ACQUIRE) != NULL &&
-           __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg;
 }
 
 /* The lock keeps the thread from ending meanwhile. */
@@ -422,9 +420,7 @@ void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     pthread_mutex_lock(&state.lock);
     for (CONTEXT *context = state.context; state.installed && context < state.context + MAX_CONTEXTS; context++) {
-        if (context->used) {
-            break_if_it_runs(context, arg, code);
-        }
+        break_if_it_runs(context, arg, code);
     }
     pthread_mutex_unlock(&state.lock);
 }
