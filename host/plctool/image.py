@@ -58,8 +58,8 @@ class ExternalFunction:
 
 @dataclass(frozen=True)
 class ImageTask:
-    """`kind`: KIND_*; `entry`: code offset to call (with the Thumb bit on Arm); `event`: (area, offset) of the byte with
-    the BOOL, `ignored`: its other bits; `external`: the name of the event a KIND_EXTERNAL task waits for."""
+    """`kind`: KIND_*; `entry`: code offset to call (with the Thumb bit on Arm); `event`: (area, offset) of the byte
+    with the BOOL, `ignored`: its other bits; `external`: the name of the event a KIND_EXTERNAL task waits for."""
 
     name: str
     kind: int

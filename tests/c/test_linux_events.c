@@ -52,7 +52,7 @@ static struct {
 /* Changes a variable at random; what it leaves behind counts. */
 static void change(RTS_UI32 i)
 {
-    RTS_UI8 before = app.variable[i];
+    RTS_UI8 before = __atomic_load_n(&app.variable[i], __ATOMIC_RELAXED);
     RTS_UI8 after = before;
     for (int k = rand_r(&app.random[i]) % 4; k > 0; k--) {
         after = rand_r(&app.random[i]) % 2 != 0;

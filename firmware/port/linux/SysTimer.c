@@ -56,13 +56,13 @@ static struct {
 /* With the lock: sleeps until the time `due_ns` has come or something has changed. */
 static void sleep_towards(TIMER *timer)
 {
-    RTS_I64 at = PortMonotonicNs(timer->due_ns);
-    struct timespec until = {.tv_sec = (time_t)(at / 1000000000), .tv_nsec = (long)(at % 1000000000)};
     if (timer->due_ns == NEVER) {
         pthread_cond_wait(&timer->changed, &timer->lock);
-    } else {
-        pthread_cond_timedwait(&timer->changed, &timer->lock, &until);
+        return;
     }
+    RTS_I64 at = PortMonotonicNs(timer->due_ns);
+    struct timespec until = {.tv_sec = (time_t)(at / 1000000000), .tv_nsec = (long)(at % 1000000000)};
+    pthread_cond_timedwait(&timer->changed, &timer->lock, &until);
 }
 
 /* Sleeps until the next call is due; 0 when the timer was stopped instead. */
@@ -166,7 +166,9 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
         error = create_thread(timer, 0);
     }
     timer->started = error == 0;
-    timer->stop = error != 0;
+    if (error != 0) {
+        timer->stop = 1; /* there is no thread that a trigger could be for */
+    }
     return error == 0 ? ERR_OK : ERR_NOMEMORY;
 }
 

@@ -125,7 +125,8 @@ class _Reader:
         if e is None:
             return
         if not isinstance(e.type, StringType) or not isinstance(e.value, str):
-            self._checker.error(node.pos, "type", f"EVENT is the name of an external event such as 'door', not {e.type}")
+            message = f"EVENT is the name of an external event such as 'door', not {e.type}"
+            self._checker.error(node.pos, "type", message)
         elif not 0 < len(e.value) <= MAX_EVENT_NAME or not e.value.isascii() or not e.value.isprintable():
             message = f"the name of an EVENT has 1 to {MAX_EVENT_NAME} ASCII characters"
             self._checker.error(node.pos, "range", message)
