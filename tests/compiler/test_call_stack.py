@@ -150,3 +150,42 @@ END_PROGRAM
     with Simulator(built.image, built.symbols) as plc:
         plc.run_cycles(1)
         assert places(plc, built.symbols) in ([("Far", 1), ("Main", 9)], [("Main", 7)])  # the latter when inlined
+
+
+INITIALISED = """FUNCTION Z : DINT
+VAR_INPUT d : DINT; END_VAR
+Z := 10 / d;
+END_FUNCTION
+FUNCTION_BLOCK Pump
+VAR x : DINT; END_VAR
+METHOD FB_Init : BOOL
+VAR_INPUT bInitRetains : BOOL; bInCopyCode : BOOL; END_VAR
+x := Z(x);
+END_METHOD
+END_FUNCTION_BLOCK
+"""
+MAIN = """PROGRAM Main
+VAR
+    n : DINT;
+    {0}
+END_VAR
+n := n + 1;
+END_PROGRAM
+"""
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize(
+    ("variable", "calls"), [("v : DINT := Z(0);", []), ("pump : Pump;", [("Pump.FB_Init", "units.st", 9)])]
+)
+def test_an_exception_in_initialisation_names_unit_and_line(tmp_path, level: Level, variable: str, calls: list) -> None:
+    """The initial values of all sources are written by one function."""
+    (tmp_path / "units.st").write_text(INITIALISED)
+    (tmp_path / "main.st").write_text(MAIN.format(variable))
+    built = compile_sources([tmp_path], level=level)
+    with Simulator(built.image, built.symbols, start=False) as plc:
+        exception = plc.status().exception
+        assert exception is not None
+        found = built.symbols.call_stack(exception.code_offset, exception.trace)
+    told = [(place.pou, place.file.rpartition("/")[2], place.line) for place in found]
+    assert told == [("Z", "units.st", 3), *calls, ("Main", "main.st", 4)]

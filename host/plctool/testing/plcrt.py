@@ -58,8 +58,8 @@ class Plcrt:
     def worker(self) -> int:
         """Process id of the child that runs the controller; 0 while it is being started again."""
         assert self.process
-        children = (pid for pid in map(int, filter(str.isdigit, os.listdir("/proc"))) if _is_child(pid, self.process.pid))
-        return next(children, 0)
+        pids = map(int, filter(str.isdigit, os.listdir("/proc")))
+        return next((pid for pid in pids if _is_child(pid, self.process.pid)), 0)
 
     def stop(self, how: signal.Signals = signal.SIGTERM) -> int:
         """Ends the process; SIGKILL stands for a power cut. Returns the exit status."""

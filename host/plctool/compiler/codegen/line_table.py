@@ -101,12 +101,6 @@ def _run(
     rows: list[Line] = []
     data, end = reader.data, len(reader.data)
     address, file, line = 0, 1, 1
-    first = 0  # index of the first row of a function, the only one before the room it takes on the stack is made
-
-    def add() -> None:
-        if line != 0 or len(rows) != first + 1:
-            rows.append(Line(address, files[file], line))
-
     while reader.at < end:
         opcode = data[reader.at]
         reader.at += 1
@@ -114,19 +108,18 @@ def _run(
             step = opcode - first_special
             address += step // span * minimum
             line += base + step % span
-            add()
+            rows.append(Line(address, files[file], line))
         elif opcode == 0:
             length = reader.uleb()
             kind = data[reader.at]
             if kind == _SET_ADDRESS:
                 address = int.from_bytes(data[reader.at + 1 : reader.at + length], "little")
-                first = len(rows)
             elif kind == _END_SEQUENCE:
                 rows.append(Line(address, "", 0))
                 address, file, line = 0, 1, 1
             reader.at += length
         elif opcode == 1:
-            add()
+            rows.append(Line(address, files[file], line))
         elif opcode == 2:
             address += reader.uleb() * minimum
         elif opcode == 3:
