@@ -58,6 +58,12 @@ bool AppHasException(void)
     return AppExceptionGet()->code != RTSEXCPT_NOEXCEPTION;
 }
 
+/* Its last cycle was broken off for a stop. That says nothing against the program, but it starts from a reset only. */
+static bool was_broken_off(void)
+{
+    return !RTS_ONE_CORE && AppExceptionGet()->code == RTSEXCPT_STOP_TIMEOUT;
+}
+
 static bool is_proven(void)
 {
     RTS_UI8 state = AppCommitGet()->state[app.image.file];
@@ -84,7 +90,8 @@ static void enter_exception_state(void)
 {
     AppAreasClearOutputs();
     app.state = AS_STOP;
-    (void)AppCommitSetState(app.image.file, SLOT_FAILED);
+    if (!was_broken_off())
+        (void)AppCommitSetState(app.image.file, SLOT_FAILED);
     AppPostEvent(EVT_CmpApp_Exception);
 }
 
@@ -301,7 +308,7 @@ RTS_RESULT AppStopApplication(void)
 {
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
-    if (AppStopTasks() && !AppHasException()) {
+    if (AppStopTasks() && (!AppHasException() || was_broken_off())) {
         (void)AppCommitSetState(app.image.file, SLOT_TRIAL);
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application stopped");
     }
