@@ -63,8 +63,9 @@ RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 ta
  * may not survive a power cut. */
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);
 
-/* Marks the newest record; ERR_DISK_FULL without room for the mark, which takes one unit of flash and is not synced.
- * And whether the newest record, of `size` bytes, is followed by a mark, or by one that was cut off. */
+/* Marks the record that was appended last, which takes one unit of flash and is not synced; ERR_DISK_FULL without room
+ * for it, ERR_DEVICE. And whether the newest record, of `size` bytes, is followed by a mark, or by one that was cut
+ * off. */
 RTS_RESULT FlashLogMark(FLASH_LOG *log);
 bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size);
 

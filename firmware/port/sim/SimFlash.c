@@ -216,10 +216,14 @@ static void copy_cells(CELLS *to, const CELLS *from)
 
 static RTS_RESULT flash_sync(void)
 {
-    chip.sync_failed = fails(SIM_SYNC);
-    if (!chip.sync_failed && chip.synced.data != NULL)
-        copy_cells(&chip.synced, &chip.cells);
-    return chip.sync_failed ? ERR_DEVICE : ERR_OK;
+    bool failed = fails(SIM_SYNC);
+
+    if (chip.synced.data != NULL) {
+        chip.sync_failed = failed;
+        if (!failed)
+            copy_cells(&chip.synced, &chip.cells);
+    }
+    return failed ? ERR_DEVICE : ERR_OK;
 }
 
 const SYS_FLASH *SysFlashGet(void)

@@ -9,7 +9,7 @@
 
 #include "AppException.h"
 #include "CMUtils.h"
-#include "CmpChecksum.h"
+#include "CmpItf.h"
 #include "CmpLog.h"
 #include "CompactDownload.h"
 #include "SysExcept.h"
@@ -34,7 +34,7 @@ typedef struct {
     RTS_UI32 number;
     RTS_UI32 crc; /* of the image */
     RTS_UI32 retain_after;
-    RTS_UI32 check; /* CRC of the words above */
+    RTS_UI32 check; /* that it was programmed whole; the image has a CRC of its own */
 } SEAL;
 
 RTS_STATIC_ASSERT(sizeof(SEAL) == FILE_ALIGN, a_seal_is_programmed_at_once);
@@ -75,7 +75,7 @@ void AppCommitWipe(RTS_UI32 slot)
 
 static RTS_UI32 seal_check(const SEAL *seal)
 {
-    return CRC32Update(0, seal, offsetof(SEAL, check));
+    return ~(seal->number ^ seal->crc ^ seal->retain_after);
 }
 
 /* Takes over a slot when the image that its header tells of has a seal with a number above `known`. */
@@ -120,15 +120,6 @@ RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
 
 /* ---- records ---- */
 
-static void clear(void)
-{
-    RTS_UI32 number = state.commit.number;
-
-    memset(&state.commit, 0, sizeof state.commit);
-    state.commit.number = number;
-    state.commit.active = SLOT_NONE;
-}
-
 /* Another layout of the flash is another kind of record, because it would mean other places. */
 static RTS_UI32 record_tag(void)
 {
@@ -162,8 +153,8 @@ void AppCommitOpen(void)
 {
     RTS_RESULT result = FlashLogOpen(&state.log, FILE_COMMIT);
 
-    state.commit.number = 0;
-    clear();
+    CMP_CLEAR(state.commit);
+    state.commit.active = SLOT_NONE;
     if (result == ERR_OK)
         result = read_record();
     if (result == ERR_OK && FlashLogIsMarked(&state.log, RECORD_SIZE))
@@ -201,7 +192,11 @@ static RTS_RESULT write_record(const char *text)
 
 RTS_RESULT AppCommitErase(void)
 {
-    clear();
+    RTS_UI32 number = state.commit.number;
+
+    memset(&state.commit, 0, sizeof state.commit);
+    state.commit.active = SLOT_NONE;
+    state.commit.number = number;
     return write_record("");
 }
 
@@ -254,10 +249,9 @@ void AppCommitBegin(void)
     (void)write_record("");
 }
 
-/* A mark after the record says so; without room for it, another record does. */
 void AppCommitDone(void)
 {
     state.commit.begun = 0;
     if (FlashLogMark(&state.log) != ERR_OK)
-        (void)write_record("");
+        (void)write_record(""); /* says so as well */
 }

@@ -71,15 +71,11 @@ void AppDownloadAbort(void)
     download.open = false;
 }
 
-/* Goes back to the application that ran until now; there was none: to none. */
+/* Goes back to the application that ran until now. */
 static void put_back(RTS_UI32 failed_slot, bool ran)
 {
-    if (!AppRollBack(failed_slot)) {
-        if (AppCommitErase() == ERR_OK)
-            AppCommitWipe(failed_slot);
-    } else if (AppInitialise() == ERR_OK && ran && !AppHasException()) {
-        (void)AppStart();
-    }
+    if (AppRollBack(failed_slot))
+        (void)(ran ? AppStart() : AppInitialise());
 }
 
 /* The checked image takes the place of the old application. */

@@ -43,14 +43,17 @@ void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
         CpuBarrier();
 }
 
-/* What nobody announced may have been the reset pin, or the watchdog of a chip that does not tell. */
+/* Which reset it was, and where, main has put into the log. What nobody announced may have been the reset pin, or the
+ * watchdog of a chip that does not tell. */
 const SYS_START *SysStartGet(void)
 {
-    static const SYS_START power = {SYS_START_POWER, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
-    static const SYS_START crash = {SYS_START_CRASH, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
-    static const SYS_START unknown = {SYS_START_UNKNOWN, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
+    static const SYS_START starts[] = {
+        {SYS_START_POWER, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""},
+        {SYS_START_CRASH, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""},
+        {SYS_START_UNKNOWN, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""},
+    };
 
     if (last.cause >= RESET_FATAL)
-        return &crash; /* which one, and where, main has put into the log */
-    return last.cause == RESET_PIN ? &unknown : &power;
+        return &starts[SYS_START_CRASH];
+    return &starts[last.cause == RESET_PIN ? SYS_START_UNKNOWN : SYS_START_POWER];
 }
