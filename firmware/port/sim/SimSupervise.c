@@ -1,5 +1,5 @@
 /*
- * SimSupervise.c - breaks endless loops.
+ * SimSupervise.c - breaks endless loops; what else takes threads.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -82,4 +82,30 @@ void SimSuperviseStart(void)
 void SimSetCycleLimit(RTS_UI32 ms)
 {
     SysAtomicStore(&supervisor.limit_ms, ms);
+}
+
+/* ---- the lock while a cycle is measured ---- */
+
+static pthread_mutex_t mutex;
+static pthread_once_t mutex_made = PTHREAD_ONCE_INIT;
+
+static void make_mutex(void)
+{
+    pthread_mutexattr_t attributes;
+
+    pthread_mutexattr_init(&attributes);
+    pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
+    pthread_mutex_init(&mutex, &attributes);
+    pthread_mutexattr_destroy(&attributes);
+}
+
+void SimMutexLock(void)
+{
+    pthread_once(&mutex_made, make_mutex);
+    pthread_mutex_lock(&mutex);
+}
+
+void SimMutexUnlock(void)
+{
+    pthread_mutex_unlock(&mutex);
 }

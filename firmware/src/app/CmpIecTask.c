@@ -10,6 +10,7 @@
 
 #include <string.h>
 
+#include "AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CmpScheduleTimer.h"
 #include "SysAtomic.h"
@@ -169,6 +170,11 @@ static void set_time(TASK *task, RTS_I64 time_ns)
     context->time_ms = (RTS_I32)((RTS_UI32)context->time_ms + ms);
 }
 
+static RTS_UI32 index_of(const TASK *task)
+{
+    return (RTS_UI32)(task - tasks.list);
+}
+
 static void run_entry(void *arg)
 {
     TASK *task = arg;
@@ -211,12 +217,12 @@ static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
     SysAtomicStore(&tasks.running, 0);
     guard_end(&task->guard);
-    AppHandleException((RTS_I32)(task - tasks.list), code, address);
+    AppHandleException((RTS_I32)index_of(task), code, address);
     return 0;
 }
 
 /* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
-static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
+static __attribute__((noinline)) int run_cycle(TASK *task, RTS_UI32 index, RTS_I64 due_ns)
 {
     RTS_I64 start_ns = SysTimeGetNs();
     RTS_EXCEPTION exception;
@@ -224,8 +230,10 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
 
     set_time(task, start_ns - tasks.time_zero);
     guard_begin(&task->guard, start_ns);
+    AppImageCopy(index, NULL);
     if (SysExceptTry(run_entry, task, &exception))
         return end_with_exception(task, exception.code, exception.address);
+    AppImageCopy(index, &tasks.running);
     elapsed_ns = SysTimeGetNs() - start_ns;
     account(task, start_ns - due_ns, elapsed_ns);
     if (watchdog_expired(task, elapsed_ns))
@@ -236,7 +244,7 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
 
 int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
-    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], due_ns) : 0;
+    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], index, due_ns) : 0;
 }
 
 /* ---- all tasks ---- */
@@ -249,6 +257,7 @@ static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *protot
     memset(task, 0, sizeof *task);
     task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
     task->context = *prototype;
+    AppImageSetContext(index_of(task), &task->context);
     task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
     task->record = record;
     task->min_ns = 0xFFFFFFFFu;
