@@ -52,7 +52,7 @@
 #endif
 
 /* RAM for the tasks' own copies of the inputs and outputs that they share, bytes: a task takes as many as it uses of
- * them, rounded to words, and once more as many of what it writes. An application that needs more is refused. The
+ * them, rounded to 8, and once more as many of what it writes. An application that needs more is refused. The
  * default holds any application that does not write inputs. 0: no copies, 500 bytes of flash less; only where tasks do
  * not interrupt each other (CmpScheduleEmbedded). */
 #ifndef APP_IMAGE_SIZE

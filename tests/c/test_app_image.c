@@ -21,7 +21,8 @@ static bool always;
 #define AppImageAttach test_attach
 #define AppImageSetContext test_set_context
 #define AppImageFind test_find
-#define AppImageCopy test_copy
+#define AppImageCopyIn test_copy_in
+#define AppImageCopyOut test_copy_out
 #define AppAreasGet fake_area
 #define SysLockEnter fake_enter
 #define SysLockLeave fake_leave
@@ -94,7 +95,7 @@ static void set_bit(RTS_UI32 task, RTS_UI32 area, RTS_UI32 offset, RTS_UI8 mask,
 }
 
 static CDL_IMAGE uses[TASKS][IMAGE_AREAS];
-static RTS_UI32 used; /* words of copies */
+static RTS_UI32 used; /* units of copies */
 
 /* A task uses this part, which another one uses too. */
 static void use(RTS_UI32 task, RTS_UI32 area, RTS_UI32 offset, RTS_UI32 size, RTS_UI32 flags)
@@ -115,7 +116,7 @@ static void start(bool with_copies)
     used = 0;
     for (i = 0; with_copies && i < IMAGE_AREAS * TASKS; i++)
         used = test_place(&images[i / IMAGE_AREAS].part[i % IMAGE_AREAS], &uses[i / IMAGE_AREAS][i % IMAGE_AREAS], used);
-    CHECK(used * IMAGE_WORD_SIZE <= sizeof copies);
+    CHECK(used * CDL_IMAGE_UNIT <= sizeof copies);
     test_attach(images);
     running = 1;
     for (i = 0; i < TASKS; i++) {
@@ -128,9 +129,9 @@ static void start(bool with_copies)
 
 static void cycle(RTS_UI32 task, void (*code)(void))
 {
-    test_copy(task, NULL);
+    test_copy_in(task);
     code();
-    test_copy(task, &running);
+    test_copy_out(task, &running);
 }
 
 /* Runs the low task once with `other` before each of its steps in turn, and `check` after each; returns the number of
@@ -225,7 +226,7 @@ static void begin_alone(void)
     uses[LOW][1] = (CDL_IMAGE){1, 1, CDL_IMAGE_WRITTEN};
     always = true;
     start(true);
-    CHECK(used * IMAGE_WORD_SIZE == 16);
+    CHECK(used * CDL_IMAGE_UNIT == 16);
 }
 
 static void what_main_writes_is_neither_lost_nor_undoes_anything(void)
@@ -383,7 +384,7 @@ static void what_is_written_takes_its_copy_twice(void)
     use(LOW, APP_AREA_OUTPUT, 0, 16, CDL_IMAGE_WRITTEN);
     use(HIGH, APP_AREA_OUTPUT, 8, 8, 0);
     start(true);
-    CHECK(used * IMAGE_WORD_SIZE == 2 * 16 + 8);
+    CHECK(used * CDL_IMAGE_UNIT == 2 * 16 + 8);
     CHECK(context[LOW].area[APP_AREA_INPUT] == fake_area(APP_AREA_INPUT));
     CHECK(byte_of(LOW, APP_AREA_OUTPUT, 0) == (RTS_UI8 *)copies);
     CHECK(byte_of(HIGH, APP_AREA_OUTPUT, 8) == (RTS_UI8 *)copies + 32);

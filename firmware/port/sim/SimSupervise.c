@@ -67,27 +67,8 @@ static void *supervise(void *unused)
     return NULL;
 }
 
-void SimSuperviseStart(void)
-{
-    pthread_t thread;
-
-    if (supervisor.process == getpid())
-        return;
-    if (pthread_create(&thread, NULL, supervise, NULL) == 0) {
-        pthread_detach(thread);
-        supervisor.process = getpid();
-    }
-}
-
-void SimSetCycleLimit(RTS_UI32 ms)
-{
-    SysAtomicStore(&supervisor.limit_ms, ms);
-}
-
-/* ---- the lock while a cycle is measured ---- */
-
+/* What SysLock costs on Linux, while a cycle is measured. */
 static pthread_mutex_t mutex;
-static pthread_once_t mutex_made = PTHREAD_ONCE_INIT;
 
 static void make_mutex(void)
 {
@@ -99,9 +80,26 @@ static void make_mutex(void)
     pthread_mutexattr_destroy(&attributes);
 }
 
+void SimSuperviseStart(void)
+{
+    pthread_t thread;
+
+    if (supervisor.process == getpid())
+        return;
+    make_mutex();
+    if (pthread_create(&thread, NULL, supervise, NULL) == 0) {
+        pthread_detach(thread);
+        supervisor.process = getpid();
+    }
+}
+
+void SimSetCycleLimit(RTS_UI32 ms)
+{
+    SysAtomicStore(&supervisor.limit_ms, ms);
+}
+
 void SimMutexLock(void)
 {
-    pthread_once(&mutex_made, make_mutex);
     pthread_mutex_lock(&mutex);
 }
 

@@ -11,11 +11,11 @@
 #include "SysAtomic.h"
 #include "SysLock.h"
 
-/* Words of the areas, which IEC code sees as bytes. */
-typedef uintptr_t __attribute__((may_alias)) WORD;
-enum { UNIT_WORDS = CDL_IMAGE_UNIT / IMAGE_WORD_SIZE };
+/* A unit of the areas, which IEC code sees as bytes. */
+typedef RTS_UI64 __attribute__((may_alias)) UNIT;
 
-RTS_STATIC_ASSERT(APP_IMAGE_SIZE / IMAGE_WORD_SIZE <= (IMAGE_INDEX)-1, copies_can_be_indexed);
+RTS_STATIC_ASSERT(sizeof(UNIT) == CDL_IMAGE_UNIT, units_are_those_of_the_image);
+RTS_STATIC_ASSERT(APP_IMAGE_SIZE / CDL_IMAGE_UNIT <= (IMAGE_INDEX)-1, copies_can_be_indexed);
 
 /* One for each of APP_MAX_TASKS; NULL before the first application. */
 static const TASK_IMAGE *plan;
@@ -25,9 +25,9 @@ static const TASK_IMAGE *plan;
 RTS_UI32 AppImagePlace(IMAGE_PART *part, const CDL_IMAGE *image, RTS_UI32 used)
 {
     bool copied = APP_IMAGE_ALWAYS || (image->flags & CDL_IMAGE_SHARED) != 0;
-    RTS_UI32 count = copied ? image->count * UNIT_WORDS : 0;
+    RTS_UI32 count = copied ? image->count : 0;
 
-    part->first = (IMAGE_INDEX)(image->first * UNIT_WORDS);
+    part->first = (IMAGE_INDEX)image->first;
     part->count = (IMAGE_INDEX)count;
     part->copy = (IMAGE_INDEX)used;
     if (image->flags & CDL_IMAGE_WRITTEN)
@@ -43,27 +43,26 @@ void AppImageAttach(const TASK_IMAGE *images)
 
 /* ---- places ---- */
 
-static WORD *shared_of(const IMAGE_PART *part, RTS_UI32 area)
+static UNIT *copy_at(RTS_UI32 index)
 {
-    return (WORD *)AppAreasGet(area) + part->first;
-}
-
-static WORD *copy_of(const IMAGE_PART *part)
-{
-    return (WORD *)AppAreasGet(AREAS_COPIES) + part->copy;
+    return (UNIT *)AppAreasGet(AREAS_COPIES) + index;
 }
 
 /* The base is where the area would begin if all of it were copied: only addresses within the part are ever used. */
-void AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context)
+bool AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context)
 {
+    bool copied = false;
     RTS_UI32 i;
 
     for (i = 0; i < IMAGE_AREAS; i++) {
         const IMAGE_PART *part = &plan[task].part[i];
-        if (part->count != 0)
-            context->area[APP_AREA_INPUT + i] =
-                (RTS_UI8 *)((uintptr_t)copy_of(part) - (uintptr_t)part->first * IMAGE_WORD_SIZE);
+        if (part->count == 0)
+            continue;
+        context->area[APP_AREA_INPUT + i] =
+            (RTS_UI8 *)((uintptr_t)copy_at(part->copy) - part->first * sizeof(UNIT));
+        copied = true;
     }
+    return copied;
 }
 
 bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset)
@@ -72,10 +71,10 @@ bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset)
     RTS_UI32 i;
 
     for (i = 0; i < IMAGE_AREAS * APP_MAX_TASKS; i++, part++) {
-        uintptr_t distance = address - (uintptr_t)copy_of(part);
-        if (distance < (uintptr_t)part->count * IMAGE_WORD_SIZE) {
+        uintptr_t distance = address - (uintptr_t)copy_at(part->copy);
+        if (distance < part->count * sizeof(UNIT)) {
             *area = APP_AREA_INPUT + i % IMAGE_AREAS;
-            *offset = (RTS_UI32)(distance + (uintptr_t)part->first * IMAGE_WORD_SIZE);
+            *offset = (RTS_UI32)(distance + part->first * sizeof(UNIT));
             return true;
         }
     }
@@ -84,39 +83,50 @@ bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset)
 
 /* ---- the cycle ---- */
 
-static void copy_in(WORD *copy, WORD *before, const WORD *shared, RTS_UI32 count)
+static void copy_in(const IMAGE_PART *part, const UNIT *shared)
 {
-    for (; count > 0; count--)
+    UNIT *copy = copy_at(part->copy);
+    UNIT *before = copy_at(part->before);
+    RTS_UI32 count;
+
+    shared += part->first;
+    for (count = part->count; count > 0; count--)
         *before++ = *copy++ = *shared++;
 }
 
-static void copy_out(const WORD *copy, const WORD *before, WORD *shared, RTS_UI32 count)
+void AppImageCopyIn(RTS_UI32 task)
 {
-    for (; count > 0; count--, shared++) {
-        WORD now = *copy++;
-        WORD changed = now ^ *before++;
+    RTS_UI32 lock = SysLockEnter();
+
+    copy_in(&plan[task].part[0], (const UNIT *)AppAreasGet(APP_AREA_INPUT));
+    copy_in(&plan[task].part[1], (const UNIT *)AppAreasGet(APP_AREA_OUTPUT));
+    SysLockLeave(lock);
+}
+
+static void copy_out(const IMAGE_PART *part, UNIT *shared)
+{
+    const UNIT *copy = copy_at(part->copy);
+    const UNIT *before = copy_at(part->before);
+    RTS_UI32 count;
+
+    if (copy == before)
+        return;
+    shared += part->first;
+    for (count = part->count; count > 0; count--, shared++) {
+        UNIT now = *copy++;
+        UNIT changed = now ^ *before++;
         if (changed != 0)
-            *shared ^= (*shared ^ now) & changed;
+            *shared = (*shared & ~changed) | (now & changed);
     }
 }
 
-void AppImageCopy(RTS_UI32 task, const RTS_UI32 *running)
+void AppImageCopyOut(RTS_UI32 task, const RTS_UI32 *running)
 {
-    const IMAGE_PART *part = plan[task].part;
-    RTS_UI32 lock;
-    RTS_UI32 i;
+    RTS_UI32 lock = SysLockEnter();
 
-    if ((part[0].count | part[1].count) == 0)
-        return;
-    lock = SysLockEnter();
-    for (i = 0; i < IMAGE_AREAS; i++, part++) {
-        WORD *copy = copy_of(part);
-        WORD *before = copy + part->before - part->copy;
-        WORD *shared = shared_of(part, APP_AREA_INPUT + i);
-        if (running == NULL)
-            copy_in(copy, before, shared, part->count);
-        else if (copy != before && SysAtomicLoad(running))
-            copy_out(copy, before, shared, part->count);
+    if (SysAtomicLoad(running)) {
+        copy_out(&plan[task].part[0], (UNIT *)AppAreasGet(APP_AREA_INPUT));
+        copy_out(&plan[task].part[1], (UNIT *)AppAreasGet(APP_AREA_OUTPUT));
     }
     SysLockLeave(lock);
 }

@@ -18,14 +18,14 @@
 
 #if APP_IMAGE_SIZE > 0
 
-/* Words of an area, or of the copies. */
-#if APP_IMAGE_SIZE > 1020 || APP_INPUT_SIZE > 1020 || APP_OUTPUT_SIZE > 1020
+/* Units of CDL_IMAGE_UNIT bytes of an area, or of the copies. */
+#if APP_IMAGE_SIZE > 255 * 8 || APP_INPUT_SIZE > 255 * 8 || APP_OUTPUT_SIZE > 255 * 8
 typedef RTS_UI16 IMAGE_INDEX;
 #else
 typedef RTS_UI8 IMAGE_INDEX;
 #endif
 
-/* What a task has copies of: `count` words of an area, from `first` on. count 0: it works on the shared area. */
+/* What a task has copies of: `count` units of an area, from `first` on. count 0: it works on the shared area. */
 typedef struct {
     IMAGE_INDEX first;
     IMAGE_INDEX count;
@@ -38,29 +38,31 @@ typedef struct {
     IMAGE_PART part[IMAGE_AREAS];
 } TASK_IMAGE;
 
-/* Gives a part its place behind the `used` words of copies before it; returns how many are used then. */
+/* Gives a part its place behind the `used` units of copies before it; returns how many are used then. */
 RTS_UI32 AppImagePlace(IMAGE_PART *part, const CDL_IMAGE *image, RTS_UI32 used);
 
 /* `used` when something is wrong: more than any device has. */
-enum { IMAGE_WORD_SIZE = sizeof(uintptr_t), IMAGE_TOO_LARGE = 0xFFFF };
+enum { IMAGE_TOO_LARGE = 0xFFFF };
 
 /* The plan of the tasks to come, APP_MAX_TASKS entries that stay valid. From main, while no task runs. */
 void AppImageAttach(const TASK_IMAGE *images);
 
-/* Leads the inputs and outputs of a task to its copies. From main, while no task runs. */
-void AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context);
+/* Leads the inputs and outputs of a task to its copies; false when it has none. From main, while no task runs. */
+bool AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context);
 
-/* Before the code of a cycle (`running` NULL) and after it, in the context of the task. What the task changed is lost
- * when *running is 0: outputs are in the safe state then. */
-void AppImageCopy(RTS_UI32 task, const RTS_UI32 *running);
+/* Before and after the code of a cycle, in the context of a task that has copies. What the task changed is lost when
+ * *running is 0: outputs are in the safe state then. */
+void AppImageCopyIn(RTS_UI32 task);
+void AppImageCopyOut(RTS_UI32 task, const RTS_UI32 *running);
 
 /* The area and offset that an address in a copy stands for. */
 bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset);
 
 #else /* tasks run one after the other, or there is nothing to share */
 #define AppImageAttach(images) ((void)0)
-#define AppImageSetContext(task, context) ((void)(task))
-#define AppImageCopy(task, running) ((void)(task))
+#define AppImageSetContext(task, context) ((void)(task), false)
+#define AppImageCopyIn(task) ((void)(task))
+#define AppImageCopyOut(task, running) ((void)(task))
 #define AppImageFind(address, area, offset) false
 #endif
 

@@ -77,9 +77,9 @@ static RTS_RESULT check_images(LOADER *l, RTS_UI32 size)
         if ((image.first + image.count) * CDL_IMAGE_UNIT >= area_size[i] + CDL_IMAGE_UNIT)
             used = IMAGE_TOO_LARGE;
     }
-    if (used > APP_IMAGE_SIZE / IMAGE_WORD_SIZE)
+    if (used > APP_IMAGE_SIZE / CDL_IMAGE_UNIT)
         return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", "process image",
-                      U(used * IMAGE_WORD_SIZE), U(APP_IMAGE_SIZE));
+                      U(used * CDL_IMAGE_UNIT), U(APP_IMAGE_SIZE));
     return ERR_OK;
 }
 #else

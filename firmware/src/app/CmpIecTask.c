@@ -30,7 +30,8 @@ typedef struct {
     const CDL_TASK *record;
     GUARD guard;
     RTS_I64 watchdog_ns; /* 0: none */
-    RTS_UI32 sensitivity;
+    RTS_UI16 sensitivity;
+    bool has_copies; /* of inputs and outputs */
     RTS_UI32 exceeded;   /* cycles in a row longer than watchdog_ns */
     RTS_UI32 ms_rest;    /* ns of context.time_ns beyond context.time_ms */
     RTS_UI32 cycles;
@@ -222,7 +223,7 @@ static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 }
 
 /* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
-static __attribute__((noinline)) int run_cycle(TASK *task, RTS_UI32 index, RTS_I64 due_ns)
+static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
 {
     RTS_I64 start_ns = SysTimeGetNs();
     RTS_EXCEPTION exception;
@@ -230,10 +231,12 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_UI32 index, RTS_I
 
     set_time(task, start_ns - tasks.time_zero);
     guard_begin(&task->guard, start_ns);
-    AppImageCopy(index, NULL);
+    if (task->has_copies)
+        AppImageCopyIn(index_of(task));
     if (SysExceptTry(run_entry, task, &exception))
         return end_with_exception(task, exception.code, exception.address);
-    AppImageCopy(index, &tasks.running);
+    if (task->has_copies)
+        AppImageCopyOut(index_of(task), &tasks.running);
     elapsed_ns = SysTimeGetNs() - start_ns;
     account(task, start_ns - due_ns, elapsed_ns);
     if (watchdog_expired(task, elapsed_ns))
@@ -244,7 +247,7 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_UI32 index, RTS_I
 
 int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
-    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], index, due_ns) : 0;
+    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], due_ns) : 0;
 }
 
 /* ---- all tasks ---- */
@@ -257,7 +260,7 @@ static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *protot
     memset(task, 0, sizeof *task);
     task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
     task->context = *prototype;
-    AppImageSetContext(index_of(task), &task->context);
+    task->has_copies = AppImageSetContext(index_of(task), &task->context);
     task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
     task->record = record;
     task->min_ns = 0xFFFFFFFFu;

@@ -10,7 +10,8 @@
 
 #include "CortexM.h"
 
-RTS_UI32 SysLockEnter(void)
+/* Not inlined in four places. */
+__attribute__((noinline)) RTS_UI32 SysLockEnter(void)
 {
     RTS_UI32 before;
     __asm__ volatile("mrs %0, basepri" : "=r"(before));
