@@ -10,8 +10,7 @@
 
 #include "CortexM.h"
 
-/* Not inlined in four places. */
-__attribute__((noinline)) RTS_UI32 SysLockEnter(void)
+RTS_UI32 SysLockEnter(void)
 {
     RTS_UI32 before;
     __asm__ volatile("mrs %0, basepri" : "=r"(before));
