@@ -140,10 +140,15 @@
 /* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log lie in flash, if not where
  * SysFileFlash computes it. No default. */
 
-/* Receive and send buffer of the communication channel, bytes each; the largest L7 message. The field's compact
+/* Receive and send buffer of a connection, bytes each; the largest L7 message. The field's compact
  * template uses 2048; larger ones raise the flash rate because there is one reply per message. */
 #ifndef NETSERVER_MESSAGE_SIZE
 #define NETSERVER_MESSAGE_SIZE 2048
+#endif
+
+/* Connections at a time: tools that may be logged in together. Each costs its two buffers and about 150 bytes. */
+#ifndef COMM_MAX_CLIENTS
+#define COMM_MAX_CLIENTS 1
 #endif
 
 /* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is

@@ -101,8 +101,30 @@ static RTS_RESULT power_on(void *unused)
     return result;
 }
 
+enum { START_TEXT_SIZE = 32 };
+static const SYS_START power_came = {SYS_START_POWER, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
+static struct {
+    SYS_START now;
+    SYS_START next; /* NULL for its text: nothing was set */
+    char text[START_TEXT_SIZE];
+} starting;
+
+void SimSetStart(const SYS_START *start)
+{
+    strncpy(starting.text, start->text, START_TEXT_SIZE - 1);
+    starting.next = *start;
+    starting.next.text = starting.text;
+}
+
+const SYS_START *SysStartGet(void)
+{
+    return &starting.now;
+}
+
 RTS_RESULT SimStart(void)
 {
+    starting.now = starting.next.text != NULL ? starting.next : power_came;
+    starting.next.text = NULL;
     sim.on = false;
     sim.power_lost = false;
     sim.now_ns = 0;

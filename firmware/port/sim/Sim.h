@@ -14,6 +14,7 @@
 
 #include "CmpErrors.h"
 #include "CmpStd.h"
+#include "SysStart.h"
 
 enum { SIM_POWER_CUT = 0x8001 };
 
@@ -22,6 +23,10 @@ enum { SIM_POWER_CUT = 0x8001 };
 /* Power on; when it is on already, it was off for a moment. Time starts at 0, the boot project runs. ERR_* of the
  * component that does not start up. */
 RTS_RESULT SimStart(void);
+
+/* What SysStartGet says at the next SimStart, and only there: after that it is SYS_START_POWER again. At most 31
+ * characters of the text are kept. */
+void SimSetStart(const SYS_START *start);
 
 /* Shuts down in good order. Does nothing when it is off. */
 void SimStop(void);
