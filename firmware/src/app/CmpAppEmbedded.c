@@ -165,6 +165,7 @@ static RTS_RESULT initialise(bool init_retains)
 
     AppExceptionClear();
     AppAreasClear(init_retains);
+    AppImageAttach(app.image.task_image);
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK) {
         unload();
@@ -382,7 +383,7 @@ bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
             return true;
         }
     }
-    return false;
+    return AppImageFind(address, index, offset);
 }
 
 /* ---- life ---- */
