@@ -180,6 +180,7 @@ static RTS_RESULT initialise(bool init_retains)
     if (app.pending == INIT_COLD)
         attach_retain(app.image.area_size[APP_AREA_RETAIN]);
     app.pending = INIT_DONE;
+    AppImageAttach(app.image.task_image);
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK) {
         unload();
@@ -417,7 +418,7 @@ bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
             return true;
         }
     }
-    return false;
+    return AppImageFind(address, index, offset);
 }
 
 /* ---- life ---- */
