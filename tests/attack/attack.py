@@ -57,14 +57,14 @@ def attempt(number: int) -> tuple[int, str, str]:
         return number, "", "the campaign itself failed:\n" + traceback.format_exc()
 
 
-def run_campaign(campaign: Campaign, short: bool, jobs: int) -> Result:
-    """Its cases, side by side."""
+def run_campaign(campaign: Campaign, most: int | None, jobs: int) -> Result:
+    """Its cases, or so many of them at random, side by side."""
     global _at_work, _cases
     begin = time.monotonic()
     _at_work, _cases = campaign, campaign.cases()
     numbers = list(range(len(_cases)))
-    if short and campaign.short < len(numbers):
-        numbers = sorted(random.Random(campaign.shop.seed).sample(numbers, campaign.short))
+    if most is not None and most < len(numbers):
+        numbers = sorted(random.Random(campaign.shop.seed).sample(numbers, most))
     campaign.prepare([_cases[number] for number in numbers])
     result = Result(campaign)
     with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
@@ -118,6 +118,7 @@ def parse(argv: list[str]) -> argparse.Namespace:
     names = ", ".join(campaign.name for campaign in CAMPAIGNS)
     parser = argparse.ArgumentParser(prog="tests/attack/run.py")
     parser.add_argument("--short", action="store_true", help="some cases of each campaign")
+    parser.add_argument("--sample", type=int, metavar="N", help="N cases of each campaign")
     parser.add_argument("--only", metavar="NAMES", help=f"campaigns, separated by commas: {names}")
     parser.add_argument("--replay", metavar="ID", help="one case, such as cut:17")
     parser.add_argument("--seed", type=int, default=1, help="another one gives other random cases")
@@ -134,7 +135,8 @@ def main(argv: list[str]) -> int:
         if args.replay:
             return replay_case(shop, args.replay)
         chosen = args.only.split(",") if args.only else [c.name for c in CAMPAIGNS]
-        results = [run_campaign(c(shop), args.short, args.jobs) for c in CAMPAIGNS if c.name in chosen]
+        campaigns = [campaign(shop) for campaign in CAMPAIGNS if campaign.name in chosen]
+        results = [run_campaign(c, c.short if args.short else args.sample, args.jobs) for c in campaigns]
         options = f"{' --sanitized' if args.sanitized else ''}{f' --seed {args.seed}' if args.seed != 1 else ''}"
         report(results, f"tests/attack/run.py{options}")
     return 1 if any(r.fallen for r in results) else 0
