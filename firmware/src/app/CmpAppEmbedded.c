@@ -58,6 +58,12 @@ bool AppHasException(void)
     return AppExceptionGet()->code != RTSEXCPT_NOEXCEPTION;
 }
 
+/* Its last cycle was broken off for a stop. That says nothing against the program, but it starts from a reset only. */
+static bool was_broken_off(void)
+{
+    return !RTS_ONE_CORE && AppExceptionGet()->code == RTSEXCPT_STOP_TIMEOUT;
+}
+
 static bool is_proven(void)
 {
     RTS_UI8 state = AppCommitGet()->state[app.image.file];
@@ -84,7 +90,8 @@ static void enter_exception_state(void)
 {
     AppAreasClearOutputs();
     app.state = AS_STOP;
-    (void)AppCommitSetState(app.image.file, SLOT_FAILED);
+    if (!was_broken_off())
+        (void)AppCommitSetState(app.image.file, SLOT_FAILED);
     AppPostEvent(EVT_CmpApp_Exception);
 }
 
@@ -173,6 +180,7 @@ static RTS_RESULT initialise(bool init_retains)
     if (app.pending == INIT_COLD)
         attach_retain(app.image.area_size[APP_AREA_RETAIN]);
     app.pending = INIT_DONE;
+    AppImageAttach(app.image.task_image);
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK) {
         unload();
@@ -301,7 +309,7 @@ RTS_RESULT AppStopApplication(void)
 {
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
-    if (AppStopTasks() && !AppHasException()) {
+    if (AppStopTasks() && (!AppHasException() || was_broken_off())) {
         (void)AppCommitSetState(app.image.file, SLOT_TRIAL);
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application stopped");
     }
@@ -410,7 +418,7 @@ bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
             return true;
         }
     }
-    return false;
+    return AppImageFind(address, index, offset);
 }
 
 /* ---- life ---- */
@@ -429,9 +437,10 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
 {
     switch (hook) {
     case CH_INIT:
+        if (AppAreasInit() != ERR_OK)
+            return ERR_NOMEMORY;
         if (!RTS_STARTS_ONCE)
             forget_all();
-        AppCommitOpen(); /* before the retain log, whose place it may tell */
         break;
     case CH_INIT_TASKS:
         AppBoot();
