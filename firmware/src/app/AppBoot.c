@@ -124,6 +124,7 @@ static void run_boot_project(void)
 
 void AppBoot(void)
 {
+    AppCommitOpen();
     if (AppCommitResult() != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, AppCommitResult(), "The commit record cannot be read");
     else if (AppCommitGet()->active == SLOT_NONE)

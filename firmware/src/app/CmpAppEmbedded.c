@@ -441,7 +441,6 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
             return ERR_NOMEMORY;
         if (!RTS_STARTS_ONCE)
             forget_all();
-        AppCommitOpen(); /* before the retain log, whose place it may tell */
         break;
     case CH_INIT_TASKS:
         AppBoot();
