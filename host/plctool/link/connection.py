@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from typing import Protocol
 
 from plctool.core import lib
 from plctool.errors import LinkError
@@ -15,7 +16,35 @@ from plctool.link.transport import BlockTransport
 PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
 _OPEN_PATIENCE = 5.0
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
-_SCAN_TIME = 1.5
+SCAN_SECONDS = 1.5
+
+
+class MessageLink(Protocol):
+    """Whole messages to one device and back, over a line of one's own (Connection) or through a gateway."""
+
+    @property
+    def name(self) -> str:
+        """For messages: the port or address."""
+
+    @property
+    def is_open(self) -> bool: ...
+
+    @property
+    def buffer_size(self) -> int:
+        """Longest message the device takes, in bytes; 0 while no channel is open."""
+
+    @property
+    def best_size(self) -> int:
+        """Length of message that carries most for its cost, in bytes; 0 while no channel is open."""
+
+    def open(self) -> None: ...
+    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes: ...
+    def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]: ...
+    def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]: ...
+    def now(self) -> float:
+        """Monotonic time in seconds; virtual for virtual lines."""
+
+    def close(self) -> None: ...
 
 
 class Connection:
@@ -33,17 +62,22 @@ class Connection:
         self.close()
 
     @property
+    def name(self) -> str:
+        return self.transport.name
+
+    @property
     def is_open(self) -> bool:
         return self._channel is not None
 
+    def now(self) -> float:
+        return self.transport.now()
+
     @property
     def buffer_size(self) -> int:
-        """Longest message the device takes, in bytes; 0 while no channel is open."""
         return self._channel.buffer_size if self._channel else 0
 
     @property
     def best_size(self) -> int:
-        """Length of message that carries most for its cost, in bytes; 0 while no channel is open."""
         return self._channel.best_size if self._channel else 0
 
     def open(self) -> None:
@@ -94,7 +128,7 @@ class Connection:
             if channel.outstanding:  # left on the way: whatever is still to come is of no use
                 self._drop_channel()
 
-    def scan(self, seconds: float = _SCAN_TIME, enough: int = 0) -> list[names.Node]:
+    def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]:
         """Devices that answer a broadcast name request within `seconds`; stops early when `enough` have answered."""
         request_id = secrets.randbits(32)
         found: dict[bytes, names.Node] = {}
