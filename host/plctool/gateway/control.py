@@ -30,26 +30,32 @@ def stop_gateways(port: str | None = None) -> list[dict[str, Any]]:
     ended = []
     for place, holder in _find(port):
         try:
-            _ask(place, {"op": "stop"})
-            _wait(place, _END_PATIENCE)
-        except Ended:
-            pass
-        except TimeoutError:
-            _kill(place, holder)
-        except LinkError as error:
-            if error.code != "gateway-stuck":
+            _dismiss(place, only_idle=False)
+        except (TimeoutError, LinkError) as error:
+            if getattr(error, "code", "gateway-stuck") != "gateway-stuck":
                 raise
             _kill(place, holder)
         ended.append({"line": holder.line, "pid": holder.pid})
     return ended
 
 
+def _dismiss(place: Place, only_idle: bool) -> None:
+    """Asks a gateway to end and waits until it has let go of its line. Raises LinkError, TimeoutError."""
+    try:
+        ends = _ask(place, {"op": "stop", "only_idle": only_idle})["ends"]
+    except Ended:
+        ends = True
+    if ends:
+        with locked(place.lock, _END_PATIENCE):
+            pass
+
+
 def dismiss_idle(port: str) -> None:
     """Ends the gateway of a port if it serves no tool just now, so that the line can be used directly."""
-    with suppress(NoGateway, LinkError, Ended, TimeoutError):
+    with suppress(NoGateway, LinkError, TimeoutError):
         place = find_place(port)
-        if find_holder(place.lock) and _ask(place, {"op": "stop", "only_idle": True})["ends"]:
-            _wait(place, _END_PATIENCE)
+        if find_holder(place.lock):
+            _dismiss(place, only_idle=True)
 
 
 def _find(port: str | None) -> list[tuple[Place, Holder]]:
@@ -83,16 +89,10 @@ def _ask(place: Place, call: dict[str, Any]) -> dict[str, Any]:
         pipe.close()
 
 
-def _wait(place: Place, patience: float) -> None:
-    """Until the gateway has let go of its line. Raises TimeoutError."""
-    with locked(place.lock, patience):
-        pass
-
-
 def _kill(place: Place, holder: Holder) -> None:
     """Ends one that does not answer; it holds its lock, so the process number is still its own."""
     for number, patience in ((signal.SIGTERM, _TERM_PATIENCE), (signal.SIGKILL, _END_PATIENCE)):
         with suppress(ProcessLookupError, TimeoutError):
             os.kill(holder.pid, number)
-            _wait(place, patience)
-            return
+            with locked(place.lock, patience):
+                return

@@ -108,7 +108,8 @@ class Gateway:
     def tools(self) -> list[Tool]:
         """The tools that use the line, in the order they came."""
         with self._lock:
-            return sorted((g.tool for g in self._guests if g.tool), key=lambda tool: tool.since)
+            there = [g.tool for g in self._guests if g.tool and not g.is_gone()]
+        return sorted(there, key=lambda tool: tool.since)
 
     def _idle_left(self) -> float:
         with self._lock:
@@ -135,7 +136,7 @@ class Gateway:
     def admit(self, guest: _Guest, tool: Tool, hello: dict[str, Any]) -> None:
         """Makes a guest a tool of this line. Raises LinkError when it cannot be served."""
         with self._lock:
-            others = [str(g.tool) for g in self._guests if g.tool]
+            others = [str(g.tool) for g in self._guests if g.tool and not g.is_gone()]
             reason = self._misfit(hello, others)
             if reason is None and len(others) < MAX_TOOLS and self._end is None:
                 guest.tool = tool
@@ -225,6 +226,10 @@ class _Guest:
         with suppress(Closed, TimeoutError):
             self._pipe.send(_failure(GOODBYE, reason), _GOODBYE_PATIENCE)
         self._pipe.shut()
+
+    def is_gone(self) -> bool:
+        """Whether the tool has left, though its thread may not know it yet."""
+        return self._pipe.is_gone()
 
     def _greet(self) -> None:
         """The first frame says who it is."""
