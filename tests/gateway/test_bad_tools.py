@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from conftest import BAUD, PATIENCE, Gate, Served
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from served import BAUD, PATIENCE, Gate, Served
 
 from plctool.gateway import server
 from plctool.gateway.frames import MAX_PAYLOAD, PROTOCOL, Frame, Kind, Pipe, Request, document_frame, encode

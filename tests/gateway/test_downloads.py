@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
-from conftest import PATIENCE, Gate, Served
 from fake_device import image_crc
+from served import PATIENCE, Gate, Served
 from small_app import make_application
 
 from plctool.core import lib
@@ -138,23 +138,40 @@ def test_a_tool_that_leaves_in_mid_download_leaves_the_old_program_and_the_devic
     assert served.plc.image == old
 
 
-def test_a_download_that_its_tool_gives_up_leaves_the_channel_in_order(served: Served) -> None:
-    """Ctrl-C: what was sent already is answered, and nobody gets the answers."""
-    other = served.tool()
-    other.open()
-    served.answer(lambda message: message + b"!")
+def test_a_download_that_its_tool_gives_up_ends_at_once_and_the_others_go_on(served: Served) -> None:
+    """Ctrl-C. The channel is closed, so that the device does not get what is on its way already."""
 
-    def messages() -> Iterator[bytes]:
-        yield from (b"block %d" % n for n in range(100))
+    def give_up(done: int, total: int) -> None:
+        raise KeyboardInterrupt
 
-    giving_up = served.tool()
-    giving_up.open()
-    stream = giving_up.stream(messages())
-    assert next(stream) == b"block 0!"
-    stream.close()  # type: ignore[attr-defined]
-    assert giving_up.exchange(b"mine") == b"mine!"
-    assert other.exchange(b"and mine") == b"and mine!"
-    assert len(served.device.messages) < 12
+    old, image = served.plc.image, make_application("2", 100_000)[0]
+    other, giving_up = served.connect(), served.connect()
+    other.read("Main.count")
+    with pytest.raises(KeyboardInterrupt):
+        giving_up.flash(image, progress=give_up)
+    assert other.read("Main.count") == 0
+    assert giving_up.read("Main.count") == 0
+    assert served.plc.image == old and len(served.plc.received) < len(image)
+
+
+def test_a_tool_that_is_killed_when_all_of_its_program_is_on_its_way_leaves_the_old_program(
+    served: Served, gate: Callable[[], Gate], eventually: Callable[[Callable[[], Any]], Any]
+) -> None:
+    """The gateway has the rest already, and must not send it."""
+    old, image = served.plc.image, make_application("2", 2_500)[0]
+    guest, other = served.guest(), served.connect()
+    opened = served.call(guest, "open").document
+    barred = gate()
+    for offset in (0, 1000, 2000):
+        message = block(image, offset, opened["session"])
+        request = Request(opened["generation"], 8.0, message, more=offset < 2000)
+        guest.send(Frame(Kind.STREAM, 8, request.encode()), PATIENCE)
+    assert barred.closed.wait(PATIENCE)
+    guest.close()
+    barred.open()
+    eventually(lambda: served.gateway.device.claim is None)
+    assert other.read("Main.count") == 0
+    assert served.plc.image == old
 
 
 def test_a_stream_is_answered_message_by_message(served: Served) -> None:
@@ -198,7 +215,7 @@ def test_the_image_arrives_whole_in_a_download_through_the_gateway(served: Serve
 
 def test_a_download_below_the_command_keeps_others_away_too(served: Served) -> None:
     """Whoever uses the services directly claims nothing."""
-    image = make_application("4", 30_000)[0]
+    image = make_application("4", 200_000)[0]
     plc, other = served.connect(), served.connect()
     refused: list[LinkError] = []
 

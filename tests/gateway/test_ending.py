@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from conftest import BAUD, PATIENCE, Gate, Served
+from served import BAUD, PATIENCE, Gate, Served
 
 from plctool.errors import LinkError
 from plctool.gateway.client import Ended, connect, greet

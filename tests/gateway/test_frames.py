@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -147,11 +148,24 @@ def test_sending_to_one_that_is_gone_is_closed() -> None:
     assert pipe.is_gone()
 
 
-def test_one_is_not_gone_while_there_is_something_to_read() -> None:
+def test_one_that_has_closed_is_gone_though_there_is_something_to_read() -> None:
     pipe, other = pipes()
-    assert not pipe.is_gone()
     other.send(encode(Frame(Kind.CALL, 1)))
-    other.close()
     assert not pipe.is_gone()
-    assert pipe.receive(30) == Frame(Kind.CALL, 1)
+    other.close()
     assert pipe.is_gone()
+    assert pipe.receive(30) == Frame(Kind.CALL, 1)
+    with pytest.raises(Closed):
+        pipe.receive(30)
+
+
+def test_a_look_at_what_has_come_leaves_it_there_and_takes_no_more_than_asked_for() -> None:
+    pipe, other = pipes()
+    frames = [Frame(Kind.STREAM, number, bytes(20_000)) for number in range(6)]
+    sending = threading.Thread(target=other.sendall, args=(b"".join(map(encode, frames)),))
+    sending.start()
+    assert pipe.receive(30) == frames[0]
+    seen = pipe.look(2)
+    assert seen == frames[1 : 1 + len(seen)] and len(seen) <= 5
+    assert [pipe.receive(30) for _ in range(5)] == frames[1:]
+    sending.join(30)

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
-from conftest import PATIENCE, Gate, Served
+from served import PATIENCE, Gate, Served
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError

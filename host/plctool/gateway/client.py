@@ -16,6 +16,7 @@ from typing import Any
 
 from plctool.errors import DeviceError, LinkError
 from plctool.gateway.frames import (
+    AHEAD,
     ENDING,
     GOODBYE,
     PROTOCOL,
@@ -29,7 +30,7 @@ from plctool.gateway.frames import (
     document_frame,
 )
 from plctool.gateway.place import NoGateway, Place, find_holder, find_place, locked
-from plctool.link.channel import MAX_REQUESTS, ChannelLost
+from plctool.link.channel import ChannelLost
 from plctool.link.connection import PATIENCE, SCAN_SECONDS
 from plctool.link.names import Node
 from plctool.link.session import Application, Session
@@ -39,7 +40,6 @@ _START_PATIENCE = 20.0  # from its start to its first word [s]
 _ANSWER_PATIENCE = 20.0  # beyond that of the request: it may have to find the device and open a channel [s]
 _SEND_PATIENCE = 10.0
 _RETRY = 0.01  # after a gateway that was just ending [s]
-_AHEAD = MAX_REQUESTS + 1  # messages of a stream that the gateway may have: one waits there for its time
 
 
 class Ended(Exception):
@@ -248,7 +248,7 @@ class GatewayConnection:
         number, sent, taken, ended = next(self._numbers), 0, 0, False
         try:
             while True:
-                while following is not None and sent < taken + _AHEAD:
+                while following is not None and sent < taken + AHEAD:
                     message, following, sent = following, next(source, None), sent + 1
                     request = Request(generation, patience, message, more=following is not None)
                     self._ask(Kind.STREAM, request.encode(), number)

@@ -19,9 +19,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
+from plctool.link.channel import MAX_REQUESTS
+
 BUSY = "downloading"  # code of the error while another tool keeps the device to itself
 ENDING = "gateway-ending"  # code of a refusal: the gateway ends, and another one may be started
 PROTOCOL = 1  # of the gateway; a tool and a gateway work together when theirs are equal
+AHEAD = MAX_REQUESTS + 1  # messages of a stream that the gateway may have: one waits there for its time
 MAX_PAYLOAD = 0x8000  # bytes; the longest message of the link with its head, or the longest list of tools, fits
 _HEAD = struct.Struct("<IBI")
 _EXCHANGE = struct.Struct("<IIB")
@@ -34,7 +37,7 @@ class Kind(IntEnum):
     HELLO = 1  # JSON: who asks; always the first frame
     CALL = 2  # JSON: {"op": ...}
     EXCHANGE = 3  # Request: one message to the device
-    STREAM = 4  # Request: one of several messages, the next one sent while the device works on this one
+    STREAM = 4  # Request: one of several messages; AHEAD of them are sent before the first reply
     CANCEL = 5  # the rest of a stream does not come
     # From the gateway.
     DONE = 0x81  # JSON: the result of HELLO, CALL or STREAM
@@ -168,17 +171,28 @@ class Pipe:
         """The next frame. Raises Closed, FrameError, and TimeoutError when it is not complete after `timeout` s."""
         end = None if timeout is None else time.monotonic() + timeout
         while not self._frames:
-            try:
-                data = self._socket.recv(_CHUNK)
-            except BlockingIOError:
+            if not self._fetch():
                 _wait(self._readable, end)
-                continue
-            except OSError as error:
-                raise Closed from error
-            if not data:
-                raise Closed
-            self._frames.extend(self._decoder.feed(data))
         return self._frames.popleft()
+
+    def look(self, most: int) -> list[Frame]:
+        """The frames that have come and were not received yet, up to about `most`. Raises Closed, FrameError."""
+        while len(self._frames) < most and self._fetch():
+            pass
+        return list(self._frames)
+
+    def _fetch(self) -> bool:
+        """Takes what the socket has; False when that is nothing."""
+        try:
+            data = self._socket.recv(_CHUNK)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise Closed from error
+        if not data:
+            raise Closed
+        self._frames.extend(self._decoder.feed(data))
+        return True
 
     def send(self, frame: Frame, timeout: float) -> None:
         """Raises Closed; TimeoutError when the other end does not read for `timeout` s: the pipe is of no use then."""
@@ -200,13 +214,13 @@ class Pipe:
             self._sending.release()
 
     def is_gone(self) -> bool:
-        """Whether the other end has closed and nothing of it is left to be read."""
+        """Whether the other end has closed, though there may be something left to receive. From any thread."""
+        poll = select.poll()
         try:
-            return not self._frames and self._socket.recv(1, socket.MSG_PEEK) == b""
-        except BlockingIOError:
-            return False
-        except OSError:
+            poll.register(self._socket, 0)  # tells only the end
+        except (OSError, ValueError):
             return True
+        return any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, event in poll.poll(0))
 
     def shut(self) -> None:
         """Ends the traffic in both directions; a thread that waits in `receive` gets Closed."""

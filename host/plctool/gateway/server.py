@@ -20,6 +20,7 @@ from typing import Any
 
 from plctool.errors import DeviceError, LinkError, PlcError
 from plctool.gateway.frames import (
+    AHEAD,
     BUSY,
     ENDING,
     GOODBYE,
@@ -279,15 +280,13 @@ class _Guest:
         if frame.number == self._ended_stream:
             return
         source = _Source(self._pipe, frame)
-        try:
+        generation = source.request.generation
+        self._ended_stream = frame.number
+        with suppress(_Cancelled):
             self._device.stream(
-                self._known(), source.request.generation, source.messages(), source.patience, source.reply
+                self._known(), generation, source.messages(), source.patience, source.reply, source.check
             )
-        finally:
-            self._ended_stream = frame.number
-        if source.failure:
-            raise source.failure
-        self._done(frame.number, {})
+            self._done(frame.number, {})
 
     def _call(self, call: dict[str, Any]) -> dict[str, Any]:
         match call.get("op"):
@@ -339,53 +338,50 @@ class _Guest:
         self._send(Frame(Kind.WAIT, self._number))
 
 
+class _Cancelled(Exception):
+    """The tool gives up its stream."""
+
+
 class _Source:
     """The messages of a stream, as the tool sends them, and the way back for their replies.
 
-    When the tool leaves on the way, what the device has is answered to the end and thrown away, so that the channel
-    stays in order for the others.
+    When the tool gives up or is gone, the stream ends at once by an exception: the device must not get the rest of a
+    program that is here already.
     """
 
     def __init__(self, pipe: Pipe, first: Frame) -> None:
         self.request = Request.decode(first.payload)
         self.patience = min(self.request.patience, MAX_PATIENCE)
-        self.failure: Exception | None = None  # what is wrong with the tool
         self._pipe = pipe
         self._number = first.number
         self._taken = 0
-        self._wanted = True  # the replies
 
     def messages(self) -> Iterator[bytes]:
-        """Ends early when the tool has left."""
-        while self._wanted:
+        """Raises what `Pipe.receive` does, and _Cancelled."""
+        while True:
             self._taken += 1
             yield self.request.message
             if not self.request.more:
                 return
-            try:
-                self._wanted = self._wanted and self._next()
-            except (Closed, FrameError, TimeoutError) as error:
-                self._fail(error)
-
-    def _next(self) -> bool:
-        """Takes the next message; False when the tool wants no more."""
-        frame = self._pipe.receive(CLAIM_SILENCE)
-        if frame.number != self._number or frame.kind not in (Kind.STREAM, Kind.CANCEL):
-            raise FrameError("another request within a stream")
-        if frame.kind is Kind.STREAM:
+            frame = self._pipe.receive(CLAIM_SILENCE)
+            self._look(frame)
             self.request = Request.decode(frame.payload)
-        return frame.kind is Kind.STREAM
+
+    def check(self) -> None:
+        """Raises _Cancelled or Closed when the rest is not wanted any more."""
+        if self._pipe.is_gone():
+            raise Closed
+        for frame in self._pipe.look(AHEAD):
+            self._look(frame)
 
     def reply(self, message: bytes) -> None:
-        if self._wanted:
-            try:
-                self._pipe.send(Frame(Kind.REPLY, self._number, Reply(self._taken, message).encode()), _SEND_PATIENCE)
-            except (Closed, TimeoutError) as error:
-                self._fail(error)
+        self._pipe.send(Frame(Kind.REPLY, self._number, Reply(self._taken, message).encode()), _SEND_PATIENCE)
 
-    def _fail(self, error: Exception) -> None:
-        self.failure = error
-        self._wanted = False
+    def _look(self, frame: Frame) -> None:
+        if frame.number != self._number or frame.kind not in (Kind.STREAM, Kind.CANCEL):
+            raise FrameError("another request within a stream")
+        if frame.kind is Kind.CANCEL:
+            raise _Cancelled
 
 
 def _failure(number: int, error: PlcError) -> Frame:

@@ -7,7 +7,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 
 from plctool.core import lib
@@ -135,11 +135,22 @@ class SharedDevice:
             return self._connection.exchange(message, patience)
 
     def stream(
-        self, tool: Tool, generation: int, messages: Iterable[bytes], patience: float, reply: Callable[[bytes], None]
+        self,
+        tool: Tool,
+        generation: int,
+        messages: Iterable[bytes],
+        patience: float,
+        reply: Callable[[bytes], None],
+        check: Callable[[], None],
     ) -> None:
-        """Requests one after the other; `reply` gets each answer. The device is the tool's alone until the end."""
-        with self._turn(tool, generation), self._claimed_meanwhile(tool):
-            for answer in self._connection.stream(map(self._noted, messages), patience):
+        """Requests one after the other; `reply` gets each answer. The device is the tool's alone until the end. `check`
+        is called again and again; what it raises, or `reply`, ends the stream and closes the channel."""
+        with (
+            self._turn(tool, generation),
+            self._claimed_meanwhile(tool),
+            closing(self._connection.stream(map(self._noted, messages), patience, check)) as answers,
+        ):
+            for answer in answers:
                 reply(answer)
 
     def scan(self, tool: Tool, seconds: float, enough: int) -> list[Node]:

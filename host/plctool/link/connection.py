@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from typing import Protocol
 
@@ -107,10 +107,14 @@ class Connection:
         (reply,) = self.stream([message], patience)
         return reply
 
-    def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]:
+    def stream(
+        self, messages: Iterable[bytes], patience: float = PATIENCE, check: Callable[[], None] = lambda: None
+    ) -> Generator[bytes, None, None]:
         """Sends requests, the next one already while the device works on the one before, and yields the replies.
 
-        On a bad line there may be fewer replies than requests, but never none to the last one.
+        On a bad line there may be fewer replies than requests, but never none to the last one. When the stream is left
+        before its end the channel is closed, so that the device gets no more of it. `check` is called again and again
+        meanwhile; what it raises ends the stream.
         """
         if self._channel is None:
             raise ChannelLost("There is no connection to the device.", "closed")
@@ -121,7 +125,7 @@ class Connection:
                     channel.send(message, self.transport.now())
                 if not channel.outstanding:
                     return
-                self._run(channel, lambda: bool(channel.replies), patience)
+                self._run(channel, lambda: bool(channel.replies), patience, check)
                 while channel.replies:
                     yield channel.replies.popleft()
         finally:
@@ -159,9 +163,12 @@ class Connection:
                 while self._send_next(channel):
                     pass
 
-    def _run(self, channel: Channel, done: Callable[[], bool], patience: float) -> None:
+    def _run(
+        self, channel: Channel, done: Callable[[], bool], patience: float, check: Callable[[], None] = lambda: None
+    ) -> None:
         """Moves packages until `done`. Raises ChannelLost after `patience` seconds of silence."""
         while not done():
+            check()
             sent = self._send_next(channel)
             now = self.transport.now()
             give_up = channel.give_up_at(patience)
