@@ -51,6 +51,11 @@
 #define APP_MEMORY_SIZE 256
 #endif
 
+/* 1: the port gives the memory of the areas (SysMem.h), to keep programs from writing beyond them. 0: a variable. */
+#ifndef APP_AREAS_FROM_PORT
+#define APP_AREAS_FROM_PORT 0
+#endif
+
 /* A new application has proven itself after running this long without an exception [us]; before that a restart may roll
  * back to the one before it. */
 #ifndef APP_PROVE_US

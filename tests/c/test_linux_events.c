@@ -7,6 +7,7 @@
  * only a stop has to be there in time, with room to spare.
  */
 #define _GNU_SOURCE
+#include "../../firmware/src/app/AppAreas.h"
 #include "../../firmware/src/app/AppException.h"
 #include "CmpAppEmbedded.h"
 #include "CmpChecksum.h"
@@ -322,6 +323,7 @@ static void the_end_of_the_runtime_breaks_initialisation_too(void)
 int main(void)
 {
     static const CMP_HOOK hooks[] = {CH_INIT_SYSTEM, CH_INIT, CH_INIT_SYSTEM_TASKS};
+    CHECK(AppAreasInit() == ERR_OK);
     for (size_t i = 0; i < RTS_COUNT(hooks); i++) {
         CHECK(SysTime_Hook(hooks[i]) == ERR_OK);
         CHECK(SysTimer_Hook(hooks[i]) == ERR_OK);

@@ -14,6 +14,7 @@
 #define APP_INPUT_SIZE 4096
 #define APP_OUTPUT_SIZE 4096
 #define APP_MEMORY_SIZE (64 * 1024)
+#define APP_AREAS_FROM_PORT 1
 #define NETSERVER_MESSAGE_SIZE 16384
 #define COMM_MAX_CLIENTS 4
 #define LOG_MAX_ENTRIES 256
@@ -70,6 +71,20 @@
 
 /* Longest sleep of the main loop with nothing to do [ms]. */
 #define PORT_IDLE_MS 10
+
+/* When the process that runs the controller dies, it is started again at once; when it dies again without having run a
+ * program or lived for PORT_LIFE_MS, after PORT_RESTART_MS, twice that and so on [ms]; in vain so many times in a row,
+ * plcrt ends. */
+#define PORT_RESTART_MS 250
+#define PORT_LIFE_MS 10000
+#define PORT_MAX_FAILURES 6
+
+/* How long it may take to end when it is asked to [ms]. */
+#define PORT_END_MS 9000
+
+/* How long the flash file and the serial device are waited for at start-up [ms]: a controller whose supervisor was killed
+ * ends within that. */
+#define PORT_BUSY_MS 1000
 
 /* How often a serial device that went away is tried again [ms]. */
 #define PORT_REOPEN_MS 1000

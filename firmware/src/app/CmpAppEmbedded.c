@@ -401,6 +401,8 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
 {
     switch (hook) {
     case CH_INIT:
+        if (AppAreasInit() != ERR_OK)
+            return ERR_NOMEMORY;
         if (!RTS_STARTS_ONCE)
             forget_all();
         break;
