@@ -47,8 +47,7 @@ bool AppRollBack(RTS_UI32 failed)
     RTS_UI32 retain_until = commit->slot[failed].retain_after;
     RTS_UI32 retain_after;
 
-    if (commit->state[other] == SLOT_EMPTY || commit->state[other] == SLOT_FAILED ||
-        load_from_slot(other, retain_until) != ERR_OK)
+    if (!AppCommitHasGood(other) || load_from_slot(other, retain_until) != ERR_OK)
         return false;
     /* A record of its own numbers its retain variables as newest before the commit makes it so. */
     RetainKeep(retain_until);

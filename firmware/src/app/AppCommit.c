@@ -66,6 +66,16 @@ RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot)
     return slot == FILE_SLOT_A ? FILE_SLOT_B : FILE_SLOT_A;
 }
 
+bool AppCommitHasGood(RTS_UI32 slot)
+{
+    return state.commit.state[slot] != SLOT_EMPTY && state.commit.state[slot] != SLOT_FAILED;
+}
+
+bool AppCommitCanGoBack(RTS_UI32 slot)
+{
+    return state.commit.state[slot] == SLOT_FAILED && AppCommitHasGood(AppCommitOtherSlot(slot));
+}
+
 void AppCommitWipe(RTS_UI32 slot)
 {
     (void)SysFileErase(slot, 0, SysFlashGet()->sector_size);
@@ -140,6 +150,14 @@ static RTS_RESULT read_record(void)
     return result;
 }
 
+/* `number`: of the newest seal, which counts no more. */
+static void forget_programs(RTS_UI32 number)
+{
+    memset(&state.commit, 0, sizeof state.commit);
+    state.commit.active = SLOT_NONE;
+    state.commit.number = number;
+}
+
 /* Without a record of ours the seals are all there is. */
 static void report_loss(void)
 {
@@ -163,8 +181,8 @@ void AppCommitOpen(void)
         state.log.opened = result;
         return;
     }
-    if (state.commit.active >= SLOT_COUNT)
-        state.commit.active = SLOT_NONE;
+    if (state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE)
+        forget_programs(0); /* not a record of ours, whatever its CRC */
     take_seals();
     if (result != ERR_OK)
         report_loss();
@@ -192,11 +210,7 @@ static RTS_RESULT write_record(const char *text)
 
 RTS_RESULT AppCommitErase(void)
 {
-    RTS_UI32 number = state.commit.number;
-
-    memset(&state.commit, 0, sizeof state.commit);
-    state.commit.active = SLOT_NONE;
-    state.commit.number = number;
+    forget_programs(state.commit.number);
     return write_record("");
 }
 
@@ -224,7 +238,7 @@ RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 changed)
         return ERR_OK;
     state.commit.state[slot] = changed;
     result = write_record("");
-    if (result != ERR_OK)
+    if (result != ERR_OK && changed != SLOT_FAILED)
         state.commit.state[slot] = before; /* tried again */
     return result;
 }
