@@ -20,6 +20,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
 #include <ucontext.h>
 
 enum {
@@ -377,23 +378,49 @@ static void break_round(CONTEXT *context, RTS_UI32 round, RTS_UI32 code)
     }
 }
 
+static bool runs(const CONTEXT *context, const void *arg)
+{
+    return context->used && runs_iec_code(context) && __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg;
+}
+
 /* The round is read first: when the thread goes on to its next one meanwhile, the break misses. */
 static void break_if_it_runs(CONTEXT *context, const void *arg, RTS_UI32 code)
 {
     RTS_UI32 round = __atomic_load_n(&context->round, __ATOMIC_ACQUIRE);
-    if (runs_iec_code(context) &&
-        __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg) {
+    if (runs(context, arg)) {
         break_round(context, round, code);
     }
+}
+
+static RTS_I64 used_ns(const CONTEXT *context)
+{
+    clockid_t clock;
+    struct timespec used;
+    if (pthread_getcpuclockid(context->thread, &clock) != 0 || clock_gettime(clock, &used) != 0) {
+        return -1;
+    }
+    return (RTS_I64)used.tv_sec * 1000000000 + used.tv_nsec;
+}
+
+/* The lock keeps the thread from ending meanwhile. */
+RTS_I64 SysExceptGetUsedNs(const void *arg)
+{
+    RTS_I64 ns = -1;
+    pthread_mutex_lock(&state.lock);
+    for (const CONTEXT *context = state.context; ns < 0 && context < state.context + MAX_CONTEXTS; context++) {
+        if (runs(context, arg)) {
+            ns = used_ns(context);
+        }
+    }
+    pthread_mutex_unlock(&state.lock);
+    return ns;
 }
 
 void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     pthread_mutex_lock(&state.lock);
     for (CONTEXT *context = state.context; state.installed && context < state.context + MAX_CONTEXTS; context++) {
-        if (context->used) {
-            break_if_it_runs(context, arg, code);
-        }
+        break_if_it_runs(context, arg, code);
     }
     pthread_mutex_unlock(&state.lock);
 }

@@ -34,16 +34,19 @@ typedef struct {
     const char *flash;
     const char *serial;
     RTS_UI32 baud;
+    char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
+    RTS_UI32 event_count;
     bool alone;
 } OPTIONS;
 
 static const char usage[] =
-    "usage: plcrt --flash FILE [--serial PATH|pty] [--baud N]\n"
+    "usage: plcrt --flash FILE [--serial PATH|pty] [--baud N] [--event NAME=PIPE]...\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
     "  --serial pty    opens a pseudo terminal and prints its name as \"serial: /dev/pts/N\"\n"
     "  --baud N        speed of the serial device, 115200 if not given\n"
+    "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
     "  --version       prints the version\n"
     "  --help          prints this\n"
@@ -88,6 +91,7 @@ enum {
     OPTION_FLASH = 256,
     OPTION_SERIAL,
     OPTION_BAUD,
+    OPTION_EVENT,
     OPTION_ALONE,
     OPTION_VERSION,
     OPTION_HELP,
@@ -100,6 +104,7 @@ static const struct option long_options[] = {
     {"flash", required_argument, NULL, OPTION_FLASH},
     {"serial", required_argument, NULL, OPTION_SERIAL},
     {"baud", required_argument, NULL, OPTION_BAUD},
+    {"event", required_argument, NULL, OPTION_EVENT},
     {"no-supervisor", no_argument, NULL, OPTION_ALONE},
     {"version", no_argument, NULL, OPTION_VERSION},
     {"help", no_argument, NULL, OPTION_HELP},
@@ -108,6 +113,14 @@ static const struct option long_options[] = {
     {"tcp", optional_argument, NULL, OPTION_TCP},
     {NULL, 0, NULL, 0},
 };
+
+static void take_event(OPTIONS *options, char *text)
+{
+    if (options->event_count == RTS_COUNT(options->event)) {
+        refuse("--event %s is one too many: there may be %d", text, SCHED_MAX_EXTERNAL_EVENTS);
+    }
+    options->event[options->event_count++] = text;
+}
 
 static void take_option(OPTIONS *options, int option)
 {
@@ -120,6 +133,9 @@ static void take_option(OPTIONS *options, int option)
         break;
     case OPTION_BAUD:
         options->baud = parse_baud(optarg);
+        break;
+    case OPTION_EVENT:
+        take_event(options, optarg);
         break;
     case OPTION_ALONE:
         options->alone = true;
@@ -182,6 +198,7 @@ static void on_end_signal(int number)
 {
     RTS_UNUSED(number);
     quit = 1;
+    SchedRequestEnd();
 }
 
 /* SIGXFSZ (a limit of file sizes) and SIGPIPE are errors of the write that met them. */
@@ -259,12 +276,22 @@ static void lock_memory(void)
 static void main_loop(void)
 {
     while (!quit) {
+        PortMainPass();
         RTS_UI32 before = PortComMoved();
         (void)CMCallHook(CH_COMM_CYCLE);
         if (PortComMoved() == before) {
-            PortComWait(SchedHasBackgroundTasks() ? PORT_BACKGROUND_MS : PORT_IDLE_MS);
+            PortComWait(PORT_IDLE_MS);
         }
     }
+}
+
+static bool open_events(const OPTIONS *options, PORT_REASON *reason)
+{
+    RTS_UI32 opened = 0;
+    while (opened < options->event_count && PortEventOpen(options->event[opened], reason)) {
+        opened++;
+    }
+    return opened == options->event_count;
 }
 
 static void log_restart(void)
@@ -333,12 +360,13 @@ int main(int argc, char **argv)
     PORT_REASON reason = {.busy = false};
     hold_standard_streams();
     ignore_signals();
-    if (!open_when_free(&options, &reason)) {
+    if (!open_when_free(&options, &reason) || !open_events(&options, &reason)) {
         fprintf(stderr, "plcrt: %s\n", reason.text);
         return EXIT_RUNTIME;
     }
     int status = options.alone ? run_alone() : PortSupervise(run_supervised);
     SysExceptShutdown();
+    PortEventClose();
     PortComClose();
     PortFlashClose();
     return status;

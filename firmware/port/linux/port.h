@@ -31,6 +31,17 @@ RTS_RESULT SysTimer_Hook(CMP_HOOK hook);
 RTS_RESULT PortTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, int fifo_priority,
                            RTS_HANDLE *timer);
 
+/* ---- SysWatchdog ---- */
+
+/* Once in each pass of the main loop: it sees from it that main has a processor. */
+void PortMainPass(void);
+
+/* ---- SysEvent ---- */
+
+/* Takes "NAME=PIPE", which stays, and opens the pipe; creates it when there is none. Before CMInit. */
+bool PortEventOpen(char *name_and_path, PORT_REASON *reason);
+void PortEventClose(void);
+
 /* ---- SysFlash ---- */
 
 /* Opens the flash file, or creates it with erased bytes, and locks it. Before CMInit. */

@@ -20,7 +20,13 @@
 #define CM_MAX_EXT_TABLES 8
 #define CHECKSUM_TABLE_ENTRIES 256
 #define EVENT_MAX_CALLBACKS 16
-#define SCHED_MAX_EXTERNAL_EVENTS 4
+#define SCHED_MAX_EXTERNAL_EVENTS 16
+#define SCHED_EVENTS_IN_TIMERS 1
+#define SCHED_FREEWHEELING_IN_TIMERS 1
+
+/* All tasks run in the thread that lets time pass, one after the other; whoever writes a variable does it between two
+ * cycles. */
+#define APP_IMAGE_ALWAYS 0
 
 /* What SimFlashConfigure starts with: geometry of a common serial NOR flash, programmed in the units of an STM32's
  * [bytes]. */
