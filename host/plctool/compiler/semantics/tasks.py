@@ -44,10 +44,23 @@ class _Reader:
                 scope.error(offset, "unknown", f"a TASK has {', '.join(most)} and {last}, not {name}{hint}")
             else:
                 read(self, value)
+        self._check_combination(decl, scope)
         sensitivity = next((offset for offset, name, _ in decl.properties if name.upper() == "SENSITIVITY"), None)
         if sensitivity is not None and not any(name.upper() == "WATCHDOG" for _, name, _ in decl.properties):
             message = "SENSITIVITY says how often in a row a cycle may be longer than WATCHDOG, which is missing"
             scope.error(sensitivity, "configuration", message)
+
+    def _check_combination(self, decl: ast.TaskDecl, scope: Scope) -> None:
+        """A property stands once; a task waits for its time or for its variable."""
+        given: set[str] = set()
+        for offset, name, _ in decl.properties:
+            key = name.upper()
+            if key in given:
+                scope.error(offset, "duplicate", f"{key} of the task {decl.name} is given twice")
+            if key in ("INTERVAL", "SINGLE") and {key, *given} >= {"INTERVAL", "SINGLE"}:
+                message = f"the task {decl.name} runs by INTERVAL or by SINGLE; declare a task for each"
+                scope.error(offset, "configuration", message)
+            given.add(key)
 
     def _interval(self, node: ast.Expr) -> None:
         interval = self._duration(node, "INTERVAL")
