@@ -17,6 +17,7 @@ from plctool.compiler.semantics.configuration import configure
 from plctool.compiler.semantics.overlaps import report_overlaps
 from plctool.compiler.semantics.permitted import check_declarations
 from plctool.compiler.semantics.program import Program
+from plctool.compiler.semantics.shared_writes import report_shared_writes
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.ast import Declaration
@@ -109,6 +110,8 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     if tests is None and application.tasks:
         program.programs.report_unused()
     world.calls.report_shared(application.tasks)
+    if tests is None and not world.diagnostics.errors:
+        report_shared_writes(application.tasks, world.diagnostics)
     allocation = world.allocation
     _check_sizes(world, sources)
     report_overlaps(allocation.variables, world.diagnostics)

@@ -15,9 +15,13 @@ from plctool.errors import UsageError
 
 WARNINGS = {
     "access": "a VAR of a function block is read from outside",
+    "always": "a comparison gives the same for every value of its type",
     "bits": "a BYTE, WORD, DWORD or LWORD is taken for an unsigned number where a REAL is needed",
     "case": "a CASE about an enumeration has no ELSE and misses some of its values",
+    "configuration": "a task has no time, no event or no program, or a program no task",
+    "endless": "a loop never ends as it is written",
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration",
+    "integer-division": "an integer division drops its fraction before the result becomes a REAL",
     "layout": "a type takes more memory than it does in other systems",
     "lifetime": "an instance of a function block lives for one call only, and starts anew in the next one",
     "narrowing": "an integer or an LREAL goes where not all of its values fit",
@@ -29,6 +33,7 @@ WARNINGS = {
     "precision": "digits are lost: a large number becomes REAL, a duration or time is finer than its type",
     "recursion": "a call through a pointer or an interface may lead back to its caller",
     "result": "a function or method never assigns its result",
+    "shared": "several tasks write one variable, or variables in one byte of %M",
     "task": "a program is called that another task, or its own, runs as well",
     "truncated": "a text is longer than the STRING it goes to",
     "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG",

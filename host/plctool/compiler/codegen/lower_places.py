@@ -16,7 +16,7 @@ from plctool.compiler.codegen.lower_frame import (
     string_capacity,
 )
 from plctool.compiler.codegen.lower_unit import Check
-from plctool.compiler.codegen.ranges import value_range
+from plctool.compiler.ranges import value_range
 from plctool.compiler.typed import (
     BitPlace,
     DerefPlace,

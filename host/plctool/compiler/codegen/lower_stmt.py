@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plctool.compiler.codegen.analysis import root_of, walk
+from plctool.compiler.analysis import root_of, walk
 from plctool.compiler.codegen.lower_blocks import assign_aggregate
 from plctool.compiler.codegen.lower_calls import call_function
 from plctool.compiler.codegen.lower_expr import truth

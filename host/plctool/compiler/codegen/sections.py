@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plctool.compiler.codegen.analysis import walk
+from plctool.compiler.analysis import walk
 from plctool.compiler.typed import Pou, PouKind, Return, Statement
 
 _LONG = 3000  # expressions and statements, some 250 lines

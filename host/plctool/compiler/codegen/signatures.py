@@ -8,7 +8,7 @@ each call and to load them in the block.
 
 from __future__ import annotations
 
-from plctool.compiler.codegen.analysis import walk
+from plctool.compiler.analysis import walk
 from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.codegen.targets import Target
