@@ -16,6 +16,7 @@ from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.nesting import room_for_nesting
 from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TypedProgram
+from plctool.compiler.types import base_of
 from plctool.core import lib
 from plctool.files import write_atomically
 from plctool.image import ApplicationInfo, ExternalFunction, Image, ImageTask, build_image
@@ -122,7 +123,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         list(files),
         program.aliases,
         _classes(program),
-        {name: constant_symbol(name, c.type, encode(c.type, c.value)) for name, c in program.constants.items()},
+        {name: constant_symbol(name, c.type, encode(base_of(c.type), c.value)) for name, c in program.constants.items()},
         linked.debug,
     )
 

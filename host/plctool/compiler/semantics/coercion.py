@@ -169,7 +169,7 @@ class Coercion:
         if isinstance(e, Const):
             assert isinstance(e.value, int)
             if e.value not in target.values.values():
-                return self._error(e.pos, "range", f"{e.value} is no value of {target}")
+                return self._error(e.pos, "range", f"{e.value} is no value of {target}; it has {target.choices}")
             name = constants.describe(e.value, target)
             self._warn(e.pos, "enum", f"the number {e.value} stands for a value of {target}; write {target}#{name}")
             return Const(e.value, target, e.pos)
