@@ -123,7 +123,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         list(files),
         program.aliases,
         _classes(program),
-        {name: constant_symbol(name, c.type, encode(base_of(c.type), c.value)) for name, c in program.constants.items()},
+        {n: constant_symbol(n, c.type, encode(base_of(c.type), c.value)) for n, c in program.constants.items()},
         linked.debug,
     )
 
