@@ -67,8 +67,9 @@ enum {
  *   reply (two in flight, used by the download); a reply that is lost then is not sent again: the client takes the
  *   next first block and goes on from its block number.
  * - An open request with the same request id from the same address is answered with the same channel as long as no
- *   block has arrived on it. With another request id it replaces the channel. Another address replaces a channel that
- *   has no login or has been silent for CHANNEL_IDLE_MS, and otherwise gets CHANNEL_OPEN_NO_CHANNEL.
+ *   block has arrived on it. With another request id it replaces the channel. Another address gets a free channel of
+ *   the COMM_MAX_CLIENTS; without one it replaces the one that has been silent for longest, of those that have no
+ *   login or have been silent for CHANNEL_IDLE_MS; otherwise it gets CHANNEL_OPEN_NO_CHANNEL.
  * - A package with a channel id the server does not know is answered with CHANNEL_PKG_CLOSE ERR_CHS_CHINVALID, at
  *   most one per CHANNEL_COMPLAINT_MS. Close requests are not answered.
  */

@@ -130,11 +130,14 @@ typedef struct {
 enum {
     CDL_BLOB_TASKS = 1,  /* array of CDL_TASK */
     CDL_BLOB_RETAIN = 2, /* u32: CRC of the retain area's layout; without it retain data belong to one image only */
+    CDL_BLOB_EVENTS = 3, /* names of the external events tasks wait for, each with NUL; for whoever reads the image */
 };
 
 enum { CDL_TASK_NAME_SIZE = 32 };
 
-/* A task. `kind` is KIND_* of CmpIecTask.h. A KIND_EXTERNAL task runs on the external event that has its name. */
+/* A task. `kind` is KIND_* of CmpIecTask.h. A KIND_EVENT task runs when the byte at `event_offset` of `event_area`, without
+ * the bits `event_ignored`, was 0 and is so no more; a KIND_EXTERNAL task on the external event whose
+ * name has the CRC-32 `event_offset`. */
 typedef struct {
     RTS_UI32 interval_us; /* cyclic tasks */
     RTS_UI32 watchdog_us; /* 0: none */
@@ -142,8 +145,9 @@ typedef struct {
     RTS_UI8 priority; /* 0 highest .. 31 */
     RTS_UI8 kind;
     RTS_UI32 entry_offset; /* of the task's code in the code segment */
-    RTS_UI16 event_area;   /* event tasks: the BOOL that triggers; APP_AREA_NONE otherwise */
-    RTS_UI16 reserved;
+    RTS_UI16 event_area;   /* event tasks; APP_AREA_NONE otherwise */
+    RTS_UI8 event_ignored; /* the other bits of the byte, when the event is one of them */
+    RTS_UI8 reserved;
     RTS_UI32 event_offset;
     char name[CDL_TASK_NAME_SIZE]; /* NUL-terminated */
 } CDL_TASK;

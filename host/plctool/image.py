@@ -58,7 +58,8 @@ class ExternalFunction:
 
 @dataclass(frozen=True)
 class ImageTask:
-    """`kind`: KIND_*; `entry`: code offset to call (with the Thumb bit on Arm); `event`: (area, offset) of the BOOL."""
+    """`kind`: KIND_*; `entry`: code offset to call (with the Thumb bit on Arm); `event`: (area, offset) of the byte
+    with the BOOL, `ignored`: its other bits; `external`: the name of the event a KIND_EXTERNAL task waits for."""
 
     name: str
     kind: int
@@ -68,6 +69,8 @@ class ImageTask:
     watchdog_us: int = 0
     watchdog_sensitivity: int = 1
     event: tuple[int, int] | None = None
+    ignored: int = 0
+    external: str = ""
 
 
 @dataclass(frozen=True)
@@ -182,6 +185,9 @@ def _external_entries(image: Image) -> Iterator[bytes]:
 
 def _blobs(image: Image) -> Iterator[bytes]:
     yield _blob(lib.CDL_BLOB_TASKS, b"".join(map(_task_entry, image.tasks)))
+    events = b"".join(_event_name(task) + b"\0" for task in image.tasks if task.external)
+    if events:
+        yield _blob(lib.CDL_BLOB_EVENTS, events)
     if image.retain_layout is not None:
         yield _blob(lib.CDL_BLOB_RETAIN, image.retain_layout.to_bytes(4, "little"))
 
@@ -190,8 +196,12 @@ def _blob(number: int, payload: bytes) -> bytes:
     return _pack("CDL_BLOB", {"magic": _BLOB_MAGIC, "id": number, "size": len(payload)}) + _padded(payload)
 
 
+def _event_name(task: ImageTask) -> bytes:
+    return task.external.encode("ascii", "replace")
+
+
 def _task_entry(task: ImageTask) -> bytes:
-    area, offset = task.event or (NO_AREA, 0)
+    area, offset = task.event or (NO_AREA, zlib.crc32(_event_name(task)))
     name = task.name.encode("ascii", "replace")[: lib.CDL_TASK_NAME_SIZE - 1]
     return _pack(
         "CDL_TASK",
@@ -203,6 +213,7 @@ def _task_entry(task: ImageTask) -> bytes:
             "kind": task.kind,
             "entry_offset": task.entry,
             "event_area": area,
+            "event_ignored": task.ignored,
             "event_offset": offset,
             "name": name,
         },
@@ -237,7 +248,7 @@ def parse_image(data: bytes) -> Image:
         areas=areas,
         functions=_parse_functions(segments["function_table"], len(code)),
         externals=list(_parse_externals(segments["external_function_table"])),
-        tasks=list(_parse_tasks(blobs.get(int(lib.CDL_BLOB_TASKS), b""), len(code))),
+        tasks=list(_parse_tasks(blobs, len(code))),
         info=_parse_info(segments["application_info"]),
         device_type=int(header.device_type),
         device_version=int(header.device_version),
@@ -325,15 +336,19 @@ def _parse_blobs(data: bytes) -> dict[int, bytes]:
     return blobs
 
 
-def _parse_tasks(payload: bytes, code_size: int) -> Iterator[ImageTask]:
+def _parse_tasks(blobs: dict[int, bytes], code_size: int) -> Iterator[ImageTask]:
+    payload = blobs.get(int(lib.CDL_BLOB_TASKS), b"")
+    names = blobs.get(int(lib.CDL_BLOB_EVENTS), b"").split(b"\0")
+    events = {zlib.crc32(name): name.decode("ascii", "replace") for name in names}
     for task in _entries("CDL_TASK", payload, "task list"):
         name = bytes(ffi.buffer(task.name)).split(b"\0")[0].decode("ascii", "replace")
         if task.entry_offset >= code_size:
             raise _refuse(f"the entry of task {name} lies outside the code")
         event = None if task.event_area == NO_AREA else (int(task.event_area), int(task.event_offset))
+        external = events.get(int(task.event_offset), "") if task.kind == lib.KIND_EXTERNAL else ""
         yield ImageTask(
             name, int(task.kind), int(task.priority), int(task.interval_us), int(task.entry_offset),
-            int(task.watchdog_us), int(task.watchdog_sensitivity), event,
+            int(task.watchdog_us), int(task.watchdog_sensitivity), event, int(task.event_ignored), external,
         )  # fmt: skip
 
 

@@ -5,6 +5,8 @@
  */
 #include "comm_fakes.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "CmpAppSrv.h"
@@ -246,6 +248,21 @@ RTS_UI32 AppDownloadOffset(void)
 bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc)
 {
     return fakes.download_open && fakes.download_total == total_size && fakes.download_crc == image_crc;
+}
+
+bool AppDownloadIsOpen(void)
+{
+    return fakes.download_open;
+}
+
+RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...)
+{
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(refusal->text, sizeof(refusal->text), format, arguments);
+    va_end(arguments);
+    return result;
 }
 
 RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpChannelServerEmbedded.h"
 #include "CmpSrv.h"
 #include "comm_client.h"
 #include "comm_fakes.h"
@@ -498,7 +499,7 @@ static void application_header_is_checked(void)
     CHECK(error_for(client.app_session ^ 2, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
     CHECK(error_for(0, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
     CHECK(error_for(client.app_session, FAKE_IMAGE_CRC + 1) == ERR_APP_INVALID_DATAID);
-    SrvEndAppSession();
+    SrvEndAppSession(ChannelGetClient(0));
     CHECK(error_for(0, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
     fakes.status.state = AS_NONE;
     CHECK(error_for(client.app_session, FAKE_IMAGE_CRC) == ERR_APP_NOT_LOADED);

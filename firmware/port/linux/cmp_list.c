@@ -13,6 +13,7 @@
     X(SysFileFlash) \
     X(CmpEventMgrEmbedded) \
     X(SysWatchdog) \
+    X(SysEvent) \
     X(CmpMath) \
     X(CmpRetain) \
     X(CmpIecTask) \

@@ -7,22 +7,37 @@
 
 #include <string.h>
 
+#include "CmpErrors.h"
+#include "SysMem.h"
 #include "rts_config.h"
 
 /* An area in words, 8-aligned for the largest IEC type; at least one word. */
 #define WORDS(size) (((size) + sizeof(RTS_I64) - 1) / sizeof(RTS_I64) + ((size) == 0))
 
-static struct areas {
+typedef struct {
     RTS_I64 data[WORDS(APP_DATA_SIZE)];
     RTS_I64 input[WORDS(APP_INPUT_SIZE)];
     RTS_I64 output[WORDS(APP_OUTPUT_SIZE)];
     RTS_I64 memory[WORDS(APP_MEMORY_SIZE)];
     RTS_I64 retain[WORDS(APP_RETAIN_SIZE)]; /* the last, because it may be left out when all are cleared */
-} areas;
+} AREAS;
+
+#if APP_AREAS_FROM_PORT
+static AREAS *areas_of_port;
+#define areas (*areas_of_port)
+
+RTS_RESULT AppAreasInit(void)
+{
+    areas_of_port = SysMemAllocArea(sizeof areas);
+    return areas_of_port != NULL ? ERR_OK : ERR_NOMEMORY;
+}
+#else
+static AREAS areas;
+#endif
 
 void AppAreasClear(bool retain_too)
 {
-    memset(&areas, 0, retain_too ? sizeof areas : offsetof(struct areas, retain));
+    memset(&areas, 0, retain_too ? sizeof areas : offsetof(AREAS, retain));
 }
 
 void AppAreasClearOutputs(void)

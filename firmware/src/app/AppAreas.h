@@ -7,6 +7,14 @@
 #define APPAREAS_H
 
 #include "CmpIecAbi.h"
+#include "rts_config.h"
+
+/* Before all else. ERR_NOMEMORY. */
+#if APP_AREAS_FROM_PORT
+RTS_RESULT AppAreasInit(void);
+#else
+#define AppAreasInit() ERR_OK
+#endif
 
 /* Sets all areas to zero, the retain area only if asked to. */
 void AppAreasClear(bool retain_too);

@@ -37,11 +37,6 @@ typedef struct {
     RTS_PFN imports[APP_MAX_IMPORTS];
 } APP_TABLES;
 
-/* Writes why, and returns `result`. A macro, so that sentences nobody would see take no flash. */
-#define APP_REFUSE(refusal, result, ...)                                                                               \
-    (APP_REFUSAL_TEXT_SIZE > 1 ? AppRefuse(refusal, result, __VA_ARGS__) : (RTS_RESULT)(result))
-RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...);
-
 /* Checks the image of `size` bytes in `file`, whose header names `crc`. On an error *image is undefined and *refusal
  * says why. */
 RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE *image, APP_REFUSAL *refusal);

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "CmpIecTask.h"
+#include "CmpScheduleTimer.h"
 
 static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
 {
@@ -26,6 +27,8 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
     if (task->kind == KIND_EVENT &&
         (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
         return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s lies outside its area.", name);
+    if (task->kind == KIND_EXTERNAL && !SchedHasExternalEvent(task->event_offset))
+        return refuse(l, ERR_NO_OBJECT, "Task %s waits for an event that is not here.", name);
     return ERR_OK;
 }
 

@@ -54,6 +54,12 @@ bool AppHasException(void)
     return AppExceptionGet()->code != RTSEXCPT_NOEXCEPTION;
 }
 
+/* Its last cycle was broken off for a stop. That says nothing against the program, but it starts from a reset only. */
+static bool was_broken_off(void)
+{
+    return !RTS_ONE_CORE && AppExceptionGet()->code == RTSEXCPT_STOP_TIMEOUT;
+}
+
 static bool is_proven(void)
 {
     return AppCommitGet()->slot[app.image.file].state == SLOT_PROVEN;
@@ -78,7 +84,8 @@ static void enter_exception_state(void)
 {
     AppAreasClearOutputs();
     app.state = AS_STOP;
-    (void)AppCommitSetState(app.image.file, SLOT_FAILED, 0);
+    if (!was_broken_off())
+        (void)AppCommitSetState(app.image.file, SLOT_FAILED, 0);
     AppPostEvent(EVT_CmpApp_Exception);
 }
 
@@ -268,7 +275,7 @@ RTS_RESULT AppStopApplication(void)
 {
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
-    if (AppStopTasks() && !AppHasException()) {
+    if (AppStopTasks() && (!AppHasException() || was_broken_off())) {
         (void)AppCommitSetState(app.image.file, SLOT_TRIAL, 0);
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application stopped");
     }
@@ -394,6 +401,8 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
 {
     switch (hook) {
     case CH_INIT:
+        if (AppAreasInit() != ERR_OK)
+            return ERR_NOMEMORY;
         if (!RTS_STARTS_ONCE)
             forget_all();
         break;

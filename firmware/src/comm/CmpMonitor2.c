@@ -203,7 +203,7 @@ static RTS_RESULT check_application(const SRV_REQUEST *request, RTS_UI32 *error)
     AppGetStatus(&status);
     if (status.state == AS_NONE)
         *error = ERR_APP_NOT_LOADED;
-    else if (!SrvIsAppSession(BytesGet32(tag.data)))
+    else if (!SrvIsAppSession(request->client, BytesGet32(tag.data)))
         *error = ERR_APP_INVALID_SESSIONID;
     else if (BytesGet32(tag.data + 4) != status.image_crc)
         *error = ERR_APP_INVALID_DATAID;
@@ -421,8 +421,8 @@ static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
 }
 
 static const SRV_SERVICE services[] = {
-    {SRV_MON2_READ, SRV_NEEDS_LOGIN, mon_read},
-    {SRV_MON2_WRITE, SRV_NEEDS_LOGIN, mon_write},
+    {SRV_MON2_READ, RIGHT_VIEW, mon_read},
+    {SRV_MON2_WRITE, RIGHT_WRITE, mon_write},
 };
 
 RTS_RESULT CmpMonitor2_Hook(CMP_HOOK hook)

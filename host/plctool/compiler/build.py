@@ -85,7 +85,10 @@ def _entry(linked: Linked, name: str, target: Target) -> int:
 
 
 def _task(task: Task, entry: int) -> ImageTask:
-    event = (task.event.area.value, task.event.offset) if task.event else None
+    event, ignored = None, 0
+    if task.event is not None:
+        event = (task.event.variable.area.value, task.event.variable.offset + task.event.offset)
+        ignored = 0 if task.event.bit is None else 0xFF ^ 1 << task.event.bit
     return ImageTask(
         task.name,
         task.kind.value,
@@ -95,6 +98,8 @@ def _task(task: Task, entry: int) -> ImageTask:
         task.watchdog_us,
         task.watchdog_sensitivity,
         event,
+        ignored,
+        task.external,
     )
 
 

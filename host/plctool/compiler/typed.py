@@ -486,7 +486,17 @@ class TaskKind(Enum):
 
     CYCLIC = 0
     EVENT = 1
+    EXTERNAL = 2
     FREEWHEELING = 3
+
+
+@dataclass
+class TaskEvent:
+    """The BOOL a task waits for: in `variable`, `offset` bytes behind its start. `bit` of that byte; None for all."""
+
+    variable: Variable
+    offset: int = 0
+    bit: int | None = None
 
 
 @dataclass
@@ -496,7 +506,8 @@ class Task:
     priority: int  # 0 highest .. 31
     interval_us: int
     programs: list[Pou]
-    event: Variable | None = None  # TASK(SINGLE := var)
+    event: TaskEvent | None = None  # TASK(SINGLE := place)
+    external: str = ""  # TASK(EVENT := 'name')
     watchdog_us: int = 0
     watchdog_sensitivity: int = 1
 
