@@ -390,7 +390,14 @@ def test_pragmas(pragma: str, found: list[tuple[str, str, str]]) -> None:
 
 # ---- properties of a task ------------------------------------------------------------------------------------------
 
-PROPERTIES = {"INTERVAL": "T#5ms", "PRIORITY": "3", "SINGLE": "g", "WATCHDOG": "T#7ms", "SENSITIVITY": "4"}
+PROPERTIES = {
+    "INTERVAL": "T#5ms",
+    "PRIORITY": "3",
+    "SINGLE": "g",
+    "EVENT": "'door'",
+    "WATCHDOG": "T#7ms",
+    "SENSITIVITY": "4",
+}
 
 
 def task(properties: str) -> str:
@@ -406,7 +413,7 @@ def test_every_property_of_a_task_changes_it() -> None:
     assert before is not None
     for name, value in PROPERTIES.items():
         rest = {"INTERVAL": "T#9ms", "WATCHDOG": "T#9ms"} | {name: value}
-        if name == "SINGLE":
+        if name in ("SINGLE", "EVENT"):
             del rest["INTERVAL"]
         after = check(task(", ".join(f"{k} := {v}" for k, v in rest.items()))).program
         assert after is not None
@@ -418,8 +425,8 @@ def test_every_property_of_a_task_changes_it() -> None:
     ("properties", "said"),
     [
         ("PRIORITY := 1, PRIORITY := 2", "PRIORITY of the task t is given twice"),
-        ("INTERVAL := T#1s, SINGLE := g", "the task t runs by INTERVAL or by SINGLE; declare a task for each"),
-        ("SINGLE := g, INTERVAL := T#1s", "the task t runs by INTERVAL or by SINGLE; declare a task for each"),
+        ("INTERVAL := T#1s, SINGLE := g", "a TASK runs by INTERVAL or by SINGLE, not by both: write another task"),
+        ("SINGLE := g, INTERVAL := T#1s", "a TASK runs by SINGLE or by INTERVAL, not by both: write another task"),
     ],
 )
 def test_properties_that_contradict_each_other_are_an_error(properties: str, said: str) -> None:

@@ -114,8 +114,8 @@ class _Builder:
     ) -> None:
         """Warns of what was probably forgotten."""
         for task, written in zip(tasks, decl.tasks, strict=False):
-            if not any(name.upper() in ("INTERVAL", "SINGLE") for _, name, _ in written.properties):
-                message = f"the task {task.name} has no INTERVAL and no SINGLE, so it runs whenever there is time"
+            if not any(name.upper() in ("INTERVAL", "SINGLE", "EVENT") for _, name, _ in written.properties):
+                message = f"the task {task.name} has no INTERVAL, SINGLE or EVENT, so it runs whenever there is time"
                 advice = "write INTERVAL := T#10ms, or T#0s if that is meant"
                 scope.warning(written.pos, "configuration", f"{message}; {advice}")
             if not task.programs:

@@ -53,31 +53,22 @@ class _Reader:
         self.task = background(decl.name)
         self._checker = Checker(world, scope)
         self._runs_by = ""
+        given: set[str] = set()
         for offset, name, value in decl.properties:
             read = self._properties.get(name.upper())
             if read is None or isinstance(value, ast.ArrayInit | ast.StructInit):
                 *most, last = self._properties
                 hint = did_you_mean(name, self._properties)
                 scope.error(offset, "unknown", f"a TASK has {', '.join(most)} and {last}, not {name}{hint}")
+            elif name.upper() in given:
+                scope.error(offset, "duplicate", f"{name.upper()} of the task {decl.name} is given twice")
             else:
+                given.add(name.upper())
                 read(self, value)
-        self._check_combination(decl, scope)
         sensitivity = next((offset for offset, name, _ in decl.properties if name.upper() == "SENSITIVITY"), None)
         if sensitivity is not None and not any(name.upper() == "WATCHDOG" for _, name, _ in decl.properties):
             message = "SENSITIVITY says how often in a row a cycle may be longer than WATCHDOG, which is missing"
             scope.error(sensitivity, "configuration", message)
-
-    def _check_combination(self, decl: ast.TaskDecl, scope: Scope) -> None:
-        """A property stands once; a task waits for its time or for its variable."""
-        given: set[str] = set()
-        for offset, name, _ in decl.properties:
-            key = name.upper()
-            if key in given:
-                scope.error(offset, "duplicate", f"{key} of the task {decl.name} is given twice")
-            if key in ("INTERVAL", "SINGLE") and {key, *given} >= {"INTERVAL", "SINGLE"}:
-                message = f"the task {decl.name} runs by INTERVAL or by SINGLE; declare a task for each"
-                scope.error(offset, "configuration", message)
-            given.add(key)
 
     def _interval(self, node: ast.Expr) -> None:
         interval = self._duration(node, "INTERVAL")
