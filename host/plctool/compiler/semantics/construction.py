@@ -12,6 +12,7 @@ from typing import Any
 
 from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, finalisers, initialisers, instances_in
 from plctool.compiler.semantics.symbols import Member
+from plctool.compiler.semantics.values import whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.typed import (
     Area,
@@ -82,7 +83,7 @@ class _Construction:
     def variable(self, variable: Variable) -> list[Statement]:
         """What a variable and all instances in it need."""
         self._retained = variable.area is Area.RETAIN
-        return self._place(VarPlace(variable, variable.type, variable.pos), variable.initial, variable.pos)
+        return self._place(whole(variable, variable.pos), variable.initial, variable.pos)
 
     def _needs(self, t: Type) -> bool:
         while isinstance(t, ArrayType):

@@ -128,6 +128,7 @@ class Programs:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=init)
                 symbol.used = direction is not None or line.location is not None
+                symbol.constant = direction is Direction.INPUT and "CONSTANT" in block.qualifiers
                 if not scope.declare(symbol, offset) or t is ERROR:
                     continue
                 full_name = f"{info.name}.{name}"
