@@ -59,6 +59,11 @@ int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception
  * in its cycle now. From any context. */
 RTS_UI32 IecTaskGetActivity(bool *busy);
 
+/* Copies `size` bytes as they are at a moment when no task is in its cycle. True: `target` holds them. False: the tasks
+ * will do it as soon as there is such a moment; call again with the same arguments. It is called off when the tasks are
+ * stopped. From main. */
+bool IecTaskSnapshot(void *target, const void *source, RTS_UI32 size);
+
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
  * simulator, between cycles. */
 RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **context);

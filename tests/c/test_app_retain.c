@@ -6,6 +6,8 @@
 #include "SysFileFlash.h"
 #include "app_device.h"
 
+enum { RECORD_MAGIC = 0x474F4C52 };
+
 static APP_SPEC spec;
 static APP_BYTES image;
 
@@ -180,7 +182,7 @@ static void another_layout_is_not_restored(void)
     start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     spec_counter(&spec, 2);
-    spec.retain_layout++;
+    spec.kept[1].variable.hash[1]++;
     load();
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     CHECK(SimStart() == ERR_OK);
@@ -336,8 +338,8 @@ static void damaged_values_give_way_to_initial_ones(void)
     for (i = 0; i < area->size; i += 4) {
         RTS_UI32 word;
         memcpy(&word, SimFlashData() + area->offset + i, sizeof word);
-        if (word == RETAIN_LAYOUT)
-            SimFlashData()[area->offset + i + 8] ^= 1; /* the CRC of the record */
+        if (word == RECORD_MAGIC)
+            SimFlashData()[area->offset + i + 16] ^= 1; /* the CRC of the record */
     }
     CHECK(SimStart() == ERR_OK);
     CHECK(retain_value() == 100);
@@ -347,15 +349,17 @@ static void damaged_values_give_way_to_initial_ones(void)
     CHECK(SimFlashViolations() == 0);
 }
 
-static void without_a_layout_only_the_same_image_gets_its_values_back(void)
+static void what_is_not_in_the_table_is_not_kept(void)
 {
     start_blank();
     spec_counter(&spec, 1);
-    spec.retain_layout = 0;
+    spec.kept_count = 1;
     load();
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
     CHECK(SimStart() == ERR_OK);
-    CHECK(retain_value() > 400);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 601);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET) == 0);
 }
 
 static void a_flash_fault_does_not_stop_the_application(void)
@@ -374,6 +378,7 @@ static void a_flash_fault_does_not_stop_the_application(void)
 static void a_large_retain_area_is_saved_whole(void)
 {
     RTS_UI32 size = APP_RETAIN_SIZE;
+    const CDL_KEPT_RUN rest = {1, 1, size - 16, 0};
     RTS_UI8 *area;
     RTS_UI32 i;
 
@@ -381,6 +386,7 @@ static void a_large_retain_area_is_saved_whole(void)
     CHECK(SimStart() == ERR_OK);
     spec_counter(&spec, 1);
     spec.areas[APP_AREA_RETAIN] = size;
+    add_kept_run(&spec, 'C', 16, 0, rest, 0);
     load();
     area = AppGetAreaAddress(APP_AREA_RETAIN, 0, size);
     for (i = 16; i < size; i++)
@@ -414,7 +420,7 @@ int main(void)
     RUN(a_rollback_brings_back_large_values_too);
     RUN(a_lost_log_costs_its_values_only);
     RUN(damaged_values_give_way_to_initial_ones);
-    RUN(without_a_layout_only_the_same_image_gets_its_values_back);
+    RUN(what_is_not_in_the_table_is_not_kept);
     RUN(a_flash_fault_does_not_stop_the_application);
     RUN(a_large_retain_area_is_saved_whole);
     return test_result();

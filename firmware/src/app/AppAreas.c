@@ -17,12 +17,12 @@ static struct areas {
     RTS_I64 input[WORDS(APP_INPUT_SIZE)];
     RTS_I64 output[WORDS(APP_OUTPUT_SIZE)];
     RTS_I64 memory[WORDS(APP_MEMORY_SIZE)];
-    RTS_I64 retain[WORDS(APP_RETAIN_SIZE)]; /* the last, because it may be left out when all are cleared */
+    RTS_I64 retain[WORDS(APP_RETAIN_SIZE)];
 } areas;
 
-void AppAreasClear(bool retain_too)
+void AppAreasClear(void)
 {
-    memset(&areas, 0, retain_too ? sizeof areas : offsetof(struct areas, retain));
+    memset(&areas, 0, sizeof areas);
 }
 
 void AppAreasClearOutputs(void)

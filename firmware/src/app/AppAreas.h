@@ -8,8 +8,8 @@
 
 #include "CmpIecAbi.h"
 
-/* Sets all areas to zero, the retain area only if asked to. */
-void AppAreasClear(bool retain_too);
+/* Sets all areas to zero. */
+void AppAreasClear(void);
 
 /* Sets the outputs to zero. From any context. */
 void AppAreasClearOutputs(void);

@@ -1,5 +1,5 @@
 /*
- * AppTasks.c - checks the blobs of an image: tasks, layout of the retain area.
+ * AppTasks.c - checks the blobs of an image: tasks, kept variables.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -7,7 +7,9 @@
 
 #include <string.h>
 
+#include "AppRetain.h"
 #include "CmpIecTask.h"
+#include "RetainTable.h"
 
 static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
 {
@@ -51,11 +53,30 @@ static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)
     return result;
 }
 
-static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 size)
+/* The order makes every hash unique, and lets two tables be compared in one pass. */
+static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
 {
-    if (size != sizeof l->image->retain_layout)
-        return refuse(l, ERR_SIZE_MISMATCH, "Retain layout has %u bytes, not 4.", U(size));
-    return LoaderReadNext(l, &l->image->retain_layout, size);
+    RETAIN_TABLE table;
+    KEPT kept;
+    RTS_UI8 last[CDL_KEPT_HASH_SIZE] = {0};
+    RTS_UI32 number = 0;
+    RTS_RESULT result;
+
+    if (l->image->kept.size != 0)
+        return refuse(l, ERR_DUPLICATE, "The image has two tables of kept variables.");
+    l->image->kept.offset = l->offset;
+    l->image->kept.size = size;
+    table = AppGetRetainTable(l->image);
+    for (;; number++) {
+        result = RetainTableNext(&table, &kept);
+        if (result == ERR_NO_OBJECT)
+            return ERR_OK;
+        if (result != ERR_OK)
+            return refuse(l, result, "Kept variable %u is not in the retain area; build the program again.", U(number));
+        if (number > 0 && memcmp(last, kept.hash, sizeof last) >= 0)
+            return refuse(l, ERR_DUPLICATE, "Kept variable %u is out of order.", U(number));
+        memcpy(last, kept.hash, sizeof last);
+    }
 }
 
 static RTS_RESULT check_blob(LOADER *l)
@@ -73,8 +94,8 @@ static RTS_RESULT check_blob(LOADER *l)
     next = LoaderAlign(l->offset + blob.size);
     if (blob.id == CDL_BLOB_TASKS)
         result = check_tasks(l, blob.size);
-    else if (blob.id == CDL_BLOB_RETAIN)
-        result = check_retain_layout(l, blob.size);
+    else if (blob.id == CDL_BLOB_RETAIN && APP_RETAIN_SIZE > 0)
+        result = check_kept(l, blob.size);
     /* Others are of a newer tool, and not needed to run. */
     l->offset = next;
     return result;
@@ -84,7 +105,6 @@ RTS_RESULT LoaderCheckBlobs(LOADER *l)
 {
     RTS_RESULT result;
 
-    l->image->retain_layout = l->image->crc; /* unless a blob says more */
     result = LoaderCheckEntries(l, SEGMENT_BLOBS, check_blob);
     if (result == ERR_OK && l->image->task_count == 0)
         return refuse(l, ERR_NO_OBJECT, "The application has no task.");

@@ -14,6 +14,7 @@
 #include "AppAreas.h"
 #include "AppCommit.h"
 #include "AppException.h"
+#include "AppRetain.h"
 #include "CmpEventMgr.h"
 #include "CmpIecTask.h"
 #include "CmpLog.h"
@@ -141,7 +142,7 @@ static void set_context(void)
 static void unload(void)
 {
     (void)IecTaskCreateAll(NULL, 0, &app.context);
-    RetainAttach(NULL, 0, 0);
+    RetainDetach();
     SysFlashReleaseCode(app.image.file);
     AppExceptionClear();
     app.state = AS_NONE;
@@ -150,24 +151,25 @@ static void unload(void)
     memset(&app.image, 0, sizeof app.image);
 }
 
-/* Initial values and fresh tasks; the application is in AS_STOP then, perhaps with an exception. It is given up when
- * its tasks cannot be created. */
+/* Initial values, what is kept, and fresh tasks; the application is in AS_STOP then, perhaps with an exception. It is
+ * given up when its tasks cannot be created. */
 static RTS_RESULT initialise(bool init_retains)
 {
     RTS_RESULT result;
 
     AppExceptionClear();
-    AppAreasClear(init_retains);
+    AppAreasClear();
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK) {
         unload();
         return result;
     }
     app.state = AS_STOP;
-    if (!run_function(CDL_FUNCTION_CODE_INIT, init_retains) || !run_function(CDL_FUNCTION_GLOBAL_INIT, init_retains))
+    if (run_function(CDL_FUNCTION_CODE_INIT, false))
+        RetainPutBack();
+    if (AppHasException() || !run_function(CDL_FUNCTION_GLOBAL_INIT, init_retains))
         enter_exception_state();
-    else if (init_retains)
-        (void)RetainSave(false);
+    RetainSettle(AppHasException());
     return ERR_OK;
 }
 
@@ -192,8 +194,6 @@ const RTS_UI8 *AppMapCode(const APP_IMAGE *image)
 
 RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until)
 {
-    RTS_UI32 retain_after = AppCommitGet()->slot[image->file].retain_after;
-    RTS_UI32 retain_size = image->area_size[APP_AREA_RETAIN];
     RTS_RESULT restored;
     RTS_RESULT result = AppLoaderRead(image, &app.tables);
 
@@ -205,14 +205,7 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     app.code = code;
     SysExceptCodeRange(code, image->code.size);
     set_context();
-    RetainAttach(app.context.area[APP_AREA_RETAIN], retain_size, image->retain_layout);
-    restored = RetainRestore(retain_after, retain_until);
-    if (restored != ERR_OK && retain_size != 0 && retain_until != retain_after)
-        LogAdd(CMPID_CmpRetain, LOG_WARNING, restored, "No saved retain variables fit the application: initial values");
-    if (is_proven())
-        RetainKeepNone();
-    else
-        RetainKeep(retain_after);
+    restored = AppRetainLoad(image, app.context.area[APP_AREA_RETAIN], retain_until);
     return initialise(restored != ERR_OK);
 }
 
@@ -294,7 +287,7 @@ static RTS_RESULT reset_origin(void)
     if (result != ERR_OK)
         return result;
     AppUnload();
-    AppAreasClear(true);
+    AppAreasClear();
     return ERR_OK;
 }
 
@@ -314,6 +307,7 @@ RTS_RESULT AppReset(RTS_UI32 option)
         result = reset_origin();
     } else {
         run_global_exit();
+        RetainCapture(option == RESET_OPTION_COLD);
         result = initialise(option == RESET_OPTION_COLD);
     }
     LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, result, "Reset %s",
@@ -385,7 +379,7 @@ static void forget_all(void)
 {
     CMP_CLEAR(app);
     AppExceptionClear();
-    AppAreasClear(true);
+    AppAreasClear();
     AppDownloadAbort();
     SysExceptCodeRange(NULL, 0);
 }

@@ -234,9 +234,100 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
     return 1;
 }
 
+/* ---- a copy of one moment ---- */
+
+/*
+ * A copy is taken when no task is in its cycle, and counts when none was until it was complete. Where tasks never pause
+ * together, they make such a moment: while a copy is wanted, a task whose cycle is due waits as long as others are in
+ * theirs, unless one of them takes longer than its own. So the longest wait first and the shortest not at all, and none
+ * waits longer than its own cycle lasts for each of the others. On one core a task cannot wait for one it has
+ * interrupted; there the moment comes by itself at the latest when the first task starts.
+ */
+enum { SNAPSHOT_NONE, SNAPSHOT_WANTED, SNAPSHOT_TAKEN, SNAPSHOT_TRIES = 4 };
+
+static struct {
+    RTS_UI32 state;  /* SNAPSHOT_* */
+    RTS_UI32 claims; /* who wants to take it now; the first one may */
+    void *target;
+    const void *source;
+    RTS_UI32 size;
+} snapshot;
+
+/* From any context. */
+static void take_snapshot(void)
+{
+    bool busy;
+
+    if (SysAtomicAdd(&snapshot.claims, 1) == 0 && SysAtomicLoad(&snapshot.state) == SNAPSHOT_WANTED) {
+        RTS_UI32 before = IecTaskGetActivity(&busy);
+        if (!busy) {
+            memcpy(snapshot.target, snapshot.source, snapshot.size);
+            if (IecTaskGetActivity(&busy) == before)
+                SysAtomicStore(&snapshot.state, SNAPSHOT_TAKEN);
+        }
+    }
+    (void)SysAtomicAdd(&snapshot.claims, 0xFFFFFFFF);
+}
+
+static bool is_wanted(void)
+{
+    return APP_RETAIN_SIZE > 0 && SysAtomicLoad(&snapshot.state) == SNAPSHOT_WANTED;
+}
+
+/* Whether a cycle that lasts longer than that of `task` is running. */
+static bool longer_runs(const TASK *task, RTS_I64 now_ns)
+{
+    IEC_GUARD guard;
+    RTS_UI32 i;
+
+    for (i = 0; i < tasks.count; i++) {
+        if (IecTaskReadGuard(i, &guard) &&
+            (tasks.list[i].last_ns > task->last_ns || now_ns - guard.start_ns > task->last_ns))
+            return true;
+    }
+    return false;
+}
+
+static RTS_NOINLINE void make_moment(const TASK *task)
+{
+    take_snapshot();
+    while (!RTS_ONE_CORE && is_wanted() && SysAtomicLoad(&tasks.running) && !longer_runs(task, SysTimeGetNs())) {
+        SysTimePause();
+        take_snapshot();
+    }
+}
+
+bool IecTaskSnapshot(void *target, const void *source, RTS_UI32 size)
+{
+    int i;
+
+    if (SysAtomicLoad(&snapshot.state) == SNAPSHOT_NONE) {
+        snapshot.target = target;
+        snapshot.source = source;
+        snapshot.size = size;
+        SysAtomicStore(&snapshot.state, SNAPSHOT_WANTED);
+    }
+    for (i = 0; i < SNAPSHOT_TRIES && is_wanted(); i++)
+        take_snapshot();
+    if (is_wanted())
+        return false;
+    SysAtomicStore(&snapshot.state, SNAPSHOT_NONE);
+    return true;
+}
+
 int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
-    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], due_ns) : 0;
+    TASK *task = &tasks.list[index];
+    int again;
+
+    if (is_wanted())
+        make_moment(task);
+    if (!SysAtomicLoad(&tasks.running))
+        return 0;
+    again = run_cycle(task, due_ns);
+    if (again && is_wanted())
+        take_snapshot();
+    return again;
 }
 
 /* ---- all tasks ---- */
@@ -269,6 +360,7 @@ RTS_RESULT IecTaskCreateAll(const CDL_TASK *records, RTS_UI32 count, const IEC_C
         create(&tasks.list[i], &records[i], prototype);
     tasks.count = count;
     tasks.time_started = false;
+    snapshot.state = SNAPSHOT_NONE;
     return SchedCreateTasks(records, count, count > 0 ? prototype->area : NULL);
 }
 
@@ -285,6 +377,7 @@ void IecTaskStopAll(void)
 {
     SysAtomicStore(&tasks.running, 0);
     SchedStop();
+    snapshot.state = SNAPSHOT_NONE;
 }
 
 RTS_UI32 IecTaskGetCount(void)
@@ -335,6 +428,7 @@ RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT) {
         CMP_CLEAR(tasks);
+        CMP_CLEAR(snapshot);
         tasks.init_guard.limit_ns = (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
     }
     return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;

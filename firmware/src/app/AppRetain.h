@@ -1,0 +1,23 @@
+/*
+ * AppRetain.h - the retain variables of an application that is loaded.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * From main only.
+ */
+#ifndef APPRETAIN_H
+#define APPRETAIN_H
+
+#include "AppLoader.h"
+#include "CmpRetain.h"
+
+/* Where the table of kept variables of an image lies. */
+RETAIN_TABLE AppGetRetainTable(const APP_IMAGE *image);
+
+/*
+ * Finds where the retain variables of an image, in the area at `area`, come from: its own record up to number
+ * `retain_until`, or the PERSISTENT ones of the application before. ERR_OK: all of them are kept.
+ */
+RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_until);
+
+#endif

@@ -1,0 +1,264 @@
+/*
+ * test_task_snapshot.c - the retain area is copied as it is at a moment between the cycles of all tasks, also when these
+ * never pause together.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * CmpIecTask is compiled a second time here, on fakes of what it calls. Each task is a thread that starts its next cycle
+ * at once and fills a part of the area with one number per cycle: a copy taken within a cycle would hold two.
+ */
+#define _GNU_SOURCE
+#include <pthread.h>
+#include <time.h>
+
+#include "../../firmware/src/app/CmpIecTask.c"
+
+#include "test.h"
+
+enum { TASKS = 4, PART = 1024, AREA_SIZE = TASKS * PART, COPIES = 300 };
+
+static RTS_UI8 area[AREA_SIZE];
+static RTS_UI8 copied[AREA_SIZE];
+static CDL_TASK records[TASKS];
+static RTS_UI32 length[TASKS]; /* of a cycle, in turns of a loop */
+static RTS_UI32 rounds[TASKS]; /* cycles begun */
+static __thread RTS_UI32 me;
+
+RTS_I64 SysTimeGetNs(void)
+{
+    struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (RTS_I64)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+void SysTimePause(void)
+{
+    static const struct timespec pause = {0, 20000};
+
+    nanosleep(&pause, NULL);
+}
+
+int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+{
+    RTS_UNUSED(exception);
+    fn(arg);
+    return 0;
+}
+
+void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *frame)
+{
+    RTS_UNUSED(code);
+    RTS_UNUSED(address);
+    RTS_UNUSED(frame);
+}
+
+void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)
+{
+    RTS_UNUSED(task);
+    RTS_UNUSED(code);
+    RTS_UNUSED(address);
+}
+
+RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count)
+{
+    RTS_UNUSED(table);
+    RTS_UNUSED(count);
+    return ERR_OK;
+}
+
+RTS_RESULT SchedCreateTasks(const CDL_TASK *list, RTS_UI32 count, RTS_UI8 *const *areas)
+{
+    RTS_UNUSED(list);
+    RTS_UNUSED(count);
+    RTS_UNUSED(areas);
+    return ERR_OK;
+}
+
+RTS_RESULT SchedStart(void)
+{
+    return ERR_OK;
+}
+
+void SchedStop(void)
+{
+}
+
+RTS_UI32 SchedGetOverruns(RTS_UI32 task)
+{
+    RTS_UNUSED(task);
+    return 0;
+}
+
+/* The code of all tasks. */
+static void fill_part(const IEC_CONTEXT *context)
+{
+    RTS_UI32 round = SysAtomicAdd(&rounds[me], 1);
+    RTS_UI32 i;
+
+    RTS_UNUSED(context);
+    for (i = 0; i < PART; i++) {
+        volatile RTS_UI32 turns = length[me] / PART;
+        area[me * PART + i] = (RTS_UI8)round;
+        while (turns > 0)
+            turns--;
+    }
+}
+
+static void *run_task(void *index)
+{
+    me = (RTS_UI32)(uintptr_t)index;
+    while (SysAtomicLoad(&tasks.running))
+        (void)IecTaskCycle(me, SysTimeGetNs());
+    return NULL;
+}
+
+static pthread_t threads[TASKS];
+static RTS_UI32 thread_count;
+
+static void begin(RTS_UI32 count)
+{
+    IEC_CONTEXT context = {0};
+    RTS_UI32 i;
+
+    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
+    context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)fill_part;
+    memset(rounds, 0, sizeof rounds);
+    CHECK(IecTaskCreateAll(records, count, &context) == ERR_OK);
+    CHECK(IecTaskStartAll() == ERR_OK);
+    thread_count = count;
+    for (i = 0; i < count; i++)
+        CHECK(pthread_create(&threads[i], NULL, run_task, (void *)(uintptr_t)i) == 0);
+    for (i = 0; i < count; i++) {
+        while (SysAtomicLoad(&rounds[i]) < 2)
+            SysTimePause();
+    }
+}
+
+static void end(void)
+{
+    RTS_UI32 i;
+
+    SysAtomicStore(&tasks.running, 0);
+    for (i = 0; i < thread_count; i++)
+        pthread_join(threads[i], NULL);
+    IecTaskStopAll();
+}
+
+static bool copy_now(void)
+{
+    RTS_UI32 tries;
+
+    for (tries = 0; tries < 100000; tries++) {
+        if (IecTaskSnapshot(copied, area, sizeof area))
+            return true;
+        SysTimePause();
+    }
+    return false;
+}
+
+static RTS_UI32 count_torn(void)
+{
+    RTS_UI32 torn = 0;
+    RTS_UI32 i;
+
+    for (i = 0; i < AREA_SIZE; i++)
+        torn += copied[i] != copied[i / PART * PART];
+    return torn;
+}
+
+static void take_copies(RTS_UI32 count)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < count; i++) {
+        memset(copied, 0xEE, sizeof copied);
+        CHECK(copy_now());
+        CHECK(count_torn() == 0);
+    }
+}
+
+static void tasks_that_never_pause_are_not_torn(void)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < TASKS; i++)
+        length[i] = 150000 + 10000 * i;
+    begin(TASKS);
+    take_copies(COPIES);
+    end();
+    for (i = 0; i < TASKS; i++)
+        CHECK(rounds[i] > 0);
+}
+
+/* It is the long one that waits, so the short one loses next to nothing. */
+static void a_short_task_goes_on_while_a_long_one_runs(void)
+{
+    length[0] = 10000000;
+    length[1] = 50000;
+    begin(2);
+    while (SysAtomicLoad(&rounds[0]) < 10)
+        take_copies(1);
+    end();
+    CHECK(rounds[1] > 20 * rounds[0]);
+}
+
+static void a_copy_of_stopped_tasks_is_taken_at_once(void)
+{
+    IEC_CONTEXT context = {0};
+
+    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
+    CHECK(IecTaskCreateAll(records, TASKS, &context) == ERR_OK);
+    memset(area, 7, sizeof area);
+    CHECK(IecTaskSnapshot(copied, area, sizeof area));
+    CHECK(memcmp(copied, area, sizeof area) == 0);
+}
+
+/* The only task is in its cycle: the copy is taken when that is over, and only once. */
+static void what_runs_is_waited_for(void)
+{
+    IEC_CONTEXT context = {0};
+
+    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
+    context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)fill_part;
+    CHECK(IecTaskCreateAll(records, 1, &context) == ERR_OK);
+    CHECK(IecTaskStartAll() == ERR_OK);
+    length[0] = 0;
+    me = 0;
+    guard_begin(&tasks.list[0].guard, 0);
+    memset(copied, 0xEE, sizeof copied);
+    CHECK(!IecTaskSnapshot(copied, area, sizeof area));
+    CHECK(!IecTaskSnapshot(copied, area, sizeof area));
+    CHECK(copied[0] == 0xEE);
+    guard_end(&tasks.list[0].guard);
+    memset(area, 77, sizeof area);
+    CHECK(IecTaskCycle(0, SysTimeGetNs()) == 1); /* takes it before it begins */
+    CHECK(copied[0] == 77 && copied[AREA_SIZE - 1] == 77);
+    CHECK(IecTaskCycle(0, SysTimeGetNs()) == 1);
+    CHECK(IecTaskSnapshot(copied, area, sizeof area));
+    CHECK(copied[0] == 77);
+    CHECK(IecTaskSnapshot(copied, area, sizeof area)); /* another one */
+    CHECK(copied[0] == area[0] && area[0] != 77);
+}
+
+static void stopping_calls_a_copy_off(void)
+{
+    what_runs_is_waited_for();
+    guard_begin(&tasks.list[0].guard, 0);
+    CHECK(!IecTaskSnapshot(copied, area, sizeof area));
+    guard_end(&tasks.list[0].guard);
+    IecTaskStopAll();
+    memset(copied, 0xEE, sizeof copied);
+    CHECK(IecTaskCycle(0, SysTimeGetNs()) == 0);
+    CHECK(copied[0] == 0xEE);
+}
+
+int main(void)
+{
+    RUN(tasks_that_never_pause_are_not_torn);
+    RUN(a_short_task_goes_on_while_a_long_one_runs);
+    RUN(a_copy_of_stopped_tasks_is_taken_at_once);
+    RUN(what_runs_is_waited_for);
+    RUN(stopping_calls_a_copy_off);
+    return test_result();
+}
