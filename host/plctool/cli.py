@@ -364,11 +364,16 @@ def _flash(args: argparse.Namespace) -> int:
         "seconds": round(result.seconds, 3),
         "skipped": result.skipped,
         "state": str(result.state),
+        "persistent": None if result.persistent is None else vars(result.persistent),
     }
 
     def text(d: dict[str, Any]) -> str:
         done = "already on the device" if d["skipped"] else f"{d['bytes']} bytes in {d['seconds']:.2f} s"
-        return f"{done}; state: {d['state']}"
+        lines = [f"{done}; state: {d['state']}"]
+        if d["persistent"]:
+            lines += [f"PERSISTENT value lost: {name} {why}" for name, why in d["persistent"]["lost"].items()]
+            lines += [f"PERSISTENT value new: {name}" for name in d["persistent"]["new"]]
+        return "\n".join(lines)
 
     return _show(args, document, text)
 

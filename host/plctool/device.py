@@ -15,6 +15,7 @@ from plctool.core import lib
 from plctool.errors import DeviceError, LinkError, UsageError
 from plctool.files import read_image
 from plctool.image import parse_image
+from plctool.kept_changes import KeptChanges, kept_changes
 from plctool.link import services
 from plctool.link.connection import Connection
 from plctool.link.monitoring import AreaRange, Contents, read_memory, write_memory
@@ -66,12 +67,14 @@ class PlcStatus:
 
 @dataclass(frozen=True)
 class FlashResult:
-    """`skipped`: the device had this very image already. `seconds` is the time the transfer took."""
+    """`skipped`: the device had this very image already. `seconds` is the time the transfer took. `persistent`: what
+    became of PERSISTENT values, None when the symbols of one of the programs are not there."""
 
     bytes: int
     seconds: float
     skipped: bool
     state: AppState
+    persistent: KeptChanges | None = None
 
 
 def connect(link: str, baud: int = DEFAULT_BAUD, symbols: Path | str | None = None) -> Plc:
@@ -171,9 +174,16 @@ class Plc:
             services.download(self._session, data, afresh, lambda done: progress(done, len(data)))
             self._verify(crc)
         seconds = self._connection.transport.now() - begin
+        persistent = None if skipped else self._kept_changes(status.image_crc, crc)
         if start and not (skipped and status.state is AppState.RUN):
             services.start(self._session)
-        return FlashResult(len(data), seconds, skipped, services.read_status(self._session).state)
+        return FlashResult(len(data), seconds, skipped, services.read_status(self._session).state, persistent)
+
+    def _kept_changes(self, before: int, after: int) -> KeptChanges | None:
+        """By the CRCs of both images."""
+        with suppress(UsageError):
+            return kept_changes(find_symbols(before).kept, find_symbols(after).kept)
+        return None
 
     def _verify(self, crc: int) -> None:
         found = services.read_status(self._session).image_crc

@@ -381,7 +381,7 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
 
 enum {
     COUNTER_OFFSET = 0,    /* data: DINT, counts */
-    STEP_OFFSET = 4,       /* data: DINT, set to `step` by GlobalInit */
+    STEP_OFFSET = 4,       /* data: DINT, set to `step` by CodeInit */
     RETAIN_A_OFFSET = 0,   /* retain: DINT, starts at 100 * step and counts */
     RETAIN_B_OFFSET = 12,  /* retain: the same number once more, at the other end of the area */
     OUTPUT_OFFSET = 0,     /* output: DINT, set to `step` */
@@ -394,9 +394,8 @@ static inline void spec_counter(APP_SPEC *spec, RTS_UI32 step)
     spec_init(spec);
     add_kept(spec, 'A', RETAIN_A_OFFSET, 0);
     add_kept(spec, 'B', RETAIN_B_OFFSET, 0);
-    spec->function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(spec);
+    spec->function[CDL_FUNCTION_CODE_INIT] = (RTS_I32)here(spec);
     emit_set(spec, APP_AREA_DATA, STEP_OFFSET, step);
-    emit_skip_unless_init_retains(spec, 2 * 14);
     emit_set(spec, APP_AREA_RETAIN, RETAIN_A_OFFSET, 100 * step);
     emit_set(spec, APP_AREA_RETAIN, RETAIN_B_OFFSET, 100 * step);
     emit_ret(spec);

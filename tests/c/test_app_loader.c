@@ -200,7 +200,7 @@ static void code_in_another_area_or_larger_than_it(void)
     check_header_refused(ERR_OUT_OF_LIMITS, "not in area 5");
     header.code_area_index = APP_AREA_CODE;
     header.code_area_size = header.code.size - 1;
-    check_header_refused(ERR_OUT_OF_LIMITS, "above its 103 bytes");
+    check_header_refused(ERR_OUT_OF_LIMITS, "above its 99 bytes");
 }
 
 /* ---- areas ---- */
