@@ -59,10 +59,11 @@ int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception
  * in its cycle now. From any context. */
 RTS_UI32 IecTaskGetActivity(bool *busy);
 
-/* Copies `size` bytes as they are at a moment when no task is in its cycle. True: `target` holds them. False: the tasks
- * will do it as soon as there is such a moment; call again with the same arguments. It is called off when the tasks are
+/* Has `copy` called at a moment when no task is in its cycle, so that what it copies is the work of whole cycles. True:
+ * it was; when a cycle came in between, more than once. False: not yet, call again; where several tasks run at a time
+ * they do it, in the context of one of them, as soon as there is such a moment. It is called off when the tasks are
  * stopped. From main. */
-bool IecTaskSnapshot(void *target, const void *source, RTS_UI32 size);
+bool IecTaskBetweenCycles(void (*copy)(void));
 
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
  * simulator, between cycles. */

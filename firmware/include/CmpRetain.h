@@ -4,13 +4,12 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * The retain area lives in RAM. It is saved as a whole: on stop and shutdown, and at most every APP_RETAIN_SAVE_US when
- * it changed. A record is the state of one moment between the cycles of all tasks, and belongs to one layout of
- * variables.
+ * it changed. A record is the state of one moment between the cycles of all tasks, and belongs to one image.
  *
  * When an application begins, values come from a source: the last record, the record of the application before, or what
- * the variables are at a reset. The source is chosen first (RetainRestore, RetainTakeOver, RetainCapture); the values
- * are put back, variable by variable as the table in the image says, when the initial values are there; and they count,
- * and are saved, when the initialisation is over. Until then all of it can be done again: a power cut loses nothing.
+ * the variables are at a reset. The source is chosen first (RetainLoad, RetainCapture); the values are put back, variable
+ * by variable as the table in the image says, when the initial values are there; and they count, and are saved, when the
+ * initialisation is over. Until then all of it can be done again: a power cut loses nothing.
  *
  * All from main.
  */
@@ -33,19 +32,18 @@ typedef struct {
 /* The largest retain area that can be saved, bytes. */
 RTS_UI32 RetainCapacity(void);
 
-/* From now on the variables of a checked table are kept, in the area at `area`. They have no source yet. */
-void RetainAttach(RTS_UI8 *area, const RETAIN_TABLE *table);
+/* From now on the variables of a checked table are kept, in the area at `area`, in records with this tag, which is the
+ * CRC of the image. The table stays where it is. They have no source yet. */
+void RetainAttach(RTS_UI8 *area, const RETAIN_TABLE *table, RTS_UI32 tag);
 void RetainDetach(void);
 
 /* Number of the newest record. */
 RTS_UI32 RetainGetSequence(void);
 
-/* The source is the newest record of this layout in the range; all values are kept. ERR_NO_OBJECT: there is none. */
-RTS_RESULT RetainRestore(FLASH_LOG_RANGE range);
-
-/* The source is the newest record in the range of an application whose checked table is `before`; PERSISTENT values are
- * kept, where name and type are as they were. ERR_NO_OBJECT: there is none. */
-RTS_RESULT RetainTakeOver(const RETAIN_TABLE *before, FLASH_LOG_RANGE range);
+/* The source is the newest record in the range of the application whose checked table is `table`: this one's, all of
+ * whose values are kept, or that of the application before, of which PERSISTENT values are kept where name and type are
+ * as they were. ERR_NO_OBJECT: there is none. */
+RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range);
 
 /* The source is what the variables are now; a cold reset keeps PERSISTENT ones only. After an initialisation that
  * failed the source is the same as then. */

@@ -129,7 +129,7 @@ typedef struct {
 
 enum {
     CDL_BLOB_TASKS = 1,  /* array of CDL_TASK */
-    CDL_BLOB_RETAIN = 2, /* CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes: what is kept */
+    CDL_BLOB_RETAIN = 2, /* what is kept: CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes */
 };
 
 enum { CDL_TASK_NAME_SIZE = 32 };
@@ -159,7 +159,7 @@ typedef struct {
 } CDL_KEPT;
 
 enum {
-    CDL_KEPT_SHAPE = 3,      /* log2 of its size in bytes; with CDL_KEPT_IS_RUN bytes of a character, 0: no text */
+    CDL_KEPT_SHAPE = 3,      /* log2 of its size in bytes, without CDL_KEPT_IS_RUN */
     CDL_KEPT_IS_RUN = 4,     /* a CDL_KEPT_RUN follows */
     CDL_KEPT_PERSISTENT = 8, /* kept over a cold reset and a download, too */
     CDL_KEPT_OFFSET_SHIFT = 4,

@@ -73,14 +73,13 @@ class ImageTask:
 @dataclass(frozen=True)
 class KeptVariable:
     """A variable that is kept, or the elements of an array (`is_run`), `stride` bytes apart. `hash`: of its name and
-    type; `offset` in the retain area and `size` of one element [bytes]; `text`: bytes of a character, 0 when it is no
-    text; `first`: index of the first element in the program."""
+    type; `offset` in the retain area and `size` of one element [bytes]; `first`: index of the first element in the
+    program."""
 
     hash: bytes
     offset: int
     size: int
     persistent: bool
-    text: int
     stride: int
     count: int
     first: int
@@ -227,7 +226,7 @@ def _task_entry(task: ImageTask) -> bytes:
 
 
 def _kept_entry(kept: KeptVariable) -> bytes:
-    shape = kept.text if kept.is_run else kept.size.bit_length() - 1
+    shape = 0 if kept.is_run else kept.size.bit_length() - 1
     bits = shape | lib.CDL_KEPT_IS_RUN * kept.is_run | lib.CDL_KEPT_PERSISTENT * kept.persistent
     entry = _pack("CDL_KEPT", {"hash": kept.hash, "place": kept.offset << lib.CDL_KEPT_OFFSET_SHIFT | bits})
     if not kept.is_run:
@@ -369,7 +368,7 @@ def _parse_kept(payload: bytes) -> Iterator[KeptVariable]:
         (entry,) = _entries("CDL_KEPT", payload[at : at + size], "table of kept variables")
         at += size
         shape = entry.place & lib.CDL_KEPT_SHAPE
-        text, length, stride, count, first = 0, 1 << shape, 1 << shape, 1, 0
+        length, stride, count, first = 1 << shape, 1 << shape, 1, 0
         is_run = bool(entry.place & lib.CDL_KEPT_IS_RUN)
         if is_run:
             runs = list(_entries("CDL_KEPT_RUN", payload[at : at + size], "table of kept variables"))
@@ -377,11 +376,11 @@ def _parse_kept(payload: bytes) -> Iterator[KeptVariable]:
                 raise _refuse("its table of kept variables is cut off")
             at += size
             run = runs[0]
-            text, length, stride, count, first = shape, int(run.size), int(run.stride), int(run.count), int(run.first)
+            length, stride, count, first = int(run.size), int(run.stride), int(run.count), int(run.first)
         persistent = bool(entry.place & lib.CDL_KEPT_PERSISTENT)
         offset = int(entry.place >> lib.CDL_KEPT_OFFSET_SHIFT)
         yield KeptVariable(
-            bytes(ffi.buffer(entry.hash)), offset, length, persistent, text, stride, count, first, is_run
+            bytes(ffi.buffer(entry.hash)), offset, length, persistent, stride, count, first, is_run
         )  # fmt: skip
 
 

@@ -23,26 +23,20 @@ class KeptChanges:
 
 def kept_changes(before: Sequence[KeptName], after: Sequence[KeptName]) -> KeptChanges:
     """Compares what the program before keeps with what the next one does."""
-    had, has = {_key(k) for k in before}, {_key(k): k for k in after}
-    wanted = [k for k in after if k.persistent]
-    kept = [k.name for k in wanted if _key(k) in had]
-    new = [k.name for k in wanted if _key(k) not in had]
-    others = {k.name.casefold(): k for k in after}
-    lost = {}
-    for k in before:
-        same = has.get(_key(k))
-        if k.persistent and (same is None or not same.persistent):
-            lost[k.name] = _reason(k, others.get(k.name.casefold()))
-    return KeptChanges(kept, new, lost)
+    had, has = ({k.name.casefold(): k for k in program} for program in (before, after))
+    wanted = {name: _why_lost(had.get(name), k) for name, k in has.items() if k.persistent}
+    kept = [has[name].name for name, why in wanted.items() if not why]
+    new = [has[name].name for name, why in wanted.items() if why]
+    fates = {k.name: _why_lost(k, has.get(name)) for name, k in had.items() if k.persistent}
+    return KeptChanges(kept, new, {name: why for name, why in fates.items() if why})
 
 
-def _key(kept: KeptName) -> tuple[str, str]:
-    return kept.name.casefold(), kept.type
-
-
-def _reason(before: KeptName, after: KeptName | None) -> str:
-    if after is None:
+def _why_lost(before: KeptName | None, after: KeptName | None) -> str:
+    """Why a value is not taken over; "" when it is."""
+    if before is None or after is None:
         return "is not there any more"
     if after.type != before.type:
         return f"was {before.type}, is {after.type}"
-    return "is RETAIN only"
+    if after.size < before.size:
+        return "is shorter"
+    return "" if after.persistent else "is RETAIN only"

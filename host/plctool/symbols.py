@@ -56,11 +56,12 @@ class SourceLine:
 @dataclass(frozen=True)
 class KeptName:
     """A RETAIN or PERSISTENT variable, or a part of one; `[]` stands for the elements of an array. `type`: as far as a
-    kept value depends on it."""
+    kept value depends on it; `size` of one element [bytes]."""
 
     name: str
     type: str
     persistent: bool
+    size: int
 
 
 @dataclass
@@ -194,7 +195,7 @@ class SymbolTable:
             "pous": [vars(unit) for unit in self.pous],
             "lines": self.lines,
             "files": self.files,
-            "kept": [[k.name, k.type, k.persistent] for k in self.kept],
+            "kept": [[k.name, k.type, k.persistent, k.size] for k in self.kept],
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))

@@ -204,14 +204,10 @@ static inline SPEC_KEPT *add_kept(APP_SPEC *spec, char name, RTS_UI32 offset, RT
     return kept;
 }
 
-/* An array that is kept, of elements of `size` bytes that lie side by side. `text`: bytes of a character. */
-static inline void add_kept_run(APP_SPEC *spec, char name, RTS_UI32 offset, RTS_UI32 flags, CDL_KEPT_RUN run,
-                                RTS_UI32 text)
+/* An array that is kept. */
+static inline void add_kept_run(APP_SPEC *spec, char name, RTS_UI32 offset, RTS_UI32 flags, CDL_KEPT_RUN run)
 {
-    SPEC_KEPT *kept = add_kept(spec, name, offset, flags | CDL_KEPT_IS_RUN);
-
-    kept->variable.place = (kept->variable.place & ~(RTS_UI32)CDL_KEPT_SHAPE) | text;
-    kept->run = run;
+    add_kept(spec, name, offset, flags | CDL_KEPT_IS_RUN)->run = run;
 }
 
 /* ---- the image ---- */

@@ -490,13 +490,13 @@ static void origin_ends_persistent_values_too(void)
     CHECK(moved() == 200);
 }
 
-/* Elements by their index, a text as far as it fits: in a table of runs. */
+/* Elements by their index, a text that has more room: in a table of runs. */
 static void runs_are_taken_over_by_index(void)
 {
     static const CDL_KEPT_RUN old_array = {2, 2, 4, 1}, new_array = {2, 3, 3, 3};
-    static const CDL_KEPT_RUN old_text = {6, 6, 1, 0}, new_text = {4, 4, 1, 0};
-    static const RTS_UI8 values[] = {10, 0, 20, 0, 30, 0, 40, 0, 'a', 'b', 'c', 'd', 'e', 0};
-    static const RTS_UI8 expected[] = {30, 0, 0xEE, 40, 0, 0xEE, 0xEE, 0xEE, 'a', 'b', 'c', 0};
+    static const CDL_KEPT_RUN old_text = {4, 4, 1, 0}, new_text = {6, 6, 1, 0};
+    static const RTS_UI8 values[] = {10, 0, 20, 0, 30, 0, 40, 0, 'a', 'b', 'c', 0, 'x', 'y'};
+    static const RTS_UI8 expected[] = {30, 0, 0xEE, 40, 0, 0xEE, 0xEE, 0xEE, 'a', 'b', 'c', 0, 0, 0};
     RTS_UI8 *area;
 
     start_blank();
@@ -504,15 +504,15 @@ static void runs_are_taken_over_by_index(void)
     spec.kept_count = 0;
     spec.tasks[0].interval_us = 3600000000u;
     spec.areas[APP_AREA_RETAIN] = 32;
-    add_kept_run(&spec, 'E', 16, CDL_KEPT_PERSISTENT, old_array, 0);
-    add_kept_run(&spec, 'F', 24, CDL_KEPT_PERSISTENT, old_text, 1);
+    add_kept_run(&spec, 'E', 16, CDL_KEPT_PERSISTENT, old_array);
+    add_kept_run(&spec, 'F', 24, CDL_KEPT_PERSISTENT, old_text);
     load();
     CHECK(SimAdvance(ms(100)) == ERR_OK);
     area = AppGetAreaAddress(APP_AREA_RETAIN, 0, 32);
     memcpy(area + 16, values, sizeof values);
     spec.kept_count = 0;
-    add_kept_run(&spec, 'E', 16, CDL_KEPT_PERSISTENT, new_array, 0);
-    add_kept_run(&spec, 'F', 24, CDL_KEPT_PERSISTENT, new_text, 1);
+    add_kept_run(&spec, 'E', 16, CDL_KEPT_PERSISTENT, new_array);
+    add_kept_run(&spec, 'F', 24, CDL_KEPT_PERSISTENT, new_text);
     spec.function[CDL_FUNCTION_CODE_INIT] = (RTS_I32)here(&spec);
     emit_set(&spec, APP_AREA_RETAIN, 16, 0xEEEEEEEE);
     emit_set(&spec, APP_AREA_RETAIN, 20, 0xEEEEEEEE);
@@ -559,7 +559,7 @@ static void a_large_retain_area_is_saved_whole(void)
     CHECK(SimStart() == ERR_OK);
     spec_counter(&spec, 1);
     spec.areas[APP_AREA_RETAIN] = size;
-    add_kept_run(&spec, 'C', 16, 0, rest, 0);
+    add_kept_run(&spec, 'C', 16, 0, rest);
     load();
     area = AppGetAreaAddress(APP_AREA_RETAIN, 0, size);
     for (i = 16; i < size; i++)

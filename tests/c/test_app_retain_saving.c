@@ -74,15 +74,6 @@ RTS_RESULT SysFileRead(RTS_UI32 file, RTS_UI32 offset, void *data, RTS_UI32 size
     return ERR_DEVICE;
 }
 
-RTS_RESULT SysFileCRC32(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size, RTS_UI32 *crc)
-{
-    RTS_UNUSED(file);
-    RTS_UNUSED(offset);
-    RTS_UNUSED(size);
-    *crc = 1;
-    return ERR_OK;
-}
-
 RTS_RESULT RetainTableNext(RETAIN_TABLE *table, KEPT *kept)
 {
     RTS_UNUSED(table);
@@ -90,11 +81,11 @@ RTS_RESULT RetainTableNext(RETAIN_TABLE *table, KEPT *kept)
     return ERR_NO_OBJECT;
 }
 
-bool IecTaskSnapshot(void *target, const void *source, RTS_UI32 size)
+bool IecTaskBetweenCycles(void (*copy_it)(void))
 {
     asked++;
     if (moment)
-        memcpy(target, source, size);
+        copy_it();
     return moment;
 }
 
@@ -121,13 +112,13 @@ RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count)
 /* An application whose initial values have been saved; `ms` later. */
 static void begin(RTS_UI32 ms)
 {
-    const RETAIN_TABLE table = {0, 0, sizeof(CDL_KEPT), AREA_SIZE};
+    static const RETAIN_TABLE table = {0, 0, sizeof(CDL_KEPT), AREA_SIZE};
 
     now_ns = 0;
     moment = false;
     CHECK(CmpRetain_Hook(CH_INIT) == ERR_OK);
     CHECK(CmpRetain_Hook(CH_INIT2) == ERR_OK);
-    RetainAttach(area, &table);
+    RetainAttach(area, &table, 1);
     RetainSettle(false);
     saves = 0;
     asked = 0;
@@ -183,10 +174,10 @@ static void a_stop_while_a_copy_is_asked_for_saves_what_is_there(void)
 
 static void nothing_is_saved_before_the_initialisation_is_over(void)
 {
-    const RETAIN_TABLE table = {0, 0, sizeof(CDL_KEPT), AREA_SIZE};
+    static const RETAIN_TABLE table = {0, 0, sizeof(CDL_KEPT), AREA_SIZE};
 
     begin(1000);
-    RetainAttach(area, &table);
+    RetainAttach(area, &table, 1);
     now_ns += 5000000000;
     pass();
     CHECK(RetainSave(false) == ERR_OK);

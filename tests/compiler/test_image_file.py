@@ -34,8 +34,8 @@ SAMPLE = Image(
     ],
     info=ApplicationInfo("Pump", "Ada", "1.2", "two pumps", "plctool", 1_700_000_000),
     kept=[
-        KeptVariable(b"\0\1\2\3\4\5\6\7", 4, 2, True, 0, 2, 1, 0, is_run=False),
-        KeptVariable(b"\1\1\2\3\4\5\6\7", 6, 2, False, 1, 3, 2, -5, is_run=True),
+        KeptVariable(b"\0\1\2\3\4\5\6\7", 4, 2, True, 2, 1, 0, is_run=False),
+        KeptVariable(b"\1\1\2\3\4\5\6\7", 6, 2, False, 3, 2, -5, is_run=True),
     ],
 )
 
@@ -56,12 +56,12 @@ offsets = st.integers(0, 99)
 hashes, places, halves = st.binary(min_size=8, max_size=8), st.integers(0, 2**28 - 1), st.integers(0, 2**16 - 1)
 single = st.sampled_from((1, 2, 4, 8)).flatmap(
     lambda size: st.builds(
-        KeptVariable, hashes, places, st.just(size), st.booleans(), st.just(0), st.just(size), st.just(1), st.just(0),
+        KeptVariable, hashes, places, st.just(size), st.booleans(), st.just(size), st.just(1), st.just(0),
         st.just(False),
     )
 )  # fmt: skip
 run = st.builds(
-    KeptVariable, hashes, places, halves, st.booleans(), st.integers(0, 2), halves, st.integers(0, 2**32 - 1),
+    KeptVariable, hashes, places, halves, st.booleans(), halves, st.integers(0, 2**32 - 1),
     st.integers(-(2**31), 2**31 - 1), st.just(True),
 )  # fmt: skip
 

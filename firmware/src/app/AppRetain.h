@@ -9,14 +9,11 @@
 #define APPRETAIN_H
 
 #include "AppLoader.h"
-#include "CmpRetain.h"
-
-/* Where the table of kept variables of an image lies. */
-RETAIN_TABLE AppGetRetainTable(const APP_IMAGE *image);
 
 /*
  * Finds where the retain variables of an image, in the area at `area`, come from: its own record up to number
- * `retain_until`, or the PERSISTENT ones of the application before. ERR_OK: all of them are kept.
+ * `retain_until`, or the PERSISTENT ones of the application before. ERR_OK: all of them are kept. The image stays where
+ * it is until RetainDetach.
  */
 RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_until);
 

@@ -7,7 +7,6 @@
 
 #include <string.h>
 
-#include "AppRetain.h"
 #include "CmpIecTask.h"
 #include "RetainTable.h"
 
@@ -53,30 +52,22 @@ static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)
     return result;
 }
 
-/* The order makes every hash unique, and lets two tables be compared in one pass. */
+/* Of two tables the last one counts. Values of variables that are out of order are not found, which harms nobody. */
 static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
 {
     RETAIN_TABLE table;
     KEPT kept;
-    RTS_UI8 last[CDL_KEPT_HASH_SIZE] = {0};
     RTS_UI32 number = 0;
     RTS_RESULT result;
 
-    if (l->image->kept.size != 0)
-        return refuse(l, ERR_DUPLICATE, "The image has two tables of kept variables.");
     l->image->kept.offset = l->offset;
     l->image->kept.size = size;
-    table = AppGetRetainTable(l->image);
-    for (;; number++) {
-        result = RetainTableNext(&table, &kept);
-        if (result == ERR_NO_OBJECT)
-            return ERR_OK;
-        if (result != ERR_OK)
-            return refuse(l, result, "Kept variable %u is not in the retain area; build the program again.", U(number));
-        if (number > 0 && memcmp(last, kept.hash, sizeof last) >= 0)
-            return refuse(l, ERR_DUPLICATE, "Kept variable %u is out of order.", U(number));
-        memcpy(last, kept.hash, sizeof last);
-    }
+    table = l->image->kept;
+    while ((result = RetainTableNext(&table, &kept)) == ERR_OK)
+        number++;
+    return result == ERR_NO_OBJECT
+               ? ERR_OK
+               : refuse(l, result, "Kept variable %u is out of place; build again.", U(number));
 }
 
 static RTS_RESULT check_blob(LOADER *l)
@@ -105,6 +96,8 @@ RTS_RESULT LoaderCheckBlobs(LOADER *l)
 {
     RTS_RESULT result;
 
+    l->image->kept.file = l->image->file;
+    l->image->kept.area_size = l->image->area_size[APP_AREA_RETAIN];
     result = LoaderCheckEntries(l, SEGMENT_BLOBS, check_blob);
     if (result == ERR_OK && l->image->task_count == 0)
         return refuse(l, ERR_NO_OBJECT, "The application has no task.");

@@ -205,7 +205,7 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     app.code = code;
     SysExceptCodeRange(code, image->code.size);
     set_context();
-    restored = AppRetainLoad(image, app.context.area[APP_AREA_RETAIN], retain_until);
+    restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until);
     return initialise(restored != ERR_OK);
 }
 

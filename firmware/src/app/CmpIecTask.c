@@ -234,44 +234,45 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
     return 1;
 }
 
-/* ---- a copy of one moment ---- */
+/* ---- a moment between all cycles ---- */
 
 /*
- * A copy is taken when no task is in its cycle, and counts when none was until it was complete. Where tasks never pause
- * together, they make such a moment: while a copy is wanted, a task whose cycle is due waits as long as others are in
- * theirs, unless one of them takes longer than its own. So the longest wait first and the shortest not at all, and none
- * waits longer than its own cycle lasts for each of the others. On one core a task cannot wait for one it has
- * interrupted; there the moment comes by itself at the latest when the first task starts.
+ * A copy counts when no task was in its cycle from its beginning to its end. On one core main finds such a moment by
+ * itself, unless cycles follow each other faster than the copy takes: tasks only interrupt it. Elsewhere tasks may never
+ * pause together, so they make such a moment: while it is wanted, a task whose cycle is due waits as long as others are
+ * in theirs, unless one of them takes longer than its own. So the longest wait first and the shortest not at all, and
+ * none waits longer than its own cycle lasts for each of the others.
  */
-enum { SNAPSHOT_NONE, SNAPSHOT_WANTED, SNAPSHOT_TAKEN, SNAPSHOT_TRIES = 4 };
+enum { MOMENT_NONE, MOMENT_WANTED, MOMENT_USED };
 
 static struct {
-    RTS_UI32 state;  /* SNAPSHOT_* */
-    RTS_UI32 claims; /* who wants to take it now; the first one may */
-    void *target;
-    const void *source;
-    RTS_UI32 size;
-} snapshot;
+    RTS_UI32 state;  /* MOMENT_* */
+    RTS_UI32 claims; /* who wants to copy now; the first one may */
+    void (*copy)(void);
+} moment;
 
-/* From any context. */
-static void take_snapshot(void)
+/* Between cycles; true when there was none meanwhile. */
+static bool copy_alone(void (*copy)(void))
 {
     bool busy;
+    RTS_UI32 before = IecTaskGetActivity(&busy);
 
-    if (SysAtomicAdd(&snapshot.claims, 1) == 0 && SysAtomicLoad(&snapshot.state) == SNAPSHOT_WANTED) {
-        RTS_UI32 before = IecTaskGetActivity(&busy);
-        if (!busy) {
-            memcpy(snapshot.target, snapshot.source, snapshot.size);
-            if (IecTaskGetActivity(&busy) == before)
-                SysAtomicStore(&snapshot.state, SNAPSHOT_TAKEN);
-        }
-    }
-    (void)SysAtomicAdd(&snapshot.claims, 0xFFFFFFFF);
+    if (busy)
+        return false;
+    copy();
+    return IecTaskGetActivity(&busy) == before;
 }
 
 static bool is_wanted(void)
 {
-    return APP_RETAIN_SIZE > 0 && SysAtomicLoad(&snapshot.state) == SNAPSHOT_WANTED;
+    return SysAtomicLoad(&moment.state) == MOMENT_WANTED;
+}
+
+static void use_moment(void)
+{
+    if (SysAtomicAdd(&moment.claims, 1) == 0 && is_wanted() && copy_alone(moment.copy))
+        SysAtomicStore(&moment.state, MOMENT_USED);
+    (void)SysAtomicAdd(&moment.claims, 0xFFFFFFFF);
 }
 
 /* Whether a cycle that lasts longer than that of `task` is running. */
@@ -290,44 +291,35 @@ static bool longer_runs(const TASK *task, RTS_I64 now_ns)
 
 static RTS_NOINLINE void make_moment(const TASK *task)
 {
-    take_snapshot();
-    while (!RTS_ONE_CORE && is_wanted() && SysAtomicLoad(&tasks.running) && !longer_runs(task, SysTimeGetNs())) {
+    use_moment();
+    while (is_wanted() && SysAtomicLoad(&tasks.running) && !longer_runs(task, SysTimeGetNs())) {
         SysTimePause();
-        take_snapshot();
+        use_moment();
     }
 }
 
-bool IecTaskSnapshot(void *target, const void *source, RTS_UI32 size)
+bool IecTaskBetweenCycles(void (*copy)(void))
 {
-    int i;
-
-    if (SysAtomicLoad(&snapshot.state) == SNAPSHOT_NONE) {
-        snapshot.target = target;
-        snapshot.source = source;
-        snapshot.size = size;
-        SysAtomicStore(&snapshot.state, SNAPSHOT_WANTED);
+    if (RTS_ONE_CORE)
+        return copy_alone(copy);
+    if (moment.state == MOMENT_NONE) {
+        moment.copy = copy;
+        SysAtomicStore(&moment.state, MOMENT_WANTED);
     }
-    for (i = 0; i < SNAPSHOT_TRIES && is_wanted(); i++)
-        take_snapshot();
+    use_moment();
     if (is_wanted())
         return false;
-    SysAtomicStore(&snapshot.state, SNAPSHOT_NONE);
+    moment.state = MOMENT_NONE;
     return true;
 }
 
 int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
     TASK *task = &tasks.list[index];
-    int again;
 
-    if (is_wanted())
+    if (!RTS_ONE_CORE && APP_RETAIN_SIZE > 0 && is_wanted())
         make_moment(task);
-    if (!SysAtomicLoad(&tasks.running))
-        return 0;
-    again = run_cycle(task, due_ns);
-    if (again && is_wanted())
-        take_snapshot();
-    return again;
+    return SysAtomicLoad(&tasks.running) ? run_cycle(task, due_ns) : 0;
 }
 
 /* ---- all tasks ---- */
@@ -360,7 +352,6 @@ RTS_RESULT IecTaskCreateAll(const CDL_TASK *records, RTS_UI32 count, const IEC_C
         create(&tasks.list[i], &records[i], prototype);
     tasks.count = count;
     tasks.time_started = false;
-    snapshot.state = SNAPSHOT_NONE;
     return SchedCreateTasks(records, count, count > 0 ? prototype->area : NULL);
 }
 
@@ -377,7 +368,8 @@ void IecTaskStopAll(void)
 {
     SysAtomicStore(&tasks.running, 0);
     SchedStop();
-    snapshot.state = SNAPSHOT_NONE;
+    if (!RTS_ONE_CORE)
+        moment.state = MOMENT_NONE;
 }
 
 RTS_UI32 IecTaskGetCount(void)
@@ -428,7 +420,8 @@ RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT) {
         CMP_CLEAR(tasks);
-        CMP_CLEAR(snapshot);
+        if (!RTS_ONE_CORE)
+            CMP_CLEAR(moment);
         tasks.init_guard.limit_ns = (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
     }
     return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;

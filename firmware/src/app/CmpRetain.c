@@ -10,7 +10,6 @@
 
 #include <string.h>
 
-#include "CmpChecksum.h"
 #include "CmpIecTask.h"
 #include "CmpLog.h"
 #include "RetainTable.h"
@@ -18,24 +17,23 @@
 #include "SysTime.h"
 #include "rts_config.h"
 
-/* What `saved_area` holds for the variables to begin with. */
-enum { SOURCE_NONE, SOURCE_OWN, SOURCE_BEFORE };
-
 static struct {
     FLASH_LOG log;
-    RTS_UI8 *area;
-    RTS_UI32 size; /* of the area in bytes, 0: nothing is kept */
-    RTS_UI32 layout;
-    RETAIN_TABLE table;
-    RETAIN_TABLE source_table;
-    RTS_UI8 source; /* SOURCE_* */
-    bool persistent_only;
-    bool settled;          /* the variables have come through an initialisation */
-    bool saved_valid;      /* `saved_area` is what flash holds for this layout */
-    bool asked;            /* for a copy between two cycles */
-    bool failed;           /* the last save failed, and was logged */
     RTS_I64 last_check_ns; /* when the area was last found saved, or was saved */
+    RTS_UI8 *area;
+    RTS_UI32 tag; /* of its records */
+    bool failed;   /* the last save failed, and was logged */
 } retain;
+
+/* All zero without an application. */
+static struct {
+    const RETAIN_TABLE *table;
+    RETAIN_TABLE source; /* of the values in `saved_area` to begin with; size 0: there are none */
+    bool persistent_only;
+    bool settled;     /* the variables have come through an initialisation */
+    bool saved_valid; /* `saved_area` is what flash holds */
+    bool asked;       /* for a copy between two cycles */
+} kept;
 
 /* It is sized by the application's retain area, as that is. */
 enum { HAS_RETAIN = APP_RETAIN_SIZE > 0 };
@@ -50,48 +48,36 @@ RTS_UI32 RetainCapacity(void)
 
 /* ---- the variables ---- */
 
-/* Names what a table keeps, and where. */
-static RTS_UI32 layout_of(const RETAIN_TABLE *table)
-{
-    RTS_UI32 crc = 0;
-
-    (void)SysFileCRC32(table->file, table->offset, table->size, &crc);
-    return crc;
-}
-
 void RetainDetach(void)
 {
-    if (!HAS_RETAIN)
-        return;
-    retain.size = 0;
-    retain.table.size = 0;
-    retain.source = SOURCE_NONE;
-    retain.persistent_only = false;
-    retain.settled = false;
-    retain.saved_valid = false;
-    retain.asked = false;
+    if (HAS_RETAIN)
+        memset(&kept, 0, sizeof kept);
 }
 
-void RetainAttach(RTS_UI8 *area, const RETAIN_TABLE *table)
+void RetainAttach(RTS_UI8 *area, const RETAIN_TABLE *table, RTS_UI32 tag)
 {
     if (!HAS_RETAIN)
         return;
     RetainDetach();
+    kept.table = table;
     retain.area = area;
-    retain.size = table->size > 0 ? table->area_size : 0;
-    retain.table = *table;
-    retain.layout = layout_of(table);
+    retain.tag = tag;
     retain.last_check_ns = SysTimeGetNs();
 }
 
 /* ---- where values come from ---- */
+
+static bool is_of_application_before(void)
+{
+    return kept.source.size > 0 && kept.source.file != kept.table->file;
+}
 
 RTS_UI32 RetainGetSequence(void)
 {
     return HAS_RETAIN ? retain.log.sequence : 0;
 }
 
-RTS_RESULT RetainRestore(FLASH_LOG_RANGE range)
+RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range)
 {
     RTS_RESULT result;
 
@@ -99,57 +85,39 @@ RTS_RESULT RetainRestore(FLASH_LOG_RANGE range)
         return ERR_NO_OBJECT;
     if ((RTS_I32)(range.after - retain.log.sequence) > 0)
         retain.log.sequence = range.after; /* the log was lost: what is saved from now on shall count */
-    if (retain.size == 0)
+    if (table->size == 0)
         return ERR_NO_OBJECT;
-    result = FlashLogRead(&retain.log, range, retain.layout, saved_area, retain.size);
+    result = FlashLogRead(&retain.log, range, tag, saved_area, table->area_size);
     if (result != ERR_OK)
         return result;
-    retain.source = SOURCE_OWN;
-    retain.source_table = retain.table;
-    retain.saved_valid = true;
-    return ERR_OK;
-}
-
-RTS_RESULT RetainTakeOver(const RETAIN_TABLE *before, FLASH_LOG_RANGE range)
-{
-    RTS_RESULT result;
-
-    if (!HAS_RETAIN || before->size == 0)
-        return ERR_NO_OBJECT;
-    result = FlashLogRead(&retain.log, range, layout_of(before), saved_area, before->area_size);
-    if (result != ERR_OK)
-        return result;
-    retain.source = SOURCE_BEFORE;
-    retain.source_table = *before;
-    retain.persistent_only = true;
+    kept.source = *table;
+    kept.persistent_only = is_of_application_before();
+    kept.saved_valid = !kept.persistent_only;
     return ERR_OK;
 }
 
 static bool is_saved(void)
 {
-    return retain.saved_valid && memcmp(saved_area, retain.area, retain.size) == 0;
+    return kept.saved_valid && memcmp(saved_area, retain.area, kept.table->area_size) == 0;
 }
 
 static void copy(void)
 {
-    if (is_saved())
-        return;
-    retain.saved_valid = false;
-    memcpy(saved_area, retain.area, retain.size);
+    kept.saved_valid = is_saved();
+    memcpy(saved_area, retain.area, kept.table->area_size);
 }
 
 void RetainCapture(bool cold)
 {
-    if (!HAS_RETAIN || retain.size == 0)
+    if (!HAS_RETAIN)
         return;
-    retain.persistent_only = retain.persistent_only || cold;
-    if (!retain.settled)
-        return;
-    copy();
-    retain.source = SOURCE_OWN;
-    retain.source_table = retain.table;
-    retain.persistent_only = cold;
-    retain.settled = false;
+    if (kept.settled) {
+        copy();
+        kept.source = *kept.table;
+        kept.persistent_only = false;
+        kept.settled = false;
+    }
+    kept.persistent_only = kept.persistent_only || cold;
 }
 
 /* ---- putting them back ---- */
@@ -158,58 +126,63 @@ void RetainCapture(bool cold)
 typedef struct {
     RTS_UI32 offset;
     RTS_UI32 size;
-    bool kept;
+    bool found;
 } QUERY;
-
-static void put_back(const KEPT *to, RTS_UI32 place, RTS_UI32 from, RTS_UI32 size)
-{
-    memcpy(retain.area + place, saved_area + from, size);
-    memset(retain.area + place + to->size - to->text, 0, to->text); /* a string that is shorter now ends there */
-}
-
-static void ask(QUERY *query, RTS_UI32 place, RTS_UI32 size)
-{
-    if (place < query->offset + query->size && query->offset < place + size)
-        query->kept = true;
-}
 
 /* Puts the elements back that both entries have, or looks whether `query` is about one of them. */
 static void take(const KEPT *to, const KEPT *from, QUERY *query)
 {
-    RTS_UI32 size = to->size < from->size ? to->size : from->size;
-    RTS_I64 skip = (RTS_I64)to->first - from->first; /* elements that only one of them has at its beginning */
-    RTS_I64 i = skip < 0 ? -skip : 0;
+    RTS_UI32 place = KeptOffset(to);
+    RTS_UI32 number = (RTS_UI32)to->run.first - (RTS_UI32)from->run.first; /* in `from`; wraps where that has none */
+    RTS_UI32 i;
 
-    for (; i < to->count && i + skip < from->count; i++) {
-        RTS_UI32 place = to->offset + (RTS_UI32)i * to->stride;
-        if (query != NULL)
-            ask(query, place, size);
-        else
-            put_back(to, place, from->offset + (RTS_UI32)(i + skip) * from->stride, size);
+    for (i = 0; i < to->run.count; i++, number++, place += to->run.stride) {
+        if (number >= from->run.count)
+            continue;
+        if (query == NULL)
+            memcpy(retain.area + place, saved_area + KeptOffset(from) + number * from->run.stride, from->run.size);
+        else if (place - query->offset < query->size)
+            query->found = true;
     }
+}
+
+static bool is_persistent(const KEPT *entry)
+{
+    return (entry->variable.place & CDL_KEPT_PERSISTENT) != 0;
+}
+
+static int compare(const KEPT *a, const KEPT *b)
+{
+    return memcmp(a->variable.hash, b->variable.hash, CDL_KEPT_HASH_SIZE);
+}
+
+/* Whether a value that the same variable had goes into `to`. A string that is shorter now begins anew. */
+static bool is_taken(const KEPT *to, const KEPT *from)
+{
+    return compare(to, from) == 0 && to->run.size >= from->run.size && (is_persistent(to) || !kept.persistent_only);
 }
 
 /* Goes through both tables, which are in the same order. Returns the number of values taken; *dropped: those that were
  * PERSISTENT and are not taken. */
 static unsigned take_all(QUERY *query, unsigned *dropped)
 {
-    RETAIN_TABLE own = retain.table;
-    RETAIN_TABLE source = retain.source_table;
-    bool more;
+    RETAIN_TABLE own = *kept.table;
+    RETAIN_TABLE source = kept.source;
     unsigned taken = 0;
+    bool more;
     KEPT to;
     KEPT from;
 
     *dropped = 0;
     more = RetainTableNext(&own, &to) == ERR_OK;
     while (RetainTableNext(&source, &from) == ERR_OK) {
-        while (more && memcmp(to.hash, from.hash, sizeof to.hash) < 0)
+        while (more && compare(&to, &from) < 0)
             more = RetainTableNext(&own, &to) == ERR_OK;
-        if (more && memcmp(to.hash, from.hash, sizeof to.hash) == 0 && (to.persistent || !retain.persistent_only)) {
+        if (more && is_taken(&to, &from)) {
             take(&to, &from, query);
             taken++;
-        } else {
-            *dropped += from.persistent;
+        } else if (is_persistent(&from)) {
+            ++*dropped;
         }
     }
     return taken;
@@ -220,12 +193,12 @@ void RetainPutBack(void)
     unsigned dropped;
     unsigned taken;
 
-    if (!HAS_RETAIN || retain.source == SOURCE_NONE)
+    if (!HAS_RETAIN || kept.source.size == 0)
         return;
     taken = take_all(NULL, &dropped);
-    if (retain.source == SOURCE_BEFORE)
+    if (is_of_application_before())
         LogAdd(CMPID_CmpRetain, dropped > 0 ? LOG_WARNING : LOG_INFO, ERR_OK,
-               "PERSISTENT values of the program before: %u taken over, %u dropped", taken, dropped);
+               "PERSISTENT values: %u taken over, %u dropped", taken, dropped);
 }
 
 static RTS_UI8 ieckept(const RTS_UI8 *address, RTS_UI32 size)
@@ -233,9 +206,8 @@ static RTS_UI8 ieckept(const RTS_UI8 *address, RTS_UI32 size)
     QUERY query = {(RTS_UI32)((uintptr_t)address - (uintptr_t)retain.area), size, false};
     unsigned dropped;
 
-    if (retain.source != SOURCE_NONE)
-        (void)take_all(&query, &dropped);
-    return query.kept;
+    (void)take_all(&query, &dropped);
+    return query.found;
 }
 
 static const CMP_EXT_FUNCTION externals[] = {
@@ -246,12 +218,12 @@ static const CMP_EXT_FUNCTION externals[] = {
 
 static RTS_RESULT save_copy(void)
 {
-    RTS_RESULT result = FlashLogAppend(&retain.log, retain.layout, saved_area, retain.size);
+    RTS_RESULT result = FlashLogAppend(&retain.log, retain.tag, saved_area, kept.table->area_size);
 
     if (result != ERR_OK && !retain.failed)
         LogAdd(CMPID_CmpRetain, LOG_ERROR, result, "Retain variables cannot be saved");
     retain.failed = result != ERR_OK;
-    retain.saved_valid = result == ERR_OK;
+    kept.saved_valid = result == ERR_OK;
     retain.last_check_ns = SysTimeGetNs();
     return result;
 }
@@ -260,12 +232,12 @@ RTS_RESULT RetainSave(bool always)
 {
     if (!HAS_RETAIN)
         return ERR_OK;
-    retain.asked = false;
-    if (retain.size == 0 || (!always && (!retain.settled || is_saved())))
-        return ERR_OK;
-    if (retain.settled)
+    kept.asked = false;
+    if (kept.settled)
         copy();
-    else if (retain.source != SOURCE_OWN)
+    else if (kept.source.size == 0)
+        always = false;
+    if (!always && (!kept.settled || kept.saved_valid))
         return ERR_OK;
     retain.failed = false; /* a stop that loses them is said, also after saves in between that failed */
     return save_copy();
@@ -273,9 +245,9 @@ RTS_RESULT RetainSave(bool always)
 
 void RetainSettle(bool failed)
 {
-    if (!HAS_RETAIN || (failed && retain.source != SOURCE_BEFORE))
+    if (!HAS_RETAIN || (failed && !is_of_application_before()))
         return;
-    retain.settled = true;
+    kept.settled = kept.table->size > 0;
     (void)RetainSave(false);
 }
 
@@ -294,9 +266,9 @@ void RetainKeepNone(void)
 /* Whether a copy is wanted. */
 static bool is_due(void)
 {
-    if (retain.asked)
+    if (kept.asked)
         return true;
-    if (retain.size == 0 || !retain.settled || SysTimeGetNs() - retain.last_check_ns < SAVE_NS)
+    if (!kept.settled || SysTimeGetNs() - retain.last_check_ns < SAVE_NS)
         return false;
     if (!is_saved())
         return true;
@@ -304,13 +276,18 @@ static bool is_due(void)
     return false;
 }
 
+static void take_copy(void)
+{
+    memcpy(saved_area, retain.area, kept.table->area_size);
+}
+
 static void save_when_due(void)
 {
     if (!is_due())
         return;
-    retain.saved_valid = false;
-    retain.asked = !IecTaskSnapshot(saved_area, retain.area, retain.size);
-    if (!retain.asked)
+    kept.saved_valid = false;
+    kept.asked = !IecTaskBetweenCycles(take_copy);
+    if (!kept.asked)
         (void)save_copy();
 }
 
@@ -327,8 +304,10 @@ RTS_RESULT CmpRetain_Hook(CMP_HOOK hook)
 {
     if (!HAS_RETAIN)
         return ERR_OK;
-    if (hook == CH_INIT)
+    if (hook == CH_INIT) {
         CMP_CLEAR(retain);
+        CMP_CLEAR(kept);
+    }
     if (hook == CH_INIT2)
         open_log();
     if (hook == CH_INIT3)

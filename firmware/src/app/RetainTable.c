@@ -5,8 +5,6 @@
  */
 #include "RetainTable.h"
 
-#include <string.h>
-
 #include "SysFileFlash.h"
 
 static RTS_RESULT read_part(RETAIN_TABLE *table, void *data, RTS_UI32 size)
@@ -22,43 +20,31 @@ static RTS_RESULT read_part(RETAIN_TABLE *table, void *data, RTS_UI32 size)
 
 static bool fits(const KEPT *kept, RTS_UI32 area_size)
 {
-    RTS_UI32 last = area_size - kept->size; /* where an element may begin */
+    const CDL_KEPT_RUN *run = &kept->run;
+    RTS_UI64 begin = KeptOffset(kept);
 
-    if (kept->size == 0 || kept->size < kept->text || kept->size > area_size || kept->offset > last)
+    if (run->size == 0 || run->count == 0 || run->stride < run->size)
         return false;
-    if (kept->count == 0 || kept->stride < kept->size)
-        return false;
-    return (RTS_UI64)(kept->count - 1) * kept->stride <= last - kept->offset;
+    return begin + (RTS_UI64)(run->count - 1) * run->stride + run->size <= area_size;
 }
 
 RTS_RESULT RetainTableNext(RETAIN_TABLE *table, KEPT *kept)
 {
-    CDL_KEPT_RUN run = {0, 0, 1, 0};
-    CDL_KEPT entry;
-    RTS_UI32 shape;
     RTS_RESULT result;
 
     if (table->size == 0)
         return ERR_NO_OBJECT;
-    result = read_part(table, &entry, sizeof entry);
+    result = read_part(table, &kept->variable, sizeof kept->variable);
     if (result != ERR_OK)
         return result;
-    shape = entry.place & CDL_KEPT_SHAPE;
-    kept->text = 0;
-    if ((entry.place & CDL_KEPT_IS_RUN) != 0) {
-        result = read_part(table, &run, sizeof run);
-        kept->text = shape;
+    if ((kept->variable.place & CDL_KEPT_IS_RUN) != 0) {
+        result = read_part(table, &kept->run, sizeof kept->run);
     } else {
-        run.size = run.stride = (RTS_UI16)(1u << shape);
+        kept->run.size = kept->run.stride = (RTS_UI16)(1u << (kept->variable.place & CDL_KEPT_SHAPE));
+        kept->run.count = 1;
+        kept->run.first = 0;
     }
-    memcpy(kept->hash, entry.hash, sizeof kept->hash);
-    kept->persistent = (entry.place & CDL_KEPT_PERSISTENT) != 0;
-    kept->offset = entry.place >> CDL_KEPT_OFFSET_SHIFT;
-    kept->size = run.size;
-    kept->stride = run.stride;
-    kept->count = run.count;
-    kept->first = run.first;
-    if (result != ERR_OK)
-        return result;
-    return fits(kept, table->area_size) ? ERR_OK : (RTS_RESULT)ERR_OUT_OF_LIMITS;
+    if (result == ERR_OK && !fits(kept, table->area_size))
+        result = ERR_OUT_OF_LIMITS;
+    return result;
 }

@@ -59,7 +59,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], len(lowered.imports))
     symbols = _symbols(program, lowered, linked, target, info.project)
     kept = kept_parts(v for v in program.globals if v.area is Area.RETAIN)
-    symbols.kept = [KeptName(part.name, part.type, part.persistent) for part in kept]
+    symbols.kept = [KeptName(part.name, part.type, part.persistent, part.size) for part in kept]
     image = Image(
         device_id=int(getattr(lib, target.device_id)),
         code=linked.code,

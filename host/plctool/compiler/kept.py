@@ -35,15 +35,13 @@ _WIDEST = 0xFFFF  # bytes: of CDL_KEPT_RUN.size and .stride
 @dataclass(frozen=True)
 class KeptPart:
     """A part of a variable that is kept, or the same part of all elements of an array. `name`: with `[]` for those;
-    `type`: as far as a kept value depends on it; `size`, `stride`, `offset` [bytes]; `text`: bytes of a character, 0
-    when it is no text."""
+    `type`: as far as a kept value depends on it; `size`, `stride`, `offset` [bytes]."""
 
     name: str
     type: str
     offset: int
     size: int
     persistent: bool
-    text: int = 0
     stride: int = 0
     count: int = 1
     first: int = 0
@@ -84,14 +82,14 @@ def kept_variables(parts: Iterable[KeptPart]) -> list[KeptVariable]:
             raise UsageError(f"{part.name} and {other.name} look alike to the device; rename one of them.", "kept-name")
     return [
         KeptVariable(
-            key, p.offset, p.size, p.persistent, p.text, p.stride or p.size, p.count, p.first, _is_run(p)
+            key, p.offset, p.size, p.persistent, p.stride or p.size, p.count, p.first, _is_run(p)
         )
         for key, p in sorted(found.items())
     ]  # fmt: skip
 
 
 def _is_run(part: KeptPart) -> bool:
-    return part.is_array or part.text > 0 or part.size not in (1, 2, 4, 8)
+    return part.is_array or part.size not in (1, 2, 4, 8)
 
 
 def _hash(part: KeptPart) -> bytes:
@@ -107,8 +105,7 @@ def _parts(t: Type, keep: Keep) -> Iterator[KeptPart]:
             for part in _parts(f.type, keep.of_member(f.keep)) if _is_data(f) else ():
                 yield replace(part, name=f".{f.name}{part.name}", offset=f.offset + part.offset)
     elif keep.kept and not _has_address(t):
-        text = t.unit if isinstance(t, StringType) else 0
-        yield KeptPart("", _type_text(t), 0, t.size, keep is Keep.PERSISTENT, text)
+        yield KeptPart("", _type_text(t), 0, t.size, keep is Keep.PERSISTENT)
 
 
 def _is_data(field: Field) -> bool:
@@ -142,8 +139,8 @@ def _has_address(t: Type) -> bool:
 
 
 def _type_text(t: Type) -> str:
-    """What has to be the same for a value to mean the same. The length of a string may change, and the names of an
-    enumeration's values; the limits of a subrange may not, because a value could be outside."""
+    """What has to be the same for a value to mean the same. A string may become longer, and the values of an
+    enumeration may get other names; the limits of a subrange may not change, because a value could be outside."""
     if isinstance(t, StringType):
         return t.keyword
     if isinstance(t, EnumType):

@@ -18,6 +18,7 @@ WARNINGS = {
     "bits": "a BYTE, WORD, DWORD or LWORD is taken for an unsigned number where a REAL is needed",
     "case": "a CASE about an enumeration has no ELSE and misses some of its values",
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration",
+    "kept": "a variable is RETAIN or PERSISTENT, but what it holds is an address, which is not kept",
     "layout": "a type takes more memory than it does in other systems",
     "lifetime": "an instance of a function block lives for one call only, and starts anew in the next one",
     "narrowing": "an integer or an LREAL goes where not all of its values fit",

@@ -132,6 +132,7 @@ class Blocks:
                     info.members[alias.casefold()] = symbol
                 if t is ERROR:
                     continue
+                self._variables.check_kept(name, t, keep, scope, offset)
                 reference = role is Role.IN_OUT
                 storage = Storage.REFERENCE if reference else Storage.SELF
                 symbol.variable = Variable(name, t, storage, symbol.pos, initial=None if reference else default)

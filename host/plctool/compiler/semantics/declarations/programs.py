@@ -133,6 +133,7 @@ class Programs:
                 symbol.used = direction is not None or line.location is not None
                 if not scope.declare(symbol, offset) or t is ERROR:
                     continue
+                self._variables.check_kept(name, t, own, scope, offset)
                 full_name = f"{info.name}.{name}"
                 location = self._variables.address(line.location, t, symbol.pos, full_name)
                 wanted = own if location is not None else keep

@@ -134,6 +134,7 @@ class UnitVariables:
                     owner = scope.pou.name if scope.pou is not None and decl.keyword == "METHOD" else decl.name
                     full_name = f"{owner}.{name}"
                     keep = Keep.of(block.qualifiers)
+                    self._variables.check_kept(name, t, keep, scope, offset)
                     symbol.variable = self._variables.shared_variable(full_name, t, init, scope, offset, keep=keep)
                 scope.declare(symbol, offset)
 

@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from plctool.compiler.kept import is_kept
 from plctool.compiler.semantics.addresses import is_open, located
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
@@ -106,6 +107,7 @@ class Variables:
             if t is not ERROR:
                 location = self.address(symbol.decl.location, t, result.pos, symbol.full_name, symbol.name)
                 keep = Keep.of(symbol.qualifiers)
+                self.check_kept(symbol.name, t, keep, scope, symbol.pos)
                 result.variable = self.area_variable(symbol.full_name, t, init, location, keep, scope, symbol.pos)
                 if result.variable is not None:
                     self._world.allocation.add(result.variable)
@@ -142,6 +144,12 @@ class Variables:
         if location is not None:
             return located(name, t, init, location, scope, offset)
         return Variable(name, t, Storage.AREA, pos, self._area(t, keep), initial=init, keep=keep)
+
+    def check_kept(self, name: str, t: Type, keep: Keep, scope: Scope, offset: int) -> None:
+        """Warns of a variable of which nothing is kept though its section says so."""
+        if keep.kept and t is not ERROR and not is_kept(t, keep):
+            message = f"{name} holds an address, which means nothing after a start: it is not kept"
+            scope.warning(offset, "kept", message)
 
     def _area(self, t: Type, keep: Keep) -> Area:
         return Area.RETAIN if keep.kept or self.is_retain(t) else Area.DATA

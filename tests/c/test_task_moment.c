@@ -1,5 +1,5 @@
 /*
- * test_task_snapshot.c - the retain area is copied as it is at a moment between the cycles of all tasks, also when these
+ * test_task_moment.c - the retain area is copied as it is at a moment between the cycles of all tasks, also when these
  * never pause together.
  *
  * SPDX-License-Identifier: Apache-2.0
@@ -105,6 +105,11 @@ static void fill_part(const IEC_CONTEXT *context)
     }
 }
 
+static void copy_area(void)
+{
+    memcpy(copied, area, sizeof area);
+}
+
 static void *run_task(void *index)
 {
     me = (RTS_UI32)(uintptr_t)index;
@@ -150,7 +155,7 @@ static bool copy_now(void)
     RTS_UI32 tries;
 
     for (tries = 0; tries < 100000; tries++) {
-        if (IecTaskSnapshot(copied, area, sizeof area))
+        if (IecTaskBetweenCycles(copy_area))
             return true;
         SysTimePause();
     }
@@ -210,7 +215,7 @@ static void a_copy_of_stopped_tasks_is_taken_at_once(void)
     CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
     CHECK(IecTaskCreateAll(records, TASKS, &context) == ERR_OK);
     memset(area, 7, sizeof area);
-    CHECK(IecTaskSnapshot(copied, area, sizeof area));
+    CHECK(IecTaskBetweenCycles(copy_area));
     CHECK(memcmp(copied, area, sizeof area) == 0);
 }
 
@@ -227,17 +232,17 @@ static void what_runs_is_waited_for(void)
     me = 0;
     guard_begin(&tasks.list[0].guard, 0);
     memset(copied, 0xEE, sizeof copied);
-    CHECK(!IecTaskSnapshot(copied, area, sizeof area));
-    CHECK(!IecTaskSnapshot(copied, area, sizeof area));
+    CHECK(!IecTaskBetweenCycles(copy_area));
+    CHECK(!IecTaskBetweenCycles(copy_area));
     CHECK(copied[0] == 0xEE);
     guard_end(&tasks.list[0].guard);
     memset(area, 77, sizeof area);
     CHECK(IecTaskCycle(0, SysTimeGetNs()) == 1); /* takes it before it begins */
     CHECK(copied[0] == 77 && copied[AREA_SIZE - 1] == 77);
     CHECK(IecTaskCycle(0, SysTimeGetNs()) == 1);
-    CHECK(IecTaskSnapshot(copied, area, sizeof area));
+    CHECK(IecTaskBetweenCycles(copy_area));
     CHECK(copied[0] == 77);
-    CHECK(IecTaskSnapshot(copied, area, sizeof area)); /* another one */
+    CHECK(IecTaskBetweenCycles(copy_area)); /* another one */
     CHECK(copied[0] == area[0] && area[0] != 77);
 }
 
@@ -245,7 +250,7 @@ static void stopping_calls_a_copy_off(void)
 {
     what_runs_is_waited_for();
     guard_begin(&tasks.list[0].guard, 0);
-    CHECK(!IecTaskSnapshot(copied, area, sizeof area));
+    CHECK(!IecTaskBetweenCycles(copy_area));
     guard_end(&tasks.list[0].guard);
     IecTaskStopAll();
     memset(copied, 0xEE, sizeof copied);
@@ -253,8 +258,47 @@ static void stopping_calls_a_copy_off(void)
     CHECK(copied[0] == 0xEE);
 }
 
+static RTS_UI32 interruptions;
+
+/* The copy, and a task that comes in the middle of it. */
+static void copy_interrupted(void)
+{
+    memcpy(copied, area, sizeof area / 2);
+    if (interruptions > 0) {
+        interruptions--;
+        CHECK(IecTaskCycle(0, SysTimeGetNs()) == 1);
+        memset(area, area[0], sizeof area);
+    }
+    memcpy(copied + sizeof area / 2, area + sizeof area / 2, sizeof area / 2);
+}
+
+static void a_cycle_that_interrupts_the_copy_spoils_it(void)
+{
+    IEC_CONTEXT context = {0};
+    RTS_UI32 i;
+
+    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
+    context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)fill_part;
+    CHECK(IecTaskCreateAll(records, 1, &context) == ERR_OK);
+    CHECK(IecTaskStartAll() == ERR_OK);
+    length[0] = 0;
+    me = 0;
+    for (i = 0; i < 20; i++) {
+        interruptions = i;
+        while (!IecTaskBetweenCycles(copy_interrupted))
+            ;
+        CHECK(interruptions == 0);
+        CHECK(memcmp(copied, area, sizeof area) == 0);
+    }
+    IecTaskStopAll();
+}
+
 int main(void)
 {
+    if (RTS_ONE_CORE) { /* there tasks interrupt each other */
+        RUN(a_cycle_that_interrupts_the_copy_spoils_it);
+        return test_result();
+    }
     RUN(tasks_that_never_pause_are_not_torn);
     RUN(a_short_task_goes_on_while_a_long_one_runs);
     RUN(a_copy_of_stopped_tasks_is_taken_at_once);
