@@ -133,7 +133,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     reset = command("reset", _reset, "reset the program; it is stopped afterwards")
     reset.add_argument(
         "option", choices=["warm", "cold", "origin"],
-        help="warm keeps RETAIN variables, cold initialises them too, origin deletes the program",
+        help="warm keeps RETAIN variables, cold only PERSISTENT ones, origin deletes the program",
     )  # fmt: skip
     _add_link(reset)
     _add_link(command("tasks", _tasks, "show the times of the tasks"))

@@ -197,7 +197,7 @@ class Plc:
         services.stop(self._session)
 
     def reset(self, option: str = "warm") -> None:
-        """Stops it; `warm` keeps retain variables, `cold` initialises them too, `origin` deletes the application."""
+        """Stops it; `warm` keeps RETAIN variables, `cold` only PERSISTENT ones, `origin` deletes the application."""
         if option not in RESET_OPTIONS:
             raise UsageError(f"There is no reset '{option}'; choose one of {', '.join(RESET_OPTIONS)}.", "bad-reset")
         services.reset(self._session, RESET_OPTIONS[option])
