@@ -135,9 +135,7 @@ def guest_program(runner: Runner, guest: Path, built: BuildResult, folder: Path)
 
 def twin_flash(runner: Runner, twin: Path, optimisation: str, folder: Path) -> int:
     """Bytes of code and constants of the twin alone, without what it takes from libraries."""
-    target = folder / "twin.o"
-    flags = [flag for flag in runner.flags if not flag.startswith("-Wl,")]
-    subprocess.run([runner.compiler, *flags, *C_FLAGS, optimisation, "-c", "-o", target, twin], check=True)
+    target = runner.compile_object(folder, twin, *C_FLAGS, optimisation)
     size = shutil.which("arm-none-eabi-size") or "size"
     return int(
         subprocess.run([size, target], check=True, capture_output=True, text=True).stdout.split("\n")[1].split()[0]

@@ -17,6 +17,7 @@ SHARED = [
     "CompactDownload.h",
     "CmpIecAbi.h",
     "SysExcept.h",
+    "SysStart.h",
     "CmpAppEmbedded.h",
     "CmpIecTask.h",
     "CmpLog.h",

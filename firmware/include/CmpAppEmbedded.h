@@ -13,6 +13,7 @@
 #include "CmpErrors.h"
 #include "CmpIecAbi.h"
 #include "CmpStd.h"
+#include "SysStart.h"
 #include "rts_config.h"
 #ifndef RTS_CFFI
 #include "CmpItf.h"
@@ -49,8 +50,6 @@ enum {
 
 enum { APP_NAME_SIZE = 60 }; /* with NUL */
 
-#define APP_NO_CODE_OFFSET 0xFFFFFFFFu
-
 /* The last exception; code RTSEXCPT_NOEXCEPTION when there is none. */
 typedef struct {
     RTS_UI32 code;
@@ -73,6 +72,13 @@ typedef struct {
     char text[APP_REFUSAL_SIZE];
 } APP_REFUSAL;
 
+#ifndef RTS_CFFI
+/* Writes why, and returns `result`. A macro, so that sentences that are never sent take no flash. */
+#define APP_REFUSE(refusal, result, ...)                                                                               \
+    (APP_REFUSAL_TEXT_SIZE > 1 ? AppRefuse(refusal, result, __VA_ARGS__) : (RTS_RESULT)(result))
+RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...);
+#endif
+
 /*
  * Download. Begin opens the idle slot (erases lazily, sector by sector), Write appends, End checks everything
  * and, only when all is well, commits the slot, stops the old application and loads the new one (state AS_STOP).
@@ -88,6 +94,7 @@ RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
 RTS_UI32 AppDownloadOffset(void); /* bytes received so far; a broken transfer continues here */
 /* Whether the download that has begun is that of this image. It outlives the channel it came through. */
 bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc);
+bool AppDownloadIsOpen(void);
 RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal);
 void AppDownloadAbort(void);
 

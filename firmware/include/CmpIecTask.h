@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A cycle is: read inputs, IEC code, write outputs, statistics, watchdog (manual 3.4, 3.5). CmpScheduleTimer decides
- * when.
+ * A cycle is: copy the inputs and outputs that others use too, IEC code, copy the changed outputs back, statistics,
+ * watchdog (manual 3.4, 3.5, 8.9), events for other tasks. CmpScheduleTimer decides when.
  */
 #ifndef CMPIECTASK_H
 #define CMPIECTASK_H
@@ -30,7 +30,7 @@ typedef struct {
     RTS_UI32 min_us;
     RTS_UI32 max_us;
     RTS_UI32 jitter_us;
-    RTS_UI32 overruns; /* due times missed because the cycle before took too long */
+    RTS_UI32 overruns; /* due times missed because the cycle before took too long; of events, those that were lost */
 } IEC_TASK_INFO;
 
 /* Replaces all tasks by the `count` given (0 deletes them); called by the loader from main while no task runs. The

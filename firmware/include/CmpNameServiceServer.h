@@ -8,7 +8,7 @@
 
 #include "CmpRouterEmbedded.h"
 
-/* Called by the router for a packet of service ROUTER_SVC_NAME_REQUEST. */
+/* ROUTER_HANDLER of service ROUTER_SVC_NAME_REQUEST. */
 void NSHandleRequest(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size);
 
 RTS_RESULT CmpNameServiceServer_Hook(CMP_HOOK hook);

@@ -12,10 +12,10 @@
 #include "CmpSrvNumbers.h"
 #include "rts_config.h"
 
-/* Counts what happened on one of the layers 2 to 4, if anybody wants to know. */
+/* Counts what happened on one of the layers 2 to 4, for tests and debuggers. */
 #define COMM_COUNT(counter) ((void)(COMM_COUNTERS && ++(counter)))
 
-/* A packet to send, in pieces, so that nobody has to assemble it in a buffer of his own. */
+/* A packet to send, in pieces, so that no layer has to assemble it in a buffer of its own. */
 typedef struct {
     const RTS_UI8 *data;
     RTS_UI32 size;
@@ -49,6 +49,17 @@ typedef struct {
     RTS_UI32 not_for_us;  /* other receiver, relative address, hop count 0 */
     RTS_UI32 ignored;     /* signals, notifications, services a leaf does not offer */
 } ROUTER_COUNTERS;
+
+/* Takes the payload of a packet; valid during the call only. */
+typedef void (*ROUTER_HANDLER)(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size);
+
+/* The services of this node, a table in CommServices.c: it takes no RAM, and the router knows none of them by name. */
+typedef struct {
+    RTS_UI8 number; /* ROUTER_SVC_* */
+    ROUTER_HANDLER handler;
+} ROUTER_SERVICE;
+extern const ROUTER_SERVICE RouterServices[];
+extern const RTS_UI32 RouterServiceCount;
 
 /* Called by a block driver for each packet whose check sum was right. `data` may be reused when it returns. */
 void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size);

@@ -3,9 +3,14 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A cyclic task runs in the context of its own SysTimer. Event tasks (rising edge of their BOOL), external event tasks
- * and freewheeling tasks run in main, in CH_COMM_CYCLE, in the order of their priority. With CmpScheduleEmbedded.c in
- * place of CmpScheduleTimer.c cyclic tasks do so too: the super loop of a device without a timer to spare.
+ * A cyclic task runs in the context of its own SysTimer. Tasks that wait for an event (the rising edge of a BOOL, or an
+ * external event) do so too on ports with SCHED_EVENTS_IN_TIMERS, freewheeling tasks with SCHED_FREEWHEELING_IN_TIMERS;
+ * elsewhere these run in main, in CH_COMM_CYCLE, in the order of their priority. With CmpScheduleEmbedded.c in place of
+ * CmpScheduleTimer.c cyclic tasks do so too: the super loop of a device without a timer to spare.
+ *
+ * A variable is looked at when a cycle of any task has ended, when inputs were read, and in each pass of main, which is
+ * for what communication wrote. So each change from FALSE to TRUE that a cycle leaves behind is one run of the task that
+ * waits for it, and changes within a cycle do not count. SCHED_MAX_WAITING_EVENTS of them may wait for the task.
  */
 #ifndef CMPSCHEDULETIMER_H
 #define CMPSCHEDULETIMER_H
@@ -19,11 +24,21 @@
  * Called by CmpIecTask from main. ERR_NOMEMORY when the port has no timer left. */
 RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas);
 
-/* Called by CmpIecTask from main. After SchedStop has returned no task is in its cycle. */
+/* Called by CmpIecTask from main. After SchedStop has returned no task is in its cycle: one that is in it for longer than
+ * SCHED_STOP_US is broken out of it, with RTSEXCPT_STOP_TIMEOUT. */
 RTS_RESULT SchedStart(void);
 void SchedStop(void);
 
-/* How many due times of a task were skipped since SchedCreateTasks, because a cycle took too long. From main. */
+/* The runtime is about to end: application code that still runs SCHED_STOP_US later, tasks and initialisation, is broken
+ * out of like that. For good; from any context, signal handlers too. */
+void SchedRequestEnd(void);
+
+/* Looks at the variables of event tasks. From any context, when they may have changed: CmpIecTask calls it at the end
+ * of each cycle; who copies inputs calls it afterwards. */
+void SchedNoteEvents(void);
+
+/* How many due times of a task were skipped since SchedCreateTasks, because a cycle took too long, or events lost,
+ * because too many waited. From main. */
 RTS_UI32 SchedGetOverruns(RTS_UI32 task);
 
 /* One pass over the tasks that run in main; part of CH_COMM_CYCLE. */
@@ -32,20 +47,22 @@ void SchedBackgroundCycle(void);
 bool SchedHasBackgroundTasks(void);
 
 /*
- * External events. A KIND_EXTERNAL task runs once for each post of the event that has the task's name. Register and
- * unregister from main (CH_INIT3, CH_EXIT3); `result` may be NULL. RTS_INVALID_HANDLE with ERR_NOMEMORY or
- * ERR_DUPLICATE.
+ * External events. A KIND_EXTERNAL task runs once for each post of the event it names. Register and unregister from main
+ * (CH_INIT3, CH_EXIT3); `result` may be NULL. RTS_INVALID_HANDLE with ERR_NOMEMORY or ERR_DUPLICATE.
  */
 RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result);
 RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE event);
 /* From any context, interrupts too. ERR_INVALID_HANDLE when it is not registered. */
 RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event);
+/* Whether an event is registered whose name has this CRC-32, see CDL_TASK. From main. */
+bool SchedHasExternalEvent(RTS_UI32 id);
 
 /*
  * Breaks IEC code that runs for too long: longer than watchdog time * sensitivity of its task, or than
- * APP_DEFAULT_WATCHDOG_US when it has no watchdog. The port calls it every few milliseconds from a context that
- * preempts every task and main (a timer interrupt above all tasks, a thread); `now_ns` is SysTimeGetNs. A cycle that
- * another one holds up is not charged for that time, as far as these calls can tell.
+ * APP_DEFAULT_WATCHDOG_US when it has no watchdog; and code that holds up a stop. The port calls it every few
+ * milliseconds from a context that preempts every task and main (a timer interrupt above all tasks, a thread); `now_ns`
+ * is SysTimeGetNs. A cycle that another one holds up is not charged for that time, as far as these calls can tell; with
+ * SCHED_PROCESSOR_TIME only for the time it had a processor.
  */
 void SchedWatchdogCheck(RTS_I64 now_ns);
 

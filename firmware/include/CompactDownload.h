@@ -130,11 +130,29 @@ typedef struct {
 enum {
     CDL_BLOB_TASKS = 1,  /* array of CDL_TASK */
     CDL_BLOB_RETAIN = 2, /* what is kept: CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes */
+    CDL_BLOB_EVENTS = 3, /* names of the external events tasks wait for, each with NUL; for whoever reads the image */
+    CDL_BLOB_IMAGES = 16, /* CDL_IMAGE for inputs and outputs of each task; those it lacks work on the shared areas */
 };
+
+/* What a task uses of the inputs or of the outputs, in units of CDL_IMAGE_UNIT bytes, so that parts that do not overlap
+ * have no word in common. count 0: nothing, or the task has to work on the shared area, because the program keeps
+ * addresses in it. */
+enum { CDL_IMAGE_UNIT = 8 };
+enum {
+    CDL_IMAGE_WRITTEN = 1, /* the task changes some of them */
+    CDL_IMAGE_SHARED = 2,  /* another task uses some of them too */
+};
+typedef struct {
+    RTS_UI16 first;
+    RTS_UI16 count;
+    RTS_UI32 flags; /* CDL_IMAGE_* */
+} CDL_IMAGE;
 
 enum { CDL_TASK_NAME_SIZE = 32 };
 
-/* A task. `kind` is KIND_* of CmpIecTask.h. A KIND_EXTERNAL task runs on the external event that has its name. */
+/* A task. `kind` is KIND_* of CmpIecTask.h. A KIND_EVENT task runs when the byte at `event_offset` of `event_area`, without
+ * the bits `event_ignored`, was 0 and is so no more; a KIND_EXTERNAL task on the external event whose
+ * name has the CRC-32 `event_offset`. */
 typedef struct {
     RTS_UI32 interval_us; /* cyclic tasks */
     RTS_UI32 watchdog_us; /* 0: none */
@@ -142,8 +160,9 @@ typedef struct {
     RTS_UI8 priority; /* 0 highest .. 31 */
     RTS_UI8 kind;
     RTS_UI32 entry_offset; /* of the task's code in the code segment */
-    RTS_UI16 event_area;   /* event tasks: the BOOL that triggers; APP_AREA_NONE otherwise */
-    RTS_UI16 reserved;
+    RTS_UI16 event_area;   /* event tasks; APP_AREA_NONE otherwise */
+    RTS_UI8 event_ignored; /* the other bits of the byte, when the event is one of them */
+    RTS_UI8 reserved;
     RTS_UI32 event_offset;
     char name[CDL_TASK_NAME_SIZE]; /* NUL-terminated */
 } CDL_TASK;
@@ -200,6 +219,7 @@ RTS_STATIC_ASSERT(sizeof(FUNCTION_INFO) == 20, function_info_is_20_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_TASK) == 56, cdl_task_is_56_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_KEPT) == 12, cdl_kept_is_12_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_KEPT_RUN) == 12, cdl_kept_run_is_12_bytes);
+RTS_STATIC_ASSERT(sizeof(CDL_IMAGE) == 8, cdl_image_is_8_bytes);
 #endif
 
 #endif

@@ -64,6 +64,7 @@ enum {
     RTSEXCPT_LICENSE_INVALID = 0x100D0001,
     RTSEXCPT_WATCHDOG_OMITTED_CYCLE = 0x1000,
     RTSEXCPT_VENDOR_EXCEPTION_BASE = 0x2000,
+    RTSEXCPT_STOP_TIMEOUT = 0x2001, /* was in its cycle for too long after a stop, and broken out of it */
 };
 
 typedef struct {
@@ -111,6 +112,10 @@ void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack);
  */
 void SysExceptBreak(const void *arg, RTS_UI32 code);
 
+/* Processor time that the context has used so far which runs SysExceptTry with `arg` [ns]; -1 when none does. Only
+ * differences count. Called by the watchdog of ports with SCHED_PROCESSOR_TIME. */
+RTS_I64 SysExceptGetUsedNs(const void *arg);
+
 /* Gives back what catching took from the process (signal handlers); the next SysExceptTry takes it again. From main,
  * when no SysExceptTry runs. Empty on bare metal. */
 void SysExceptShutdown(void);
@@ -120,6 +125,8 @@ void SysExceptShutdown(void);
 /* Where the code of the application lies; size 0: there is none. From main, while no IEC code runs. */
 void SysExceptCodeRange(const RTS_UI8 *start, RTS_UI32 size);
 bool SysExceptIsCode(uintptr_t address);
+/* The offset in it of an address for which SysExceptIsCode is true. */
+RTS_UI32 SysExceptCodeOffset(uintptr_t address);
 
 /* Whether a word may be an address that a call in the application's code returns to. */
 bool SysExceptIsReturn(uintptr_t word);

@@ -11,6 +11,9 @@
 /* Monotonic time in ns since start-up, never going back, resolution 1 us or better. From any context, below 1 us. */
 RTS_I64 SysTimeGetNs(void);
 
+/* Processor time the calling context has used so far [ns]; only differences count. Ports with SCHED_PROCESSOR_TIME. */
+RTS_I64 SysTimeGetUsedNs(void);
+
 /* Milliseconds of the same clock; wraps after 49 days, so compare differences only. */
 RTS_UI32 SysTimeGetMs(void);
 

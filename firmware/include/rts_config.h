@@ -51,6 +51,26 @@
 #define APP_MEMORY_SIZE 256
 #endif
 
+/* 1: the port gives the memory of the areas (SysMem.h), to keep programs from writing beyond them. 0: a variable. */
+#ifndef APP_AREAS_FROM_PORT
+#define APP_AREAS_FROM_PORT 0
+#endif
+
+/* RAM for the tasks' own copies of the inputs and outputs that they share, bytes: a task takes as many as it uses of
+ * them, rounded to 8, and once more as many of what it writes. An application that needs more is refused. The
+ * default holds any application that does not write inputs. 0: no copies, 500 bytes of flash less; only where tasks do
+ * not interrupt each other (CmpScheduleEmbedded). */
+#ifndef APP_IMAGE_SIZE
+#define APP_IMAGE_SIZE (APP_MAX_TASKS * (APP_INPUT_SIZE + 2 * APP_OUTPUT_SIZE))
+#endif
+
+/* 1: main runs beside the tasks (threads, several cores), so that a task has copies also of what it uses alone, and
+ * what is written from the PC neither changes within its cycle nor gets lost. 0: main is interrupted by the tasks, or
+ * calls them. */
+#ifndef APP_IMAGE_ALWAYS
+#define APP_IMAGE_ALWAYS (!RTS_ONE_CORE)
+#endif
+
 /* A new application has proven itself after running this long without an exception [us]; before that a restart may roll
  * back to the one before it. */
 #ifndef APP_PROVE_US
@@ -61,6 +81,53 @@
  * endless loop never takes the device away. */
 #ifndef APP_DEFAULT_WATCHDOG_US
 #define APP_DEFAULT_WATCHDOG_US 10000000
+#endif
+
+/* Initialisation code is broken out of after this long [us]: communication waits for it, and so does a reset. */
+#ifndef APP_INIT_WATCHDOG_US
+#define APP_INIT_WATCHDOG_US APP_DEFAULT_WATCHDOG_US
+#endif
+
+/* No cycle takes longer than this, whatever WATCHDOG and SENSITIVITY of its task say [us]; 0: no such limit. For ports
+ * where tasks hold up main, and with it communication and every stop. */
+#ifndef APP_MAX_CYCLE_US
+#define APP_MAX_CYCLE_US 0
+#endif
+
+/* A task that is in its cycle so long after a stop, a reset, a download or the end of the runtime was asked for is
+ * broken out of it [us]: with the code that runs at the end (FB_Exit) it stays within a second. Only where tasks run
+ * beside main (RTS_ONE_CORE 0); where they interrupt it, none runs when main stops them. */
+#ifndef SCHED_STOP_US
+#define SCHED_STOP_US 400000
+#endif
+
+/* 1: tasks that wait for an event run in timers of the port, at their priority: it offers SysTimerTrigger. 0: in main,
+ * between communication. */
+#ifndef SCHED_EVENTS_IN_TIMERS
+#define SCHED_EVENTS_IN_TIMERS 0
+#endif
+
+/* 1: freewheeling tasks do too, and pause after each cycle for a fifth of the time it took, but at least for the time
+ * below [us], so that tasks below them get on. For ports with threads; elsewhere they run in main, once in each of its
+ * passes. */
+#ifndef SCHED_FREEWHEELING_IN_TIMERS
+#define SCHED_FREEWHEELING_IN_TIMERS 0
+#endif
+#ifndef SCHED_FREEWHEELING_PAUSE_US
+#define SCHED_FREEWHEELING_PAUSE_US 1000
+#endif
+
+/* Events of a task that may wait while it runs, or cannot run; further ones are lost, and counted as its overruns. After
+ * a delay the task runs so often in a row. Takes no RAM. */
+#ifndef SCHED_MAX_WAITING_EVENTS
+#define SCHED_MAX_WAITING_EVENTS 100
+#endif
+
+/* 1: watchdogs count the processor time of a task (SysTimeGetUsedNs, SysExceptGetUsedNs), because its context shares
+ * the processor with more than the tasks above it: a process that is paused is not charged for it. 0: the time that
+ * passes. */
+#ifndef SCHED_PROCESSOR_TIME
+#define SCHED_PROCESSOR_TIME 0
 #endif
 
 /* Changed retain variables are saved at most this often [us]: what a power cut may lose against the wear of the flash.
@@ -107,7 +174,7 @@
 #define EVENT_MAX_CALLBACKS 4
 #endif
 
-/* External events that may be registered; two words each. 0: tasks of that kind never run. */
+/* External events that may be registered; one word each. 0: a program with a task that waits for one is refused. */
 #ifndef SCHED_MAX_EXTERNAL_EVENTS
 #define SCHED_MAX_EXTERNAL_EVENTS 2
 #endif
@@ -125,10 +192,15 @@
 /* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log lie in flash, if not where
  * SysFileFlash computes it. No default. */
 
-/* Receive and send buffer of the communication channel, bytes each; the largest L7 message. The field's compact
+/* Receive and send buffer of a connection, bytes each; the largest L7 message. The field's compact
  * template uses 2048; larger ones raise the flash rate because there is one reply per message. */
 #ifndef NETSERVER_MESSAGE_SIZE
 #define NETSERVER_MESSAGE_SIZE 2048
+#endif
+
+/* Connections at a time: tools that may be logged in together. Each costs its two buffers and about 150 bytes. */
+#ifndef COMM_MAX_CLIENTS
+#define COMM_MAX_CLIENTS 1
 #endif
 
 /* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is

@@ -75,7 +75,8 @@ class DebugInfo:
         if trace.link is not None:  # a function that calls no other; how much it has pushed is not known
             starts += [(pushed, trace.link) for pushed in range(0, _MOST_PUSHED, self._word)]
         chains = ([target - 1, *self._unwind(target - 1, pointer, trace.words)] for pointer, target in starts)
-        return max(chains, key=len, default=[])
+        own = self._function(offset) if offset is not None else -1  # it does not call itself: what says so is left over
+        return max((c for c in chains if own < 0 or own not in map(self._function, c)), key=len, default=[])
 
     def _unwind(self, offset: int, pointer: int, words: Mapping[int, int], link: int | None = None) -> list[int]:
         """`link`: where the function at `offset` returns to, if it has not saved that."""
@@ -89,9 +90,14 @@ class DebugInfo:
             calls.append(offset)
         return calls
 
-    def _frame(self, offset: int) -> _Frame | None:
+    def _function(self, offset: int) -> int:
+        """The index of the function that holds the code at `offset`, -1 for none."""
         i = bisect_right(self._functions, offset, key=lambda function: function[0]) - 1
-        if i < 0 or offset >= self._functions[i][1]:
+        return i if i >= 0 and offset < self._functions[i][1] else -1
+
+    def _frame(self, offset: int) -> _Frame | None:
+        i = self._function(offset)
+        if i < 0:
             return None
         _, _, changes, stack_pointer = self._functions[i]
         row = [row for row in changes.get_decoded().table if row["pc"] <= offset][-1]

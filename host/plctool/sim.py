@@ -6,6 +6,7 @@ It is the same C core that runs on a controller, with the simulator port: a day 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ class Simulator:
         _check(lib.SimFlashConfigure(_FLASH_SIZE, _SECTOR, _PROGRAM_UNIT, 0xFF), "The simulated flash cannot be made")
         _check(lib.SimStart(), "The simulator does not start")
         Simulator._running = self
+        lib.SimForgetEvents()
         try:
             self.download(image)
             if start:
@@ -71,6 +73,7 @@ class Simulator:
     def download(self, image: bytes) -> None:
         """Replaces the program, stopped. Raises DeviceError with the reason when it is refused; the old one runs on
         then."""
+        self._add_events(image)
         crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
         _check(lib.AppDownloadBegin(len(image), crc), "The image is refused")
         _check(lib.AppDownloadWrite(0, image, len(image)), "The image cannot be stored")
@@ -79,6 +82,17 @@ class Simulator:
         if result != lib.ERR_OK:
             text = ffi.string(refusal.text).decode("latin-1")
             raise DeviceError(f"The image is refused: {why(result, text)}.", "refused", result)
+
+    def _add_events(self, image: bytes) -> None:
+        """The simulated device has every external event that the program waits for."""
+        with suppress(UsageError):  # a bad image is refused with the reason of the device
+            for task in parse_image(image).tasks:
+                if task.external:
+                    _check(lib.SimAddEvent(task.external.encode("ascii")), "The simulator has too many events")
+
+    def post(self, event: str) -> None:
+        """An external event happens: what waits for it runs when time passes. Raises DeviceError when nothing does."""
+        _check(lib.SimPostEvent(event.encode("ascii", "replace")), f"The program does not wait for the event {event}")
 
     def start(self) -> None:
         """Starts the program; the first cycle of each task is due at once."""
@@ -180,7 +194,10 @@ class Simulator:
         memory = self._memory(symbol)
         if memory is None:
             raise unreachable(symbol, self._content)
-        memory[:] = symbol.encode(value, bytes(memory))
+        change = symbol.change(value)
+        place = memory[change.offset : change.offset + len(change.data)]
+        masked = (new & change.mask | old & ~change.mask for new, old in zip(change.data, place, strict=True))
+        memory[change.offset : change.offset + len(change.data)] = bytes(masked)
 
     def _resolve(self, name: str) -> Symbol:
         if self.symbols is None:

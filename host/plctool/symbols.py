@@ -157,9 +157,14 @@ class SymbolTable:
             scopes = self._debug_info.scopes(offset)
             place = self.address_to_line(offset)
             if place is not None:
-                places.append(SourceLine(scopes[0].pou, place.file, place.line) if scopes else place)
-            places += [SourceLine(o.pou, i.call_file, i.call_line) for i, o in pairwise(scopes) if i.call_line]
+                places.append(self._in_pou(scopes[0].pou, place.file, place.line) if scopes else place)
+            places += [self._in_pou(o.pou, i.call_file, i.call_line) for i, o in pairwise(scopes) if i.call_line]
         return places
+
+    def _in_pou(self, pou: str, file: str, line: int) -> SourceLine:
+        """A line of a POU. What initialises all variables has none of its own: then of the POU that declares them."""
+        made = any(unit.name == pou and not unit.file for unit in self.pous)
+        return SourceLine(self._pou_at(file, line, None) or pou if made else pou, file, line)
 
     @cached_property
     def _debug_info(self) -> DebugInfo:

@@ -50,6 +50,8 @@ typedef struct {
     RTS_UI32 import_count;
     SPEC_KEPT kept[SPEC_MAX_KEPT];
     RTS_UI32 kept_count; /* 0: no blob */
+    CDL_IMAGE images[2 * APP_MAX_TASKS]; /* what the tasks use of inputs and outputs */
+    RTS_UI32 image_count;                /* 0: no blob */
     const char *info[5];
 } APP_SPEC;
 
@@ -356,6 +358,8 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
     h.blob.offset = image->size;
     append_blob(image, CDL_BLOB_TASKS, spec->tasks, spec->task_count * (RTS_UI32)sizeof(CDL_TASK));
     append_kept(image, spec);
+    if (spec->image_count != 0)
+        append_blob(image, CDL_BLOB_IMAGES, spec->images, spec->image_count * (RTS_UI32)sizeof(CDL_IMAGE));
     h.blob = end_segment(image, h.blob.offset);
     pad(image, APP_CODE_ALIGN);
     h.code.offset = image->size;

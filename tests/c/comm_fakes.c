@@ -5,6 +5,8 @@
  */
 #include "comm_fakes.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "CmpAppSrv.h"
@@ -20,6 +22,7 @@
 #include "SimLink.h"
 #include "SysCom.h"
 #include "SysExcept.h"
+#include "SysLock.h"
 #include "SysTime.h"
 
 FAKES fakes;
@@ -45,6 +48,17 @@ RTS_UI32 SysTargetRandom(void)
 {
     fakes.random = fakes.random * 1664525u + 1013904223u;
     return fakes.random ^ fakes.random >> 16;
+}
+
+RTS_UI32 SysLockEnter(void)
+{
+    fakes.locks++;
+    return fakes.lock_depth++;
+}
+
+void SysLockLeave(RTS_UI32 before)
+{
+    fakes.lock_depth = before;
 }
 
 RTS_UI32 SysComGetCount(void)
@@ -246,6 +260,21 @@ RTS_UI32 AppDownloadOffset(void)
 bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc)
 {
     return fakes.download_open && fakes.download_total == total_size && fakes.download_crc == image_crc;
+}
+
+bool AppDownloadIsOpen(void)
+{
+    return fakes.download_open;
+}
+
+RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...)
+{
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(refusal->text, sizeof(refusal->text), format, arguments);
+    va_end(arguments);
+    return result;
 }
 
 RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)

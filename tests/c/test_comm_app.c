@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpChannelServerEmbedded.h"
 #include "CmpSrv.h"
 #include "SysExcept.h"
 #include "comm_client.h"
@@ -66,7 +67,7 @@ static void login_gives_a_session_and_the_image_crc_as_guids(void)
     CHECK(call(SRV_APP_LOGIN));
     CHECK(take_login_reply(&option));
     CHECK(BytesGet16(option.data) == ERR_OK);
-    CHECK(SrvIsAppSession(BytesGet32(option.data + 2)));
+    CHECK(SrvIsAppSession(ChannelGetClient(0), BytesGet32(option.data + 2)));
     CHECK(BytesGet32(option.data + 6) == FAKE_IMAGE_CRC);
     CHECK(BytesGet32(option.data + 22) == FAKE_IMAGE_CRC);
     CHECK(memcmp(option.data + 10, "\0\0\0\0\0\0\0\0\0\0\0\0", 12) == 0);
@@ -145,7 +146,7 @@ static void logout_ends_the_application_session_only(void)
     put_descriptor(client.app_session, NULL);
     CHECK(call(SRV_APP_START));
     CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_APP_INVALID_SESSIONID);
-    CHECK(SrvIsLoggedIn());
+    CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 /* ---- control ---- */

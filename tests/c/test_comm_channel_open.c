@@ -145,7 +145,7 @@ static void new_open_from_the_same_peer_replaces_its_channel(void)
     CHECK(client_login(&client));
     client_send_open(&client, 8, 2048);
     CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
-    CHECK(!SrvIsLoggedIn());
+    CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
     CHECK(works(&client));
 }
 
@@ -186,7 +186,7 @@ static void idle_channel_with_login_is_given_to_another_peer(void)
     client_send_open(&other, 1, 2048);
     CHECK(is_close(ERR_CHS_CLOSED));
     CHECK(client_take_open(&other) == CHANNEL_OPEN_OK);
-    CHECK(!SrvIsLoggedIn());
+    CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 static void close_request_of_the_owner_ends_channel_and_session(void)
@@ -195,7 +195,7 @@ static void close_request_of_the_owner_ends_channel_and_session(void)
     CHECK(client_login(&client));
     client_send_close(&client);
     CHECK(is_silent());
-    CHECK(!SrvIsLoggedIn());
+    CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
     CHECK(!works(&client));
 }
 

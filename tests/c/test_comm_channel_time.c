@@ -28,7 +28,7 @@ static void silent_client_loses_the_channel_after_thirty_seconds(void)
     }
     fakes_cycle(100);
     CHECK(is_close(ERR_CHS_TIMEOUT));
-    CHECK(!SrvIsLoggedIn());
+    CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 static void keepalives_of_the_client_keep_the_channel(void)
@@ -57,7 +57,7 @@ static void restart_of_the_runtime_forgets_the_channel(void)
     setup();
     CHECK(client_login(&client));
     fakes_start();
-    CHECK(!SrvIsLoggedIn());
+    CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
     CHECK(!works(&client));
     CHECK(client_open(&client));
     CHECK(works(&client));

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
 #include "CmpSrv.h"
 #include "comm_client.h"
@@ -30,7 +31,7 @@ static RTS_UI32 handle(const RTS_UI8 *message, RTS_UI32 size)
 {
     RTS_UI8 *copy = malloc(size + 1); /* of exactly this size, for the sanitizer */
     memcpy(copy, message, size);
-    RTS_UI32 result = SrvHandleMessage(copy, size, reply.message, sizeof(reply.message));
+    RTS_UI32 result = SrvHandleMessage(ChannelGetClient(0), copy, size, reply.message, sizeof(reply.message));
     free(copy);
     return result;
 }
@@ -127,7 +128,7 @@ static void too_small_reply_buffer_is_not_overrun(void)
     fakes_start();
     for (RTS_UI32 capacity = 0; capacity < 300; capacity++) {
         RTS_UI8 *buffer = malloc(capacity + 1);
-        RTS_UI32 size = SrvHandleMessage(ident, 20, buffer, capacity);
+        RTS_UI32 size = SrvHandleMessage(ChannelGetClient(0), ident, 20, buffer, capacity);
         CHECK(size <= capacity);
         CHECK((size == 0) == (capacity < 28));
         free(buffer);
@@ -207,7 +208,7 @@ static void anonymous_login_gives_a_session_with_the_validation_bit(void)
     setup();
     CHECK(client_login(&client));
     CHECK(client.session >> 31 == 1);
-    CHECK(SrvIsLoggedIn());
+    CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 static void login_reply_tells_the_settings(void)
@@ -231,7 +232,7 @@ static void malformed_empty_user_of_a_real_client_does_not_hurt(void)
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply));
     CHECK(reply_error(&reply) == ERR_OK);
-    CHECK(SrvIsLoggedIn());
+    CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 static void asymmetric_login_is_refused(void)
@@ -244,7 +245,7 @@ static void asymmetric_login_is_refused(void)
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply));
     CHECK(BTagFindContainer(&reply.tags, TAG_DEV_LOGIN_REPLY, &login) == ERR_OK);
     CHECK(BTagFindUnsigned(&login, TAG_DEV_LOGIN_RESULT, &value) == ERR_OK && value == ERR_NOT_SUPPORTED);
-    CHECK(!SrvIsLoggedIn());
+    CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 static void login_without_type_is_an_error(void)
@@ -252,7 +253,7 @@ static void login_without_type_is_an_error(void)
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, NULL, 0, &reply));
     CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
-    CHECK(!SrvIsLoggedIn());
+    CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 static void second_login_replaces_the_session(void)
@@ -265,7 +266,7 @@ static void second_login_replaces_the_session(void)
     client.session = L7_SESSION_INITIAL;
     CHECK(client_login(&client));
     CHECK(client.session != before.session);
-    CHECK(!SrvIsAppSession(before.app_session));
+    CHECK(!SrvIsAppSession(ChannelGetClient(0), before.app_session));
     before.sent = client.sent;
     before.received = client.received;
     CHECK(!client_login_app(&before));
@@ -280,11 +281,11 @@ static void logout_ends_the_session(void)
     BytesPut32(content + 2, client.session ^ 1);
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGOUT, content, sizeof(content), &reply));
     CHECK(reply_number(&reply, TAG_DEV_LOGOUT_REPLY) == ERR_INVALID_SESSION_ID);
-    CHECK(SrvIsLoggedIn());
+    CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
     BytesPut32(content + 2, client.session);
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGOUT, content, sizeof(content), &reply));
     CHECK(reply_number(&reply, TAG_DEV_LOGOUT_REPLY) == ERR_OK);
-    CHECK(!SrvIsLoggedIn());
+    CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
     CHECK(!client_login_app(&client));
 }
 
@@ -299,7 +300,7 @@ static void session_does_not_survive_its_channel(void)
     CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
     client.session = old.session;
     CHECK(!client_login_app(&client));
-    CHECK(reply_error(&reply) != ERR_OK || !SrvIsLoggedIn());
+    CHECK(reply_error(&reply) != ERR_OK || !SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 static void session_ids_differ(void)
@@ -308,7 +309,7 @@ static void session_ids_differ(void)
 
     setup();
     for (RTS_UI32 i = 0; i < RTS_COUNT(ids); i++) {
-        ids[i] = SrvCreateSession();
+        ids[i] = SrvCreateSession(ChannelGetClient(0));
         for (RTS_UI32 k = 0; k < i; k++)
             CHECK(ids[k] != ids[i]);
     }

@@ -3,9 +3,10 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * No test can send so many, so this one is inside the channel server and sets the numbers.
+ * No test can send so many, so this one sets the numbers.
  */
-#include "../../firmware/src/comm/CmpChannelServerEmbedded.c"
+#include "CmpBytes.h"
+#include "CmpChannelServerEmbedded.h"
 #include "comm_client.h"
 #include "comm_fakes.h"
 #include "test.h"
@@ -27,8 +28,9 @@ static void setup(void)
     fakes_start();
     client_init(&client, 0x0102);
     CHECK(client_open(&client));
-    channel.rx.block = client.sent = 0xFFFFFFFE;
-    channel.tx.base = client.received = 0xFFFFFFFE;
+    CHANNEL *channel = &ChannelGetClient(0)->channel;
+    channel->rx.block = client.sent = 0xFFFFFFFE;
+    channel->tx.base = client.received = 0xFFFFFFFE;
     BTagWriterInit(&writer, content, sizeof(content));
     BTagWrite32(&writer, TAG_DEV_ECHO_REPLY_LENGTH, DATA);
     BTagOpen(&writer, TAG_DEV_ECHO_DATA, BTAG_ALIGN_0);

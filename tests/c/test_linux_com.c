@@ -76,7 +76,7 @@ static void check_round_trip(int client)
 
 static void open_com(const char *path)
 {
-    PORT_REASON reason = {""};
+    PORT_REASON reason = {"", false};
     CHECK(PortComOpen(path, 115200, &reason));
     CHECK(SysComGetCount() == 1);
     CHECK(SysComOpen(0) == ERR_OK);
@@ -189,7 +189,7 @@ static void a_device_that_goes_away_is_taken_up_again(void)
 
 static void what_cannot_be_opened_is_said(void)
 {
-    PORT_REASON reason = {""};
+    PORT_REASON reason = {"", false};
     CHECK(!PortComOpen("/dev/does-not-exist", 115200, &reason));
     CHECK(strstr(reason.text, "/dev/does-not-exist") != NULL);
     CHECK(!PortComOpen("/dev/null", 115200, &reason));
@@ -200,7 +200,7 @@ static void what_cannot_be_opened_is_said(void)
 
 static void a_device_that_keeps_another_speed_is_refused(void)
 {
-    PORT_REASON reason = {""};
+    PORT_REASON reason = {"", false};
     speed_is_fixed = true;
     CHECK(!PortComOpen("pty", 115200, &reason));
     CHECK(strstr(reason.text, "115200 baud") != NULL);
@@ -211,7 +211,7 @@ static void a_device_that_keeps_another_speed_is_refused(void)
 
 static void a_device_that_another_program_uses_is_refused(void)
 {
-    PORT_REASON reason = {""};
+    PORT_REASON reason = {"", false};
     char name[64];
     int end = posix_openpt(O_RDWR | O_NOCTTY);
     CHECK(end >= 0 && grantpt(end) == 0 && unlockpt(end) == 0 && ptsname_r(end, name, sizeof(name)) == 0);

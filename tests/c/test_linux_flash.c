@@ -25,7 +25,7 @@ static const RTS_UI8 pattern[2 * UNIT] = "0123456789abcde";
 
 static const SYS_FLASH *open_flash(void)
 {
-    PORT_REASON reason = {""};
+    PORT_REASON reason = {"", false};
     CHECK(PortFlashOpen(path, &reason));
     CHECK(reason.text[0] == '\0');
     return SysFlashGet();
@@ -185,7 +185,7 @@ static void a_creation_that_was_cut_short_is_completed(void)
 
 static void check_refused(const char *part_of_reason)
 {
-    PORT_REASON reason = {""};
+    PORT_REASON reason = {"", false};
     CHECK(!PortFlashOpen(path, &reason));
     CHECK(strstr(reason.text, part_of_reason) != NULL);
     CHECK(strstr(reason.text, path) != NULL);

@@ -175,10 +175,54 @@ static void there_is_a_timer_for_every_task_and_then_no_more(void)
     }
 }
 
+static void without_an_interval_each_trigger_is_one_call(void)
+{
+    RTS_HANDLE timer = create(0, 0);
+    SysTimerTrigger(timer, 0); /* not started: nothing happens */
+    CHECK(SysTimerStart(timer) == ERR_OK);
+    for (RTS_UI32 i = 1; i <= 20; i++) { /* the first comes by itself */
+        wait_for_calls(i);
+        CHECK(record.count == i);
+        SysTimerTrigger(timer, 0);
+    }
+    wait_for_calls(21);
+    CHECK(SysTimerGetOverruns(timer) == 0);
+    CHECK(SysTimerDelete(timer) == ERR_OK);
+    SysTimerTrigger(timer, 0);
+}
+
+static void a_trigger_may_be_for_later_and_the_earliest_counts(void)
+{
+    RTS_HANDLE timer = create(0, 0);
+    RTS_I64 start_ns = SysTimeGetNs();
+    CHECK(SysTimerStart(timer) == ERR_OK);
+    wait_for_calls(1);
+    SysTimerTrigger(timer, start_ns + 3600000000000);
+    SysTimerTrigger(timer, start_ns + 30000000);
+    SysTimerTrigger(timer, start_ns + 60000000000);
+    wait_for_calls(2);
+    CHECK(record.call[1].called_ns >= start_ns + 30000000);
+    SysTimerTrigger(timer, start_ns + 3600000000000);
+    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK(record.count == 2);
+}
+
+static void a_trigger_while_the_callback_runs_has_it_run_again(void)
+{
+    RTS_HANDLE timer = create(0, 30);
+    CHECK(SysTimerStart(timer) == ERR_OK);
+    wait_for_calls(1);
+    while (__atomic_load_n(&record.count, __ATOMIC_SEQ_CST) < 2) {
+        SysTimerTrigger(timer, 0);
+        sleep_ms(1);
+    }
+    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK(record.count <= 3);
+}
+
 static void wrong_arguments_are_refused(void)
 {
     RTS_HANDLE timer = 7;
-    CHECK(SysTimerCreate(note, &record, 0, 0, &timer) == ERR_PARAMETER);
     CHECK(SysTimerCreate(NULL, &record, 1000, 0, &timer) == ERR_PARAMETER);
     CHECK(SysTimerCreate(note, &record, 1000, 32, &timer) == ERR_PARAMETER);
     CHECK(SysTimerStart((RTS_HANDLE)RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
@@ -251,6 +295,9 @@ int main(void)
     RUN(stop_does_not_wait_for_the_next_due_time);
     RUN(a_timer_starts_anew_after_a_stop);
     RUN(there_is_a_timer_for_every_task_and_then_no_more);
+    RUN(without_an_interval_each_trigger_is_one_call);
+    RUN(a_trigger_may_be_for_later_and_the_earliest_counts);
+    RUN(a_trigger_while_the_callback_runs_has_it_run_again);
     RUN(wrong_arguments_are_refused);
     RUN(a_stack_overflow_in_a_task_is_caught);
     CHECK(SysTimer_Hook(CH_EXIT_SYSTEM) == ERR_OK);

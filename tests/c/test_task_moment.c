@@ -24,10 +24,16 @@ static RTS_UI32 length[TASKS]; /* of a cycle, in turns of a loop */
 static RTS_UI32 rounds[TASKS]; /* cycles begun */
 static __thread RTS_UI32 me;
 
+static RTS_I64 fixed_ns; /* 0: time passes */
+static RTS_UI32 pauses;
+static RTS_UI32 last_pause; /* in which the cycle of task 1 ends; 0: it does not */
+
 RTS_I64 SysTimeGetNs(void)
 {
     struct timespec now;
 
+    if (fixed_ns != 0)
+        return fixed_ns;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (RTS_I64)now.tv_sec * 1000000000 + now.tv_nsec;
 }
@@ -36,7 +42,14 @@ void SysTimePause(void)
 {
     static const struct timespec pause = {0, 20000};
 
-    nanosleep(&pause, NULL);
+    if (fixed_ns == 0) {
+        nanosleep(&pause, NULL);
+        return;
+    }
+    pauses++;
+    fixed_ns += 20000;
+    if (pauses == last_pause)
+        guard_end(&tasks.list[1].guard);
 }
 
 int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
@@ -89,6 +102,35 @@ RTS_UI32 SchedGetOverruns(RTS_UI32 task)
     RTS_UNUSED(task);
     return 0;
 }
+
+void SchedNoteEvents(void)
+{
+}
+
+RTS_I64 SysTimeGetUsedNs(void)
+{
+    return 0;
+}
+
+#if APP_IMAGE_SIZE > 0
+bool AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context)
+{
+    RTS_UNUSED(task);
+    RTS_UNUSED(context);
+    return false;
+}
+
+void AppImageCopyIn(RTS_UI32 task)
+{
+    RTS_UNUSED(task);
+}
+
+void AppImageCopyOut(RTS_UI32 task, const RTS_UI32 *running)
+{
+    RTS_UNUSED(task);
+    RTS_UNUSED(running);
+}
+#endif
 
 /* The code of all tasks. */
 static void fill_part(const IEC_CONTEXT *context)
@@ -196,16 +238,53 @@ static void tasks_that_never_pause_are_not_torn(void)
         CHECK(rounds[i] > 0);
 }
 
-/* It is the long one that waits, so the short one loses next to nothing. */
-static void a_short_task_goes_on_while_a_long_one_runs(void)
+/* Two tasks stand still in time: task 1 has been in its cycle since `since_ms` ms; their last cycles took as long as
+ * given. Returns how often task 0 pauses before it begins while a copy is wanted. */
+static RTS_UI32 pauses_of(RTS_UI32 own_ms, RTS_UI32 other_ms, RTS_UI32 since_ms, RTS_UI32 ends_in)
 {
-    length[0] = 10000000;
-    length[1] = 50000;
-    begin(2);
-    while (SysAtomicLoad(&rounds[0]) < 10)
-        take_copies(1);
-    end();
-    CHECK(rounds[1] > 20 * rounds[0]);
+    enum { MS = 1000000 };
+    IEC_CONTEXT context = {0};
+
+    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
+    CHECK(IecTaskCreateAll(records, 2, &context) == ERR_OK);
+    fixed_ns = 1000 * (RTS_I64)MS;
+    CHECK(IecTaskStartAll() == ERR_OK);
+    tasks.list[0].last_ns = own_ms * MS;
+    tasks.list[1].last_ns = other_ms * MS;
+    guard_begin(&tasks.list[1].guard, fixed_ns - (RTS_I64)since_ms * MS);
+    pauses = 0;
+    last_pause = ends_in;
+    CHECK(!IecTaskBetweenCycles(copy_area));
+    make_moment(&tasks.list[0]);
+    CHECK(is_wanted() == (ends_in == 0 || pauses < ends_in));
+    fixed_ns = 0;
+    return pauses;
+}
+
+static void a_long_task_waits_for_a_short_one(void)
+{
+    CHECK(pauses_of(10, 1, 0, 7) == 7);
+}
+
+static void a_short_task_does_not_wait_for_a_long_one(void)
+{
+    CHECK(pauses_of(1, 10, 0, 7) == 0);
+}
+
+static void a_task_does_not_wait_for_one_that_takes_longer_this_time(void)
+{
+    CHECK(pauses_of(10, 1, 11, 7) == 0);
+}
+
+static void a_task_waits_no_longer_than_its_own_cycle_takes(void)
+{
+    CHECK(pauses_of(10, 1, 0, 0) == 501);
+    CHECK(pauses_of(10, 1, 9, 0) == 51);
+}
+
+static void a_first_cycle_waits_for_nobody(void)
+{
+    CHECK(pauses_of(0, 1, 0, 7) == 0);
 }
 
 static void a_copy_of_stopped_tasks_is_taken_at_once(void)
@@ -300,7 +379,11 @@ int main(void)
         return test_result();
     }
     RUN(tasks_that_never_pause_are_not_torn);
-    RUN(a_short_task_goes_on_while_a_long_one_runs);
+    RUN(a_long_task_waits_for_a_short_one);
+    RUN(a_short_task_does_not_wait_for_a_long_one);
+    RUN(a_task_does_not_wait_for_one_that_takes_longer_this_time);
+    RUN(a_task_waits_no_longer_than_its_own_cycle_takes);
+    RUN(a_first_cycle_waits_for_nobody);
     RUN(a_copy_of_stopped_tasks_is_taken_at_once);
     RUN(what_runs_is_waited_for);
     RUN(stopping_calls_a_copy_off);

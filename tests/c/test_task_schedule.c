@@ -80,7 +80,7 @@ static void an_event_that_is_true_at_the_start_is_no_edge(void)
     CHECK(count_of(0) == 0);
 }
 
-static void a_pulse_that_is_over_before_anybody_looks_is_no_edge(void)
+static void an_edge_counts_however_short_the_variable_was_clear_between_cycles(void)
 {
     begin();
     add_event_task();
@@ -92,7 +92,94 @@ static void a_pulse_that_is_over_before_anybody_looks_is_no_edge(void)
     emit_ret(&spec);
     load();
     CHECK(SimAdvance(ms(9)) == ERR_OK);
-    CHECK(count_of(0) == 1); /* the first edge: since then it was cleared and set again between two looks */
+    CHECK(count_of(0) == 10); /* though it is TRUE whenever time passes */
+}
+
+static void what_one_cycle_sets_and_clears_is_no_edge(void)
+{
+    begin();
+    add_event_task();
+    add_task(&spec, "Pulse", KIND_CYCLIC, 1000, here(&spec));
+    emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 1);
+    emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 0);
+    emit_ret(&spec);
+    load();
+    CHECK(SimAdvance(ms(9)) == ERR_OK);
+    CHECK(count_of(0) == 0);
+}
+
+static void an_event_task_runs_as_soon_as_the_cycle_that_set_its_variable_is_over(void)
+{
+    begin();
+    add_task(&spec, "Event", KIND_EVENT, 0, here(&spec))->event_area = APP_AREA_DATA;
+    spec.tasks[0].event_offset = EVENT_OFFSET;
+    spec.tasks[0].priority = 0;
+    emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 1); /* order += 1 */
+    emit_ret(&spec);
+    add_task(&spec, "Set", KIND_CYCLIC, 1000, here(&spec))->priority = 3;
+    emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 1);
+    emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, 10); /* order := 10 */
+    emit_ret(&spec);
+    add_task(&spec, "Later", KIND_CYCLIC, 1000, here(&spec))->priority = 4;
+    emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 100);
+    emit_ret(&spec);
+    load();
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == 111);
+}
+
+/* Though Set takes 2 ms, what was due with it comes by priority. */
+static void an_event_task_takes_its_turn_by_priority(void)
+{
+    static const RTS_UI8 priority[2] = {20, 6};
+    enum { BY_EVENT = 1, BY_OTHER = 2 };
+    RTS_UI32 i;
+
+    for (i = 0; i < 2; i++) {
+        begin();
+        add_event_task()->priority = priority[i];
+        spec.tasks[0].entry_offset = here(&spec);
+        emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, BY_EVENT);
+        emit_ret(&spec);
+        add_import(&spec, "simburn", 0x76DDCD81, 0x00010000);
+        add_task(&spec, "Set", KIND_CYCLIC, 10000, here(&spec))->priority = 3;
+        emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 1);
+        emit_call(&spec, 0, 2000);
+        emit_ret(&spec);
+        add_task(&spec, "Other", KIND_CYCLIC, 10000, here(&spec))->priority = 10;
+        emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, BY_OTHER);
+        emit_ret(&spec);
+        load();
+        CHECK(SimAdvance(0) == ERR_OK);
+        CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == (i == 0 ? BY_EVENT : BY_OTHER)); /* who came last */
+    }
+}
+
+static void an_event_may_be_one_bit_of_a_byte(void)
+{
+    begin();
+    add_event_task()->event_ignored = 0xFF ^ 1 << 3;
+    load();
+    set_event(0xF7);
+    CHECK(SimAdvance(ms(1)) == ERR_OK);
+    CHECK(count_of(0) == 0);
+    set_event(0x08);
+    CHECK(SimAdvance(ms(1)) == ERR_OK);
+    CHECK(count_of(0) == 1);
+    set_event(0xFF); /* it stays as it is */
+    CHECK(SimAdvance(ms(1)) == ERR_OK);
+    CHECK(count_of(0) == 1);
+}
+
+static void several_tasks_may_wait_for_one_variable(void)
+{
+    begin();
+    add_event_task();
+    add_event_task()->priority = 5;
+    load();
+    set_event(1);
+    CHECK(SimAdvance(ms(1)) == ERR_OK);
+    CHECK(count_of(0) == 1 && count_of(1) == 1);
 }
 
 static void an_edge_of_one_interval_is_not_missed(void)
@@ -106,24 +193,42 @@ static void an_edge_of_one_interval_is_not_missed(void)
     emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 0);
     emit_ret(&spec);
     load();
-    CHECK(SimAdvance(ms(11)) == ERR_OK); /* set at 0 2 4 6 8 10, cleared after it at 0 3 6 9: edges at 2 4 8 10 */
-    CHECK(count_of(0) == 4);
+    CHECK(SimAdvance(ms(11)) == ERR_OK); /* set at 0 2 4 6 8 10, cleared after it at 0 3 6 9: edges at 0 2 4 8 10 */
+    CHECK(count_of(0) == 5);
 }
 
-static void freewheeling_tasks_run_again_and_again(void)
+static void freewheeling_tasks_run_again_after_a_pause(void)
 {
     begin();
     add_counting_task("Free", KIND_FREEWHEELING, 0);
     load();
     CHECK(SimAdvance(ms(1000)) == ERR_OK);
-    CHECK(count_of(0) >= 100);
+    CHECK(count_of(0) == 1001);
     CHECK(AppStopApplication() == ERR_OK);
-    set_event(0);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(count_of(0) >= 100);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(count_of(0) == 1001);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(1)) == ERR_OK);
+    CHECK(count_of(0) == 1003);
 }
 
-static void tasks_in_the_background_run_by_priority(void)
+/* Cycles of 50 ms and pauses of a fifth of it: a task below, of the same processor, has its share. */
+static void a_freewheeling_task_pauses_for_a_fifth_of_its_cycle(void)
+{
+    begin();
+    add_import(&spec, "simburn", 0x76DDCD81, 0x00010000);
+    add_task(&spec, "Free", KIND_FREEWHEELING, 0, here(&spec))->priority = 0;
+    emit_call(&spec, 0, 50000);
+    emit_add(&spec, APP_AREA_DATA, 0, 1);
+    emit_ret(&spec);
+    add_counting_task("Below", KIND_CYCLIC, 10000);
+    load();
+    CHECK(SimAdvance(ms(60) * 20) == ERR_OK);
+    CHECK(count_of(0) >= 20 && count_of(0) <= 21);
+    CHECK(count_of(1) >= 20);
+}
+
+static void freewheeling_tasks_run_by_priority(void)
 {
     begin();
     add_task(&spec, "Low", KIND_FREEWHEELING, 0, here(&spec))->priority = 20;
@@ -136,8 +241,16 @@ static void tasks_in_the_background_run_by_priority(void)
     emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 100);
     emit_ret(&spec);
     load();
-    CHECK(SimCommCycle() == ERR_OK);
+    CHECK(SimAdvance(0) == ERR_OK);
     CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == 111);
+}
+
+static CDL_TASK *add_external_task(const char *name, const char *event)
+{
+    CDL_TASK *task = add_counting_task(name, KIND_EXTERNAL, 0);
+
+    task->event_offset = CRC32Update(0, event, strlen(event));
+    return task;
 }
 
 static void an_external_event_runs_its_task_once_per_post(void)
@@ -146,8 +259,8 @@ static void an_external_event_runs_its_task_once_per_post(void)
     RTS_HANDLE event;
 
     begin();
-    add_counting_task("Pulse", KIND_EXTERNAL, 0);
-    event = SchedRegisterExternalEvent("Pulse", &result);
+    add_external_task("Pulse", "pulse");
+    event = SchedRegisterExternalEvent("pulse", &result);
     CHECK(result == ERR_OK);
     CHECK(SchedPostExternalEvent(event) == ERR_OK); /* before the start: does not count */
     load();
@@ -168,24 +281,58 @@ static void an_external_event_runs_its_task_once_per_post(void)
 
 static void external_events_are_limited_and_unique(void)
 {
-    static const char *const names[SCHED_MAX_EXTERNAL_EVENTS] = {"a", "b", "c", "d"};
+    char name[] = "a";
     RTS_RESULT result = ERR_OK;
     RTS_HANDLE event;
     int i;
 
     begin();
-    for (i = 0; i < SCHED_MAX_EXTERNAL_EVENTS; i++)
-        event = SchedRegisterExternalEvent(names[i], NULL);
+    for (i = 0; i < SCHED_MAX_EXTERNAL_EVENTS; i++, name[0]++)
+        event = SchedRegisterExternalEvent(name, NULL);
     CHECK(SchedRegisterExternalEvent("a", &result) == (RTS_HANDLE)RTS_INVALID_HANDLE);
     CHECK(result == ERR_DUPLICATE);
-    CHECK(SchedRegisterExternalEvent("e", &result) == (RTS_HANDLE)RTS_INVALID_HANDLE);
+    CHECK(SchedRegisterExternalEvent(name, &result) == (RTS_HANDLE)RTS_INVALID_HANDLE);
     CHECK(result == ERR_NOMEMORY);
     CHECK(SchedUnregisterExternalEvent(event) == ERR_OK);
     CHECK(SchedUnregisterExternalEvent(event) == ERR_INVALID_HANDLE);
     CHECK(SchedUnregisterExternalEvent(99) == ERR_INVALID_HANDLE);
     CHECK(SchedPostExternalEvent((RTS_HANDLE)RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
-    CHECK(SchedRegisterExternalEvent("e", &result) != (RTS_HANDLE)RTS_INVALID_HANDLE);
+    CHECK(SchedRegisterExternalEvent(name, &result) != (RTS_HANDLE)RTS_INVALID_HANDLE);
     CHECK(result == ERR_OK);
+}
+
+static void posts_beyond_what_may_wait_are_lost_and_counted(void)
+{
+    IEC_TASK_INFO info;
+    RTS_UI32 i;
+
+    begin();
+    add_external_task("One", "pulse");
+    add_external_task("Other", "pulse");
+    CHECK(SimAddEvent("pulse") == ERR_OK);
+    load();
+    for (i = 0; i < SCHED_MAX_WAITING_EVENTS + 7; i++)
+        CHECK(SimPostEvent("pulse") == ERR_OK);
+    CHECK(SimPostEvent("other") == ERR_NO_OBJECT);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(count_of(0) == SCHED_MAX_WAITING_EVENTS && count_of(1) == SCHED_MAX_WAITING_EVENTS);
+    CHECK(IecTaskGetInfo(0, &info) == ERR_OK && info.overruns == 7);
+    CHECK(SimPostEvent("pulse") == ERR_OK);
+    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK(count_of(0) == SCHED_MAX_WAITING_EVENTS + 1);
+    CHECK(IecTaskGetInfo(0, &info) == ERR_OK && info.overruns == 7);
+    SimForgetEvents();
+}
+
+static void a_program_that_waits_for_an_event_nobody_has_is_refused(void)
+{
+    begin();
+    add_external_task("Pulse", "pulse");
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_NO_OBJECT);
+    CHECK(SimAddEvent("pulse") == ERR_OK);
+    CHECK(download(&image) == ERR_OK);
+    SimForgetEvents();
 }
 
 static void as_many_tasks_as_the_device_can_run(void)
@@ -261,12 +408,20 @@ int main(void)
     RUN(of_tasks_that_are_due_the_highest_priority_runs_first);
     RUN(an_event_task_runs_once_per_rising_edge);
     RUN(an_event_that_is_true_at_the_start_is_no_edge);
-    RUN(a_pulse_that_is_over_before_anybody_looks_is_no_edge);
+    RUN(an_edge_counts_however_short_the_variable_was_clear_between_cycles);
+    RUN(what_one_cycle_sets_and_clears_is_no_edge);
+    RUN(an_event_task_runs_as_soon_as_the_cycle_that_set_its_variable_is_over);
+    RUN(an_event_task_takes_its_turn_by_priority);
+    RUN(an_event_may_be_one_bit_of_a_byte);
+    RUN(several_tasks_may_wait_for_one_variable);
     RUN(an_edge_of_one_interval_is_not_missed);
-    RUN(freewheeling_tasks_run_again_and_again);
-    RUN(tasks_in_the_background_run_by_priority);
+    RUN(freewheeling_tasks_run_again_after_a_pause);
+    RUN(a_freewheeling_task_pauses_for_a_fifth_of_its_cycle);
+    RUN(freewheeling_tasks_run_by_priority);
     RUN(an_external_event_runs_its_task_once_per_post);
     RUN(external_events_are_limited_and_unique);
+    RUN(posts_beyond_what_may_wait_are_lost_and_counted);
+    RUN(a_program_that_waits_for_an_event_nobody_has_is_refused);
     RUN(as_many_tasks_as_the_device_can_run);
     RUN(downloads_free_the_timers_of_the_tasks_before);
     RUN(run_cycles_counts_cycles_of_the_first_task);

@@ -7,6 +7,7 @@ import struct
 import pytest
 from back_support import POS, ProgramBuilder, Running, binary, build, const, load, place
 
+from plctool.compiler import Level, compile_sources
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.emit import emit_object
 from plctool.compiler.codegen.link import link
@@ -108,6 +109,26 @@ def test_single_precision_needs_no_calls_with_an_fpu() -> None:
     )
     for name in ("cortex-m4f", "cortex-m7", "x86_64-linux", "aarch64-linux"):
         assert parse_image(build(program, name).image).externals == []
+
+
+PROBES = {"x86_64-linux": bytes.fromhex("48c7042400000000"), "aarch64-linux": bytes.fromhex("ff0300f9")}  # [sp] := 0
+
+
+@pytest.mark.parametrize("target", PROBES)
+@pytest.mark.parametrize("level", [0, 1, 2, 3, "s"])
+@pytest.mark.parametrize(("bytes_", "probed"), [(400, False), (20_000, True), (17_039_360, True)])
+def test_each_page_of_a_large_frame_is_touched(tmp_path, target: str, level: Level, bytes_: int, probed: bool) -> None:
+    path = tmp_path / "frame.st"
+    path.write_text(
+        f"""FUNCTION Far : INT VAR_INPUT i : DINT; END_VAR VAR field : ARRAY[1..{bytes_}] OF SINT; END_VAR
+field[i] := 1;
+Far := field[i + 1];
+END_FUNCTION
+PROGRAM Main VAR n : INT; i : DINT; END_VAR n := Far(i); END_PROGRAM
+"""
+    )
+    code = parse_image(compile_sources([path], target=target, level=level, checks="none").image).code
+    assert (PROBES[target] in code) == probed
 
 
 def test_an_unknown_target_is_refused_with_the_names_of_the_others() -> None:

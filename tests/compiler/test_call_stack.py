@@ -126,3 +126,66 @@ def test_a_function_that_never_returns_is_told_once(tmp_path) -> None:
     after_call = next(offset for offset, _, line in built.symbols.lines if line == 4) + 2
     (place,) = built.symbols.call_stack(None, Trace(link=after_call))
     assert (place.pou, place.line) == ("Main", 4)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_frame_that_finds_no_room_names_the_unit_that_takes_it(tmp_path, level: Level) -> None:
+    """The exception comes while the unit makes room, before its first line: at its declaration."""
+    path = tmp_path / "far.st"
+    path.write_text(
+        """FUNCTION Far : DINT
+VAR_INPUT i : DINT; END_VAR
+VAR field : ARRAY[0..4259839] OF DINT; END_VAR
+field[i] := i;
+Far := field[i + 1];
+END_FUNCTION
+PROGRAM Main
+VAR n, i : DINT; END_VAR
+n := Far(i);
+i := n;
+END_PROGRAM
+"""
+    )
+    built = compile_sources([path], level=level, checks="none")
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        assert places(plc, built.symbols) in ([("Far", 1), ("Main", 9)], [("Main", 7)])  # the latter when inlined
+
+
+INITIALISED = """FUNCTION Z : DINT
+VAR_INPUT d : DINT; END_VAR
+Z := 10 / d;
+END_FUNCTION
+FUNCTION_BLOCK Pump
+VAR x : DINT; END_VAR
+METHOD FB_Init : BOOL
+VAR_INPUT bInitRetains : BOOL; bInCopyCode : BOOL; END_VAR
+x := Z(x);
+END_METHOD
+END_FUNCTION_BLOCK
+"""
+MAIN = """PROGRAM Main
+VAR
+    n : DINT;
+    {0}
+END_VAR
+n := n + 1;
+END_PROGRAM
+"""
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize(
+    ("variable", "calls"), [("v : DINT := Z(0);", []), ("pump : Pump;", [("Pump.FB_Init", "units.st", 9)])]
+)
+def test_an_exception_in_initialisation_names_unit_and_line(tmp_path, level: Level, variable: str, calls: list) -> None:
+    """The initial values of all sources are written by one function."""
+    (tmp_path / "units.st").write_text(INITIALISED)
+    (tmp_path / "main.st").write_text(MAIN.format(variable))
+    built = compile_sources([tmp_path], level=level)
+    with Simulator(built.image, built.symbols, start=False) as plc:
+        exception = plc.status().exception
+        assert exception is not None
+        found = built.symbols.call_stack(exception.code_offset, exception.trace)
+    told = [(place.pou, place.file.rpartition("/")[2], place.line) for place in found]
+    assert told == [("Z", "units.st", 3), *calls, ("Main", "main.st", 4)]

@@ -81,7 +81,35 @@ def test_task_with_single_waits_for_its_event() -> None:
     (task,) = program(configuration("TASK t(SINGLE := go, PRIORITY := 1); PROGRAM one WITH t : P;", before)).tasks
     assert task.kind is TaskKind.EVENT
     assert task.event is not None
-    assert task.event.name == "go"
+    assert (task.event.variable.name, task.event.offset, task.event.bit) == ("go", 0, None)
+
+
+@pytest.mark.parametrize(
+    ("single", "area", "offset", "bit"),
+    [
+        ("%IX0.3", Area.INPUT, 0, 3),
+        ("%QX5.7", Area.OUTPUT, 5, 7),
+        ("door", Area.INPUT, 2, 1),
+        ("word.11", Area.MEMORY, 9, 3),
+        ("list.second", Area.DATA, 3, None),
+        ("list.bits.9", Area.DATA, 1, 1),
+    ],
+)
+def test_task_may_wait_for_a_bit_or_a_member(single: str, area: Area, offset: int, bit: int | None) -> None:
+    before = (
+        "TYPE pair : STRUCT bits : WORD; first, second : BOOL; END_STRUCT END_TYPE "
+        "VAR_GLOBAL list : pair; door AT %IX2.1 : BOOL; word AT %MW4 : WORD; END_VAR "
+    )
+    (task,) = program(configuration(f"TASK t(SINGLE := {single}); PROGRAM one WITH t : P;", before)).tasks
+    assert task.kind is TaskKind.EVENT
+    assert task.event is not None
+    variable = task.event.variable
+    assert (variable.area, variable.offset + task.event.offset, task.event.bit) == (area, offset, bit)
+
+
+def test_task_waits_for_an_external_event_by_name() -> None:
+    (task,) = tasks("TASK t(EVENT := 'door', PRIORITY := 1); PROGRAM one WITH t : P;")
+    assert (task.kind, task.external) == (TaskKind.EXTERNAL, "door")
 
 
 def test_program_without_task_runs_in_the_background() -> None:
@@ -142,14 +170,24 @@ def test_globals_of_a_configuration_are_known_everywhere() -> None:
         ("TASK t(INTERVAL := 5);", "2:20: INTERVAL is a duration such as T#10ms, not integer constant"),
         ("TASK t(INTERVAL := T#-1s);", "2:20: INTERVAL has to lie between 0 and 35 minutes"),
         ("TASK t(PRIORITY := 32);", "2:20: PRIORITY is 0 (highest) to 31, not 32"),
-        ("TASK t(SINGLE := 5);", "2:18: SINGLE is a global BOOL variable"),
+        ("TASK t(SINGLE := 5);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
+        ("TASK t(SINGLE := TRUE);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
+        ("TASK t(SINGLE := NOT %IX0.1);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
+        ("TASK t(SINGLE := %IW0);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
+        ("TASK t(EVENT := 5);", "2:17: EVENT is the name of an external event such as 'door', not integer constant"),
+        ("TASK t(EVENT := '');", "2:17: the name of an EVENT has 1 to 63 ASCII characters"),
+        ("TASK t(EVENT := 'a$Nb');", "2:17: the name of an EVENT has 1 to 63 ASCII characters"),
         (
-            "TASK t(SINGLE := %IX0.1);",
-            "2:18: SINGLE is a global BOOL variable, not a bit at an address: copy that to one in another task",
+            "TASK t(INTERVAL := T#1s, SINGLE := %IX0.1);",
+            "2:36: a TASK runs by INTERVAL or by SINGLE, not by both: write another task",
+        ),
+        (
+            "TASK t(SINGLE := %IX0.1, EVENT := 'door');",
+            "2:35: a TASK runs by SINGLE or by EVENT, not by both: write another task",
         ),
         (
             "TASK t(SPEED := 5);",
-            "2:8: a TASK has INTERVAL, PRIORITY, SINGLE, WATCHDOG and SENSITIVITY, not SPEED",
+            "2:8: a TASK has INTERVAL, PRIORITY, SINGLE, EVENT, WATCHDOG and SENSITIVITY, not SPEED",
         ),
         ("TASK t(WATCHDOG := 5);", "2:20: WATCHDOG is a duration such as T#10ms, not integer constant"),
         ("TASK t(WATCHDOG := T#2h);", "2:20: WATCHDOG has to lie between 0 and 35 minutes"),

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpChannelServerEmbedded.h"
 #include "CmpSrv.h"
 #include "comm_fakes.h"
 #include "comm_client.h"
@@ -140,8 +141,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fakes.task_count = FAKE_TASKS;
     fakes.log_count = 5;
     put_pointers();
-    RTS_UI32 session = SrvLogin(0);
-    RTS_UI32 app_session = SrvCreateAppSession();
+    RTS_UI32 session = SrvLogin(ChannelGetClient(0), 0);
+    RTS_UI32 app_session = SrvCreateAppSession(ChannelGetClient(0));
     memcpy(message, "\x55\xCD\x10\x00", 4);
     memcpy(message + 4, data, size);
     if (message[5] & 0x80)
@@ -150,7 +151,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     FUZZ_CHECK(copy != NULL);
     memcpy(copy, message, size + 4);
     RTS_UI32 capacity = CHANNEL_MIN_MESSAGE + data[size - 1];
-    RTS_UI32 got = SrvHandleMessage(copy, (RTS_UI32)size + 4, reply, capacity);
+    RTS_UI32 got = SrvHandleMessage(ChannelGetClient(0), copy, (RTS_UI32)size + 4, reply, capacity);
     free(copy);
     FUZZ_CHECK(got >= 20 && got <= capacity);
     FUZZ_CHECK(BytesGet32(reply + 12) == got - 20);

@@ -85,6 +85,14 @@ class Runner:
         subprocess.run([self.compiler, *flags, "-o", program, *sources, "-lm"], check=True)
         return program
 
+    def compile_object(self, folder: Path, source: Path, *extra: str) -> Path:
+        """The object file of one source, without the runtime."""
+        target = folder / f"{source.stem}-{self.target}.o"
+        flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *extra]
+        compiled = [flag for flag in flags if not flag.startswith("-Wl,")]
+        subprocess.run([self.compiler, *compiled, "-c", "-o", target, source], check=True)
+        return target
+
     def run(self, batch: bytes, folder: Path) -> bytes:
         """The results of a batch, see runner.c."""
         folder.mkdir(exist_ok=True)

@@ -158,7 +158,9 @@ def spoiled_symbols(built: Built, image: bytes) -> Path:
     return path
 
 
-def test_endless_loop_is_broken_while_a_faster_task_goes_on(make_board, build) -> None:
+# A watchdog of the task's own may make the 2 s of the default less, but not more: communication waits as long.
+@pytest.mark.parametrize("watchdog", ["", ", WATCHDOG := T#30m, SENSITIVITY := 1000"])
+def test_endless_loop_is_broken_while_a_faster_task_goes_on(make_board, build, watchdog) -> None:
     statement = "WHILE trip DO x := x + 1; END_WHILE"
     text = f"""
 VAR_GLOBAL
@@ -179,7 +181,7 @@ END_PROGRAM
 CONFIGURATION Config
     RESOURCE Res ON PLC
         TASK Fast(INTERVAL := T#1ms, PRIORITY := 1);
-        TASK Slow(INTERVAL := T#10ms, PRIORITY := 5);
+        TASK Slow(INTERVAL := T#10ms, PRIORITY := 5{watchdog});
         PROGRAM Count WITH Fast : Count;
         PROGRAM Main WITH Slow : Main;
     END_RESOURCE

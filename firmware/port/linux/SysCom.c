@@ -132,7 +132,9 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
     state.speed = *speed;
     memcpy(state.path, pty ? "" : path, pty ? 1 : strlen(path) + 1);
     if (pty ? !open_pty() : !open_device()) {
-        PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)baud, strerror(errno));
+        int error = errno;
+        PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)baud, strerror(error));
+        reason->busy = error == EBUSY;
         PortComClose();
         return false;
     }
@@ -151,6 +153,14 @@ void PortComClose(void)
     state.line = -1;
     state.slave = -1;
     state.configured = false;
+}
+
+void PortComHandOver(void)
+{
+    if (state.line >= 0 && state.slave < 0) {
+        close(state.line);
+        state.line = -1;
+    }
 }
 
 const char *PortComPtyName(void)
@@ -220,6 +230,9 @@ RTS_RESULT SysComOpen(RTS_UI32 index)
         return ERR_DEVICE;
     }
     state.open = true;
+    if (state.line < 0 && !open_device()) {
+        LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is away: %s", state.path, strerror(errno));
+    }
     return ERR_OK;
 }
 

@@ -7,37 +7,36 @@
  * not ours (Python): signal handlers are taken at first use, faults outside SysExceptTry go to whoever had them
  * before, and SysExceptShutdown gives everything back.
  *
- * Leaving a handler by siglongjmp is sound here: IEC code and the C functions it may call hold no lock and own nothing.
- * The handlers block no signal (SA_NODEFER, empty mask), so no mask has to be saved: sigsetjmp costs a few ns.
+ * IEC code runs on a stack of its own (IecStack.h), so that what it destroys there is its own. Leaving it from a handler
+ * is sound: IEC code and the C functions it may call hold no lock and own nothing. The handlers block no signal
+ * (SA_NODEFER, empty mask), so no mask has to be saved.
  */
 #define _GNU_SOURCE
 #include "SysExcept.h"
 
+#include "IecStack.h"
+
 #include <pthread.h>
-#include <setjmp.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
 #include <ucontext.h>
 
 enum {
-    MAX_CONTEXTS = 64,                /* threads that run IEC code at the same time */
-    SIGNAL_STACK_SIZE = 32 * 1024,    /* a signal frame with all vector registers takes up to 12 KiB */
-    OVERFLOW_ZONE = 16 * 1024 * 1024, /* a fault this far below the end of a stack is an overflow of it */
-    GUARD_SIZE = 64 * 1024,           /* some C libraries count the guard pages as part of the stack */
-    BREAK_SIGNAL_OFFSET = 5,          /* from SIGRTMIN: clear of what debuggers and libraries use */
+    MAX_CONTEXTS = 64,       /* threads that run IEC code at the same time */
+    BREAK_SIGNAL_OFFSET = 5, /* from SIGRTMIN: clear of what debuggers and libraries use */
 };
 
-/* A thread that runs IEC code. The thread itself writes `jump`, `round` and `arg`; SysExceptBreak reads them from
- * another. */
+/* A thread that runs IEC code. The thread itself writes `stack.running`, `round` and `arg`; SysExceptBreak reads them
+ * from another. */
 typedef struct {
-    sigjmp_buf *jump;        /* of the running SysExceptTry, NULL outside of it */
+    IEC_STACK stack;         /* the first member; stays when the thread ends, for the next one */
     RTS_UI32 round;          /* counts SysExceptTry, so that a break that comes late does not hit the next one */
     RTS_UI32 break_round;    /* the round to break */
     RTS_UI32 break_code;
     const void *arg;         /* of the running SysExceptTry */
     RTS_EXCEPTION exception; /* on the way from the handler to SysExceptTry */
-    uintptr_t stack_end;     /* lowest address of the stack */
     pthread_t thread;
     int used;
 } CONTEXT;
@@ -69,15 +68,21 @@ static struct {
     },
 };
 
-static unsigned char signal_stack[MAX_CONTEXTS][SIGNAL_STACK_SIZE] __attribute__((aligned(16)));
-
-/* The static TLS model: reading it in a handler never allocates. */
-static __thread CONTEXT *self __attribute__((tls_model("initial-exec")));
+/* That of the calling thread, NULL without. */
+static CONTEXT *self(void)
+{
+    return (CONTEXT *)IecStackOfThread;
+}
 
 static void fatal(const char *message)
 {
     fprintf(stderr, "SysExcept: %s\n", message);
     abort();
+}
+
+static bool runs_iec_code(const CONTEXT *context)
+{
+    return context != NULL && __atomic_load_n(&context->stack.running, __ATOMIC_ACQUIRE) != 0;
 }
 
 /* ---- in the handler ---- */
@@ -100,17 +105,47 @@ static PLACE place_of(const void *ucontext)
 #endif
 }
 
-/* What lies between the stack pointer and SysExceptTry is the application's. */
+/* What may be read of the IEC stack from a stack pointer on, which may have been destroyed. */
+static const uintptr_t *readable(const IEC_STACK *stack, uintptr_t pointer)
+{
+    uintptr_t from = pointer & ~(sizeof(uintptr_t) - 1);
+    if (IecStackIsOverflow(stack, pointer)) {
+        from = stack->bottom;
+    }
+    return (const uintptr_t *)(from >= stack->bottom && from < stack->top ? from : stack->top);
+}
+
 static void leave(CONTEXT *context, RTS_UI32 code, PLACE place)
 {
-    sigjmp_buf *jump = context->jump;
-    uintptr_t readable = context->stack_end + GUARD_SIZE;
-    uintptr_t stack = place.stack > readable ? place.stack : readable;
-    SysExceptTrace(place.address, (const uintptr_t *)stack, (const uintptr_t *)jump, place.link);
+    const uintptr_t *end = (const uintptr_t *)context->stack.top;
+    SysExceptTrace(place.address, readable(&context->stack, place.stack), end, place.link);
     context->exception.code = code;
     context->exception.address = place.address;
-    __atomic_store_n(&context->jump, NULL, __ATOMIC_RELEASE);
-    siglongjmp(*jump, 1);
+    __atomic_store_n(&context->stack.running, 0, __ATOMIC_RELEASE);
+    IecStackLeave(&context->stack);
+}
+
+/* C code that IEC code called: the call that is nearest on the stack. */
+static uintptr_t last_return(const uintptr_t *word, const uintptr_t *end)
+{
+    while (word < end && !SysExceptIsReturn(*word)) {
+        word++;
+    }
+    return word < end ? *word - 1 : 0;
+}
+
+uintptr_t IecStackLastPlace(const void *ucontext, const void **arg)
+{
+    const CONTEXT *context = self();
+    PLACE place = place_of(ucontext);
+    *arg = context != NULL ? context->arg : NULL;
+    if (!runs_iec_code(context)) {
+        return 0;
+    }
+    if (SysExceptIsCode(place.address)) {
+        return place.address;
+    }
+    return last_return(readable(&context->stack, place.stack), (const uintptr_t *)context->stack.top);
 }
 
 static SIGNAL *find_signal(int number)
@@ -124,8 +159,7 @@ static SIGNAL *find_signal(int number)
 
 static RTS_UI32 fault_code(const CONTEXT *context, const SIGNAL *signal, const siginfo_t *info)
 {
-    uintptr_t below = context->stack_end + GUARD_SIZE - (uintptr_t)info->si_addr;
-    int overflow = signal->number == SIGSEGV && info->si_addr != NULL && below <= OVERFLOW_ZONE + GUARD_SIZE;
+    bool overflow = signal->number == SIGSEGV && IecStackIsOverflow(&context->stack, (uintptr_t)info->si_addr);
     return overflow ? (RTS_UI32)RTSEXCPT_STACK_OVERFLOW : signal->code;
 }
 
@@ -147,9 +181,9 @@ static void chain(const SIGNAL *signal, siginfo_t *info, void *ucontext)
 
 static void on_fault(int number, siginfo_t *info, void *ucontext)
 {
-    CONTEXT *context = self;
+    CONTEXT *context = self();
     SIGNAL *signal = find_signal(number);
-    if (context != NULL && context->jump != NULL) {
+    if (runs_iec_code(context)) {
         leave(context, fault_code(context, signal, info), place_of(ucontext));
     }
     chain(signal, info, ucontext);
@@ -157,11 +191,10 @@ static void on_fault(int number, siginfo_t *info, void *ucontext)
 
 static void on_break(int number, siginfo_t *info, void *ucontext)
 {
-    CONTEXT *context = self;
+    CONTEXT *context = self();
     RTS_UNUSED(number);
     RTS_UNUSED(info);
-    if (context != NULL && context->jump != NULL &&
-        __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round) {
+    if (runs_iec_code(context) && __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round) {
         leave(context, context->break_code, place_of(ucontext));
     }
 }
@@ -222,11 +255,12 @@ static void detach(void *param)
 {
     CONTEXT *context = param;
     stack_t stack;
-    if (sigaltstack(NULL, &stack) == 0 && stack.ss_sp == signal_stack[context - state.context]) {
+    size_t size;
+    if (sigaltstack(NULL, &stack) == 0 && stack.ss_sp == IecStackSignalMemory(&context->stack, &size)) {
         stack_t none = {.ss_flags = SS_DISABLE};
         sigaltstack(&none, NULL);
     }
-    self = NULL;
+    IecStackOfThread = NULL;
     pthread_mutex_lock(&state.lock);
     context->used = 0;
     pthread_mutex_unlock(&state.lock);
@@ -256,25 +290,12 @@ static CONTEXT *take_context(void)
     return context;
 }
 
-static uintptr_t own_stack_end(void)
-{
-    pthread_attr_t attributes;
-    void *lowest = NULL;
-    size_t size;
-    if (pthread_getattr_np(pthread_self(), &attributes) == 0) {
-        pthread_attr_getstack(&attributes, &lowest, &size);
-        pthread_attr_destroy(&attributes);
-    }
-    return (uintptr_t)lowest;
-}
-
 /* A stack overflow leaves no room for a handler on the stack itself. */
 static void give_signal_stack(const CONTEXT *context)
 {
     stack_t stack;
     if (sigaltstack(NULL, &stack) == 0 && (stack.ss_flags & SS_DISABLE) != 0) {
-        stack.ss_sp = signal_stack[context - state.context];
-        stack.ss_size = SIGNAL_STACK_SIZE;
+        stack.ss_sp = IecStackSignalMemory(&context->stack, &stack.ss_size);
         stack.ss_flags = 0;
         sigaltstack(&stack, NULL);
     }
@@ -297,20 +318,22 @@ static CONTEXT *attach(void)
     pthread_mutex_lock(&state.lock);
     install();
     pthread_mutex_unlock(&state.lock);
-    if (self == NULL) {
+    if (self() == NULL) {
         CONTEXT *context = take_context();
-        context->stack_end = own_stack_end();
+        if (!IecStackReserve(&context->stack)) {
+            fatal("no address space is left for the stack of a task: raise the limit (ulimit -v)");
+        }
         give_signal_stack(context);
         pthread_setspecific(state.key, context);
-        self = context;
+        IecStackOfThread = &context->stack;
     }
     unblock_signals();
-    return self;
+    return self();
 }
 
 static CONTEXT *own_context(void)
 {
-    CONTEXT *context = self;
+    CONTEXT *context = self();
     return context != NULL && __atomic_load_n(&state.installed, __ATOMIC_RELAXED) ? context : attach();
 }
 
@@ -324,15 +347,12 @@ static void begin_round(CONTEXT *context, const void *arg)
 
 int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
-    sigjmp_buf jump;
-    begin_round(own_context(), arg);
-    if (sigsetjmp(jump, 0) != 0) {
-        *exception = self->exception;
+    CONTEXT *context = own_context();
+    begin_round(context, arg);
+    if (IecStackRun(&context->stack, fn, arg) != 0) {
+        *exception = context->exception;
         return 1;
     }
-    __atomic_store_n(&self->jump, &jump, __ATOMIC_RELEASE);
-    fn(arg);
-    __atomic_store_n(&self->jump, NULL, __ATOMIC_RELEASE);
     exception->code = RTSEXCPT_NOEXCEPTION;
     exception->address = 0;
     return 0;
@@ -340,8 +360,8 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
-    CONTEXT *context = self;
-    if (context == NULL || context->jump == NULL) {
+    CONTEXT *context = self();
+    if (!runs_iec_code(context)) {
         fatal("an exception was raised outside of IEC code");
     }
     leave(context, code, (PLACE){.address = address, .stack = (uintptr_t)stack});
@@ -358,23 +378,49 @@ static void break_round(CONTEXT *context, RTS_UI32 round, RTS_UI32 code)
     }
 }
 
+static bool runs(const CONTEXT *context, const void *arg)
+{
+    return context->used && runs_iec_code(context) && __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg;
+}
+
 /* The round is read first: when the thread goes on to its next one meanwhile, the break misses. */
 static void break_if_it_runs(CONTEXT *context, const void *arg, RTS_UI32 code)
 {
     RTS_UI32 round = __atomic_load_n(&context->round, __ATOMIC_ACQUIRE);
-    if (__atomic_load_n(&context->jump, __ATOMIC_ACQUIRE) != NULL &&
-        __atomic_load_n(&context->arg, __ATOMIC_ACQUIRE) == arg) {
+    if (runs(context, arg)) {
         break_round(context, round, code);
     }
+}
+
+static RTS_I64 used_ns(const CONTEXT *context)
+{
+    clockid_t clock;
+    struct timespec used;
+    if (pthread_getcpuclockid(context->thread, &clock) != 0 || clock_gettime(clock, &used) != 0) {
+        return -1;
+    }
+    return (RTS_I64)used.tv_sec * 1000000000 + used.tv_nsec;
+}
+
+/* The lock keeps the thread from ending meanwhile. */
+RTS_I64 SysExceptGetUsedNs(const void *arg)
+{
+    RTS_I64 ns = -1;
+    pthread_mutex_lock(&state.lock);
+    for (const CONTEXT *context = state.context; ns < 0 && context < state.context + MAX_CONTEXTS; context++) {
+        if (runs(context, arg)) {
+            ns = used_ns(context);
+        }
+    }
+    pthread_mutex_unlock(&state.lock);
+    return ns;
 }
 
 void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     pthread_mutex_lock(&state.lock);
     for (CONTEXT *context = state.context; state.installed && context < state.context + MAX_CONTEXTS; context++) {
-        if (context->used) {
-            break_if_it_runs(context, arg, code);
-        }
+        break_if_it_runs(context, arg, code);
     }
     pthread_mutex_unlock(&state.lock);
 }

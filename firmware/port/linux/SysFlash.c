@@ -203,6 +203,7 @@ static bool lock_file(int file, const char *path, PORT_REASON *reason)
     }
     if (errno == EWOULDBLOCK) {
         PortReason(reason, "flash file %s is in use by another plcrt: end that one or name another file", path);
+        reason->busy = true;
     } else {
         PortReason(reason, "cannot lock flash file %s: %s", path, strerror(errno));
     }

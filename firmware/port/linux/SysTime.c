@@ -25,6 +25,13 @@ RTS_I64 SysTimeGetNs(void)
     return monotonic_ns() - state.start_ns;
 }
 
+RTS_I64 SysTimeGetUsedNs(void)
+{
+    struct timespec used;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+    return (RTS_I64)used.tv_sec * 1000000000 + used.tv_nsec;
+}
+
 RTS_UI32 SysTimeGetMs(void)
 {
     return (RTS_UI32)(SysTimeGetNs() / 1000000);

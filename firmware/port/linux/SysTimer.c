@@ -1,11 +1,11 @@
 /*
- * SysTimer.c - periodic timers of the Linux port: one SCHED_FIFO thread each.
+ * SysTimer.c - timers of the Linux port: one SCHED_FIFO thread each.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
  * A thread lives from SysTimerStart to SysTimerStop, on a stack that was reserved at start-up. It sleeps on a condition
  * variable with an absolute CLOCK_MONOTONIC time, which wakes as precisely as clock_nanosleep and can be cut short by
- * SysTimerStop.
+ * SysTimerStop and SysTimerTrigger. Its lock passes on priority, since tasks trigger each other.
  */
 #define _GNU_SOURCE
 #include "SysTimer.h"
@@ -29,19 +29,20 @@ enum {
     MAX_TIMERS = APP_MAX_TASKS + 1, /* and the watchdog */
     STACK_STEP = PORT_STACK_GUARD + PORT_STACK_SIZE,
 };
+#define NEVER INT64_MAX
 
 typedef struct {
     SYS_TIMER_CALLBACK callback; /* NULL when the timer is free */
     void *param;
-    RTS_I64 interval_ns;
-    RTS_I64 start_ns;
-    RTS_UI32 overruns; /* atomic */
+    RTS_I64 interval_ns; /* 0: calls when it is triggered */
+    RTS_UI32 overruns;   /* atomic */
     int priority;
     int started;
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t changed;
-    int stop; /* under `lock` */
+    RTS_I64 due_ns; /* of the next call, NEVER without one; of timers without interval under `lock` */
+    int stop;       /* under `lock`; also while there is no thread */
 } TIMER;
 
 static struct {
@@ -52,15 +53,30 @@ static struct {
 
 /* ---- in the thread ---- */
 
-/* Sleeps until the time has come; 0 when the timer was stopped instead. */
-static int sleep_until(TIMER *timer, RTS_I64 due_ns)
+/* With the lock: sleeps until the time `due_ns` has come or something has changed. */
+static void sleep_towards(TIMER *timer)
 {
-    RTS_I64 at = PortMonotonicNs(due_ns);
+    if (timer->due_ns == NEVER) {
+        pthread_cond_wait(&timer->changed, &timer->lock);
+        return;
+    }
+    RTS_I64 at = PortMonotonicNs(timer->due_ns);
     struct timespec until = {.tv_sec = (time_t)(at / 1000000000), .tv_nsec = (long)(at % 1000000000)};
+    pthread_cond_timedwait(&timer->changed, &timer->lock, &until);
+}
+
+/* Sleeps until the next call is due; 0 when the timer was stopped instead. */
+static int wait_until_due(TIMER *timer, RTS_I64 *due_ns)
+{
     pthread_mutex_lock(&timer->lock);
-    while (!timer->stop && pthread_cond_timedwait(&timer->changed, &timer->lock, &until) != ETIMEDOUT) {
+    while (!timer->stop && timer->due_ns > SysTimeGetNs()) {
+        sleep_towards(timer);
     }
     int go_on = !timer->stop;
+    *due_ns = timer->due_ns;
+    if (timer->interval_ns == 0) {
+        timer->due_ns = NEVER;
+    }
     pthread_mutex_unlock(&timer->lock);
     return go_on;
 }
@@ -71,6 +87,14 @@ static RTS_UI32 count_missed(RTS_I64 due_ns, RTS_I64 now_ns, RTS_I64 interval_ns
     return now_ns <= due_ns ? 0 : (RTS_UI32)((now_ns - due_ns - 1) / interval_ns + 1);
 }
 
+static void set_next_due(TIMER *timer)
+{
+    timer->due_ns += timer->interval_ns;
+    RTS_UI32 missed = count_missed(timer->due_ns, SysTimeGetNs(), timer->interval_ns);
+    (void)SysAtomicAdd(&timer->overruns, missed);
+    timer->due_ns += missed * timer->interval_ns;
+}
+
 static void do_nothing(void *arg)
 {
     RTS_UNUSED(arg);
@@ -79,16 +103,15 @@ static void do_nothing(void *arg)
 static void *run(void *param)
 {
     TIMER *timer = param;
-    RTS_I64 due_ns = timer->start_ns;
+    RTS_I64 due_ns;
     RTS_EXCEPTION none;
     (void)SysExceptTry(do_nothing, NULL, &none); /* takes what catching needs now, not in the first cycle */
     prctl(PR_SET_TIMERSLACK, 1UL); /* matters without SCHED_FIFO only: else 50 us late */
-    while (sleep_until(timer, due_ns)) {
+    while (wait_until_due(timer, &due_ns)) {
         timer->callback(timer->param, due_ns);
-        due_ns += timer->interval_ns;
-        RTS_UI32 missed = count_missed(due_ns, SysTimeGetNs(), timer->interval_ns);
-        (void)SysAtomicAdd(&timer->overruns, missed);
-        due_ns += missed * timer->interval_ns;
+        if (timer->interval_ns != 0) {
+            set_next_due(timer);
+        }
     }
     return NULL;
 }
@@ -131,8 +154,10 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     if (timer->started) {
         return ERR_INVALID_STATE;
     }
+    pthread_mutex_lock(&timer->lock);
     timer->stop = 0;
-    timer->start_ns = SysTimeGetNs();
+    timer->due_ns = SysTimeGetNs();
+    pthread_mutex_unlock(&timer->lock);
     int error = create_thread(timer, state.realtime);
     if (error == EPERM && state.realtime) {
         state.realtime = 0;
@@ -141,6 +166,9 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
         error = create_thread(timer, 0);
     }
     timer->started = error == 0;
+    if (error != 0) {
+        timer->stop = 1; /* there is no thread that a trigger could be for */
+    }
     return error == 0 ? ERR_OK : ERR_NOMEMORY;
 }
 
@@ -162,13 +190,28 @@ RTS_RESULT SysTimerStop(RTS_HANDLE handle)
     return ERR_OK;
 }
 
+/* The timer may be created, started or stopped meanwhile by main: then the trigger has no meaning, but does no harm. */
+void SysTimerTrigger(RTS_HANDLE handle, RTS_I64 due_ns)
+{
+    if (handle >= MAX_TIMERS) {
+        return;
+    }
+    TIMER *timer = &state.timer[handle];
+    pthread_mutex_lock(&timer->lock);
+    if (!timer->stop && timer->interval_ns == 0 && due_ns < timer->due_ns) {
+        timer->due_ns = due_ns;
+        pthread_cond_signal(&timer->changed);
+    }
+    pthread_mutex_unlock(&timer->lock);
+}
+
 /* ---- creating and deleting ---- */
 
 RTS_RESULT PortTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, int fifo_priority,
                            RTS_HANDLE *timer)
 {
     RTS_HANDLE i = 0;
-    if (callback == NULL || interval_us == 0) {
+    if (callback == NULL) {
         return ERR_PARAMETER;
     }
     while (i < MAX_TIMERS && state.timer[i].callback != NULL) {
@@ -220,7 +263,12 @@ static void init_timer(TIMER *timer)
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
     pthread_cond_init(&timer->changed, &attributes);
     pthread_condattr_destroy(&attributes);
-    pthread_mutex_init(&timer->lock, NULL);
+    pthread_mutexattr_t passes_on_priority;
+    pthread_mutexattr_init(&passes_on_priority);
+    (void)pthread_mutexattr_setprotocol(&passes_on_priority, PTHREAD_PRIO_INHERIT);
+    pthread_mutex_init(&timer->lock, &passes_on_priority);
+    pthread_mutexattr_destroy(&passes_on_priority);
+    timer->stop = 1;
 }
 
 static RTS_RESULT init(void)

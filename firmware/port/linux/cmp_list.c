@@ -9,10 +9,12 @@
     X(SysTime) \
     X(CmpLog) \
     X(SysTarget) \
+    X(SysLock) \
     X(SysTimer) \
     X(SysFileFlash) \
     X(CmpEventMgrEmbedded) \
     X(SysWatchdog) \
+    X(SysEvent) \
     X(CmpMath) \
     X(CmpRetain) \
     X(CmpIecTask) \

@@ -4,11 +4,13 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * SIGTERM and SIGINT end it in order, a second one at once. SIGHUP is ignored: a controller does not stop because
- * somebody closes the terminal it was started from.
+ * somebody closes the terminal it was started from. The controller itself is a child process (Supervisor.c), which ends
+ * on SIGTERM only: SIGINT from a terminal reaches both.
  */
 #define _GNU_SOURCE
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
+#include "Supervisor.h"
 #include "SysExcept.h"
 #include "port.h"
 #include "rts_config.h"
@@ -23,6 +25,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { EXIT_RUNTIME = 1, EXIT_USAGE = 2, DEFAULT_BAUD = 115200 };
@@ -31,15 +34,20 @@ typedef struct {
     const char *flash;
     const char *serial;
     RTS_UI32 baud;
+    char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
+    RTS_UI32 event_count;
+    bool alone;
 } OPTIONS;
 
 static const char usage[] =
-    "usage: plcrt --flash FILE [--serial PATH|pty] [--baud N]\n"
+    "usage: plcrt --flash FILE [--serial PATH|pty] [--baud N] [--event NAME=PIPE]...\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
     "  --serial pty    opens a pseudo terminal and prints its name as \"serial: /dev/pts/N\"\n"
     "  --baud N        speed of the serial device, 115200 if not given\n"
+    "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
+    "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
     "  --version       prints the version\n"
     "  --help          prints this\n"
     "\n"
@@ -83,6 +91,8 @@ enum {
     OPTION_FLASH = 256,
     OPTION_SERIAL,
     OPTION_BAUD,
+    OPTION_EVENT,
+    OPTION_ALONE,
     OPTION_VERSION,
     OPTION_HELP,
     OPTION_CAN,
@@ -94,6 +104,8 @@ static const struct option long_options[] = {
     {"flash", required_argument, NULL, OPTION_FLASH},
     {"serial", required_argument, NULL, OPTION_SERIAL},
     {"baud", required_argument, NULL, OPTION_BAUD},
+    {"event", required_argument, NULL, OPTION_EVENT},
+    {"no-supervisor", no_argument, NULL, OPTION_ALONE},
     {"version", no_argument, NULL, OPTION_VERSION},
     {"help", no_argument, NULL, OPTION_HELP},
     {"can", required_argument, NULL, OPTION_CAN},
@@ -101,6 +113,14 @@ static const struct option long_options[] = {
     {"tcp", optional_argument, NULL, OPTION_TCP},
     {NULL, 0, NULL, 0},
 };
+
+static void take_event(OPTIONS *options, char *text)
+{
+    if (options->event_count == RTS_COUNT(options->event)) {
+        refuse("--event %s is one too many: there may be %d", text, SCHED_MAX_EXTERNAL_EVENTS);
+    }
+    options->event[options->event_count++] = text;
+}
 
 static void take_option(OPTIONS *options, int option)
 {
@@ -113,6 +133,12 @@ static void take_option(OPTIONS *options, int option)
         break;
     case OPTION_BAUD:
         options->baud = parse_baud(optarg);
+        break;
+    case OPTION_EVENT:
+        take_event(options, optarg);
+        break;
+    case OPTION_ALONE:
+        options->alone = true;
         break;
     case OPTION_VERSION:
         print_and_exit("plcrt " PLCRT_VERSION "\n");
@@ -172,21 +198,25 @@ static void on_end_signal(int number)
 {
     RTS_UNUSED(number);
     quit = 1;
+    SchedRequestEnd();
 }
 
 /* SIGXFSZ (a limit of file sizes) and SIGPIPE are errors of the write that met them. */
-static void take_signals(void)
+static void ignore_signals(void)
+{
+    (void)signal(SIGHUP, SIG_IGN);
+    (void)signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGXFSZ, SIG_IGN);
+}
+
+/* `flags`: SA_RESETHAND, for a second signal that ends the process at once, or 0. */
+static void take_end_signals(int flags)
 {
     sigset_t ends;
-    struct sigaction end = {.sa_handler = on_end_signal, .sa_flags = (int)SA_RESETHAND};
-    struct sigaction ignore = {.sa_handler = SIG_IGN};
+    struct sigaction end = {.sa_handler = on_end_signal, .sa_flags = flags};
     sigemptyset(&end.sa_mask);
-    sigemptyset(&ignore.sa_mask);
     sigaction(SIGTERM, &end, NULL);
     sigaction(SIGINT, &end, NULL);
-    sigaction(SIGHUP, &ignore, NULL);
-    sigaction(SIGPIPE, &ignore, NULL);
-    sigaction(SIGXFSZ, &ignore, NULL);
     sigemptyset(&ends); /* they may have been blocked by whoever started us */
     sigaddset(&ends, SIGTERM);
     sigaddset(&ends, SIGINT);
@@ -246,11 +276,28 @@ static void lock_memory(void)
 static void main_loop(void)
 {
     while (!quit) {
+        PortMainPass();
         RTS_UI32 before = PortComMoved();
         (void)CMCallHook(CH_COMM_CYCLE);
         if (PortComMoved() == before) {
-            PortComWait(SchedHasBackgroundTasks() ? PORT_BACKGROUND_MS : PORT_IDLE_MS);
+            PortComWait(PORT_IDLE_MS);
         }
+    }
+}
+
+static bool open_events(const OPTIONS *options, PORT_REASON *reason)
+{
+    RTS_UI32 opened = 0;
+    while (opened < options->event_count && PortEventOpen(options->event[opened], reason)) {
+        opened++;
+    }
+    return opened == options->event_count;
+}
+
+static void log_restart(void)
+{
+    if (SysStartGet()->stay_stopped) {
+        LogAdd(CMPID_CmpMgr, LOG_WARNING, ERR_OK, "The controller died (%s) and was started again", SysStartGet()->text);
     }
 }
 
@@ -259,8 +306,9 @@ static int run(void)
     if (!start()) {
         return EXIT_RUNTIME;
     }
+    log_restart();
     lock_memory();
-    if (PortComPtyName() != NULL) {
+    if (PortIsUp() && PortComPtyName() != NULL) {
         printf("serial: %s\n", PortComPtyName());
         (void)fflush(stdout);
     }
@@ -268,20 +316,57 @@ static int run(void)
     return end() ? EXIT_SUCCESS : EXIT_RUNTIME;
 }
 
+static int run_alone(void)
+{
+    take_end_signals((int)SA_RESETHAND);
+    return run();
+}
+
+/* The supervisor sees to it that a second signal ends it at once. */
+static int run_supervised(void)
+{
+    take_end_signals(0);
+    (void)signal(SIGINT, SIG_IGN);
+    return run();
+}
+
+static bool open_all(const OPTIONS *options, PORT_REASON *reason)
+{
+    if (!PortFlashOpen(options->flash, reason)) {
+        return false;
+    }
+    if (options->serial != NULL && !PortComOpen(options->serial, options->baud, reason)) {
+        PortFlashClose();
+        return false;
+    }
+    return true;
+}
+
+/* What the last plcrt used may be busy for a moment after it was killed. */
+static bool open_when_free(const OPTIONS *options, PORT_REASON *reason)
+{
+    const struct timespec moment = {0, 10 * 1000 * 1000};
+    bool opened = open_all(options, reason);
+    for (int ms = 0; !opened && reason->busy && ms < PORT_BUSY_MS; ms += 10) {
+        (void)nanosleep(&moment, NULL);
+        opened = open_all(options, reason);
+    }
+    return opened;
+}
+
 int main(int argc, char **argv)
 {
     OPTIONS options = parse_options(argc, argv);
-    PORT_REASON reason;
-    int status = EXIT_RUNTIME;
+    PORT_REASON reason = {.busy = false};
     hold_standard_streams();
-    take_signals();
-    if (PortFlashOpen(options.flash, &reason) &&
-        (options.serial == NULL || PortComOpen(options.serial, options.baud, &reason))) {
-        status = run();
-    } else {
+    ignore_signals();
+    if (!open_when_free(&options, &reason) || !open_events(&options, &reason)) {
         fprintf(stderr, "plcrt: %s\n", reason.text);
+        return EXIT_RUNTIME;
     }
+    int status = options.alone ? run_alone() : PortSupervise(run_supervised);
     SysExceptShutdown();
+    PortEventClose();
     PortComClose();
     PortFlashClose();
     return status;

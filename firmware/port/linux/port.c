@@ -14,4 +14,5 @@ void PortReason(PORT_REASON *reason, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(reason->text, sizeof(reason->text), format, arguments);
     va_end(arguments);
+    reason->busy = false;
 }

@@ -12,6 +12,7 @@
 /* Where a Port function writes why it failed: one sentence. */
 typedef struct {
     char text[256];
+    bool busy; /* another process has it: it may be free soon */
 } PORT_REASON;
 
 void PortReason(PORT_REASON *reason, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -30,6 +31,17 @@ RTS_RESULT SysTimer_Hook(CMP_HOOK hook);
 RTS_RESULT PortTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, int fifo_priority,
                            RTS_HANDLE *timer);
 
+/* ---- SysWatchdog ---- */
+
+/* Once in each pass of the main loop: it sees from it that main has a processor. */
+void PortMainPass(void);
+
+/* ---- SysEvent ---- */
+
+/* Takes "NAME=PIPE", which stays, and opens the pipe; creates it when there is none. Before CMInit. */
+bool PortEventOpen(char *name_and_path, PORT_REASON *reason);
+void PortEventClose(void);
+
 /* ---- SysFlash ---- */
 
 /* Opens the flash file, or creates it with erased bytes, and locks it. Before CMInit. */
@@ -42,6 +54,9 @@ bool PortComKnowsBaud(RTS_UI32 baud);
 /* Opens the one serial line: a device, or with path "pty" a new pseudo terminal. Before CMInit. */
 bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason);
 void PortComClose(void);
+/* For a process whose child has the line now: closes a device, which the child opens anew when it is lost. A pseudo
+ * terminal stays open, so that it outlives the child. */
+void PortComHandOver(void);
 /* Name of the pseudo terminal, NULL when the line is none. */
 const char *PortComPtyName(void);
 /* Bytes read and written so far: main sees from it whether there may be more to do. */

@@ -14,12 +14,25 @@
 #define APP_INPUT_SIZE 4096
 #define APP_OUTPUT_SIZE 4096
 #define APP_MEMORY_SIZE (64 * 1024)
+#define APP_AREAS_FROM_PORT 1
 #define NETSERVER_MESSAGE_SIZE 16384
+#define COMM_MAX_CLIENTS 4
 #define LOG_MAX_ENTRIES 256
 #define CHECKSUM_TABLE_ENTRIES 256
 
 /* Less than the patience of plctool with a device that does not answer, and of whoever ends plcrt [us]. */
 #define APP_DEFAULT_WATCHDOG_US 5000000
+
+/* A reset answers within a second, also that of a program whose initialisation does not end [us]. */
+#define APP_INIT_WATCHDOG_US 700000
+
+/* Every task is a thread of its own; their processor time is known. */
+#define SCHED_EVENTS_IN_TIMERS 1
+#define SCHED_FREEWHEELING_IN_TIMERS 1
+#define SCHED_PROCESSOR_TIME 1
+
+/* plcrt --event */
+#define SCHED_MAX_EXTERNAL_EVENTS 8
 
 /* The flash file [bytes]. Geometry of a common serial NOR flash, programmed in the units of an STM32's. */
 #define PORT_FLASH_SIZE (4 * 1024 * 1024)
@@ -39,18 +52,39 @@
 #endif
 #define PORT_STACK_GUARD (16 * 1024 * 1024)
 
-/* SCHED_FIFO priority of an IEC priority p is PORT_PRIORITY_HIGHEST - p: 80..49. The watchdog is above all of them. */
+/* SCHED_FIFO priority of an IEC priority p is PORT_PRIORITY_HIGHEST - p: 80..49. Above all of them are external events,
+ * main as long as tasks leave it no time otherwise, and the watchdog. */
 #define PORT_PRIORITY_HIGHEST 80
+#define PORT_PRIORITY_EVENTS 84
+#define PORT_PRIORITY_URGENT_MAIN 86
 #define PORT_PRIORITY_WATCHDOG 90
+
+/* Main, which wakes every PORT_IDLE_MS, has no processor when it makes no pass for so long, and then has priority for
+ * so long [us]: communication answers within 20 ms even when tasks take all processors. */
+#define PORT_MAIN_STARVES_US 15000
+#define PORT_MAIN_URGENT_US 1000000
 
 /* How often the watchdog thread looks for cycles that do not end [us]: how much longer than its watchdog time an
  * endless loop may run. Each look costs up to 15 us of a virtual machine's processor. (A cycle that ends too late is
  * found at its end.) */
 #define PORT_WATCHDOG_US 5000
 
-/* Longest sleep of the main loop [ms]: with nothing to do, and while event or freewheeling tasks run in it. */
+/* Longest sleep of the main loop with nothing to do [ms]. */
 #define PORT_IDLE_MS 10
-#define PORT_BACKGROUND_MS 1
+
+/* When the process that runs the controller dies, it is started again at once; when it dies again without having run a
+ * program or lived for PORT_LIFE_MS, after PORT_RESTART_MS, twice that and so on [ms]; in vain so many times in a row,
+ * plcrt ends. */
+#define PORT_RESTART_MS 250
+#define PORT_LIFE_MS 10000
+#define PORT_MAX_FAILURES 6
+
+/* How long it may take to end when it is asked to [ms]. */
+#define PORT_END_MS 9000
+
+/* How long the flash file and the serial device are waited for at start-up [ms]: a controller whose supervisor was killed
+ * ends within that. */
+#define PORT_BUSY_MS 1000
 
 /* How often a serial device that went away is tried again [ms]. */
 #define PORT_REOPEN_MS 1000

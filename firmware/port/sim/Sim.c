@@ -15,6 +15,7 @@
 #include "CmpScheduleTimer.h"
 #include "SimLink.h"
 #include "SysExcept.h"
+#include "SysLock.h"
 #include "SysTarget.h"
 #include "SysTime.h"
 #include "SysTimer.h"
@@ -35,10 +36,11 @@ enum { MAX_TIMERS = APP_MAX_TASKS + 4 };
 typedef struct {
     SYS_TIMER_CALLBACK callback; /* NULL: free */
     void *param;
-    RTS_I64 interval_ns;
-    RTS_I64 due_ns; /* NEVER while stopped */
+    RTS_I64 interval_ns; /* 0: triggered */
+    RTS_I64 due_ns;      /* NEVER while stopped, or not triggered */
     RTS_UI32 priority;
     RTS_UI32 overruns;
+    bool started;
 } TIMER;
 
 static struct {
@@ -48,6 +50,7 @@ static struct {
     jmp_buf jump;
     RTS_I64 now_ns;
     RTS_I64 next_comm_ns;
+    RTS_I64 group_ns; /* when the timers that run now were due; NEVER when none run */
     bool real_clock; /* reading the clock costs what it costs on Linux */
     TIMER timer[MAX_TIMERS];
 } sim;
@@ -100,12 +103,35 @@ static RTS_RESULT power_on(void *unused)
     return result;
 }
 
+enum { START_TEXT_SIZE = 32 };
+static const SYS_START power_came = {SYS_START_POWER, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
+static struct {
+    SYS_START now;
+    SYS_START next; /* NULL for its text: nothing was set */
+    char text[START_TEXT_SIZE];
+} starting;
+
+void SimSetStart(const SYS_START *start)
+{
+    strncpy(starting.text, start->text, START_TEXT_SIZE - 1);
+    starting.next = *start;
+    starting.next.text = starting.text;
+}
+
+const SYS_START *SysStartGet(void)
+{
+    return &starting.now;
+}
+
 RTS_RESULT SimStart(void)
 {
+    starting.now = starting.next.text != NULL ? starting.next : power_came;
+    starting.next.text = NULL;
     sim.on = false;
     sim.power_lost = false;
     sim.now_ns = 0;
     sim.next_comm_ns = 0;
+    sim.group_ns = NEVER;
     forget_timers();
     SimComPowerOn();
     SimLinkReset();
@@ -181,6 +207,23 @@ RTS_I64 SimNow(void)
     return sim.now_ns;
 }
 
+/* ---- lock ---- */
+
+/* Nobody else is there; while a cycle is measured it costs what it costs on Linux. */
+RTS_UI32 SysLockEnter(void)
+{
+    if (sim.real_clock)
+        SimMutexLock();
+    return 0;
+}
+
+void SysLockLeave(RTS_UI32 before)
+{
+    RTS_UNUSED(before);
+    if (sim.real_clock)
+        SimMutexUnlock();
+}
+
 /* ---- timers ---- */
 
 static TIMER *get_timer(RTS_HANDLE handle)
@@ -193,11 +236,11 @@ RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 int
 {
     RTS_UI32 i;
 
-    if (callback == NULL || interval_us == 0 || priority > 31)
+    if (callback == NULL || priority > 31)
         return ERR_PARAMETER;
     for (i = 0; i < MAX_TIMERS; i++) {
         if (sim.timer[i].callback == NULL) {
-            TIMER created = {callback, param, (RTS_I64)interval_us * NS_PER_US, NEVER, priority, 0};
+            TIMER created = {callback, param, (RTS_I64)interval_us * NS_PER_US, NEVER, priority, 0, false};
             sim.timer[i] = created;
             *timer = i;
             return ERR_OK;
@@ -213,7 +256,25 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     if (timer == NULL)
         return ERR_INVALID_HANDLE;
     timer->due_ns = sim.now_ns;
+    timer->started = true;
     return ERR_OK;
+}
+
+/* What was due before is due with what runs now, also when that took its time: so priority decides what comes next. */
+static RTS_I64 not_before_now(RTS_I64 due_ns)
+{
+    RTS_I64 now_ns = sim.group_ns < sim.now_ns ? sim.group_ns : sim.now_ns;
+
+    return due_ns > now_ns ? due_ns : now_ns;
+}
+
+void SysTimerTrigger(RTS_HANDLE handle, RTS_I64 due_ns)
+{
+    TIMER *timer = get_timer(handle);
+
+    due_ns = not_before_now(due_ns);
+    if (timer != NULL && timer->started && timer->interval_ns == 0 && due_ns < timer->due_ns)
+        timer->due_ns = due_ns;
 }
 
 RTS_RESULT SysTimerStop(RTS_HANDLE handle)
@@ -223,6 +284,7 @@ RTS_RESULT SysTimerStop(RTS_HANDLE handle)
     if (timer == NULL)
         return ERR_INVALID_HANDLE;
     timer->due_ns = NEVER;
+    timer->started = false;
     return ERR_OK;
 }
 
@@ -276,10 +338,15 @@ static void set_next_due(TIMER *timer)
 
 static void run_timer(TIMER *timer)
 {
-    if (timer->due_ns > sim.now_ns)
-        sim.now_ns = timer->due_ns;
-    timer->callback(timer->param, timer->due_ns);
-    set_next_due(timer);
+    RTS_I64 due_ns = timer->due_ns;
+
+    if (due_ns > sim.now_ns)
+        sim.now_ns = due_ns;
+    if (timer->interval_ns == 0)
+        timer->due_ns = NEVER; /* it may be triggered again now */
+    timer->callback(timer->param, due_ns);
+    if (timer->interval_ns != 0)
+        set_next_due(timer);
 }
 
 /* ---- the passing of time ---- */
@@ -295,8 +362,10 @@ static void run_group(TIMER *timer)
 {
     RTS_I64 due_ns = timer->due_ns;
 
+    sim.group_ns = due_ns;
     for (; timer != NULL && timer->due_ns == due_ns; timer = next_timer())
         run_timer(timer);
+    sim.group_ns = NEVER;
     if (SchedHasBackgroundTasks())
         SchedBackgroundCycle();
 }
@@ -328,6 +397,7 @@ static RTS_RESULT advance(void *arg)
 {
     const PASSAGE *passage = arg;
 
+    SchedNoteEvents(); /* of variables that were written before */
     while (run_next(passage->limit_ns))
         ;
     if (sim.now_ns < passage->end_ns)
@@ -386,6 +456,7 @@ static RTS_RESULT run_cycles(void *arg)
     RTS_UI32 done = 0;
     RTS_RESULT result = running_state();
 
+    SchedNoteEvents();
     while (result == ERR_OK && done < cycles) {
         if (!run_next(end_ns))
             return ERR_TIMEOUT;
@@ -586,7 +657,72 @@ int SimHasExternal(const char *name)
     return sim.on && CMFindExternal(name) != NULL;
 }
 
+/* ---- external events ---- */
+
+/* The hardware's, so they survive a loss of power. */
+static struct {
+    RTS_UI32 count;
+    struct {
+        char name[SIM_EVENT_NAME_SIZE];
+        RTS_HANDLE event;
+    } list[SCHED_MAX_EXTERNAL_EVENTS];
+} events;
+
+static RTS_RESULT register_event(RTS_UI32 index)
+{
+    RTS_RESULT result;
+
+    events.list[index].event = SchedRegisterExternalEvent(events.list[index].name, &result);
+    return result;
+}
+
+static RTS_UI32 find_event(const char *name)
+{
+    RTS_UI32 i = 0;
+
+    while (i < events.count && strcmp(events.list[i].name, name) != 0)
+        i++;
+    return i;
+}
+
+RTS_RESULT SimAddEvent(const char *name)
+{
+    RTS_SIZE size = strlen(name) + 1;
+
+    if (find_event(name) < events.count)
+        return ERR_OK;
+    if (size < 2 || size > SIM_EVENT_NAME_SIZE)
+        return ERR_PARAMETER;
+    if (events.count == SCHED_MAX_EXTERNAL_EVENTS)
+        return ERR_NOMEMORY;
+    memcpy(events.list[events.count].name, name, size);
+    events.count++;
+    return sim.on ? register_event(events.count - 1) : ERR_OK;
+}
+
+RTS_RESULT SimPostEvent(const char *name)
+{
+    RTS_UI32 index = find_event(name);
+
+    return index < events.count ? SchedPostExternalEvent(events.list[index].event) : (RTS_RESULT)ERR_NO_OBJECT;
+}
+
+void SimForgetEvents(void)
+{
+    for (; events.count > 0; events.count--) {
+        if (sim.on)
+            (void)SchedUnregisterExternalEvent(events.list[events.count - 1].event);
+    }
+}
+
 RTS_RESULT SysSim_Hook(CMP_HOOK hook)
 {
-    return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 i;
+
+    if (hook != CH_INIT3)
+        return ERR_OK;
+    for (i = 0; i < events.count && result == ERR_OK; i++)
+        result = register_event(i);
+    return result == ERR_OK ? CMRegisterExternal(externals, RTS_COUNT(externals)) : result;
 }

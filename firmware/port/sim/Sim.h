@@ -14,6 +14,7 @@
 
 #include "CmpErrors.h"
 #include "CmpStd.h"
+#include "SysStart.h"
 
 enum { SIM_POWER_CUT = 0x8001 };
 
@@ -23,14 +24,18 @@ enum { SIM_POWER_CUT = 0x8001 };
  * component that does not start up. */
 RTS_RESULT SimStart(void);
 
+/* What SysStartGet says at the next SimStart, and only there: after that it is SYS_START_POWER again. At most 31
+ * characters of the text are kept. */
+void SimSetStart(const SYS_START *start);
+
 /* Shuts down in good order. Does nothing when it is off. */
 void SimStop(void);
 
 /* ---- time ---- */
 
 /*
- * Lets `ns` of virtual time pass: each cyclic task runs when it is due (by time, then priority), event tasks follow at
- * once, background work (CH_COMM_CYCLE) runs at least once at the end. ERR_NOTINITIALIZED when power is off,
+ * Lets `ns` of virtual time pass: each task runs when it is due (by time, then priority), event tasks as soon as the
+ * cycle that set their variable is over, background work (CH_COMM_CYCLE) runs at least once at the end. ERR_NOTINITIALIZED when power is off,
  * ERR_PARAMETER for a negative time and when the clock would pass 292 years.
  */
 RTS_RESULT SimAdvance(RTS_I64 ns);
@@ -43,7 +48,7 @@ RTS_RESULT SimRunFor(RTS_I64 ns);
  * of virtual time. */
 RTS_RESULT SimRunCycles(RTS_UI32 cycles);
 
-/* One round of background work (communication, exceptions, event tasks); no time passes. */
+/* One round of background work (communication, exceptions); no time passes. */
 RTS_RESULT SimCommCycle(void);
 
 /* Virtual time since SimStart [ns]. */
@@ -58,6 +63,17 @@ void SimSetCycleLimit(RTS_UI32 ms);
 /* Who the device is from now on; the default is plctool's target for the machine it runs on. */
 void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version);
 void SimSetNodeName(const char *name); /* at most 31 characters are kept */
+
+enum { SIM_EVENT_NAME_SIZE = 64 };
+
+/* Gives the device an external event that tasks may wait for; it has it until they are all forgotten. ERR_PARAMETER for
+ * a name that is empty or too long, ERR_NOMEMORY when it has SCHED_MAX_EXTERNAL_EVENTS. */
+RTS_RESULT SimAddEvent(const char *name);
+void SimForgetEvents(void);
+
+/* The event happens now: the task that waits for it runs when time passes, or passes on. ERR_NO_OBJECT when the device
+ * has no such event. */
+RTS_RESULT SimPostEvent(const char *name);
 
 /* Whether IEC code can call a C function of this name (lower case). While power is off nothing can be called. */
 int SimHasExternal(const char *name);

@@ -13,13 +13,20 @@
 #define APP_INPUT_SIZE 4096
 #define APP_OUTPUT_SIZE 4096
 #define APP_MEMORY_SIZE (64 * 1024)
+#define APP_AREAS_FROM_PORT 1
 #define NETSERVER_MESSAGE_SIZE 16384
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160
 #define CM_MAX_EXT_TABLES 8
 #define CHECKSUM_TABLE_ENTRIES 256
 #define EVENT_MAX_CALLBACKS 16
-#define SCHED_MAX_EXTERNAL_EVENTS 4
+#define SCHED_MAX_EXTERNAL_EVENTS 16
+#define SCHED_EVENTS_IN_TIMERS 1
+#define SCHED_FREEWHEELING_IN_TIMERS 1
+
+/* All tasks run in the thread that lets time pass, one after the other; whoever writes a variable does it between two
+ * cycles. */
+#define APP_IMAGE_ALWAYS 0
 
 /* What SimFlashConfigure starts with: geometry of a common serial NOR flash, programmed in the units of an STM32's
  * [bytes]. */

@@ -36,10 +36,6 @@ void AppHandlePendingException(void);
 
 void AppPostEvent(RTS_UI32 event);
 
-/* ---- download ---- */
-
-bool AppDownloadIsOpen(void);
-
 /* ---- boot project ---- */
 
 /* Loads and starts what is in flash. */

@@ -8,6 +8,7 @@
 #ifndef APPLOADER_H
 #define APPLOADER_H
 
+#include "AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CmpRetain.h"
 #include "CompactDownload.h"
@@ -30,6 +31,9 @@ typedef struct {
     RTS_UI32 imports; /* offset of the names of external functions */
     RTS_UI32 task_count;
     RTS_UI32 import_count;
+#if APP_IMAGE_SIZE > 0
+    TASK_IMAGE task_image[APP_MAX_TASKS];
+#endif
 } APP_IMAGE;
 
 /* What the tasks of an image need as long as they live. */
@@ -37,11 +41,6 @@ typedef struct {
     CDL_TASK tasks[APP_MAX_TASKS];
     RTS_PFN imports[APP_MAX_IMPORTS];
 } APP_TABLES;
-
-/* Writes why, and returns `result`. A macro, so that sentences nobody would see take no flash. */
-#define APP_REFUSE(refusal, result, ...)                                                                               \
-    (APP_REFUSAL_TEXT_SIZE > 1 ? AppRefuse(refusal, result, __VA_ARGS__) : (RTS_RESULT)(result))
-RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...);
 
 /* Checks the image of `size` bytes in `file`, whose header names `crc`. On an error *image is undefined and *refusal
  * says why. */

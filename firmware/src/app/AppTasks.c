@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "CmpIecTask.h"
+#include "CmpScheduleTimer.h"
 #include "RetainTable.h"
 
 static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
@@ -27,6 +28,8 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
     if (task->kind == KIND_EVENT &&
         (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
         return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s lies outside its area.", name);
+    if (task->kind == KIND_EXTERNAL && !SchedHasExternalEvent(task->event_offset))
+        return refuse(l, ERR_NO_OBJECT, "Task %s waits for an event that is not here.", name);
     return ERR_OK;
 }
 
@@ -70,6 +73,34 @@ static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
                : refuse(l, result, "Kept variable %u is out of place; build again.", U(number));
 }
 
+#if APP_IMAGE_SIZE > 0
+/* Behind the list of tasks: what each of them uses of inputs and outputs. */
+static RTS_RESULT check_images(LOADER *l, RTS_UI32 size)
+{
+    IMAGE_PART *part = l->image->task_image[0].part;
+    const IMAGE_PART *end = part + IMAGE_AREAS * l->image->task_count;
+    const RTS_UI32 *area_size = &l->image->area_size[APP_AREA_INPUT];
+    RTS_UI32 used = 0;
+    CDL_IMAGE image;
+    RTS_UI32 i;
+
+    for (i = 0; part < end && size >= sizeof image; i ^= 1, size -= (RTS_UI32)sizeof image) {
+        RTS_RESULT result = LoaderReadNext(l, &image, sizeof image);
+        if (result != ERR_OK)
+            return result;
+        used = AppImagePlace(part++, &image, used);
+        if ((image.first + image.count) * CDL_IMAGE_UNIT >= area_size[i] + CDL_IMAGE_UNIT)
+            used = IMAGE_TOO_LARGE;
+    }
+    if (used > APP_IMAGE_SIZE / CDL_IMAGE_UNIT)
+        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", "process image",
+                      U(used * CDL_IMAGE_UNIT), U(APP_IMAGE_SIZE));
+    return ERR_OK;
+}
+#else
+#define check_images(l, size) ((void)(size), (RTS_RESULT)ERR_OK)
+#endif
+
 static RTS_RESULT check_blob(LOADER *l)
 {
     CDL_BLOB blob;
@@ -87,6 +118,8 @@ static RTS_RESULT check_blob(LOADER *l)
         result = check_tasks(l, blob.size);
     else if (blob.id == CDL_BLOB_RETAIN && APP_RETAIN_SIZE > 0)
         result = check_kept(l, blob.size);
+    else if (blob.id == CDL_BLOB_IMAGES)
+        result = check_images(l, blob.size);
     /* Others are of a newer tool, and not needed to run. */
     l->offset = next;
     return result;

@@ -55,6 +55,12 @@ bool AppHasException(void)
     return AppExceptionGet()->code != RTSEXCPT_NOEXCEPTION;
 }
 
+/* Its last cycle was broken off for a stop. That says nothing against the program, but it starts from a reset only. */
+static bool was_broken_off(void)
+{
+    return !RTS_ONE_CORE && AppExceptionGet()->code == RTSEXCPT_STOP_TIMEOUT;
+}
+
 static bool is_proven(void)
 {
     return AppCommitGet()->slot[app.image.file].state == SLOT_PROVEN;
@@ -79,7 +85,8 @@ static void enter_exception_state(void)
 {
     AppAreasClearOutputs();
     app.state = AS_STOP;
-    (void)AppCommitSetState(app.image.file, SLOT_FAILED, 0);
+    if (!was_broken_off())
+        (void)AppCommitSetState(app.image.file, SLOT_FAILED, 0);
     AppPostEvent(EVT_CmpApp_Exception);
 }
 
@@ -159,6 +166,7 @@ static RTS_RESULT initialise(bool init_retains)
 
     AppExceptionClear();
     AppAreasClear();
+    AppImageAttach(app.image.task_image);
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK) {
         unload();
@@ -261,7 +269,7 @@ RTS_RESULT AppStopApplication(void)
 {
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
-    if (AppStopTasks() && !AppHasException()) {
+    if (AppStopTasks() && (!AppHasException() || was_broken_off())) {
         (void)AppCommitSetState(app.image.file, SLOT_TRIAL, 0);
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application stopped");
     }
@@ -369,7 +377,7 @@ bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
             return true;
         }
     }
-    return false;
+    return AppImageFind(address, index, offset);
 }
 
 /* ---- life ---- */
@@ -388,6 +396,8 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
 {
     switch (hook) {
     case CH_INIT:
+        if (AppAreasInit() != ERR_OK)
+            return ERR_NOMEMORY;
         if (!RTS_STARTS_ONCE)
             forget_all();
         break;

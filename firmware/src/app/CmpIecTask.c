@@ -10,6 +10,7 @@
 
 #include <string.h>
 
+#include "AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CmpScheduleTimer.h"
 #include "SysAtomic.h"
@@ -29,7 +30,8 @@ typedef struct {
     const CDL_TASK *record;
     GUARD guard;
     RTS_I64 watchdog_ns; /* 0: none */
-    RTS_UI32 sensitivity;
+    RTS_UI16 sensitivity;
+    bool has_copies; /* of inputs and outputs */
     RTS_UI32 exceeded;   /* cycles in a row longer than watchdog_ns */
     RTS_UI32 ms_rest;    /* ns of context.time_ns beyond context.time_ms */
     RTS_UI32 cycles;
@@ -169,6 +171,11 @@ static void set_time(TASK *task, RTS_I64 time_ns)
     context->time_ms = (RTS_I32)((RTS_UI32)context->time_ms + ms);
 }
 
+static RTS_UI32 index_of(const TASK *task)
+{
+    return (RTS_UI32)(task - tasks.list);
+}
+
 static void run_entry(void *arg)
 {
     TASK *task = arg;
@@ -192,6 +199,12 @@ static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
     SysAtomicStore(&task->cycles, task->cycles + 1);
 }
 
+/* What SysTimeGetNs does not tell: how long this context had the processor. It costs more. */
+static RTS_I64 used_ns(const TASK *task)
+{
+    return SCHED_PROCESSOR_TIME && task->watchdog_ns != 0 ? SysTimeGetUsedNs() : 0;
+}
+
 /* Both rules of manual 3.4: too many cycles in a row that are too long, or one that is far too long. */
 static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
 {
@@ -211,7 +224,7 @@ static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
     SysAtomicStore(&tasks.running, 0);
     guard_end(&task->guard);
-    AppHandleException((RTS_I32)(task - tasks.list), code, address);
+    AppHandleException((RTS_I32)index_of(task), code, address);
     return 0;
 }
 
@@ -219,18 +232,24 @@ static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
 {
     RTS_I64 start_ns = SysTimeGetNs();
+    RTS_I64 used_before_ns = used_ns(task);
     RTS_EXCEPTION exception;
     RTS_I64 elapsed_ns;
 
     set_time(task, start_ns - tasks.time_zero);
     guard_begin(&task->guard, start_ns);
+    if (task->has_copies)
+        AppImageCopyIn(index_of(task));
     if (SysExceptTry(run_entry, task, &exception))
         return end_with_exception(task, exception.code, exception.address);
+    if (task->has_copies)
+        AppImageCopyOut(index_of(task), &tasks.running);
     elapsed_ns = SysTimeGetNs() - start_ns;
     account(task, start_ns - due_ns, elapsed_ns);
-    if (watchdog_expired(task, elapsed_ns))
+    if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
         return end_with_exception(task, RTSEXCPT_WATCHDOG, 0);
     guard_end(&task->guard);
+    SchedNoteEvents();
     return 1;
 }
 
@@ -324,6 +343,17 @@ int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 
 /* ---- all tasks ---- */
 
+/* How long a cycle of the task may take. */
+static RTS_I64 limit_of(const TASK *task)
+{
+    const RTS_I64 most_ns = (RTS_I64)APP_MAX_CYCLE_US * NS_PER_US;
+    RTS_I64 limit_ns = task->watchdog_ns * (RTS_I64)task->sensitivity;
+
+    if (limit_ns == 0)
+        return (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
+    return most_ns != 0 && limit_ns > most_ns ? most_ns : limit_ns;
+}
+
 static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *prototype)
 {
     RTS_UI32 phase = task->guard.phase;
@@ -332,14 +362,13 @@ static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *protot
     memset(task, 0, sizeof *task);
     task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
     task->context = *prototype;
+    task->has_copies = AppImageSetContext(index_of(task), &task->context);
     task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
     task->record = record;
     task->min_ns = 0xFFFFFFFFu;
     task->watchdog_ns = (RTS_I64)record->watchdog_us * NS_PER_US;
     task->sensitivity = record->watchdog_sensitivity > 1 ? record->watchdog_sensitivity : 1;
-    task->guard.limit_ns = task->watchdog_ns * (RTS_I64)task->sensitivity;
-    if (task->watchdog_ns == 0)
-        task->guard.limit_ns = (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
+    task->guard.limit_ns = limit_of(task);
 }
 
 RTS_RESULT IecTaskCreateAll(const CDL_TASK *records, RTS_UI32 count, const IEC_CONTEXT *prototype)
@@ -422,7 +451,7 @@ RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook)
         CMP_CLEAR(tasks);
         if (!RTS_ONE_CORE)
             CMP_CLEAR(moment);
-        tasks.init_guard.limit_ns = (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
+        tasks.init_guard.limit_ns = (RTS_I64)APP_INIT_WATCHDOG_US * NS_PER_US;
     }
     return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;
 }

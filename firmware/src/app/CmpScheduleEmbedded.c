@@ -16,7 +16,6 @@
 #include "rts_config.h"
 
 typedef struct {
-    TRIGGER trigger;
     RTS_UI32 overruns;
     RTS_I64 due_ns; /* cyclic tasks */
 } SCHEDULED;
@@ -32,7 +31,7 @@ static struct {
 static void run_cyclic(RTS_UI32 index)
 {
     SCHEDULED *task = &schedule.task[index];
-    RTS_I64 interval_ns = (RTS_I64)task->trigger.record->interval_us * 1000;
+    RTS_I64 interval_ns = (RTS_I64)TriggerGetTask(index)->interval_us * 1000;
     RTS_I64 now_ns;
 
     if (SysTimeGetNs() < task->due_ns)
@@ -45,19 +44,27 @@ static void run_cyclic(RTS_UI32 index)
 
 RTS_UI32 SchedGetOverruns(RTS_UI32 task)
 {
-    return schedule.task[task].overruns;
+    return schedule.task[task].overruns + TriggerGetLost(task);
+}
+
+/* A pass of the loop comes soon. */
+void SchedWake(RTS_UI32 task)
+{
+    RTS_UNUSED(task);
 }
 
 void SchedBackgroundCycle(void)
 {
     RTS_UI32 i;
 
+    if (schedule.started)
+        SchedNoteEvents(); /* of variables that were written from outside */
     for (i = 0; i < schedule.count && schedule.started; i++) {
         RTS_UI32 index = schedule.order[i];
-        TRIGGER *trigger = &schedule.task[index].trigger;
-        if (trigger->record->kind == KIND_CYCLIC)
+        RTS_UI32 kind = TriggerGetTask(index)->kind;
+        if (kind == KIND_CYCLIC)
             run_cyclic(index);
-        else if (TriggerFired(trigger))
+        else if (kind == KIND_FREEWHEELING || TriggerTake(index))
             (void)IecTaskCycle(index, SysTimeGetNs());
     }
 }
@@ -67,28 +74,28 @@ bool SchedHasBackgroundTasks(void)
     return schedule.started && schedule.count > 0;
 }
 
-static void add_task(const CDL_TASK *record, RTS_UI8 *const *areas)
+static void add_task(const CDL_TASK *tasks)
 {
     RTS_UI32 index = schedule.count++;
     RTS_UI32 place;
 
-    TriggerInit(&schedule.task[index].trigger, record, areas);
     schedule.task[index].overruns = 0;
     for (place = index; place > 0; place--) {
-        if (schedule.task[schedule.order[place - 1]].trigger.record->priority <= record->priority)
+        if (tasks[schedule.order[place - 1]].priority <= tasks[index].priority)
             break;
         schedule.order[place] = schedule.order[place - 1];
     }
     schedule.order[place] = (RTS_UI8)index;
 }
 
-RTS_RESULT SchedCreateTasks(const CDL_TASK *records, RTS_UI32 count, RTS_UI8 *const *areas)
+RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas)
 {
     RTS_UI32 i;
 
+    TriggerCreate(tasks, count, areas);
     schedule.count = 0;
     for (i = 0; i < count; i++)
-        add_task(&records[i], areas);
+        add_task(tasks);
     return ERR_OK;
 }
 
@@ -97,10 +104,9 @@ RTS_RESULT SchedStart(void)
     RTS_I64 now_ns = SysTimeGetNs();
     RTS_UI32 i;
 
-    for (i = 0; i < schedule.count; i++) {
-        TriggerForget(&schedule.task[i].trigger);
+    TriggerForget();
+    for (i = 0; i < schedule.count; i++)
         schedule.task[i].due_ns = now_ns;
-    }
     schedule.started = true;
     return ERR_OK;
 }
@@ -108,6 +114,11 @@ RTS_RESULT SchedStart(void)
 void SchedStop(void)
 {
     schedule.started = false;
+}
+
+/* Main runs the tasks, so none runs when it ends. */
+void SchedRequestEnd(void)
+{
 }
 
 /* One cycle runs at a time, or none. */

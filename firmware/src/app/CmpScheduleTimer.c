@@ -1,5 +1,5 @@
 /*
- * CmpScheduleTimer.c - when IEC tasks run: cyclic tasks in timers, the others in main.
+ * CmpScheduleTimer.c - when IEC tasks run: in timers, as far as the port has them for their kind, the others in main.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -8,64 +8,107 @@
 #include <string.h>
 
 #include "CmpIecTask.h"
+#include "SysAtomic.h"
 #include "SysExcept.h"
 #include "SysTime.h"
 #include "SysTimer.h"
 #include "TaskTrigger.h"
 #include "rts_config.h"
 
-/* How one task is scheduled. */
-typedef struct {
-    TRIGGER trigger;
-    RTS_HANDLE timer; /* cyclic tasks */
-} SCHEDULED;
+/* Tasks interrupt each other: without copies they would undo each other's outputs. */
+RTS_STATIC_ASSERT(APP_IMAGE_SIZE > 0 || APP_MAX_TASKS == 1, tasks_that_interrupt_each_other_have_copies_of_outputs);
 
 static struct {
     RTS_UI32 count;
-    RTS_UI32 background_count;
+    RTS_UI32 background_count; /* tasks that run in main */
     bool started;
-    SCHEDULED task[APP_MAX_TASKS];
-    RTS_UI8 background[APP_MAX_TASKS]; /* tasks that run in main, highest priority first */
+    RTS_HANDLE timer[APP_MAX_TASKS];
     RTS_I64 checked_ns;                  /* when the last check of the watchdog was */
-    RTS_I64 since_ns[APP_MAX_TASKS + 1]; /* by guard: start of its cycle plus the time it was held up */
+    RTS_I64 since_ns[APP_MAX_TASKS + 1]; /* by guard: when what its cycle is charged with began */
 } schedule;
 
-/* ---- cyclic tasks ---- */
+enum { NS_PER_US = 1000 };
 
-static void on_timer(void *param, RTS_I64 due_ns)
+/* ---- tasks in timers ---- */
+
+static void run_cyclic(void *param, RTS_I64 due_ns)
 {
     (void)IecTaskCycle((RTS_UI32)(uintptr_t)param, due_ns);
 }
 
+/* One event, one cycle. */
+static void run_events(void *param, RTS_I64 due_ns)
+{
+    RTS_UI32 task = (RTS_UI32)(uintptr_t)param;
+
+    RTS_UNUSED(due_ns);
+    while (TriggerTake(task) && IecTaskCycle(task, SysTimeGetNs()))
+        ;
+}
+
+/* Manual 3.5: after its cycle it leaves the processor to others. */
+static void run_freewheeling(void *param, RTS_I64 due_ns)
+{
+    enum { PAUSE_DIVISOR = 5 };
+    const RTS_I64 shortest_ns = (RTS_I64)SCHED_FREEWHEELING_PAUSE_US * NS_PER_US;
+    RTS_UI32 task = (RTS_UI32)(uintptr_t)param;
+    RTS_I64 start_ns = SysTimeGetNs();
+    RTS_I64 end_ns;
+    RTS_I64 pause_ns;
+
+    RTS_UNUSED(due_ns);
+    if (!IecTaskCycle(task, start_ns))
+        return;
+    end_ns = SysTimeGetNs();
+    pause_ns = (end_ns - start_ns) / PAUSE_DIVISOR;
+    SysTimerTrigger(schedule.timer[task], end_ns + (pause_ns > shortest_ns ? pause_ns : shortest_ns));
+}
+
+/* What the timer of a task calls; NULL when it runs in main. */
+static SYS_TIMER_CALLBACK callback_of(RTS_UI32 kind)
+{
+    if (kind == KIND_CYCLIC)
+        return run_cyclic;
+    if (kind == KIND_FREEWHEELING)
+        return SCHED_FREEWHEELING_IN_TIMERS ? run_freewheeling : NULL;
+    return SCHED_EVENTS_IN_TIMERS ? run_events : NULL;
+}
+
+void SchedWake(RTS_UI32 task)
+{
+    if (SCHED_EVENTS_IN_TIMERS)
+        SysTimerTrigger(schedule.timer[task], 0);
+}
+
 RTS_UI32 SchedGetOverruns(RTS_UI32 task)
 {
-    return SysTimerGetOverruns(schedule.task[task].timer);
+    return SysTimerGetOverruns(schedule.timer[task]) + TriggerGetLost(task);
 }
 
 /* ---- tasks in main ---- */
 
-static void add_background(RTS_UI32 task)
+static void run_background(RTS_UI32 task)
 {
-    RTS_UI32 place = schedule.background_count++;
-
-    while (place > 0 && schedule.task[schedule.background[place - 1]].trigger.record->priority >
-                            schedule.task[task].trigger.record->priority) {
-        schedule.background[place] = schedule.background[place - 1];
-        place--;
-    }
-    schedule.background[place] = (RTS_UI8)task;
+    if (TriggerGetTask(task)->kind == KIND_FREEWHEELING || TriggerTake(task))
+        (void)IecTaskCycle(task, SysTimeGetNs());
 }
 
 void SchedBackgroundCycle(void)
 {
+    RTS_UI32 left = schedule.background_count;
+    RTS_UI32 priority;
     RTS_UI32 i;
 
     if (!schedule.started)
         return;
-    for (i = 0; i < schedule.background_count; i++) {
-        RTS_UI32 task = schedule.background[i];
-        if (TriggerFired(&schedule.task[task].trigger))
-            (void)IecTaskCycle(task, SysTimeGetNs());
+    SchedNoteEvents(); /* of variables that were written from outside */
+    for (priority = 0; left > 0; priority++) {
+        for (i = 0; i < schedule.count; i++) {
+            if (TriggerGetTask(i)->priority == priority && callback_of(TriggerGetTask(i)->kind) == NULL) {
+                run_background(i);
+                left--;
+            }
+        }
     }
 }
 
@@ -80,64 +123,101 @@ static void delete_timers(void)
 {
     RTS_UI32 i;
 
-    for (i = 0; i < schedule.count; i++) {
-        if (schedule.task[i].timer != (RTS_HANDLE)RTS_INVALID_HANDLE)
-            (void)SysTimerDelete(schedule.task[i].timer);
-    }
+    for (i = 0; i < schedule.count; i++)
+        (void)SysTimerDelete(schedule.timer[i]);
     schedule.count = 0;
     schedule.background_count = 0;
 }
 
-static RTS_RESULT add_task(const CDL_TASK *record, RTS_UI8 *const *areas)
+static RTS_RESULT add_task(const CDL_TASK *task)
 {
     RTS_UI32 index = schedule.count++;
-    SCHEDULED *task = &schedule.task[index];
+    SYS_TIMER_CALLBACK callback = callback_of(task->kind);
 
-    TriggerInit(&task->trigger, record, areas);
-    task->timer = (RTS_HANDLE)RTS_INVALID_HANDLE;
-    if (record->kind == KIND_CYCLIC)
-        return SysTimerCreate(on_timer, (void *)(uintptr_t)index, record->interval_us, record->priority, &task->timer);
-    add_background(index);
+    schedule.timer[index] = (RTS_HANDLE)RTS_INVALID_HANDLE;
+    if (callback != NULL)
+        return SysTimerCreate(callback, (void *)(uintptr_t)index, task->kind == KIND_CYCLIC ? task->interval_us : 0,
+                              task->priority, &schedule.timer[index]);
+    schedule.background_count++;
     return ERR_OK;
 }
 
-RTS_RESULT SchedCreateTasks(const CDL_TASK *records, RTS_UI32 count, RTS_UI8 *const *areas)
+RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas)
 {
     RTS_RESULT result = ERR_OK;
     RTS_UI32 i;
 
     delete_timers();
+    TriggerCreate(tasks, count, areas);
     for (i = 0; i < count && result == ERR_OK; i++)
-        result = add_task(&records[i], areas);
+        result = add_task(&tasks[i]);
     if (result != ERR_OK)
         delete_timers();
     return result;
 }
 
+/* Each timer calls at once: so no event is missed that comes before the timer of its task starts. */
 RTS_RESULT SchedStart(void)
 {
     RTS_RESULT result = ERR_OK;
     RTS_UI32 i;
 
-    for (i = 0; i < schedule.count; i++)
-        TriggerForget(&schedule.task[i].trigger);
+    TriggerForget();
     schedule.started = true;
     for (i = 0; i < schedule.count && result == ERR_OK; i++) {
-        if (schedule.task[i].timer != (RTS_HANDLE)RTS_INVALID_HANDLE)
-            result = SysTimerStart(schedule.task[i].timer);
+        if (schedule.timer[i] != (RTS_HANDLE)RTS_INVALID_HANDLE)
+            result = SysTimerStart(schedule.timer[i]);
     }
     return result;
 }
+
+/* ---- stopping within a time ---- */
+
+/* Not on one core: there no task runs when main stops them. `asked` counts the beginnings and ends of stops, odd: one
+ * goes on; the others belong to the watchdog. */
+static struct {
+    RTS_UI32 asked;
+    RTS_UI32 end_asked; /* of the runtime */
+    RTS_UI32 seen;
+    RTS_I64 since_ns;
+} stop;
 
 void SchedStop(void)
 {
     RTS_UI32 i;
 
     schedule.started = false;
-    for (i = 0; i < schedule.count; i++) {
-        if (schedule.task[i].timer != (RTS_HANDLE)RTS_INVALID_HANDLE)
-            (void)SysTimerStop(schedule.task[i].timer);
-    }
+    if (!RTS_ONE_CORE)
+        SysAtomicStore(&stop.asked, stop.asked + 1);
+    for (i = 0; i < schedule.count; i++)
+        (void)SysTimerStop(schedule.timer[i]);
+    if (!RTS_ONE_CORE)
+        SysAtomicStore(&stop.asked, stop.asked + 1);
+}
+
+void SchedRequestEnd(void)
+{
+    SysAtomicStore(&stop.end_asked, 1);
+}
+
+/* Looks whether somebody waits for tasks, and since when. */
+static void look_for_stop(RTS_I64 now_ns)
+{
+    RTS_UI32 asked = SysAtomicLoad(&stop.asked);
+
+    if (SysAtomicLoad(&stop.end_asked))
+        asked = 1; /* that is once and for all */
+    if (asked != stop.seen)
+        stop.since_ns = now_ns;
+    stop.seen = asked;
+}
+
+/* Code that begins after that, such as what runs at the end, has as much time again. */
+static bool holds_up_stop(const IEC_GUARD *guard, RTS_I64 now_ns)
+{
+    RTS_I64 since_ns = guard->start_ns > stop.since_ns ? guard->start_ns : stop.since_ns;
+
+    return (stop.seen & 1) != 0 && now_ns - since_ns > (RTS_I64)SCHED_STOP_US * NS_PER_US;
 }
 
 /* ---- supervision ---- */
@@ -161,7 +241,7 @@ static RTS_I64 find_latest_start(void)
 /* Time stands still for a cycle as long as one that started later, and may have interrupted it, goes on from one check
  * to the next. Of several tasks that take too long the one that holds up the others is broken first, and they
  * finish. */
-void SchedWatchdogCheck(RTS_I64 now_ns)
+static void check_time(RTS_I64 now_ns)
 {
     RTS_I64 latest_ns = find_latest_start();
     RTS_I64 held_ns = latest_ns < schedule.checked_ns ? now_ns - schedule.checked_ns : 0;
@@ -182,10 +262,50 @@ void SchedWatchdogCheck(RTS_I64 now_ns)
     }
 }
 
+/* Where the port knows the processor time of each task: what it had used when a check first saw the cycle counts. */
+static void check_used_time(RTS_UI32 index, const IEC_GUARD *guard)
+{
+    static RTS_UI32 serials[APP_MAX_TASKS + 1];
+    RTS_I64 used_ns = SysExceptGetUsedNs(guard->arg);
+
+    if (used_ns < 0)
+        return; /* its cycle is over */
+    if (serials[index] != guard->serial)
+        schedule.since_ns[index] = used_ns;
+    serials[index] = guard->serial;
+    if (used_ns - schedule.since_ns[index] > guard->limit_ns)
+        SysExceptBreak(guard->arg, RTSEXCPT_WATCHDOG);
+}
+
+static void check_each(RTS_I64 now_ns)
+{
+    IEC_GUARD guard;
+    RTS_UI32 i;
+
+    look_for_stop(now_ns);
+    for (i = 0; i <= IecTaskGetCount(); i++) {
+        if (!IecTaskReadGuard(i, &guard))
+            continue;
+        if (holds_up_stop(&guard, now_ns))
+            SysExceptBreak(guard.arg, RTSEXCPT_STOP_TIMEOUT);
+        else if (SCHED_PROCESSOR_TIME)
+            check_used_time(i, &guard);
+    }
+}
+
+void SchedWatchdogCheck(RTS_I64 now_ns)
+{
+    if (!RTS_ONE_CORE)
+        check_each(now_ns);
+    if (!SCHED_PROCESSOR_TIME)
+        check_time(now_ns);
+}
+
 RTS_RESULT CmpScheduleTimer_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT) {
         CMP_CLEAR(schedule);
+        CMP_CLEAR(stop);
         TriggerReset();
     }
     if (hook == CH_COMM_CYCLE)

@@ -2,94 +2,156 @@
  * TaskTrigger.c - events that make a task run; external events.
  *
  * SPDX-License-Identifier: Apache-2.0
+ *
+ * Events are counted where they happen and answered where the task runs, each by one cycle. The count is a single
+ * number: how often the variable was found changed, which is odd while it is TRUE. Whoever looks at the variable looks
+ * again when another context has counted meanwhile, so that looks of several tasks come in an order, and no edge that a
+ * task left behind at the end of its cycle is counted twice or not at all.
  */
 #include "TaskTrigger.h"
 
 #include <string.h>
 
+#include "CmpChecksum.h"
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
 #include "SysAtomic.h"
 #include "rts_config.h"
 
+/* Events are counted modulo 65536: fewer may wait. */
 typedef struct {
-    const char *name; /* NULL: free */
-    RTS_UI32 posts;
-} EXTERNAL_EVENT;
+    RTS_UI32 changes;  /* of the variable, odd: it is TRUE; two for each post of an external event */
+    RTS_UI16 answered; /* events that a cycle was for, and those lost */
+    RTS_UI16 lost;
+} TRIGGER;
+
+static struct {
+    const CDL_TASK *tasks;
+    RTS_UI8 *const *areas;
+    RTS_UI32 count;
+    RTS_UI32 watched; /* tasks up to the last one that waits for a variable */
+    TRIGGER list[APP_MAX_TASKS];
+} triggers;
 
 enum { PLACES = SCHED_MAX_EXTERNAL_EVENTS > 0 ? SCHED_MAX_EXTERNAL_EVENTS : 1 };
-static EXTERNAL_EVENT events[PLACES];
+static RTS_UI32 events[PLACES]; /* CRC of the name, 0: free */
 
 void TriggerReset(void)
 {
+    CMP_CLEAR(triggers);
     if (SCHED_MAX_EXTERNAL_EVENTS > 0)
         CMP_CLEAR(events);
 }
 
-static EXTERNAL_EVENT *find_event(const char *name)
+/* ---- counting ---- */
+
+static RTS_UI32 is_true(const CDL_TASK *task)
+{
+    const volatile RTS_UI8 *byte = triggers.areas[task->event_area] + task->event_offset;
+
+    return (*byte & ~(RTS_UI32)task->event_ignored) != 0;
+}
+
+static void note(RTS_UI32 task)
+{
+    RTS_UI32 *changes = &triggers.list[task].changes;
+    RTS_UI32 before = SysAtomicLoad(changes);
+
+    for (; is_true(&triggers.tasks[task]) != (before & 1); before = SysAtomicLoad(changes)) {
+        (void)SysAtomicReplace(changes, before, before + 1); /* or another context did; and may not have woken it yet */
+        if ((before & 1) == 0)
+            SchedWake(task);
+    }
+}
+
+void SchedNoteEvents(void)
 {
     RTS_UI32 i;
 
-    for (i = 0; SCHED_MAX_EXTERNAL_EVENTS > 0 && i < PLACES; i++) {
-        if (events[i].name != NULL && strcmp(events[i].name, name) == 0)
-            return &events[i];
-    }
-    return NULL;
-}
-
-void TriggerInit(TRIGGER *trigger, const CDL_TASK *record, RTS_UI8 *const *areas)
-{
-    memset(trigger, 0, sizeof *trigger);
-    trigger->record = record;
-    if (record->kind == KIND_EVENT)
-        trigger->flag = areas[record->event_area] + record->event_offset;
-}
-
-void TriggerForget(TRIGGER *trigger)
-{
-    const EXTERNAL_EVENT *event;
-
-    if (trigger->record->kind == KIND_EVENT)
-        trigger->seen = *trigger->flag != 0;
-    if (trigger->record->kind == KIND_EXTERNAL) {
-        event = find_event(trigger->record->name);
-        trigger->seen = event != NULL ? SysAtomicLoad(&event->posts) : 0;
+    for (i = 0; i < triggers.watched; i++) {
+        if (triggers.tasks[i].kind == KIND_EVENT)
+            note(i);
     }
 }
 
-static bool has_rising_edge(TRIGGER *trigger)
+/* Events so far: a variable that is TRUE has risen once more than it fell. */
+static RTS_UI16 count_events(const TRIGGER *trigger)
 {
-    RTS_UI32 now = *trigger->flag != 0;
-    bool rising = now > trigger->seen;
-
-    trigger->seen = now;
-    return rising;
+    return (RTS_UI16)((SysAtomicLoad(&trigger->changes) + 1) / 2);
 }
 
-/* One post, one cycle; posts that come while the task runs are answered in the next passes. */
-static bool has_post(TRIGGER *trigger)
+bool TriggerTake(RTS_UI32 task)
 {
-    const EXTERNAL_EVENT *event = find_event(trigger->record->name);
+    TRIGGER *trigger = &triggers.list[task];
+    RTS_UI16 waiting = (RTS_UI16)(count_events(trigger) - trigger->answered);
 
-    if (event == NULL || SysAtomicLoad(&event->posts) == trigger->seen)
+    if (waiting == 0)
         return false;
-    trigger->seen++;
+    trigger->answered++;
+    if (waiting > SCHED_MAX_WAITING_EVENTS) {
+        waiting = (RTS_UI16)(waiting - SCHED_MAX_WAITING_EVENTS);
+        trigger->answered = (RTS_UI16)(trigger->answered + waiting);
+        trigger->lost = (RTS_UI16)(trigger->lost + waiting);
+    }
     return true;
 }
 
-bool TriggerFired(TRIGGER *trigger)
+RTS_UI32 TriggerGetLost(RTS_UI32 task)
 {
-    switch (trigger->record->kind) {
-    case KIND_EVENT:
-        return has_rising_edge(trigger);
-    case KIND_EXTERNAL:
-        return has_post(trigger);
-    default:
-        return true;
+    return triggers.list[task].lost;
+}
+
+/* ---- the tasks ---- */
+
+void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas)
+{
+    RTS_UI32 i;
+
+    memset(&triggers, 0, sizeof triggers);
+    triggers.tasks = tasks;
+    triggers.areas = areas;
+    triggers.count = count;
+    for (i = 0; i < count; i++) {
+        if (tasks[i].kind == KIND_EVENT)
+            triggers.watched = i + 1;
     }
 }
 
+const CDL_TASK *TriggerGetTask(RTS_UI32 task)
+{
+    return &triggers.tasks[task];
+}
+
+void TriggerForget(void)
+{
+    RTS_UI32 i;
+
+    SchedNoteEvents();
+    for (i = 0; i < triggers.count; i++)
+        triggers.list[i].answered = count_events(&triggers.list[i]);
+}
+
 /* ---- external events ---- */
+
+static RTS_UI32 id_of(const char *name)
+{
+    return CRC32Update(0, name, (RTS_SIZE)strlen(name));
+}
+
+/* The place of an event, or the first free one for 0; PLACES when there is none. */
+static RTS_UI32 find_event(RTS_UI32 id)
+{
+    RTS_UI32 i = 0;
+
+    while (i < PLACES && events[i] != id)
+        i++;
+    return i;
+}
+
+bool SchedHasExternalEvent(RTS_UI32 id)
+{
+    return SCHED_MAX_EXTERNAL_EVENTS > 0 && id != 0 && find_event(id) < PLACES;
+}
 
 static RTS_HANDLE no_event(RTS_RESULT *result, RTS_RESULT reason)
 {
@@ -100,38 +162,43 @@ static RTS_HANDLE no_event(RTS_RESULT *result, RTS_RESULT reason)
 
 RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result)
 {
-    RTS_UI32 i;
+    RTS_UI32 place = find_event(0);
 
-    if (find_event(name) != NULL)
+    if (SchedHasExternalEvent(id_of(name)))
         return no_event(result, ERR_DUPLICATE);
-    for (i = 0; SCHED_MAX_EXTERNAL_EVENTS > 0 && i < PLACES; i++) {
-        if (events[i].name == NULL) {
-            events[i].name = name;
-            if (result != NULL)
-                *result = ERR_OK;
-            return i;
-        }
-    }
-    return no_event(result, ERR_NOMEMORY);
+    if (SCHED_MAX_EXTERNAL_EVENTS == 0 || place == PLACES)
+        return no_event(result, ERR_NOMEMORY);
+    events[place] = id_of(name);
+    if (result != NULL)
+        *result = ERR_OK;
+    return place;
 }
 
 static bool is_event(RTS_HANDLE event)
 {
-    return SCHED_MAX_EXTERNAL_EVENTS > 0 && event < PLACES && events[event].name != NULL;
+    return SCHED_MAX_EXTERNAL_EVENTS > 0 && event < PLACES && events[event] != 0;
 }
 
 RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE event)
 {
     if (!is_event(event))
         return ERR_INVALID_HANDLE;
-    events[event].name = NULL;
+    events[event] = 0;
     return ERR_OK;
 }
 
 RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event)
 {
+    RTS_UI32 i;
+
     if (!is_event(event))
         return ERR_INVALID_HANDLE;
-    (void)SysAtomicAdd(&events[event].posts, 1);
+    for (i = 0; i < triggers.count; i++) {
+        const CDL_TASK *task = &triggers.tasks[i];
+        if (task->kind == KIND_EXTERNAL && task->event_offset == events[event]) {
+            (void)SysAtomicAdd(&triggers.list[i].changes, 2);
+            SchedWake(i);
+        }
+    }
     return ERR_OK;
 }

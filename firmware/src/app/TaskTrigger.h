@@ -1,5 +1,5 @@
 /*
- * TaskTrigger.h - events that make a task run, for both schedulers.
+ * TaskTrigger.h - events that make a task run, for both schedulers. Tasks have the index they have in the application.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -9,18 +9,26 @@
 #include "CmpStd.h"
 #include "CompactDownload.h"
 
-typedef struct {
-    const CDL_TASK *record;
-    const volatile RTS_UI8 *flag; /* event tasks: their BOOL */
-    RTS_UI32 seen; /* event tasks: that BOOL at the last look; external event tasks: posts that were answered */
-} TRIGGER;
+/* Replaces all triggers by those of `count` tasks; nothing has happened yet. Records and areas (base addresses by
+ * APP_AREA_*) stay valid until the next call. From main, while no task runs. */
+void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas);
 
-void TriggerInit(TRIGGER *trigger, const CDL_TASK *record, RTS_UI8 *const *areas);
-/* Events that happened before the start do not count, nor does a BOOL that is TRUE already. */
-void TriggerForget(TRIGGER *trigger);
-/* Whether a task that is not cyclic shall run now; asked once in each pass of main. */
-bool TriggerFired(TRIGGER *trigger);
+const CDL_TASK *TriggerGetTask(RTS_UI32 task);
+
+/* Events that happened before the start do not count, nor does a BOOL that is TRUE already. From main, while no task
+ * runs. */
+void TriggerForget(void);
+
+/* Takes one of the events that wait for a task; false when none does. From where the task runs. */
+bool TriggerTake(RTS_UI32 task);
+
+/* Events that were lost since TriggerCreate, because SCHED_MAX_WAITING_EVENTS waited already. */
+RTS_UI32 TriggerGetLost(RTS_UI32 task);
+
 /* Forgets all external events. */
 void TriggerReset(void);
+
+/* The scheduler's: an event waits for the task. From any context. */
+void SchedWake(RTS_UI32 task);
 
 #endif

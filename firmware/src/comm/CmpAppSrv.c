@@ -15,12 +15,12 @@
 /* ---- login ---- */
 
 /* Creates an application session; `needs_app`: not when there is no application. */
-static RTS_RESULT write_login_reply(BTAG_WRITER *reply, bool needs_app)
+static RTS_RESULT write_login_reply(COMM_CLIENT *client, BTAG_WRITER *reply, bool needs_app)
 {
     APP_STATUS status;
 
     AppGetStatus(&status);
-    RTS_UI32 session = needs_app && status.state == AS_NONE ? 0 : SrvCreateAppSession();
+    RTS_UI32 session = needs_app && status.state == AS_NONE ? 0 : SrvCreateAppSession(client);
     BTagOpen(reply, TAG_APP_DESCRIPTOR, BTAG_ALIGN_0);
     BTagOpen(reply, TAG_APP_OPTION, BTAG_ALIGN_2);
     BTagAppend16(reply, session == 0 ? ERR_APP_NOT_EXIST : ERR_OK);
@@ -39,7 +39,7 @@ static RTS_RESULT login_app(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTAG name;
     RTS_RESULT result = BTagFind(&request->tags, TAG_APP_LOGIN_NAME, 1, APP_NAME_SIZE, &name);
 
-    return result == ERR_OK ? write_login_reply(reply, true) : result;
+    return result == ERR_OK ? write_login_reply(request->client, reply, true) : result;
 }
 
 static RTS_RESULT create_app(SRV_REQUEST *request, BTAG_WRITER *reply)
@@ -50,12 +50,12 @@ static RTS_RESULT create_app(SRV_REQUEST *request, BTAG_WRITER *reply)
 
     if (result == ERR_OK)
         result = BTagFind(&descriptor, TAG_APP_OPTION, 1, APP_NAME_SIZE, &name);
-    return result == ERR_OK ? write_login_reply(reply, false) : result;
+    return result == ERR_OK ? write_login_reply(request->client, reply, false) : result;
 }
 
-static RTS_RESULT check_app_session(RTS_UI32 session)
+static RTS_RESULT check_app_session(const COMM_CLIENT *client, RTS_UI32 session)
 {
-    return SrvIsAppSession(session) ? ERR_OK : ERR_APP_INVALID_SESSIONID;
+    return SrvIsAppSession(client, session) ? ERR_OK : ERR_APP_INVALID_SESSIONID;
 }
 
 static RTS_RESULT logout_app(SRV_REQUEST *request, BTAG_WRITER *reply)
@@ -65,9 +65,9 @@ static RTS_RESULT logout_app(SRV_REQUEST *request, BTAG_WRITER *reply)
 
     if (result != ERR_OK)
         return result;
-    result = check_app_session(session);
+    result = check_app_session(request->client, session);
     if (result == ERR_OK)
-        SrvEndAppSession();
+        SrvEndAppSession(request->client);
     BTagWrite16(reply, TAG_APP_LOGOUT, result);
     return ERR_OK;
 }
@@ -82,7 +82,7 @@ static RTS_RESULT read_descriptor(const SRV_REQUEST *request, BTAG_READER *descr
 
     if (result == ERR_OK)
         result = BTagFindUnsigned(descriptor, TAG_APP_SESSION, &session);
-    *verdict = check_app_session(session);
+    *verdict = check_app_session(request->client, session);
     return result;
 }
 
@@ -257,6 +257,19 @@ static RTS_RESULT read_task_info(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 /* ---- download ---- */
 
+/* The session that began the download which is open. */
+static struct {
+    const COMM_CLIENT *client;
+    RTS_UI32 session;
+} downloader;
+
+/* A download belongs to its session as long as that lasts; another client can neither continue nor replace it. */
+static bool is_anothers(const COMM_CLIENT *client)
+{
+    return COMM_MAX_CLIENTS > 1 && AppDownloadIsOpen() && downloader.client != client &&
+           downloader.client->session.id == downloader.session;
+}
+
 typedef struct {
     RTS_UI32 flags;
     RTS_UI32 offset;
@@ -316,14 +329,25 @@ static RTS_RESULT write_new_part(const DOWNLOAD_BLOCK *block)
     return AppDownloadWrite(next, block->data + known, block->size - known);
 }
 
-static RTS_RESULT take_block(const DOWNLOAD_BLOCK *block)
+static RTS_RESULT begin(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *block)
+{
+    if (COMM_MAX_CLIENTS > 1) {
+        downloader.client = client;
+        downloader.session = client->session.id;
+    }
+    return AppDownloadBegin(block->total, block->crc);
+}
+
+static RTS_RESULT take_block(const COMM_CLIENT *client, const DOWNLOAD_BLOCK *block, APP_REFUSAL *refusal)
 {
     RTS_RESULT result = ERR_OK;
 
+    if (is_anothers(client))
+        return APP_REFUSE(refusal, ERR_INVALID_STATE, "Another tool is downloading; try again when it is done.");
     if (block->offset > block->total || block->size > block->total - block->offset)
         return ERR_OUT_OF_LIMITS;
     if (block->offset == 0 && (block->flags & DLF_CONTINUEDOWNLOAD) == 0)
-        result = AppDownloadBegin(block->total, block->crc);
+        result = begin(client, block);
     if (result != ERR_OK)
         return result;
     if (!is_under_way(block))
@@ -342,7 +366,7 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
         return result;
     refusal.text[0] = '\0';
     if (block.size != 0)
-        result = take_block(&block);
+        result = take_block(request->client, &block, &refusal);
     RTS_UI32 next = bytes_received(&block);
     if (result == ERR_OK && is_under_way(&block) && next == block.total)
         result = AppDownloadEnd(&refusal);
@@ -354,18 +378,18 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
 }
 
 static const SRV_SERVICE services[] = {
-    {SRV_APP_LOGIN, SRV_NEEDS_LOGIN, login_app},
-    {SRV_APP_LOGOUT, SRV_NEEDS_LOGIN, logout_app},
-    {SRV_APP_CREATE, SRV_NEEDS_LOGIN, create_app},
-    {SRV_APP_START, SRV_NEEDS_LOGIN, start},
-    {SRV_APP_STOP, SRV_NEEDS_LOGIN, stop},
-    {SRV_APP_RESET, SRV_NEEDS_LOGIN, reset},
-    {SRV_APP_READ_STATUS, SRV_OPEN, read_status},
-    {SRV_APP_DOWNLOAD_COMPACT, SRV_NEEDS_LOGIN, download_compact},
+    {SRV_APP_LOGIN, RIGHT_VIEW, login_app},
+    {SRV_APP_LOGOUT, RIGHT_VIEW, logout_app},
+    {SRV_APP_CREATE, RIGHT_DOWNLOAD, create_app},
+    {SRV_APP_START, RIGHT_CONTROL, start},
+    {SRV_APP_STOP, RIGHT_CONTROL, stop},
+    {SRV_APP_RESET, RIGHT_CONTROL, reset},
+    {SRV_APP_READ_STATUS, RIGHT_NONE, read_status},
+    {SRV_APP_DOWNLOAD_COMPACT, RIGHT_DOWNLOAD, download_compact},
 #if SRV_INFORMATION
-    {SRV_APP_READ_APPLICATION_LIST, SRV_OPEN, read_application_list},
-    {SRV_APP_READ_APPLICATION_INFO, SRV_OPEN, read_application_info},
-    {SRV_APP_READ_TASK_INFO, SRV_OPEN, read_task_info},
+    {SRV_APP_READ_APPLICATION_LIST, RIGHT_NONE, read_application_list},
+    {SRV_APP_READ_APPLICATION_INFO, RIGHT_NONE, read_application_info},
+    {SRV_APP_READ_TASK_INFO, RIGHT_NONE, read_task_info},
 #endif
 };
 

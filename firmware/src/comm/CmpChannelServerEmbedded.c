@@ -17,57 +17,11 @@
 enum {
     REPEAT_FIRST_MS = 1000, /* doubles with each repetition */
     REPEAT_COUNT = 4,
-    REPEAT_GAP_MS = 100, /* between repetitions that the client's own repetitions ask for */
-    /* Length and CRC of a message travel before its bytes and fill the first block together with them. */
-    PREFIX_SIZE = CHANNEL_FIRST_SIZE - CHANNEL_DATA_SIZE,
-    MIN_ROOM = PREFIX_SIZE + 12, /* a path whose packets carry less is not worth a channel */
+    REPEAT_GAP_MS = 100,             /* between repetitions that the client's own repetitions ask for */
+    MIN_ROOM = COMM_PREFIX_SIZE + 12, /* a path whose packets carry less is not worth a channel */
 };
 
-typedef RTS_UI8 MESSAGE[PREFIX_SIZE + NETSERVER_MESSAGE_SIZE]; /* after its length and CRC */
-
-/* The request on its way in. */
-typedef struct {
-    RTS_UI32 block; /* number of the highest block received in order */
-    RTS_UI32 gap;   /* the nearest block that has come too early since then, counted from there; 0: none */
-    RTS_UI32 fill;
-    RTS_UI32 left; /* bytes still missing; 0 between requests */
-} RECEIVER;
-
-/* The reply on its way out. It is kept after the acknowledgement, as nothing needs the room. What concerns one reply
- * counts its blocks, so that their numbers may wrap. */
-typedef struct {
-    RTS_UI32 base; /* number of the last block before the reply */
-    RTS_UI32 count;
-    RTS_UI32 sent;
-    RTS_UI32 acked;
-    RTS_UI32 size;
-    RTS_UI32 sent_at;
-    RTS_UI32 repeats;
-    RTS_UI32 missed; /* block the client last asked for; 0: none */
-    RTS_UI32 missed_at;
-} SENDER;
-
-/* The channel; id 0 when closed. Times are those of SysTimeGetMs. */
-typedef struct {
-    RTS_UI16 id;
-    RTS_UI8 address_words; /* of both addresses, agreed */
-    bool fresh;            /* no block has arrived yet */
-    bool open_due;         /* the open response is waiting for room in the driver */
-    bool ack_due;
-    bool missing_due;    /* the acknowledgement asks for a repetition */
-    RTS_UI32 request_id; /* of the open request */
-    RTS_UI32 limit;      /* largest message, both directions */
-    RTS_UI32 room;       /* bytes of a message, with its prefix, in one block */
-    RTS_UI32 last_received;
-    RTS_UI32 last_sent;
-    RECEIVER rx;
-    SENDER tx;
-    ROUTER_PEER peer;
-} CHANNEL;
-
-static CHANNEL channel;
-static MESSAGE request_buffer;
-static MESSAGE reply_buffer;
+static COMM_CLIENT clients[COMM_MAX_CLIENTS];
 
 /* What outlives a channel. */
 static struct {
@@ -76,6 +30,18 @@ static struct {
 } server;
 
 static CHANNEL_COUNTERS counters;
+
+#define FOR_EACH_CLIENT(client) for (COMM_CLIENT *client = clients; client < clients + COMM_MAX_CLIENTS; client++)
+
+COMM_CLIENT *ChannelGetClient(RTS_UI32 index)
+{
+    return index < COMM_MAX_CLIENTS ? &clients[index] : NULL;
+}
+
+bool ChannelIsOpen(const COMM_CLIENT *client)
+{
+    return client->channel.id != 0;
+}
 
 /* ---- packages without blocks ---- */
 
@@ -105,18 +71,26 @@ static RTS_RESULT send_meta(const ROUTER_PEER *peer, RTS_UI8 type, RTS_UI8 *pack
     return send_package(peer, package, size);
 }
 
-static RTS_RESULT send_open_response(const ROUTER_PEER *peer, RTS_UI32 request_id, RTS_UI16 result, RTS_UI16 id)
+static RTS_RESULT send_open_response(const CHANNEL *channel)
+{
+    RTS_UI8 package[CHANNEL_OPEN_RESP_SIZE] = {0};
+
+    BytesPut32(package + 8, channel->request_id);
+    BytesPut16(package + 12, CHANNEL_OPEN_OK);
+    BytesPut16(package + 14, channel->id);
+    BytesPut32(package + 16, channel->limit);
+    package[21] = channel->address_words;
+    return send_meta(&channel->peer, CHANNEL_PKG_OPEN_RESP, package, sizeof(package));
+}
+
+static void send_open_refusal(const ROUTER_PEER *peer, RTS_UI32 request_id)
 {
     RTS_UI8 package[CHANNEL_OPEN_RESP_SIZE] = {0};
 
     BytesPut32(package + 8, request_id);
-    BytesPut16(package + 12, result);
-    BytesPut16(package + 14, id);
-    if (result == CHANNEL_OPEN_OK) {
-        BytesPut32(package + 16, channel.limit);
-        package[21] = channel.address_words;
-    }
-    return send_meta(peer, CHANNEL_PKG_OPEN_RESP, package, sizeof(package));
+    BytesPut16(package + 12, CHANNEL_OPEN_NO_CHANNEL);
+    BytesPut16(package + 14, CHANNEL_ID_NONE);
+    (void)send_meta(peer, CHANNEL_PKG_OPEN_RESP, package, sizeof(package));
 }
 
 static void send_close(const ROUTER_PEER *peer, RTS_UI16 id, RTS_RESULT error)
@@ -132,43 +106,52 @@ static void send_rts_info(const ROUTER_PEER *peer)
 {
     RTS_UI8 package[CHANNEL_META_SIZE + 2];
 
-    BytesPut16(package + 8, CHANNEL_MAX_CHANNELS);
+    BytesPut16(package + 8, COMM_MAX_CLIENTS);
     (void)send_meta(peer, CHANNEL_PKG_RTSINFO_RESP, package, sizeof(package));
 }
 
 /* An acknowledgement; its beginning alone is a keepalive. */
-static RTS_RESULT send_short(RTS_UI8 type, RTS_UI8 flags, RTS_UI32 size)
+static RTS_RESULT send_short(const CHANNEL *channel, RTS_UI8 type, RTS_UI8 flags, RTS_UI32 size)
 {
     RTS_UI8 package[CHANNEL_ACK_SIZE] = {type, flags};
 
-    BytesPut16(package + 2, channel.id);
-    BytesPut32(package + 4, channel.rx.block);
-    return send_package(&channel.peer, package, size);
+    BytesPut16(package + 2, channel->id);
+    BytesPut32(package + 4, channel->rx.block);
+    return send_package(&channel->peer, package, size);
 }
 
 /* ---- life of the channel ---- */
 
-static void forget_channel(void)
+static void forget_channel(COMM_CLIENT *client)
 {
-    channel.id = 0;
-    SrvEndSession();
+    client->channel.id = 0;
+    SrvEndSession(client);
 }
 
-static void close_channel(RTS_RESULT error)
+static void close_channel(COMM_CLIENT *client, RTS_RESULT error)
 {
     COMM_COUNT(counters.failed);
-    send_close(&channel.peer, channel.id, error);
-    forget_channel();
+    send_close(&client->channel.peer, client->channel.id, error);
+    forget_channel(client);
 }
 
-/* 1..CHANNEL_ID_MAX, and another one than last time. */
+static COMM_CLIENT *find_client(RTS_UI16 id)
+{
+    FOR_EACH_CLIENT(client)
+        if (client->channel.id == id)
+            return client;
+    return NULL;
+}
+
+/* 1..CHANNEL_ID_MAX, another one than last time and than those in use. */
 static RTS_UI16 new_id(void)
 {
-    RTS_UI32 id = 1 + SysTargetRandom() % (CHANNEL_ID_MAX - 1);
-
-    if (id >= server.last_id)
-        id++;
-    server.last_id = (RTS_UI16)id;
+    do {
+        RTS_UI32 id = 1 + SysTargetRandom() % (CHANNEL_ID_MAX - 1);
+        if (id >= server.last_id)
+            id++;
+        server.last_id = (RTS_UI16)id;
+    } while (COMM_MAX_CLIENTS > 1 && find_client(server.last_id) != NULL);
     return server.last_id;
 }
 
@@ -198,33 +181,57 @@ static bool read_open_request(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_
     return request->limit >= CHANNEL_MIN_MESSAGE && payload >= CHANNEL_DATA_SIZE + MIN_ROOM;
 }
 
-/* Somebody is using the channel and has shown that he may. */
-static bool is_taken(const ROUTER_PEER *peer, RTS_UI32 now_ms)
+/* The channel is in use by a logged-in client. */
+static bool is_taken(const COMM_CLIENT *client, RTS_UI32 now_ms)
 {
-    return channel.id != 0 && !RouterIsSamePeer(peer, &channel.peer) && SrvIsLoggedIn() &&
-           now_ms - channel.last_received < CHANNEL_IDLE_MS;
+    return client->channel.id != 0 && SrvIsLoggedIn(client) &&
+           now_ms - client->channel.last_received < CHANNEL_IDLE_MS;
+}
+
+/* Whether `a` is the better one to give to a new peer: it is free, or has been silent longer. */
+static bool is_better(const CHANNEL *a, const CHANNEL *b, RTS_UI32 now_ms)
+{
+    if (a->id == 0 || b->id == 0)
+        return b->id != 0;
+    return now_ms - a->last_received > now_ms - b->last_received;
+}
+
+/* The one this peer has, or one that can be given to it; NULL when all are taken. */
+static COMM_CLIENT *claim_client(const ROUTER_PEER *peer, RTS_UI32 now_ms)
+{
+    COMM_CLIENT *found = NULL;
+
+    FOR_EACH_CLIENT(client) {
+        if (client->channel.id != 0 && RouterIsSamePeer(peer, &client->channel.peer))
+            return client;
+        if (!is_taken(client, now_ms) && (found == NULL || is_better(&client->channel, &found->channel, now_ms)))
+            found = client;
+    }
+    return found;
 }
 
 /* The client asks again because our response was lost. */
-static bool is_repetition(const ROUTER_PEER *peer, const OPEN_REQUEST *request)
+static bool is_repetition(const CHANNEL *channel, const ROUTER_PEER *peer, const OPEN_REQUEST *request)
 {
-    return channel.id != 0 && channel.fresh && request->request_id == channel.request_id &&
-           RouterIsSamePeer(peer, &channel.peer);
+    return channel->id != 0 && channel->fresh && request->request_id == channel->request_id &&
+           RouterIsSamePeer(peer, &channel->peer);
 }
 
-static void open_channel(const ROUTER_PEER *peer, const OPEN_REQUEST *request)
+static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPEN_REQUEST *request)
 {
-    if (channel.id != 0 && !RouterIsSamePeer(peer, &channel.peer))
-        send_close(&channel.peer, channel.id, ERR_CHS_CLOSED);
-    forget_channel();
-    memset(&channel, 0, sizeof(channel));
-    channel.peer = *peer;
-    channel.request_id = request->request_id;
-    channel.limit = request->limit;
-    channel.room = request->room;
-    channel.address_words = request->address_words;
-    channel.id = new_id();
-    channel.fresh = true;
+    CHANNEL *channel = &client->channel;
+
+    if (channel->id != 0 && !RouterIsSamePeer(peer, &channel->peer))
+        send_close(&channel->peer, channel->id, ERR_CHS_CLOSED);
+    forget_channel(client);
+    memset(channel, 0, sizeof(*channel));
+    channel->peer = *peer;
+    channel->request_id = request->request_id;
+    channel->limit = request->limit;
+    channel->room = request->room;
+    channel->address_words = request->address_words;
+    channel->id = new_id();
+    channel->fresh = true;
     COMM_COUNT(counters.opened);
 }
 
@@ -236,107 +243,110 @@ static void handle_open(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 s
         COMM_COUNT(counters.malformed);
         return;
     }
-    if (is_taken(peer, now_ms)) {
+    COMM_CLIENT *client = claim_client(peer, now_ms);
+    if (client == NULL) {
         COMM_COUNT(counters.refused);
-        (void)send_open_response(peer, request.request_id, CHANNEL_OPEN_NO_CHANNEL, CHANNEL_ID_NONE);
+        send_open_refusal(peer, request.request_id);
         return;
     }
-    if (!is_repetition(peer, &request))
-        open_channel(peer, &request);
-    channel.last_received = now_ms;
-    channel.open_due = true;
+    if (!is_repetition(&client->channel, peer, &request))
+        open_channel(client, peer, &request);
+    client->channel.last_received = now_ms;
+    client->channel.open_due = true;
 }
 
 /* ---- sending the reply ---- */
 
-/* Of the message in reply_buffer. */
-static void start_reply(RTS_UI32 size)
+/* Of the message in client->reply. */
+static void start_reply(COMM_CLIENT *client, RTS_UI32 size)
 {
-    SENDER *tx = &channel.tx;
+    CHANNEL_SENDER *tx = &client->channel.tx;
 
-    BytesPut32(reply_buffer, size);
-    BytesPut32(reply_buffer + 4, CRC32Update(0, reply_buffer + PREFIX_SIZE, size));
+    BytesPut32(client->reply, size);
+    BytesPut32(client->reply + 4, CRC32Update(0, client->reply + COMM_PREFIX_SIZE, size));
     tx->base += tx->count;
-    tx->size = PREFIX_SIZE + size;
-    tx->count = (tx->size + channel.room - 1) / channel.room;
+    tx->size = COMM_PREFIX_SIZE + size;
+    tx->count = (tx->size + client->channel.room - 1) / client->channel.room;
     tx->sent = 0;
     tx->acked = 0;
     tx->repeats = 0;
     tx->missed = 0;
 }
 
-static RTS_RESULT send_block(void)
+static RTS_RESULT send_block(const COMM_CLIENT *client)
 {
-    const SENDER *tx = &channel.tx;
+    const CHANNEL *channel = &client->channel;
+    const CHANNEL_SENDER *tx = &channel->tx;
     RTS_UI8 header[CHANNEL_DATA_SIZE] = {CHANNEL_PKG_DATA, tx->sent == 0 ? CHANNEL_FLAG_FIRST : 0};
-    RTS_UI32 offset = tx->sent * channel.room;
+    RTS_UI32 offset = tx->sent * channel->room;
     RTS_UI32 left = tx->size - offset;
-    BLK_PART parts[2] = {{header, sizeof(header)}, {reply_buffer + offset, left < channel.room ? left : channel.room}};
+    BLK_PART parts[2] = {{header, sizeof(header)},
+                         {client->reply + offset, left < channel->room ? left : channel->room}};
 
-    BytesPut16(header + 2, channel.id);
+    BytesPut16(header + 2, channel->id);
     BytesPut32(header + 4, tx->base + tx->sent + 1);
-    BytesPut32(header + 8, channel.rx.block);
-    return RouterSend(&channel.peer, ROUTER_SVC_CHANNEL, parts, 2);
+    BytesPut32(header + 8, channel->rx.block);
+    return RouterSend(&channel->peer, ROUTER_SVC_CHANNEL, parts, 2);
 }
 
 /* Sends the most urgent of what is due. ERR_NOTHING_TO_DO, ERR_NOBUFFER. */
-static RTS_RESULT send_next(RTS_UI32 now_ms)
+static RTS_RESULT send_next(COMM_CLIENT *client, RTS_UI32 now_ms)
 {
+    CHANNEL *channel = &client->channel;
     RTS_RESULT result = ERR_NOTHING_TO_DO;
 
-    if (channel.open_due) {
-        result = send_open_response(&channel.peer, channel.request_id, CHANNEL_OPEN_OK, channel.id);
-        channel.open_due = result != ERR_OK;
-    } else if (channel.ack_due) {
-        result = send_short(CHANNEL_PKG_ACK, channel.missing_due ? CHANNEL_FLAG_MISSING : 0, CHANNEL_ACK_SIZE);
-        channel.ack_due = result != ERR_OK;
-        channel.missing_due = channel.missing_due && channel.ack_due;
-    } else if (channel.tx.sent < channel.tx.count) {
-        result = send_block();
+    if (channel->open_due) {
+        result = send_open_response(channel);
+        channel->open_due = result != ERR_OK;
+    } else if (channel->ack_due) {
+        result = send_short(channel, CHANNEL_PKG_ACK, channel->missing_due ? CHANNEL_FLAG_MISSING : 0,
+                            CHANNEL_ACK_SIZE);
+        channel->ack_due = result != ERR_OK;
+        channel->missing_due = channel->missing_due && channel->ack_due;
+    } else if (channel->tx.sent < channel->tx.count) {
+        result = send_block(client);
         if (result == ERR_OK) {
-            channel.tx.sent++;
-            channel.tx.sent_at = now_ms;
+            channel->tx.sent++;
+            channel->tx.sent_at = now_ms;
         }
-    } else if (now_ms - channel.last_sent >= CHANNEL_KEEPALIVE_MS) {
-        result = send_short(CHANNEL_PKG_KEEPALIVE, 0, CHANNEL_KEEPALIVE_SIZE);
+    } else if (now_ms - channel->last_sent >= CHANNEL_KEEPALIVE_MS) {
+        result = send_short(channel, CHANNEL_PKG_KEEPALIVE, 0, CHANNEL_KEEPALIVE_SIZE);
     }
     return result;
 }
 
 /* Sends what is due as far as the driver has room. */
-static void pump(RTS_UI32 now_ms)
+static void pump(COMM_CLIENT *client, RTS_UI32 now_ms)
 {
-    while (send_next(now_ms) == ERR_OK)
-        channel.last_sent = now_ms;
+    while (send_next(client, now_ms) == ERR_OK)
+        client->channel.last_sent = now_ms;
 }
 
-static bool is_waiting_for_ack(void)
+static bool is_waiting_for_ack(const CHANNEL_SENDER *tx)
 {
-    return channel.tx.acked < channel.tx.count && channel.tx.sent == channel.tx.count;
+    return tx->acked < tx->count && tx->sent == tx->count;
 }
 
-static void repeat_reply(void)
+static void repeat_reply(CHANNEL_SENDER *tx)
 {
-    channel.tx.sent = channel.tx.acked;
+    tx->sent = tx->acked;
     COMM_COUNT(counters.repeats);
 }
 
 /* The client asks for the block after those it has. Some ask with each block that comes after it: once is enough. */
-static void handle_missing(RTS_UI32 now_ms)
+static void handle_missing(CHANNEL_SENDER *tx, RTS_UI32 now_ms)
 {
-    SENDER *tx = &channel.tx;
     RTS_UI32 missed = tx->acked + 1;
 
     if (tx->sent == tx->acked || (tx->missed == missed && now_ms - tx->missed_at < REPEAT_GAP_MS))
         return;
     tx->missed = missed;
     tx->missed_at = now_ms;
-    repeat_reply();
+    repeat_reply(tx);
 }
 
-static void handle_ack(RTS_UI32 block, bool missing, RTS_UI32 now_ms)
+static void handle_ack(CHANNEL_SENDER *tx, RTS_UI32 block, bool missing, RTS_UI32 now_ms)
 {
-    SENDER *tx = &channel.tx;
     RTS_UI32 acked = block - tx->base; /* of an earlier reply: more than there are */
 
     if (acked < tx->acked || acked > tx->count)
@@ -347,99 +357,101 @@ static void handle_ack(RTS_UI32 block, bool missing, RTS_UI32 now_ms)
     if (tx->sent < acked)
         tx->sent = acked;
     if (missing && acked < tx->count)
-        handle_missing(now_ms);
+        handle_missing(tx, now_ms);
 }
 
 /* ---- receiving the request ---- */
 
-static RTS_RESULT handle_message(void)
+static RTS_RESULT handle_message(COMM_CLIENT *client)
 {
-    const RTS_UI8 *message = request_buffer + PREFIX_SIZE;
-    RTS_UI32 size = BytesGet32(request_buffer);
+    const RTS_UI8 *message = client->request + COMM_PREFIX_SIZE;
+    RTS_UI32 size = BytesGet32(client->request);
 
-    if (CRC32Update(0, message, size) != BytesGet32(request_buffer + 4))
+    if (CRC32Update(0, message, size) != BytesGet32(client->request + 4))
         return ERR_CHS_CHECKSUM;
-    size = SrvHandleMessage(message, size, reply_buffer + PREFIX_SIZE, channel.limit);
+    size = SrvHandleMessage(client, message, size, client->reply + COMM_PREFIX_SIZE, client->channel.limit);
     if (size == 0)
         return ERR_CHS_REQNOTHANDLED;
-    start_reply(size); /* whoever asks again has had the reply before */
+    start_reply(client, size); /* a new request implies that the previous reply arrived */
     return ERR_OK;
 }
 
 /* A new request, whatever has become of the one before. */
-static RTS_RESULT start_message(const RTS_UI8 *data, RTS_UI32 size)
+static RTS_RESULT start_message(CHANNEL *channel, const RTS_UI8 *data, RTS_UI32 size)
 {
-    RTS_UI32 length = size < PREFIX_SIZE ? 0 : BytesGet32(data);
+    RTS_UI32 length = size < COMM_PREFIX_SIZE ? 0 : BytesGet32(data);
 
-    channel.rx.fill = 0;
-    channel.rx.left = 0;
+    channel->rx.fill = 0;
+    channel->rx.left = 0;
     if (length == 0)
         return ERR_CHS_PROTOCOL;
-    if (length > channel.limit)
+    if (length > channel->limit)
         return ERR_CHS_MESSAGESIZE;
-    channel.rx.left = PREFIX_SIZE + length;
+    channel->rx.left = COMM_PREFIX_SIZE + length;
     return ERR_OK;
 }
 
 /* Takes the block that is next in order: `data` is what follows its header. */
-static RTS_RESULT accept_block(bool is_first, const RTS_UI8 *data, RTS_UI32 size)
+static RTS_RESULT accept_block(COMM_CLIENT *client, bool is_first, const RTS_UI8 *data, RTS_UI32 size)
 {
-    RECEIVER *rx = &channel.rx;
-    RTS_RESULT result = is_first ? start_message(data, size) : ERR_OK;
+    CHANNEL_RECEIVER *rx = &client->channel.rx;
+    RTS_RESULT result = is_first ? start_message(&client->channel, data, size) : ERR_OK;
 
     if (result != ERR_OK)
         return result;
     if (rx->left == 0 || size > rx->left)
         return ERR_CHS_PROTOCOL;
-    memcpy(request_buffer + rx->fill, data, size);
+    memcpy(client->request + rx->fill, data, size);
     rx->fill += size;
     rx->left -= size;
     rx->block++;
     rx->gap = 0;
-    return rx->left == 0 ? handle_message() : ERR_OK;
+    return rx->left == 0 ? handle_message(client) : ERR_OK;
 }
 
 /* A block received before: its acknowledgement was lost, and perhaps the reply too. */
-static void handle_duplicate(RTS_UI32 now_ms)
+static void handle_duplicate(CHANNEL *channel, RTS_UI32 now_ms)
 {
     COMM_COUNT(counters.duplicates);
-    channel.ack_due = true;
-    if (is_waiting_for_ack() && now_ms - channel.tx.sent_at >= REPEAT_GAP_MS)
-        repeat_reply();
+    channel->ack_due = true;
+    if (is_waiting_for_ack(&channel->tx) && now_ms - channel->tx.sent_at >= REPEAT_GAP_MS)
+        repeat_reply(&channel->tx);
 }
 
 /* Blocks before this one are missing. Said once per run of the client through its blocks, or one loss would be
  * answered with a storm of repetitions. */
-static void handle_gap(RTS_UI32 ahead)
+static void handle_gap(CHANNEL *channel, RTS_UI32 ahead)
 {
     COMM_COUNT(counters.gaps);
-    if (channel.rx.gap == 0 || ahead <= channel.rx.gap) {
-        channel.rx.gap = ahead;
-        channel.ack_due = true;
-        channel.missing_due = true;
+    if (channel->rx.gap == 0 || ahead <= channel->rx.gap) {
+        channel->rx.gap = ahead;
+        channel->ack_due = true;
+        channel->missing_due = true;
     }
 }
 
-static void handle_data(const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
+static void handle_data(COMM_CLIENT *client, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
-    RTS_UI32 ahead = BytesGet32(data + 4) - channel.rx.block; /* numbers wrap */
+    CHANNEL *channel = &client->channel;
+    RTS_UI32 ahead = BytesGet32(data + 4) - channel->rx.block; /* numbers wrap */
     RTS_RESULT result = ERR_OK;
 
-    channel.fresh = false;
-    handle_ack(BytesGet32(data + 8), false, now_ms);
+    channel->fresh = false;
+    handle_ack(&channel->tx, BytesGet32(data + 8), false, now_ms);
     if (ahead == 1)
-        result = accept_block((data[1] & CHANNEL_FLAG_FIRST) != 0, data + CHANNEL_DATA_SIZE, size - CHANNEL_DATA_SIZE);
+        result = accept_block(client, (data[1] & CHANNEL_FLAG_FIRST) != 0, data + CHANNEL_DATA_SIZE,
+                              size - CHANNEL_DATA_SIZE);
     else if ((RTS_I32)ahead <= 0)
-        handle_duplicate(now_ms);
+        handle_duplicate(channel, now_ms);
     else
-        handle_gap(ahead);
+        handle_gap(channel, ahead);
     if (result != ERR_OK)
-        close_channel(result);
+        close_channel(client, result);
 }
 
 /* ---- packages ---- */
 
-/* Tells whoever uses a channel that is not his (or not any more), so that he need not wait for a time-out. */
+/* Tells a peer that its channel does not exist (any more), so that it need not wait for a time-out. */
 static void complain(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
 {
     COMM_COUNT(counters.foreign);
@@ -449,9 +461,12 @@ static void complain(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
     send_close(peer, id, ERR_CHS_CHINVALID);
 }
 
-static bool is_owner(const ROUTER_PEER *peer, RTS_UI16 id)
+/* The client of an open channel, for the peer that opened it; else NULL. */
+static COMM_CLIENT *find_owner(const ROUTER_PEER *peer, RTS_UI16 id)
 {
-    return channel.id != 0 && id == channel.id && RouterIsSamePeer(peer, &channel.peer);
+    COMM_CLIENT *client = id != 0 ? find_client(id) : NULL;
+
+    return client != NULL && RouterIsSamePeer(peer, &client->channel.peer) ? client : NULL;
 }
 
 static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
@@ -460,25 +475,29 @@ static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data,
         COMM_COUNT(counters.malformed);
         return;
     }
-    if (!is_owner(peer, BytesGet16(data + 2))) {
+    COMM_CLIENT *client = find_owner(peer, BytesGet16(data + 2));
+    if (client == NULL) {
         complain(peer, BytesGet16(data + 2), now_ms);
         return;
     }
-    channel.last_received = now_ms;
+    client->channel.last_received = now_ms;
     if (data[0] == CHANNEL_PKG_DATA && size >= CHANNEL_DATA_SIZE)
-        handle_data(data, size, now_ms);
+        handle_data(client, data, size, now_ms);
     else if (data[0] == CHANNEL_PKG_ACK && size >= CHANNEL_ACK_SIZE)
-        handle_ack(BytesGet32(data + 4), (data[1] & CHANNEL_FLAG_MISSING) != 0, now_ms);
+        handle_ack(&client->channel.tx, BytesGet32(data + 4), (data[1] & CHANNEL_FLAG_MISSING) != 0, now_ms);
     else if (data[0] != CHANNEL_PKG_KEEPALIVE)
         COMM_COUNT(counters.malformed);
 }
 
 static void handle_close(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
 {
-    if (size < CHANNEL_CLOSE_SIZE)
+    if (size < CHANNEL_CLOSE_SIZE) {
         COMM_COUNT(counters.malformed);
-    else if (is_owner(peer, BytesGet16(data + 8)))
-        forget_channel();
+        return;
+    }
+    COMM_CLIENT *client = find_owner(peer, BytesGet16(data + 8));
+    if (client != NULL)
+        forget_channel(client);
     else
         COMM_COUNT(counters.foreign);
 }
@@ -498,6 +517,13 @@ static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RT
         send_rts_info(peer);
 }
 
+static void pump_all(void)
+{
+    FOR_EACH_CLIENT(client)
+        if (client->channel.id != 0)
+            pump(client, SysTimeGetMs()); /* a service may have taken its time */
+}
+
 RTS_NOINLINE void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 now_ms = SysTimeGetMs();
@@ -508,33 +534,36 @@ RTS_NOINLINE void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *d
         handle_meta_package(peer, data, size, now_ms);
     else
         handle_channel_package(peer, data, size, now_ms);
-    if (channel.id != 0)
-        pump(SysTimeGetMs()); /* a service may have taken its time */
+    pump_all();
 }
 
 /* ---- time ---- */
 
-static void repeat_when_overdue(RTS_UI32 now_ms)
+static void repeat_when_overdue(CHANNEL_SENDER *tx, RTS_UI32 now_ms)
 {
-    SENDER *tx = &channel.tx;
-
-    if (!is_waiting_for_ack() || tx->repeats >= REPEAT_COUNT ||
+    if (!is_waiting_for_ack(tx) || tx->repeats >= REPEAT_COUNT ||
         now_ms - tx->sent_at < (RTS_UI32)REPEAT_FIRST_MS << tx->repeats)
         return;
     tx->repeats++;
-    repeat_reply();
+    repeat_reply(tx);
 }
 
-static void cycle(RTS_UI32 now_ms)
+static void cycle_client(COMM_CLIENT *client, RTS_UI32 now_ms)
 {
-    if (channel.id == 0)
+    if (client->channel.id == 0)
         return;
-    if (now_ms - channel.last_received >= CHANNEL_TIMEOUT_MS) {
-        close_channel(ERR_CHS_TIMEOUT);
+    if (now_ms - client->channel.last_received >= CHANNEL_TIMEOUT_MS) {
+        close_channel(client, ERR_CHS_TIMEOUT);
         return;
     }
-    repeat_when_overdue(now_ms);
-    pump(now_ms);
+    repeat_when_overdue(&client->channel.tx, now_ms);
+    pump(client, now_ms);
+}
+
+static void cycle(void)
+{
+    FOR_EACH_CLIENT(client)
+        cycle_client(client, SysTimeGetMs());
 }
 
 const CHANNEL_COUNTERS *ChannelGetCounters(void)
@@ -544,10 +573,17 @@ const CHANNEL_COUNTERS *ChannelGetCounters(void)
 
 static void reset_all(void)
 {
-    CMP_CLEAR(channel);
+    CMP_CLEAR(clients);
     CMP_CLEAR(server);
     if (COMM_COUNTERS)
         CMP_CLEAR(counters);
+}
+
+static void close_all(void)
+{
+    FOR_EACH_CLIENT(client)
+        if (client->channel.id != 0)
+            close_channel(client, ERR_CHS_SHUTDOWN);
 }
 
 RTS_RESULT CmpChannelServerEmbedded_Hook(CMP_HOOK hook)
@@ -555,8 +591,8 @@ RTS_RESULT CmpChannelServerEmbedded_Hook(CMP_HOOK hook)
     if (hook == CH_INIT)
         reset_all();
     else if (hook == CH_COMM_CYCLE)
-        cycle(SysTimeGetMs());
-    else if (hook == CH_EXIT_COMM && channel.id != 0)
-        close_channel(ERR_CHS_SHUTDOWN);
+        cycle();
+    else if (hook == CH_EXIT_COMM)
+        close_all();
     return ERR_OK;
 }

@@ -10,7 +10,6 @@
 
 #include "CMUtils.h"
 #include "CmpBytes.h"
-#include "CmpChannelServerEmbedded.h"
 #include "CmpSrv.h"
 #include "SysTarget.h"
 #include "rts_config.h"
@@ -72,7 +71,7 @@ static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
     write_wide_text(reply, TAG_DEV_DEVICE_NAME, target->device_name, NS_MAX_TYPE_NAMES);
     write_wide_text(reply, TAG_DEV_VENDOR_NAME, target->vendor_name, NS_MAX_TYPE_NAMES);
     write_wide_text(reply, TAG_DEV_NODE_NAME, target->node_name, NS_MAX_NODE_NAME);
-    BTagWrite16(reply, TAG_DEV_MAX_CHANNELS, CHANNEL_MAX_CHANNELS);
+    BTagWrite16(reply, TAG_DEV_MAX_CHANNELS, COMM_MAX_CLIENTS);
     write_serial_number(reply, target->serial_number);
     if (SRV_INFORMATION)
         write_stack(reply);
@@ -82,8 +81,7 @@ static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static RTS_RESULT session_create(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
-    RTS_UNUSED(request);
-    BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvCreateSession());
+    BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvCreateSession(request->client));
     BTagWrite32(reply, TAG_DEV_AUTH_TYPE, DEV_CRYPT_XOR);
     return ERR_OK;
 }
@@ -99,7 +97,7 @@ static RTS_RESULT login(SRV_REQUEST *request, BTAG_WRITER *reply)
     BTagOpen(reply, TAG_DEV_LOGIN_REPLY, BTAG_ALIGN_0);
     if (crypt & DEV_CRYPT_XOR) {
         BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_OK);
-        BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvLogin(request->session));
+        BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvLogin(request->client, request->session));
         BTagWrite32(reply, TAG_DEV_SETTINGS, DEV_SETTING_MONITOR2);
     } else {
         BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_NOT_SUPPORTED);
@@ -114,7 +112,7 @@ static RTS_RESULT logout(SRV_REQUEST *request, BTAG_WRITER *reply)
     RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_DEV_LOGOUT_SESSION, &session);
 
     if (result == ERR_OK)
-        BTagWrite16(reply, TAG_DEV_LOGOUT_REPLY, SrvLogout(session));
+        BTagWrite16(reply, TAG_DEV_LOGOUT_REPLY, SrvLogout(request->client, session));
     return result;
 }
 
@@ -148,13 +146,13 @@ static RTS_RESULT echo(SRV_REQUEST *request, BTAG_WRITER *reply)
 #endif
 
 static const SRV_SERVICE services[] = {
-    {SRV_DEV_GET_TARGET_IDENT, SRV_OPEN, get_target_ident},
-    {SRV_DEV_LOGIN, SRV_OPEN, login},
-    {SRV_DEV_LOGOUT, SRV_OPEN, logout},
+    {SRV_DEV_GET_TARGET_IDENT, RIGHT_NONE, get_target_ident},
+    {SRV_DEV_LOGIN, RIGHT_NONE, login},
+    {SRV_DEV_LOGOUT, RIGHT_NONE, logout},
 #if SRV_INFORMATION
-    {SRV_DEV_ECHO, SRV_OPEN, echo},
+    {SRV_DEV_ECHO, RIGHT_NONE, echo},
 #endif
-    {SRV_DEV_SESSION_CREATE, SRV_OPEN, session_create},
+    {SRV_DEV_SESSION_CREATE, RIGHT_NONE, session_create},
 };
 
 RTS_RESULT CmpDevice_Hook(CMP_HOOK hook)

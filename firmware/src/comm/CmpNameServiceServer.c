@@ -9,7 +9,6 @@
 
 #include "CMUtils.h"
 #include "CmpBytes.h"
-#include "CmpChannelServerEmbedded.h"
 #include "SysTarget.h"
 #include "rts_config.h"
 
@@ -46,7 +45,7 @@ static RTS_UI8 *put_body(RTS_UI8 *reply, const SYS_TARGET *target, bool is_0400,
     RTS_UI32 serial = CMUtlStrNLen(target->serial_number, NS_MAX_SERIAL);
     NAMES names = {reply + (is_0400 ? REPLY_0400_SIZE : REPLY_0103_SIZE), (ROOM_FOR_TEXTS - serial) / 2};
 
-    BytesPut16(reply + 8, CHANNEL_MAX_CHANNELS);
+    BytesPut16(reply + 8, COMM_MAX_CLIENTS);
     reply[10] = 1; /* little endian */
     BytesPut16(reply + 14, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
     RTS_UI32 device = put_name(&names, target->device_name, NS_MAX_TYPE_NAMES);
@@ -68,7 +67,7 @@ static RTS_UI8 *put_body_0101(RTS_UI8 *reply, const SYS_TARGET *target)
     NAMES names = {reply + REPLY_0101_SIZE, ROOM_FOR_TEXTS / 2};
 
     BytesPut32(reply + 8, target->type);
-    BytesPut16(reply + 12, CHANNEL_MAX_CHANNELS);
+    BytesPut16(reply + 12, COMM_MAX_CLIENTS);
     reply[14] = 1; /* little endian */
     BytesPut16(reply + 18, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
     BytesPut16(reply + 20, put_name(&names, target->device_name, NS_MAX_TYPE_NAMES));

@@ -7,9 +7,6 @@
 
 #include <string.h>
 
-#include "CmpChannelServerEmbedded.h"
-#include "CmpNameServiceServer.h"
-
 enum {
     HEADER_SIZE = 2 * ROUTER_HEADER_WORDS,
     FLAG_SIGNAL = 0x20,
@@ -71,18 +68,17 @@ static RTS_UI16 max_packet(RTS_UI8 flags)
     return (RTS_UI16)(units == 0 ? BLK_MAX_SIZE : (units + 1) * BLOCK_UNIT);
 }
 
+/* Services without a handler: address requests are for parents, and a notification would make its sender our parent. */
 static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *payload, RTS_UI32 size)
 {
-    if (service == ROUTER_SVC_CHANNEL) {
-        COMM_COUNT(counters.handled);
-        ChannelHandlePackage(peer, payload, size);
-    } else if (service == ROUTER_SVC_NAME_REQUEST) {
-        COMM_COUNT(counters.handled);
-        NSHandleRequest(peer, payload, size);
-    } else {
-        /* Address requests are for parents; a notification would make anybody our parent. */
-        COMM_COUNT(counters.ignored);
+    for (RTS_UI32 i = 0; i < RouterServiceCount; i++) {
+        if (RouterServices[i].number == service) {
+            COMM_COUNT(counters.handled);
+            RouterServices[i].handler(peer, payload, size);
+            return;
+        }
     }
+    COMM_COUNT(counters.ignored);
 }
 
 void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)

@@ -21,69 +21,64 @@ typedef struct {
 } SRV_GROUP;
 
 static struct {
-    bool logged_in;
-    RTS_UI32 session; /* 0: none */
-    RTS_UI32 app_session;
     RTS_SIZE group_count;
     SRV_GROUP groups[SRV_MAX_GROUPS];
 } srv;
 
 /* ---- session ---- */
 
-static bool is_session(RTS_UI32 id)
+static bool is_session(const COMM_CLIENT *client, RTS_UI32 id)
 {
-    return id != 0 && id == srv.session;
+    return id != 0 && id == client->session.id;
 }
 
-RTS_UI32 SrvCreateSession(void)
+RTS_UI32 SrvCreateSession(COMM_CLIENT *client)
 {
-    SrvEndSession();
-    srv.session = SysTargetRandom() | SESSION_VALID;
-    return srv.session;
+    SrvEndSession(client);
+    client->session.id = SysTargetRandom() | SESSION_VALID;
+    return client->session.id;
 }
 
-RTS_UI32 SrvLogin(RTS_UI32 id)
+RTS_UI32 SrvLogin(COMM_CLIENT *client, RTS_UI32 id)
 {
-    if (!is_session(id))
-        SrvCreateSession();
-    srv.logged_in = true;
-    return srv.session;
+    if (!is_session(client, id))
+        SrvCreateSession(client);
+    client->session.rights = RIGHT_ALL;
+    return client->session.id;
 }
 
-RTS_RESULT SrvLogout(RTS_UI32 id)
+RTS_RESULT SrvLogout(COMM_CLIENT *client, RTS_UI32 id)
 {
-    if (!is_session(id))
+    if (!is_session(client, id))
         return ERR_INVALID_SESSION_ID;
-    SrvEndSession();
+    SrvEndSession(client);
     return ERR_OK;
 }
 
-bool SrvIsLoggedIn(void)
+bool SrvIsLoggedIn(const COMM_CLIENT *client)
 {
-    return srv.logged_in;
+    return client->session.rights != RIGHT_NONE;
 }
 
-void SrvEndSession(void)
+void SrvEndSession(COMM_CLIENT *client)
 {
-    srv.session = 0;
-    srv.app_session = 0;
-    srv.logged_in = false;
+    memset(&client->session, 0, sizeof(client->session));
 }
 
-RTS_UI32 SrvCreateAppSession(void)
+RTS_UI32 SrvCreateAppSession(COMM_CLIENT *client)
 {
-    srv.app_session = SysTargetRandom() | 1;
-    return srv.app_session;
+    client->session.app_session = SysTargetRandom() | 1;
+    return client->session.app_session;
 }
 
-bool SrvIsAppSession(RTS_UI32 id)
+bool SrvIsAppSession(const COMM_CLIENT *client, RTS_UI32 id)
 {
-    return id != 0 && id == srv.app_session;
+    return id != 0 && id == client->session.app_session;
 }
 
-void SrvEndAppSession(void)
+void SrvEndAppSession(COMM_CLIENT *client)
 {
-    srv.app_session = 0;
+    client->session.app_session = 0;
 }
 
 /* ---- dispatch ---- */
@@ -115,13 +110,13 @@ static const SRV_SERVICE *find_service(const SRV_GROUP *group, RTS_UI16 service)
     return NULL;
 }
 
-static RTS_RESULT check_access(const SRV_SERVICE *service, RTS_UI32 session)
+static RTS_RESULT check_right(const SRV_SERVICE *service, const SRV_REQUEST *request)
 {
-    if (service->access == SRV_OPEN)
+    if (service->right == RIGHT_NONE)
         return ERR_OK;
-    if (!is_session(session))
+    if (!is_session(request->client, request->session))
         return ERR_INVALID_SESSION_ID;
-    return srv.logged_in ? ERR_OK : ERR_NO_ACCESS_RIGHTS;
+    return (request->client->session.rights & service->right) != 0 ? ERR_OK : ERR_NO_ACCESS_RIGHTS;
 }
 
 static RTS_RESULT dispatch(RTS_UI16 group_id, RTS_UI16 service_id, SRV_REQUEST *request, BTAG_WRITER *reply)
@@ -133,7 +128,7 @@ static RTS_RESULT dispatch(RTS_UI16 group_id, RTS_UI16 service_id, SRV_REQUEST *
     const SRV_SERVICE *service = find_service(group, service_id);
     if (service == NULL)
         return ERR_L7_UNKNOWNCMD;
-    RTS_RESULT result = check_access(service, request->session);
+    RTS_RESULT result = check_right(service, request);
     if (result == ERR_OK)
         result = service->handler(request, reply);
     if (result == ERR_OK && !BTagIsComplete(reply))
@@ -163,7 +158,8 @@ static void put_header(RTS_UI8 *reply, RTS_UI32 header, const RTS_UI8 *message, 
     BytesPut32(reply + 12, content);
 }
 
-RTS_NOINLINE RTS_UI32 SrvHandleMessage(const RTS_UI8 *message, RTS_UI32 size, RTS_UI8 *reply, RTS_UI32 capacity)
+RTS_NOINLINE RTS_UI32 SrvHandleMessage(COMM_CLIENT *client, const RTS_UI8 *message, RTS_UI32 size, RTS_UI8 *reply,
+                                       RTS_UI32 capacity)
 {
     enum { ERROR_CONTENT = 8 };
     RTS_UI32 start = check_header(message, size);
@@ -176,6 +172,7 @@ RTS_NOINLINE RTS_UI32 SrvHandleMessage(const RTS_UI8 *message, RTS_UI32 size, RT
         header = start;
     if (start == 0 || capacity < header + ERROR_CONTENT)
         return 0;
+    request.client = client;
     request.session = BytesGet32(message + 8);
     request.reply_session = request.session;
     RTS_UI32 content = BytesGet32(message + 12);

@@ -30,6 +30,11 @@ bool SysExceptIsCode(uintptr_t address)
     return address - code.start < code.size;
 }
 
+RTS_UI32 SysExceptCodeOffset(uintptr_t address)
+{
+    return (RTS_UI32)(address - code.start);
+}
+
 bool SysExceptIsReturn(uintptr_t word)
 {
     return SysExceptIsCode(word) && (word & APP_ENTRY_MODE_BIT) == APP_ENTRY_MODE_BIT;

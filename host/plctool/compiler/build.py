@@ -16,13 +16,15 @@ from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.kept import kept_parts, kept_variables
 from plctool.compiler.nesting import room_for_nesting
-from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TypedProgram
+from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
 from plctool.core import lib
 from plctool.files import write_atomically
-from plctool.image import ApplicationInfo, ExternalFunction, Image, ImageTask, build_image
+from plctool.image import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image
 from plctool.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
 from plctool.values import encode
 from plctool.variables import Symbol, constant_symbol
+
+_UNIT = int(lib.CDL_IMAGE_UNIT)
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,10 @@ def _entry(linked: Linked, name: str, target: Target) -> int:
 
 
 def _task(task: Task, entry: int) -> ImageTask:
-    event = (task.event.area.value, task.event.offset) if task.event else None
+    event, ignored = None, 0
+    if task.event is not None:
+        event = (task.event.variable.area.value, task.event.variable.offset + task.event.offset)
+        ignored = 0 if task.event.bit is None else 0xFF ^ 1 << task.event.bit
     return ImageTask(
         task.name,
         task.kind.value,
@@ -96,7 +101,15 @@ def _task(task: Task, entry: int) -> ImageTask:
         task.watchdog_us,
         task.watchdog_sensitivity,
         event,
+        ignored,
+        task.external,
+        (_part(task, Area.INPUT), _part(task, Area.OUTPUT)),
     )
+
+
+def _part(task: Task, area: Area) -> ImagePart:
+    part = task.parts.get(area, TaskPart())
+    return ImagePart(part.start // _UNIT, (part.end - part.start) // _UNIT, part.written, part.shared)
 
 
 def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, project: str) -> SymbolTable:

@@ -63,6 +63,7 @@ class Variable:
     keep: Keep = Keep.UNSAID
     bit: int | None = None  # a BOOL at an address such as %IX0.3: the bit in the byte at `offset`
     bounds: list[tuple[Variable, Variable]] = field(default_factory=list)
+    shared_output: bool = False  # several tasks are meant to write it
 
 
 # ---- initial values ------------------------------------------------------------------------------------------------
@@ -487,19 +488,44 @@ class TaskKind(Enum):
 
     CYCLIC = 0
     EVENT = 1
+    EXTERNAL = 2
     FREEWHEELING = 3
+
+
+@dataclass(frozen=True)
+class TaskPart:
+    """What a task uses of the inputs or outputs: bytes from `start` up to `end`, which is 0 for nothing. `written`: it
+    changes some of them; `shared`: another task uses some of them too."""
+
+    start: int = 0
+    end: int = 0
+    written: bool = False
+    shared: bool = False
+
+
+@dataclass
+class TaskEvent:
+    """The BOOL a task waits for: in `variable`, `offset` bytes behind its start. `bit` of that byte; None for all."""
+
+    variable: Variable
+    offset: int = 0
+    bit: int | None = None
 
 
 @dataclass
 class Task:
+    """`parts`: what it needs a copy of where others use it, of the inputs and of the outputs."""
+
     name: str
     kind: TaskKind
     priority: int  # 0 highest .. 31
     interval_us: int
     programs: list[Pou]
-    event: Variable | None = None  # TASK(SINGLE := var)
+    event: TaskEvent | None = None  # TASK(SINGLE := place)
+    external: str = ""  # TASK(EVENT := 'name')
     watchdog_us: int = 0
     watchdog_sensitivity: int = 1
+    parts: dict[Area, TaskPart] = field(default_factory=dict)
 
 
 @dataclass

@@ -23,6 +23,15 @@ def find_plcrt() -> str:
     return found
 
 
+def _is_child(pid: int, parent: int) -> bool:
+    """Whether a process runs and was started by `parent`."""
+    try:
+        state, ppid = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[:2]
+    except OSError:
+        return False
+    return int(ppid) == parent and state not in "ZX"
+
+
 class Plcrt:
     """Context manager around one process; `port` is the pseudo terminal it serves."""
 
@@ -44,6 +53,13 @@ class Plcrt:
             self.process.kill()
             raise UsageError(f"plcrt did not start: {self.process.stderr.read().strip() or line.strip()}")
         self.port = line.removeprefix("serial: ").strip()
+
+    @property
+    def worker(self) -> int:
+        """Process id of the child that runs the controller; 0 while it is being started again."""
+        assert self.process
+        pids = map(int, filter(str.isdigit, os.listdir("/proc")))
+        return next((pid for pid in pids if _is_child(pid, self.process.pid)), 0)
 
     def stop(self, how: signal.Signals = signal.SIGTERM) -> int:
         """Ends the process; SIGKILL stands for a power cut. Returns the exit status."""

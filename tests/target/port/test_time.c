@@ -234,6 +234,63 @@ static void call_that_does_not_come_is_noticed(void)
     NVIC_ISER(BOARD_TASK_IRQ / 32) = ((1u << SYSTIMER_COUNT) - 1) << BOARD_TASK_IRQ % 32;
 }
 
+static void timer_without_interval_calls_when_it_is_triggered(void)
+{
+    RTS_HANDLE timer;
+    reset_counters();
+    CHECK_EQUAL(SysTimerCreate(on_fast, &fast, 0, 5, &timer), ERR_OK);
+    SysTimerTrigger(timer, 0);
+    SysTimerTrigger(99, 0);
+    CHECK_EQUAL(fast.calls, 0);
+    SysTimerStart(timer);
+    wait_ms(3);
+    CHECK_EQUAL(fast.calls, 1); /* the first comes by itself */
+    for (RTS_UI32 i = 2; i < 10; i++) {
+        SysTimerTrigger(timer, 0);
+        CpuBarrier();
+        CHECK_EQUAL(fast.calls, i);
+    }
+    CHECK_EQUAL(SysTimersWork(), 1);
+    SysTimerStop(timer);
+    SysTimerTrigger(timer, 0);
+    CpuBarrier();
+    CHECK_EQUAL(fast.calls, 9);
+    SysTimerDelete(timer);
+}
+
+static RTS_HANDLE triggered;
+
+/* Triggers itself once more, and a timer of better priority. */
+static void on_trigger(void *param, RTS_I64 due)
+{
+    RTS_UNUSED(due);
+    if (slow.calls++ == 1) { /* the call after the first, which comes by itself */
+        RTS_UI32 before = fast.calls;
+        SysTimerTrigger(*(RTS_HANDLE *)param, 0);
+        SysTimerTrigger(triggered, 0);
+        CpuBarrier();
+        slow.others = fast.calls - before;
+    }
+}
+
+static void triggered_timer_interrupts_one_below_and_comes_again_after_itself(void)
+{
+    RTS_HANDLE low;
+    reset_counters();
+    CHECK_EQUAL(SysTimerCreate(on_trigger, &low, 0, 20, &low), ERR_OK);
+    CHECK_EQUAL(SysTimerCreate(on_fast, &fast, 0, 1, &triggered), ERR_OK);
+    SysTimerStart(low);
+    SysTimerStart(triggered);
+    wait_ms(3);
+    SysTimerTrigger(low, 0);
+    CpuBarrier();
+    CHECK_EQUAL(slow.calls, 3);
+    CHECK_EQUAL(slow.others, 1);
+    CHECK_EQUAL(fast.calls, 2);
+    SysTimerDelete(low);
+    SysTimerDelete(triggered);
+}
+
 static void all_timers_and_no_more_can_be_created(void)
 {
     RTS_HANDLE timers[SYSTIMER_COUNT], one_more;
@@ -248,7 +305,6 @@ static void bad_timer_parameters_are_refused(void)
 {
     RTS_HANDLE timer;
     CHECK_EQUAL(SysTimerCreate(NULL, NULL, 1000, 5, &timer), ERR_PARAMETER);
-    CHECK_EQUAL(SysTimerCreate(on_fast, NULL, 0, 5, &timer), ERR_PARAMETER);
     CHECK_EQUAL(SysTimerCreate(on_fast, NULL, 1000, 32, &timer), ERR_PARAMETER);
     CHECK_EQUAL(SysTimerStop(99), ERR_INVALID_HANDLE);
 }
@@ -266,6 +322,8 @@ int main(void)
     TEST_RUN(overrun_skips_due_times_and_counts_them);
     TEST_RUN(stopped_timer_is_silent);
     TEST_RUN(call_that_does_not_come_is_noticed);
+    TEST_RUN(timer_without_interval_calls_when_it_is_triggered);
+    TEST_RUN(triggered_timer_interrupts_one_below_and_comes_again_after_itself);
     TEST_RUN(all_timers_and_no_more_can_be_created);
     TEST_RUN(bad_timer_parameters_are_refused);
     TEST_END();

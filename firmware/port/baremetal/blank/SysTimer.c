@@ -1,5 +1,5 @@
 /*
- * SysTimer.c - periodic timers, one for each cyclic task. Contract: SysTimer.h.
+ * SysTimer.c - timers, one for each cyclic task. Contract: SysTimer.h.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -34,6 +34,14 @@ RTS_RESULT SysTimerStop(RTS_HANDLE timer)
 {
     RTS_UNUSED(timer);
     return ERR_NOTIMPLEMENTED;
+}
+
+/* Write here, and say SCHED_EVENTS_IN_TIMERS 1 in rts_config_port.h: a timer created with interval 0 calls once, in its
+ * context. Until then tasks that wait for an event run in main. */
+void SysTimerTrigger(RTS_HANDLE timer, RTS_I64 due_ns)
+{
+    RTS_UNUSED(timer);
+    RTS_UNUSED(due_ns);
 }
 
 /* Write here: stop and free. */

@@ -6,7 +6,8 @@
  * One hardware timer of the board is the alarm for the earliest due time. When it fires, each timer that is due gets
  * its own interrupt line set pending by software, and runs at its own NVIC level: any number of timers from one
  * hardware timer, and due times that never drift. Due times are the alarm's alone: it goes on while callbacks run, and
- * counts what they miss. Rank is by priority, among equals by place.
+ * counts what they miss. Rank is by priority, among equals by place. A timer without an interval is set pending by
+ * SysTimerTrigger; that it is due every 71 minutes too costs less than an exception from the rule.
  */
 #include "SysTimer.h"
 
@@ -121,14 +122,14 @@ static TIMER *find_timer(RTS_HANDLE handle)
 RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
                           RTS_HANDLE *timer)
 {
-    if (callback == NULL || interval_us == 0 || priority > 31)
+    if (callback == NULL || priority > 31)
         return ERR_PARAMETER;
     for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
         if (state.timer[i].state != TIMER_FREE)
             continue;
         state.timer[i] = (TIMER){.callback = callback,
                                  .param = param,
-                                 .interval_us = interval_us,
+                                 .interval_us = interval_us != 0 ? interval_us : UINT32_MAX,
                                  .priority = (RTS_UI8)priority,
                                  .state = TIMER_STOPPED};
         if (state.end <= &state.timer[i])
@@ -151,6 +152,14 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     BoardAlarmSet(0);
     CpuRestore(mask);
     return ERR_OK;
+}
+
+/* While the interrupt is active, it is left pending, and comes again. */
+void SysTimerTrigger(RTS_HANDLE handle, RTS_I64 due_ns)
+{
+    RTS_UNUSED(due_ns);
+    if (handle < SYSTIMER_COUNT && state.timer[handle].state >= TIMER_WAITING)
+        NVIC_STIR = BOARD_TASK_IRQ + handle;
 }
 
 /* Called from main, so no timer's interrupt is active: it is enough that none starts again, nor one that is pending. */

@@ -6,6 +6,8 @@
  * A chip with a reset cause register can tell more: its board calls ResetSetCause.
  */
 #include "CortexM.h"
+#include "SysExcept.h"
+#include "SysStart.h"
 
 enum { RECORD_MAGIC = 0x52535430 };
 enum { AIRCR_SYSRESETREQ = 0x05FA0004 };
@@ -39,4 +41,19 @@ void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
     SCB_AIRCR = AIRCR_SYSRESETREQ;
     for (;;)
         CpuBarrier();
+}
+
+/* What nobody announced may have been the reset pin, or the watchdog of a chip that does not tell. */
+const SYS_START *SysStartGet(void)
+{
+    static const char *const texts[RESET_CAUSE_COUNT] = {"power on", "reset pin", "software", "fault of the runtime",
+                                        "hardware watchdog"};
+    static SYS_START start = {SYS_START_POWER, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
+    if (last.cause >= RESET_FATAL)
+        start.cause = SYS_START_CRASH;
+    else if (last.cause == RESET_PIN)
+        start.cause = SYS_START_UNKNOWN;
+    if (LOG_MAX_ENTRIES > 0)
+        start.text = texts[last.cause];
+    return &start;
 }

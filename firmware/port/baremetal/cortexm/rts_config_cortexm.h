@@ -20,11 +20,18 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #define APP_CALL_ENTRY(entry, context) IecCall((context), 0, (uintptr_t)(entry))
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((context), (init_retains), (uintptr_t)(entry))
 
-/* No program of a small controller takes this long for a cycle [us]: an endless loop is an exception soon. A task that
- * does says so, by a watchdog of its own. */
-#ifndef APP_DEFAULT_WATCHDOG_US
-#define APP_DEFAULT_WATCHDOG_US 2000000
+/* No program of a small controller takes this long for a cycle [us]: an endless loop is an exception soon. Its own
+ * watchdog does not make it longer: tasks interrupt main, so nobody can talk to the device meanwhile, stop it or send
+ * another program, and plctool waits 5 s for an answer. */
+#ifndef APP_MAX_CYCLE_US
+#define APP_MAX_CYCLE_US 2000000
 #endif
+#ifndef APP_DEFAULT_WATCHDOG_US
+#define APP_DEFAULT_WATCHDOG_US APP_MAX_CYCLE_US
+#endif
+
+/* Tasks that wait for an event run in a line of their own, too. */
+#define SCHED_EVENTS_IN_TIMERS 1
 
 /* Stack of the application code of one task, bytes: a multiple of 32, which are lost to the guard below it. */
 #ifndef RTS_IEC_STACK_SIZE

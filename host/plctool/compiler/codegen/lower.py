@@ -111,14 +111,15 @@ def _global_init(unit: Unit, startup: Pou) -> None:
     fn = Function(f"void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains)", unit.plain)
     flag, text = fn.value("icmp ne i32 %init_retains, 0"), value_type(BOOL)
     operand = flag if text == "i1" else fn.value(f"zext i1 {flag} to {text}")
-    fn.do(f"call void @{unit.symbol(startup)}(ptr %ctx, {text} {operand})")
+    # Not inlined, because it has lines and this has none.
+    fn.do(f"call void @{unit.symbol(startup)}(ptr %ctx, {text} {operand}) noinline")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_INIT, fn, linkage="")
 
 
 def _global_exit(unit: Unit, shutdown: Pou) -> None:
     fn = Function(f"void @{GLOBAL_EXIT}(ptr noalias nonnull readonly %ctx)", unit.plain)
-    fn.do(f"call void @{unit.symbol(shutdown)}(ptr %ctx)")
+    fn.do(f"call void @{unit.symbol(shutdown)}(ptr %ctx) noinline")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_EXIT, fn, linkage="")
 

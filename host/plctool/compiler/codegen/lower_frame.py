@@ -79,7 +79,7 @@ class Frame:
     def at(self, pos: Pos) -> None:
         """What is written from now on belongs to the line of `pos`."""
         if self.fn.scope >= 0:
-            self.fn.debug = self.unit.location(pos.line, self.fn.scope)
+            self.fn.debug = self.unit.location(pos, self.fn.scope)
 
     # ---- what is written for each kind of node ----
 

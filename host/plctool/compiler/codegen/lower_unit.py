@@ -18,6 +18,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError
 
 _ALWAYS = 'nounwind "no-builtins"'
+_PROBES = ' "probe-stack"="inline-asm"'
 _INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
 
 
@@ -102,7 +103,8 @@ class Unit:
         self.files: dict[str, int] = {}
         self._import_slots: dict[str, int] = {}
         self._symbols: set[str] = set()
-        self._locations: dict[tuple[int, int], str] = {}
+        self._locations: dict[tuple[int, str, int], str] = {}
+        self._scopes: dict[tuple[int, str], int] = {}  # the parts of functions that come from a file
         self._struct_symbols: dict[StructType, str] = {}
         self._subroutine_type = -1
         self._compile_unit = -1
@@ -112,10 +114,11 @@ class Unit:
         self._tag_root = module.metadata(f'!{{!"any", !{tree}, i64 0}}')
         self._tags: dict[object, str] = {}
         # An access through NULL that is not checked is left to the processor, which faults.
-        always = _ALWAYS if Check.NULL in options.checks else f"{_ALWAYS} null_pointer_is_valid"
-        self.smallest = module.attributes(f"minsize optsize {_ALWAYS}")
+        base = _ALWAYS + (_PROBES if self.target.probes else "")
+        always = base if Check.NULL in options.checks else f"{base} null_pointer_is_valid"
+        self.smallest = module.attributes(f"minsize optsize {base}")
         self.plain = module.attributes(f"{'optsize ' if options.compact else ''}{always}")
-        self.strings = module.attributes(f"{'optsize ' if options.size else ''}{_ALWAYS}")
+        self.strings = module.attributes(f"{'optsize ' if options.size else ''}{base}")
         self._program = self.plain
         if options.compact and not options.size:
             self._program = module.attributes(f'optsize {always} "function-inline-threshold"="{_INLINED}"')
@@ -245,16 +248,27 @@ class Unit:
             module.named_metadata("llvm.dbg.cu", [self._compile_unit])
             flags = ('!{i32 7, !"Dwarf Version", i32 4}', '!{i32 2, !"Debug Info Version", i32 3}')
             module.named_metadata("llvm.module.flags", [module.metadata(flag) for flag in flags])
-        return module.distinct_metadata(
-            f'!DISubprogram(name: "{name}", scope: !{file}, file: !{file}, line: {pos.line}, '
+        scope = module.distinct_metadata(
+            f'!DISubprogram(name: "{name}", scope: !{file}, file: !{file}, line: {pos.line}, scopeLine: {pos.line}, '
             f"type: !{self._subroutine_type}, spFlags: DISPFlagDefinition, unit: !{self._compile_unit})"
         )
+        self._scopes[scope, pos.file] = scope
+        return scope
 
-    def location(self, line: int, scope: int) -> str:
-        """The `, !dbg` suffix for instructions of a line."""
-        key = (line, scope)
+    def location(self, pos: Pos, scope: int) -> str:
+        """The `, !dbg` suffix for instructions of a line, in the function with that scope."""
+        key = (pos.line, pos.file, scope)
         text = self._locations.get(key)
         if text is None:
-            text = f", !dbg !{self.module.metadata(f'!DILocation(line: {line}, scope: !{scope})')}"
+            inner = self._scope_in(pos.file, scope)
+            text = f", !dbg !{self.module.metadata(f'!DILocation(line: {pos.line}, scope: !{inner})')}"
             self._locations[key] = text
         return text
+
+    def _scope_in(self, file: str, scope: int) -> int:
+        """The part of a scope that comes from another file than the function: initial values come from everywhere."""
+        inner = self._scopes.get((scope, file))
+        if inner is None:
+            text = f"!DILexicalBlockFile(scope: !{scope}, file: !{self.file(file)}, discriminator: 0)"
+            inner = self._scopes[scope, file] = self.module.metadata(text)
+        return inner

@@ -25,7 +25,8 @@ class Target:
     `device_id` names a TARGET_ID_* of CompactDownload.h. `stubs`: undefined compiler calls (soft float, 64-bit
     division) go through the import table, whose base is in a reserved register. `unaligned`: loads and stores of any
     size work at any address. `vectors`: 16-byte vector compares are cheap. `registers`: that carry arguments inside the
-    image, for addresses and integers, and for reals (0: reals are like integers).
+    image, for addresses and integers, and for reals (0: reals are like integers). `probes`: a function that is entered
+    touches each page of its frame, so that a large one does not pass over the guard at the end of the stack.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Target:
     unaligned: bool
     vectors: bool = False
     abi: str = ""
+    probes: bool = False
     external_convention: str = (
         ""  # LLVM calling convention of C functions that take or return floats; "" is the default
     )
@@ -55,11 +57,11 @@ TARGETS: dict[str, Target] = {
     for t in (
         Target(
             "x86_64-linux", "x86_64-unknown-linux-gnu", "x86-64", "", Machine.X86_64, "TARGET_ID_X86_64_LINUX",
-            pointer_size=8, registers=(6, 8), stubs=False, unaligned=True, vectors=True,
+            pointer_size=8, registers=(6, 8), stubs=False, unaligned=True, vectors=True, probes=True,
         ),
         Target(
             "aarch64-linux", "aarch64-unknown-linux-gnu", "generic", "", Machine.AARCH64, "TARGET_ID_AARCH64_LINUX",
-            pointer_size=8, registers=(8, 8), stubs=False, unaligned=True,
+            pointer_size=8, registers=(8, 8), stubs=False, unaligned=True, probes=True,
         ),
         Target(
             "cortex-m0", "thumbv6m-none-unknown", "cortex-m0", "+reserve-r9", Machine.THUMB_V6M, "TARGET_ID_CORTEX_M0",

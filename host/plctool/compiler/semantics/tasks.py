@@ -1,4 +1,5 @@
-"""The properties of a TASK: `TASK Fast(INTERVAL := T#10ms, PRIORITY := 1, WATCHDOG := T#5ms, SENSITIVITY := 3);`
+"""The properties of a TASK: `TASK Fast(INTERVAL := T#10ms, PRIORITY := 1, WATCHDOG := T#5ms, SENSITIVITY := 3);`, with
+INTERVAL, SINGLE or EVENT saying when it runs.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -14,12 +15,13 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import BitPlace, Load, Task, TaskKind, VarPlace
-from plctool.compiler.types import BOOL, LTIME, TIME
+from plctool.compiler.typed import BitPlace, Load, MemberPlace, Place, Storage, Task, TaskEvent, TaskKind, VarPlace
+from plctool.compiler.types import BOOL, LTIME, TIME, StringType
 
 LOWEST_PRIORITY = 31
 MAX_DURATION_US = 0x7FFF_FFFF
 MAX_SENSITIVITY = 0xFFFF
+MAX_EVENT_NAME = 63
 
 
 def background(name: str) -> Task:
@@ -28,14 +30,29 @@ def background(name: str) -> Task:
 
 
 def read_task(world: World, decl: ast.TaskDecl, scope: Scope) -> Task:
-    """The task that is declared; without INTERVAL and SINGLE it runs when there is time."""
+    """The task that is declared; without INTERVAL, SINGLE and EVENT it runs when there is time."""
     return _Reader(world, decl, scope).task
+
+
+def _event_at(place: Place) -> TaskEvent | None:
+    """Where a variable, member or bit is, when its address is known beforehand."""
+    match place:
+        case VarPlace(var) if var.storage is Storage.AREA:
+            return TaskEvent(var)
+        case MemberPlace(base, offset):
+            event = _event_at(base)
+            return event and TaskEvent(event.variable, event.offset + offset)
+        case BitPlace(base, bit):
+            event = _event_at(base)
+            return event and TaskEvent(event.variable, event.offset + bit // 8, bit % 8)
+    return None
 
 
 class _Reader:
     def __init__(self, world: World, decl: ast.TaskDecl, scope: Scope) -> None:
         self.task = background(decl.name)
         self._checker = Checker(world, scope)
+        self._runs_by = ""
         for offset, name, value in decl.properties:
             read = self._properties.get(name.upper())
             if read is None or isinstance(value, ast.ArrayInit | ast.StructInit):
@@ -51,8 +68,17 @@ class _Reader:
 
     def _interval(self, node: ast.Expr) -> None:
         interval = self._duration(node, "INTERVAL")
-        if interval:
-            self.task.interval_us, self.task.kind = interval, TaskKind.CYCLIC
+        if interval and self._run_by("INTERVAL", TaskKind.CYCLIC, node):
+            self.task.interval_us = interval
+
+    def _run_by(self, name: str, kind: TaskKind, node: ast.Expr) -> bool:
+        """A task runs by one thing; False after a diagnosis."""
+        if self._runs_by:
+            message = f"a TASK runs by {self._runs_by} or by {name}, not by both: write another task"
+            self._checker.error(node.pos, "configuration", message)
+            return False
+        self._runs_by, self.task.kind = name, kind
+        return True
 
     def _watchdog(self, node: ast.Expr) -> None:
         self.task.watchdog_us = self._duration(node, "WATCHDOG")
@@ -88,17 +114,30 @@ class _Reader:
 
     def _single(self, node: ast.Expr) -> None:
         e = self._checker.expr(node)
-        if e.type is BOOL and isinstance(e, Load) and isinstance(e.place, VarPlace):
-            self.task.event, self.task.kind = e.place.var, TaskKind.EVENT
-        elif e.type is not ERROR:
-            bit = isinstance(e, Load) and isinstance(e.place, BitPlace)
-            reason = ", not a bit at an address: copy that to one in another task" if bit else ""
-            self._checker.error(node.pos, "type", f"SINGLE is a global BOOL variable{reason}")
+        event = _event_at(e.place) if e.type is BOOL and isinstance(e, Load) else None
+        if event is None and e.type is not ERROR:
+            self._checker.error(node.pos, "type", "SINGLE is a global BOOL variable or a bit such as %IX0.3")
+        elif event is not None and self._run_by("SINGLE", TaskKind.EVENT, node):
+            self.task.event = event
+
+    def _event(self, node: ast.Expr) -> None:
+        e = self._checker.constant(node)
+        if e is None:
+            return
+        if not isinstance(e.type, StringType) or not isinstance(e.value, str):
+            message = f"EVENT is the name of an external event such as 'door', not {e.type}"
+            self._checker.error(node.pos, "type", message)
+        elif not 0 < len(e.value) <= MAX_EVENT_NAME or not e.value.isascii() or not e.value.isprintable():
+            message = f"the name of an EVENT has 1 to {MAX_EVENT_NAME} ASCII characters"
+            self._checker.error(node.pos, "range", message)
+        elif self._run_by("EVENT", TaskKind.EXTERNAL, node):
+            self.task.external = e.value
 
     _properties: ClassVar[dict[str, Callable[[Any, ast.Expr], None]]] = {
         "INTERVAL": _interval,
         "PRIORITY": _priority,
         "SINGLE": _single,
+        "EVENT": _event,
         "WATCHDOG": _watchdog,
         "SENSITIVITY": _sensitivity,
     }

@@ -18,6 +18,7 @@
 #define EXCEPT_MAX_CALLS 0
 #define APP_REFUSAL_TEXT_SIZE 1
 #define APP_RETAIN_SIZE 0
+#define APP_IMAGE_SIZE 0 /* the super loop runs one task after the other */
 #define SRV_INFORMATION 0
 #define NS_OLD_VERSIONS 0
 #define COMM_COUNTERS 0

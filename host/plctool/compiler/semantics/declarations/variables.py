@@ -110,6 +110,7 @@ class Variables:
                 self.check_kept(symbol.name, t, keep, scope, symbol.pos)
                 result.variable = self.area_variable(symbol.full_name, t, init, location, keep, scope, symbol.pos)
                 if result.variable is not None:
+                    result.variable.shared_output = "shared_output" in symbol.decl.attributes
                     self._world.allocation.add(result.variable)
         symbol.busy = False
         symbol.symbol = result

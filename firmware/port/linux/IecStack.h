@@ -1,0 +1,49 @@
+/*
+ * IecStack.h - stacks of their own for IEC code: nothing of the runtime lies on them, and guards lie around them.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Shared by the linux and the sim port. A program that writes beyond a local array destroys what IEC code left there,
+ * or meets a guard; what the thread goes on with afterwards lies on the stack it came from. Only the stack record, which
+ * is found through a thread-local variable, leads back there.
+ */
+#ifndef IECSTACK_H
+#define IECSTACK_H
+
+#include "CmpStd.h"
+
+/* The layout of the first three is known to IecStackSwitch.S. */
+typedef struct {
+    uintptr_t back;    /* stack pointer of the thread, saved while IEC code runs */
+    uintptr_t top;     /* behind the highest address of the IEC stack */
+    RTS_UI32 running;  /* IEC code runs; atomic */
+    uintptr_t bottom;  /* lowest address */
+    struct {
+        void *own_state, *own_bottom; /* of the address sanitizer */
+        size_t own_size;
+    } sanitizer;
+} IEC_STACK;
+
+/* Memory for a stack that has none; false when the process may not have more. */
+bool IecStackReserve(IEC_STACK *stack);
+/* The memory for the signal handlers of the thread that runs on it. */
+void *IecStackSignalMemory(const IEC_STACK *stack, size_t *size);
+
+/* Whether the address lies in the guard below the stack, where it grows into. */
+bool IecStackIsOverflow(const IEC_STACK *stack, uintptr_t address);
+
+/* Runs fn(arg) on the IEC stack: 0 when it returned, 1 when IecStackLeave was called. */
+int IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
+/* Ends the running IecStackRun of this thread, from the IEC stack or from a signal handler. */
+void IecStackLeave(IEC_STACK *stack) __attribute__((noreturn));
+
+/* The record of the calling thread, NULL without: found whatever its registers hold. Reading it in a handler never
+ * allocates. */
+extern __thread IEC_STACK *IecStackOfThread __attribute__((tls_model("initial-exec"), visibility("hidden")));
+
+/* In SysExcept.c, for the handler of a signal that ends the process: the last address of the application's code that the
+ * calling thread was at, 0 when it is not in IEC code. *arg: what its latest SysExceptTry was called with, NULL when it
+ * called none. */
+uintptr_t IecStackLastPlace(const void *ucontext, const void **arg);
+
+#endif

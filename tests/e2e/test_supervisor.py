@@ -1,0 +1,211 @@
+"""plcrt's supervisor: whatever ends the process that runs the controller, it is there again, or all ends in order."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from plctool.link.connection import Connection
+from plctool.link.serial import SerialTransport
+from plctool.link.services import read_identity, read_status
+from plctool.link.session import Session
+from plctool.testing.plcrt import Plcrt, find_plcrt
+
+DEADLY = [signal.SIGSEGV, signal.SIGBUS, signal.SIGILL, signal.SIGFPE, signal.SIGTRAP, signal.SIGABRT, signal.SIGSYS]
+OUTSIDE = signal.SIGKILL
+
+
+def name(pid: int) -> str:
+    return Path(f"/proc/{pid}/comm").read_text().strip()
+
+
+def files(pid: int) -> int:
+    return len(list(Path(f"/proc/{pid}/fd").iterdir()))
+
+
+def runs(pid: int) -> bool:
+    """Whether a process runs; one that is a zombie does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def exists(pid: int) -> bool:
+    return Path(f"/proc/{pid}").exists()
+
+
+def answer(port: str) -> str:
+    with Connection(SerialTransport(port)) as connection:
+        session = Session(connection)
+        assert read_identity(session).device_name == "plcrt"
+        return read_status(session).state.value
+
+
+@pytest.fixture
+def kill_worker(plcrt, eventually):
+    """Kills the worker with a signal, and waits for the next one."""
+
+    def kill(number: signal.Signals) -> None:
+        worker = eventually(lambda: plcrt.worker)
+        os.kill(worker, number)
+        eventually(lambda: plcrt.worker not in (0, worker))
+
+    return kill
+
+
+def log_texts(tool, plcrt) -> list[str]:
+    return [entry["text"] for entry in tool.ok("log", "--port", plcrt.port)["entries"]]
+
+
+@pytest.mark.parametrize("number", [*DEADLY, OUTSIDE])
+def test_it_answers_on_the_same_line_after_a_death_and_says_what_it_died_of(tool, plcrt, kill_worker, number):
+    kill_worker(number)
+    assert answer(plcrt.port) == "none"
+    said = f"signal {number.name}" if number is not signal.SIGSYS else f"signal {number.value}"
+    assert any("was started again" in text and said in text for text in log_texts(tool, plcrt))
+
+
+def test_it_is_there_again_within_a_second(plcrt, kill_worker):
+    """The best of five: machines under load are slow."""
+    seconds = []
+    for _ in range(5):
+        begin = time.monotonic()
+        kill_worker(OUTSIDE)
+        answer(plcrt.port)
+        seconds.append(time.monotonic() - begin)
+    assert min(seconds) < 1
+
+
+def test_nothing_is_left_of_those_that_died(plcrt, kill_worker):
+    before = files(plcrt.process.pid), files(plcrt.worker)
+    workers = []
+    for _ in range(10):
+        workers.append(plcrt.worker)
+        kill_worker(OUTSIDE)
+    answer(plcrt.port)
+    assert (files(plcrt.process.pid), files(plcrt.worker)) == before
+    assert not any(map(exists, workers))
+
+
+def test_ps_tells_them_apart(plcrt):
+    assert (name(plcrt.process.pid), name(plcrt.worker)) == ("plcrt", "plcrt-worker")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_both_end_in_order(plcrt, number):
+    worker = plcrt.worker
+    assert plcrt.stop(number) == 0
+    assert not exists(worker)
+
+
+def test_an_interrupt_of_the_terminal_reaches_both_and_ends_them_in_order(tmp_path):
+    with Plcrt(tmp_path / "flash") as plcrt:
+        worker = plcrt.worker
+        os.kill(worker, signal.SIGINT)
+        assert plcrt.stop(signal.SIGINT) == 0
+        assert not exists(worker)
+
+
+def test_a_worker_that_is_asked_to_end_ends_plcrt(plcrt):
+    os.kill(plcrt.worker, signal.SIGTERM)
+    assert plcrt.process.wait(20) == 0
+
+
+def test_a_second_signal_ends_both_at_once(plcrt):
+    worker = plcrt.worker
+    os.kill(worker, signal.SIGSTOP)
+    plcrt.process.terminate()
+    with pytest.raises(subprocess.TimeoutExpired):
+        plcrt.process.wait(0.3)
+    plcrt.process.terminate()
+    assert plcrt.process.wait(20) == -signal.SIGTERM
+    assert not runs(worker)
+
+
+def test_the_worker_ends_with_a_supervisor_that_is_killed(plcrt, eventually):
+    worker = plcrt.worker
+    plcrt.stop(signal.SIGKILL)
+    eventually(lambda: not runs(worker))
+    plcrt.start()  # at once: neither the flash file nor the line is held
+    assert answer(plcrt.port) == "none"
+
+
+def test_a_killed_plcrt_may_be_started_at_once(plcrt):
+    for _ in range(20):
+        plcrt.stop(signal.SIGKILL)
+        plcrt.start()
+    assert answer(plcrt.port) == "none"
+
+
+def test_a_controller_that_dies_again_and_again_without_a_program_is_given_up(plcrt, eventually):
+    worker, deaths = 0, 0
+    while plcrt.process.poll() is None:
+        if plcrt.worker not in (0, worker):
+            worker = plcrt.worker
+            os.kill(worker, signal.SIGABRT)
+            deaths += 1
+    _, said = plcrt.process.communicate(timeout=20)
+    assert plcrt.process.returncode == 1 and 3 <= deaths <= 10
+    assert "times in a row without a program (signal SIGABRT)" in said
+
+
+def test_one_that_is_killed_from_outside_is_never_given_up(plcrt, kill_worker):
+    for _ in range(12):
+        kill_worker(OUTSIDE)
+        answer(plcrt.port)
+
+
+def test_it_ends_while_it_waits_to_start_the_next(plcrt, eventually):
+    """With the third death comes a pause."""
+    worker, deaths = 0, 0
+    while deaths < 4:
+        if plcrt.worker not in (0, worker):
+            worker = plcrt.worker
+            os.kill(worker, signal.SIGABRT)
+            deaths += 1
+    plcrt.process.terminate()
+    assert plcrt.process.wait(20) in (0, 1)
+
+
+def test_it_runs_where_ended_children_are_ignored(tmp_path):
+    """As a shell may start it; the kernel then forgets how a child ended."""
+    ignore = lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # noqa: E731
+    command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, preexec_fn=ignore) as process:
+        assert process.stdout.readline()
+        process.terminate()
+        assert process.wait(20) == 0
+
+
+def test_without_a_supervisor_it_is_one_process(tmp_path):
+    with Plcrt(tmp_path / "flash", "--no-supervisor") as plcrt:
+        assert plcrt.worker == 0
+        assert answer(plcrt.port) == "none"
+        assert plcrt.stop() == 0
+
+
+def test_a_serial_device_is_opened_again_by_the_next_worker(tmp_path, eventually):
+    import pty
+
+    ours, theirs = pty.openpty()
+    command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", os.ttyname(theirs)]
+    with subprocess.Popen(command) as process:
+        plcrt = Plcrt(tmp_path / "flash")
+        plcrt.process = process
+        worker = eventually(lambda: plcrt.worker)
+        opened = lambda pid: os.ttyname(theirs) in [os.readlink(f) for f in Path(f"/proc/{pid}/fd").iterdir()]  # noqa: E731
+        eventually(lambda: opened(worker))
+        assert not opened(process.pid)  # a device that goes away is not held by anybody
+        os.kill(worker, OUTSIDE)
+        eventually(lambda: plcrt.worker not in (0, worker))
+        eventually(lambda: opened(plcrt.worker))
+        process.terminate()
+        assert process.wait(20) == 0
+    os.close(ours)
+    os.close(theirs)
