@@ -8,6 +8,7 @@ bytes, NUL-terminated, as in the CODESYS family.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -257,6 +258,33 @@ class ReferenceType(PointerType):
         return f"REFERENCE TO {self.target}"
 
 
+class Keep(Enum):
+    """Whether a declaration says that a variable keeps its value over a power cut. PERSISTENT ones keep it over a cold
+    reset and a download, too."""
+
+    UNSAID = ""
+    NON_RETAIN = "NON_RETAIN"
+    RETAIN = "RETAIN"
+    PERSISTENT = "PERSISTENT"
+
+    @staticmethod
+    def of(qualifiers: Collection[str]) -> Keep:
+        """What the qualifiers of a section say; the strongest counts."""
+        return next((k for k in (Keep.PERSISTENT, Keep.RETAIN, Keep.NON_RETAIN) if k.value in qualifiers), Keep.UNSAID)
+
+    @property
+    def kept(self) -> bool:
+        """Whether the value is kept."""
+        return self in (Keep.RETAIN, Keep.PERSISTENT)
+
+    def of_member(self, own: Keep) -> Keep:
+        """Of a member that says `own`, in a variable of this kind: what it says itself counts, but a RETAIN member is
+        PERSISTENT in a PERSISTENT variable."""
+        if own is Keep.UNSAID or (own is Keep.RETAIN and self is Keep.PERSISTENT):
+            return self
+        return own
+
+
 @dataclass
 class Field:
     """A member of a struct or function block; `offset` in bytes is set by `lay_out`. `alias`: a second name."""
@@ -265,6 +293,7 @@ class Field:
     type: Type
     offset: int = -1
     alias: str = ""
+    keep: Keep = Keep.UNSAID
 
     @property
     def hidden(self) -> bool:

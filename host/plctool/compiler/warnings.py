@@ -22,6 +22,7 @@ WARNINGS = {
     "endless": "a loop never ends as it is written",
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration",
     "integer-division": "an integer division drops its fraction before the result becomes a REAL",
+    "kept": "a variable is RETAIN or PERSISTENT, but what it holds is an address, which is not kept",
     "layout": "a type takes more memory than it does in other systems",
     "lifetime": "an instance of a function block lives for one call only, and starts anew in the next one",
     "narrowing": "an integer or an LREAL goes where not all of its values fit",

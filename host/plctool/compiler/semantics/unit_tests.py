@@ -47,6 +47,7 @@ from plctool.compiler.typed import (
     TaskKind,
     Variable,
 )  # fmt: skip
+from plctool.compiler.types import Keep
 
 _LARGEST_ON_STACK = 0x4000  # bytes; what is larger lives in the data area
 
@@ -215,7 +216,9 @@ class TestProgram:
             symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
             if t is not ERROR:
                 if line.location is not None:
-                    symbol.variable = variables.area_variable(name, t, default, line.location, set(), scope, offset)
+                    symbol.variable = variables.area_variable(
+                        name, t, default, line.location, Keep.UNSAID, scope, offset
+                    )
                 else:
                     symbol.variable = self._instance(symbol, default, pou, shared is not None)
             variable = symbol.variable
