@@ -22,7 +22,7 @@ _LOCK_POLL = 0.005  # seconds
 
 
 class NoGateway(Exception):
-    """A gateway is not possible here; its text says why. The line is used directly then."""
+    """A gateway is not possible here; the message says why. The line is used directly then."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def _bases() -> Iterator[tuple[Path, str]]:
 
 
 def _check_ours(folder: Path) -> None:
-    """Nobody else may put a socket there that takes our programs."""
+    """No other user may put a socket there that takes our programs."""
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid() or status.st_mode & 0o077:
         raise NoGateway(f"{folder} is not a folder of this user alone (mode 0700)")
