@@ -58,8 +58,6 @@ class Place:
 
 def find_place(port: str) -> Place:
     """The place of the line that a port's name means. Raises NoGateway when there can be no gateway for it."""
-    if not hasattr(socket, "AF_UNIX") or sys.platform == "win32":
-        raise NoGateway("this system has no local sockets")
     if "://" in port:
         raise NoGateway("only ports of this machine have a gateway")
     return Place(runtime_folder(), os.path.realpath(port))
@@ -67,6 +65,8 @@ def find_place(port: str) -> Place:
 
 def runtime_folder() -> Path:
     """A folder that is ours alone, made when it is missing. Raises NoGateway."""
+    if not hasattr(socket, "AF_UNIX") or sys.platform == "win32":
+        raise NoGateway("this system has no local sockets")
     failure = "no folder for it"
     for base, name in _bases():
         folder = base / name
