@@ -22,7 +22,7 @@ from plctool.gateway.place import NoGateway
 from plctool.image import parse_image
 from plctool.link import services
 from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink
-from plctool.link.monitoring import AreaRange, Contents, read_memory, write_memory
+from plctool.link.monitoring import AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
 from plctool.link.serial import DEFAULT_BAUD, SerialTransport
 from plctool.link.services import AppState, Identity, LogEntry, Stack, TaskInfo
@@ -340,34 +340,28 @@ class Plc:
         return Contents([next(read) if s.fixed is None else s.fixed for s in symbols], contents.consistent)
 
     def write(self, values: Mapping[str, Any]) -> None:
-        """Sets variables, by one message if they fit; texts such as 'T#80ms' are understood.
-
-        A single bit is written with the rest of its byte as it was just before: what the program changes in that byte
-        between the two messages is lost.
-        """
+        """Sets variables, by one message if they fit; texts such as 'T#80ms' are understood. Of a single bit the
+        controller leaves the rest of its byte alone."""
         table = self.symbols()
         named = [(table.resolve(name), value) for name, value in values.items()]
         for symbol, _ in named:
             symbol.check_writable(symbol.area)
-        contents = self._read_reachable(table, [symbol for symbol, _ in named if symbol.bit is not None])
-        data: dict[AreaRange, bytes] = {}
-        for symbol, value in named:
-            place = _range(symbol)
-            data[place] = symbol.encode(value, data.get(place, contents.get(place)))
+        changes = [(_range(symbol), symbol.change(value)) for symbol, value in named]
         try:
-            write_memory(self._session, table.image_crc, list(data.items()))
+            write_memory(
+                self._session,
+                table.image_crc,
+                [Write(place.part(c.offset, len(c.data)), c.data, c.mask) for place, c in changes],
+            )
         except DeviceError:
-            self._read_reachable(table, [symbol for symbol, _ in named if symbol.pointer is not None])
+            self._check_reachable(table, [symbol for symbol, _ in named if symbol.pointer is not None])
             raise
 
-    def _read_reachable(self, table: SymbolTable, symbols: Sequence[Symbol]) -> dict[AreaRange, bytes]:
-        """What the variables hold. Raises DeviceError when a pointer to one of them leads to no variable."""
-        found: dict[AreaRange, bytes] = {}
+    def _check_reachable(self, table: SymbolTable, symbols: Sequence[Symbol]) -> None:
+        """Raises DeviceError when a pointer to one of the variables leads to no variable."""
         for symbol, data in zip(symbols, self._read(table, symbols).values if symbols else (), strict=True):
             if data is None:
                 raise unreachable(symbol, lambda pointer: self._read(table, [pointer]).values[0])
-            found[_range(symbol)] = data
-        return found
 
     def watch(
         self,

@@ -19,6 +19,7 @@ from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.parser import parse
+from plctool.compiler.task_images import plan_images
 from plctool.compiler.typed import Area, TypedProgram
 from plctool.compiler.types import MAX_SIZE
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
@@ -111,7 +112,7 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     report_overlaps(allocation.variables, world.diagnostics)
     if not application.tasks and not world.names.tests and not world.diagnostics.errors and sources:
         world.diagnostics.warning(sources[0].pos(0), "no-program", "there is no PROGRAM, so nothing would run")
-    return TypedProgram(
+    typed = TypedProgram(
         pous=world.pous,
         globals=allocation.variables,
         tasks=application.tasks,
@@ -125,6 +126,9 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
         constants=world.constants,
         externals=program.external_functions(),
     )
+    if not world.diagnostics.errors:
+        plan_images(typed, world.diagnostics)
+    return typed
 
 
 def _check_sizes(world: World, sources: Sequence[Source]) -> None:

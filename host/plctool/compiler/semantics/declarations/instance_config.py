@@ -197,6 +197,7 @@ class InstanceConfig:
         variable = located(entry.name, place.type, initial or symbol.default, location, entry.scope, entry.line.pos)
         if variable is None:
             return None
+        variable.shared_output = True  # a global instance is copied by every task
         self._world.allocation.add(variable)
         outside: Place = VarPlace(variable, variable.type, variable.pos)
         if variable.bit is not None:
