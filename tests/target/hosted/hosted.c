@@ -15,6 +15,7 @@
 
 #include "Sim.h"
 #include "SysExcept.h"
+#include "SysMem.h"
 #include "sim_port.h"
 
 static struct {
@@ -68,9 +69,26 @@ void SimMutexUnlock(void)
 {
 }
 
+/* The same at each call. */
+void *SysMemAllocArea(size_t size)
+{
+    static void *area;
+
+    if (area == NULL)
+        area = memalign(16, size);
+    return area;
+}
+
 void SimSetCycleLimit(RTS_UI32 ms)
 {
     RTS_UNUSED(ms);
+}
+
+int nanosleep(const struct timespec *time, struct timespec *left)
+{
+    RTS_UNUSED(time);
+    RTS_UNUSED(left);
+    return 0;
 }
 
 int clock_gettime(clockid_t clock, struct timespec *now)
