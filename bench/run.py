@@ -105,6 +105,30 @@ def bench_empty_task() -> None:
     )
 
 
+def image_program(size: int, *, shared: bool) -> str:
+    """A task that uses `size` bytes, half of them inputs that it copies to as many outputs. `shared`: another task,
+    which hardly ever runs, uses them too."""
+    use = f"FOR i := 1 TO {size // 8} DO out[i] := in[i] + 1; END_FOR"
+    rest = f"n := in[{size // 8}] + out[{size // 8}] + in[1] + out[1];" if shared else ""
+    return (
+        f"VAR_GLOBAL in AT %ID0 : ARRAY[1..{size // 8}] OF UDINT; out AT %QD0 : ARRAY[1..{size // 8}] OF UDINT; "
+        f"END_VAR PROGRAM Main VAR i : INT; END_VAR {use} END_PROGRAM "
+        f"PROGRAM Other VAR n : UDINT; END_VAR {rest} END_PROGRAM CONFIGURATION C RESOURCE R ON D "
+        f"TASK A(INTERVAL := T#1ms); TASK B(INTERVAL := T#30m); PROGRAM Main WITH A : Main; "
+        f"PROGRAM Other WITH B : Other; END_RESOURCE END_CONFIGURATION"
+    )
+
+
+def bench_image() -> None:
+    print("\nOne cycle with inputs and outputs (half of the bytes each, all of them changed), with the lock of Linux")
+    for size in (8, 32, 64):
+        alone, both = (best_bench(build(image_program(size, shared=shared)))[0] for shared in (False, True))
+        alone_ns, both_ns = alone[2] - alone[1], both[2] - both[1]
+        line(
+            f"{size} bytes that another task uses too", f"{both_ns:.1f} ns", f"{both_ns - alone_ns:+.1f} ns for copies"
+        )
+
+
 def checksum(plc: Simulator) -> int:
     """As tanks_checksum() in the C twin."""
     bits = [int.from_bytes(struct.pack("<f", plc.read(f"Plant.level{i}")), "little") for i in (1, 2)]
@@ -156,6 +180,7 @@ def bench_day() -> None:
 def main() -> None:
     compiling.main()
     bench_empty_task()
+    bench_image()
     bench_tanks()
     targets.main()
     overheads.main()

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A cycle is: read inputs, IEC code, write outputs, statistics, watchdog (manual 3.4, 3.5), events for other tasks.
- * CmpScheduleTimer decides when.
+ * A cycle is: copy the inputs and outputs that others use too, IEC code, copy the changed outputs back, statistics,
+ * watchdog (manual 3.4, 3.5, 8.9), events for other tasks. CmpScheduleTimer decides when.
  */
 #ifndef CMPIECTASK_H
 #define CMPIECTASK_H

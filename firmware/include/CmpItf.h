@@ -72,6 +72,7 @@ enum {
     CMPID_CmpLogSrv = 0x0017,
     CMPID_CmpNameServiceServer = 0x0018,
     CMPID_SysSim = 0x0019,
+    CMPID_SysLock = 0x001A,
     CMPID_SysEvent = 0x001C,
 };
 

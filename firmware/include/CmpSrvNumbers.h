@@ -295,11 +295,14 @@ enum { TAG_TASK_INFO = 0x42, TASK_INFO_WORDS = 10 };
  *   request of its own. Padding: less than 6 bytes at the end. TAG_MON2_CONSISTENT u16 1 (own) follows when no task was
  *   in its cycle while the values were copied: together they are a state between two cycles. Otherwise ask again.
  * WRITE  request: TAG_MON2_WRITE_LIST = n x { u16 id, u32 size, value, u16 code size, code }. Code as for reading, or
- *   the program with Cpy of 4.9 (`15 0C 00` address `17 0C 09 04 1B 06 00 01 00 00 17 04 09 04 17 08 09 04 04`).
+ *   the program with Cpy of 4.9 (`15 0C 00` address `17 0C 09 04 1B 06 00 01 00 00 17 04 09 04 17 08 09 04 04`), or
+ *   (own) an address and `40 mask`: of the byte there the bits in the mask are set to those of the value (its first byte),
+ *   in one step, so that nothing is lost that tasks write to the other bits meanwhile.
  *   Reply: empty = all written; TAG_MON2_ERROR and TAG_MON2_ERROR_INDEX u32 (own): the first bad entry, nothing has
  *   been written (but the entries before it when a pointer to it changed just then). Writable are the areas data,
  *   retain, input, output and memory.
- * Values of 1, 2, 4 and 8 bytes at a multiple of their size are copied in one access where the CPU can.
+ * Values of 1, 2, 4 and 8 bytes at a multiple of their size are read in one access where the CPU can; values of up to
+ * MON2_ONE_STEP_SIZE bytes are written in one step for tasks that take inputs and give outputs; on one core for all.
  */
 enum {
     SRV_MON2_READ = 1,
@@ -318,6 +321,7 @@ enum {
     TAG_MON2_ERROR_INDEX = 0x42, /* own */
     TAG_MON2_CONSISTENT = 0x43,  /* own */
     MON2_POINTER_SIZE = 8,
+    MON2_ONE_STEP_SIZE = 64,
     MON2_APPLICATION_SIZE = 20,
     MON2_ID_FAILED = 0x8000, /* own */
     MON2_OP_HALT = 0x01,
@@ -327,6 +331,7 @@ enum {
     MON2_OP_RAO = 0x06, /* relative to the area in the next byte: leaves an address */
     MON2_OP_DER = 0x09, /* the value, of as many bytes as the next byte says, at an address */
     MON2_OP_ADD = 0x0E,
+    MON2_OP_MASK = 0x40, /* own: of the byte at an address only the bits that are 1 in the next byte are written */
 };
 
 /*

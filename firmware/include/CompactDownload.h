@@ -131,7 +131,22 @@ enum {
     CDL_BLOB_TASKS = 1,  /* array of CDL_TASK */
     CDL_BLOB_RETAIN = 2, /* u32: CRC of the retain area's layout; without it retain data belong to one image only */
     CDL_BLOB_EVENTS = 3, /* names of the external events tasks wait for, each with NUL; for whoever reads the image */
+    CDL_BLOB_IMAGES = 16, /* CDL_IMAGE for inputs and outputs of each task; those it lacks work on the shared areas */
 };
+
+/* What a task uses of the inputs or of the outputs, in units of CDL_IMAGE_UNIT bytes, so that parts that do not overlap
+ * have no word in common. count 0: nothing, or the task has to work on the shared area, because the program keeps
+ * addresses in it. */
+enum { CDL_IMAGE_UNIT = 8 };
+enum {
+    CDL_IMAGE_WRITTEN = 1, /* the task changes some of them */
+    CDL_IMAGE_SHARED = 2,  /* another task uses some of them too */
+};
+typedef struct {
+    RTS_UI16 first;
+    RTS_UI16 count;
+    RTS_UI32 flags; /* CDL_IMAGE_* */
+} CDL_IMAGE;
 
 enum { CDL_TASK_NAME_SIZE = 32 };
 
@@ -177,6 +192,7 @@ RTS_STATIC_ASSERT(sizeof(AREA_INFO) == 8, area_info_is_8_bytes);
 RTS_STATIC_ASSERT(sizeof(POU_REF) == 8, pou_ref_is_8_bytes);
 RTS_STATIC_ASSERT(sizeof(FUNCTION_INFO) == 20, function_info_is_20_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_TASK) == 56, cdl_task_is_56_bytes);
+RTS_STATIC_ASSERT(sizeof(CDL_IMAGE) == 8, cdl_image_is_8_bytes);
 #endif
 
 #endif

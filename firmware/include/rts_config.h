@@ -56,10 +56,36 @@
 #define APP_AREAS_FROM_PORT 0
 #endif
 
+/* RAM for the tasks' own copies of the inputs and outputs that they share, bytes: a task takes as many as it uses of
+ * them, rounded to 8, and once more as many of what it writes. An application that needs more is refused. The
+ * default holds any application that does not write inputs. 0: no copies, 500 bytes of flash less; only where tasks do
+ * not interrupt each other (CmpScheduleEmbedded). */
+#ifndef APP_IMAGE_SIZE
+#define APP_IMAGE_SIZE (APP_MAX_TASKS * (APP_INPUT_SIZE + 2 * APP_OUTPUT_SIZE))
+#endif
+
+/* 1: main runs beside the tasks (threads, several cores), so that a task has copies also of what it uses alone, and
+ * what is written from the PC neither changes within its cycle nor gets lost. 0: main is interrupted by the tasks, or
+ * calls them. */
+#ifndef APP_IMAGE_ALWAYS
+#define APP_IMAGE_ALWAYS (!RTS_ONE_CORE)
+#endif
+
 /* A new application has proven itself after running this long without an exception [us]; before that a restart may roll
  * back to the one before it. */
 #ifndef APP_PROVE_US
 #define APP_PROVE_US 3000000
+#endif
+
+/* Whether SysStartGet may ask that the boot project stays stopped, 100 bytes of flash. */
+#ifndef APP_MAY_STAY_STOPPED
+#define APP_MAY_STAY_STOPPED 1
+#endif
+
+/* The port's words for a crash that are kept in the commit record ("signal SIGSEGV"), bytes with NUL; on the stack of
+ * main. 1: only number and place of the exception are kept. */
+#ifndef APP_CRASH_TEXT_SIZE
+#define APP_CRASH_TEXT_SIZE 32
 #endif
 
 /* A cycle of a task without watchdog, and initialisation code, is broken out of after this long [us], so that an

@@ -57,9 +57,24 @@ class ExternalFunction:
 
 
 @dataclass(frozen=True)
+class ImagePart:
+    """What a task uses of the inputs or outputs: `first` and `count` in units of CDL_IMAGE_UNIT bytes. `written`: it
+    changes some of them; `shared`: another task uses some of them too."""
+
+    first: int = 0
+    count: int = 0
+    written: bool = False
+    shared: bool = False
+
+
+NO_PARTS = (ImagePart(), ImagePart())
+
+
+@dataclass(frozen=True)
 class ImageTask:
     """`kind`: KIND_*; `entry`: code offset to call (with the Thumb bit on Arm); `event`: (area, offset) of the byte
-    with the BOOL, `ignored`: its other bits; `external`: the name of the event a KIND_EXTERNAL task waits for."""
+    with the BOOL, `ignored`: its other bits; `external`: the name of the event a KIND_EXTERNAL task waits for;
+    `parts`: what it uses of inputs and of outputs."""
 
     name: str
     kind: int
@@ -71,6 +86,7 @@ class ImageTask:
     event: tuple[int, int] | None = None
     ignored: int = 0
     external: str = ""
+    parts: tuple[ImagePart, ImagePart] = NO_PARTS
 
 
 @dataclass(frozen=True)
@@ -190,6 +206,8 @@ def _blobs(image: Image) -> Iterator[bytes]:
         yield _blob(lib.CDL_BLOB_EVENTS, events)
     if image.retain_layout is not None:
         yield _blob(lib.CDL_BLOB_RETAIN, image.retain_layout.to_bytes(4, "little"))
+    if any(task.parts != NO_PARTS for task in image.tasks):
+        yield _blob(lib.CDL_BLOB_IMAGES, b"".join(_part_entry(part) for task in image.tasks for part in task.parts))
 
 
 def _blob(number: int, payload: bytes) -> bytes:
@@ -198,6 +216,11 @@ def _blob(number: int, payload: bytes) -> bytes:
 
 def _event_name(task: ImageTask) -> bytes:
     return task.external.encode("ascii", "replace")
+
+
+def _part_entry(part: ImagePart) -> bytes:
+    flags = lib.CDL_IMAGE_WRITTEN * part.written | lib.CDL_IMAGE_SHARED * part.shared
+    return _pack("CDL_IMAGE", {"first": part.first, "count": part.count, "flags": flags})
 
 
 def _task_entry(task: ImageTask) -> bytes:
@@ -248,7 +271,7 @@ def parse_image(data: bytes) -> Image:
         areas=areas,
         functions=_parse_functions(segments["function_table"], len(code)),
         externals=list(_parse_externals(segments["external_function_table"])),
-        tasks=list(_parse_tasks(blobs, len(code))),
+        tasks=_parse_tasks(blobs, len(code)),
         info=_parse_info(segments["application_info"]),
         device_type=int(header.device_type),
         device_version=int(header.device_version),
@@ -336,20 +359,31 @@ def _parse_blobs(data: bytes) -> dict[int, bytes]:
     return blobs
 
 
-def _parse_tasks(blobs: dict[int, bytes], code_size: int) -> Iterator[ImageTask]:
-    payload = blobs.get(int(lib.CDL_BLOB_TASKS), b"")
+def _parse_tasks(blobs: dict[int, bytes], code_size: int) -> list[ImageTask]:
+    tasks = []
     names = blobs.get(int(lib.CDL_BLOB_EVENTS), b"").split(b"\0")
     events = {zlib.crc32(name): name.decode("ascii", "replace") for name in names}
-    for task in _entries("CDL_TASK", payload, "task list"):
+    parts = [_parse_part(e) for e in _entries("CDL_IMAGE", blobs.get(int(lib.CDL_BLOB_IMAGES), b""), "image list")]
+    for number, task in enumerate(_entries("CDL_TASK", blobs.get(int(lib.CDL_BLOB_TASKS), b""), "task list")):
         name = bytes(ffi.buffer(task.name)).split(b"\0")[0].decode("ascii", "replace")
         if task.entry_offset >= code_size:
             raise _refuse(f"the entry of task {name} lies outside the code")
         event = None if task.event_area == NO_AREA else (int(task.event_area), int(task.event_offset))
         external = events.get(int(task.event_offset), "") if task.kind == lib.KIND_EXTERNAL else ""
-        yield ImageTask(
-            name, int(task.kind), int(task.priority), int(task.interval_us), int(task.entry_offset),
-            int(task.watchdog_us), int(task.watchdog_sensitivity), event, int(task.event_ignored), external,
+        inputs, outputs = (*parts[2 * number : 2 * number + 2], *NO_PARTS)[:2]
+        tasks.append(
+            ImageTask(
+                name, int(task.kind), int(task.priority), int(task.interval_us), int(task.entry_offset),
+                int(task.watchdog_us), int(task.watchdog_sensitivity), event, int(task.event_ignored), external,
+                (inputs, outputs),
+            )
         )  # fmt: skip
+    return tasks
+
+
+def _parse_part(entry: Any) -> ImagePart:
+    written, shared = bool(entry.flags & lib.CDL_IMAGE_WRITTEN), bool(entry.flags & lib.CDL_IMAGE_SHARED)
+    return ImagePart(int(entry.first), int(entry.count), written, shared)
 
 
 def _parse_info(data: bytes) -> ApplicationInfo:

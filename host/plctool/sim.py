@@ -194,7 +194,10 @@ class Simulator:
         memory = self._memory(symbol)
         if memory is None:
             raise unreachable(symbol, self._content)
-        memory[:] = symbol.encode(value, bytes(memory))
+        change = symbol.change(value)
+        place = memory[change.offset : change.offset + len(change.data)]
+        masked = (new & change.mask | old & ~change.mask for new, old in zip(change.data, place, strict=True))
+        memory[change.offset : change.offset + len(change.data)] = bytes(masked)
 
     def _resolve(self, name: str) -> Symbol:
         if self.symbols is None:

@@ -39,6 +39,16 @@ class ClassType(EnumType):
 
 
 @dataclass(frozen=True)
+class Change:
+    """`data` goes to where a variable lies, `offset` bytes on. Of a single byte only the bits in `mask`: the others are
+    other variables, and not ours to write."""
+
+    offset: int
+    data: bytes
+    mask: int = 0xFF
+
+
+@dataclass(frozen=True)
 class Symbol:
     """A variable or a part of one. `offset` in bytes in the area or, when `pointer` leads to it, from there on; `bit`
     when it is one bit of an integer; `fixed` is the content of a constant that has no place in memory."""
@@ -70,15 +80,12 @@ class Symbol:
             return bool(int.from_bytes(data[: self.size], "little") >> self.bit & 1)
         return decode(self.type, data)
 
-    def encode(self, value: Any, before: bytes | None = None) -> bytes:
-        """The bytes to write. `before`: the present ones, needed to change a single bit. Raises UsageError."""
+    def change(self, value: Any) -> Change:
+        """What to write for a value. Raises UsageError."""
         if self.bit is None:
-            return encode(self.type, value)
-        if before is None:
-            raise UsageError(f"{self.name} is a bit; write the whole {self.type}.", "bit")
-        word = int.from_bytes(before[: self.size], "little") & ~(1 << self.bit)
-        bit = encode(ELEMENTARY["BOOL"], value)[0]
-        return (word | bit << self.bit).to_bytes(self.size, "little")
+            return Change(0, encode(self.type, value))
+        byte, bit = divmod(self.bit, 8)
+        return Change(byte, bytes([encode(ELEMENTARY["BOOL"], value)[0] << bit]), 1 << bit)
 
     def parse(self, text: str) -> Any:
         """The value a person typed for it, for `encode`. Raises UsageError."""

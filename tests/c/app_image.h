@@ -42,6 +42,8 @@ typedef struct {
     SPEC_IMPORT imports[APP_MAX_IMPORTS + 1];
     RTS_UI32 import_count;
     RTS_UI32 retain_layout; /* 0: no blob */
+    CDL_IMAGE images[2 * APP_MAX_TASKS]; /* what the tasks use of inputs and outputs */
+    RTS_UI32 image_count;                /* 0: no blob */
     const char *info[5];
 } APP_SPEC;
 
@@ -315,6 +317,8 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
     append_blob(image, CDL_BLOB_TASKS, spec->tasks, spec->task_count * (RTS_UI32)sizeof(CDL_TASK));
     if (spec->retain_layout != 0)
         append_blob(image, CDL_BLOB_RETAIN, &spec->retain_layout, sizeof spec->retain_layout);
+    if (spec->image_count != 0)
+        append_blob(image, CDL_BLOB_IMAGES, spec->images, spec->image_count * (RTS_UI32)sizeof(CDL_IMAGE));
     h.blob = end_segment(image, h.blob.offset);
     pad(image, APP_CODE_ALIGN);
     h.code.offset = image->size;

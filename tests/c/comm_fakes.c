@@ -22,6 +22,7 @@
 #include "SimLink.h"
 #include "SysCom.h"
 #include "SysExcept.h"
+#include "SysLock.h"
 #include "SysTime.h"
 
 FAKES fakes;
@@ -47,6 +48,17 @@ RTS_UI32 SysTargetRandom(void)
 {
     fakes.random = fakes.random * 1664525u + 1013904223u;
     return fakes.random ^ fakes.random >> 16;
+}
+
+RTS_UI32 SysLockEnter(void)
+{
+    fakes.locks++;
+    return fakes.lock_depth++;
+}
+
+void SysLockLeave(RTS_UI32 before)
+{
+    fakes.lock_depth = before;
 }
 
 RTS_UI32 SysComGetCount(void)

@@ -62,6 +62,8 @@ typedef struct {
     bool task_busy;
     RTS_UI32 task_activity;
     RTS_UI32 activity_per_look; /* how much there is from one look at it to the next */
+    RTS_UI32 lock_depth;
+    RTS_UI32 locks;
 } FAKES;
 
 extern FAKES fakes;

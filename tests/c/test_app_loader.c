@@ -599,6 +599,73 @@ static void two_lists_of_tasks(void)
     check_refused(ERR_DUPLICATE, "two lists of tasks");
 }
 
+/* ---- what tasks use of inputs and outputs ---- */
+
+/* Two tasks that use all of the outputs. */
+static void begin_images(void)
+{
+    CDL_IMAGE all = {0, 16 / CDL_IMAGE_UNIT, CDL_IMAGE_WRITTEN | CDL_IMAGE_SHARED};
+
+    begin();
+    add_task(&spec, "Other", KIND_CYCLIC, 1000, 0);
+    spec.image_count = 4;
+    spec.images[1] = spec.images[3] = all;
+}
+
+static void tasks_may_use_all_of_an_area(void)
+{
+    begin_images();
+    build_image(&image, &spec);
+    check_accepted();
+}
+
+static void a_task_that_uses_more_than_there_is(void)
+{
+    static const CDL_IMAGE wrong[] = {{0, 3, 0}, {2, 1, 0}, {0xFFFF, 1, 0}, {1, 0xFFFF, 0}, {0xFFFF, 0xFFFF, 0}};
+    RTS_UI32 i;
+
+    for (i = 0; i < RTS_COUNT(wrong); i++) {
+        begin_images();
+        spec.images[3] = wrong[i];
+        check_spec_refused(ERR_NOMEMORY, "The process image area needs 524280 bytes, this device has 196608.");
+        begin_images();
+        spec.images[0] = wrong[i];
+        check_spec_refused(ERR_NOMEMORY, "The process image area needs");
+    }
+}
+
+static void a_list_of_what_fewer_or_more_tasks_use(void)
+{
+    for (spec.image_count = 3; spec.image_count <= 5; spec.image_count++) {
+        RTS_UI32 count = spec.image_count;
+        begin_images();
+        spec.image_count = count;
+        build_image(&image, &spec);
+        check_accepted();
+    }
+}
+
+/* The simulator has as many as all tasks can need, unless they write inputs. */
+static void copies_that_need_more_than_the_device_has(void)
+{
+    CDL_IMAGE all = {0, APP_INPUT_SIZE / CDL_IMAGE_UNIT, CDL_IMAGE_WRITTEN | CDL_IMAGE_SHARED};
+    RTS_UI32 i;
+
+    begin();
+    spec.areas[APP_AREA_INPUT] = APP_INPUT_SIZE;
+    spec.areas[APP_AREA_OUTPUT] = APP_OUTPUT_SIZE;
+    while (spec.task_count < APP_MAX_TASKS)
+        add_task(&spec, "Other", KIND_CYCLIC, 1000, 0);
+    spec.image_count = 2 * APP_MAX_TASKS;
+    for (i = 0; i < spec.image_count; i++)
+        spec.images[i] = all;
+    check_spec_refused(ERR_NOMEMORY, "The process image area needs 262144 bytes, this device has 196608.");
+    for (i = 0; i < spec.image_count; i += 2)
+        spec.images[i].flags = CDL_IMAGE_SHARED;
+    build_image(&image, &spec);
+    check_accepted();
+}
+
 static void a_blob_nobody_knows_is_left_alone(void)
 {
     begin_image();
@@ -666,6 +733,10 @@ int main(void)
     RUN(blobs_that_are_not_whole);
     RUN(a_retain_layout_of_another_size);
     RUN(two_lists_of_tasks);
+    RUN(tasks_may_use_all_of_an_area);
+    RUN(a_task_that_uses_more_than_there_is);
+    RUN(a_list_of_what_fewer_or_more_tasks_use);
+    RUN(copies_that_need_more_than_the_device_has);
     RUN(a_blob_nobody_knows_is_left_alone);
     RUN(a_flash_that_cannot_be_mapped_is_read_instead);
     return test_result();

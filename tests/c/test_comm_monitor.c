@@ -614,6 +614,77 @@ static void every_other_write_program_is_refused(void)
     CHECK(write_program(code, sizeof(code)) == ERR_OK);
 }
 
+/* ---- writing bits ---- */
+
+static void add_write_bits(RTS_UI32 size, RTS_UI8 value, RTS_UI8 area, RTS_UI8 offset, RTS_UI8 mask)
+{
+    RTS_UI8 code[] = {MON2_OP_LD16, offset, 0, MON2_OP_RAO, area, MON2_OP_MASK, mask};
+
+    add_write_program(size, (const RTS_UI8[]){value, value}, code, sizeof(code));
+}
+
+static void every_bit_is_written_and_no_other_changes(void)
+{
+    static const RTS_UI8 areas[] = {APP_AREA_DATA, APP_AREA_RETAIN, APP_AREA_INPUT, APP_AREA_OUTPUT, APP_AREA_MEMORY};
+
+    for (RTS_UI32 test = 0; test < RTS_COUNT(areas) * 8 * 2; test++) {
+        RTS_UI8 area = areas[test % RTS_COUNT(areas)];
+        RTS_UI8 mask = (RTS_UI8)(1u << test / RTS_COUNT(areas) % 8);
+        RTS_UI8 before = test & 1 ? 0xA5 : 0x5A;
+        for (RTS_UI32 on = 0; on < 2; on++) {
+            setup();
+            fakes_area(area)[5] = before;
+            begin_write();
+            add_write_bits(1, on ? 0xFF : 0x00, area, 5, mask);
+            CHECK(send_write() == ERR_OK);
+            CHECK(fakes_area(area)[5] == (on ? before | mask : before & ~mask));
+            CHECK(fakes_area(area)[4] == 4 + 16 * area && fakes_area(area)[6] == 6 + 16 * area);
+        }
+    }
+}
+
+static void bits_are_written_through_pointers(void)
+{
+    setup();
+    put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);
+    begin_write();
+    add_write_program(1, (const RTS_UI8 *)"\xFF",
+                      (const RTS_UI8 *)"\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E\x40\x80", 13);
+    CHECK(send_write() == ERR_OK);
+    CHECK(fakes_area(APP_AREA_MEMORY)[TARGET_AT + 4] == (0x80 | (TARGET_AT + 4 + 16 * APP_AREA_MEMORY)));
+}
+
+static void bits_are_those_of_one_byte_and_only_written(void)
+{
+    setup();
+    begin_write();
+    add_write_bits(2, 0xFF, APP_AREA_DATA, 5, 0x01);
+    CHECK(send_write() == ERR_OK);
+    CHECK(fakes_area(APP_AREA_DATA)[5] == 5 && fakes_area(APP_AREA_DATA)[6] == 6);
+    CHECK(WRITE_PROGRAM("\x02\x05\x00\x06\x00\x40") == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK(WRITE_PROGRAM("\x02\x05\x00\x06\x00\x40\x01\x01\x01") == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    begin_write();
+    add_write_bits(1, 0xFF, APP_AREA_CODE, 5, 0x01);
+    CHECK(send_write() == MONITORING_ERR_OPERATION_DENIED);
+    CHECK(fakes_area(APP_AREA_DATA)[5] == 5 && fakes_area(APP_AREA_CODE)[5] == 0x55);
+    CHECK(READ_ERROR("\x02\x05\x00\x06\x00\x40\x01", 1) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+}
+
+/* Tasks do not have to wait for what is long. */
+static void what_is_written_in_one_step(void)
+{
+    static const RTS_UI8 value[MON2_ONE_STEP_SIZE + 1];
+
+    for (RTS_UI32 size = 1; size <= sizeof(value); size++) {
+        setup();
+        fakes.locks = 0;
+        begin_write();
+        add_write(size, value, APP_AREA_INPUT, 0);
+        CHECK(send_write() == ERR_OK);
+        CHECK(fakes.locks == (size <= MON2_ONE_STEP_SIZE) && fakes.lock_depth == 0);
+    }
+}
+
 static void code_cannot_be_written(void)
 {
     setup();
@@ -716,6 +787,10 @@ int main(void)
     RUN(several_variables_are_written_by_one_request);
     RUN(program_of_the_programming_system_is_recognised);
     RUN(every_other_write_program_is_refused);
+    RUN(every_bit_is_written_and_no_other_changes);
+    RUN(bits_are_written_through_pointers);
+    RUN(bits_are_those_of_one_byte_and_only_written);
+    RUN(what_is_written_in_one_step);
     RUN(code_cannot_be_written);
     RUN(variables_are_written_through_pointers);
     RUN(one_bad_entry_leaves_everything_unwritten);

@@ -9,6 +9,7 @@
 #define _GNU_SOURCE
 #include "../../firmware/src/app/AppAreas.h"
 #include "../../firmware/src/app/AppException.h"
+#include "../../firmware/src/app/AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CmpChecksum.h"
 #include "CmpIecTask.h"
@@ -121,7 +122,9 @@ static void begin(void)
 
 static void start(void)
 {
+    static const TASK_IMAGE no_copies[APP_MAX_TASKS];
     static IEC_CONTEXT context;
+    AppImageAttach(no_copies);
     context.area[APP_AREA_DATA] = app.variable;
     context.area[APP_AREA_CODE] = (RTS_UI8 *)CODE;
     CHECK(IecTaskCreateAll(app.task, app.count, &context) == ERR_OK);

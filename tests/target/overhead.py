@@ -81,6 +81,40 @@ class Counter:
         return max(counts, key=lambda number: counts[number])
 
 
+IMAGE_BYTES = 32  # half of them inputs
+
+
+def image_program(*, shared: bool) -> str:
+    """A task that copies inputs to outputs; `shared`: another task, which hardly ever runs, uses them too."""
+    words = IMAGE_BYTES // 8
+    moves = " ".join(f"out[{i}] := in[{i}];" for i in range(words))
+    sums = " + ".join(f"in[{i}] + out[{i}]" for i in range(words))
+    rest = f"n := {sums};" if shared else ""
+    return f"""
+VAR_GLOBAL in AT %ID0 : ARRAY[0..{words - 1}] OF UDINT; out AT %QD0 : ARRAY[0..{words - 1}] OF UDINT; END_VAR
+PROGRAM Main {moves} END_PROGRAM
+PROGRAM Other VAR n : UDINT; END_VAR {rest} END_PROGRAM
+CONFIGURATION C
+    RESOURCE R ON PLC
+        TASK A(INTERVAL := T#1ms, PRIORITY := 1);
+        TASK B(INTERVAL := T#30m, PRIORITY := 9);
+        PROGRAM Main WITH A : Main;
+        PROGRAM Other WITH B : Other;
+    END_RESOURCE
+END_CONFIGURATION
+"""
+
+
+def count_images(machine: str, firmware: Firmware, folder: Path) -> list[int]:
+    """A cycle in which a task alone uses the inputs and outputs, and one in which it has copies of them. Between two
+    cycles of the program nothing is written, so its outputs do not change."""
+    counts = []
+    for shared in (False, True):
+        built = compile_text(image_program(shared=shared), TARGETS[machine], folder, checks="none")
+        counts.append(Counter(machine, firmware, built, folder).count("AlarmIrq", firmware.functions["main"]))
+    return counts
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("machine", choices=TARGETS)
@@ -99,9 +133,13 @@ def main() -> None:
         caller = firmware.functions["ChannelHandlePackage"]
         one = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names[:1]) and None)
         more = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names) and None)
+        alone, shared = count_images(args.machine, firmware, Path(folder))
     print(f"{args.machine}: instructions of the runtime")
     print(f"{cycle:6}  a task cycle: from the alarm's interrupt back to the main loop")
     print(f"{until_program:6}    of it the switch to the task: until its program begins")
+    print(
+        f"{shared - alone:6}  more for copies of {IMAGE_BYTES} bytes of inputs and outputs that another task uses too"
+    )
     print(f"{one:6}  a request that reads one variable")
     print(f"{(more - one) / (VARIABLES - 1):6.0f}  each further variable")
 

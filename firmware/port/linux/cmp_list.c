@@ -9,6 +9,7 @@
     X(SysTime) \
     X(CmpLog) \
     X(SysTarget) \
+    X(SysLock) \
     X(SysTimer) \
     X(SysFileFlash) \
     X(CmpEventMgrEmbedded) \

@@ -15,6 +15,7 @@
 #include "CmpScheduleTimer.h"
 #include "SimLink.h"
 #include "SysExcept.h"
+#include "SysLock.h"
 #include "SysTarget.h"
 #include "SysTime.h"
 #include "SysTimer.h"
@@ -103,7 +104,7 @@ static RTS_RESULT power_on(void *unused)
 }
 
 enum { START_TEXT_SIZE = 32 };
-static const SYS_START power_came = {SYS_START_POWER, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
+static const SYS_START power_came = {SYS_START_POWER, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
 static struct {
     SYS_START now;
     SYS_START next; /* NULL for its text: nothing was set */
@@ -196,6 +197,23 @@ RTS_UI32 SysTimeGetMs(void)
 RTS_I64 SimNow(void)
 {
     return sim.now_ns;
+}
+
+/* ---- lock ---- */
+
+/* Nobody else is there; while a cycle is measured it costs what it costs on Linux. */
+RTS_UI32 SysLockEnter(void)
+{
+    if (sim.real_clock)
+        SimMutexLock();
+    return 0;
+}
+
+void SysLockLeave(RTS_UI32 before)
+{
+    RTS_UNUSED(before);
+    if (sim.real_clock)
+        SimMutexUnlock();
 }
 
 /* ---- timers ---- */

@@ -1,5 +1,5 @@
 /*
- * SimSupervise.c - breaks endless loops.
+ * SimSupervise.c - breaks endless loops; what else takes threads.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -67,12 +67,26 @@ static void *supervise(void *unused)
     return NULL;
 }
 
+/* What SysLock costs on Linux, while a cycle is measured. */
+static pthread_mutex_t mutex;
+
+static void make_mutex(void)
+{
+    pthread_mutexattr_t attributes;
+
+    pthread_mutexattr_init(&attributes);
+    pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
+    pthread_mutex_init(&mutex, &attributes);
+    pthread_mutexattr_destroy(&attributes);
+}
+
 void SimSuperviseStart(void)
 {
     pthread_t thread;
 
     if (supervisor.process == getpid())
         return;
+    make_mutex();
     if (pthread_create(&thread, NULL, supervise, NULL) == 0) {
         pthread_detach(thread);
         supervisor.process = getpid();
@@ -82,4 +96,14 @@ void SimSuperviseStart(void)
 void SimSetCycleLimit(RTS_UI32 ms)
 {
     SysAtomicStore(&supervisor.limit_ms, ms);
+}
+
+void SimMutexLock(void)
+{
+    pthread_mutex_lock(&mutex);
+}
+
+void SimMutexUnlock(void)
+{
+    pthread_mutex_unlock(&mutex);
 }

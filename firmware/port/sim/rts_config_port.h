@@ -24,6 +24,10 @@
 #define SCHED_EVENTS_IN_TIMERS 1
 #define SCHED_FREEWHEELING_IN_TIMERS 1
 
+/* All tasks run in the thread that lets time pass, one after the other; whoever writes a variable does it between two
+ * cycles. */
+#define APP_IMAGE_ALWAYS 0
+
 /* What SimFlashConfigure starts with: geometry of a common serial NOR flash, programmed in the units of an STM32's
  * [bytes]. */
 #define SIM_FLASH_SIZE (4 * 1024 * 1024)

@@ -19,6 +19,10 @@ void SimComPowerOn(void);
 /* Starts the thread that breaks endless loops, once per process. */
 void SimSuperviseStart(void);
 
+/* A mutex as on Linux, for what it costs. */
+void SimMutexLock(void);
+void SimMutexUnlock(void);
+
 RTS_RESULT SysSim_Hook(CMP_HOOK hook);
 
 #endif

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "CmpErrors.h"
+#include "SysLock.h"
 #include "SysMem.h"
 #include "rts_config.h"
 
@@ -19,6 +20,7 @@ typedef struct {
     RTS_I64 input[WORDS(APP_INPUT_SIZE)];
     RTS_I64 output[WORDS(APP_OUTPUT_SIZE)];
     RTS_I64 memory[WORDS(APP_MEMORY_SIZE)];
+    RTS_I64 copies[WORDS(APP_IMAGE_SIZE)]; /* of inputs and outputs */
     RTS_I64 retain[WORDS(APP_RETAIN_SIZE)]; /* the last, because it may be left out when all are cleared */
 } AREAS;
 
@@ -40,16 +42,29 @@ void AppAreasClear(bool retain_too)
     memset(&areas, 0, retain_too ? sizeof areas : offsetof(AREAS, retain));
 }
 
+/* A task that copies its outputs back meanwhile is before or after. */
 void AppAreasClearOutputs(void)
 {
+    RTS_UI32 lock = SysLockEnter();
+
     memset(areas.output, 0, sizeof areas.output);
+    SysLockLeave(lock);
+}
+
+RTS_UI8 *AppAreasGet(RTS_UI32 area)
+{
+    static const RTS_UI32 offsets[] = {
+        offsetof(AREAS, data),   offsetof(AREAS, retain), offsetof(AREAS, input),
+        offsetof(AREAS, output), offsetof(AREAS, memory), offsetof(AREAS, copies),
+    };
+
+    return (RTS_UI8 *)&areas + offsets[area];
 }
 
 void AppAreasSet(IEC_CONTEXT *context)
 {
-    context->area[APP_AREA_DATA] = (RTS_UI8 *)areas.data;
-    context->area[APP_AREA_RETAIN] = (RTS_UI8 *)areas.retain;
-    context->area[APP_AREA_INPUT] = (RTS_UI8 *)areas.input;
-    context->area[APP_AREA_OUTPUT] = (RTS_UI8 *)areas.output;
-    context->area[APP_AREA_MEMORY] = (RTS_UI8 *)areas.memory;
+    RTS_UI32 i;
+
+    for (i = 0; i < APP_AREA_CODE; i++)
+        context->area[i] = AppAreasGet(i);
 }

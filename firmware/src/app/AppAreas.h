@@ -19,8 +19,12 @@ RTS_RESULT AppAreasInit(void);
 /* Sets all areas to zero, the retain area only if asked to. */
 void AppAreasClear(bool retain_too);
 
-/* Sets the outputs to zero. From any context. */
+/* Sets the outputs to zero. From main or a task, outside of SysExceptTry. */
 void AppAreasClearOutputs(void);
+
+/* Where APP_AREA_DATA .. APP_AREA_MEMORY, or the copies of the tasks (AppImage.h), begins. */
+enum { AREAS_COPIES = APP_AREA_CODE };
+RTS_UI8 *AppAreasGet(RTS_UI32 area);
 
 /* Enters the addresses of the RAM areas. */
 void AppAreasSet(IEC_CONTEXT *context);

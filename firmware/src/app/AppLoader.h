@@ -8,6 +8,7 @@
 #ifndef APPLOADER_H
 #define APPLOADER_H
 
+#include "AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CompactDownload.h"
 #include "rts_config.h"
@@ -29,6 +30,9 @@ typedef struct {
     RTS_UI32 imports; /* offset of the names of external functions */
     RTS_UI32 task_count;
     RTS_UI32 import_count;
+#if APP_IMAGE_SIZE > 0
+    TASK_IMAGE task_image[APP_MAX_TASKS];
+#endif
 } APP_IMAGE;
 
 /* What the tasks of an image need as long as they live. */

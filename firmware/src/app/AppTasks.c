@@ -61,6 +61,34 @@ static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 size)
     return LoaderReadNext(l, &l->image->retain_layout, size);
 }
 
+#if APP_IMAGE_SIZE > 0
+/* Behind the list of tasks: what each of them uses of inputs and outputs. */
+static RTS_RESULT check_images(LOADER *l, RTS_UI32 size)
+{
+    IMAGE_PART *part = l->image->task_image[0].part;
+    const IMAGE_PART *end = part + IMAGE_AREAS * l->image->task_count;
+    const RTS_UI32 *area_size = &l->image->area_size[APP_AREA_INPUT];
+    RTS_UI32 used = 0;
+    CDL_IMAGE image;
+    RTS_UI32 i;
+
+    for (i = 0; part < end && size >= sizeof image; i ^= 1, size -= (RTS_UI32)sizeof image) {
+        RTS_RESULT result = LoaderReadNext(l, &image, sizeof image);
+        if (result != ERR_OK)
+            return result;
+        used = AppImagePlace(part++, &image, used);
+        if ((image.first + image.count) * CDL_IMAGE_UNIT >= area_size[i] + CDL_IMAGE_UNIT)
+            used = IMAGE_TOO_LARGE;
+    }
+    if (used > APP_IMAGE_SIZE / CDL_IMAGE_UNIT)
+        return refuse(l, ERR_NOMEMORY, "The %s area needs %u bytes, this device has %u.", "process image",
+                      U(used * CDL_IMAGE_UNIT), U(APP_IMAGE_SIZE));
+    return ERR_OK;
+}
+#else
+#define check_images(l, size) ((void)(size), (RTS_RESULT)ERR_OK)
+#endif
+
 static RTS_RESULT check_blob(LOADER *l)
 {
     CDL_BLOB blob;
@@ -78,6 +106,8 @@ static RTS_RESULT check_blob(LOADER *l)
         result = check_tasks(l, blob.size);
     else if (blob.id == CDL_BLOB_RETAIN)
         result = check_retain_layout(l, blob.size);
+    else if (blob.id == CDL_BLOB_IMAGES)
+        result = check_images(l, blob.size);
     /* Others are of a newer tool, and not needed to run. */
     l->offset = next;
     return result;

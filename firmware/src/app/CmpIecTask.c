@@ -10,6 +10,7 @@
 
 #include <string.h>
 
+#include "AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CmpScheduleTimer.h"
 #include "SysAtomic.h"
@@ -29,7 +30,8 @@ typedef struct {
     const CDL_TASK *record;
     GUARD guard;
     RTS_I64 watchdog_ns; /* 0: none */
-    RTS_UI32 sensitivity;
+    RTS_UI16 sensitivity;
+    bool has_copies; /* of inputs and outputs */
     RTS_UI32 exceeded;   /* cycles in a row longer than watchdog_ns */
     RTS_UI32 ms_rest;    /* ns of context.time_ns beyond context.time_ms */
     RTS_UI32 cycles;
@@ -169,6 +171,11 @@ static void set_time(TASK *task, RTS_I64 time_ns)
     context->time_ms = (RTS_I32)((RTS_UI32)context->time_ms + ms);
 }
 
+static RTS_UI32 index_of(const TASK *task)
+{
+    return (RTS_UI32)(task - tasks.list);
+}
+
 static void run_entry(void *arg)
 {
     TASK *task = arg;
@@ -217,7 +224,7 @@ static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
     SysAtomicStore(&tasks.running, 0);
     guard_end(&task->guard);
-    AppHandleException((RTS_I32)(task - tasks.list), code, address);
+    AppHandleException((RTS_I32)index_of(task), code, address);
     return 0;
 }
 
@@ -231,8 +238,12 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
 
     set_time(task, start_ns - tasks.time_zero);
     guard_begin(&task->guard, start_ns);
+    if (task->has_copies)
+        AppImageCopyIn(index_of(task));
     if (SysExceptTry(run_entry, task, &exception))
         return end_with_exception(task, exception.code, exception.address);
+    if (task->has_copies)
+        AppImageCopyOut(index_of(task), &tasks.running);
     elapsed_ns = SysTimeGetNs() - start_ns;
     account(task, start_ns - due_ns, elapsed_ns);
     if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
@@ -268,6 +279,7 @@ static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *protot
     memset(task, 0, sizeof *task);
     task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
     task->context = *prototype;
+    task->has_copies = AppImageSetContext(index_of(task), &task->context);
     task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
     task->record = record;
     task->min_ns = 0xFFFFFFFFu;

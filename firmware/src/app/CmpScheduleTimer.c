@@ -15,6 +15,9 @@
 #include "TaskTrigger.h"
 #include "rts_config.h"
 
+/* Tasks interrupt each other: without copies they would undo each other's outputs. */
+RTS_STATIC_ASSERT(APP_IMAGE_SIZE > 0 || APP_MAX_TASKS == 1, tasks_that_interrupt_each_other_have_copies_of_outputs);
+
 static struct {
     RTS_UI32 count;
     RTS_UI32 background_count; /* tasks that run in main */

@@ -16,11 +16,14 @@
 #include "CmpBytes.h"
 #include "CmpIecTask.h"
 #include "CmpSrv.h"
+#include "SysAtomic.h"
+#include "SysLock.h"
 
 enum {
     ENTRY_HEAD = 6, /* u16 id, u32 size */
     ENTRY_FAILED = ENTRY_HEAD + 1,
     CONSISTENT_SIZE = 8, /* its element, with what aligns it */
+    ALL_BITS = 0xFF,
 };
 
 typedef struct {
@@ -128,16 +131,25 @@ static bool is_end(PROGRAM *program)
     return is_zero(program->code, program->size);
 }
 
-/* The address alone; to write also the programming system's program: allocate a frame, address, and unless disabled
- * copy to it. */
-static RTS_RESULT parse(PROGRAM program, bool is_write, AREA_ADDRESS *address)
+/* Takes "Mask bits" if that comes next. */
+static RTS_UI32 take_mask(PROGRAM *program)
+{
+    if (program->size < 2 || program->code[0] != MON2_OP_MASK)
+        return ALL_BITS;
+    skip(program, 2);
+    return *(program->code - 1);
+}
+
+/* The address alone; to write also some bits at it, or the programming system's program: allocate a frame, address, and
+ * unless disabled copy to it. *mask: NULL when this is not to write. */
+static RTS_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask)
 {
     static const RTS_UI8 head[] = {0x15, 0x0C, 0x00};
     static const RTS_UI8 tail[] = {0x17, 0x0C, 0x09, 0x04, 0x1B, 0x06, 0x00, 0x01, 0x00, 0x00,
                                    0x17, 0x04, 0x09, 0x04, 0x17, 0x08, 0x09, 0x04, MON2_OP_CPY};
     RTS_UI32 tail_size = 0;
 
-    if (is_write && goes_on_with(&program, head, sizeof(head))) {
+    if (mask != NULL && goes_on_with(&program, head, sizeof(head))) {
         skip(&program, sizeof(head));
         tail_size = sizeof(tail);
     }
@@ -147,6 +159,8 @@ static RTS_RESULT parse(PROGRAM program, bool is_write, AREA_ADDRESS *address)
     if (!goes_on_with(&program, tail, tail_size))
         return MONITORING_ERR_UNSUPPORTED_OPERATOR;
     skip(&program, tail_size);
+    if (mask != NULL)
+        *mask = take_mask(&program);
     return is_end(&program) ? MONITORING_ERR_OK : MONITORING_ERR_UNSUPPORTED_OPERATOR;
 }
 
@@ -267,7 +281,7 @@ static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 rese
     RTS_UI32 room = BTagGetRoom(reply);
     RTS_UI32 id = var->id;
     RTS_UI32 size = var->size;
-    RTS_RESULT result = parse(var->program, false, &address);
+    RTS_RESULT result = parse(var->program, &address, NULL);
 
     if (result == MONITORING_ERR_OK)
         result = resolve(&address, size, &memory);
@@ -346,6 +360,7 @@ static RTS_RESULT mon_read(SRV_REQUEST *request, BTAG_WRITER *reply)
 typedef struct {
     const RTS_UI8 *value;
     RTS_UI32 size;
+    RTS_UI32 mask; /* ALL_BITS, or those to write of the first byte alone */
     PROGRAM program;
 } WRITE_VAR;
 
@@ -369,18 +384,32 @@ static bool next_write(const RTS_UI8 **data, RTS_UI32 *size, WRITE_VAR *var)
     return true;
 }
 
-static RTS_RESULT write_variable(const WRITE_VAR *var, bool commit)
+/* In one step for the tasks, unless that would keep them waiting. */
+static void write_memory(RTS_UI8 *memory, const WRITE_VAR *var)
+{
+    bool locked = var->size <= MON2_ONE_STEP_SIZE;
+    RTS_UI32 lock = locked ? SysLockEnter() : 0;
+
+    if (var->mask != ALL_BITS)
+        SysAtomicSetBits(memory, (RTS_UI8)var->mask, var->value[0]);
+    else
+        store(memory, var->value, var->size);
+    if (locked)
+        SysLockLeave(lock);
+}
+
+static RTS_RESULT write_variable(WRITE_VAR *var, bool commit)
 {
     AREA_ADDRESS address;
     RTS_UI8 *memory = NULL;
-    RTS_RESULT result = parse(var->program, true, &address);
+    RTS_RESULT result = parse(var->program, &address, &var->mask);
 
     if (result == MONITORING_ERR_OK)
         result = resolve(&address, var->size, &memory);
     if (result == MONITORING_ERR_OK && address.area == APP_AREA_CODE)
         result = MONITORING_ERR_OPERATION_DENIED;
     if (result == MONITORING_ERR_OK && commit)
-        store(memory, var->value, var->size);
+        write_memory(memory, var);
     return result;
 }
 

@@ -2,78 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import fields
-from typing import get_args
-
 from plctool.compiler.typed import (
     AddressOf,
-    Assign,
     Call,
-    Const,
-    Continue,
     DerefPlace,
-    Direction,
-    Exit,
-    Expr,
     FbCall,
     For,
-    Place,
     Pou,
     SelfPlace,
-    Statement,
     Storage,
-    ValuePlace,
     Variable,
     VarPlace,
 )
-
-_NODES = set(get_args(Place) + get_args(Expr) + get_args(Statement)) - {Const, Exit, Continue}  # without the smallest
-_LEAVES = frozenset(("type", "pos", "op", "offset", "bit", "intrinsic", "truncate", "check", "dispatch", "function"))
-_PARTS = {node: tuple(f.name for f in fields(node) if f.name not in _LEAVES) for node in _NODES}  # what may hold nodes
-
-
-def walk(root: object) -> Iterator[object]:
-    """Every node of statements or expressions below `root` (a node, or lists and tuples of them)."""
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        kind = type(node)
-        if kind is list or kind is tuple:
-            stack.extend(node)  # type: ignore[arg-type]
-        elif kind in _PARTS:
-            yield node
-            for name in _PARTS[kind]:
-                stack.append(getattr(node, name))
-
-
-def root_of(place: Place) -> Variable | None:
-    """The variable a place is part of; None when it is reached through a pointer or is a value."""
-    while not isinstance(place, VarPlace):
-        if isinstance(place, DerefPlace | ValuePlace | SelfPlace):
-            return None
-        place = place.base
-    return None if place.var.storage is Storage.REFERENCE else place.var
-
-
-def written_places(node: object) -> Iterator[Place]:
-    """Places that `node` itself writes, or hands out by reference so that others may."""
-    if isinstance(node, Assign):
-        yield node.target
-    elif isinstance(node, For):
-        yield node.var
-    elif isinstance(node, AddressOf):
-        yield node.place
-    elif isinstance(node, FbCall):
-        yield node.instance
-        for _, place in node.in_outs + node.outputs:
-            yield place
-    elif isinstance(node, Call):
-        if node.instance is not None:
-            yield node.instance
-        for parameter, argument in zip(node.function.parameters, node.args, strict=True):
-            if parameter.direction is not Direction.INPUT and argument is not None:
-                yield argument  # type: ignore[misc]
+from plctool.compiler.typed_nodes import root_of, walk, written_places
 
 
 class Effects:

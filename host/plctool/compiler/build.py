@@ -15,14 +15,16 @@ from plctool.compiler.codegen.targets import Machine, Target
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.nesting import room_for_nesting
-from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TypedProgram
+from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
 from plctool.compiler.types import base_of
 from plctool.core import lib
 from plctool.files import write_atomically
-from plctool.image import ApplicationInfo, ExternalFunction, Image, ImageTask, build_image
+from plctool.image import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image
 from plctool.symbols import CodeUnit, SymbolTable, layout_signature, symbol_path
 from plctool.values import encode
 from plctool.variables import Symbol, constant_symbol
+
+_UNIT = int(lib.CDL_IMAGE_UNIT)
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,13 @@ def _task(task: Task, entry: int) -> ImageTask:
         event,
         ignored,
         task.external,
+        (_part(task, Area.INPUT), _part(task, Area.OUTPUT)),
     )
+
+
+def _part(task: Task, area: Area) -> ImagePart:
+    part = task.parts.get(area, TaskPart())
+    return ImagePart(part.start // _UNIT, (part.end - part.start) // _UNIT, part.written, part.shared)
 
 
 def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Target, project: str) -> SymbolTable:

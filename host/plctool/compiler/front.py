@@ -23,6 +23,7 @@ from plctool.compiler.source import Source
 from plctool.compiler.syntax.ast import Declaration
 from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
 from plctool.compiler.syntax.parser import Parsed, parse_all
+from plctool.compiler.task_images import plan_images
 from plctool.compiler.typed import Area, TypedProgram
 from plctool.compiler.types import MAX_SIZE
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
@@ -117,7 +118,7 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     report_overlaps(allocation.variables, world.diagnostics)
     if not application.tasks and not world.names.tests and not world.diagnostics.errors and sources:
         world.diagnostics.warning(sources[0].pos(0), "no-program", "there is no PROGRAM, so nothing would run")
-    return TypedProgram(
+    typed = TypedProgram(
         pous=world.pous,
         globals=allocation.variables,
         tasks=application.tasks,
@@ -131,6 +132,9 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
         constants=world.constants,
         externals=program.external_functions(),
     )
+    if not world.diagnostics.errors:
+        plan_images(typed, world.diagnostics)
+    return typed
 
 
 def _looked_at(source: Source, parsed: Parsed, diagnostics: Diagnostics) -> list[Declaration]:

@@ -62,6 +62,7 @@ class Variable:
     constant: bool = False
     bit: int | None = None  # a BOOL at an address such as %IX0.3: the bit in the byte at `offset`
     bounds: list[tuple[Variable, Variable]] = field(default_factory=list)
+    shared_output: bool = False  # several tasks are meant to write it
 
 
 # ---- initial values ------------------------------------------------------------------------------------------------
@@ -490,6 +491,17 @@ class TaskKind(Enum):
     FREEWHEELING = 3
 
 
+@dataclass(frozen=True)
+class TaskPart:
+    """What a task uses of the inputs or outputs: bytes from `start` up to `end`, which is 0 for nothing. `written`: it
+    changes some of them; `shared`: another task uses some of them too."""
+
+    start: int = 0
+    end: int = 0
+    written: bool = False
+    shared: bool = False
+
+
 @dataclass
 class TaskEvent:
     """The BOOL a task waits for: in `variable`, `offset` bytes behind its start. `bit` of that byte; None for all."""
@@ -501,6 +513,8 @@ class TaskEvent:
 
 @dataclass
 class Task:
+    """`parts`: what it needs a copy of where others use it, of the inputs and of the outputs."""
+
     name: str
     kind: TaskKind
     priority: int  # 0 highest .. 31
@@ -510,6 +524,7 @@ class Task:
     external: str = ""  # TASK(EVENT := 'name')
     watchdog_us: int = 0
     watchdog_sensitivity: int = 1
+    parts: dict[Area, TaskPart] = field(default_factory=dict)
 
 
 @dataclass

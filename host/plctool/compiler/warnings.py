@@ -34,6 +34,7 @@ WARNINGS = {
     "recursion": "a call through a pointer or an interface may lead back to its caller",
     "result": "a function or method never assigns its result",
     "shared": "several tasks write one variable, or variables in one byte of %M",
+    "shared-output": "two tasks write the same bit of an output",
     "task": "a program is called that another task, or its own, runs as well",
     "truncated": "a text is longer than the STRING it goes to",
     "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG",

@@ -15,6 +15,7 @@ from plctool.link.session import Session
 _VALUE_HEAD = struct.Struct("<HI")  # id and size before each value
 _MESSAGE_OVERHEAD = 96  # layer 7 header, application tag and list heads, bytes
 _TRIES = 5  # to read values while no task runs
+_ALL_BITS = 0xFF
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,16 @@ def _leads_nowhere(piece: AreaRange, error: int) -> bool:
     return bool(piece.hops) and error in outside
 
 
-def write_memory(session: Session, image_crc: int, values: Sequence[tuple[AreaRange, bytes]]) -> None:
+@dataclass(frozen=True)
+class Write:
+    """`value` for a range; of a single byte only the bits in `mask`."""
+
+    where: AreaRange
+    value: bytes
+    mask: int = _ALL_BITS
+
+
+def write_memory(session: Session, image_crc: int, values: Sequence[Write]) -> None:
     """Writes all values, in one request if they fit, to the application with this CRC.
 
     Not repeated when it is unknown whether they were written.
@@ -165,9 +175,11 @@ def write_memory(session: Session, image_crc: int, values: Sequence[tuple[AreaRa
     session.recover(session.application)
     room = session.connection.buffer_size - _MESSAGE_OVERHEAD
     message = b""
-    for index, (where, value) in enumerate(values):
-        code = _address_code(where)
-        entry = _VALUE_HEAD.pack(index, len(value)) + value + struct.pack("<H", len(code)) + code
+    for index, write in enumerate(values):
+        code = _address_code(write.where)
+        if write.mask != _ALL_BITS:
+            code += bytes([lib.MON2_OP_MASK, write.mask])
+        entry = _VALUE_HEAD.pack(index, len(write.value)) + write.value + struct.pack("<H", len(code)) + code
         if message and len(message) + len(entry) > room:
             _write_batch(session, image_crc, message)
             message = b""
@@ -209,4 +221,7 @@ def _check_monitoring(session: Session, tags: bintag.Tags, action: str) -> None:
 
 def _monitoring_error(action: str, error: int) -> DeviceError:
     name = l7.monitoring_error_name(error)
+    if action == "write" and error == lib.MONITORING_ERR_UNSUPPORTED_OPERATOR:
+        hint = "Its firmware may be too old to write single bits: write the whole byte or word."
+        return DeviceError(f"The device refused the write: {name}. {hint}", l7.slug(name), error)
     return DeviceError(f"The device refused the {action}: {name}.", l7.slug(name), error)

@@ -58,6 +58,14 @@ void SimSuperviseStart(void)
 {
 }
 
+void SimMutexLock(void)
+{
+}
+
+void SimMutexUnlock(void)
+{
+}
+
 void SimSetCycleLimit(RTS_UI32 ms)
 {
     RTS_UNUSED(ms);

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plctool.compiler.analysis import walk
 from plctool.compiler.codegen.lower_arith import convert, is_real
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Frame, Ref, rule
 from plctool.compiler.codegen.lower_string import copy_literal, copy_string
@@ -26,6 +25,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import walk
 from plctool.compiler.types import BOOL, PointerType, StringType, StructType, is_scalar
 
 _POINTER = PointerType(BOOL)  # what an instance stores for a VAR_IN_OUT

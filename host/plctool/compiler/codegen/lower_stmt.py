@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from plctool.compiler.analysis import root_of, walk
 from plctool.compiler.codegen.lower_blocks import assign_aggregate
 from plctool.compiler.codegen.lower_calls import call_function
 from plctool.compiler.codegen.lower_expr import truth
@@ -25,6 +24,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import root_of, walk
 from plctool.compiler.types import StringType, is_scalar
 
 _WIDEST_SWITCH = 64  # labels of one range that become cases of a switch

@@ -8,11 +8,11 @@ each call and to load them in the block.
 
 from __future__ import annotations
 
-from plctool.compiler.analysis import walk
 from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.codegen.targets import Target
 from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
+from plctool.compiler.typed_nodes import walk
 from plctool.compiler.types import StringType, Type, is_scalar
 
 HandedInputs = dict[Pou, list[Variable]]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from plctool.compiler.analysis import Effects, root_of, walk, written_places
+from plctool.compiler.analysis import Effects
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.typed import (
     AddressOf,
@@ -37,6 +37,7 @@ from plctool.compiler.typed import (
     VarPlace,
     While,
 )
+from plctool.compiler.typed_nodes import root_of, walk, written_places
 
 Loop = While | Repeat | For
 _CLOCKS = (Intrinsic.TIME, Intrinsic.LTIME)

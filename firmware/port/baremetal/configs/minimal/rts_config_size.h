@@ -7,6 +7,7 @@
 #ifndef RTS_CONFIG_SIZE_H
 #define RTS_CONFIG_SIZE_H
 
+#define APP_CRASH_TEXT_SIZE 1
 #define APP_MAX_TASKS 2
 #define APP_MAX_IMPORTS 16
 #define CM_MAX_EXT_TABLES 2
@@ -18,6 +19,7 @@
 #define EXCEPT_MAX_CALLS 0
 #define APP_REFUSAL_TEXT_SIZE 1
 #define APP_RETAIN_SIZE 0
+#define APP_IMAGE_SIZE 0 /* the super loop runs one task after the other */
 #define SRV_INFORMATION 0
 #define NS_OLD_VERSIONS 0
 #define COMM_COUNTERS 0

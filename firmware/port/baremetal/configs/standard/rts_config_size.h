@@ -7,6 +7,7 @@
 #ifndef RTS_CONFIG_SIZE_H
 #define RTS_CONFIG_SIZE_H
 
+#define APP_CRASH_TEXT_SIZE 1
 #define APP_MAX_TASKS 3
 #define NETSERVER_MESSAGE_SIZE 944 /* two full blocks */
 #define EVENT_MAX_CALLBACKS 0
@@ -16,7 +17,7 @@
 #define LOG_MAX_ENTRIES 6
 #define EXCEPT_MAX_CALLS 6
 #define RTS_MAIN_STACK_SIZE 2240
-#define LOG_TEXT_SIZE 64
+#define LOG_TEXT_SIZE 56
 #define SRV_MAX_GROUPS 4
 
 #define BOARD_UART_COUNT 1

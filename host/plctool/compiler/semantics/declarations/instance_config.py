@@ -195,6 +195,7 @@ class InstanceConfig:
         variable = located(entry.name, place.type, initial or symbol.default, location, entry.scope, entry.line.pos)
         if variable is None:
             return None
+        variable.shared_output = True  # a global instance is copied by every task
         self._world.allocation.add(variable)
         return _Copy(fixed.variable, place, whole(variable, variable.pos), AREAS[symbol.open_area])
 

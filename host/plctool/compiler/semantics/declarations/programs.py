@@ -136,6 +136,7 @@ class Programs:
                 symbol.variable = self._variables.area_variable(full_name, t, init, location, qualifiers, scope, offset)
                 if symbol.variable is None:
                     continue
+                symbol.variable.shared_output = "shared_output" in line.attributes
                 allocation.add(symbol.variable)
                 if direction is not None:
                     info.parameters.append((symbol, direction))

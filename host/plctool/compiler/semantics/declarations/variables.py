@@ -109,6 +109,7 @@ class Variables:
                     symbol.full_name, t, init, location, symbol.qualifiers, scope, symbol.pos
                 )
                 if result.variable is not None:
+                    result.variable.shared_output = "shared_output" in symbol.decl.attributes
                     self._world.allocation.add(result.variable)
         symbol.busy = False
         symbol.symbol = result

@@ -1,0 +1,98 @@
+"""Going through the typed program: its nodes, the variables of places, what is written, who is called."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from typing import get_args
+
+from plctool.compiler.typed import (
+    AddressOf,
+    Assign,
+    Call,
+    Const,
+    Continue,
+    DerefPlace,
+    Direction,
+    Exit,
+    Expr,
+    FbCall,
+    For,
+    Place,
+    Pou,
+    SelfPlace,
+    Statement,
+    Storage,
+    ValuePlace,
+    Variable,
+    VarPlace,
+)
+
+_NODES = set(get_args(Place) + get_args(Expr) + get_args(Statement)) - {Const, Exit, Continue}  # without the smallest
+_LEAVES = frozenset(("type", "pos", "op", "offset", "bit", "intrinsic", "truncate", "check", "dispatch", "function"))
+_PARTS = {node: tuple(f.name for f in fields(node) if f.name not in _LEAVES) for node in _NODES}  # what may hold nodes
+
+
+def walk(root: object) -> Iterator[object]:
+    """Every node of statements or expressions below `root` (a node, or lists and tuples of them)."""
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        kind = type(node)
+        if kind is list or kind is tuple:
+            stack.extend(node)  # type: ignore[arg-type]
+        elif kind in _PARTS:
+            yield node
+            for name in _PARTS[kind]:
+                stack.append(getattr(node, name))
+
+
+def root_of(place: Place) -> Variable | None:
+    """The variable a place is part of; None when it is reached through a pointer or is a value."""
+    while not isinstance(place, VarPlace):
+        if isinstance(place, DerefPlace | ValuePlace | SelfPlace):
+            return None
+        place = place.base
+    return None if place.var.storage is Storage.REFERENCE else place.var
+
+
+def written_places(node: object) -> Iterator[Place]:
+    """Places that `node` itself writes, or hands out by reference so that others may."""
+    if isinstance(node, Assign):
+        yield node.target
+    elif isinstance(node, For):
+        yield node.var
+    elif isinstance(node, AddressOf):
+        yield node.place
+    elif isinstance(node, FbCall):
+        yield node.instance
+        for _, place in node.in_outs + node.outputs:
+            yield place
+    elif isinstance(node, Call):
+        if node.instance is not None:
+            yield node.instance
+        for parameter, argument in zip(node.function.parameters, node.args, strict=True):
+            if parameter.direction is not Direction.INPUT and argument is not None:
+                yield argument  # type: ignore[misc]
+
+
+def referenced_places(node: object) -> Iterator[Place]:
+    """Places whose address `node` takes so that it may be kept: by ADR, REF=, or as VAR_IN_OUT."""
+    if isinstance(node, AddressOf):
+        yield node.place
+    elif isinstance(node, FbCall):
+        for _, place in node.in_outs:
+            yield place
+    elif isinstance(node, Call):
+        for parameter, argument in zip(node.function.parameters, node.args, strict=True):
+            if parameter.direction is Direction.IN_OUT and argument is not None:
+                yield argument  # type: ignore[misc]
+
+
+def callees(node: object) -> Iterable[Pou]:
+    """What `node` may call."""
+    if not isinstance(node, Call | FbCall):
+        return ()
+    if node.dispatch is not None:
+        return node.dispatch.targets.values()
+    return (node.function,) if isinstance(node, Call) else (node.block,)
