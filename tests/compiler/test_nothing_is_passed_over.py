@@ -263,6 +263,7 @@ PLACES = {
 HEEDED_AT = {
     "qualified_only": {"VAR_GLOBAL", "enumeration", "named enumeration"},
     "external": {"FUNCTION"},
+    "shared_output": {"variable"},
 }
 
 
