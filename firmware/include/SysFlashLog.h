@@ -11,10 +11,27 @@
 #ifndef SYSFLASHLOG_H
 #define SYSFLASHLOG_H
 
+#include "CmpStd.h"
+
+/* What a record begins with, at a multiple of FILE_ALIGN; its data follow. (Shared with the host.) */
+typedef struct {
+    RTS_UI32 magic; /* FLASH_LOG_MAGIC */
+    RTS_UI32 sequence;
+    RTS_UI32 tag;
+    RTS_UI32 size; /* of the data in bytes */
+    RTS_UI32 crc;  /* CRC-32 of the four words above and the data */
+} FLASH_LOG_HEAD;
+
+enum { FLASH_LOG_HEAD_SIZE = 20, FLASH_LOG_MAGIC = 0x474F4C52 };
+
+#ifndef RTS_CFFI
+
 #include "SysFileFlash.h"
 
+RTS_STATIC_ASSERT(sizeof(FLASH_LOG_HEAD) == FLASH_LOG_HEAD_SIZE, record_head_size);
+
 typedef struct {
-    RTS_UI32 file;
+    RTS_UI32 file;     /* not 0 */
     RTS_RESULT opened; /* nothing is appended to a log that cannot be read */
     RTS_UI32 start;    /* of the half in use */
     RTS_UI32 used;     /* bytes of that half that may have been programmed */
@@ -23,7 +40,6 @@ typedef struct {
     RTS_UI32 kept;     /* start of a half that is not erased; FLASH_LOG_NONE */
 } FLASH_LOG;
 
-enum { FLASH_LOG_HEAD_SIZE = 20 };
 #define FLASH_LOG_NONE 0xFFFFFFFFu
 
 /* Finds the newest record and the place for the next. ERR_DEVICE flash fault. */
@@ -43,8 +59,15 @@ typedef struct {
 RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size);
 
 /* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault,
- * also an earlier one of FlashLogOpen. */
+ * also an earlier one of FlashLogOpen. After a fault the record is the newest nevertheless when it can be read, but
+ * may not survive a power cut. */
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);
+
+/* Marks the record that was appended last, which takes one unit of flash and is not synced; ERR_DISK_FULL without room
+ * for it, ERR_DEVICE. And whether the newest record, of `size` bytes, is followed by a mark, or by one that was cut
+ * off. */
+RTS_RESULT FlashLogMark(FLASH_LOG *log);
+bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size);
 
 /*
  * From now on the newest record up to number `until` is kept: when there is no room, it is the other half that is
@@ -55,5 +78,7 @@ void FlashLogKeepNone(FLASH_LOG *log);
 
 /* The largest record, in bytes of data. */
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log);
+
+#endif
 
 #endif

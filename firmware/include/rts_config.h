@@ -77,6 +77,17 @@
 #define APP_PROVE_US 3000000
 #endif
 
+/* Whether SysStartGet may ask that the boot project stays stopped, 100 bytes of flash. */
+#ifndef APP_MAY_STAY_STOPPED
+#define APP_MAY_STAY_STOPPED 1
+#endif
+
+/* The port's words for a crash that are kept in the commit record ("signal SIGSEGV"), bytes with NUL; on the stack of
+ * main. 1: only number and place of the exception are kept. */
+#ifndef APP_CRASH_TEXT_SIZE
+#define APP_CRASH_TEXT_SIZE 32
+#endif
+
 /* A cycle of a task without watchdog, and initialisation code, is broken out of after this long [us], so that an
  * endless loop never takes the device away. */
 #ifndef APP_DEFAULT_WATCHDOG_US
@@ -134,7 +145,7 @@
  * A save takes the size of the area and 20 bytes, rounded up to 16, of one half of the retain log; a half is erased
  * when it is full. So 500 bytes that change all the time, saved every second in two halves of 8 KiB, erase each sector
  * once in 30 s (100 000 erases: 35 days); every 60 s it is almost six years. The retain area is in RAM twice, because
- * what was saved last is compared with. */
+ * what was saved last is compared with. On one core the copy has to fit between two cycles. */
 #ifndef APP_RETAIN_SAVE_US
 #define APP_RETAIN_SAVE_US 1000000
 #endif

@@ -104,7 +104,7 @@ static RTS_RESULT power_on(void *unused)
 }
 
 enum { START_TEXT_SIZE = 32 };
-static const SYS_START power_came = {SYS_START_POWER, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
+static const SYS_START power_came = {SYS_START_POWER, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
 static struct {
     SYS_START now;
     SYS_START next; /* NULL for its text: nothing was set */
@@ -192,6 +192,14 @@ RTS_I64 SysTimeGetNs(void)
 RTS_UI32 SysTimeGetMs(void)
 {
     return (RTS_UI32)(sim.now_ns / NS_PER_MS);
+}
+
+/* Tasks run one after the other here, but for tests that have threads of their own. */
+void SysTimePause(void)
+{
+    static const struct timespec pause = {0, 20000};
+
+    nanosleep(&pause, NULL);
 }
 
 RTS_I64 SimNow(void)
