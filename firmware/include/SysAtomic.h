@@ -75,10 +75,10 @@ SYSATOMIC_INLINE bool SysAtomicReplace(RTS_UI32 *object, RTS_UI32 expected, RTS_
 }
 
 /* Gives the bits of `mask` in a byte the values they have in `value`; what a task writes to its other bits at the same
- * time is not undone. Within SysLock, which on one core keeps the tasks out. */
+ * time is not undone. Within SysLock, which on one core, such as one without instructions for it, keeps the tasks out. */
 SYSATOMIC_INLINE void SysAtomicSetBits(RTS_UI8 *byte, RTS_UI8 mask, RTS_UI8 value)
 {
-#if RTS_ONE_CORE
+#if RTS_ONE_CORE || !defined(__GCC_HAVE_SYNC_COMPARE_AND_SWAP_1)
     *(volatile RTS_UI8 *)byte = (RTS_UI8)((*(volatile RTS_UI8 *)byte & ~mask) | (value & mask));
 #else
     (void)__atomic_fetch_and(byte, (RTS_UI8)(value | ~mask), __ATOMIC_RELAXED);

@@ -19,6 +19,7 @@ enum { FILE_SLOT_A = 0, FILE_SLOT_B = 1, FILE_COMMIT = 2, FILE_RETAIN = 3, FILE_
 
 /* Bytes that are programmed at a time; all program sizes divide it. */
 enum { FILE_ALIGN = 16 };
+#define SysFileAlign(size) (((size) + FILE_ALIGN - 1) & ~(RTS_UI32)(FILE_ALIGN - 1))
 
 /* Where a file lies in flash: both multiples of the sector size. */
 typedef struct {

@@ -14,7 +14,7 @@
 #include "SysFileFlash.h"
 
 typedef struct {
-    RTS_UI32 file;
+    RTS_UI32 file;     /* not 0 */
     RTS_RESULT opened; /* nothing is appended to a log that cannot be read */
     RTS_UI32 start;    /* of the half in use */
     RTS_UI32 used;     /* bytes of that half that may have been programmed */
@@ -43,8 +43,15 @@ typedef struct {
 RTS_RESULT FlashLogRead(const FLASH_LOG *log, FLASH_LOG_RANGE range, RTS_UI32 tag, void *data, RTS_UI32 size);
 
 /* Appends a record and checks that it can be read. ERR_DISK_FULL when it can never fit, ERR_DEVICE flash fault,
- * also an earlier one of FlashLogOpen. */
+ * also an earlier one of FlashLogOpen. After a fault the record is the newest nevertheless when it can be read, but
+ * may not survive a power cut. */
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size);
+
+/* Marks the record that was appended last, which takes one unit of flash and is not synced; ERR_DISK_FULL without room
+ * for it, ERR_DEVICE. And whether the newest record, of `size` bytes, is followed by a mark, or by one that was cut
+ * off. */
+RTS_RESULT FlashLogMark(FLASH_LOG *log);
+bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size);
 
 /*
  * From now on the newest record up to number `until` is kept: when there is no room, it is the other half that is

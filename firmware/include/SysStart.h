@@ -27,13 +27,14 @@ enum {
 #define APP_NO_CODE_OFFSET 0xFFFFFFFFu
 
 typedef struct {
-    RTS_UI32 cause; /* SYS_START_* */
+    RTS_UI8 cause; /* SYS_START_* */
     /* Not 0: the boot project is loaded but not called, until it is started by a user, or until the next start. For a
-     * port whose restart after a crash is no decision of the user's (Linux), and for a button that says so. */
-    RTS_UI32 stay_stopped;
+     * port whose restart after a crash is no decision of the user's (Linux), and for a button that says so; with
+     * APP_MAY_STAY_STOPPED. */
+    RTS_UI8 stay_stopped;
     /* The rest tells of a crash. */
+    RTS_I16 task;         /* index of the task, -1: in none, but in initialisation or the runtime itself */
     RTS_UI32 exception;   /* RTSEXCPT_*, RTSEXCPT_NOEXCEPTION when it is not known */
-    RTS_I32 task;         /* index of the task, -1: in none, but in initialisation or the runtime itself */
     RTS_UI32 code_offset; /* in the code segment of the application, APP_NO_CODE_OFFSET */
     const char *text;     /* "signal SIGSEGV", "hardware watchdog"; never NULL, "" when there is nothing to say */
 } SYS_START;

@@ -77,6 +77,17 @@
 #define APP_PROVE_US 3000000
 #endif
 
+/* Whether SysStartGet may ask that the boot project stays stopped, 100 bytes of flash. */
+#ifndef APP_MAY_STAY_STOPPED
+#define APP_MAY_STAY_STOPPED 1
+#endif
+
+/* The port's words for a crash that are kept in the commit record ("signal SIGSEGV"), bytes with NUL; on the stack of
+ * main. 1: only number and place of the exception are kept. */
+#ifndef APP_CRASH_TEXT_SIZE
+#define APP_CRASH_TEXT_SIZE 32
+#endif
+
 /* A cycle of a task without watchdog, and initialisation code, is broken out of after this long [us], so that an
  * endless loop never takes the device away. */
 #ifndef APP_DEFAULT_WATCHDOG_US

@@ -49,7 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     def command(name: str, action: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
         sub = commands.add_parser(name, help=text, description=text[:1].upper() + text[1:] + ".")
         sub.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
-        sub.set_defaults(action=action)
+        sub.set_defaults(action=action, command=name)
         return sub
 
     _add_file_commands(command)
@@ -160,6 +160,12 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     watch.add_argument("--count", type=_count, metavar="N", help="readings; default: until Ctrl-C")
     _add_link(watch, symbols=True)
 
+    gateway = command("gateway", _gateway, "show or end the processes that share a serial line among tools")
+    gateway.add_argument(
+        "what", choices=["status", "stop"], help="status: who uses which line; stop: end it and tell its tools"
+    )
+    gateway.add_argument("--port", metavar="PORT", help="of this port only; default: all of this user")
+
 
 def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
@@ -186,6 +192,9 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
     link = parser.add_argument_group("link")
     link.add_argument("--port", metavar="PORT", help="serial port or pyserial URL, for example /dev/ttyS0")
     link.add_argument("--baud", type=_count, default=115200, metavar="N", help="default: 115200")
+    link.add_argument(
+        "--no-gateway", action="store_true", help="do not share the port; default: with PLCTOOL_GATEWAY=off"
+    )
     for kind, metavar in (("can", "INTERFACE:CHANNEL"), ("udp", "HOST[:PORT]"), ("tcp", "HOST[:PORT]")):
         link.add_argument(f"--{kind}", metavar=metavar, help="not in this version")
     link.add_argument("--node", type=int, metavar="N", help="not in this version")
@@ -353,18 +362,37 @@ def _link(args: argparse.Namespace) -> str:
 def _connect(args: argparse.Namespace) -> Plc:
     from plctool.device import connect
 
-    return connect(_link(args), args.baud, getattr(args, "symbols", None))
+    return connect(
+        _link(args), args.baud, getattr(args, "symbols", None), gateway=_gateway_wanted(args), tool=_me(args)
+    )
+
+
+def _gateway_wanted(args: argparse.Namespace) -> bool | None:
+    return False if args.no_gateway else None
+
+
+def _me(args: argparse.Namespace) -> str:
+    """What other tools on the line are told this one is: the command and its arguments without options."""
+    image = [args.image.name] if "image" in args else []
+    option = [args.option] if "option" in args else []
+    return " ".join(["plctool", args.command, *option, *image, *getattr(args, "names", getattr(args, "values", []))])
 
 
 def _flash(args: argparse.Namespace) -> int:
-    with _connect(args) as plc, _Progress(not args.json) as progress:
-        result = plc.flash(args.image, start=not args.no_start, force=args.force, progress=progress.show)
+    with _connect(args) as plc:
+        others = plc.others()
+        if others and not args.json:
+            users = "1 other tool uses" if len(others) == 1 else f"{len(others)} other tools use"
+            print(f"{users} this line: {', '.join(map(str, others))}", flush=True)
+        with _Progress(not args.json) as progress:
+            result = plc.flash(args.image, start=not args.no_start, force=args.force, progress=progress.show)
     document = {
         "bytes": result.bytes,
         "seconds": round(result.seconds, 3),
         "skipped": result.skipped,
         "state": str(result.state),
         "persistent": None if result.persistent is None else vars(result.persistent),
+        "others": [vars(other) for other in others],
     }
 
     def text(d: dict[str, Any]) -> str:
@@ -420,7 +448,7 @@ def _scan(args: argparse.Namespace) -> int:
             "version": node.version,
             "serial_number": node.serial_number,
         }
-        for node in scan(_link(args), args.baud)
+        for node in scan(_link(args), args.baud, gateway=_gateway_wanted(args), tool=_me(args))
     ]
     return _show(args, {"devices": devices}, lambda d: output.table(d["devices"], devices[0]))
 
@@ -511,16 +539,20 @@ def _watch(args: argparse.Namespace) -> int:
     if sys.stdout.isatty():
         return _watch_live(args)
     with _connect(args) as plc:
-        for seconds, reading in plc.watch(args.names, args.interval, args.count):
+        for seconds, reading in plc.watch(args.names, args.interval, args.count, _say_waiting):
             print(f"{seconds:8.3f} s  {output.values_text(reading.texts, '  ')}", flush=True)
     return EXIT_OK
+
+
+def _say_waiting(reason: str) -> None:
+    print(f"plctool: {reason}", file=sys.stderr, flush=True)
 
 
 def _watch_json(args: argparse.Namespace) -> int:
     """All samples as one document, when the count is reached or at Ctrl-C."""
     samples = []
     with _connect(args) as plc, suppress(KeyboardInterrupt):
-        for seconds, reading in plc.watch(args.names, args.interval, args.count):
+        for seconds, reading in plc.watch(args.names, args.interval, args.count, _say_waiting):
             sample = {"time_s": round(seconds, 6), "values": reading.values, "consistent": reading.consistent}
             samples.append(sample)
     return _show(args, {"samples": samples}, lambda d: "")
@@ -532,12 +564,21 @@ def _watch_live(args: argparse.Namespace) -> int:
     from rich.text import Text
 
     with _connect(args) as plc, Live(auto_refresh=False) as live:
-        for seconds, reading in plc.watch(args.names, args.interval, args.count):
+        waiting = lambda reason: live.console.print(f"plctool: {reason}", markup=False)  # noqa: E731
+        for seconds, reading in plc.watch(args.names, args.interval, args.count, waiting):
             table = Table("variable", "value", caption=f"{seconds:.1f} s, Ctrl-C ends")
             for name, text in reading.texts.items():
                 table.add_row(Text(name), Text(text))
             live.update(table, refresh=True)
     return EXIT_OK
+
+
+def _gateway(args: argparse.Namespace) -> int:
+    from plctool.gateway.control import gateways, stop_gateways
+
+    if args.what == "status":
+        return _show(args, {"gateways": gateways(args.port)}, output.gateways_text)
+    return _show(args, {"stopped": stop_gateways(args.port)}, output.stopped_text)
 
 
 # ---- the frame -------------------------------------------------------------------------------------------------------

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
+import os
 import shutil
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -14,10 +15,14 @@ from typing import Any, overload
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError, UsageError
 from plctool.files import read_image
+from plctool.gateway.client import GatewayConnection, GatewaySession, connect_gateway
+from plctool.gateway.control import dismiss_idle
+from plctool.gateway.frames import BUSY
+from plctool.gateway.place import NoGateway
 from plctool.image import parse_image
 from plctool.kept_changes import KeptChanges, kept_changes
 from plctool.link import services
-from plctool.link.connection import Connection
+from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink
 from plctool.link.monitoring import AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
 from plctool.link.serial import DEFAULT_BAUD, SerialTransport
@@ -32,7 +37,7 @@ RESET_OPTIONS = {
     "cold": lib.RESET_OPTION_COLD,
     "origin": lib.RESET_OPTION_ORIGIN,
 }
-_SCAN_SECONDS = 1.5
+_BUSY_POLL = 0.2  # shortest time between two looks at a device that another tool keeps to itself [s]
 
 
 @dataclass(frozen=True)
@@ -77,24 +82,66 @@ class FlashResult:
     persistent: KeptChanges | None = None
 
 
-def connect(link: str, baud: int = DEFAULT_BAUD, symbols: Path | str | None = None) -> Plc:
+@dataclass(frozen=True)
+class OtherTool:
+    """Another tool of this machine that uses the same line: how its user called it, and its process number."""
+
+    tool: str
+    pid: int
+
+    def __str__(self) -> str:
+        return f"{self.tool} (pid {self.pid})"
+
+
+def connect(
+    link: str,
+    baud: int = DEFAULT_BAUD,
+    symbols: Path | str | None = None,
+    *,
+    gateway: bool | None = None,
+    tool: str | None = None,
+) -> Plc:
     """Opens a link to a controller, such as "serial:/dev/ttyS0" or "serial:socket://host:port".
 
-    `symbols` names a symbol file when it is neither in the cache nor beside the image. Raises LinkError when the link
-    cannot be opened; whether a controller answers shows with the first call.
+    `symbols` names a symbol file when it is neither in the cache nor beside the image. A serial port of this machine is
+    shared with other tools through a gateway where there can be one; with `gateway` false, or PLCTOOL_GATEWAY=off, it
+    is opened by this process and locked. `tool` is what other tools are told this one is. Raises LinkError when the
+    link cannot be opened; whether a controller answers shows with the first call.
     """
-    return Plc(Connection(open_transport(link, baud)), Path(symbols) if symbols else None)
+    return Plc(_open_link(link, baud, gateway, tool), Path(symbols) if symbols else None)
 
 
-def scan(link: str, baud: int = DEFAULT_BAUD, seconds: float = _SCAN_SECONDS) -> list[Node]:
+def scan(
+    link: str,
+    baud: int = DEFAULT_BAUD,
+    seconds: float = SCAN_SECONDS,
+    *,
+    gateway: bool | None = None,
+    tool: str | None = None,
+) -> list[Node]:
     """The controllers that answer on a link within `seconds`. Raises LinkError when there are none."""
-    with Connection(open_transport(link, baud)) as connection:
+    connection = _open_link(link, baud, gateway, tool)
+    try:
         nodes = connection.scan(seconds)
         if not nodes:
-            raise LinkError(
-                f"No device answers on {connection.transport.name}; check cable, baud rate and power.", "no-answer"
-            )
+            raise LinkError(f"No device answers on {connection.name}; check cable, baud rate and power.", "no-answer")
         return nodes
+    finally:
+        connection.close()
+
+
+def _open_link(link: str, baud: int, gateway: bool | None, tool: str | None) -> MessageLink:
+    """A way to the device, through a gateway where that is possible and wanted."""
+    kind, _, port = link.partition(":")
+    if kind == "serial" and port:
+        if gateway is None:
+            gateway = os.environ.get("PLCTOOL_GATEWAY", "on").lower() not in ("off", "no", "0")
+        if gateway:
+            with suppress(NoGateway):
+                return connect_gateway(port, baud, tool or Path(sys.argv[0]).name or "Python")
+        else:
+            dismiss_idle(port)
+    return Connection(open_transport(link, baud))
 
 
 def open_transport(link: str, baud: int = DEFAULT_BAUD) -> BlockTransport:
@@ -110,9 +157,9 @@ def open_transport(link: str, baud: int = DEFAULT_BAUD) -> BlockTransport:
 class Plc:
     """One controller. Channel and login are made at the first call and renewed by themselves."""
 
-    def __init__(self, connection: Connection, symbols: Path | None = None) -> None:
+    def __init__(self, connection: MessageLink, symbols: Path | None = None) -> None:
         self._connection = connection
-        self._session = Session(connection)
+        self._session = GatewaySession(connection) if isinstance(connection, GatewayConnection) else Session(connection)
         self._symbol_file = symbols
         self._table: SymbolTable | None = None
 
@@ -124,6 +171,12 @@ class Plc:
 
     def close(self) -> None:
         self._connection.close()
+
+    def others(self) -> list[OtherTool]:
+        """The other tools that use the line at present; none when this process has it to itself."""
+        if not isinstance(self._connection, GatewayConnection):
+            return []
+        return [OtherTool(tool, pid) for tool, pid in self._connection.others()]
 
     # ---- the device ----
 
@@ -157,23 +210,37 @@ class Plc:
         """Replaces the application and starts it. The old one runs until the new one has arrived and passed all checks.
 
         `force`: also when the controller has this very image already. `unchecked`: without a look at the image here;
-        the controller checks it anyway. `progress` gets the bytes that have arrived and their total.
+        the controller checks it anyway. `progress` gets the bytes that have arrived and their total. Other tools are
+        kept away meanwhile; raises LinkError when one of them is downloading.
         """
         data = image if isinstance(image, bytes) else read_image(Path(image))
         if not unchecked:
             parse_image(data)
+        what = "a program" if isinstance(image, bytes) else Path(image).name
+        with self._session.exclusive(f"downloading {what}"):
+            return self._flash(image, data, start, force, unchecked, progress)
+
+    def _flash(
+        self,
+        image: Path | str | bytes,
+        data: bytes,
+        start: bool,
+        force: bool,
+        unchecked: bool,
+        progress: Callable[[int, int], None],
+    ) -> FlashResult:
         crc = int.from_bytes(data[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
         status = services.read_status(self._session)
         is_there = (status.image_crc, status.image_size) == (crc, len(data))
         if not isinstance(image, bytes):
             _keep_symbols(Path(image), crc)
         skipped = is_there and status.exception is None and not force and not unchecked
-        begin = self._connection.transport.now()
+        begin = self._connection.now()
         if not skipped:
             afresh = is_there or unchecked
             services.download(self._session, data, afresh, lambda done: progress(done, len(data)))
             self._verify(crc)
-        seconds = self._connection.transport.now() - begin
+        seconds = self._connection.now() - begin
         persistent = None if skipped else self._kept_changes(status.image_crc, crc)
         if start and not (skipped and status.state is AppState.RUN):
             services.start(self._session)
@@ -307,16 +374,34 @@ class Plc:
                 raise unreachable(symbol, lambda pointer: self._read(table, [pointer]).values[0])
 
     def watch(
-        self, names: Sequence[str], interval: float = 0.5, count: int | None = None
+        self,
+        names: Sequence[str],
+        interval: float = 0.5,
+        count: int | None = None,
+        waiting: Callable[[str], None] = lambda reason: None,
     ) -> Iterator[tuple[float, Reading]]:
         """Reads again and again: yields seconds since the first reading, and what was read. Endless without `count`.
 
-        Pointers are followed anew each time; what is behind one that leads to no variable is None then.
+        Pointers are followed anew each time; what is behind one that leads to no variable is None then. While another
+        tool downloads a program there are no readings; `waiting` is called with the reason at the begin of that.
         """
         begin = time.monotonic()
-        for n in itertools.count() if count is None else range(count):
-            time.sleep(max(0.0, begin + n * interval - time.monotonic()))
-            yield time.monotonic() - begin, self._sample(self.symbols(), names)
+        due, readings, waits = begin, 0, False
+        while count is None or readings < count:
+            time.sleep(max(0.0, due - time.monotonic()))
+            due += interval
+            at = time.monotonic() - begin
+            try:
+                reading = self._sample(self.symbols(), names)
+            except LinkError as error:
+                if error.code != BUSY:
+                    raise
+                if not waits:
+                    waiting(error.message)
+                waits, due = True, max(due, time.monotonic() + _BUSY_POLL)
+            else:
+                waits, readings = False, readings + 1
+                yield at, reading
 
 
 def explain_exception(exception: services.AppException, task: str | None, table: SymbolTable | None) -> ExceptionInfo:

@@ -72,3 +72,21 @@ def info_text(document: dict[str, Any]) -> str:
         if isinstance(rows, list) and rows:
             lines += ["", f"{name}:", table(rows, rows[0])]
     return "\n".join(lines)
+
+
+def gateways_text(document: dict[str, Any]) -> str:
+    """A line for each gateway, and one for each tool it serves."""
+    return "\n".join(map(_gateway_text, document["gateways"])) or "No gateway runs."
+
+
+def _gateway_text(gateway: dict[str, Any]) -> str:
+    if gateway["stuck"]:
+        return f"{gateway['line']}: gateway (pid {gateway['pid']}) does not answer"
+    lines = [f"{gateway['line']}: {gateway['baud']} baud, gateway (pid {gateway['pid']})"]
+    lines += [f"  {tool['tool']} (pid {tool['pid']})" for tool in gateway["tools"]]
+    return "\n".join([*lines, f"  {gateway['claim']}"] if gateway["claim"] else lines)
+
+
+def stopped_text(document: dict[str, Any]) -> str:
+    lines = [f"{gateway['line']}: gateway (pid {gateway['pid']}) ended" for gateway in document["stopped"]]
+    return "\n".join(lines) or "No gateway runs."

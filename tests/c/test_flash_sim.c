@@ -216,6 +216,55 @@ static void code_is_mapped_per_slot_and_aligned(void)
     SysFlashReleaseCode(2);
 }
 
+static void a_call_that_is_planned_to_fail_fails_once_and_does_nothing(void)
+{
+    const SYS_FLASH *flash = blank(8, 0xFF);
+    RTS_UI8 data[8];
+
+    SimFlashFail(SIM_PROGRAM, 2);
+    SimFlashFail(SIM_ERASE, 1);
+    SimFlashFail(SIM_READ, 1);
+    CHECK(flash->program(0, ones, 8) == ERR_OK);
+    CHECK(flash->program(8, ones, 8) == ERR_DEVICE);
+    CHECK(SimFlashData()[8] == 0xFF);
+    CHECK(flash->program(8, ones, 8) == ERR_OK); /* not programmed twice */
+    CHECK(flash->erase(0) == ERR_DEVICE);
+    CHECK(SimFlashData()[0] == 1);
+    CHECK(flash->read(0, data, 8) == ERR_DEVICE);
+    CHECK(flash->read(0, data, 8) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+}
+
+static void what_a_sync_did_not_save_is_lost_with_power(void)
+{
+    const SYS_FLASH *flash = blank(8, 0xFF);
+
+    SimFlashFail(SIM_SYNC, 2);
+    CHECK(flash->program(0, ones, 8) == ERR_OK);
+    CHECK(flash->sync() == ERR_OK);
+    CHECK(flash->program(8, ones, 8) == ERR_OK);
+    CHECK(flash->sync() == ERR_DEVICE);
+    CHECK(SimFlashData()[8] == 1);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(SimFlashData()[0] == 1);
+    CHECK(SimFlashData()[8] == 0xFF);
+}
+
+static void a_plan_for_the_next_start_counts_from_there(void)
+{
+    RTS_UI32 calls;
+
+    (void)blank(8, 0xFF);
+    SimFlashSetMapped(0);
+    SimFlashFail(SIM_READ, 1);
+    SimFlashAtStart();
+    CHECK(SimStart() == ERR_OK); /* a log cannot be read, so less is read in all */
+    calls = SimFlashCalls(SIM_READ);
+    CHECK(SimStart() == ERR_OK); /* and the plan is over */
+    CHECK(calls < SimFlashCalls(SIM_READ));
+    SimFlashSetMapped(1);
+}
+
 int main(void)
 {
     RUN(only_possible_geometries_are_accepted);
@@ -229,5 +278,8 @@ int main(void)
     RUN(outside_of_a_call_a_cut_leaves_the_flash_dead_until_power_on);
     RUN(content_is_kept_and_brought_back_with_what_was_programmed);
     RUN(code_is_mapped_per_slot_and_aligned);
+    RUN(a_call_that_is_planned_to_fail_fails_once_and_does_nothing);
+    RUN(what_a_sync_did_not_save_is_lost_with_power);
+    RUN(a_plan_for_the_next_start_counts_from_there);
     return test_result();
 }

@@ -40,7 +40,8 @@ Tool = Callable[..., Done]
 
 @pytest.fixture(autouse=True)
 def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Commands run in a folder of their own, with a cache of their own."""
+    """Commands run in a folder of their own, with a cache of their own, and have the port to themselves."""
+    monkeypatch.setenv("PLCTOOL_GATEWAY", "off")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
     return tmp_path

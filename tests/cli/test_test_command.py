@@ -384,6 +384,6 @@ def test_hundreds_of_tests_take_seconds(tool: Tool) -> None:
         "TEST 'number %d'\nVAR c : Counter; END_VAR\nc(); ADVANCE_TIME(T#1s); c();\nASSERT_EQ(c.value, 2);\nEND_TEST\n"
     )
     path = write(COUNTER + "".join(test % n for n in range(300)))
-    begin = time.perf_counter()
+    begin = time.process_time()  # ours alone, whatever else the machine does
     assert tool("test", str(path)).status == 0
-    assert time.perf_counter() - begin < 10
+    assert time.process_time() - begin < 10

@@ -116,8 +116,7 @@ def all_of(text: str) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_mutated_programs_are_diagnosed(seed: int) -> None:
     r = random.Random(seed)
-    deadline = time.monotonic() + 1.5
-    while time.monotonic() < deadline:
+    for _ in range(40):
         text = mutated(r)
         try:
             all_of(text)

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from plctool.gateway.control import dismiss_idle
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
 from plctool.link.services import download
@@ -115,6 +116,7 @@ def test_a_kill_during_a_download_leaves_the_old_program(tool, plcrt, counter, s
             plcrt.stop(signal.SIGKILL)
             raise PowerCut
 
+    dismiss_idle(plcrt.port)
     with Connection(SerialTransport(plcrt.port)) as connection, pytest.raises(PowerCut):
         download(Session(connection), other, afresh=True, progress=kill)
     plcrt.start()

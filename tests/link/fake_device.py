@@ -298,10 +298,10 @@ class FakePlc:
     """The services on top: an application in memory. Pass `handle` to a FakeDevice."""
 
     LOGIN = 0x80001234
-    APPLICATION = 0x80004321
 
     def __init__(self) -> None:
         self.state, self.operating = lib.AS_NONE, 0
+        self.application_session = 0x80004321
         self.image = b""
         self.exception = (lib.RTSEXCPT_NOEXCEPTION, 0xFFFFFFFF, -1)
         self.memory = {area: bytearray(70000) for area in range(5)}
@@ -341,8 +341,8 @@ class FakePlc:
             (lib.SG_DEVICE, lib.SRV_DEV_GET_TARGET_IDENT): self._identity,
             (app, lib.SRV_APP_LOGIN): self._login_application,
             (app, lib.SRV_APP_READ_STATUS): self._status,
-            (app, lib.SRV_APP_START): lambda tags: self._control(lib.AS_RUN),
-            (app, lib.SRV_APP_STOP): lambda tags: self._control(lib.AS_STOP),
+            (app, lib.SRV_APP_START): lambda tags: self._control(tags, lib.AS_RUN),
+            (app, lib.SRV_APP_STOP): lambda tags: self._control(tags, lib.AS_STOP),
             (app, lib.SRV_APP_RESET): self._reset,
             (app, lib.SRV_APP_DOWNLOAD_COMPACT): self._download,
             (app, lib.SRV_APP_READ_TASK_INFO): self._task_info,
@@ -383,7 +383,9 @@ class FakePlc:
     def _login_application(self, tags: bintag.Tags) -> list[bintag.Tag]:
         guid = struct.pack("<I", self.crc) + bytes(12)
         result = lib.ERR_OK if self.image else lib.ERR_APP_NOT_EXIST
-        content = struct.pack("<HI", result, self.APPLICATION if self.image else 0) + guid + guid
+        if self.image:
+            self.application_session += 2  # the one before is not valid any more
+        content = struct.pack("<HI", result, self.application_session if self.image else 0) + guid + guid
         return [bintag.container(lib.TAG_APP_DESCRIPTOR, bintag.Tag(lib.TAG_APP_OPTION, content, shift=2))]
 
     def _status(self, tags: bintag.Tags) -> list[bintag.Tag]:
@@ -397,7 +399,9 @@ class FakePlc:
             )
         ]
 
-    def _control(self, state: int) -> list[bintag.Tag]:
+    def _control(self, tags: bintag.Tags, state: int) -> list[bintag.Tag]:
+        if tags.container(lib.TAG_APP_DESCRIPTOR).u32(lib.TAG_APP_SESSION) != self.application_session:
+            return [bintag.u16(lib.TAG_SERVICE_RESULT, lib.ERR_APP_INVALID_SESSIONID)]
         if self.operating & lib.OS_EXCEPTION and state == lib.AS_RUN:
             return [bintag.u16(lib.TAG_SERVICE_RESULT, lib.ERR_INVALID_STATE)]
         self.state = state
@@ -450,7 +454,7 @@ class FakePlc:
 
     def _check_monitoring(self, tags: bintag.Tags) -> list[bintag.Tag]:
         session, crc = struct.unpack_from("<II", tags.bytes(lib.TAG_MON2_APPLICATION, 20))
-        if session != self.APPLICATION:
+        if session != self.application_session:
             return [bintag.u32(lib.TAG_MON2_ERROR, lib.ERR_APP_INVALID_SESSIONID)]
         return [] if crc == self.crc else [bintag.u32(lib.TAG_MON2_ERROR, lib.ERR_APP_INVALID_DATAID)]
 

@@ -2,8 +2,8 @@
 
 A plugin of QEMU writes down every store into the flash while a program is stopped, started, replaced, and proves
 itself. The flash after the first n stores is what a power cut there leaves; boards are started with it. Tried are all
-n in the logs of commit records and retain variables, and a selection in the slot that takes the program, which
-nobody reads until a record names it. POWER_CUTS=all tries all n.
+n in the logs of commit records and retain variables and at the end of the program, where its seal makes it count, and
+a selection in the rest of the slot, which nobody reads before. POWER_CUTS=all tries all n.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ SECTOR_SIZE = 4096
 STORE = struct.Struct("<I8s")
 PROVEN = 3500  # cycles of 1 ms after which a program has proven itself
 IN_SLOT = 40  # cuts to try in the slot
+SEAL_STORES = 4  # the two of the seal, and what is before
 AT_ONCE = 2  # boards
 
 
@@ -126,7 +127,7 @@ def selected(replacement: Replacement) -> list[Cut]:
     if os.environ.get("POWER_CUTS") == "all":
         return cuts
     in_slot = [cut.stores for cut in cuts if cut.in_slot]
-    some = {in_slot[len(in_slot) * i // IN_SLOT] for i in range(IN_SLOT)} | {in_slot[-1]}
+    some = {in_slot[len(in_slot) * i // IN_SLOT] for i in range(IN_SLOT)} | set(in_slot[-SEAL_STORES:])
     return [cut for cut in cuts if not cut.in_slot or cut.stores in some]
 
 

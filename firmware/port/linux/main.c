@@ -248,10 +248,11 @@ static bool report_errors(RTS_UI32 from)
     return found;
 }
 
+/* Also what is wrong with the flash is said here, not only in the log: the device may have no other line. */
 static bool start(void)
 {
     RTS_RESULT result = CMInit();
-    if (result != ERR_OK && !report_errors(1)) {
+    if (!report_errors(1) && result != ERR_OK) {
         fprintf(stderr, "plcrt: start-up failed with error 0x%04X\n", (unsigned)result);
     }
     return result == ERR_OK;

@@ -104,7 +104,7 @@ static RTS_RESULT power_on(void *unused)
 }
 
 enum { START_TEXT_SIZE = 32 };
-static const SYS_START power_came = {SYS_START_POWER, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
+static const SYS_START power_came = {SYS_START_POWER, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
 static struct {
     SYS_START now;
     SYS_START next; /* NULL for its text: nothing was set */

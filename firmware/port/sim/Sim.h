@@ -109,6 +109,20 @@ RTS_RESULT SimFlashRestore(void);
 /* Plans a cut or fault at the `operation`-th flash operation from now, 1 being the next; 0 forgets the plan. */
 void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode);
 
+/* Calls of the flash that can fail: a read (none while the flash is mapped), program, erase, sync, mapping of code. */
+enum { SIM_READ = 0, SIM_PROGRAM = 1, SIM_ERASE = 2, SIM_SYNC = 3, SIM_MAP_CODE = 4, SIM_CALLS = 5 };
+
+/* Plans that the `call`-th call of a kind from now, 1 being the next, fails; 0 forgets the plan. Nothing is read,
+ * programmed, erased. With SIM_SYNC all is in flash, but what came after the sync before is lost with power, unless
+ * another sync succeeds. */
+void SimFlashFail(RTS_UI32 kind, RTS_UI32 call);
+
+/* What is planned now is for the next SimStart, and counts from there; other plans end with power. */
+void SimFlashAtStart(void);
+
+/* Calls of a kind since SimStart. */
+RTS_UI32 SimFlashCalls(RTS_UI32 kind);
+
 /* Flash operations (programs and erases) since SimStart. */
 RTS_UI32 SimFlashOps(void);
 

@@ -30,14 +30,24 @@ typedef struct {
     RTS_UI8 *programmed;
 } CELLS;
 
+/* When something happens, as values of the counters; 0: never. */
+typedef struct {
+    RTS_UI32 cut_at;
+    RTS_UI32 cut_mode;
+    RTS_UI32 fail_at[SIM_CALLS];
+} PLAN;
+
 static struct {
     SYS_FLASH flash;
     CELLS cells;
-    CELLS kept; /* by SimFlashSave */
+    CELLS kept;   /* by SimFlashSave */
+    CELLS synced; /* by the last sync, when one is planned to fail */
+    bool sync_failed;
     bool unmapped;
     RTS_UI32 operations;
-    RTS_UI32 cut_at; /* value of `operations` at which it happens, 0: never */
-    RTS_UI32 cut_mode;
+    RTS_UI32 calls[SIM_CALLS];
+    PLAN plan;
+    PLAN next_plan; /* from the next power on */
     bool power_lost;
     RTS_UI32 violations;
     char violation[80];
@@ -70,13 +80,19 @@ static bool was_programmed(RTS_UI32 offset, RTS_UI32 size)
 static RTS_UI32 begin_operation(RTS_UI32 size, int *after)
 {
     *after = -1;
-    if (++chip.operations != chip.cut_at)
+    if (++chip.operations != chip.plan.cut_at)
         return size;
-    chip.cut_at = 0;
-    *after = (int)chip.cut_mode;
-    if (chip.cut_mode == SIM_CUT_AFTER)
+    chip.plan.cut_at = 0;
+    *after = (int)chip.plan.cut_mode;
+    if (chip.plan.cut_mode == SIM_CUT_AFTER)
         return size;
-    return chip.cut_mode == SIM_CUT_BEFORE ? 0 : size / 2;
+    return chip.plan.cut_mode == SIM_CUT_BEFORE ? 0 : size / 2;
+}
+
+/* Counts a call; whether it fails. */
+static bool fails(RTS_UI32 kind)
+{
+    return chip.power_lost || ++chip.calls[kind] == chip.plan.fail_at[kind];
 }
 
 static RTS_RESULT end_operation(int after)
@@ -94,6 +110,8 @@ static RTS_RESULT end_operation(int after)
 
 static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 {
+    if (fails(SIM_READ))
+        return ERR_DEVICE;
     if (!is_inside(offset, size))
         return violate("read outside", offset);
     memcpy(data, chip.cells.data + offset, size);
@@ -118,7 +136,7 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
     RTS_UI32 unit = chip.flash.program_size;
     int after;
 
-    if (chip.power_lost)
+    if (fails(SIM_PROGRAM))
         return ERR_DEVICE;
     if (!is_inside(offset, size) || size == 0)
         return violate("program outside", offset);
@@ -135,7 +153,7 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
     RTS_UI32 size = chip.flash.sector_size;
     int after;
 
-    if (chip.power_lost)
+    if (fails(SIM_ERASE))
         return ERR_DEVICE;
     if (!is_inside(offset, size))
         return violate("erase outside", offset);
@@ -147,9 +165,22 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
     return end_operation(after);
 }
 
+static void copy_cells(CELLS *to, const CELLS *from)
+{
+    memcpy(to->data, from->data, chip.flash.size);
+    memcpy(to->programmed, from->programmed, chip.flash.size);
+}
+
 static RTS_RESULT flash_sync(void)
 {
-    return chip.power_lost ? ERR_DEVICE : ERR_OK;
+    bool failed = fails(SIM_SYNC);
+
+    if (chip.synced.data != NULL) {
+        chip.sync_failed = failed;
+        if (!failed)
+            copy_cells(&chip.synced, &chip.cells);
+    }
+    return failed ? ERR_DEVICE : ERR_OK;
 }
 
 const SYS_FLASH *SysFlashGet(void)
@@ -163,7 +194,7 @@ const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
 {
     void *code;
 
-    if (slot >= CODE_SLOTS || size == 0 || !is_inside(offset, size))
+    if (slot >= CODE_SLOTS || size == 0 || !is_inside(offset, size) || fails(SIM_MAP_CODE))
         return NULL;
     SysFlashReleaseCode(slot);
     code = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -227,6 +258,7 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
         return ERR_PARAMETER;
     free_cells(&chip.cells);
     free_cells(&chip.kept);
+    free_cells(&chip.synced);
     if (!allocate_cells(&chip.cells, size))
         return ERR_NOMEMORY;
     memset(chip.cells.data, erased, size);
@@ -247,8 +279,15 @@ RTS_RESULT SimFlashPowerOn(void)
     for (slot = 0; slot < CODE_SLOTS; slot++)
         SysFlashReleaseCode(slot);
     chip.operations = 0;
-    chip.cut_at = 0;
+    memset(chip.calls, 0, sizeof chip.calls);
+    chip.plan = chip.next_plan;
+    memset(&chip.next_plan, 0, sizeof chip.next_plan);
     chip.power_lost = false;
+    if (chip.sync_failed)
+        copy_cells(&chip.cells, &chip.synced);
+    chip.sync_failed = false;
+    if (chip.plan.fail_at[SIM_SYNC] == 0)
+        free_cells(&chip.synced);
     if (chip.cells.data != NULL)
         return ERR_OK;
     return SimFlashConfigure(SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED);
@@ -268,12 +307,6 @@ RTS_UI8 *SimFlashData(void)
 RTS_UI32 SimFlashSize(void)
 {
     return chip.flash.size;
-}
-
-static void copy_cells(CELLS *to, const CELLS *from)
-{
-    memcpy(to->data, from->data, chip.flash.size);
-    memcpy(to->programmed, from->programmed, chip.flash.size);
 }
 
 RTS_RESULT SimFlashSave(void)
@@ -296,8 +329,41 @@ RTS_RESULT SimFlashRestore(void)
 
 void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode)
 {
-    chip.cut_at = operation == 0 ? 0 : chip.operations + operation;
-    chip.cut_mode = mode;
+    chip.plan.cut_at = operation == 0 ? 0 : chip.operations + operation;
+    chip.plan.cut_mode = mode;
+}
+
+void SimFlashFail(RTS_UI32 kind, RTS_UI32 call)
+{
+    if (kind >= SIM_CALLS)
+        return;
+    if (kind == SIM_SYNC && chip.synced.data == NULL) {
+        if (!allocate_cells(&chip.synced, chip.flash.size))
+            return;
+        copy_cells(&chip.synced, &chip.cells);
+    }
+    chip.plan.fail_at[kind] = call == 0 ? 0 : chip.calls[kind] + call;
+}
+
+static RTS_UI32 count_from_zero(RTS_UI32 at, RTS_UI32 now)
+{
+    return at > now ? at - now : 0;
+}
+
+void SimFlashAtStart(void)
+{
+    RTS_UI32 kind;
+
+    chip.next_plan.cut_at = count_from_zero(chip.plan.cut_at, chip.operations);
+    chip.next_plan.cut_mode = chip.plan.cut_mode;
+    for (kind = 0; kind < SIM_CALLS; kind++)
+        chip.next_plan.fail_at[kind] = count_from_zero(chip.plan.fail_at[kind], chip.calls[kind]);
+    memset(&chip.plan, 0, sizeof chip.plan);
+}
+
+RTS_UI32 SimFlashCalls(RTS_UI32 kind)
+{
+    return kind < SIM_CALLS ? chip.calls[kind] : 0;
 }
 
 RTS_UI32 SimFlashOps(void)

@@ -21,12 +21,16 @@ bool AppHasException(void);
 const RTS_UI8 *AppMapCode(const APP_IMAGE *image);
 
 /* Takes over a checked image with its code mapped at `code`, when nothing is loaded. Retain variables come from a
- * record up to number `retain_until`. The application is in AS_STOP then, perhaps with an exception. */
+ * record up to number `retain_until`. The application is in AS_STOP then, and nothing of it was called. */
 RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until);
 void AppUnload(void);
 
-/* Starts the loaded application. `died_before`: starts of an unproven one that were not ended in good order. */
-RTS_RESULT AppStart(RTS_UI32 died_before);
+/* Gives the loaded application its initial values and its tasks; it is in AS_STOP then, perhaps with an exception. It
+ * is given up when its tasks cannot be created: ERR_NOMEMORY. */
+RTS_RESULT AppInitialise(void);
+
+/* Starts the loaded application, initialised before if it was not yet. ERR_EXCEPTION: that failed. */
+RTS_RESULT AppStart(void);
 
 /* Stops the tasks; true when they ran. */
 bool AppStopTasks(void);
@@ -38,12 +42,16 @@ void AppPostEvent(RTS_UI32 event);
 
 /* ---- boot project ---- */
 
-/* Loads and starts what is in flash. */
+/* Loads what is in flash, and starts it unless it died before. */
 void AppBoot(void);
 
+/* Starts what was loaded and not started, because a user asks for it: also what died before, when there is none to go
+ * back to. */
+RTS_RESULT AppBootByHand(void);
+
 /*
- * Loads the other slot instead of `failed`, from now on; false when it holds nothing that can run. Its retain variables
- * are those it had when the failed application came.
+ * Loads the other slot instead of `failed`, from now on, without calling anything of it; false when it holds nothing
+ * that can run. Its retain variables are those it had when the failed application came.
  */
 bool AppRollBack(RTS_UI32 failed);
 

@@ -1,31 +1,43 @@
 /*
- * AppBoot.c - what runs after a start-up: the boot project, or the application before it when that fails.
+ * AppBoot.c - what runs after a start-up: the boot project, or the application before it when that died.
  *
  * SPDX-License-Identifier: Apache-2.0
+ *
+ * Only its own death counts against an application, and is noted in flash before anything else is done. When it cannot
+ * be loaded for another reason (a fault of the flash, a function that this firmware lacks), nothing is written and
+ * nothing runs: the next start finds all as it was.
  */
 #include "App.h"
 #include "AppCommit.h"
+#include "AppException.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
+#include "SysExcept.h"
+#include "SysStart.h"
 
-/* How often an application may be started without proving itself: while there is one to go back to, and when there is
- * none. Beyond the second the device takes it for the reason of its restarts and leaves it stopped. */
-enum { STARTS_WITHOUT_PROOF = 2, STARTS_WITHOUT_FALLBACK = 10 };
-
-static bool load_from_slot(RTS_UI32 slot, RTS_UI32 retain_until)
+static RTS_RESULT load_from_slot(RTS_UI32 slot, RTS_UI32 retain_until)
 {
     const COMMIT_SLOT *committed = &AppCommitGet()->slot[slot];
-    const RTS_UI8 *code;
+    const RTS_UI8 *code = NULL;
     APP_REFUSAL refusal;
     APP_IMAGE image;
     RTS_RESULT result = AppLoaderCheck(slot, committed->size, committed->crc, &image, &refusal);
 
-    if (result != ERR_OK) {
-        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Boot project refused: %s", refusal.text);
-        return false;
+    if (result != ERR_OK && result != ERR_DEVICE && image.code.size == 0)
+        result = ERR_CRC_FAILED; /* not the image that was committed: the loader knows the code when it is */
+    if (result == ERR_OK) {
+        code = AppMapCode(&image);
+        if (code == NULL)
+            result = APP_REFUSE(&refusal, ERR_NOMEMORY, "There is no executable memory for the code.");
     }
-    code = AppMapCode(&image);
-    return code != NULL && AppLoad(&image, code, retain_until) == ERR_OK;
+    if (result == ERR_OK) {
+        result = AppLoad(&image, code, retain_until);
+        if (result != ERR_OK)
+            result = APP_REFUSE(&refusal, result, "The flash cannot be read.");
+    }
+    if (result != ERR_OK)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Boot project refused: %s", refusal.text);
+    return result;
 }
 
 bool AppRollBack(RTS_UI32 failed)
@@ -35,8 +47,8 @@ bool AppRollBack(RTS_UI32 failed)
     RTS_UI32 retain_until = commit->slot[failed].retain_after;
     RTS_UI32 retain_after;
 
-    if (commit->slot[other].state == SLOT_EMPTY || commit->slot[other].state == SLOT_FAILED ||
-        !load_from_slot(other, retain_until))
+    if (commit->state[other] == SLOT_EMPTY || commit->state[other] == SLOT_FAILED ||
+        load_from_slot(other, retain_until) != ERR_OK)
         return false;
     /* A record of its own numbers its retain variables as newest before the commit makes it so. */
     RetainKeep(retain_until);
@@ -44,47 +56,93 @@ bool AppRollBack(RTS_UI32 failed)
     (void)RetainSave(true);
     (void)AppCommitRollBack(failed, retain_after);
     RetainKeepNone();
-    LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "The new application failed: back to the one before");
+    LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Back to the application before");
     return true;
 }
 
-static bool has_died(const COMMIT_SLOT *slot, RTS_UI32 starts)
+/* The application is in the exception that ended the run before this start. */
+static void take_exception(const SYS_START *start)
 {
-    return slot->state == SLOT_FAILED || (slot->state == SLOT_STARTED && slot->starts >= starts);
+    APP_EXCEPTION exception = {start->exception, start->code_offset, start->task};
+
+    if (exception.code == RTSEXCPT_NOEXCEPTION)
+        exception.code = RTSEXCPT_BOOTPROJECT_CRASH;
+    AppExceptionSet(&exception, start->text);
 }
 
-/* Loads what shall run; false when there is nothing. */
-static bool load_boot_project(RTS_UI32 active)
+/* Whether the active application was what ended the run before this start. */
+static bool has_died(RTS_UI32 cause)
 {
-    if (has_died(&AppCommitGet()->slot[active], STARTS_WITHOUT_PROOF) && AppRollBack(active))
-        return true;
-    return load_from_slot(active, RetainGetSequence()) || AppRollBack(active);
+    static const RTS_UI8 unfinished[] = {0xFF, 1, 2}; /* [SYS_START_*]: initialisations that are a death */
+    const COMMIT *commit = AppCommitGet();
+
+    return commit->begun >= unfinished[cause] ||
+           (cause == SYS_START_CRASH && commit->state[commit->active] == SLOT_STARTED);
 }
 
-/* A boot project starts by itself; one that died stays stopped when there is none to go back to. */
-static void run_boot_project(RTS_UI32 active)
+/* Loads what shall run. */
+static RTS_RESULT load_boot_project(bool may_go_back)
 {
-    const COMMIT_SLOT *slot;
+    RTS_UI32 active = AppCommitGet()->active;
+    RTS_RESULT result;
 
-    if (active == SLOT_NONE) {
-        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "No boot project");
+    if (may_go_back && AppCommitGet()->state[active] == SLOT_FAILED && AppRollBack(active))
+        return ERR_OK;
+    result = load_from_slot(active, RetainGetSequence());
+    return result == ERR_CRC_FAILED && may_go_back && AppRollBack(active) ? (RTS_RESULT)ERR_OK : result;
+}
+
+static bool stays_stopped(void)
+{
+    return APP_MAY_STAY_STOPPED && SysStartGet()->stay_stopped != 0;
+}
+
+/* Notes that the application was what ended the run before this start. */
+static void take_death(void)
+{
+    const SYS_START *start = SysStartGet();
+    bool died = has_died(start->cause);
+
+    if (LOG_MAX_ENTRIES > 0 && (died || (start->cause == SYS_START_CRASH && stays_stopped())))
+        take_exception(start);
+    if (died)
+        AppCommitSetDead(start->text);
+}
+
+/* A boot project starts by itself, unless it died. */
+static void run_boot_project(void)
+{
+    take_death();
+    if (load_boot_project(!stays_stopped()) != ERR_OK)
         return;
-    }
-    if (!load_boot_project(active))
-        return;
-    slot = &AppCommitGet()->slot[AppGetSlot()];
-    if (has_died(slot, STARTS_WITHOUT_FALLBACK))
-        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Boot project not started: it failed before");
-    else if (!AppHasException())
-        (void)AppStart(slot->state == SLOT_STARTED ? slot->starts : 0);
+    if (stays_stopped() || AppCommitIsDead())
+        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_OK, "Boot project not started%s",
+               AppCommitIsDead() ? ": it failed before" : "");
+    else
+        (void)AppStart();
 }
 
 void AppBoot(void)
 {
-    RTS_RESULT result = AppCommitOpen();
-
-    if (result == ERR_OK)
-        run_boot_project(AppCommitGet()->active);
+    AppCommitOpen();
+    if (AppCommitResult() != ERR_OK)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, AppCommitResult(), "The commit record cannot be read");
+    else if (AppCommitGet()->active == SLOT_NONE)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "No boot project");
     else
-        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "The commit record cannot be read");
+        run_boot_project();
+}
+
+RTS_RESULT AppBootByHand(void)
+{
+    RTS_UI32 active = AppCommitGet()->active;
+    RTS_RESULT result;
+
+    if (APP_MAY_STAY_STOPPED && active != SLOT_NONE && AppCommitGet()->state[active] == SLOT_FAILED) {
+        AppUnload();
+        result = load_boot_project(true);
+        if (result != ERR_OK)
+            return result;
+    }
+    return AppStart();
 }

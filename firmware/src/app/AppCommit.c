@@ -1,5 +1,5 @@
 /*
- * AppCommit.c - the commit record.
+ * AppCommit.c - seals and commit records.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -7,41 +7,58 @@
 
 #include <string.h>
 
+#include "AppException.h"
+#include "CMUtils.h"
+#include "CmpItf.h"
 #include "CmpLog.h"
+#include "CompactDownload.h"
+#include "SysExcept.h"
+#include "SysFlash.h"
 #include "SysFlashLog.h"
 
-RTS_STATIC_ASSERT(sizeof(COMMIT) == 36, commit_record_is_36_bytes);
+RTS_STATIC_ASSERT(sizeof(COMMIT) == 32, commit_is_32_bytes);
 
-enum { COMMIT_TAG = 0x54494D43 };
+enum { COMMIT_TAG = 0x324D4D43, BEGUN_MAX = 0xFE };
+
+/* What the log holds: the commit, and with it why the application is dead, which nobody would read without a log. */
+typedef struct {
+    COMMIT commit;
+    APP_EXCEPTION exception;        /* that the active application is in */
+    char text[APP_CRASH_TEXT_SIZE]; /* the port's words, "" without */
+} RECORD;
+
+enum { HAS_CAUSE = LOG_MAX_ENTRIES > 0, RECORD_SIZE = HAS_CAUSE ? sizeof(RECORD) : sizeof(COMMIT) };
+
+/* The first unit after an image. */
+typedef struct {
+    RTS_UI32 number;
+    RTS_UI32 crc; /* of the image */
+    RTS_UI32 retain_after;
+    RTS_UI32 check; /* that it was programmed whole; the image has a CRC of its own */
+} SEAL;
+
+RTS_STATIC_ASSERT(sizeof(SEAL) == FILE_ALIGN, a_seal_is_programmed_at_once);
 
 static struct {
-    FLASH_LOG log;
-    COMMIT commit;
-} record;
+    FLASH_LOG log; /* its `opened` says whether anything is known */
+    COMMIT commit; /* what is in flash, or should be and could not be written */
+} state;
 
-static void set_blank(COMMIT *commit)
+RTS_RESULT AppCommitResult(void)
 {
-    memset(commit, 0, sizeof *commit);
-    commit->active = SLOT_NONE;
-}
-
-RTS_RESULT AppCommitOpen(void)
-{
-    RTS_RESULT result;
-
-    set_blank(&record.commit);
-    result = FlashLogOpen(&record.log, FILE_COMMIT);
-    if (result != ERR_OK)
-        return result;
-    if (FlashLogReadNewest(&record.log, COMMIT_TAG, &record.commit, sizeof record.commit) != ERR_OK ||
-        (record.commit.active >= SLOT_COUNT && record.commit.active != SLOT_NONE))
-        set_blank(&record.commit);
-    return ERR_OK;
+    return state.log.opened;
 }
 
 const COMMIT *AppCommitGet(void)
 {
-    return &record.commit;
+    return &state.commit;
+}
+
+bool AppCommitIsDead(void)
+{
+    RTS_UI8 active = state.commit.active;
+
+    return active < SLOT_COUNT && state.commit.state[active] >= SLOT_FAILED;
 }
 
 RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot)
@@ -49,54 +66,192 @@ RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot)
     return slot == FILE_SLOT_A ? FILE_SLOT_B : FILE_SLOT_A;
 }
 
-static RTS_RESULT write_record(const COMMIT *commit)
+void AppCommitWipe(RTS_UI32 slot)
 {
-    RTS_RESULT result = FlashLogAppend(&record.log, COMMIT_TAG, commit, sizeof *commit);
+    (void)SysFileErase(slot, 0, SysFlashGet()->sector_size);
+}
 
+/* ---- seals ---- */
+
+static RTS_UI32 seal_check(const SEAL *seal)
+{
+    return ~(seal->number ^ seal->crc ^ seal->retain_after);
+}
+
+/* Takes over a slot when the image that its header tells of has a seal with a number above `known`. */
+static void take_seal(RTS_UI32 slot, RTS_UI32 known)
+{
+    CDL_HEADER header;
+    SEAL seal;
+
+    if (SysFileRead(slot, 0, &header, sizeof header) != ERR_OK ||
+        SysFileRead(slot, SysFileAlign(header.total_size), &seal, sizeof seal) != ERR_OK ||
+        seal.check != seal_check(&seal) || seal.crc != header.crc || (RTS_I32)(seal.number - known) <= 0)
+        return;
+    state.commit.slot[slot] = (COMMIT_SLOT){header.total_size, seal.crc, seal.retain_after};
+    state.commit.state[slot] = SLOT_TRIAL;
+    if ((RTS_I32)(seal.number - state.commit.number) > 0) {
+        state.commit.number = seal.number;
+        state.commit.active = (RTS_UI8)slot;
+        state.commit.begun = 0;
+    }
+}
+
+static void take_seals(void)
+{
+    RTS_UI32 known = state.commit.number;
+
+    take_seal(FILE_SLOT_A, known);
+    take_seal(FILE_SLOT_B, known);
+}
+
+RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
+{
+    SEAL seal = {state.commit.number + 1, crc, retain_after, 0};
+
+    seal.check = seal_check(&seal);
+    if (SysFileWrite(slot, &seal, sizeof seal) == ERR_OK && SysFileClose(slot) == ERR_OK)
+        take_seals();
+    if (state.commit.active == slot)
+        return ERR_OK;
+    AppCommitWipe(slot);
+    return ERR_DEVICE;
+}
+
+/* ---- records ---- */
+
+/* Another layout of the flash is another kind of record, because it would mean other places. */
+static RTS_UI32 record_tag(void)
+{
+    return COMMIT_TAG + SysFileGetArea(FILE_SLOT_B)->offset;
+}
+
+static RTS_RESULT read_record(void)
+{
+    RECORD record;
+    void *data = HAS_CAUSE ? (void *)&record : (void *)&state.commit;
+    RTS_RESULT result = FlashLogReadNewest(&state.log, record_tag(), data, RECORD_SIZE);
+
+    if (HAS_CAUSE && result == ERR_OK) {
+        state.commit = record.commit;
+        if (AppCommitIsDead())
+            AppExceptionSet(&record.exception, record.text);
+    }
+    return result;
+}
+
+/* Without a record of ours the seals are all there is. */
+static void report_loss(void)
+{
+    if (state.log.sequence != 0)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, ERR_VERSION_MISMATCH, "Flash was laid out by another firmware");
+    if (state.commit.active != SLOT_NONE)
+        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT, "No commit record: the newest program is taken");
+}
+
+void AppCommitOpen(void)
+{
+    RTS_RESULT result = FlashLogOpen(&state.log, FILE_COMMIT);
+
+    CMP_CLEAR(state.commit);
+    state.commit.active = SLOT_NONE;
     if (result == ERR_OK)
-        record.commit = *commit;
-    else
+        result = read_record();
+    if (result == ERR_OK && FlashLogIsMarked(&state.log, RECORD_SIZE))
+        state.commit.begun = 0;
+    if (result != ERR_OK && result != ERR_NO_OBJECT) {
+        state.log.opened = result;
+        return;
+    }
+    if (state.commit.active >= SLOT_COUNT)
+        state.commit.active = SLOT_NONE;
+    take_seals();
+    if (result != ERR_OK)
+        report_loss();
+}
+
+/* Writes what has been changed. */
+static RTS_RESULT write_record(const char *text)
+{
+    RECORD record;
+    const void *data = HAS_CAUSE ? (void *)&record : (void *)&state.commit;
+    RTS_RESULT result;
+
+    if (HAS_CAUSE) {
+        memset(&record, 0, sizeof record);
+        record.commit = state.commit;
+        record.exception = *AppExceptionGet();
+        if (APP_CRASH_TEXT_SIZE > 1)
+            memcpy(record.text, text, CMUtlStrNLen(text, sizeof record.text - 1));
+    }
+    result = FlashLogAppend(&state.log, record_tag(), data, RECORD_SIZE);
+    if (result != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "The commit record cannot be written");
     return result;
 }
 
-RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 size, RTS_UI32 crc, RTS_UI32 retain_after)
-{
-    COMMIT commit = record.commit;
-    const COMMIT_SLOT trial = {size, crc, retain_after, SLOT_TRIAL, 0, 0};
-
-    commit.active = (RTS_UI8)slot;
-    commit.slot[slot] = trial;
-    return write_record(&commit);
-}
-
 RTS_RESULT AppCommitErase(void)
 {
-    COMMIT commit;
+    RTS_UI32 number = state.commit.number;
 
-    set_blank(&commit);
-    return write_record(&commit);
+    memset(&state.commit, 0, sizeof state.commit);
+    state.commit.active = SLOT_NONE;
+    state.commit.number = number;
+    return write_record("");
 }
 
 RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after)
 {
-    COMMIT commit = record.commit;
     RTS_UI32 other = AppCommitOtherSlot(failed);
+    RTS_RESULT result;
 
-    commit.active = (RTS_UI8)other;
-    commit.slot[failed].state = SLOT_FAILED;
-    commit.slot[other].retain_after = retain_after;
-    return write_record(&commit);
+    state.commit.active = (RTS_UI8)other;
+    state.commit.begun = 0;
+    state.commit.state[failed] = SLOT_FAILED;
+    state.commit.slot[other].retain_after = retain_after;
+    result = write_record("");
+    if (result == ERR_OK)
+        AppCommitWipe(failed);
+    return result;
 }
 
-RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state, RTS_UI8 starts)
+RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 changed)
 {
-    COMMIT commit = record.commit;
-    COMMIT_SLOT *changed = &commit.slot[slot];
+    RTS_UI8 before = state.commit.state[slot];
+    RTS_RESULT result;
 
-    if (changed->state == SLOT_PROVEN || (changed->state == state && changed->starts == starts))
+    if (before == SLOT_PROVEN || before == changed)
         return ERR_OK;
-    changed->state = state;
-    changed->starts = starts;
-    return write_record(&commit);
+    state.commit.state[slot] = changed;
+    result = write_record("");
+    if (result != ERR_OK)
+        state.commit.state[slot] = before; /* tried again */
+    return result;
+}
+
+void AppCommitSetDead(const char *text)
+{
+    RTS_UI8 *dead = &state.commit.state[state.commit.active];
+
+    *dead = *dead == SLOT_PROVEN ? SLOT_HALTED : SLOT_FAILED;
+    state.commit.begun = 0;
+    (void)write_record(text);
+}
+
+void AppCommitBegin(void)
+{
+    RTS_UI8 *begun = &state.commit.state[state.commit.active];
+
+    if (*begun == SLOT_HALTED)
+        *begun = SLOT_PROVEN;
+    if (state.commit.begun < BEGUN_MAX)
+        state.commit.begun++;
+    (void)write_record("");
+}
+
+void AppCommitDone(void)
+{
+    state.commit.begun = 0;
+    if (FlashLogMark(&state.log) != ERR_OK)
+        (void)write_record(""); /* says so as well */
 }

@@ -1,13 +1,17 @@
 /*
- * AppCommit.h - which slot holds the application: the commit record.
+ * AppCommit.h - which slot holds the application, and what is known about it.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Each record is the whole truth about both slots, so the newest valid one is all there is to know. From main only.
+ * A slot says itself that its image is a program of the device: after the image follows a seal, one unit that is
+ * programmed when all else is in flash and checked. Seals are numbered, so that the newest program is found even when
+ * nothing else is left. What happened to the programs since is in a log of commit records, each the whole truth about
+ * both slots: the newest valid one counts, unless a slot has a newer seal. From main only.
  */
 #ifndef APPCOMMIT_H
 #define APPCOMMIT_H
 
+#include "CmpAppEmbedded.h"
 #include "CmpErrors.h"
 #include "CmpStd.h"
 
@@ -15,9 +19,10 @@
 enum {
     SLOT_EMPTY = 0,
     SLOT_TRIAL = 1,   /* downloaded; stopped in good order since it was last started */
-    SLOT_STARTED = 2, /* started `starts` times without having proven itself */
+    SLOT_STARTED = 2, /* started, and has not proven itself yet */
     SLOT_PROVEN = 3,  /* ran for APP_PROVE_US without exception */
-    SLOT_FAILED = 4,  /* had an exception before it was proven */
+    SLOT_FAILED = 4,  /* died before it was proven: not run without being asked to */
+    SLOT_HALTED = 5,  /* proven, but died in its initialisation: not run without being asked to */
 };
 
 enum { SLOT_COUNT = 2, SLOT_NONE = 0xFF };
@@ -26,41 +31,58 @@ typedef struct {
     RTS_UI32 size;
     RTS_UI32 crc;
     RTS_UI32 retain_after; /* retain records up to this number are not of this application */
-    RTS_UI8 state;         /* SLOT_* */
-    RTS_UI8 starts;
-    RTS_UI16 reserved;
 } COMMIT_SLOT;
 
 typedef struct {
     RTS_UI8 active; /* slot of the application, SLOT_NONE without one */
-    RTS_UI8 reserved[3];
+    RTS_UI8 begun;  /* how many initialisations of it in a row were begun and not finished */
+    RTS_UI8 state[SLOT_COUNT]; /* SLOT_* */
+    RTS_UI32 number;           /* of the newest seal */
     COMMIT_SLOT slot[SLOT_COUNT];
 } COMMIT;
 
-/* Finds the newest record. */
-RTS_RESULT AppCommitOpen(void);
+/* Finds out what is in flash. When the application died, it is in that exception again. */
+void AppCommitOpen(void);
+
+/* ERR_OK, or ERR_DEVICE: the flash could not be read, nothing is known, and nothing is written. */
+RTS_RESULT AppCommitResult(void);
 
 /* The record in force. */
 const COMMIT *AppCommitGet(void);
 
+/* Whether the active application died, and is not to be run without being asked to. */
+bool AppCommitIsDead(void);
+
 /* The slot that is not `slot`; of SLOT_NONE the first. */
 RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
 
+/* Seals the image in `slot`, whose file ends with it: from now on it is what boots, a trial. On ERR_DEVICE what was
+ * before still is, and the image is given up. */
+RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after);
+
 /*
  * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the one before
- * stays.
+ * stays, or it is this one but may be lost when power is.
  */
 
-/* The image in `slot` is what boots: a trial. */
-RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 size, RTS_UI32 crc, RTS_UI32 retain_after);
-
-/* Nothing boots. */
+/* Nothing boots. AppCommitWipe follows. */
 RTS_RESULT AppCommitErase(void);
 
-/* The slot that is not `failed` is what boots; its retain records are those after `retain_after`. */
+/* The slot that is not `failed` is what boots; its retain records are those after `retain_after`. The other is wiped. */
 RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after);
 
-/* A new state of the image in `slot`. Writes nothing when it has proven itself, or that is its state already. */
-RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state, RTS_UI8 starts);
+/* A new state of the image in `slot`, and the exception it is in. Writes nothing when it has proven itself, or that is
+ * its state already. */
+RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state);
+
+/* The active one died, of the exception it is in: SLOT_FAILED, or SLOT_HALTED when it has proven itself. */
+void AppCommitSetDead(const char *text);
+
+/* The initialisation of the active one begins, and has ended. */
+void AppCommitBegin(void);
+void AppCommitDone(void);
+
+/* Makes what is in a slot unusable, so that no lost record brings it back. */
+void AppCommitWipe(RTS_UI32 slot);
 
 #endif

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * An image is written to the idle slot, checked there, mapped, committed (from here on it is what boots), and only then
- * is the old application stopped and this one loaded.
+ * An image is written to the slot that is not what boots, checked there, mapped, sealed (from here on it is what
+ * boots), and only then is the old application stopped and this one loaded.
  */
 #include "App.h"
 #include "AppCommit.h"
@@ -22,10 +22,12 @@ static struct {
 
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
 {
-    RTS_UI32 slot = AppCommitOtherSlot(AppGetSlot());
+    RTS_UI32 slot = AppCommitOtherSlot(AppGetSlot() != SLOT_NONE ? AppGetSlot() : AppCommitGet()->active);
 
     AppDownloadAbort();
-    if (total_size > SysFileGetArea(slot)->size)
+    if (AppCommitResult() != ERR_OK)
+        return ERR_DEVICE; /* what is worth keeping is not known */
+    if (total_size > SysFileGetArea(slot)->size - FILE_ALIGN) /* the seal follows */
         return ERR_NOMEMORY;
     download.open = true;
     download.slot = slot;
@@ -72,8 +74,8 @@ void AppDownloadAbort(void)
 /* Goes back to the application that ran until now. */
 static void put_back(RTS_UI32 failed_slot, bool ran)
 {
-    if (AppRollBack(failed_slot) && ran && !AppHasException())
-        (void)AppStart(0);
+    if (AppRollBack(failed_slot))
+        (void)(ran ? AppStart() : AppInitialise());
 }
 
 /* The checked image takes the place of the old application. */
@@ -86,7 +88,7 @@ static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
 
     if (code == NULL)
         return APP_REFUSE(refusal, ERR_NOMEMORY, "There is no executable memory for the code.");
-    result = AppCommitInstall(image->file, image->size, image->crc, retain_after);
+    result = AppCommitInstall(image->file, image->crc, retain_after);
     if (result != ERR_OK) {
         SysFlashReleaseCode(image->file);
         return APP_REFUSE(refusal, result, "The flash cannot be written.");
@@ -95,6 +97,8 @@ static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
     ran = AppStopTasks();
     AppUnload();
     result = AppLoad(image, code, retain_after);
+    if (result == ERR_OK)
+        result = AppInitialise();
     if (result != ERR_OK)
         put_back(image->file, ran);
     AppPostEvent(EVT_DownloadDone);

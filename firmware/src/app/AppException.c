@@ -25,6 +25,7 @@ const char *AppExceptionName(RTS_UI32 code)
         RTS_UI32 code;
         const char *name;
     } names[] = {
+        {RTSEXCPT_BOOTPROJECT_CRASH, "crash"},
         {RTSEXCPT_WATCHDOG, "watchdog expired"},
         {RTSEXCPT_DIVIDEBYZERO, "division by zero"},
         {RTSEXCPT_ARRAYBOUNDS, "index out of range"},
@@ -71,6 +72,9 @@ bool AppExceptionTake(APP_RAISED *raised)
 void AppExceptionSet(const APP_EXCEPTION *exception, const char *where)
 {
     const char *name = AppExceptionName(exception->code);
+
+    if (where[0] == '\0')
+        where = "Before this start";
 
     state.current = *exception;
     if (exception->code_offset == APP_NO_CODE_OFFSET)

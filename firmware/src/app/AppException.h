@@ -20,7 +20,8 @@ typedef struct {
 /* Hands over what a task has raised, once; false when there is nothing. */
 bool AppExceptionTake(APP_RAISED *raised);
 
-/* The exception the application is in from now on; `where` is for the log. */
+/* The exception the application is in from now on; `where` is for the log; "": not known,
+ * because it was in an earlier run. */
 void AppExceptionSet(const APP_EXCEPTION *exception, const char *where);
 
 /* Its code is RTSEXCPT_NOEXCEPTION when there is none. */

@@ -23,12 +23,12 @@ static RTS_NOINLINE RTS_RESULT take_over(RTS_UI32 slot)
     APP_IMAGE image;
     RTS_RESULT result = ERR_NO_OBJECT;
 
-    if (before->state != SLOT_EMPTY)
+    if (AppCommitGet()->state[other] != SLOT_EMPTY)
         result = AppLoaderCheck(other, before->size, before->crc, &image, &refusal);
     return result == ERR_OK ? RetainLoad(&image.kept, before->crc, range) : result;
 }
 
-RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_until)
+RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_until, bool proven)
 {
     const COMMIT_SLOT *slot = &AppCommitGet()->slot[image->file];
     const FLASH_LOG_RANGE range = {slot->retain_after, retain_until};
@@ -38,10 +38,10 @@ RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_
         return ERR_NO_OBJECT;
     RetainAttach(area, &image->kept, image->crc);
     result = RetainLoad(&image->kept, image->crc, range);
-    if (result != ERR_OK && (image->kept.size > 0 || slot->state != SLOT_PROVEN) && take_over(image->file) != ERR_OK &&
+    if (result != ERR_OK && (image->kept.size > 0 || !proven) && take_over(image->file) != ERR_OK &&
         image->kept.size > 0 && retain_until != slot->retain_after)
         LogAdd(CMPID_CmpRetain, LOG_WARNING, result, "No saved retain variables fit the application: initial values");
-    if (slot->state == SLOT_PROVEN)
+    if (proven)
         RetainKeepNone();
     else
         RetainKeep(slot->retain_after);

@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * An application that is new has to prove itself by running for a while. Until it has, dying makes the next start-up go
- * back to the one before (AppBoot.c).
+ * back to the one before (AppBoot.c). Losing power is no way to die.
  */
 #include "CmpAppEmbedded.h"
 
@@ -23,15 +23,19 @@
 #include "SysFlash.h"
 #include "SysTime.h"
 
-#define PROVE_NS ((RTS_I64)APP_PROVE_US * 1000)
+#define PROVE_MS (APP_PROVE_US / 1000)
+
+/* What a loaded application waits for: nothing, its initial values, those of retain variables too. */
+enum { INIT_DONE = 0, INIT_WARM = 1, INIT_COLD = 2 };
 
 static struct {
-    RTS_UI32 state; /* AS_* */
+    RTS_UI8 state;   /* AS_* */
+    RTS_UI8 pending; /* INIT_* */
     const RTS_UI8 *code;
     APP_IMAGE image;
     APP_TABLES tables;
     IEC_CONTEXT context; /* what every task starts from */
-    RTS_I64 run_since_ns;
+    RTS_UI32 run_since_ms;
 } app;
 
 void AppPostEvent(RTS_UI32 event)
@@ -63,7 +67,9 @@ static bool was_broken_off(void)
 
 static bool is_proven(void)
 {
-    return AppCommitGet()->slot[app.image.file].state == SLOT_PROVEN;
+    RTS_UI8 state = AppCommitGet()->state[app.image.file];
+
+    return state == SLOT_PROVEN || state == SLOT_HALTED;
 }
 
 /* ---- exceptions ---- */
@@ -86,7 +92,7 @@ static void enter_exception_state(void)
     AppAreasClearOutputs();
     app.state = AS_STOP;
     if (!was_broken_off())
-        (void)AppCommitSetState(app.image.file, SLOT_FAILED, 0);
+        (void)AppCommitSetState(app.image.file, SLOT_FAILED);
     AppPostEvent(EVT_CmpApp_Exception);
 }
 
@@ -153,37 +159,46 @@ static void unload(void)
     SysFlashReleaseCode(app.image.file);
     AppExceptionClear();
     app.state = AS_NONE;
+    app.pending = INIT_DONE;
     app.code = NULL;
     SysExceptCodeRange(NULL, 0);
     memset(&app.image, 0, sizeof app.image);
 }
 
-/* Initial values, what is kept, and fresh tasks; the application is in AS_STOP then, perhaps with an exception. It is
- * given up when its tasks cannot be created. */
+/* Initial values, what is kept, and fresh tasks. What the flash says meanwhile is that it was begun: nothing else tells
+ * of a program that ends the runtime here. */
 static RTS_RESULT initialise(bool init_retains)
 {
     RTS_RESULT result;
 
     AppExceptionClear();
     AppAreasClear();
+    app.pending = INIT_DONE;
     AppImageAttach(app.image.task_image);
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
     if (result != ERR_OK) {
         unload();
         return result;
     }
-    app.state = AS_STOP;
+    AppCommitBegin();
     if (run_function(CDL_FUNCTION_CODE_INIT, false))
         RetainPutBack();
     if (AppHasException() || !run_function(CDL_FUNCTION_GLOBAL_INIT, init_retains))
         enter_exception_state();
     RetainSettle(AppHasException());
+    AppCommitDone();
     return ERR_OK;
+}
+
+RTS_RESULT AppInitialise(void)
+{
+    RetainCapture(false); /* they may have been written meanwhile */
+    return initialise(app.pending == INIT_COLD);
 }
 
 static void run_global_exit(void)
 {
-    if (!AppHasException())
+    if (app.pending == INIT_DONE && !AppHasException())
         (void)run_function(CDL_FUNCTION_GLOBAL_EXIT, false);
 }
 
@@ -211,10 +226,13 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     }
     app.image = *image;
     app.code = code;
+    app.state = AS_STOP;
     SysExceptCodeRange(code, image->code.size);
     set_context();
-    restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until);
-    return initialise(restored != ERR_OK);
+    AppAreasClear();
+    restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until, is_proven());
+    app.pending = restored == ERR_OK ? INIT_WARM : INIT_COLD;
+    return ERR_OK;
 }
 
 /* ---- start and stop ---- */
@@ -236,13 +254,17 @@ bool AppStopTasks(void)
     return true;
 }
 
-RTS_RESULT AppStart(RTS_UI32 died_before)
+RTS_RESULT AppStart(void)
 {
-    RTS_RESULT result;
+    RTS_RESULT result = app.pending == INIT_DONE ? ERR_OK : AppInitialise();
 
+    if (result == ERR_OK && AppHasException())
+        result = ERR_EXCEPTION;
+    if (result != ERR_OK)
+        return result;
     AppPostEvent(EVT_PrepareStart);
-    (void)AppCommitSetState(app.image.file, SLOT_STARTED, (RTS_UI8)(died_before + 1));
-    app.run_since_ns = SysTimeGetNs();
+    (void)AppCommitSetState(app.image.file, SLOT_STARTED);
+    app.run_since_ms = SysTimeGetMs();
     result = IecTaskStartAll();
     if (result != ERR_OK) {
         IecTaskStopAll();
@@ -260,9 +282,11 @@ RTS_RESULT AppStartApplication(void)
     AppHandlePendingException();
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
+    if (app.pending != INIT_DONE)
+        return AppBootByHand();
     if (AppHasException())
         return ERR_INVALID_STATE;
-    return app.state == AS_RUN ? ERR_OK : AppStart(0);
+    return app.state == AS_RUN ? ERR_OK : AppStart();
 }
 
 RTS_RESULT AppStopApplication(void)
@@ -270,7 +294,7 @@ RTS_RESULT AppStopApplication(void)
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
     if (AppStopTasks() && (!AppHasException() || was_broken_off())) {
-        (void)AppCommitSetState(app.image.file, SLOT_TRIAL, 0);
+        (void)AppCommitSetState(app.image.file, SLOT_TRIAL);
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application stopped");
     }
     return ERR_OK;
@@ -278,12 +302,12 @@ RTS_RESULT AppStopApplication(void)
 
 static void check_proof(void)
 {
-    if (app.state != AS_RUN || is_proven() || SysTimeGetNs() - app.run_since_ns < PROVE_NS)
+    if (app.state != AS_RUN || is_proven() || SysTimeGetMs() - app.run_since_ms < PROVE_MS)
         return;
-    if (AppCommitSetState(app.image.file, SLOT_PROVEN, 0) == ERR_OK)
+    if (AppCommitSetState(app.image.file, SLOT_PROVEN) == ERR_OK)
         RetainKeepNone();
     else
-        app.run_since_ns = SysTimeGetNs(); /* try again later, not in every pass */
+        app.run_since_ms = SysTimeGetMs(); /* try again later, not in every pass */
 }
 
 /* ---- reset ---- */
@@ -296,6 +320,8 @@ static RTS_RESULT reset_origin(void)
         return result;
     AppUnload();
     AppAreasClear();
+    AppCommitWipe(FILE_SLOT_A);
+    AppCommitWipe(FILE_SLOT_B);
     return ERR_OK;
 }
 
@@ -316,7 +342,7 @@ RTS_RESULT AppReset(RTS_UI32 option)
     } else {
         run_global_exit();
         RetainCapture(option == RESET_OPTION_COLD);
-        result = initialise(option == RESET_OPTION_COLD);
+        result = initialise(option == RESET_OPTION_COLD || app.pending == INIT_COLD);
     }
     LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, result, "Reset %s",
            option == RESET_OPTION_WARM ? "warm" : option == RESET_OPTION_COLD ? "cold" : "origin");

@@ -64,7 +64,7 @@ static void note(RTS_UI32 task)
     }
 }
 
-void SchedNoteEvents(void)
+static RTS_NOINLINE void note_all(void)
 {
     RTS_UI32 i;
 
@@ -72,6 +72,13 @@ void SchedNoteEvents(void)
         if (triggers.tasks[i].kind == KIND_EVENT)
             note(i);
     }
+}
+
+/* In each cycle of every program, most of which have no such task. */
+void SchedNoteEvents(void)
+{
+    if (triggers.watched != 0)
+        note_all();
 }
 
 /* Events so far: a variable that is TRUE has risen once more than it fell. */

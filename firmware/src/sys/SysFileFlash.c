@@ -66,26 +66,19 @@ static bool map_files(void)
 
 #else
 
-/* Sectors of one half of the retain log: enough for the largest record, but at most an eighth of the flash. */
-static RTS_UI32 retain_half_sectors(const SYS_FLASH *flash)
-{
-    RTS_UI32 sector = flash->sector_size;
-    RTS_UI32 most = flash->size / 8 / sector;
-    RTS_UI32 wanted = (FLASH_LOG_HEAD_SIZE + APP_RETAIN_SIZE + FILE_ALIGN + sector - 1) / sector;
-
-    if (most == 0)
-        return 1;
-    return wanted < most ? wanted : most;
-}
-
-/* Both logs lie behind the slots, which share what is left. False when nothing is left for them. */
+/*
+ * Both logs lie behind the slots, which share what is left. A half of the retain log is a sixteenth of the flash and
+ * a sector. Nothing else has a say, so that firmware of other sizes finds what this one has written. False when
+ * nothing is left for the slots.
+ */
 static bool map_files(void)
 {
     const SYS_FLASH *flash = SysFlashGet();
-    RTS_UI32 commit = 2 * flash->sector_size;
-    RTS_UI32 retain = 2 * flash->sector_size * retain_half_sectors(flash);
+    RTS_UI32 sector = flash->sector_size;
+    RTS_UI32 commit = 2 * sector;
+    RTS_UI32 retain = commit * (flash->size / 16 / sector + 1);
     RTS_UI32 rest = flash->size > commit + retain ? flash->size - commit - retain : 0;
-    RTS_UI32 slot = rest / 2 / flash->sector_size * flash->sector_size;
+    RTS_UI32 slot = rest / 2 / sector * sector;
     const RTS_UI32 sizes[FILE_COUNT] = {slot, slot, commit, retain};
     RTS_UI32 offset = 0;
     RTS_UI32 i;

@@ -19,6 +19,7 @@ typedef struct {
 } RECORD_HEAD;
 
 RTS_STATIC_ASSERT(sizeof(RECORD_HEAD) == FLASH_LOG_HEAD_SIZE, record_head_size);
+RTS_STATIC_ASSERT(sizeof(FLASH_LOG) >= FILE_ALIGN, a_mark_is_the_beginning_of_a_log);
 
 enum { RECORD_MAGIC = 0x474F4C52 };
 
@@ -45,7 +46,7 @@ static RTS_UI32 half_size(const FLASH_LOG *log)
 
 static RTS_UI32 record_length(RTS_UI32 size)
 {
-    return (FLASH_LOG_HEAD_SIZE + size + FILE_ALIGN - 1) / FILE_ALIGN * FILE_ALIGN;
+    return SysFileAlign(FLASH_LOG_HEAD_SIZE + size);
 }
 
 static bool is_newer(RTS_UI32 a, RTS_UI32 b)
@@ -58,11 +59,13 @@ static RTS_UI32 head_crc(const RECORD_HEAD *head)
     return CRC32Update(0, head, offsetof(RECORD_HEAD, crc));
 }
 
-static bool data_is_valid(RTS_UI32 file, RTS_UI32 position, const RECORD_HEAD *head)
+/* ERR_OK: the record is valid. ERR_CRC_FAILED: it is not. ERR_DEVICE: who knows. */
+static RTS_RESULT check_data(RTS_UI32 file, RTS_UI32 position, const RECORD_HEAD *head)
 {
     RTS_UI32 crc = head_crc(head);
+    RTS_RESULT result = SysFileCRC32(file, position + FLASH_LOG_HEAD_SIZE, head->size, &crc);
 
-    return SysFileCRC32(file, position + FLASH_LOG_HEAD_SIZE, head->size, &crc) == ERR_OK && crc == head->crc;
+    return result == ERR_OK && crc != head->crc ? (RTS_RESULT)ERR_CRC_FAILED : result;
 }
 
 static bool is_wanted(const WANTED *wanted, const RECORD_HEAD *head)
@@ -100,10 +103,13 @@ static RTS_RESULT scan_half(const FLASH_LOG *log, RTS_UI32 start, const WANTED *
             RTS_UI32 length = record_length(head.size);
             if (offset + length > end)
                 end = offset + length;
-            if (data_is_valid(log->file, start + offset, &head)) {
+            result = check_data(log->file, start + offset, &head);
+            if (result == ERR_OK) {
                 if (is_wanted(wanted, &head))
                     note(found, &head, start + offset);
                 step = length;
+            } else if (result != ERR_CRC_FAILED) {
+                return result; /* it may be the newest: nothing is to take its number */
             }
         }
         offset += step;
@@ -240,6 +246,7 @@ static RTS_RESULT write_record(RTS_UI32 file, RTS_UI32 position, const RECORD_HE
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size)
 {
     RECORD_HEAD head = {RECORD_MAGIC, log->sequence + 1, tag, size, 0};
+    RTS_RESULT checked;
     RTS_UI32 position;
     RTS_RESULT result = log->opened;
 
@@ -254,11 +261,24 @@ RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI
     log->used += record_length(size); /* also when it fails: nothing is programmed twice */
     log->sequence++;
     result = write_record(log->file, position, &head, data);
-    if (data_is_valid(log->file, position, &head)) {
-        log->newest = position; /* whatever failed: from now on */
-        return ERR_OK;
-    }
-    return result != ERR_OK ? result : (RTS_RESULT)ERR_DEVICE;
+    checked = check_data(log->file, position, &head);
+    if (checked == ERR_OK)
+        log->newest = position; /* also when it may not survive a power cut */
+    return result != ERR_OK || checked == ERR_OK ? result : (RTS_RESULT)ERR_DEVICE;
+}
+
+RTS_RESULT FlashLogMark(FLASH_LOG *log)
+{
+    if (log->used >= half_size(log))
+        return ERR_DISK_FULL;
+    SysFileAppend(log->file, log->start + log->used);
+    log->used += FILE_ALIGN;
+    return SysFileWrite(log->file, log, FILE_ALIGN); /* whatever is not erased and starts no record */
+}
+
+bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size)
+{
+    return log->start + log->used > log->newest + record_length(size);
 }
 
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
+from typing import Protocol
 
 from plctool.core import lib
 from plctool.errors import LinkError
@@ -15,7 +16,35 @@ from plctool.link.transport import BlockTransport
 PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
 _OPEN_PATIENCE = 5.0
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
-_SCAN_TIME = 1.5
+SCAN_SECONDS = 1.5
+
+
+class MessageLink(Protocol):
+    """Whole messages to one device and back, over a line of one's own (Connection) or through a gateway."""
+
+    @property
+    def name(self) -> str:
+        """For messages: the port or address."""
+
+    @property
+    def is_open(self) -> bool: ...
+
+    @property
+    def buffer_size(self) -> int:
+        """Longest message the device takes, in bytes; 0 while no channel is open."""
+
+    @property
+    def best_size(self) -> int:
+        """Length of message that carries most for its cost, in bytes; 0 while no channel is open."""
+
+    def open(self) -> None: ...
+    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes: ...
+    def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]: ...
+    def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]: ...
+    def now(self) -> float:
+        """Monotonic time in seconds; virtual for virtual lines."""
+
+    def close(self) -> None: ...
 
 
 class Connection:
@@ -33,17 +62,22 @@ class Connection:
         self.close()
 
     @property
+    def name(self) -> str:
+        return self.transport.name
+
+    @property
     def is_open(self) -> bool:
         return self._channel is not None
 
+    def now(self) -> float:
+        return self.transport.now()
+
     @property
     def buffer_size(self) -> int:
-        """Longest message the device takes, in bytes; 0 while no channel is open."""
         return self._channel.buffer_size if self._channel else 0
 
     @property
     def best_size(self) -> int:
-        """Length of message that carries most for its cost, in bytes; 0 while no channel is open."""
         return self._channel.best_size if self._channel else 0
 
     def open(self) -> None:
@@ -73,10 +107,14 @@ class Connection:
         (reply,) = self.stream([message], patience)
         return reply
 
-    def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]:
+    def stream(
+        self, messages: Iterable[bytes], patience: float = PATIENCE, check: Callable[[], None] = lambda: None
+    ) -> Generator[bytes, None, None]:
         """Sends requests, the next one already while the device works on the one before, and yields the replies.
 
-        On a bad line there may be fewer replies than requests, but never none to the last one.
+        On a bad line there may be fewer replies than requests, but never none to the last one. When the stream is left
+        before its end the channel is closed, so that the device gets no more of it. `check` is called again and again
+        meanwhile; what it raises ends the stream.
         """
         if self._channel is None:
             raise ChannelLost("There is no connection to the device.", "closed")
@@ -87,14 +125,14 @@ class Connection:
                     channel.send(message, self.transport.now())
                 if not channel.outstanding:
                     return
-                self._run(channel, lambda: bool(channel.replies), patience)
+                self._run(channel, lambda: bool(channel.replies), patience, check)
                 while channel.replies:
                     yield channel.replies.popleft()
         finally:
             if channel.outstanding:  # left on the way: whatever is still to come is of no use
                 self._drop_channel()
 
-    def scan(self, seconds: float = _SCAN_TIME, enough: int = 0) -> list[names.Node]:
+    def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]:
         """Devices that answer a broadcast name request within `seconds`; stops early when `enough` have answered."""
         request_id = secrets.randbits(32)
         found: dict[bytes, names.Node] = {}
@@ -125,9 +163,12 @@ class Connection:
                 while self._send_next(channel):
                     pass
 
-    def _run(self, channel: Channel, done: Callable[[], bool], patience: float) -> None:
+    def _run(
+        self, channel: Channel, done: Callable[[], bool], patience: float, check: Callable[[], None] = lambda: None
+    ) -> None:
         """Moves packages until `done`. Raises ChannelLost after `patience` seconds of silence."""
         while not done():
+            check()
             sent = self._send_next(channel)
             now = self.transport.now()
             give_up = channel.give_up_at(patience)

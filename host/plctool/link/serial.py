@@ -7,6 +7,7 @@ import math
 import os
 import time
 from collections import deque
+from contextlib import suppress
 from typing import Any
 
 from plctool.errors import LinkError
@@ -34,6 +35,12 @@ class SerialTransport:
 
     def now(self) -> float:
         return time.monotonic()
+
+    def fileno(self) -> int | None:
+        """What tells by poll that the line is gone; None for a URL that has no such thing."""
+        with suppress(AttributeError, OSError):  # io.UnsupportedOperation is an OSError
+            return int(self._port.fileno())
+        return None
 
     def send(self, packet: bytes) -> None:
         try:

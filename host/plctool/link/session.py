@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -10,7 +11,7 @@ from plctool.core import lib
 from plctool.errors import DeviceError
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
-from plctool.link.connection import PATIENCE, Connection
+from plctool.link.connection import PATIENCE, MessageLink
 
 _T = TypeVar("_T")
 _TRIES = 3
@@ -33,8 +34,9 @@ class Application:
 class Session:
     """Calls services of one device. Channel and logins are made when first needed."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: MessageLink) -> None:
         self.connection = connection
+        self.logins = 0  # how often it has logged in; each needs a channel of its own
         self._id: int | None = None
         self._application: Application | None = None
 
@@ -42,45 +44,53 @@ class Session:
         self, group: int, service: int, tags: Iterable[bintag.Tag] = (), patience: float = PATIENCE
     ) -> bintag.Tags:
         """One request and its reply. Raises ChannelLost when the channel is gone, DeviceError when refused."""
-        return self._exchange(self.message(group, service, bintag.encode(tags)), patience)
+        reply = self._exchange(self.message(group, service, bintag.encode(tags)), patience)
+        if _wants_application_login(group, reply):
+            self.forget_application()
+            raise ChannelLost("Another tool took the login to the application; try again.", "closed")
+        return reply
 
     def message(self, group: int, service: int, content: bytes) -> l7.Message:
         """A request with the id of the session, which is created when there is none."""
-        self.ensure()
-        assert self._id is not None
-        return l7.Message(group, service, self._id, content)
+        return l7.Message(group, service, self.ensure(), content)
 
-    def ensure(self) -> None:
-        """Opens a channel and logs in, unless that is done."""
+    def ensure(self) -> int:
+        """Opens a channel and logs in, unless that is done. Returns the id of the session."""
         if self.connection.is_open and self._id is not None:
-            return
+            return self._id
         self._id = self._application = None
         if not self.connection.is_open:
             self.connection.open()
         self._id = self._login()
+        self.logins += 1
+        return self._id
 
     def application(self) -> Application:
         """The login to the application on the device. Raises DeviceError when there is none."""
         self.ensure()
         if self._application is None:
-            tags = self.call(lib.SG_APPLICATION, lib.SRV_APP_LOGIN, [bintag.text(lib.TAG_APP_LOGIN_NAME, _APPLICATION)])
-            content = tags.container(lib.TAG_APP_DESCRIPTOR).bytes(lib.TAG_APP_OPTION, lib.APP_LOGIN_REPLY_SIZE)
-            result = int.from_bytes(content[:2], "little")
-            if result == lib.ERR_APP_NOT_EXIST:
-                raise DeviceError("There is no application on the device; flash one first.", "app-not-exist", result)
-            l7.check_result(result, "login to the application")
-            guid = content[lib.APP_LOGIN_REPLY_SIZE - _GUID_SIZE : lib.APP_LOGIN_REPLY_SIZE]
-            self._application = Application(int.from_bytes(content[2:6], "little"), guid)
+            self._application = self._login_application()
         return self._application
 
     def forget_application(self) -> None:
         """To be called when the application on the device may have become another one."""
         self._application = None
 
+    @property
+    def application_session(self) -> int:
+        """The session number of the login to the application; 0 when there is none at present."""
+        return self._application.session if self._application else 0
+
+    def exclusive(self, purpose: str) -> AbstractContextManager[None]:
+        """Keeps other tools of this machine away from the device. `purpose`, such as "downloading app.cdl", is what
+        they are told. A line of our own has no other tools."""
+        return nullcontext()
+
     def recover(self, action: Callable[[], _T], repeatable: bool = True) -> _T:
         """Runs `action`, and again on a new channel when the channel was lost.
 
-        What is not `repeatable` is repeated only when the device had closed the channel, so did not take the request.
+        What is not `repeatable` is repeated only when the device did not take the request: its channel was closed, or
+        the application session was no longer valid.
         """
         for left in reversed(range(_TRIES)):
             ready = False
@@ -107,3 +117,20 @@ class Session:
         reply = self._exchange(request).container(lib.TAG_DEV_LOGIN_REPLY)
         l7.check_result(reply.u16(lib.TAG_DEV_LOGIN_RESULT), "login")
         return reply.u32(lib.TAG_DEV_SESSION_ID)
+
+    def _login_application(self) -> Application:
+        tags = self.call(lib.SG_APPLICATION, lib.SRV_APP_LOGIN, [bintag.text(lib.TAG_APP_LOGIN_NAME, _APPLICATION)])
+        content = tags.container(lib.TAG_APP_DESCRIPTOR).bytes(lib.TAG_APP_OPTION, lib.APP_LOGIN_REPLY_SIZE)
+        result = int.from_bytes(content[:2], "little")
+        if result == lib.ERR_APP_NOT_EXIST:
+            raise DeviceError("There is no application on the device; flash one first.", "app-not-exist", result)
+        l7.check_result(result, "login to the application")
+        guid = content[lib.APP_LOGIN_REPLY_SIZE - _GUID_SIZE : lib.APP_LOGIN_REPLY_SIZE]
+        return Application(int.from_bytes(content[2:6], "little"), guid)
+
+
+def _wants_application_login(group: int, reply: bintag.Tags) -> bool:
+    """Whether a service was refused because the application session is not valid any more."""
+    tag = {lib.SG_APPLICATION: lib.TAG_SERVICE_RESULT, lib.SG_MONITORING2: lib.TAG_MON2_ERROR}.get(group)
+    result = None if tag is None else reply.find(tag)
+    return result is not None and int.from_bytes(result, "little") == lib.ERR_APP_INVALID_SESSIONID

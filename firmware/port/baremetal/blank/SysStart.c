@@ -13,6 +13,6 @@
  * again. */
 const SYS_START *SysStartGet(void)
 {
-    static const SYS_START start = {SYS_START_UNKNOWN, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
+    static const SYS_START start = {SYS_START_UNKNOWN, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""};
     return &start;
 }

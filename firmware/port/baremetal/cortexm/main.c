@@ -7,7 +7,6 @@
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "CortexM.h"
-#include "SysStart.h"
 #include "SysTime.h"
 
 /* The communication loop may be kept from running for so long, by tasks that leave it no time. */
@@ -15,11 +14,13 @@ enum { MAIN_WATCHDOG_MS = 20000 };
 
 static void log_reset_cause(void)
 {
+    static const char *const names[RESET_CAUSE_COUNT] = {"power on", "reset pin", "software", "fault of the runtime",
+                                        "hardware watchdog"};
     const RESET_RECORD *record = ResetGet();
     if (record->cause < RESET_FATAL)
-        LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", SysStartGet()->text);
+        LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);
     else
-        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%x, CFSR 0x%x", SysStartGet()->text,
+        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%x, CFSR 0x%x", names[record->cause],
                (unsigned)record->pc, (unsigned)record->status);
 }
 

@@ -43,17 +43,17 @@ void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
         CpuBarrier();
 }
 
-/* What nobody announced may have been the reset pin, or the watchdog of a chip that does not tell. */
+/* Which reset it was, and where, main has put into the log. What nobody announced may have been the reset pin, or the
+ * watchdog of a chip that does not tell. */
 const SYS_START *SysStartGet(void)
 {
-    static const char *const texts[RESET_CAUSE_COUNT] = {"power on", "reset pin", "software", "fault of the runtime",
-                                        "hardware watchdog"};
-    static SYS_START start = {SYS_START_POWER, 0, RTSEXCPT_NOEXCEPTION, -1, APP_NO_CODE_OFFSET, ""};
+    static const SYS_START starts[] = {
+        {SYS_START_POWER, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""},
+        {SYS_START_CRASH, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""},
+        {SYS_START_UNKNOWN, 0, -1, RTSEXCPT_NOEXCEPTION, APP_NO_CODE_OFFSET, ""},
+    };
+
     if (last.cause >= RESET_FATAL)
-        start.cause = SYS_START_CRASH;
-    else if (last.cause == RESET_PIN)
-        start.cause = SYS_START_UNKNOWN;
-    if (LOG_MAX_ENTRIES > 0)
-        start.text = texts[last.cause];
-    return &start;
+        return &starts[SYS_START_CRASH];
+    return &starts[last.cause == RESET_PIN ? SYS_START_UNKNOWN : SYS_START_POWER];
 }

@@ -20,6 +20,11 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #define APP_CALL_ENTRY(entry, context) IecCall((context), 0, (uintptr_t)(entry))
 #define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((context), (init_retains), (uintptr_t)(entry))
 
+/* A crash is a reset, and the start after it decides. A board with a button that holds the boot project back has 1. */
+#ifndef APP_MAY_STAY_STOPPED
+#define APP_MAY_STAY_STOPPED 0
+#endif
+
 /* No program of a small controller takes this long for a cycle [us]: an endless loop is an exception soon. Its own
  * watchdog does not make it longer: tasks interrupt main, so nobody can talk to the device meanwhile, stop it or send
  * another program, and plctool waits 5 s for an answer. */

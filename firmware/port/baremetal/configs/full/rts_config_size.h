@@ -6,6 +6,7 @@
 #ifndef RTS_CONFIG_SIZE_H
 #define RTS_CONFIG_SIZE_H
 
+#define APP_CRASH_TEXT_SIZE 1
 #define APP_MAX_TASKS 4
 #define APP_MAX_IMPORTS 64
 #define APP_DATA_SIZE 16384

@@ -1,0 +1,448 @@
+"""A tool's end of the gateway: finds it or starts it, and looks like a connection of one's own."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import selectors
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from typing import Any
+
+from plctool.errors import DeviceError, LinkError
+from plctool.gateway.frames import (
+    AHEAD,
+    ENDING,
+    GOODBYE,
+    PROTOCOL,
+    Closed,
+    Frame,
+    FrameError,
+    Kind,
+    Pipe,
+    Reply,
+    Request,
+    document_frame,
+)
+from plctool.gateway.place import NoGateway, Place, find_holder, find_place, locked
+from plctool.link.channel import ChannelLost
+from plctool.link.connection import PATIENCE, SCAN_SECONDS
+from plctool.link.names import Node
+from plctool.link.session import Application, Session
+
+_ATTACH_PATIENCE = 30.0  # to find or start a gateway [s]
+_START_PATIENCE = 20.0  # from its start to its first word [s]
+_ANSWER_PATIENCE = 20.0  # beyond that of the request: it may have to find the device and open a channel [s]
+_SEND_PATIENCE = 10.0
+_RETRY = 0.01  # after a gateway that was just ending [s]
+
+
+class Ended(Exception):
+    """The gateway has just ended; another one may be started."""
+
+
+# ---- finding and starting ----
+
+
+def connect_gateway(port: str, baud: int, words: str) -> GatewayConnection:
+    """A connection through the gateway of a port, which is started when it does not run. `words`: what other tools are
+    told this one is.
+
+    Raises NoGateway when there can be none, LinkError when the line cannot be opened or not be shared.
+    """
+    return GatewayConnection(find_place(port), port, baud, words)
+
+
+def _attach(place: Place, baud: int, words: str) -> Pipe:
+    """Raises NoGateway, LinkError."""
+    end = time.monotonic() + _ATTACH_PATIENCE
+    while True:
+        try:
+            pipe = connect(place) or _start_once(place, baud)
+            greet(pipe, place, {"baud": baud, "tool": words})
+            return pipe
+        except Ended:
+            if time.monotonic() >= end:
+                raise _stuck(place) from None
+            time.sleep(_RETRY)
+
+
+def connect(place: Place) -> Pipe | None:
+    """None when nothing listens there, as after a gateway was killed."""
+    connected = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        connected.settimeout(_ANSWER_PATIENCE)
+        connected.connect(str(place.socket))
+    except (FileNotFoundError, ConnectionRefusedError):
+        connected.close()
+        return None
+    except TimeoutError:
+        connected.close()
+        raise _stuck(place) from None
+    except OSError as error:
+        connected.close()
+        raise NoGateway(str(error)) from error
+    return Pipe(connected)
+
+
+def _start_once(place: Place, baud: int) -> Pipe:
+    """Starts the gateway unless another tool has just done that. Raises Ended when it has ended already."""
+    try:
+        with locked(place.start_lock, _ATTACH_PATIENCE):
+            pipe = connect(place)
+            if pipe is None:
+                _start(place, baud)
+                pipe = connect(place)
+    except TimeoutError:
+        raise _stuck(place) from None
+    except OSError as error:
+        raise NoGateway(str(error)) from error
+    if pipe is None:
+        raise Ended
+    return pipe
+
+
+def _start(place: Place, baud: int) -> None:
+    """Returns when the gateway listens. Raises NoGateway when it does not start, LinkError when it cannot open the
+    line."""
+    if not sys.executable or getattr(sys, "frozen", False):
+        raise NoGateway("this program cannot start Python")
+    command = [sys.executable, "-P", "-m", "plctool.gateway", place.line, str(baud), str(place.folder)]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(os.path.abspath(p) for p in sys.path if p)}
+    with open(place.log, "wb") as log, suppress(subprocess.TimeoutExpired):
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            start_new_session=True,
+            cwd="/",
+            env=environment,
+        )
+        assert process.stdout
+        with process.stdout:
+            line = _first_line(process.stdout.fileno(), _START_PATIENCE)
+        process.wait(_START_PATIENCE)  # only what started the gateway, which is no child of ours
+    if line is None:
+        raise _stuck(place)
+    try:
+        said = json.loads(line)
+    except ValueError:
+        raise NoGateway(f"it did not start; {place.log} may say why") from None
+    if "busy" in said:
+        raise LinkError(said["busy"], "gateway-stuck")
+    if "error" in said:
+        raise LinkError(said["error"]["message"], said["error"]["code"])
+
+
+def _first_line(descriptor: int, patience: float) -> bytes | None:
+    """What comes up to the end of a line, or until the other end has closed; None when it does not come in time."""
+    end = time.monotonic() + patience
+    line = b""
+    with selectors.DefaultSelector() as selector:
+        selector.register(descriptor, selectors.EVENT_READ)
+        while not line.endswith(b"\n"):
+            if not selector.select(max(0.0, end - time.monotonic())):
+                return None
+            data = os.read(descriptor, 4096)
+            if not data:
+                break
+            line += data
+    return line
+
+
+def greet(pipe: Pipe, place: Place, hello: dict[str, Any], patience: float = _ANSWER_PATIENCE) -> None:
+    """Says who we are. Raises LinkError when the gateway takes no such tool, Ended when it ends."""
+    ask(pipe, place, document_frame(Kind.HELLO, 1, {"protocol": PROTOCOL, "pid": os.getpid(), **hello}), patience)
+
+
+def ask(pipe: Pipe, place: Place, frame: Frame, patience: float = _ANSWER_PATIENCE) -> dict[str, Any]:
+    """Asks the gateway something on a new pipe. Raises LinkError, and Ended when it ends."""
+    try:
+        with suppress(Closed):  # it may have said something before
+            pipe.send(frame, patience)
+        answer = pipe.receive(patience)
+        said = answer.document
+    except Closed:
+        pipe.close()
+        raise Ended from None
+    except (TimeoutError, FrameError):
+        pipe.close()
+        raise _stuck(place) from None
+    if answer.kind is Kind.DONE:
+        return said
+    pipe.close()
+    if answer.number == GOODBYE or said.get("code") == ENDING:
+        raise Ended
+    raise failure(said)
+
+
+def _stuck(place: Place) -> LinkError:
+    holder = find_holder(place.lock)
+    who = f" (pid {holder.pid})" if holder else ""
+    return LinkError(
+        f"The gateway of {place.line}{who} does not answer; end it with 'plctool gateway stop'.", "gateway-stuck"
+    )
+
+
+def failure(said: dict[str, Any]) -> LinkError | DeviceError:
+    """The error of a FAILED frame."""
+    message, code = str(said.get("message", "")), str(said.get("code", ""))
+    if said.get("kind") == "device":
+        return DeviceError(message, code, int(said.get("result", 0)))
+    return ChannelLost(message, code) if said.get("kind") == "channel" else LinkError(message, code)
+
+
+# ---- the connection ----
+
+
+class GatewayConnection:
+    """A MessageLink through the gateway of a line. Finds the gateway again, or starts another one, when it was lost."""
+
+    def __init__(self, place: Place, port: str, baud: int, words: str) -> None:
+        self.session = 0  # id of the device's session, while the channel is open
+        self.buffer_size = 0
+        self.best_size = 0
+        self._place = place
+        self._port = port
+        self._baud = baud
+        self._words = words
+        self._numbers = itertools.count(1)
+        self._generation: int | None = None  # of the channel; None while none is open
+        self._purpose: str | None = None  # why we keep the device to ourselves
+        self._pipe: Pipe | None = _attach(place, baud, words)
+
+    @property
+    def name(self) -> str:
+        return self._port
+
+    @property
+    def is_open(self) -> bool:
+        return self._generation is not None
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def open(self) -> None:
+        """Has a channel opened unless there is one. Raises LinkError when nobody answers."""
+        opened = self._call("open")
+        self.session, self.buffer_size = int(opened["session"]), int(opened["buffer_size"])
+        self.best_size, self._generation = int(opened["best_size"]), int(opened["generation"])
+
+    def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
+        """Sends a request and returns the reply. Raises ChannelLost when the channel is gone or the gateway ended."""
+        number = self._ask(Kind.EXCHANGE, Request(self._channel(), patience, message).encode())
+        return self._reply(self._answer(number, patience)).message
+
+    def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]:
+        """Sends requests, the next ones already while the device works, and yields the replies; see Connection."""
+        generation, source = self._channel(), iter(messages)
+        following = next(source, None)
+        if following is None:
+            return
+        number, sent, taken, ended = next(self._numbers), 0, 0, False
+        try:
+            while True:
+                while following is not None and sent < taken + AHEAD:
+                    message, following, sent = following, next(source, None), sent + 1
+                    request = Request(generation, patience, message, more=following is not None)
+                    self._ask(Kind.STREAM, request.encode(), number)
+                try:
+                    frame = self._answer(number, patience)
+                except (LinkError, DeviceError):
+                    ended = True
+                    raise
+                if ended := frame.kind is Kind.DONE:
+                    return
+                reply = self._reply(frame)
+                taken = reply.taken
+                yield reply.message
+        finally:
+            if not ended:
+                with suppress(LinkError):
+                    self._ask(Kind.CANCEL, b"", number)
+
+    def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[Node]:
+        """See Connection."""
+        nodes = self._call("scan", seconds + PATIENCE, seconds=seconds, enough=enough)["nodes"]
+        return [Node(**node | {"address": bytes.fromhex(node["address"])}) for node in nodes]
+
+    def close(self) -> None:
+        """Leaves the gateway; never raises."""
+        self._drop()
+
+    # ---- what tools share ----
+
+    def application(self) -> Application:
+        """The login to the application that all tools share. Raises DeviceError when there is none."""
+        said = self._call("application", generation=self._channel())
+        return Application(int(said["session"]), bytes.fromhex(said["data_guid"]))
+
+    def forget_application(self, session: int) -> None:
+        """Application session `session` is out of date; harmless when it is not the one in use."""
+        self._call("forget", session=session)
+
+    def others(self) -> list[tuple[str, int]]:
+        """The other tools that use the line, as their users called them, and their process numbers."""
+        return [(str(tool["tool"]), int(tool["pid"])) for tool in self._call("others")["tools"]]
+
+    @contextmanager
+    def exclusive(self, purpose: str) -> Iterator[None]:
+        """Keeps the other tools away from the device. Raises LinkError when one of them does so already."""
+        self._call("claim", purpose=purpose)
+        self._purpose = purpose  # also for another gateway, should this one be lost
+        try:
+            yield
+        finally:
+            self._purpose = None
+            with suppress(LinkError):
+                self._call("release")
+
+    # ---- frames ----
+
+    def _channel(self) -> int:
+        if self._generation is None:
+            raise ChannelLost("There is no connection to the device.", "closed")
+        return self._generation
+
+    def _call(self, op: str, patience: float = PATIENCE, **arguments: Any) -> dict[str, Any]:
+        """Asks the gateway; another one when this one was lost before it could know of it."""
+        try:
+            return self._call_once(op, patience, arguments)
+        except ChannelLost as error:
+            if self._pipe is not None or error.code != "closed":
+                raise
+            return self._call_once(op, patience, arguments)
+
+    def _call_once(self, op: str, patience: float, arguments: dict[str, Any]) -> dict[str, Any]:
+        if self._pipe is None:
+            self._attach_again()
+        number = self._ask(Kind.CALL, json.dumps({"op": op, **arguments}).encode())
+        try:
+            return self._answer(number, patience).document
+        except FrameError:
+            raise self._nonsense() from None
+
+    def _attach_again(self) -> None:
+        try:
+            self._pipe = _attach(self._place, self._baud, self._words)
+        except NoGateway as error:
+            raise LinkError(f"The gateway of {self._port} cannot be started again ({error}); try again.") from error
+        if self._purpose:
+            self._call_once("claim", PATIENCE, {"purpose": self._purpose})
+
+    def _ask(self, kind: Kind, payload: bytes, number: int = GOODBYE) -> int:
+        """Sends a request, with the number of one that has begun or a new one, which is returned."""
+        number = number or next(self._numbers)
+        if self._pipe is None:
+            raise self._not_taken()
+        try:
+            self._pipe.send(Frame(kind, number, payload), _SEND_PATIENCE)
+        except TimeoutError:
+            self._drop()
+            raise _stuck(self._place) from None
+        except FrameError:
+            raise LinkError(f"A request of {len(payload)} bytes is too long.", "too-long") from None
+        except Closed:
+            self._farewell()
+            raise self._not_taken() from None
+        return number
+
+    def _farewell(self) -> None:
+        """Raises what the gateway has said before it ended, if it has."""
+        pipe = self._pipe
+        try:
+            while pipe is not None:
+                frame = pipe.receive(0.0)
+                if frame.number == GOODBYE:
+                    raise failure(frame.document)
+        except (Closed, FrameError, TimeoutError):
+            pass
+        finally:
+            self._drop()
+
+    def _answer(self, number: int, patience: float) -> Frame:
+        """The next answer to a request. Raises what has failed."""
+        while True:
+            frame = self._next_frame(patience + _ANSWER_PATIENCE)
+            if frame.number not in (number, GOODBYE) or frame.kind is Kind.WAIT:
+                continue  # WAIT, or the rest of a stream that was broken off
+            if frame.kind is not Kind.FAILED:
+                return frame
+            if frame.number == GOODBYE:
+                self._drop()
+            try:
+                error = failure(frame.document)
+            except FrameError:
+                raise self._nonsense() from None
+            if isinstance(error, ChannelLost):
+                self._generation = None
+            raise error
+
+    def _next_frame(self, patience: float) -> Frame:
+        if self._pipe is None:
+            raise self._not_taken()
+        try:
+            return self._pipe.receive(patience)
+        except Closed:
+            self._drop()
+            raise ChannelLost(
+                f"The gateway of {self._port} ended while it worked on a request, which may have been carried out; "
+                "look, and try again.",
+                "gateway-lost",
+            ) from None
+        except TimeoutError:
+            self._drop()
+            raise _stuck(self._place) from None
+        except FrameError:
+            raise self._nonsense() from None
+
+    def _reply(self, frame: Frame) -> Reply:
+        try:
+            return Reply.decode(frame.payload)
+        except FrameError:
+            raise self._nonsense() from None
+
+    def _nonsense(self) -> LinkError:
+        self._drop()
+        return LinkError(
+            f"The gateway of {self._port} sent what plctool does not understand; end it with 'plctool gateway stop'.",
+            "gateway-protocol",
+        )
+
+    def _not_taken(self) -> ChannelLost:
+        self._drop()
+        return ChannelLost(f"The gateway of {self._port} has ended; try again.", "closed")
+
+    def _drop(self) -> None:
+        pipe, self._pipe, self._generation = self._pipe, None, None
+        if pipe:
+            pipe.close()
+
+
+class GatewaySession(Session):
+    """A session whose logins are those of the gateway."""
+
+    def __init__(self, gateway: GatewayConnection) -> None:
+        super().__init__(gateway)
+        self._gateway = gateway
+
+    def exclusive(self, purpose: str) -> AbstractContextManager[None]:
+        return self._gateway.exclusive(purpose)
+
+    def forget_application(self) -> None:
+        if session := self.application_session:
+            with suppress(LinkError):  # a gateway that is gone has forgotten everything
+                self._gateway.forget_application(session)
+        super().forget_application()
+
+    def _login(self) -> int:
+        return self._gateway.session
+
+    def _login_application(self) -> Application:
+        return self._gateway.application()
