@@ -122,7 +122,9 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     flash = command("flash", _flash, "bring an image onto a device and start it")
     _add_image(flash)
-    flash.add_argument("--no-start", action="store_true", help="leave the program stopped")
+    flash.add_argument(
+        "--no-start", action="store_true", help="leave the program stopped, until it is started or power comes back"
+    )
     flash.add_argument("--force", action="store_true", help="also when the device has this image already")
     _add_link(flash)
 
@@ -391,8 +393,8 @@ def _flash(args: argparse.Namespace) -> int:
         "seconds": round(result.seconds, 3),
         "skipped": result.skipped,
         "state": str(result.state),
-        "persistent": None if result.persistent is None else vars(result.persistent),
         "others": [vars(other) for other in others],
+        "persistent": None if result.persistent is None else vars(result.persistent),
     }
 
     def text(d: dict[str, Any]) -> str:

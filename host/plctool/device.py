@@ -382,7 +382,7 @@ class Plc:
     ) -> Iterator[tuple[float, Reading]]:
         """Reads again and again: yields seconds since the first reading, and what was read. Endless without `count`.
 
-        Pointers are followed anew each time; what is behind one that leads to no variable is None then. While another
+        Pointers are followed anew each time; a value whose pointer leads to no variable is None. While another
         tool downloads a program there are no readings; `waiting` is called with the reason at the begin of that.
         """
         begin = time.monotonic()

@@ -194,12 +194,11 @@ static void several_tasks_may_write_and_several_answer(void)
     (void)add(KIND_FREEWHEELING, 20, change1);
     start();
     CHECK(reaches(&app.rises[0], app.enough));
-    sleep_ms(20);
+    CHECK(reaches(&app.runs[0], 1));
+    CHECK(reaches(&app.runs[1], 1));
     IecTaskStopAll();
-    /* Which of the rises the other task has undone is not known, but both answer the same ones. */
-    CHECK(app.runs[0] > 0);
-    CHECK(app.runs[0] + lost_by(0) >= app.runs[1] + lost_by(1) - 1);
-    CHECK(app.runs[0] + lost_by(0) <= app.runs[1] + lost_by(1) + 1);
+    /* How many of the rises each sees is not known: the other writer may undo one between the two looks at it. */
+    CHECK(app.rises[0] >= app.enough);
 }
 
 enum { POSTERS = 3, POSTS = 2000 };

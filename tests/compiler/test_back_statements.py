@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
-from plctool.compiler.codegen.ranges import type_range
+from plctool.compiler.ranges import type_range
 from plctool.compiler.typed import (
     AddressOf,
     Assign,

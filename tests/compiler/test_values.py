@@ -173,6 +173,31 @@ def test_enums_are_shown_by_name() -> None:
     assert decode(COLOUR, b"\x09\x00") == 9
 
 
+@pytest.mark.parametrize("value", [7, "7", "16#07", "Colour#7", "Purple", -1, [0, 7], {"x": 7}, True])
+def test_what_an_enumeration_has_not_is_refused(value: object) -> None:
+    """The program would not know what to do with it: no branch of a CASE is for it."""
+    t: Type = COLOUR
+    if isinstance(value, list):
+        t = ArrayType(COLOUR, ((0, 1),))
+    elif isinstance(value, dict):
+        t = laid_out(StructType("Painted", [Field("x", COLOUR)]))
+    with pytest.raises(
+        UsageError, match=r"is not a value of Colour; choose one of Red \(0\), Green \(5\), Blue \(6\)\."
+    ):
+        encode(t, value)
+
+
+@pytest.mark.parametrize("value", [5, "5", "16#05", "Green", "green", "Colour#Green", "Colour.Green"])
+def test_an_enumeration_takes_its_values_by_name_and_number(value: object) -> None:
+    assert encode(COLOUR, value) == b"\5\0"
+
+
+def test_a_message_does_not_list_hundreds_of_values() -> None:
+    many = EnumType("Many", INT, {f"v{n}": n for n in range(500)})
+    with pytest.raises(UsageError, match=r"v11 \(11\), \.\.\.\.$"):
+        encode(many, 700)
+
+
 # ---- as ST writes them ----
 
 SCALARS = [BOOL, SINT, INT, UDINT, WORD, LWORD, REAL, LREAL, TIME, LTIME, DATE, TOD, DT, LDT, CHAR, WCHAR]
@@ -199,6 +224,8 @@ def test_what_is_shown_can_be_typed(t: Type) -> None:
     def check(data: bytes) -> None:
         if isinstance(t, PointerType):
             data = bytes(t.size)
+        if isinstance(t, EnumType):
+            data = encode(t, list(t.values)[data[0] % len(t.values)])
         text = literal(t, decode(t, data))
         assert literal(t, decode(t, encode(t, parse_value(t, text)))) == text
 

@@ -93,7 +93,7 @@ def test_what_is_no_request_ends_the_connection(served: Served, sent: bytes, eve
     eventually(lambda: served.gateway.tools() == [])
 
 
-def test_half_a_frame_keeps_nobody_waiting(served: Served) -> None:
+def test_half_a_frame_keeps_no_other_tool_waiting(served: Served) -> None:
     half = raw(served, HELLO + encode(Frame(Kind.EXCHANGE, 2, bytes(50)))[:-1])
     assert served.connect().read("Main.count") == 0
     half.close()
@@ -129,7 +129,7 @@ def test_a_flood_of_requests_is_answered_in_turn_with_the_others(served: Served)
     assert [flooding.receive(PATIENCE).number for _ in range(2, 200)] == list(range(2, 200))
 
 
-def test_one_that_does_not_read_is_dropped_and_keeps_nobody_waiting(
+def test_one_that_does_not_read_is_dropped_and_keeps_no_other_waiting(
     served: Served, monkeypatch: pytest.MonkeyPatch, eventually: Eventually
 ) -> None:
     monkeypatch.setattr(server, "_SEND_PATIENCE", 0.05)

@@ -214,7 +214,7 @@ def test_the_image_arrives_whole_in_a_download_through_the_gateway(served: Serve
 
 
 def test_a_download_below_the_command_keeps_others_away_too(served: Served) -> None:
-    """Whoever uses the services directly claims nothing."""
+    """A program that uses the services directly claims nothing."""
     image = make_application("4", 200_000)[0]
     plc, other = served.connect(), served.connect()
     refused: list[LinkError] = []

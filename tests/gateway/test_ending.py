@@ -50,7 +50,7 @@ def test_a_line_that_is_lost_is_told_to_every_tool(served: Served, eventually: E
         second.read("Main.count")
 
 
-def test_tools_are_told_that_it_was_ended_by_somebody(served: Served, eventually: Eventually) -> None:
+def test_tools_are_told_that_it_was_ended_by_command(served: Served, eventually: Eventually) -> None:
     tool, asking = served.connect(), served.guest(asks_only=True, tool="plctool gateway")
     tool.read("Main.count")
     asking.send(document_frame(Kind.CALL, 2, {"op": "stop"}), PATIENCE)

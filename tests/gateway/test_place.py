@@ -78,6 +78,7 @@ def test_a_system_without_local_sockets_has_no_gateway(monkeypatch: pytest.Monke
     monkeypatch.delattr(socket, "AF_UNIX")
     with pytest.raises(NoGateway):
         find_place("/dev/ttyS0")
+    assert running() == []
 
 
 def test_who_holds_a_lock_is_known_as_long_as_it_is_held(runtime: Path) -> None:

@@ -73,8 +73,8 @@
 #define PORT_IDLE_MS 10
 
 /* When the process that runs the controller dies, it is started again at once; when it dies again without having run a
- * program or lived for PORT_LIFE_MS, after PORT_RESTART_MS, twice that and so on [ms]; in vain so many times in a row,
- * plcrt ends. */
+ * program or lived for PORT_LIFE_MS, after PORT_RESTART_MS, twice that and so on [ms]; after so many deaths in a row plcrt
+ * ends, unless the last one came from outside (SIGKILL). */
 #define PORT_RESTART_MS 250
 #define PORT_LIFE_MS 10000
 #define PORT_MAX_FAILURES 6

@@ -54,6 +54,13 @@ const COMMIT *AppCommitGet(void)
     return &state.commit;
 }
 
+bool AppCommitIsProven(RTS_UI32 slot)
+{
+    RTS_UI8 state = AppCommitGet()->state[slot];
+
+    return state == SLOT_PROVEN || state == SLOT_HALTED;
+}
+
 bool AppCommitIsDead(void)
 {
     RTS_UI8 active = state.commit.active;

@@ -28,10 +28,11 @@ static RTS_NOINLINE RTS_RESULT take_over(RTS_UI32 slot)
     return result == ERR_OK ? RetainLoad(&image.kept, before->crc, range) : result;
 }
 
-RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_until, bool proven)
+RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_until)
 {
     const COMMIT_SLOT *slot = &AppCommitGet()->slot[image->file];
     const FLASH_LOG_RANGE range = {slot->retain_after, retain_until};
+    bool proven = AppCommitIsProven(image->file);
     RTS_RESULT result;
 
     if (APP_RETAIN_SIZE == 0)

@@ -12,9 +12,9 @@
 
 /*
  * Finds where the retain variables of an image, in the area at `area`, come from: its own record up to number
- * `retain_until`, or the PERSISTENT ones of the application before, to which the device may go back unless this one has
- * `proven` itself. ERR_OK: all of them are kept. The image stays where it is until RetainDetach.
+ * `retain_until`, or the PERSISTENT ones of the application before. ERR_OK: all of them are kept. The image stays where
+ * it is until RetainDetach.
  */
-RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_until, bool proven);
+RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_until);
 
 #endif

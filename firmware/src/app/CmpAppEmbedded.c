@@ -67,9 +67,7 @@ static bool was_broken_off(void)
 
 static bool is_proven(void)
 {
-    RTS_UI8 state = AppCommitGet()->state[app.image.file];
-
-    return state == SLOT_PROVEN || state == SLOT_HALTED;
+    return AppCommitIsProven(app.image.file);
 }
 
 /* ---- exceptions ---- */
@@ -230,7 +228,7 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     SysExceptCodeRange(code, image->code.size);
     set_context();
     AppAreasClear();
-    restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until, is_proven());
+    restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until);
     app.pending = restored == ERR_OK ? INIT_WARM : INIT_COLD;
     return ERR_OK;
 }

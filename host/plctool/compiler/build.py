@@ -17,6 +17,7 @@ from plctool.compiler.garbage import no_collection
 from plctool.compiler.kept import kept_parts, kept_variables
 from plctool.compiler.nesting import room_for_nesting
 from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
+from plctool.compiler.types import base_of
 from plctool.core import lib
 from plctool.files import write_atomically
 from plctool.image import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image
@@ -137,7 +138,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         list(files),
         program.aliases,
         _classes(program),
-        {name: constant_symbol(name, c.type, encode(c.type, c.value)) for name, c in program.constants.items()},
+        {n: constant_symbol(n, c.type, encode(base_of(c.type), c.value)) for n, c in program.constants.items()},
         linked.debug,
     )
 

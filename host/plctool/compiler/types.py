@@ -100,6 +100,7 @@ ELEMENTARY: dict[str, Elementary] = {
 """By name, in capitals; a type may have several names. The last six are integers as wide as a pointer in memory."""
 
 DEFAULT_STRING_LENGTH = 80
+MAX_CHOICES = 12  # values of an enumeration that a message lists
 MAX_SIZE = 0x7FFF_FFFF  # of a variable and of an area; offsets are signed 32-bit numbers on the targets
 
 
@@ -143,6 +144,12 @@ class EnumType(Type):
     name: str
     base: Elementary
     values: dict[str, int]  # in order of declaration, names as declared
+
+    @property
+    def choices(self) -> str:
+        """`Red (0), Green (1)`: what there is, for messages."""
+        shown = [f"{name} ({value})" for name, value in list(self.values.items())[:MAX_CHOICES]]
+        return ", ".join(shown) + ", ..." * (len(self.values) > MAX_CHOICES)
 
     @property
     def size(self) -> int:

@@ -34,7 +34,7 @@ def main(arguments: list[str]) -> int:
             os.write(lock, f"{os.getpid()} {line}".encode(errors="surrogateescape"))
             _serve(place, int(baud))
     except TimeoutError:
-        _say({"busy": f"The gateway of {line} that runs already takes no tools; end it with 'plctool gateway stop'."})
+        _say({"busy": f"The gateway of {line} that is running takes no tools; end it with 'plctool gateway stop'."})
     except PlcError as error:
         _say({"error": {"code": error.code, "message": error.message}})
     return 0
@@ -55,7 +55,7 @@ def _serve(place: Place, baud: int) -> None:
     try:
         gateway.run()
     finally:
-        # The name goes first: who comes now starts a gateway of his own, and that waits until the line is free.
+        # The name goes first: a tool that comes now starts another gateway, which waits until the line is free.
         with suppress(OSError):
             place.socket.unlink()
         gateway.end()

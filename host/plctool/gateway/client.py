@@ -229,7 +229,7 @@ class GatewayConnection:
         return time.monotonic()
 
     def open(self) -> None:
-        """Has a channel opened unless there is one. Raises LinkError when nobody answers."""
+        """Has a channel opened unless there is one. Raises LinkError when no device answers."""
         opened = self._call("open")
         self.session, self.buffer_size = int(opened["session"]), int(opened["buffer_size"])
         self.best_size, self._generation = int(opened["best_size"]), int(opened["generation"])

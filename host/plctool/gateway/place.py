@@ -22,7 +22,7 @@ _LOCK_POLL = 0.005  # seconds
 
 
 class NoGateway(Exception):
-    """A gateway is not possible here; its text says why. The line is used directly then."""
+    """A gateway is not possible here; the message says why. The line is used directly then."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,6 @@ class Place:
 
 def find_place(port: str) -> Place:
     """The place of the line that a port's name means. Raises NoGateway when there can be no gateway for it."""
-    if not hasattr(socket, "AF_UNIX") or sys.platform == "win32":
-        raise NoGateway("this system has no local sockets")
     if "://" in port:
         raise NoGateway("only ports of this machine have a gateway")
     return Place(runtime_folder(), os.path.realpath(port))
@@ -67,6 +65,8 @@ def find_place(port: str) -> Place:
 
 def runtime_folder() -> Path:
     """A folder that is ours alone, made when it is missing. Raises NoGateway."""
+    if not hasattr(socket, "AF_UNIX") or sys.platform == "win32":
+        raise NoGateway("this system has no local sockets")
     failure = "no folder for it"
     for base, name in _bases():
         folder = base / name
@@ -95,7 +95,7 @@ def _bases() -> Iterator[tuple[Path, str]]:
 
 
 def _check_ours(folder: Path) -> None:
-    """Nobody else may put a socket there that takes our programs."""
+    """No other user may put a socket there that takes our programs."""
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid() or status.st_mode & 0o077:
         raise NoGateway(f"{folder} is not a folder of this user alone (mode 0700)")

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from plctool.compiler.codegen.analysis import Effects
+from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_body import write_body, write_calls
 from plctool.compiler.codegen.lower_classes import write_dispatcher
-from plctool.compiler.codegen.lower_frame import Body, Frame, Ref, string_capacity
+from plctool.compiler.codegen.lower_frame import TAGGED_AREAS, Body, Frame, Ref, string_capacity
 from plctool.compiler.codegen.lower_helpers import MEMORY_FUNCTIONS, memory_functions, string_helper
 from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
 from plctool.compiler.codegen.partition import texts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import handed_inputs, parameter_list
-from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
+from plctool.compiler.typed import Area, External, Pou, Task, TypedProgram, Variable
 from plctool.compiler.types import BOOL, is_scalar
 from plctool.core import lib
 
@@ -99,8 +99,13 @@ def _code_init(unit: Unit, variables: list[Variable]) -> None:
     """Gives all variables their constant initial values; what is kept is put back afterwards, by the runtime."""
     fn = Function(f"void @{CODE_INIT}(ptr noalias nonnull readonly %ctx)", unit.plain)
     frame = Frame(unit, fn, None)
+    overwriting = _overwriting(variables)
     for var in variables:
-        ref = Ref(frame.area_base(var.area), var.offset, var.type, direct=True, capacity=string_capacity(var.type))
+        bit = -1 if var.bit is None else var.bit
+        base, capacity = frame.area_base(var.area), string_capacity(var.type)
+        ref = Ref(base, var.offset, var.type, direct=True, capacity=capacity, bit=bit)
+        if var in overwriting:
+            frame.clear(ref)
         initialise(frame, ref, var.initial)
     fn.terminate("ret void")
     unit.module.add(CODE_INIT, fn, linkage="")
@@ -122,6 +127,20 @@ def _global_exit(unit: Unit, shutdown: Pou) -> None:
     fn.do(f"call void @{unit.symbol(shutdown)}(ptr %ctx) noinline")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_EXIT, fn, linkage="")
+
+
+def _overwriting(variables: list[Variable]) -> set[Variable]:
+    """Variables at addresses (AT) with initial values, where one before them has put its own: zeros count there."""
+    found = set()
+    written: set[tuple[Area, int]] = set()
+    for var in variables:
+        if var.area in TAGGED_AREAS or var.initial is None:
+            continue
+        own = {(var.area, var.offset + i) for i in range(var.type.size)}
+        if own & written:
+            found.add(var)
+        written |= own
+    return found
 
 
 def _struct_initialisers(unit: Unit) -> None:

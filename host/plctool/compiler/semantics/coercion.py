@@ -22,6 +22,8 @@ from plctool.compiler.semantics.conversions import (
     scaled,
     time_to_ltime,
 )
+from plctool.compiler.semantics.divisions import lost_fraction
+from plctool.compiler.semantics.overlays import overlays
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.syntax.literals import BitPattern
 from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Const, Convert, Expr, Load, Pos
@@ -167,7 +169,7 @@ class Coercion:
         if isinstance(e, Const):
             assert isinstance(e.value, int)
             if e.value not in target.values.values():
-                return self._error(e.pos, "range", f"{e.value} is no value of {target}")
+                return self._error(e.pos, "range", f"{e.value} is no value of {target}; it has {target.choices}")
             name = constants.describe(e.value, target)
             self._warn(e.pos, "enum", f"the number {e.value} stands for a value of {target}; write {target}#{name}")
             return Const(e.value, target, e.pos)
@@ -209,7 +211,9 @@ class Coercion:
         if isinstance(e.type, PointerType) and isinstance(target, PointerType):
             if isinstance(e.type, InterfaceType):
                 return self._mismatch(e, target)
-            if not isinstance(e, AddressOf) and BYTE not in (e.type.target, target.target):
+            if isinstance(e, AddressOf):
+                self._address(e, target)
+            elif BYTE not in (e.type.target, target.target):
                 self._warn(e.pos, "pointer", f"{e.type} becomes {target}: it points to something else")
             return replace(e, type=target)
         number = elementary(e.type if isinstance(target, PointerType) else target)
@@ -218,6 +222,15 @@ class Coercion:
         if number.bits < 64:
             self._warn(e.pos, "narrowing", f"a pointer has 64 bits, {number} {number.bits}; use LWORD")
         return convert(e, target)
+
+    def _address(self, e: AddressOf, target: PointerType) -> None:
+        """The address of a variable as a pointer to something else. To look at it as bits, or as a part it begins with,
+        is what such pointers are for."""
+        found, wanted = e.place.type, target.target
+        if not overlays(found, wanted):
+            message = f"what {target} points to is read as {wanted}, but this is {found}"
+            message = f"{message}; declare POINTER TO {found}, or convert the value"
+            self._warn(e.pos, "pointer", message)
 
     def _to_interface(self, e: Expr, target: InterfaceType) -> Expr:
         """The address of an instance, or what another interface variable holds."""
@@ -283,6 +296,9 @@ class Coercion:
             e = convert(e, source)
         if source.kind is not Kind.INT:
             return self._needs(e, source.name, target.name)
-        if source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
+        lost = lost_fraction(e, target)
+        if lost:
+            self._warn(e.pos, "integer-division", lost)
+        elif source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
             self._warn(e.pos, "precision", f"{e.type} becomes {target}: large values are rounded")
         return convert(e, target)

@@ -14,6 +14,7 @@ from typing import Any
 from plctool.compiler.kept import is_kept
 from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, finalisers, initialisers, instances_in
 from plctool.compiler.semantics.symbols import Member
+from plctool.compiler.semantics.values import whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.typed import (
     AddressOf,
@@ -114,7 +115,7 @@ class _Construction:
     def variable(self, variable: Variable) -> list[Statement]:
         """What a variable and all instances in it need."""
         keep = variable.keep if variable.area is Area.RETAIN else None
-        return self._place(VarPlace(variable, variable.type, variable.pos), variable.initial, variable.pos, keep)
+        return self._place(whole(variable, variable.pos), variable.initial, variable.pos, keep)
 
     def _needs(self, t: Type) -> bool:
         while isinstance(t, ArrayType):

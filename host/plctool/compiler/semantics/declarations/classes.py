@@ -260,7 +260,8 @@ class Classes:
         if not member.abstract:
             self._world.bodies.add(scope, decl)
         elif decl.body:
-            scope.error(decl.pos, "inheritance", f"{member.name} has no body, because it is ABSTRACT")
+            reason = "belongs to an INTERFACE" if cls.is_interface else "is ABSTRACT"
+            scope.error(decl.pos, "inheritance", f"{member.name} has no body, because it {reason}")
         return info
 
     def declare_members(self) -> None:

@@ -69,8 +69,12 @@ class TypeDeclarations:
 
     # ---- declaration lines ----
 
-    def declared_type(self, decl: ast.VarDecl, scope: Scope, may: May = May.BE_PLAIN) -> tuple[Type, Initial | None]:
-        """Type and initial value of a declaration line; None for all zero."""
+    def declared_type(
+        self, decl: ast.VarDecl, scope: Scope, may: May = May.BE_PLAIN, *, overrides: bool = False
+    ) -> tuple[Type, Initial | None]:
+        """Type and initial value of a declaration line; None for all zero, unless it says 0 where memory may hold
+        something else: it lies at an address, or `overrides` another initial value."""
+        overrides = overrides or decl.location is not None
         self._check_extras(decl, may, scope)
         spec, init = self._with_arguments(decl, scope)
         if isinstance(spec, ast.ArraySpec) and None in spec.bounds and May.BE_OPEN_ARRAY in may:
@@ -81,8 +85,10 @@ class TypeDeclarations:
         if init is None or t is ERROR:
             return t, default
         given = self._initials.initial(init, t, scope)
-        if given is None or (default is None and given == ScalarInit(0) and str(given.value) != "-0.0"):
-            return t, default if given is None else None
+        if given is None:
+            return t, default
+        if default is None and not overrides and given == ScalarInit(0) and str(given.value) != "-0.0":
+            return t, None
         return t, overlay(given, default)
 
     def _with_arguments(self, decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:

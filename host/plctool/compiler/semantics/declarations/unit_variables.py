@@ -32,7 +32,7 @@ _KEEPING = {
 
 def _holds_constants(block: ast.VarBlock) -> bool:
     """Whether what a block declares has one value for ever. CONSTANT parameters are only read-only."""
-    return "CONSTANT" in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL")
+    return "CONSTANT" in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL", "VAR_INST")
 
 
 def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.VarDecl, Role]]:

@@ -209,7 +209,7 @@ def referenced_place(
         place = changeable_place(c, node, f"{what} {name}", f"be given to {what} {name}")
     if place is None:
         return None
-    if isinstance(place, BitPlace):
+    if isinstance(place, BitPlace) and not output:
         c.error(node.pos, "type", f"a single bit has no address, so it cannot be given to {what} {name}")
         return None
     if isinstance(place.type, StringType) and isinstance(t, StringType):
