@@ -141,6 +141,7 @@ static RTS_RESULT read_record(void)
 
     if (HAS_CAUSE && result == ERR_OK) {
         state.commit = record.commit;
+        record.text[sizeof record.text - 1] = '\0'; /* whatever the flash holds */
         if (AppCommitIsDead())
             AppExceptionSet(&record.exception, record.text);
     }
