@@ -42,11 +42,12 @@ RTS_UI32 RetainGetSequence(void);
 
 /* The source is the newest record in the range of the application whose checked table is `table`: this one's, all of
  * whose values are kept, or that of the application before, of which PERSISTENT values are kept where name and type are
- * as they were. ERR_NO_OBJECT: there is none. */
+ * as they were. Those of its own are in the area at once, which is zero, for who looks at an application that waits.
+ * ERR_NO_OBJECT: there is none. */
 RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range);
 
-/* The source is what the variables are now: those of a record too, which the area has until then; a cold reset keeps PERSISTENT ones only. After an initialisation that
- * failed the source is the same as then. */
+/* The source is what the variables are now; a cold reset keeps PERSISTENT ones only. While there are none, and after an
+ * initialisation that failed, the source stays the same. */
 void RetainCapture(bool cold);
 
 /* Puts the values back; the area has its initial values. */

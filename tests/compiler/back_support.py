@@ -197,5 +197,9 @@ class Running:
 
     def __setitem__(self, name: str, value: Any) -> None:
         symbol = self.built.symbols.resolve(f"Main.{name}")
-        data = symbol.encode(value)
-        ctypes.memmove(self.context.area[symbol.area] + symbol.offset, data, len(data))
+        change = symbol.change(value)
+        place = symbol.offset + change.offset
+        data = change.data
+        if change.mask != 0xFF:
+            data = bytes([(self.memory(symbol.area, place, 1)[0] & ~change.mask) | data[0]])
+        ctypes.memmove(self.context.area[symbol.area] + place, data, len(data))

@@ -73,16 +73,6 @@ RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot)
     return slot == FILE_SLOT_A ? FILE_SLOT_B : FILE_SLOT_A;
 }
 
-bool AppCommitHasGood(RTS_UI32 slot)
-{
-    return state.commit.state[slot] != SLOT_EMPTY && state.commit.state[slot] != SLOT_FAILED;
-}
-
-bool AppCommitCanGoBack(RTS_UI32 slot)
-{
-    return state.commit.state[slot] == SLOT_FAILED && AppCommitHasGood(AppCommitOtherSlot(slot));
-}
-
 void AppCommitWipe(RTS_UI32 slot)
 {
     (void)SysFileErase(slot, 0, SysFlashGet()->sector_size);
@@ -151,18 +141,11 @@ static RTS_RESULT read_record(void)
 
     if (HAS_CAUSE && result == ERR_OK) {
         state.commit = record.commit;
+        record.text[sizeof record.text - 1] = '\0'; /* whatever the flash holds */
         if (AppCommitIsDead())
             AppExceptionSet(&record.exception, record.text);
     }
     return result;
-}
-
-/* `number`: of the newest seal, which counts no more. */
-static void forget_programs(RTS_UI32 number)
-{
-    memset(&state.commit, 0, sizeof state.commit);
-    state.commit.active = SLOT_NONE;
-    state.commit.number = number;
 }
 
 /* Without a record of ours the seals are all there is. */
@@ -174,22 +157,29 @@ static void report_loss(void)
         LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT, "No commit record: the newest program is taken");
 }
 
+static void forget_record(void)
+{
+    memset(&state.commit, 0, sizeof state.commit);
+    state.commit.active = SLOT_NONE;
+}
+
 void AppCommitOpen(void)
 {
     RTS_RESULT result = FlashLogOpen(&state.log, FILE_COMMIT);
 
-    CMP_CLEAR(state.commit);
-    state.commit.active = SLOT_NONE;
+    forget_record();
     if (result == ERR_OK)
         result = read_record();
+    if (result == ERR_OK && state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE) {
+        forget_record(); /* not one of ours: the seals count */
+        result = ERR_NO_OBJECT;
+    }
     if (result == ERR_OK && FlashLogIsMarked(&state.log, RECORD_SIZE))
         state.commit.begun = 0;
     if (result != ERR_OK && result != ERR_NO_OBJECT) {
         state.log.opened = result;
         return;
     }
-    if (state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE)
-        forget_programs(0); /* not a record of ours, whatever its CRC */
     take_seals();
     if (result != ERR_OK)
         report_loss();
@@ -217,7 +207,10 @@ static RTS_RESULT write_record(const char *text)
 
 RTS_RESULT AppCommitErase(void)
 {
-    forget_programs(state.commit.number);
+    RTS_UI32 number = state.commit.number;
+
+    forget_record();
+    state.commit.number = number;
     return write_record("");
 }
 
@@ -245,7 +238,7 @@ RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 changed)
         return ERR_OK;
     state.commit.state[slot] = changed;
     result = write_record("");
-    if (result != ERR_OK && changed != SLOT_FAILED)
+    if (result != ERR_OK)
         state.commit.state[slot] = before; /* tried again */
     return result;
 }

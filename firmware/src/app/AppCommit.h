@@ -59,10 +59,6 @@ bool AppCommitIsDead(void);
 /* The slot that is not `slot`; of SLOT_NONE the first. */
 RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
 
-/* Whether a slot has an image that did not fail; and whether that of `slot` did, and the other slot has one. */
-bool AppCommitHasGood(RTS_UI32 slot);
-bool AppCommitCanGoBack(RTS_UI32 slot);
-
 /* Seals the image in `slot`, whose file ends with it: from now on it is what boots, a trial. On ERR_DEVICE what was
  * before still is, and the image is given up. */
 RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after);

@@ -20,27 +20,30 @@ static struct {
     RTS_UI32 crc;
 } download;
 
-/* Where an image goes: not where what boots is, unless that has failed and the other slot has one to go back to, which
- * is then the last good one. */
-static RTS_UI32 choose_slot(void)
+/* An application that failed gives way to the one before it now, or that one would be overwritten though it is the
+ * newest that runs. */
+static void leave_failed_application(void)
 {
-    RTS_UI32 loaded = AppGetSlot();
-    RTS_UI32 boots = loaded != SLOT_NONE ? loaded : AppCommitGet()->active;
+    const COMMIT *commit = AppCommitGet();
 
-    return boots < SLOT_COUNT && AppCommitCanGoBack(boots) ? boots : AppCommitOtherSlot(boots);
+    if (commit->active == SLOT_NONE || commit->state[commit->active] != SLOT_FAILED ||
+        !AppCanRollBack(commit->active))
+        return;
+    AppUnload();
+    (void)AppRollBack(commit->active);
 }
 
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
 {
-    RTS_UI32 slot = choose_slot();
+    RTS_UI32 slot;
 
     AppDownloadAbort();
     if (AppCommitResult() != ERR_OK)
         return ERR_DEVICE; /* what is worth keeping is not known */
+    leave_failed_application();
+    slot = AppCommitOtherSlot(AppGetSlot() != SLOT_NONE ? AppGetSlot() : AppCommitGet()->active);
     if (total_size > SysFileGetArea(slot)->size - FILE_ALIGN) /* the seal follows */
         return ERR_NOMEMORY;
-    if (slot == AppGetSlot())
-        AppUnload(); /* its code may run where it lies */
     download.open = true;
     download.slot = slot;
     download.size = total_size;

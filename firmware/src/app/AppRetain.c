@@ -32,16 +32,17 @@ RTS_RESULT AppRetainLoad(const APP_IMAGE *image, RTS_UI8 *area, RTS_UI32 retain_
 {
     const COMMIT_SLOT *slot = &AppCommitGet()->slot[image->file];
     const FLASH_LOG_RANGE range = {slot->retain_after, retain_until};
+    bool proven = AppCommitIsProven(image->file);
     RTS_RESULT result;
 
     if (APP_RETAIN_SIZE == 0)
         return ERR_NO_OBJECT;
     RetainAttach(area, &image->kept, image->crc);
     result = RetainLoad(&image->kept, image->crc, range);
-    if (result != ERR_OK && (image->kept.size > 0 || !AppCommitIsProven(image->file)) && take_over(image->file) != ERR_OK &&
+    if (result != ERR_OK && (image->kept.size > 0 || !proven) && take_over(image->file) != ERR_OK &&
         image->kept.size > 0 && retain_until != slot->retain_after)
         LogAdd(CMPID_CmpRetain, LOG_WARNING, result, "No saved retain variables fit the application: initial values");
-    if (AppCommitIsProven(image->file))
+    if (proven)
         RetainKeepNone();
     else
         RetainKeep(slot->retain_after);

@@ -190,7 +190,7 @@ static RTS_RESULT initialise(bool init_retains)
 
 RTS_RESULT AppInitialise(void)
 {
-    RetainCapture(false);
+    RetainCapture(false); /* they may have been written meanwhile */
     return initialise(app.pending == INIT_COLD);
 }
 
@@ -227,6 +227,7 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     app.state = AS_STOP;
     SysExceptCodeRange(code, image->code.size);
     set_context();
+    AppAreasClear();
     restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until);
     app.pending = restored == ERR_OK ? INIT_WARM : INIT_COLD;
     return ERR_OK;

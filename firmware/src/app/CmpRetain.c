@@ -31,7 +31,6 @@ static struct {
     RETAIN_TABLE source; /* of the values in `saved_area` to begin with; size 0: there are none */
     bool persistent_only;
     bool settled;     /* the variables have come through an initialisation */
-    bool shown;       /* they have not, but the area has the values of the record, to be looked at and corrected */
     bool saved_valid; /* `saved_area` is what flash holds */
     bool asked;       /* for a copy between two cycles */
 } kept;
@@ -78,28 +77,6 @@ RTS_UI32 RetainGetSequence(void)
     return HAS_RETAIN ? retain.log.sequence : 0;
 }
 
-RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range)
-{
-    RTS_RESULT result;
-
-    if (!HAS_RETAIN)
-        return ERR_NO_OBJECT;
-    if ((RTS_I32)(range.after - retain.log.sequence) > 0)
-        retain.log.sequence = range.after; /* the log was lost: what is saved from now on shall count */
-    if (table->size == 0)
-        return ERR_NO_OBJECT;
-    result = FlashLogRead(&retain.log, range, tag, saved_area, table->area_size);
-    if (result != ERR_OK)
-        return result;
-    kept.source = *table;
-    kept.persistent_only = is_of_application_before();
-    kept.saved_valid = !kept.persistent_only;
-    kept.shown = kept.saved_valid;
-    if (kept.shown)
-        memcpy(retain.area, saved_area, table->area_size);
-    return ERR_OK;
-}
-
 static bool is_saved(void)
 {
     return kept.saved_valid && memcmp(saved_area, retain.area, kept.table->area_size) == 0;
@@ -115,12 +92,11 @@ void RetainCapture(bool cold)
 {
     if (!HAS_RETAIN)
         return;
-    if (kept.settled || kept.shown) {
+    if (kept.settled) {
         copy();
         kept.source = *kept.table;
         kept.persistent_only = false;
         kept.settled = false;
-        kept.shown = false;
     }
     kept.persistent_only = kept.persistent_only || cold;
 }
@@ -193,6 +169,30 @@ static unsigned take_all(QUERY *query, unsigned *dropped)
     return taken;
 }
 
+RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range)
+{
+    unsigned dropped;
+    RTS_RESULT result;
+
+    if (!HAS_RETAIN)
+        return ERR_NO_OBJECT;
+    if ((RTS_I32)(range.after - retain.log.sequence) > 0)
+        retain.log.sequence = range.after; /* the log was lost: what is saved from now on shall count */
+    if (table->size == 0)
+        return ERR_NO_OBJECT;
+    result = FlashLogRead(&retain.log, range, tag, saved_area, table->area_size);
+    if (result != ERR_OK)
+        return result;
+    kept.source = *table;
+    kept.persistent_only = is_of_application_before();
+    if (kept.persistent_only)
+        return ERR_OK;
+    (void)take_all(NULL, &dropped);
+    kept.saved_valid = true;
+    kept.settled = true;
+    return ERR_OK;
+}
+
 void RetainPutBack(void)
 {
     unsigned dropped;
@@ -238,11 +238,10 @@ RTS_RESULT RetainSave(bool always)
     if (!HAS_RETAIN)
         return ERR_OK;
     kept.asked = false;
-    if (kept.settled)
-        copy();
-    else if (kept.source.size == 0)
-        always = false;
-    if (!always && (!kept.settled || kept.saved_valid))
+    if (!kept.settled)
+        return ERR_OK;
+    copy();
+    if (kept.saved_valid && !always)
         return ERR_OK;
     retain.failed = false; /* a stop that loses them is said, also after saves in between that failed */
     return save_copy();
