@@ -7,6 +7,7 @@ import time
 
 import pytest
 
+
 @pytest.fixture
 def plcrt(ordinary_plcrt):
     return ordinary_plcrt
