@@ -27,6 +27,9 @@
 #include <time.h>
 #include <unistd.h>
 
+/* How often the supervisor looks for its worker without a signal that tells it to, should one be lost [ms]. */
+enum { LOOK_MS = 1000 };
+
 /* Written by the worker and read when it is gone. */
 typedef struct {
     bool announced;      /* one was up; stays */
@@ -246,11 +249,11 @@ static void take_end_signal(int number)
     signal_worker(SIGTERM);
 }
 
-/* Waits for a signal, until a time [ms], 0 for ever; takes those that end plcrt. */
+/* Waits for a signal, until a time [ms], 0 for LOOK_MS; takes those that end plcrt. */
 static void wait_for_signal(const sigset_t *set, RTS_I64 until_ms)
 {
     siginfo_t info;
-    RTS_I64 left = until_ms == 0 ? 3600 * 1000 : until_ms - now_ms();
+    RTS_I64 left = until_ms == 0 ? LOOK_MS : until_ms - now_ms();
     struct timespec timeout = {.tv_sec = left > 0 ? left / 1000 : 0, .tv_nsec = left > 0 ? left % 1000 * 1000000 : 0};
     int number = sigtimedwait(set, &info, &timeout);
     if (number == SIGTERM || number == SIGINT) {
