@@ -74,9 +74,17 @@ class DebugInfo:
         starts = [(at + self._word, target) for at, target in sorted(trace.words.items())]
         if trace.link is not None:  # a function that calls no other; how much it has pushed is not known
             starts += [(pushed, trace.link) for pushed in range(0, _MOST_PUSHED, self._word)]
-        chains = ([target - 1, *self._unwind(target - 1, pointer, trace.words)] for pointer, target in starts)
-        own = self._function(offset) if offset is not None else -1  # it does not call itself: what says so is left over
-        return max((c for c in chains if own < 0 or own not in map(self._function, c)), key=len, default=[])
+        chains = [[target - 1, *self._unwind(target - 1, pointer, trace.words)] for pointer, target in starts]
+        if offset is not None and self._function(offset) >= 0 and trace.words:
+            # It makes room on the stack, over what earlier calls have left there. The highest word is no such thing.
+            outermost = trace.words[max(trace.words)] - 1
+            chains = [chain for chain in chains if chain[-1] == outermost and self._is_possible([offset, *chain])]
+        return max(chains, key=len, default=[])
+
+    def _is_possible(self, chain: list[int]) -> bool:
+        """No function calls itself, directly or by way of others: what says so was left on the stack by earlier calls."""
+        functions = [i for i in map(self._function, chain) if i >= 0]
+        return len(set(functions)) == len(functions)
 
     def _unwind(self, offset: int, pointer: int, words: Mapping[int, int], link: int | None = None) -> list[int]:
         """`link`: where the function at `offset` returns to, if it has not saved that."""

@@ -105,12 +105,28 @@ static PLACE place_of(const void *ucontext)
 #endif
 }
 
-/* What may be read of the IEC stack from a stack pointer on, which may have been destroyed. */
+/* The stack is read as it is, whatever a sanitizer thinks of the gaps between its variables. */
+#define READS_STACK __attribute__((no_sanitize("address")))
+
+/* What a stack that overflowed tells: below what the running calls have left lies what earlier ones have, so only as
+ * many words as are kept. */
+READS_STACK static const uintptr_t *highest_calls(const IEC_STACK *stack)
+{
+    const uintptr_t *word = (const uintptr_t *)stack->top;
+    int found = 0;
+    while ((uintptr_t)word > stack->bottom && found < EXCEPT_MAX_CALLS) {
+        word--;
+        found += SysExceptIsReturn(*word);
+    }
+    return word;
+}
+
+/* What is to be read of the IEC stack from a stack pointer on, which may have been destroyed. */
 static const uintptr_t *readable(const IEC_STACK *stack, uintptr_t pointer)
 {
     uintptr_t from = pointer & ~(sizeof(uintptr_t) - 1);
     if (IecStackIsOverflow(stack, pointer)) {
-        from = stack->bottom;
+        return highest_calls(stack);
     }
     return (const uintptr_t *)(from >= stack->bottom && from < stack->top ? from : stack->top);
 }
@@ -126,7 +142,7 @@ static void leave(CONTEXT *context, RTS_UI32 code, PLACE place)
 }
 
 /* C code that IEC code called: the call that is nearest on the stack. */
-static uintptr_t last_return(const uintptr_t *word, const uintptr_t *end)
+READS_STACK static uintptr_t last_return(const uintptr_t *word, const uintptr_t *end)
 {
     while (word < end && !SysExceptIsReturn(*word)) {
         word++;
