@@ -1,6 +1,8 @@
 # make demo   the whole story on this machine        make test   all tests
 # make lint   ruff, mypy                             make bench  figures, side by side
 # make size   flash and RAM of the bare-metal runtime, per component
+# make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
+# make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each
 #
 # Everything is installed into .venv and built in build*/; Debian packages that are missing are installed when you are root.
 
@@ -13,7 +15,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
 BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
 
-.PHONY: demo test lint bench size all clean
+.PHONY: demo test lint bench size attack fuzz all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -43,11 +45,25 @@ bench: $(BENCHED:%=%/build.ninja)
 size: build-cm3/build.ninja
 	$(MESON) compile -C build-cm3 size
 
+ATTACKED := build$(if $(findstring --sanitized,$(ARGS)),-sanitized)
+
+attack: $(ATTACKED)/build.ninja
+	$(MESON) configure $(ATTACKED) -Dhost=true
+	$(MESON) compile -C $(ATTACKED)
+	$(BIN)/python tests/attack/run.py $(ARGS)
+
+FUZZED := build build-sanitized
+FUZZ_SECONDS ?= 60
+
+fuzz: $(FUZZED:%=%/build.ninja)
+	set -e; for build in $(FUZZED); do $(MESON) compile -C $$build; done
+	$(BIN)/python tests/fuzz/run.py --seconds $(FUZZ_SECONDS) $(FUZZED)
+
 build/build.ninja: $(VENV)/dev
 	$(MESON) setup build
 
 build-sanitized/build.ninja: $(VENV)/dev
-	$(MESON) setup build-sanitized -Dhost=false -Db_sanitize=address,undefined -Db_lundef=false
+	$(MESON) setup build-sanitized -Db_sanitize=address,undefined -Db_lundef=false
 
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini

@@ -113,7 +113,7 @@ def profile(path: Path) -> Stages:
     sources = load_sources([path])
     with stages.stage("lexing, parsing"):
         for source in sources:
-            parse(source, Diagnostics().at(source))
+            parse(source, Diagnostics().at(source).error)
     with stages.stage("names and types"):
         checked = check_sources(sources)
     stages.seconds["names and types"] -= stages.seconds["lexing, parsing"]

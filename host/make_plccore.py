@@ -24,6 +24,7 @@ SHARED = [
     "CmpSrvNumbers.h",
     "Sim.h",
     "SimLink.h",
+    "SysFlashLog.h",
 ]
 
 

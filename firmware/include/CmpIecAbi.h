@@ -25,9 +25,19 @@ typedef struct {
 /* Entry of a task (all its programs in order), of CodeInit and GlobalExit. */
 typedef void (*IEC_ENTRY)(const IEC_CONTEXT *context);
 
-/* GlobalInit: `init_retains` is 1 when retain variables take their initial values as well (cold start), else 0. The
- * runtime has zeroed the areas before. */
+/*
+ * An application begins in three steps. The runtime sets all areas to zero, and CodeInit gives all variables those
+ * initial values that are constant, RETAIN and PERSISTENT ones too. Then the runtime puts back the values that are kept.
+ * GlobalInit runs what the program itself does to begin: initial values that are calculated, FB_Init. `init_retains` is
+ * 0 when the RETAIN variables are kept, else 1.
+ */
 typedef void (*IEC_GLOBAL_INIT)(const IEC_CONTEXT *context, RTS_UI32 init_retains);
+
+/*
+ * The external function "ieckept" (interface text below), which GlobalInit may call: whether a value among the `size`
+ * bytes at `address` was put back, so that it does not take its initial one.
+ */
+typedef RTS_UI8 (*IEC_KEPT)(const RTS_UI8 *address, RTS_UI32 size);
 
 /*
  * The external function every image may import as "iecraise" (interface text below): a failed run-time check. `code` is

@@ -59,6 +59,12 @@ int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception
  * in its cycle now. From any context. */
 RTS_UI32 IecTaskGetActivity(bool *busy);
 
+/* Has `copy` called at a moment when no task is in its cycle, so that what it copies is the work of whole cycles. True:
+ * it was; when a cycle came in between, more than once. False: not yet, call again; where several tasks run at a time
+ * they do it, in the context of one of them, as soon as there is such a moment. It is called off when the tasks are
+ * stopped. From main. */
+bool IecTaskBetweenCycles(void (*copy)(void));
+
 /* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
  * simulator, between cycles. */
 RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **context);

@@ -1,10 +1,16 @@
 /*
- * CmpRetain.h - retain variables in flash. Manual 3.3.5.
+ * CmpRetain.h - RETAIN and PERSISTENT variables in flash. Manual 3.3.5.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The retain area lives in RAM. It is saved as a whole, from main: on stop and shutdown, and at most every
- * APP_RETAIN_SAVE_US when it changed. A record belongs to one layout of variables and is restored only into the same.
+ * The retain area lives in RAM. It is saved as a whole: on stop and shutdown, and at most every APP_RETAIN_SAVE_US when
+ * it changed. A record is the state of one moment between the cycles of all tasks, and belongs to one image.
+ *
+ * When an application begins, values come from a source: the last record, the record of the application before, or what
+ * the variables are at a reset. The source is chosen first (RetainLoad, RetainCapture); the values are put back, variable
+ * by variable as the table in the image says, when the initial values are there; and they count, and are saved, when the
+ * initialisation is over. Until then all of it can be done again: a power cut loses nothing.
+ *
  * All from main.
  */
 #ifndef CMPRETAIN_H
@@ -13,21 +19,45 @@
 #include "CmpErrors.h"
 #include "CmpItf.h"
 #include "CmpStd.h"
+#include "SysFlashLog.h"
+
+/* Where in flash the table of kept variables of an image is (CDL_KEPT), and how large its retain area. */
+typedef struct {
+    RTS_UI32 file;
+    RTS_UI32 offset;
+    RTS_UI32 size;      /* of the table in bytes, 0: nothing is kept */
+    RTS_UI32 area_size; /* bytes */
+} RETAIN_TABLE;
 
 /* The largest retain area that can be saved, bytes. */
 RTS_UI32 RetainCapacity(void);
 
-/* From now on `size` bytes at `area` are kept; `layout` names their layout. Size 0: nothing is kept. */
-void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout);
+/* From now on the variables of a checked table are kept, in the area at `area`, in records with this tag, which is the
+ * CRC of the image. The table stays where it is. They have no source yet. */
+void RetainAttach(RTS_UI8 *area, const RETAIN_TABLE *table, RTS_UI32 tag);
+void RetainDetach(void);
 
 /* Number of the newest record. */
 RTS_UI32 RetainGetSequence(void);
 
-/* Fills the area with what was saved last for this layout, in a record after number `after`, up to `until`.
- * ERR_NO_OBJECT: there is none, the area is as it was. */
-RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until);
+/* The source is the newest record in the range of the application whose checked table is `table`: this one's, all of
+ * whose values are kept, or that of the application before, of which PERSISTENT values are kept where name and type are
+ * as they were. Those of its own are in the area at once, which is zero, for who looks at an application that waits.
+ * ERR_NO_OBJECT: there is none. */
+RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range);
 
-/* Saves the area when it is not what was saved last, or always; no task runs. ERR_DEVICE flash fault. */
+/* The source is what the variables are now; a cold reset keeps PERSISTENT ones only. While there are none, and after an
+ * initialisation that failed, the source stays the same. */
+void RetainCapture(bool cold);
+
+/* Puts the values back; the area has its initial values. */
+void RetainPutBack(void);
+
+/* The initialisation is over: what the variables are now is saved. After one that failed only what comes from the
+ * application before, whose own table will be gone. */
+void RetainSettle(bool failed);
+
+/* Saves what counts when it is not what was saved last, or always; no task runs. ERR_DEVICE flash fault. */
 RTS_RESULT RetainSave(bool always);
 
 /* From now on the record numbered `until`, or the newest before it, is kept in flash, whatever is saved. It is that of

@@ -129,7 +129,7 @@ typedef struct {
 
 enum {
     CDL_BLOB_TASKS = 1,  /* array of CDL_TASK */
-    CDL_BLOB_RETAIN = 2, /* u32: CRC of the retain area's layout; without it retain data belong to one image only */
+    CDL_BLOB_RETAIN = 2, /* what is kept: CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes */
     CDL_BLOB_EVENTS = 3, /* names of the external events tasks wait for, each with NUL; for whoever reads the image */
     CDL_BLOB_IMAGES = 16, /* CDL_IMAGE for inputs and outputs of each task; those it lacks work on the shared areas */
 };
@@ -167,6 +167,31 @@ typedef struct {
     char name[CDL_TASK_NAME_SIZE]; /* NUL-terminated */
 } CDL_TASK;
 
+/*
+ * A variable that is kept, a member or an element of one: RETAIN, PERSISTENT. A changed program finds it again by the
+ * hash, of its full name without the indices of CDL_KEPT_RUN, and of its type.
+ */
+enum { CDL_KEPT_HASH_SIZE = 8 };
+typedef struct {
+    RTS_UI8 hash[CDL_KEPT_HASH_SIZE];
+    RTS_UI32 place; /* offset in the retain area << CDL_KEPT_OFFSET_SHIFT, and the bits below */
+} CDL_KEPT;
+
+enum {
+    CDL_KEPT_SHAPE = 3,      /* log2 of its size in bytes, without CDL_KEPT_IS_RUN */
+    CDL_KEPT_IS_RUN = 4,     /* a CDL_KEPT_RUN follows */
+    CDL_KEPT_PERSISTENT = 8, /* kept over a cold reset and a download, too */
+    CDL_KEPT_OFFSET_SHIFT = 4,
+};
+
+/* Elements of an array that lie `stride` bytes apart, or members of them; a string is a run of one. */
+typedef struct {
+    RTS_UI16 size;   /* of an element, bytes */
+    RTS_UI16 stride; /* at least `size` */
+    RTS_UI32 count;
+    RTS_I32 first; /* index of the first one in the program */
+} CDL_KEPT_RUN;
+
 /* Download flags (5.4), low word of CDL_HEADER.flags and of the download service. */
 enum {
     DLF_CONTINUEDOWNLOAD = 1,
@@ -192,6 +217,8 @@ RTS_STATIC_ASSERT(sizeof(AREA_INFO) == 8, area_info_is_8_bytes);
 RTS_STATIC_ASSERT(sizeof(POU_REF) == 8, pou_ref_is_8_bytes);
 RTS_STATIC_ASSERT(sizeof(FUNCTION_INFO) == 20, function_info_is_20_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_TASK) == 56, cdl_task_is_56_bytes);
+RTS_STATIC_ASSERT(sizeof(CDL_KEPT) == 12, cdl_kept_is_12_bytes);
+RTS_STATIC_ASSERT(sizeof(CDL_KEPT_RUN) == 12, cdl_kept_run_is_12_bytes);
 RTS_STATIC_ASSERT(sizeof(CDL_IMAGE) == 8, cdl_image_is_8_bytes);
 #endif
 

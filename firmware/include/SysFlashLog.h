@@ -11,7 +11,24 @@
 #ifndef SYSFLASHLOG_H
 #define SYSFLASHLOG_H
 
+#include "CmpStd.h"
+
+/* What a record begins with, at a multiple of FILE_ALIGN; its data follow. (Shared with the host.) */
+typedef struct {
+    RTS_UI32 magic; /* FLASH_LOG_MAGIC */
+    RTS_UI32 sequence;
+    RTS_UI32 tag;
+    RTS_UI32 size; /* of the data in bytes */
+    RTS_UI32 crc;  /* CRC-32 of the four words above and the data */
+} FLASH_LOG_HEAD;
+
+enum { FLASH_LOG_HEAD_SIZE = 20, FLASH_LOG_MAGIC = 0x474F4C52 };
+
+#ifndef RTS_CFFI
+
 #include "SysFileFlash.h"
+
+RTS_STATIC_ASSERT(sizeof(FLASH_LOG_HEAD) == FLASH_LOG_HEAD_SIZE, record_head_size);
 
 typedef struct {
     RTS_UI32 file;     /* not 0 */
@@ -23,7 +40,6 @@ typedef struct {
     RTS_UI32 kept;     /* start of a half that is not erased; FLASH_LOG_NONE */
 } FLASH_LOG;
 
-enum { FLASH_LOG_HEAD_SIZE = 20 };
 #define FLASH_LOG_NONE 0xFFFFFFFFu
 
 /* Finds the newest record and the place for the next. ERR_DEVICE flash fault. */
@@ -62,5 +78,7 @@ void FlashLogKeepNone(FLASH_LOG *log);
 
 /* The largest record, in bytes of data. */
 RTS_UI32 FlashLogCapacity(const FLASH_LOG *log);
+
+#endif
 
 #endif

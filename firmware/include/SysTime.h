@@ -17,4 +17,8 @@ RTS_I64 SysTimeGetUsedNs(void);
 /* Milliseconds of the same clock; wraps after 49 days, so compare differences only. */
 RTS_UI32 SysTimeGetMs(void);
 
+/* Lets others run for some 20 us. By a task that waits for another one; only where several run at a time
+ * (RTS_ONE_CORE 0). */
+void SysTimePause(void);
+
 #endif

@@ -122,7 +122,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     flash = command("flash", _flash, "bring an image onto a device and start it")
     _add_image(flash)
-    flash.add_argument("--no-start", action="store_true", help="leave the program stopped")
+    flash.add_argument("--no-start", action="store_true", help="leave it stopped until it is started or power returns")
     flash.add_argument("--force", action="store_true", help="also when the device has this image already")
     _add_link(flash)
 
@@ -133,7 +133,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     reset = command("reset", _reset, "reset the program; it is stopped afterwards")
     reset.add_argument(
         "option", choices=["warm", "cold", "origin"],
-        help="warm keeps RETAIN variables, cold initialises them too, origin deletes the program",
+        help="warm keeps RETAIN variables, cold only PERSISTENT ones, origin deletes the program",
     )  # fmt: skip
     _add_link(reset)
     _add_link(command("tasks", _tasks, "show the times of the tasks"))
@@ -392,11 +392,16 @@ def _flash(args: argparse.Namespace) -> int:
         "skipped": result.skipped,
         "state": str(result.state),
         "others": [vars(other) for other in others],
+        "persistent": None if result.persistent is None else vars(result.persistent),
     }
 
     def text(d: dict[str, Any]) -> str:
         done = "already on the device" if d["skipped"] else f"{d['bytes']} bytes in {d['seconds']:.2f} s"
-        return f"{done}; state: {d['state']}"
+        lines = [f"{done}; state: {d['state']}"]
+        if d["persistent"]:
+            lines += [f"PERSISTENT value lost: {name} {why}" for name, why in d["persistent"]["lost"].items()]
+            lines += [f"PERSISTENT value new: {name}" for name in d["persistent"]["new"]]
+        return "\n".join(lines)
 
     return _show(args, document, text)
 

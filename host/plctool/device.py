@@ -20,6 +20,7 @@ from plctool.gateway.control import dismiss_idle
 from plctool.gateway.frames import BUSY
 from plctool.gateway.place import NoGateway
 from plctool.image import parse_image
+from plctool.kept_changes import KeptChanges, kept_changes
 from plctool.link import services
 from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink
 from plctool.link.monitoring import AreaRange, Contents, Write, read_memory, write_memory
@@ -71,12 +72,14 @@ class PlcStatus:
 
 @dataclass(frozen=True)
 class FlashResult:
-    """`skipped`: the device had this very image already. `seconds` is the time the transfer took."""
+    """`skipped`: the device had this very image already. `seconds` is the time the transfer took. `persistent`: what
+    became of PERSISTENT values, None when the symbols of one of the programs are not there."""
 
     bytes: int
     seconds: float
     skipped: bool
     state: AppState
+    persistent: KeptChanges | None = None
 
 
 @dataclass(frozen=True)
@@ -238,9 +241,16 @@ class Plc:
             services.download(self._session, data, afresh, lambda done: progress(done, len(data)))
             self._verify(crc)
         seconds = self._connection.now() - begin
+        persistent = None if skipped else self._kept_changes(status.image_crc, crc)
         if start and not (skipped and status.state is AppState.RUN):
             services.start(self._session)
-        return FlashResult(len(data), seconds, skipped, services.read_status(self._session).state)
+        return FlashResult(len(data), seconds, skipped, services.read_status(self._session).state, persistent)
+
+    def _kept_changes(self, before: int, after: int) -> KeptChanges | None:
+        """By the CRCs of both images."""
+        with suppress(UsageError):
+            return kept_changes(find_symbols(before).kept, find_symbols(after).kept)
+        return None
 
     def _verify(self, crc: int) -> None:
         found = services.read_status(self._session).image_crc
@@ -254,7 +264,7 @@ class Plc:
         services.stop(self._session)
 
     def reset(self, option: str = "warm") -> None:
-        """Stops it; `warm` keeps retain variables, `cold` initialises them too, `origin` deletes the application."""
+        """Stops it; `warm` keeps RETAIN variables, `cold` only PERSISTENT ones, `origin` deletes the application."""
         if option not in RESET_OPTIONS:
             raise UsageError(f"There is no reset '{option}'; choose one of {', '.join(RESET_OPTIONS)}.", "bad-reset")
         services.reset(self._session, RESET_OPTIONS[option])

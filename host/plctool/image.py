@@ -90,9 +90,25 @@ class ImageTask:
 
 
 @dataclass(frozen=True)
+class KeptVariable:
+    """A variable that is kept, or the elements of an array (`is_run`), `stride` bytes apart. `hash`: of its name and
+    type; `offset` in the retain area and `size` of one element [bytes]; `first`: index of the first element in the
+    program."""
+
+    hash: bytes
+    offset: int
+    size: int
+    persistent: bool
+    stride: int
+    count: int
+    first: int
+    is_run: bool
+
+
+@dataclass(frozen=True)
 class Image:
-    """An application. `areas`: bytes of RAM by area index. `functions`: CDL_FUNCTION_* -> code offset to call.
-    `retain_layout`: a number that changes when the layout of the retain area does, None when there is none."""
+    """An application. `areas`: bytes of RAM by area index. `functions`: CDL_FUNCTION_* -> code offset to call. `kept`:
+    in ascending order of their hashes."""
 
     device_id: int
     code: bytes
@@ -105,7 +121,7 @@ class Image:
     device_version: int = DEVICE_VERSION
     compiler_version: int = COMPILER_VERSION
     flags: int = 0
-    retain_layout: int | None = None
+    kept: list[KeptVariable] = field(default_factory=list)
     crc: int = 0  # set by `parse_image`
 
 
@@ -204,8 +220,8 @@ def _blobs(image: Image) -> Iterator[bytes]:
     events = b"".join(_event_name(task) + b"\0" for task in image.tasks if task.external)
     if events:
         yield _blob(lib.CDL_BLOB_EVENTS, events)
-    if image.retain_layout is not None:
-        yield _blob(lib.CDL_BLOB_RETAIN, image.retain_layout.to_bytes(4, "little"))
+    if image.kept:
+        yield _blob(lib.CDL_BLOB_RETAIN, b"".join(map(_kept_entry, image.kept)))
     if any(task.parts != NO_PARTS for task in image.tasks):
         yield _blob(lib.CDL_BLOB_IMAGES, b"".join(_part_entry(part) for task in image.tasks for part in task.parts))
 
@@ -243,6 +259,16 @@ def _task_entry(task: ImageTask) -> bytes:
     )
 
 
+def _kept_entry(kept: KeptVariable) -> bytes:
+    shape = 0 if kept.is_run else kept.size.bit_length() - 1
+    bits = shape | lib.CDL_KEPT_IS_RUN * kept.is_run | lib.CDL_KEPT_PERSISTENT * kept.persistent
+    entry = _pack("CDL_KEPT", {"hash": kept.hash, "place": kept.offset << lib.CDL_KEPT_OFFSET_SHIFT | bits})
+    if not kept.is_run:
+        return entry
+    run = {"size": kept.size, "stride": kept.stride, "count": kept.count, "first": kept.first}
+    return entry + _pack("CDL_KEPT_RUN", run)
+
+
 # ---- taking apart --------------------------------------------------------------------------------------------------
 
 
@@ -264,7 +290,6 @@ def parse_image(data: bytes) -> Image:
         areas[int(entry.index)] = int(entry.size)
     areas.pop(int(lib.APP_AREA_CODE), None)
     blobs = _parse_blobs(segments["blob"])
-    retain = blobs.get(int(lib.CDL_BLOB_RETAIN))
     return Image(
         device_id=int(header.device_id),
         code=code,
@@ -277,7 +302,7 @@ def parse_image(data: bytes) -> Image:
         device_version=int(header.device_version),
         compiler_version=int(header.compiler_version),
         flags=int(header.flags),
-        retain_layout=None if retain is None else int.from_bytes(retain, "little"),
+        kept=list(_parse_kept(blobs.get(int(lib.CDL_BLOB_RETAIN), b""))),
         crc=int(header.crc),
     )
 
@@ -384,6 +409,28 @@ def _parse_tasks(blobs: dict[int, bytes], code_size: int) -> list[ImageTask]:
 def _parse_part(entry: Any) -> ImagePart:
     written, shared = bool(entry.flags & lib.CDL_IMAGE_WRITTEN), bool(entry.flags & lib.CDL_IMAGE_SHARED)
     return ImagePart(int(entry.first), int(entry.count), written, shared)
+
+
+def _parse_kept(payload: bytes) -> Iterator[KeptVariable]:
+    size, at = ffi.sizeof("CDL_KEPT"), 0
+    while at < len(payload):
+        (entry,) = _entries("CDL_KEPT", payload[at : at + size], "table of kept variables")
+        at += size
+        shape = entry.place & lib.CDL_KEPT_SHAPE
+        length, stride, count, first = 1 << shape, 1 << shape, 1, 0
+        is_run = bool(entry.place & lib.CDL_KEPT_IS_RUN)
+        if is_run:
+            runs = list(_entries("CDL_KEPT_RUN", payload[at : at + size], "table of kept variables"))
+            if not runs:
+                raise _refuse("its table of kept variables is cut off")
+            at += size
+            run = runs[0]
+            length, stride, count, first = int(run.size), int(run.stride), int(run.count), int(run.first)
+        persistent = bool(entry.place & lib.CDL_KEPT_PERSISTENT)
+        offset = int(entry.place >> lib.CDL_KEPT_OFFSET_SHIFT)
+        yield KeptVariable(
+            bytes(ffi.buffer(entry.hash)), offset, length, persistent, stride, count, first, is_run
+        )  # fmt: skip
 
 
 def _parse_info(data: bytes) -> ApplicationInfo:

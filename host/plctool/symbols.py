@@ -11,7 +11,7 @@ import os
 import re
 import zlib
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -53,11 +53,23 @@ class SourceLine:
     line: int
 
 
+@dataclass(frozen=True)
+class KeptName:
+    """A RETAIN or PERSISTENT variable, or a part of one; `[]` stands for the elements of an array. `type`: as far as a
+    kept value depends on it; `size` of one element [bytes]."""
+
+    name: str
+    type: str
+    persistent: bool
+    size: int
+
+
 @dataclass
 class SymbolTable:
     """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry holds up to
     the next one. `aliases`: other names of variables. `classes`: the numbers by which instances tell their class.
-    `constants`: those that have no place in memory. `debug`: see `DebugInfo`."""
+    `constants`: those that have no place in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
+    lose."""
 
     image_crc: int
     target: str
@@ -71,6 +83,7 @@ class SymbolTable:
     classes: dict[str, int] = field(default_factory=dict)
     constants: dict[str, Symbol] = field(default_factory=dict)
     debug: list[bytes] = field(default_factory=list)
+    kept: list[KeptName] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -187,6 +200,7 @@ class SymbolTable:
             "pous": [vars(unit) for unit in self.pous],
             "lines": self.lines,
             "files": self.files,
+            "kept": [[k.name, k.type, k.persistent, k.size] for k in self.kept],
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
@@ -215,6 +229,7 @@ class SymbolTable:
                 document["classes"],
                 {n: _read_constant(n, c, types) for n, c in document["constants"].items()},
                 [zlib.decompress(base64.b64decode(text)) for text in document["debug"]],
+                [KeptName(*entry) for entry in document.get("kept", [])],
             )
         except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None
@@ -304,15 +319,3 @@ def find_symbols(image_crc: int, beside: Path | None = None) -> SymbolTable:
         f"There are no symbols for the image that runs (CRC {image_crc:08X}); name its .sym file.",
         "no-symbols",
     )
-
-
-def layout_signature(symbols: Iterable[Symbol]) -> int:
-    """A number that changes when a name, a place or a type among `symbols` does."""
-    types: dict[str, Any] = {}
-    places = []
-    for symbol in symbols:
-        describe(symbol.type, types)
-        places.append([symbol.name.casefold(), symbol.offset, symbol.type.name])
-    for entry in types.values():
-        entry.pop("properties", None)  # they are not in memory
-    return zlib.crc32(json.dumps([sorted(places), types], sort_keys=True).encode())

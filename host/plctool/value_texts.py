@@ -294,4 +294,4 @@ def _parse_enum(t: EnumType, text: str) -> int:
             return value
     if re.match(r"-?\d", text):
         return _parse_integer(t, text)
-    raise bad_value(text, t, f"choose one of {', '.join(t.values)}")
+    raise bad_value(text, t, f"choose one of {t.choices}")

@@ -154,6 +154,8 @@ def _encode_integer(t: Type, base: Elementary, value: int) -> bytes:
     high = 1 if base.kind is Kind.BOOL else (1 << (base.bits - base.signed)) - 1
     if isinstance(t, SubrangeType):
         low, high = t.low, t.high
+    if isinstance(t, EnumType) and value not in t.values.values():
+        raise bad_value(value, t, f"choose one of {t.choices}")
     if not low <= value <= high:
         raise bad_value(value, t, f"it takes {low} to {high}")
     return value.to_bytes(base.size, "little", signed=base.signed)

@@ -33,6 +33,13 @@ typedef struct {
 } SPEC_IMPORT;
 
 typedef struct {
+    CDL_KEPT variable;
+    CDL_KEPT_RUN run; /* when `variable` says so */
+} SPEC_KEPT;
+
+enum { SPEC_MAX_KEPT = 8 };
+
+typedef struct {
     RTS_UI8 code[1024];
     RTS_UI32 code_size;
     RTS_UI32 areas[APP_AREA_CODE]; /* bytes */
@@ -41,7 +48,8 @@ typedef struct {
     RTS_UI32 task_count;
     SPEC_IMPORT imports[APP_MAX_IMPORTS + 1];
     RTS_UI32 import_count;
-    RTS_UI32 retain_layout; /* 0: no blob */
+    SPEC_KEPT kept[SPEC_MAX_KEPT];
+    RTS_UI32 kept_count; /* 0: no blob */
     CDL_IMAGE images[2 * APP_MAX_TASKS]; /* what the tasks use of inputs and outputs */
     RTS_UI32 image_count;                /* 0: no blob */
     const char *info[5];
@@ -188,6 +196,22 @@ static inline void add_import(APP_SPEC *spec, const char *name, RTS_UI32 signatu
     spec->imports[spec->import_count++] = import;
 }
 
+/* A DINT that is kept; its hash is `name` alone. In the order of their names. */
+static inline SPEC_KEPT *add_kept(APP_SPEC *spec, char name, RTS_UI32 offset, RTS_UI32 flags)
+{
+    SPEC_KEPT *kept = &spec->kept[spec->kept_count++];
+
+    kept->variable.hash[0] = (RTS_UI8)name;
+    kept->variable.place = offset << CDL_KEPT_OFFSET_SHIFT | flags | 2;
+    return kept;
+}
+
+/* An array that is kept. */
+static inline void add_kept_run(APP_SPEC *spec, char name, RTS_UI32 offset, RTS_UI32 flags, CDL_KEPT_RUN run)
+{
+    add_kept(spec, name, offset, flags | CDL_KEPT_IS_RUN)->run = run;
+}
+
 /* ---- the image ---- */
 
 static inline void append(APP_BYTES *image, const void *data, RTS_UI32 size)
@@ -209,6 +233,24 @@ static inline void append_blob(APP_BYTES *image, RTS_UI32 id, const void *data, 
     append(image, &blob, sizeof blob);
     append(image, data, size);
     pad(image, 4);
+}
+
+static inline void append_kept(APP_BYTES *image, const APP_SPEC *spec)
+{
+    RTS_UI8 table[SPEC_MAX_KEPT * sizeof(SPEC_KEPT)];
+    RTS_UI32 size = 0;
+    RTS_UI32 i;
+
+    for (i = 0; i < spec->kept_count; i++) {
+        const SPEC_KEPT *kept = &spec->kept[i];
+        RTS_UI32 part = sizeof kept->variable;
+        if ((kept->variable.place & CDL_KEPT_IS_RUN) != 0)
+            part += (RTS_UI32)sizeof kept->run;
+        memcpy(table + size, kept, part);
+        size += part;
+    }
+    if (size > 0)
+        append_blob(image, CDL_BLOB_RETAIN, table, size);
 }
 
 static inline void append_areas(APP_BYTES *image, const APP_SPEC *spec)
@@ -315,8 +357,7 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
     h.external_function_table = end_segment(image, h.function_table.offset + h.function_table.size);
     h.blob.offset = image->size;
     append_blob(image, CDL_BLOB_TASKS, spec->tasks, spec->task_count * (RTS_UI32)sizeof(CDL_TASK));
-    if (spec->retain_layout != 0)
-        append_blob(image, CDL_BLOB_RETAIN, &spec->retain_layout, sizeof spec->retain_layout);
+    append_kept(image, spec);
     if (spec->image_count != 0)
         append_blob(image, CDL_BLOB_IMAGES, spec->images, spec->image_count * (RTS_UI32)sizeof(CDL_IMAGE));
     h.blob = end_segment(image, h.blob.offset);
@@ -340,11 +381,10 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
 
 enum {
     COUNTER_OFFSET = 0,    /* data: DINT, counts */
-    STEP_OFFSET = 4,       /* data: DINT, set to `step` by GlobalInit */
+    STEP_OFFSET = 4,       /* data: DINT, set to `step` by CodeInit */
     RETAIN_A_OFFSET = 0,   /* retain: DINT, starts at 100 * step and counts */
     RETAIN_B_OFFSET = 12,  /* retain: the same number once more, at the other end of the area */
     OUTPUT_OFFSET = 0,     /* output: DINT, set to `step` */
-    RETAIN_LAYOUT = 0x1234,
 };
 
 static inline void spec_counter(APP_SPEC *spec, RTS_UI32 step)
@@ -352,10 +392,10 @@ static inline void spec_counter(APP_SPEC *spec, RTS_UI32 step)
     RTS_UI32 entry;
 
     spec_init(spec);
-    spec->retain_layout = RETAIN_LAYOUT;
-    spec->function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(spec);
+    add_kept(spec, 'A', RETAIN_A_OFFSET, 0);
+    add_kept(spec, 'B', RETAIN_B_OFFSET, 0);
+    spec->function[CDL_FUNCTION_CODE_INIT] = (RTS_I32)here(spec);
     emit_set(spec, APP_AREA_DATA, STEP_OFFSET, step);
-    emit_skip_unless_init_retains(spec, 2 * 14);
     emit_set(spec, APP_AREA_RETAIN, RETAIN_A_OFFSET, 100 * step);
     emit_set(spec, APP_AREA_RETAIN, RETAIN_B_OFFSET, 100 * step);
     emit_ret(spec);

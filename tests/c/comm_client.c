@@ -11,18 +11,16 @@
 #include "CmpChecksum.h"
 #include "SimLink.h"
 
-enum { HEADER = 12 };
-
 /* ---- layer 3 ---- */
 
 RTS_UI32 client_packet(const CLIENT *client, RTS_UI8 service, const RTS_UI8 *payload, RTS_UI32 size, RTS_UI8 *packet)
 {
-    const RTS_UI8 header[HEADER] = {
+    const RTS_UI8 header[CLIENT_HEADER_SIZE] = {
         0xC5, 0x6B, 0x40, service, 0, 0x11, 0, 1, (RTS_UI8)(client->address >> 8), (RTS_UI8)client->address, 0, 0};
 
-    memcpy(packet, header, HEADER);
-    memcpy(packet + HEADER, payload, size);
-    return HEADER + size;
+    memcpy(packet, header, CLIENT_HEADER_SIZE);
+    memcpy(packet + CLIENT_HEADER_SIZE, payload, size);
+    return CLIENT_HEADER_SIZE + size;
 }
 
 void client_send_package(const CLIENT *client, const RTS_UI8 *package, RTS_UI32 size)
@@ -37,12 +35,12 @@ RTS_UI32 client_take(const CLIENT *client, RTS_UI8 *service, RTS_UI8 *payload)
     RTS_UI8 packet[BLK_MAX_SIZE];
     RTS_UI32 size = SimLinkReceive(packet, sizeof(packet));
 
-    if (size < HEADER || packet[5] != 0x11 || (packet[6] << 8 | packet[7]) != client->address)
+    if (size < CLIENT_HEADER_SIZE || packet[5] != 0x11 || (packet[6] << 8 | packet[7]) != client->address)
         return 0;
     if (service != NULL)
         *service = packet[3];
-    memcpy(payload, packet + HEADER, size - HEADER);
-    return size - HEADER;
+    memcpy(payload, packet + CLIENT_HEADER_SIZE, size - CLIENT_HEADER_SIZE);
+    return size - CLIENT_HEADER_SIZE;
 }
 
 /* ---- layer 4 ---- */
@@ -133,7 +131,7 @@ void client_send_message(CLIENT *client, const RTS_UI8 *message, RTS_UI32 size)
     RTS_UI32 offset = 0;
 
     do {
-        RTS_UI32 room = BLK_MAX_SIZE - HEADER - (flags & CHANNEL_FLAG_FIRST ? CHANNEL_FIRST_SIZE : CHANNEL_DATA_SIZE);
+        RTS_UI32 room = CLIENT_PAYLOAD_SIZE - (flags & CHANNEL_FLAG_FIRST ? CHANNEL_FIRST_SIZE : CHANNEL_DATA_SIZE);
         RTS_UI32 part = size - offset < room ? size - offset : room;
         client_send_block(client, ++client->sent, flags, message, size, offset, part);
         flags = CHANNEL_FLAG_TO_SERVER;

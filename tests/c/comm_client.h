@@ -27,7 +27,11 @@ typedef struct {
 
 /* ---- layer 3 ---- */
 
-/* Makes a packet from this client to the device; returns its size. */
+/* Of a packet; and what fits into one. */
+enum { CLIENT_HEADER_SIZE = 12, CLIENT_PAYLOAD_SIZE = BLK_MAX_SIZE - CLIENT_HEADER_SIZE };
+
+/* Makes a packet from this client to the device; returns its size. `size`: at most CLIENT_PAYLOAD_SIZE, as in all that
+ * follow. */
 RTS_UI32 client_packet(const CLIENT *client, RTS_UI8 service, const RTS_UI8 *payload, RTS_UI32 size, RTS_UI8 *packet);
 /* Sends a channel package. */
 void client_send_package(const CLIENT *client, const RTS_UI8 *package, RTS_UI32 size);

@@ -200,7 +200,7 @@ static void code_in_another_area_or_larger_than_it(void)
     check_header_refused(ERR_OUT_OF_LIMITS, "not in area 5");
     header.code_area_index = APP_AREA_CODE;
     header.code_area_size = header.code.size - 1;
-    check_header_refused(ERR_OUT_OF_LIMITS, "above its 103 bytes");
+    check_header_refused(ERR_OUT_OF_LIMITS, "above its 99 bytes");
 }
 
 /* ---- areas ---- */
@@ -583,12 +583,38 @@ static void blobs_that_are_not_whole(void)
     check_refused(ERR_SIZE_MISMATCH, "Task list of 55 bytes");
 }
 
-static void a_retain_layout_of_another_size(void)
+/* Refused, and the variable that is wrong is named. */
+static void check_kept_refused(RTS_RESULT expected, const char *text)
+{
+    check_spec_refused(expected, text);
+    begin();
+}
+
+static void kept_variables_outside_the_retain_area(void)
+{
+    static const CDL_KEPT_RUN wrong[] = {
+        {4, 4, 5, 0},  {4, 4, 0, 0},          {4, 3, 2, 0},      {0, 4, 1, 0},          {17, 17, 1, 0},
+        {4, 0, 2, 0},  {4, 4, 0x40000001, 0}, {1, 1, 0, 1},      {4, 0xFFFF, 0x10002, 0}, {65535, 65535, 1, 0},
+    };
+    RTS_UI32 i;
+
+    begin();
+    spec.kept[1].variable.place += 1 << CDL_KEPT_OFFSET_SHIFT; /* ends one byte behind it */
+    check_kept_refused(ERR_OUT_OF_LIMITS, "Kept variable 1 is out of place");
+    spec.kept[0].variable.place |= 0xFFFFFFF0;
+    check_kept_refused(ERR_OUT_OF_LIMITS, "Kept variable 0 is out of place");
+    for (i = 0; i < RTS_COUNT(wrong); i++) {
+        add_kept_run(&spec, 'C', 0, 0, wrong[i]);
+        check_kept_refused(ERR_OUT_OF_LIMITS, "Kept variable 2 is out of place");
+    }
+}
+
+static void a_table_of_kept_variables_that_is_cut_off(void)
 {
     begin_image();
-    image.bytes[header.blob.offset + 12 + sizeof(CDL_TASK) + 8] = 3;
+    image.bytes[header.blob.offset + 12 + sizeof(CDL_TASK) + 8] = 4; /* its size: as plctool wrote it once */
     image_fix_crc(&image);
-    check_refused(ERR_SIZE_MISMATCH, "Retain layout has 3 bytes");
+    check_refused(ERR_OUT_OF_LIMITS, "Kept variable 0 is out of place; build again");
 }
 
 static void two_lists_of_tasks(void)
@@ -731,7 +757,8 @@ int main(void)
     RUN(a_task_with_wrong_values);
     RUN(an_event_variable_outside_its_area);
     RUN(blobs_that_are_not_whole);
-    RUN(a_retain_layout_of_another_size);
+    RUN(kept_variables_outside_the_retain_area);
+    RUN(a_table_of_kept_variables_that_is_cut_off);
     RUN(two_lists_of_tasks);
     RUN(tasks_may_use_all_of_an_area);
     RUN(a_task_that_uses_more_than_there_is);

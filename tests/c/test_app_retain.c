@@ -6,6 +6,8 @@
 #include "SysFileFlash.h"
 #include "app_device.h"
 
+enum { RECORD_MAGIC = 0x474F4C52 };
+
 static APP_SPEC spec;
 static APP_BYTES image;
 
@@ -180,7 +182,7 @@ static void another_layout_is_not_restored(void)
     start_and_load(1);
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     spec_counter(&spec, 2);
-    spec.retain_layout++;
+    spec.kept[1].variable.hash[1]++;
     load();
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     CHECK(SimStart() == ERR_OK);
@@ -336,8 +338,8 @@ static void damaged_values_give_way_to_initial_ones(void)
     for (i = 0; i < area->size; i += 4) {
         RTS_UI32 word;
         memcpy(&word, SimFlashData() + area->offset + i, sizeof word);
-        if (word == RETAIN_LAYOUT)
-            SimFlashData()[area->offset + i + 8] ^= 1; /* the CRC of the record */
+        if (word == RECORD_MAGIC)
+            SimFlashData()[area->offset + i + 16] ^= 1; /* the CRC of the record */
     }
     CHECK(SimStart() == ERR_OK);
     CHECK(retain_value() == 100);
@@ -347,15 +349,190 @@ static void damaged_values_give_way_to_initial_ones(void)
     CHECK(SimFlashViolations() == 0);
 }
 
-static void without_a_layout_only_the_same_image_gets_its_values_back(void)
+/* ---- PERSISTENT ---- */
+
+enum { PLAIN_OFFSET = RETAIN_A_OFFSET, MOVED_OFFSET = RETAIN_B_OFFSET };
+
+/* Application 1, with its first number PERSISTENT, has run until `spec` takes its place, where that number is the
+ * second. */
+static void prepare_take_over(void)
 {
     start_blank();
     spec_counter(&spec, 1);
-    spec.retain_layout = 0;
+    spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
+    load();
+    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    CHECK(retain_value() == 634);
+    spec_counter(&spec, 2);
+    spec.kept_count = 0;
+    add_kept(&spec, 'A', MOVED_OFFSET, CDL_KEPT_PERSISTENT);
+    add_kept(&spec, 'C', PLAIN_OFFSET, CDL_KEPT_PERSISTENT);
+}
+
+static bool is_application(RTS_UI32 step)
+{
+    return read_u32(APP_AREA_DATA, STEP_OFFSET) == step;
+}
+
+static RTS_UI32 plain(void)
+{
+    return read_u32(APP_AREA_RETAIN, PLAIN_OFFSET);
+}
+
+static RTS_UI32 moved(void)
+{
+    return read_u32(APP_AREA_RETAIN, MOVED_OFFSET);
+}
+
+static void a_download_keeps_persistent_values_wherever_they_lie_then(void)
+{
+    prepare_take_over();
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(moved() == 634 && plain() == 200);
+    CHECK(log_has("1 taken over, 0 dropped"));
+    CHECK(SimStart() == ERR_OK);
+    CHECK(is_application(2) && moved() == 634 && plain() == 200);
+}
+
+static void what_a_download_drops_is_counted(void)
+{
+    prepare_take_over();
+    spec.kept[0].variable.hash[1]++; /* another type */
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(moved() == 200 && plain() == 200);
+    CHECK(log_has("0 taken over, 1 dropped"));
+    CHECK(SimStart() == ERR_OK);
+    CHECK(is_application(2));
+    CHECK(!log_has("dropped")); /* it has values of its own now */
+}
+
+static void download_and_run(void *unused)
+{
+    RTS_UNUSED(unused);
+    (void)download(&image);
+    (void)AppStartApplication();
+    (void)SimAdvance(ms(2000));
+}
+
+/* Power fails at any operation of the download, of the first start and of the first saves: the old application goes on
+ * with its values, or the new one with those it takes over. A second cut follows at once. */
+static void a_take_over_survives_every_power_cut(void)
+{
+    RTS_UI32 k;
+    RTS_UI32 taken_over = 0;
+
+    prepare_take_over();
+    build_image(&image, &spec);
+    CHECK(SimFlashSave() == ERR_OK);
+    for (k = 1; k < 1000; k++) {
+        CHECK(SimFlashRestore() == ERR_OK);
+        CHECK(SimStart() == ERR_OK);
+        SimFlashCut(k, k % 2 != 0 ? SIM_CUT_AFTER : SIM_CUT_TORN);
+        if (SimCall(download_and_run, NULL) == ERR_OK)
+            break;
+        SimFlashCut(k % 7 + 1, SIM_CUT_AFTER);
+        (void)SimCall(start_up, NULL);
+        CHECK(SimStart() == ERR_OK);
+        if (is_application(1)) {
+            CHECK(retain_value() >= 534);
+        } else {
+            CHECK(is_application(2) && plain() % 2 == 0);
+            CHECK(moved() >= 534 && moved() <= 2000);
+            CHECK(moved() - plain() >= 534 - 200 && moved() - plain() <= 634 - 200);
+            taken_over++;
+        }
+    }
+    CHECK(k < 1000 && taken_over > 3);
+    CHECK(SimFlashViolations() == 0);
+}
+
+/* Application 2 dies in its initialisation; application 3 takes its slot's place and finds the value all the same. */
+static void a_program_that_fails_at_once_hands_values_on(void)
+{
+    prepare_take_over();
+    spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
+    emit_divide_by_zero(&spec);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    spec_counter(&spec, 3);
+    spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(is_application(3));
+    CHECK(plain() == 634 && moved() == 300);
+}
+
+/* An application between without such a variable ends its life: it does not come back from the past. */
+static void a_value_that_was_dropped_does_not_come_back(void)
+{
+    prepare_take_over();
+    spec.kept_count = 0;
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(log_has("0 taken over, 1 dropped"));
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    spec_counter(&spec, 1);
+    spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
+    load();
+    CHECK(retain_value() == 100);
+}
+
+static void origin_ends_persistent_values_too(void)
+{
+    prepare_take_over();
+    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(moved() == 200);
+}
+
+/* Elements by their index, a text that has more room: in a table of runs. */
+static void runs_are_taken_over_by_index(void)
+{
+    static const CDL_KEPT_RUN old_array = {2, 2, 4, 1}, new_array = {2, 3, 3, 3};
+    static const CDL_KEPT_RUN old_text = {4, 4, 1, 0}, new_text = {6, 6, 1, 0};
+    static const RTS_UI8 values[] = {10, 0, 20, 0, 30, 0, 40, 0, 'a', 'b', 'c', 0, 'x', 'y'};
+    static const RTS_UI8 expected[] = {30, 0, 0xEE, 40, 0, 0xEE, 0xEE, 0xEE, 'a', 'b', 'c', 0, 0, 0};
+    RTS_UI8 *area;
+
+    start_blank();
+    spec_counter(&spec, 1);
+    spec.kept_count = 0;
+    spec.tasks[0].interval_us = 3600000000u;
+    spec.areas[APP_AREA_RETAIN] = 32;
+    add_kept_run(&spec, 'E', 16, CDL_KEPT_PERSISTENT, old_array);
+    add_kept_run(&spec, 'F', 24, CDL_KEPT_PERSISTENT, old_text);
+    load();
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    area = AppGetAreaAddress(APP_AREA_RETAIN, 0, 32);
+    memcpy(area + 16, values, sizeof values);
+    spec.kept_count = 0;
+    add_kept_run(&spec, 'E', 16, CDL_KEPT_PERSISTENT, new_array);
+    add_kept_run(&spec, 'F', 24, CDL_KEPT_PERSISTENT, new_text);
+    spec.function[CDL_FUNCTION_CODE_INIT] = (RTS_I32)here(&spec);
+    emit_set(&spec, APP_AREA_RETAIN, 16, 0xEEEEEEEE);
+    emit_set(&spec, APP_AREA_RETAIN, 20, 0xEEEEEEEE);
+    emit_ret(&spec);
+    build_image(&image, &spec);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(memcmp(AppGetAreaAddress(APP_AREA_RETAIN, 16, sizeof expected), expected, sizeof expected) == 0);
+}
+
+static void what_is_not_in_the_table_is_not_kept(void)
+{
+    start_blank();
+    spec_counter(&spec, 1);
+    spec.kept_count = 1;
     load();
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK(AppStopApplication() == ERR_OK);
     CHECK(SimStart() == ERR_OK);
-    CHECK(retain_value() > 400);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 601);
+    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET) == 100);
 }
 
 static void a_flash_fault_does_not_stop_the_application(void)
@@ -374,6 +551,7 @@ static void a_flash_fault_does_not_stop_the_application(void)
 static void a_large_retain_area_is_saved_whole(void)
 {
     RTS_UI32 size = APP_RETAIN_SIZE;
+    const CDL_KEPT_RUN rest = {1, 1, size - 16, 0};
     RTS_UI8 *area;
     RTS_UI32 i;
 
@@ -381,6 +559,7 @@ static void a_large_retain_area_is_saved_whole(void)
     CHECK(SimStart() == ERR_OK);
     spec_counter(&spec, 1);
     spec.areas[APP_AREA_RETAIN] = size;
+    add_kept_run(&spec, 'C', 16, 0, rest);
     load();
     area = AppGetAreaAddress(APP_AREA_RETAIN, 0, size);
     for (i = 16; i < size; i++)
@@ -414,7 +593,14 @@ int main(void)
     RUN(a_rollback_brings_back_large_values_too);
     RUN(a_lost_log_costs_its_values_only);
     RUN(damaged_values_give_way_to_initial_ones);
-    RUN(without_a_layout_only_the_same_image_gets_its_values_back);
+    RUN(a_download_keeps_persistent_values_wherever_they_lie_then);
+    RUN(what_a_download_drops_is_counted);
+    RUN(a_take_over_survives_every_power_cut);
+    RUN(a_program_that_fails_at_once_hands_values_on);
+    RUN(a_value_that_was_dropped_does_not_come_back);
+    RUN(origin_ends_persistent_values_too);
+    RUN(runs_are_taken_over_by_index);
+    RUN(what_is_not_in_the_table_is_not_kept);
     RUN(a_flash_fault_does_not_stop_the_application);
     RUN(a_large_retain_area_is_saved_whole);
     return test_result();

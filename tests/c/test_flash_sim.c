@@ -3,7 +3,10 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#define _GNU_SOURCE
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "Sim.h"
 #include "SysFlash.h"
@@ -265,6 +268,56 @@ static void a_plan_for_the_next_start_counts_from_there(void)
     SimFlashSetMapped(1);
 }
 
+static void calls_can_fail_from_one_on(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    SimFlashFailFrom(SIM_PROGRAM, 2);
+    CHECK(flash->program(8, ones, 1) == ERR_OK);
+    CHECK(flash->program(9, ones, 1) == ERR_DEVICE && flash->program(9, ones, 1) == ERR_DEVICE);
+    SimFlashFail(SIM_PROGRAM, 0);
+    CHECK(flash->program(9, ones, 1) == ERR_OK);
+    SimFlashFailFrom(SIM_PROGRAM, 1);
+    SimFlashAtStart();
+    CHECK(SimStart() == ERR_OK);
+    CHECK(flash->program(10, ones, 1) == ERR_DEVICE && flash->program(10, ones, 1) == ERR_DEVICE);
+    SimFlashFail(SIM_MAP_CODE, 1);
+    CHECK(SysFlashMapCode(0, 0, 16) == NULL && SysFlashMapCode(0, 0, 16) != NULL);
+}
+
+static void what_is_loaded_counts_as_programmed(void)
+{
+    static RTS_UI8 content[16 * 1024];
+    const SYS_FLASH *flash = blank(1, 0xFF);
+
+    memset(content, 0xFF, sizeof content);
+    content[5] = 1;
+    CHECK(SimFlashLoad(content, 100) == ERR_PARAMETER);
+    CHECK(SimFlashLoad(content, sizeof content) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(flash->program(4, ones, 1) == ERR_OK);
+    CHECK(SimFlashViolations() == 0);
+    CHECK(flash->program(5, ones, 1) == ERR_OK);
+    CHECK(SimFlashViolations() == 1);
+}
+
+/* What a process programmed is there after it died; a store of its own into the flash is what it dies of. */
+static void cells_survive_the_process_and_are_not_written_by_stores(void)
+{
+    const SYS_FLASH *flash = blank(1, 0xFF);
+    int status = 0;
+    pid_t child = fork();
+
+    if (child == 0) {
+        (void)flash->program(0, ones, 1);
+        *(volatile RTS_UI8 *)(uintptr_t)flash->mapped = 7;
+        _exit(0);
+    }
+    CHECK(child > 0 && waitpid(child, &status, 0) == child);
+    CHECK(!WIFEXITED(status) || WEXITSTATUS(status) != 0);
+    CHECK(SimFlashData()[0] == 1);
+}
+
 int main(void)
 {
     RUN(only_possible_geometries_are_accepted);
@@ -281,5 +334,8 @@ int main(void)
     RUN(a_call_that_is_planned_to_fail_fails_once_and_does_nothing);
     RUN(what_a_sync_did_not_save_is_lost_with_power);
     RUN(a_plan_for_the_next_start_counts_from_there);
+    RUN(calls_can_fail_from_one_on);
+    RUN(what_is_loaded_counts_as_programmed);
+    RUN(cells_survive_the_process_and_are_not_written_by_stores);
     return test_result();
 }

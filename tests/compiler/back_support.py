@@ -35,6 +35,7 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.types import BOOL, INT, Type, align_up
+from plctool.core import lib
 from plctool.image import parse_image
 
 POS = Pos("main.st", 1, 1)
@@ -165,10 +166,13 @@ class Running:
             table[i] = ctypes.cast(helper()[functions[external.name]], ctypes.c_void_p).value
         self._table = table
         self.context.imports = ctypes.addressof(table)
-        self.initialise(retains=True)
+        self.initialise()
 
-    def initialise(self, *, retains: bool) -> None:
-        assert self._call(self.image.functions[1], int(retains)) == 0
+    def initialise(self) -> None:
+        """CodeInit and, if there is one, GlobalInit of a cold start."""
+        for number in (lib.CDL_FUNCTION_CODE_INIT, lib.CDL_FUNCTION_GLOBAL_INIT):
+            if number in self.image.functions:
+                assert self._call(self.image.functions[number], 1) == 0
 
     def _call(self, offset: int, argument: int = 0) -> int:
         code: int = helper().helper_call(self.base + offset, ctypes.addressof(self.context), argument)
@@ -193,5 +197,9 @@ class Running:
 
     def __setitem__(self, name: str, value: Any) -> None:
         symbol = self.built.symbols.resolve(f"Main.{name}")
-        data = symbol.encode(value)
-        ctypes.memmove(self.context.area[symbol.area] + symbol.offset, data, len(data))
+        change = symbol.change(value)
+        place = symbol.offset + change.offset
+        data = change.data
+        if change.mask != 0xFF:
+            data = bytes([(self.memory(symbol.area, place, 1)[0] & ~change.mask) | data[0]])
+        ctypes.memmove(self.context.area[symbol.area] + place, data, len(data))

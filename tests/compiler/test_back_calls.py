@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from plctool.compiler.codegen.lower_unit import interface_signature
 from plctool.compiler.typed import (
-    Area,
     ArrayInit,
     Assign,
     BinaryOp,
@@ -468,26 +467,3 @@ def test_initial_values_of_all_kinds() -> None:
     assert run["given"] == {**default, "b": 2.5}
     assert run["many"] == [{**default, "d": 9}] + [default] * 9
     assert run["grid"] == [[4, 4, 4], [4, 4, 4]]
-
-
-def test_retain_variables_are_initialised_only_when_asked() -> None:
-    p = ProgramBuilder()
-    p.variable("kept", INT, ScalarInit(5), Area.RETAIN)
-    p.variable("lost", INT, ScalarInit(6))
-    run = p.run()
-    assert (run["kept"], run["lost"]) == (5, 6)
-    run["kept"], run["lost"] = 50, 60
-    run.initialise(retains=False)
-    assert (run["kept"], run["lost"]) == (50, 6)
-
-
-def test_retain_layout_changes_with_names_and_types_only() -> None:
-    def layout(name: str, t: Type, value: int) -> int | None:
-        p = ProgramBuilder()
-        p.variable(name, t, ScalarInit(value), Area.RETAIN)
-        from plctool.image import parse_image
-
-        return parse_image(build(p.program()).image).retain_layout
-
-    assert layout("a", INT, 1) == layout("A", INT, 2)
-    assert len({layout("a", INT, 1), layout("b", INT, 1), layout("a", DINT, 1)}) == 3

@@ -11,6 +11,7 @@ import pytest
 from back_support import build
 from test_back_random import Generator, meaningful, outcome
 
+from plctool.core import lib
 from plctool.image import parse_image
 
 SEEDS = range(100, 116)
@@ -42,7 +43,7 @@ def application(number: int, image: bytes) -> tuple[list[str], str]:
         f'static const u8 code{number}[] __attribute__((aligned(16), section(".text"))) = {{{code}}};',
         f"static const function imports{number}[] = {{{', '.join([*imports, '0'])}}};",
     ]
-    entries = f"{parsed.functions[1]}, {parsed.tasks[0].entry}"
+    entries = f"{parsed.functions[lib.CDL_FUNCTION_CODE_INIT]}, {parsed.tasks[0].entry}"
     return definitions, f"{{code{number}, {parsed.areas[0]}, {entries}, imports{number}}},"
 
 

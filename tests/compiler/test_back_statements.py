@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
-from plctool.compiler.codegen.ranges import type_range
+from plctool.compiler.ranges import type_range
 from plctool.compiler.typed import (
     AddressOf,
     Assign,
@@ -254,7 +254,7 @@ def test_any_index_out_of_bounds_raises_with_its_line(bounds: tuple[int, int], t
     for value in {low, high, *range(bounds[0] - 2, bounds[1] + 3), 1 << 32 if high > 1 << 32 else high}:
         if not low <= value <= high:
             continue
-        run.initialise(retains=True)
+        run.initialise()
         run["i"] = value
         inside = bounds[0] <= value <= bounds[1]
         assert run.cycle() == (0 if inside else ARRAYBOUNDS), value

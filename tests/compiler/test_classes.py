@@ -86,15 +86,6 @@ def test_dispatch_compiles_for_every_target(target: str, tmp_path: Path) -> None
     assert compile_sources([file], target=target).image
 
 
-def test_kept_instances_get_the_class_numbers_of_the_new_program() -> None:
-    """Retain variables keep their values when a program is changed; its classes may have other numbers then."""
-    program = FAMILY + "PROGRAM Main VAR RETAIN f : ARRAY[1..2] OF Derived; END_VAR f[1].Value(); END_PROGRAM"
-    text = code(program)
-    kept = text[text.index("\nkept") :]
-    stores = re.findall(r"store i32 2, ptr", kept[: kept.index("\n}")])
-    assert len(stores) == 2
-
-
 def test_members_of_the_base_are_found_by_name(tmp_path: Path) -> None:
     file = tmp_path / "f.st"
     file.write_text(

@@ -16,6 +16,7 @@ from plctool.image import (
     ExternalFunction,
     Image,
     ImageTask,
+    KeptVariable,
     build_image,
     describe_image,
     parse_image,
@@ -32,7 +33,10 @@ SAMPLE = Image(
         ImageTask("on_event", 1, 5, 0, 32, event=(0, 12)),
     ],
     info=ApplicationInfo("Pump", "Ada", "1.2", "two pumps", "plctool", 1_700_000_000),
-    retain_layout=0x12345678,
+    kept=[
+        KeptVariable(b"\0\1\2\3\4\5\6\7", 4, 2, True, 2, 1, 0, is_run=False),
+        KeptVariable(b"\1\1\2\3\4\5\6\7", 6, 2, False, 3, 2, -5, is_run=True),
+    ],
 )
 
 
@@ -49,6 +53,17 @@ def test_what_is_built_is_read_again() -> None:
 
 names = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=31)
 offsets = st.integers(0, 99)
+hashes, places, halves = st.binary(min_size=8, max_size=8), st.integers(0, 2**28 - 1), st.integers(0, 2**16 - 1)
+single = st.sampled_from((1, 2, 4, 8)).flatmap(
+    lambda size: st.builds(
+        KeptVariable, hashes, places, st.just(size), st.booleans(), st.just(size), st.just(1), st.just(0),
+        st.just(False),
+    )
+)  # fmt: skip
+run = st.builds(
+    KeptVariable, hashes, places, halves, st.booleans(), halves, st.integers(0, 2**32 - 1),
+    st.integers(-(2**31), 2**31 - 1), st.just(True),
+)  # fmt: skip
 
 
 @settings(max_examples=60, deadline=None)
@@ -70,7 +85,7 @@ offsets = st.integers(0, 99)
             )
         ),
         info=st.builds(ApplicationInfo, names, names, names, names, names, st.integers(0, 2**32 - 1)),
-        retain_layout=st.none() | st.integers(0, 2**32 - 1),
+        kept=st.lists(single | run),
     )
 )  # fmt: skip
 def test_any_image_is_read_as_it_was_built(image: Image) -> None:

@@ -42,7 +42,7 @@ from plctool.compiler.types import (
 from plctool.errors import UsageError
 from plctool.value_texts import format_time, literal, parse_time, parse_value
 from plctool.values import decode, encode
-from plctool.variables import Symbol
+from plctool.variables import Change, Symbol
 
 
 def laid_out(t: StructType) -> StructType:
@@ -161,16 +161,40 @@ def test_structs_and_arrays_are_dicts_and_lists() -> None:
 
 def test_bits_are_changed_in_their_word() -> None:
     symbol = Symbol("Main.word.3", 0, 0, WORD, bit=3)
-    assert symbol.encode(True, b"\x01\x80") == b"\x09\x80"
-    assert symbol.encode("FALSE", b"\xff\xff") == b"\xf7\xff"
+    assert symbol.change(True) == Change(0, b"\x08", 0x08)
+    assert symbol.change("FALSE") == Change(0, b"\x00", 0x08)
+    assert Symbol("Main.word.12", 0, 0, WORD, bit=12).change(True) == Change(1, b"\x10", 0x10)
     assert symbol.decode(b"\x08\x00") is True
-    with pytest.raises(UsageError):
-        symbol.encode(True)
 
 
 def test_enums_are_shown_by_name() -> None:
     assert decode(COLOUR, encode(COLOUR, 5)) == "Green"
     assert decode(COLOUR, b"\x09\x00") == 9
+
+
+@pytest.mark.parametrize("value", [7, "7", "16#07", "Colour#7", "Purple", -1, [0, 7], {"x": 7}, True])
+def test_what_an_enumeration_has_not_is_refused(value: object) -> None:
+    """The program would not know what to do with it: no branch of a CASE is for it."""
+    t: Type = COLOUR
+    if isinstance(value, list):
+        t = ArrayType(COLOUR, ((0, 1),))
+    elif isinstance(value, dict):
+        t = laid_out(StructType("Painted", [Field("x", COLOUR)]))
+    with pytest.raises(
+        UsageError, match=r"is not a value of Colour; choose one of Red \(0\), Green \(5\), Blue \(6\)\."
+    ):
+        encode(t, value)
+
+
+@pytest.mark.parametrize("value", [5, "5", "16#05", "Green", "green", "Colour#Green", "Colour.Green"])
+def test_an_enumeration_takes_its_values_by_name_and_number(value: object) -> None:
+    assert encode(COLOUR, value) == b"\5\0"
+
+
+def test_a_message_does_not_list_hundreds_of_values() -> None:
+    many = EnumType("Many", INT, {f"v{n}": n for n in range(500)})
+    with pytest.raises(UsageError, match=r"v11 \(11\), \.\.\.\.$"):
+        encode(many, 700)
 
 
 # ---- as ST writes them ----
@@ -199,6 +223,8 @@ def test_what_is_shown_can_be_typed(t: Type) -> None:
     def check(data: bytes) -> None:
         if isinstance(t, PointerType):
             data = bytes(t.size)
+        if isinstance(t, EnumType):
+            data = encode(t, list(t.values)[data[0] % len(t.values)])
         text = literal(t, decode(t, data))
         assert literal(t, decode(t, encode(t, parse_value(t, text)))) == text
 

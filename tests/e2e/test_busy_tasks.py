@@ -129,12 +129,13 @@ END_CONFIGURATION
 
 def test_a_process_that_is_paused_in_a_cycle_is_not_a_task_that_takes_too_long(tool, plcrt: Plcrt, connected):
     connected.flash(tool.build("paused", PAUSED))
-    assert plcrt.process is not None
+    worker = plcrt.worker
+    assert worker > 0  # 0 would be this process and its relatives
     for _ in range(6):
         before = connected.read("Main.n")
-        os.kill(plcrt.process.pid, signal.SIGSTOP)
+        os.kill(worker, signal.SIGSTOP)
         time.sleep(0.5)
-        os.kill(plcrt.process.pid, signal.SIGCONT)
+        os.kill(worker, signal.SIGCONT)
         while connected.read("Main.n") < before + 3:
             assert connected.status().exception is None
     assert connected.status().exception is None
@@ -176,4 +177,4 @@ def test_cycles_on_another_processor_do_not_stop_the_clock_of_an_endless_loop(to
     connected.write({"go": True})
     exception = eventually(lambda: connected.status().exception)
     assert (exception.name, exception.task) == ("WATCHDOG", "Endless")
-    assert connected.tasks()[1].cycles - cycles < 100  # not as long as they go on
+    assert connected.tasks()[1].cycles - cycles < 40  # not six times as long

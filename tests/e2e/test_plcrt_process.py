@@ -107,6 +107,25 @@ def test_a_small_file_of_somebody_else_is_not_touched(tmp_path):
     assert notes.read_text() == "milk, bread"
 
 
+@pytest.mark.parametrize("change", [-1, -4096, 1, 4096])
+def test_a_flash_file_that_was_cut_short_or_grew_is_not_touched_and_its_size_is_said(plcrt, change):
+    plcrt.stop()
+    whole = b"\0" * 4096 + plcrt.flash.read_bytes()[4096:]
+    content = whole[:change] if change < 0 else whole + bytes(change)
+    plcrt.flash.write_bytes(content)
+    done = run_plcrt("--flash", str(plcrt.flash))
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert f"{len(content)} bytes and not {len(whole)}" in done.stderr and "name another file" in done.stderr
+    assert plcrt.flash.read_bytes() == content
+
+
+@pytest.mark.skipif(not Path("/sys/kernel/uevent_seqnum").exists(), reason="no file that not even root may write")
+def test_a_flash_file_that_may_not_be_written_is_said_with_what_to_do():
+    done = run_plcrt("--flash", "/sys/kernel/uevent_seqnum")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert "plcrt has to write it" in done.stderr
+
+
 def test_a_limit_of_file_sizes_is_an_error_and_not_a_signal(tmp_path):
     limit = 100_000
     done = run_plcrt(

@@ -112,8 +112,7 @@ END_CONFIGURATION
 
 def on_one_processor(plcrt: Plcrt) -> None:
     """The threads that tasks will have inherit it."""
-    assert plcrt.process is not None
-    for thread in Path(f"/proc/{plcrt.process.pid}/task").iterdir():
+    for thread in Path(f"/proc/{plcrt.worker}/task").iterdir():
         os.sched_setaffinity(int(thread.name), {min(os.sched_getaffinity(0))})
 
 

@@ -13,6 +13,7 @@ from plctool.errors import DeviceError, UsageError
 from plctool.sim import Simulator
 
 MAIN = """
+TYPE Mode : (Idle, Run := 5); END_TYPE
 TYPE Point : STRUCT x : INT; y : REAL := 1.5; END_STRUCT; END_TYPE
 PROGRAM Main
 VAR
@@ -22,6 +23,7 @@ VAR
     pulses : UDINT;
     name : STRING := 'tank';
     divisor : INT := 1;
+    mode : Mode;
     result : INT;
 END_VAR
 VAR RETAIN kept : UDINT := 5; END_VAR
@@ -107,6 +109,14 @@ def test_values_that_do_not_fit_are_refused(plc):
         with pytest.raises(UsageError):
             plc.write(name, value)
     assert plc.read("Main.divisor") == 1
+
+
+@pytest.mark.parametrize("value", [1, "1", "Stop", "Mode#2"])
+def test_a_value_that_an_enumeration_has_not_is_refused(plc, value):
+    plc.write("Main.mode", "Run")
+    with pytest.raises(UsageError, match=r"choose one of Idle \(0\), Run \(5\)\."):
+        plc.write("Main.mode", value)
+    assert plc.read("Main.mode") == "Run"
 
 
 def test_an_exception_stops_the_program_and_a_reset_lets_it_start_again(plc):

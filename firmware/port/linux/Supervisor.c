@@ -199,7 +199,7 @@ static void note_death(int status)
     PortSetStart(&state.start);
 }
 
-/* A worker that ran a program, lived for a while, or was killed from outside says nothing against the next one. */
+/* A worker that ran a program, lived for a while, or was up and killed from outside says nothing against the next. */
 static void count_failure(void)
 {
     bool innocent = state.life->ran || now_ms() - state.started_ms >= PORT_LIFE_MS ||
@@ -210,7 +210,9 @@ static void count_failure(void)
 /* Before the next start [ms]: the first at once, then longer and longer. */
 static RTS_I64 pause_ms(void)
 {
-    return state.failures < 2 ? 0 : (RTS_I64)PORT_RESTART_MS << (state.failures - 2);
+    unsigned longest = PORT_MAX_FAILURES - 2;
+    unsigned doubled = state.failures < longest ? state.failures : longest;
+    return state.failures < 2 ? 0 : (RTS_I64)PORT_RESTART_MS << (doubled - 2);
 }
 
 /* ---- waiting ---- */
@@ -291,7 +293,7 @@ static bool survives(int status, const sigset_t *set)
         fprintf(stderr, "plcrt: the controller died while it ended (%s)\n", state.text);
         return false;
     }
-    if (state.failures >= PORT_MAX_FAILURES) {
+    if (state.failures >= PORT_MAX_FAILURES && state.start.cause == SYS_START_CRASH) {
         fprintf(stderr, "plcrt: the controller died %u times in a row without a program (%s): try another flash file\n",
                 state.failures, state.text);
         return false;

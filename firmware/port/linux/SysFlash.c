@@ -26,7 +26,6 @@ enum { CODE_SLOTS = 2, ERASED = 0xFF };
 
 static struct {
     int file;
-    SYS_FLASH flash;
     RTS_UI8 *code[CODE_SLOTS];
 } state = {.file = -1};
 
@@ -132,9 +131,21 @@ static RTS_RESULT flash_sync(void)
     return fdatasync(state.file) == 0 ? ERR_OK : fault("sync failed", 0);
 }
 
+/* Read-only memory, which no wild pointer changes. */
+static const SYS_FLASH flash = {
+    .size = PORT_FLASH_SIZE,
+    .sector_size = PORT_FLASH_SECTOR_SIZE,
+    .program_size = PORT_FLASH_PROGRAM_SIZE,
+    .erased = ERASED,
+    .read = flash_read,
+    .program = flash_program,
+    .erase = flash_erase,
+    .sync = flash_sync,
+};
+
 const SYS_FLASH *SysFlashGet(void)
 {
-    return &state.flash;
+    return &flash;
 }
 
 /* ---- code ---- */
@@ -211,17 +222,23 @@ static bool lock_file(int file, const char *path, PORT_REASON *reason)
 }
 
 /* A flash file, or the beginning of one: what lies there besides belongs to somebody else. */
-static bool is_flash_file(int file)
+static bool is_flash_file(int file, off_t size)
 {
-    struct stat info;
-    return fstat(file, &info) == 0 && S_ISREG(info.st_mode) &&
-           (info.st_size == PORT_FLASH_SIZE || (info.st_size < PORT_FLASH_SIZE && is_erased(file, 0, info.st_size)));
+    return size == PORT_FLASH_SIZE || (size < PORT_FLASH_SIZE && is_erased(file, 0, size));
 }
 
 static bool prepare_file(int file, const char *path, PORT_REASON *reason)
 {
-    if (!is_flash_file(file)) {
-        PortReason(reason, "%s is not a flash file of plcrt (%d bytes): name another file", path, PORT_FLASH_SIZE);
+    struct stat info;
+    if (fstat(file, &info) != 0 || !S_ISREG(info.st_mode)) {
+        PortReason(reason, "%s is not a flash file of plcrt: name another file", path);
+        return false;
+    }
+    if (!is_flash_file(file, info.st_size)) {
+        PortReason(reason,
+                   "%s is not a flash file of plcrt, or not all of one: it has %lld bytes and not %d; it is left as it is, "
+                   "put a copy of it in its place or name another file",
+                   path, (long long)info.st_size, PORT_FLASH_SIZE);
         return false;
     }
     if (!fill_erased(file, lseek(file, 0, SEEK_END)) || !sync_folder(path)) {
@@ -244,23 +261,19 @@ static bool reserve_code(PORT_REASON *reason)
     return true;
 }
 
+static const char *advice(int error)
+{
+    bool no_write = error == EACCES || error == EPERM || error == EROFS;
+    return no_write ? "; plcrt has to write it: give it the right to, or name a copy where it has" : "";
+}
+
 bool PortFlashOpen(const char *path, PORT_REASON *reason)
 {
     state.file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
     if (state.file < 0) {
-        PortReason(reason, "cannot open flash file %s: %s", path, strerror(errno));
+        PortReason(reason, "cannot open flash file %s: %s%s", path, strerror(errno), advice(errno));
         return false;
     }
-    state.flash = (SYS_FLASH){
-        .size = PORT_FLASH_SIZE,
-        .sector_size = PORT_FLASH_SECTOR_SIZE,
-        .program_size = PORT_FLASH_PROGRAM_SIZE,
-        .erased = ERASED,
-        .read = flash_read,
-        .program = flash_program,
-        .erase = flash_erase,
-        .sync = flash_sync,
-    };
     if (!lock_file(state.file, path, reason) || !prepare_file(state.file, path, reason) || !reserve_code(reason)) {
         PortFlashClose();
         return false;

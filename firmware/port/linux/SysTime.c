@@ -42,6 +42,13 @@ RTS_I64 PortMonotonicNs(RTS_I64 time_ns)
     return time_ns + state.start_ns;
 }
 
+void SysTimePause(void)
+{
+    static const struct timespec pause = {0, 20000};
+
+    nanosleep(&pause, NULL);
+}
+
 RTS_RESULT SysTime_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT_SYSTEM) {

@@ -45,12 +45,12 @@
 /* The largest code segment that can be made executable, per slot [bytes]: a slot is less than half of the flash. */
 #define PORT_CODE_SIZE (PORT_FLASH_SIZE / 2)
 
-/* Stack of a task's thread [bytes]; the thread sanitizer needs 1 MiB. The zone below it has no memory: a function
- * whose local variables are larger than the zone could jump over it, into the next stack. */
+/* Stack of a task's thread [bytes], on which the runtime runs and IEC code does not (IecStack.c); the thread sanitizer
+ * needs 1 MiB. The zone below it has no memory. */
 #ifndef PORT_STACK_SIZE
 #define PORT_STACK_SIZE (256 * 1024)
 #endif
-#define PORT_STACK_GUARD (16 * 1024 * 1024)
+#define PORT_STACK_GUARD (64 * 1024)
 
 /* SCHED_FIFO priority of an IEC priority p is PORT_PRIORITY_HIGHEST - p: 80..49. Above all of them are external events,
  * main as long as tasks leave it no time otherwise, and the watchdog. */
@@ -73,8 +73,8 @@
 #define PORT_IDLE_MS 10
 
 /* When the process that runs the controller dies, it is started again at once; when it dies again without having run a
- * program or lived for PORT_LIFE_MS, after PORT_RESTART_MS, twice that and so on [ms]; in vain so many times in a row,
- * plcrt ends. */
+ * program or lived for PORT_LIFE_MS, after PORT_RESTART_MS, twice that and so on [ms]; after so many deaths in a row plcrt
+ * ends, unless the last one came from outside (SIGKILL). */
 #define PORT_RESTART_MS 250
 #define PORT_LIFE_MS 10000
 #define PORT_MAX_FAILURES 6

@@ -194,6 +194,14 @@ RTS_UI32 SysTimeGetMs(void)
     return (RTS_UI32)(sim.now_ns / NS_PER_MS);
 }
 
+/* Tasks run one after the other here, but for tests that have threads of their own. */
+void SysTimePause(void)
+{
+    static const struct timespec pause = {0, 20000};
+
+    nanosleep(&pause, NULL);
+}
+
 RTS_I64 SimNow(void)
 {
     return sim.now_ns;

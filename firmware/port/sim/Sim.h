@@ -98,9 +98,13 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
 /* 0: the flash is read through its read function only. From power off; the default is 1. */
 void SimFlashSetMapped(int mapped);
 
-/* The content, to look at or to spoil. */
+/* The content, to look at or to spoil: writable until the next SimStart. It is shared with child processes. */
 RTS_UI8 *SimFlashData(void);
 RTS_UI32 SimFlashSize(void);
+
+/* Sets the whole content, e.g. of a flash file; what is not erased counts as programmed. From power off.
+ * ERR_PARAMETER for another size than SimFlashConfigure was told. */
+RTS_RESULT SimFlashLoad(const RTS_UI8 *data, RTS_UI32 size);
 
 /* Keeps the content, and brings back what was kept (nothing, when the geometry changed since). From power off. */
 RTS_RESULT SimFlashSave(void);
@@ -116,6 +120,12 @@ enum { SIM_READ = 0, SIM_PROGRAM = 1, SIM_ERASE = 2, SIM_SYNC = 3, SIM_MAP_CODE 
  * programmed, erased. With SIM_SYNC all is in flash, but what came after the sync before is lost with power, unless
  * another sync succeeds. */
 void SimFlashFail(RTS_UI32 kind, RTS_UI32 call);
+
+/* The same, and all calls of that kind after it. */
+void SimFlashFailFrom(RTS_UI32 kind, RTS_UI32 call);
+
+/* Power is off: what was not synced when a sync failed is lost. SimStart does it, too; for a process that ends. */
+void SimFlashPowerOff(void);
 
 /* What is planned now is for the next SimStart, and counts from there; other plans end with power. */
 void SimFlashAtStart(void);

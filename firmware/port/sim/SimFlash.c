@@ -4,13 +4,15 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A byte may be programmed once after an erase, also with the value it has. What breaks a rule is counted, and happens
- * as it would on a chip.
+ * as it would on a chip. The cells survive the end of a child process that ran the runtime, as they survive power off,
+ * and while power is on a store into them is a fault, as it is on a chip.
  */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include "Sim.h"
 #include "SysFlash.h"
@@ -24,10 +26,12 @@ typedef struct {
     RTS_UI32 size;
 } MAPPING;
 
-/* The cells, and which of them were programmed since they were erased. */
+/* The cells, and which of them were programmed since they were erased; shared with child processes. */
 typedef struct {
-    RTS_UI8 *data;
+    int file;      /* memory with the cells, by which they are changed */
+    RTS_UI8 *data; /* the same, for reading */
     RTS_UI8 *programmed;
+    RTS_UI32 size;
 } CELLS;
 
 /* When something happens, as values of the counters; 0: never. */
@@ -35,6 +39,7 @@ typedef struct {
     RTS_UI32 cut_at;
     RTS_UI32 cut_mode;
     RTS_UI32 fail_at[SIM_CALLS];
+    bool fail_on[SIM_CALLS]; /* all calls after that one, too */
 } PLAN;
 
 static struct {
@@ -73,6 +78,18 @@ static bool was_programmed(RTS_UI32 offset, RTS_UI32 size)
     return memchr(chip.cells.programmed + offset, 1, size) != NULL;
 }
 
+/* Whether tests may store into the cells. */
+static void set_writable(bool writable)
+{
+    (void)mprotect(chip.cells.data, chip.cells.size, writable ? PROT_READ | PROT_WRITE : PROT_READ);
+}
+
+static void set_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
+{
+    if (pwrite(chip.cells.file, data, size, (off_t)offset) != (ssize_t)size)
+        violate("the simulator's memory failed", offset);
+}
+
 /* ---- cuts ---- */
 
 /* Counts an operation on `size` bytes; returns how many of them happen. *after: what follows, SIM_CUT_* or
@@ -92,7 +109,12 @@ static RTS_UI32 begin_operation(RTS_UI32 size, int *after)
 /* Counts a call; whether it fails. */
 static bool fails(RTS_UI32 kind)
 {
-    return chip.power_lost || ++chip.calls[kind] == chip.plan.fail_at[kind];
+    RTS_UI32 at = chip.plan.fail_at[kind];
+
+    if (chip.power_lost)
+        return true;
+    chip.calls[kind]++;
+    return chip.calls[kind] == at || (chip.plan.fail_on[kind] && chip.calls[kind] > at);
 }
 
 static RTS_RESULT end_operation(int after)
@@ -118,17 +140,39 @@ static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
     return ERR_OK;
 }
 
+/* What a cell holds after `value` was programmed into it: bits only change away from erased. */
+static RTS_UI8 programmed_cell(RTS_UI8 old, RTS_UI8 value)
+{
+    return chip.flash.erased == 0xFF ? old & value : old | value;
+}
+
 /* A half programmed unit counts as programmed. */
 static void program_cells(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 unit = chip.flash.program_size;
-    RTS_UI32 i;
+    RTS_UI8 part[64];
+    RTS_UI32 done;
+    RTS_UI32 count;
 
-    for (i = 0; i < size; i++) {
-        RTS_UI8 *cell = chip.cells.data + offset + i;
-        *cell = chip.flash.erased == 0xFF ? *cell & data[i] : *cell | data[i];
+    for (done = 0; done < size; done += count) {
+        RTS_UI32 i;
+        count = size - done < sizeof part ? size - done : (RTS_UI32)sizeof part;
+        for (i = 0; i < count; i++)
+            part[i] = programmed_cell(chip.cells.data[offset + done + i], data[done + i]);
+        set_cells(offset + done, part, count);
     }
     memset(chip.cells.programmed + offset, 1, (size + unit - 1) / unit * unit);
+}
+
+static void erase_cells(RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_UI8 part[64];
+    RTS_UI32 done;
+
+    memset(part, chip.flash.erased, sizeof part);
+    for (done = 0; done < size; done += (RTS_UI32)sizeof part)
+        set_cells(offset + done, part, size - done < sizeof part ? size - done : (RTS_UI32)sizeof part);
+    memset(chip.cells.programmed + offset, 0, size);
 }
 
 static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size)
@@ -160,8 +204,7 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
     if (offset % size != 0)
         return violate("erase misaligned", offset);
     size = begin_operation(size, &after);
-    memset(chip.cells.data + offset, chip.flash.erased, size);
-    memset(chip.cells.programmed + offset, 0, size);
+    erase_cells(offset, size);
     return end_operation(after);
 }
 
@@ -226,16 +269,31 @@ static bool is_power_of_two(RTS_UI32 n)
 
 static void free_cells(CELLS *cells)
 {
-    free(cells->data);
-    free(cells->programmed);
-    cells->data = NULL;
-    cells->programmed = NULL;
+    if (cells->data != NULL)
+        munmap(cells->data, cells->size);
+    if (cells->programmed != NULL)
+        munmap(cells->programmed, cells->size);
+    if (cells->size != 0)
+        close(cells->file);
+    memset(cells, 0, sizeof *cells);
+}
+
+static RTS_UI8 *map_shared(int file, RTS_UI32 size)
+{
+    int flags = file < 0 ? MAP_SHARED | MAP_ANONYMOUS : MAP_SHARED;
+    void *memory = mmap(NULL, size, PROT_READ | PROT_WRITE, flags, file, 0);
+
+    return memory == MAP_FAILED ? NULL : memory;
 }
 
 static bool allocate_cells(CELLS *cells, RTS_UI32 size)
 {
-    cells->data = malloc(size);
-    cells->programmed = calloc(size, 1);
+    cells->file = memfd_create("flash", MFD_CLOEXEC);
+    if (cells->file < 0)
+        return false;
+    cells->size = size;
+    cells->programmed = map_shared(-1, size);
+    cells->data = ftruncate(cells->file, (off_t)size) == 0 ? map_shared(cells->file, size) : NULL;
     if (cells->data != NULL && cells->programmed != NULL)
         return true;
     free_cells(cells);
@@ -272,25 +330,35 @@ RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 progr
     return ERR_OK;
 }
 
+void SimFlashPowerOff(void)
+{
+    if (chip.sync_failed && chip.synced.data != NULL) {
+        set_writable(true);
+        copy_cells(&chip.cells, &chip.synced);
+    }
+    chip.sync_failed = false;
+}
+
 RTS_RESULT SimFlashPowerOn(void)
 {
+    RTS_RESULT result = ERR_OK;
     RTS_UI32 slot;
 
     for (slot = 0; slot < CODE_SLOTS; slot++)
         SysFlashReleaseCode(slot);
+    SimFlashPowerOff();
     chip.operations = 0;
     memset(chip.calls, 0, sizeof chip.calls);
     chip.plan = chip.next_plan;
     memset(&chip.next_plan, 0, sizeof chip.next_plan);
     chip.power_lost = false;
-    if (chip.sync_failed)
-        copy_cells(&chip.cells, &chip.synced);
-    chip.sync_failed = false;
     if (chip.plan.fail_at[SIM_SYNC] == 0)
         free_cells(&chip.synced);
-    if (chip.cells.data != NULL)
-        return ERR_OK;
-    return SimFlashConfigure(SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED);
+    if (chip.cells.data == NULL)
+        result = SimFlashConfigure(SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED);
+    if (result == ERR_OK)
+        set_writable(false);
+    return result;
 }
 
 void SimFlashSetMapped(int mapped)
@@ -301,7 +369,22 @@ void SimFlashSetMapped(int mapped)
 
 RTS_UI8 *SimFlashData(void)
 {
+    if (chip.cells.data != NULL)
+        set_writable(true);
     return chip.cells.data;
+}
+
+RTS_RESULT SimFlashLoad(const RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 i;
+
+    if (chip.cells.data == NULL || size != chip.flash.size)
+        return ERR_PARAMETER;
+    set_writable(true);
+    memcpy(chip.cells.data, data, size);
+    for (i = 0; i < size; i++)
+        chip.cells.programmed[i] = data[i] != chip.flash.erased;
+    return ERR_OK;
 }
 
 RTS_UI32 SimFlashSize(void)
@@ -323,6 +406,7 @@ RTS_RESULT SimFlashRestore(void)
 {
     if (chip.kept.data == NULL)
         return ERR_NO_OBJECT;
+    set_writable(true);
     copy_cells(&chip.cells, &chip.kept);
     return ERR_OK;
 }
@@ -333,16 +417,27 @@ void SimFlashCut(RTS_UI32 operation, RTS_UI32 mode)
     chip.plan.cut_mode = mode;
 }
 
-void SimFlashFail(RTS_UI32 kind, RTS_UI32 call)
+static void plan_failure(RTS_UI32 kind, RTS_UI32 call, bool all_after)
 {
     if (kind >= SIM_CALLS)
         return;
+    chip.plan.fail_on[kind] = all_after && call != 0;
     if (kind == SIM_SYNC && chip.synced.data == NULL) {
         if (!allocate_cells(&chip.synced, chip.flash.size))
             return;
         copy_cells(&chip.synced, &chip.cells);
     }
     chip.plan.fail_at[kind] = call == 0 ? 0 : chip.calls[kind] + call;
+}
+
+void SimFlashFail(RTS_UI32 kind, RTS_UI32 call)
+{
+    plan_failure(kind, call, false);
+}
+
+void SimFlashFailFrom(RTS_UI32 kind, RTS_UI32 call)
+{
+    plan_failure(kind, call, true);
 }
 
 static RTS_UI32 count_from_zero(RTS_UI32 at, RTS_UI32 now)
@@ -356,8 +451,10 @@ void SimFlashAtStart(void)
 
     chip.next_plan.cut_at = count_from_zero(chip.plan.cut_at, chip.operations);
     chip.next_plan.cut_mode = chip.plan.cut_mode;
-    for (kind = 0; kind < SIM_CALLS; kind++)
+    for (kind = 0; kind < SIM_CALLS; kind++) {
         chip.next_plan.fail_at[kind] = count_from_zero(chip.plan.fail_at[kind], chip.calls[kind]);
+        chip.next_plan.fail_on[kind] = chip.plan.fail_on[kind];
+    }
     memset(&chip.plan, 0, sizeof chip.plan);
 }
 

@@ -21,7 +21,7 @@ typedef struct {
     RTS_I64 output[WORDS(APP_OUTPUT_SIZE)];
     RTS_I64 memory[WORDS(APP_MEMORY_SIZE)];
     RTS_I64 copies[WORDS(APP_IMAGE_SIZE)]; /* of inputs and outputs */
-    RTS_I64 retain[WORDS(APP_RETAIN_SIZE)]; /* the last, because it may be left out when all are cleared */
+    RTS_I64 retain[WORDS(APP_RETAIN_SIZE)];
 } AREAS;
 
 #if APP_AREAS_FROM_PORT
@@ -37,9 +37,9 @@ RTS_RESULT AppAreasInit(void)
 static AREAS areas;
 #endif
 
-void AppAreasClear(bool retain_too)
+void AppAreasClear(void)
 {
-    memset(&areas, 0, retain_too ? sizeof areas : offsetof(AREAS, retain));
+    memset(&areas, 0, sizeof areas);
 }
 
 /* A task that copies its outputs back meanwhile is before or after. */

@@ -16,8 +16,8 @@ RTS_RESULT AppAreasInit(void);
 #define AppAreasInit() ERR_OK
 #endif
 
-/* Sets all areas to zero, the retain area only if asked to. */
-void AppAreasClear(bool retain_too);
+/* Sets all areas to zero. */
+void AppAreasClear(void);
 
 /* Sets the outputs to zero. From main or a task, outside of SysExceptTry. */
 void AppAreasClearOutputs(void);

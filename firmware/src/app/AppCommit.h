@@ -50,6 +50,9 @@ RTS_RESULT AppCommitResult(void);
 /* The record in force. */
 const COMMIT *AppCommitGet(void);
 
+/* Whether the application in `slot` has proven itself. */
+bool AppCommitIsProven(RTS_UI32 slot);
+
 /* Whether the active application died, and is not to be run without being asked to. */
 bool AppCommitIsDead(void);
 

@@ -10,6 +10,7 @@
 
 #include "AppImage.h"
 #include "CmpAppEmbedded.h"
+#include "CmpRetain.h"
 #include "CompactDownload.h"
 #include "rts_config.h"
 
@@ -25,7 +26,7 @@ typedef struct {
     CDL_SEGMENT info;
     RTS_UI32 area_size[APP_AREA_COUNT];
     RTS_UI32 entry[CDL_FUNCTION_COUNT]; /* offset in the code segment or IMAGE_NO_ENTRY */
-    RTS_UI32 retain_layout;
+    RETAIN_TABLE kept;
     RTS_UI32 tasks;   /* offset of the task records */
     RTS_UI32 imports; /* offset of the names of external functions */
     RTS_UI32 task_count;

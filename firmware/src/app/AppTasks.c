@@ -1,5 +1,5 @@
 /*
- * AppTasks.c - checks the blobs of an image: tasks, layout of the retain area.
+ * AppTasks.c - checks the blobs of an image: tasks, kept variables.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -9,6 +9,7 @@
 
 #include "CmpIecTask.h"
 #include "CmpScheduleTimer.h"
+#include "RetainTable.h"
 
 static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
 {
@@ -54,11 +55,22 @@ static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)
     return result;
 }
 
-static RTS_RESULT check_retain_layout(LOADER *l, RTS_UI32 size)
+/* Of two tables the last one counts. Values of variables that are out of order are not found, which harms nobody. */
+static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
 {
-    if (size != sizeof l->image->retain_layout)
-        return refuse(l, ERR_SIZE_MISMATCH, "Retain layout has %u bytes, not 4.", U(size));
-    return LoaderReadNext(l, &l->image->retain_layout, size);
+    RETAIN_TABLE table;
+    KEPT kept;
+    RTS_UI32 number = 0;
+    RTS_RESULT result;
+
+    l->image->kept.offset = l->offset;
+    l->image->kept.size = size;
+    table = l->image->kept;
+    while ((result = RetainTableNext(&table, &kept)) == ERR_OK)
+        number++;
+    return result == ERR_NO_OBJECT
+               ? ERR_OK
+               : refuse(l, result, "Kept variable %u is out of place; build again.", U(number));
 }
 
 #if APP_IMAGE_SIZE > 0
@@ -104,8 +116,8 @@ static RTS_RESULT check_blob(LOADER *l)
     next = LoaderAlign(l->offset + blob.size);
     if (blob.id == CDL_BLOB_TASKS)
         result = check_tasks(l, blob.size);
-    else if (blob.id == CDL_BLOB_RETAIN)
-        result = check_retain_layout(l, blob.size);
+    else if (blob.id == CDL_BLOB_RETAIN && APP_RETAIN_SIZE > 0)
+        result = check_kept(l, blob.size);
     else if (blob.id == CDL_BLOB_IMAGES)
         result = check_images(l, blob.size);
     /* Others are of a newer tool, and not needed to run. */
@@ -117,7 +129,8 @@ RTS_RESULT LoaderCheckBlobs(LOADER *l)
 {
     RTS_RESULT result;
 
-    l->image->retain_layout = l->image->crc; /* unless a blob says more */
+    l->image->kept.file = l->image->file;
+    l->image->kept.area_size = l->image->area_size[APP_AREA_RETAIN];
     result = LoaderCheckEntries(l, SEGMENT_BLOBS, check_blob);
     if (result == ERR_OK && l->image->task_count == 0)
         return refuse(l, ERR_NO_OBJECT, "The application has no task.");

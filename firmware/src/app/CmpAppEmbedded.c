@@ -14,6 +14,7 @@
 #include "AppAreas.h"
 #include "AppCommit.h"
 #include "AppException.h"
+#include "AppRetain.h"
 #include "CmpEventMgr.h"
 #include "CmpIecTask.h"
 #include "CmpLog.h"
@@ -66,9 +67,7 @@ static bool was_broken_off(void)
 
 static bool is_proven(void)
 {
-    RTS_UI8 state = AppCommitGet()->state[app.image.file];
-
-    return state == SLOT_PROVEN || state == SLOT_HALTED;
+    return AppCommitIsProven(app.image.file);
 }
 
 /* ---- exceptions ---- */
@@ -154,7 +153,7 @@ static void set_context(void)
 static void unload(void)
 {
     (void)IecTaskCreateAll(NULL, 0, &app.context);
-    RetainAttach(NULL, 0, 0);
+    RetainDetach();
     SysFlashReleaseCode(app.image.file);
     AppExceptionClear();
     app.state = AS_NONE;
@@ -164,21 +163,14 @@ static void unload(void)
     memset(&app.image, 0, sizeof app.image);
 }
 
-static void attach_retain(RTS_UI32 size)
-{
-    RetainAttach(app.context.area[APP_AREA_RETAIN], size, app.image.retain_layout);
-}
-
-/* Initial values and fresh tasks. What the flash says meanwhile is that it was begun: nothing else tells of a program
- * that ends the runtime here. */
+/* Initial values, what is kept, and fresh tasks. What the flash says meanwhile is that it was begun: nothing else tells
+ * of a program that ends the runtime here. */
 static RTS_RESULT initialise(bool init_retains)
 {
     RTS_RESULT result;
 
     AppExceptionClear();
-    AppAreasClear(init_retains);
-    if (app.pending == INIT_COLD)
-        attach_retain(app.image.area_size[APP_AREA_RETAIN]);
+    AppAreasClear();
     app.pending = INIT_DONE;
     AppImageAttach(app.image.task_image);
     result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
@@ -187,16 +179,18 @@ static RTS_RESULT initialise(bool init_retains)
         return result;
     }
     AppCommitBegin();
-    if (!run_function(CDL_FUNCTION_CODE_INIT, init_retains) || !run_function(CDL_FUNCTION_GLOBAL_INIT, init_retains))
+    if (run_function(CDL_FUNCTION_CODE_INIT, false))
+        RetainPutBack();
+    if (AppHasException() || !run_function(CDL_FUNCTION_GLOBAL_INIT, init_retains))
         enter_exception_state();
-    else if (init_retains)
-        (void)RetainSave(false);
+    RetainSettle(AppHasException());
     AppCommitDone();
     return ERR_OK;
 }
 
 RTS_RESULT AppInitialise(void)
 {
+    RetainCapture(false); /* they may have been written meanwhile */
     return initialise(app.pending == INIT_COLD);
 }
 
@@ -221,8 +215,6 @@ const RTS_UI8 *AppMapCode(const APP_IMAGE *image)
 
 RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until)
 {
-    RTS_UI32 retain_after = AppCommitGet()->slot[image->file].retain_after;
-    RTS_UI32 retain_size = image->area_size[APP_AREA_RETAIN];
     RTS_RESULT restored;
     RTS_RESULT result = AppLoaderRead(image, &app.tables);
 
@@ -235,19 +227,9 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     app.state = AS_STOP;
     SysExceptCodeRange(code, image->code.size);
     set_context();
-    attach_retain(retain_size);
-    restored = RetainRestore(retain_after, retain_until);
-    if (restored != ERR_OK && retain_size != 0 && retain_until != retain_after)
-        LogAdd(CMPID_CmpRetain, LOG_WARNING, restored, "No saved retain variables fit the application: initial values");
-    app.pending = INIT_WARM;
-    if (restored != ERR_OK) {
-        app.pending = INIT_COLD;
-        attach_retain(0); /* no zeros are to be saved in place of initial values */
-    }
-    if (is_proven())
-        RetainKeepNone();
-    else
-        RetainKeep(retain_after);
+    AppAreasClear();
+    restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until);
+    app.pending = restored == ERR_OK ? INIT_WARM : INIT_COLD;
     return ERR_OK;
 }
 
@@ -335,7 +317,7 @@ static RTS_RESULT reset_origin(void)
     if (result != ERR_OK)
         return result;
     AppUnload();
-    AppAreasClear(true);
+    AppAreasClear();
     AppCommitWipe(FILE_SLOT_A);
     AppCommitWipe(FILE_SLOT_B);
     return ERR_OK;
@@ -357,6 +339,7 @@ RTS_RESULT AppReset(RTS_UI32 option)
         result = reset_origin();
     } else {
         run_global_exit();
+        RetainCapture(option == RESET_OPTION_COLD);
         result = initialise(option == RESET_OPTION_COLD || app.pending == INIT_COLD);
     }
     LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, result, "Reset %s",
@@ -428,7 +411,7 @@ static void forget_all(void)
 {
     CMP_CLEAR(app);
     AppExceptionClear();
-    AppAreasClear(true);
+    AppAreasClear();
     AppDownloadAbort();
     SysExceptCodeRange(NULL, 0);
 }

@@ -253,9 +253,92 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
     return 1;
 }
 
+/* ---- a moment between all cycles ---- */
+
+/*
+ * A copy counts when no task was in its cycle from its beginning to its end. On one core main finds such a moment by
+ * itself, unless cycles follow each other faster than the copy takes: tasks only interrupt it. Elsewhere tasks may never
+ * pause together, so they make such a moment: while it is wanted, a task whose cycle is due waits as long as others are
+ * in theirs, unless one of them takes longer than its own. So the longest wait first and the shortest not at all, and
+ * none waits longer than its own cycle lasts for each of the others.
+ */
+enum { MOMENT_NONE, MOMENT_WANTED, MOMENT_USED };
+
+static struct {
+    RTS_UI32 state;  /* MOMENT_* */
+    RTS_UI32 claims; /* who wants to copy now; the first one may */
+    void (*copy)(void);
+} moment;
+
+/* Between cycles; true when there was none meanwhile. */
+static bool copy_alone(void (*copy)(void))
+{
+    bool busy;
+    RTS_UI32 before = IecTaskGetActivity(&busy);
+
+    if (busy)
+        return false;
+    copy();
+    return IecTaskGetActivity(&busy) == before;
+}
+
+static bool is_wanted(void)
+{
+    return SysAtomicLoad(&moment.state) == MOMENT_WANTED;
+}
+
+static void use_moment(void)
+{
+    if (SysAtomicAdd(&moment.claims, 1) == 0 && is_wanted() && copy_alone(moment.copy))
+        SysAtomicStore(&moment.state, MOMENT_USED);
+    (void)SysAtomicAdd(&moment.claims, 0xFFFFFFFF);
+}
+
+/* Whether a cycle that lasts longer than that of `task` is running. */
+static bool longer_runs(const TASK *task, RTS_I64 now_ns)
+{
+    IEC_GUARD guard;
+    RTS_UI32 i;
+
+    for (i = 0; i < tasks.count; i++) {
+        if (IecTaskReadGuard(i, &guard) &&
+            (tasks.list[i].last_ns > task->last_ns || now_ns - guard.start_ns > task->last_ns))
+            return true;
+    }
+    return false;
+}
+
+static RTS_NOINLINE void make_moment(const TASK *task)
+{
+    use_moment();
+    while (is_wanted() && SysAtomicLoad(&tasks.running) && !longer_runs(task, SysTimeGetNs())) {
+        SysTimePause();
+        use_moment();
+    }
+}
+
+bool IecTaskBetweenCycles(void (*copy)(void))
+{
+    if (RTS_ONE_CORE)
+        return copy_alone(copy);
+    if (moment.state == MOMENT_NONE) {
+        moment.copy = copy;
+        SysAtomicStore(&moment.state, MOMENT_WANTED);
+    }
+    use_moment();
+    if (is_wanted())
+        return false;
+    moment.state = MOMENT_NONE;
+    return true;
+}
+
 int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
-    return SysAtomicLoad(&tasks.running) ? run_cycle(&tasks.list[index], due_ns) : 0;
+    TASK *task = &tasks.list[index];
+
+    if (!RTS_ONE_CORE && APP_RETAIN_SIZE > 0 && is_wanted())
+        make_moment(task);
+    return SysAtomicLoad(&tasks.running) ? run_cycle(task, due_ns) : 0;
 }
 
 /* ---- all tasks ---- */
@@ -314,6 +397,8 @@ void IecTaskStopAll(void)
 {
     SysAtomicStore(&tasks.running, 0);
     SchedStop();
+    if (!RTS_ONE_CORE)
+        moment.state = MOMENT_NONE;
 }
 
 RTS_UI32 IecTaskGetCount(void)
@@ -364,6 +449,8 @@ RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT) {
         CMP_CLEAR(tasks);
+        if (!RTS_ONE_CORE)
+            CMP_CLEAR(moment);
         tasks.init_guard.limit_ns = (RTS_I64)APP_INIT_WATCHDOG_US * NS_PER_US;
     }
     return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;

@@ -1,11 +1,10 @@
 /*
- * CmpRetain.c - retain variables in flash.
+ * CmpRetain.c - RETAIN and PERSISTENT variables in flash.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The area is copied in main while tasks may preempt or run beside it. A copy counts when no cycle ran meanwhile, so
- * that what is saved is the state between two cycles; only when that cannot be had for a whole save interval, the copy
- * is taken as it is.
+ * There is one copy of the area in RAM: what was saved last, a record that is read, or the variables at a reset. A
+ * value is put back from it into the area that has its initial values by then.
  */
 #include "CmpRetain.h"
 
@@ -13,21 +12,30 @@
 
 #include "CmpIecTask.h"
 #include "CmpLog.h"
-#include "SysFlashLog.h"
+#include "RetainTable.h"
+#include "SysFileFlash.h"
 #include "SysTime.h"
 #include "rts_config.h"
 
 static struct {
     FLASH_LOG log;
-    RTS_UI8 *area;
-    RTS_UI32 size;
-    RTS_UI32 layout;
-    bool saved_valid;      /* `saved_area` is what flash holds for this layout */
-    bool failed;           /* the last save failed, and was logged */
     RTS_I64 last_check_ns; /* when the area was last found saved, or was saved */
+    RTS_UI8 *area;
+    RTS_UI32 tag; /* of its records */
+    bool failed;   /* the last save failed, and was logged */
 } retain;
 
-/* What flash holds; it is sized by the application's retain area, as that is. */
+/* All zero without an application. */
+static struct {
+    const RETAIN_TABLE *table;
+    RETAIN_TABLE source; /* of the values in `saved_area` to begin with; size 0: there are none */
+    bool persistent_only;
+    bool settled;     /* the variables have come through an initialisation */
+    bool saved_valid; /* `saved_area` is what flash holds */
+    bool asked;       /* for a copy between two cycles */
+} kept;
+
+/* It is sized by the application's retain area, as that is. */
 enum { HAS_RETAIN = APP_RETAIN_SIZE > 0 };
 static RTS_UI8 saved_area[HAS_RETAIN ? APP_RETAIN_SIZE : 1];
 
@@ -38,15 +46,30 @@ RTS_UI32 RetainCapacity(void)
     return HAS_RETAIN ? FlashLogCapacity(&retain.log) : 0;
 }
 
-void RetainAttach(RTS_UI8 *area, RTS_UI32 size, RTS_UI32 layout)
+/* ---- the variables ---- */
+
+void RetainDetach(void)
+{
+    if (HAS_RETAIN)
+        memset(&kept, 0, sizeof kept);
+}
+
+void RetainAttach(RTS_UI8 *area, const RETAIN_TABLE *table, RTS_UI32 tag)
 {
     if (!HAS_RETAIN)
         return;
+    RetainDetach();
+    kept.table = table;
     retain.area = area;
-    retain.size = size;
-    retain.layout = layout;
-    retain.saved_valid = false;
+    retain.tag = tag;
     retain.last_check_ns = SysTimeGetNs();
+}
+
+/* ---- where values come from ---- */
+
+static bool is_of_application_before(void)
+{
+    return kept.source.size > 0 && kept.source.file != kept.table->file;
 }
 
 RTS_UI32 RetainGetSequence(void)
@@ -54,67 +77,182 @@ RTS_UI32 RetainGetSequence(void)
     return HAS_RETAIN ? retain.log.sequence : 0;
 }
 
-RTS_RESULT RetainRestore(RTS_UI32 after, RTS_UI32 until)
-{
-    FLASH_LOG_RANGE range = {after, until};
-    RTS_RESULT result;
-
-    if (!HAS_RETAIN)
-        return ERR_NO_OBJECT;
-    if ((RTS_I32)(after - retain.log.sequence) > 0)
-        retain.log.sequence = after; /* the log was lost: what is saved from now on shall count */
-    if (retain.size == 0)
-        return ERR_NO_OBJECT;
-    result = FlashLogRead(&retain.log, range, retain.layout, retain.area, retain.size);
-    if (result != ERR_OK)
-        return result;
-    memcpy(saved_area, retain.area, retain.size);
-    retain.saved_valid = true;
-    return ERR_OK;
-}
-
 static bool is_saved(void)
 {
-    return retain.saved_valid && memcmp(saved_area, retain.area, retain.size) == 0;
+    return kept.saved_valid && memcmp(saved_area, retain.area, kept.table->area_size) == 0;
 }
 
 static void copy(void)
 {
-    retain.saved_valid = false;
-    memcpy(saved_area, retain.area, retain.size);
+    kept.saved_valid = is_saved();
+    memcpy(saved_area, retain.area, kept.table->area_size);
 }
 
-/* Copies the area; true when no task ran a cycle meanwhile. */
-static bool copy_between_cycles(void)
+void RetainCapture(bool cold)
 {
-    bool busy;
-    RTS_UI32 before = IecTaskGetActivity(&busy);
-
-    if (busy)
-        return false;
-    copy();
-    return IecTaskGetActivity(&busy) == before;
+    if (!HAS_RETAIN)
+        return;
+    if (kept.settled) {
+        copy();
+        kept.source = *kept.table;
+        kept.persistent_only = false;
+        kept.settled = false;
+    }
+    kept.persistent_only = kept.persistent_only || cold;
 }
+
+/* ---- putting them back ---- */
+
+/* A part of the retain area, of which it is to be found out whether a value in it is kept. */
+typedef struct {
+    RTS_UI32 offset;
+    RTS_UI32 size;
+    bool found;
+} QUERY;
+
+/* Puts the elements back that both entries have, or looks whether `query` is about one of them. */
+static void take(const KEPT *to, const KEPT *from, QUERY *query)
+{
+    RTS_UI32 place = KeptOffset(to);
+    RTS_UI32 number = (RTS_UI32)to->run.first - (RTS_UI32)from->run.first; /* in `from`; wraps where that has none */
+    RTS_UI32 i;
+
+    for (i = 0; i < to->run.count; i++, number++, place += to->run.stride) {
+        if (number >= from->run.count)
+            continue;
+        if (query == NULL)
+            memcpy(retain.area + place, saved_area + KeptOffset(from) + number * from->run.stride, from->run.size);
+        else if (place - query->offset < query->size)
+            query->found = true;
+    }
+}
+
+static bool is_persistent(const KEPT *entry)
+{
+    return (entry->variable.place & CDL_KEPT_PERSISTENT) != 0;
+}
+
+static int compare(const KEPT *a, const KEPT *b)
+{
+    return memcmp(a->variable.hash, b->variable.hash, CDL_KEPT_HASH_SIZE);
+}
+
+/* Whether a value that the same variable had goes into `to`. A string that is shorter now begins anew. */
+static bool is_taken(const KEPT *to, const KEPT *from)
+{
+    return compare(to, from) == 0 && to->run.size >= from->run.size && (is_persistent(to) || !kept.persistent_only);
+}
+
+/* Goes through both tables, which are in the same order. Returns the number of values taken; *dropped: those that were
+ * PERSISTENT and are not taken. */
+static unsigned take_all(QUERY *query, unsigned *dropped)
+{
+    RETAIN_TABLE own = *kept.table;
+    RETAIN_TABLE source = kept.source;
+    unsigned taken = 0;
+    bool more;
+    KEPT to;
+    KEPT from;
+
+    *dropped = 0;
+    more = RetainTableNext(&own, &to) == ERR_OK;
+    while (RetainTableNext(&source, &from) == ERR_OK) {
+        while (more && compare(&to, &from) < 0)
+            more = RetainTableNext(&own, &to) == ERR_OK;
+        if (more && is_taken(&to, &from)) {
+            take(&to, &from, query);
+            taken++;
+        } else if (is_persistent(&from)) {
+            ++*dropped;
+        }
+    }
+    return taken;
+}
+
+RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range)
+{
+    unsigned dropped;
+    RTS_RESULT result;
+
+    if (!HAS_RETAIN)
+        return ERR_NO_OBJECT;
+    if ((RTS_I32)(range.after - retain.log.sequence) > 0)
+        retain.log.sequence = range.after; /* the log was lost: what is saved from now on shall count */
+    if (table->size == 0)
+        return ERR_NO_OBJECT;
+    result = FlashLogRead(&retain.log, range, tag, saved_area, table->area_size);
+    if (result != ERR_OK)
+        return result;
+    kept.source = *table;
+    kept.persistent_only = is_of_application_before();
+    if (kept.persistent_only)
+        return ERR_OK;
+    (void)take_all(NULL, &dropped);
+    kept.saved_valid = true;
+    kept.settled = true;
+    return ERR_OK;
+}
+
+void RetainPutBack(void)
+{
+    unsigned dropped;
+    unsigned taken;
+
+    if (!HAS_RETAIN || kept.source.size == 0)
+        return;
+    taken = take_all(NULL, &dropped);
+    if (is_of_application_before())
+        LogAdd(CMPID_CmpRetain, dropped > 0 ? LOG_WARNING : LOG_INFO, ERR_OK,
+               "PERSISTENT values: %u taken over, %u dropped", taken, dropped);
+}
+
+static RTS_UI8 ieckept(const RTS_UI8 *address, RTS_UI32 size)
+{
+    QUERY query = {(RTS_UI32)((uintptr_t)address - (uintptr_t)retain.area), size, false};
+    unsigned dropped;
+
+    (void)take_all(&query, &dropped);
+    return query.found;
+}
+
+static const CMP_EXT_FUNCTION externals[] = {
+    {"ieckept", 0xEBCA3613, 0x00010000, (RTS_PFN)ieckept}, /* ieckept(POINTER TO BYTE,UDINT):BOOL */
+};
+
+/* ---- saving ---- */
 
 static RTS_RESULT save_copy(void)
 {
-    RTS_RESULT result = FlashLogAppend(&retain.log, retain.layout, saved_area, retain.size);
+    RTS_RESULT result = FlashLogAppend(&retain.log, retain.tag, saved_area, kept.table->area_size);
 
     if (result != ERR_OK && !retain.failed)
         LogAdd(CMPID_CmpRetain, LOG_ERROR, result, "Retain variables cannot be saved");
     retain.failed = result != ERR_OK;
-    retain.saved_valid = result == ERR_OK;
+    kept.saved_valid = result == ERR_OK;
     retain.last_check_ns = SysTimeGetNs();
     return result;
 }
 
 RTS_RESULT RetainSave(bool always)
 {
-    if (!HAS_RETAIN || retain.size == 0 || (is_saved() && !always))
+    if (!HAS_RETAIN)
+        return ERR_OK;
+    kept.asked = false;
+    if (!kept.settled)
         return ERR_OK;
     copy();
+    if (kept.saved_valid && !always)
+        return ERR_OK;
     retain.failed = false; /* a stop that loses them is said, also after saves in between that failed */
     return save_copy();
+}
+
+void RetainSettle(bool failed)
+{
+    if (!HAS_RETAIN || (failed && !is_of_application_before()))
+        return;
+    kept.settled = kept.table->size > 0;
+    (void)RetainSave(false);
 }
 
 void RetainKeep(RTS_UI32 until)
@@ -129,28 +267,32 @@ void RetainKeepNone(void)
         FlashLogKeepNone(&retain.log);
 }
 
+/* Whether a copy is wanted. */
+static bool is_due(void)
+{
+    if (kept.asked)
+        return true;
+    if (!kept.settled || SysTimeGetNs() - retain.last_check_ns < SAVE_NS)
+        return false;
+    if (!is_saved())
+        return true;
+    retain.last_check_ns = SysTimeGetNs();
+    return false;
+}
+
+static void take_copy(void)
+{
+    memcpy(saved_area, retain.area, kept.table->area_size);
+}
+
 static void save_when_due(void)
 {
-    enum { TRIES = 4 };
-    RTS_I64 waited = SysTimeGetNs() - retain.last_check_ns;
-    int i;
-
-    if (retain.size == 0 || waited < SAVE_NS)
+    if (!is_due())
         return;
-    if (is_saved()) {
-        retain.last_check_ns = SysTimeGetNs();
-        return;
-    }
-    for (i = 0; i < TRIES; i++) {
-        if (copy_between_cycles()) {
-            (void)save_copy();
-            return;
-        }
-    }
-    if (waited >= 2 * SAVE_NS) {
-        copy();
+    kept.saved_valid = false;
+    kept.asked = !IecTaskBetweenCycles(take_copy);
+    if (!kept.asked)
         (void)save_copy();
-    }
 }
 
 /* A device whose retain flash is broken still runs, with initial values. */
@@ -166,10 +308,14 @@ RTS_RESULT CmpRetain_Hook(CMP_HOOK hook)
 {
     if (!HAS_RETAIN)
         return ERR_OK;
-    if (hook == CH_INIT)
+    if (hook == CH_INIT) {
         CMP_CLEAR(retain);
+        CMP_CLEAR(kept);
+    }
     if (hook == CH_INIT2)
         open_log();
+    if (hook == CH_INIT3)
+        return CMRegisterExternal(externals, RTS_COUNT(externals));
     if (hook == CH_COMM_CYCLE)
         save_when_due();
     return ERR_OK;

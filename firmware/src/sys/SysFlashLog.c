@@ -10,19 +10,6 @@
 #include "CmpChecksum.h"
 #include "SysFlash.h"
 
-typedef struct {
-    RTS_UI32 magic;
-    RTS_UI32 sequence;
-    RTS_UI32 tag;
-    RTS_UI32 size; /* of the data that follow */
-    RTS_UI32 crc;  /* of the four words above and the data */
-} RECORD_HEAD;
-
-RTS_STATIC_ASSERT(sizeof(RECORD_HEAD) == FLASH_LOG_HEAD_SIZE, record_head_size);
-RTS_STATIC_ASSERT(sizeof(FLASH_LOG) >= FILE_ALIGN, a_mark_is_the_beginning_of_a_log);
-
-enum { RECORD_MAGIC = 0x474F4C52 };
-
 /* The records a scan looks for. */
 typedef struct {
     FLASH_LOG_RANGE range;
@@ -54,13 +41,13 @@ static bool is_newer(RTS_UI32 a, RTS_UI32 b)
     return (RTS_I32)(a - b) > 0;
 }
 
-static RTS_UI32 head_crc(const RECORD_HEAD *head)
+static RTS_UI32 head_crc(const FLASH_LOG_HEAD *head)
 {
-    return CRC32Update(0, head, offsetof(RECORD_HEAD, crc));
+    return CRC32Update(0, head, offsetof(FLASH_LOG_HEAD, crc));
 }
 
 /* ERR_OK: the record is valid. ERR_CRC_FAILED: it is not. ERR_DEVICE: who knows. */
-static RTS_RESULT check_data(RTS_UI32 file, RTS_UI32 position, const RECORD_HEAD *head)
+static RTS_RESULT check_data(RTS_UI32 file, RTS_UI32 position, const FLASH_LOG_HEAD *head)
 {
     RTS_UI32 crc = head_crc(head);
     RTS_RESULT result = SysFileCRC32(file, position + FLASH_LOG_HEAD_SIZE, head->size, &crc);
@@ -68,7 +55,7 @@ static RTS_RESULT check_data(RTS_UI32 file, RTS_UI32 position, const RECORD_HEAD
     return result == ERR_OK && crc != head->crc ? (RTS_RESULT)ERR_CRC_FAILED : result;
 }
 
-static bool is_wanted(const WANTED *wanted, const RECORD_HEAD *head)
+static bool is_wanted(const WANTED *wanted, const FLASH_LOG_HEAD *head)
 {
     if (wanted == NULL)
         return true;
@@ -76,7 +63,7 @@ static bool is_wanted(const WANTED *wanted, const RECORD_HEAD *head)
            (wanted->any_kind || (head->tag == wanted->tag && head->size == wanted->size));
 }
 
-static void note(FOUND *found, const RECORD_HEAD *head, RTS_UI32 position)
+static void note(FOUND *found, const FLASH_LOG_HEAD *head, RTS_UI32 position)
 {
     if (found->any && !is_newer(head->sequence, found->sequence))
         return;
@@ -92,14 +79,14 @@ static RTS_RESULT scan_half(const FLASH_LOG *log, RTS_UI32 start, const WANTED *
     RTS_UI32 size = half_size(log);
     RTS_UI32 offset = 0;
     RTS_UI32 end = 0;
-    RECORD_HEAD head;
+    FLASH_LOG_HEAD head;
 
     while (size - offset >= FLASH_LOG_HEAD_SIZE) {
         RTS_RESULT result = SysFileRead(log->file, start + offset, &head, sizeof head);
         RTS_UI32 step = FILE_ALIGN;
         if (result != ERR_OK)
             return result;
-        if (head.magic == RECORD_MAGIC && head.size <= size - offset - FLASH_LOG_HEAD_SIZE) {
+        if (head.magic == FLASH_LOG_MAGIC && head.size <= size - offset - FLASH_LOG_HEAD_SIZE) {
             RTS_UI32 length = record_length(head.size);
             if (offset + length > end)
                 end = offset + length;
@@ -171,7 +158,7 @@ RTS_RESULT FlashLogOpen(FLASH_LOG *log, RTS_UI32 file)
 
 RTS_RESULT FlashLogReadNewest(const FLASH_LOG *log, RTS_UI32 tag, void *data, RTS_UI32 size)
 {
-    RECORD_HEAD head;
+    FLASH_LOG_HEAD head;
     RTS_RESULT result = SysFileRead(log->file, log->newest, &head, sizeof head);
 
     if (result != ERR_OK)
@@ -230,7 +217,7 @@ static RTS_RESULT make_room(FLASH_LOG *log, RTS_UI32 length)
     return result;
 }
 
-static RTS_RESULT write_record(RTS_UI32 file, RTS_UI32 position, const RECORD_HEAD *head, const void *data)
+static RTS_RESULT write_record(RTS_UI32 file, RTS_UI32 position, const FLASH_LOG_HEAD *head, const void *data)
 {
     RTS_RESULT result;
 
@@ -245,7 +232,7 @@ static RTS_RESULT write_record(RTS_UI32 file, RTS_UI32 position, const RECORD_HE
 
 RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI32 size)
 {
-    RECORD_HEAD head = {RECORD_MAGIC, log->sequence + 1, tag, size, 0};
+    FLASH_LOG_HEAD head = {FLASH_LOG_MAGIC, log->sequence + 1, tag, size, 0};
     RTS_RESULT checked;
     RTS_UI32 position;
     RTS_RESULT result = log->opened;

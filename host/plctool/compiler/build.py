@@ -14,12 +14,14 @@ from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.codegen.targets import Machine, Target
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
+from plctool.compiler.kept import kept_parts, kept_variables
 from plctool.compiler.nesting import room_for_nesting
 from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
+from plctool.compiler.types import base_of
 from plctool.core import lib
 from plctool.files import write_atomically
 from plctool.image import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image
-from plctool.symbols import CodeUnit, SymbolTable, layout_signature, symbol_path
+from plctool.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
 from plctool.values import encode
 from plctool.variables import Symbol, constant_symbol
 
@@ -59,7 +61,8 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     objects = emit_objects(lowered.texts, target, options.opt_level)
     linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], len(lowered.imports))
     symbols = _symbols(program, lowered, linked, target, info.project)
-    retained = [symbols.variables[v.name] for v in program.globals if v.area is Area.RETAIN]
+    kept = kept_parts(v for v in program.globals if v.area is Area.RETAIN)
+    symbols.kept = [KeptName(part.name, part.type, part.persistent, part.size) for part in kept]
     image = Image(
         device_id=int(getattr(lib, target.device_id)),
         code=linked.code,
@@ -73,7 +76,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
             _task(task, _entry(linked, name, target)) for task, name in zip(program.tasks, lowered.tasks, strict=True)
         ],
         info=info,
-        retain_layout=layout_signature(retained) if retained else None,
+        kept=kept_variables(kept),
     )
     built = build_image(image)
     symbols.image_crc = int.from_bytes(built[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
@@ -135,7 +138,7 @@ def _symbols(program: TypedProgram, lowered: Lowered, linked: Linked, target: Ta
         list(files),
         program.aliases,
         _classes(program),
-        {name: constant_symbol(name, c.type, encode(c.type, c.value)) for name, c in program.constants.items()},
+        {n: constant_symbol(n, c.type, encode(base_of(c.type), c.value)) for n, c in program.constants.items()},
         linked.debug,
     )
 

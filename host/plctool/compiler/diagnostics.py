@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Literal
@@ -67,9 +67,9 @@ class Diagnostics:
         for code, ranges in switched_off(source).items():
             self._muted[source.path, code] = ranges
 
-    def at(self, source: Source) -> Callable[[int, str, str], None]:
-        """Reports errors by their offset in a source."""
-        return lambda offset, code, message: self.error(source.pos(offset), code, message)
+    def at(self, source: Source) -> SourceDiagnostics:
+        """Reports by offset in a source."""
+        return SourceDiagnostics(self, source)
 
     def _add(self, pos: Pos, severity: Severity, code: str, message: str) -> None:
         if len(message) > MAX_MESSAGE:
@@ -86,6 +86,22 @@ class Diagnostics:
     def sorted(self) -> list[Diagnostic]:
         """All findings by file and place."""
         return sorted(self._found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
+
+
+@dataclass(frozen=True)
+class SourceDiagnostics:
+    """Findings by their offset in one text."""
+
+    diagnostics: Diagnostics
+    source: Source
+
+    def error(self, offset: int, code: str, message: str) -> None:
+        """As `Diagnostics.error`."""
+        self.diagnostics.error(self.source.pos(offset), code, message)
+
+    def warning(self, offset: int, code: str, message: str) -> None:
+        """As `Diagnostics.warning`."""
+        self.diagnostics.warning(self.source.pos(offset), code, message)
 
 
 def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:

@@ -9,16 +9,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plctool.compiler.diagnostics import Diagnostic, TooManyErrors, render
+from plctool.compiler.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.library import Library, standard_library
 from plctool.compiler.nesting import NestingError, room_for_nesting
 from plctool.compiler.semantics.configuration import configure
 from plctool.compiler.semantics.overlaps import report_overlaps
+from plctool.compiler.semantics.permitted import check_declarations
 from plctool.compiler.semantics.program import Program
+from plctool.compiler.semantics.shared_writes import report_shared_writes
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
-from plctool.compiler.syntax.parser import parse
+from plctool.compiler.syntax.ast import Declaration
+from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
+from plctool.compiler.syntax.parser import Parsed, parse_all
 from plctool.compiler.task_images import plan_images
 from plctool.compiler.typed import Area, TypedProgram
 from plctool.compiler.types import MAX_SIZE
@@ -87,14 +91,14 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
 
 def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
     world = program.world
-    parsed = [(source, parse(source, world.diagnostics.at(source))) for source in sources]
+    texts = [(source, parse_all(source, world.diagnostics.at(source).error)) for source in sources]
     if world.diagnostics.errors:
         return None
+    parsed = [(source, _looked_at(source, text, world.diagnostics)) for source, text in texts]
     tests = None if suite is None else suite.begin(program)
     if tests is not None:
         parsed = tests.prepare(parsed)
     for source, declarations in parsed:
-        world.diagnostics.mute(source)
         world.names.register(declarations)
         world.names.register_globals(declarations, source)
     program.declare_all()
@@ -107,6 +111,8 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     if tests is None and application.tasks:
         program.programs.report_unused()
     world.calls.report_shared(application.tasks)
+    if tests is None and not world.diagnostics.errors:
+        report_shared_writes(application.tasks, world.diagnostics)
     allocation = world.allocation
     _check_sizes(world, sources)
     report_overlaps(allocation.variables, world.diagnostics)
@@ -129,6 +135,16 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     if not world.diagnostics.errors:
         plan_images(typed, world.diagnostics)
     return typed
+
+
+def _looked_at(source: Source, parsed: Parsed, diagnostics: Diagnostics) -> list[Declaration]:
+    """The declarations of a file of the program, when what stands with them has been looked at."""
+    diagnostics.mute(source)
+    reports = diagnostics.at(source)
+    check_pragmas(parsed.pragmas, reports)
+    check_attributes(parsed.attributes, parsed.places, reports)
+    check_declarations(parsed.declarations, source, diagnostics)
+    return parsed.declarations
 
 
 def _check_sizes(world: World, sources: Sequence[Source]) -> None:

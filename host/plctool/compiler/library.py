@@ -79,7 +79,7 @@ class Library:
     def parse(self, key: str, diagnostics: Diagnostics) -> list[ast.Declaration]:
         """The declarations of the unit that defines the name; none when there is no such unit."""
         entry = self._entries.get(key)
-        return parse(entry.source, diagnostics.at(entry.source), entry.start, entry.end) if entry else []
+        return parse(entry.source, diagnostics.at(entry.source).error, entry.start, entry.end) if entry else []
 
 
 @dataclass(frozen=True)

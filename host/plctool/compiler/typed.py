@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from plctool.compiler.types import StructType, Type
+from plctool.compiler.types import Keep, StructType, Type
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ class Variable:
     offset: int = -1
     initial: Initial | None = None
     constant: bool = False
+    keep: Keep = Keep.UNSAID
     bit: int | None = None  # a BOOL at an address such as %IX0.3: the bit in the byte at `offset`
     bounds: list[tuple[Variable, Variable]] = field(default_factory=list)
     shared_output: bool = False  # several tasks are meant to write it

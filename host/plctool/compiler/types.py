@@ -8,6 +8,7 @@ bytes, NUL-terminated, as in the CODESYS family.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -99,6 +100,7 @@ ELEMENTARY: dict[str, Elementary] = {
 """By name, in capitals; a type may have several names. The last six are integers as wide as a pointer in memory."""
 
 DEFAULT_STRING_LENGTH = 80
+MAX_CHOICES = 12  # values of an enumeration that a message lists
 MAX_SIZE = 0x7FFF_FFFF  # of a variable and of an area; offsets are signed 32-bit numbers on the targets
 
 
@@ -142,6 +144,12 @@ class EnumType(Type):
     name: str
     base: Elementary
     values: dict[str, int]  # in order of declaration, names as declared
+
+    @property
+    def choices(self) -> str:
+        """`Red (0), Green (1)`: what there is, for messages."""
+        shown = [f"{name} ({value})" for name, value in list(self.values.items())[:MAX_CHOICES]]
+        return ", ".join(shown) + ", ..." * (len(self.values) > MAX_CHOICES)
 
     @property
     def size(self) -> int:
@@ -250,6 +258,33 @@ class ReferenceType(PointerType):
         return f"REFERENCE TO {self.target}"
 
 
+class Keep(Enum):
+    """Whether a declaration says that a variable keeps its value over a power cut. PERSISTENT ones keep it over a cold
+    reset and a download, too."""
+
+    UNSAID = ""
+    NON_RETAIN = "NON_RETAIN"
+    RETAIN = "RETAIN"
+    PERSISTENT = "PERSISTENT"
+
+    @staticmethod
+    def of(qualifiers: Collection[str]) -> Keep:
+        """What the qualifiers of a section say; the strongest counts."""
+        return next((k for k in (Keep.PERSISTENT, Keep.RETAIN, Keep.NON_RETAIN) if k.value in qualifiers), Keep.UNSAID)
+
+    @property
+    def kept(self) -> bool:
+        """Whether the value is kept."""
+        return self in (Keep.RETAIN, Keep.PERSISTENT)
+
+    def of_member(self, own: Keep) -> Keep:
+        """Of a member that says `own`, in a variable of this kind: what it says itself counts, but a RETAIN member is
+        PERSISTENT in a PERSISTENT variable."""
+        if own is Keep.UNSAID or (own is Keep.RETAIN and self is Keep.PERSISTENT):
+            return self
+        return own
+
+
 @dataclass
 class Field:
     """A member of a struct or function block; `offset` in bytes is set by `lay_out`. `alias`: a second name."""
@@ -258,6 +293,7 @@ class Field:
     type: Type
     offset: int = -1
     alias: str = ""
+    keep: Keep = Keep.UNSAID
 
     @property
     def hidden(self) -> bool:

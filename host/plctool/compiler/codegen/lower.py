@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from plctool.compiler.codegen.analysis import Effects
+from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_body import write_body, write_calls
-from plctool.compiler.codegen.lower_classes import renumber, write_dispatcher
-from plctool.compiler.codegen.lower_frame import Body, Frame, Ref, string_capacity
+from plctool.compiler.codegen.lower_classes import write_dispatcher
+from plctool.compiler.codegen.lower_frame import TAGGED_AREAS, Body, Frame, Ref, string_capacity
 from plctool.compiler.codegen.lower_helpers import MEMORY_FUNCTIONS, memory_functions, string_helper
 from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
@@ -19,6 +19,7 @@ from plctool.compiler.typed import Area, External, Pou, Task, TypedProgram, Vari
 from plctool.compiler.types import BOOL, is_scalar
 from plctool.core import lib
 
+CODE_INIT = "code_init"
 GLOBAL_INIT = "global_init"
 GLOBAL_EXIT = "global_exit"
 
@@ -41,8 +42,11 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     unit = Unit(options, program.area_sizes, program.defaults)
     unit.handed = handed_inputs(program, options.target)
     tasks = [_task_entry(unit, number, task) for number, task in enumerate(program.tasks)]
-    _global_init(unit, program.globals, program.startup)
-    functions = {int(lib.CDL_FUNCTION_GLOBAL_INIT): GLOBAL_INIT}
+    _code_init(unit, program.globals)
+    functions = {int(lib.CDL_FUNCTION_CODE_INIT): CODE_INIT}
+    if program.startup is not None:
+        _global_init(unit, program.startup)
+        functions[int(lib.CDL_FUNCTION_GLOBAL_INIT)] = GLOBAL_INIT
     if program.shutdown is not None:
         _global_exit(unit, program.shutdown)
         functions[int(lib.CDL_FUNCTION_GLOBAL_EXIT)] = GLOBAL_EXIT
@@ -91,27 +95,29 @@ def _pou(unit: Unit, pou: Pou, effects: Effects) -> None:
     unit.module.add(unit.symbol(pou), fn)
 
 
-def _global_init(unit: Unit, variables: list[Variable], startup: Pou | None) -> None:
-    fn = Function(f"void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains)", unit.plain)
+def _code_init(unit: Unit, variables: list[Variable]) -> None:
+    """Gives all variables their constant initial values; what is kept is put back afterwards, by the runtime."""
+    fn = Function(f"void @{CODE_INIT}(ptr noalias nonnull readonly %ctx)", unit.plain)
     frame = Frame(unit, fn, None)
-    _initialise_area(frame, variables, (Area.DATA, Area.OUTPUT, Area.MEMORY, Area.INPUT))
-    if any(v.area is Area.RETAIN for v in variables):
-        retains, kept, end = fn.label("retains"), fn.label("kept"), fn.label("end")
-        fn.branch_if(fn.value("icmp ne i32 %init_retains, 0"), retains, kept)
-        fn.begin(retains)
-        _initialise_area(frame, variables, (Area.RETAIN,))
-        fn.branch(end)
-        fn.begin(kept)
-        for var in variables:
-            if var.area is Area.RETAIN:
-                renumber(frame, Ref(frame.area_base(var.area), var.offset, var.type, direct=True))
-        fn.begin(end)
-    if startup is not None:
-        flag = fn.value("icmp ne i32 %init_retains, 0")
-        text = value_type(BOOL)
-        operand = flag if text == "i1" else fn.value(f"zext i1 {flag} to {text}")
-        # Not inlined, because it has lines and this has none.
-        fn.do(f"call void @{unit.symbol(startup)}(ptr %ctx, {text} {operand}) noinline")
+    overwriting = _overwriting(variables)
+    for var in variables:
+        bit = -1 if var.bit is None else var.bit
+        base, capacity = frame.area_base(var.area), string_capacity(var.type)
+        ref = Ref(base, var.offset, var.type, direct=True, capacity=capacity, bit=bit)
+        if var in overwriting:
+            frame.clear(ref)
+        initialise(frame, ref, var.initial)
+    fn.terminate("ret void")
+    unit.module.add(CODE_INIT, fn, linkage="")
+
+
+def _global_init(unit: Unit, startup: Pou) -> None:
+    """Initial values that are calculated, and FB_Init."""
+    fn = Function(f"void @{GLOBAL_INIT}(ptr noalias nonnull readonly %ctx, i32 %init_retains)", unit.plain)
+    flag, text = fn.value("icmp ne i32 %init_retains, 0"), value_type(BOOL)
+    operand = flag if text == "i1" else fn.value(f"zext i1 {flag} to {text}")
+    # Not inlined, because it has lines and this has none.
+    fn.do(f"call void @{unit.symbol(startup)}(ptr %ctx, {text} {operand}) noinline")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_INIT, fn, linkage="")
 
@@ -123,11 +129,18 @@ def _global_exit(unit: Unit, shutdown: Pou) -> None:
     unit.module.add(GLOBAL_EXIT, fn, linkage="")
 
 
-def _initialise_area(frame: Frame, variables: list[Variable], areas: tuple[Area, ...]) -> None:
+def _overwriting(variables: list[Variable]) -> set[Variable]:
+    """Variables at addresses (AT) with initial values, where one before them has put its own: zeros count there."""
+    found = set()
+    written: set[tuple[Area, int]] = set()
     for var in variables:
-        if var.area in areas:
-            ref = Ref(frame.area_base(var.area), var.offset, var.type, direct=True, capacity=string_capacity(var.type))
-            initialise(frame, ref, var.initial)
+        if var.area in TAGGED_AREAS or var.initial is None:
+            continue
+        own = {(var.area, var.offset + i) for i in range(var.type.size)}
+        if own & written:
+            found.add(var)
+        written |= own
+    return found
 
 
 def _struct_initialisers(unit: Unit) -> None:

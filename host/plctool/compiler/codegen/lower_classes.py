@@ -4,15 +4,12 @@ goes on to the right method. Only direct calls result: LLVM can inline them, and
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from plctool.compiler.codegen.ir import Function
-from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame, Ref
-from plctool.compiler.codegen.lower_init import struct_members
+from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame
 from plctool.compiler.codegen.lower_unit import Unit, value_type
 from plctool.compiler.codegen.signatures import parameter_list
-from plctool.compiler.typed import Dispatch, ScalarInit
-from plctool.compiler.types import UDINT, ArrayType, StructType, Type, is_scalar
+from plctool.compiler.typed import Dispatch
+from plctool.compiler.types import is_scalar
 
 CLASS_NUMBER = "%class"
 
@@ -53,35 +50,3 @@ def _arguments(parameters: str) -> str:
     """The arguments that hand all parameters on: types and names without attributes."""
     words = (p.split() for p in parameters.split(", "))
     return ", ".join(f"{w[0]} {w[-1]}" for w in words)
-
-
-def renumber(frame: Frame, ref: Ref) -> None:
-    """Writes the class numbers of all instances in a variable that keeps its other values: a new program may have
-    numbered its classes anew."""
-    t = ref.type
-    if isinstance(t, ArrayType):
-        if has_number(frame.unit, t.element):
-            for n in range(t.count):
-                renumber(frame, ref.member(n * t.element.size, t.element))
-    elif isinstance(t, StructType):
-        for f, value in struct_members(frame.unit, t, None):
-            if f.name == CLASS_NUMBER and isinstance(value, ScalarInit):
-                frame.store(ref.member(f.offset, UDINT), str(value.value))
-            else:
-                renumber(frame, ref.member(f.offset, f.type))
-
-
-def has_number(unit: Unit, t: Type) -> bool:
-    """Whether a type holds instances with class numbers."""
-    return any(True for _ in _numbers(unit, t))
-
-
-def _numbers(unit: Unit, t: Type) -> Iterator[int]:
-    if isinstance(t, ArrayType):
-        yield from _numbers(unit, t.element)
-    elif isinstance(t, StructType):
-        for f in t.fields:
-            if f.name == CLASS_NUMBER:
-                yield f.offset
-            else:
-                yield from _numbers(unit, f.type)

@@ -35,7 +35,7 @@ from plctool.compiler.codegen.lower_frame import (
 )
 from plctool.compiler.codegen.lower_string import compare_strings, equals_literal, literal_text
 from plctool.compiler.codegen.lower_unit import Check, value_type
-from plctool.compiler.codegen.ranges import type_range, value_range
+from plctool.compiler.ranges import type_range, value_range
 from plctool.compiler.typed import (
     AddressOf,
     Binary,

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from plctool.compiler.codegen.analysis import Effects
+from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_unit import RAISE, Check, Unit, value_type
 from plctool.compiler.typed import Area, Expr, Place, Pos, Pou, Statement, Variable

@@ -6,7 +6,7 @@ from plctool.compiler.codegen.lower_arith import compare, is_signed, known_integ
 from plctool.compiler.codegen.lower_expr import truth
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, STATEMENTS, Body, rule
 from plctool.compiler.codegen.lower_unit import Check, value_type
-from plctool.compiler.codegen.ranges import type_range, value_range
+from plctool.compiler.ranges import type_range, value_range
 from plctool.compiler.typed import BinaryOp, For, Repeat, Statement, Variable, While
 
 

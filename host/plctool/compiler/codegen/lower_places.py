@@ -16,7 +16,7 @@ from plctool.compiler.codegen.lower_frame import (
     string_capacity,
 )
 from plctool.compiler.codegen.lower_unit import Check
-from plctool.compiler.codegen.ranges import value_range
+from plctool.compiler.ranges import value_range
 from plctool.compiler.typed import (
     BitPlace,
     DerefPlace,
@@ -31,7 +31,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.types import DINT, UDINT, ArrayType, PointerType, StringType, StructType, Type, is_scalar
+from plctool.compiler.types import BYTE, DINT, UDINT, ArrayType, PointerType, StringType, StructType, Type, is_scalar
 
 
 @rule(REFS, VarPlace)
@@ -39,6 +39,7 @@ def variable(frame: Frame, place: VarPlace) -> Ref:
     """A variable, wherever it lives."""
     var, t = place.var, place.var.type
     if var.storage is Storage.AREA:
+        assert var.bit is None or place.type is BYTE, "a bit is written as a bit of its byte"
         tag = ""
         if var.area in TAGGED_AREAS:
             tag = frame.unit.tag("globals" if is_scalar(t) else (var.area, var.offset))

@@ -22,15 +22,18 @@ from plctool.compiler.semantics.conversions import (
     scaled,
     time_to_ltime,
 )
-from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.semantics.divisions import lost_fraction
+from plctool.compiler.semantics.overlays import overlays
+from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.syntax.literals import BitPattern
-from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Const, Convert, Expr, Load, Pos
+from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Pos
 from plctool.compiler.types import (
     BOOL,
     BYTE,
     LTIME,
     REAL,
     TIME,
+    WORD,
     Elementary,
     EnumType,
     InterfaceType,
@@ -92,6 +95,11 @@ class Coercion:
         self._diagnostics.warning(pos, code, message)
 
     def _mismatch(self, e: Expr, target: Type) -> Expr:
+        if e.type is NOTHING and isinstance(e, Call):
+            name = e.function.name.rpartition(".")[2]
+            kind = "METHOD" if e.instance is not None else "FUNCTION"
+            message = f"{name} gives no result; call it as a statement, or declare {kind} {name} : {target}"
+            return self._error(e.pos, "type", message)
         return self._error(e.pos, "type", f"{e.type} does not fit {target}")
 
     def _no_scalars(self, e: Expr, target: Type) -> Expr:
@@ -99,6 +107,9 @@ class Coercion:
         source, to = elementary(e.type), elementary(target)
         if isinstance(target, StringType) and source is not None:
             return self._needs(e, source.name, target.keyword)
+        if isinstance(e, Const) and isinstance(e.value, str) and len(e.value) == 1 and to in (BYTE, WORD):
+            message = f"a character of a STRING is a number here: write 16#{ord(e.value):02X} for '{e.value}'"
+            return self._error(e.pos, "type", message)
         if isinstance(e.type, StringType) and to is not None:
             return self._needs(e, e.type.keyword, to.name)
         return self._mismatch(e, target)
@@ -167,7 +178,7 @@ class Coercion:
         if isinstance(e, Const):
             assert isinstance(e.value, int)
             if e.value not in target.values.values():
-                return self._error(e.pos, "range", f"{e.value} is no value of {target}")
+                return self._error(e.pos, "range", f"{e.value} is no value of {target}; it has {target.choices}")
             name = constants.describe(e.value, target)
             self._warn(e.pos, "enum", f"the number {e.value} stands for a value of {target}; write {target}#{name}")
             return Const(e.value, target, e.pos)
@@ -209,7 +220,9 @@ class Coercion:
         if isinstance(e.type, PointerType) and isinstance(target, PointerType):
             if isinstance(e.type, InterfaceType):
                 return self._mismatch(e, target)
-            if not isinstance(e, AddressOf) and BYTE not in (e.type.target, target.target):
+            if isinstance(e, AddressOf):
+                self._address(e, target)
+            elif BYTE not in (e.type.target, target.target):
                 self._warn(e.pos, "pointer", f"{e.type} becomes {target}: it points to something else")
             return replace(e, type=target)
         number = elementary(e.type if isinstance(target, PointerType) else target)
@@ -218,6 +231,15 @@ class Coercion:
         if number.bits < 64:
             self._warn(e.pos, "narrowing", f"a pointer has 64 bits, {number} {number.bits}; use LWORD")
         return convert(e, target)
+
+    def _address(self, e: AddressOf, target: PointerType) -> None:
+        """The address of a variable as a pointer to something else. To look at it as bits, or as a part it begins with,
+        is what such pointers are for."""
+        found, wanted = e.place.type, target.target
+        if not overlays(found, wanted):
+            message = f"what {target} points to is read as {wanted}, but this is {found}"
+            message = f"{message}; declare POINTER TO {found}, or convert the value"
+            self._warn(e.pos, "pointer", message)
 
     def _to_interface(self, e: Expr, target: InterfaceType) -> Expr:
         """The address of an instance, or what another interface variable holds."""
@@ -283,6 +305,9 @@ class Coercion:
             e = convert(e, source)
         if source.kind is not Kind.INT:
             return self._needs(e, source.name, target.name)
-        if source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
+        lost = lost_fraction(e, target)
+        if lost:
+            self._warn(e.pos, "integer-division", lost)
+        elif source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
             self._warn(e.pos, "precision", f"{e.type} becomes {target}: large values are rounded")
         return convert(e, target)

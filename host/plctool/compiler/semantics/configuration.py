@@ -103,9 +103,30 @@ class _Builder:
                     self._application.tasks.append(freewheeling)
                 task = freewheeling
             self._program(instance, task, scope)
+        if not self._world.diagnostics.errors:
+            self._report_gaps(decl, list(tasks.values()), freewheeling, scope)
         for instance, program, task in self._connections:
             self._connect(instance, program, task, scope)
         self._connections.clear()
+
+    def _report_gaps(
+        self, decl: ast.ConfigurationDecl, tasks: list[Task], freewheeling: Task | None, scope: Scope
+    ) -> None:
+        """Warns of what was probably forgotten."""
+        for task, written in zip(tasks, decl.tasks, strict=False):
+            if not any(name.upper() in ("INTERVAL", "SINGLE", "EVENT") for _, name, _ in written.properties):
+                message = f"the task {task.name} has no INTERVAL, SINGLE or EVENT, so it runs whenever there is time"
+                advice = "write INTERVAL := T#10ms, or T#0s if that is meant"
+                scope.warning(written.pos, "configuration", f"{message}; {advice}")
+            if not task.programs:
+                message = f"the task {task.name} runs no program; write PROGRAM Name WITH {task.name} : Type;"
+                scope.warning(written.pos, "configuration", message)
+        if freewheeling is not None and tasks:
+            for instance in decl.programs:
+                if instance.task is None:
+                    message = f"the program {instance.name} has no task, so it runs whenever there is time"
+                    advice = f"write PROGRAM {instance.name} WITH {tasks[0].name} : {instance.type_name};"
+                    scope.warning(instance.pos, "configuration", f"{message}; {advice}")
 
     def _task_of(self, instance: ast.ProgramInstance, tasks: dict[str, Task], scope: Scope) -> Task | None:
         if instance.task is None:

@@ -6,14 +6,18 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from plctool.compiler.kept import is_kept
 from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, finalisers, initialisers, instances_in
 from plctool.compiler.semantics.symbols import Member
+from plctool.compiler.semantics.values import whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.typed import (
+    AddressOf,
     Area,
     ArrayInit,
     Assign,
@@ -23,6 +27,7 @@ from plctool.compiler.typed import (
     Const,
     Direction,
     Expr,
+    External,
     For,
     If,
     IndexPlace,
@@ -39,11 +44,24 @@ from plctool.compiler.typed import (
     Statement,
     Storage,
     StructInit,
+    Unary,
+    UnaryOp,
     Variable,
     VarPlace,
     overlay,
 )
-from plctool.compiler.types import BOOL, DINT, ArrayType, PointerType, StringType, StructType, Type
+from plctool.compiler.types import (
+    BOOL,
+    BYTE,
+    DINT,
+    UDINT,
+    ArrayType,
+    Keep,
+    RawPointerType,
+    StringType,
+    StructType,
+    Type,
+)
 
 _LOOP_FROM = 4  # equal elements that are worth a loop
 
@@ -71,18 +89,33 @@ def construct(world: World) -> tuple[Pou | None, Pou | None]:
     return start if start.body else None, end if end.body else None
 
 
+_KEPT_TEXT = "ieckept(POINTER TO BYTE,UDINT):BOOL"
+
+
+def _kept_function() -> Pou:
+    """The function of the runtime that tells whether a value in some memory was put back (CmpIecAbi.h)."""
+    pos = Pos("", 1, 1)
+    pou = Pou("ieckept", PouKind.FUNCTION, pos, result=Variable("ieckept", BOOL, Storage.LOCAL, pos))
+    for name, t in (("address", RawPointerType(BYTE)), ("size", UDINT)):
+        pou.parameters.append(Parameter(Variable(name, t, Storage.LOCAL, pos), Direction.INPUT))
+    pou.external = External("ieckept", zlib.crc32(_KEPT_TEXT.encode()), 0x00010000)
+    return pou
+
+
+_KEPT = _kept_function()
+
+
 class _Construction:
     def __init__(self, world: World, pou: Pou, init_retains: Expr) -> None:
         self._world = world
         self._pou = pou
         self._init_retains = init_retains
-        self._retained = False  # the variable keeps its values
         self._needed: dict[StructType, bool] = {}
 
     def variable(self, variable: Variable) -> list[Statement]:
         """What a variable and all instances in it need."""
-        self._retained = variable.area is Area.RETAIN
-        return self._place(VarPlace(variable, variable.type, variable.pos), variable.initial, variable.pos)
+        keep = variable.keep if variable.area is Area.RETAIN else None
+        return self._place(whole(variable, variable.pos), variable.initial, variable.pos, keep)
 
     def _needs(self, t: Type) -> bool:
         while isinstance(t, ArrayType):
@@ -96,28 +129,41 @@ class _Construction:
             self._needed[t] = known
         return known
 
-    def _place(self, place: Place, initial: Initial | None, pos: Pos) -> list[Statement]:
+    def _place(self, place: Place, initial: Initial | None, pos: Pos, keep: Keep | None) -> list[Statement]:
+        """`keep`: None outside of the retain area."""
         t = place.type
         if isinstance(initial, ComputedInit):
             assign = Assign(place, initial.value, pos)
-            kept = self._retained and not isinstance(t, PointerType)  # an address may be another one each time
-            return [If([(self._init_retains, [assign])], [], pos)] if kept else [assign]
+            fresh = self._is_fresh(place, keep)
+            return [assign] if fresh is None else [If([(fresh, [assign])], [], pos)]
         if not self._needs(t) and not _is_computed(initial):
             return []
         if isinstance(t, ArrayType):
-            return self._array(place, t, initial, pos)
+            return self._array(place, t, initial, pos, keep)
         assert isinstance(t, StructType)
         given = initial if isinstance(initial, StructInit) else StructInit({})
         complete = overlay(given, _moved_initial(self._world.defaults.get(t.name), place))
         assert isinstance(complete, StructInit)
         statements: list[Statement] = []
         for f in t.fields:
-            statements += self._place(MemberPlace(place, f.offset, f.type, pos), complete.members.get(f.name), pos)
+            part, own = MemberPlace(place, f.offset, f.type, pos), None if keep is None else keep.of_member(f.keep)
+            statements += self._place(part, complete.members.get(f.name), pos, own)
         for member in initialisers(self._world, t):
-            statements.append(self._call(member, place, complete.arguments, pos))
+            statements.append(self._call(member, place, complete.arguments, pos, keep))
         return statements
 
-    def _array(self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos) -> list[Statement]:
+    def _is_fresh(self, place: Place, keep: Keep | None) -> Expr | None:
+        """Whether nothing was put back into a place, so that it begins anew; None when nothing in it is ever kept."""
+        if keep is None or not is_kept(place.type, keep):
+            return None
+        pos = place.pos
+        address = AddressOf(place, RawPointerType(BYTE), pos)
+        kept = Call(_KEPT, [address, Const(place.type.size, UDINT, pos)], BOOL, pos)
+        return Unary(UnaryOp.NOT, kept, BOOL, pos)
+
+    def _array(
+        self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos, keep: Keep | None
+    ) -> list[Statement]:
         base = _flat(place, t, pos)
         runs = list(initial.runs) if isinstance(initial, ArrayInit) else []
         runs.append((t.count - sum(count for count, _ in runs), None))
@@ -126,22 +172,24 @@ class _Construction:
         for count, value in runs:
             if count >= _LOOP_FROM:
                 loop, element = _loop(self._pou, base, t.element, first, first + count - 1)
-                loop.body = self._place(element, value, pos)
+                loop.body = self._place(element, value, pos, keep)
                 statements.append(loop)
             else:
                 for n in range(first, first + count):
                     element = IndexPlace(base, [Const(n, DINT, pos)], t.element, pos)
-                    statements += self._place(element, value, pos)
+                    statements += self._place(element, value, pos, keep)
             first += count
         return statements
 
-    def _call(self, member: Member, place: Place, arguments: Mapping[str, Expr], pos: Pos) -> Statement:
+    def _call(
+        self, member: Member, place: Place, arguments: Mapping[str, Expr], pos: Pos, keep: Keep | None
+    ) -> Statement:
         info = self._world.declared.member(member)
         args: list[Expr | Place | None] = []
         for symbol, direction in info.parameters:
             key = symbol.name.casefold()
             if key == INIT_RETAINS:
-                args.append(self._init_retains)
+                args.append(self._is_fresh(place, keep) or self._init_retains)
             elif key == COPY_CODE:
                 args.append(Const(0, BOOL, pos))
             elif key in arguments:

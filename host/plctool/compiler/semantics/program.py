@@ -17,6 +17,7 @@ from plctool.compiler.semantics.declarations.type_declarations import TypeDeclar
 from plctool.compiler.semantics.declarations.unit_variables import UnitVariables
 from plctool.compiler.semantics.declarations.variables import Variables
 from plctool.compiler.semantics.declared import Declared
+from plctool.compiler.semantics.endless import report_endless
 from plctool.compiler.semantics.generics import is_generic
 from plctool.compiler.semantics.rules.bodies import report_unused, write_body
 from plctool.compiler.semantics.scope import Scope
@@ -86,6 +87,8 @@ class Program:
         )
         world.dispatches.report_calls(world.calls, world.diagnostics)
         world.calls.report_recursion()
+        if not world.diagnostics.errors:
+            report_endless(world.loops, world.diagnostics)
 
     def _check_queue(self) -> list[Scope]:
         """Checks what is queued and what that needs; the scopes to look into for what is not used."""

@@ -11,7 +11,7 @@ from enum import Enum
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Direction, Initial, Pos, Pou, Variable
-from plctool.compiler.types import Elementary, Kind, PointerType, StructType, Type
+from plctool.compiler.types import Elementary, Keep, Kind, PointerType, StructType, Type
 
 
 class _ErrorType(Type):
@@ -80,6 +80,7 @@ class VarSymbol:
     by_reference: bool = False
     used: bool = False
     access: str = ""  # PUBLIC, PRIVATE, PROTECTED or INTERNAL, where it is written
+    keep: Keep = Keep.UNSAID  # what the section of a member says
     open_area: str = ""  # I, Q or M: of a member of a function block AT %I*, %Q* or %M*
 
 

@@ -53,13 +53,17 @@ class _Reader:
         self.task = background(decl.name)
         self._checker = Checker(world, scope)
         self._runs_by = ""
+        given: set[str] = set()
         for offset, name, value in decl.properties:
             read = self._properties.get(name.upper())
             if read is None or isinstance(value, ast.ArrayInit | ast.StructInit):
                 *most, last = self._properties
                 hint = did_you_mean(name, self._properties)
                 scope.error(offset, "unknown", f"a TASK has {', '.join(most)} and {last}, not {name}{hint}")
+            elif name.upper() in given:
+                scope.error(offset, "duplicate", f"{name.upper()} of the task {decl.name} is given twice")
             else:
+                given.add(name.upper())
                 read(self, value)
         sensitivity = next((offset for offset, name, _ in decl.properties if name.upper() == "SENSITIVITY"), None)
         if sensitivity is not None and not any(name.upper() == "WATCHDOG" for _, name, _ in decl.properties):

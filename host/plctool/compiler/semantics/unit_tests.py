@@ -27,7 +27,7 @@ from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestBody
-from plctool.compiler.semantics.values import load
+from plctool.compiler.semantics.values import load, whole
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -46,8 +46,8 @@ from plctool.compiler.typed import (
     Task,
     TaskKind,
     Variable,
-    VarPlace,
 )  # fmt: skip
+from plctool.compiler.types import Keep
 
 _LARGEST_ON_STACK = 0x4000  # bytes; what is larger lives in the data area
 
@@ -216,7 +216,9 @@ class TestProgram:
             symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
             if t is not ERROR:
                 if line.location is not None:
-                    symbol.variable = variables.area_variable(name, t, default, line.location, set(), scope, offset)
+                    symbol.variable = variables.area_variable(
+                        name, t, default, line.location, Keep.UNSAID, scope, offset
+                    )
                 else:
                     symbol.variable = self._instance(symbol, default, pou, shared is not None)
             variable = symbol.variable
@@ -225,7 +227,7 @@ class TestProgram:
             elif variable is not None:
                 pou.locals.append(variable)
             if variable is not None and computed is not None:
-                scope.prologue.append(Assign(VarPlace(variable, t, variable.pos), computed, variable.pos))
+                scope.prologue.append(Assign(whole(variable, variable.pos), computed, variable.pos))
             scope.declare(symbol, offset)
 
     def _constant(self, line: ast.VarDecl, scope: Scope, owner: str) -> None:

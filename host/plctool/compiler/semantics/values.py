@@ -6,8 +6,19 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.symbols import UNTYPED_INT, UNTYPED_REAL
-from plctool.compiler.typed import DerefPlace, Expr, Load, Place, SelfPlace, ValuePlace, VarPlace
-from plctool.compiler.types import ReferenceType
+from plctool.compiler.typed import (
+    BitPlace,
+    DerefPlace,
+    Expr,
+    Load,
+    Place,
+    Pos,
+    SelfPlace,
+    ValuePlace,
+    Variable,
+    VarPlace,
+)  # fmt: skip
+from plctool.compiler.types import BOOL, BYTE, ReferenceType
 
 
 def is_untyped(e: Expr) -> bool:
@@ -18,6 +29,13 @@ def is_untyped(e: Expr) -> bool:
 def place_of(e: Expr) -> Place:
     """The place a value was loaded from, or a temporary one."""
     return e.place if isinstance(e, Load) else ValuePlace(e, e.type, e.pos)
+
+
+def whole(variable: Variable, pos: Pos) -> Place:
+    """The place of a variable: of a bit at an address, that bit of the byte there."""
+    if variable.bit is None:
+        return VarPlace(variable, variable.type, pos)
+    return BitPlace(VarPlace(variable, BYTE, pos), variable.bit, BOOL, pos)
 
 
 def is_temporary(place: Place) -> bool:

@@ -15,6 +15,7 @@ from plctool.compiler.semantics.call_graph import CallGraph
 from plctool.compiler.semantics.coercion import Coercion
 from plctool.compiler.semantics.declared import Declared
 from plctool.compiler.semantics.dispatches import Dispatches
+from plctool.compiler.semantics.endless import Loop
 from plctool.compiler.semantics.names import Names
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, PouSymbol
@@ -45,6 +46,7 @@ class World:
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
         self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
         self.pous: list[Pou] = []
+        self.loops: list[tuple[Pou, Loop]] = []  # of the program, each with the unit it stands in
 
     def scope(self, source: Source, *, library: bool = False) -> Scope:
         """An empty scope in a source."""

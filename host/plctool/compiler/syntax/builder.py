@@ -10,6 +10,7 @@ from typing import Any
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast, literals
+from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.builder_chart import read_action, read_priority
 from plctool.compiler.syntax.builder_units import Arrangement
 from plctool.compiler.syntax.lexer import Report, Token
@@ -50,9 +51,18 @@ class Builder:
 
     def __init__(self) -> None:
         self.source = Source("", "")
-        self.attributes: dict[int, dict[str, str]] = {}
+        self.attributes: Attributes = {}
+        self.places: dict[int, str] = {}  # what is declared where an attribute stands in front
         self.report: Report = lambda pos, code, message: None
         self.units = Arrangement(lambda pos, code, message: self.report(pos, code, message), self.pou)
+
+    def _attributes_at(self, pos: int, what: str) -> dict[str, str]:
+        """The attributes in front of a declaration."""
+        found = self.attributes.get(pos)
+        if found is None:
+            return {}
+        self.places[pos] = what
+        return found
 
     # ---- types ----
 
@@ -60,12 +70,12 @@ class Builder:
         return self.units.arrange(units)
 
     def types(self, keyword: Token, *decls: Any) -> list[Any]:
-        for decl in _listed(decls):
-            decl.qualified = self._is_qualified(keyword) or self._is_qualified(decl)
-        return _listed(decls)
-
-    def _is_qualified(self, start: Token | ast.TypeDecl) -> bool:
-        return "qualified_only" in self.attributes.get(start.pos, {})
+        kinds = {decl: "enumeration" if isinstance(decl.spec, ast.EnumSpec) else "TYPE" for decl in _listed(decls)}
+        first = "enumeration" if "enumeration" in kinds.values() else "TYPE"
+        all_qualified = "qualified_only" in self._attributes_at(keyword.pos, first)
+        for decl, kind in kinds.items():
+            decl.qualified = "qualified_only" in self._attributes_at(decl.pos, kind) or all_qualified
+        return list(kinds)
 
     def type_decl(
         self, name: Token, base: tuple[int, str] | None, spec: ast.TypeSpec, init: ast.Init | None
@@ -121,7 +131,9 @@ class Builder:
     def pointer(self, keyword: Token, target: ast.TypeSpec) -> ast.PointerSpec:
         return ast.PointerSpec(keyword.pos, keyword.text.upper(), target)
 
-    def struct(self, keyword: Token, *fields: ast.VarDecl | None) -> ast.StructSpec:
+    def struct(self, keyword: Token, overlap: Token | None, *fields: ast.VarDecl | None) -> ast.StructSpec:
+        if overlap is not None and keyword.type == "STRUCT":
+            self.report(overlap.pos, "syntax", "the members of a STRUCT do not overlap; those of a UNION do")
         return ast.StructSpec(keyword.pos, [f for f in fields if f is not None], keyword.type == "UNION")
 
     def name(self, first: Token, *rest: Token) -> tuple[int, str]:
@@ -144,7 +156,7 @@ class Builder:
     ) -> ast.VarDecl:
         pos = names[0].pos
         address = self.direct(location) if location else None
-        attributes = self.attributes.get(pos, {})
+        attributes = self._attributes_at(pos, "variable")
         written = [(t.pos, t.text) for t in names]
         return ast.VarDecl(pos, written, address, spec, init, attributes, edge.text.upper() if edge else "")
 
@@ -189,7 +201,8 @@ class Builder:
 
     def global_block(self, keyword: Token, *items: Any) -> ast.GlobalBlock:
         block = self.var_block(keyword, *items)
-        return ast.GlobalBlock(block, self.source, qualified=self._is_qualified(keyword))
+        qualified = "qualified_only" in self._attributes_at(keyword.pos, "VAR_GLOBAL")
+        return ast.GlobalBlock(block, self.source, qualified=qualified)
 
     def var_blocks(self, *blocks: Any) -> list[Any]:
         return [b for b in blocks if b is not None]
@@ -197,7 +210,7 @@ class Builder:
     def pou(self, keyword: Token, head: list[Any], result: Any, blocks: Any, body: Any) -> ast.PouDecl:
         """`head`: modifiers and name."""
         *modifiers, name = head
-        attributes = self.attributes.get(keyword.pos, {})
+        attributes = self._attributes_at(keyword.pos, keyword.text.upper())
         decl = ast.PouDecl(name.pos, keyword.text.upper(), name.text, result, [], body or [], attributes, self.source)
         decl.modifiers = {t.text.upper() for t in modifiers if t is not None}
         self.units.complete(decl, None, None, blocks or [])

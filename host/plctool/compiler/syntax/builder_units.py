@@ -117,14 +117,17 @@ class Arrangement:
     def namespace(self, rest: Sequence[Any]) -> list[Any]:
         """The units of a namespace, which know its name."""
         at = next(i for i, part in enumerate(rest) if isinstance(part, tuple))
-        internal, name = at > 0, rest[at][1]
+        words, name = {token.text.upper() for token in rest[:at]}, rest[at][1]
+        for token in rest[:at]:
+            if token.text.upper() not in ("PUBLIC", "INTERNAL") or len(words) > 1:
+                self._report(token.pos, "syntax", "a NAMESPACE is INTERNAL, or seen by all; leave out other words")
         units = self.arrange(rest[at + 1 :])
         for unit in units:
             space = _namespace(unit)
             space.name = f"{name}.{space.name}" if space.name else name
             if space.internal is not None:
                 space.internal = f"{name}.{space.internal}" if space.internal else name
-            elif internal:
+            elif "INTERNAL" in words:
                 space.internal = name.rpartition(".")[0]
         return units
 

@@ -5,11 +5,13 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.automaton import Parser, Reducer
 from plctool.compiler.syntax.builder import Builder
 from plctool.compiler.syntax.lexer import (
@@ -22,6 +24,7 @@ from plctool.compiler.syntax.lexer import (
     is_followed_by_name,
     is_operator_function,
     meant,
+    modified,
 )
 from plctool.compiler.syntax.syntax_errors import Recovery
 from plctool.compiler.syntax.tables import Rule, Tables, load_tables
@@ -85,6 +88,9 @@ _AMBIGUOUS = SOFT | {"OP", "NOT"}
 def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None:
     """Gives a word that the language may have a use for the type it has where it stands."""
     kind = token.type
+    if kind == "MODIFIER" and (unit := modified(token, text)) is not None:
+        recovery.report_in_front(token, *unit)
+        return
     if kind == "MISSPELT":
         right = meant(token, text)
         is_name = not right or parser.tables.after(parser.states, right) is None
@@ -107,17 +113,35 @@ def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None
         token.type = "IDENT"
 
 
+@dataclass
+class Parsed:
+    """A text: its declarations, the attributes in it and what is declared behind them, its other pragmas."""
+
+    declarations: list[ast.Declaration]
+    attributes: Attributes
+    places: dict[int, str]
+    pragmas: list[tuple[int, str]]
+
+
 def parse(source: Source, report: Report, start: int = 0, end: int | None = None) -> list[ast.Declaration]:
     """The declarations of a text (of the part from offset `start` to `end`). Errors go to `report`."""
+    return parse_all(source, report, start, end).declarations
+
+
+def parse_all(source: Source, report: Report, start: int = 0, end: int | None = None) -> Parsed:
+    """All that a text holds."""
     tables, builder, reducers = _machine()
     parser = Parser(tables, reducers)
     recovery = Recovery(parser, source, report)
     lexer = Lexer(source.text, recovery.report_token, start, end)
-    builder.source, builder.attributes, builder.report = source, lexer.attributes, report
+    places: dict[int, str] = {}
+    builder.source, builder.attributes, builder.places, builder.report = source, lexer.attributes, places, report
     feed = parser.feed
     for token in lexer:
         if token.type in _AMBIGUOUS:
             _decide(token, parser, recovery, source.text)
+            if token.type == "LEFT_OUT":
+                continue
         if recovery.skipping and not recovery.resume(token):
             continue
         if feed(token):
@@ -125,4 +149,4 @@ def parse(source: Source, report: Report, start: int = 0, end: int | None = None
         else:
             recovery.handle(token)
     result = parser.values[0] if len(parser.values) == 1 else []
-    return result if isinstance(result, list) else []
+    return Parsed(result if isinstance(result, list) else [], lexer.attributes, places, lexer.pragmas)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from plctool.compiler.semantics.declarations.classes import Classes
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
 from plctool.compiler.semantics.declarations.unit_variables import ROLES, UnitVariables, new_pou
-from plctool.compiler.semantics.declarations.variables import RETAINING, Variables
+from plctool.compiler.semantics.declarations.variables import Variables
 from plctool.compiler.semantics.edges import edge_variables, see_edge
 from plctool.compiler.semantics.instances import require_instances
 from plctool.compiler.semantics.open_arrays import give_bounds
@@ -32,6 +32,7 @@ from plctool.compiler.typed import (
 )  # fmt: skip
 from plctool.compiler.types import (
     Field,
+    Keep,
     ReferenceType,
     StructType,
 )  # fmt: skip
@@ -110,7 +111,8 @@ class Blocks:
 
     def _members(self, block: ast.VarBlock, info: BlockInfo, defaults: dict[str, Initial], scope: Scope) -> None:
         role, direction = ROLES[block.keyword], DIRECTIONS.get(block.keyword)
-        info.retain = info.retain or bool(block.qualifiers & RETAINING)
+        keep = self._units.keep_of(block, info.pou)
+        info.retain = info.retain or keep.kept
         for line in block.decls:
             t, default = self._types.declared_type(line, scope, _MEMBER_MAY[role])
             if role is not Role.IN_OUT:
@@ -130,24 +132,25 @@ class Blocks:
                     info.members[alias.casefold()] = symbol
                 if t is ERROR:
                     continue
+                self._variables.check_kept(name, t, keep, scope, offset)
                 reference = role is Role.IN_OUT
                 storage = Storage.REFERENCE if reference else Storage.SELF
                 symbol.variable = Variable(name, t, storage, symbol.pos, initial=None if reference else default)
-                info.type.fields.append(Field(name, ReferenceType(t) if reference else t, alias=alias))
+                info.type.fields.append(Field(name, ReferenceType(t) if reference else t, alias=alias, keep=keep))
                 if default is not None and not reference:
                     defaults[name] = default
                 if direction is not None:
                     info.pou.parameters.append(Parameter(symbol.variable, direction, reference))
                 for bound in give_bounds(symbol.variable, Storage.SELF):
-                    self._hidden_member(bound, info)
+                    self._hidden_member(bound, info, keep)
                 if line.edge:
                     last, edge = edge_variables(symbol.variable)
-                    self._hidden_member(last, info)
-                    self._hidden_member(edge, info)
+                    self._hidden_member(last, info, keep)
+                    self._hidden_member(edge, info, keep)
                     see_edge(symbol, line.edge, last, edge, scope)
 
-    def _hidden_member(self, variable: Variable, info: BlockInfo) -> None:
+    def _hidden_member(self, variable: Variable, info: BlockInfo, keep: Keep) -> None:
         """A member that has no name in the program."""
         symbol = VarSymbol(variable.name, variable.pos, variable.type, Role.LOCAL, variable)
         info.members[variable.name.casefold()] = symbol
-        info.type.fields.append(Field(variable.name, variable.type))
+        info.type.fields.append(Field(variable.name, variable.type, keep=keep))

@@ -31,7 +31,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
-from plctool.compiler.types import UDINT, Field, InterfaceType, StructType
+from plctool.compiler.types import UDINT, Field, InterfaceType, Keep, StructType
 
 _LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
 CLASS_NUMBER = "%class"  # the hidden member; no identifier, so nothing else can have its name
@@ -119,7 +119,7 @@ class Classes:
 
     def _inherit(self, info: BlockInfo, base: BlockInfo, defaults: dict[str, Initial]) -> None:
         info.type.base = base.type
-        info.type.fields += [Field(f.name, f.type) for f in base.type.fields]
+        info.type.fields += [Field(f.name, f.type, keep=f.keep) for f in base.type.fields]
         info.members |= base.members
         info.retain = base.retain
         info.pou.parameters += base.pou.parameters
@@ -146,7 +146,8 @@ class Classes:
         for full_name, symbol in self._lasting(info.cls, scope):
             symbol.variable = Variable(full_name, symbol.type, Storage.SELF, symbol.pos, initial=symbol.default)
             info.members[full_name.casefold()] = symbol
-            info.type.fields.append(Field(full_name, symbol.type))
+            info.type.fields.append(Field(full_name, symbol.type, keep=symbol.keep))
+            info.retain = info.retain or symbol.keep.kept
             if symbol.default is not None:
                 defaults[full_name] = symbol.default
 
@@ -160,6 +161,7 @@ class Classes:
                     t, default = self._types.declared_type(line, scope)
                     for offset, name in line.names:
                         symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
+                        symbol.keep = Keep.of(block.qualifiers)
                         cls.instance_variables.setdefault(key, {})[name.casefold()] = symbol
                         if t is not ERROR:
                             yield f"{key}.{name}", symbol
@@ -258,7 +260,8 @@ class Classes:
         if not member.abstract:
             self._world.bodies.add(scope, decl)
         elif decl.body:
-            scope.error(decl.pos, "inheritance", f"{member.name} has no body, because it is ABSTRACT")
+            reason = "belongs to an INTERFACE" if cls.is_interface else "is ABSTRACT"
+            scope.error(decl.pos, "inheritance", f"{member.name} has no body, because it {reason}")
         return info
 
     def declare_members(self) -> None:

@@ -22,13 +22,12 @@ from plctool.compiler.semantics.declarations.type_declarations import TypeDeclar
 from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, VarSymbol
-from plctool.compiler.semantics.values import load
+from plctool.compiler.semantics.values import load, whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Area,
     Assign,
-    BitPlace,
     Initial,
     MemberPlace,
     Place,
@@ -38,9 +37,8 @@ from plctool.compiler.typed import (
     Storage,
     Task,
     Variable,
-    VarPlace,
 )  # fmt: skip
-from plctool.compiler.types import BOOL, BYTE, ArrayType, StructType, Type, base_of
+from plctool.compiler.types import BOOL, ArrayType, StructType, Type, base_of
 
 
 @dataclass(eq=False)
@@ -174,7 +172,7 @@ class InstanceConfig:
         initial: Initial | None = None
         if line.init is not None:
             decl = ast.VarDecl(line.pos, [(line.pos, entry.name)], None, line.type, line.init)
-            initial = self._types.declared_type(decl, scope)[1]
+            initial = self._types.declared_type(decl, scope, overrides=True)[1]
             variable = fixed.variable
             if initial is not None:
                 variable.initial = with_part(
@@ -199,10 +197,7 @@ class InstanceConfig:
             return None
         variable.shared_output = True  # a global instance is copied by every task
         self._world.allocation.add(variable)
-        outside: Place = VarPlace(variable, variable.type, variable.pos)
-        if variable.bit is not None:
-            outside = BitPlace(VarPlace(variable, BYTE, variable.pos), variable.bit, BOOL, variable.pos)
-        return _Copy(fixed.variable, place, outside, AREAS[symbol.open_area])
+        return _Copy(fixed.variable, place, whole(variable, variable.pos), AREAS[symbol.open_area])
 
     def _member(self, place: Place) -> VarSymbol | None:
         """The variable of a function block that a place is."""

@@ -33,6 +33,7 @@ from plctool.compiler.typed import (
     Pou,
     Variable,
 )  # fmt: skip
+from plctool.compiler.types import Keep
 
 _PROGRAM_MAY = {
     Direction.INPUT: May.HAVE_ADDRESS | May.BE_EDGE, Direction.OUTPUT: May.HAVE_ADDRESS, None: May.HAVE_ADDRESS,
@@ -93,7 +94,7 @@ class Programs:
     def _declare(self, planned: PlannedInstance, allocation: Allocation) -> tuple[ProgramInfo, Scope]:
         """An instance whose variables go into `allocation`. Its qualifiers, such as RETAIN, are for all variables that
         have none."""
-        symbol, name, qualifiers = planned.symbol, planned.name, set(planned.qualifiers)
+        symbol, name, keep = planned.symbol, planned.name, Keep.of(planned.qualifiers)
         decl = symbol.decl
         pou = new_pou(symbol, name)
         info = ProgramInfo(name, pou, [])
@@ -105,11 +106,12 @@ class Programs:
                     block.pos, "unsupported", "a PROGRAM has no VAR_IN_OUT; use VAR_EXTERNAL or a global variable"
                 )
             else:
-                self._program_variables(block, info, scope, allocation, block.qualifiers or qualifiers)
+                self._program_variables(block, info, scope, allocation, keep)
 
         def place(member: str, variable: VarSymbol) -> Variable | None:
             full_name, t = f"{name}.{member}", variable.type
-            placed = self._variables.area_variable(full_name, t, variable.default, None, qualifiers, scope, 0)
+            own = keep.of_member(variable.keep)
+            placed = self._variables.area_variable(full_name, t, variable.default, None, own, scope, 0)
             if placed is not None:
                 allocation.add(placed)
             return placed
@@ -119,20 +121,24 @@ class Programs:
         return info, scope
 
     def _program_variables(
-        self, block: ast.VarBlock, info: ProgramInfo, scope: Scope, allocation: Allocation, qualifiers: set[str]
+        self, block: ast.VarBlock, info: ProgramInfo, scope: Scope, allocation: Allocation, keep: Keep
     ) -> None:
-        direction = DIRECTIONS.get(block.keyword)
+        direction, own = DIRECTIONS.get(block.keyword), self._units.keep_of(block, info.pou)
+        keep = keep.of_member(own)
         for line in block.decls:
             t, init = self._types.declared_type(line, scope, _PROGRAM_MAY[direction])
             require_instances(self._world, t, scope, line.pos)
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=init)
                 symbol.used = direction is not None or line.location is not None
+                symbol.constant = direction is Direction.INPUT and "CONSTANT" in block.qualifiers
                 if not scope.declare(symbol, offset) or t is ERROR:
                     continue
+                self._variables.check_kept(name, t, own, scope, offset)
                 full_name = f"{info.name}.{name}"
                 location = self._variables.address(line.location, t, symbol.pos, full_name)
-                symbol.variable = self._variables.area_variable(full_name, t, init, location, qualifiers, scope, offset)
+                wanted = own if location is not None else keep
+                symbol.variable = self._variables.area_variable(full_name, t, init, location, wanted, scope, offset)
                 if symbol.variable is None:
                     continue
                 symbol.variable.shared_output = "shared_output" in line.attributes

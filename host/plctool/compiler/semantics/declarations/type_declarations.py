@@ -19,6 +19,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbol, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.slips import TYPES
 from plctool.compiler.typed import ArrayInit, Const, Initial, ScalarInit, StructInit, overlay
 from plctool.compiler.types import (
     BOOL,
@@ -69,8 +70,12 @@ class TypeDeclarations:
 
     # ---- declaration lines ----
 
-    def declared_type(self, decl: ast.VarDecl, scope: Scope, may: May = May.BE_PLAIN) -> tuple[Type, Initial | None]:
-        """Type and initial value of a declaration line; None for all zero."""
+    def declared_type(
+        self, decl: ast.VarDecl, scope: Scope, may: May = May.BE_PLAIN, *, overrides: bool = False
+    ) -> tuple[Type, Initial | None]:
+        """Type and initial value of a declaration line; None for all zero, unless it says 0 where memory may hold
+        something else: it lies at an address, or `overrides` another initial value."""
+        overrides = overrides or decl.location is not None
         self._check_extras(decl, may, scope)
         spec, init = self._with_arguments(decl, scope)
         if isinstance(spec, ast.ArraySpec) and None in spec.bounds and May.BE_OPEN_ARRAY in may:
@@ -81,8 +86,10 @@ class TypeDeclarations:
         if init is None or t is ERROR:
             return t, default
         given = self._initials.initial(init, t, scope)
-        if given is None or (default is None and given == ScalarInit(0) and str(given.value) != "-0.0"):
-            return t, default if given is None else None
+        if given is None:
+            return t, default
+        if default is None and not overrides and given == ScalarInit(0) and str(given.value) != "-0.0":
+            return t, None
         return t, overlay(given, default)
 
     def _with_arguments(self, decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
@@ -187,7 +194,11 @@ class TypeDeclarations:
         if is_group(spec.name):
             scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
         elif symbol is None and scope.lookup(spec.name) is None:
+            upper = spec.name.upper()
             hint = did_you_mean(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])
+            hint = f"; write {TYPES[upper]}" if upper in TYPES else hint
+            if upper == "ENUM":
+                hint = "; an enumeration is written Name : (First, Second);"
             scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
         else:
             scope.error(spec.pos, "type", f"{spec.name} is not a type")

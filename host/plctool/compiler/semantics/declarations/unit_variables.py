@@ -9,13 +9,14 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
-from plctool.compiler.semantics.declarations.variables import RETAINING, Variables
+from plctool.compiler.semantics.declarations.variables import Variables
 from plctool.compiler.semantics.instances import is_instance, require_instances
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, GlobalSymbol, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Pou, PouKind, Storage, Variable
+from plctool.compiler.types import Keep
 
 ROLES = {
     "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,
@@ -31,7 +32,7 @@ _KEEPING = {
 
 def _holds_constants(block: ast.VarBlock) -> bool:
     """Whether what a block declares has one value for ever. CONSTANT parameters are only read-only."""
-    return "CONSTANT" in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL")
+    return "CONSTANT" in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL", "VAR_INST")
 
 
 def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.VarDecl, Role]]:
@@ -132,10 +133,17 @@ class UnitVariables:
                 if t is not ERROR:
                     owner = scope.pou.name if scope.pou is not None and decl.keyword == "METHOD" else decl.name
                     full_name = f"{owner}.{name}"
-                    symbol.variable = self._variables.shared_variable(
-                        full_name, t, init, scope, offset, retain=bool(block.qualifiers & RETAINING)
-                    )
+                    keep = Keep.of(block.qualifiers)
+                    self._variables.check_kept(name, t, keep, scope, offset)
+                    symbol.variable = self._variables.shared_variable(full_name, t, init, scope, offset, keep=keep)
                 scope.declare(symbol, offset)
+
+    def keep_of(self, block: ast.VarBlock, pou: Pou) -> Keep:
+        """Whether the variables of a section keep their values; where none can, `permitted` has said so."""
+        short = pou.kind in (PouKind.FUNCTION, PouKind.METHOD) and block.keyword not in ("VAR_STAT", "VAR_INST")
+        if short or block.keyword in ("VAR_TEMP", "VAR_IN_OUT"):
+            return Keep.UNSAID
+        return Keep.of(block.qualifiers)
 
     def declare_stack_variables(self, block: ast.VarBlock, pou: Pou, scope: Scope) -> None:
         """VAR of a function, VAR_TEMP: they live during the call."""

@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from plctool.compiler.kept import is_kept
 from plctool.compiler.semantics.addresses import is_open, located
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
@@ -26,6 +27,7 @@ from plctool.compiler.typed import (
 from plctool.compiler.types import (
     ArrayType,
     Elementary,
+    Keep,
     Kind,
     StringType,
     StructType,
@@ -33,8 +35,6 @@ from plctool.compiler.types import (
     base_of,
     is_scalar,
 )  # fmt: skip
-
-RETAINING = frozenset(("RETAIN", "PERSISTENT"))  # qualifiers that let a variable keep its value over a power cut
 
 
 class Variables:
@@ -74,14 +74,15 @@ class Variables:
         offset: int,
         *,
         constant: bool = False,
-        retain: bool = False,
+        keep: Keep = Keep.UNSAID,
     ) -> Variable:
         """A variable that exists once for all instances of its POU."""
         key = (scope.source.path, offset)
         variable = self._world.shared.get(key)
         if variable is None:
-            area = Area.RETAIN if retain or self.is_retain(t) else Area.DATA
+            area = self._area(t, keep)
             variable = Variable(full_name, t, Storage.AREA, scope.pos(offset), area, initial=init, constant=constant)
+            variable.keep = keep
             self._world.shared[key] = variable
             self._world.allocation.add(variable)
         return variable
@@ -105,9 +106,9 @@ class Variables:
             result = VarSymbol(symbol.name, scope.pos(symbol.pos), t, Role.GLOBAL, default=init)
             if t is not ERROR:
                 location = self.address(symbol.decl.location, t, result.pos, symbol.full_name, symbol.name)
-                result.variable = self.area_variable(
-                    symbol.full_name, t, init, location, symbol.qualifiers, scope, symbol.pos
-                )
+                keep = Keep.of(symbol.qualifiers)
+                self.check_kept(symbol.name, t, keep, scope, symbol.pos)
+                result.variable = self.area_variable(symbol.full_name, t, init, location, keep, scope, symbol.pos)
                 if result.variable is not None:
                     result.variable.shared_output = "shared_output" in symbol.decl.attributes
                     self._world.allocation.add(result.variable)
@@ -127,7 +128,7 @@ class Variables:
         t: Type,
         init: Initial | None,
         location: ast.DirectAddress | None,
-        qualifiers: set[str],
+        keep: Keep,
         scope: Scope,
         offset: int,
     ) -> Variable | None:
@@ -137,10 +138,22 @@ class Variables:
             message = f"{t} has instances of function blocks, which have no address; give one to their variables"
             scope.error(location.pos, "location", message)
             return None
+        if location is not None and keep.kept:
+            message = f"what is at an address is not kept; declare {name} without AT, or without {keep.value}"
+            scope.error(location.pos, "location", message)
+            return None
         if location is not None:
             return located(name, t, init, location, scope, offset)
-        retain = bool(qualifiers & RETAINING) or self.is_retain(t)
-        return Variable(name, t, Storage.AREA, pos, Area.RETAIN if retain else Area.DATA, initial=init)
+        return Variable(name, t, Storage.AREA, pos, self._area(t, keep), initial=init, keep=keep)
+
+    def check_kept(self, name: str, t: Type, keep: Keep, scope: Scope, offset: int) -> None:
+        """Warns of a variable of which nothing is kept though its section says so."""
+        if keep.kept and t is not ERROR and not is_kept(t, keep):
+            message = f"{name} holds an address, which means nothing after a start: it is not kept"
+            scope.warning(offset, "kept", message)
+
+    def _area(self, t: Type, keep: Keep) -> Area:
+        return Area.RETAIN if keep.kept or self.is_retain(t) else Area.DATA
 
     def _holds_instances(self, t: Type) -> bool:
         return any(part in self._world.blocks for part in instances_in(t))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.endless import has_exit
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import Role, VarSymbol
@@ -64,22 +65,11 @@ def _ends(statements: list[Statement]) -> bool:
     if isinstance(last, If | Case):
         return _ends(last.otherwise) and all(_ends(body) for _, body in last.branches)
     if isinstance(last, While):
-        return _is_constant(last.condition, 1) and not _has_exit(last.body)
+        return _is_constant(last.condition, 1) and not has_exit(last.body)
     if isinstance(last, Repeat):
-        return _is_constant(last.until, 0) and not _has_exit(last.body)
+        return _is_constant(last.until, 0) and not has_exit(last.body)
     return isinstance(last, Return | Exit | Continue)
 
 
 def _is_constant(e: Expr, value: int) -> bool:
     return isinstance(e, Const) and e.value == value
-
-
-def _has_exit(statements: list[Statement]) -> bool:
-    """Whether an EXIT leaves the loop whose body this is."""
-    for statement in statements:
-        bodies: list[list[Statement]] = []
-        if isinstance(statement, If | Case):
-            bodies = [*(body for _, body in statement.branches), statement.otherwise]
-        if isinstance(statement, Exit) or any(map(_has_exit, bodies)):
-            return True
-    return False

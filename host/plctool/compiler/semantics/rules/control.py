@@ -8,6 +8,7 @@ from __future__ import annotations
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary
+from plctool.compiler.semantics.endless import Loop
 from plctool.compiler.semantics.rules.bodies import check_body, report_unreachable
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.symbols import ERROR
@@ -157,7 +158,7 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
     body = _loop_body(c, node.body)
     if place is None or ERROR in (start.type, stop.type, step.type):
         return []
-    return [For(place, start, stop, step, body, pos)]
+    return [_noted(c, For(place, start, stop, step, body, pos))]
 
 
 def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:
@@ -166,6 +167,13 @@ def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:
     if isinstance(e, Const) and isinstance(e.value, int) and e.value < 0 and counter is not None:
         target = SIGNED[counter.bits]
     return c.coerce(e, target)
+
+
+def _noted(c: Checker, loop: Loop) -> Loop:
+    """The loop, which is looked at once more when all bodies are checked: whether it ends."""
+    if c.scope.pou is not None and not c.scope.library:
+        c.world.loops.append((c.scope.pou, loop))
+    return loop
 
 
 def _loop_body(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
@@ -181,14 +189,14 @@ def while_statement(c: Checker, node: ast.While) -> list[Statement]:
     condition = c.condition(node.condition)
     if _constant_condition(node.condition, condition) is False and node.body:
         report_unreachable(c, node.body[0].pos, ": the condition is always FALSE")
-    return [While(condition, _loop_body(c, node.body), c.pos(node.pos))]
+    return [_noted(c, While(condition, _loop_body(c, node.body), c.pos(node.pos)))]
 
 
 @checks_statement(ast.RepeatUntil)
 def repeat_statement(c: Checker, node: ast.RepeatUntil) -> list[Statement]:
     """REPEAT"""
     body = _loop_body(c, node.body)
-    return [Repeat(body, c.condition(node.until), c.pos(node.pos))]
+    return [_noted(c, Repeat(body, c.condition(node.until), c.pos(node.pos)))]
 
 
 @checks_statement(ast.Exit)

@@ -11,6 +11,7 @@ from difflib import get_close_matches
 from plctool.compiler.semantics import dates
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import BITS, NUMBERS, SIGNED, UNSIGNED, convert, elementary, settle
+from plctool.compiler.semantics.divisions import lost_fraction
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.symbols import ERROR, TypeSymbol
 from plctool.compiler.semantics.values import is_untyped
@@ -104,6 +105,10 @@ def _by_types(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Ex
         return _truncated(c, name, e, target, node)
     if isinstance(e.type, StringType) or isinstance(target, StringType):
         return _text_conversion(c, e, target, node)
+    if isinstance(target, Elementary) and target.kind is Kind.REAL:
+        lost = lost_fraction(e, target, explicit=True)
+        if lost:
+            c.warning(node.args[0].pos, "integer-division", lost)
     result = convert_explicitly(c, e, target)
     return result or c.error(node.pos, "type", f"there is no conversion from {e.type} to {target}")
 

@@ -22,6 +22,7 @@ from plctool.compiler.semantics.conversions import (
 from plctool.compiler.semantics.rules.common_types import match_literals, untyped_bits
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.semantics.type_limits import always
 from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Unary, UnaryOp
@@ -119,6 +120,8 @@ def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expe
         t = _number_type(left.type, right.type)
         if t is not None and op is BinaryOp.MOD and t.kind is Kind.REAL:
             t = None
+    if t is None and op is BinaryOp.ADD and (isinstance(left.type, StringType) or isinstance(right.type, StringType)):
+        return c.error(offset, "type", "texts are joined by CONCAT(a, b), not by +")
     if t is None:
         return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
     if t in _UNTYPED:
@@ -220,6 +223,8 @@ def _duration_arithmetic(c: Checker, op: BinaryOp, left: Expr, right: Expr, offs
 
 
 def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> Expr:
+    if is_untyped(left) is not is_untyped(right):
+        _report_decided(c, op, left, right, offset)
     left, right = match_literals(c, left, right, None)
     if isinstance(left.type, InterfaceType) and isinstance(right.type, StructType):
         right = c.coerce(right, left.type)
@@ -240,6 +245,15 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
         return _build(c, op, left, right, BOOL, offset)
     t = base_of(t)
     return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), BOOL, offset)
+
+
+def _report_decided(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> None:
+    """Warns of a comparison with a literal that is always TRUE or FALSE. A generic function may be for other types."""
+    literal, value = (left, right) if is_untyped(left) else (right, left)
+    if isinstance(literal, Const) and isinstance(literal.value, int) and not c.scope.bindings:
+        message = always(op, value, literal.value, swapped=literal is left)
+        if message:
+            c.warning(offset, "always", message)
 
 
 def _build(c: Checker, op: BinaryOp, left: Expr, right: Expr, t: Type, offset: int) -> Expr:

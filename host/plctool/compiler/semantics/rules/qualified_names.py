@@ -17,10 +17,9 @@ from plctool.compiler.semantics.symbols import (
     TypeSymbol,
     VarSymbol,
 )
-from plctool.compiler.semantics.values import load
+from plctool.compiler.semantics.values import load, whole
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import BitPlace, Const, Expr, Load, Pos, VarPlace
-from plctool.compiler.types import BOOL, BYTE
+from plctool.compiler.typed import Const, Expr, Pos, VarPlace
 
 _LONGEST = 16  # parts of a name behind its first; more are members of members
 
@@ -33,9 +32,7 @@ def variable_value(symbol: VarSymbol, pos: Pos) -> Expr:
     variable = symbol.variable
     if variable is None:
         return error_value(pos)
-    if variable.bit is not None:
-        return Load(BitPlace(VarPlace(variable, BYTE, pos), variable.bit, BOOL, pos), BOOL, pos)
-    return load(VarPlace(variable, symbol.type, pos))
+    return load(whole(variable, pos) if variable.bit is not None else VarPlace(variable, symbol.type, pos))
 
 
 def namespace_member(c: Checker, namespace: Namespace, node: ast.Member) -> Expr:

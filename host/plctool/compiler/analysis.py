@@ -1,4 +1,4 @@
-"""Questions about the typed program that decide between two correct ways of lowering."""
+"""Questions about the typed program: what a statement writes, what a call may touch."""
 
 from __future__ import annotations
 
@@ -62,6 +62,10 @@ class Effects:
         if isinstance(node, Call):
             return node.dispatch is None and self.is_local(node.function)
         return not isinstance(node, FbCall)
+
+    def has_address_taken(self, variable: Variable, pou: Pou) -> bool:
+        """Whether the POU takes the address of a variable or of a part of it."""
+        return variable in self._addressed_in(pou)
 
     def _addressed_in(self, pou: Pou) -> set[Variable]:
         """Variables whose address the POU takes."""

@@ -1,0 +1,28 @@
+/*
+ * RetainTable.h - reads the table of kept variables in an image.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RETAINTABLE_H
+#define RETAINTABLE_H
+
+#include "CmpRetain.h"
+#include "CompactDownload.h"
+
+/* An entry; of a single variable `run` says that it is one of its size. */
+typedef struct {
+    CDL_KEPT variable;
+    CDL_KEPT_RUN run;
+} KEPT;
+
+/* Reads the next entry; *table becomes the rest. ERR_NO_OBJECT at the end, ERR_OUT_OF_LIMITS when the entry is cut off
+ * or does not lie in the retain area, or an error of the flash. */
+RTS_RESULT RetainTableNext(RETAIN_TABLE *table, KEPT *kept);
+
+/* Of the first element in the retain area, bytes. */
+static inline RTS_UI32 KeptOffset(const KEPT *kept)
+{
+    return kept->variable.place >> CDL_KEPT_OFFSET_SHIFT;
+}
+
+#endif

@@ -1,0 +1,251 @@
+"""What may stand with a declaration: the sections of a unit, the qualifiers of a section, the modifiers of a unit.
+
+The tables say what does something; whatever else the grammar takes is reported here, so that nothing is passed over
+without a word.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.source import Source
+from plctool.compiler.syntax import ast
+
+KEEPING = frozenset(("RETAIN", "NON_RETAIN", "PERSISTENT"))
+ACCESS = frozenset(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"))
+_CONSTANT = frozenset(("CONSTANT",))
+_NONE = frozenset[str]()
+
+_CALL = {  # what lives for one call, and what does not
+    "VAR": _CONSTANT, "VAR_TEMP": _CONSTANT, "VAR_STAT": _CONSTANT | KEEPING, "VAR_EXTERNAL": _CONSTANT,
+}  # fmt: skip
+_PARAMETERS = {"VAR_INPUT": _CONSTANT, "VAR_OUTPUT": _NONE, "VAR_IN_OUT": _CONSTANT}
+_LASTING = {**_CALL, "VAR_INPUT": _CONSTANT | KEEPING, "VAR_OUTPUT": KEEPING, "VAR_IN_OUT": _CONSTANT}
+_TEST = {"VAR": _CONSTANT, "VAR_TEMP": _CONSTANT, "VAR_EXTERNAL": _CONSTANT}
+
+SECTIONS: dict[str, dict[str, frozenset[str]]] = {
+    "FUNCTION": {**_CALL, **_PARAMETERS},
+    "FUNCTION_BLOCK": {**_LASTING, "VAR": _CONSTANT | KEEPING | ACCESS},
+    "CLASS": {**_CALL, "VAR": _CONSTANT | KEEPING | ACCESS},
+    "PROGRAM": {**_LASTING, "VAR": _CONSTANT | KEEPING | ACCESS},
+    "METHOD": {**_CALL, **_PARAMETERS, "VAR_INST": KEEPING},
+    "method of an INTERFACE": _PARAMETERS,
+    "PROPERTY": {**_CALL, "VAR_INST": KEEPING},
+    "property of an INTERFACE": {},
+    "ACTION": {},
+    "CONFIGURATION": {"VAR_GLOBAL": _CONSTANT | KEEPING},
+    "file": {"VAR_GLOBAL": _CONSTANT | KEEPING | {"PUBLIC", "INTERNAL"}},
+    "TEST": _TEST,
+    "SETUP": _TEST,
+    "TEARDOWN": _TEST,
+}
+"""For each kind of unit its sections, and for each of those the qualifiers that do something there."""
+
+_OBJECTS = ACCESS | {"FINAL", "ABSTRACT", "OVERRIDE"}
+MODIFIERS: dict[str, frozenset[str]] = {
+    "FUNCTION": frozenset(("PUBLIC", "INTERNAL")),
+    "FUNCTION_BLOCK": frozenset(("PUBLIC", "INTERNAL", "ABSTRACT", "FINAL")),
+    "CLASS": frozenset(("PUBLIC", "INTERNAL", "ABSTRACT", "FINAL")),
+    "PROGRAM": frozenset(("PUBLIC", "INTERNAL")),
+    "INTERFACE": frozenset(("PUBLIC", "INTERNAL")),
+    "METHOD": _OBJECTS,
+    "PROPERTY": _OBJECTS,
+    "method of an INTERFACE": frozenset(("PUBLIC", "ABSTRACT")),
+    "property of an INTERFACE": frozenset(("PUBLIC", "ABSTRACT")),
+    "ACTION": _NONE,
+    "NAMESPACE": frozenset(("PUBLIC", "INTERNAL")),
+}
+"""For each kind of unit the words that may stand in front of its name."""
+
+_INSTEAD_OF_SECTION = {
+    ("FUNCTION", "VAR_INST"): "VAR_STAT keeps a value from call to call",
+    ("FUNCTION_BLOCK", "VAR_INST"): "VAR keeps its value from call to call",
+    ("PROGRAM", "VAR_INST"): "VAR keeps its value from cycle to cycle",
+    ("CLASS", "VAR_INST"): "VAR keeps its value",
+    ("CLASS", "VAR_INPUT"): "nothing calls a CLASS itself; write VAR PUBLIC, or an input of a METHOD",
+    ("CLASS", "VAR_OUTPUT"): "nothing calls a CLASS itself; write VAR PUBLIC, or an output of a METHOD",
+    ("CLASS", "VAR_IN_OUT"): "nothing calls a CLASS itself; write it into a METHOD",
+    ("PROGRAM", "VAR_IN_OUT"): "use VAR_EXTERNAL or a global variable",
+}
+
+
+def check_declarations(declarations: Iterable[ast.Declaration], source: Source, diagnostics: Diagnostics) -> None:
+    """Reports what stands in a file and does nothing, or contradicts itself."""
+    check = _Check(source, diagnostics)
+    for decl in declarations:
+        check.declaration(decl)
+
+
+class _Check:
+    def __init__(self, source: Source, diagnostics: Diagnostics) -> None:
+        self._source = source
+        self._diagnostics = diagnostics
+
+    def _error(self, offset: int, message: str) -> None:
+        self._diagnostics.error(self._source.pos(offset), "qualifier", message)
+
+    def _warning(self, offset: int, message: str) -> None:
+        self._diagnostics.warning(self._source.pos(offset), "no-effect", message)
+
+    def declaration(self, decl: ast.Declaration) -> None:
+        if isinstance(decl, ast.PouDecl):
+            self._unit(decl, _kind(decl))
+        elif isinstance(decl, ast.GlobalBlock):
+            self._section("file", decl.block)
+        elif isinstance(decl, ast.TestDecl):
+            for block in decl.blocks:
+                if block.keyword in SECTIONS[decl.keyword]:  # the others are refused where tests are declared
+                    self._section(decl.keyword, block)
+        elif isinstance(decl, ast.ConfigurationDecl):
+            self._configuration(decl)
+
+    def _configuration(self, decl: ast.ConfigurationDecl) -> None:
+        for block in decl.globals:
+            self._section("CONFIGURATION", block)
+        for instance in decl.programs:
+            for qualifier in instance.qualifiers - KEEPING:
+                message = f"a program cannot be {qualifier}; RETAIN, NON_RETAIN or PERSISTENT may stand here"
+                self._error(instance.pos, message)
+
+    # ---- units ----
+
+    def _unit(self, decl: ast.PouDecl, kind: str) -> None:
+        self._modifiers(decl, kind)
+        for block in decl.blocks[_given(decl) :]:
+            self._section(kind, block)
+        if "external" in decl.attributes and decl.keyword == "FUNCTION":
+            self._external(decl)
+        for member in decl.members:
+            inside = f"{_kind(member).lower()} of an INTERFACE" if kind == "INTERFACE" else _kind(member)
+            self._unit(member, inside)
+
+    def _external(self, decl: ast.PouDecl) -> None:
+        """What the C function does is not said here."""
+        if decl.body:
+            self._error(decl.body[0].pos, f"{decl.name} is written in C, so it has no statements here")
+        for block in decl.blocks:
+            if block.keyword not in _PARAMETERS and block.decls:
+                message = f"{decl.name} is written in C, so it has no {block.keyword} here"
+                self._error(block.pos, message)
+
+    def _modifiers(self, decl: ast.PouDecl, kind: str) -> None:
+        given = decl.modifiers - {"CLASS"}
+        for word in sorted(given - MODIFIERS[kind]):
+            self._error(decl.pos, _wrong_modifier(kind, word))
+        access = sorted(given & ACCESS)
+        if len(access) > 1:
+            self._error(decl.pos, f"{decl.name} cannot be {' and '.join(access)}; choose one")
+        for one, other in (("ABSTRACT", "FINAL"), ("ABSTRACT", "PRIVATE")):
+            if {one, other} <= given:
+                message = f"{decl.name} cannot be {one} and {other}: derived blocks complete what is {one}"
+                self._error(decl.pos, message)
+
+    # ---- sections ----
+
+    def _section(self, kind: str, block: ast.VarBlock) -> None:
+        keyword = block.keyword
+        allowed = SECTIONS[kind].get(keyword)
+        if allowed is None:
+            self._error(block.pos, _wrong_section(kind, keyword))
+            return
+        for word in sorted(block.qualifiers - allowed):
+            self._error(block.pos, _wrong_qualifier(kind, keyword, word))
+        self._combination(kind, block)
+        for line in block.decls:
+            self._line(block, line)
+
+    def _combination(self, kind: str, block: ast.VarBlock) -> None:
+        given = block.qualifiers
+        keeps = sorted(given & {"RETAIN", "PERSISTENT"})
+        if keeps and "NON_RETAIN" in given:
+            self._error(block.pos, f"a variable cannot be {keeps[0]} and NON_RETAIN; choose one")
+        access = sorted(given & ACCESS)
+        if len(access) > 1:
+            self._error(block.pos, f"a variable cannot be {' and '.join(access)}; choose one")
+        if keeps and "CONSTANT" in given:
+            self._warning(block.pos, f"{keeps[0]} has no effect here: a constant never changes; leave it out")
+        if kind == "PROGRAM" and access and access != ["PUBLIC"]:
+            message = (
+                f"{access[0]} has no effect in a PROGRAM: other units see its variables all the same; leave it out"
+            )
+            self._warning(block.pos, message)
+
+    def _line(self, block: ast.VarBlock, line: ast.VarDecl) -> None:
+        name = line.names[0][1]
+        if line.location is not None and "CONSTANT" in block.qualifiers and block.keyword == "VAR_GLOBAL":
+            self._error(line.location.pos, f"the constant {name} has no address; leave out CONSTANT or AT")
+        if line.init is None:
+            return
+        if block.keyword == "VAR_EXTERNAL":
+            message = f"this initial value has no effect: {name} gets the one of its VAR_GLOBAL; write it there"
+            self._warning(line.pos, message)
+        elif block.keyword == "VAR_IN_OUT":
+            message = f"this initial value has no effect: each call gives {name} a variable; leave it out"
+            self._warning(line.pos, message)
+
+
+def _given(decl: ast.PouDecl) -> int:
+    """How many sections in front nobody wrote: that of the value of a SET."""
+    return int(decl.keyword == "SET")
+
+
+def _kind(decl: ast.PouDecl) -> str:
+    if "CLASS" in decl.modifiers:
+        return "CLASS"
+    return "PROPERTY" if decl.keyword in ("GET", "SET") else decl.keyword
+
+
+def _with_article(kind: str) -> str:
+    return f"{'an' if kind[0] in 'AI' else 'a'} {kind}"
+
+
+def _wrong_section(kind: str, keyword: str) -> str:
+    advice = _INSTEAD_OF_SECTION.get((kind, keyword)) or f"it has {_listed(SECTIONS[kind])}"
+    return f"{_with_article(kind)} has no {keyword}; {advice}"
+
+
+def _listed(words: Iterable[str], conjunction: str = "and") -> str:
+    *most, last = words or ["no variables"]
+    return f"{', '.join(most)} {conjunction} {last}" if most else last
+
+
+def _wrong_modifier(kind: str, word: str) -> str:
+    if kind.endswith("INTERFACE") and kind != "INTERFACE":
+        return f"what an INTERFACE declares is PUBLIC and to be implemented; leave out {word}"
+    allowed = sorted(MODIFIERS[kind])
+    return f"{_with_article(kind)} cannot be {word}; it may be {_listed(allowed, 'or')}"
+
+
+def _wrong_qualifier(kind: str, keyword: str, word: str) -> str:
+    if word in ("FINAL", "ABSTRACT", "OVERRIDE"):
+        return f"{word} is for blocks and methods, not for variables; leave it out"
+    if word in ACCESS:
+        return _wrong_access(kind, keyword, word)
+    if word == "CONSTANT":
+        reason = "it is there to be written" if keyword == "VAR_OUTPUT" else "a constant is written VAR CONSTANT"
+        return f"a {keyword} cannot be CONSTANT: {reason}"
+    return f"a {keyword} cannot be {word}: {_why_not_kept(kind, keyword)}"
+
+
+def _wrong_access(kind: str, keyword: str, word: str) -> str:
+    if keyword in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT"):
+        return f"{word} is for VAR; a {keyword} is there for all who call; leave it out"
+    if keyword == "VAR_GLOBAL":
+        return f"a VAR_GLOBAL may be PUBLIC or INTERNAL, not {word}"
+    return (
+        f"{word} is for the VAR of a FUNCTION_BLOCK or CLASS; only {_with_article(kind)} itself sees this; leave it out"
+    )
+
+
+def _why_not_kept(kind: str, keyword: str) -> str:
+    if keyword == "VAR_IN_OUT":
+        return "it is a variable of the caller; write it where that is declared"
+    if keyword == "VAR_EXTERNAL":
+        return "it only repeats a VAR_GLOBAL; write it there"
+    if kind in ("TEST", "SETUP", "TEARDOWN"):
+        return "a test starts anew each time; leave it out"
+    lasting = "VAR" if kind in ("PROGRAM", "FUNCTION_BLOCK", "CLASS") else "VAR_STAT"
+    return f"it lives for one call; {lasting} RETAIN keeps a value"

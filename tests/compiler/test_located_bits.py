@@ -1,0 +1,35 @@
+"""Writing a bit writes that bit and nothing else, wherever it lies and whatever writes it."""
+
+from __future__ import annotations
+
+from bit_programs import BitProgram, bit_programs, block_programs
+from hypothesis import given, settings
+
+from plctool.compiler.build import build_program
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.targets import find_target
+from plctool.compiler.front import check_sources
+from plctool.compiler.source import Source
+from plctool.sim import Simulator
+
+
+def run(p: BitProgram) -> None:
+    checked = check_sources([Source("bits.st", p.text)])
+    assert checked.program is not None, checked.diagnostics
+    built = build_program(checked.program, Options(find_target("x86_64-linux"), 0))
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        assert plc.status().exception is None
+        assert {name: plc.read(name) for name in p.expected} == p.expected
+
+
+@settings(max_examples=150, deadline=None)
+@given(bit_programs())
+def test_a_write_reaches_its_bit_only(p: BitProgram) -> None:
+    run(p)
+
+
+@settings(max_examples=20, deadline=None)
+@given(block_programs())
+def test_bits_of_blocks_are_copied_alone(p: BitProgram) -> None:
+    run(p)
