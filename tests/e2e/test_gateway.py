@@ -12,6 +12,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +37,10 @@ def runtime(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
     monkeypatch.setenv("PLCTOOL_GATEWAY_IDLE", "600")
     yield
-    for holder in gateways():
-        os.kill(holder["pid"], signal.SIGKILL)
-    shutil.rmtree(folder)
+    for gateway in gateways():  # one whose line has closed is ending by itself, and tidies up
+        with suppress(ProcessLookupError):
+            os.kill(gateway["pid"], signal.SIGKILL)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 class Running:
