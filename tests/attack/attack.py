@@ -21,6 +21,7 @@ from images import Images
 from kills import Kills
 from records import Records
 from sectors import Sectors
+from simulated import die_with_parent
 from workshop import Workshop, open_workshop
 
 CAMPAIGNS: tuple[type[Campaign], ...] = (Kills, Cuts, Calls, BadPrograms, Images, Records, Sectors)
@@ -67,7 +68,7 @@ def run_campaign(campaign: Campaign, most: int | None, jobs: int) -> Result:
         numbers = sorted(random.Random(campaign.shop.seed).sample(numbers, most))
     campaign.prepare([_cases[number] for number in numbers])
     result = Result(campaign)
-    with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
+    with ProcessPoolExecutor(jobs, get_context("fork"), die_with_parent) as pool:
         for number, outcome, reason in pool.map(attempt, numbers, chunksize=4):
             if outcome:
                 result.outcomes[outcome] += 1

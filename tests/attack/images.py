@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import random
 from collections.abc import Callable
 from contextlib import suppress
@@ -178,15 +179,23 @@ MUTATIONS: dict[str, Mutation] = {
 }
 
 
+# What asks the kernel for something: SYSCALL, SYSENTER and INT 80 of x86-64, SVC 0 of AArch64. Such an image is not
+# tried: it could stop or delete anything of the user who started the campaign.
+KERNEL_CALLS = {"x86_64": (b"\x0f\x05", b"\x0f\x34", b"\xcd\x80"), "aarch64": (b"\x01\x00\x00\xd4",)}[
+    platform.machine()
+]
+
+
 def hostile(shop: Workshop, base: str, kind: str, number: int) -> bytes:
     """An image that went wrong in one way, or in some, with its CRC."""
     rng = random.Random(f"{shop.seed} {number}")
-    image = Image(shop[base].image)
-    mutate = MUTATIONS[kind]
-    for _ in range(rng.choice((1, 1, 1, 2, 4))):
-        if len(image) >= lib.CDL_HEADER_SIZE + 64:
-            mutate(rng, image)
-    return with_crc(image)
+    while True:
+        image = Image(shop[base].image)
+        for _ in range(rng.choice((1, 1, 1, 2, 4))):
+            if len(image) >= lib.CDL_HEADER_SIZE + 64:
+                MUTATIONS[kind](rng, image)
+        if not any(image.count(call) > shop[base].image.count(call) for call in KERNEL_CALLS):
+            return with_crc(image)
 
 
 class Images(Campaign):

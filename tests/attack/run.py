@@ -33,6 +33,7 @@ def environment(build: Path, sanitized: bool) -> dict[str, str]:
         "PYTHONPATH": f"{ROOT / 'host'}:{build / 'host'}",
         "PYTHONDONTWRITEBYTECODE": "1",
         "PLCRT": str(build / "firmware/port/linux/plcrt"),
+        "PLCTOOL_GATEWAY": "off",
     }
     if sanitized:
         names = ("libasan.so", "libubsan.so")

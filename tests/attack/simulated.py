@@ -6,6 +6,7 @@ one starts from is what the one before left, as with a real device. This process
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pickle
 import resource
@@ -121,6 +122,12 @@ class Flash:
         return _await(child, reading)
 
 
+def die_with_parent() -> None:
+    """This process ends with the one that forked it, whatever ends that."""
+    pr_set_pdeathsig = 1
+    ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+
+
 def violation() -> str:
     """The first use of the flash against its rules, "" without one."""
     return bytes(ffi.string(lib.SimFlashViolation())).decode()
@@ -130,6 +137,7 @@ def _live(
     writing: int, use: Callable[[Device], Any], plan: Callable[[], None], after: Ended | None, stay: bool
 ) -> None:
     """The child; does not return."""
+    die_with_parent()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT + 5))
     try:

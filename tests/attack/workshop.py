@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
-from simulated import Device, Ended, Flash, Geometry
+from simulated import Device, Ended, Flash, Geometry, die_with_parent
 
 from plctool.core import lib
 
@@ -94,7 +94,7 @@ def compile_all(sources: dict[str, str], folder: Path, jobs: int, checks: str = 
     """Compiles programs by name, in processes of their own, which take the compiler's memory with them."""
     work = [(name, text, checks, folder) for name, text in sources.items()]
     programs = {}
-    with ProcessPoolExecutor(jobs, mp_context=get_context("fork")) as pool:
+    with ProcessPoolExecutor(jobs, get_context("fork"), die_with_parent) as pool:
         for name, image, error in pool.map(_compile, work):
             if error:
                 raise SystemExit(f"{name}: {error}")

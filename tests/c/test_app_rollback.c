@@ -40,6 +40,33 @@ static void an_application_that_dies_before_it_proved_itself_is_rolled_back(void
     CHECK(!log_has("division by zero"));
 }
 
+static void a_download_after_a_death_leaves_the_last_good_application(void)
+{
+    APP_BYTES image;
+    APP_BYTES third;
+
+    start_with_counter(1);
+    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    build_dying(&image);
+    build_counter(&third, 3);
+    CHECK(download(&image) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(10)) == ERR_OK);
+    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK(AppDownloadBegin(third.size, image_crc(&third)) == ERR_OK);
+    CHECK(AppDownloadWrite(0, third.bytes, third.size / 2) == ERR_OK);
+    CHECK(SimStart() == ERR_OK); /* the download is cut */
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK(download(&third) == ERR_OK);
+    CHECK(AppStartApplication() == ERR_OK);
+    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK(SimStart() == ERR_OK);
+    CHECK(app_state() == AS_RUN);
+    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 3);
+    CHECK(SimFlashViolations() == 0);
+}
+
 /* Ten times within the time of its proof; then it proves itself. */
 static void losing_power_is_not_dying(void)
 {
@@ -215,6 +242,7 @@ int main(void)
 {
     NEEDS_X86_64;
     RUN(an_application_that_dies_before_it_proved_itself_is_rolled_back);
+    RUN(a_download_after_a_death_leaves_the_last_good_application);
     RUN(losing_power_is_not_dying);
     RUN(a_first_application_may_lose_power_as_often_as_it_likes);
     RUN(an_application_that_ran_long_enough_is_not_rolled_back);

@@ -12,6 +12,7 @@ import time
 import pytest
 
 from plctool.errors import PlcError
+from plctool.gateway.control import dismiss_idle
 from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
 from plctool.link.services import download, read_status
@@ -153,6 +154,7 @@ def test_a_death_in_initialisation_leaves_the_device_reachable(tool, plcrt, coun
     good = status(tool, plcrt)["image_crc"]
     image = tool.build("slow", SLOW_START).read_bytes()
     killer = threading.Timer(0.4, lambda: kill_worker(number))  # long before the initialisation ends
+    dismiss_idle(plcrt.port)  # the gateway of the command before
     with Connection(SerialTransport(plcrt.port)) as connection, contextlib.suppress(PlcError):
         session = Session(connection)
         read_status(session)
@@ -172,7 +174,7 @@ def test_a_death_in_initialisation_leaves_the_device_reachable(tool, plcrt, coun
 def test_a_death_during_a_download_leaves_the_old_program(tool, plcrt, counter, eventually, kill_worker, share):
     prove(tool, plcrt, counter, eventually)
     crc = status(tool, plcrt)["image_crc"]
-    other = counter.read_bytes() * 100
+    other = counter.read_bytes() * 1000  # many messages, of which several are under way
 
     class Died(Exception):
         pass
@@ -182,6 +184,7 @@ def test_a_death_during_a_download_leaves_the_old_program(tool, plcrt, counter, 
             kill_worker(signal.SIGABRT)
             raise Died
 
+    dismiss_idle(plcrt.port)  # the gateway of the command before
     with Connection(SerialTransport(plcrt.port)) as connection, pytest.raises(Died):
         download(Session(connection), other, afresh=True, progress=kill)
     assert status(tool, plcrt)["image_crc"] == crc
