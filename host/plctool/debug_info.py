@@ -82,7 +82,7 @@ class DebugInfo:
         return max(chains, key=len, default=[])
 
     def _is_possible(self, chain: list[int]) -> bool:
-        """No function calls itself, directly or by way of others: what says so was left on the stack by earlier calls."""
+        """No function calls itself, directly or by way of others: what says so was left by earlier calls."""
         functions = [i for i in map(self._function, chain) if i >= 0]
         return len(set(functions)) == len(functions)
 
