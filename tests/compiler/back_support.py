@@ -37,6 +37,7 @@ from plctool.compiler.typed import (
 from plctool.compiler.types import BOOL, INT, Type, align_up
 from plctool.core import lib
 from plctool.image import parse_image
+from plctool.values import encode
 
 POS = Pos("main.st", 1, 1)
 
@@ -197,5 +198,5 @@ class Running:
 
     def __setitem__(self, name: str, value: Any) -> None:
         symbol = self.built.symbols.resolve(f"Main.{name}")
-        data = symbol.encode(value)
+        data = encode(symbol.type, value)
         ctypes.memmove(self.context.area[symbol.area] + symbol.offset, data, len(data))
