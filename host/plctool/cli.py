@@ -122,9 +122,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     flash = command("flash", _flash, "bring an image onto a device and start it")
     _add_image(flash)
-    flash.add_argument(
-        "--no-start", action="store_true", help="leave the program stopped, until it is started or power comes back"
-    )
+    flash.add_argument("--no-start", action="store_true", help="leave it stopped until it is started or power returns")
     flash.add_argument("--force", action="store_true", help="also when the device has this image already")
     _add_link(flash)
 

@@ -37,7 +37,6 @@ from plctool.compiler.typed import (
 from plctool.compiler.types import BOOL, INT, Type, align_up
 from plctool.core import lib
 from plctool.image import parse_image
-from plctool.values import encode
 
 POS = Pos("main.st", 1, 1)
 
@@ -198,5 +197,9 @@ class Running:
 
     def __setitem__(self, name: str, value: Any) -> None:
         symbol = self.built.symbols.resolve(f"Main.{name}")
-        data = encode(symbol.type, value)
-        ctypes.memmove(self.context.area[symbol.area] + symbol.offset, data, len(data))
+        change = symbol.change(value)
+        place = symbol.offset + change.offset
+        data = change.data
+        if change.mask != 0xFF:
+            data = bytes([(self.memory(symbol.area, place, 1)[0] & ~change.mask) | data[0]])
+        ctypes.memmove(self.context.area[symbol.area] + place, data, len(data))

@@ -184,7 +184,7 @@ def test_result_that_is_not_used_is_fine_for_a_call_with_effects() -> None:
         ("i := i(1);", "6: i is not a function"),
         ("i := Main(1);", "6: a call of the program Main is a statement and has no value"),
         ("i := COUNTER(1);", "6: COUNTER is a function block type; declare an instance of it and call that"),
-        ("i := Proc(s);", "6: nothing does not fit INT"),
+        ("i := Proc(s);", "6: Proc gives no result; call it as a statement, or declare FUNCTION Proc : INT"),
         ("i := SHL(1);", "6: SHL takes 2 arguments, not 1"),
         ("i := ABS(b);", "6: ABS needs a number, not BOOL"),
         ("r := SIN(r);", "6: unknown function SIN"),

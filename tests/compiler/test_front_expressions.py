@@ -308,7 +308,7 @@ def test_comparison_is_a_bool(expression: str) -> None:
         ("p = p", 8, "cannot compare"),
         ("tm = tm", 9, "cannot compare"),
         ("b AND i", 8, "BOOL and INT"),
-        ("s + s", 8, "cannot combine"),
+        ("s + s", 8, "joined by CONCAT"),
         ("NOT r", 6, "NOT needs"),
         ("-s", 6, "needs a number"),
         ("r MOD r", 8, "MOD cannot combine"),
@@ -416,7 +416,7 @@ def test_bit_at_an_address_is_a_bit_of_its_byte() -> None:
         ("by := w.%B2;", 9, "no part"),
         ("b := tm.QQ;", 9, "no variable QQ"),
         ("b := tm.START2;", 9, "no variable"),
-        ("i := %IX;", 6, "no place"),
+        ("i := %IX;", 6, "%IX is not an address"),
         ("b := %IX0.8;", 6, "not an address"),
     ],
 )

@@ -41,7 +41,7 @@ CALL = {"VAR": "CONSTANT", "VAR_TEMP": "CONSTANT", "VAR_STAT": f"CONSTANT {KEEP}
 TEST = {"VAR": "CONSTANT", "VAR_TEMP": "CONSTANT", "VAR_EXTERNAL": "CONSTANT"}
 HANDED = {"VAR_INPUT": "CONSTANT", "VAR_OUTPUT": "", "VAR_IN_OUT": "CONSTANT"}
 LASTING = {"VAR": f"CONSTANT {KEEP} {ACCESS}", "VAR_INPUT": f"CONSTANT {KEEP}", "VAR_OUTPUT": KEEP}
-INST = {"VAR_INST": ""}
+INST = {"VAR_INST": KEEP}
 EXPECTED = {
     "FUNCTION": CALL | HANDED,
     "FUNCTION_BLOCK": CALL | LASTING | {"VAR_IN_OUT": "CONSTANT"},
@@ -263,6 +263,7 @@ PLACES = {
 HEEDED_AT = {
     "qualified_only": {"VAR_GLOBAL", "enumeration", "named enumeration"},
     "external": {"FUNCTION"},
+    "shared_output": {"variable"},
 }
 
 

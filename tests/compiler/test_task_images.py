@@ -141,6 +141,8 @@ def test_two_tasks_that_write_one_bit_are_warned_of(tmp_path: Path, one: str, tw
     ("one", "two"),
     [
         ("bit0 := TRUE;", "bit1 := FALSE"),
+        ("%QX0.4 := TRUE;", "%QX1.0 := FALSE"),
+        ("%QX0.7 := TRUE;", "%QX1.6 := FALSE"),
         ("word.3 := TRUE;", "word.4 := FALSE"),
         ("table[1] := 1;", "table[2] := 1"),
         ("bit0 := TRUE;", "n := BOOL_TO_INT(bit0)"),

@@ -42,7 +42,7 @@ from plctool.compiler.types import (
 from plctool.errors import UsageError
 from plctool.value_texts import format_time, literal, parse_time, parse_value
 from plctool.values import decode, encode
-from plctool.variables import Symbol
+from plctool.variables import Change, Symbol
 
 
 def laid_out(t: StructType) -> StructType:
@@ -161,11 +161,10 @@ def test_structs_and_arrays_are_dicts_and_lists() -> None:
 
 def test_bits_are_changed_in_their_word() -> None:
     symbol = Symbol("Main.word.3", 0, 0, WORD, bit=3)
-    assert symbol.encode(True, b"\x01\x80") == b"\x09\x80"
-    assert symbol.encode("FALSE", b"\xff\xff") == b"\xf7\xff"
+    assert symbol.change(True) == Change(0, b"\x08", 0x08)
+    assert symbol.change("FALSE") == Change(0, b"\x00", 0x08)
+    assert Symbol("Main.word.12", 0, 0, WORD, bit=12).change(True) == Change(1, b"\x10", 0x10)
     assert symbol.decode(b"\x08\x00") is True
-    with pytest.raises(UsageError):
-        symbol.encode(True)
 
 
 def test_enums_are_shown_by_name() -> None:

@@ -70,7 +70,7 @@ def kill_worker(plcrt, eventually):
     def kill(number: signal.Signals) -> None:
         worker = eventually(lambda: plcrt.worker)
         os.kill(worker, number)
-        eventually(lambda: plcrt.worker not in (0, worker))
+        eventually(lambda: plcrt.worker not in (None, worker))
 
     return kill
 

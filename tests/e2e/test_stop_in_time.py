@@ -7,6 +7,12 @@ import time
 
 import pytest
 
+
+@pytest.fixture
+def plcrt(ordinary_plcrt):
+    return ordinary_plcrt
+
+
 LONG = "WATCHDOG := T#30m, SENSITIVITY := 1000"
 # How much longer than the promised second a command may take on a machine under load, start of Python included [s].
 PATIENCE = 10

@@ -54,7 +54,7 @@ def kill_worker(plcrt, eventually):
     def kill(number: signal.Signals) -> None:
         worker = eventually(lambda: plcrt.worker)
         os.kill(worker, number)
-        eventually(lambda: plcrt.worker not in (0, worker))
+        eventually(lambda: plcrt.worker not in (None, worker))
 
     return kill
 
@@ -144,9 +144,9 @@ def test_a_killed_plcrt_may_be_started_at_once(plcrt):
 
 
 def test_a_controller_that_dies_again_and_again_without_a_program_is_given_up(plcrt, eventually):
-    worker, deaths = 0, 0
+    worker, deaths = None, 0
     while plcrt.process.poll() is None:
-        if plcrt.worker not in (0, worker):
+        if plcrt.worker not in (None, worker):
             worker = plcrt.worker
             os.kill(worker, signal.SIGABRT)
             deaths += 1
@@ -163,9 +163,9 @@ def test_one_that_is_killed_from_outside_is_never_given_up(plcrt, kill_worker):
 
 def test_it_ends_while_it_waits_to_start_the_next(plcrt, eventually):
     """With the third death comes a pause."""
-    worker, deaths = 0, 0
+    worker, deaths = None, 0
     while deaths < 4:
-        if plcrt.worker not in (0, worker):
+        if plcrt.worker not in (None, worker):
             worker = plcrt.worker
             os.kill(worker, signal.SIGABRT)
             deaths += 1
@@ -185,7 +185,7 @@ def test_it_runs_where_ended_children_are_ignored(tmp_path):
 
 def test_without_a_supervisor_it_is_one_process(tmp_path):
     with Plcrt(tmp_path / "flash", "--no-supervisor") as plcrt:
-        assert plcrt.worker == 0
+        assert plcrt.worker is None
         assert answer(plcrt.port) == "none"
         assert plcrt.stop() == 0
 
@@ -203,7 +203,7 @@ def test_a_serial_device_is_opened_again_by_the_next_worker(tmp_path, eventually
         eventually(lambda: opened(worker))
         assert not opened(process.pid)  # a device that goes away is not held by anybody
         os.kill(worker, OUTSIDE)
-        eventually(lambda: plcrt.worker not in (0, worker))
+        eventually(lambda: plcrt.worker not in (None, worker))
         eventually(lambda: opened(plcrt.worker))
         process.terminate()
         assert process.wait(20) == 0

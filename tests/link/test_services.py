@@ -24,7 +24,7 @@ from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
 from plctool.link import l7, monitoring, services
 from plctool.link.connection import Connection
-from plctool.link.monitoring import AreaRange
+from plctool.link.monitoring import AreaRange, Write
 from plctool.link.services import AppException, AppState
 from plctool.link.session import Session
 
@@ -272,7 +272,7 @@ def test_long_values_behind_pointers_are_read_in_pieces() -> None:
 def test_values_are_written_behind_pointers() -> None:
     bench = Bench()
     bench.plc.memory[0][0:8] = pointer(1, 100)
-    monitoring.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 2, (4,)), b"\xaa\xbb")])
+    monitoring.write_memory(bench.session, bench.crc, [Write(AreaRange(0, 0, 2, (4,)), b"\xaa\xbb")])
     assert bench.plc.memory[1][104:106] == b"\xaa\xbb"
 
 
@@ -307,7 +307,7 @@ def test_values_of_several_requests_are_not_consistent() -> None:
 
 def test_values_are_written_to_their_places() -> None:
     bench = Bench()
-    values = [(AreaRange(0, 10, 2), b"\xaa\xbb"), (AreaRange(4, 66000, 1), b"c")]
+    values = [Write(AreaRange(0, 10, 2), b"\xaa\xbb"), Write(AreaRange(4, 66000, 1), b"c")]
     monitoring.write_memory(bench.session, bench.crc, values)
     assert bench.plc.memory[0][10:12] == b"\xaa\xbb"
     assert bench.plc.memory[4][66000] == ord("c")
@@ -315,7 +315,9 @@ def test_values_are_written_to_their_places() -> None:
 
 def test_more_values_than_a_message_holds_are_all_written() -> None:
     bench = Bench(buffer_size=512)
-    monitoring.write_memory(bench.session, bench.crc, [(AreaRange(0, n, 1), bytes([n & 0xFF])) for n in range(300)])
+    monitoring.write_memory(
+        bench.session, bench.crc, [Write(AreaRange(0, n, 1), bytes([n & 0xFF])) for n in range(300)]
+    )
     assert bench.plc.memory[0][:300] == bytes(n & 0xFF for n in range(300))
 
 
@@ -352,7 +354,7 @@ def test_a_write_that_the_device_did_not_take_is_repeated() -> None:
     bench = Bench()
     services.read_status(bench.session)
     bench.device.restart()
-    monitoring.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 1), b"x")])
+    monitoring.write_memory(bench.session, bench.crc, [Write(AreaRange(0, 0, 1), b"x")])
     assert bench.plc.writes == 1
 
 
@@ -367,7 +369,7 @@ def test_a_write_whose_answer_is_lost_is_not_repeated() -> None:
 
     bench.device.handler = answer_and_die
     with pytest.raises(LinkError):
-        monitoring.write_memory(bench.session, bench.crc, [(AreaRange(0, 0, 1), b"x")])
+        monitoring.write_memory(bench.session, bench.crc, [Write(AreaRange(0, 0, 1), b"x")])
     assert bench.plc.writes == 1
 
 

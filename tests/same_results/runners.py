@@ -33,7 +33,7 @@ _LINUX_SOURCES = [
     *_PORTABLE,
     *(FIRMWARE / "src").glob("comm/*.c"),
     *(FIRMWARE / "port/sim").glob("*.c"),
-    FIRMWARE / "port/linux/SysExcept.c",
+    *(FIRMWARE / "port/linux" / name for name in ("IecStack.c", "IecStackSwitch.S", "SysExcept.c", "SysMem.c")),
 ]
 # Picolibc keeps the clock to itself unless told that there is one.
 _BARE_FLAGS = [

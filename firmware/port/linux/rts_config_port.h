@@ -45,12 +45,12 @@
 /* The largest code segment that can be made executable, per slot [bytes]: a slot is less than half of the flash. */
 #define PORT_CODE_SIZE (PORT_FLASH_SIZE / 2)
 
-/* Stack of a task's thread [bytes]; the thread sanitizer needs 1 MiB. The zone below it has no memory: a function
- * whose local variables are larger than the zone could jump over it, into the next stack. */
+/* Stack of a task's thread [bytes], on which the runtime runs and IEC code does not (IecStack.c); the thread sanitizer
+ * needs 1 MiB. The zone below it has no memory. */
 #ifndef PORT_STACK_SIZE
 #define PORT_STACK_SIZE (256 * 1024)
 #endif
-#define PORT_STACK_GUARD (16 * 1024 * 1024)
+#define PORT_STACK_GUARD (64 * 1024)
 
 /* SCHED_FIFO priority of an IEC priority p is PORT_PRIORITY_HIGHEST - p: 80..49. Above all of them are external events,
  * main as long as tasks leave it no time otherwise, and the watchdog. */

@@ -49,6 +49,9 @@ void AppBoot(void);
  * back to. */
 RTS_RESULT AppBootByHand(void);
 
+/* Whether the slot that is not `failed` has an application that may run. */
+bool AppCanRollBack(RTS_UI32 failed);
+
 /*
  * Loads the other slot instead of `failed`, from now on, without calling anything of it; false when it holds nothing
  * that can run. Its retain variables are those it had when the failed application came.

@@ -40,15 +40,19 @@ static RTS_RESULT load_from_slot(RTS_UI32 slot, RTS_UI32 retain_until)
     return result;
 }
 
+bool AppCanRollBack(RTS_UI32 failed)
+{
+    RTS_UI8 state = AppCommitGet()->state[AppCommitOtherSlot(failed)];
+
+    return state != SLOT_EMPTY && state != SLOT_FAILED;
+}
+
 bool AppRollBack(RTS_UI32 failed)
 {
-    const COMMIT *commit = AppCommitGet();
-    RTS_UI32 other = AppCommitOtherSlot(failed);
-    RTS_UI32 retain_until = commit->slot[failed].retain_after;
+    RTS_UI32 retain_until = AppCommitGet()->slot[failed].retain_after;
     RTS_UI32 retain_after;
 
-    if (commit->state[other] == SLOT_EMPTY || commit->state[other] == SLOT_FAILED ||
-        load_from_slot(other, retain_until) != ERR_OK)
+    if (!AppCanRollBack(failed) || load_from_slot(AppCommitOtherSlot(failed), retain_until) != ERR_OK)
         return false;
     /* A record of its own numbers its retain variables as newest before the commit makes it so. */
     RetainKeep(retain_until);

@@ -141,6 +141,7 @@ static RTS_RESULT read_record(void)
 
     if (HAS_CAUSE && result == ERR_OK) {
         state.commit = record.commit;
+        record.text[sizeof record.text - 1] = '\0'; /* whatever the flash holds */
         if (AppCommitIsDead())
             AppExceptionSet(&record.exception, record.text);
     }
@@ -156,22 +157,29 @@ static void report_loss(void)
         LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT, "No commit record: the newest program is taken");
 }
 
+static void forget_record(void)
+{
+    memset(&state.commit, 0, sizeof state.commit);
+    state.commit.active = SLOT_NONE;
+}
+
 void AppCommitOpen(void)
 {
     RTS_RESULT result = FlashLogOpen(&state.log, FILE_COMMIT);
 
-    CMP_CLEAR(state.commit);
-    state.commit.active = SLOT_NONE;
+    forget_record();
     if (result == ERR_OK)
         result = read_record();
+    if (result == ERR_OK && state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE) {
+        forget_record(); /* not one of ours: the seals count */
+        result = ERR_NO_OBJECT;
+    }
     if (result == ERR_OK && FlashLogIsMarked(&state.log, RECORD_SIZE))
         state.commit.begun = 0;
     if (result != ERR_OK && result != ERR_NO_OBJECT) {
         state.log.opened = result;
         return;
     }
-    if (state.commit.active >= SLOT_COUNT)
-        state.commit.active = SLOT_NONE;
     take_seals();
     if (result != ERR_OK)
         report_loss();
@@ -201,8 +209,7 @@ RTS_RESULT AppCommitErase(void)
 {
     RTS_UI32 number = state.commit.number;
 
-    memset(&state.commit, 0, sizeof state.commit);
-    state.commit.active = SLOT_NONE;
+    forget_record();
     state.commit.number = number;
     return write_record("");
 }

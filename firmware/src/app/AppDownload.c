@@ -20,13 +20,28 @@ static struct {
     RTS_UI32 crc;
 } download;
 
+/* An application that failed gives way to the one before it now, or that one would be overwritten though it is the
+ * newest that runs. */
+static void leave_failed_application(void)
+{
+    const COMMIT *commit = AppCommitGet();
+
+    if (commit->active == SLOT_NONE || commit->state[commit->active] != SLOT_FAILED ||
+        !AppCanRollBack(commit->active))
+        return;
+    AppUnload();
+    (void)AppRollBack(commit->active);
+}
+
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
 {
-    RTS_UI32 slot = AppCommitOtherSlot(AppGetSlot() != SLOT_NONE ? AppGetSlot() : AppCommitGet()->active);
+    RTS_UI32 slot;
 
     AppDownloadAbort();
     if (AppCommitResult() != ERR_OK)
         return ERR_DEVICE; /* what is worth keeping is not known */
+    leave_failed_application();
+    slot = AppCommitOtherSlot(AppGetSlot() != SLOT_NONE ? AppGetSlot() : AppCommitGet()->active);
     if (total_size > SysFileGetArea(slot)->size - FILE_ALIGN) /* the seal follows */
         return ERR_NOMEMORY;
     download.open = true;

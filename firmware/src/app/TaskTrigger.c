@@ -112,16 +112,10 @@ RTS_UI32 TriggerGetLost(RTS_UI32 task)
 
 void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas)
 {
-    RTS_UI32 i;
-
     memset(&triggers, 0, sizeof triggers);
     triggers.tasks = tasks;
     triggers.areas = areas;
     triggers.count = count;
-    for (i = 0; i < count; i++) {
-        if (tasks[i].kind == KIND_EVENT)
-            triggers.watched = i + 1;
-    }
 }
 
 const CDL_TASK *TriggerGetTask(RTS_UI32 task)
@@ -133,9 +127,15 @@ void TriggerForget(void)
 {
     RTS_UI32 i;
 
-    SchedNoteEvents();
-    for (i = 0; i < triggers.count; i++)
-        triggers.list[i].answered = count_events(&triggers.list[i]);
+    for (i = 0; i < triggers.count; i++) {
+        RTS_UI32 changes = 0;
+        if (triggers.tasks[i].kind == KIND_EVENT) {
+            triggers.watched = i + 1;
+            changes = is_true(&triggers.tasks[i]);
+        }
+        SysAtomicStore(&triggers.list[i].changes, changes);
+        triggers.list[i].answered = (RTS_UI16)changes; /* as many rises */
+    }
 }
 
 /* ---- external events ---- */

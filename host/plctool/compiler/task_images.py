@@ -208,9 +208,7 @@ def _output_bits(place: Place) -> list[_Write]:
 def _bits(place: Place) -> tuple[int, int]:
     """The bits of the area that a place covers, which has a root; all of an array when the index is not known."""
     if isinstance(place, VarPlace):
-        start = place.var.offset * 8
-        if place.var.bit is not None:
-            return start + place.var.bit, start + place.var.bit + 1
+        start = place.var.offset * 8  # of a bit at an address its byte: it is a BitPlace of that
         return start, start + place.type.size * 8
     assert not isinstance(place, DerefPlace | ValuePlace | SelfPlace)
     start, end = _bits(place.base)

@@ -55,11 +55,11 @@ class Plcrt:
         self.port = line.removeprefix("serial: ").strip()
 
     @property
-    def worker(self) -> int:
-        """Process id of the child that runs the controller; 0 while it is being started again."""
+    def worker(self) -> int | None:
+        """Process id of the child that runs the controller; None while it is being started again."""
         assert self.process
         pids = map(int, filter(str.isdigit, os.listdir("/proc")))
-        return next((pid for pid in pids if _is_child(pid, self.process.pid)), 0)
+        return next((pid for pid in pids if _is_child(pid, self.process.pid)), None)
 
     def stop(self, how: signal.Signals = signal.SIGTERM) -> int:
         """Ends the process; SIGKILL stands for a power cut. Returns the exit status."""

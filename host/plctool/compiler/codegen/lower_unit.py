@@ -19,6 +19,7 @@ from plctool.errors import UsageError
 
 _ALWAYS = 'nounwind "no-builtins"'
 _PROBES = ' "probe-stack"="inline-asm"'
+_LARGE_FRAME = 4096  # bytes of local variables
 _INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
 
 
@@ -137,6 +138,8 @@ class Unit:
         """What LLVM is told about inlining a POU: the standard library is made for it, if there is room."""
         if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self._sections:
             return "noinline"
+        if sum(variable.type.size for variable in pou.locals) > _LARGE_FRAME:
+            return "noinline"  # or its caller would need that room, and probe it, also when it does not call
         return "inlinehint" if not pou.checks and (pou.no_init or not self.options.compact) else ""
 
     # ---- what is referred to ----

@@ -24,15 +24,16 @@ from plctool.compiler.semantics.conversions import (
 )
 from plctool.compiler.semantics.divisions import lost_fraction
 from plctool.compiler.semantics.overlays import overlays
-from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
+from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.syntax.literals import BitPattern
-from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Const, Convert, Expr, Load, Pos
+from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Pos
 from plctool.compiler.types import (
     BOOL,
     BYTE,
     LTIME,
     REAL,
     TIME,
+    WORD,
     Elementary,
     EnumType,
     InterfaceType,
@@ -94,6 +95,11 @@ class Coercion:
         self._diagnostics.warning(pos, code, message)
 
     def _mismatch(self, e: Expr, target: Type) -> Expr:
+        if e.type is NOTHING and isinstance(e, Call):
+            name = e.function.name.rpartition(".")[2]
+            kind = "METHOD" if e.instance is not None else "FUNCTION"
+            message = f"{name} gives no result; call it as a statement, or declare {kind} {name} : {target}"
+            return self._error(e.pos, "type", message)
         return self._error(e.pos, "type", f"{e.type} does not fit {target}")
 
     def _no_scalars(self, e: Expr, target: Type) -> Expr:
@@ -101,6 +107,9 @@ class Coercion:
         source, to = elementary(e.type), elementary(target)
         if isinstance(target, StringType) and source is not None:
             return self._needs(e, source.name, target.keyword)
+        if isinstance(e, Const) and isinstance(e.value, str) and len(e.value) == 1 and to in (BYTE, WORD):
+            message = f"a character of a STRING is a number here: write 16#{ord(e.value):02X} for '{e.value}'"
+            return self._error(e.pos, "type", message)
         if isinstance(e.type, StringType) and to is not None:
             return self._needs(e, e.type.keyword, to.name)
         return self._mismatch(e, target)

@@ -299,6 +299,15 @@ class Names:
         types = [s for s in self._units.values() if isinstance(s, TypeSymbol) and s.decl.qualified]
         return found + [f"{t.decl.name}.{v}" for t in types for v in _enum_names(t) if v.casefold() == key]
 
+    def program_variables(self, name: str) -> list[str]:
+        """What a name is in the PROGRAMs that have a variable of it, with the instance in front."""
+        found = []
+        for instance in self.planned.values():
+            blocks = (b for b in instance.symbol.decl.blocks if b.keyword != "VAR_TEMP")
+            written = [n for b in blocks for line in b.decls for _, n in line.names if n.casefold() == name.casefold()]
+            found += [f"{instance.name}.{n}" for n in written]
+        return found
+
     def visible_names(self) -> list[str]:
         """Names of globals, functions and enumeration values, for suggestions."""
         values = [name for s in self._units.values() if isinstance(s, TypeSymbol) for name in _enum_names(s)]

@@ -31,9 +31,9 @@ SECTIONS: dict[str, dict[str, frozenset[str]]] = {
     "FUNCTION_BLOCK": {**_LASTING, "VAR": _CONSTANT | KEEPING | ACCESS},
     "CLASS": {**_CALL, "VAR": _CONSTANT | KEEPING | ACCESS},
     "PROGRAM": {**_LASTING, "VAR": _CONSTANT | KEEPING | ACCESS},
-    "METHOD": {**_CALL, **_PARAMETERS, "VAR_INST": _NONE},
+    "METHOD": {**_CALL, **_PARAMETERS, "VAR_INST": KEEPING},
     "method of an INTERFACE": _PARAMETERS,
-    "PROPERTY": {**_CALL, "VAR_INST": _NONE},
+    "PROPERTY": {**_CALL, "VAR_INST": KEEPING},
     "property of an INTERFACE": {},
     "ACTION": {},
     "CONFIGURATION": {"VAR_GLOBAL": _CONSTANT | KEEPING},
@@ -245,8 +245,6 @@ def _why_not_kept(kind: str, keyword: str) -> str:
         return "it is a variable of the caller; write it where that is declared"
     if keyword == "VAR_EXTERNAL":
         return "it only repeats a VAR_GLOBAL; write it there"
-    if keyword == "VAR_INST":
-        return "it is kept as its instance is; write it where the instance is declared"
     if kind in ("TEST", "SETUP", "TEARDOWN"):
         return "a test starts anew each time; leave it out"
     lasting = "VAR" if kind in ("PROGRAM", "FUNCTION_BLOCK", "CLASS") else "VAR_STAT"

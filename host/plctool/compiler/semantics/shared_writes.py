@@ -19,7 +19,6 @@ from plctool.compiler.typed import (
     Call,
     Const,
     Direction,
-    Dispatch,
     FbCall,
     For,
     IndexPlace,
@@ -33,10 +32,10 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.typed_nodes import walk
+from plctool.compiler.typed_nodes import callees, walk
 from plctool.compiler.types import ArrayType
 
-_SHARED = (Area.DATA, Area.RETAIN, Area.OUTPUT, Area.MEMORY)
+_SHARED = (Area.DATA, Area.RETAIN, Area.MEMORY)  # of the outputs, each task has an image of its own
 
 
 @dataclass(frozen=True)
@@ -146,27 +145,27 @@ class _Units:
         elif isinstance(node, For):
             self._write(node.var, unit)
         elif isinstance(node, FbCall):
-            callees = _callees(node.block, node.dispatch)
-            unit.callees += callees
+            called = list(callees(node))
+            unit.callees += called
             self._write(node.instance, unit)
             for _, place in node.outputs:
                 self._write(place, unit)
             for variable, place in node.in_outs:
-                if any(variable in self.unit(callee).parameters for callee in callees):
+                if any(variable in self.unit(callee).parameters for callee in called):
                     self._write(place, unit)
         elif isinstance(node, Call):
             self._call(node, unit)
 
     def _call(self, node: Call, unit: _Unit) -> None:
-        callees = _callees(node.function, node.dispatch)
-        unit.callees += callees
-        if node.instance is not None and any(self.unit(callee).own for callee in callees):
+        called = list(callees(node))
+        unit.callees += called
+        if node.instance is not None and any(self.unit(callee).own for callee in called):
             self._write(node.instance, unit)
         for number, (parameter, argument) in enumerate(zip(node.function.parameters, node.args, strict=True)):
             if argument is None or not isinstance(argument, Place) or parameter.direction is Direction.INPUT:
                 continue
-            variables = [callee.parameters[number].variable for callee in callees]
-            writes = any(v in self.unit(c).parameters for c, v in zip(callees, variables, strict=True))
+            variables = [callee.parameters[number].variable for callee in called]
+            writes = any(v in self.unit(c).parameters for c, v in zip(called, variables, strict=True))
             if parameter.direction is Direction.OUTPUT or writes or node.function.external is not None:
                 self._write(argument, unit)
 
@@ -176,7 +175,7 @@ class _Units:
             if isinstance(root, MemberPlace):
                 start += 8 * root.offset
             elif isinstance(root, BitPlace):
-                start, size = _bit(root)
+                start, size = 0, 8 * root.base.type.size  # changing a bit writes the whole number
             elif isinstance(root, IndexPlace):
                 start, size = _element(root, start, size)
             else:
@@ -191,18 +190,6 @@ class _Units:
         elif variable.storage is Storage.AREA and variable.area in _SHARED and not _is_hidden(variable):
             start += 8 * variable.offset
             unit.writes.append(_Write(variable, start, start + size, place.pos))
-
-
-def _callees(pou: Pou, dispatch: Dispatch | None) -> list[Pou]:
-    return [pou] if dispatch is None else list(dispatch.targets.values())
-
-
-def _bit(place: BitPlace) -> tuple[int, int]:
-    """What changing a bit reads and writes: in the image of the outputs, which the tasks share bit by bit, the bit;
-    elsewhere the whole number that it is part of."""
-    root = place.base
-    outputs = isinstance(root, VarPlace) and root.var.area is Area.OUTPUT
-    return (place.bit, 1) if outputs else (0, 8 * place.base.type.size)
 
 
 def _element(place: IndexPlace, start: int, size: int) -> tuple[int, int]:

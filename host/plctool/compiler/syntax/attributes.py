@@ -20,6 +20,7 @@ HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
     "external": frozenset(("FUNCTION",)),
     "version": frozenset(("FUNCTION",)),
+    "shared_output": frozenset(("variable",)),
 }
 """What does something, and in front of what."""
 

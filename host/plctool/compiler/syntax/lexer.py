@@ -20,7 +20,7 @@ _TOKEN = re.compile(
   | (?P<DATE>(?i:L?(?:DATE_AND_TIME|DATE|DT|D|TIME_OF_DAY|TOD))\#[\d:._-]+)
   | (?P<STRING>(?i:(?:W?STRING|W?CHAR)\#)?(?:'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*"))
   | (?P<TYPED>[A-Za-z_]\w*\#(?:[+-]?\d[\d_]*(?:\.[\d_]+)?[eE][+-]?\d+|[+-]?\w+(?:\.\w+)*(?:\#\w+)?)?)
-  | (?P<DIRECT>%(?:[IQMiqm](?:\*|[XBWDLxbwdl]?\d+(?:\.\d+)*)|[XBWDLxbwdl]\d+))
+  | (?P<DIRECT>%(?:[IQMiqm](?:\*|[XBWDLxbwdl]?\d+(?:\.\d+)*|[XBWDLxbwdl]?(?!\w))|[XBWDLxbwdl]\d+))
   | (?P<PRAGMA>\{[^{}]*\})
   | (?P<FOREIGN>\{\{.*?\}\})
   | (?P<NESTED>\(\*|/\*)
@@ -88,6 +88,8 @@ OPENING = frozenset((
 """Terminals that are names where no name (behind AT, no address) follows."""
 
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
+_DURATION = re.compile(r"\d+(?:ms|us|ns|s|m|h|d)", re.IGNORECASE)
+_MODIFIED = re.compile(r"\s+(METHOD|PROPERTY|FUNCTION_BLOCK|FUNCTION|CLASS|PROGRAM|INTERFACE)\s+(\w+)", re.IGNORECASE)
 _STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quotes
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAMED_ARGUMENT = re.compile(r"\s*\(\s*[A-Za-z_]\w*\s*(?::=|=>)", re.ASCII)
@@ -209,12 +211,20 @@ class Lexer:
             self.pragmas.append((pos, text))
 
     def _foreign(self, pos: int) -> None:
-        self._report(pos, "pragma", "code in C cannot be compiled; put it into an EXTERNAL function")
+        message = "code in C cannot be compiled; put it into an EXTERNAL function"
+        if self.text[:pos].rstrip()[-4:].upper().endswith((")", "THEN", "ELSE", "DO")):
+            message = "there are no { } around statements; write IF x THEN ... END_IF"
+        self._report(pos, "pragma", message)
 
     def _slip(self, text: str, pos: int) -> Token:
         """What was meant by a sign or number of another language."""
         if text in slips.SIGNS:
             kind, meant, message = slips.SIGNS[text]
+        elif _DURATION.fullmatch(text):
+            before = self.text[max(0, pos - 20) : pos]
+            whole = before[len(before.rstrip("0123456789.")) :]
+            kind, meant, pos = "NUMBER", "", pos - len(whole)
+            message = f"a duration is written T#{whole}{text}, not {whole}{text}"
         else:
             kind, meant = "NUMBER", text.lower().replace("0x", "16#", 1).replace("0b", "2#", 1)
             message = f"a number is written {meant}, not {text}" if "#" in meant else f"{text} is not a number"
@@ -230,7 +240,8 @@ class Lexer:
             self._report(pos, "pragma", "this pragma is not closed")
             return True
         shown = character if character.isprintable() else f"character {ord(character)}"
-        self._report(pos, "character", f"{shown} has no place in a program")
+        hint = "; a comment is written // or (* *)" if character == "#" else ""
+        self._report(pos, "character", f"{shown} has no place in a program{hint}")
         return True
 
     def _end_of_line(self, pos: int) -> int:
@@ -256,7 +267,13 @@ def begins_unit(token: Token, text: str) -> bool:
 
 def meant(token: Token, text: str) -> str:
     """The terminal of the keyword that a misspelt one stands for, "" when it seems to be a name."""
-    return "" if _PART_FOLLOWS.match(text, token.end) else KEYWORDS[slips.WORDS[token.text.upper()]]
+    return "" if _PART_FOLLOWS.match(text, token.end) else KEYWORDS[slips.WORDS[token.text.upper()].split()[0]]
+
+
+def modified(token: Token, text: str) -> tuple[str, str] | None:
+    """Keyword and name of a unit whose modifier stands in front of it, as in `PUBLIC METHOD m`."""
+    match = _MODIFIED.match(text, token.end)
+    return None if match is None else (match[1].upper(), match[2])
 
 
 def is_operator_function(token: Token, text: str) -> bool:

@@ -24,6 +24,7 @@ from plctool.compiler.syntax.lexer import (
     is_followed_by_name,
     is_operator_function,
     meant,
+    modified,
 )
 from plctool.compiler.syntax.syntax_errors import Recovery
 from plctool.compiler.syntax.tables import Rule, Tables, load_tables
@@ -87,6 +88,9 @@ _AMBIGUOUS = SOFT | {"OP", "NOT"}
 def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None:
     """Gives a word that the language may have a use for the type it has where it stands."""
     kind = token.type
+    if kind == "MODIFIER" and (unit := modified(token, text)) is not None:
+        recovery.report_in_front(token, *unit)
+        return
     if kind == "MISSPELT":
         right = meant(token, text)
         is_name = not right or parser.tables.after(parser.states, right) is None
@@ -136,6 +140,8 @@ def parse_all(source: Source, report: Report, start: int = 0, end: int | None = 
     for token in lexer:
         if token.type in _AMBIGUOUS:
             _decide(token, parser, recovery, source.text)
+            if token.type == "LEFT_OUT":
+                continue
         if recovery.skipping and not recovery.resume(token):
             continue
         if feed(token):

@@ -20,9 +20,38 @@ SIGNS = {
 
 WORDS = {
     "ELSEIF": "ELSIF",
+    "VAR_INOUT": "VAR_IN_OUT",
+    "VAR_RETAIN": "VAR RETAIN",
     **{f"END{word}": f"END_{word}" for word in ("IF", "CASE", "FOR", "WHILE", "REPEAT", "VAR", "STRUCT", "TYPE")},
 }
 """Keywords spelled wrongly, and rightly."""
+
+TYPES = {
+    "BOOLEAN": "BOOL", "FLOAT": "REAL", "FLOAT32": "REAL", "FLOAT64": "LREAL", "DOUBLE": "LREAL", "SINGLE": "REAL",
+    "INTEGER": "DINT", "LONG": "DINT", "SHORT": "INT", "INT8": "SINT", "INT16": "INT", "INT32": "DINT", "INT64": "LINT",
+    "UINT8": "USINT", "UINT16": "UINT", "UINT32": "UDINT", "UINT64": "ULINT", "INT8_T": "SINT", "INT16_T": "INT",
+    "INT32_T": "DINT", "INT64_T": "LINT", "UINT8_T": "USINT", "UINT16_T": "UINT", "UINT32_T": "UDINT",
+    "UINT64_T": "ULINT", "STR": "STRING", "TIMER": "TON", "COUNTER": "CTU",
+}  # fmt: skip
+"""Types of other languages."""
+
+NAMES = {
+    "BREAK": "EXIT leaves a loop, and a branch of a CASE ends by itself",
+    **dict.fromkeys(("NULLPTR", "NIL", "NONE"), "write NULL"),
+    "PI": "write LREAL#3.141592653589793, or declare a constant",
+    "ON": "write TRUE", "OFF": "write FALSE", "YES": "write TRUE", "NO": "write FALSE",
+}  # fmt: skip
+"""Names of other languages."""
+
+FUNCTIONS = {
+    **dict.fromkeys(("STRCMP", "EQUALS"), "texts are compared with ="),
+    "STRLEN": "write LEN", "STRCAT": "write CONCAT", "STRCPY": "texts are assigned with :=", "STRSTR": "write FIND",
+    "SUBSTR": "write MID", "ATOI": "write STRING_TO_INT", "ATOF": "write STRING_TO_REAL", "POW": "write a ** b",
+    "ROUND": "write REAL_TO_INT, which rounds", "MALLOC": "nothing is allocated while a program runs",
+    **dict.fromkeys(("PRINTF", "PRINT"), "a program prints nothing; write the text into a STRING and watch it"),
+    **dict.fromkeys(("SLEEP", "DELAY", "WAIT"), "a program never waits; call a TON in each cycle"),
+}  # fmt: skip
+"""Functions of other languages."""
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,12 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
+
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import slips
 from plctool.compiler.syntax.automaton import Parser
+from plctool.compiler.syntax.hints import hint
 from plctool.compiler.syntax.lexer import KEYWORDS, Report, Token
 from plctool.compiler.syntax.tables import END
 
@@ -58,6 +61,7 @@ _WORDS = {
 _PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",)}
 _RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
 _BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
+_ELSE_IF = re.compile(r"\bELSE\s+IF\b", re.IGNORECASE)
 _APART = 3  # an error closer than so many tokens to the one before is a consequence of it
 
 Stack = list[int]
@@ -83,7 +87,10 @@ class Recovery:
         """Reports that `token` does not fit, and repairs what can be repaired."""
         self._quiet = self._accepted < _APART
         self._accepted = 0
+        if self._parted_end(token):
+            return
         self._reduce()
+        self._hint(token)
         if self._late_variables(token) or self._stray_end(token):
             return
         while self._insert(token) or self._close(token):
@@ -99,8 +106,15 @@ class Recovery:
 
     def report_misspelt(self, token: Token, kind: str) -> None:
         """Reports a keyword that is spelled wrongly; `kind` is the terminal it stands for."""
-        self.report_token(token.pos, "syntax", f"{token.text} is written {kind.removeprefix('_')}")
-        token.type = kind
+        right = slips.WORDS[token.text.upper()]
+        self.report_token(token.pos, "syntax", f"{token.text} is written {right}")
+        token.type, token.text = kind, right.split()[0]
+
+    def report_in_front(self, token: Token, keyword: str, name: str) -> None:
+        """Reports a modifier that stands in front of the keyword of a unit, and leaves it out."""
+        word = token.text.upper()
+        self._report(token.pos, "syntax", f"{word} stands behind {keyword}: {keyword} {word} {name}")
+        token.type = "LEFT_OUT"
 
     def refuse(self, token: Token) -> None:
         """Reports a word that begins what this compiler leaves out, and leaves it out."""
@@ -211,6 +225,31 @@ class Recovery:
         self._parser.feed(Token("_" + end, end, token.pos))
         return True
 
+    def _parted_end(self, token: Token) -> bool:
+        """`END IF` for END_IF."""
+        previous, name = self.previous, token.text.upper()
+        if previous is None or previous.text.upper() != "END" or f"END_{name}" not in KEYWORDS:
+            return False
+        if not self._parser.values or self._parser.values[-1] is not previous:
+            return False
+        self._say(previous.pos, f"END {token.text} is written END_{name}")
+        self._parser.states.pop()
+        self._parser.values.pop()
+        token.type = f"_END_{name}"
+        return self._parser.feed(token)
+
+    def _hint(self, token: Token) -> None:
+        """Says what was meant when the text around the error gives it away; the rest is a consequence."""
+        if self._quiet:
+            return
+        item = self._item(self._parser.states)
+        where = {"stmt": "body", "var_decl": "declaration"}.get(item or "", "")
+        begin = self._last[0].pos if self._last else token.pos
+        found = hint(self._source.text, begin, token.pos, where)
+        if found is not None:
+            self._say(*found)
+            self._quiet = True
+
     def _leave_out(self, token: Token, message: str, end: str) -> None:
         """Reports `token`, and goes on behind the word or sign `end`."""
         self._say(token.pos, message)
@@ -250,6 +289,11 @@ class Recovery:
     def _report_open(self, token: Token, opener: Token | None) -> None:
         assert opener is not None
         line = self._source.pos(opener.pos).line
+        second = list(_ELSE_IF.finditer(self._source.text, opener.pos, token.pos)) if opener.type == "IF" else []
+        if second:
+            message = "ELSE IF begins a second IF, with an END_IF of its own; write ELSIF"
+            self._say(second[-1].start(), message)
+            return
         self._say(token.pos, f"{_CLOSERS[opener.type]} missing for the {opener.text.upper()} in line {line}")
 
     def _skip(self, token: Token) -> None:

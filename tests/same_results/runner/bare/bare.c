@@ -98,6 +98,21 @@ void SimSuperviseStart(void)
 {
 }
 
+void SimMutexLock(void)
+{
+}
+
+void SimMutexUnlock(void)
+{
+}
+
+int nanosleep(const struct timespec *time, struct timespec *left)
+{
+    RTS_UNUSED(time);
+    RTS_UNUSED(left);
+    return 0;
+}
+
 int clock_gettime(clockid_t clock, struct timespec *now)
 {
     RTS_UNUSED(clock);

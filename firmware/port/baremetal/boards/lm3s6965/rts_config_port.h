@@ -6,6 +6,9 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
+/* A second connection has no room in its 64 KiB. */
+#define COMM_MAX_CLIENTS 1
+
 #include "rts_config_size.h"
 
 #include "rts_config_cortexm.h"

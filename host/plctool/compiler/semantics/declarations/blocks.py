@@ -111,7 +111,7 @@ class Blocks:
 
     def _members(self, block: ast.VarBlock, info: BlockInfo, defaults: dict[str, Initial], scope: Scope) -> None:
         role, direction = ROLES[block.keyword], DIRECTIONS.get(block.keyword)
-        keep = self._units.keep_of(block, info.pou, scope)
+        keep = self._units.keep_of(block, info.pou)
         info.retain = info.retain or keep.kept
         for line in block.decls:
             t, default = self._types.declared_type(line, scope, _MEMBER_MAY[role])

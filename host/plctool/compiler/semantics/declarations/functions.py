@@ -118,7 +118,6 @@ class Functions:
 
     def _parameters(self, block: ast.VarBlock, info: FunctionInfo, scope: Scope) -> None:
         direction = DIRECTIONS[block.keyword]
-        self._units.keep_of(block, info.pou, scope)
         for line in block.decls:
             if scope.library and line.init is None and isinstance(line.type, ast.NamedType):
                 t, default = self._parameter_type(line.type, scope)

@@ -123,7 +123,7 @@ class Programs:
     def _program_variables(
         self, block: ast.VarBlock, info: ProgramInfo, scope: Scope, allocation: Allocation, keep: Keep
     ) -> None:
-        direction, own = DIRECTIONS.get(block.keyword), self._units.keep_of(block, info.pou, scope)
+        direction, own = DIRECTIONS.get(block.keyword), self._units.keep_of(block, info.pou)
         keep = keep.of_member(own)
         for line in block.decls:
             t, init = self._types.declared_type(line, scope, _PROGRAM_MAY[direction])

@@ -19,6 +19,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbol, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.slips import TYPES
 from plctool.compiler.typed import ArrayInit, Const, Initial, ScalarInit, StructInit, overlay
 from plctool.compiler.types import (
     BOOL,
@@ -193,7 +194,11 @@ class TypeDeclarations:
         if is_group(spec.name):
             scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
         elif symbol is None and scope.lookup(spec.name) is None:
+            upper = spec.name.upper()
             hint = did_you_mean(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])
+            hint = f"; write {TYPES[upper]}" if upper in TYPES else hint
+            if upper == "ENUM":
+                hint = "; an enumeration is written Name : (First, Second);"
             scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
         else:
             scope.error(spec.pos, "type", f"{spec.name} is not a type")

@@ -138,21 +138,15 @@ class UnitVariables:
                     symbol.variable = self._variables.shared_variable(full_name, t, init, scope, offset, keep=keep)
                 scope.declare(symbol, offset)
 
-    def keep_of(self, block: ast.VarBlock, pou: Pou, scope: Scope) -> Keep:
-        """Whether the variables of a section keep their values; reports sections that cannot."""
-        keep = Keep.of(block.qualifiers)
+    def keep_of(self, block: ast.VarBlock, pou: Pou) -> Keep:
+        """Whether the variables of a section keep their values; where none can, `permitted` has said so."""
         short = pou.kind in (PouKind.FUNCTION, PouKind.METHOD) and block.keyword not in ("VAR_STAT", "VAR_INST")
-        if keep.kept and (short or block.keyword in ("VAR_TEMP", "VAR_IN_OUT")):
-            where = f"a {pou.kind.value}" if short else block.keyword
-            kept = {PouKind.FUNCTION: "VAR_STAT", PouKind.METHOD: "VAR_INST"}.get(pou.kind, "VAR")
-            message = f"{where} has no variables that last, so none is kept; use {kept} {keep.value}, or VAR_GLOBAL"
-            scope.error(block.pos, "lifetime", message)
+        if short or block.keyword in ("VAR_TEMP", "VAR_IN_OUT"):
             return Keep.UNSAID
-        return keep
+        return Keep.of(block.qualifiers)
 
     def declare_stack_variables(self, block: ast.VarBlock, pou: Pou, scope: Scope) -> None:
         """VAR of a function, VAR_TEMP: they live during the call."""
-        self.keep_of(block, pou, scope)
         for line in block.decls:
             t, init = self._types.declared_type(line, scope)
             for offset, name in line.names:

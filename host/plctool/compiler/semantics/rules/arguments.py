@@ -31,7 +31,18 @@ from plctool.compiler.typed import (
     ScalarInit,
     ValuePlace,
 )
-from plctool.compiler.types import LREAL, REAL, ReferenceType, StringType, StructType, SubrangeType, Type, is_scalar
+from plctool.compiler.types import (
+    BOOL,
+    LREAL,
+    REAL,
+    ReferenceType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+    base_of,
+    is_scalar,
+)
 
 Actual = ast.Argument | Expr | None  # as written, or checked already
 
@@ -184,10 +195,19 @@ def _actual_argument(
 def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
     """The value of an input; a REFERENCE TO gets the address."""
     if not isinstance(t, ReferenceType):
+        if _is_slip(node, t, name):
+            return c.error(node.pos, "arguments", f"the input {name} is given with :=, not with =")
         e = c.expr(node, t)
         return e if takes_array(t, e.type) else c.coerce(e, t)
     place = referenced_place(c, node, t.target, name, output=False)
     return error_value(c.pos(node.pos)) if place is None else refer(place, t)
+
+
+def _is_slip(node: ast.Expr, t: Type, name: str) -> bool:
+    """`f(x = 1)` for an input x that is no BOOL."""
+    if not isinstance(node, ast.Binary) or node.op != "=" or not isinstance(node.left, ast.Name) or base_of(t) is BOOL:
+        return False
+    return node.left.name.casefold() == name.casefold()
 
 
 def refer(place: Place, t: ReferenceType) -> Expr:

@@ -17,9 +17,9 @@ from plctool.compiler.semantics.rules.qualified_names import dotted_name
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Namespace, PouSymbol, VarSymbol
 from plctool.compiler.semantics.typed_functions import overloaded_form
 from plctool.compiler.syntax import ast
-from plctool.compiler.syntax.slips import REFUSED_CALLS
-from plctool.compiler.typed import Expr
-from plctool.compiler.types import StructType, Type
+from plctool.compiler.syntax.slips import FUNCTIONS, REFUSED_CALLS
+from plctool.compiler.typed import Expr, Load, MemberPlace
+from plctool.compiler.types import ELEMENTARY, ArrayType, StructType, Type
 
 
 @checks(ast.Call)
@@ -82,7 +82,18 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
     overloaded = overloaded_form(node)
     if overloaded is not None:
         return call(c, overloaded, expected)
-    return c.error(callee.pos, "unknown", f"unknown function {name}{function_hint(c, name)}")
+    if name.upper() in ELEMENTARY:
+        shown = _written(node)
+        message = f"{name} is a type; a conversion is written TO_{name.upper()}({shown})"
+        return c.error(callee.pos, "unknown", message)
+    hint = f"; {FUNCTIONS[name.upper()]}" if name.upper() in FUNCTIONS else function_hint(c, name)
+    return c.error(callee.pos, "unknown", f"unknown function {name}{hint}")
+
+
+def _written(node: ast.Call) -> str:
+    """The argument of a call when it is a name, else dots."""
+    value = node.args[0].value if node.args else None
+    return value.name if isinstance(value, ast.Name) else "..."
 
 
 def _not_callable(c: Checker, symbol: object, name: str) -> str:
@@ -93,6 +104,8 @@ def _not_callable(c: Checker, symbol: object, name: str) -> str:
     if isinstance(symbol, PouSymbol) and symbol.keyword == "PROGRAM":
         listed = " or ".join(f"{instance}()" for instance in c.world.names.instances_of(symbol))
         return f"the program {name} has several instances; call {listed}"
+    if isinstance(symbol, VarSymbol) and isinstance(symbol.type, ArrayType):
+        return f"{name} is an array; an element is written {name}[1]"
     return f"{name} is not a function"
 
 
@@ -102,6 +115,10 @@ def _call_of_place(c: Checker, node: ast.Call) -> Expr:
         return e
     if isinstance(e.type, StructType) and e.type in c.world.blocks:
         return c.error(node.pos, "call", f"a call of the function block {e.type} is a statement and has no value")
+    if isinstance(node.callee, ast.Member) and isinstance(e, Load) and not node.args:
+        owner = e.place.base.type if isinstance(e.place, MemberPlace) else None
+        of = f" of {owner}" if owner is not None else ""
+        return c.error(node.pos, "call", f"{node.callee.name} is a variable{of}, not a method; leave out ()")
     return c.error(node.pos, "call", f"{e.type} cannot be called")
 
 

@@ -61,6 +61,8 @@ def member_of(c: Checker, base: Expr, node: ast.Member) -> Expr:
         return error_value(c.pos(node.pos)) if bit is None else bit_access(c, bit, None)
     if not isinstance(t, StructType):
         hint = "; write ^. to follow the pointer" if isinstance(t, PointerType) else ""
+        if isinstance(t, StringType) and name.upper() in ("LEN", "LENGTH", "SIZE"):
+            hint = "; its length is LEN(...)"
         return c.error(node.name_pos, "type", f"{t} has no members{hint}")
     block = c.world.blocks.get(t)
     if block is not None:

@@ -5,6 +5,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
+
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import error_value
@@ -29,10 +31,12 @@ from plctool.compiler.semantics.symbols import (
     VarSymbol,
 )
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.slips import NAMES
 from plctool.compiler.typed import AddressOf, Const, Expr, SelfPlace
 from plctool.compiler.types import EnumType, PointerType, Type
 
 _OWN = ("THIS", "SUPER")
+_DURATION = re.compile(r"T_?(\d+(?:ms|us|ns|s|m|h|d))", re.IGNORECASE)
 
 
 @checks(ast.Name)
@@ -104,6 +108,14 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     longer = c.world.names.qualified_names(node.name)
     if longer:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(longer)}")
+    if node.name.upper() in NAMES:
+        return c.error(node.pos, "unknown", f"unknown name {node.name}; {NAMES[node.name.upper()]}")
+    duration = _DURATION.fullmatch(node.name)
+    if duration is not None:
+        return c.error(node.pos, "unknown", f"unknown name {node.name}; a duration is written T#{duration[1].lower()}")
+    inside = c.world.names.program_variables(node.name)
+    if inside:
+        return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(inside)}")
     names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
     hint = did_you_mean(node.name, {_written(c, n) for n in names} - {""})
     return c.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")

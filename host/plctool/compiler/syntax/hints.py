@@ -1,0 +1,112 @@
+"""Mistakes that the text around a syntax error gives away, and what to write instead.
+
+A parser knows what it expected; that `ARRAY[10]` was meant as ten elements, or `{1, 2}` as a list, it cannot know.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from plctool.compiler.syntax import slips
+
+_TYPE = (
+    r"(?P<type>(?:STRING|WSTRING)(?:\s*[\[(]\s*\w+\s*[\])])?|BOOL|BYTE|[LD]?WORD|U?[SDL]?INT|L?REAL|L?TIME|L?DATE|L?TOD|L?DT|"
+    r"W?CHAR|" + "|".join(slips.TYPES) + r")(?![\w#])"
+)
+_TYPE_FIRST = rf"(?:^|;|\bVAR)[ \t]*(?P<here>{_TYPE}[ \t]+(?P<name>[A-Za-z_]\w*)[ \t]*)(?=[;:\[,=])"
+_UNIT = r"\s*(?P<unit>ms|us|ns|s|m|h|d)\b"
+_IN_VARIABLES = "a variable is declared with its name first: {name} : {type};"
+_IN_BODY = "variables are declared in VAR ... END_VAR before the statements: {name} : {type};"
+_CHOICE = "a choice is written CASE a OF 1: ...; ELSE ...; END_CASE"
+_LOOP = "a loop is written FOR i := 0 TO 9 DO ... END_FOR"
+
+
+@dataclass(frozen=True)
+class _Hint:
+    """`pattern` is looked for around an error, from the line of the last good word on. `at`: the group the error has to
+    stand in; `where`: in a body, in a declaration, or both ("")."""
+
+    pattern: re.Pattern[str]
+    message: str | Callable[[re.Match[str]], str]
+    at: str = ""
+    where: str = ""
+
+
+def _hint(pattern: str, message: str | Callable[[re.Match[str]], str], at: str = "", where: str = "") -> _Hint:
+    return _Hint(re.compile(pattern, re.IGNORECASE | re.MULTILINE), message, at, where)
+
+
+def _count(match: re.Match[str]) -> str:
+    return f"an array has its first and its last index in brackets: ARRAY[0..{int(match['count']) - 1}] OF ..."
+
+
+def _list(match: re.Match[str]) -> str:
+    values = ", ".join(part.strip() for part in match["values"].split(","))
+    return f"the values of an array are written in brackets: [{values}]"
+
+
+def _typed(message: str) -> Callable[[re.Match[str]], str]:
+    """`message` with the name of the type as it is here."""
+    return lambda m: message.format(name=m["name"], type=slips.TYPES.get(m["type"].upper(), m["type"]))
+
+
+def _located(match: re.Match[str]) -> str:
+    return f"AT stands behind the name: {match['name']} AT {match['place']} : {match['type'].strip()};"
+
+
+_HINTS = (
+    _hint(r"(?P<name>\w+)\s+REF\s*=\s*(?P<value>[\w.\[\]]+)\s*[,)]",
+          "an input that is a reference is given with :=, as others are: {name} := {value}", "", "body"),
+    _hint(r"\bARRAY\s*\[\s*(?P<count>\d+)\s*\]", _count),
+    _hint(r":=\s*(?P<here>\{(?P<values>[^{};']*)\}\s*)", _list, "here"),
+    _hint(r"\b(?:IF|ELSIF|WHILE|UNTIL)\b[^;]*?(?P<here>:=)", "a comparison is written =; := assigns", "here"),
+    _hint(r"[^'\s(,=](?P<here>'(?='))", "a quote within a text is written $'", "here"),
+    _hint(r"\bFOR\s*\(.*", _LOOP),
+    _hint(r"\bFOR\s+(?:EACH\s+)?\w+\s+IN\b", _LOOP),
+    _hint(r"\bSWITCH\b[^;]*", _CHOICE),
+    _hint(r"\bCASE\s+\w+\s*:(?!=)", _CHOICE),
+    _hint(r"\bBEGIN\s+\w+\s*", "there is no BEGIN; the statements follow END_VAR"),
+    _hint(r"\bGOTO\s+\w+\s*", slips.REFUSED["JMP"].message),
+    _hint(r"\bCONST\s+\w+", "constants are declared in VAR CONSTANT ... END_VAR", "", "declaration"),
+    _hint(r":\s*(?P<here>(?:unsigned|signed|long|short)\s+\w+)",
+          "there is no unsigned; write UINT, UDINT ... for a type without negative numbers", "here", "declaration"),
+    _hint(_TYPE_FIRST, _typed(_IN_VARIABLES), "here", "declaration"),
+    _hint(_TYPE_FIRST, _typed(_IN_BODY), "here", "body"),
+    _hint(rf"(?<![\w.])(?P<name>[A-Za-z_]\w*)\s*:(?!=)\s*{_TYPE}", _typed(_IN_BODY), "", "body"),
+    _hint(r"(?<![\w.])(?P<name>[A-Za-z_]\w*)\s*:(?!=)\s*(?P<type>[A-Za-z_]\w*)\s*;", _typed(_IN_BODY), "", "body"),
+    _hint(rf"\(\s*{_TYPE}\s*\)\s*(?P<name>\w+)",
+          lambda m: f"a conversion is written TO_{m['type'].upper()}({m['name']}), not ({m['type']})"),
+    _hint(r"\w\s*(?P<here>\^\s*(?:\d+|\w+(?=\s*;)))",
+          lambda m: f"a power is written a ** {m['here'][1:].strip()}; ^ follows a pointer", "here"),
+    _hint(r"(?<![\w.,])(?P<whole>\d+),(?P<part>\d+)(?![\w,])", "a real number is written with a point: {whole}.{part}"),
+    _hint(r"(?<![\w\])^.])\.(?P<part>\d+)", "a number begins with a digit: 0.{part}"),
+    _hint(rf"(?<![\w#.])(?P<number>\d+(?:\.\d+)?){_UNIT}",
+          "a duration is written T#{number}{unit}, not {number}{unit}"),
+    _hint(r"(?<![\w)\]^])\*\s*(?P<name>[A-Za-z_]\w*)", "what {name} points to is written {name}^"),
+    _hint(r"&\s*(?P<name>[A-Za-z_]\w*)", "the address of {name} is written ADR({name})"),
+    _hint(r"(?P<name>\w+)\s*:(?!=)\s*(?P<type>\w+(?:\s*\[[^\]]*\])?\s+)AT\s+(?P<place>%[\w.*]+)", _located),
+    _hint(r"\b(?P<word>REFERENCE|POINTER)_TO\s+\w+\s*", "{word}_TO is written {word} TO"),
+    _hint(r"(?:^|;)[ \t]*(?P<here>--.*)", "a comment is written // or (* *)", "here"),
+)  # fmt: skip
+
+
+def hint(text: str, begin: int, pos: int, where: str) -> tuple[int, str] | None:
+    """What to say of a mistake at offset `pos` of `text`, and where; None when it is not one of these. `begin`: the
+    offset of the last word but one that was fine; `where`: body, declaration or ""."""
+    start = text.rfind("\n", 0, begin) + 1
+    end = text.find("\n", pos)
+    window = text[start : len(text) if end < 0 else end]
+    column = pos - start
+    for known in _HINTS:
+        if known.where not in ("", where):
+            continue
+        for match in known.pattern.finditer(window):
+            if match.start(known.at or 0) <= column <= match.end(known.at or 0):
+                said = known.message
+                message = said(match) if callable(said) else said.format(**match.groupdict())
+                return start + match.start(known.at or 0), message
+    return None

@@ -1,0 +1,151 @@
+"""What people write who come from other languages and systems, or write in a hurry: each message says what to write.
+
+The list was written before the messages were looked at. A mistake must not hide what else is wrong in other statements
+more than it has to, so every case says all messages it gives.
+"""
+
+from __future__ import annotations
+
+import pytest
+from front_support import messages
+
+BLOCK = (
+    "FUNCTION_BLOCK Valve\nVAR_INPUT x : INT; ref : REFERENCE TO INT; END_VAR\nVAR_OUTPUT q : BOOL; END_VAR\n"
+    "q := x > 0;\nEND_FUNCTION_BLOCK\nFUNCTION Nothing\nVAR_INPUT x : INT; END_VAR\nEND_FUNCTION\n"
+)
+VARIABLES = (
+    "a, b : INT; x, y : BOOL; r : REAL; s : STRING; t : TIME; tm : TON; arr : ARRAY[1..9] OF INT; v : Valve; "
+    "p : POINTER TO INT;"
+)
+BODY = 14  # the line where a case stands
+DECLARE = "variables are declared in VAR ... END_VAR before the statements: c : INT;"
+CHOICE = "a choice is written CASE a OF 1: ...; ELSE ...; END_CASE"
+
+
+def in_body(body: str) -> list[str]:
+    """Line within the body and message of each error."""
+    found = messages(f"{BLOCK}PROGRAM Main\nVAR\n{VARIABLES}\n\nEND_VAR\n{body}\nEND_PROGRAM\n")
+    return [f"{int(m.split(':')[0]) - BODY + 1}: {m.split(': ', 1)[1]}" for m in found]
+
+
+def in_declaration(line: str) -> list[str]:
+    """Messages about a declaration."""
+    found = messages(f"{BLOCK}PROGRAM Main\nVAR\n{VARIABLES}\n{line}\nEND_VAR\na := 1;\nEND_PROGRAM\n")
+    return [m.split(": ", 1)[1] for m in found]
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("v(ref REF= a);", ["1: an input that is a reference is given with :=, as others are: ref := a"]),
+        ("IF x THEN\na := 1;\nELSE IF y THEN\na := 2;\nEND_IF;", [
+            "3: ELSE IF begins a second IF, with an END_IF of its own; write ELSIF"
+        ]),
+        ("a := 1;\nINT c;\na := 2;", [f"2: {DECLARE}"]),
+        ("a := 1;\nc : INT;\na := 2;", [f"2: {DECLARE}"]),
+        ("a := 1;\nc : INT := 5;\na := 2;", [f"2: {DECLARE}"]),
+        ("lab:\na := 1;", ["1: JMP and labels are not supported; write a loop, IF, EXIT or RETURN"]),
+        ("IF a := 1 THEN\nb := 1;\nEND_IF;", ["1: a comparison is written =; := assigns"]),
+        ("WHILE a := 1 DO\nb := 1;\nEND_WHILE;", ["1: a comparison is written =; := assigns"]),
+        ("tm(IN := TRUE, PT := 5s);", ["1: a duration is written T#5s, not 5s"]),
+        ("t := 1.5s;", ["1: a duration is written T#1.5s, not 1.5s"]),
+        ("t := 500ms;", ["1: a duration is written T#500ms, not 500ms"]),
+        ("t := T5s;", ["1: unknown name T5s; a duration is written T#5s"]),
+        ("s := 'a' + 'b';", ["1: texts are joined by CONCAT(a, b), not by +"]),
+        ("s := s + 'b' + s;", ["1: texts are joined by CONCAT(a, b), not by +"]),
+        ("s := s + a;", ["1: texts are joined by CONCAT(a, b), not by +"]),
+        ("a := arr(1);", ["1: arr is an array; an element is written arr[1]"]),
+        ("x := %IX;\na := unknown1;", [
+            "1: %IX is not an address such as %IX0.3 or %QW2", "2: unknown name unknown1"
+        ]),
+        ("a := Nothing(1);", ["1: Nothing gives no result; call it as a statement, or declare FUNCTION Nothing : INT"]),
+        ("s := 'it''s';", ["1: a quote within a text is written $'"]),
+        ("FOR (a = 0; a < 10; a++) b := 1;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
+        ("FOR a IN arr DO b := 1; END_FOR;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
+        ("CASE a OF\n1: b := 1; BREAK;\nEND_CASE;", [
+            "2: unknown name BREAK; EXIT leaves a loop, and a branch of a CASE ends by itself"
+        ]),
+        ("SWITCH a\nCASE 1: b := 1;", [f"1: {CHOICE}"]),
+        ("a := INT(r);", ["1: INT is a type; a conversion is written TO_INT(r)"]),
+        ("a := (INT)r;", ["1: a conversion is written TO_INT(r), not (INT)"]),
+        ("a := b ^ 2;", ["1: a power is written a ** 2; ^ follows a pointer"]),
+        ("r := 1,5;", ["1: a real number is written with a point: 1.5"]),
+        ("r := .5;", ["1: a number begins with a digit: 0.5"]),
+        ("a := *p;", ["1: what p points to is written p^"]),
+        ("p := &a;", ["1: the address of a is written ADR(a)"]),
+        ("IF p = nullptr THEN a := 1; END_IF;", ["1: unknown name nullptr; write NULL"]),
+        ("IF (x) {\na := 1;\n}", ["1: there are no { } around statements; write IF x THEN ... END_IF"]),
+        ("IF x THEN\na := 1;\nEND IF;\na := 2;", ["3: END IF is written END_IF"]),
+        ("v(x = 1);", ["1: the input x is given with :=, not with ="]),
+        ("x := v.q();", ["1: q is a variable of Valve, not a method; leave out ()"]),
+        ("s[0] := 'a';", ["1: a character of a STRING is a number here: write 16#61 for 'a'"]),
+        ("a := s.length;", ["1: STRING[80] has no members; its length is LEN(...)"]),
+        ("IF strcmp(s, 'a') = 0 THEN a := 1; END_IF;", ["1: unknown function strcmp; texts are compared with ="]),
+        ("a := strlen(s);", ["1: unknown function strlen; write LEN"]),
+        ("a := 1; # first", ["1: # has no place in a program; a comment is written // or (* *)"]),
+        ("a := 1; -- first\nb := 2;", ["1: a comment is written // or (* *)"]),
+        ("GOTO lab;", ["1: JMP and labels are not supported; write a loop, IF, EXIT or RETURN"]),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_body(body: str, said: list[str]) -> None:
+    assert in_body(body) == said
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("INT c;", "a variable is declared with its name first: c : INT;"),
+        ("c : ARRAY[10] OF INT;", "an array has its first and its last index in brackets: ARRAY[0..9] OF ..."),
+        ("c : ARRAY[0..2] OF INT := {1,2,3};", "the values of an array are written in brackets: [1, 2, 3]"),
+        ("c : REFERENCE_TO INT;", "REFERENCE_TO is written REFERENCE TO"),
+        ("c : POINTER_TO INT;", "POINTER_TO is written POINTER TO"),
+        ("c : BOOL AT %QX1.4;", "AT stands behind the name: c AT %QX1.4 : BOOL;"),
+        ("c : FLOAT;", "unknown type FLOAT; write REAL"),
+        ("c : DOUBLE := 1.0;", "unknown type DOUBLE; write LREAL"),
+        ("c : uint8_t;", "unknown type uint8_t; write USINT"),
+        ("c : BOOLEAN;", "unknown type BOOLEAN; write BOOL"),
+        ("c : unsigned int;", "there is no unsigned; write UINT, UDINT ... for a type without negative numbers"),
+        ("CONST c : INT := 1;", "constants are declared in VAR CONSTANT ... END_VAR"),
+    ],
+)
+def test_a_mistake_in_a_declaration(line: str, said: str) -> None:
+    assert in_declaration(line) == [said]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "FUNCTION_BLOCK G\nPUBLIC METHOD m : INT\nm := 1;\nEND_METHOD\nEND_FUNCTION_BLOCK\n",
+            ["2:1: PUBLIC stands behind METHOD: METHOD PUBLIC m"],
+        ),
+        (
+            "ABSTRACT FUNCTION_BLOCK G\nEND_FUNCTION_BLOCK\n",
+            ["1:1: ABSTRACT stands behind FUNCTION_BLOCK: FUNCTION_BLOCK ABSTRACT G"],
+        ),
+        (
+            "PROGRAM Main\nVAR a : INT; END_VAR\nBEGIN\na := 1;\nEND_PROGRAM\n",
+            ["3:1: there is no BEGIN; the statements follow END_VAR"],
+        ),
+        (
+            "TYPE Color : ENUM (Red, Green); END_TYPE\n",
+            ["1:14: unknown type ENUM; an enumeration is written Name : (First, Second);"],
+        ),
+        (
+            "FUNCTION F : INT\nVAR_INOUT a : INT; END_VAR\nF := a;\nEND_FUNCTION\n",
+            ["2:1: VAR_INOUT is written VAR_IN_OUT"],
+        ),
+        (
+            "PROGRAM Main\nVAR_RETAIN a : INT; END_VAR\na := 1;\nEND_PROGRAM\n",
+            ["2:1: VAR_RETAIN is written VAR RETAIN"],
+        ),
+        (
+            "PROGRAM PLC_PRG\nVAR rLevel : REAL; END_VAR\nrLevel := 1.0;\nEND_PROGRAM\n"
+            "VAR_GLOBAL wLevel : WORD; END_VAR\nFUNCTION_BLOCK Use\nVAR a : REAL; END_VAR\na := rLevel;\n"
+            "END_FUNCTION_BLOCK\n",
+            ["8:6: unknown name rLevel; write PLC_PRG.rLevel"],
+        ),
+    ],
+)
+def test_a_mistake_in_a_unit(text: str, said: list[str]) -> None:
+    assert messages(text) == said
