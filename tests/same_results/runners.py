@@ -27,6 +27,7 @@ _BARE_SOURCES = [
     *_PORTABLE,
     FIRMWARE / "port/sim/Sim.c",
     FIRMWARE / "port/baremetal/cortexm/CmpCompilerCalls.c",
+    FIRMWARE / "port/baremetal/blank/SysAtomic.c",  # nothing here can come in between
     *(HERE / "bare").glob("*.c"),
 ]
 _LINUX_SOURCES = [

@@ -120,18 +120,6 @@ int clock_gettime(clockid_t clock, struct timespec *now)
     return 0;
 }
 
-#ifdef __ARM_ARCH_6M__
-/* This processor has no instruction for it, and nothing here can come in between. */
-unsigned __atomic_fetch_add_4(volatile void *place, unsigned value, int order)
-{
-    unsigned before = *(volatile unsigned *)place;
-
-    RTS_UNUSED(order);
-    *(volatile unsigned *)place = before + value;
-    return before;
-}
-#endif
-
 /* ---- checked errors ---- */
 
 static struct {
