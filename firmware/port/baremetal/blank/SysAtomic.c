@@ -8,26 +8,27 @@
 
 #ifndef __GCC_HAVE_SYNC_COMPARE_AND_SWAP_4
 
-RTS_UI32 __atomic_fetch_add_4(volatile void *object, RTS_UI32 value, int order);
-bool __atomic_compare_exchange_4(volatile void *object, void *expected, RTS_UI32 value, bool weak, int success,
+/* The compiler's own types: its 32 bits are `unsigned`, whatever RTS_UI32 is. */
+unsigned __atomic_fetch_add_4(volatile void *object, unsigned value, int order);
+bool __atomic_compare_exchange_4(volatile void *object, void *expected, unsigned value, bool weak, int success,
                                  int failure);
 
 /* Write here: mask all interrupts before, and give them back after. */
-RTS_UI32 __atomic_fetch_add_4(volatile void *object, RTS_UI32 value, int order)
+unsigned __atomic_fetch_add_4(volatile void *object, unsigned value, int order)
 {
-    volatile RTS_UI32 *number = object;
-    RTS_UI32 before = *number;
+    volatile unsigned *number = object;
+    unsigned before = *number;
     RTS_UNUSED(order);
     *number = before + value;
     return before;
 }
 
 /* Here too. */
-bool __atomic_compare_exchange_4(volatile void *object, void *expected, RTS_UI32 value, bool weak, int success,
+bool __atomic_compare_exchange_4(volatile void *object, void *expected, unsigned value, bool weak, int success,
                                  int failure)
 {
-    volatile RTS_UI32 *number = object;
-    RTS_UI32 *before = expected;
+    volatile unsigned *number = object;
+    unsigned *before = expected;
     bool equal = *number == *before;
     RTS_UNUSED(weak);
     RTS_UNUSED(success);
