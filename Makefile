@@ -1,5 +1,6 @@
 # make demo   the whole story on this machine        make test   all tests
-# make lint   ruff, mypy                             make bench  figures, side by side
+# make lint   clang-format, ruff, mypy               make bench  figures, side by side
+# make format gives C and Python their one style
 # make size   flash and RAM of the bare-metal runtime, per component
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each
@@ -15,7 +16,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
 BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
 
-.PHONY: demo test lint bench size attack fuzz all clean
+.PHONY: demo test lint format bench size attack fuzz all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -31,10 +32,18 @@ run-tests:
 all: $(BUILDS:%=%/build.ninja)
 	set -e; for build in $(BUILDS); do $(MESON) compile -C $$build; done
 
+C_FILES = find firmware tests bench examples -name '*.[ch]' -print0
+
 lint: $(VENV)/dev
+	$(C_FILES) | xargs -0 $(BIN)/clang-format --dry-run --Werror
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	MYPYPATH=host $(BIN)/mypy -p plctool
+
+format: $(VENV)/dev
+	$(C_FILES) | xargs -0 $(BIN)/clang-format -i
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
 
 BENCHED := $(filter build build-cm3 build-cm4f,$(BUILDS))
 

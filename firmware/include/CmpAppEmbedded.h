@@ -58,8 +58,8 @@ typedef struct {
 } APP_EXCEPTION;
 
 typedef struct {
-    RTS_UI32 state;    /* AS_* */
-    RTS_UI32 op_state; /* OS_* */
+    RTS_UI32 state;     /* AS_* */
+    RTS_UI32 op_state;  /* OS_* */
     RTS_UI32 image_crc; /* 0 without application, like the size */
     RTS_UI32 image_size;
     APP_EXCEPTION exception;
@@ -74,7 +74,7 @@ typedef struct {
 
 #ifndef RTS_CFFI
 /* Writes why, and returns `result`. A macro, so that sentences that are never sent take no flash. */
-#define APP_REFUSE(refusal, result, ...)                                                                               \
+#define APP_REFUSE(refusal, result, ...) \
     (APP_REFUSAL_TEXT_SIZE > 1 ? AppRefuse(refusal, result, __VA_ARGS__) : (RTS_RESULT)(result))
 RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...);
 #endif

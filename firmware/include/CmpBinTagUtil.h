@@ -63,8 +63,8 @@ typedef struct {
     RTS_UI32 capacity;
     RTS_UI32 size;
     RTS_UI32 depth;
-    bool overflow; /* something did not fit; sticks, to be checked once at the end */
-    RTS_UI32 open[BTAG_MAX_NESTING]; /* position of each open element */
+    bool overflow;                    /* something did not fit; sticks, to be checked once at the end */
+    RTS_UI32 open[BTAG_MAX_NESTING];  /* position of each open element */
     RTS_UI32 start[BTAG_MAX_NESTING]; /* position of its content */
 } BTAG_WRITER;
 

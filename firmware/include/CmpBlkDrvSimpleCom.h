@@ -11,10 +11,10 @@
 typedef struct {
     RTS_UI32 frames;
     RTS_UI32 crc_errors;
-    RTS_UI32 overflows;           /* longer than any packet of this device */
-    RTS_UI32 too_short;           /* no room for a CRC */
-    RTS_UI32 bad_escapes;         /* "#" and neither "_", "<" nor ">" */
-    RTS_UI32 unfinished;          /* "#<" within a frame */
+    RTS_UI32 overflows;   /* longer than any packet of this device */
+    RTS_UI32 too_short;   /* no room for a CRC */
+    RTS_UI32 bad_escapes; /* "#" and neither "_", "<" nor ">" */
+    RTS_UI32 unfinished;  /* "#<" within a frame */
     RTS_UI32 ends_without_start;
 } COM_COUNTERS;
 

@@ -13,13 +13,13 @@
 
 typedef struct {
     RTS_UI32 opened;
-    RTS_UI32 refused;      /* open requests while all channels were in use */
-    RTS_UI32 malformed;    /* length, version or CRC of a package wrong */
-    RTS_UI32 foreign;      /* unknown channel id, or not its owner */
-    RTS_UI32 duplicates;   /* blocks received again */
-    RTS_UI32 gaps;         /* blocks that came before an earlier one */
-    RTS_UI32 repeats;      /* times the reply was sent again */
-    RTS_UI32 failed;       /* channels closed because of an error */
+    RTS_UI32 refused;    /* open requests while all channels were in use */
+    RTS_UI32 malformed;  /* length, version or CRC of a package wrong */
+    RTS_UI32 foreign;    /* unknown channel id, or not its owner */
+    RTS_UI32 duplicates; /* blocks received again */
+    RTS_UI32 gaps;       /* blocks that came before an earlier one */
+    RTS_UI32 repeats;    /* times the reply was sent again */
+    RTS_UI32 failed;     /* channels closed because of an error */
 } CHANNEL_COUNTERS;
 
 /* Client number `index`, whether it has a channel or not; NULL from COMM_MAX_CLIENTS on. */

@@ -15,11 +15,11 @@
 
 /* One per task, so that each task has the time of its own cycle. Read-only to IEC code. */
 typedef struct {
-    RTS_I64 time_ns;                 /* monotonic time at the start of this cycle, from start of the application */
-    RTS_I32 time_ms;                 /* the same in ms, wraps */
+    RTS_I64 time_ns; /* monotonic time at the start of this cycle, from start of the application */
+    RTS_I32 time_ms; /* the same in ms, wraps */
     RTS_UI32 reserved;
-    RTS_UI8 *area[APP_AREA_COUNT];   /* base address of each area; code too */
-    const RTS_PFN *imports;          /* resolved external functions, in the order of their table */
+    RTS_UI8 *area[APP_AREA_COUNT]; /* base address of each area; code too */
+    const RTS_PFN *imports;        /* resolved external functions, in the order of their table */
 } IEC_CONTEXT;
 
 /* Entry of a task (all its programs in order), of CodeInit and GlobalExit. */

@@ -71,10 +71,10 @@ RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **contex
 
 /* IEC code that runs right now, for who supervises it. */
 typedef struct {
-    RTS_UI32 serial;   /* differs from one cycle of the task to its next */
+    RTS_UI32 serial; /* differs from one cycle of the task to its next */
     RTS_I64 start_ns;
-    RTS_I64 limit_ns;  /* how long it may take */
-    const void *arg;   /* for SysExceptBreak */
+    RTS_I64 limit_ns; /* how long it may take */
+    const void *arg;  /* for SysExceptBreak */
 } IEC_GUARD;
 
 /* Reads guard `index`: one for each task, and one at IecTaskGetCount() for code that IecTaskRunGuarded runs. Returns 0

@@ -23,7 +23,7 @@ typedef enum {
     CH_INIT_TASKS,        /* boot project, IEC tasks */
     CH_INIT_COMM,         /* open the communication */
     CH_INIT_FINISHED,
-    CH_COMM_CYCLE,        /* main loop: never blocks */
+    CH_COMM_CYCLE, /* main loop: never blocks */
     CH_EXIT_COMM,
     CH_EXIT_TASKS,
     CH_EXIT_SYSTEM_TASKS,
@@ -39,10 +39,10 @@ typedef RTS_RESULT (*PF_HOOK_FUNCTION)(CMP_HOOK hook);
 
 /* Clears the variable a component keeps its state in, in the first hook it has. For a source that includes rts_config.h
  * and string.h. */
-#define CMP_CLEAR(state)                                                                                               \
-    do {                                                                                                               \
-        if (!RTS_STARTS_ONCE)                                                                                          \
-            memset(&(state), 0, sizeof(state));                                                                        \
+#define CMP_CLEAR(state)                        \
+    do {                                        \
+        if (!RTS_STARTS_ONCE)                   \
+            memset(&(state), 0, sizeof(state)); \
     } while (0)
 
 /* Component numbers, in log entries; the field's numbers where known. */
@@ -89,9 +89,9 @@ extern const RTS_SIZE cmp_component_count;
 
 /* Defines the list from a macro of the port that names the components, COMPONENTS(X) being X(CmpLog) X(CmpSrv) and so
  * on. CmpLog has the hook CmpLog_Hook and the number CMPID_CmpLog. */
-#define CMP_LIST(components)                                                                                           \
-    components(CMP_DECLARE) const PF_HOOK_FUNCTION cmp_hooks[] = {components(CMP_HOOK_OF)};                            \
-    const CMP_NAME cmp_names[] = {components(CMP_NAME_OF)};                                                            \
+#define CMP_LIST(components)                                                                \
+    components(CMP_DECLARE) const PF_HOOK_FUNCTION cmp_hooks[] = {components(CMP_HOOK_OF)}; \
+    const CMP_NAME cmp_names[] = {components(CMP_NAME_OF)};                                 \
     const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_hooks)
 #define CMP_DECLARE(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
 #define CMP_HOOK_OF(component) component##_Hook,
@@ -112,9 +112,9 @@ const char *CMGetComponentName(RTS_UI32 id);
 /* ---- external functions: C functions offered to IEC code ---- */
 
 typedef struct {
-    const char *name;     /* lower case */
-    RTS_UI32 signature;   /* CRC-32 of the interface text, as plctool export-itf writes it */
-    RTS_UI32 version;     /* library version, major << 16 | minor */
+    const char *name;   /* lower case */
+    RTS_UI32 signature; /* CRC-32 of the interface text, as plctool export-itf writes it */
+    RTS_UI32 version;   /* library version, major << 16 | minor */
     RTS_PFN function;
 } CMP_EXT_FUNCTION;
 

@@ -29,10 +29,10 @@ typedef struct {
 
 /* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. Without log
  * its arguments are not evaluated, and the texts take no flash. */
-#define LogAdd(...)                                                                                                    \
-    do {                                                                                                               \
-        if (LOG_MAX_ENTRIES > 0)                                                                                       \
-            LogAddEntry(__VA_ARGS__);                                                                                  \
+#define LogAdd(...)                   \
+    do {                              \
+        if (LOG_MAX_ENTRIES > 0)      \
+            LogAddEntry(__VA_ARGS__); \
     } while (0)
 void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...);
 

@@ -17,7 +17,7 @@ typedef struct {
     RTS_UI32 count;
     RTS_UI32 used;
     RTS_UI32 most_used;
-    void *free;          /* list of free blocks, linked through their first word */
+    void *free; /* list of free blocks, linked through their first word */
 } MEM_POOL;
 
 enum { MEMPOOL_ALIGN = sizeof(RTS_I64) };

@@ -45,9 +45,9 @@ typedef struct {
 /* What happened to packets since start. */
 typedef struct {
     RTS_UI32 handled;
-    RTS_UI32 malformed;   /* header wrong or cut */
-    RTS_UI32 not_for_us;  /* other receiver, relative address, hop count 0 */
-    RTS_UI32 ignored;     /* signals, notifications, services a leaf does not offer */
+    RTS_UI32 malformed;  /* header wrong or cut */
+    RTS_UI32 not_for_us; /* other receiver, relative address, hop count 0 */
+    RTS_UI32 ignored;    /* signals, notifications, services a leaf does not offer */
 } ROUTER_COUNTERS;
 
 /* Takes the payload of a packet; valid during the call only. */

@@ -128,9 +128,9 @@ typedef struct {
 } CDL_BLOB;
 
 enum {
-    CDL_BLOB_TASKS = 1,  /* array of CDL_TASK */
-    CDL_BLOB_RETAIN = 2, /* what is kept: CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes */
-    CDL_BLOB_EVENTS = 3, /* names of the external events tasks wait for, each with NUL; for whoever reads the image */
+    CDL_BLOB_TASKS = 1,   /* array of CDL_TASK */
+    CDL_BLOB_RETAIN = 2,  /* what is kept: CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes */
+    CDL_BLOB_EVENTS = 3,  /* names of the external events tasks wait for, each with NUL; for whoever reads the image */
     CDL_BLOB_IMAGES = 16, /* CDL_IMAGE for inputs and outputs of each task; those it lacks work on the shared areas */
 };
 

@@ -68,8 +68,8 @@ enum {
 };
 
 typedef struct {
-    RTS_UI32 code;        /* RTSEXCPT_*, RTSEXCPT_NOEXCEPTION when the function returned normally */
-    uintptr_t address;    /* program counter at the fault; for checked errors that of the call that raised it */
+    RTS_UI32 code;     /* RTSEXCPT_*, RTSEXCPT_NOEXCEPTION when the function returned normally */
+    uintptr_t address; /* program counter at the fault; for checked errors that of the call that raised it */
 } RTS_EXCEPTION;
 
 #if EXCEPT_MAX_CALLS > 0

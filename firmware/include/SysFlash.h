@@ -13,10 +13,11 @@
 #include "CmpStd.h"
 
 typedef struct {
-    RTS_UI32 size;         /* bytes, a multiple of sector_size */
-    RTS_UI32 sector_size;  /* smallest erasable unit, bytes; a power of two */
-    RTS_UI32 program_size; /* smallest programmable unit, bytes: 1, 2, 4, 8, 16; offsets and sizes are multiples of it */
-    RTS_UI8 erased;        /* value of an erased byte, usually 0xFF */
+    RTS_UI32 size;        /* bytes, a multiple of sector_size */
+    RTS_UI32 sector_size; /* smallest erasable unit, bytes; a power of two */
+    RTS_UI32
+    program_size;   /* smallest programmable unit, bytes: 1, 2, 4, 8, 16; offsets and sizes are multiples of it */
+    RTS_UI8 erased; /* value of an erased byte, usually 0xFF */
 
     /* The flash as memory for reading, size bytes; NULL when it cannot be mapped. */
     const RTS_UI8 *mapped;

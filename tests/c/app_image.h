@@ -49,7 +49,7 @@ typedef struct {
     SPEC_IMPORT imports[APP_MAX_IMPORTS + 1];
     RTS_UI32 import_count;
     SPEC_KEPT kept[SPEC_MAX_KEPT];
-    RTS_UI32 kept_count; /* 0: no blob */
+    RTS_UI32 kept_count;                 /* 0: no blob */
     CDL_IMAGE images[2 * APP_MAX_TASKS]; /* what the tasks use of inputs and outputs */
     RTS_UI32 image_count;                /* 0: no blob */
     const char *info[5];
@@ -380,11 +380,11 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
 /* ---- an application for everybody: a task of 10 ms that counts up by `step` ---- */
 
 enum {
-    COUNTER_OFFSET = 0,    /* data: DINT, counts */
-    STEP_OFFSET = 4,       /* data: DINT, set to `step` by CodeInit */
-    RETAIN_A_OFFSET = 0,   /* retain: DINT, starts at 100 * step and counts */
-    RETAIN_B_OFFSET = 12,  /* retain: the same number once more, at the other end of the area */
-    OUTPUT_OFFSET = 0,     /* output: DINT, set to `step` */
+    COUNTER_OFFSET = 0,   /* data: DINT, counts */
+    STEP_OFFSET = 4,      /* data: DINT, set to `step` by CodeInit */
+    RETAIN_A_OFFSET = 0,  /* retain: DINT, starts at 100 * step and counts */
+    RETAIN_B_OFFSET = 12, /* retain: the same number once more, at the other end of the area */
+    OUTPUT_OFFSET = 0,    /* output: DINT, set to `step` */
 };
 
 static inline void spec_counter(APP_SPEC *spec, RTS_UI32 step)

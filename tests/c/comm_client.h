@@ -16,7 +16,7 @@
 enum { TESTS_NEED_MESSAGE_SIZE = 2048 };
 
 typedef struct {
-    RTS_UI16 address;  /* one word */
+    RTS_UI16 address; /* one word */
     RTS_UI16 channel;
     RTS_UI32 limit;    /* granted buffer */
     RTS_UI32 sent;     /* number of the last block sent */

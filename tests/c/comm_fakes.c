@@ -295,8 +295,15 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
 void fakes_hook(CMP_HOOK hook)
 {
     static const PF_HOOK_FUNCTION hooks[] = {
-        CmpSrv_Hook, CmpDevice_Hook, CmpAppSrv_Hook, CmpMonitor2_Hook, CmpLogSrv_Hook,
-        CmpChannelServerEmbedded_Hook, CmpNameServiceServer_Hook, CmpRouterEmbedded_Hook, CmpBlkDrvSimpleCom_Hook,
+        CmpSrv_Hook,
+        CmpDevice_Hook,
+        CmpAppSrv_Hook,
+        CmpMonitor2_Hook,
+        CmpLogSrv_Hook,
+        CmpChannelServerEmbedded_Hook,
+        CmpNameServiceServer_Hook,
+        CmpRouterEmbedded_Hook,
+        CmpBlkDrvSimpleCom_Hook,
     };
     const RTS_UI32 count = RTS_COUNT(hooks);
 

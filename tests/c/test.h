@@ -13,19 +13,19 @@
 
 static int test_failures;
 
-#define CHECK(condition)                                                                                               \
-    do {                                                                                                               \
-        if (!(condition)) {                                                                                            \
-            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, __func__, #condition);                              \
-            test_failures++;                                                                                           \
-        }                                                                                                              \
+#define CHECK(condition)                                                                  \
+    do {                                                                                  \
+        if (!(condition)) {                                                               \
+            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, __func__, #condition); \
+            test_failures++;                                                              \
+        }                                                                                 \
     } while (0)
 
-#define RUN(test)                                                                                                      \
-    do {                                                                                                               \
-        int before = test_failures;                                                                                    \
-        test();                                                                                                        \
-        printf("%s %s\n", test_failures == before ? "ok  " : "FAIL", #test);                                           \
+#define RUN(test)                                                            \
+    do {                                                                     \
+        int before = test_failures;                                          \
+        test();                                                              \
+        printf("%s %s\n", test_failures == before ? "ok  " : "FAIL", #test); \
     } while (0)
 
 static inline int test_result(void)

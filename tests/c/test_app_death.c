@@ -156,7 +156,7 @@ static void what_stays_stopped_is_not_called(void)
     CHECK(AppStopApplication() == ERR_OK);
     SimStop(); /* nor at the end */
     CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1); /* and the next start decides */
+    CHECK(running_step() == 1);                                             /* and the next start decides */
     CHECK(log_has("signal SIGSEGV: access violation at code offset 0x12")); /* which knows why */
     CHECK(log_has("Back to the application before"));
 }

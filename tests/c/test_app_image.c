@@ -100,7 +100,8 @@ static RTS_UI32 used; /* units of copies */
 /* A task uses this part, which another one uses too. */
 static void use(RTS_UI32 task, RTS_UI32 area, RTS_UI32 offset, RTS_UI32 size, RTS_UI32 flags)
 {
-    uses[task][area - APP_AREA_INPUT] = (CDL_IMAGE){(RTS_UI16)(offset / 8), (RTS_UI16)(size / 8), flags | CDL_IMAGE_SHARED};
+    uses[task][area - APP_AREA_INPUT] =
+        (CDL_IMAGE){(RTS_UI16)(offset / 8), (RTS_UI16)(size / 8), flags | CDL_IMAGE_SHARED};
 }
 
 static void use_nothing(void)
@@ -115,7 +116,8 @@ static void start(bool with_copies)
     memset(images, 0, sizeof images);
     used = 0;
     for (i = 0; with_copies && i < IMAGE_AREAS * TASKS; i++)
-        used = test_place(&images[i / IMAGE_AREAS].part[i % IMAGE_AREAS], &uses[i / IMAGE_AREAS][i % IMAGE_AREAS], used);
+        used =
+            test_place(&images[i / IMAGE_AREAS].part[i % IMAGE_AREAS], &uses[i / IMAGE_AREAS][i % IMAGE_AREAS], used);
     CHECK(used * CDL_IMAGE_UNIT <= sizeof copies);
     test_attach(images);
     running = 1;

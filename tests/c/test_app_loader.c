@@ -212,8 +212,10 @@ static void areas_larger_than_the_device_has(void)
         RTS_UI32 limit;
         const char *name;
     } cases[] = {
-        {APP_AREA_DATA, APP_DATA_SIZE, "data"},       {APP_AREA_INPUT, APP_INPUT_SIZE, "input"},
-        {APP_AREA_OUTPUT, APP_OUTPUT_SIZE, "output"}, {APP_AREA_MEMORY, APP_MEMORY_SIZE, "memory"},
+        {APP_AREA_DATA, APP_DATA_SIZE, "data"},
+        {APP_AREA_INPUT, APP_INPUT_SIZE, "input"},
+        {APP_AREA_OUTPUT, APP_OUTPUT_SIZE, "output"},
+        {APP_AREA_MEMORY, APP_MEMORY_SIZE, "memory"},
     };
     char text[100];
     RTS_SIZE i;
@@ -544,8 +546,8 @@ static void an_event_variable_outside_its_area(void)
         RTS_UI16 area;
         RTS_UI32 offset;
     } cases[] = {
-        {APP_AREA_DATA, 64},   {APP_AREA_DATA, 0xFFFFFFFF}, {APP_AREA_MEMORY, 0}, {APP_AREA_CODE, 0},
-        {APP_AREA_COUNT, 0},   {APP_AREA_NONE, 0},          {0x8000, 0},
+        {APP_AREA_DATA, 64}, {APP_AREA_DATA, 0xFFFFFFFF}, {APP_AREA_MEMORY, 0}, {APP_AREA_CODE, 0},
+        {APP_AREA_COUNT, 0}, {APP_AREA_NONE, 0},          {0x8000, 0},
     };
     RTS_SIZE i;
 
@@ -593,8 +595,10 @@ static void check_kept_refused(RTS_RESULT expected, const char *text)
 static void kept_variables_outside_the_retain_area(void)
 {
     static const CDL_KEPT_RUN wrong[] = {
-        {4, 4, 5, 0},  {4, 4, 0, 0},          {4, 3, 2, 0},      {0, 4, 1, 0},          {17, 17, 1, 0},
-        {4, 0, 2, 0},  {4, 4, 0x40000001, 0}, {1, 1, 0, 1},      {4, 0xFFFF, 0x10002, 0}, {65535, 65535, 1, 0},
+        {4, 4, 5, 0},          {4, 4, 0, 0},   {4, 3, 2, 0},
+        {0, 4, 1, 0},          {17, 17, 1, 0}, {4, 0, 2, 0},
+        {4, 4, 0x40000001, 0}, {1, 1, 0, 1},   {4, 0xFFFF, 0x10002, 0},
+        {65535, 65535, 1, 0},
     };
     RTS_UI32 i;
 

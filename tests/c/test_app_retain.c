@@ -119,7 +119,7 @@ static void changing_variables_are_saved_once_per_second(void)
     CHECK(SimAdvance(ms(5000)) == ERR_OK);
     operations = SimFlashOps();
     CHECK(SimAdvance(ms(10000)) == ERR_OK);
-    CHECK(SimFlashOps() - operations >= 9 * 2); /* a record is two to four programs */
+    CHECK(SimFlashOps() - operations >= 9 * 2);      /* a record is two to four programs */
     CHECK(SimFlashOps() - operations <= 10 * 4 + 8); /* and at most one change of the half */
 }
 

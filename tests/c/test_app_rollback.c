@@ -33,7 +33,7 @@ static void an_application_that_dies_before_it_proved_itself_is_rolled_back(void
     CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
     CHECK(log_has("Back to the application before"));
     CHECK(log_has("division by zero at code offset 0x")); /* and why */
-    CHECK(SimStart() == ERR_OK); /* and it stays so */
+    CHECK(SimStart() == ERR_OK);                          /* and it stays so */
     CHECK(app_state() == AS_RUN);
     CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
     CHECK(!log_has("Back to"));

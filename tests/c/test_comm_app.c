@@ -109,8 +109,8 @@ static void names_are_bounded(void)
 
 static void captured_create_request_gives_a_session(void)
 {
-    static const RTS_UI8 request[] = {0x81, 0x01, 0x90, 0x00, 0x10, 0x0E, 'A', 'p', 'p', 'l', 'i', 'c',
-                                      'a',  't',  'i',  'o',  'n',  0,    0,   0};
+    static const RTS_UI8 request[] = {0x81, 0x01, 0x90, 0x00, 0x10, 0x0E, 'A', 'p', 'p', 'l',
+                                      'i',  'c',  'a',  't',  'i',  'o',  'n', 0,   0,   0};
     BTAG option;
 
     fakes_start();

@@ -18,9 +18,12 @@ static void samples_of_the_specification_are_read(void)
     BTAG_READER reader;
     BTAG tag;
 
-    READER(&reader, "\x01\x8C\x80\x00" "abcdefghijkl"
-                    "\x0A\x92\x80\x80\x80\x00" "abcdefghijklmnopqr"
-                    "\x82\xFF\x03\x04" "wxyz");
+    READER(&reader, "\x01\x8C\x80\x00"
+                    "abcdefghijkl"
+                    "\x0A\x92\x80\x80\x80\x00"
+                    "abcdefghijklmnopqr"
+                    "\x82\xFF\x03\x04"
+                    "wxyz");
     CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
     CHECK(tag.id == 0x01 && tag.size == 12);
     CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
@@ -95,9 +98,11 @@ static void length_beyond_the_rest_is_refused(void)
     BTAG_READER reader;
     BTAG tag;
 
-    READER(&reader, "\x01\x04" "abc");
+    READER(&reader, "\x01\x04"
+                    "abc");
     CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
-    READER(&reader, "\x01\xFF\xFF\xFF\xFF\x0F" "abc");
+    READER(&reader, "\x01\xFF\xFF\xFF\xFF\x0F"
+                    "abc");
     CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
 }
 
@@ -142,7 +147,8 @@ static void missing_element_is_told_from_one_of_wrong_size(void)
     BTAG_READER reader;
     BTAG tag;
 
-    READER(&reader, "\x01\x03" "abc");
+    READER(&reader, "\x01\x03"
+                    "abc");
     CHECK(BTagFind(&reader, 2, 0, 100, &tag) == ERR_L7_TAG_MISSING);
     CHECK(BTagFind(&reader, 1, 4, 100, &tag) == ERR_SIZE_MISMATCH);
     CHECK(BTagFind(&reader, 1, 0, 2, &tag) == ERR_SIZE_MISMATCH);
@@ -154,7 +160,11 @@ static void integers_have_one_two_or_four_bytes(void)
     RTS_UI32 value = 5;
     BTAG_READER reader;
 
-    READER(&reader, "\x01\x03" "abc" "\x02\x08" "abcdefgh" "\x03\x00");
+    READER(&reader, "\x01\x03"
+                    "abc"
+                    "\x02\x08"
+                    "abcdefgh"
+                    "\x03\x00");
     CHECK(BTagFindUnsigned(&reader, 1, &value) == ERR_SIZE_MISMATCH);
     CHECK(BTagFindUnsigned(&reader, 2, &value) == ERR_SIZE_MISMATCH);
     CHECK(BTagFindUnsigned(&reader, 3, &value) == ERR_SIZE_MISMATCH);
@@ -166,7 +176,8 @@ static void optional_integer_keeps_its_default_when_absent(void)
     RTS_UI32 value = 5;
     BTAG_READER reader;
 
-    READER(&reader, "\x01\x03" "abc");
+    READER(&reader, "\x01\x03"
+                    "abc");
     CHECK(BTagFindOptional(&reader, 9, &value) == ERR_OK && value == 5);
     CHECK(BTagFindOptional(&reader, 1, &value) == ERR_SIZE_MISMATCH);
 }
@@ -176,7 +187,10 @@ static void find_begins_at_the_start_wherever_the_reader_stands(void)
     BTAG_READER reader;
     BTAG tag;
 
-    READER(&reader, "\x01\x01" "a" "\x02\x01" "b");
+    READER(&reader, "\x01\x01"
+                    "a"
+                    "\x02\x01"
+                    "b");
     CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
     CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
     CHECK(BTagFind(&reader, 1, 1, 1, &tag) == ERR_OK);
@@ -188,7 +202,10 @@ static void find_stops_at_a_broken_element(void)
     BTAG_READER reader;
     BTAG tag;
 
-    READER(&reader, "\x01\x01" "a" "\x02\x09" "b");
+    READER(&reader, "\x01\x01"
+                    "a"
+                    "\x02\x09"
+                    "b");
     CHECK(BTagFind(&reader, 1, 1, 1, &tag) == ERR_OK);
     CHECK(BTagFind(&reader, 3, 1, 1, &tag) == ERR_BTAG_BUFFEROVERRUN);
 }
@@ -199,7 +216,10 @@ static void data_element_is_no_container(void)
     BTAG_READER content;
     BTAG tag;
 
-    READER(&reader, "\x7F\x01" "a" "\xFF\xFE\x03\x00" "\x82\xFF\x03\x00");
+    READER(&reader, "\x7F\x01"
+                    "a"
+                    "\xFF\xFE\x03\x00"
+                    "\x82\xFF\x03\x00");
     CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
     CHECK(BTagReadContainer(&reader, &tag, &content) == ERR_BTAG_NOCONTAINERTAG);
     CHECK(BTagReadNext(&reader, &tag) == ERR_OK);

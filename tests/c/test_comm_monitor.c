@@ -391,8 +391,8 @@ static void pointer_itself_must_lie_in_an_area(void)
 
 static void every_other_step_is_refused(void)
 {
-    RTS_UI8 code[] = {MON2_OP_LD16, POINTER_AT, 0, MON2_OP_RAO, 0,
-                      MON2_OP_DER, MON2_POINTER_SIZE, MON2_OP_LD16, 4, 0, MON2_OP_ADD};
+    RTS_UI8 code[] = {MON2_OP_LD16,      POINTER_AT,   0, MON2_OP_RAO, 0,          MON2_OP_DER,
+                      MON2_POINTER_SIZE, MON2_OP_LD16, 4, 0,           MON2_OP_ADD};
 
     setup();
     put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);

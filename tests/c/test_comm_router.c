@@ -275,11 +275,13 @@ static void captured_scan_is_answered_in_the_captured_form(void)
 {
     static const RTS_UI8 request[] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x11, 0x00, 0xAF, 0x00, 0x01,
                                       0x00, 0x00, 0x02, 0xC2, 0x00, 0x04, 0x01, 0x00, 0x00, 0x00};
+    /* clang-format off */
     static const RTS_UI8 reply[] = {
         0xC5, 0x73, 0x40, 0x04, 0x00, 0x11, 0x00, 0x01, 0x00, 0xAF, 0x00, 0x00, /* router */
         0x80, 0xC2, 0x00, 0x04, 0x01, 0x00, 0x00, 0x00, 0x01, 0x00, 0x01, 0x00, 0x00, 0x00, 0x05, 0x00,
         0x06, 0x00, 0x06, 0x00, 0x00, 0x10, 0x00, 0x00, 0x02, 0x00, 0x01, 0x00, 0x14, 0x05, 0x0E, 0x03,
         0x00, 0x00, 0x00, 0x00, 0x05, 0x00, 0x02, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00};
+    /* clang-format on */
 
     setup();
     RouterHandleData(&driver, request, sizeof(request));
@@ -354,12 +356,28 @@ static void reply_has_the_wanted_version_or_a_lower_one(void)
 static void name_request_is_answered_by_the_node_of_that_name_only(void)
 {
     setup();
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400, "N\0o\0d\0e\0" "7\0\0\0", 12) == 1);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400, "N\0o\0d\0e\0" "7\0", 10) == 1);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400, "N\0o\0d\0e\0" "8\0\0\0", 12) == 0);
+    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
+               "N\0o\0d\0e\0"
+               "7\0\0\0",
+               12) == 1);
+    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
+               "N\0o\0d\0e\0"
+               "7\0",
+               10) == 1);
+    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
+               "N\0o\0d\0e\0"
+               "8\0\0\0",
+               12) == 0);
     CHECK(scan(NS_RESOLVE_NAME, 0x0400, "N\0o\0d\0e\0", 8) == 0);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400, "N\0o\0d\0e\0" "7\0" "7\0", 12) == 0);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400, "N\0o\0d\0e\0" "7", 9) == 0);
+    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
+               "N\0o\0d\0e\0"
+               "7\0"
+               "7\0",
+               12) == 0);
+    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
+               "N\0o\0d\0e\0"
+               "7",
+               9) == 0);
     CHECK(scan(NS_RESOLVE_NAME, 0x0400, "", 0) == 0);
 }
 

@@ -226,8 +226,8 @@ static void login_reply_tells_the_settings(void)
 
 static void malformed_empty_user_of_a_real_client_does_not_hurt(void)
 {
-    static const RTS_UI8 content[] = {0x22, 0x84, 0x80, 0x00, 1,    0,    0,    0,    0x23, 0x84, 0x80, 0x00, 1, 2,
-                                      3,    4,    0x81, 0x01, 0x84, 0x00, 0x90, 0x80, 0x80, 0x00};
+    static const RTS_UI8 content[] = {0x22, 0x84, 0x80, 0x00, 1,    0,    0,    0,    0x23, 0x84, 0x80, 0x00,
+                                      1,    2,    3,    4,    0x81, 0x01, 0x84, 0x00, 0x90, 0x80, 0x80, 0x00};
 
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply));
@@ -350,7 +350,10 @@ static void identity_is_told_in_the_layout_of_the_field(void)
     CHECK(BytesGet32(tag.data + 8) == 0x030E0514);
     CHECK(reply_number(&reply, TAG_DEV_RTS_VERSION) == RTS_VERSION);
     CHECK(BTagFind(&reply.tags, TAG_DEV_NODE_NAME, 16, 16, &tag) == ERR_OK);
-    CHECK(memcmp(tag.data, "\x0C\0\0\0N\0o\0d\0e\0" "7\0\0\0", 16) == 0);
+    CHECK(memcmp(tag.data,
+                 "\x0C\0\0\0N\0o\0d\0e\0"
+                 "7\0\0\0",
+                 16) == 0);
     CHECK(BTagFind(&reply.tags, TAG_DEV_VENDOR_NAME, 18, 20, &tag) == ERR_OK);
     CHECK(memcmp(tag.data, "\x0E\0\0\0V\0e\0n\0d\0o\0r\0\0\0", 18) == 0);
     CHECK(BTagFind(&reply.tags, TAG_DEV_SERIAL_NUMBER, 8, 10, &tag) == ERR_OK);

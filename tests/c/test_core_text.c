@@ -11,8 +11,9 @@
 
 static char out[64];
 
-#define FORMATS(expected, ...)                                                                                         \
-    (memset(out, 'x', sizeof out), CMUtlsnprintf(out, sizeof out, __VA_ARGS__) == strlen(expected) && strcmp(out, expected) == 0)
+#define FORMATS(expected, ...)     \
+    (memset(out, 'x', sizeof out), \
+     CMUtlsnprintf(out, sizeof out, __VA_ARGS__) == strlen(expected) && strcmp(out, expected) == 0)
 
 static void every_conversion_works(void)
 {

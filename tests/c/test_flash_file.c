@@ -79,7 +79,8 @@ static void what_is_written_in_pieces_can_be_read(void)
             start(geometries[g]);
             SysFileCreate(FILE_SLOT_B);
             while (done < sizeof pattern) {
-                RTS_UI32 size = (RTS_UI32)sizeof pattern - done < blocks[b] ? (RTS_UI32)sizeof pattern - done : blocks[b];
+                RTS_UI32 size =
+                    (RTS_UI32)sizeof pattern - done < blocks[b] ? (RTS_UI32)sizeof pattern - done : blocks[b];
                 CHECK(SysFileWrite(FILE_SLOT_B, pattern + done, size) == ERR_OK);
                 done += size;
                 CHECK(SysFileGetPos(FILE_SLOT_B) == done);

@@ -5,7 +5,11 @@
  *
  * SysFileFlash is compiled a second time here, with such a map.
  */
-#define FILE_MAP {0x4000, 0x2000}, {0x8000, 0x4000}, {0x0000, 0x0400}, {0x1000, 0x1000}
+#define FILE_MAP                                          \
+    {0x4000, 0x2000}, {0x8000, 0x4000}, {0x0000, 0x0400}, \
+    {                                                     \
+        0x1000, 0x1000                                    \
+    }
 #define SysFileGetArea test_area
 #define SysFileCreate test_create
 #define SysFileAppend test_append

@@ -66,13 +66,41 @@ static void change(RTS_UI32 i)
     }
 }
 
-static void change0(const IEC_CONTEXT *context) { RTS_UNUSED(context); change(0); }
-static void change1(const IEC_CONTEXT *context) { RTS_UNUSED(context); change(1); }
-static void change2(const IEC_CONTEXT *context) { RTS_UNUSED(context); change(2); }
-static void run0(const IEC_CONTEXT *context) { RTS_UNUSED(context); (void)SysAtomicAdd(&app.runs[0], 1); }
-static void run1(const IEC_CONTEXT *context) { RTS_UNUSED(context); (void)SysAtomicAdd(&app.runs[1], 1); }
-static void run2(const IEC_CONTEXT *context) { RTS_UNUSED(context); (void)SysAtomicAdd(&app.runs[2], 1); }
-static void count(const IEC_CONTEXT *context) { RTS_UNUSED(context); (void)SysAtomicAdd(&app.cycles, 1); }
+static void change0(const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(context);
+    change(0);
+}
+static void change1(const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(context);
+    change(1);
+}
+static void change2(const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(context);
+    change(2);
+}
+static void run0(const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(context);
+    (void)SysAtomicAdd(&app.runs[0], 1);
+}
+static void run1(const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(context);
+    (void)SysAtomicAdd(&app.runs[1], 1);
+}
+static void run2(const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(context);
+    (void)SysAtomicAdd(&app.runs[2], 1);
+}
+static void count(const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(context);
+    (void)SysAtomicAdd(&app.cycles, 1);
+}
 
 static void loop(const IEC_CONTEXT *context)
 {

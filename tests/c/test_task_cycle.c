@@ -219,7 +219,8 @@ static void the_time_goes_on_over_stop_and_start(void)
 /* Milliseconds are counted on from cycle to cycle; they must be those of the division, whatever the steps are. */
 static void milliseconds_follow_the_nanoseconds(void)
 {
-    static const RTS_I64 steps[] = {1, 999999, 1000000, 1234567, 10000000, 4294967295, 4294967296, 4300000000, 3600000000000};
+    static const RTS_I64 steps[] = {1,          999999,     1000000,    1234567,      10000000,
+                                    4294967295, 4294967296, 4300000000, 3600000000000};
     RTS_I64 zero;
     RTS_UI32 i;
     RTS_UI32 k;

@@ -69,7 +69,9 @@ static void call(const app_t *a, u32 offset, u32 argument)
     register const function *base __asm__("s11") = a->imports;
     register const context_t *a0 __asm__("a0") = &context;
     register u32 a1 __asm__("a1") = argument;
-    __asm__ volatile("jalr ra, %2, 0" : "+r"(a0), "+r"(a1) : "r"(a->code + offset), "r"(base)
+    __asm__ volatile("jalr ra, %2, 0"
+                     : "+r"(a0), "+r"(a1)
+                     : "r"(a->code + offset), "r"(base)
                      : "ra", "t0", "t1", "t2", "t3", "t4", "t5", "t6", "a2", "a3", "a4", "a5", "a6", "a7", "memory");
 }
 __asm__(".globl _start\n_start:\n.option push\n.option norelax\nla gp, __global_pointer$\n.option pop\ncall run\n");
@@ -86,7 +88,9 @@ static void call(const app_t *a, u32 offset, u32 argument)
     register const function *base __asm__("r9") = a->imports;
     register const context_t *r0 __asm__("r0") = &context;
     register u32 r1 __asm__("r1") = argument;
-    __asm__ volatile("blx %2" : "+r"(r0), "+r"(r1) : "r"(a->code + offset), "r"(base)
+    __asm__ volatile("blx %2"
+                     : "+r"(r0), "+r"(r1)
+                     : "r"(a->code + offset), "r"(base)
                      : "r2", "r3", "r12", "lr", "cc", "memory");
 }
 __asm__(".thumb\n.thumb_func\n.globl _start\n_start: bl run\n");

@@ -67,9 +67,9 @@ static uint32_t state = 2463534242u;
 
 /* ---- what an input reaches ---- */
 
-static uint8_t hits[MAP_SIZE];        /* by the input that runs: how often it took a step from one place to another */
-static uint8_t reached[MAP_SIZE];     /* by all so far: a bit for each range of numbers */
-static __thread bool is_watched; /* threads of the target are not */
+static uint8_t hits[MAP_SIZE];    /* by the input that runs: how often it took a step from one place to another */
+static uint8_t reached[MAP_SIZE]; /* by all so far: a bit for each range of numbers */
+static __thread bool is_watched;  /* threads of the target are not */
 static uintptr_t place_before;
 
 void __sanitizer_cov_trace_pc(void);

@@ -47,8 +47,10 @@ static size_t put_message(uint8_t *data, size_t at, uint32_t first, const uint8_
 size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 {
     static const uint8_t status[24] = {0x55, 0xCD, 0x10, 0, 2, 0, 0x14};
+    /* clang-format off */
     static const uint8_t echo[36] = {0x55, 0xCD, 0x10, 0, 1, 0, 5, 0, 0, 0, 0, 0, 16, 0, 0, 0, 0, 0, 0, 0,
                                      0x52, 0x84, 0x80, 0, 0, 4, 0, 0};
+    /* clang-format on */
     static const uint8_t ack[8] = {CHANNEL_PKG_ACK, CHANNEL_FLAG_TO_SERVER | CHANNEL_FLAG_MISSING, 0, 0, 3};
     static const uint8_t keepalive[4] = {CHANNEL_PKG_KEEPALIVE, CHANNEL_FLAG_TO_SERVER};
     static const uint8_t close[12] = {CHANNEL_PKG_CLOSE_REQ, 0, 1, 1};

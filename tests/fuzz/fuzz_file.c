@@ -28,11 +28,11 @@ static struct {
 size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 {
     static const uint8_t inputs[][15] = {
-        {0, 0, 0, 4, 100, 0, 8, 0, 0, 12, 0, 0, 16, 5, 0},               /* create, write 100, close, read */
-        {1, 0, 0, 5, 0, 2, 5, 17, 0, 9, 0, 0, 0, 0, 0},                  /* two files */
-        {18, 0, 0, 14, 0, 0, 6, 36, 0, 10, 0, 0, 14, 48, 0},             /* erase, append, write, close, append */
-        {0, 0, 0, 20, 3, 0, 4, 100, 0, 8, 0, 0, 0, 0, 0},                /* a program that fails */
-        {2, 0, 0, 6, 255, 255, 6, 0, 4, 10, 0, 0, 0, 0, 0},              /* more than fits */
+        {0, 0, 0, 4, 100, 0, 8, 0, 0, 12, 0, 0, 16, 5, 0},   /* create, write 100, close, read */
+        {1, 0, 0, 5, 0, 2, 5, 17, 0, 9, 0, 0, 0, 0, 0},      /* two files */
+        {18, 0, 0, 14, 0, 0, 6, 36, 0, 10, 0, 0, 14, 48, 0}, /* erase, append, write, close, append */
+        {0, 0, 0, 20, 3, 0, 4, 100, 0, 8, 0, 0, 0, 0, 0},    /* a program that fails */
+        {2, 0, 0, 6, 255, 255, 6, 0, 4, 10, 0, 0, 0, 0, 0},  /* more than fits */
     };
 
     if (index >= RTS_COUNT(inputs) || capacity < sizeof(inputs[0]))

@@ -28,6 +28,7 @@ static size_t seed(uint8_t *data, uint8_t group, uint8_t service, const char *co
     return HEAD + size;
 }
 
+/* clang-format off */
 #define SEED(group, service, content) seed(data, group, service, content, sizeof(content) - 1)
 #define APP "\x01\x14" "SSSS" "\x4F\x3E\x2D\x1C" "\0\0\0\0\0\0\0\0\0\0\0\0"
 #define POSITION "\x02\x10" "\0\0\0\0" "\0\0\0\0" "\x20\0\0\0" "\x01\x02\x03\x04"
@@ -84,6 +85,7 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
         return 0;
     }
 }
+/* clang-format on */
 
 /* Puts the sessions where the first inputs have "SSSS" or the header its zero. */
 static void repair(uint8_t *message, size_t size, RTS_UI32 session, RTS_UI32 app_session)

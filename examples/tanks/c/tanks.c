@@ -165,7 +165,8 @@ void control_cycle(int32_t now_ms)
 
     hysteresis(&control.supply_ok, field.level1, 12.0f, 6.0f);
     hysteresis(&control.worth_pumping, wanted_speed, 5.0f, 1.0f);
-    control.pump = guard_motor(&control.guard, control.worth_pumping, control.supply_ok && field.level2 < 95.0f, now_ms);
+    control.pump =
+        guard_motor(&control.guard, control.worth_pumping, control.supply_ok && field.level2 < 95.0f, now_ms);
     control.speed = control.pump ? wanted_speed : 0.0f;
     control.inlet = !hysteresis(&control.supply_full, field.level1, 85.0f, 60.0f);
 

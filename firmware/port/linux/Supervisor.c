@@ -32,17 +32,17 @@ enum { LOOK_MS = 1000 };
 
 /* Written by the worker and read when it is gone. */
 typedef struct {
-    bool announced;      /* one was up; stays */
-    bool up;             /* it serves its line */
-    bool ended;          /* in order */
-    int number;          /* of the signal that it met, 0: none */
-    bool ran;            /* the thread that died has run IEC code */
-    RTS_I16 task;        /* whose cycle that thread was in, -1: none */
+    bool announced; /* one was up; stays */
+    bool up;        /* it serves its line */
+    bool ended;     /* in order */
+    int number;     /* of the signal that it met, 0: none */
+    bool ran;       /* the thread that died has run IEC code */
+    RTS_I16 task;   /* whose cycle that thread was in, -1: none */
     RTS_UI32 code_offset;
 } LIFE;
 
 static struct {
-    LIFE *life;           /* NULL without supervisor */
+    LIFE *life; /* NULL without supervisor */
     int (*work)(void);
     pid_t worker;
     RTS_I64 started_ms;

@@ -27,11 +27,11 @@ static struct {
     char path[256]; /* of the device, "" for a pseudo terminal */
     char pty_name[64];
     speed_t speed;
-    int line;       /* what is read and written; -1 while the device is away */
-    int slave;      /* of a pseudo terminal */
+    int line;  /* what is read and written; -1 while the device is away */
+    int slave; /* of a pseudo terminal */
     bool configured;
     bool open;
-    bool full;      /* the line took less than was offered */
+    bool full; /* the line took less than was offered */
     RTS_UI32 moved;
     RTS_UI32 tried_ms;
 } state = {.line = -1, .slave = -1};

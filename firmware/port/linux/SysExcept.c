@@ -31,9 +31,9 @@ enum {
 /* A thread that runs IEC code. The thread itself writes `stack.running`, `round` and `arg`; SysExceptBreak reads them
  * from another. */
 typedef struct {
-    IEC_STACK stack;         /* the first member; stays when the thread ends, for the next one */
-    RTS_UI32 round;          /* counts SysExceptTry, so that a break that comes late does not hit the next one */
-    RTS_UI32 break_round;    /* the round to break */
+    IEC_STACK stack;      /* the first member; stays when the thread ends, for the next one */
+    RTS_UI32 round;       /* counts SysExceptTry, so that a break that comes late does not hit the next one */
+    RTS_UI32 break_round; /* the round to break */
     RTS_UI32 break_code;
     const void *arg;         /* of the running SysExceptTry */
     RTS_EXCEPTION exception; /* on the way from the handler to SysExceptTry */
@@ -58,14 +58,15 @@ static struct {
 } state = {
     .lock = PTHREAD_MUTEX_INITIALIZER,
     .once = PTHREAD_ONCE_INIT,
-    .signal = {
-        {.number = SIGSEGV, .code = RTSEXCPT_ACCESS_VIOLATION},
-        {.number = SIGBUS, .code = RTSEXCPT_ACCESS_VIOLATION},
-        {.number = SIGFPE, .code = RTSEXCPT_DIVIDEBYZERO},
-        {.number = SIGILL, .code = RTSEXCPT_ILLEGAL_INSTRUCTION},
-        {.number = SIGTRAP, .code = RTSEXCPT_ILLEGAL_INSTRUCTION}, /* what a compiler's trap is on AArch64 */
-        {.number = 0, .code = RTSEXCPT_WATCHDOG},                  /* the break signal, known at run time only */
-    },
+    .signal =
+        {
+            {.number = SIGSEGV, .code = RTSEXCPT_ACCESS_VIOLATION},
+            {.number = SIGBUS, .code = RTSEXCPT_ACCESS_VIOLATION},
+            {.number = SIGFPE, .code = RTSEXCPT_DIVIDEBYZERO},
+            {.number = SIGILL, .code = RTSEXCPT_ILLEGAL_INSTRUCTION},
+            {.number = SIGTRAP, .code = RTSEXCPT_ILLEGAL_INSTRUCTION}, /* what a compiler's trap is on AArch64 */
+            {.number = 0, .code = RTSEXCPT_WATCHDOG},                  /* the break signal, known at run time only */
+        },
 };
 
 /* That of the calling thread, NULL without. */

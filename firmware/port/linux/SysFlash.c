@@ -235,10 +235,11 @@ static bool prepare_file(int file, const char *path, PORT_REASON *reason)
         return false;
     }
     if (!is_flash_file(file, info.st_size)) {
-        PortReason(reason,
-                   "%s is not a flash file of plcrt, or not all of one: it has %lld bytes and not %d; it is left as it is, "
-                   "put a copy of it in its place or name another file",
-                   path, (long long)info.st_size, PORT_FLASH_SIZE);
+        PortReason(
+            reason,
+            "%s is not a flash file of plcrt, or not all of one: it has %lld bytes and not %d; it is left as it is, "
+            "put a copy of it in its place or name another file",
+            path, (long long)info.st_size, PORT_FLASH_SIZE);
         return false;
     }
     if (!fill_erased(file, lseek(file, 0, SEEK_END)) || !sync_folder(path)) {

@@ -16,8 +16,8 @@
 /* Sizes are rounded up to pages by the system. */
 static void *map_guarded(size_t size)
 {
-    char *memory = mmap(NULL, GUARD_SIZE + size + GUARD_SIZE, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1,
-                        0);
+    char *memory =
+        mmap(NULL, GUARD_SIZE + size + GUARD_SIZE, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (memory == MAP_FAILED) {
         return NULL;
     }

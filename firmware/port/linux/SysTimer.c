@@ -106,7 +106,7 @@ static void *run(void *param)
     RTS_I64 due_ns;
     RTS_EXCEPTION none;
     (void)SysExceptTry(do_nothing, NULL, &none); /* takes what catching needs now, not in the first cycle */
-    prctl(PR_SET_TIMERSLACK, 1UL); /* matters without SCHED_FIFO only: else 50 us late */
+    prctl(PR_SET_TIMERSLACK, 1UL);               /* matters without SCHED_FIFO only: else 50 us late */
     while (wait_until_due(timer, &due_ns)) {
         timer->callback(timer->param, due_ns);
         if (timer->interval_ns != 0) {
@@ -275,8 +275,8 @@ static RTS_RESULT init(void)
 {
     memset(&state, 0, sizeof(state));
     state.realtime = 1;
-    char *stacks = mmap(NULL, (size_t)MAX_TIMERS * STACK_STEP, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE,
-                        -1, 0);
+    char *stacks =
+        mmap(NULL, (size_t)MAX_TIMERS * STACK_STEP, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (stacks == MAP_FAILED) {
         return ERR_NOMEMORY;
     }

@@ -5,28 +5,28 @@
  */
 #include "CmpItf.h"
 
-#define COMPONENTS(X) \
-    X(SysTime) \
-    X(CmpLog) \
-    X(SysTarget) \
-    X(SysLock) \
-    X(SysTimer) \
-    X(SysFileFlash) \
-    X(CmpEventMgrEmbedded) \
-    X(SysWatchdog) \
-    X(SysEvent) \
-    X(CmpMath) \
-    X(CmpRetain) \
-    X(CmpIecTask) \
-    X(CmpScheduleTimer) \
-    X(CmpAppEmbedded) \
-    X(CmpSrv) \
-    X(CmpDevice) \
-    X(CmpAppSrv) \
-    X(CmpMonitor2) \
-    X(CmpLogSrv) \
-    X(CmpBlkDrvSimpleCom) \
-    X(CmpRouterEmbedded) \
+#define COMPONENTS(X)       \
+    X(SysTime)              \
+    X(CmpLog)               \
+    X(SysTarget)            \
+    X(SysLock)              \
+    X(SysTimer)             \
+    X(SysFileFlash)         \
+    X(CmpEventMgrEmbedded)  \
+    X(SysWatchdog)          \
+    X(SysEvent)             \
+    X(CmpMath)              \
+    X(CmpRetain)            \
+    X(CmpIecTask)           \
+    X(CmpScheduleTimer)     \
+    X(CmpAppEmbedded)       \
+    X(CmpSrv)               \
+    X(CmpDevice)            \
+    X(CmpAppSrv)            \
+    X(CmpMonitor2)          \
+    X(CmpLogSrv)            \
+    X(CmpBlkDrvSimpleCom)   \
+    X(CmpRouterEmbedded)    \
     X(CmpNameServiceServer) \
     X(CmpChannelServerEmbedded)
 

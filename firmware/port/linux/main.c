@@ -298,7 +298,8 @@ static bool open_events(const OPTIONS *options, PORT_REASON *reason)
 static void log_restart(void)
 {
     if (SysStartGet()->stay_stopped) {
-        LogAdd(CMPID_CmpMgr, LOG_WARNING, ERR_OK, "The controller died (%s) and was started again", SysStartGet()->text);
+        LogAdd(CMPID_CmpMgr, LOG_WARNING, ERR_OK, "The controller died (%s) and was started again",
+               SysStartGet()->text);
     }
 }
 

@@ -51,7 +51,7 @@ static struct {
     RTS_I64 now_ns;
     RTS_I64 next_comm_ns;
     RTS_I64 group_ns; /* when the timers that run now were due; NEVER when none run */
-    bool real_clock; /* reading the clock costs what it costs on Linux */
+    bool real_clock;  /* reading the clock costs what it costs on Linux */
     TIMER timer[MAX_TIMERS];
 } sim;
 

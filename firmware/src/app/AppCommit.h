@@ -34,8 +34,8 @@ typedef struct {
 } COMMIT_SLOT;
 
 typedef struct {
-    RTS_UI8 active; /* slot of the application, SLOT_NONE without one */
-    RTS_UI8 begun;  /* how many initialisations of it in a row were begun and not finished */
+    RTS_UI8 active;            /* slot of the application, SLOT_NONE without one */
+    RTS_UI8 begun;             /* how many initialisations of it in a row were begun and not finished */
     RTS_UI8 state[SLOT_COUNT]; /* SLOT_* */
     RTS_UI32 number;           /* of the newest seal */
     COMMIT_SLOT slot[SLOT_COUNT];

@@ -26,8 +26,7 @@ static void leave_failed_application(void)
 {
     const COMMIT *commit = AppCommitGet();
 
-    if (commit->active == SLOT_NONE || commit->state[commit->active] != SLOT_FAILED ||
-        !AppCanRollBack(commit->active))
+    if (commit->active == SLOT_NONE || commit->state[commit->active] != SLOT_FAILED || !AppCanRollBack(commit->active))
         return;
     AppUnload();
     (void)AppRollBack(commit->active);

@@ -21,8 +21,8 @@ RTS_RESULT LoaderCheckFunctions(LOADER *l)
     RTS_RESULT result;
 
     if (l->header.function_table.size != sizeof table)
-        return refuse(l, ERR_SIZE_MISMATCH, "Function table has %u bytes, not %u.",
-                      U(l->header.function_table.size), U(sizeof table));
+        return refuse(l, ERR_SIZE_MISMATCH, "Function table has %u bytes, not %u.", U(l->header.function_table.size),
+                      U(sizeof table));
     result = LoaderRead(l, l->header.function_table.offset, table, sizeof table);
     if (result != ERR_OK)
         return result;
@@ -31,8 +31,7 @@ RTS_RESULT LoaderCheckFunctions(LOADER *l)
         if (table[i].area == APP_AREA_NONE)
             continue;
         if (i >= CDL_FUNCTION_RELOC)
-            return refuse(l, ERR_NOT_SUPPORTED, "Function %u is not supported.",
-                          U(i));
+            return refuse(l, ERR_NOT_SUPPORTED, "Function %u is not supported.", U(i));
         if (!LoaderIsCode(l, table[i].area, table[i].offset))
             return refuse(l, ERR_INVALID_REFERENCE, "Function %u lies outside the code.", U(i));
         l->image->entry[i] = table[i].offset;
@@ -88,8 +87,7 @@ static void add_unresolved(LOADER *l, const char *name, RTS_RESULT result)
     RTS_SIZE length = strlen(refusal->text);
 
     if (l->unresolved == ERR_OK)
-        l->unresolved =
-            refuse(l, result, "External functions this device lacks: %s (%s)", name, problem_text(result));
+        l->unresolved = refuse(l, result, "External functions this device lacks: %s (%s)", name, problem_text(result));
     else if (APP_REFUSAL_TEXT_SIZE > 1)
         CMUtlsnprintf(refusal->text + length, sizeof refusal->text - length, ", %s (%s)", name, problem_text(result));
     LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "External function %s: %s", name, problem_text(result));
@@ -103,16 +101,14 @@ static RTS_RESULT check_import(LOADER *l)
     RTS_RESULT result;
 
     if (index == APP_MAX_IMPORTS)
-        return refuse(l, ERR_NOMEMORY, "More than the %u external functions possible.",
-                      U(APP_MAX_IMPORTS));
+        return refuse(l, ERR_NOMEMORY, "More than the %u external functions possible.", U(APP_MAX_IMPORTS));
     result = LoaderReadNext(l, &ref, EXT_REF_INFO_SIZE);
     if (result != ERR_OK)
         return result;
     if (!read_name(l->image->file, &l->offset, l->end, name))
         return refuse(l, ERR_PARAMETER, "Name of external function %u is empty or too long.", U(index));
     if (ref.area != APP_AREA_NONE || ref.offset != index * sizeof(RTS_PFN))
-        return refuse(l, ERR_INVALID_REFERENCE, "External function %s is not in import slot %u.",
-                      name, U(index));
+        return refuse(l, ERR_INVALID_REFERENCE, "External function %s is not in import slot %u.", name, U(index));
     result = find_import(&ref, name);
     if (result != ERR_OK)
         add_unresolved(l, name, result);

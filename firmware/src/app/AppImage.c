@@ -58,8 +58,7 @@ bool AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context)
         const IMAGE_PART *part = &plan[task].part[i];
         if (part->count == 0)
             continue;
-        context->area[APP_AREA_INPUT + i] =
-            (RTS_UI8 *)((uintptr_t)copy_at(part->copy) - part->first * sizeof(UNIT));
+        context->area[APP_AREA_INPUT + i] = (RTS_UI8 *)((uintptr_t)copy_at(part->copy) - part->first * sizeof(UNIT));
         copied = true;
     }
     return copied;

@@ -142,7 +142,8 @@ static RTS_RESULT check_target(LOADER *l)
         return refuse(l, ERR_TYPE_MISMATCH, "The image is for device type 0x%x, this device is 0x%x.",
                       U(l->header.device_type), U(target->type));
     if (l->header.device_id != target->id)
-        return refuse(l, ERR_ID_MISMATCH, "The image is for device id 0x%x, this device is 0x%x: build it for this target.",
+        return refuse(l, ERR_ID_MISMATCH,
+                      "The image is for device id 0x%x, this device is 0x%x: build it for this target.",
                       U(l->header.device_id), U(target->id));
     if (l->header.device_version >> 24 != target->version >> 24)
         return refuse(l, ERR_VERSION_MISMATCH, "The image is for device version %u.x, this device has %u.x.",
@@ -227,8 +228,10 @@ static RTS_RESULT check_areas(LOADER *l)
 RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE *image, APP_REFUSAL *refusal)
 {
     static const CHECK checks[] = {
-        check_header,    check_crc,     check_target,        check_segments, check_code,  check_areas,
-        LoaderCheckFunctions, LoaderCheckImports, LoaderCheckIecFunctions, LoaderCheckInfo,     LoaderCheckBlobs,
+        check_header,         check_crc,          check_target,
+        check_segments,       check_code,         check_areas,
+        LoaderCheckFunctions, LoaderCheckImports, LoaderCheckIecFunctions,
+        LoaderCheckInfo,      LoaderCheckBlobs,
     };
     LOADER l;
     RTS_RESULT result = ERR_OK;

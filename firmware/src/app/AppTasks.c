@@ -68,9 +68,8 @@ static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
     table = l->image->kept;
     while ((result = RetainTableNext(&table, &kept)) == ERR_OK)
         number++;
-    return result == ERR_NO_OBJECT
-               ? ERR_OK
-               : refuse(l, result, "Kept variable %u is out of place; build again.", U(number));
+    return result == ERR_NO_OBJECT ? ERR_OK
+                                   : refuse(l, result, "Kept variable %u is out of place; build again.", U(number));
 }
 
 #if APP_IMAGE_SIZE > 0

@@ -343,7 +343,9 @@ RTS_RESULT AppReset(RTS_UI32 option)
         result = initialise(option == RESET_OPTION_COLD || app.pending == INIT_COLD);
     }
     LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, result, "Reset %s",
-           option == RESET_OPTION_WARM ? "warm" : option == RESET_OPTION_COLD ? "cold" : "origin");
+           option == RESET_OPTION_WARM   ? "warm"
+           : option == RESET_OPTION_COLD ? "cold"
+                                         : "origin");
     AppPostEvent(EVT_ResetDone);
     return result;
 }

@@ -31,9 +31,9 @@ typedef struct {
     GUARD guard;
     RTS_I64 watchdog_ns; /* 0: none */
     RTS_UI16 sensitivity;
-    bool has_copies; /* of inputs and outputs */
-    RTS_UI32 exceeded;   /* cycles in a row longer than watchdog_ns */
-    RTS_UI32 ms_rest;    /* ns of context.time_ns beyond context.time_ms */
+    bool has_copies;   /* of inputs and outputs */
+    RTS_UI32 exceeded; /* cycles in a row longer than watchdog_ns */
+    RTS_UI32 ms_rest;  /* ns of context.time_ns beyond context.time_ms */
     RTS_UI32 cycles;
     RTS_UI32 last_ns;
     RTS_UI32 min_ns;

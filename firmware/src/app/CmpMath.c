@@ -16,6 +16,7 @@ static float real_power(float base, float exponent)
 }
 
 /* The signatures are those of the interface texts in CmpMath.h. */
+/* clang-format off */
 static const CMP_EXT_FUNCTION functions[] = {
     {"sin", 0xB90BD8A4, VERSION, (RTS_PFN)sin},
     {"cos", 0xAC9E7EFF, VERSION, (RTS_PFN)cos},
@@ -40,6 +41,7 @@ static const CMP_EXT_FUNCTION functions[] = {
     {"atan2f", 0x8B5C7723, VERSION, (RTS_PFN)atan2f},
     {"powf", 0x4F59F748, VERSION, (RTS_PFN)real_power},
 };
+/* clang-format on */
 
 RTS_RESULT CmpMath_Hook(CMP_HOOK hook)
 {

@@ -22,7 +22,7 @@ static struct {
     RTS_I64 last_check_ns; /* when the area was last found saved, or was saved */
     RTS_UI8 *area;
     RTS_UI32 tag; /* of its records */
-    bool failed;   /* the last save failed, and was logged */
+    bool failed;  /* the last save failed, and was logged */
 } retain;
 
 /* All zero without an application. */

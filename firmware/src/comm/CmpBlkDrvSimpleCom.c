@@ -21,7 +21,7 @@ enum {
     READ_CHUNK = 64,
     READ_MAX = 2048, /* bytes per cycle, so that a babbling line does not stop the rest of the runtime */
     WRITE_CHUNK = 32,
-    LENGTH_SIZE = 2, /* before each packet in the queue */
+    LENGTH_SIZE = 2,                                                          /* before each packet in the queue */
     ROUTER_HEADER_MAX = 2 * ROUTER_HEADER_WORDS + 4 * ROUTER_MAX_ADDRESS + 2, /* addresses of both sides, filler */
     /* A packet with the largest message of the channel in one block. No packet is larger, in either direction. */
     MESSAGE_MAX = ROUTER_HEADER_MAX + CHANNEL_FIRST_SIZE + NETSERVER_MESSAGE_SIZE,

@@ -17,7 +17,7 @@
 enum {
     REPEAT_FIRST_MS = 1000, /* doubles with each repetition */
     REPEAT_COUNT = 4,
-    REPEAT_GAP_MS = 100,             /* between repetitions that the client's own repetitions ask for */
+    REPEAT_GAP_MS = 100,              /* between repetitions that the client's own repetitions ask for */
     MIN_ROOM = COMM_PREFIX_SIZE + 12, /* a path whose packets carry less is not worth a channel */
 };
 
@@ -137,7 +137,7 @@ static void close_channel(COMM_CLIENT *client, RTS_RESULT error)
 
 static COMM_CLIENT *find_client(RTS_UI16 id)
 {
-    FOR_EACH_CLIENT(client)
+    FOR_EACH_CLIENT (client)
         if (client->channel.id == id)
             return client;
     return NULL;
@@ -184,8 +184,7 @@ static bool read_open_request(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_
 /* The channel is in use by a logged-in client. */
 static bool is_taken(const COMM_CLIENT *client, RTS_UI32 now_ms)
 {
-    return client->channel.id != 0 && SrvIsLoggedIn(client) &&
-           now_ms - client->channel.last_received < CHANNEL_IDLE_MS;
+    return client->channel.id != 0 && SrvIsLoggedIn(client) && now_ms - client->channel.last_received < CHANNEL_IDLE_MS;
 }
 
 /* Whether `a` is the better one to give to a new peer: it is free, or has been silent longer. */
@@ -201,7 +200,7 @@ static COMM_CLIENT *claim_client(const ROUTER_PEER *peer, RTS_UI32 now_ms)
 {
     COMM_CLIENT *found = NULL;
 
-    FOR_EACH_CLIENT(client) {
+    FOR_EACH_CLIENT (client) {
         if (client->channel.id != 0 && RouterIsSamePeer(peer, &client->channel.peer))
             return client;
         if (!is_taken(client, now_ms) && (found == NULL || is_better(&client->channel, &found->channel, now_ms)))
@@ -299,8 +298,8 @@ static RTS_RESULT send_next(COMM_CLIENT *client, RTS_UI32 now_ms)
         result = send_open_response(channel);
         channel->open_due = result != ERR_OK;
     } else if (channel->ack_due) {
-        result = send_short(channel, CHANNEL_PKG_ACK, channel->missing_due ? CHANNEL_FLAG_MISSING : 0,
-                            CHANNEL_ACK_SIZE);
+        result =
+            send_short(channel, CHANNEL_PKG_ACK, channel->missing_due ? CHANNEL_FLAG_MISSING : 0, CHANNEL_ACK_SIZE);
         channel->ack_due = result != ERR_OK;
         channel->missing_due = channel->missing_due && channel->ack_due;
     } else if (channel->tx.sent < channel->tx.count) {
@@ -519,7 +518,7 @@ static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RT
 
 static void pump_all(void)
 {
-    FOR_EACH_CLIENT(client)
+    FOR_EACH_CLIENT (client)
         if (client->channel.id != 0)
             pump(client, SysTimeGetMs()); /* a service may have taken its time */
 }
@@ -562,7 +561,7 @@ static void cycle_client(COMM_CLIENT *client, RTS_UI32 now_ms)
 
 static void cycle(void)
 {
-    FOR_EACH_CLIENT(client)
+    FOR_EACH_CLIENT (client)
         cycle_client(client, SysTimeGetMs());
 }
 
@@ -581,7 +580,7 @@ static void reset_all(void)
 
 static void close_all(void)
 {
-    FOR_EACH_CLIENT(client)
+    FOR_EACH_CLIENT (client)
         if (client->channel.id != 0)
             close_channel(client, ERR_CHS_SHUTDOWN);
 }

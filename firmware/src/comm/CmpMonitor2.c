@@ -145,8 +145,10 @@ static RTS_UI32 take_mask(PROGRAM *program)
 static RTS_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask)
 {
     static const RTS_UI8 head[] = {0x15, 0x0C, 0x00};
+    /* clang-format off */
     static const RTS_UI8 tail[] = {0x17, 0x0C, 0x09, 0x04, 0x1B, 0x06, 0x00, 0x01, 0x00, 0x00,
                                    0x17, 0x04, 0x09, 0x04, 0x17, 0x08, 0x09, 0x04, MON2_OP_CPY};
+    /* clang-format on */
     RTS_UI32 tail_size = 0;
 
     if (mask != NULL && goes_on_with(&program, head, sizeof(head))) {

@@ -116,7 +116,10 @@ RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *
 {
     const BLK_DRV *driver = peer->driver;
     RTS_UI8 header[HEADER_SIZE + 4 * ROUTER_MAX_ADDRESS + 2] = {
-        ROUTER_MAGIC, ROUTER_HOP_COUNT << HOP_SHIFT | ROUTER_HEADER_WORDS, ROUTER_PRIO_NORMAL << PRIO_SHIFT, service,
+        ROUTER_MAGIC,
+        ROUTER_HOP_COUNT << HOP_SHIFT | ROUTER_HEADER_WORDS,
+        ROUTER_PRIO_NORMAL << PRIO_SHIFT,
+        service,
     };
     BLK_PART all[1 + ROUTER_MAX_PARTS];
     RTS_UI32 receiver = 2u * peer->address_words;

@@ -40,28 +40,28 @@ static inline void check_failed(const char *file, int line, const char *what, in
     semihost_print("\n");
 }
 
-#define CHECK_EQUAL(got, wanted)                                                                                       \
-    do {                                                                                                               \
-        int64_t got_ = (int64_t)(got), wanted_ = (int64_t)(wanted);                                                    \
-        if (got_ != wanted_)                                                                                           \
-            check_failed(__FILE__, __LINE__, #got, got_, wanted_);                                                     \
+#define CHECK_EQUAL(got, wanted)                                    \
+    do {                                                            \
+        int64_t got_ = (int64_t)(got), wanted_ = (int64_t)(wanted); \
+        if (got_ != wanted_)                                        \
+            check_failed(__FILE__, __LINE__, #got, got_, wanted_);  \
     } while (0)
 
 #define CHECK(condition) CHECK_EQUAL(!!(condition), 1)
 
 /* A fault outside of SysExceptTry restarts the controller, and would restart the tests for ever. */
-#define TEST_BEGIN()                                                                                                   \
-    do {                                                                                                               \
-        if (ResetGet()->cause != RESET_POWER_ON) {                                                                     \
-            check_failed(__FILE__, __LINE__, "program counter of a fault of the runtime", ResetGet()->pc, 0);          \
-            semihost_exit(1);                                                                                          \
-        }                                                                                                              \
+#define TEST_BEGIN()                                                                                          \
+    do {                                                                                                      \
+        if (ResetGet()->cause != RESET_POWER_ON) {                                                            \
+            check_failed(__FILE__, __LINE__, "program counter of a fault of the runtime", ResetGet()->pc, 0); \
+            semihost_exit(1);                                                                                 \
+        }                                                                                                     \
     } while (0)
 
-#define TEST_RUN(test)                                                                                                 \
-    do {                                                                                                               \
-        semihost_print(#test "\n");                                                                                    \
-        test();                                                                                                        \
+#define TEST_RUN(test)              \
+    do {                            \
+        semihost_print(#test "\n"); \
+        test();                     \
     } while (0)
 
 #define TEST_END() semihost_exit(check_failures != 0)

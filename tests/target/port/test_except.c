@@ -99,7 +99,8 @@ static void raise_with_everything_clobbered(void *arg)
     RTS_UNUSED(arg);
 #ifdef __ARM_FP
     __asm__ volatile("vmov.f32 s16, #1.0\n\tvmov.f32 s20, #2.0\n\tvmov.f32 s31, #3.0\n\t"
-                     "vmov.f32 s1, #4.0" ::: "memory");
+                     "vmov.f32 s1, #4.0" ::
+                         : "memory");
 #endif
     __asm__ volatile("movs r4, #99\n\tmov r5, r4\n\tmov r6, r4\n\tmov r8, r4\n\tmov r9, r4\n\tmov r10, r4\n\t"
                      "mov r11, r4\n\tudf #2");
@@ -379,7 +380,8 @@ static void keep_registers_busy(void *arg)
                          :
                          : "r2", "r3", "r4", "r5", "r6", "r8", "r9", "r10", "r11", "r12", "cc", "memory"
 #ifdef __ARM_FP
-                         , "s0", "s1", "s15", "s16", "s20", "s31"
+                           ,
+                           "s0", "s1", "s15", "s16", "s20", "s31"
 #endif
         );
         bad += wrong;
@@ -538,9 +540,9 @@ enum { RETURN_OFFSET = 8 };
 
 /* Pushes three words, so that the frame of an exception is moved to a multiple of 8, with a return address into
  * `program` as the lowest; goes on with `then`. */
-#define PUSH_RETURN_ADDRESS(then)                                                                                      \
-    __asm__ volatile(USE_FPU "mov r1, %0\n\tpush {r1, r2, lr}\n\t" then ::"r"(                                         \
-                         (uintptr_t)program + RETURN_OFFSET + APP_ENTRY_MODE_BIT)                                      \
+#define PUSH_RETURN_ADDRESS(then)                                                                                  \
+    __asm__ volatile(USE_FPU "mov r1, %0\n\tpush {r1, r2, lr}\n\t" then ::"r"((uintptr_t)program + RETURN_OFFSET + \
+                                                                              APP_ENTRY_MODE_BIT)                  \
                      : "r1", "memory")
 
 static void fail_below_a_return_address(void *arg)

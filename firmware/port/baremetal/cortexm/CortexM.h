@@ -140,7 +140,7 @@ typedef enum { RESET_POWER_ON, RESET_PIN, RESET_SOFTWARE, RESET_FATAL, RESET_WAT
 /* Why the controller started, and for the last two where it was. In RAM that no start-up clears. */
 typedef struct {
     RTS_UI32 magic;
-    RTS_UI32 cause;  /* RESET_CAUSE */
+    RTS_UI32 cause; /* RESET_CAUSE */
     RTS_UI32 pc;
     RTS_UI32 status; /* CFSR */
 } RESET_RECORD;

@@ -124,8 +124,8 @@ __attribute__((naked)) static void try_return(void)
 }
 
 /* Leaves the running Try. */
-__attribute__((naked, noreturn)) static void
-try_raise(RTS_UI32 code, uintptr_t address, const void *stack, uintptr_t link)
+__attribute__((naked, noreturn)) static void try_raise(RTS_UI32 code, uintptr_t address, const void *stack,
+                                                       uintptr_t link)
 {
     RTS_UNUSED(code);
     RTS_UNUSED(address);
@@ -189,8 +189,8 @@ __attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, uin
 }
 
 /* Hands the frame that the exception pushed, and EXC_RETURN, to `function`, and returns to where that says. */
-#define DISPATCH(function)                                                                                             \
-    __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\t"                          \
+#define DISPATCH(function)                                                                      \
+    __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\t" \
                      "bl " #function "\n\tbx r0")
 
 /* From the process stack the call leaves, with what is in r0 to r3 of its frame; from the main stack it enters. */
@@ -323,8 +323,8 @@ void SysExceptShutdown(void)
 
 /* Where a function that is broken goes on: it leaves the running Try. By then the processor has taken its frame back,
  * so that the stack pointer is as it was. */
-__attribute__((naked, noreturn)) static void
-try_break(RTS_UI32 code, uintptr_t address, RTS_UI32 unused, uintptr_t link)
+__attribute__((naked, noreturn)) static void try_break(RTS_UI32 code, uintptr_t address, RTS_UI32 unused,
+                                                       uintptr_t link)
 {
     RTS_UNUSED(code);
     RTS_UNUSED(address);

@@ -15,7 +15,7 @@ enum { MAIN_WATCHDOG_MS = 20000 };
 static void log_reset_cause(void)
 {
     static const char *const names[RESET_CAUSE_COUNT] = {"power on", "reset pin", "software", "fault of the runtime",
-                                        "hardware watchdog"};
+                                                         "hardware watchdog"};
     const RESET_RECORD *record = ResetGet();
     if (record->cause < RESET_FATAL)
         LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);

@@ -51,8 +51,15 @@ static RTS_RESULT flash_sync(void)
 const SYS_FLASH *SysFlashGet(void)
 {
     static const SYS_FLASH flash = {
-        SIM_FLASH_SIZE, SIM_FLASH_SECTOR_SIZE, SIM_FLASH_PROGRAM_SIZE, SIM_FLASH_ERASED, CELLS,
-        flash_read,     flash_program,         flash_erase,            flash_sync,
+        SIM_FLASH_SIZE,
+        SIM_FLASH_SECTOR_SIZE,
+        SIM_FLASH_PROGRAM_SIZE,
+        SIM_FLASH_ERASED,
+        CELLS,
+        flash_read,
+        flash_program,
+        flash_erase,
+        flash_sync,
     };
 
     return &flash;

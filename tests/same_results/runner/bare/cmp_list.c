@@ -5,18 +5,18 @@
  */
 #include "CmpCompilerCalls.h"
 
-#define COMPONENTS(X)                                                                                                  \
-    X(CmpLog)                                                                                                          \
-    X(SysSim)                                                                                                          \
-    X(CmpEventMgrEmbedded)                                                                                             \
-    X(SysFileFlash)                                                                                                    \
-    X(CmpRetain)                                                                                                       \
-    X(CmpScheduleTimer)                                                                                                \
-    X(CmpIecTask)                                                                                                      \
-    X(CmpMath)                                                                                                         \
-    X(CmpIntCalls)                                                                                                     \
-    X(CmpRealCalls)                                                                                                    \
-    X(CmpLrealCalls)                                                                                                   \
+#define COMPONENTS(X)      \
+    X(CmpLog)              \
+    X(SysSim)              \
+    X(CmpEventMgrEmbedded) \
+    X(SysFileFlash)        \
+    X(CmpRetain)           \
+    X(CmpScheduleTimer)    \
+    X(CmpIecTask)          \
+    X(CmpMath)             \
+    X(CmpIntCalls)         \
+    X(CmpRealCalls)        \
+    X(CmpLrealCalls)       \
     X(CmpAppEmbedded)
 
 CMP_LIST(COMPONENTS);

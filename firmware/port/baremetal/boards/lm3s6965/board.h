@@ -19,8 +19,8 @@ void UartIrq(void);
 void AlarmIrq(void);
 void NmiHandler(void); /* of cortexm: the chip's watchdog has no NMI, an interrupt above all tasks is the next best */
 
-#define BOARD_VECTORS                                                                                                  \
-    [IRQ_VECTOR(IRQ_UART0)] = {UartIrq}, [IRQ_VECTOR(IRQ_WATCHDOG)] = {NmiHandler},                                    \
+#define BOARD_VECTORS                                                               \
+    [IRQ_VECTOR(IRQ_UART0)] = {UartIrq}, [IRQ_VECTOR(IRQ_WATCHDOG)] = {NmiHandler}, \
     [IRQ_VECTOR(IRQ_TIMER0A)] = {AlarmIrq},
 
 /* Called from BoardInit. */

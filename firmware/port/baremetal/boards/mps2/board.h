@@ -27,7 +27,9 @@ void AlarmIrq(void);
 #else
 #define BOARD_UART1_VECTORS
 #endif
+/* clang-format off */
 #define BOARD_VECTORS BOARD_UART0_VECTORS BOARD_UART1_VECTORS [IRQ_VECTOR(IRQ_TIMER0)] = {AlarmIrq},
+/* clang-format on */
 
 /* Called from BoardInit. */
 void UartInit(void);

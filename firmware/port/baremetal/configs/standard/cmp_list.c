@@ -6,24 +6,24 @@
 #include "CmpCompilerCalls.h"
 
 /* System components first; services before the components that register with them. */
-#define COMPONENTS(X)                                                                                                  \
-    X(CmpLog)                                                                                                          \
-    X(SysFileFlash)                                                                                                    \
-    X(CmpRetain)                                                                                                       \
-    X(CmpScheduleTimer)                                                                                                \
-    X(CmpIecTask)                                                                                                      \
-    X(SysWatchdog)                                                                                                     \
-    X(CmpIntCalls)                                                                                                     \
-    X(CmpRealCalls)                                                                                                    \
-    X(CmpAppEmbedded)                                                                                                  \
-    X(CmpSrv)                                                                                                          \
-    X(CmpDevice)                                                                                                       \
-    X(CmpAppSrv)                                                                                                       \
-    X(CmpLogSrv)                                                                                                       \
-    X(CmpMonitor2)                                                                                                     \
-    X(CmpRouterEmbedded)                                                                                               \
-    X(CmpNameServiceServer)                                                                                            \
-    X(CmpChannelServerEmbedded)                                                                                        \
+#define COMPONENTS(X)           \
+    X(CmpLog)                   \
+    X(SysFileFlash)             \
+    X(CmpRetain)                \
+    X(CmpScheduleTimer)         \
+    X(CmpIecTask)               \
+    X(SysWatchdog)              \
+    X(CmpIntCalls)              \
+    X(CmpRealCalls)             \
+    X(CmpAppEmbedded)           \
+    X(CmpSrv)                   \
+    X(CmpDevice)                \
+    X(CmpAppSrv)                \
+    X(CmpLogSrv)                \
+    X(CmpMonitor2)              \
+    X(CmpRouterEmbedded)        \
+    X(CmpNameServiceServer)     \
+    X(CmpChannelServerEmbedded) \
     X(CmpBlkDrvSimpleCom)
 
 CMP_LIST(COMPONENTS);
