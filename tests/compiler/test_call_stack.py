@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from plctool.compiler import Level, compile_sources
 from plctool.debug.symbols import SymbolTable
+from plctool.debug.trace import Trace
 from plctool.image.file import parse_image
-from plctool.link.services import Trace
 from plctool.sim import Simulator
 
 LEVELS: list[Level] = [0, 1, 2, 3, "s"]

@@ -7,12 +7,13 @@ Every function takes a `Session`; requests that were lost with their channel are
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
 
 from plctool.core import exception_name, lib
+from plctool.debug.trace import Trace
 from plctool.errors import DeviceError
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
@@ -52,21 +53,6 @@ class AppState(StrEnum):
     RUN = "run"
     STOP = "stop"
     EXCEPTION = "exception"
-
-
-@dataclass(frozen=True)
-class Trace:
-    """What the stack had when the application stopped. `words`: by distance from the stack pointer in bytes, the code
-    offsets to which calls may return. `link`: the same of the link register of processors that have one."""
-
-    words: dict[int, int] = field(default_factory=dict)
-    link: int | None = None
-
-    @staticmethod
-    def of(calls: Iterable[tuple[int, int]]) -> Trace:
-        """From (target, distance) of each EXCEPT_CALL."""
-        words = {distance: target for target, distance in calls}
-        return Trace({d: t for d, t in words.items() if d != lib.EXCEPT_LINK}, words.get(lib.EXCEPT_LINK))
 
 
 @dataclass(frozen=True)
