@@ -25,7 +25,8 @@ FLOORS = (
     ("debug",),
     ("link",),
     ("gateway",),
-    ("device", "sim", "compiler"),
+    ("controller", "compiler"),
+    ("device", "sim"),
     ("",),
     ("port_check", "st_tests", "testing"),
     ("cli",),
@@ -34,7 +35,9 @@ FLOORS = (
 # What floors alone do not say: (package, what it does not know although that lies below it).
 APART = (
     ("compiler", ("link", "gateway")),
-    ("sim", ("gateway",)),
+    ("device", ("compiler",)),
+    ("sim", ("compiler", "gateway")),
+    ("controller", ("gateway",)),
     ("testing", ("compiler", "device", "sim", "link")),
 )
 # The same within the compiler.

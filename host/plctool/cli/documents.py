@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from plctool.compiler import Level
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.warnings import WarningOptions
-    from plctool.device import ExceptionInfo, Plc, PlcStatus
-    from plctool.sim import Simulator
+    from plctool.controller import Controller, ExceptionInfo, PlcStatus
+    from plctool.device import Plc
 
 Document = dict[str, Any]
 Texts = dict[str, str]
@@ -179,11 +179,10 @@ def run(
     from plctool.sim import Simulator
 
     with Simulator.from_file(path) as plc:
-        assert plc.symbols
+        table = plc.symbols()
         for name in gets:
-            plc.symbols.resolve(name)  # a wrong name is told before the run
-        for name, text in sets.items():
-            plc.write(name, plc.symbols.resolve(name).parse(text))
+            table.resolve(name)  # a wrong name is reported before the run
+        plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
         if time_ms is None:
             plc.run_cycles(1 if cycles is None else cycles)
         else:
@@ -198,15 +197,9 @@ def run(
         return document, reading.texts
 
 
-def _raise_exception(plc: Simulator) -> None:
-    from plctool.device import explain_exception
-
-    exception = plc.status().exception
-    if exception is None:
-        return
-    tasks = plc.tasks()
-    task = tasks[exception.task].name if 0 <= exception.task < len(tasks) else None
-    raise ProgramStopped(explain_exception(exception, task, plc.symbols))
+def _raise_exception(plc: Controller) -> None:
+    if exception := plc.status().exception:
+        raise ProgramStopped(exception)
 
 
 def bench(path: Path, cycles: int) -> Document:

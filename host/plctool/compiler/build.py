@@ -23,7 +23,7 @@ from plctool.files import write_atomically
 from plctool.iec.areas import Area
 from plctool.iec.types import base_of
 from plctool.iec.values import encode
-from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image
+from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image, image_crc
 from plctool.image.targets import Machine, Target
 
 _UNIT = int(lib.CDL_IMAGE_UNIT)
@@ -80,7 +80,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
         kept=kept_variables(kept),
     )
     built = build_image(image)
-    symbols.image_crc = int.from_bytes(built[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+    symbols.image_crc = image_crc(built)
     return BuildResult(built, symbols, code_sizes(symbols, len(linked.code)))
 
 

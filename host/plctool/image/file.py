@@ -307,6 +307,11 @@ def parse_image(data: bytes) -> Image:
     )
 
 
+def image_crc(data: bytes) -> int:
+    """The checksum that the header of an image carries; 0 for what is too short to have one."""
+    return int.from_bytes(data[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+
+
 def _parse_header(data: bytes) -> Any:
     size = int(lib.CDL_HEADER_SIZE)
     if len(data) < size:

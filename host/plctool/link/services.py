@@ -15,6 +15,7 @@ from functools import partial
 from plctool.core import exception_name, lib
 from plctool.debug.trace import Trace
 from plctool.errors import DeviceError
+from plctool.image.file import image_crc
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
 from plctool.link.names import version_text
@@ -23,7 +24,6 @@ from plctool.link.session import Session
 _SLOW = 30.0  # patience for what may erase flash or run initialisation code [s]
 _TRANSFER_PATIENCE = 10.0  # longer than flash takes to erase a sector [s]
 _DOWNLOAD_TRIES = 4  # without any progress
-_NO_OFFSET = 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,11 @@ class AppException:
     code_offset: int | None
     task: int
     trace: Trace = field(default_factory=Trace)
+
+    @staticmethod
+    def of(code: int, code_offset: int, task: int, trace: Trace) -> AppException:
+        """From what the device has for it (APP_EXCEPTION)."""
+        return AppException(code, None if code_offset == lib.APP_NO_CODE_OFFSET else code_offset, task, trace)
 
     @property
     def name(self) -> str:
@@ -166,11 +171,12 @@ def read_status(session: Session) -> Status:
     exception = None
     if code != lib.RTSEXCPT_NOEXCEPTION:
         trace = Trace.of(struct.iter_unpack("<II", status.find(lib.TAG_APP_CALLS) or b""))
-        exception = AppException(code, None if offset == _NO_OFFSET else offset, task, trace)
-    return Status(_app_state(state, operating), crc, size, exception, operating)
+        exception = AppException.of(code, offset, task, trace)
+    return Status(app_state(state, operating), crc, size, exception, operating)
 
 
-def _app_state(state: int, operating: int) -> AppState:
+def app_state(state: int, operating: int) -> AppState:
+    """From AS_* and the OS_* flags."""
     if operating & lib.OS_EXCEPTION:
         return AppState.EXCEPTION
     return {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}.get(state, AppState.STOP)
@@ -262,7 +268,7 @@ class _Transfer:
         self.arrived = 0
         self._session = session
         self._image = image
-        self._crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+        self._crc = image_crc(image)
         self._progress = progress
 
     def ask(self) -> int:

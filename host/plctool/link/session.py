@@ -123,10 +123,16 @@ class Session:
         content = tags.container(lib.TAG_APP_DESCRIPTOR).bytes(lib.TAG_APP_OPTION, lib.APP_LOGIN_REPLY_SIZE)
         result = int.from_bytes(content[:2], "little")
         if result == lib.ERR_APP_NOT_EXIST:
-            raise DeviceError("There is no application on the device; flash one first.", "app-not-exist", result)
+            raise no_application()
         l7.check_result(result, "login to the application")
         guid = content[lib.APP_LOGIN_REPLY_SIZE - _GUID_SIZE : lib.APP_LOGIN_REPLY_SIZE]
         return Application(int.from_bytes(content[2:6], "little"), guid)
+
+
+def no_application() -> DeviceError:
+    """The error of what needs an application when there is none."""
+    result = lib.ERR_APP_NOT_EXIST
+    return DeviceError("There is no application on the device; flash one first.", "app-not-exist", result)
 
 
 def _wants_application_login(group: int, reply: bintag.Tags) -> bool:

@@ -8,8 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from plctool.controller import FlashResult
 from plctool.core import lib
-from plctool.device import FlashResult, Plc
+from plctool.device import Plc
 from plctool.errors import DeviceError, UsageError
 from plctool.link.services import AppState, Identity, TaskInfo
 from plctool.port_check.report import CheckFailed, NotAvailable

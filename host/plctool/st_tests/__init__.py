@@ -22,9 +22,9 @@ from plctool.compiler.internal import bugs_reported
 from plctool.compiler.semantics.unit_test_statements import FAILED, NUMBER, Assertion, Operand
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
+from plctool.controller import ExceptionInfo
 from plctool.core import ffi, lib
 from plctool.debug.symbols import SourceLine
-from plctool.device import ExceptionInfo, explain_exception
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.value_texts import literal
@@ -168,7 +168,7 @@ class _Bench:
     def run(self, number: int) -> Outcome:
         plc, case = self._plc, self._suite.cases[number]
         begin = time.perf_counter()
-        plc.reset(lib.RESET_OPTION_COLD)
+        plc.reset("cold")
         failure = self._exception(case)
         if failure is None:
             self._cycle(number)
@@ -179,7 +179,7 @@ class _Bench:
         return Outcome(case.name, case.pos.file, case.pos.line, time.perf_counter() - begin, failure)
 
     def _cycle(self, number: int) -> None:
-        self._plc.write(NUMBER, number)
+        self._plc.write({NUMBER: number})
         self._plc.start()
         self._plc.run_cycles(1)
 
@@ -187,18 +187,17 @@ class _Bench:
         """Runs what has this number on the variables as they are after an exception."""
         areas = {lib.AppGetAreaAddress(area.value, 0, size): size for area, size in self._sizes.items() if size}
         kept = {address: bytes(ffi.buffer(address, size)) for address, size in areas.items()}
-        self._plc.reset(lib.RESET_OPTION_COLD)
+        self._plc.reset("cold")
         for address, content in kept.items():
             ffi.memmove(address, content, len(content))
         self._cycle(number)
 
     def _exception(self, case: TestCase) -> Failure | None:
-        exception = self._plc.status().exception
-        if exception is None:
+        info = self._plc.status().exception
+        if info is None:
             return None
-        info = explain_exception(exception, None, self._built.symbols)
         where = f" in {info.pou}" if info.pou and not _TEST.fullmatch(info.pou) else ""
-        text = _EXCEPTIONS.get(exception.code, "run-time exception") + where
+        text = _EXCEPTIONS.get(info.code, "run-time exception") + where
         place = (info.file, info.line) if info.file and info.line else (case.pos.file, case.pos.line)
         return Failure(info.name, text, *place, is_exception=True, pou=info.pou, calls=_calls(info))
 
