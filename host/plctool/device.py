@@ -21,42 +21,36 @@ from plctool.link import services
 from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink
 from plctool.link.monitoring import AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
-from plctool.link.serial import DEFAULT_BAUD, SerialTransport
 from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
 from plctool.link.session import Session
-from plctool.link.transport import BlockTransport
+from plctool.link.transports import Link, open_transport, parse_link
 
 _BUSY_POLL = 0.2  # shortest time between two looks at a device that another tool keeps to itself [s]
 
 
 def connect(
-    link: str,
-    baud: int = DEFAULT_BAUD,
+    link: str | Link,
     symbols: Path | str | None = None,
     *,
     gateway: bool | None = None,
     tool: str | None = None,
 ) -> Plc:
-    """Opens a link to a controller, such as "serial:/dev/ttyS0" or "serial:socket://host:port".
+    """Opens a link to a controller, such as "serial:/dev/ttyS0", "serial:/dev/ttyS0?baud=9600" or
+    "serial:socket://host:port".
 
     `symbols` names a symbol file when it is neither in the cache nor beside the image. A serial port of this machine is
     shared with other tools through a gateway where there can be one; with `gateway` false, or PLCTOOL_GATEWAY=off, it
-    is opened by this process and locked. `tool` is what other tools are told this one is. Raises LinkError when the
-    link cannot be opened; whether a controller answers shows with the first call.
+    is opened by this process and locked. `tool` is what other tools are told this one is. Raises UsageError for what is
+    not a link, LinkError when it cannot be opened; whether a controller answers shows with the first call.
     """
-    return Plc(_open_link(link, baud, gateway, tool), Path(symbols) if symbols else None)
+    return Plc(_open_link(link, gateway, tool), Path(symbols) if symbols else None)
 
 
 def scan(
-    link: str,
-    baud: int = DEFAULT_BAUD,
-    seconds: float = SCAN_SECONDS,
-    *,
-    gateway: bool | None = None,
-    tool: str | None = None,
+    link: str | Link, seconds: float = SCAN_SECONDS, *, gateway: bool | None = None, tool: str | None = None
 ) -> list[Node]:
     """The controllers that answer on a link within `seconds`. Raises LinkError when there are none."""
-    connection = _open_link(link, baud, gateway, tool)
+    connection = _open_link(link, gateway, tool)
     try:
         nodes = connection.scan(seconds)
         if not nodes:
@@ -66,28 +60,18 @@ def scan(
         connection.close()
 
 
-def _open_link(link: str, baud: int, gateway: bool | None, tool: str | None) -> MessageLink:
+def _open_link(text: str | Link, gateway: bool | None, tool: str | None) -> MessageLink:
     """A way to the device, through a gateway where that is possible and wanted."""
-    kind, _, port = link.partition(":")
-    if kind == "serial" and port:
+    link = parse_link(text) if isinstance(text, str) else text
+    if link.is_shared:
         if gateway is None:
             gateway = os.environ.get("PLCTOOL_GATEWAY", "on").lower() not in ("off", "no", "0")
         if gateway:
             with suppress(NoGateway):
-                return connect_gateway(port, baud, tool or Path(sys.argv[0]).name or "Python")
+                return connect_gateway(link, tool or Path(sys.argv[0]).name or "Python")
         else:
-            dismiss_idle(port)
-    return Connection(open_transport(link, baud))
-
-
-def open_transport(link: str, baud: int = DEFAULT_BAUD) -> BlockTransport:
-    """The block transport a link names."""
-    kind, separator, address = link.partition(":")
-    if separator and kind == "serial" and address:
-        return SerialTransport(address, baud)
-    if separator and kind in ("can", "udp", "tcp"):
-        raise UsageError(f"Links over {kind} are not in this version; use a serial line (--port).", "no-such-link")
-    raise UsageError(f"'{link}' is not a link; write for example serial:/dev/ttyS0.", "no-such-link")
+            dismiss_idle(link.place)
+    return Connection(open_transport(link))
 
 
 class Plc(Controller):

@@ -29,6 +29,7 @@ class SimSerial:
 
     name = "simulated serial line"
     local_address = b"\x00\x02"
+    max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     byte_rate = 115200 / BITS_PER_BYTE
 

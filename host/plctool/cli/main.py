@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from plctool.cli import output
 from plctool.errors import InternalError, PlcError, UsageError
+from plctool.link.transports import LATER, TRANSPORTS, Link, make_link, not_yet
 from plctool.version import plctool_version
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 130, 141
 DEFAULT_INTERVAL = 0.5
 BENCH_CYCLES = 10000
-LATER = {
+LATER_COMMANDS = {
     "force": "use write, which a program may overwrite",
     "unforce": "there is nothing to unforce",
 }
@@ -190,13 +191,16 @@ def _add_warnings(parser: argparse.ArgumentParser) -> None:
 
 def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
     link = parser.add_argument_group("link")
-    link.add_argument("--port", metavar="PORT", help="serial port or pyserial URL, for example /dev/ttyS0")
-    link.add_argument("--baud", type=_count, default=115200, metavar="N", help="default: 115200")
+    for kind in TRANSPORTS.values():
+        if kind.flag:
+            link.add_argument(f"--{kind.flag}", metavar=kind.flag.upper(), help=kind.help)
+        for name, option in kind.options.items():
+            link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
     link.add_argument(
         "--no-gateway", action="store_true", help="do not share the port; default: with PLCTOOL_GATEWAY=off"
     )
-    for kind, metavar in (("can", "INTERFACE:CHANNEL"), ("udp", "HOST[:PORT]"), ("tcp", "HOST[:PORT]")):
-        link.add_argument(f"--{kind}", metavar=metavar, help="not in this version")
+    for scheme, place in LATER.items():
+        link.add_argument(f"--{scheme}", metavar=place, help="not in this version")
     link.add_argument("--node", type=int, metavar="N", help="not in this version")
     if symbols:
         parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="when they are not found by themselves")
@@ -350,22 +354,26 @@ def _demo(args: argparse.Namespace) -> int:
 # ---- commands on devices ---------------------------------------------------------------------------------------------
 
 
-def _link(args: argparse.Namespace) -> str:
+def _link(args: argparse.Namespace) -> Link:
     """The link the arguments name."""
-    for kind in ("can", "udp", "tcp", "node"):
-        if getattr(args, kind) is not None:
-            raise UsageError(f"--{kind} is not in this version; use a serial line (--port).", "no-such-link")
-    if not args.port:
+    for name in (*LATER, "node"):
+        if getattr(args, name) is not None:
+            raise not_yet(f"--{name}")
+    given = [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and getattr(args, kind.flag)]
+    if not given:
         raise UsageError("Say where the device is: --port /dev/ttyS0, for example.", "no-link")
-    return f"serial:{args.port}"
+    if len(given) > 1:
+        flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
+        raise UsageError(f"Name one link only, {flags}.", "no-link")
+    kind = TRANSPORTS[given[0]]
+    options = {name: value for name in kind.options if (value := getattr(args, name)) is not None}
+    return make_link(given[0], getattr(args, kind.flag), **options)
 
 
 def _connect(args: argparse.Namespace) -> Plc:
     from plctool.device import connect
 
-    return connect(
-        _link(args), args.baud, getattr(args, "symbols", None), gateway=_gateway_wanted(args), tool=_me(args)
-    )
+    return connect(_link(args), getattr(args, "symbols", None), gateway=_gateway_wanted(args), tool=_me(args))
 
 
 def _gateway_wanted(args: argparse.Namespace) -> bool | None:
@@ -449,7 +457,7 @@ def _scan(args: argparse.Namespace) -> int:
             "version": node.version,
             "serial_number": node.serial_number,
         }
-        for node in scan(_link(args), args.baud, gateway=_gateway_wanted(args), tool=_me(args))
+        for node in scan(_link(args), gateway=_gateway_wanted(args), tool=_me(args))
     ]
     return _show(args, {"devices": devices}, lambda d: output.table(d["devices"], devices[0]))
 
@@ -506,7 +514,7 @@ def _port_check(args: argparse.Namespace) -> int:
 
     report = port_check.run_port_check(
         lambda: _connect(args),
-        baud=args.baud,
+        link=_link(args),
         replace=args.yes,
         max_drift=args.max_drift,
         power_cycle=power_cycle if args.power_cycle else None,
@@ -594,8 +602,10 @@ def _show(args: argparse.Namespace, document: dict[str, Any], text: Callable[[di
 
 
 def _command(arguments: Sequence[str]) -> int:
-    if arguments and arguments[0] in LATER:
-        raise UsageError(f"'{arguments[0]}' is not in this version of plctool; {LATER[arguments[0]]}.", "not-yet")
+    if arguments and arguments[0] in LATER_COMMANDS:
+        raise UsageError(
+            f"'{arguments[0]}' is not in this version of plctool; {LATER_COMMANDS[arguments[0]]}.", "not-yet"
+        )
     args = _parser().parse_args(arguments)
     if args.version:
         print(f"plctool {plctool_version()}")

@@ -88,7 +88,9 @@ class Connection:
                 raise self._error("No device answers on {}; check cable, baud rate and power.", "no-answer")
             self._peer = found[0].address
         header = router.header_size(self._peer, self.transport.local_address)
-        line = Line(lib.BLK_MAX_SIZE - header, header + self.transport.packet_overhead, self.transport.byte_rate)
+        line = Line(
+            self.transport.max_packet - header, header + self.transport.packet_overhead, self.transport.byte_rate
+        )
         words = (len(self._peer) + len(self.transport.local_address)) // 2
         channel = Channel(line, words, secrets.randbits(32))
         channel.open(self.transport.now())

@@ -15,8 +15,12 @@ class SimTransport:
 
     name = "the simulator"
     local_address = b"\x00\x02"
+    max_packet = int(lib.BLK_MAX_SIZE)
     packet_overhead = 0
     byte_rate = math.inf
+
+    def fileno(self) -> int | None:
+        return None  # the simulator runs in this thread
 
     def now(self) -> float:
         return float(lib.SimNow()) / 1e9
@@ -25,9 +29,9 @@ class SimTransport:
         _check(lib.SimLinkSend(packet, len(packet)))
 
     def receive(self, timeout: float) -> bytes | None:
-        buffer = ffi.new("RTS_UI8[]", lib.BLK_MAX_SIZE)
+        buffer = ffi.new("RTS_UI8[]", self.max_packet)
         left = round(timeout * 1e9)
-        while not (size := lib.SimLinkReceive(buffer, lib.BLK_MAX_SIZE)):
+        while not (size := lib.SimLinkReceive(buffer, self.max_packet)):
             if left < 0:
                 return None
             _check(lib.SimAdvance(min(left, _STEP_NS)))

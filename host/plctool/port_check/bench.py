@@ -13,6 +13,7 @@ from plctool.core import lib
 from plctool.device import Plc
 from plctool.errors import DeviceError, UsageError
 from plctool.link.services import AppState, Identity, TaskInfo
+from plctool.link.transports import Link
 from plctool.port_check.report import CheckFailed, NotAvailable
 
 INTERVAL_US = 10_000  # of the programs' task
@@ -59,10 +60,10 @@ END_CONFIGURATION
 class Bench:
     """The controller under test, its target, and where programs for it are built."""
 
-    def __init__(self, connect: Callable[[], Plc], plc: Plc, target: str, folder: Path, baud: int) -> None:
+    def __init__(self, connect: Callable[[], Plc], plc: Plc, target: str, folder: Path, link: Link) -> None:
         self.plc = plc
         self.target = target
-        self.baud = baud
+        self.link = link
         self._connect = connect
         self._folder = folder
         self._built: dict[str, Path] = {}

@@ -170,9 +170,12 @@ class Checks:
 
     def throughput(self) -> Result:
         """How much of the line's byte rate a download gets."""
+        baud = self._bench.link.options.get("baud")
+        if baud is None:
+            raise NotAvailable("this link has no fixed byte rate")
         result = self._bench.flash(_padded(max(DOWNLOAD_UNITS)))
         rate = result.bytes / max(result.seconds, 1e-6)
-        share = rate / (self._bench.baud / BITS_PER_BYTE)
+        share = rate / (int(baud) / BITS_PER_BYTE)
         figures = {"bytes": result.bytes, "bytes_per_s": round(rate), "share": round(share, 3)}
         text = f"{result.bytes} bytes at {rate:.0f} bytes/s: {share * 100:.0f} % of the byte rate"
         if share < MIN_LINE_SHARE:
