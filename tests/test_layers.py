@@ -21,7 +21,8 @@ ROOT = Path(plctool.__file__).parent
 # From the ground up; the packages and modules of one line do not know each other. "" is what `import plctool` gives.
 FLOORS = (
     ("errors", "core", "version"),
-    ("files", "iec", "image"),
+    ("files", "iec"),
+    ("image",),
     ("debug",),
     ("link",),
     ("gateway",),
@@ -38,7 +39,7 @@ APART = (
     ("device", ("compiler",)),
     ("sim", ("compiler", "gateway")),
     ("controller", ("gateway",)),
-    ("testing", ("compiler", "device", "sim", "link")),
+    ("testing", ("compiler", "device", "sim")),
 )
 # The same within the compiler.
 NOT_BELOW = {

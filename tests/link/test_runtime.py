@@ -18,8 +18,8 @@ from plctool.link import services, simplecom
 from plctool.link.connection import Connection
 from plctool.link.session import Session
 from plctool.link.sim import SimTransport
-from plctool.link.transport import BlockTransport
-from plctool.testing.line import BITS_PER_BYTE, Damage
+from plctool.link.transport import BITS_PER_BYTE, BlockTransport
+from plctool.testing.line import Damage
 
 TICK_NS = 500_000
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from plctool.errors import UsageError
+from plctool.image.targets import DEFAULT_TARGET
 from plctool.link.transports import LATER, TRANSPORTS
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build = command("build", "compile a program to an image")
     _add_sources(build)
     build.add_argument("-o", "--output", type=Path, default=Path("app.cdl"), metavar="IMAGE", help="default: app.cdl")
-    build.add_argument("--target", default="x86_64-linux", metavar="NAME", help="processor; default: x86_64-linux")
+    build.add_argument("--target", default=DEFAULT_TARGET, metavar="NAME", help=f"processor; default: {DEFAULT_TARGET}")
     build.add_argument(
         "-O", dest="level", type=_level, metavar="0..3|s", default=2, help="optimisation, s for small code; default: 2"
     )

@@ -6,6 +6,7 @@ import math
 
 from plctool.core import error_name, ffi, lib
 from plctool.errors import LinkError
+from plctool.link.transport import TOOL_ADDRESS
 
 _STEP_NS = 1_000_000  # longest piece of virtual time between two looks at the queue
 
@@ -14,7 +15,7 @@ class SimTransport:
     """Packets by function calls. The simulator has to be on (see plctool.sim); time passes only while waiting."""
 
     name = "the simulator"
-    local_address = b"\x00\x02"
+    local_address = TOOL_ADDRESS
     max_packet = int(lib.BLK_MAX_SIZE)
     packet_overhead = 0
     byte_rate = math.inf

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
+TOOL_ADDRESS = b"\x00\x02"  # router address of a tool on a line of its own
+BITS_PER_BYTE = 10  # of a serial line, 8N1: start bit, eight data bits, stop bit
 DEFAULT_BAUD = 115200  # of a serial line if the user names none
 
 
