@@ -276,7 +276,7 @@ class Checks:
 
     def _faulty(self, variables: str, body: str) -> str:
         """A program that fails after some good cycles."""
-        from plctool.compiler.codegen.targets import find_target
+        from plctool.image.targets import find_target
 
         text = program(variables, f"IF n > {_HEALTHY_CYCLES} THEN\n{body}\nEND_IF")
         if "Large" not in body:
