@@ -203,7 +203,7 @@ class Checks:
         status = self._plc.status()
         if status.image_crc != image or status.state is not AppState.RUN:
             raise CheckFailed(f"After {COMMITS} records the program is another one, or it is in {status.state}.")
-        faults = [entry.text for entry in self._bench.log() if entry.text.startswith("The commit record cannot")]
+        faults = [entry.text for entry in self._bench.log() if entry.text.startswith("Commit record cannot")]
         if faults:
             raise CheckFailed(f"The log says: {faults[-1]}")
         return f"{COMMITS} records written", {"records": COMMITS}
