@@ -18,7 +18,7 @@ from plctool.gateway.control import dismiss_idle
 from plctool.gateway.frames import BUSY
 from plctool.gateway.place import NoGateway
 from plctool.link import services
-from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink
+from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink, no_answer
 from plctool.link.monitoring import AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
 from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
@@ -54,7 +54,7 @@ def scan(
     try:
         nodes = connection.scan(seconds)
         if not nodes:
-            raise LinkError(f"No device answers on {connection.name}; check cable, baud rate and power.", "no-answer")
+            raise no_answer(connection.name)
         return nodes
     finally:
         connection.close()
