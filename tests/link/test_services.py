@@ -406,7 +406,7 @@ def test_an_image_that_is_there_already_is_not_sent_again_unless_asked() -> None
     sent = bench.line.sent_bytes
     services.download(bench.session, bench.plc.image)
     assert bench.line.sent_bytes - sent < 500
-    services.download(bench.session, bench.plc.image, afresh=True)
+    services.download(bench.session, bench.plc.image, restart=True)
     assert bench.line.sent_bytes - sent > 1000
 
 

@@ -36,7 +36,7 @@ _BLOB_MAGIC = lib.CDL_BLOB_MAGIC & 0xFFFFFFFF
 
 @dataclass(frozen=True)
 class ApplicationInfo:
-    """Texts for people; `date` in seconds since 1970 (UTC), 0 when unknown."""
+    """Strings for users; `date` in seconds since 1970 (UTC), 0 when unknown."""
 
     project: str = ""
     author: str = ""
