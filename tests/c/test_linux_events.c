@@ -8,7 +8,7 @@
  */
 #define _GNU_SOURCE
 #include "../../firmware/src/app/AppAreas.h"
-#include "../../firmware/src/app/AppException.h"
+#include "AppException.h"
 #include "../../firmware/src/app/AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CmpChecksum.h"

@@ -3,13 +3,12 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "AppChecks.h"
+#include "AppTasks.h"
 
 #include <string.h>
 
-#include "CmpIecTask.h"
-#include "CmpScheduleTimer.h"
 #include "RetainTable.h"
+#include "SchedEvents.h"
 
 static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
 {

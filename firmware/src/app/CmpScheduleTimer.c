@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#include "CmpIecTask.h"
+#include "IecCycle.h"
 #include "SysAtomic.h"
 #include "SysExcept.h"
 #include "SysTime.h"
@@ -72,12 +72,6 @@ static SYS_TIMER_CALLBACK callback_of(RTS_UI32 kind)
     if (kind == KIND_FREEWHEELING)
         return SCHED_FREEWHEELING_IN_TIMERS ? run_freewheeling : NULL;
     return SCHED_EVENTS_IN_TIMERS ? run_events : NULL;
-}
-
-void SchedWake(RTS_UI32 task)
-{
-    if (SCHED_EVENTS_IN_TIMERS)
-        SysTimerTrigger(schedule.timer[task], 0);
 }
 
 RTS_UI32 SchedGetOverruns(RTS_UI32 task)
@@ -148,7 +142,7 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
     RTS_UI32 i;
 
     delete_timers();
-    TriggerCreate(tasks, count, areas);
+    TriggerCreate(tasks, count, areas, schedule.timer);
     for (i = 0; i < count && result == ERR_OK; i++)
         result = add_task(&tasks[i]);
     if (result != ERR_OK)

@@ -13,9 +13,10 @@
 #include <string.h>
 
 #include "CmpChecksum.h"
-#include "CmpIecTask.h"
-#include "CmpScheduleTimer.h"
+#include "CmpItf.h"
+#include "SchedEvents.h"
 #include "SysAtomic.h"
+#include "SysTimer.h"
 #include "rts_config.h"
 
 /* Events are counted modulo 65536: fewer may wait. */
@@ -33,6 +34,8 @@ static struct {
     TRIGGER list[APP_MAX_TASKS];
 } triggers;
 
+static const RTS_HANDLE *timers; /* of the tasks, where SCHED_EVENTS_IN_TIMERS */
+
 enum { PLACES = SCHED_MAX_EXTERNAL_EVENTS > 0 ? SCHED_MAX_EXTERNAL_EVENTS : 1 };
 static RTS_UI32 events[PLACES]; /* CRC of the name, 0: free */
 
@@ -44,6 +47,13 @@ void TriggerReset(void)
 }
 
 /* ---- counting ---- */
+
+/* Where tasks that wait for events run in main, a pass of it comes soon. */
+static void wake(RTS_UI32 task)
+{
+    if (SCHED_EVENTS_IN_TIMERS && timers != NULL)
+        SysTimerTrigger(timers[task], 0);
+}
 
 static RTS_UI32 is_true(const CDL_TASK *task)
 {
@@ -60,7 +70,7 @@ static void note(RTS_UI32 task)
     for (; is_true(&triggers.tasks[task]) != (before & 1); before = SysAtomicLoad(changes)) {
         (void)SysAtomicReplace(changes, before, before + 1); /* or another context did; and may not have woken it yet */
         if ((before & 1) == 0)
-            SchedWake(task);
+            wake(task);
     }
 }
 
@@ -110,12 +120,13 @@ RTS_UI32 TriggerGetLost(RTS_UI32 task)
 
 /* ---- the tasks ---- */
 
-void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas)
+void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas, const RTS_HANDLE *task_timers)
 {
     memset(&triggers, 0, sizeof triggers);
     triggers.tasks = tasks;
     triggers.areas = areas;
     triggers.count = count;
+    timers = task_timers;
 }
 
 const CDL_TASK *TriggerGetTask(RTS_UI32 task)
@@ -204,7 +215,7 @@ RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event)
         const CDL_TASK *task = &triggers.tasks[i];
         if (task->kind == KIND_EXTERNAL && task->event_offset == events[event]) {
             (void)SysAtomicAdd(&triggers.list[i].changes, 2);
-            SchedWake(i);
+            wake(i);
         }
     }
     return ERR_OK;

@@ -1,0 +1,51 @@
+/*
+ * AppException.h - the exception of the application, and how it gets from a task to main.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * From main only, unless said otherwise. (Shared with the host.)
+ */
+#ifndef APPEXCEPTION_H
+#define APPEXCEPTION_H
+
+#include "CmpStd.h"
+#include "SysStart.h"
+
+/* The last exception; code RTSEXCPT_NOEXCEPTION when there is none. */
+typedef struct {
+    RTS_UI32 code;
+    RTS_UI32 code_offset; /* fault address in the code segment, APP_NO_CODE_OFFSET when it was elsewhere */
+    RTS_I32 task;         /* index of the task, -1 when in initialisation code */
+} APP_EXCEPTION;
+
+#ifndef RTS_CFFI
+/* Called by CmpIecTask in the context of the task whose cycle failed, when no task starts another cycle: sets the
+ * outputs to zero and records the exception. The rest (log, outputs that other tasks have written meanwhile, events)
+ * follows in CH_COMM_CYCLE. */
+void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address);
+
+/* The words for an RTSEXCPT_* code, for the log. From any context. */
+const char *AppExceptionName(RTS_UI32 code);
+
+/* What has happened. `task`: index, -1 in initialisation code. */
+typedef struct {
+    RTS_I32 task;
+    RTS_UI32 code; /* RTSEXCPT_* */
+    uintptr_t address;
+} APP_RAISED;
+
+/* Hands over what a task has raised, once; false when there is nothing. */
+bool AppExceptionTake(APP_RAISED *raised);
+
+/* The exception the application is in from now on; `where` is for the log; "": not known,
+ * because it was in an earlier run. */
+void AppExceptionSet(const APP_EXCEPTION *exception, const char *where);
+
+/* Its code is RTSEXCPT_NOEXCEPTION when there is none. */
+const APP_EXCEPTION *AppExceptionGet(void);
+
+/* Forgets it, and what a task may have raised; no task runs. */
+void AppExceptionClear(void);
+#endif
+
+#endif
