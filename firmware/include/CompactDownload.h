@@ -19,7 +19,8 @@ enum {
     CDL_CRC_OFFSET = 100,
     CDL_BLOB_MAGIC = -1223966498, /* 0xB70BC0DE as a signed enum constant */
     APP_CODE_ALIGN = 16,
-    APP_NAME_SIZE = 60, /* of a name or text in an image that the runtime reads, with NUL */
+    APP_POINTER_SIZE = 8, /* what a variable that is a pointer takes, on every target; the address comes first */
+    APP_NAME_SIZE = 60,   /* of a name or text in an image that the runtime reads, with NUL */
 };
 
 /* Area indices. Code is position independent and holds the constants; the other areas are RAM owned by the runtime. */

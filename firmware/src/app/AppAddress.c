@@ -5,9 +5,12 @@
  */
 #include "AppAddress.h"
 
+#include <string.h>
+
 #include "AppImage.h"
 #include "AppLife.h"
 #include "AppState.h"
+#include "CompactDownload.h"
 
 RTS_UI32 AppGetAreaSize(RTS_UI32 index)
 {
@@ -33,4 +36,26 @@ bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
         }
     }
     return AppImageFind(address, index, offset);
+}
+
+MON_RESULT AppAddressResolve(const AREA_ADDRESS *address, RTS_UI32 size, RTS_UI8 **memory)
+{
+    if (size == 0)
+        return MONITORING_ERR_SIZE_0;
+    if (AppGetAreaSize(address->area) == 0)
+        return MONITORING_ERR_INVALID_AREA;
+    *memory = AppGetAreaAddress(address->area, address->offset, size);
+    return *memory != NULL ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_INDEX;
+}
+
+MON_RESULT AppAddressFollow(AREA_ADDRESS *address)
+{
+    RTS_UI8 *memory;
+    uintptr_t pointer;
+    MON_RESULT result = AppAddressResolve(address, APP_POINTER_SIZE, &memory);
+
+    if (result != MONITORING_ERR_OK)
+        return result;
+    memcpy(&pointer, memory, sizeof(pointer));
+    return AppFindArea(pointer, &address->area, &address->offset) ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_POINTER;
 }
