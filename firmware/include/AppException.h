@@ -19,9 +19,8 @@ typedef struct {
 } APP_EXCEPTION;
 
 #ifndef RTS_CFFI
-/* Called by CmpIecTask in the context of the task whose cycle failed, when no task starts another cycle: sets the
- * outputs to zero and records the exception. The rest (log, outputs that other tasks have written meanwhile, events)
- * follows in CH_COMM_CYCLE. */
+/* Called by the cycle in the context of the task that failed, when the application is in its safe state: records the
+ * exception. The rest (log, outputs that other tasks have written meanwhile, events) follows in CH_COMM_CYCLE. */
 void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address);
 
 /* The words for an RTSEXCPT_* code, for the log. From any context. */

@@ -3,8 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A cycle is: copy the inputs and outputs that others use too, IEC code, copy the changed outputs back, statistics,
- * watchdog (manual 3.4, 3.5, 8.9), events for other tasks.
+ * A cycle is: the phases before the code (CyclePhases.h), with them a copy of the inputs and outputs that others use too,
+ * IEC code, the phases after it, with them the changed outputs, statistics, watchdog (manual 3.4, 3.5, 8.9), events for
+ * other tasks.
  */
 #ifndef IECCYCLE_H
 #define IECCYCLE_H

@@ -75,6 +75,26 @@ RTS_I64 SysTimeGetUsedNs(void)
     return 0;
 }
 
+void AppEnterSafeState(void)
+{
+}
+
+bool CyclePhasesExist(void)
+{
+    return false;
+}
+
+void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task, const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(when);
+    RTS_UNUSED(task);
+    RTS_UNUSED(context);
+}
+
+void CyclePhasesForget(void)
+{
+}
+
 #if APP_IMAGE_SIZE > 0
 bool AppImageSetContext(RTS_UI32 task, IEC_CONTEXT *context)
 {

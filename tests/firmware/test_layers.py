@@ -136,6 +136,11 @@ def test_a_header_declares_the_functions_of_one_source() -> None:
     assert scattered == {}
 
 
+def test_outputs_are_cleared_on_the_one_way_into_the_safe_state() -> None:
+    users = {name for name, path in MODULES.items() if "AppAreasClearOutputs" in _words(_code(path))}
+    assert users == {"AppAreas", "CyclePhases"}
+
+
 def test_a_function_is_declared_in_one_header() -> None:
     places = sorted((name, header) for header, functions in DECLARED.items() for name in functions)
     twice = {name: found for name, group in groupby(places, lambda place: place[0])

@@ -20,6 +20,7 @@
 #include "CmpIecTask.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
+#include "CyclePhases.h"
 #include "SysExcept.h"
 #include "SysFileFlash.h"
 #include "SysFlash.h"
@@ -104,11 +105,11 @@ static void record_exception(const APP_RAISED *raised)
     AppExceptionSet(&exception, raised->task < 0 ? "Initialisation" : app.tables.tasks[raised->task].name);
 }
 
-/* The safe state after an exception: outputs are zero (again, since other tasks have finished their cycle), and an
- * application that is new will not be booted. */
+/* The safe state after an exception (again, since other tasks have finished their cycle); an application that is new
+ * will not be booted. */
 static void enter_exception_state(void)
 {
-    AppAreasClearOutputs();
+    AppEnterSafeState();
     app.state = AS_STOP;
     if (!AppWasBrokenOff())
         (void)AppCommitSetState(app.image.file, SLOT_FAILED);
@@ -273,7 +274,7 @@ bool AppStopTasks(void)
     IecTaskStopAll();
     AppHandlePendingException(); /* one may have come in the last cycle */
     if (app.state == AS_RUN) {
-        AppAreasClearOutputs();
+        AppEnterSafeState();
         app.state = AS_STOP;
         (void)RetainSave(false);
     }
@@ -295,7 +296,7 @@ RTS_RESULT AppStart(void)
     result = IecTaskStartAll();
     if (result != ERR_OK) {
         IecTaskStopAll();
-        AppAreasClearOutputs(); /* some tasks may have run */
+        AppEnterSafeState(); /* some tasks may have run */
         return result;
     }
     app.state = AS_RUN;

@@ -13,6 +13,7 @@
 #include "AppException.h"
 #include "AppImage.h"
 #include "CmpItf.h"
+#include "CyclePhases.h"
 #include "SchedEvents.h"
 #include "SysAtomic.h"
 #include "SysTime.h"
@@ -32,6 +33,7 @@ typedef struct {
     GUARD guard;
     RTS_I64 watchdog_ns; /* 0: none */
     RTS_UI16 sensitivity;
+    bool has_phases;   /* anything before or after its code */
     bool has_copies;   /* of inputs and outputs */
     RTS_UI32 exceeded; /* cycles in a row longer than watchdog_ns */
     RTS_UI32 ms_rest;  /* ns of context.time_ns beyond context.time_ms */
@@ -211,8 +213,28 @@ static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
     SysAtomicStore(&tasks.running, 0);
     guard_end(&task->guard);
+    AppEnterSafeState(); /* at once: main may be busy with the flash */
     AppHandleException((RTS_I32)index_of(task), code, address);
     return 0;
+}
+
+static void run_phases_before(TASK *task)
+{
+    CyclePhasesRun(CYCLE_INPUTS, index_of(task), &task->context);
+    if (task->has_copies || !CyclePhasesExist())
+        AppImageCopyIn(index_of(task));
+    CyclePhasesRun(CYCLE_BEFORE_CODE, index_of(task), &task->context);
+}
+
+static void run_phases_after(TASK *task)
+{
+    CyclePhasesRun(CYCLE_AFTER_CODE, index_of(task), &task->context);
+    if (task->has_copies || !CyclePhasesExist())
+        AppImageCopyOut(index_of(task), &tasks.running);
+    if (CyclePhasesExist() && SysAtomicLoad(&tasks.running)) {
+        CyclePhasesRun(CYCLE_OUTPUTS, index_of(task), &task->context);
+        CyclePhasesRun(CYCLE_RECORD, index_of(task), &task->context);
+    }
 }
 
 /* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
@@ -225,12 +247,12 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
 
     set_time(task, start_ns - tasks.time_zero);
     guard_begin(&task->guard, start_ns);
-    if (task->has_copies)
-        AppImageCopyIn(index_of(task));
+    if (task->has_phases)
+        run_phases_before(task);
     if (SysExceptTry(run_entry, task, &exception))
         return end_with_exception(task, exception.code, exception.address);
-    if (task->has_copies)
-        AppImageCopyOut(index_of(task), &tasks.running);
+    if (task->has_phases)
+        run_phases_after(task);
     elapsed_ns = SysTimeGetNs() - start_ns;
     account(task, start_ns - due_ns, elapsed_ns);
     if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
@@ -350,6 +372,7 @@ static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *protot
     task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
     task->context = *prototype;
     task->has_copies = AppImageSetContext(index_of(task), &task->context);
+    task->has_phases = task->has_copies || CyclePhasesExist();
     task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
     task->record = record;
     task->min_ns = 0xFFFFFFFFu;
@@ -392,6 +415,7 @@ void IecCycleForget(void)
     CMP_CLEAR(tasks);
     if (!RTS_ONE_CORE)
         CMP_CLEAR(moment);
+    CyclePhasesForget();
     tasks.init_guard.limit_ns = (RTS_I64)APP_INIT_WATCHDOG_US * NS_PER_US;
 }
 
