@@ -81,21 +81,11 @@ typedef struct {
     const char *name;
 } CMP_NAME;
 
-/* The port's list, system components first. Names are apart from the hooks: where nobody asks for them they take no
+/* The port's list, in the order of CmpOrder.h. Names are apart from the hooks: where nobody asks for them they take no
  * flash. */
 extern const PF_HOOK_FUNCTION cmp_hooks[];
 extern const CMP_NAME cmp_names[];
 extern const RTS_SIZE cmp_component_count;
-
-/* Defines the list from a macro of the port that names the components, COMPONENTS(X) being X(CmpLog) X(CmpSrv) and so
- * on. CmpLog has the hook CmpLog_Hook and the number CMPID_CmpLog. */
-#define CMP_LIST(components)                                                                \
-    components(CMP_DECLARE) const PF_HOOK_FUNCTION cmp_hooks[] = {components(CMP_HOOK_OF)}; \
-    const CMP_NAME cmp_names[] = {components(CMP_NAME_OF)};                                 \
-    const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_hooks)
-#define CMP_DECLARE(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
-#define CMP_HOOK_OF(component) component##_Hook,
-#define CMP_NAME_OF(component) {CMPID_##component, #component},
 
 /* Runs all CH_INIT_* hooks. On an error the ones that ran are undone by their CH_EXIT_* and the error is returned. */
 RTS_RESULT CMInit(void);

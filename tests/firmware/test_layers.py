@@ -69,7 +69,7 @@ def _included(path: Path) -> set[str]:
     return found
 
 
-def _stands_on(module: str) -> set[str]:
+def stands_on(module: str) -> set[str]:
     """The modules whose functions a module uses."""
     used = _words(_code(MODULES[module])) & {name for header in _included(MODULES[module]) & HEADERS.keys()
                                              for name in DECLARED[header]}  # fmt: skip
@@ -97,12 +97,12 @@ def _knows(module: str) -> set[str]:
 def test_the_sources_are_read_as_meant() -> None:
     assert len(MODULES) > 40
     assert "LogAddEntry" in DEFINED["CmpLog"]
-    assert {"SysFlashLog", "CmpLog"} <= _stands_on("CmpRetain")
+    assert {"SysFlashLog", "CmpLog"} <= stands_on("CmpRetain")
     assert {"SysFlashLog", "CmpLog", "IecCycle"} <= _knows("CmpRetain")
 
 
 def test_no_modules_stand_on_each_other_in_a_circle() -> None:
-    TopologicalSorter({name: _stands_on(name) for name in MODULES}).prepare()  # raises CycleError, which names it
+    TopologicalSorter({name: stands_on(name) for name in MODULES}).prepare()  # raises CycleError, which names it
 
 
 def test_no_modules_include_the_headers_of_each_other_in_a_circle() -> None:
