@@ -330,7 +330,7 @@ static void a_cycle_that_ends_in_time_is_not_broken_by_a_stop(void)
 static void *run_init(void *broken)
 {
     RTS_EXCEPTION exception;
-    *(bool *)broken = IecTaskRunGuarded((void (*)(void *))(uintptr_t)loop, NULL, &exception) != 0 &&
+    *(bool *)broken = !IecTaskRunGuarded((void (*)(void *))(uintptr_t)loop, NULL, &exception) &&
                       exception.code == RTSEXCPT_STOP_TIMEOUT;
     return NULL;
 }
