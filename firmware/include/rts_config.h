@@ -200,7 +200,8 @@
 #define CHECKSUM_TABLE_ENTRIES 16
 #endif
 
-/* Settings of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. */
+/* Settings of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. plcrt looks for
+ * {"SysTarget", "NodeName", 0, "name in a scan"}. */
 #ifndef SETTINGS_TABLE
 #define SETTINGS_TABLE
 #endif
