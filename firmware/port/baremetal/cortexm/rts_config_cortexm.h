@@ -36,7 +36,9 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #endif
 
 /* Tasks that wait for an event run in a line of their own, too. */
+#ifndef SCHED_EVENTS_IN_TIMERS
 #define SCHED_EVENTS_IN_TIMERS 1
+#endif
 
 /* Stack of the application code of one task, bytes: a multiple of 32, which are lost to the guard below it. */
 #ifndef RTS_IEC_STACK_SIZE
