@@ -158,7 +158,7 @@ def test_read_shows_values_as_st_writes_them(tool: Any, running: FakePlc) -> Non
 
 def test_read_says_when_the_values_are_not_of_one_cycle(tool: Any, running: FakePlc) -> None:
     running.disturbed = 1000
-    assert "more than one cycle" in tool("read", *PORT, "Main.count", "Main.ok").err
+    assert "different cycles" in tool("read", *PORT, "Main.count", "Main.ok").err
     assert tool("read", *PORT, "Main.count", "Main.ok", "--json").json["consistent"] is False
 
 

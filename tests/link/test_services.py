@@ -76,7 +76,7 @@ def test_broken_headers_are_link_errors(data: bytes) -> None:
 
 def test_the_answer_to_something_else_is_a_link_error() -> None:
     request = l7.Message(1, 2, 0, b"")
-    with pytest.raises(LinkError, match="another request"):
+    with pytest.raises(LinkError, match="not for the request"):
         l7.decode_reply(l7.encode(l7.Message(0x81, 3, 0, b"")), request)
 
 
