@@ -129,7 +129,7 @@ RTS_NOINLINE void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size
 
 /* Of the linker script. Where the areas begin and end is a multiple of an eighth of their size, rounded up to a power
  * of 2 (APP_AREAS_ALIGNED): so two regions of that size next to each other hold them. */
-extern RTS_UI8 areas_start[], areas_end[], gates_start[], gates_end[];
+extern RTS_UI8 areas_start[], areas_end[];
 
 static void allow_areas(void)
 {
@@ -247,7 +247,7 @@ __attribute__((naked, noinline)) static RTS_UI64 try_enter(void (*fn)(void *arg)
                      "pop {r3-r11, pc}");
 }
 
-static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
+__attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 {
     TRY *try = state.top;
     if (try == state.tries + APP_MAX_TASKS)
@@ -274,7 +274,7 @@ static int is_readable(const TRY *try, uintptr_t stack)
 
 /* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return,
  * because try_enter used the FPU, so that the frame returned to has one too. */
-static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link)
+__attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link)
 {
     TRY *try = --state.top;
     if (code != RTSEXCPT_NOEXCEPTION && is_readable(try, stack))
@@ -300,13 +300,8 @@ __attribute__((naked)) static void gate_return(void)
                      "i"((int)offsetof(TRY, gate) - (int)sizeof(TRY)), "i"(CONTROL_NPRIV));
 }
 
-static int is_gate(const FRAME *frame)
-{
-    return frame->pc - (uintptr_t)gates_start < (uintptr_t)(gates_end - gates_start);
-}
-
 /* A function with a gate that calls another by its gate has the privileges. */
-static void open_gate(FRAME *frame)
+__attribute__((used)) static void open_gate(FRAME *frame)
 {
     TRY *try = state.top - 1;
     if (try->gate != 0)
@@ -316,9 +311,13 @@ static void open_gate(FRAME *frame)
     set_control(0);
 }
 
+/* Goes to 1 unless the SVC was that of a gate. Most code lies behind the gates. */
+#define LOOK_FOR_A_GATE                                                                                       \
+    "mrs r0, psp\n\tldr r2, [r0, #24]\n\tmovw r3, #:lower16:gates_end\n\tmovt r3, #:upper16:gates_end\n\t"     \
+    "cmp r2, r3\n\tbhs 1f\n\tmovw r3, #:lower16:gates_start\n\tmovt r3, #:upper16:gates_start\n\tcmp r2, r3\n\t" \
+    "blo 1f\n\tpush {r3, lr}\n\tbl open_gate\n\tpop {r3, pc}\n"
 #else
-#define is_gate(frame) 0
-#define open_gate(frame) ((void)(frame))
+#define LOOK_FOR_A_GATE ""
 #endif
 
 /* ---- handlers ---- */
@@ -328,21 +327,13 @@ static void open_gate(FRAME *frame)
     __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\t" \
                      "bl " #function "\n\tbx r0")
 
-/* From the main stack the call enters; from the process stack it leaves, unless it is that of a gate. */
-__attribute__((used)) static RTS_UI32 svc_dispatch(FRAME *frame, RTS_UI32 exc_return)
-{
-    if (!(exc_return & EXC_RETURN_PSP))
-        return enter(frame, exc_return);
-    if (!is_gate(frame))
-        return leave(frame->r0, frame->r1, frame->r2, frame->r3);
-    open_gate(frame);
-    return exc_return;
-}
-
+/* From the main stack the call enters. From the process stack it leaves, with what is in r0 to r3 of its frame, unless
+ * it is that of a gate. */
 __attribute__((naked)) void SvcHandler(void);
 void SvcHandler(void)
 {
-    DISPATCH(svc_dispatch);
+    __asm__ volatile("tst lr, #4\n\tbne 2f\n\tmrs r0, msp\n\tmov r1, lr\n\tbl enter\n\tbx r0\n"
+                     "2:\n\t" LOOK_FOR_A_GATE "1:\n\tmrs r12, psp\n\tldm r12, {r0-r3}\n\tbl leave\n\tbx r0");
 }
 
 /* The stack pointer before the exception pushed its frame, with or without the FPU's registers; for the trace alone. */
@@ -509,10 +500,10 @@ void SysExceptBreak(const void *arg, RTS_UI32 code)
     }
 }
 
-/* When a large frame leaves no room for that of the fault, its place is lost: then find_caller finds the entry, as what
- * a call in its first instruction would return to. */
+/* When a large frame leaves no room for that of the fault, its place is lost: then find_caller finds the entry, behind
+ * the instructions that make its frame and have no line. */
 #if RTS_IEC_UNPRIVILEGED
-#define PUSH_ENTRY "adds r3, r2, #2\n\tpush {r3, r9}\n\tpush {r9, lr}\n\t"
+#define PUSH_ENTRY "add r3, r2, #10\n\tpush {r3, r9}\n\tpush {r9, lr}\n\t"
 #define RETURN "pop {r9, lr}\n\tadd sp, #8\n\tbx lr"
 #else
 #define PUSH_ENTRY "push {r9, lr}\n\t"
