@@ -1,12 +1,12 @@
-"""A program that writes where it must not, in the configuration where the MPU keeps it from doing so: it is stopped, the
-place is named, nothing was changed, and whoever keeps to its own memory does not notice that there is an MPU."""
+"""A program that writes where it must not, where the MPU keeps it from doing so: it is stopped, the place is named, nothing
+was changed; and whoever keeps to its own memory does not notice that there is an MPU."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import pytest
-from environment import eventually
+from environment import MACHINE, eventually
 from programs import Built, program
 from qemu import Board
 
@@ -69,8 +69,9 @@ TARGETS: dict[str, Callable[[Board], int]] = {
     "vectors": lambda board: 0x40,
     "code of the runtime": lambda board: board.address_of("IecCall") & ~3,
     "peripheral": lambda board: PERIPHERAL,
-    "register of the processor": lambda board: REGISTER,
 }
+if MACHINE != "lm3s6965evb":  # of which QEMU's model passes over what the bus refuses
+    TARGETS["register of the processor"] = lambda board: REGISTER
 
 
 @pytest.fixture
@@ -185,9 +186,8 @@ def test_program_runs_while_the_flash_is_written(full: Board, build) -> None:
     with Plc(Connection(full.line())) as plc:
         plc.flash(build(text).path)
         for _ in range(3):
-            before = plc.read("Main.n")
-            plc.flash(build(text).path, start=True)
-            eventually(lambda before=before: plc.read("Main.n") > 50)
+            eventually(lambda: plc.read("Main.n") > 50)
+            plc.flash(build(text).path)
         assert plc.status().state is AppState.RUN
 
 

@@ -68,7 +68,8 @@ static void store_four_words(void *arg)
 static void push_there(void *arg)
 {
     const STORE *store = arg;
-    __asm__ volatile("adds r3, %0, #4\n\tmov sp, r3\n\tpush {%1}\n\tmovs r0, #0\n\tsvc 0" ::"r"(store->address), "r"(store->value)
+    __asm__ volatile("adds r3, %0, #4\n\tmov sp, r3\n\tpush {%1}\n\tmovs r0, #0\n\tsvc 0" ::"r"(store->address),
+                     "r"(store->value)
                      : "r3", "memory");
 }
 
@@ -79,8 +80,7 @@ static void store_by_unprivileged_instruction(void *arg)
 }
 
 static void (*const stores[])(void *) = {
-    store_byte,       store_half, store_word,
-    store_two_words,  push_there, store_by_unprivileged_instruction,
+    store_byte,       store_half, store_word, store_two_words, push_there, store_by_unprivileged_instruction,
     store_four_words,
 };
 
@@ -160,15 +160,24 @@ static void store_into_vectors_is_stopped(void)
 static void store_into_registers_is_stopped(void)
 {
     static const uintptr_t registers[] = {
-        0x40000000,                                                 /* peripherals */
-        0x42000000,                                                 /* their bits */
-        0x22000000 + ((uintptr_t)IEC_STACKS & 0xFFFFF) * 32,        /* bits of RAM */
-        0xE000E010, 0xE000E100, 0xE000ED08, 0xE000ED94, 0xE000EDA0, /* SysTick, NVIC, VTOR, MPU */
+        0x40000000,                                          /* peripherals */
+        0x42000000,                                          /* their bits */
+        0x22000000 + ((uintptr_t)IEC_STACKS & 0xFFFFF) * 32, /* bits of RAM */
     };
-    RTS_UI32 mpu = MPU_CTRL;
     for (RTS_UI32 i = 0; i < RTS_COUNT(registers); i++)
         expect_stopped(registers[i]);
-    CHECK_EQUAL(MPU_CTRL, mpu);
+}
+
+/* Of SysTick, NVIC, SCB and MPU. They are no matter of the MPU: the bus refuses, of which there is no exception in QEMU's
+ * model of one chip (test_wild_writes.py has the others). */
+static void store_into_registers_of_the_processor_changes_nothing(void)
+{
+    static const uintptr_t registers[] = {0xE000E014, 0xE000E100, 0xE000ED08, 0xE000ED14, 0xE000ED94, 0xE000EDA0};
+    for (RTS_UI32 i = 0; i < RTS_COUNT(registers); i++) {
+        RTS_UI32 before = REG32(registers[i]);
+        (void)may_store(registers[i], ~before);
+        CHECK_EQUAL(REG32(registers[i]), before);
+    }
 }
 
 static void jump_there(void *arg)
@@ -217,13 +226,13 @@ static RTS_UI32 random_number(void)
     return random_state;
 }
 
-/* Half of them anywhere, half of them where there is RAM. */
+/* Half of them where there is RAM, half of them anywhere but among the registers of the processor. */
 static uintptr_t random_address(RTS_UI32 round)
 {
     extern RTS_UI8 end[];
     RTS_UI32 number = random_number();
     if (round % 2)
-        return number & ~3u;
+        return number >> 20 == 0xE00 ? 0 : number & ~3u;
     return IEC_STACKS + number % ((uintptr_t)end - IEC_STACKS) / 4 * 4;
 }
 
@@ -344,8 +353,8 @@ static void main_keeps_its_rights_below_tasks(void)
 /* ---- gates ---- */
 
 /* As a program has it, in its import table. */
-#define IMPORT(function)  \
-    APP_GATE(function); \
+#define IMPORT(function) \
+    APP_GATE(function);  \
     static __typeof__(function) *const volatile imported_##function = (__typeof__(function) *)APP_GATED(function)
 
 /* Arguments in registers and on the stack, and a result of two registers. */
@@ -512,6 +521,7 @@ int main(void)
     TEST_RUN(store_into_code_is_stopped);
     TEST_RUN(store_into_vectors_is_stopped);
     TEST_RUN(store_into_registers_is_stopped);
+    TEST_RUN(store_into_registers_of_the_processor_changes_nothing);
     TEST_RUN(data_is_not_executed);
     TEST_RUN(rights_cannot_be_taken);
     TEST_RUN(store_lands_in_the_areas_or_on_the_stack_or_is_stopped);

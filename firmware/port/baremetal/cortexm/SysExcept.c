@@ -312,8 +312,8 @@ __attribute__((used)) static void open_gate(FRAME *frame)
 }
 
 /* Goes to 1 unless the SVC was that of a gate. Most code lies behind the gates. */
-#define LOOK_FOR_A_GATE                                                                                       \
-    "mrs r0, psp\n\tldr r2, [r0, #24]\n\tmovw r3, #:lower16:gates_end\n\tmovt r3, #:upper16:gates_end\n\t"     \
+#define LOOK_FOR_A_GATE                                                                                          \
+    "mrs r0, psp\n\tldr r2, [r0, #24]\n\tmovw r3, #:lower16:gates_end\n\tmovt r3, #:upper16:gates_end\n\t"       \
     "cmp r2, r3\n\tbhs 1f\n\tmovw r3, #:lower16:gates_start\n\tmovt r3, #:upper16:gates_start\n\tcmp r2, r3\n\t" \
     "blo 1f\n\tpush {r3, lr}\n\tbl open_gate\n\tpop {r3, pc}\n"
 #else

@@ -56,11 +56,11 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #define APP_AREAS_ALIGNED(size) __attribute__((aligned((size) > 256 ? 1 << (RTS_LOG2((size) - 1) - 2) : 32)))
 #define APP_AREAS_SECTION __attribute__((section(".bss.areas")))
 
-#define APP_GATE(function)                                                                               \
-    __attribute__((naked, section(".text.gate." #function))) static void function##_gate(void)           \
-    {                                                                                                    \
-        __asm__ volatile("svc 1\n\tb %c0" ::"i"(function));                                              \
-    }                                                                                                    \
+#define APP_GATE(function)                                                                             \
+    __attribute__((naked, unused, section(".text.gate." #function))) static void function##_gate(void) \
+    {                                                                                                  \
+        __asm__ volatile("svc 1\n\tb %c0" ::"i"(function));                                            \
+    }                                                                                                  \
     RTS_STATIC_ASSERT(1, function##_has_a_gate)
 #define APP_GATED(function) function##_gate
 #endif
