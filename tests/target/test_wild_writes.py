@@ -1,5 +1,5 @@
-"""A program that writes where it must not, where the MPU keeps it from doing so: it is stopped, the place is named, nothing
-was changed; and whoever keeps to its own memory does not notice that there is an MPU."""
+"""A program that writes where it must not, where the MPU keeps it from doing so: it is stopped, the place is named,
+nothing was changed; and who keeps to its own memory does not notice that there is an MPU."""
 
 from __future__ import annotations
 
