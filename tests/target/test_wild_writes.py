@@ -11,10 +11,10 @@ from programs import Built, program
 from qemu import Board
 
 from plctool.core import lib
+from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
-from plctool.symbols import symbol_path
 
 STATEMENT = "p^ := 16#5A5A_A5A5;"
 TEXT = f"""
@@ -189,5 +189,3 @@ def test_program_runs_while_the_flash_is_written(full: Board, build) -> None:
             eventually(lambda: plc.read("Main.n") > 50)
             plc.flash(build(text).path)
         assert plc.status().state is AppState.RUN
-
-
