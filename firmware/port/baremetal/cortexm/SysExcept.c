@@ -177,9 +177,23 @@ static void take_rights(TRY *try)
     allow_stack(stack_slot(try));
 }
 
+/* FPU registers of the function that is left may still wait to be saved on its stack, with its rights. Another interrupt
+ * may come before the exception return that gives them up: it would save them where these rights do not reach any more.
+ * Those that wait for privileged code are of the frame that is returned to. */
+static void drop_fpu_context(void)
+{
+#ifdef __ARM_FP
+    enum { FPCCR_LSPACT = 1, FPCCR_USER = 2 };
+    RTS_UI32 control = FPU_FPCCR;
+    if ((control & (FPCCR_LSPACT | FPCCR_USER)) == (FPCCR_LSPACT | FPCCR_USER))
+        FPU_FPCCR = control & ~(RTS_UI32)FPCCR_LSPACT;
+#endif
+}
+
 /* The slot of the depth below lies above; of main, which has all rights, none does, but nobody runs that it matters to. */
 static void give_back_rights(const TRY *try)
 {
+    drop_fpu_context();
     set_control(try->outer_control);
     allow_stack((uintptr_t)(try->first + 1));
 }
