@@ -8,7 +8,7 @@ import pytest
 
 from plctool.compiler import compile_sources, load_sources
 from plctool.compiler.front import check_sources
-from plctool.compiler.source_files import structured_text
+from plctool.compiler.formats.twincat import read_object
 from plctool.errors import UsageError
 from plctool.sim import Simulator
 
@@ -134,18 +134,121 @@ def test_errors_in_twincat_files_have_the_line_and_column_of_the_file(tmp_path: 
     assert line[found[0].column - 1 :].startswith("FB_Missing")
 
 
-def test_lines_of_twincat_files_stay_where_they_are() -> None:
-    text = structured_text(BLOCK, Path("FB_Counter.TcPOU"))
-    for number, line in enumerate(BLOCK.splitlines()):
-        if "CDATA" not in line and "<" not in line:
-            assert text.splitlines()[number] == line
+def test_every_line_of_a_twincat_file_is_found_again() -> None:
+    source = read_object("FB_Counter.TcPOU", BLOCK)
+    at = 0
+    found = 0
+    for line in source.text.splitlines(keepends=True):
+        pos = source.pos(at)
+        at += len(line)
+        if not line.startswith(("END_", "ACTION", "GET")) or line == "END_VAR\n":
+            assert source.line_text(pos.line)[pos.column - 1 :].startswith(line.strip("\n")) or not line.strip()
+            found += bool(line.strip())
+    assert found > 20
 
 
-def test_charts_and_diagrams_of_twincat_are_refused_by_name(tmp_path: Path) -> None:
+def test_a_chart_of_twincat_is_named_and_the_rest_is_checked(tmp_path: Path) -> None:
+    (tmp_path / "FB_Chart.TcPOU").write_text(
+        xml("""  <POU Name="FB_Chart"><Declaration><![CDATA[FUNCTION_BLOCK FB_Chart
+VAR_OUTPUT ready : BOOL; END_VAR]]></Declaration>
+    <Implementation><CFC><XmlArchive/></CFC></Implementation></POU>""")
+    )
+    (tmp_path / "MAIN.st").write_text(
+        "PROGRAM MAIN\nVAR f : FB_Chart; b : BOOL; END_VAR\nf();\nb := f.redy;\nEND_PROGRAM"
+    )
+    found = [d for d in check_sources(load_sources([tmp_path])).diagnostics if d.severity == "error"]
+    assert [(d.line, d.code) for d in found] == [(5, "language"), (4, "unknown")]
+    assert found[0].message == "FB_Chart is written in CFC; only Structured Text can be compiled"
+
+
+def test_all_diagrams_are_listed_however_many_there_are(tmp_path: Path) -> None:
+    for i in range(30):
+        (tmp_path / f"P{i}.TcPOU").write_text(
+            MAIN.replace("MAIN", f"P{i}").replace("<ST>", "<NWL>").replace("</ST>", "</NWL>")
+        )
+    result = check_sources(load_sources([tmp_path]))
+    assert sum(d.code == "language" for d in result.diagnostics) == 30
+    assert not result.ok
+
+
+def test_a_cut_off_twincat_file_is_an_error_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "MAIN.TcPOU"
-    path.write_text(MAIN.replace("<ST>", "<SFC>").replace("</ST>", "</SFC>"), "utf-8")
-    with pytest.raises(UsageError, match="holds SFC; only Structured Text"):
-        load_sources([path])
+    path.write_text(MAIN[: MAIN.index("</POU>")])
+    (found,) = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
+    assert found.code == "xml"
+    assert found.line == len(path.read_text().splitlines())
+
+
+TASK = xml("""  <Task Name="Fast Task" Id="{1}">
+    <!--CycleTime in micro seconds.-->
+    <CycleTime>2000</CycleTime>
+    <Priority>20</Priority>
+    <PouCall>
+      <Name>MAIN</Name>
+    </PouCall>
+    <PouCall>
+      <Name>VisuElems.Visu_Prg</Name>
+    </PouCall>
+  </Task>""")
+COUNTING = MAIN.replace("counter : FB_Counter;\n    ", "").replace(
+    "counter();\nsum := counter.Add(GVL_Limits.highest);\nwidth := counter.Step;", "sum := sum + 1;"
+)
+
+
+def test_a_task_of_twincat_has_its_cycle_time_and_programs(tmp_path: Path) -> None:
+    (tmp_path / "MAIN.TcPOU").write_text(COUNTING)
+    (tmp_path / "Fast.TcTTO").write_text(TASK)
+    program = check_sources(load_sources([tmp_path])).program
+    assert program is not None
+    (task,) = program.tasks
+    assert (task.name, task.interval_us, task.priority) == ("Fast_Task", 2000, 20)
+    with started(tmp_path) as plc:
+        plc.run_cycles(3)
+        assert plc.read("MAIN.sum") == 3
+
+
+def test_a_program_that_a_task_of_twincat_misses_is_reported_in_the_task_file(tmp_path: Path) -> None:
+    (tmp_path / "MAIN.TcPOU").write_text(COUNTING)
+    (tmp_path / "Fast.TcTTO").write_text(TASK.replace("MAIN", "MIAN"))
+    (found,) = [d for d in check_sources(load_sources([tmp_path])).diagnostics if d.severity == "error"]
+    assert Path(found.file).name == "Fast.TcTTO"
+    assert "MIAN" in TASK.splitlines()[found.line] or "PouCall" in TASK.splitlines()[found.line]
+
+
+PROJECT = """<Project>
+  <ItemGroup>
+    <Compile Include="POUs\\Main.TcPOU"><SubType>Code</SubType></Compile>
+    <Compile Include="Old.TcPOU"><ExcludeFromBuild>true</ExcludeFromBuild></Compile>
+  </ItemGroup>
+</Project>
+"""
+
+
+def test_the_project_file_of_twincat_says_which_files_belong(tmp_path: Path) -> None:
+    (tmp_path / "pous").mkdir()
+    (tmp_path / "pous" / "MAIN.TcPOU").write_text(COUNTING)
+    (tmp_path / "Old.TcPOU").write_text("garbage")
+    (tmp_path / "Forgotten.TcPOU").write_text("garbage")
+    project = tmp_path / "plant.plcproj"
+    project.write_text(PROJECT)
+    assert [Path(s.path).name for s in load_sources([tmp_path])] == ["MAIN.TcPOU"]
+    assert [Path(s.path).name for s in load_sources([project])] == ["MAIN.TcPOU"]
+    solution = tmp_path / "plant.tsproj"
+    solution.write_text('<TcSmProject><Project PrjFilePath="plant.plcproj"/></TcSmProject>')
+    assert [Path(s.path).name for s in load_sources([solution])] == ["MAIN.TcPOU"]
+
+
+def test_a_missing_file_of_a_twincat_project_is_named(tmp_path: Path) -> None:
+    (tmp_path / "plant.plcproj").write_text(PROJECT)
+    with pytest.raises(UsageError, match=r"plant.plcproj:3: POUs.Main.TcPOU belongs to the project but is missing"):
+        load_sources([tmp_path])
+
+
+def test_several_twincat_projects_in_a_folder_are_named(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.plcproj").write_text(PROJECT)
+    with pytest.raises(UsageError, match=r"several PLC projects .* give one of them: .*a.plcproj, .*b.plcproj"):
+        load_sources([tmp_path])
 
 
 def test_a_folder_without_sources_says_what_sources_are(tmp_path: Path) -> None:

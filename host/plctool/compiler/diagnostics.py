@@ -18,6 +18,7 @@ Severity = Literal["error", "warning"]
 
 MAX_ERRORS = 20  # what follows is seldom news
 MAX_MESSAGE = 300  # characters; names may be of any length
+_UNCOUNTED = frozenset(("language",))  # errors that hide no others
 MAX_LINE = 160  # characters of a source line that are shown with a finding
 
 
@@ -47,6 +48,7 @@ class Diagnostics:
         self._muted: dict[tuple[str, str], LineRanges] = {}
         self._found: dict[Diagnostic, None] = {}
         self.errors = 0
+        self._counted = 0  # errors that are counted to MAX_ERRORS
 
     def error(self, pos: Pos, code: str, message: str) -> None:
         """Records an error; raises TooManyErrors when it is one too many."""
@@ -65,13 +67,22 @@ class Diagnostics:
     def mute(self, source: Source) -> None:
         """Heeds the pragmas of a text that turn warnings off."""
         for code, ranges in switched_off(source).items():
-            self._muted[source.path, code] = ranges
+            self._muted.setdefault((source.path, code), []).extend(ranges)
+
+    def found_by_reader(self, source: Source) -> None:
+        """Takes over what the reader of a file found. Diagrams do not count: all are named, and the rest is checked."""
+        for found in source.findings:
+            pos = Pos(source.path, found.line, found.column)
+            if found.severity == "warning":
+                self.warning(pos, found.code, found.message)
+            else:
+                self._add(pos, "error", found.code, found.message, counts=found.code not in _UNCOUNTED)
 
     def at(self, source: Source) -> SourceDiagnostics:
         """Reports by offset in a source."""
         return SourceDiagnostics(self, source)
 
-    def _add(self, pos: Pos, severity: Severity, code: str, message: str) -> None:
+    def _add(self, pos: Pos, severity: Severity, code: str, message: str, *, counts: bool = True) -> None:
         if len(message) > MAX_MESSAGE:
             message = message[: MAX_MESSAGE - 3] + "..."
         diagnostic = Diagnostic(pos.file, pos.line, pos.column, severity, code, message)
@@ -80,7 +91,8 @@ class Diagnostics:
         self._found[diagnostic] = None
         if severity == "error":
             self.errors += 1
-            if self.errors >= MAX_ERRORS:
+            self._counted += counts
+            if self._counted >= MAX_ERRORS:
                 raise TooManyErrors
 
     def sorted(self) -> list[Diagnostic]:
@@ -119,7 +131,7 @@ def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
 def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> list[str]:
     """All findings as people read them, and whether there may be more."""
     texts = [render(d, sources) for d in diagnostics]
-    if sum(d.severity == "error" for d in diagnostics) >= MAX_ERRORS:
+    if sum(d.severity == "error" and d.code not in _UNCOUNTED for d in diagnostics) >= MAX_ERRORS:
         texts.append(f"There may be more than these {MAX_ERRORS} errors; correct some and check again.")
     return texts
 

@@ -92,7 +92,10 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
 def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
     world = program.world
     texts = [(source, parse_all(source, world.diagnostics.at(source).error)) for source in sources]
-    if world.diagnostics.errors:
+    syntax_errors = world.diagnostics.errors
+    for source in sources:
+        world.diagnostics.found_by_reader(source)
+    if syntax_errors:
         return None
     parsed = [(source, _looked_at(source, text, world.diagnostics)) for source, text in texts]
     tests = None if suite is None else suite.begin(program)

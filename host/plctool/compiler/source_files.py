@@ -1,4 +1,4 @@
-"""Reads source files: Structured Text in any usual encoding, and the XML that TwinCAT 3 keeps it in.
+"""Finds and reads source files: Structured Text in any usual encoding, and what other systems keep it in.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -6,34 +6,82 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import codecs
-import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from plctool.compiler.formats import twincat
 from plctool.compiler.source import Source
-from plctool.compiler.syntax.lexer import Lexer
 from plctool.errors import UsageError
 
-SUFFIXES = frozenset((".st", ".exp", ".tcpou", ".tcgvl", ".tcdut", ".tcio"))
-"""Of files that are taken from folders, in lower case: Structured Text, exports of CODESYS 2, TwinCAT 3."""
+Reader = Callable[[str, str], list[Source]]
+"""Makes sources from the path and the text of a file."""
 
-_UNITS = frozenset(("FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "INTERFACE"))
-_PART = re.compile(
-    r"<!\[CDATA\[(?P<code>.*?)\]\]>|<(?P<tag>/?\w+)(?:[^>]*?\bName=\"(?P<name>[^\"]*)\")?[^>]*?(?P<empty>/?)>",
-    re.DOTALL,
-)
-_OTHER_LANGUAGES = frozenset(("SFC", "NWL", "FBD", "LD", "IL", "CFC"))
+
+def _plain(path: str, text: str) -> list[Source]:
+    return [Source(path, text)]
+
+
+def _twincat(path: str, text: str) -> list[Source]:
+    return [twincat.read_object(path, text)]
+
+
+READERS: dict[str, Reader] = {
+    ".st": _plain,
+    ".exp": _plain,
+    **dict.fromkeys((".tcpou", ".tcgvl", ".tcdut", ".tcio", ".tctto"), _twincat),
+}
+"""How a file is read, by its suffix in lower case."""
+
+SUFFIXES = frozenset(READERS)
+"""Of files that are taken from folders, in lower case."""
+
+
+def load(paths: Iterable[Path]) -> list[Source]:
+    """The files named, those of projects named, and all sources in folders named.
+
+    Raises OSError when one cannot be read, UsageError when there is nothing to read.
+    """
+    files: dict[Path, None] = {}
+    for path in paths:
+        files.update(dict.fromkeys(_files(path)))
+    return [source for file in files for source in read_file(file)]
+
+
+def read_file(path: Path) -> list[Source]:
+    """What a file holds."""
+    return READERS.get(path.suffix.lower(), _plain)(str(path), decode(path.read_bytes()))
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        return find_sources(path)
+    suffix = path.suffix.lower()
+    if suffix == ".plcproj":
+        return [p for p in twincat.project_files(path, decode(path.read_bytes())) if p.suffix.lower() in SUFFIXES]
+    if suffix == ".tsproj":
+        projects = twincat.projects_of_solution(path, decode(path.read_bytes()))
+        if not projects:
+            raise UsageError(f"{path} names no PLC project (.plcproj) that is there.", "no-source")
+        return [file for project in projects for file in _files(project)]
+    return [path]
 
 
 def find_sources(folder: Path) -> list[Path]:
-    """All source files in a folder and those below it."""
-    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
+    """The source files in a folder and those below it; of a TwinCAT project, those that belong to it.
 
-
-def read_source(path: Path) -> Source:
-    """The text of a file. Raises OSError when it cannot be read, UsageError when it holds another language."""
-    text = decode(path.read_bytes())
-    return Source(str(path), structured_text(text, path) if path.suffix.lower().startswith(".tc") else text)
+    Raises UsageError when there are none, or several projects.
+    """
+    projects = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".plcproj" and path.is_file())
+    if len(projects) > 1:
+        names = ", ".join(str(path) for path in projects)
+        raise UsageError(f"There are several PLC projects in {folder}; give one of them: {names}.", "no-source")
+    found = sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
+    if projects:
+        home = projects[0].parent
+        found = [*_files(projects[0]), *(path for path in found if home not in path.parents)]
+    if not found:
+        raise UsageError(f"There is no source file (.st, .exp, .TcPOU ...) in {folder}.", "no-source")
+    return found
 
 
 def decode(data: bytes) -> str:
@@ -44,47 +92,3 @@ def decode(data: bytes) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
-
-
-def structured_text(xml: str, path: Path) -> str:
-    """The code in a file of TwinCAT 3, each line where it was, with the END_... that are not written there."""
-    return "".join(_pieces(xml, path))
-
-
-def _pieces(xml: str, path: Path) -> Iterator[str]:
-    at, unit = 0, ""
-    for match in _PART.finditer(xml):
-        yield _blank(xml[at : match.start()])
-        at = match.end()
-        code, tag = match["code"], match["tag"]
-        if code is not None:
-            unit = unit or _unit_keyword(code)
-            yield f"{_blank('<![CDATA[')}{code}{_blank(']]>')}"
-            continue
-        if tag in _OTHER_LANGUAGES:
-            raise UsageError(f"{path} holds {tag}; only Structured Text can be compiled.", "language")
-        yield f"{_blank(match[0])}{'' if match['empty'] else _keyword(tag, match['name'], unit)}"
-    yield _blank(xml[at:])
-
-
-def _keyword(tag: str, name: str | None, unit: str) -> str:
-    """What stands for a tag in Structured Text."""
-    if tag in ("/POU", "/Itf"):
-        return f"END_{unit}\n"
-    if tag == "Action":
-        return f"ACTION {name}:"
-    if tag in ("Get", "Set"):
-        return tag.upper()
-    return f"END_{tag[1:].upper()}" if tag in ("/Method", "/Action", "/Property", "/Get", "/Set") else ""
-
-
-def _unit_keyword(declaration: str) -> str:
-    """Which unit a declaration begins."""
-    tokens = Lexer(declaration, lambda offset, code, message: None)
-    return next((token.type for token in tokens if token.type in _UNITS), "")
-
-
-def _blank(text: str) -> str:
-    """As many lines, and as many characters in the last one."""
-    head, newline, last = text.rpartition("\n")
-    return "\n" * (head.count("\n") + len(newline)) + " " * len(last)
