@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources, load_sources
-from plctool.compiler.front import check_sources
 from plctool.compiler.formats.twincat import read_object
+from plctool.compiler.front import check_sources
 from plctool.errors import UsageError
 from plctool.sim import Simulator
 

@@ -32,27 +32,27 @@ class Finding:
 @dataclass(frozen=True)
 class Piece:
     """From character `offset` on, a text stands in line and column (from 1) of the file: one line of it at most when it
-    is `copied`. What is not was made up for what stands there; all of it is at that one place."""
+    is `copied`. What is not was made up for what stands there; all of it is at that one place. `path`: the file, if it is
+    another one."""
 
     offset: int
     line: int
     column: int
     copied: bool
+    path: str = ""
 
 
 @dataclass(frozen=True)
 class Source:
     """A text to compile; `path` is what diagnostics and debug information call it.
 
-    `name`: what the list of globals in it is called, unless by the file. `owner`: the unit that the METHOD, PROPERTY or
-    ACTION in it belongs to, when that is another file. `original`: the file, when the text was made from it, in
-    `pieces` that begin at offset 0.
+    `name`: what the list of globals in it is called, unless by the file. `original`: the file, when the text was made
+    from it, in `pieces` that begin at offset 0.
     """
 
     path: str
     text: str
     name: str = ""
-    owner: str = ""
     original: str | None = field(default=None, repr=False)
     pieces: tuple[Piece, ...] = field(default=(), repr=False, compare=False)
     findings: tuple[Finding, ...] = field(default=(), compare=False)
@@ -88,9 +88,8 @@ class Source:
 
     def _pos_in_pieces(self, offset: int) -> Pos:
         piece = self.pieces[max(0, bisect_right(self._offsets, offset) - 1)]
-        if not piece.copied:
-            return Pos(self.path, piece.line, piece.column)
-        return Pos(self.path, piece.line, piece.column + offset - piece.offset)
+        more = offset - piece.offset if piece.copied else 0
+        return Pos(piece.path or self.path, piece.line, piece.column + more)
 
     def line_text(self, line: int) -> str:
         """The text of a line (from 1) of the file, without its end."""

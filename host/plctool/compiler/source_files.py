@@ -6,15 +6,19 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import codecs
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from plctool.compiler.formats import twincat
+from plctool.compiler.formats import object_text, twincat
 from plctool.compiler.source import Source
 from plctool.errors import UsageError
 
 Reader = Callable[[str, str], list[Source]]
 """Makes sources from the path and the text of a file."""
+
+
+def _structured_text(path: str, text: str) -> list[Source]:
+    return [object_text.read_object(path, text)]
 
 
 def _plain(path: str, text: str) -> list[Source]:
@@ -26,7 +30,7 @@ def _twincat(path: str, text: str) -> list[Source]:
 
 
 READERS: dict[str, Reader] = {
-    ".st": _plain,
+    ".st": _structured_text,
     ".exp": _plain,
     **dict.fromkeys((".tcpou", ".tcgvl", ".tcdut", ".tcio", ".tctto"), _twincat),
 }
@@ -44,12 +48,32 @@ def load(paths: Iterable[Path]) -> list[Source]:
     files: dict[Path, None] = {}
     for path in paths:
         files.update(dict.fromkeys(_files(path)))
-    return [source for file in files for source in read_file(file)]
+    read = {file: read_file(file) for file in files}
+    for owner, members in _members(read).items():
+        read[owner] = object_text.with_members(read[owner][0], [read.pop(member)[0] for member in members])
+    return [source for sources in read.values() for source in sources]
+
+
+def _members(read: Mapping[Path, list[Source]]) -> dict[Path, list[Path]]:
+    """The files that hold members of the unit in another one, by that."""
+    found: dict[Path, list[Path]] = {}
+    for file, sources in read.items():
+        owner = _owner(file)
+        if owner in read and object_text.is_member(sources):
+            found.setdefault(owner, []).append(file)
+    return found
+
+
+def _owner(file: Path) -> Path:
+    """The file of the unit to which a member in a file of its own belongs: `Pump.st` for `Pump.Start.st`, and for
+    `Pump/Start.st`."""
+    unit, dot, _ = file.stem.rpartition(".")
+    return file.with_name(unit + file.suffix) if dot else file.parent.with_suffix(file.suffix)
 
 
 def read_file(path: Path) -> list[Source]:
     """What a file holds."""
-    return READERS.get(path.suffix.lower(), _plain)(str(path), decode(path.read_bytes()))
+    return READERS.get(path.suffix.lower(), _structured_text)(str(path), decode(path.read_bytes()))
 
 
 def _files(path: Path) -> list[Path]:

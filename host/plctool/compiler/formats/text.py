@@ -70,11 +70,34 @@ class Text:
                 self._add(part, line, column, copied=True)
                 line, column = line + 1, 1
 
-    def join(self, other: Text) -> None:
-        """Adds another text at the end."""
-        self._pieces += [replace(piece, offset=piece.offset + self._length) for piece in other._pieces]
-        self._parts += other._parts
-        self._length += other._length
+    def spliced(self, text: str, inserts: Iterable[tuple[int, int, str]]) -> None:
+        """Adds a whole file in which parts are other ones: from offset, to offset, what stands there instead. The parts
+        are in order and do not overlap."""
+        at, line, start = 0, 1, 0
+        for begin, end, instead in inserts:
+            self.copied([Chunk(text[at:begin], line, at - start + 1)])
+            line += text.count("\n", at, begin)
+            start = max(start, text.rfind("\n", at, begin) + 1)
+            self.made(instead, Place(line, max(1, begin - start)))
+            line += text.count("\n", begin, end)
+            start = max(start, text.rfind("\n", begin, end) + 1)
+            at = end
+        self.copied([Chunk(text[at:], line, at - start + 1)])
+
+    def source_text(self, source: Source) -> None:
+        """Adds the text of a whole file that may be another one."""
+        pieces = source.pieces or Text.of_lines(source.text)
+        self._pieces += [replace(p, offset=p.offset + self._length, path=p.path or source.path) for p in pieces]
+        self._parts.append(source.text)
+        self._length += len(source.text)
+        self.made("\n", Place(pieces[-1].line, pieces[-1].column))
+
+    @staticmethod
+    def of_lines(text: str) -> tuple[Piece, ...]:
+        """The pieces of a text that is the file."""
+        made = Text()
+        made.copied([Chunk(text, 1, 1)])
+        return tuple(made._pieces) or (Piece(0, 1, 1, copied=False),)
 
     def _add(self, text: str, line: int, column: int, *, copied: bool) -> None:
         if text:
@@ -85,7 +108,7 @@ class Text:
     def source(self, path: str, original: str, *, name: str = "", findings: tuple[Finding, ...] = ()) -> Source:
         """The text as a source of that file."""
         pieces = tuple(self._pieces) or (Piece(0, 1, 1, copied=False),)
-        return Source(path, "".join(self._parts), name, "", original, pieces, findings)
+        return Source(path, "".join(self._parts), name, original, pieces, findings)
 
 
 def lines_of(text: str) -> list[Chunk]:

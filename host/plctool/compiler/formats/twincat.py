@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from pathlib import Path, PureWindowsPath
 
-from plctool.compiler.formats.text import Findings, Place, Text
+from plctool.compiler.formats.text import Findings, Text
 from plctool.compiler.formats.units import unit_keyword
 from plctool.compiler.formats.xml_tree import Element, XmlError, read_xml
 from plctool.compiler.source import Source
@@ -91,7 +91,7 @@ class _Object:
     def _task(self, task: Element) -> None:
         """Becomes a CONFIGURATION, because that is what tasks are in."""
         cycle, priority = task.child("CycleTime"), task.child("Priority")
-        calls = [name for call in task.all("PouCall") if (name := call.child("Name")) is not None]
+        calls = [called for call in task.all("PouCall") if (called := call.child("Name")) is not None]
         properties = []
         if cycle is not None and cycle.text.isdecimal() and int(cycle.text):
             properties.append(f"INTERVAL := LTIME#{int(cycle.text)}us")
