@@ -31,9 +31,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Piece:
-    """From character `offset` on, a text stands in line and column (from 1) of the file: one line of it at most when it
-    is `copied`. What is not was made up for what stands there; all of it is at that one place. `path`: the file, if it is
-    another one."""
+    """From character `offset` on, a text stands in line and column (from 1) of the file, or of another one at `path`.
+
+    A piece that is `copied` is within one line of it. What is not was made up for what stands there, all of it at that
+    one place."""
 
     offset: int
     line: int

@@ -6,10 +6,10 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import codecs
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from pathlib import Path
 
-from plctool.compiler.formats import object_text, twincat
+from plctool.compiler.formats import object_text, plcopen, twincat
 from plctool.compiler.source import Source
 from plctool.errors import UsageError
 
@@ -29,9 +29,14 @@ def _twincat(path: str, text: str) -> list[Source]:
     return [twincat.read_object(path, text)]
 
 
+def _xml(path: str, text: str) -> list[Source]:
+    return plcopen.read_project(path, text)
+
+
 READERS: dict[str, Reader] = {
     ".st": _structured_text,
     ".exp": _plain,
+    ".xml": _xml,
     **dict.fromkeys((".tcpou", ".tcgvl", ".tcdut", ".tcio", ".tctto"), _twincat),
 }
 """How a file is read, by its suffix in lower case."""
@@ -99,13 +104,26 @@ def find_sources(folder: Path) -> list[Path]:
     if len(projects) > 1:
         names = ", ".join(str(path) for path in projects)
         raise UsageError(f"There are several PLC projects in {folder}; give one of them: {names}.", "no-source")
-    found = sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
+    found = sorted(path for path in folder.rglob("*") if _is_source(path))
+    found = [path for path in found if not _is_generated(path, found)]
     if projects:
         home = projects[0].parent
         found = [*_files(projects[0]), *(path for path in found if home not in path.parents)]
     if not found:
         raise UsageError(f"There is no source file (.st, .exp, .TcPOU ...) in {folder}.", "no-source")
     return found
+
+
+def _is_source(path: Path) -> bool:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES or not path.is_file():
+        return False
+    return suffix != ".xml" or plcopen.is_project(decode(path.read_bytes()))
+
+
+def _is_generated(path: Path, found: Container[Path]) -> bool:
+    """Whether OpenPLC Editor or Beremiz made a file from the plc.xml beside its folder."""
+    return path.parent.name == "build" and path.parent.with_name("plc.xml") in found
 
 
 def decode(data: bytes) -> str:

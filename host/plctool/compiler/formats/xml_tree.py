@@ -57,6 +57,11 @@ class Element:
                 yield child
             yield from child.every(*tags)
 
+    def child_data(self, name: str) -> list[Element]:
+        """What is added to this element in PLCopen XML under a name, of which only the last part counts."""
+        added = [data for data in self.all("addData") for data in data.all("data")]
+        return [data for data in added if data.get("name").rpartition("/")[2].lower() == name]
+
     def every_chunk(self) -> list[Chunk]:
         """The text in this element and in those in it."""
         return [*self.chunks, *(chunk for child in self.children for chunk in child.every_chunk())]
