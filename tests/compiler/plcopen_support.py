@@ -16,13 +16,15 @@ def project(pous: str = "", data_types: str = "", instances: str = "", added: st
     """A whole file."""
     return (
         f"{HEAD}<types>\n<dataTypes>{data_types}</dataTypes>\n<pous>\n{pous}\n</pous>\n</types>\n"
-        f"<instances><configurations>{instances}</configurations></instances>\n<addData>{added}</addData>\n</project>\n"
+        f"<instances><configurations>{instances}</configurations></instances>\n"
+        f"<addData>{added}</addData>\n</project>\n"
     )
 
 
 def pou(name: str, body: str, variables: str = "", kind: str = "program", more: str = "") -> str:
     """A unit. `variables`: the lists in its interface."""
-    return f'<pou name="{name}" pouType="{kind}">\n<interface>{variables}</interface>\n<body>\n{body}\n</body>\n{more}</pou>'
+    head = f'<pou name="{name}" pouType="{kind}">\n<interface>{variables}</interface>'
+    return f"{head}\n<body>\n{body}\n</body>\n{more}</pou>"
 
 
 def st(text: str) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from plcopen_support import errors, pou, project, st, started, variables
+from plcopen_support import data, errors, pou, project, st, started, variables
 
 CYCLE = """<configuration name="c"><resource name="r"><task name="t" priority="1" interval="T#10ms">
 <pouInstance name="Main" typeName="Main"/></task></resource></configuration>"""
@@ -73,7 +74,7 @@ def test_a_chart_goes_round(tmp_path: Path) -> None:
         for _ in range(20):
             plc.run_cycles(1)
             seen.append((plc.read("Main.Busy.X"), plc.read("Main.a")))
-    changes = [b for a, b in zip(seen, seen[1:], strict=False) if a != b]
+    changes = [b for a, b in pairwise(seen) if a != b]
     assert changes[:3] == [(True, True), (False, False), (True, True)]
 
 
@@ -173,7 +174,7 @@ def test_an_action_may_have_a_qualifier_with_a_time(tmp_path: Path) -> None:
         (transition(9, "77", "TRUE"), "a transition has no step before or behind it"),
         ('<transition localId="9">' + into("1") + "</transition>", "a transition has no condition"),
         (
-            step(9, "CS", "5", more='<addData><data name="x"><attributes><attribute>Count</attribute></attributes></data></addData>'),
+            step(9, "CS", "5", more=f"<addData>{data('sfc/element', '<attribute>Count</attribute>')}</addData>"),
             "the step CS has an action of CODESYS, Count; use an action block",
         ),
     ],

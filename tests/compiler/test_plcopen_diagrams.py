@@ -39,7 +39,8 @@ def given(number: int, text: str, more: str = "") -> str:
 
 def taken(number: int, name: str, source: str, row: int = 0, more: str = "") -> str:
     """An output variable."""
-    return f'<outVariable localId="{number}" {more}>{at(row, 90)}{lines(source)}<expression>{name}</expression></outVariable>\n'
+    head = f'<outVariable localId="{number}" {more}>{at(row, 90)}'
+    return f"{head}{lines(source)}<expression>{name}</expression></outVariable>\n"
 
 
 def block(

@@ -7,28 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from enum import Enum, auto
 from typing import TypeVar
 
 from plctool.compiler.source import Source
+from plctool.iec.literals import LiteralKind as LiteralKind
 
 N = TypeVar("N")
 
 # ---- expressions ---------------------------------------------------------------------------------------------------
-
-
-class LiteralKind(Enum):
-    """What sort of constant was written."""
-
-    INT = auto()
-    REAL = auto()
-    BOOL = auto()
-    TIME = auto()  # value in ns
-    DATE = auto()  # value in ns since 1970 or midnight
-    STRING = auto()
-    WSTRING = auto()
-    NULL = auto()
-    BAD = auto()  # already reported
 
 
 @dataclass(slots=True, eq=False)

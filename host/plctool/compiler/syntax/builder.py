@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from plctool.compiler.source import Source
-from plctool.compiler.syntax import ast, literals
+from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.builder_chart import read_action, read_priority
 from plctool.compiler.syntax.builder_units import Arrangement
 from plctool.compiler.syntax.lexer import Report, Token
+from plctool.iec import literals
 
 _PRECEDENCE = {
     "**": 7, "*": 6, "/": 6, "MOD": 6, "+": 5, "-": 5, "<": 4, ">": 4, "<=": 4, ">=": 4, "=": 3, "<>": 3,

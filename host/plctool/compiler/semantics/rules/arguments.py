@@ -31,7 +31,7 @@ from plctool.compiler.typed import (
     ScalarInit,
     ValuePlace,
 )
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     LREAL,
     REAL,

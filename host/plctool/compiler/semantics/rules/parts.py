@@ -27,7 +27,7 @@ from plctool.compiler.typed import (
     SelfPlace,
     Storage,
 )
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DINT,

@@ -26,7 +26,7 @@ from plctool.compiler.typed import (
     IntrinsicCall,
     Load,
 )
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     DINT,
     ELEMENTARY,
