@@ -9,7 +9,7 @@ import codecs
 from collections.abc import Callable, Container, Iterable, Mapping
 from pathlib import Path
 
-from plctool.compiler.formats import object_text, plcopen, twincat
+from plctool.compiler.formats import codesys2, object_text, plcopen, twincat
 from plctool.compiler.source import Source
 from plctool.errors import UsageError
 
@@ -21,8 +21,8 @@ def _structured_text(path: str, text: str) -> list[Source]:
     return [object_text.read_object(path, text)]
 
 
-def _plain(path: str, text: str) -> list[Source]:
-    return [Source(path, text)]
+def _export(path: str, text: str) -> list[Source]:
+    return [codesys2.read_export(path, text)]
 
 
 def _twincat(path: str, text: str) -> list[Source]:
@@ -35,7 +35,7 @@ def _xml(path: str, text: str) -> list[Source]:
 
 READERS: dict[str, Reader] = {
     ".st": _structured_text,
-    ".exp": _plain,
+    ".exp": _export,
     ".xml": _xml,
     **dict.fromkeys((".tcpou", ".tcgvl", ".tcdut", ".tcio", ".tctto"), _twincat),
 }
