@@ -255,3 +255,101 @@ def test_a_folder_without_sources_says_what_sources_are(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("nothing")
     with pytest.raises(UsageError, match=r"no source file \(.st, .exp, .TcPOU"):
         load_sources([tmp_path])
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("plant.project", "export the units with Project, Export PLCopenXML"),
+        ("plant.projectarchive", "export the units with Project, Export PLCopenXML"),
+        ("plant.export", "export the units with Project, Export PLCopenXML"),
+        ("Util.library", "give the sources of the library"),
+        ("Util.compiled-library", "give the sources of the library"),
+        ("plant.pro", "open it in CODESYS 2.3 and export it"),
+        ("plant.tnzip", "give the folder of the PLC project in it"),
+    ],
+)
+def test_a_file_without_text_says_what_to_export(tmp_path: Path, name: str, message: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(b"PK\x03\x04\0\0\0\xff" * 30)
+    (tmp_path / "main.st").write_text(PROGRAM.replace("LEN(text)", "k"))
+    found = [d for d in check_sources(load_sources([path, tmp_path / "main.st"])).diagnostics if d.severity == "error"]
+    assert {d.code for d in found} == {"unknown", "file"}
+    assert message in next(d.message for d in found if d.code == "file")
+    (tmp_path / "main.st").unlink()
+    with pytest.raises(UsageError, match=f"There is no source file .*{name} is no text: .*"):
+        load_sources([tmp_path])
+
+
+def test_a_binary_file_is_one_error_whatever_it_is_called(tmp_path: Path) -> None:
+    path = tmp_path / "main.st"
+    path.write_bytes(bytes(range(256)) * 4)
+    (found,) = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
+    assert found.message.startswith("this is a binary file")
+
+
+@pytest.mark.parametrize("suffix", [".ST", ".iecst", ".scl"])
+def test_other_suffixes_of_program_texts_are_taken_from_folders(tmp_path: Path, suffix: str) -> None:
+    (tmp_path / f"main{suffix}").write_text(PROGRAM, "utf-8")
+    with started(tmp_path) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.n") == 5
+
+
+def test_variables_and_types_of_automation_studio_are_globals(tmp_path: Path) -> None:
+    declared = "(* all *)\nVAR\n    speed : Level := 3;\nEND_VAR\nVAR CONSTANT\n    k : INT := 4;\nEND_VAR\n"
+    (tmp_path / "Global.var").write_text(declared)
+    (tmp_path / "Global.typ").write_text("TYPE\n    Level : INT;\nEND_TYPE\n")
+    (tmp_path / "main.st").write_text("PROGRAM Main\nspeed := speed + k;\nEND_PROGRAM\n")
+    with started(tmp_path) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Global.speed") == 7
+
+
+GENERATED = """FUNCTION_BLOCK LOGGER
+  VAR_INPUT
+    TRIG : BOOL;
+  END_VAR
+  IF TRIG THEN
+  {{
+   LogMessage(1);
+  }}
+  END_IF;
+END_FUNCTION_BLOCK
+
+FUNCTION_BLOCK python_eval
+  VAR_INPUT
+    TRIG : BOOL;
+  END_VAR
+  {extern void eval(int);eval(0);}
+END_FUNCTION_BLOCK
+
+FUNCTION_BLOCK python_gear
+  VAR
+    py_eval : python_eval;
+  END_VAR
+  py_eval(TRIG := TRUE);
+END_FUNCTION_BLOCK
+
+PROGRAM Main
+  VAR
+    n : INT;
+  END_VAR
+  n := n + 1;
+END_PROGRAM
+"""
+
+
+def test_the_blocks_in_c_in_front_of_an_openplc_program_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "plc.st"
+    path.write_text(GENERATED)
+    with started(path) as plc:
+        plc.run_cycles(2)
+        assert plc.read("Main.n") == 2
+
+
+def test_a_program_that_uses_a_block_in_c_is_told_so(tmp_path: Path) -> None:
+    path = tmp_path / "plc.st"
+    path.write_text(GENERATED.replace("n : INT;", "n : INT; log : LOGGER;"))
+    found = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
+    assert any("code in C cannot be compiled" in d.message for d in found)

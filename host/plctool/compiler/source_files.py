@@ -9,8 +9,8 @@ import codecs
 from collections.abc import Callable, Container, Iterable, Mapping
 from pathlib import Path
 
-from plctool.compiler.formats import codesys2, object_text, plcopen, twincat
-from plctool.compiler.source import Source
+from plctool.compiler.formats import beremiz, codesys2, global_lists, object_text, plcopen, twincat, unreadable
+from plctool.compiler.source import Finding, Source
 from plctool.errors import UsageError
 
 Reader = Callable[[str, str], list[Source]]
@@ -18,7 +18,7 @@ Reader = Callable[[str, str], list[Source]]
 
 
 def _structured_text(path: str, text: str) -> list[Source]:
-    return [object_text.read_object(path, text)]
+    return [beremiz.without_blocks_in_c(object_text.read_object(path, text))]
 
 
 def _export(path: str, text: str) -> list[Source]:
@@ -33,8 +33,13 @@ def _xml(path: str, text: str) -> list[Source]:
     return plcopen.read_project(path, text)
 
 
+def _variables(path: str, text: str) -> list[Source]:
+    return [global_lists.read_list(path, text)]
+
+
 READERS: dict[str, Reader] = {
-    ".st": _structured_text,
+    **dict.fromkeys((".st", ".iecst", ".scl", ".fun", ".typ"), _structured_text),
+    ".var": _variables,
     ".exp": _export,
     ".xml": _xml,
     **dict.fromkeys((".tcpou", ".tcgvl", ".tcdut", ".tcio", ".tctto"), _twincat),
@@ -78,7 +83,11 @@ def _owner(file: Path) -> Path:
 
 def read_file(path: Path) -> list[Source]:
     """What a file holds."""
-    return READERS.get(path.suffix.lower(), _structured_text)(str(path), decode(path.read_bytes()))
+    data = path.read_bytes()
+    refused = unreadable.refusal(path, data)
+    if refused:
+        return [Source(str(path), "", findings=(Finding(1, 1, "file", refused),))]
+    return READERS.get(path.suffix.lower(), _structured_text)(str(path), decode(data))
 
 
 def _files(path: Path) -> list[Path]:
@@ -110,8 +119,16 @@ def find_sources(folder: Path) -> list[Path]:
         home = projects[0].parent
         found = [*_files(projects[0]), *(path for path in found if home not in path.parents)]
     if not found:
-        raise UsageError(f"There is no source file (.st, .exp, .TcPOU ...) in {folder}.", "no-source")
+        raise UsageError(
+            f"There is no source file (.st, .exp, .TcPOU ...) in {folder}{_other_files(folder)}.", "no-source"
+        )
     return found
+
+
+def _other_files(folder: Path) -> str:
+    """What to do with the files that hold programs but no text."""
+    others = (path for path in sorted(folder.rglob("*")) if path.suffix.lower() in unreadable.WHAT_TO_DO)
+    return next((f"; {path.name} is no text: {unreadable.WHAT_TO_DO[path.suffix.lower()]}" for path in others), "")
 
 
 def _is_source(path: Path) -> bool:
