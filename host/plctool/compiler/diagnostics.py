@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Literal
 
+from plctool.compiler.missing_names import Use, table
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Pos
 from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
@@ -17,6 +18,7 @@ from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
 Severity = Literal["error", "warning"]
 
 MAX_ERRORS = 20  # what follows is seldom news
+MAX_MISSING = 10  # places of unknown names that are shown each; of more there is a table
 MAX_MESSAGE = 300  # characters; names may be of any length
 _UNCOUNTED = frozenset(("language",))  # errors that hide no others
 MAX_LINE = 160  # characters of a source line that are shown with a finding
@@ -32,6 +34,7 @@ class Diagnostic:
     severity: Severity
     code: str
     message: str
+    missing: str = ""  # the name that nothing declares and that no other is like: maybe of a library
 
 
 class TooManyErrors(Exception):
@@ -47,12 +50,18 @@ class Diagnostics:
         self.options = ALL_WARNINGS
         self._muted: dict[tuple[str, str], LineRanges] = {}
         self._found: dict[Diagnostic, None] = {}
+        self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
+        self.baseless: set[str] = set()  # those of them whose base is unknown
         self.errors = 0
         self._counted = 0  # errors that are counted to MAX_ERRORS
 
     def error(self, pos: Pos, code: str, message: str) -> None:
         """Records an error; raises TooManyErrors when it is one too many."""
         self._add(pos, "error", code, message)
+
+    def missing(self, pos: Pos, name: str, message: str) -> None:
+        """Records that nothing is known by a name. These do not count: what a program needs is said in full."""
+        self._add(pos, "error", "unknown", message, missing=name)
 
     def warning(self, pos: Pos, code: str, message: str) -> None:
         """Records a warning, unless it is not wanted; `code` is one of WARNINGS."""
@@ -82,16 +91,18 @@ class Diagnostics:
         """Reports by offset in a source."""
         return SourceDiagnostics(self, source)
 
-    def _add(self, pos: Pos, severity: Severity, code: str, message: str, *, counts: bool = True) -> None:
+    def _add(
+        self, pos: Pos, severity: Severity, code: str, message: str, *, counts: bool = True, missing: str = ""
+    ) -> None:
         if len(message) > MAX_MESSAGE:
             message = message[: MAX_MESSAGE - 3] + "..."
-        diagnostic = Diagnostic(pos.file, pos.line, pos.column, severity, code, message)
+        diagnostic = Diagnostic(pos.file, pos.line, pos.column, severity, code, message, missing)
         if diagnostic in self._found:
             return
         self._found[diagnostic] = None
         if severity == "error":
             self.errors += 1
-            self._counted += counts
+            self._counted += counts and not missing
             if self._counted >= MAX_ERRORS:
                 raise TooManyErrors
 
@@ -129,11 +140,19 @@ def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
 
 
 def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> list[str]:
-    """All findings as people read them, and whether there may be more."""
-    texts = [render(d, sources) for d in diagnostics]
-    if sum(d.severity == "error" and d.code not in _UNCOUNTED for d in diagnostics) >= MAX_ERRORS:
+    """All findings as people read them, and whether there may be more. Many missing names become one table."""
+    missing = [d for d in diagnostics if d.missing]
+    listed = len(missing) > MAX_MISSING
+    texts = [render(d, sources) for d in diagnostics if not (listed and d.missing)]
+    texts += missing_names_text(missing) if listed else []
+    if sum(d.severity == "error" and d.code not in _UNCOUNTED and not d.missing for d in diagnostics) >= MAX_ERRORS:
         texts.append(f"There may be more than these {MAX_ERRORS} errors; correct some and check again.")
     return texts
+
+
+def missing_names_text(missing: Sequence[Diagnostic]) -> list[str]:
+    """What a program needs and nothing declares, by library."""
+    return table([Use(d.missing, d.file, d.line) for d in missing])
 
 
 def _part_of(line: str, column: int) -> tuple[str, int]:

@@ -8,6 +8,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
@@ -15,6 +16,7 @@ from xml.parsers import expat
 from plctool.compiler.formats.text import Chunk, Place
 
 MAX_DEPTH = 200
+_LONE_RETURN = re.compile(r"\r(?!\n)")  # a line end for expat, but for nothing else here
 
 
 class XmlError(Exception):
@@ -85,7 +87,7 @@ class _Reader:
 
     def read(self, text: str) -> Element:
         try:
-            self._parser.Parse(text.encode("utf-8", "replace"), True)
+            self._parser.Parse(_LONE_RETURN.sub(" ", text).encode("utf-8", "replace"), True)
         except expat.ExpatError as error:
             what = expat.errors.messages.get(error.code, str(error.code))
             raise XmlError(Place(error.lineno, error.offset + 1), f"the file is not whole XML: {what}") from None
