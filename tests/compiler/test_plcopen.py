@@ -47,6 +47,30 @@ def test_tasks_have_their_programs_and_intervals(tmp_path: Path) -> None:
     assert [p.name for t in program.tasks for p in t.programs] == ["one", "two"]
 
 
+APPLICATION = data(
+    "application",
+    '<resource name="Application"><task name="MainTask" interval="PT0.03S" priority="1">'
+    '<pouInstance name="Main" typeName=""/><addData>'
+    + data("tasksettings", '<TaskSettings KindOfTask="Cyclic" Interval="t#30ms" IntervalUnit="ms"/>')
+    + '</addData></task><task name="Visu" interval="PT0.1S"><pouInstance name="VisuElems.Visu_Prg" typeName=""/></task>'
+    '<task name="Idle" priority="9"><pouInstance name="Other" typeName=""/><addData>'
+    + data("tasksettings", '<TaskSettings KindOfTask="Freewheeling"/>')
+    + "</addData></task><addData>"
+    + data("pou", COUNTER)
+    + data("pou", COUNTER.replace("Main", "Other"))
+    + "</addData></resource>",
+)
+
+
+def test_an_application_of_codesys_has_its_tasks_and_units(tmp_path: Path) -> None:
+    program = check_sources(load_sources([written(tmp_path, project(added=APPLICATION))])).program
+    assert program is not None
+    assert [(t.name, t.interval_us, [p.name for p in t.programs]) for t in program.tasks] == [
+        ("MainTask", 30_000, ["Main"]),
+        ("Idle", 0, ["Other"]),
+    ]
+
+
 TYPES = """
 <dataType name="State"><baseType><enum><values>
   <value name="Idle"/><value name="Busy" value="5"/></values></enum></baseType></dataType>

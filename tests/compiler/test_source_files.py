@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources, load_sources
+from plctool.compiler.diagnostics import render_all
 from plctool.compiler.formats.twincat import read_object
 from plctool.compiler.front import check_sources
 from plctool.errors import UsageError
@@ -353,3 +354,19 @@ def test_a_program_that_uses_a_block_in_c_is_told_so(tmp_path: Path) -> None:
     path.write_text(GENERATED.replace("n : INT;", "n : INT; log : LOGGER;"))
     found = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
     assert any("code in C cannot be compiled" in d.message for d in found)
+
+
+def test_structured_text_beside_a_twincat_project_belongs_to_it(tmp_path: Path) -> None:
+    (tmp_path / "POUs").mkdir()
+    (tmp_path / "POUs" / "MAIN.TcPOU").write_text(COUNTING)
+    (tmp_path / "more.st").write_text("TYPE T : INT; END_TYPE")
+    (tmp_path / "Forgotten.TcPOU").write_text("garbage")
+    (tmp_path / "plant.plcproj").write_text(PROJECT)
+    assert {Path(s.path).name for s in load_sources([tmp_path])} == {"MAIN.TcPOU", "more.st"}
+
+
+def test_a_diagram_is_listed_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "A.TcPOU").write_text(MAIN.replace("<ST>", "<CFC>").replace("</ST>", "</CFC>"))
+    sources = load_sources([tmp_path])
+    listed = [text for text in render_all(check_sources(sources).diagnostics, sources) if "CFC" in text]
+    assert [text.count("\n") for text in listed] == [0]

@@ -143,7 +143,7 @@ def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> 
     """All findings as people read them, and whether there may be more. Many missing names become one table."""
     missing = [d for d in diagnostics if d.missing]
     listed = len(missing) > MAX_MISSING
-    texts = [render(d, sources) for d in diagnostics if not (listed and d.missing)]
+    texts = [render(d, () if d.code in _UNCOUNTED else sources) for d in diagnostics if not (listed and d.missing)]
     texts += missing_names_text(missing) if listed else []
     if sum(d.severity == "error" and d.code not in _UNCOUNTED and not d.missing for d in diagnostics) >= MAX_ERRORS:
         texts.append(f"There may be more than these {MAX_ERRORS} errors; correct some and check again.")

@@ -117,7 +117,8 @@ def find_sources(folder: Path) -> list[Path]:
     found = [path for path in found if not _is_generated(path, found)]
     if projects:
         home = projects[0].parent
-        found = [*_files(projects[0]), *(path for path in found if home not in path.parents)]
+        others = (path for path in found if home not in path.parents or not path.suffix.lower().startswith(".tc"))
+        found = sorted({*_files(projects[0]), *others})
     if not found:
         raise UsageError(
             f"There is no source file (.st, .exp, .TcPOU ...) in {folder}{_other_files(folder)}.", "no-source"

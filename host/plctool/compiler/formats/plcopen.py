@@ -61,7 +61,7 @@ class _Project:
 
     def read(self, root: Element) -> None:
         for pou in root.every("pou"):
-            outputs = [v for part in pou.every("interface") for s in part.all("outputVars") for v in s.all("variable")]
+            outputs = [v for part in pou.all("interface") for s in part.all("outputVars") for v in s.all("variable")]
             known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in outputs}
             known[""] = types.type_of(pou.child("interface", "returnType"))
             self._blocks[pou.get("name").casefold()] = known

@@ -13,12 +13,13 @@ from plctool.compiler.formats.twincat import LOWEST_PRIORITY, identifier
 from plctool.compiler.formats.xml_tree import Element
 
 _ISO = re.compile(r"P(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?", re.IGNORECASE)
+_NAME = re.compile(r"\w+")  # a visualisation, which is run by a library, has a dot in it
 _UNITS = {"µs": "us", "us": "us", "ms": "ms", "s": "s"}
 
 
 def write_configuration(text: Text, element: Element, findings: Findings) -> None:
     """A CONFIGURATION; where it names no program, its globals alone."""
-    instances = list(element.every("pouInstance"))
+    instances = [i for i in element.every("pouInstance") if _NAME.fullmatch(i.get("typeName") or i.get("name"))]
     unnamed = [section for section in element.every("globalVars") if not section.get("name")]
     if not instances:
         for section in unnamed:
@@ -27,11 +28,12 @@ def write_configuration(text: Text, element: Element, findings: Findings) -> Non
     text.made(f"CONFIGURATION {identifier(element.get('name') or 'Config')}\n", element.at)
     for section in unnamed:
         types.block(text, section)
-    tasks = list(element.every("task"))
+    of_task = {id(instance): task for task in element.every("task") for instance in task.every("pouInstance")}
+    busy = {id(of_task[id(i)]) for i in instances if id(i) in of_task}
+    tasks = [t for t in element.every("task") if id(t) in busy or next(t.every("pouInstance"), None) is None]
     for task in tasks:
         properties = ", ".join(_properties(task, findings))
         text.made(f"TASK {identifier(task.get('name'))}({properties});\n", task.at)
-    of_task = {id(instance): task for task in tasks for instance in task.every("pouInstance")}
     for instance in instances:
         owner = of_task.get(id(instance))
         within = f" WITH {identifier(owner.get('name'))}" if owner is not None else ""
