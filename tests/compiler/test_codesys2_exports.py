@@ -154,6 +154,17 @@ def test_comments_that_do_not_nest(tmp_path: Path) -> None:
     assert found(tmp_path, text.replace("'No'", "'Yes'"))
 
 
+def test_a_mark_in_a_comment_of_a_section_that_is_left_out_moves_nothing(tmp_path: Path) -> None:
+    library = LIBRARY.replace("'Yes'", "'No'").replace("CONCAT: 0", "(* a (* b *)\nCONCAT: 0")
+    (error,) = [d for d in found(tmp_path, library + PROGRAM.replace("n + 1", "n + k")) if d.severity == "error"]
+    assert (library + PROGRAM).splitlines()[error.line - 1] == "n := n + 1;"
+
+
+def test_a_section_for_tasks_without_any_is_left_out(tmp_path: Path) -> None:
+    (only,) = found(tmp_path, PROGRAM + f"{HEADER}RESOURCE\nEND_RESOURCE\n")
+    assert only.message == "left out: RESOURCE"
+
+
 @pytest.mark.parametrize("language", ["LD", "FBD", "CFC", "SFC"])
 def test_a_diagram_is_refused_by_name_and_the_rest_is_checked(tmp_path: Path, language: str) -> None:
     drawn = PROGRAM.replace(

@@ -145,3 +145,9 @@ def test_places_are_those_of_the_file(tmp_path: Path) -> None:
     text = COUNTER.replace("IMPLEMENTS I_Counter", "").replace("twice := total", "twice := totel")
     line = text.splitlines().index("twice := totel * 2;") + 1
     assert errors(written(tmp_path, {"FB_Counter.st": text}))[0].startswith(f"{line}:10: unknown name totel")
+
+
+def test_files_may_be_named_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(tmp_path, {"a.st": "PROGRAM P\nEND_PROGRAM", ".b.st": "METHOD m\n"})
+    monkeypatch.chdir(tmp_path)
+    assert [s.path for s in load_sources(["a.st", ".b.st"])] == ["a.st", ".b.st"]

@@ -69,16 +69,18 @@ def _members(read: Mapping[Path, list[Source]]) -> dict[Path, list[Path]]:
     found: dict[Path, list[Path]] = {}
     for file, sources in read.items():
         owner = _owner(file)
-        if owner in read and object_text.is_member(sources):
+        if owner is not None and owner in read and object_text.is_member(sources):
             found.setdefault(owner, []).append(file)
     return found
 
 
-def _owner(file: Path) -> Path:
+def _owner(file: Path) -> Path | None:
     """The file of the unit to which a member in a file of its own belongs: `Pump.st` for `Pump.Start.st`, and for
     `Pump/Start.st`."""
     unit, dot, _ = file.stem.rpartition(".")
-    return file.with_name(unit + file.suffix) if dot else file.parent.with_suffix(file.suffix)
+    if dot:
+        return file.with_name(unit + file.suffix) if unit else None
+    return file.parent.with_suffix(file.suffix) if file.parent.name else None
 
 
 def read_file(path: Path) -> list[Source]:

@@ -75,11 +75,11 @@ class _Export:
                 left_out += self._names(span)
         if first is not None and left_out:
             message = f"left out: {', '.join(dict.fromkeys(left_out))}"
-            self._findings.add(self._place(first.start), "left-out", message, "warning")
+            self._findings.warning(self._place(first.start), "left-out", message)
         if not self._edits:
             return Source(self._path, self._text)
         made_text = Text()
-        made_text.spliced(self._text, sorted(self._edits))
+        made_text.spliced(self._text, _apart(self._edits))
         return made_text.source(self._path, self._text, findings=self._findings.all)
 
     def _place(self, offset: int) -> Place:
@@ -186,8 +186,9 @@ class _Export:
         text = self._masked[span.start : span.end]
         tasks = list(_TASK.finditer(text))
         lines = []
-        for task, following in zip(tasks, [*tasks[1:], None], strict=True):
-            body = text[task.end() : following.start() if following else len(text)]
+        starts = [task.start() for task in tasks]
+        for task, end in zip(tasks, [*starts[1:], len(text)], strict=False):
+            body = text[task.end() : end]
             properties = {m[1].upper(): m[2].strip() for m in _PROPERTY.finditer(task[2])}
             known = [f"{k} := {v}" for k, v in properties.items() if k in ("INTERVAL", "PRIORITY", "SINGLE") and v]
             programs = [(m[1], m[2]) for m in _INSTANCE.finditer(body)]
@@ -216,6 +217,15 @@ class _Export:
                 lines.append(f"    {name} AT {address} : {_TYPES[located[1].upper()]};")
                 name = address = ""
         return "\n".join(["VAR_GLOBAL", *dict.fromkeys(lines), "END_VAR\n"]) if lines else ""
+
+
+def _apart(edits: list[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
+    """In order, without those within another one: marks in comments of a section that is left out."""
+    found: list[tuple[int, int, str]] = []
+    for edit in sorted(edits, key=lambda e: (e[0], -e[1])):
+        if not found or edit[0] >= found[-1][1]:
+            found.append(edit)
+    return found
 
 
 def _blank(text: str) -> str:

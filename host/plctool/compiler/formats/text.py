@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from plctool.compiler.source import Finding, Piece, Source
 
@@ -33,9 +33,13 @@ class Findings:
     def __init__(self) -> None:
         self._found: dict[Finding, None] = {}
 
-    def add(self, at: Place, code: str, message: str, severity: Literal["error", "warning"] = "error") -> None:
-        """Notes a finding."""
-        self._found[Finding(at.line, at.column, code, message, severity)] = None
+    def add(self, at: Place, code: str, message: str) -> None:
+        """Notes an error."""
+        self._found[Finding(at.line, at.column, code, message)] = None
+
+    def warning(self, at: Place, code: str, message: str) -> None:
+        """Notes a warning."""
+        self._found[Finding(at.line, at.column, code, message, "warning")] = None
 
     def refuse(self, at: Place, what: str, language: str) -> None:
         """A body that is no Structured Text."""
