@@ -46,8 +46,8 @@ READERS: dict[str, Reader] = {
 }
 """How a file is read, by its suffix in lower case."""
 
-SUFFIXES = frozenset(READERS)
-"""Of files that are taken from folders, in lower case."""
+SUFFIXES = frozenset(READERS) - {".xml"}
+"""That sources alone have, in lower case. An .xml is taken from a folder when it is a project."""
 
 
 def load(paths: Iterable[Path]) -> list[Source]:
@@ -136,7 +136,7 @@ def _other_files(folder: Path) -> str:
 
 def _is_source(path: Path) -> bool:
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES or not path.is_file():
+    if suffix not in READERS or not path.is_file():
         return False
     return suffix != ".xml" or plcopen.is_project(decode(path.read_bytes()))
 
