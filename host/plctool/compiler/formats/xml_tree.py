@@ -27,7 +27,7 @@ class XmlError(Exception):
         self.at = at
 
 
-@dataclass
+@dataclass(slots=True)
 class Element:
     """An element. Names are without the prefix of their namespace; `chunks` is the text directly in it."""
 
@@ -54,10 +54,13 @@ class Element:
 
     def every(self, *tags: str) -> Iterator[Element]:
         """All elements with one of these names in this one, however deep."""
-        for child in self.children:
-            if child.tag in tags:
-                yield child
-            yield from child.every(*tags)
+        waiting = self.children[::-1]
+        while waiting:
+            element = waiting.pop()
+            if element.tag in tags:
+                yield element
+            if element.children:
+                waiting += element.children[::-1]
 
     def child_data(self, name: str) -> list[Element]:
         """What is added to this element in PLCopen XML under a name, of which only the last part counts."""
@@ -100,8 +103,11 @@ class _Reader:
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         if len(self._open) > MAX_DEPTH:
             raise XmlError(self._at, f"more than {MAX_DEPTH} elements stand in each other")
-        own = {key.rpartition(":")[2]: value for key, value in attributes.items()}
-        element = Element(name.rpartition(":")[2], own, self._at)
+        if any(":" in key for key in attributes):
+            attributes = {key.rpartition(":")[2]: value for key, value in attributes.items()}
+        parser = self._parser
+        at = Place(parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
+        element = Element(name.rpartition(":")[2], attributes, at)
         self._open[-1].children.append(element)
         self._open.append(element)
 
