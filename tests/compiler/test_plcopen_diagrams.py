@@ -271,9 +271,9 @@ def test_an_error_in_a_diagram_has_the_line_of_its_element(tmp_path: Path) -> No
 
 
 def test_an_output_may_name_its_variable_in_the_block(tmp_path: Path) -> None:
+    point = "<connectionPointOut><expression>el</expression></connectionPointOut>"
     timer = block(3, "TON", {"IN": "2", "PT": "4"}, "Q ET", "TON0").replace(
-        '<variable formalParameter="ET"/>',
-        '<variable formalParameter="ET"><connectionPointOut><expression>el</expression></connectionPointOut></variable>',
+        '<variable formalParameter="ET"/>', f'<variable formalParameter="ET">{point}</variable>'
     )
     body = ladder(contact(2, "go", "1"), given(4, "T#1s"), timer, coil(5, "done", "3.Q"))
     found = run(tmp_path, body, ["go:BOOL:=TRUE", "done:BOOL", "el:TIME", "TON0:TON"], cycles=4)

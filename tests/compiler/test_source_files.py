@@ -370,3 +370,11 @@ def test_a_diagram_is_listed_in_one_line(tmp_path: Path) -> None:
     sources = load_sources([tmp_path])
     listed = [text for text in render_all(check_sources(sources).diagnostics, sources) if "CFC" in text]
     assert [text.count("\n") for text in listed] == [0]
+
+
+def test_a_list_of_globals_has_the_name_in_the_file_of_twincat(tmp_path: Path) -> None:
+    (tmp_path / "Limits.TcGVL").write_text(GLOBALS)
+    (tmp_path / "main.st").write_text("PROGRAM Main\nVAR n : INT; END_VAR\nn := GVL_Limits.highest;\nEND_PROGRAM\n")
+    with started(tmp_path) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.n") == 5

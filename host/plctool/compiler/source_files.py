@@ -10,6 +10,7 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from pathlib import Path
 
 from plctool.compiler.formats import beremiz, codesys2, global_lists, object_text, plcopen, twincat, unreadable
+from plctool.compiler.garbage import no_collection
 from plctool.compiler.source import Finding, Source
 from plctool.errors import UsageError
 
@@ -58,7 +59,8 @@ def load(paths: Iterable[Path]) -> list[Source]:
     files: dict[Path, None] = {}
     for path in paths:
         files.update(dict.fromkeys(_files(path)))
-    read = {file: read_file(file) for file in files}
+    with no_collection():
+        read = {file: read_file(file) for file in files}
     for owner, members in _members(read).items():
         read[owner] = object_text.with_members(read[owner][0], [read.pop(member)[0] for member in members])
     return [source for sources in read.values() for source in sources]

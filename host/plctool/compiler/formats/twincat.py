@@ -22,14 +22,15 @@ _PROJECT_OF = re.compile(r"PrjFilePath=\"([^\"]+\.plcproj)\"", re.IGNORECASE)
 
 def read_object(path: str, text: str) -> Source:
     """A .TcPOU, .TcGVL, .TcDUT, .TcIO or .TcTTO as Structured Text, with the END_... that are not written there."""
-    findings, made = Findings(), Text()
+    findings, made, name = Findings(), Text(), ""
     try:
         reader = _Object(made, findings)
         for part in read_xml(text).children:
             reader.read(part)
+            name = part.get("Name") if part.tag == "GVL" else name
     except XmlError as error:
         findings.add(error.at, "xml", str(error))
-    return made.source(path, text, findings=findings.all)
+    return made.source(path, text, name=name, findings=findings.all)
 
 
 class _Object:
