@@ -65,18 +65,30 @@ _SECTION_NAME: 'Root'
 _INDEX_IN_PARENT: '-1'
 _IECIN: %IB0
 
-_CHANNEL: 'input'
-_SECTION_NAME: 'DI'
+_CHANNEL
+_SECTION_NAME: 'BOOLOnX_I'
+_INDEX_IN_PARENT: '1'
 _SYMBOLIC_NAME: 'Button'
+_COMMENT: ''
+_CHANNEL_MODE: 'I'
 _IECADR: %IX2.3
 _END_CHANNEL
 
-_CHANNEL: 'output'
+_CHANNEL
+_SECTION_NAME: 'WordOutput'
 _SYMBOLIC_NAME: 'Speed'
+_CHANNEL_MODE: 'Q'
 _IECADR: %QW4
 _END_CHANNEL
 
-_CHANNEL: 'spare'
+_CHANNEL
+_SECTION_NAME: 'FloatInput'
+_SYMBOLIC_NAME: 'Level'
+_CHANNEL_MODE: 'I'
+_IECADR: %ID3
+_END_CHANNEL
+
+_CHANNEL
 _SYMBOLIC_NAME: ''
 _IECADR: %QW6
 _END_CHANNEL
@@ -112,13 +124,17 @@ def started(folder: Path) -> Simulator:
 
 def test_a_whole_project_runs_and_what_is_left_out_is_named(tmp_path: Path) -> None:
     text = LIBRARY + PROGRAM + VISUALISATION + OTHER + HARDWARE + TASKS + SETTINGS
-    (only,) = found(tmp_path, text.replace("n := n + 1;", "n := n + 1;\nIF Button THEN\n    Speed := 7;\nEND_IF;"))
+    (only,) = found(
+        tmp_path, text.replace("n := n + 1;", "n := n + 1;\nIF Button THEN\n    Speed := REAL_TO_WORD(Level);\nEND_IF;")
+    )
     assert (only.severity, only.code) == ("warning", "left-out")
     assert only.message == "left out: the library STANDARD.LIB, VISUALISATION Overview, _ALARMCONFIG, _WORKSPACE"
     with started(tmp_path) as plc:
         plc.write("Button", True)
+        plc.write("Level", 7.0)
         plc.run_cycles(1)
         assert plc.read("PLC_PRG.n") == 1
+        assert plc.read("Speed") in (7, "16#0007")
 
 
 def test_tasks_run_their_programs(tmp_path: Path) -> None:

@@ -203,18 +203,22 @@ class _Export:
     def _hardware(self, span: _Span) -> str:
         """Channels of modules that have a name and an address."""
         lines: list[str] = []
-        name = address = ""
+        name = address = section = ""
         for match in _ENTRY.finditer(self._text, span.start, span.end):
             key, value = match[1].upper(), match[2].strip()
-            if key in ("CHANNEL", "MODULE", "BITVALUE", "BIT") or key.startswith("END_"):
-                name = address = ""
-            elif key in ("SYMBOLIC_NAME", "SYMBOLICNAME", "SYMBOL"):
+            if key in ("CHANNEL", "MODULE") or key.startswith("END_"):
+                name = address = section = ""
+            elif key == "SECTION_NAME":
+                section = value.lower()
+            elif key == "SYMBOLIC_NAME":
                 name = value
-            elif key in ("IECADR", "IECADDRESS", "ADDRESS"):
+            elif key == "IECADR":
                 address = value
             located = _ADDRESS.fullmatch(address)
             if located and _NAME.fullmatch(name):
-                lines.append(f"    {name} AT {address} : {_TYPES[located[1].upper()]};")
+                size = located[1].upper()
+                spec = "REAL" if size == "D" and section.startswith(("float", "real")) else _TYPES[size]
+                lines.append(f"    {name} AT {address} : {spec};")
                 name = address = ""
         return "\n".join(["VAR_GLOBAL", *dict.fromkeys(lines), "END_VAR\n"]) if lines else ""
 
