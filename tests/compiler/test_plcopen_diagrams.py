@@ -278,3 +278,24 @@ def test_an_output_may_name_its_variable_in_the_block(tmp_path: Path) -> None:
     body = ladder(contact(2, "go", "1"), given(4, "T#1s"), timer, coil(5, "done", "3.Q"))
     found = run(tmp_path, body, ["go:BOOL:=TRUE", "done:BOOL", "el:TIME", "TON0:TON"], cycles=4)
     assert found["el"] not in (0, "T#0s", "T#0ms")
+
+
+@pytest.mark.parametrize(("variable", "declared"), [("p.x", "p:Point"), ("r[2]", "r:Row"), ("c.CV", "c:CTU")])
+def test_the_type_of_a_member_or_element_is_known(tmp_path: Path, variable: str, declared: str) -> None:
+    types = """<dataType name="Point"><baseType><struct><variable name="x"><type><INT/></type></variable></struct>
+</baseType></dataType>"""
+    body = network(
+        given(1, variable),
+        given(2, "5"),
+        block(3, "ADD", {"IN1": "1", "IN2": "2"}),
+        taken(4, "n", "3.OUT", row=10),
+        taken(5, "m", "3.OUT", row=60),
+    )
+    row = (
+        '<localVars><variable name="r"><type><array><dimension lower="1" upper="3"/><baseType><INT/></baseType></array>'
+    )
+    own = f"{row}</type></variable></localVars>" if declared == "r:Row" else variables("localVars", declared)
+    main = pou("Main", body, variables("localVars", "n:INT", "m:INT") + own)
+    with started(tmp_path, project(main, types, CYCLE)) as plc:
+        plc.run_cycles(1)
+        assert (plc.read("Main.n"), plc.read("Main.m")) == (5, 5)

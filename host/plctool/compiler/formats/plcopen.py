@@ -65,6 +65,11 @@ class _Project:
             known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in outputs}
             known[""] = types.type_of(pou.child("interface", "returnType"))
             self._blocks[pou.get("name").casefold()] = known
+        for data_type in root.every("dataType"):
+            struct = data_type.child("baseType", "struct")
+            members = struct.all("variable") if struct is not None else []
+            known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in members}
+            self._blocks[data_type.get("name").casefold()] = known
         self._walk(root)
         for configuration in _configurations(root):
             write_configuration(self.text, configuration, self._findings)

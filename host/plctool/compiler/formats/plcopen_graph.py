@@ -35,6 +35,9 @@ _CHOOSERS = frozenset(("SEL", "MUX"))  # the first input says which of the other
 _OUTPUTS = {"Q": "BOOL", "QU": "BOOL", "QD": "BOOL", "Q1": "BOOL", "ET": "TIME", "CV": "INT"}
 _LITERALS = ((re.compile(r"(?i)TRUE|FALSE"), "BOOL"), (re.compile(r"(?i)T(?:IME)?#.*"), "TIME"))
 _TYPED = re.compile(r"(?i)([A-Z]+)#[^#]+")
+_PATH = re.compile(r"\w+(?:\[[^\[\]]*\])?(?:\.\w+(?:\[[^\[\]]*\])?)*")
+_PART = re.compile(r"(\w+)(\[[^\[\]]*\])?(?:\.|$)")
+_ARRAY = re.compile(r"ARRAY\[[^\[\]]*\] OF (.*)")
 _CONVERSION = re.compile(r"(?i)\w+_TO_([A-Z]+)|TO_([A-Z]+)")
 
 
@@ -322,7 +325,23 @@ class Network:
             if pattern.fullmatch(text):
                 return spec
         typed = _TYPED.fullmatch(text)
-        return typed[1].upper() if typed else self._unit.types.get(text.casefold(), "")
+        return typed[1].upper() if typed else self._type_of_variable(text.casefold())
+
+    def _type_of_variable(self, text: str) -> str:
+        """Of `x`, `x.member`, `x[1].member`; "" when a part of it is not known."""
+        if not _PATH.fullmatch(text):
+            return ""
+        spec = ""
+        for i, (name, indices) in enumerate(_PART.findall(text)):
+            if i:
+                members = self._unit.blocks.get(spec.casefold())
+                spec = _OUTPUTS.get(name.upper(), "") if members is None else members.get(name, "")
+            else:
+                spec = self._unit.types.get(name, "")
+            if indices:
+                array = _ARRAY.fullmatch(spec)
+                spec = array[1] if array is not None else ""
+        return spec
 
 
 def _parameters(block: Element, which: str) -> list[Element]:
