@@ -291,10 +291,9 @@ def test_the_type_of_a_member_or_element_is_known(tmp_path: Path, variable: str,
         taken(4, "n", "3.OUT", row=10),
         taken(5, "m", "3.OUT", row=60),
     )
-    row = (
-        '<localVars><variable name="r"><type><array><dimension lower="1" upper="3"/><baseType><INT/></baseType></array>'
-    )
-    own = f"{row}</type></variable></localVars>" if declared == "r:Row" else variables("localVars", declared)
+    row = '<array><dimension lower="1" upper="3"/><baseType><INT/></baseType></array>'
+    array = f'<localVars><variable name="r"><type>{row}</type></variable></localVars>'
+    own = array if declared == "r:Row" else variables("localVars", declared)
     main = pou("Main", body, variables("localVars", "n:INT", "m:INT") + own)
     with started(tmp_path, project(main, types, CYCLE)) as plc:
         plc.run_cycles(1)
