@@ -140,7 +140,10 @@ def _is_source(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix not in READERS or not path.is_file():
         return False
-    return suffix != ".xml" or plcopen.is_project(decode(path.read_bytes()))
+    if suffix != ".xml":
+        return True
+    with path.open("rb") as file:
+        return plcopen.is_project(decode(file.read(plcopen.HEAD)))
 
 
 def _is_generated(path: Path, found: Container[Path]) -> bool:

@@ -25,12 +25,12 @@ _KEYWORDS = {"function": "FUNCTION", "functionblock": "FUNCTION_BLOCK", "program
 _MODIFIERS = ("Abstract", "Final", "Internal", "Private", "Protected", "Public")
 _DIAGRAMS = ("FBD", "LD", "SFC", "CFC", "IL")
 _NAMESPACE = re.compile(r"plcopen\.org/xml/tc6|iec61131-10", re.IGNORECASE)
-_HEAD = 4096  # characters in which the name space of a project stands
+HEAD = 4096  # bytes in which the name space of a project stands
 
 
 def is_project(text: str) -> bool:
     """Whether an XML file seems to be a project."""
-    return _NAMESPACE.search(text, 0, _HEAD) is not None
+    return _NAMESPACE.search(text, 0, HEAD) is not None
 
 
 def read_project(path: str, text: str) -> list[Source]:

@@ -54,8 +54,8 @@ class Body:
 
 @dataclass
 class Unit:
-    """What a body may have to know of its unit. `types`: of variables, as far as known, by case-folded name; `blocks`: of
-    outputs of the function blocks and functions of the file ("" is the result) and of members of its structures."""
+    """What a body may have to know of its unit. `types`: of variables, as far as known, by case-folded name. `blocks`:
+    of outputs of the function blocks and functions of the file ("" is the result), and of members of its structures."""
 
     name: str
     keeps: bool  # whether its variables live from one call to the next
