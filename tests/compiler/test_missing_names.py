@@ -103,3 +103,13 @@ def test_few_missing_names_are_shown_where_they_are(tmp_path: Path) -> None:
 )
 def test_a_library_is_known_by_the_names_in_it(name: str, library: str) -> None:
     assert library_of(name) == library
+
+
+def test_a_syntax_error_in_one_file_hides_no_name_that_another_needs() -> None:
+    broken = Source("broken.st", "FUNCTION_BLOCK Mine\nVAR_OUTPUT a : INT; END_VAR\na := := 1;\nEND_FUNCTION_BLOCK")
+    whole = Source("whole.st", "PROGRAM Main\nVAR m : Mine; p : MC_Power; END_VAR\nm();\nm.b := 'x';\nEND_PROGRAM")
+    found = [(d.file, d.message) for d in check_sources([broken, whole]).diagnostics if d.severity == "error"]
+    assert found == [
+        ("broken.st", "expected a value before :="),
+        ("whole.st", "unknown type MC_Power"),
+    ]

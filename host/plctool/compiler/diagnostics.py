@@ -53,7 +53,8 @@ class Diagnostics:
         self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
         self.baseless: set[str] = set()  # those of them whose base is unknown
         self.errors = 0
-        self._counted = 0  # errors that are counted to MAX_ERRORS
+        self._counted = 0  # errors that are counted to the limit
+        self.limit = MAX_ERRORS
 
     def error(self, pos: Pos, code: str, message: str) -> None:
         """Records an error; raises TooManyErrors when it is one too many."""
@@ -103,7 +104,7 @@ class Diagnostics:
         if severity == "error":
             self.errors += 1
             self._counted += counts and not missing
-            if self._counted >= MAX_ERRORS:
+            if self._counted >= self.limit:
                 raise TooManyErrors
 
     def sorted(self) -> list[Diagnostic]:

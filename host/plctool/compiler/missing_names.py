@@ -46,6 +46,18 @@ _LIBRARIES = [
 ]
 
 
+_DECLARED = re.compile(
+    r"\b(?:PROGRAM|FUNCTION_BLOCK|FUNCTION|INTERFACE|CLASS|TYPE|METHOD|PROPERTY|ACTION|NAMESPACE)"
+    r"(?:\s+(?:ABSTRACT|FINAL|PUBLIC|INTERNAL|PRIVATE|PROTECTED))*\s+(\w+)|(\w+)\s*(?::(?!=)|,|\bAT\b|\))",
+    re.IGNORECASE,
+)
+
+
+def declared_names(text: str) -> set[str]:
+    """What a text that cannot be parsed may declare, case-folded; rather too much than too little."""
+    return {(match[1] or match[2]).casefold() for match in _DECLARED.finditer(text)}
+
+
 @dataclass(frozen=True)
 class Use:
     """A place where a name is used that nothing declares."""
