@@ -378,3 +378,11 @@ def test_a_list_of_globals_has_the_name_in_the_file_of_twincat(tmp_path: Path) -
     with started(tmp_path) as plc:
         plc.run_cycles(1)
         assert plc.read("Main.n") == 5
+
+
+@pytest.mark.parametrize("tag", ["NWL", "SFC"])
+def test_a_diagram_of_twincat_says_how_it_can_be_read(tmp_path: Path, tag: str) -> None:
+    path = tmp_path / "A.TcPOU"
+    path.write_text(MAIN.replace("<ST>", f"<{tag}>").replace("</ST>", f"</{tag}>"))
+    found = next(d for d in check_sources(load_sources([path])).diagnostics if d.code == "language")
+    assert found.message.endswith("; export the project as PLCopen XML, of which SFC, LD and FBD are read")

@@ -41,9 +41,9 @@ class Findings:
         """Notes a warning."""
         self._found[Finding(at.line, at.column, code, message, "warning")] = None
 
-    def refuse(self, at: Place, what: str, language: str) -> None:
-        """A body that is no Structured Text."""
-        self.add(at, "language", f"{what} is written in {language}; only Structured Text can be compiled")
+    def refuse(self, at: Place, what: str, language: str, advice: str = "only Structured Text can be compiled") -> None:
+        """A body that is no Structured Text, and what to do about it."""
+        self.add(at, "language", f"{what} is written in {language}; {advice}")
 
     @property
     def all(self) -> tuple[Finding, ...]:

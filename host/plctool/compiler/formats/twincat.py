@@ -17,6 +17,8 @@ from plctool.errors import UsageError
 LOWEST_PRIORITY = 31
 _TEXT = frozenset(("ST", "STNonEdit"))
 _MEMBERS = {"Method": "METHOD", "Property": "PROPERTY", "Action": "ACTION"}
+_DRAWN = {"NWL": "LD, FBD or IL", "SFC": "SFC", "LD": "LD", "FBD": "FBD"}
+_EXPORT = "export the project as PLCopen XML, of which SFC, LD and FBD are read"
 _PROJECT_OF = re.compile(r"PrjFilePath=\"([^\"]+\.plcproj)\"", re.IGNORECASE)
 
 
@@ -86,8 +88,10 @@ class _Object:
             for body in implementation.children:
                 if body.tag in _TEXT:
                     self._text.copied(body.chunks)
-                elif body.tag in ("SFC", "NWL", "CFC", "UML", "IL", "FBD", "LD"):
-                    self._findings.refuse(body.at, name, {"NWL": "LD, FBD or IL"}.get(body.tag, body.tag))
+                elif body.tag in _DRAWN:
+                    self._findings.refuse(body.at, name, _DRAWN[body.tag], _EXPORT)
+                elif body.tag in ("CFC", "UML", "IL"):
+                    self._findings.refuse(body.at, name, body.tag)
 
     def _task(self, task: Element) -> None:
         """Becomes a CONFIGURATION, because that is what tasks are in."""
