@@ -386,3 +386,11 @@ def test_a_diagram_of_twincat_says_how_it_can_be_read(tmp_path: Path, tag: str) 
     path.write_text(MAIN.replace("<ST>", f"<{tag}>").replace("</ST>", f"</{tag}>"))
     found = next(d for d in check_sources(load_sources([path])).diagnostics if d.code == "language")
     assert found.message.endswith("; export the project as PLCopen XML, of which SFC, LD and FBD are read")
+
+
+def test_what_a_cut_off_file_declares_is_not_missing(tmp_path: Path) -> None:
+    (tmp_path / "FB_Counter.TcPOU").write_text(BLOCK[: BLOCK.index("<Action")])
+    (tmp_path / "MAIN.st").write_text("PROGRAM MAIN\nVAR f : FB_Counter; p : MC_Power; END_VAR\nf();\nEND_PROGRAM")
+    errors = [d for d in check_sources(load_sources([tmp_path])).diagnostics if d.severity == "error"]
+    assert [d.code for d in errors] == ["xml", "unknown"]
+    assert errors[1].message == "unknown type MC_Power"

@@ -94,12 +94,17 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
 
 def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
     world = program.world
-    texts = [(source, parse_all(source, world.diagnostics.at(source).error)) for source in sources]
-    syntax_errors = world.diagnostics.errors
+    texts: list[tuple[Source, Parsed]] = []
+    broken: list[Source] = []
+    for source in sources:
+        before = world.diagnostics.errors
+        texts.append((source, parse_all(source, world.diagnostics.at(source).error)))
+        if world.diagnostics.errors > before or any(found.code == "xml" for found in source.findings):
+            broken.append(source)
     for source in sources:
         world.diagnostics.found_by_reader(source)
-    if syntax_errors:
-        _name_what_is_missing(program, sources)
+    if broken:
+        _name_what_is_missing(program, sources, broken)
         return None
     parsed = [(source, _looked_at(source, text, world.diagnostics)) for source, text in texts]
     tests = None if suite is None else suite.begin(program)
@@ -144,15 +149,14 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     return typed
 
 
-def _name_what_is_missing(program: Program, sources: Sequence[Source]) -> None:
+def _name_what_is_missing(program: Program, sources: Sequence[Source], broken: Sequence[Source]) -> None:
     """Names that nothing declares in the files without syntax errors: a mistake in one file hides no library that the
-    others need. Other errors wait, because they may follow from what a file with mistakes declares."""
+    others need. Other errors wait, because they may follow from what the `broken` files declare."""
     found = program.world.diagnostics
-    broken = {d.file for d in found.sorted() if d.severity == "error" and d.code != "language"}
-    whole = [source for source in sources if source.path not in broken]
+    whole = [source for source in sources if source not in broken]
     if not whole:
         return
-    declared = {name for s in sources if s.path in broken for name in declared_names(s.original or s.text)}
+    declared = {name for s in sources if s not in whole for name in declared_names(s.original or s.text)}
     other = Program(program.world.names.library)
     other.world.diagnostics.limit = sys.maxsize
     _check(other, whole, None)
