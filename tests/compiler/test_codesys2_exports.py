@@ -130,8 +130,8 @@ def test_a_whole_project_runs_and_what_is_left_out_is_named(tmp_path: Path) -> N
     assert (only.severity, only.code) == ("warning", "left-out")
     assert only.message == "left out: the library STANDARD.LIB, VISUALISATION Overview, _ALARMCONFIG, _WORKSPACE"
     with started(tmp_path) as plc:
-        plc.write("Button", True)
-        plc.write("Level", 7.0)
+        plc.write({"Button": True})
+        plc.write({"Level": 7.0})
         plc.run_cycles(1)
         assert plc.read("PLC_PRG.n") == 1
         assert plc.read("Speed") in (7, "16#0007")

@@ -115,7 +115,7 @@ def test_simultaneous_branches_wait_for_each_other(tmp_path: Path) -> None:
     with started(tmp_path, chart(*elements)) as plc:
         plc.run_cycles(6)
         assert [plc.read(f"Main.{s}.X") for s in ("One", "Two", "Three", "End")] == [True, False, True, False]
-        plc.write("Main.n", 1)
+        plc.write({"Main.n": 1})
         plc.run_cycles(2)
         assert [plc.read(f"Main.{s}.X") for s in ("One", "Three", "End")] == [False, False, True]
 
@@ -149,8 +149,8 @@ def test_a_condition_may_be_a_named_transition_or_a_variable(tmp_path: Path) -> 
     with started(tmp_path, chart(*elements, more=go)) as plc:
         plc.run_cycles(3)
         assert plc.read("Main.Busy.X") is True
-        plc.write("Main.n", 1)
-        plc.write("Main.a", True)
+        plc.write({"Main.n": 1})
+        plc.write({"Main.a": True})
         plc.run_cycles(3)
         assert plc.read("Main.Start.X") is True
 
