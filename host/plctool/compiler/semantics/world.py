@@ -42,7 +42,7 @@ class World:
         self.blocks: dict[StructType, BlockInfo] = {}
         self.interfaces: dict[StructType, ClassInfo] = {}
         self.defaults: dict[str, StructInit] = {}
-        self.shared: dict[tuple[str, int], Variable] = {}
+        self.shared: dict[tuple[str, str, int], Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
         self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
         self.pous: list[Pou] = []

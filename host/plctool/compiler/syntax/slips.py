@@ -70,6 +70,8 @@ REFUSED = {
     "__TRY": Refusal("exceptions cannot be caught, they stop the program; test beforehand what may fail", "__ENDTRY"),
     "_LD_BODY": Refusal(_GRAPHIC),
     "_FBD_BODY": Refusal(_GRAPHIC),
+    "_CFC_BODY": Refusal(_GRAPHIC),
+    "_SFC_BODY": Refusal(_GRAPHIC),
 }
 """Words that begin what this compiler leaves out."""
 
