@@ -163,7 +163,7 @@ def test_result_that_is_not_used_is_fine_for_a_call_with_effects() -> None:
         ("i := Add3(1, 2, 3, 4);", "20: Add3 takes 3 arguments, not 4"),
         ("i := Add3(1);", "6: the argument b of Add3 is missing"),
         ("i := Add3(b := 1, c := 2, d := 3);", "27: Add3 has no parameter d"),
-        ("i := Add3(b := 2, 1);", "19: arguments without a name come before those with one"),
+        ("i := Add3(b := 2, 1);", "19: b is given twice"),
         ("i := Add3(x := 1);", "11: Add3 has no parameter x"),
         ("i := Add3(a := 1, a := 2);", "19: a is given twice"),
         ("i := Add3(a => j);", "11: a is given with :="),

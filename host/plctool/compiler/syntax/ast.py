@@ -115,9 +115,17 @@ class Argument:
 
 @dataclass(slots=True, eq=False)
 class Call:
+    """`had_enable`: EN or ENO were among the arguments and are handled already."""
+
     pos: int
     callee: Expr
     args: list[Argument]
+    had_enable: bool = False
+
+    @property
+    def formal(self) -> bool:
+        """Whether arguments are given by name, so that others may be left out."""
+        return self.had_enable or any(argument.name is not None for argument in self.args)
 
 
 @dataclass(slots=True, eq=False)

@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast, literals
@@ -14,6 +14,8 @@ from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.builder_chart import read_action, read_priority
 from plctool.compiler.syntax.builder_units import Arrangement
 from plctool.compiler.syntax.lexer import Report, Token
+
+I = TypeVar("I", bound="ast.Init | None")
 
 _PRECEDENCE = {
     "**": 7, "*": 6, "/": 6, "MOD": 6, "+": 5, "-": 5, "<": 4, ">": 4, "<=": 4, ">=": 4, "=": 3, "<>": 3,
@@ -44,6 +46,13 @@ def _chain(operands: Sequence[ast.Expr], operators: Sequence[Token]) -> ast.Expr
 
 def _listed(children: tuple[Any, ...]) -> list[Any]:
     return [c for c in children if c is not None]
+
+
+def _placed(init: I, pos: int) -> I:
+    """An initial value; `()` has no token of its own, so it stands where its name does."""
+    if isinstance(init, ast.StructInit) and init.pos < 0:
+        init.pos = pos
+    return init
 
 
 class Builder:
@@ -89,14 +98,14 @@ class Builder:
     def named_type(self, name: tuple[int, str]) -> ast.NamedType:
         return ast.NamedType(*name)
 
-    def initialised_type(self, name: Token, inits: ast.ArrayInit) -> ast.NamedType:
-        return ast.NamedType(name.pos, name.text, inits=inits)
+    def initialised_type(self, name: tuple[int, str], inits: ast.ArrayInit) -> ast.NamedType:
+        return ast.NamedType(*name, inits=inits)
 
     def text_type(self, name: Token, length: ast.Expr | None) -> ast.NamedType:
         return ast.NamedType(name.pos, name.text, length)
 
-    def subrange(self, base: Token, low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
-        return ast.SubrangeSpec(base.pos, base.text, low, high)
+    def subrange(self, base: tuple[int, str], low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
+        return ast.SubrangeSpec(*base, low, high)
 
     def enum(self, values: list[tuple[int, str, ast.Init | None]]) -> ast.EnumSpec:
         return ast.EnumSpec(values[0][0] if values else 0, None, values)
@@ -104,10 +113,10 @@ class Builder:
     def enum_with_base(self, values: list[tuple[int, str, ast.Init | None]], base: Token) -> ast.EnumSpec:
         return ast.EnumSpec(base.pos, base.text, values)
 
-    def enum_of_base(self, base: Token, values: list[Any]) -> ast.EnumSpec:
+    def enum_of_base(self, base: tuple[int, str], values: list[Any]) -> ast.EnumSpec:
         """`INT (red, green := 5)`, or an instance with values, perhaps without names: `Pump(valve, limit := 5)`."""
         named = [(v.pos, v.name, None) if isinstance(v, ast.Name) else v for v in values]
-        return ast.EnumSpec(base.pos, base.text, [v if isinstance(v, tuple) else (v.pos, "", v) for v in named])
+        return ast.EnumSpec(*base, [v if isinstance(v, tuple) else (v.pos, "", v) for v in named])
 
     def enum_values(self, *values: Any) -> list[Any]:
         return [v for v in values if v is not None]
@@ -157,6 +166,7 @@ class Builder:
         pos = names[0].pos
         address = self.direct(location) if location else None
         attributes = self._attributes_at(pos, "variable")
+        init = _placed(init, pos)
         written = [(t.pos, t.text) for t in names]
         return ast.VarDecl(pos, written, address, spec, init, attributes, edge.text.upper() if edge else "")
 
@@ -192,10 +202,15 @@ class Builder:
                 members[-1] = offset, name, listed
             else:
                 listed.items.append(item)
-        return ast.StructInit(members[0][0], members)
+        return ast.StructInit(members[0][0] if members else -1, members)
+
+    def positional_init(self, *values: Any) -> ast.StructInit:
+        """`(1, 2)`: the inputs of FB_Init in their order."""
+        given = _listed(values)
+        return ast.StructInit(given[0].pos, [v if isinstance(v, tuple) else (v.pos, "", v) for v in given])
 
     def member_init(self, name: Token, value: ast.Init) -> tuple[int, str, ast.Init]:
-        return name.pos, name.text, value
+        return name.pos, name.text, _placed(value, name.pos)
 
     # ---- units ----
 
@@ -528,7 +543,7 @@ class Builder:
     def positional(self, value: ast.Expr) -> ast.Argument:
         return ast.Argument(value.pos, None, value)
 
-    def input(self, name: Token, value: ast.Expr) -> ast.Argument:
+    def input(self, name: Token, value: ast.Expr | None = None) -> ast.Argument:
         return ast.Argument(name.pos, name.text, value)
 
     def output(self, name: Token, target: ast.Expr | None = None) -> ast.Argument:

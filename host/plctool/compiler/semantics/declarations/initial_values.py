@@ -11,8 +11,9 @@ from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, initialisers
 from plctool.compiler.semantics.rules.arguments import input_value
+from plctool.compiler.semantics.rules.qualified_names import dotted_name
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Namespace, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import ArrayInit, ComputedInit, Const, Expr, Initial, Load, ScalarInit, StructInit, VarPlace
@@ -70,7 +71,7 @@ class InitialValues:
         for count in counts[1:]:
             inner *= count
         for item in items:
-            if isinstance(item, ast.Call) and isinstance(item.callee, ast.Name) and self._is_repeat(item, scope):
+            if isinstance(item, ast.Call) and self._is_repeat(item, scope):
                 item = ast.Repeat(item.pos, item.callee, [a.value for a in item.args if a.value is not None])
             if isinstance(item, ast.Repeat):
                 more = self._repeated(item, counts, element, scope)
@@ -87,9 +88,17 @@ class InitialValues:
         return runs
 
     def _is_repeat(self, item: ast.Call, scope: Scope) -> bool:
-        assert isinstance(item.callee, ast.Name)
-        symbol = scope.lookup(item.callee.name)
-        return isinstance(symbol, VarSymbol | GlobalSymbol)
+        """Whether the callee is a variable: `N(TRUE)`, `Sizes.N(TRUE)`."""
+        if isinstance(item.callee, ast.Name):
+            return isinstance(scope.lookup(item.callee.name), VarSymbol | GlobalSymbol)
+        name = dotted_name(Checker(self._world, scope), item.callee)
+        if name is None:
+            return False
+        owner, _, own = name.rpartition(".")
+        space = scope.lookup(owner)
+        return isinstance(scope.lookup(name), GlobalSymbol) or (
+            isinstance(space, Namespace) and own.casefold() in space.members
+        )
 
     def _repeated(
         self, item: ast.Repeat, counts: list[int], element: Type, scope: Scope

@@ -93,19 +93,13 @@ class TypeDeclarations:
         return t, overlay(given, default)
 
     def _with_arguments(self, decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
-        """Type and initial value with what stands behind the name of a type: `TON(PT := T#1s)` and `TON[(PT := T#1s)]`
-        are initial values."""
+        """Type and initial value with what stands in brackets behind the type of an array: `F[(1), (2)]`."""
         spec, init = decl.type, decl.init
         given: ast.Init | None = None
-        if isinstance(spec, ast.EnumSpec) and isinstance(scope.unit(spec.base or ""), PouSymbol | TypeSymbol):
-            members = [(o, name, v) if v is not None else (o, "", ast.Name(o, name)) for o, name, v in spec.values]
-            given, spec = ast.StructInit(spec.pos, members), ast.NamedType(spec.pos, spec.base or "")
-            if isinstance(init, ast.StructInit):
-                return spec, ast.StructInit(init.pos, [*given.members, *init.members])
-        elif isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
+        if isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
             element = spec.element
-            given = element.inits
-            if given is not None:
+            if element.inits is not None:
+                given = ast.ArrayInit(element.inits.pos, [_of_instance(item) for item in element.inits.items])
                 spec = ast.ArraySpec(spec.pos, spec.bounds, ast.NamedType(element.pos, element.name))
         if given is not None and init is not None:
             scope.error(init.pos, "duplicate", "there are two initial values; write the second one into the first")
@@ -143,6 +137,8 @@ class TypeDeclarations:
         if isinstance(spec, ast.ArraySpec):
             return self._array(spec, scope)
         if isinstance(spec, ast.EnumSpec):
+            if name is None and isinstance(scope.unit(spec.base or ""), PouSymbol | TypeSymbol):
+                return self._instance(spec, scope)
             return self._enum(spec, scope, name)
         if isinstance(spec, ast.SubrangeSpec):
             return self._subrange(spec, scope, name)
@@ -302,6 +298,15 @@ class TypeDeclarations:
         first = next(iter(t.values.values()), 0)
         return t, ScalarInit(first) if first else None
 
+    def _instance(self, spec: ast.EnumSpec, scope: Scope) -> tuple[Type, Initial | None]:
+        """`TON(PT := T#1s)`, `Pump(valve, 3)`: a type with initial values and inputs of FB_Init."""
+        members = [(o, name, v) if v is not None else (o, "", ast.Name(o, name)) for o, name, v in spec.values]
+        t, default = self._named(ast.NamedType(spec.pos, spec.base or ""), scope)
+        if t is ERROR or not members:
+            return t, default
+        given = self._initials.initial(ast.StructInit(spec.pos, members), t, scope)
+        return t, default if given is None else overlay(given, default)
+
     def _subrange(self, spec: ast.SubrangeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
         base = self.named_type(spec.pos, spec.base, scope)
         checker = Checker(self._world, scope)
@@ -382,3 +387,8 @@ class TypeDeclarations:
     def struct_default(self, t: StructType) -> Initial | None:
         """What a struct or instance starts with: None for all zero."""
         return StructInit({}) if t.name in self._world.defaults else None
+
+
+def _of_instance(item: ast.Init | ast.Repeat) -> ast.Init | ast.Repeat:
+    """`(1)` behind the type of an array of instances: the input of one FB_Init."""
+    return item if isinstance(item, ast.ArrayInit | ast.StructInit | ast.Repeat) else ast.StructInit(item.pos, [(item.pos, "", item)])

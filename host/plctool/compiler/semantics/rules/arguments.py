@@ -14,6 +14,7 @@ from plctool.compiler.semantics.conversions import elementary, error_value, same
 from plctool.compiler.semantics.generics import is_group
 from plctool.compiler.semantics.open_arrays import handed_bounds
 from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.rules.qualified_names import dotted_name
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
 from plctool.compiler.semantics.values import place_of
 from plctool.compiler.syntax import ast
@@ -71,27 +72,39 @@ def split_enable(node: ast.Call, declared: Container[str] = ()) -> tuple[list[as
 
 def parameter_names(c: Checker, callee: ast.Expr) -> set[str]:
     """What the function of that name declares, folded; nothing for one that is built in."""
-    if not isinstance(callee, ast.Name):
-        return set()
-    symbol = c.world.names.unit(callee.name.casefold(), library=c.scope.library)
+    if isinstance(callee, ast.Name):
+        symbol = c.world.names.unit(callee.name.casefold(), library=c.scope.library)
+    else:
+        symbol = named_function(c, callee)
     if not isinstance(symbol, PouSymbol):
         return set()
     return {name.casefold() for name, _, _ in parameter_lines(symbol.decl)}
 
 
+def named_function(c: Checker, callee: ast.Expr) -> PouSymbol | None:
+    """The FUNCTION that a name with a namespace or library in front stands for."""
+    dotted = dotted_name(c, callee)
+    symbol = None if dotted is None else c.scope.unit(dotted)
+    return symbol if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION" else None
+
+
 def plain_arguments(c: Checker, node: ast.Call, declared: Container[str] = ()) -> list[ast.Argument] | None:
-    """The arguments of a call that is part of an expression; None after a diagnosis."""
+    """The arguments of a call that is part of an expression; None after a diagnosis. `EN := TRUE` says nothing."""
     args, enable = split_enable(node, declared)
-    if enable.en is None and enable.eno is None:
+    if enable.eno is None and (enable.en is None or _is_true(enable.en)):
         return args
     c.error(node.pos, "arguments", "EN and ENO need the call to be a statement or the whole right side of :=")
     return None
 
 
+def _is_true(node: ast.Expr) -> bool:
+    return isinstance(node, ast.Literal) and node.kind is ast.LiteralKind.BOOL and node.value == 1
+
+
 def bind(
     c: Checker, args: list[ast.Argument], names: list[tuple[str, Direction]], what: str, offset: int
 ) -> dict[int, ast.Argument] | None:
-    """Arguments by index of their parameter; None after a diagnosis."""
+    """Arguments by index of their parameter, without the empty ones (`PT := `); None after a diagnosis."""
     if not args:
         return {}
     if all(a.name is None for a in args):
@@ -107,35 +120,43 @@ def bind(
     index = {name.casefold(): i for i, (name, _) in enumerate(names)}
     inputs = [i for i, (_, direction) in enumerate(names) if direction is not Direction.OUTPUT]
     for position, argument in enumerate(args):
-        if argument.name is None:  # arguments without a name come first
-            if position >= len(inputs) or any(a.name is not None for a in args[:position]):
-                c.error(argument.pos, "arguments", "arguments without a name come before those with one")
+        if argument.name is None:  # it counts from the first, whether those before it have names or not
+            if position >= len(inputs):
+                takes = arguments_text(len(inputs))
+                c.error(argument.pos, "arguments", f"{what} takes {takes} without a name; give this one its name")
                 return None
-            bound[inputs[position]] = argument
-            continue
-        i = index.get(argument.name.casefold())
+            i: int | None = inputs[position]
+        else:
+            i = index.get(argument.name.casefold())
         if i is None:
             hint = did_you_mean(argument.name, (n for n, _ in names))
             c.error(argument.pos, "arguments", f"{what} has no parameter {argument.name}{hint}")
             return None
         if i in bound:
-            c.error(argument.pos, "arguments", f"{argument.name} is given twice")
+            c.error(argument.pos, "arguments", f"{names[i][0]} is given twice")
             return None
         is_output = names[i][1] is Direction.OUTPUT
-        if argument.output is not is_output:
+        if argument.name is not None and argument.output is not is_output:
             arrow = "=>" if is_output else ":="
             c.error(argument.pos, "arguments", f"{argument.name} is given with {arrow}")
             return None
         bound[i] = argument
-    return bound
+    return {i: argument for i, argument in bound.items() if argument.value is not None or argument.output}
 
 
-def typed_call(c: Checker, info: FunctionInfo, actuals: dict[int, Actual], offset: int, *, noted: bool = True) -> Expr:
-    """The call node: arguments in order of the parameters, defaults filled in. `noted`: a call that leads back is
-    recursion."""
+def typed_call(
+    c: Checker,
+    info: FunctionInfo,
+    actuals: dict[int, Actual],
+    offset: int,
+    *,
+    formal: bool = False,
+    noted: bool = True,
+) -> Expr:
+    """The call node: arguments in order of the parameters, defaults filled in. `formal`: arguments are given by name,
+    so that others may be left out. `noted`: a call that leads back is recursion."""
     pos, name, ok = c.pos(offset), info.pou.name, True
     args: list[Expr | Place | None] = []
-    formal = any(isinstance(a, ast.Argument) and a.name is not None for a in actuals.values())
     parameters = list(zip(info.parameters, info.pou.parameters, strict=False))
     for i, ((symbol, direction), parameter) in enumerate(parameters):
         actual = actuals.get(i)

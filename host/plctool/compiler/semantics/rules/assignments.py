@@ -18,6 +18,8 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Assign, Const, DerefPlace, If, Load, Pos, Statement
 from plctool.compiler.types import BOOL, OpenArrayType, ReferenceType
 
+_NOTHING = (ast.LiteralKind.NULL, ast.LiteralKind.INT)
+
 
 @checks_statement(ast.Assign)
 def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
@@ -63,7 +65,7 @@ def _assign_one(c: Checker, target: ast.Expr, source: ast.Expr, pos: Pos) -> Sta
 
 
 def _assign_reference(c: Checker, node: ast.Assign) -> list[Statement]:
-    """`r REF= x` lets r refer to x; `r REF= NULL` to nothing."""
+    """`r REF= x` lets r refer to x; `r REF= NULL`, as `r REF= 0`, to nothing."""
     target, pos = node.targets[0], c.pos(node.pos)
     place = changeable_place(c, target, "the left side of REF=", "be assigned to")
     pointer = place.pointer if isinstance(place, DerefPlace) else None
@@ -71,7 +73,7 @@ def _assign_reference(c: Checker, node: ast.Assign) -> list[Statement]:
         if place is not None:
             c.error(target.pos, "type", f"the left side of REF= is a REFERENCE TO, not {place.type}")
         return []
-    if isinstance(node.value, ast.Literal) and node.value.kind is ast.LiteralKind.NULL:
+    if isinstance(node.value, ast.Literal) and node.value.value == 0 and node.value.kind in _NOTHING:
         return [Assign(pointer.place, Const(0, pointer.type, pos), pos)]
     value = input_value(c, node.value, pointer.type, "reference")
     return [] if value.type is ERROR else [Assign(pointer.place, value, pos)]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.open_arrays import handed_bounds
-from plctool.compiler.semantics.rules.arguments import bind, input_value, referenced_place
+from plctool.compiler.semantics.rules.arguments import bind, input_value, named_function, referenced_place
 from plctool.compiler.semantics.rules.members import bound_member
 from plctool.compiler.semantics.rules.methods import body_dispatch
 from plctool.compiler.semantics.rules.places import changeable_place
@@ -88,7 +88,7 @@ def program_arguments(
 def called_instance(c: Checker, call: ast.Call) -> Expr | None:
     """The instance a call statement is about; None when it calls a function."""
     callee = call.callee
-    if bound_member(c, callee, called=True) is not None:
+    if bound_member(c, callee, called=True) is not None or named_function(c, callee) is not None:
         return None
     if isinstance(callee, ast.Name):
         symbol = c.scope.lookup(callee.name)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value
-from plctool.compiler.semantics.rules.arguments import bind, split_enable, typed_call
+from plctool.compiler.semantics.rules.arguments import bind, plain_arguments, typed_call
 from plctool.compiler.semantics.rules.members import Bound, bound_member, instance_member, usable
 from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, Member
 from plctool.compiler.semantics.values import load
@@ -31,20 +31,27 @@ from plctool.compiler.types import ReferenceType
 
 def method_call(c: Checker, bound: Bound, node: ast.Call) -> Expr:
     """A call of a method or action."""
-    args, enable = split_enable(node)
+    args = plain_arguments(c, node)
     offset = node.callee.name_pos if isinstance(node.callee, ast.Member) else node.pos
-    if enable.en is not None or enable.eno is not None:
-        return c.error(node.pos, "arguments", "EN and ENO need the call to be a statement")
+    if args is None:
+        return error_value(c.pos(node.pos))
     if bound.callable is None and bound.getter is not None:
         return c.error(offset, "call", f"{bound.cls.name}.{bound.key} is a property and is used without ()")
     member = usable(c, bound, bound.callable, offset)
     if member is None:
         return error_value(c.pos(node.pos))
-    return _member_call(c, bound, member, args, node.pos, offset)
+    return _member_call(c, bound, member, args, node.pos, offset, formal=node.formal)
 
 
 def _member_call(
-    c: Checker, bound: Bound, member: Member, args: list[ast.Argument], offset: int, name_offset: int
+    c: Checker,
+    bound: Bound,
+    member: Member,
+    args: list[ast.Argument],
+    offset: int,
+    name_offset: int,
+    *,
+    formal: bool = False,
 ) -> Expr:
     place = bound.place
     if isinstance(place, SelfPlace) and place.exact and member.abstract:
@@ -55,7 +62,7 @@ def _member_call(
     if bound_args is None:
         return error_value(c.pos(offset))
     elsewhere = dispatch is not None or isinstance(place, DerefPlace)
-    e = typed_call(c, info, dict(bound_args), offset, noted=not elsewhere)
+    e = typed_call(c, info, dict(bound_args), offset, formal=formal, noted=not elsewhere)
     if isinstance(e, Call):
         e.instance, e.dispatch = place, dispatch
         if dispatch is not None and isinstance(place, SelfPlace):
