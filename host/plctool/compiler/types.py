@@ -144,6 +144,7 @@ class EnumType(Type):
     name: str
     base: Elementary
     values: dict[str, int]  # in order of declaration, names as declared
+    strict: bool = False  # only its own values may be assigned
 
     @property
     def choices(self) -> str:

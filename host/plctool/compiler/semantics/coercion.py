@@ -173,8 +173,12 @@ class Coercion:
 
     def _to_enum(self, e: Expr, target: EnumType) -> Expr:
         source = elementary(e.type)
-        if isinstance(e.type, EnumType) or source is None or source.kind not in NUMBERS:
+        if source is None or source.kind not in NUMBERS:
             return self._mismatch(e, target)
+        if isinstance(e.type, EnumType):
+            return self._other_enum(e, e.type, target)
+        if target.strict and not isinstance(e, Const):
+            return self._error(e.pos, "type", f"{e.type} does not fit {target}, which is 'strict'; use its values")
         if isinstance(e, Const):
             assert isinstance(e.value, int)
             if e.value not in target.values.values():
@@ -183,6 +187,14 @@ class Coercion:
             self._warn(e.pos, "enum", f"the number {e.value} stands for a value of {target}; write {target}#{name}")
             return Const(e.value, target, e.pos)
         self._warn(e.pos, "enum", f"{e.type} becomes {target} without a check whether it is one of its values")
+        return convert(e, target)
+
+    def _other_enum(self, e: Expr, source: EnumType, target: EnumType) -> Expr:
+        """A value of another enumeration: its number."""
+        if source.strict or target.strict:
+            strict = target if target.strict else source
+            return self._error(e.pos, "type", f"{source} does not fit {target}, because {strict} is 'strict'")
+        self._warn(e.pos, "enum", f"a value of {source} becomes one of {target} by its number")
         return convert(e, target)
 
     def _string(self, e: Expr, target: StringType) -> Expr:

@@ -196,6 +196,9 @@ class _Construction:
                 args.append(arguments[key])
             elif isinstance(symbol.default, ScalarInit):
                 args.append(Const(symbol.default.value, symbol.type, pos))
+            elif symbol.given and isinstance(symbol.type, StructType | ArrayType):
+                constant = VarPlace(self._world.default_of(symbol), symbol.type, pos)
+                args.append(Load(constant, symbol.type, pos))
             elif symbol.given:
                 args.append(Const("" if isinstance(symbol.type, StringType) else 0, symbol.type, pos))
             elif direction is Direction.INPUT:

@@ -242,11 +242,16 @@ class ClassInfo:
         return list(found)
 
     def find(self, key: str) -> Member | None:
-        """A member, own or inherited: `name`, or `name.get` and `name.set` of a property."""
+        """A member, own or inherited: `name`, or `name.get` and `name.set` of a property. A property hides a PRIVATE
+        method of a base, and the other way round."""
+        name, _, accessor = key.partition(".")
+        others = (name,) if accessor else (f"{name}.get", f"{name}.set")
         cls: ClassInfo | None = self
         while cls is not None:
             if key in cls.members:
                 return cls.members[key]
+            if any(other in cls.members for other in others):
+                return None
             cls = cls.base
         return next((i.members[key] for i in self.all_interfaces() if key in i.members), None)
 

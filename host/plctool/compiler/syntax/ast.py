@@ -171,10 +171,12 @@ class ArrayInit:
 
 @dataclass(slots=True, eq=False)
 class StructInit:
-    """`(member := value, ...)`"""
+    """`(member := value, ...)`. `arguments`: it stands behind the name of a type, `Pump(limit := 5)`, where the inputs of
+    FB_Init come before members of the same name; a value without a name ("") is always one of them."""
 
     pos: int
     members: list[tuple[int, str, Init]]
+    arguments: bool = False
 
 
 Init = Expr | ArrayInit | StructInit
@@ -266,7 +268,7 @@ class VarBlock:
 
 @dataclass(slots=True, eq=False)
 class TypeDecl:
-    """`qualified`: the values of the enumeration need its name in front, {attribute 'qualified_only'}."""
+    """A type with what stands in front of it or of its TYPE."""
 
     pos: int
     name: str
@@ -274,7 +276,12 @@ class TypeDecl:
     init: Init | None
     source: Source
     namespace: Namespace | None = None
-    qualified: bool = False
+    attributes: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def qualified(self) -> bool:
+        """Whether the values of the enumeration need its name in front."""
+        return "qualified_only" in self.attributes
 
 
 @dataclass(slots=True, eq=False)

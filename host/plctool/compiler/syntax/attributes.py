@@ -18,6 +18,7 @@ Attributes = dict[int, dict[str, str]]
 
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
+    "strict": frozenset(("enumeration",)),
     "external": frozenset(("FUNCTION",)),
     "version": frozenset(("FUNCTION",)),
     "shared_output": frozenset(("variable",)),
@@ -83,7 +84,7 @@ SILENT = frozenset((
     "nameprefix", "namespace", "no_assign", "no_assign_warning", "no_copy", "no_explicit_call",
     "no_instance_in_retain", "no_override", "object_name", "obsolete", "parameterstringof",
     "pin_presentation_order_inputs", "pin_presentation_order_outputs", "pingroup", "processvalue", "pytmc",
-    "reflection", "signature_flag", "strict", "symbol", "sysobject", "tc2gvlvarnames",
+    "reflection", "signature_flag", "symbol", "sysobject", "tc2gvlvarnames",
     "tccontextid", "tccontextname", "tcdisplayscale", "tcdisplaytypeguid", "tcencapsulate", "tcnosymbol",
     "tcrpcenable", "tctypesystem", "unit", "usage", "warning",
 ))  # fmt: skip

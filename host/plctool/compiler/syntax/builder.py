@@ -81,9 +81,9 @@ class Builder:
     def types(self, keyword: Token, *decls: Any) -> list[Any]:
         kinds = {decl: "enumeration" if isinstance(decl.spec, ast.EnumSpec) else "TYPE" for decl in _listed(decls)}
         first = "enumeration" if "enumeration" in kinds.values() else "TYPE"
-        all_qualified = "qualified_only" in self._attributes_at(keyword.pos, first)
+        of_all = self._attributes_at(keyword.pos, first)
         for decl, kind in kinds.items():
-            decl.qualified = "qualified_only" in self._attributes_at(decl.pos, kind) or all_qualified
+            decl.attributes = {**of_all, **self._attributes_at(decl.pos, kind)}
         return list(kinds)
 
     def type_decl(

@@ -126,9 +126,9 @@ class InitialValues:
         block = self._world.blocks.get(t)
         members: dict[str, Initial] = {}
         arguments: dict[str, Expr] = {}
-        for offset, name, value in self._named(node, t, scope):
+        for offset, name, value, first in self._named(node, t, scope):
             field = t.member(name)
-            if field is None and self._initialiser_argument(name, value, t, arguments, scope):
+            if (field is None or first) and self._initialiser_argument(name, value, t, arguments, scope):
                 continue
             if field is None or (block is not None and block.members[name.casefold()].role is Role.IN_OUT):
                 hint = did_you_mean(name, (f.name for f in t.fields))
@@ -141,18 +141,19 @@ class InitialValues:
                 members[field.name] = given
         return StructInit(members, arguments)
 
-    def _named(self, node: ast.StructInit, t: StructType, scope: Scope) -> list[tuple[int, str, ast.Init]]:
-        """The members with names: values without one are for the inputs of FB_Init, in their order."""
+    def _named(self, node: ast.StructInit, t: StructType, scope: Scope) -> list[tuple[int, str, ast.Init, bool]]:
+        """The members with names: values without one are for the inputs of FB_Init, in their order. With each, whether
+        such an input comes before a member of that name."""
         names: list[str] = []
         for member in initialisers(self._world, t)[-1:]:
             inputs = [symbol.name for symbol, _ in self._world.declared.member(member).parameters]
             names = [name for name in inputs if name.casefold() not in (INIT_RETAINS, COPY_CODE)]
-        found: list[tuple[int, str, ast.Init]] = []
+        found: list[tuple[int, str, ast.Init, bool]] = []
         for offset, name, value in node.members:
             if not name and not names:
                 scope.error(offset, "arguments", f"{t} has no FB_Init that takes this value; give the value a name")
                 continue
-            found.append((offset, name or names.pop(0), value))
+            found.append((offset, name or names.pop(0), value, node.arguments or not name))
         return found
 
     def _initialiser_argument(

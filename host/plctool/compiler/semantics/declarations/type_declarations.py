@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import Flag, auto
 
 from plctool.compiler.diagnostics import did_you_mean
@@ -20,7 +21,7 @@ from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbo
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import TYPES
-from plctool.compiler.typed import ArrayInit, Const, Initial, ScalarInit, StructInit, overlay
+from plctool.compiler.typed import ArrayInit, Const, Initial, Pos, ScalarInit, StructInit, overlay
 from plctool.compiler.types import (
     BOOL,
     BYTE,
@@ -211,9 +212,13 @@ class TypeDeclarations:
             return ERROR
         symbol.busy = True
         t, default = self.type_of(decl.spec, scope, decl.name)
+        if isinstance(t, EnumType) and isinstance(decl.spec, ast.EnumSpec):
+            t.strict = "strict" in decl.attributes
         if symbol.type is None:
             symbol.type, symbol.default = t, default
         if decl.init is not None and t is not ERROR:  # it may name a value of this very enumeration
+            if isinstance(t, EnumType) and isinstance(decl.spec, ast.EnumSpec):
+                scope.names.update(_values_of(t, scope.pos(decl.pos)))
             given = self._initials.initial(decl.init, t, scope)
             symbol.default = default if given is None else overlay(given, default)
         symbol.busy = False
@@ -289,10 +294,7 @@ class TypeDeclarations:
                 scope.error(offset, "range", f"{value} does not fit {base}")
                 value = 0
             t.values[value_name] = value
-            constant = Const(value, t, scope.pos(offset))
-            inner.names[key] = VarSymbol(
-                value_name, constant.pos, t, Role.LOCAL, value=constant, constant=True, used=True
-            )
+            inner.names[key] = _value_symbol(t, value_name, scope.pos(offset))
             if name is None:
                 scope.names.setdefault(key, inner.names[key])
         first = next(iter(t.values.values()), 0)
@@ -304,7 +306,7 @@ class TypeDeclarations:
         t, default = self._named(ast.NamedType(spec.pos, spec.base or ""), scope)
         if t is ERROR or not members:
             return t, default
-        given = self._initials.initial(ast.StructInit(spec.pos, members), t, scope)
+        given = self._initials.initial(ast.StructInit(spec.pos, members, arguments=True), t, scope)
         return t, default if given is None else overlay(given, default)
 
     def _subrange(self, spec: ast.SubrangeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
@@ -391,4 +393,18 @@ class TypeDeclarations:
 
 def _of_instance(item: ast.Init | ast.Repeat) -> ast.Init | ast.Repeat:
     """`(1)` behind the type of an array of instances: the input of one FB_Init."""
-    return item if isinstance(item, ast.ArrayInit | ast.StructInit | ast.Repeat) else ast.StructInit(item.pos, [(item.pos, "", item)])
+    if isinstance(item, ast.StructInit):
+        return replace(item, arguments=True)
+    if isinstance(item, ast.ArrayInit | ast.Repeat):
+        return item
+    return ast.StructInit(item.pos, [(item.pos, "", item)], arguments=True)
+
+
+def _value_symbol(t: EnumType, name: str, pos: Pos) -> VarSymbol:
+    constant = Const(t.values[name], t, pos)
+    return VarSymbol(name, pos, t, Role.LOCAL, value=constant, constant=True, used=True)
+
+
+def _values_of(t: EnumType, pos: Pos) -> dict[str, VarSymbol]:
+    """The values of an enumeration as names, case-folded."""
+    return {name.casefold(): _value_symbol(t, name, pos) for name in t.values}

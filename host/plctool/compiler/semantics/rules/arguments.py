@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import elementary, error_value, same_type, takes_array
+from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, same_type, takes_array
 from plctool.compiler.semantics.generics import is_group
 from plctool.compiler.semantics.open_arrays import handed_bounds
 from plctool.compiler.semantics.rules.places import changeable_place
@@ -23,6 +23,7 @@ from plctool.compiler.typed import (
     BitPlace,
     Call,
     Const,
+    Convert,
     DerefPlace,
     Direction,
     Expr,
@@ -31,11 +32,14 @@ from plctool.compiler.typed import (
     Place,
     ScalarInit,
     ValuePlace,
+    VarPlace,
 )
 from plctool.compiler.types import (
     BOOL,
+    ArrayType,
     LREAL,
     REAL,
+    Kind,
     ReferenceType,
     StringType,
     StructType,
@@ -181,6 +185,10 @@ def typed_call(
 
 def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
     pos, t = c.pos(offset), symbol.type
+    if isinstance(t, StructType | ArrayType) and t not in c.world.blocks:
+        variable = c.world.default_of(symbol)
+        place = VarPlace(variable, t, pos)
+        return place if parameter.by_reference else Load(place, t, pos)
     value: int | float | str = "" if isinstance(t, StringType) else 0
     if isinstance(symbol.default, ScalarInit):
         value = symbol.default.value
@@ -264,9 +272,21 @@ def referenced_place(
     if not same_type(place.type, t) and not (
         isinstance(place.type, SubrangeType) and place.type.base is t and not output
     ):
+        if output and _becomes(c, place, t):
+            return place
         c.error(node.pos, "type", f"{what} {name} is {t} and needs a variable of this type, not {place.type}")
         return None
     return place
+
+
+def _becomes(c: Checker, place: Place, t: Type) -> bool:
+    """Whether an output of a function can be converted when it is written back: numbers of all types."""
+    source, target = elementary(t), elementary(place.type)
+    kinds = (*NUMBERS, Kind.REAL)
+    if source is None or target is None or source.kind not in kinds or target.kind not in kinds:
+        return False
+    value = c.coerce(Load(place, t, place.pos), place.type)  # warns as an assignment would
+    return value.type is not ERROR and not (isinstance(value, Convert) and value.check is not None)
 
 
 def parameter_lines(decl: ast.PouDecl) -> list[tuple[str, Direction, str | None]]:

@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.rules.access import is_inside
 from plctool.compiler.semantics.rules.members import Bound, bound_member
 from plctool.compiler.semantics.rules.qualified_names import space_of
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
@@ -83,11 +84,14 @@ def _member_read_only(c: Checker, node: ast.Member) -> str | None:
         return _symbol_read_only(c, variable)
     base = c.expr(node.base)
     own = base.place if isinstance(base, AddressOf | Load) and isinstance(base.place, SelfPlace) else None
-    block = c.world.blocks.get(base.type) if isinstance(base.type, StructType) else None
+    t = base.type if own is None else own.type
+    block = c.world.blocks.get(t) if isinstance(t, StructType) else None
     if own is not None:
-        return None
+        return None if block is None else _symbol_read_only(c, block.members.get(node.name.casefold()))
     if block is not None:
         member = block.members.get(node.name.casefold())
+        if member is not None and member.role is Role.LOCAL and not member.constant and is_inside(c, member, block):
+            return _read_only(c, node.base)
         if member is not None and member.role is not Role.INPUT and member.access != "PUBLIC":
             article = "an" if member.role is Role.OUTPUT else "a"
             return f"{node.name} is {article} {member.role.value} of {base.type}"

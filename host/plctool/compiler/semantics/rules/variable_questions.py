@@ -25,9 +25,13 @@ from plctool.compiler.typed import (
     Intrinsic,
     IntrinsicCall,
     Load,
+    Storage,
+    Variable,
+    VarPlace,
 )
 from plctool.compiler.types import (
     BOOL,
+    BYTE,
     DINT,
     ELEMENTARY,
     UDINT,
@@ -78,10 +82,28 @@ def _open_size(c: Checker, e: Expr, t: OpenArrayType, offset: int) -> Expr:
 def _is_valid(c: Checker, node: ast.Expr) -> Expr:
     """Whether a reference refers to something."""
     e, pos = c.expr(node), c.pos(node.pos)
+    in_out = _in_out_given(c, e)
+    if in_out is not None:
+        return in_out
     pointer = e.place.pointer if isinstance(e, Load) and isinstance(e.place, DerefPlace) else None
     if pointer is None or not isinstance(pointer.type, ReferenceType):
         return e if e.type is ERROR else c.error(node.pos, "type", f"{e.type} is not a REFERENCE TO")
     return Binary(BinaryOp.NE, pointer, Const(0, pointer.type, pos), BOOL, pos)
+
+
+def _in_out_given(c: Checker, e: Expr) -> Expr | None:
+    """Whether a VAR_IN_OUT was given: that of a function always is, that of an instance from its first call on. None
+    when it is none."""
+    variable = e.place.var if isinstance(e, Load) and isinstance(e.place, VarPlace) else None
+    if variable is None or variable.storage is not Storage.REFERENCE:
+        return None
+    block = None if c.scope.cls is None else c.scope.cls.block
+    symbol = None if block is None else block.members.get(variable.name.casefold())
+    if block is None or symbol is None or symbol.variable is not variable:
+        return Const(1, BOOL, e.pos)
+    t = RawPointerType(BYTE)
+    slot = Load(VarPlace(Variable(variable.name, t, Storage.SELF, e.pos, offset=variable.offset), t, e.pos), t, e.pos)
+    return Binary(BinaryOp.NE, slot, Const(0, t, e.pos), BOOL, e.pos)
 
 
 def _size(c: Checker, t: Type, node: ast.Call) -> Expr:

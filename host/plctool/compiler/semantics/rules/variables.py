@@ -27,6 +27,7 @@ from plctool.compiler.semantics.symbols import (
     MemberSymbol,
     Namespace,
     PouSymbol,
+    Role,
     TypeSymbol,
     VarSymbol,
 )
@@ -51,6 +52,8 @@ def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
         if not c.scope.may_use(symbol, node.name, node.pos):
             return error_value(c.pos(node.pos))
         symbol = c.world.declared.variable(symbol)
+    if isinstance(expected, EnumType) and _yields(c, symbol, node.name, expected):
+        return _value_of(c, expected, node.name, node.pos, node.pos)
     if isinstance(symbol, VarSymbol):
         return variable_value(symbol, c.pos(node.pos))
     own = _own_name(c, node, symbol)
@@ -61,6 +64,16 @@ def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
         if value is not None or symbol is None:
             return value or _unknown(c, node)
     return c.error(node.pos, "name", f"{node.name} is {describe(symbol)}, not a value")
+
+
+def _yields(c: Checker, symbol: object, name: str, wanted: EnumType) -> bool:
+    """Whether a name is that of a method and of a value of the enumeration that is wanted here."""
+    if name.casefold() not in (value.casefold() for value in wanted.values):
+        return False
+    if isinstance(symbol, VarSymbol):
+        return symbol.role is Role.RESULT and symbol.type is not wanted
+    bound = own_member(c, name) if isinstance(symbol, MemberSymbol) else None
+    return bound is not None and bound.callable is not None
 
 
 def _enumerated(c: Checker, node: ast.Name, expected: Type | None) -> Expr | None:
