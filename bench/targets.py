@@ -27,14 +27,14 @@ from runners import RUNNERS, Runner  # noqa: E402
 from plctool.compiler import load_sources  # noqa: E402
 from plctool.compiler.build import BuildResult, build_program  # noqa: E402
 from plctool.compiler.codegen.lower_unit import Options, parse_checks  # noqa: E402
-from plctool.compiler.codegen.targets import find_target  # noqa: E402
 from plctool.compiler.front import check_sources  # noqa: E402
 from plctool.compiler.typed import TypedProgram  # noqa: E402
 from plctool.core import lib  # noqa: E402
-from plctool.image import parse_image  # noqa: E402
+from plctool.debug.variables import Symbol  # noqa: E402
+from plctool.image.file import parse_image  # noqa: E402
+from plctool.image.targets import find_target  # noqa: E402
 from plctool.sim import Simulator  # noqa: E402
 from plctool.testing.children import ends_with_us  # noqa: E402
-from plctool.variables import Symbol  # noqa: E402
 
 CYCLES = 1000  # before the checksums are compared
 GUEST_CYCLES = 200  # fewer, because soft float takes 50 000 instructions in each

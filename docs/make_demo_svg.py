@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from plctool import demo
+from plctool.cli import demo
 
 console = Console(record=True, width=96, force_terminal=True)
 demo.run(console)

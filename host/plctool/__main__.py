@@ -4,6 +4,6 @@ from __future__ import annotations
 
 import sys
 
-from plctool.cli import main
+from plctool.cli.main import main
 
 sys.exit(main())

@@ -13,14 +13,16 @@ from pathlib import Path
 from typing import Any, overload
 
 from plctool.core import lib
+from plctool.debug.kept_changes import KeptChanges, kept_changes
+from plctool.debug.symbols import SourceLine, SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
+from plctool.debug.variables import Reading, Symbol, unreachable
 from plctool.errors import DeviceError, LinkError, UsageError
 from plctool.files import read_image
 from plctool.gateway.client import GatewayConnection, GatewaySession, connect_gateway
 from plctool.gateway.control import dismiss_idle
 from plctool.gateway.frames import BUSY
 from plctool.gateway.place import NoGateway
-from plctool.image import parse_image
-from plctool.kept_changes import KeptChanges, kept_changes
+from plctool.image.file import parse_image
 from plctool.link import services
 from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink
 from plctool.link.monitoring import AreaRange, Contents, Write, read_memory, write_memory
@@ -29,8 +31,6 @@ from plctool.link.serial import DEFAULT_BAUD, SerialTransport
 from plctool.link.services import AppState, Identity, LogEntry, Stack, TaskInfo
 from plctool.link.session import Session
 from plctool.link.transport import BlockTransport
-from plctool.symbols import SourceLine, SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
-from plctool.variables import Reading, Symbol, unreachable
 
 RESET_OPTIONS = {
     "warm": lib.RESET_OPTION_WARM,

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from plctool.core import error_name, ffi, lib
+from plctool.debug.symbols import SymbolTable, find_symbols
+from plctool.debug.variables import Reading, Symbol, unreachable
 from plctool.errors import DeviceError, UsageError
 from plctool.files import read_image
-from plctool.image import parse_image
+from plctool.image.file import parse_image
 from plctool.link.l7 import why
 from plctool.link.services import AppException, AppState, Status, TaskInfo, Trace
-from plctool.symbols import SymbolTable, find_symbols
-from plctool.variables import Reading, Symbol, unreachable
 
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _SECTOR = 4096

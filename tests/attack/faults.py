@@ -7,7 +7,7 @@ import zlib
 from dataclasses import dataclass
 
 from plctool.core import lib
-from plctool.image import parse_image
+from plctool.image.file import parse_image
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def _compile(job: tuple[str, str, str, Path]) -> tuple[str, bytes, str]:
     """Name, image and what the compiler says when there is none."""
     name, text, checks, folder = job
     from plctool.compiler import CompileError, compile_sources
-    from plctool.symbols import symbol_path
+    from plctool.debug.symbols import symbol_path
 
     source = folder / f"{name}.st"
     source.write_text(text)

@@ -16,9 +16,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "link"))
 from fake_device import FakeDevice, FakeLine, FakePlc
 from small_app import make_application
 
-from plctool import cli, device
+from plctool import device
+from plctool.cli import main as cli
+from plctool.debug.symbols import symbol_path
 from plctool.link.transport import BlockTransport
-from plctool.symbols import symbol_path
 
 
 @dataclass

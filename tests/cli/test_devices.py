@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from fake_device import FakePlc
 
-from plctool import cli
+from plctool.cli import main as cli
 from plctool.core import lib
 
 PORT = ("--port", "/dev/fake")

@@ -13,8 +13,8 @@ import pytest
 from conftest import Tool
 
 from plctool.core import lib
+from plctool.debug.symbols import find_symbols
 from plctool.sim import Simulator
-from plctool.symbols import find_symbols
 
 ROOT = Path(__file__).parents[2]
 CC = shutil.which("gcc") or shutil.which("cc")

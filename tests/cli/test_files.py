@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from plctool import output
-from plctool.symbols import load_symbols
+from plctool.cli import output
+from plctool.debug.symbols import load_symbols
 
 COUNTER = """PROGRAM Main
 VAR
@@ -312,7 +312,7 @@ def test_demo_as_json_is_one_document(
         print("once upon a time")
         return status
 
-    monkeypatch.setattr("plctool.demo.main", story)
+    monkeypatch.setattr("plctool.cli.demo.main", story)
     done = tool("demo", "--json")
     assert done.status == status
     assert done.json == document if document else "error" in done.json
@@ -338,7 +338,7 @@ def test_commands_of_later_versions_say_so(tool: Any, command: str) -> None:
 
 
 def test_help_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
-    from plctool import cli
+    from plctool.cli import main as cli
 
     with pytest.raises(SystemExit) as caught:
         cli.main(["--help"])
@@ -361,7 +361,7 @@ def test_the_version_is_printed() -> None:
 
 
 def test_starting_does_not_import_what_is_slow() -> None:
-    code = "import sys, plctool.cli; plctool.cli.main(['--version']); print([m for m in sys.modules])"
+    code = "import sys; from plctool.cli import main; main.main(['--version']); print([m for m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     for module in ("llvmlite", "lark", "rich", "elftools", "serial", "_plccore"):
         assert f"'{module}'" not in done.stdout

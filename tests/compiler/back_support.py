@@ -12,9 +12,7 @@ from typing import Any
 
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check, Options
-from plctool.compiler.codegen.targets import find_target
 from plctool.compiler.typed import (
-    Area,
     Binary,
     BinaryOp,
     Const,
@@ -34,9 +32,11 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.types import BOOL, INT, Type, align_up
 from plctool.core import lib
-from plctool.image import parse_image
+from plctool.iec.areas import Area
+from plctool.iec.types import BOOL, INT, Type, align_up
+from plctool.image.file import parse_image
+from plctool.image.targets import find_target
 
 POS = Pos("main.st", 1, 1)
 

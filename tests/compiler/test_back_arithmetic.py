@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
 from plctool.compiler.ranges import type_range
 from plctool.compiler.typed import Assign, BinaryOp, Convert, Expr, Intrinsic, IntrinsicCall, Pos, Unary, UnaryOp
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DINT,

@@ -35,7 +35,7 @@ from plctool.compiler.typed import (
     ValuePlace,
     Variable,
 )
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DINT,

@@ -12,7 +12,7 @@ from back_support import build
 from test_back_random import Generator, meaningful, outcome
 
 from plctool.core import lib
-from plctool.image import parse_image
+from plctool.image.file import parse_image
 
 SEEDS = range(100, 116)
 HARNESS = Path(__file__).with_name("emulate.c")

@@ -38,7 +38,8 @@ from plctool.compiler.typed import (
     UnaryOp,
     Variable,
 )
-from plctool.compiler.types import (
+from plctool.debug.symbols import SymbolTable
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DINT,
@@ -51,7 +52,6 @@ from plctool.compiler.types import (
     StringType,
     StructType,
 )
-from plctool.symbols import SymbolTable
 
 POINT = StructType("Point", [Field("x", DINT), Field("b", BOOL), Field("y", DINT)])
 POINT.lay_out()

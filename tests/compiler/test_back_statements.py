@@ -39,7 +39,7 @@ from plctool.compiler.typed import (
     Variable,
     While,
 )
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DINT,

@@ -11,11 +11,11 @@ from plctool.compiler import load_sources
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.codegen.targets import find_target
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
 from plctool.compiler.typed import TypedProgram
-from plctool.image import parse_image
+from plctool.image.file import parse_image
+from plctool.image.targets import find_target
 from plctool.sim import Simulator
 
 BLOCK = """FUNCTION_BLOCK Block

@@ -12,9 +12,7 @@ from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.emit import emit_object
 from plctool.compiler.codegen.link import link
 from plctool.compiler.codegen.relocations import OutOfReach, stub
-from plctool.compiler.codegen.targets import TARGETS, Machine, Target, find_target
 from plctool.compiler.typed import (
-    Area,
     Assign,
     BinaryOp,
     Call,
@@ -31,10 +29,12 @@ from plctool.compiler.typed import (
     TypedProgram,
     Variable,
 )
-from plctool.compiler.types import DINT, INT, LINT, LREAL, REAL, ArrayType, StringType
 from plctool.core import lib
 from plctool.errors import UsageError
-from plctool.image import parse_image
+from plctool.iec.areas import Area
+from plctool.iec.types import DINT, INT, LINT, LREAL, REAL, ArrayType, StringType
+from plctool.image.file import parse_image
+from plctool.image.targets import TARGETS, Machine, Target, find_target
 
 ALL = list(TARGETS.values())
 

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler import Level, compile_sources
-from plctool.image import parse_image
+from plctool.debug.symbols import SymbolTable
+from plctool.image.file import parse_image
 from plctool.link.services import Trace
 from plctool.sim import Simulator
-from plctool.symbols import SymbolTable
 
 LEVELS: list[Level] = [0, 1, 2, 3, "s"]
 

@@ -11,14 +11,14 @@ from plctool.compiler import compile_sources
 from plctool.compiler.build import BuildResult
 from plctool.compiler.codegen.lower import lower
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.codegen.targets import TARGETS, find_target
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
 from plctool.compiler.typed import TypedProgram
 from plctool.core import lib
+from plctool.debug.symbols import SymbolTable
 from plctool.errors import UsageError
+from plctool.image.targets import TARGETS, find_target
 from plctool.sim import Simulator
-from plctool.symbols import SymbolTable
 
 FAMILY = """
 FUNCTION_BLOCK Base

@@ -9,7 +9,7 @@ from front_support import body_of, main, messages, program
 
 from plctool.compiler import typed
 from plctool.compiler.typed import Assign, Call, Const, Convert, FbCall, If, Load, Pou, ValuePlace
-from plctool.compiler.types import StringType
+from plctool.iec.types import StringType
 
 LIBRARY = """
 {attribute 'no_checks'}

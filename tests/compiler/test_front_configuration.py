@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from front_support import messages, program, variable
 
-from plctool.compiler.typed import Area, Assign, Task, TaskKind, VarPlace
+from plctool.compiler.typed import Assign, Task, TaskKind, VarPlace
+from plctool.iec.areas import Area
 
 PROGRAMS = """PROGRAM P
 VAR_INPUT a : INT; END_VAR

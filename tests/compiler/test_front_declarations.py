@@ -6,8 +6,9 @@ import pytest
 from front_support import check, findings, main, messages, program, variable
 
 from plctool.compiler.front import Source, check_sources
-from plctool.compiler.typed import Area, ArrayInit, Const, ScalarInit, Storage, StructInit, TypedProgram
-from plctool.compiler.types import ArrayType, EnumType, StringType, StructType, SubrangeType
+from plctool.compiler.typed import ArrayInit, Const, ScalarInit, Storage, StructInit, TypedProgram
+from plctool.iec.areas import Area
+from plctool.iec.types import ArrayType, EnumType, StringType, StructType, SubrangeType
 
 COLOR = "TYPE Color : (Red, Green := 5, Blue); END_TYPE\n"
 FUNCTION = "FUNCTION F : INT VAR_INPUT a : INT; END_VAR VAR b : INT := {}; END_VAR F := a + b; END_FUNCTION\n"

@@ -9,7 +9,7 @@ from front_support import folded, main, messages
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plctool.compiler.syntax import literals
+from plctool.iec import literals
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from plctool.compiler.diagnostics import MAX_MESSAGE, render
 from plctool.compiler.front import Source, check_sources
 from plctool.compiler.syntax.lexer import KEYWORDS
-from plctool.compiler.types import ELEMENTARY
+from plctool.iec.types import ELEMENTARY
 
 PROGRAMS = [p.read_text("latin-1") for p in sorted((Path(__file__).parents[1] / "st").glob("*.st"))]
 VARIABLES = "x : INT; b : BOOL; a : ARRAY[0..3] OF INT;"

@@ -14,14 +14,15 @@ from test_back_random import meaningful
 
 from plctool.compiler.build import build_program
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.codegen.targets import find_target
 from plctool.compiler.diagnostics import render
 from plctool.compiler.front import CheckResult, Source, check_sources
-from plctool.compiler.typed import Area, TypedProgram
-from plctool.compiler.types import LREAL, REAL
+from plctool.compiler.typed import TypedProgram
 from plctool.core import ffi, lib
+from plctool.debug.symbols import SymbolTable
+from plctool.iec.areas import Area
+from plctool.iec.types import LREAL, REAL
+from plctool.image.targets import find_target
 from plctool.sim import Simulator
-from plctool.symbols import SymbolTable
 
 NUMBERS = ["SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT"]
 REALS = ["REAL", "LREAL"]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
-from plctool.image import (
+from plctool.image.file import (
     ApplicationInfo,
     ExternalFunction,
     Image,

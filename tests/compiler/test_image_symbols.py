@@ -8,7 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.compiler.types import (
+from plctool.debug.symbols import (
+    CodeUnit,
+    SourceLine,
+    SymbolTable,
+    cache_path,
+    find_symbols,
+    load_symbols,
+    symbol_path,
+)
+from plctool.debug.variables import Symbol, constant_symbol, unreachable
+from plctool.errors import UsageError
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DINT,
@@ -30,17 +41,6 @@ from plctool.compiler.types import (
     SubrangeType,
     Type,
 )
-from plctool.errors import UsageError
-from plctool.symbols import (
-    CodeUnit,
-    SourceLine,
-    SymbolTable,
-    cache_path,
-    find_symbols,
-    load_symbols,
-    symbol_path,
-)
-from plctool.variables import Symbol, constant_symbol, unreachable
 
 
 def point() -> StructType:

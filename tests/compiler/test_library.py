@@ -7,7 +7,7 @@ import pytest
 from plctool.compiler.front import check_sources
 from plctool.compiler.library import Library
 from plctool.compiler.source import Source
-from plctool.compiler.types import ELEMENTARY
+from plctool.iec.types import ELEMENTARY
 
 NUMBERS = ["SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT"]
 BITS = ["BYTE", "WORD", "DWORD", "LWORD"]

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 
 from plctool.compiler.build import build_program
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.codegen.targets import find_target
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
+from plctool.image.targets import find_target
 from plctool.sim import Simulator
 
 

@@ -16,7 +16,7 @@ from plctool.compiler.semantics.tasks import _Reader
 from plctool.compiler.semantics.unit_tests import TestSuite as Suite
 from plctool.compiler.syntax import attributes
 from plctool.compiler.syntax.lexer import KEYWORDS
-from plctool.compiler.typed import Area
+from plctool.iec.areas import Area
 
 MAIN = "PROGRAM Main\nVAR k : INT; END_VAR\nk := 1;\nEND_PROGRAM\n"
 UNITS = {

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from plctool.compiler import compile_sources
 from plctool.compiler.build import BuildResult
-from plctool.compiler.syntax.literals import typed
+from plctool.iec.literals import typed
 from plctool.sim import Simulator
 
 CYCLE_MS = 10

@@ -28,8 +28,8 @@ from property_support import (
     wrap,
 )
 
-from plctool.compiler.types import ELEMENTARY
-from plctool.value_texts import format_date, format_time
+from plctool.iec.types import ELEMENTARY
+from plctool.iec.value_texts import format_date, format_time
 
 # ---- strings -------------------------------------------------------------------------------------------------------
 

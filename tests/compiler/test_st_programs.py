@@ -12,12 +12,12 @@ import pytest
 
 from plctool.compiler import check_sources, compile_sources
 from plctool.compiler.diagnostics import Diagnostic
-from plctool.compiler.syntax.literals import string, typed, unsigned
-from plctool.compiler.types import ELEMENTARY, REAL
+from plctool.debug.symbols import SymbolTable
+from plctool.iec.literals import string, typed, unsigned
+from plctool.iec.types import ELEMENTARY, REAL
+from plctool.iec.value_texts import format_date, parse_date
+from plctool.iec.values import decode, encode
 from plctool.sim import Simulator
-from plctool.symbols import SymbolTable
-from plctool.value_texts import format_date, parse_date
-from plctool.values import decode, encode
 
 FOLDER = Path(__file__).parents[1] / "st"
 PROGRAMS = sorted(FOLDER.glob("*.st"))

@@ -10,7 +10,7 @@ import pytest
 from plctool.compiler import compile_sources
 from plctool.compiler.build import BuildResult
 from plctool.compiler.warnings import warning_options
-from plctool.image import NO_PARTS, ImagePart, parse_image
+from plctool.image.file import NO_PARTS, ImagePart, parse_image
 
 GLOBALS = """
 VAR_GLOBAL

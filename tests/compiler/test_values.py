@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plctool.compiler.types import (
+from plctool.debug.variables import Change, Symbol
+from plctool.errors import UsageError
+from plctool.iec.types import (
     BOOL,
     BYTE,
     CHAR,
@@ -39,10 +41,8 @@ from plctool.compiler.types import (
     SubrangeType,
     Type,
 )
-from plctool.errors import UsageError
-from plctool.value_texts import format_time, literal, parse_time, parse_value
-from plctool.values import decode, encode
-from plctool.variables import Change, Symbol
+from plctool.iec.value_texts import format_time, literal, parse_time, parse_value
+from plctool.iec.values import decode, encode
 
 
 def laid_out(t: StructType) -> StructType:

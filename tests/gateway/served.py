@@ -15,13 +15,13 @@ from small_app import make_application
 
 import plctool
 from plctool.core import lib
+from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.gateway.client import GatewayConnection, connect_gateway
 from plctool.gateway.frames import PROTOCOL, Frame, Kind, Pipe, document_frame
 from plctool.gateway.place import Place, find_place
 from plctool.gateway.server import Gateway
 from plctool.link.connection import Connection
-from plctool.symbols import symbol_path
 
 PORT = "/dev/no-such-line"
 BAUD = 115200

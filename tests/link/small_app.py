@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from plctool.compiler.types import BOOL, DINT, INT, REAL, TIME, ArrayType, StringType
 from plctool.core import lib
-from plctool.image import ApplicationInfo, Image, ImageTask, build_image
-from plctool.symbols import CodeUnit, SymbolTable
-from plctool.variables import Symbol
+from plctool.debug.symbols import CodeUnit, SymbolTable
+from plctool.debug.variables import Symbol
+from plctool.iec.types import BOOL, DINT, INT, REAL, TIME, ArrayType, StringType
+from plctool.image.file import ApplicationInfo, Image, ImageTask, build_image
 
 RETURN = b"\xc3"
 DATA, CODE = int(lib.APP_AREA_DATA), int(lib.APP_AREA_CODE)

@@ -10,10 +10,10 @@ from small_app import make_application
 
 import plctool
 from plctool.core import lib
+from plctool.debug.symbols import SymbolTable, cache_path, symbol_path
 from plctool.device import Plc, open_transport
 from plctool.errors import DeviceError, LinkError, UsageError
 from plctool.link.connection import Connection
-from plctool.symbols import SymbolTable, cache_path, symbol_path
 
 
 class Controller:

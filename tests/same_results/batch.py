@@ -12,11 +12,12 @@ from runners import Runner
 
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_unit import Options, parse_checks
-from plctool.compiler.codegen.targets import find_target
-from plctool.compiler.typed import Area, TypedProgram
+from plctool.compiler.typed import TypedProgram
 from plctool.core import ffi, lib
+from plctool.debug.variables import Symbol
+from plctool.iec.areas import Area
+from plctool.image.targets import find_target
 from plctool.sim import Simulator
-from plctool.variables import Symbol
 
 REFERENCE = "x86_64-linux"
 AREAS = (Area.DATA, Area.RETAIN, Area.OUTPUT, Area.MEMORY)

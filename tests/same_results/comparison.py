@@ -7,9 +7,9 @@ import struct
 
 from batch import AREAS, Recording, State
 
-from plctool.compiler.typed import Area
-from plctool.compiler.types import LREAL, REAL, PointerType, StringType
-from plctool.variables import Symbol
+from plctool.debug.variables import Symbol
+from plctool.iec.areas import Area
+from plctool.iec.types import LREAL, REAL, PointerType, StringType
 
 
 def is_nan(data: bytes) -> bool:

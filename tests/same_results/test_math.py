@@ -17,7 +17,7 @@ from runners import RUNNERS
 
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
-from plctool.compiler.typed import Area
+from plctool.iec.areas import Area
 
 BOUND_ULP = 2.0
 COUNT = 300  # arguments of each function

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from plctool.compiler import compile_sources
 from plctool.core import lib
-from plctool.kept_changes import kept_changes
+from plctool.debug.kept_changes import kept_changes
 from plctool.sim import Simulator
 
 

@@ -13,7 +13,7 @@ from plctool.compiler import compile_sources
 from plctool.compiler.build import BuildResult
 from plctool.core import lib
 from plctool.errors import DeviceError
-from plctool.image import parse_image
+from plctool.image.file import parse_image
 from plctool.sim import Simulator
 
 LENGTH = 40

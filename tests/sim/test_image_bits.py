@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from plctool.compiler import compile_sources
 from plctool.compiler.build import BuildResult
+from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.link.connection import Connection
 from plctool.link.sim import SimTransport
 from plctool.sim import Simulator
-from plctool.symbols import symbol_path
 
 BYTES = 3  # of each area
 AREAS = {"I": "ins", "Q": "outs", "M": "mem"}

@@ -8,9 +8,9 @@ import pytest
 
 from plctool.compiler import compile_sources
 from plctool.compiler.build import BuildResult
+from plctool.debug.symbols import SymbolTable
 from plctool.errors import DeviceError, UsageError
 from plctool.sim import Simulator
-from plctool.symbols import SymbolTable
 
 TYPES = """
 TYPE

@@ -25,9 +25,9 @@ from environment import TARGETS  # noqa: E402
 from programs import Built, compile_text, program  # noqa: E402
 from qemu import Board  # noqa: E402
 
+from plctool.debug.symbols import symbol_path  # noqa: E402
 from plctool.device import Plc  # noqa: E402
 from plctool.link.connection import Connection  # noqa: E402
-from plctool.symbols import symbol_path  # noqa: E402
 
 VARIABLES = 11
 ENOUGH = 200  # counts

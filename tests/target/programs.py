@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from plctool.compiler import Level, compile_sources
-from plctool.symbols import SymbolTable, symbol_path
+from plctool.debug.symbols import SymbolTable, symbol_path
 
 
 @dataclass(frozen=True)

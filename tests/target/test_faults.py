@@ -16,12 +16,12 @@ from environment import TARGET, eventually
 from programs import Built, compile_text
 
 from plctool.core import lib
+from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.errors import LinkError
-from plctool.image import parse_image
+from plctool.image.file import parse_image
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
-from plctool.symbols import symbol_path
 
 FUNCTION = """
 FUNCTION Large : DINT

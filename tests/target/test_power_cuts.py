@@ -24,11 +24,11 @@ from environment import MACHINE, TARGET, eventually, firmware
 from programs import COUNTER, TWO_TASKS, Built, compile_text
 from qemu import Board
 
+from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.errors import PlcError
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
-from plctool.symbols import symbol_path
 
 HERE = Path(__file__).parent
 FLASH_SIZE = 0x80000  # of the area for programs and files

@@ -7,11 +7,11 @@ from environment import eventually
 from programs import COUNTER, TWO_TASKS, program
 from qemu import FLASH_SIZE
 
+from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.errors import DeviceError
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
-from plctool.symbols import symbol_path
 
 
 def test_program_is_flashed_and_counts(plc, build):

@@ -130,7 +130,7 @@ void AppBoot(void)
 {
     AppCommitOpen();
     if (AppCommitResult() != ERR_OK)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, AppCommitResult(), "The commit record cannot be read");
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, AppCommitResult(), "Commit record cannot be read");
     else if (AppCommitGet()->active == SLOT_NONE)
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "No boot project");
     else

@@ -85,16 +85,20 @@ static RTS_UI32 seal_check(const SEAL *seal)
     return ~(seal->number ^ seal->crc ^ seal->retain_after);
 }
 
-/* Takes over a slot when the image that its header tells of has a seal with a number above `known`. */
-static void take_seal(RTS_UI32 slot, RTS_UI32 known)
+/* Takes over a slot when the image that its header tells of has a seal with a number above `known`. Returns whether the
+ * record may be true: false when it must have known the seal, and tells of another image. */
+static bool take_seal(RTS_UI32 slot, RTS_UI32 known)
 {
+    const COMMIT_SLOT *recorded = &state.commit.slot[slot];
     CDL_HEADER header;
     SEAL seal;
 
     if (SysFileRead(slot, 0, &header, sizeof header) != ERR_OK ||
         SysFileRead(slot, SysFileAlign(header.total_size), &seal, sizeof seal) != ERR_OK ||
-        seal.check != seal_check(&seal) || seal.crc != header.crc || (RTS_I32)(seal.number - known) <= 0)
-        return;
+        seal.check != seal_check(&seal) || seal.crc != header.crc)
+        return true;
+    if ((RTS_I32)(seal.number - known) <= 0)
+        return recorded->size == 0 || recorded->crc == seal.crc;
     state.commit.slot[slot] = (COMMIT_SLOT){header.total_size, seal.crc, seal.retain_after};
     state.commit.state[slot] = SLOT_TRIAL;
     if ((RTS_I32)(seal.number - state.commit.number) > 0) {
@@ -102,14 +106,15 @@ static void take_seal(RTS_UI32 slot, RTS_UI32 known)
         state.commit.active = (RTS_UI8)slot;
         state.commit.begun = 0;
     }
+    return true;
 }
 
-static void take_seals(void)
+static bool take_seals(void)
 {
     RTS_UI32 known = state.commit.number;
+    bool agrees = take_seal(FILE_SLOT_A, known);
 
-    take_seal(FILE_SLOT_A, known);
-    take_seal(FILE_SLOT_B, known);
+    return take_seal(FILE_SLOT_B, known) && agrees;
 }
 
 RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
@@ -118,7 +123,7 @@ RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
 
     seal.check = seal_check(&seal);
     if (SysFileWrite(slot, &seal, sizeof seal) == ERR_OK && SysFileClose(slot) == ERR_OK)
-        take_seals();
+        (void)take_seals();
     if (state.commit.active == slot)
         return ERR_OK;
     AppCommitWipe(slot);
@@ -152,9 +157,9 @@ static RTS_RESULT read_record(void)
 static void report_loss(void)
 {
     if (state.log.sequence != 0)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, ERR_VERSION_MISMATCH, "Flash was laid out by another firmware");
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, ERR_VERSION_MISMATCH, "Flash laid out by another firmware");
     if (state.commit.active != SLOT_NONE)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT, "No commit record: the newest program is taken");
+        LogAdd(CMPID_CmpAppEmbedded, LOG_WARNING, ERR_NO_OBJECT, "No commit record: newest program taken");
 }
 
 static void forget_record(void)
@@ -170,17 +175,17 @@ void AppCommitOpen(void)
     forget_record();
     if (result == ERR_OK)
         result = read_record();
-    if (result == ERR_OK && state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE) {
-        forget_record(); /* not one of ours: the seals count */
-        result = ERR_NO_OBJECT;
-    }
-    if (result == ERR_OK && FlashLogIsMarked(&state.log, RECORD_SIZE))
-        state.commit.begun = 0;
     if (result != ERR_OK && result != ERR_NO_OBJECT) {
         state.log.opened = result;
         return;
     }
-    take_seals();
+    if (result == ERR_OK && FlashLogIsMarked(&state.log, RECORD_SIZE))
+        state.commit.begun = 0;
+    if (!take_seals() || (state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE)) {
+        forget_record(); /* not one of ours: the seals count */
+        (void)take_seals();
+        result = ERR_NO_OBJECT;
+    }
     if (result != ERR_OK)
         report_loss();
 }
@@ -201,7 +206,7 @@ static RTS_RESULT write_record(const char *text)
     }
     result = FlashLogAppend(&state.log, record_tag(), data, RECORD_SIZE);
     if (result != ERR_OK)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "The commit record cannot be written");
+        LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Commit record cannot be written");
     return result;
 }
 
@@ -238,7 +243,7 @@ RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 changed)
         return ERR_OK;
     state.commit.state[slot] = changed;
     result = write_record("");
-    if (result != ERR_OK)
+    if (result != ERR_OK && changed != SLOT_FAILED)
         state.commit.state[slot] = before; /* tried again */
     return result;
 }

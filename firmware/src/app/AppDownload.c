@@ -20,16 +20,19 @@ static struct {
     RTS_UI32 crc;
 } download;
 
-/* An application that failed gives way to the one before it now, or that one would be overwritten though it is the
- * newest that runs. */
-static void leave_failed_application(void)
+/* Which slot is kept. An application that failed gives way to the one before it now, or that one would be overwritten
+ * though it is the newest that runs; it is kept also when it cannot be read now. */
+static RTS_UI32 slot_to_keep(void)
 {
     const COMMIT *commit = AppCommitGet();
+    RTS_UI32 active = commit->active;
 
-    if (commit->active == SLOT_NONE || commit->state[commit->active] != SLOT_FAILED || !AppCanRollBack(commit->active))
-        return;
-    AppUnload();
-    (void)AppRollBack(commit->active);
+    if (active != SLOT_NONE && commit->state[active] == SLOT_FAILED && AppCanRollBack(active)) {
+        AppUnload();
+        (void)AppRollBack(active);
+        return AppCommitOtherSlot(active);
+    }
+    return AppGetSlot() != SLOT_NONE ? AppGetSlot() : active;
 }
 
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
@@ -39,8 +42,7 @@ RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
     AppDownloadAbort();
     if (AppCommitResult() != ERR_OK)
         return ERR_DEVICE; /* what is worth keeping is not known */
-    leave_failed_application();
-    slot = AppCommitOtherSlot(AppGetSlot() != SLOT_NONE ? AppGetSlot() : AppCommitGet()->active);
+    slot = AppCommitOtherSlot(slot_to_keep());
     if (total_size > SysFileGetArea(slot)->size - FILE_ALIGN) /* the seal follows */
         return ERR_NOMEMORY;
     download.open = true;

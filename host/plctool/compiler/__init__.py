@@ -1,6 +1,6 @@
 """The compiler: IEC 61131-3 Structured Text in, an application image and its symbols out.
 
-The parts are imported when they are first needed: `plctool.compiler.types` alone must not cost the start-up of LLVM.
+The parts are imported when they are first needed: `plctool.iec.types` alone must not cost the start-up of LLVM.
 """
 
 from __future__ import annotations
@@ -94,12 +94,12 @@ def compile_sources(
     """
     from plctool.compiler.build import build_program
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
-    from plctool.compiler.codegen.targets import find_target
     from plctool.compiler.diagnostics import render
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
-    from plctool.image import ApplicationInfo
+    from plctool.image.file import ApplicationInfo
+    from plctool.image.targets import find_target
 
     number, size = (2, True) if level == "s" else (level, False)
     options = Options(find_target(target), number, parse_checks(checks), debug, size)

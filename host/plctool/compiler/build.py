@@ -11,19 +11,20 @@ from plctool.compiler.codegen.link import Linked, link
 from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_classes import CLASS_NUMBER
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.codegen.targets import Machine, Target
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.kept import kept_parts, kept_variables
 from plctool.compiler.nesting import room_for_nesting
-from plctool.compiler.typed import Area, Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
-from plctool.compiler.types import base_of
+from plctool.compiler.typed import Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
 from plctool.core import lib
+from plctool.debug.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
+from plctool.debug.variables import Symbol, constant_symbol
 from plctool.files import write_atomically
-from plctool.image import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image
-from plctool.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
-from plctool.values import encode
-from plctool.variables import Symbol, constant_symbol
+from plctool.iec.areas import Area
+from plctool.iec.types import base_of
+from plctool.iec.values import encode
+from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image
+from plctool.image.targets import Machine, Target
 
 _UNIT = int(lib.CDL_IMAGE_UNIT)
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 from plctool.compiler.semantics.declarations.functions import interface_text
 from plctool.compiler.typed import Direction, Parameter, Pou
-from plctool.compiler.types import (
+from plctool.errors import UsageError
+from plctool.iec.types import (
     ArrayType,
     Elementary,
     EnumType,
@@ -28,7 +29,6 @@ from plctool.compiler.types import (
     base_of,
     is_scalar,
 )
-from plctool.errors import UsageError
 
 _C_WORDS = frozenset((
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "float",

@@ -24,9 +24,10 @@ from plctool.compiler.syntax.ast import Declaration
 from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
 from plctool.compiler.syntax.parser import Parsed, parse_all
 from plctool.compiler.task_images import plan_images
-from plctool.compiler.typed import Area, TypedProgram
-from plctool.compiler.types import MAX_SIZE
+from plctool.compiler.typed import TypedProgram
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
+from plctool.iec.areas import Area
+from plctool.iec.types import MAX_SIZE
 
 if TYPE_CHECKING:
     from plctool.compiler.semantics.unit_tests import TestSuite

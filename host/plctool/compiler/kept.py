@@ -13,7 +13,9 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from plctool.compiler.typed import Variable
-from plctool.compiler.types import (
+from plctool.core import lib
+from plctool.errors import UsageError
+from plctool.iec.types import (
     ArrayType,
     Elementary,
     EnumType,
@@ -25,9 +27,7 @@ from plctool.compiler.types import (
     SubrangeType,
     Type,
 )
-from plctool.core import lib
-from plctool.errors import UsageError
-from plctool.image import KeptVariable
+from plctool.image.file import KeptVariable
 
 _WIDEST = 0xFFFF  # bytes: of CDL_KEPT_RUN.size and .stride
 

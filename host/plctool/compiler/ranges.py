@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from plctool.compiler.typed import Binary, BinaryOp, Const, Convert, Expr, Load, Variable, VarPlace
-from plctool.compiler.types import Elementary, Kind, Type, base_of
+from plctool.iec.types import Elementary, Kind, Type, base_of
 
 Range = tuple[int, int]
 

@@ -14,7 +14,6 @@ from itertools import combinations
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.typed import (
     AddressOf,
-    Area,
     BitPlace,
     Const,
     DerefPlace,
@@ -33,8 +32,9 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import callees, referenced_places, root_of, walk, written_places
-from plctool.compiler.types import ArrayType, InterfaceType, PointerType, StructType, Type
 from plctool.core import lib
+from plctool.iec.areas import Area
+from plctool.iec.types import ArrayType, InterfaceType, PointerType, StructType, Type
 
 IMAGE_AREAS = (Area.INPUT, Area.OUTPUT)
 _IMAGES = frozenset(IMAGE_AREAS)

@@ -11,7 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from plctool.compiler.types import Keep, StructType, Type
+from plctool.iec.areas import Area
+from plctool.iec.types import Keep, StructType, Type
 
 
 @dataclass(frozen=True)
@@ -21,17 +22,6 @@ class Pos:
     file: str
     line: int
     column: int
-
-
-class Area(Enum):
-    """Memory areas, numbered as in firmware/include/CompactDownload.h (APP_AREA_*)."""
-
-    DATA = 0
-    RETAIN = 1
-    INPUT = 2
-    OUTPUT = 3
-    MEMORY = 4
-    CODE = 5
 
 
 class Storage(Enum):

@@ -24,7 +24,7 @@ _CYCLES = "Main.n"
 
 def target_of(identity: Identity) -> str:
     """The target that plctool compiles for a controller. Raises UsageError when there is none."""
-    from plctool.compiler.codegen.targets import TARGETS
+    from plctool.image.targets import TARGETS
 
     for target in TARGETS.values():
         if getattr(lib, target.device_id) == identity.target_id:
@@ -78,7 +78,7 @@ class Bench:
     def build(self, text: str) -> Path:
         """The image of a program; its symbols lie beside it."""
         from plctool.compiler import compile_sources
-        from plctool.symbols import symbol_path
+        from plctool.debug.symbols import symbol_path
 
         if text not in self._built:
             source = self._folder / f"check{len(self._built)}.st"

@@ -200,7 +200,7 @@ class Checks:
         status = self._plc.status()
         if status.image_crc != image or status.state is not AppState.RUN:
             raise CheckFailed(f"After {COMMITS} records the program is another one, or it is in {status.state}.")
-        faults = [entry.text for entry in self._bench.log() if entry.text.startswith("The commit record cannot")]
+        faults = [entry.text for entry in self._bench.log() if entry.text.startswith("Commit record cannot")]
         if faults:
             raise CheckFailed(f"The log says: {faults[-1]}")
         return f"{COMMITS} records written", {"records": COMMITS}
@@ -276,7 +276,7 @@ class Checks:
 
     def _faulty(self, variables: str, body: str) -> str:
         """A program that fails after some good cycles."""
-        from plctool.compiler.codegen.targets import find_target
+        from plctool.image.targets import find_target
 
         text = program(variables, f"IF n > {_HEALTHY_CYCLES} THEN\n{body}\nEND_IF")
         if "Large" not in body:

@@ -7,7 +7,7 @@ from functools import cache
 
 import llvmlite.binding as llvm
 
-from plctool.compiler.codegen.targets import Target
+from plctool.image.targets import Target
 
 
 @cache

@@ -27,10 +27,10 @@ from plctool.compiler.codegen.relocations import (
     stub,
     thumb_addend,
 )
-from plctool.compiler.codegen.targets import Machine, Target
 from plctool.compiler.typed import External
-from plctool.compiler.types import align_up
 from plctool.errors import UsageError
+from plctool.iec.types import align_up
+from plctool.image.targets import Machine, Target
 
 _WRITABLE, _ALLOCATED, _EXECUTABLE = 1, 2, 4
 _DROPPED = (".ARM.exidx", ".ARM.extab", ".eh_frame")

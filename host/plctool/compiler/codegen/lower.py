@@ -15,9 +15,10 @@ from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
 from plctool.compiler.codegen.partition import texts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import handed_inputs, parameter_list
-from plctool.compiler.typed import Area, External, Pou, Task, TypedProgram, Variable
-from plctool.compiler.types import BOOL, is_scalar
+from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
+from plctool.iec.areas import Area
+from plctool.iec.types import BOOL, is_scalar
 
 CODE_INIT = "code_init"
 GLOBAL_INIT = "global_init"

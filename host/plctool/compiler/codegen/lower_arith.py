@@ -9,7 +9,7 @@ from plctool.compiler.codegen.ir import float_literal
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, Frame, zero
 from plctool.compiler.codegen.lower_unit import Check, value_type
 from plctool.compiler.typed import BinaryOp, Const, Intrinsic, Pos, UnaryOp
-from plctool.compiler.types import BOOL, Elementary, Kind, Type, base_of
+from plctool.iec.types import BOOL, Elementary, Kind, Type, base_of
 
 LOGIC = {BinaryOp.AND: "and", BinaryOp.OR: "or", BinaryOp.XOR: "xor"}
 _INTEGER = {BinaryOp.ADD: "add", BinaryOp.SUB: "sub", BinaryOp.MUL: "mul", **LOGIC}

@@ -26,7 +26,7 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import walk
-from plctool.compiler.types import BOOL, PointerType, StringType, StructType, is_scalar
+from plctool.iec.types import BOOL, PointerType, StringType, StructType, is_scalar
 
 _POINTER = PointerType(BOOL)  # what an instance stores for a VAR_IN_OUT
 

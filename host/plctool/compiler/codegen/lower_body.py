@@ -10,7 +10,7 @@ from plctool.compiler.codegen.lower_string import copy_string
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.codegen.signatures import result_in_memory
 from plctool.compiler.typed import Pou, PouKind, Variable
-from plctool.compiler.types import StringType, is_scalar
+from plctool.iec.types import StringType, is_scalar
 
 
 def write_body(frame: Body) -> None:

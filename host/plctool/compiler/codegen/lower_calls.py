@@ -16,7 +16,7 @@ from plctool.compiler.typed import (
     Place,
     Pou,
 )
-from plctool.compiler.types import StringType, is_scalar
+from plctool.iec.types import StringType, is_scalar
 
 
 def call_function(frame: Frame, e: Call, result: Ref | None) -> str:

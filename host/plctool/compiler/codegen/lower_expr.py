@@ -51,7 +51,7 @@ from plctool.compiler.typed import (
     Unary,
     VarPlace,
 )
-from plctool.compiler.types import UDINT, StringType, Type
+from plctool.iec.types import UDINT, StringType, Type
 
 _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 

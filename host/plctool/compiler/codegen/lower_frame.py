@@ -13,9 +13,10 @@ from typing import Any, TypeVar
 from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_unit import RAISE, Check, Unit, value_type
-from plctool.compiler.typed import Area, Expr, Place, Pos, Pou, Statement, Variable
-from plctool.compiler.types import Elementary, StringType, Type, base_of, is_scalar
+from plctool.compiler.typed import Expr, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
+from plctool.iec.areas import Area
+from plctool.iec.types import Elementary, StringType, Type, base_of, is_scalar
 
 _FUNCTION_WIDE = ("%self", "%result", "%p", "%m", "%s")  # parameters and stack memory, by the names `ir` and we give
 TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)

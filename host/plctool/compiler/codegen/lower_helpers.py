@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from plctool.compiler.codegen.targets import Target
+from plctool.image.targets import Target
 
 # The chunk loop of a function that stops at a NUL or after %count characters: %w runs over the chunks within %room
 # bytes; %x is %w as an address. VISIT loads the chunk as %v. It ends in %full with %n, the number of characters, or

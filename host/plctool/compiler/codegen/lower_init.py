@@ -16,7 +16,7 @@ from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.codegen.lower_string import copy_literal, encode_text
 from plctool.compiler.codegen.lower_unit import Unit
 from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, StructInit, overlay
-from plctool.compiler.types import ArrayType, Elementary, Field, Kind, StringType, StructType, Type, base_of, is_scalar
+from plctool.iec.types import ArrayType, Elementary, Field, Kind, StringType, StructType, Type, base_of, is_scalar
 
 _LOOP_FROM = 5  # equal scalars that are worth a loop
 _CONSTANT_FROM = 4  # different scalars that are worth a constant

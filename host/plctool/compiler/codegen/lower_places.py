@@ -31,7 +31,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.types import BYTE, DINT, UDINT, ArrayType, PointerType, StringType, StructType, Type, is_scalar
+from plctool.iec.types import BYTE, DINT, UDINT, ArrayType, PointerType, StringType, StructType, Type, is_scalar
 
 
 @rule(REFS, VarPlace)

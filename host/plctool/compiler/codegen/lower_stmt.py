@@ -25,7 +25,7 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import root_of, walk
-from plctool.compiler.types import StringType, is_scalar
+from plctool.iec.types import StringType, is_scalar
 
 _WIDEST_SWITCH = 64  # labels of one range that become cases of a switch
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from plctool.compiler.codegen.lower_arith import compare
 from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.typed import BinaryOp
-from plctool.compiler.types import DINT, StringType
+from plctool.iec.types import DINT, StringType
 
 _INLINE_COPY = 128  # bytes that LLVM copies with a few vector moves
 _SHORT_COPY = 16  # bytes that it copies without vectors, but with unaligned words

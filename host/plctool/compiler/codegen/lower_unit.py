@@ -11,11 +11,12 @@ from enum import Enum
 
 from plctool.compiler.codegen.ir import Module, escape
 from plctool.compiler.codegen.lower_helpers import LIBRARY_FUNCTIONS
-from plctool.compiler.codegen.targets import Target
-from plctool.compiler.typed import Area, Dispatch, External, Pos, Pou, PouKind, StructInit, Variable
-from plctool.compiler.types import Elementary, Kind, PointerType, StructType, Type, base_of
+from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
+from plctool.iec.areas import Area
+from plctool.iec.types import Elementary, Kind, PointerType, StructType, Type, base_of
+from plctool.image.targets import Target
 
 _ALWAYS = 'nounwind "no-builtins"'
 _PROBES = ' "probe-stack"="inline-asm"'

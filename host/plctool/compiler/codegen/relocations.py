@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from plctool.compiler.codegen.targets import Machine
+from plctool.image.targets import Machine
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_unit import value_type
-from plctool.compiler.codegen.targets import Target
 from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
 from plctool.compiler.typed_nodes import walk
-from plctool.compiler.types import StringType, Type, is_scalar
+from plctool.iec.types import StringType, Type, is_scalar
+from plctool.image.targets import Target
 
 HandedInputs = dict[Pou, list[Variable]]
 

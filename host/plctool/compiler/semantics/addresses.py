@@ -14,8 +14,9 @@ from plctool.compiler.semantics.conversions import elementary
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Area, Initial, Storage, Variable
-from plctool.compiler.types import BOOL, ELEMENTARY, Elementary, Type, base_of
+from plctool.compiler.typed import Initial, Storage, Variable
+from plctool.iec.areas import Area
+from plctool.iec.types import BOOL, ELEMENTARY, Elementary, Type, base_of
 
 MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
 AREAS = {"I": Area.INPUT, "Q": Area.OUTPUT, "M": Area.MEMORY}

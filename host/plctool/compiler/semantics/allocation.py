@@ -5,8 +5,9 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.typed import Area, Variable
-from plctool.compiler.types import align_up
+from plctool.compiler.typed import Variable
+from plctool.iec.areas import Area
+from plctool.iec.types import align_up
 
 
 class Allocation:

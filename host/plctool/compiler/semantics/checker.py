@@ -18,7 +18,7 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Pos, Statement
-from plctool.compiler.types import BOOL, Type
+from plctool.iec.types import BOOL, Type
 
 ExprNode = TypeVar("ExprNode", bound=ast.Expr)
 StmtNode = TypeVar("StmtNode", bound=ast.Stmt)

@@ -25,9 +25,9 @@ from plctool.compiler.semantics.conversions import (
 from plctool.compiler.semantics.divisions import lost_fraction
 from plctool.compiler.semantics.overlays import overlays
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
-from plctool.compiler.syntax.literals import BitPattern
 from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Pos
-from plctool.compiler.types import (
+from plctool.iec.literals import BitPattern
+from plctool.iec.types import (
     BOOL,
     BYTE,
     LTIME,

@@ -12,7 +12,7 @@ from typing import Any
 
 from plctool.compiler.semantics.symbols import UNTYPED_INT
 from plctool.compiler.typed import BinaryOp, Intrinsic
-from plctool.compiler.types import BOOL, REAL, Elementary, EnumType, Kind, PointerType, SubrangeType, Type, base_of
+from plctool.iec.types import BOOL, REAL, Elementary, EnumType, Kind, PointerType, SubrangeType, Type, base_of
 
 Value = int | float | str
 

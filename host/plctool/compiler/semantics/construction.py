@@ -18,7 +18,6 @@ from plctool.compiler.semantics.values import whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.typed import (
     AddressOf,
-    Area,
     ArrayInit,
     Assign,
     Call,
@@ -50,7 +49,8 @@ from plctool.compiler.typed import (
     VarPlace,
     overlay,
 )
-from plctool.compiler.types import (
+from plctool.iec.areas import Area
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DINT,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import Binary, BinaryOp, Const, Convert, Expr, Pos
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     BYTE,
     CHAR,

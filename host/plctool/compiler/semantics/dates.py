@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.conversions import NS_PER_MS, convert, scaled
 from plctool.compiler.typed import BinaryOp, Expr
-from plctool.compiler.types import DATE, DT, LDATE, LDT, LTIME, LTOD, TIME, TOD, Elementary, Type
+from plctool.iec.types import DATE, DT, LDATE, LDT, LTIME, LTOD, TIME, TOD, Elementary, Type
 
 _DAY_NS = 86_400_000_000_000
 _SECOND = 1_000_000_000

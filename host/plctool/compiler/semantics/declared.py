@@ -21,7 +21,7 @@ from plctool.compiler.semantics.symbols import (
     TypeSymbol,
     VarSymbol,
 )
-from plctool.compiler.types import InterfaceType, StructType, Type
+from plctool.iec.types import InterfaceType, StructType, Type
 
 
 @dataclass(frozen=True)

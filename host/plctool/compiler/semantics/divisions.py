@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.conversions import NUMBERS, elementary
 from plctool.compiler.typed import Binary, BinaryOp, Convert, Expr, Unary
-from plctool.compiler.types import Elementary, Kind
+from plctool.iec.types import Elementary, Kind
 
 
 def lost_fraction(e: Expr, target: Elementary, *, explicit: bool = False) -> str:

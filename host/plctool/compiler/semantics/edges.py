@@ -13,7 +13,7 @@ from dataclasses import replace
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import VarSymbol
 from plctool.compiler.typed import Assign, Binary, BinaryOp, Load, Unary, UnaryOp, Variable, VarPlace
-from plctool.compiler.types import BOOL
+from plctool.iec.types import BOOL
 
 RISING = "R_EDGE"
 

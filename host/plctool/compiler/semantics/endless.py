@@ -13,7 +13,6 @@ from plctool.compiler.analysis import Effects
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.typed import (
     AddressOf,
-    Area,
     Assign,
     Call,
     Case,
@@ -38,6 +37,7 @@ from plctool.compiler.typed import (
     While,
 )
 from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.iec.areas import Area
 
 Loop = While | Repeat | For
 _CLOCKS = (Intrinsic.TIME, Intrinsic.LTIME)

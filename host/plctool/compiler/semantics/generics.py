@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from plctool.compiler.semantics.symbols import DIRECTIONS
 from plctool.compiler.syntax import ast
-from plctool.compiler.types import BOOL, ELEMENTARY, Elementary, EnumType, Kind, StringType, SubrangeType, Type, base_of
+from plctool.iec.types import BOOL, ELEMENTARY, Elementary, EnumType, Kind, StringType, SubrangeType, Type, base_of
 
 LIBRARY_STRING = StringType(255)  # STRING without a length, as parameter or result of a library function
 WIDE_LIBRARY_STRING = StringType(255, wide=True)

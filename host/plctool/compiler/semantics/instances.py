@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import Member
 from plctool.compiler.semantics.world import World
-from plctool.compiler.types import ArrayType, StructType, Type
+from plctool.iec.types import ArrayType, StructType, Type
 
 INITIALISERS = ("fb_init", "fb_reinit", "fb_exit")  # each class may have its own parameters
 INIT_RETAINS, COPY_CODE = "binitretains", "bincopycode"  # what every FB_Init is told

@@ -19,7 +19,7 @@ from plctool.compiler.semantics.symbols import GlobalSymbol, Namespace, PouSymbo
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Pos
-from plctool.compiler.types import ELEMENTARY
+from plctool.iec.types import ELEMENTARY
 
 _RESERVED = {*ELEMENTARY, "STRING", "WSTRING", *GROUPS}
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from plctool.compiler.typed import Const, Direction, Expr, Load, Parameter, Place, Pos, Storage, Variable, VarPlace
-from plctool.compiler.types import DINT, ArrayType, OpenArrayType
+from plctool.iec.types import DINT, ArrayType, OpenArrayType
 
 Bounds = list[tuple[Expr, Expr]]
 

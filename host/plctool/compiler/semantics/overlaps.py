@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.typed import Area, Variable
+from plctool.compiler.typed import Variable
+from plctool.iec.areas import Area
 
 
 def report_overlaps(variables: Iterable[Variable], diagnostics: Diagnostics) -> None:

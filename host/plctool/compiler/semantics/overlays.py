@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.symbols import ERROR
-from plctool.compiler.types import ArrayType, Elementary, Kind, PointerType, StringType, StructType, Type, base_of
+from plctool.iec.types import ArrayType, Elementary, Kind, PointerType, StringType, StructType, Type, base_of
 
 _BITS = (Kind.BIT, Kind.CHAR)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, settle
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Pos
-from plctool.compiler.types import LINT, LWORD, InterfaceType, PointerType, RawPointerType, ReferenceType
+from plctool.iec.types import LINT, LWORD, InterfaceType, PointerType, RawPointerType, ReferenceType
 
 
 def is_address(e: Expr) -> bool:

@@ -36,7 +36,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )  # fmt: skip
-from plctool.compiler.types import BOOL, PointerType, StructType
+from plctool.iec.types import BOOL, PointerType, StructType
 
 
 class Queries:

@@ -22,7 +22,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Pos, Pou, Statement
-from plctool.compiler.types import Type
+from plctool.iec.types import Type
 
 
 def _internal_to(symbol: Symbol) -> str | None:

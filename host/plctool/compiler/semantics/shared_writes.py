@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.semantics.open_arrays import bounds_of
 from plctool.compiler.typed import (
-    Area,
     Assign,
     BitPlace,
     Call,
@@ -33,7 +32,8 @@ from plctool.compiler.typed import (
     VarPlace,
 )
 from plctool.compiler.typed_nodes import callees, walk
-from plctool.compiler.types import ArrayType
+from plctool.iec.areas import Area
+from plctool.iec.types import ArrayType
 
 _SHARED = (Area.DATA, Area.RETAIN, Area.MEMORY)  # of the outputs, each task has an image of its own
 

@@ -11,7 +11,7 @@ from enum import Enum
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Direction, Initial, Pos, Pou, Variable
-from plctool.compiler.types import Elementary, Keep, Kind, PointerType, StructType, Type
+from plctool.iec.types import Elementary, Keep, Kind, PointerType, StructType, Type
 
 
 class _ErrorType(Type):

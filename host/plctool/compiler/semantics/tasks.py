@@ -16,7 +16,7 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import BitPlace, Load, MemberPlace, Place, Storage, Task, TaskEvent, TaskKind, VarPlace
-from plctool.compiler.types import BOOL, LTIME, TIME, StringType
+from plctool.iec.types import BOOL, LTIME, TIME, StringType
 
 LOWEST_PRIORITY = 31
 MAX_DURATION_US = 0x7FFF_FFFF

@@ -9,7 +9,7 @@ from plctool.compiler.ranges import Range, type_range
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary
 from plctool.compiler.typed import BinaryOp, Const, Expr
-from plctool.compiler.types import BOOL, EnumType, SubrangeType, Type
+from plctool.iec.types import BOOL, EnumType, SubrangeType, Type
 
 _SWAPPED = {BinaryOp.LT: BinaryOp.GT, BinaryOp.GT: BinaryOp.LT, BinaryOp.LE: BinaryOp.GE, BinaryOp.GE: BinaryOp.LE}
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from plctool.compiler.syntax import ast
-from plctool.compiler.types import ELEMENTARY
+from plctool.iec.types import ELEMENTARY
 
 _OF_ONE_TYPE = (
     "ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "ATAN2", "ADD", "SUB", "MUL", "DIV",

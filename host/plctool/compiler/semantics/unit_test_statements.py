@@ -40,7 +40,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )  # fmt: skip
-from plctool.compiler.types import BOOL, DINT, LREAL, LTIME, TIME, UDINT, ArrayType, Kind, StringType, StructType, Type
+from plctool.iec.types import BOOL, DINT, LREAL, LTIME, TIME, UDINT, ArrayType, Kind, StringType, StructType, Type
 
 NUMBER, FAILED = "__test", "__failed"
 """Hidden variables: the test to run (from 0); afterwards the assert that failed (from 1)."""

@@ -47,7 +47,7 @@ from plctool.compiler.typed import (
     TaskKind,
     Variable,
 )  # fmt: skip
-from plctool.compiler.types import Keep
+from plctool.iec.types import Keep
 
 _LARGEST_ON_STACK = 0x4000  # bytes; what is larger lives in the data area
 

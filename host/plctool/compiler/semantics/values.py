@@ -18,7 +18,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )  # fmt: skip
-from plctool.compiler.types import BOOL, BYTE, ReferenceType
+from plctool.iec.types import BOOL, BYTE, ReferenceType
 
 
 def is_untyped(e: Expr) -> bool:

@@ -21,7 +21,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, PouSymbol, VarSymbol
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Call, Const, Expr, Pou, Storage, StructInit, Variable
-from plctool.compiler.types import WCHAR, StructType, Type
+from plctool.iec.types import WCHAR, StructType, Type
 
 
 class World:

@@ -7,28 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from enum import Enum, auto
 from typing import TypeVar
 
 from plctool.compiler.source import Source
+from plctool.iec.literals import LiteralKind as LiteralKind
 
 N = TypeVar("N")
 
 # ---- expressions ---------------------------------------------------------------------------------------------------
-
-
-class LiteralKind(Enum):
-    """What sort of constant was written."""
-
-    INT = auto()
-    REAL = auto()
-    BOOL = auto()
-    TIME = auto()  # value in ns
-    DATE = auto()  # value in ns since 1970 or midnight
-    STRING = auto()
-    WSTRING = auto()
-    NULL = auto()
-    BAD = auto()  # already reported
 
 
 @dataclass(slots=True, eq=False)
@@ -171,8 +157,8 @@ class ArrayInit:
 
 @dataclass(slots=True, eq=False)
 class StructInit:
-    """`(member := value, ...)`. `arguments`: it stands behind the name of a type, `Pump(limit := 5)`, where the inputs of
-    FB_Init come before members of the same name; a value without a name ("") is always one of them."""
+    """`(member := value, ...)`. `arguments`: it stands behind the name of a type, `Pump(limit := 5)`, where the inputs
+    of FB_Init come before members of the same name; a value without a name ("") is always one of them."""
 
     pos: int
     members: list[tuple[int, str, Init]]

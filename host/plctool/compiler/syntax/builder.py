@@ -9,13 +9,14 @@ from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from plctool.compiler.source import Source
-from plctool.compiler.syntax import ast, literals
+from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.builder_chart import read_action, read_priority
 from plctool.compiler.syntax.builder_units import Arrangement
 from plctool.compiler.syntax.lexer import Report, Token
+from plctool.iec import literals
 
-I = TypeVar("I", bound="ast.Init | None")
+_Init = TypeVar("_Init", bound="ast.Init | None")
 
 _PRECEDENCE = {
     "**": 7, "*": 6, "/": 6, "MOD": 6, "+": 5, "-": 5, "<": 4, ">": 4, "<=": 4, ">=": 4, "=": 3, "<>": 3,
@@ -48,7 +49,7 @@ def _listed(children: tuple[Any, ...]) -> list[Any]:
     return [c for c in children if c is not None]
 
 
-def _placed(init: I, pos: int) -> I:
+def _placed(init: _Init, pos: int) -> _Init:
     """An initial value; `()` has no token of its own, so it stands where its name does."""
     if isinstance(init, ast.StructInit) and init.pos < 0:
         init.pos = pos

@@ -30,7 +30,7 @@ from plctool.compiler.typed import (
     StructInit,
     Variable,
 )  # fmt: skip
-from plctool.compiler.types import (
+from plctool.iec.types import (
     Field,
     Keep,
     ReferenceType,

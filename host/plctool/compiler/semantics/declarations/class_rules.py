@@ -10,7 +10,7 @@ from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.symbols import ERROR, ClassInfo, Member
 from plctool.compiler.semantics.world import World
-from plctool.compiler.types import BOOL
+from plctool.iec.types import BOOL
 
 
 def check_class(world: World, cls: ClassInfo) -> None:

@@ -22,7 +22,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )  # fmt: skip
-from plctool.compiler.types import ArrayType, StructType, Type
+from plctool.iec.types import ArrayType, StructType, Type
 
 Step = str | int  # the name of a member, or the number of an element from 0
 

@@ -34,7 +34,7 @@ from plctool.compiler.typed import (
     Storage,
     Variable,
 )  # fmt: skip
-from plctool.compiler.types import (
+from plctool.iec.types import (
     ArrayType,
     OpenArrayType,
     StringType,

@@ -17,7 +17,7 @@ from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Namespace, R
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import ArrayInit, ComputedInit, Const, Expr, Initial, Load, ScalarInit, StructInit, VarPlace
-from plctool.compiler.types import MAX_SIZE, ArrayType, ReferenceType, StructType, Type
+from plctool.iec.types import MAX_SIZE, ArrayType, ReferenceType, StructType, Type
 
 MAX_RUNS = 1_000_000  # of different values that a repetition makes
 

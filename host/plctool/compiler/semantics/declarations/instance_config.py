@@ -26,7 +26,6 @@ from plctool.compiler.semantics.values import load, whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
-    Area,
     Assign,
     Initial,
     MemberPlace,
@@ -38,7 +37,8 @@ from plctool.compiler.typed import (
     Task,
     Variable,
 )  # fmt: skip
-from plctool.compiler.types import BOOL, ArrayType, StructType, Type, base_of
+from plctool.iec.areas import Area
+from plctool.iec.types import BOOL, ArrayType, StructType, Type, base_of
 
 
 @dataclass(eq=False)

@@ -33,7 +33,7 @@ from plctool.compiler.typed import (
     Pou,
     Variable,
 )  # fmt: skip
-from plctool.compiler.types import Keep
+from plctool.iec.types import Keep
 
 _PROGRAM_MAY = {
     Direction.INPUT: May.HAVE_ADDRESS | May.BE_EDGE, Direction.OUTPUT: May.HAVE_ADDRESS, None: May.HAVE_ADDRESS,

@@ -22,7 +22,7 @@ from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import TYPES
 from plctool.compiler.typed import ArrayInit, Const, Initial, Pos, ScalarInit, StructInit, overlay
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DEFAULT_STRING_LENGTH,

@@ -16,7 +16,7 @@ from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, GlobalSymbol, 
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Pou, PouKind, Storage, Variable
-from plctool.compiler.types import Keep
+from plctool.iec.types import Keep
 
 ROLES = {
     "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,

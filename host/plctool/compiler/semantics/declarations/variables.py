@@ -14,17 +14,9 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import (
-    Area,
-    ComputedInit,
-    Const,
-    Initial,
-    Pos,
-    ScalarInit,
-    Storage,
-    Variable,
-)
-from plctool.compiler.types import (
+from plctool.compiler.typed import ComputedInit, Const, Initial, Pos, ScalarInit, Storage, Variable
+from plctool.iec.areas import Area
+from plctool.iec.types import (
     ArrayType,
     Elementary,
     Keep,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, Member, Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.types import Type
+from plctool.iec.types import Type
 
 
 def may_see(c: Checker, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Expr
-from plctool.compiler.types import Type
+from plctool.iec.types import Type
 
 
 @dataclass(frozen=True)

@@ -34,11 +34,11 @@ from plctool.compiler.typed import (
     ValuePlace,
     VarPlace,
 )
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
-    ArrayType,
     LREAL,
     REAL,
+    ArrayType,
     Kind,
     ReferenceType,
     StringType,

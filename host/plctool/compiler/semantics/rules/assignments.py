@@ -16,7 +16,7 @@ from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Assign, Const, DerefPlace, If, Load, Pos, Statement
-from plctool.compiler.types import BOOL, OpenArrayType, ReferenceType
+from plctool.iec.types import BOOL, OpenArrayType, ReferenceType
 
 _NOTHING = (ast.LiteralKind.NULL, ast.LiteralKind.INT)
 

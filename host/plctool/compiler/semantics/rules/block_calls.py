@@ -35,7 +35,7 @@ from plctool.compiler.typed import (
     UnaryOp,
     Variable,
 )
-from plctool.compiler.types import BOOL, StringType, StructType
+from plctool.iec.types import BOOL, StringType, StructType
 
 
 @dataclass

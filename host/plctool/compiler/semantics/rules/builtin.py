@@ -14,7 +14,7 @@ from plctool.compiler.semantics.rules.conversion_calls import conversion, conver
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Expr
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     Type,
 )

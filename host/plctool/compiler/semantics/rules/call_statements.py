@@ -17,7 +17,7 @@ from plctool.compiler.semantics.rules.qualified_names import called_program
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Assign, Call, CallStatement, Const, If, Statement
-from plctool.compiler.types import BOOL, StructType
+from plctool.iec.types import BOOL, StructType
 
 
 @checks_statement(ast.ExprStmt)

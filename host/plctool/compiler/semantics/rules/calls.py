@@ -22,7 +22,7 @@ from plctool.compiler.semantics.typed_functions import overloaded_form
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import FUNCTIONS, REFUSED_CALLS
 from plctool.compiler.typed import Expr, Load, MemberPlace
-from plctool.compiler.types import ELEMENTARY, ArrayType, StructType, Type
+from plctool.iec.types import ELEMENTARY, ArrayType, StructType, Type
 
 
 @checks(ast.Call)

@@ -14,7 +14,7 @@ from plctool.compiler.semantics.symbols import ClassInfo, VarSymbol
 from plctool.compiler.semantics.values import load
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Expr, MemberPlace, Place
-from plctool.compiler.types import StructType
+from plctool.iec.types import StructType
 
 
 def action_flag(c: Checker, node: ast.Member) -> Expr | None:

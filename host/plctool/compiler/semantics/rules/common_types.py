@@ -19,7 +19,7 @@ from plctool.compiler.semantics.conversions import (
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.typed import Const, Expr
-from plctool.compiler.types import BOOL, CHAR, LREAL, REAL, WCHAR, Kind, PointerType, SubrangeType, Type
+from plctool.iec.types import BOOL, CHAR, LREAL, REAL, WCHAR, Kind, PointerType, SubrangeType, Type
 
 
 def untyped_bits(c: Checker, e: Expr, expected: Type | None) -> Expr:

@@ -15,7 +15,7 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Case, Const, Continue, Exit, Expr, For, If, Repeat, Return, Statement, While
-from plctool.compiler.types import EnumType, Type
+from plctool.iec.types import EnumType, Type
 
 
 class _Labels:

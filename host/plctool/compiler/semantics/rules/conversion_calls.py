@@ -17,7 +17,7 @@ from plctool.compiler.semantics.symbols import ERROR, TypeSymbol
 from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Intrinsic, IntrinsicCall
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     DINT,
     DWORD,

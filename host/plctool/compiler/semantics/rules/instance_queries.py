@@ -12,7 +12,7 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.values import place_of
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import AddressOf, Call, CallStatement, DerefPlace, Expr, Load, Place, Pos, Statement
-from plctool.compiler.types import BOOL, InterfaceType, PointerType, ReferenceType, StructType, Type
+from plctool.iec.types import BOOL, InterfaceType, PointerType, ReferenceType, StructType, Type
 
 _INTERFACE, _POINTER = "an interface", "a pointer to a function block"
 QUERIES = {"__QUERYINTERFACE": _INTERFACE, "__QUERYPOINTER": _POINTER}

@@ -17,7 +17,7 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.values import is_untyped, load
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Intrinsic, IntrinsicCall, VarPlace
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     DINT,
     ELEMENTARY,

@@ -25,7 +25,7 @@ from plctool.compiler.semantics.symbols import ERROR, PouSymbol
 from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Direction, Expr
-from plctool.compiler.types import LREAL, REAL, WCHAR, StringType, Type
+from plctool.iec.types import LREAL, REAL, WCHAR, StringType, Type
 
 _TEXT_PARAMETERS = {"STR": "IN", "STR1": "IN1", "STR2": "IN2", "SIZE": "L", "LEN": "L", "POS": "P"}
 """Names that CODESYS gives the parameters of string functions, and those of the standard."""
@@ -64,7 +64,9 @@ def call_symbol(
 def _standard_names(args: list[ast.Argument], declared: set[str]) -> list[ast.Argument]:
     """The arguments with the names of the standard in place of those of CODESYS."""
     return [
-        a if (a.name or "").casefold() in declared else replace(a, name=_TEXT_PARAMETERS.get((a.name or "").upper(), a.name))
+        a
+        if (a.name or "").casefold() in declared
+        else replace(a, name=_TEXT_PARAMETERS.get((a.name or "").upper(), a.name))
         for a in args
     ]
 

@@ -11,7 +11,7 @@ from plctool.compiler.semantics.conversions import NS_PER_MS, character, error_v
 from plctool.compiler.semantics.symbols import NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Pos
-from plctool.compiler.types import BOOL, ELEMENTARY, LTIME, TIME, TOD, StringType, Type
+from plctool.iec.types import BOOL, ELEMENTARY, LTIME, TIME, TOD, StringType, Type
 
 
 @checks(ast.Literal)

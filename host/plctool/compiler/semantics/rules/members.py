@@ -24,7 +24,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.semantics.values import place_of
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import AddressOf, DerefPlace, Expr, Place, SelfPlace
-from plctool.compiler.types import InterfaceType, StructType
+from plctool.iec.types import InterfaceType, StructType
 
 
 @dataclass

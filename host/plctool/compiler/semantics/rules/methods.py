@@ -26,7 +26,7 @@ from plctool.compiler.typed import (
     Storage,
     VarPlace,
 )
-from plctool.compiler.types import ReferenceType
+from plctool.iec.types import ReferenceType
 
 
 def method_call(c: Checker, bound: Bound, node: ast.Call) -> Expr:

@@ -13,7 +13,7 @@ from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary,
 from plctool.compiler.semantics.rules.applied import Applied, BuiltIn
 from plctool.compiler.semantics.rules.operators import fold_unary, operate
 from plctool.compiler.typed import BinaryOp, Expr, UnaryOp
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
 )
 

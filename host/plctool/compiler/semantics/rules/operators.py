@@ -26,7 +26,7 @@ from plctool.compiler.semantics.type_limits import always
 from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Unary, UnaryOp
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     DT,
     LREAL,

@@ -13,7 +13,7 @@ from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSym
 from plctool.compiler.semantics.values import is_temporary
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import AddressOf, DerefPlace, Load, Place, SelfPlace
-from plctool.compiler.types import StructType
+from plctool.iec.types import StructType
 
 
 def named_place(c: Checker, node: ast.Expr, use: str) -> Place | None:

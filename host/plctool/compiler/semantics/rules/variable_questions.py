@@ -29,7 +29,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
-from plctool.compiler.types import (
+from plctool.iec.types import (
     BOOL,
     BYTE,
     DINT,

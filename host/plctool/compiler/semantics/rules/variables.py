@@ -34,7 +34,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import NAMES
 from plctool.compiler.typed import AddressOf, Const, Expr, SelfPlace
-from plctool.compiler.types import EnumType, PointerType, Type
+from plctool.iec.types import EnumType, PointerType, Type
 
 _OWN = ("THIS", "SUPER")
 _DURATION = re.compile(r"T_?(\d+(?:ms|us|ns|s|m|h|d))", re.IGNORECASE)

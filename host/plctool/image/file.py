@@ -449,7 +449,7 @@ def _parse_info(data: bytes) -> ApplicationInfo:
 
 def target_name(device_id: int) -> str:
     """The name of the target with this TARGET_ID_*, or the number in hex."""
-    from plctool.compiler.codegen.targets import TARGETS
+    from plctool.image.targets import TARGETS
 
     for target in TARGETS.values():
         if getattr(lib, target.device_id) == device_id:

@@ -9,9 +9,9 @@ import datetime
 import math
 import re
 from decimal import Decimal
+from enum import Enum, auto
 
-from plctool.compiler.syntax.ast import LiteralKind
-from plctool.compiler.types import ELEMENTARY
+from plctool.iec.types import ELEMENTARY
 
 Value = int | float | str
 
@@ -39,6 +39,20 @@ _UNDERSCORES = re.compile(r"__|_\Z|\A_|_\.|\._")
 _ESCAPES = {"$": "$", "'": "'", '"': '"', "L": "\n", "N": "\n", "P": "\f", "R": "\r", "T": "\t"}
 _ESCAPE = re.compile(r"\$([0-9A-Fa-f]{2}|[$'\"LNPRTlnprt]|.|\Z)", re.DOTALL)
 _WIDE_ESCAPE = re.compile(r"\$([0-9A-Fa-f]{4}|[$'\"LNPRTlnprt]|.|\Z)", re.DOTALL)
+
+
+class LiteralKind(Enum):
+    """What sort of constant was written."""
+
+    INT = auto()
+    REAL = auto()
+    BOOL = auto()
+    TIME = auto()  # value in ns
+    DATE = auto()  # value in ns since 1970 or midnight
+    STRING = auto()
+    WSTRING = auto()
+    NULL = auto()
+    BAD = auto()  # already reported
 
 
 class BitPattern(int):

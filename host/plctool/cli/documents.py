@@ -47,7 +47,7 @@ def build(
     complete or not at all.
     """
     from plctool.compiler import compile_sources
-    from plctool.symbols import symbol_path
+    from plctool.debug.symbols import symbol_path
 
     check_output(output, paths, f"-o {output.stem}.cdl")
     result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug, warnings=warnings)
@@ -129,8 +129,8 @@ def diagnostic_document(diagnostic: Diagnostic) -> Document:
 
 def info(path: Path) -> Document:
     """Header, tables and POUs of an image; with its symbols also the bytes of code that each POU made."""
-    from plctool.image import describe_image
-    from plctool.symbols import find_symbols
+    from plctool.debug.symbols import find_symbols
+    from plctool.image.file import describe_image
 
     data = read_image(path)
     document = describe_image(data)
@@ -151,9 +151,9 @@ def info(path: Path) -> Document:
 def variables(path: Path, patterns: Sequence[str]) -> Document:
     """The variables of an image, and parts of them, whose names match one of the patterns; without patterns all
     variables."""
-    from plctool.compiler.typed import Area
-    from plctool.image import describe_image
-    from plctool.symbols import find_symbols
+    from plctool.debug.symbols import find_symbols
+    from plctool.iec.areas import Area
+    from plctool.image.file import describe_image
 
     symbols = find_symbols(int(describe_image(read_image(path))["crc"], 16), path)
     areas = {area.value: area.name.lower() for area in Area}

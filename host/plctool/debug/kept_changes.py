@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from plctool.symbols import KeptName
+from plctool.debug.symbols import KeptName
 
 
 @dataclass(frozen=True)

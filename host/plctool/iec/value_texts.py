@@ -9,8 +9,9 @@ import datetime
 import re
 from typing import Any
 
-from plctool.compiler.syntax.literals import LiteralError, string
-from plctool.compiler.types import (
+from plctool.errors import UsageError
+from plctool.iec.literals import LiteralError, string
+from plctool.iec.types import (
     ELEMENTARY,
     ArrayType,
     Elementary,
@@ -22,7 +23,6 @@ from plctool.compiler.types import (
     Type,
     base_of,
 )
-from plctool.errors import UsageError
 
 _UNITS_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
              "us": 1_000, "ns": 1}  # fmt: skip

@@ -17,20 +17,20 @@ from plctool.compiler import CompileError, load_sources
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.codegen.targets import DEFAULT_TARGET, TARGETS, find_target
 from plctool.compiler.front import Diagnostic, check_sources, render
 from plctool.compiler.internal import bugs_reported
 from plctool.compiler.semantics.unit_test_statements import FAILED, NUMBER, Assertion, Operand
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
-from plctool.compiler.typed import Area
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.core import ffi, lib
+from plctool.debug.symbols import SourceLine
 from plctool.device import ExceptionInfo, explain_exception
 from plctool.errors import UsageError
+from plctool.iec.areas import Area
+from plctool.iec.value_texts import literal
+from plctool.iec.values import decode
+from plctool.image.targets import DEFAULT_TARGET, TARGETS, find_target
 from plctool.sim import Simulator
-from plctool.symbols import SourceLine
-from plctool.value_texts import literal
-from plctool.values import decode
 
 if TYPE_CHECKING:
     from plctool.compiler.source import Source

@@ -18,14 +18,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from plctool.compiler.types import ArrayType
+from plctool.debug.variables import Symbol, Units, constant_symbol, walk
 from plctool.errors import UsageError
 from plctool.files import write_atomically
-from plctool.type_descriptions import DescribedTypes, describe
-from plctool.variables import Symbol, Units, constant_symbol, walk
+from plctool.iec.type_descriptions import DescribedTypes, describe
+from plctool.iec.types import ArrayType
 
 if TYPE_CHECKING:
-    from plctool.debug_info import DebugInfo
+    from plctool.debug.call_frames import DebugInfo
     from plctool.link.services import Trace
 
 FORMAT = 3
@@ -168,7 +168,7 @@ class SymbolTable:
 
     @cached_property
     def _debug_info(self) -> DebugInfo:
-        from plctool.debug_info import DebugInfo
+        from plctool.debug.call_frames import DebugInfo
 
         return DebugInfo(self.debug)
 

@@ -25,9 +25,9 @@ BAR_WIDTH = 30
 
 def examples() -> Path:
     """The folder of examples: in the installed package, or at the root of the source tree."""
-    here = Path(__file__).parent
-    inside = here / "examples"
-    return inside if inside.is_dir() else here.parents[1] / "examples"
+    package = Path(__file__).parents[1]
+    inside = package / "examples"
+    return inside if inside.is_dir() else package.parents[1] / "examples"
 
 
 class Story:

@@ -10,7 +10,8 @@ import math
 import struct
 from typing import Any
 
-from plctool.compiler.types import (
+from plctool.errors import UsageError
+from plctool.iec.types import (
     ArrayType,
     Elementary,
     EnumType,
@@ -22,8 +23,7 @@ from plctool.compiler.types import (
     Type,
     base_of,
 )
-from plctool.errors import UsageError
-from plctool.value_texts import bad_value, format_date, format_time, parse_value
+from plctool.iec.value_texts import bad_value, format_date, format_time, parse_value
 
 # ---- bytes -> value ------------------------------------------------------------------------------------------------
 

@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from plctool.compiler.typed import Area
-from plctool.compiler.types import (
+from plctool.errors import DeviceError, UsageError
+from plctool.iec.areas import Area
+from plctool.iec.types import (
     ELEMENTARY,
     ArrayType,
     Elementary,
@@ -27,9 +28,8 @@ from plctool.compiler.types import (
     Type,
     base_of,
 )
-from plctool.errors import DeviceError, UsageError
-from plctool.value_texts import literal, parse_value
-from plctool.values import decode, encode
+from plctool.iec.value_texts import literal, parse_value
+from plctool.iec.values import decode, encode
 
 _TOKEN = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]*)\]|\.(\d+)|(\^)")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from plctool.compiler.types import (
+from plctool.iec.types import (
     ELEMENTARY,
     ArrayType,
     Elementary,

@@ -1,4 +1,4 @@
-"""The command line: reads arguments, calls `plctool.ops`, prints. Imports are late, so that every start is quick."""
+"""The command line: reads arguments, calls `documents`, prints. Imports are late, so that every start is quick."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from plctool import output
+from plctool.cli import output
 from plctool.errors import InternalError, PlcError, UsageError
 from plctool.version import plctool_version
 
@@ -228,7 +228,7 @@ def _percent(text: str) -> float:
 
 
 def _duration_ms(text: str) -> int:
-    from plctool.value_texts import parse_time
+    from plctool.iec.value_texts import parse_time
 
     milliseconds = parse_time(text)
     if milliseconds < 0:
@@ -258,9 +258,9 @@ def _warnings(args: argparse.Namespace) -> WarningOptions:
 
 
 def _build(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
-    document, warnings = ops.build(
+    document, warnings = documents.build(
         args.sources, args.output, args.target, args.level, args.checks, args.debug, _warnings(args)
     )
     if not args.json:
@@ -270,30 +270,30 @@ def _build(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
-    document, texts = ops.check(args.sources, _warnings(args))
+    document, texts = documents.check(args.sources, _warnings(args))
     _show(args, document, lambda d: "\n".join(texts))
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
 
 
 def _info(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
-    return _show(args, ops.info(args.image), output.info_text)
+    return _show(args, documents.info(args.image), output.info_text)
 
 
 def _symbols(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
-    document = ops.variables(args.image, args.patterns)
+    document = documents.variables(args.image, args.patterns)
     return _show(args, document, lambda d: output.table(d["variables"], ("name", "type", "area")))
 
 
 def _run(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
-    document, texts = ops.run(args.image, args.cycles, args.time, _pairs(args.set), args.get)
+    document, texts = documents.run(args.image, args.cycles, args.time, _pairs(args.set), args.get)
     return _show(
         args,
         document,
@@ -302,11 +302,12 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _test(args: argparse.Namespace) -> int:
-    from plctool import ops, st_tests
+    from plctool import st_tests
+    from plctool.cli import documents
     from plctool.files import write_atomically
 
     if args.junit:
-        ops.check_output(args.junit, args.sources, "--junit report.xml")
+        documents.check_output(args.junit, args.sources, "--junit report.xml")
     report = st_tests.run_tests(args.sources, pattern=args.filter, level=args.level, warnings=_warnings(args))
     if args.junit:
         write_atomically(args.junit, st_tests.junit_xml(report))
@@ -319,23 +320,23 @@ def _test(args: argparse.Namespace) -> int:
 
 
 def _export_itf(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
     def text(d: dict[str, Any]) -> str:
         kept = "" if d["source_written"] else " (kept as it is; --force replaces it)"
         return f"{output.table(d['functions'], d['functions'][0])}\n{d['header']}\n{d['source']}{kept}"
 
-    return _show(args, ops.export_interface(args.sources, args.output, args.force), text)
+    return _show(args, documents.export_interface(args.sources, args.output, args.force), text)
 
 
 def _bench(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
-    return _show(args, ops.bench(args.image, args.cycles), lambda d: output.table(d["tasks"], d["tasks"][0]))
+    return _show(args, documents.bench(args.image, args.cycles), lambda d: output.table(d["tasks"], d["tasks"][0]))
 
 
 def _demo(args: argparse.Namespace) -> int:
-    from plctool import demo
+    from plctool.cli import demo
 
     if not args.json:
         return demo.main()
@@ -436,7 +437,7 @@ class _Progress:
 
 def _scan(args: argparse.Namespace) -> int:
     from plctool.device import scan
-    from plctool.image import target_name
+    from plctool.image.file import target_name
 
     devices = [
         {
@@ -454,10 +455,10 @@ def _scan(args: argparse.Namespace) -> int:
 
 
 def _status(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
     with _connect(args) as plc:
-        return _show(args, ops.status(plc), output.status_text)
+        return _show(args, documents.status(plc), output.status_text)
 
 
 def _start(args: argparse.Namespace) -> int:
@@ -474,26 +475,26 @@ def _reset(args: argparse.Namespace) -> int:
 
 def _control(args: argparse.Namespace, action: Callable[[Plc], None]) -> int:
     """Does something and tells the state it leads to."""
-    from plctool import ops
+    from plctool.cli import documents
 
     with _connect(args) as plc:
         action(plc)
-        return _show(args, ops.status(plc), output.status_text)
+        return _show(args, documents.status(plc), output.status_text)
 
 
 def _tasks(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
     columns = ("name", "cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns")
     with _connect(args) as plc:
-        return _show(args, ops.tasks(plc), lambda d: output.table(d["tasks"], columns))
+        return _show(args, documents.tasks(plc), lambda d: output.table(d["tasks"], columns))
 
 
 def _log(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
     with _connect(args) as plc:
-        return _show(args, ops.log(plc), output.log_text)
+        return _show(args, documents.log(plc), output.log_text)
 
 
 def _port_check(args: argparse.Namespace) -> int:
@@ -516,20 +517,20 @@ def _port_check(args: argparse.Namespace) -> int:
 
 
 def _read(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
     with _connect(args) as plc:
-        document, texts = ops.read(plc, args.names)
+        document, texts = documents.read(plc, args.names)
     if not (document["consistent"] or args.json):
         print("plctool: a task ran meanwhile: these values are of more than one cycle.", file=sys.stderr)
     return _show(args, document, lambda d: output.values_text(texts))
 
 
 def _write(args: argparse.Namespace) -> int:
-    from plctool import ops
+    from plctool.cli import documents
 
     with _connect(args) as plc:
-        document, texts = ops.write(plc, _pairs(args.values))
+        document, texts = documents.write(plc, _pairs(args.values))
     return _show(args, document, lambda d: output.values_text(texts))
 
 

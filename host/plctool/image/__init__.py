@@ -1,0 +1,1 @@
+"""The application image, and the processors it is made for."""
