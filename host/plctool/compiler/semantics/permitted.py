@@ -68,7 +68,6 @@ _INSTEAD_OF_SECTION = {
     ("CLASS", "VAR_INPUT"): "nothing calls a CLASS itself; write VAR PUBLIC, or an input of a METHOD",
     ("CLASS", "VAR_OUTPUT"): "nothing calls a CLASS itself; write VAR PUBLIC, or an output of a METHOD",
     ("CLASS", "VAR_IN_OUT"): "nothing calls a CLASS itself; write it into a METHOD",
-    ("PROGRAM", "VAR_IN_OUT"): "use VAR_EXTERNAL or a global variable",
 }
 
 

@@ -20,7 +20,7 @@ from plctool.compiler.semantics.names import Names
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, PouSymbol, VarSymbol
 from plctool.compiler.source import Source
-from plctool.compiler.typed import Call, Const, Expr, Pou, Storage, StructInit, Variable
+from plctool.compiler.typed import Call, Const, Expr, Pou, ScalarInit, Storage, StructInit, Variable
 from plctool.iec.types import WCHAR, StructType, Type
 
 
@@ -43,6 +43,7 @@ class World:
         self.interfaces: dict[StructType, ClassInfo] = {}
         self.defaults: dict[str, StructInit] = {}
         self.shared: dict[tuple[str, int], Variable] = {}
+        self._texts: dict[tuple[int | float | str, Type], Variable] = {}
         self._parameter_defaults: dict[tuple[str, int], Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
         self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
@@ -74,6 +75,17 @@ class World:
             name = f"{symbol.name} default {symbol.pos.line}.{symbol.pos.column}"
             variable = Variable(name, symbol.type, Storage.AREA, symbol.pos, initial=symbol.default, constant=True)
             self._parameter_defaults[key] = variable
+            self.allocation.add(variable)
+        return variable
+
+    def text(self, constant: Const) -> Variable:
+        """Memory that holds a text for those who ask for its address."""
+        variable = self._texts.get((constant.value, constant.type))
+        if variable is None:
+            initial = ScalarInit(constant.value)
+            name = f"text {len(self._texts) + 1}"
+            variable = Variable(name, constant.type, Storage.AREA, constant.pos, initial=initial, constant=True)
+            self._texts[constant.value, constant.type] = variable
             self.allocation.add(variable)
         return variable
 

@@ -133,7 +133,7 @@ def bind(
         else:
             i = index.get(argument.name.casefold())
         if i is None:
-            hint = did_you_mean(argument.name, (n for n, _ in names))
+            hint = did_you_mean(argument.name or "", (n for n, _ in names))
             c.error(argument.pos, "arguments", f"{what} has no parameter {argument.name}{hint}")
             return None
         if i in bound:

@@ -16,7 +16,7 @@ from plctool.compiler.semantics.rules.methods import body_dispatch
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.rules.qualified_names import variable_value
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, BlockInfo, GlobalSymbol, ProgramInfo, Role, VarSymbol
-from plctool.compiler.semantics.values import load, place_of
+from plctool.compiler.semantics.values import load, place_of, whole
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Assign,
@@ -68,6 +68,10 @@ def program_arguments(
     if bound is None:
         return None
     before, behind, ok = list[Statement](), list[Statement](), True
+    for i, (symbol, direction) in enumerate(program.parameters):
+        if direction is Direction.IN_OUT and i not in bound:
+            c.error(offset, "arguments", f"the VAR_IN_OUT {symbol.name} of {program.name} is missing")
+            ok = False
     for i, argument in bound.items():
         (symbol, direction), pos = program.parameters[i], c.pos(argument.pos)
         if argument.value is None or symbol.variable is None:
@@ -77,6 +81,11 @@ def program_arguments(
             e = input_value(c, argument.value, symbol.type, symbol.name)
             ok = ok and e.type is not ERROR
             before.append(Assign(place_of(own), e, pos))
+            continue
+        if direction is Direction.IN_OUT:
+            e = input_value(c, argument.value, symbol.type, symbol.name)
+            ok = ok and e.type is not ERROR
+            before.append(Assign(whole(symbol.variable, pos), e, pos))
             continue
         taken = _taken(c, symbol.name, own, argument)
         ok = ok and taken is not None

@@ -64,11 +64,12 @@ def call_symbol(
 def _standard_names(args: list[ast.Argument], declared: set[str]) -> list[ast.Argument]:
     """The arguments with the names of the standard in place of those of CODESYS."""
     return [
-        a
-        if (a.name or "").casefold() in declared
-        else replace(a, name=_TEXT_PARAMETERS.get((a.name or "").upper(), a.name))
-        for a in args
+        a if a.name is None or a.name.casefold() in declared else replace(a, name=_standard_name(a.name)) for a in args
     ]
+
+
+def _standard_name(name: str) -> str:
+    return _TEXT_PARAMETERS.get(name.upper(), name)
 
 
 def _call_checked(c: Checker, symbol: PouSymbol, values: list[Expr], offset: int, expected: Type | None) -> Expr:

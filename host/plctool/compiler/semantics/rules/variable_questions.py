@@ -11,7 +11,8 @@ from plctool.compiler.semantics.open_arrays import bounds_of
 from plctool.compiler.semantics.rules.applied import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.operators import operate
 from plctool.compiler.semantics.rules.places import named_place
-from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, PouSymbol, TypeSymbol
+from plctool.compiler.semantics.rules.qualified_names import space_of
+from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, GlobalSymbol, PouSymbol, TypeSymbol, VarSymbol
 from plctool.compiler.semantics.values import place_of
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -111,7 +112,12 @@ def _size(c: Checker, t: Type, node: ast.Call) -> Expr:
 
 
 def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
-    """ADR(x), REF(x)"""
+    """ADR(x), REF(x); of a constant, the address of a variable that holds it."""
+    constant = _constant_text(c, node)
+    if constant is not None and isinstance(constant.type, StringType):
+        return AddressOf(
+            VarPlace(c.world.text(constant), constant.type, constant.pos), kind(constant.type), constant.pos
+        )
     place = named_place(c, node, "an address")
     if place is None:
         return error_value(c.pos(node.pos))
@@ -119,6 +125,24 @@ def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
         return c.error(node.pos, "type", "a single bit has no address")
     t = place.type.element if isinstance(place.type, OpenArrayType) else place.type
     return AddressOf(place, kind(t), c.pos(node.pos))
+
+
+def _constant_text(c: Checker, node: ast.Expr) -> Const | None:
+    """The value of a text, or of a constant that is one; None for anything else."""
+    symbol: object = None
+    if isinstance(node, ast.Name):
+        symbol = c.scope.lookup(node.name)
+    elif isinstance(node, ast.Member):
+        space = space_of(c, node.base)
+        symbol = None if space is None else space.members.get(node.name.casefold())
+    elif not isinstance(node, ast.Literal) or node.kind not in (ast.LiteralKind.STRING, ast.LiteralKind.WSTRING):
+        return None
+    if isinstance(symbol, GlobalSymbol):
+        symbol = c.world.declared.variable(symbol)
+    if not isinstance(node, ast.Literal) and not (isinstance(symbol, VarSymbol) and symbol.value is not None):
+        return None
+    e = c.expr(node)
+    return e if isinstance(e, Const) and isinstance(e.type, StringType) else None
 
 
 def _string_size(c: Checker, f: Applied) -> Expr:
