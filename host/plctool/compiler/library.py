@@ -20,7 +20,10 @@ _FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
 _OPENING = re.compile(
     r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
 )
-_QUALIFIED = re.compile(r"(?:standard|standard64|util|tc2_standard|tc2_system|tc2_utilities)\.(?=\w+$)", re.IGNORECASE)
+_NAMESPACES = (
+    "standard", "standard64", "util", "tc2_standard", "tc2_system", "tc2_utilities", "__system", "ibaselibrary",
+)  # fmt: skip
+_QUALIFIED = re.compile(rf"(?:{'|'.join(_NAMESPACES)})\.(?=\w+$)", re.IGNORECASE)
 _STRUCT = re.compile(r"\bSTRUCT\b.*?\bEND_STRUCT\b", re.DOTALL)
 _DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
 

@@ -160,9 +160,7 @@ class _Builder:
         given = {(a.name or "").casefold() for a in args}
         for symbol, direction in program.parameters:
             if direction is Direction.IN_OUT and symbol.name.casefold() not in given:
-                message = (
-                    f"{program.name} has the VAR_IN_OUT {symbol.name}, so a task cannot run it; call it in a program"
-                )
+                message = f"{program.name} has the VAR_IN_OUT {symbol.name}, so no task runs it; call it in a program"
                 self._world.diagnostics.error(pos, "configuration", message)
                 return
 

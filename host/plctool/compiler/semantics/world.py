@@ -40,6 +40,7 @@ class World:
         self.direct = DirectVariables(self.allocation)
         self.bodies = BodyQueue()
         self.blocks: dict[StructType, BlockInfo] = {}
+        self.open_members: dict[StructType, dict[str, VarSymbol]] = {}  # of structures: AT %I*, %Q*, %M*
         self.interfaces: dict[StructType, ClassInfo] = {}
         self.defaults: dict[str, StructInit] = {}
         self.shared: dict[tuple[str, int], Variable] = {}

@@ -21,7 +21,7 @@ from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbo
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import TYPES
-from plctool.compiler.typed import ArrayInit, Const, Initial, Pos, ScalarInit, StructInit, overlay
+from plctool.compiler.typed import ArrayInit, Const, Initial, Pos, ScalarInit, Storage, StructInit, Variable, overlay
 from plctool.iec.types import (
     BOOL,
     BYTE,
@@ -351,8 +351,9 @@ class TypeDeclarations:
         if spec.base is not None and not self._extend(t, spec.base, defaults, scope):
             return ERROR, None
         seen.update(f.name.casefold() for f in t.fields)
+        located: dict[str, VarSymbol] = dict(self._world.open_members.get(t.base, {})) if t.base is not None else {}
         for decl in spec.fields:
-            field_type, default = self.declared_type(decl, scope)
+            field_type, default = self.declared_type(decl, scope, May.HAVE_OPEN_ADDRESS)
             require_instances(self._world, field_type, scope, decl.pos)
             for offset, field_name in decl.names:
                 if field_name.casefold() in seen:
@@ -360,17 +361,32 @@ class TypeDeclarations:
                     continue
                 seen.add(field_name.casefold())
                 t.fields.append(Field(field_name, field_type))
+                if decl.location is not None and field_type is not ERROR:
+                    symbol = VarSymbol(field_name, scope.pos(offset), field_type, Role.LOCAL, default=default)
+                    symbol.variable = Variable(field_name, field_type, Storage.SELF, symbol.pos)
+                    symbol.open_area = decl.location.text[1]
+                    located[field_name.casefold()] = symbol
                 if default is not None and not (spec.union and defaults):  # of a union the first one counts
                     defaults[field_name] = default
         if any(f.type is ERROR for f in t.fields):
             return ERROR, None
         t.lay_out(behind_base=True)
+        self._place_members(t, located)
         if t.size > MAX_SIZE:
             scope.error(spec.pos, "size", f"a struct of {t.size} bytes is too large")
             return ERROR, None
         if defaults:
             self._world.defaults[name] = StructInit(defaults)
         return t, self.struct_default(t)
+
+    def _place_members(self, t: StructType, located: dict[str, VarSymbol]) -> None:
+        """Notes the members with AT %I* and the like, now that they have their offsets."""
+        for key, symbol in located.items():
+            field = t.member(key)
+            if field is not None and symbol.variable is not None:
+                symbol.variable.offset = field.offset
+        if located:
+            self._world.open_members[t] = located
 
     def _extend(self, t: StructType, spec: ast.NamedType, defaults: dict[str, Initial], scope: Scope) -> bool:
         """Begins a struct with the members of the one it EXTENDS."""

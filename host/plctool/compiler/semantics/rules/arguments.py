@@ -9,10 +9,11 @@ from collections.abc import Container
 from dataclasses import dataclass, replace
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.any_values import handed
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, same_type, takes_array
-from plctool.compiler.semantics.generics import is_group
-from plctool.compiler.semantics.open_arrays import handed_bounds
+from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, same_type, settle, takes_array
+from plctool.compiler.semantics.generics import accepts, group_name, is_group
+from plctool.compiler.semantics.open_arrays import handed_bounds, total_size
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.rules.qualified_names import dotted_name
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
@@ -161,15 +162,23 @@ def typed_call(
     so that others may be left out. `noted`: a call that leads back is recursion."""
     pos, name, ok = c.pos(offset), info.pou.name, True
     args: list[Expr | Place | None] = []
+    behind: list[Expr] = []
     parameters = list(zip(info.parameters, info.pou.parameters, strict=False))
     for i, ((symbol, direction), parameter) in enumerate(parameters):
         actual = actuals.get(i)
         if actual is None and direction is not Direction.OUTPUT:
-            if direction is Direction.IN_OUT or not (formal or symbol.given):
+            if direction is Direction.IN_OUT or symbol.group or not (formal or symbol.given):
                 c.error(offset, "arguments", f"the argument {symbol.name} of {name} is missing")
                 ok = False
                 continue
             args.append(_default_value(c, symbol, parameter, offset))
+            continue
+        if symbol.group and actual is not None:
+            described = _described(c, actual, symbol, offset)
+            ok = ok and described is not None
+            if described is not None:
+                args.append(described[0])
+                behind += described[1]
             continue
         argument = None if actual is None else _actual_argument(c, actual, symbol, direction, parameter)
         ok = ok and (actual is None or argument is not None)
@@ -178,9 +187,28 @@ def typed_call(
         return error_value(pos)
     for parameter, argument in zip(info.pou.parameters, list(args), strict=False):
         args += [bound for _, bound in handed_bounds(parameter.variable, argument, pos)]
+    args += behind
     if noted:
         c.world.calls.add(c.scope.pou, info.pou, pos)
     return Call(info.pou, args, info.result if info.result is not None else NOTHING, pos)
+
+
+def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tuple[Expr, list[Expr]] | None:
+    """What is handed over for a parameter of type ANY_...: a variable, or a value for the time of the call."""
+    if isinstance(actual, ast.Argument):
+        offset = actual.pos
+        e = None if actual.value is None else settle(c.expr(actual.value))
+    else:
+        e = actual
+    if e is None or e.type is ERROR:
+        return None
+    if not accepts(symbol.group, e.type) and symbol.type is not e.type:
+        c.error(offset, "type", f"{symbol.name} takes {group_name(symbol.group)}, not {e.type}")
+        return None
+    place = place_of(e)
+    if isinstance(place, BitPlace):
+        place = ValuePlace(e, e.type, e.pos)
+    return handed(place, e.type, total_size(place))
 
 
 def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from plctool.compiler.semantics.any_values import describes_any
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import common_type, elementary, error_value, settle
 from plctool.compiler.semantics.generics import (
@@ -47,7 +48,7 @@ def call_symbol(
             assert argument.value is not None
             result = _call_checked(c, symbol, [result, c.expr(argument.value, expected)], offset, expected)
         return result
-    if is_generic(symbol.decl):
+    if is_generic(symbol.decl) and not describes_any(symbol.decl):
         return _call_generic(c, symbol, args, offset, expected, formal=formal)
     info = c.world.declared.function(symbol, {})
     if info is None:
@@ -76,7 +77,7 @@ def _call_checked(c: Checker, symbol: PouSymbol, values: list[Expr], offset: int
     """A call with arguments that are checked already."""
     if any(v.type is ERROR for v in values):
         return error_value(c.pos(offset))
-    if is_generic(symbol.decl):
+    if is_generic(symbol.decl) and not describes_any(symbol.decl):
         return _instantiate(c, symbol, dict(enumerate(values)), offset, expected)
     info = c.world.declared.function(symbol, {})
     if info is None or len(info.parameters) != len(values):

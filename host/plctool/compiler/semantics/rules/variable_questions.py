@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value, settle
-from plctool.compiler.semantics.open_arrays import bounds_of
+from plctool.compiler.semantics.open_arrays import bounds_of, total_size
 from plctool.compiler.semantics.rules.applied import Applied, BuiltIn, named
-from plctool.compiler.semantics.rules.operators import operate
 from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.rules.qualified_names import space_of
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, GlobalSymbol, PouSymbol, TypeSymbol, VarSymbol
@@ -33,7 +32,6 @@ from plctool.compiler.typed import (
 from plctool.iec.types import (
     BOOL,
     BYTE,
-    DINT,
     ELEMENTARY,
     UDINT,
     ArrayType,
@@ -66,18 +64,8 @@ def of_variable(c: Checker, name: str, node: ast.Call) -> Expr:
             return error_value(c.pos(node.pos)) if t is ERROR else _size(c, t, node)
     e = settle(c.expr(argument))
     if isinstance(e.type, OpenArrayType):
-        return _open_size(c, e, e.type, node.pos)
+        return total_size(place_of(e))
     return e if e.type is ERROR else _size(c, e.type, node)
-
-
-def _open_size(c: Checker, e: Expr, t: OpenArrayType, offset: int) -> Expr:
-    """The bytes of an ARRAY[*], which are known when it runs."""
-    size: Expr = Const(t.element.size, DINT, e.pos)
-    for low, high in bounds_of(place_of(e)):
-        last = operate(c, BinaryOp.SUB, high, low, offset)
-        count = operate(c, BinaryOp.ADD, last, Const(1, DINT, e.pos), offset)
-        size = operate(c, BinaryOp.MUL, size, count, offset)
-    return size
 
 
 def _is_valid(c: Checker, node: ast.Expr) -> Expr:
