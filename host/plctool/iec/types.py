@@ -145,6 +145,7 @@ class EnumType(Type):
     base: Elementary
     values: dict[str, int]  # in order of declaration, names as declared
     strict: bool = False  # only its own values may be assigned
+    named: bool = False  # TO_STRING gives the name of a value, not its number
 
     @property
     def choices(self) -> str:

@@ -81,6 +81,7 @@ class VarSymbol:
     used: bool = False
     access: str = ""  # PUBLIC, PRIVATE, PROTECTED or INTERNAL, where it is written
     keep: Keep = Keep.UNSAID  # what the section of a member says
+    is_path: bool = False  # starts with the path of its instance
     group: str = ""  # ANY_... of a parameter that describes its argument (any_values.py)
     open_area: str = ""  # I, Q or M: of a member of a function block AT %I*, %Q* or %M*
 

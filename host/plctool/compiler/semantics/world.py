@@ -21,7 +21,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, PouSymbol, VarSymbol
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Call, Const, Expr, Pou, ScalarInit, Storage, StructInit, Variable
-from plctool.iec.types import WCHAR, StructType, Type
+from plctool.iec.types import WCHAR, EnumType, StructType, Type
 
 
 class World:
@@ -44,6 +44,7 @@ class World:
         self.interfaces: dict[StructType, ClassInfo] = {}
         self.defaults: dict[str, StructInit] = {}
         self.shared: dict[tuple[str, int], Variable] = {}
+        self.enumeration_texts: dict[EnumType, PouSymbol] = {}  # what gives the names of values
         self._texts: dict[tuple[int | float | str, Type], Variable] = {}
         self._parameter_defaults: dict[tuple[str, int], Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name

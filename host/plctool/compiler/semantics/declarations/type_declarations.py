@@ -213,7 +213,7 @@ class TypeDeclarations:
         symbol.busy = True
         t, default = self.type_of(decl.spec, scope, decl.name)
         if isinstance(t, EnumType) and isinstance(decl.spec, ast.EnumSpec):
-            t.strict = "strict" in decl.attributes
+            t.strict, t.named = "strict" in decl.attributes, "to_string" in decl.attributes
         if symbol.type is None:
             symbol.type, symbol.default = t, default
         if decl.init is not None and t is not ERROR:  # it may name a value of this very enumeration
