@@ -46,7 +46,7 @@ from plctool.iec.types import (
     Type,
 )  # fmt: skip
 
-_EXAMPLES = {Kind.DATE: "a literal such as DT#2024-02-29-12:30:15, or ULINT_TO_{}(...)", Kind.CHAR: "{}#'A'"}
+_FORMS = {"DATE": "2024-02-29", "TOD": "12:30:15", "DT": "2024-02-29-12:30:15"}
 
 
 class Coercion:
@@ -146,7 +146,7 @@ class Coercion:
                 e.pos, "type", f"{value} is not a duration; write {'T' if to is TIME else 'LTIME'}#{value}{unit}"
             )
         if to.kind in (Kind.DATE, Kind.CHAR):
-            return self._error(e.pos, "type", f"{value} is not a {to}; write {_EXAMPLES[to.kind].format(to)}")
+            return self._error(e.pos, "type", f"{value} is not a {to}; write {_example(to)}")
         if isinstance(value, BitPattern) and to.signed and value >> to.bits == 0 and not constants.fits(value, to):
             negative = constants.wrap(value, to)
             self._warn(e.pos, "narrowing", f"{value} becomes {target} {negative}, which has the same bits")
@@ -323,3 +323,10 @@ class Coercion:
         elif source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
             self._warn(e.pos, "precision", f"{e.type} becomes {target}: large values are rounded")
         return convert(e, target)
+
+
+def _example(t: Elementary) -> str:
+    """How a value of a date or character type is written."""
+    if t.kind is Kind.CHAR:
+        return f"{t}#'A'"
+    return f"a literal such as {t}#{_FORMS[t.name.removeprefix('L')]}, or ULINT_TO_{t}(...)"

@@ -163,8 +163,16 @@ class _Construction:
                 statements.append(Assign(part, Const(path[: f.type.length], f.type, pos), pos))
         for member in initialisers(self._world, t):
             statements.append(self._call(member, place, complete.arguments, pos, keep))
+        statements += [self._set(t, place, key, value, pos) for key, value in complete.properties.items()]
         statements += [self._start(member, place, pos) for member in starters(self._world, t)]
         return statements
+
+    def _set(self, t: StructType, place: Place, key: str, value: Expr, pos: Pos) -> Statement:
+        """The SET of a property that the declaration gives a value."""
+        cls = self._world.class_of(t)
+        setter = None if cls is None else cls.find(f"{key}.set")
+        assert setter is not None
+        return CallStatement(Call(self._world.declared.member(setter).pou, [value], NOTHING, pos, instance=place), pos)
 
     def _start(self, member: Member, place: Place, pos: Pos) -> Statement:
         """The call of a method with {attribute 'call_after_init'}."""
@@ -295,7 +303,7 @@ def _loop(pou: Pou, base: Place, t: Type, first: int, last: int) -> tuple[For, P
 def _is_computed(initial: Initial | None) -> bool:
     """Whether something in an initial value is not constant."""
     if isinstance(initial, StructInit):
-        return any(map(_is_computed, initial.members.values()))
+        return bool(initial.properties) or any(map(_is_computed, initial.members.values()))
     if isinstance(initial, ArrayInit):
         return any(_is_computed(value) for _, value in initial.runs)
     return isinstance(initial, ComputedInit)
@@ -306,7 +314,11 @@ def _moved_initial(initial: Initial | None, instance: Place) -> Initial | None:
     if isinstance(initial, StructInit):
         moved = {name: _moved_initial(value, instance) for name, value in initial.members.items()}
         members = {name: value for name, value in moved.items() if value is not None}
-        return StructInit(members, {name: _moved(e, instance) for name, e in initial.arguments.items()})
+        arguments, properties = (
+            {name: _moved(e, instance) for name, e in given.items()}
+            for given in (initial.arguments, initial.properties)
+        )
+        return StructInit(members, arguments, properties)
     if isinstance(initial, ArrayInit):
         return ArrayInit([(count, _moved_initial(value, instance)) for count, value in initial.runs])
     return ComputedInit(_moved(initial.value, instance)) if isinstance(initial, ComputedInit) else initial

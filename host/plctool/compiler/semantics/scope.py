@@ -31,7 +31,7 @@ def _internal_to(symbol: Symbol) -> str | None:
         space, marked = symbol.namespace, "INTERNAL" in symbol.qualifiers
     elif isinstance(symbol, TypeSymbol | PouSymbol):
         decl = symbol.decl
-        space, marked = decl.namespace, isinstance(decl, ast.PouDecl) and "INTERNAL" in decl.modifiers
+        space, marked = decl.namespace, "INTERNAL" in decl.modifiers
     else:
         return None
     if space is None or not space.name or not (marked or space.internal is not None):

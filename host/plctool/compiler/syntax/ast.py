@@ -263,6 +263,7 @@ class TypeDecl:
     source: Source
     namespace: Namespace | None = None
     attributes: dict[str, str] = field(default_factory=dict)
+    modifiers: set[str] = field(default_factory=set)  # PUBLIC, INTERNAL
 
     @property
     def qualified(self) -> bool:
@@ -524,7 +525,10 @@ class Continue:
 
 @dataclass(slots=True, eq=False)
 class Return:
+    """`RETURN`, or `RETURN(condition)` as CODESYS has it."""
+
     pos: int
+    condition: Expr | None = None
 
 
 Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return

@@ -87,14 +87,15 @@ class Builder:
             decl.attributes = {**of_all, **self._attributes_at(decl.pos, kind)}
         return list(kinds)
 
-    def type_decl(
-        self, name: Token, base: tuple[int, str] | None, spec: ast.TypeSpec, init: ast.Init | None
-    ) -> ast.TypeDecl:
+    def type_decl(self, *rest: Any) -> ast.TypeDecl:
+        *modifiers, name, base, spec, init = rest
         if base is not None and isinstance(spec, ast.StructSpec):
             spec.base = ast.NamedType(*base)
         elif base is not None:
             self.report(base[0], "syntax", "only a STRUCT or UNION can extend another one")
-        return ast.TypeDecl(name.pos, name.text, spec, init, self.source)
+        decl = ast.TypeDecl(name.pos, name.text, spec, init, self.source)
+        decl.modifiers = {token.text.upper() for token in modifiers}
+        return decl
 
     def named_type(self, name: tuple[int, str]) -> ast.NamedType:
         return ast.NamedType(*name)
@@ -450,8 +451,8 @@ class Builder:
     def continue_stmt(self, keyword: Token) -> ast.Continue:
         return ast.Continue(keyword.pos)
 
-    def return_stmt(self, keyword: Token) -> ast.Return:
-        return ast.Return(keyword.pos)
+    def return_stmt(self, keyword: Token, condition: ast.Expr | None) -> ast.Return:
+        return ast.Return(keyword.pos, condition)
 
     # ---- expressions ----
 

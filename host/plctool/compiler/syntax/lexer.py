@@ -15,7 +15,7 @@ _TOKEN = re.compile(
     r"""\s*(?:
     (?P<WORD>[A-Za-z_\xC0-\uFFFF][\w\xC0-\uFFFF]*+(?!\#))
   | (?P<PUNCT>:=|\?=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*)\[\]:;,.<>^]|=(?!=)|&(?!&))
-  | (?P<NUMBER>\d[\d_]*+(?:\#\w++|(?:\.\d[\d_]*+)?(?:[eE][+-]?\d++)?)(?!\w))
+  | (?P<NUMBER>\d[\d_]*+(?:\#\w++|(?:\.\d[\d_]*+|\.(?=[eE][+-]?\d|[^\w.]))?(?:[eE][+-]?\d++)?)(?!\w))
   | (?P<SKIP>//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/)
   | (?P<DATE>(?i:L?(?:DATE_AND_TIME|DATE|DT|D|TIME_OF_DAY|TOD))\#[\d:._-]+)
   | (?P<STRING>(?i:(?:W?STRING|W?CHAR)\#)?(?:'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*"))
@@ -180,12 +180,19 @@ class Lexer:
                     return
 
     def _skip_comment(self, mark: str, at: int) -> int:
-        """The end of a comment that holds comments, or of the text."""
-        start, depth = at - 2, 1
+        """The end of a comment that holds comments, or of the text. One that is not closed ends at the first mark:
+        there are systems where comments do not nest."""
+        start, depth, first = at - 2, 1, 0
         for match in _COMMENT_MARK[mark].finditer(self.text, at, self._end):
             depth += 1 if match.group() == mark else -1
+            first = first or (match.end() if match.group() != mark else 0)
             if depth == 0:
                 return match.end()
+        if first:
+            opened = self.text.find(mark, at, first)
+            message = f"a comment in a comment: this {mark} is not closed, so the outer comment ends where it would end"
+            self.pragmas.append((opened, f"{{warning '{message}'}}"))
+            return first
         self._report(start, "comment", "this comment is not closed")
         return self._end
 

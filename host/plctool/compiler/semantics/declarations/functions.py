@@ -13,7 +13,6 @@ from plctool.compiler.semantics.any_values import NAME, describes_any, is_any, p
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
 from plctool.compiler.semantics.declarations.unit_variables import ROLES, UnitVariables, new_pou
 from plctool.compiler.semantics.generics import LIBRARY_STRING, WIDE_LIBRARY_STRING
-from plctool.compiler.semantics.instances import is_instance
 from plctool.compiler.semantics.open_arrays import bound_parameters
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import (
@@ -130,9 +129,6 @@ class Functions:
 
     def _declare_result(self, info: FunctionInfo, decl: ast.PouDecl, spec: ast.TypeSpec, scope: Scope) -> None:
         t, default = self._parameter_type(spec, scope)
-        if is_instance(self._world, t):
-            scope.error(spec.pos, "type", f"a function cannot return the function block {t}")
-            t = ERROR
         info.result = t
         symbol = VarSymbol(decl.name, scope.pos(decl.pos), t, Role.RESULT)
         if t is not ERROR:
@@ -163,9 +159,6 @@ class Functions:
                 symbol.constant = "CONSTANT" in block.qualifiers
                 if not scope.declare(symbol, offset):
                     continue
-                if direction is not Direction.IN_OUT and is_instance(self._world, t):
-                    scope.error(offset, "type", f"pass the function block {name} as VAR_IN_OUT")
-                    symbol.type = ERROR
                 storage = Storage.REFERENCE if by_reference else Storage.LOCAL
                 symbol.variable = Variable(name, t, storage, symbol.pos)
                 info.parameters.append((symbol, direction))

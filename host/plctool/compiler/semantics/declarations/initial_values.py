@@ -126,9 +126,12 @@ class InitialValues:
         block = self._world.blocks.get(t)
         members: dict[str, Initial] = {}
         arguments: dict[str, Expr] = {}
+        properties: dict[str, Expr] = {}
         for offset, name, value, first in self._named(node, t, scope):
             field = t.member(name)
             if (field is None or first) and self._initialiser_argument(name, value, t, arguments, scope):
+                continue
+            if field is None and self._property(name, value, t, properties, scope):
                 continue
             if field is None or (block is not None and block.members[name.casefold()].role is Role.IN_OUT):
                 hint = did_you_mean(name, (f.name for f in t.fields))
@@ -139,7 +142,17 @@ class InitialValues:
             given = self.initial(value, field.type, scope)
             if given is not None:
                 members[field.name] = given
-        return StructInit(members, arguments)
+        return StructInit(members, arguments, properties)
+
+    def _property(self, name: str, node: ast.Init, t: StructType, properties: dict[str, Expr], scope: Scope) -> bool:
+        """`fb : MyFB := (Mode := 3)` for a property with a SET; False when there is none."""
+        cls, key = self._world.class_of(t), name.casefold()
+        setter = None if cls is None else cls.find(f"{key}.set")
+        if setter is None or isinstance(node, ast.ArrayInit | ast.StructInit):
+            return False
+        symbol, _ = self._world.declared.member(setter).parameters[0]
+        properties[key] = input_value(Checker(self._world, scope), node, symbol.type, name)
+        return True
 
     def _named(self, node: ast.StructInit, t: StructType, scope: Scope) -> list[tuple[int, str, ast.Init, bool]]:
         """The members with names: values without one are for the inputs of FB_Init, in their order. With each, whether

@@ -14,7 +14,7 @@ from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, same_type, settle, takes_array
 from plctool.compiler.semantics.generics import accepts, group_name, is_group
 from plctool.compiler.semantics.open_arrays import handed_bounds, total_size
-from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.rules.places import changeable_place, may_copy
 from plctool.compiler.semantics.rules.qualified_names import dotted_name
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
 from plctool.compiler.semantics.values import place_of
@@ -255,7 +255,8 @@ def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
         if _is_slip(node, t, name):
             return c.error(node.pos, "arguments", f"the input {name} is given with :=, not with =")
         e = c.expr(node, t)
-        return e if takes_array(t, e.type) else c.coerce(e, t)
+        e = e if takes_array(t, e.type) else c.coerce(e, t)
+        return e if may_copy(c, e, node.pos) else error_value(c.pos(node.pos))
     place = referenced_place(c, node, t.target, name, output=False)
     return error_value(c.pos(node.pos)) if place is None else refer(place, t)
 

@@ -15,7 +15,7 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Case, Const, Continue, Exit, Expr, For, If, Repeat, Return, Statement, While
-from plctool.iec.types import EnumType, Type
+from plctool.iec.types import BOOL, EnumType, Type
 
 
 class _Labels:
@@ -217,5 +217,14 @@ def continue_statement(c: Checker, node: ast.Continue) -> list[Statement]:
 
 @checks_statement(ast.Return)
 def return_statement(c: Checker, node: ast.Return) -> list[Statement]:
-    """RETURN"""
-    return [Return(c.pos(node.pos))]
+    """RETURN, RETURN(condition)"""
+    pos = c.pos(node.pos)
+    if node.condition is None:
+        return [Return(pos)]
+    condition = c.settled(node.condition)
+    if condition.type is not BOOL or isinstance(condition, Const):
+        if condition.type is not ERROR:
+            message = "RETURN takes no value; assign it to the name of the function, then RETURN"
+            c.error(node.condition.pos, "syntax", message)
+        return []
+    return [If([(condition, [Return(pos)])], [], pos)]
