@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-from plctool.compiler.semantics.addresses import AREAS, located
+from plctool.compiler.semantics.addresses import located
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.declarations.fixed_places import FixedPlace, fixed_place, with_part
@@ -37,6 +37,7 @@ from plctool.compiler.typed import (
     Task,
     Variable,
 )  # fmt: skip
+from plctool.iec.addresses import AREAS
 from plctool.iec.areas import Area
 from plctool.iec.types import BOOL, ArrayType, StructType, Type, base_of
 
