@@ -222,13 +222,6 @@ class ClassInfo:
     names: dict[str, Symbol] = field(default_factory=dict)
     instance_variables: dict[str, dict[str, VarSymbol]] = field(default_factory=dict)  # VAR_INST, by member
     number: int = 0
-    lacks_base: bool = False  # what it extends or implements is not known, which is reported
-
-    @property
-    def incomplete(self) -> bool:
-        """Whether it may have more members than are known, so that nothing is said of those that are missing."""
-        bases = [self.base] if self.base is not None else []
-        return self.lacks_base or any(c.incomplete for c in (*bases, *self.interfaces))
 
     @property
     def is_interface(self) -> bool:

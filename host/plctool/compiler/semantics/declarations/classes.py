@@ -80,14 +80,12 @@ class Classes:
             self._inherit(info, base, defaults)
         elif cls.number:
             info.type.fields.append(Field(CLASS_NUMBER, UDINT))
-        cls.lacks_base = bool(decl.bases) and base is None
         if cls.number:
             defaults[CLASS_NUMBER] = ScalarInit(cls.number)
         for offset, name in _named(decl.interfaces):
             interface = self._interface_named(offset, name, scope)
             if interface is not None:
                 cls.interfaces.append(interface)
-            cls.lacks_base = cls.lacks_base or interface is None
         info.type.interfaces = [i.type for i in cls.all_interfaces() if i.type is not None]
         self._add_members(cls)
         info.type.properties = sorted({m.decl.name for m in cls.members.values() if m.is_property})
@@ -238,8 +236,6 @@ class Classes:
                 scope.error(offset, "recursion", f"{decl.name} extends itself through {name}")
             elif base is not None:
                 cls.interfaces.append(base)
-            else:
-                cls.lacks_base = True
         target.interfaces = [i.type for i in cls.all_interfaces() if i.type is not None]
         return t
 

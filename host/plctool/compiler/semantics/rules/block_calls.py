@@ -123,8 +123,7 @@ def block_call(c: Checker, call: ast.Call, instance: Expr) -> list[Statement]:
         c.error(call.pos, "call", f"{block.type} is a CLASS and has no body; call one of its methods")
         return []
     names = [(p.variable.name, p.direction) for p in block.pou.parameters]
-    args = [_by_own_name(a, block) for a in call.args if not _is_of_unknown(c, a, block)]
-    bound = bind(c, args, names, block.type.name, call.pos)
+    bound = bind(c, [_by_own_name(a, block) for a in call.args], names, block.type.name, call.pos)
     if bound is None:
         return []
     place, pos = place_of(instance), c.pos(call.pos)
@@ -205,17 +204,6 @@ def _taken(c: Checker, name: str, value: Expr, argument: ast.Argument) -> Assign
         value = Unary(UnaryOp.NOT, c.coerce(value, BOOL), BOOL, pos)
     value = c.coerce(value, target.type)
     return None if value.type is ERROR else Assign(target, value, pos)
-
-
-def _is_of_unknown(c: Checker, argument: ast.Argument, block: BlockInfo) -> bool:
-    """Whether an argument is for a parameter of an unknown type, or one that an unknown base may have: nothing more is
-    said of it."""
-    symbol = block.members.get((argument.name or "").casefold())
-    incomplete = block.cls is not None and block.cls.incomplete
-    unknown = symbol.type is ERROR if symbol is not None else incomplete and argument.name is not None
-    if unknown and argument.value is not None:
-        c.expr(argument.value)
-    return unknown
 
 
 def _by_own_name(argument: ast.Argument, block: BlockInfo) -> ast.Argument:

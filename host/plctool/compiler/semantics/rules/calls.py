@@ -100,8 +100,6 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
         shown = _written(node)
         message = f"{name} is a type; a conversion is written TO_{name.upper()}({shown})"
         return c.error(callee.pos, "unknown", message)
-    if c.scope.cls is not None and c.scope.cls.incomplete:
-        return error_value(c.pos(node.pos))
     hint = f"; {FUNCTIONS[name.upper()]}" if name.upper() in FUNCTIONS else function_hint(c, name)
     return c.error(callee.pos, "unknown", f"unknown function {name}{hint}")
 

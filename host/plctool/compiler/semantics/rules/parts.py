@@ -82,8 +82,6 @@ def _block_member(c: Checker, base: Expr, members: dict[str, VarSymbol], node: a
     if symbol is None:
         names = [m.name for m in members.values() if m.role in (Role.INPUT, Role.OUTPUT)]
         cls = c.world.class_of(base.type)
-        if cls is not None and cls.incomplete:
-            return error_value(c.pos(node.pos))
         methods = cls.member_names() if cls is not None else []
         hint = did_you_mean(node.name, names + methods)
         what = "variable or method" if methods else "variable"

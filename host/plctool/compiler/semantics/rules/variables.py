@@ -112,8 +112,6 @@ def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
         return None
     if name == "THIS":
         return SelfPlace(cls.type, c.pos(node.pos))
-    if cls.base is None and cls.incomplete:
-        return None
     if cls.base is None or cls.base.type is None:
         c.error(node.pos, "name", f"SUPER stands for the base, but {cls.name} extends nothing")
         return None
@@ -121,8 +119,6 @@ def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
 
 
 def _unknown(c: Checker, node: ast.Name) -> Expr:
-    if c.scope.cls is not None and c.scope.cls.incomplete:
-        return error_value(c.pos(node.pos))
     longer = c.world.names.qualified_names(node.name)
     if longer:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(longer)}")
