@@ -126,6 +126,7 @@ class Blocks:
                 symbol.open_area = line.location.text[1] if line.location is not None else ""
                 symbol.constant = "CONSTANT" in block.qualifiers
                 symbol.is_path = "instance-path" in line.attributes
+                symbol.used = symbol.used or symbol.is_path
                 if symbol.is_path and not isinstance(t, StringType):
                     scope.error(offset, "attribute", f"the path of the instance needs a STRING, not {t}")
                 if not scope.declare(symbol, offset):
