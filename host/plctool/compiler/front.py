@@ -22,6 +22,7 @@ from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.ast import Declaration
 from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
+from plctool.compiler.syntax.conditions import declared_names
 from plctool.compiler.syntax.parser import Parsed, parse_all
 from plctool.compiler.task_images import plan_images
 from plctool.compiler.typed import TypedProgram
@@ -92,7 +93,8 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
 
 def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
     world = program.world
-    texts = [(source, parse_all(source, world.diagnostics.at(source).error)) for source in sources]
+    declared = declared_names([source.text for source in sources], world.names.library.names)
+    texts = [(source, parse_all(source, world.diagnostics.at(source).error, declared=declared)) for source in sources]
     if world.diagnostics.errors:
         return None
     parsed = [(source, _looked_at(source, text, world.diagnostics)) for source, text in texts]

@@ -148,6 +148,15 @@ class EnumType(Type):
     named: bool = False  # TO_STRING gives the name of a value, not its number
 
     @property
+    def inline(self) -> bool:
+        """Whether it is declared with a variable, without a name of its own."""
+        return self.name.startswith("(")
+
+    def has(self, name: str) -> bool:
+        """Whether it has a value of that name."""
+        return name.casefold() in map(str.casefold, self.values)
+
+    @property
     def choices(self) -> str:
         """`Red (0), Green (1)`: what there is, for messages."""
         shown = [f"{name} ({value})" for name, value in list(self.values.items())[:MAX_CHOICES]]

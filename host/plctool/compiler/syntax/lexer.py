@@ -124,7 +124,15 @@ class Lexer:
     """Iterates over the tokens of a text; `attributes` collects the attributes by the offset of the token they precede,
     `pragmas` all other pragmas with their own."""
 
-    def __init__(self, text: str, report: Report, start: int = 0, end: int | None = None) -> None:
+    def __init__(
+        self,
+        text: str,
+        report: Report,
+        start: int = 0,
+        end: int | None = None,
+        declared: frozenset[str] = frozenset(),
+    ) -> None:
+        """`declared`: what {IF defined(pou: NAME)} finds."""
         self.text = text
         self.attributes: dict[int, dict[str, str]] = {}
         self.pragmas: list[tuple[int, str]] = []
@@ -132,7 +140,7 @@ class Lexer:
         self._start = start
         self._end = len(text) if end is None else end
         self._pending: dict[str, str] = {}
-        self._conditions = Conditions(report)
+        self._conditions = Conditions(report, declared)
 
     def __iter__(self) -> Iterator[Token]:
         """All tokens, last one of type $END."""

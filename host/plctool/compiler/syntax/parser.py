@@ -142,12 +142,18 @@ def parse(source: Source, report: Report, start: int = 0, end: int | None = None
     return parse_all(source, report, start, end).declarations
 
 
-def parse_all(source: Source, report: Report, start: int = 0, end: int | None = None) -> Parsed:
-    """All that a text holds."""
+def parse_all(
+    source: Source,
+    report: Report,
+    start: int = 0,
+    end: int | None = None,
+    declared: frozenset[str] = frozenset(),
+) -> Parsed:
+    """All that a text holds. `declared`: what {IF defined(pou: NAME)} finds."""
     tables, builder, reducers = _machine()
     parser = Parser(tables, reducers)
     recovery = Recovery(parser, source, report)
-    lexer = Lexer(source.text, recovery.report_token, start, end)
+    lexer = Lexer(source.text, recovery.report_token, start, end, declared)
     places: dict[int, str] = {}
     builder.source, builder.attributes, builder.places, builder.report = source, lexer.attributes, places, report
     feed = parser.feed

@@ -69,7 +69,7 @@ def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
 
 def _yields(c: Checker, symbol: object, name: str, wanted: EnumType) -> bool:
     """Whether a name is that of a method and of a value of the enumeration that is wanted here."""
-    if name.casefold() not in (value.casefold() for value in wanted.values):
+    if not wanted.has(name):
         return False
     if isinstance(symbol, VarSymbol):
         return symbol.role is Role.RESULT and symbol.type is not wanted
@@ -79,6 +79,8 @@ def _yields(c: Checker, symbol: object, name: str, wanted: EnumType) -> bool:
 
 def _enumerated(c: Checker, node: ast.Name, expected: Type | None) -> Expr | None:
     """The value of an enumeration by its bare name; None when there is none of that name."""
+    if isinstance(expected, EnumType) and expected.inline and expected.has(node.name):
+        return _value_of(c, expected, node.name, node.pos, node.pos)
     symbols = c.world.names.enumerations_with(node.name)
     types = [t for s in symbols if isinstance(t := c.world.declared.type_of(s), EnumType)]
     if len(types) > 1 and expected in types:
