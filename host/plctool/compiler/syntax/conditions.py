@@ -1,5 +1,5 @@
 """Conditional pragmas: {define NAME}, {undefine NAME}, {IF defined(NAME)}, {ELSIF ...}, {ELSE}, {END_IF}. In a
-condition also defined(pou: NAME), (type: NAME) and (variable: NAME), which ask for what the program or the library declares.
+condition also defined(pou: NAME), (type: NAME), (variable: NAME): whether the program or the library declares it.
 
 SPDX-License-Identifier: Apache-2.0
 """
