@@ -21,6 +21,7 @@ SHARED = [
     "CmpAppEmbedded.h",
     "CmpIecTask.h",
     "CmpLog.h",
+    "CmpPackets.h",
     "CmpSrvNumbers.h",
     "Sim.h",
     "SimLink.h",

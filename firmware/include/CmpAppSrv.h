@@ -4,7 +4,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Layouts: CmpSrvNumbers.h.
+ * Requests and replies: docs/protocol.md.
  */
 #ifndef CMPAPPSRV_H
 #define CMPAPPSRV_H

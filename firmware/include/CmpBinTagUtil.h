@@ -88,6 +88,7 @@ void BTagPad(BTAG_WRITER *writer);
 void BTagAppendText(BTAG_WRITER *writer, const char *text, RTS_UI32 max);
 
 /* Whole elements. */
+void BTagWrite(BTAG_WRITER *writer, RTS_UI32 id, BTAG_ALIGN align, const void *data, RTS_UI32 size);
 void BTagWrite16(BTAG_WRITER *writer, RTS_UI32 id, RTS_UI32 value);
 void BTagWrite32(BTAG_WRITER *writer, RTS_UI32 id, RTS_UI32 value);
 void BTagWriteText(BTAG_WRITER *writer, RTS_UI32 id, const char *text, RTS_UI32 max);

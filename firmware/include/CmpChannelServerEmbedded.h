@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * COMM_MAX_CLIENTS channels, each with a receive and a send buffer. The rules where codesys-v3-protocol 3 is silent:
- * CmpSrvNumbers.h. All from main.
+ * docs/protocol.md. All from main.
  */
 #ifndef CMPCHANNELSERVEREMBEDDED_H
 #define CMPCHANNELSERVEREMBEDDED_H

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Layouts: CmpSrvNumbers.h.
+ * Requests and replies: docs/protocol.md.
  */
 #ifndef CMPDEVICE_H
 #define CMPDEVICE_H

@@ -9,13 +9,14 @@
 #ifndef COMMCLIENT_H
 #define COMMCLIENT_H
 
+#include "CmpPackets.h"
 #include "CmpRouterEmbedded.h"
 #include "rts_config.h"
 
 /* ---- layer 4 ---- */
 
-/* Length and CRC of a message travel before its bytes and fill the first block together with them. */
-enum { COMM_PREFIX_SIZE = CHANNEL_FIRST_SIZE - CHANNEL_DATA_SIZE };
+/* A message has its CHANNEL_MESSAGE before it in the first block, and so in the buffer. */
+enum { COMM_PREFIX_SIZE = sizeof(CHANNEL_MESSAGE) };
 
 typedef RTS_UI8 COMM_MESSAGE[COMM_PREFIX_SIZE + NETSERVER_MESSAGE_SIZE];
 

@@ -56,13 +56,13 @@ bool is_silent(void)
 
 bool is_ack(RTS_UI32 number, RTS_UI8 flags)
 {
-    return take(CHANNEL_PKG_ACK) == CHANNEL_ACK_SIZE && package[1] == flags &&
+    return take(CHANNEL_PKG_ACK) == sizeof(CHANNEL_ACK) && package[1] == flags &&
            BytesGet16(package + 2) == client.channel && BytesGet32(package + 4) == number;
 }
 
 bool is_close(RTS_UI16 error)
 {
-    return take(CHANNEL_PKG_CLOSE) == CHANNEL_CLOSE_SIZE && BytesGet16(package + 10) == error;
+    return take(CHANNEL_PKG_CLOSE) == sizeof(CHANNEL_CLOSE) && BytesGet16(package + 10) == error;
 }
 
 bool is_block(RTS_UI32 number)

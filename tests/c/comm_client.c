@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpPackets.h"
 #include "CmpChecksum.h"
 #include "SimLink.h"
 
@@ -61,7 +62,7 @@ void client_seal(RTS_UI8 *package, RTS_UI32 size)
 
 void client_send_open(const CLIENT *client, RTS_UI32 request_id, RTS_UI32 buffer)
 {
-    RTS_UI8 package[CHANNEL_OPEN_REQ_SIZE] = {CHANNEL_PKG_OPEN_REQ};
+    RTS_UI8 package[sizeof(CHANNEL_OPEN_REQUEST)] = {CHANNEL_PKG_OPEN_REQ};
 
     BytesPut32(package + 8, request_id);
     BytesPut32(package + 12, buffer);
@@ -74,7 +75,7 @@ int client_take_open(CLIENT *client)
 {
     RTS_UI8 package[BLK_MAX_SIZE];
 
-    if (client_take(client, NULL, package) != CHANNEL_OPEN_RESP_SIZE || package[0] != CHANNEL_PKG_OPEN_RESP)
+    if (client_take(client, NULL, package) != sizeof(CHANNEL_OPEN_RESPONSE) || package[0] != CHANNEL_PKG_OPEN_RESP)
         return -1;
     client->channel = BytesGet16(package + 14);
     client->limit = BytesGet32(package + 16);
@@ -91,7 +92,7 @@ bool client_open(CLIENT *client)
 
 void client_send_close(const CLIENT *client)
 {
-    RTS_UI8 package[CHANNEL_CLOSE_SIZE] = {CHANNEL_PKG_CLOSE_REQ};
+    RTS_UI8 package[sizeof(CHANNEL_CLOSE)] = {CHANNEL_PKG_CLOSE_REQ};
 
     BytesPut16(package + 8, client->channel);
     client_seal(package, sizeof(package));
@@ -102,7 +103,7 @@ void client_send_block(const CLIENT *client, RTS_UI32 number, RTS_UI8 flags, con
                        RTS_UI32 offset, RTS_UI32 size)
 {
     RTS_UI8 package[BLK_MAX_SIZE] = {CHANNEL_PKG_DATA, flags};
-    RTS_UI32 header = CHANNEL_DATA_SIZE;
+    RTS_UI32 header = sizeof(CHANNEL_DATA);
 
     BytesPut16(package + 2, client->channel);
     BytesPut32(package + 4, number);
@@ -118,7 +119,7 @@ void client_send_block(const CLIENT *client, RTS_UI32 number, RTS_UI8 flags, con
 
 void client_send_ack(const CLIENT *client, RTS_UI32 ack, RTS_UI8 flags)
 {
-    RTS_UI8 package[CHANNEL_ACK_SIZE] = {CHANNEL_PKG_ACK, (RTS_UI8)(CHANNEL_FLAG_TO_SERVER | flags)};
+    RTS_UI8 package[sizeof(CHANNEL_ACK)] = {CHANNEL_PKG_ACK, (RTS_UI8)(CHANNEL_FLAG_TO_SERVER | flags)};
 
     BytesPut16(package + 2, client->channel);
     BytesPut32(package + 4, ack);
@@ -131,7 +132,7 @@ void client_send_message(CLIENT *client, const RTS_UI8 *message, RTS_UI32 size)
     RTS_UI32 offset = 0;
 
     do {
-        RTS_UI32 room = CLIENT_PAYLOAD_SIZE - (flags & CHANNEL_FLAG_FIRST ? CHANNEL_FIRST_SIZE : CHANNEL_DATA_SIZE);
+        RTS_UI32 room = CLIENT_PAYLOAD_SIZE - (flags & CHANNEL_FLAG_FIRST ? CHANNEL_FIRST_SIZE : sizeof(CHANNEL_DATA));
         RTS_UI32 part = size - offset < room ? size - offset : room;
         client_send_block(client, ++client->sent, flags, message, size, offset, part);
         flags = CHANNEL_FLAG_TO_SERVER;
@@ -147,7 +148,7 @@ RTS_UI32 client_take_message(CLIENT *client, RTS_UI8 *message)
     RTS_UI32 fill = 0;
 
     do {
-        RTS_UI32 header = CHANNEL_DATA_SIZE;
+        RTS_UI32 header = sizeof(CHANNEL_DATA);
         RTS_UI32 size = client_take(client, NULL, package);
         if (size < header || package[0] != CHANNEL_PKG_DATA || BytesGet16(package + 2) != client->channel ||
             BytesGet32(package + 4) != client->received + 1)
@@ -242,7 +243,7 @@ bool client_login_app(CLIENT *client)
 
     if (!client_request(client, SG_APPLICATION, SRV_APP_LOGIN, content, sizeof(content), &reply) ||
         BTagFindContainer(&reply.tags, TAG_APP_DESCRIPTOR, &descriptor) != ERR_OK ||
-        BTagFind(&descriptor, TAG_APP_OPTION, APP_LOGIN_REPLY_SIZE, APP_LOGIN_REPLY_SIZE, &option) != ERR_OK)
+        BTagFind(&descriptor, TAG_APP_OPTION, sizeof(APP_LOGIN_REPLY), sizeof(APP_LOGIN_REPLY), &option) != ERR_OK)
         return false;
     client->app_session = BytesGet32(option.data + 2);
     return BytesGet16(option.data) == ERR_OK;

@@ -55,7 +55,7 @@ static bool take_login_reply(BTAG *option)
     BTAG_READER descriptor;
 
     return BTagFindContainer(&reply.tags, TAG_APP_DESCRIPTOR, &descriptor) == ERR_OK &&
-           BTagFind(&descriptor, TAG_APP_OPTION, APP_LOGIN_REPLY_SIZE, APP_LOGIN_REPLY_SIZE, option) == ERR_OK;
+           BTagFind(&descriptor, TAG_APP_OPTION, sizeof(APP_LOGIN_REPLY), sizeof(APP_LOGIN_REPLY), option) == ERR_OK;
 }
 
 static void login_gives_a_session_and_the_image_crc_as_guids(void)
@@ -608,7 +608,7 @@ static void malformed_position_is_an_error(void)
     CHECK(call(SRV_APP_DOWNLOAD_COMPACT));
     CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
     for (RTS_UI32 size = 1; size < 20; size++) {
-        if (size == CDL_POSITION_SIZE)
+        if (size == sizeof(CDL_POSITION))
             continue;
         BTagOpen(begin_content(), TAG_CDL_POSITION, BTAG_ALIGN_0);
         BTagAppendZeros(&writer, size);

@@ -125,13 +125,13 @@ static void cut_packages_are_dropped(void)
     RTS_UI8 block[CHANNEL_FIRST_SIZE] = {CHANNEL_PKG_DATA, NEXT};
     BytesPut16(block + 2, client.channel);
     BytesPut32(block + 4, 1);
-    for (RTS_UI32 size = 0; size < CHANNEL_DATA_SIZE; size++)
+    for (RTS_UI32 size = 0; size < sizeof(CHANNEL_DATA); size++)
         client_send_package(&client, block, size);
     block[0] = CHANNEL_PKG_ACK;
-    for (RTS_UI32 size = 0; size < CHANNEL_ACK_SIZE; size++)
+    for (RTS_UI32 size = 0; size < sizeof(CHANNEL_ACK); size++)
         client_send_package(&client, block, size);
     CHECK(is_silent());
-    CHECK(counters()->malformed == CHANNEL_DATA_SIZE + CHANNEL_ACK_SIZE);
+    CHECK(counters()->malformed == sizeof(CHANNEL_DATA) + sizeof(CHANNEL_ACK));
     CHECK(works(&client));
 }
 

@@ -261,7 +261,7 @@ static void full_driver_delays_blocks_and_loses_none(void)
     client_send_block(&client, 2, NEXT, message, size, 480, 480);
     client_send_block(&client, 3, NEXT, message, size, 960, size - 960);
     for (int i = 0; i < SIM_LINK_PACKETS; i++)
-        CHECK(SimLinkReceive(drop, sizeof(drop)) == 12 + CHANNEL_ACK_SIZE);
+        CHECK(SimLinkReceive(drop, sizeof(drop)) == 12 + sizeof(CHANNEL_ACK));
     fakes_cycle(1);
     CHECK(client_take_message(&client, reply) > 1200);
 }

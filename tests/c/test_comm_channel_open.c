@@ -53,7 +53,7 @@ static void granted_buffer_is_the_smaller_of_wanted_and_own(void)
 
 static void address_size_is_never_less_than_the_addresses(void)
 {
-    RTS_UI8 request[CHANNEL_OPEN_REQ_SIZE] = {CHANNEL_PKG_OPEN_REQ};
+    RTS_UI8 request[sizeof(CHANNEL_OPEN_REQUEST)] = {CHANNEL_PKG_OPEN_REQ};
 
     fakes_start();
     client_init(&client, 0x0102);
@@ -78,7 +78,7 @@ static void buffer_too_small_for_any_reply_opens_nothing(void)
 
 static void meta_packages_with_wrong_crc_version_or_length_are_dropped(void)
 {
-    RTS_UI8 request[CHANNEL_OPEN_REQ_SIZE] = {CHANNEL_PKG_OPEN_REQ};
+    RTS_UI8 request[sizeof(CHANNEL_OPEN_REQUEST)] = {CHANNEL_PKG_OPEN_REQ};
 
     fakes_start();
     client_init(&client, 0x0102);
@@ -88,7 +88,7 @@ static void meta_packages_with_wrong_crc_version_or_length_are_dropped(void)
     client_send_package(&client, request, sizeof(request));
     for (RTS_UI32 size = 1; size < 16; size++) {
         client_seal(request, sizeof(request));
-        if (size >= CHANNEL_META_SIZE)
+        if (size >= sizeof(CHANNEL_META_HEADER))
             client_seal(request, size);
         client_send_package(&client, request, size);
     }
@@ -224,7 +224,7 @@ static void close_request_from_somebody_else_is_ignored(void)
 
 static void rts_info_tells_the_number_of_channels(void)
 {
-    RTS_UI8 request[CHANNEL_META_SIZE] = {CHANNEL_PKG_RTSINFO_REQ};
+    RTS_UI8 request[sizeof(CHANNEL_META_HEADER)] = {CHANNEL_PKG_RTSINFO_REQ};
 
     fakes_start();
     client_init(&client, 0x0102);
@@ -246,7 +246,7 @@ static void blocks_from_another_peer_are_refused(void)
     RTS_UI32 size = echo_message(4);
     client_send_block(&other, 1, FIRST, message, size, 0, size);
     CHECK(counters()->foreign == 1);
-    CHECK(client_take(&other, NULL, package) == CHANNEL_CLOSE_SIZE);
+    CHECK(client_take(&other, NULL, package) == sizeof(CHANNEL_CLOSE));
     CHECK(BytesGet16(package + 10) == ERR_CHS_CHINVALID);
     CHECK(works(&client));
 }

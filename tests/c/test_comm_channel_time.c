@@ -11,7 +11,7 @@ static void keepalives_are_sent_when_there_is_nothing_else(void)
     fakes_cycle(999);
     CHECK(is_silent());
     fakes_cycle(1);
-    CHECK(take(CHANNEL_PKG_KEEPALIVE) == CHANNEL_KEEPALIVE_SIZE);
+    CHECK(take(CHANNEL_PKG_KEEPALIVE) == sizeof(CHANNEL_HEADER));
     CHECK(BytesGet16(package + 2) == client.channel && package[1] == 0);
     fakes_cycle(999);
     CHECK(is_silent());

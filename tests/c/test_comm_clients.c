@@ -104,7 +104,7 @@ static void of_the_places_without_login_the_one_silent_for_longest_is_given_away
     }
     CHECK(works(&client[0])); /* so number 1 is the most silent one */
     client_send_open(&client[COUNT], 1, 2048);
-    CHECK(client_take(&client[1], NULL, answer) == CHANNEL_CLOSE_SIZE && answer[0] == CHANNEL_PKG_CLOSE);
+    CHECK(client_take(&client[1], NULL, answer) == sizeof(CHANNEL_CLOSE) && answer[0] == CHANNEL_PKG_CLOSE);
     CHECK(client_take_open(&client[COUNT]) == CHANNEL_OPEN_OK);
     CHECK(works(&client[0]) && works(&client[2]) && works(&client[3]) && works(&client[COUNT]));
 }

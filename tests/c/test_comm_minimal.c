@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpPackets.h"
 #include "SimLink.h"
 #include "comm_client.h"
 #include "comm_fakes.h"
@@ -19,7 +20,7 @@ static RTS_UI8 reply[BLK_MAX_SIZE];
 /* Scans in this version; returns the size of the reply. */
 static RTS_UI32 scan(RTS_UI16 version)
 {
-    RTS_UI8 request[NS_REQUEST_SIZE];
+    RTS_UI8 request[sizeof(NS_REQUEST)];
     RTS_UI8 packet[BLK_MAX_SIZE];
     RTS_UI8 service = 0;
 

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpPackets.h"
 #include "CmpChecksum.h"
 #include "SimLink.h"
 #include "comm_client.h"
@@ -30,7 +31,7 @@ static size_t put_message(uint8_t *data, size_t at, uint32_t first, const uint8_
 {
     for (size_t offset = 0; offset < size; offset += 12, first++) {
         uint8_t package[32] = {CHANNEL_PKG_DATA, CHANNEL_FLAG_TO_SERVER};
-        size_t head = CHANNEL_DATA_SIZE;
+        size_t head = sizeof(CHANNEL_DATA);
         BytesPut32(package + 4, first);
         if (offset == 0) {
             package[1] |= CHANNEL_FLAG_FIRST;
@@ -88,11 +89,11 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 
 static void repair(const CLIENT *client, uint8_t *package, RTS_UI32 size)
 {
-    if (size >= CHANNEL_META_SIZE && (package[0] & CHANNEL_META) != 0) {
-        if (package[0] == CHANNEL_PKG_CLOSE_REQ && size >= CHANNEL_CLOSE_SIZE)
+    if (size >= sizeof(CHANNEL_META_HEADER) && (package[0] & CHANNEL_META) != 0) {
+        if (package[0] == CHANNEL_PKG_CLOSE_REQ && size >= sizeof(CHANNEL_CLOSE))
             BytesPut16(package + 8, client->channel);
         client_seal(package, size);
-    } else if (size >= CHANNEL_KEEPALIVE_SIZE) {
+    } else if (size >= sizeof(CHANNEL_HEADER)) {
         BytesPut16(package + 2, client->channel);
     }
 }
@@ -104,11 +105,12 @@ static void drain(CLIENT *client)
     RTS_UI32 size;
 
     while ((size = client_take(client, NULL, package)) != 0) {
-        FUZZ_CHECK(size >= CHANNEL_KEEPALIVE_SIZE);
-        if (package[0] == CHANNEL_PKG_OPEN_RESP && size == CHANNEL_OPEN_RESP_SIZE && BytesGet16(package + 12) == 0)
+        FUZZ_CHECK(size >= sizeof(CHANNEL_HEADER));
+        if (package[0] == CHANNEL_PKG_OPEN_RESP && size == sizeof(CHANNEL_OPEN_RESPONSE) &&
+            BytesGet16(package + 12) == 0)
             client->channel = BytesGet16(package + 14);
         else if (package[0] == CHANNEL_PKG_DATA)
-            FUZZ_CHECK(size > CHANNEL_DATA_SIZE && BytesGet16(package + 2) == client->channel);
+            FUZZ_CHECK(size > sizeof(CHANNEL_DATA) && BytesGet16(package + 2) == client->channel);
     }
 }
 

@@ -1,6 +1,6 @@
 """A device in Python behind a line on a virtual clock: fast, repeatable, and as bad as a test wants it.
 
-The channel server follows the rules written down in CmpSrvNumbers.h, independently of the client's code. Nothing
+The channel server follows the rules written down in docs/protocol.md, independently of the client's code. Nothing
 sleeps: `FakeLine.receive` moves the clock to the next event.
 """
 

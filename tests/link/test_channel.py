@@ -12,7 +12,6 @@ from fake_device import FakeDevice, FakeLine, damage
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from plctool.core import lib
 from plctool.errors import LinkError
 from plctool.link.channel import Channel, ChannelLost, ErrorRate, Line, RoundTrip, State
 from plctool.link.connection import Connection
@@ -382,8 +381,3 @@ def test_timeouts_follow_the_round_trip_and_back_off() -> None:
     assert 1.0 <= trip.timeout < 1.2
     trip.progress()
     assert trip.timeout < 0.6
-
-
-def test_constants_agree_with_the_structs() -> None:
-    assert lib.CHANNEL_DATA_SIZE == 12
-    assert lib.CHANNEL_FIRST_SIZE == 20

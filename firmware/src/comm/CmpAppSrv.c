@@ -8,6 +8,7 @@
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
 #include "CmpIecTask.h"
+#include "CmpPackets.h"
 #include "CmpSrv.h"
 #include "SysExcept.h"
 #include "rts_config.h"
@@ -17,19 +18,17 @@
 /* Creates an application session; `needs_app`: not when there is no application. */
 static RTS_RESULT write_login_reply(COMM_CLIENT *client, BTAG_WRITER *reply, bool needs_app)
 {
+    APP_LOGIN_REPLY login = {0};
     APP_STATUS status;
 
     AppGetStatus(&status);
     RTS_UI32 session = needs_app && status.state == AS_NONE ? 0 : SrvCreateAppSession(client);
+    BytesPut16(login.result, session == 0 ? ERR_APP_NOT_EXIST : ERR_OK);
+    BytesPut32(login.session, session);
+    BytesPut32(login.code_guid, status.image_crc);
+    BytesPut32(login.data_guid, status.image_crc);
     BTagOpen(reply, TAG_APP_DESCRIPTOR, BTAG_ALIGN_0);
-    BTagOpen(reply, TAG_APP_OPTION, BTAG_ALIGN_2);
-    BTagAppend16(reply, session == 0 ? ERR_APP_NOT_EXIST : ERR_OK);
-    BTagAppend32(reply, session);
-    for (int guid = 0; guid < 2; guid++) { /* code, data */
-        BTagAppend32(reply, status.image_crc);
-        BTagAppendZeros(reply, 12);
-    }
-    BTagClose(reply);
+    BTagWrite(reply, TAG_APP_OPTION, BTAG_ALIGN_2, &login, sizeof(login));
     BTagClose(reply);
     return ERR_OK;
 }
@@ -128,17 +127,18 @@ static RTS_RESULT reset(SRV_REQUEST *request, BTAG_WRITER *reply)
 
 static void write_exception(BTAG_WRITER *reply, const APP_EXCEPTION *exception)
 {
+    APP_LAST_EXCEPTION last;
+
     if (exception->code != RTSEXCPT_NOEXCEPTION && exception->code_offset != APP_NO_CODE_OFFSET) {
-        BTagOpen(reply, TAG_APP_EXECUTION_POSITION, BTAG_ALIGN_2);
-        BTagAppend16(reply, APP_AREA_CODE);
-        BTagAppend32(reply, exception->code_offset);
-        BTagClose(reply);
+        APP_POSITION position;
+        BytesPut16(position.area, APP_AREA_CODE);
+        BytesPut32(position.offset, exception->code_offset);
+        BTagWrite(reply, TAG_APP_EXECUTION_POSITION, BTAG_ALIGN_2, &position, sizeof(position));
     }
-    BTagOpen(reply, TAG_APP_LAST_EXCEPTION, BTAG_ALIGN_0);
-    BTagAppend32(reply, exception->code);
-    BTagAppend32(reply, exception->code_offset);
-    BTagAppend32(reply, (RTS_UI32)exception->task);
-    BTagClose(reply);
+    BytesPut32(last.code, exception->code);
+    BytesPut32(last.code_offset, exception->code_offset);
+    BytesPut32(last.task, (RTS_UI32)exception->task);
+    BTagWrite(reply, TAG_APP_LAST_EXCEPTION, BTAG_ALIGN_0, &last, sizeof(last));
 }
 
 #if EXCEPT_MAX_CALLS > 0
@@ -168,20 +168,20 @@ static void write_calls(BTAG_WRITER *reply)
 static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     APP_STATUS status;
+    APP_STATE state;
+    APP_IMAGE_IDENTITY image;
 
     RTS_UNUSED(request);
     AppGetStatus(&status);
+    BytesPut16(state.result, ERR_OK);
+    BytesPut32(state.state, status.state);
+    BytesPut32(state.op_state, status.op_state);
+    BytesPut32(image.crc, status.image_crc);
+    BytesPut32(image.size, status.image_size);
     BTagOpen(reply, TAG_APP_STATUS, BTAG_ALIGN_0);
-    BTagOpen(reply, TAG_APP_STATE, BTAG_ALIGN_2);
-    BTagAppend16(reply, ERR_OK);
-    BTagAppend32(reply, status.state);
-    BTagAppend32(reply, status.op_state);
-    BTagClose(reply);
+    BTagWrite(reply, TAG_APP_STATE, BTAG_ALIGN_2, &state, sizeof(state));
     write_exception(reply, &status.exception);
-    BTagOpen(reply, TAG_APP_IMAGE, BTAG_ALIGN_0);
-    BTagAppend32(reply, status.image_crc);
-    BTagAppend32(reply, status.image_size);
-    BTagClose(reply);
+    BTagWrite(reply, TAG_APP_IMAGE, BTAG_ALIGN_0, &image, sizeof(image));
     if (status.exception.code != RTSEXCPT_NOEXCEPTION) /* else a task may have one just now */
         write_calls(reply);
     BTagClose(reply);
@@ -231,14 +231,20 @@ static RTS_RESULT read_application_info(SRV_REQUEST *request, BTAG_WRITER *reply
 
 static void write_task(BTAG_WRITER *reply, const IEC_TASK_INFO *info)
 {
-    const RTS_UI32 words[TASK_INFO_WORDS] = {
-        info->kind,   info->priority, info->interval_us, info->cycles,    info->last_us,
-        info->avg_us, info->min_us,   info->max_us,      info->jitter_us, info->overruns,
-    };
+    TASK_INFO numbers;
 
+    BytesPut32(numbers.kind, info->kind);
+    BytesPut32(numbers.priority, info->priority);
+    BytesPut32(numbers.interval_us, info->interval_us);
+    BytesPut32(numbers.cycles, info->cycles);
+    BytesPut32(numbers.last_us, info->last_us);
+    BytesPut32(numbers.avg_us, info->avg_us);
+    BytesPut32(numbers.min_us, info->min_us);
+    BytesPut32(numbers.max_us, info->max_us);
+    BytesPut32(numbers.jitter_us, info->jitter_us);
+    BytesPut32(numbers.overruns, info->overruns);
     BTagOpen(reply, TAG_TASK_INFO, BTAG_ALIGN_0);
-    for (RTS_UI32 i = 0; i < TASK_INFO_WORDS; i++)
-        BTagAppend32(reply, words[i]);
+    BTagAppend(reply, &numbers, sizeof(numbers));
     BTagAppendText(reply, info->name, sizeof(info->name) - 1);
     BTagClose(reply);
 }
@@ -281,15 +287,17 @@ typedef struct {
 
 static RTS_RESULT read_block(const SRV_REQUEST *request, DOWNLOAD_BLOCK *block)
 {
+    const CDL_POSITION *position;
     BTAG tag;
-    RTS_RESULT result = BTagFind(&request->tags, TAG_CDL_POSITION, CDL_POSITION_SIZE, CDL_POSITION_SIZE, &tag);
+    RTS_RESULT result = BTagFind(&request->tags, TAG_CDL_POSITION, sizeof(*position), sizeof(*position), &tag);
 
     if (result != ERR_OK)
         return result;
-    block->flags = BytesGet32(tag.data);
-    block->offset = BytesGet32(tag.data + 4);
-    block->total = BytesGet32(tag.data + 8);
-    block->crc = BytesGet32(tag.data + 12);
+    position = (const CDL_POSITION *)tag.data;
+    block->flags = BytesGet32(position->flags);
+    block->offset = BytesGet32(position->offset);
+    block->total = BytesGet32(position->total_size);
+    block->crc = BytesGet32(position->crc);
     result = BTagFind(&request->tags, TAG_CDL_DATA, 1, request->tags.size, &tag);
     block->data = result == ERR_OK ? tag.data : NULL;
     block->size = result == ERR_OK ? tag.size : 0;

@@ -216,7 +216,7 @@ void BTagClose(BTAG_WRITER *writer)
     RTS_UI32 length = open;
     while (writer->data[length] & 0x80)
         length++;
-    length++; /* behind the id */
+    length++; /* after the id */
     put_number(writer->data + length, writer->size - start, start - length);
 }
 
@@ -262,6 +262,13 @@ void BTagAppendText(BTAG_WRITER *writer, const char *text, RTS_UI32 max)
     BTagAppend(writer, text, CMUtlStrNLen(text, max));
     BTagAppendZeros(writer, 1);
     BTagPad(writer);
+}
+
+void BTagWrite(BTAG_WRITER *writer, RTS_UI32 id, BTAG_ALIGN align, const void *data, RTS_UI32 size)
+{
+    BTagOpen(writer, id, align);
+    BTagAppend(writer, data, size);
+    BTagClose(writer);
 }
 
 void BTagWrite16(BTAG_WRITER *writer, RTS_UI32 id, RTS_UI32 value)

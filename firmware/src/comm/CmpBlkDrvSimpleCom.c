@@ -13,6 +13,7 @@
 #include "CmpBytes.h"
 #include "CmpChecksum.h"
 #include "CmpLog.h"
+#include "CmpPackets.h"
 #include "SysCom.h"
 #include "rts_config.h"
 
@@ -21,8 +22,8 @@ enum {
     READ_CHUNK = 64,
     READ_MAX = 2048, /* bytes per cycle, so that a babbling line does not stop the rest of the runtime */
     WRITE_CHUNK = 32,
-    LENGTH_SIZE = 2,                                                          /* before each packet in the queue */
-    ROUTER_HEADER_MAX = 2 * ROUTER_HEADER_WORDS + 4 * ROUTER_MAX_ADDRESS + 2, /* addresses of both sides, filler */
+    LENGTH_SIZE = 2,                                                        /* before each packet in the queue */
+    ROUTER_HEADER_MAX = sizeof(ROUTER_HEADER) + 4 * ROUTER_MAX_ADDRESS + 2, /* addresses of both sides, filler */
     /* A packet with the largest message of the channel in one block. No packet is larger, in either direction. */
     MESSAGE_MAX = ROUTER_HEADER_MAX + CHANNEL_FIRST_SIZE + NETSERVER_MESSAGE_SIZE,
     PACKET_MAX = MESSAGE_MAX < BLK_MAX_SIZE ? MESSAGE_MAX : BLK_MAX_SIZE,

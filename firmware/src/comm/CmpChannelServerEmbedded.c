@@ -9,6 +9,7 @@
 
 #include "CmpBytes.h"
 #include "CmpChecksum.h"
+#include "CmpPackets.h"
 #include "CmpSrv.h"
 #include "SysTarget.h"
 #include "SysTime.h"
@@ -52,72 +53,75 @@ static RTS_RESULT send_package(const ROUTER_PEER *peer, const RTS_UI8 *package, 
     return RouterSend(peer, ROUTER_SVC_CHANNEL, &part, 1);
 }
 
-static RTS_UI32 meta_crc(const RTS_UI8 *package, RTS_UI32 size)
+static RTS_UI32 meta_crc(const void *package, RTS_UI32 size)
 {
-    static const RTS_UI8 zeros[4] = {0};
-    RTS_UI32 crc = CRC32Update(0, package, 4);
+    static const RTS_UI8 zeros[sizeof(WIRE_UI32)] = {0};
+    const CHANNEL_META_HEADER *meta = package;
+    RTS_UI32 crc = CRC32Update(0, meta, offsetof(CHANNEL_META_HEADER, crc));
 
     crc = CRC32Update(crc, zeros, sizeof(zeros));
-    return CRC32Update(crc, package + CHANNEL_META_SIZE, size - CHANNEL_META_SIZE);
+    return CRC32Update(crc, meta + 1, size - sizeof(*meta));
 }
 
 /* Completes and sends a meta package whose body is in place. */
-static RTS_RESULT send_meta(const ROUTER_PEER *peer, RTS_UI8 type, RTS_UI8 *package, RTS_UI32 size)
+static RTS_RESULT send_meta(const ROUTER_PEER *peer, RTS_UI8 type, void *package, RTS_UI32 size)
 {
-    package[0] = type;
-    package[1] = 0;
-    BytesPut16(package + 2, CHANNEL_VERSION);
-    BytesPut32(package + 4, meta_crc(package, size));
+    CHANNEL_META_HEADER *meta = package;
+
+    meta->type = type;
+    meta->flags = 0;
+    BytesPut16(meta->version, CHANNEL_VERSION);
+    BytesPut32(meta->crc, meta_crc(package, size));
     return send_package(peer, package, size);
 }
 
 static RTS_RESULT send_open_response(const CHANNEL *channel)
 {
-    RTS_UI8 package[CHANNEL_OPEN_RESP_SIZE] = {0};
+    CHANNEL_OPEN_RESPONSE response = {0};
 
-    BytesPut32(package + 8, channel->request_id);
-    BytesPut16(package + 12, CHANNEL_OPEN_OK);
-    BytesPut16(package + 14, channel->id);
-    BytesPut32(package + 16, channel->limit);
-    package[21] = channel->address_words;
-    return send_meta(&channel->peer, CHANNEL_PKG_OPEN_RESP, package, sizeof(package));
+    BytesPut32(response.request_id, channel->request_id);
+    BytesPut16(response.result, CHANNEL_OPEN_OK);
+    BytesPut16(response.id, channel->id);
+    BytesPut32(response.limit, channel->limit);
+    response.address_words = channel->address_words;
+    return send_meta(&channel->peer, CHANNEL_PKG_OPEN_RESP, &response, sizeof(response));
 }
 
 static void send_open_refusal(const ROUTER_PEER *peer, RTS_UI32 request_id)
 {
-    RTS_UI8 package[CHANNEL_OPEN_RESP_SIZE] = {0};
+    CHANNEL_OPEN_RESPONSE response = {0};
 
-    BytesPut32(package + 8, request_id);
-    BytesPut16(package + 12, CHANNEL_OPEN_NO_CHANNEL);
-    BytesPut16(package + 14, CHANNEL_ID_NONE);
-    (void)send_meta(peer, CHANNEL_PKG_OPEN_RESP, package, sizeof(package));
+    BytesPut32(response.request_id, request_id);
+    BytesPut16(response.result, CHANNEL_OPEN_NO_CHANNEL);
+    BytesPut16(response.id, CHANNEL_ID_NONE);
+    (void)send_meta(peer, CHANNEL_PKG_OPEN_RESP, &response, sizeof(response));
 }
 
 static void send_close(const ROUTER_PEER *peer, RTS_UI16 id, RTS_RESULT error)
 {
-    RTS_UI8 package[CHANNEL_CLOSE_SIZE];
+    CHANNEL_CLOSE close;
 
-    BytesPut16(package + 8, id);
-    BytesPut16(package + 10, error);
-    (void)send_meta(peer, CHANNEL_PKG_CLOSE, package, sizeof(package)); /* a courtesy: the peer notices anyway */
+    BytesPut16(close.id, id);
+    BytesPut16(close.error, error);
+    (void)send_meta(peer, CHANNEL_PKG_CLOSE, &close, sizeof(close)); /* a courtesy: the peer notices anyway */
 }
 
 static void send_rts_info(const ROUTER_PEER *peer)
 {
-    RTS_UI8 package[CHANNEL_META_SIZE + 2];
+    CHANNEL_RTS_INFO info;
 
-    BytesPut16(package + 8, COMM_MAX_CLIENTS);
-    (void)send_meta(peer, CHANNEL_PKG_RTSINFO_RESP, package, sizeof(package));
+    BytesPut16(info.max_channels, COMM_MAX_CLIENTS);
+    (void)send_meta(peer, CHANNEL_PKG_RTSINFO_RESP, &info, sizeof(info));
 }
 
 /* An acknowledgement; its beginning alone is a keepalive. */
 static RTS_RESULT send_short(const CHANNEL *channel, RTS_UI8 type, RTS_UI8 flags, RTS_UI32 size)
 {
-    RTS_UI8 package[CHANNEL_ACK_SIZE] = {type, flags};
+    CHANNEL_ACK ack = {{type, flags, {0}}, {0}};
 
-    BytesPut16(package + 2, channel->id);
-    BytesPut32(package + 4, channel->rx.block);
-    return send_package(&channel->peer, package, size);
+    BytesPut16(ack.head.id, channel->id);
+    BytesPut32(ack.acknowledged, channel->rx.block);
+    return send_package(&channel->peer, (const RTS_UI8 *)&ack, size);
 }
 
 /* ---- life of the channel ---- */
@@ -165,20 +169,21 @@ typedef struct {
 /* False when this path or buffer size is no basis for a channel. */
 static bool read_open_request(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, OPEN_REQUEST *request)
 {
+    const CHANNEL_OPEN_REQUEST *open = (const CHANNEL_OPEN_REQUEST *)data;
     RTS_UI32 words = (RTS_UI32)peer->address_words + peer->driver->address_words;
 
-    if (size < CHANNEL_META_SIZE + 8)
+    if (size < offsetof(CHANNEL_OPEN_REQUEST, address_words))
         return false;
-    request->request_id = BytesGet32(data + 8);
-    request->limit = BytesGet32(data + 12);
-    if (size >= CHANNEL_OPEN_REQ_SIZE && data[16] > words)
-        words = data[16] < 2 * ROUTER_MAX_ADDRESS ? data[16] : 2 * ROUTER_MAX_ADDRESS;
+    request->request_id = BytesGet32(open->request_id);
+    request->limit = BytesGet32(open->limit);
+    if (size >= sizeof(*open) && open->address_words > words)
+        words = open->address_words < 2 * ROUTER_MAX_ADDRESS ? open->address_words : 2 * ROUTER_MAX_ADDRESS;
     if (request->limit > NETSERVER_MESSAGE_SIZE)
         request->limit = NETSERVER_MESSAGE_SIZE;
     request->address_words = (RTS_UI8)words;
     RTS_UI32 payload = RouterGetMaxPayload(peer, words);
-    request->room = payload - CHANNEL_DATA_SIZE;
-    return request->limit >= CHANNEL_MIN_MESSAGE && payload >= CHANNEL_DATA_SIZE + MIN_ROOM;
+    request->room = payload - (RTS_UI32)sizeof(CHANNEL_DATA);
+    return request->limit >= CHANNEL_MIN_MESSAGE && payload >= sizeof(CHANNEL_DATA) + MIN_ROOM;
 }
 
 /* The channel is in use by a logged-in client. */
@@ -260,9 +265,10 @@ static void handle_open(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 s
 static void start_reply(COMM_CLIENT *client, RTS_UI32 size)
 {
     CHANNEL_SENDER *tx = &client->channel.tx;
+    CHANNEL_MESSAGE *message = (CHANNEL_MESSAGE *)client->reply;
 
-    BytesPut32(client->reply, size);
-    BytesPut32(client->reply + 4, CRC32Update(0, client->reply + COMM_PREFIX_SIZE, size));
+    BytesPut32(message->size, size);
+    BytesPut32(message->crc, CRC32Update(0, message + 1, size));
     tx->base += tx->count;
     tx->size = COMM_PREFIX_SIZE + size;
     tx->count = (tx->size + client->channel.room - 1) / client->channel.room;
@@ -276,15 +282,15 @@ static RTS_RESULT send_block(const COMM_CLIENT *client)
 {
     const CHANNEL *channel = &client->channel;
     const CHANNEL_SENDER *tx = &channel->tx;
-    RTS_UI8 header[CHANNEL_DATA_SIZE] = {CHANNEL_PKG_DATA, tx->sent == 0 ? CHANNEL_FLAG_FIRST : 0};
+    CHANNEL_DATA header = {{CHANNEL_PKG_DATA, tx->sent == 0 ? CHANNEL_FLAG_FIRST : 0, {0}}, {0}, {0}};
     RTS_UI32 offset = tx->sent * channel->room;
     RTS_UI32 left = tx->size - offset;
-    BLK_PART parts[2] = {{header, sizeof(header)},
+    BLK_PART parts[2] = {{(const RTS_UI8 *)&header, sizeof(header)},
                          {client->reply + offset, left < channel->room ? left : channel->room}};
 
-    BytesPut16(header + 2, channel->id);
-    BytesPut32(header + 4, tx->base + tx->sent + 1);
-    BytesPut32(header + 8, channel->rx.block);
+    BytesPut16(header.head.id, channel->id);
+    BytesPut32(header.block, tx->base + tx->sent + 1);
+    BytesPut32(header.acknowledged, channel->rx.block);
     return RouterSend(&channel->peer, ROUTER_SVC_CHANNEL, parts, 2);
 }
 
@@ -299,7 +305,7 @@ static RTS_RESULT send_next(COMM_CLIENT *client, RTS_UI32 now_ms)
         channel->open_due = result != ERR_OK;
     } else if (channel->ack_due) {
         result =
-            send_short(channel, CHANNEL_PKG_ACK, channel->missing_due ? CHANNEL_FLAG_MISSING : 0, CHANNEL_ACK_SIZE);
+            send_short(channel, CHANNEL_PKG_ACK, channel->missing_due ? CHANNEL_FLAG_MISSING : 0, sizeof(CHANNEL_ACK));
         channel->ack_due = result != ERR_OK;
         channel->missing_due = channel->missing_due && channel->ack_due;
     } else if (channel->tx.sent < channel->tx.count) {
@@ -309,7 +315,7 @@ static RTS_RESULT send_next(COMM_CLIENT *client, RTS_UI32 now_ms)
             channel->tx.sent_at = now_ms;
         }
     } else if (now_ms - channel->last_sent >= CHANNEL_KEEPALIVE_MS) {
-        result = send_short(channel, CHANNEL_PKG_KEEPALIVE, 0, CHANNEL_KEEPALIVE_SIZE);
+        result = send_short(channel, CHANNEL_PKG_KEEPALIVE, 0, sizeof(CHANNEL_HEADER));
     }
     return result;
 }
@@ -363,10 +369,11 @@ static void handle_ack(CHANNEL_SENDER *tx, RTS_UI32 block, bool missing, RTS_UI3
 
 static RTS_RESULT handle_message(COMM_CLIENT *client)
 {
+    const CHANNEL_MESSAGE *head = (const CHANNEL_MESSAGE *)client->request;
     const RTS_UI8 *message = client->request + COMM_PREFIX_SIZE;
-    RTS_UI32 size = BytesGet32(client->request);
+    RTS_UI32 size = BytesGet32(head->size);
 
-    if (CRC32Update(0, message, size) != BytesGet32(client->request + 4))
+    if (CRC32Update(0, message, size) != BytesGet32(head->crc))
         return ERR_CHS_CHECKSUM;
     size = SrvHandleMessage(client, message, size, client->reply + COMM_PREFIX_SIZE, client->channel.limit);
     if (size == 0)
@@ -378,7 +385,7 @@ static RTS_RESULT handle_message(COMM_CLIENT *client)
 /* A new request, whatever has become of the one before. */
 static RTS_RESULT start_message(CHANNEL *channel, const RTS_UI8 *data, RTS_UI32 size)
 {
-    RTS_UI32 length = size < COMM_PREFIX_SIZE ? 0 : BytesGet32(data);
+    RTS_UI32 length = size < COMM_PREFIX_SIZE ? 0 : BytesGet32(((const CHANNEL_MESSAGE *)data)->size);
 
     channel->rx.fill = 0;
     channel->rx.left = 0;
@@ -429,17 +436,17 @@ static void handle_gap(CHANNEL *channel, RTS_UI32 ahead)
     }
 }
 
-static void handle_data(COMM_CLIENT *client, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
+static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
     CHANNEL *channel = &client->channel;
-    RTS_UI32 ahead = BytesGet32(data + 4) - channel->rx.block; /* numbers wrap */
+    RTS_UI32 ahead = BytesGet32(data->block) - channel->rx.block; /* numbers wrap */
     RTS_RESULT result = ERR_OK;
 
     channel->fresh = false;
-    handle_ack(&channel->tx, BytesGet32(data + 8), false, now_ms);
+    handle_ack(&channel->tx, BytesGet32(data->acknowledged), false, now_ms);
     if (ahead == 1)
-        result = accept_block(client, (data[1] & CHANNEL_FLAG_FIRST) != 0, data + CHANNEL_DATA_SIZE,
-                              size - CHANNEL_DATA_SIZE);
+        result = accept_block(client, (data->head.flags & CHANNEL_FLAG_FIRST) != 0, (const RTS_UI8 *)(data + 1),
+                              size - (RTS_UI32)sizeof(*data));
     else if ((RTS_I32)ahead <= 0)
         handle_duplicate(channel, now_ms);
     else
@@ -470,31 +477,35 @@ static COMM_CLIENT *find_owner(const ROUTER_PEER *peer, RTS_UI16 id)
 
 static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
-    if (size < CHANNEL_KEEPALIVE_SIZE || (data[1] & CHANNEL_FLAG_TO_SERVER) == 0) {
+    const CHANNEL_HEADER *head = (const CHANNEL_HEADER *)data;
+    const CHANNEL_ACK *ack = (const CHANNEL_ACK *)data;
+
+    if (size < sizeof(*head) || (head->flags & CHANNEL_FLAG_TO_SERVER) == 0) {
         COMM_COUNT(counters.malformed);
         return;
     }
-    COMM_CLIENT *client = find_owner(peer, BytesGet16(data + 2));
+    COMM_CLIENT *client = find_owner(peer, BytesGet16(head->id));
     if (client == NULL) {
-        complain(peer, BytesGet16(data + 2), now_ms);
+        complain(peer, BytesGet16(head->id), now_ms);
         return;
     }
     client->channel.last_received = now_ms;
-    if (data[0] == CHANNEL_PKG_DATA && size >= CHANNEL_DATA_SIZE)
-        handle_data(client, data, size, now_ms);
-    else if (data[0] == CHANNEL_PKG_ACK && size >= CHANNEL_ACK_SIZE)
-        handle_ack(&client->channel.tx, BytesGet32(data + 4), (data[1] & CHANNEL_FLAG_MISSING) != 0, now_ms);
-    else if (data[0] != CHANNEL_PKG_KEEPALIVE)
+    if (head->type == CHANNEL_PKG_DATA && size >= sizeof(CHANNEL_DATA))
+        handle_data(client, (const CHANNEL_DATA *)data, size, now_ms);
+    else if (head->type == CHANNEL_PKG_ACK && size >= sizeof(*ack))
+        handle_ack(&client->channel.tx, BytesGet32(ack->acknowledged), (head->flags & CHANNEL_FLAG_MISSING) != 0,
+                   now_ms);
+    else if (head->type != CHANNEL_PKG_KEEPALIVE)
         COMM_COUNT(counters.malformed);
 }
 
-static void handle_close(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
+static void handle_close(const ROUTER_PEER *peer, const CHANNEL_CLOSE *close, RTS_UI32 size)
 {
-    if (size < CHANNEL_CLOSE_SIZE) {
+    if (size < sizeof(*close)) {
         COMM_COUNT(counters.malformed);
         return;
     }
-    COMM_CLIENT *client = find_owner(peer, BytesGet16(data + 8));
+    COMM_CLIENT *client = find_owner(peer, BytesGet16(close->id));
     if (client != NULL)
         forget_channel(client);
     else
@@ -503,16 +514,18 @@ static void handle_close(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 
 
 static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
 {
-    if (size < CHANNEL_META_SIZE || BytesGet16(data + 2) >> 8 != CHANNEL_VERSION >> 8 ||
-        BytesGet32(data + 4) != meta_crc(data, size)) {
+    const CHANNEL_META_HEADER *meta = (const CHANNEL_META_HEADER *)data;
+
+    if (size < sizeof(*meta) || BytesGet16(meta->version) >> 8 != CHANNEL_VERSION >> 8 ||
+        BytesGet32(meta->crc) != meta_crc(data, size)) {
         COMM_COUNT(counters.malformed);
         return;
     }
-    if (data[0] == CHANNEL_PKG_OPEN_REQ)
+    if (meta->type == CHANNEL_PKG_OPEN_REQ)
         handle_open(peer, data, size, now_ms);
-    else if (data[0] == CHANNEL_PKG_CLOSE_REQ)
-        handle_close(peer, data, size);
-    else if (data[0] == CHANNEL_PKG_RTSINFO_REQ)
+    else if (meta->type == CHANNEL_PKG_CLOSE_REQ)
+        handle_close(peer, (const CHANNEL_CLOSE *)data, size);
+    else if (meta->type == CHANNEL_PKG_RTSINFO_REQ)
         send_rts_info(peer);
 }
 

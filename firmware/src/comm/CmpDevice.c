@@ -10,6 +10,7 @@
 
 #include "CMUtils.h"
 #include "CmpBytes.h"
+#include "CmpPackets.h"
 #include "CmpSrv.h"
 #include "SysTarget.h"
 #include "rts_config.h"
@@ -41,32 +42,33 @@ static void write_serial_number(BTAG_WRITER *reply, const char *text)
 static void write_stack(BTAG_WRITER *reply)
 {
     SYS_STACK stack = SysTargetGetStack();
+    DEV_STACK content;
 
-    BTagOpen(reply, TAG_DEV_STACK, BTAG_ALIGN_0);
-    BTagAppend32(reply, stack.size);
-    BTagAppend32(reply, stack.unused);
-    BTagClose(reply);
+    BytesPut32(content.size, stack.size);
+    BytesPut32(content.unused, stack.unused);
+    BTagWrite(reply, TAG_DEV_STACK, BTAG_ALIGN_0, &content, sizeof(content));
 }
 
 static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     const SYS_TARGET *target = SysTargetGet();
     RTS_RESULT match = ERR_OK;
-    BTAG expected;
+    DEV_IDENT ident;
+    BTAG tag;
 
-    RTS_RESULT result = BTagFind(&request->tags, TAG_DEV_IDENT, 12, request->tags.size, &expected);
+    RTS_RESULT result = BTagFind(&request->tags, TAG_DEV_IDENT, sizeof(ident), request->tags.size, &tag);
     if (result == ERR_OK) {
-        if (BytesGet32(expected.data) != target->type || BytesGet32(expected.data + 4) != target->id)
+        const DEV_IDENT *expected = (const DEV_IDENT *)tag.data;
+        if (BytesGet32(expected->type) != target->type || BytesGet32(expected->id) != target->id)
             match = ERR_TYPE_MISMATCH;
     } else if (result != ERR_L7_TAG_MISSING) {
         return result;
     }
     BTagWrite16(reply, TAG_DEV_RESULT, match);
-    BTagOpen(reply, TAG_DEV_IDENT, BTAG_ALIGN_0);
-    BTagAppend32(reply, target->type);
-    BTagAppend32(reply, target->id);
-    BTagAppend32(reply, target->version);
-    BTagClose(reply);
+    BytesPut32(ident.type, target->type);
+    BytesPut32(ident.id, target->id);
+    BytesPut32(ident.version, target->version);
+    BTagWrite(reply, TAG_DEV_IDENT, BTAG_ALIGN_0, &ident, sizeof(ident));
     BTagWrite32(reply, TAG_DEV_RTS_VERSION, RTS_VERSION);
     write_wide_text(reply, TAG_DEV_DEVICE_NAME, target->device_name, NS_MAX_TYPE_NAMES);
     write_wide_text(reply, TAG_DEV_VENDOR_NAME, target->vendor_name, NS_MAX_TYPE_NAMES);

@@ -5,7 +5,9 @@
  */
 #include "CmpLogSrv.h"
 
+#include "CmpBytes.h"
 #include "CmpLog.h"
+#include "CmpPackets.h"
 #include "CmpSrv.h"
 
 enum { COMPONENT_NAME_MAX = 31 };
@@ -13,6 +15,7 @@ enum { COMPONENT_NAME_MAX = 31 };
 static void write_entry(BTAG_WRITER *reply, const LOG_ENTRY *entry)
 {
     RTS_UI64 time_ns = (RTS_UI64)entry->time_ns;
+    LOG_RECORD record = {0};
 
     BTagOpen(reply, TAG_LOG_RECORD, BTAG_ALIGN_0);
     BTagWrite32(reply, TAG_LOG_HANDLE, entry->handle);
@@ -20,12 +23,10 @@ static void write_entry(BTAG_WRITER *reply, const LOG_ENTRY *entry)
     BTagAppend32(reply, (RTS_UI32)time_ns);
     BTagAppend32(reply, (RTS_UI32)(time_ns >> 32));
     BTagClose(reply);
-    BTagOpen(reply, TAG_LOG_ENTRY, BTAG_ALIGN_0);
-    BTagAppend32(reply, entry->component);
-    BTagAppend32(reply, entry->log_class);
-    BTagAppend32(reply, entry->error);
-    BTagAppend32(reply, 0);
-    BTagClose(reply);
+    BytesPut32(record.component, entry->component);
+    BytesPut32(record.log_class, entry->log_class);
+    BytesPut32(record.error, entry->error);
+    BTagWrite(reply, TAG_LOG_ENTRY, BTAG_ALIGN_0, &record, sizeof(record));
     BTagWriteText(reply, TAG_LOG_TEXT, entry->text, LOG_TEXT_SIZE - 1);
     BTagWriteText(reply, TAG_LOG_COMPONENT_NAME, CMGetComponentName(entry->component), COMPONENT_NAME_MAX);
     BTagClose(reply);

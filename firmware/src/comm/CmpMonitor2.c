@@ -15,12 +15,13 @@
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
 #include "CmpIecTask.h"
+#include "CmpPackets.h"
 #include "CmpSrv.h"
 #include "SysAtomic.h"
 #include "SysLock.h"
 
 enum {
-    ENTRY_HEAD = 6, /* u16 id, u32 size */
+    ENTRY_HEAD = sizeof(MON2_VALUE),
     ENTRY_FAILED = ENTRY_HEAD + 1,
     CONSISTENT_SIZE = 8, /* its element, with what aligns it */
     ALL_BITS = 0xFF,
@@ -210,18 +211,20 @@ static void store(RTS_UI8 *memory, const RTS_UI8 *value, RTS_UI32 size)
 static RTS_RESULT check_application(const SRV_REQUEST *request, RTS_UI32 *error)
 {
     APP_STATUS status;
+    const MON2_APPLICATION *application;
     BTAG tag;
     RTS_RESULT result =
-        BTagFind(&request->tags, TAG_MON2_APPLICATION, MON2_APPLICATION_SIZE, MON2_APPLICATION_SIZE, &tag);
+        BTagFind(&request->tags, TAG_MON2_APPLICATION, sizeof(*application), sizeof(*application), &tag);
 
     if (result != ERR_OK)
         return result;
+    application = (const MON2_APPLICATION *)tag.data;
     AppGetStatus(&status);
     if (status.state == AS_NONE)
         *error = ERR_APP_NOT_LOADED;
-    else if (!SrvIsAppSession(request->client, BytesGet32(tag.data)))
+    else if (!SrvIsAppSession(request->client, BytesGet32(application->session)))
         *error = ERR_APP_INVALID_SESSIONID;
-    else if (BytesGet32(tag.data + 4) != status.image_crc)
+    else if (BytesGet32(application->data_guid) != status.image_crc)
         *error = ERR_APP_INVALID_DATAID;
     else
         *error = ERR_OK;
@@ -280,6 +283,7 @@ static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 rese
 {
     AREA_ADDRESS address;
     RTS_UI8 *memory = NULL;
+    MON2_VALUE head;
     RTS_UI32 room = BTagGetRoom(reply);
     RTS_UI32 id = var->id;
     RTS_UI32 size = var->size;
@@ -293,8 +297,9 @@ static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 rese
         id |= MON2_ID_FAILED;
         size = 1;
     }
-    BTagAppend16(reply, id);
-    BTagAppend32(reply, size);
+    BytesPut16(head.id, id);
+    BytesPut32(head.size, size);
+    BTagAppend(reply, &head, sizeof(head));
     RTS_UI8 *value = BTagReserve(reply, size);
     if (value == NULL)
         return;
@@ -369,11 +374,13 @@ typedef struct {
 /* Takes one entry off the list; false when the rest is too short for what it says. */
 static bool next_write(const RTS_UI8 **data, RTS_UI32 *size, WRITE_VAR *var)
 {
-    if (*size < ENTRY_HEAD)
+    const MON2_VALUE *head = (const MON2_VALUE *)*data;
+
+    if (*size < sizeof(*head))
         return false;
-    var->size = BytesGet32(*data + 2);
-    var->value = *data + ENTRY_HEAD;
-    RTS_UI32 rest = *size - ENTRY_HEAD;
+    var->size = BytesGet32(head->size);
+    var->value = (const RTS_UI8 *)(head + 1);
+    RTS_UI32 rest = *size - (RTS_UI32)sizeof(*head);
     if (var->size > rest || rest - var->size < 2)
         return false;
     rest -= var->size + 2;

@@ -9,15 +9,13 @@
 
 #include "CMUtils.h"
 #include "CmpBytes.h"
+#include "CmpPackets.h"
 #include "SysTarget.h"
 #include "rts_config.h"
 
 enum {
-    REPLY_0400_SIZE = 48,
-    REPLY_0103_SIZE = 32,
-    REPLY_0101_SIZE = 22,
     NUL_SIZES = 3 * 2 + 1, /* of three wide names and the serial number */
-    ROOM_FOR_TEXTS = NS_REPLY_SIZE - REPLY_0400_SIZE - NUL_SIZES,
+    ROOM_FOR_TEXTS = NS_REPLY_SIZE - (int)sizeof(NS_REPLY_0400) - NUL_SIZES,
 };
 
 RTS_STATIC_ASSERT(NS_REPLY_SIZE <= NS_MAX_REPLY, ns_reply_fits_a_packet);
@@ -39,38 +37,39 @@ static RTS_UI32 put_name(NAMES *names, const char *text, RTS_UI32 max)
     return length;
 }
 
-/* What follows the first 8 bytes in versions 1.02, 1.03 and 4.00, the last one with more of it; returns the end. */
-static RTS_UI8 *put_body(RTS_UI8 *reply, const SYS_TARGET *target, bool is_0400, RTS_UI8 driver_type)
+/* What follows the request id in versions 1.02, 1.03 and 4.00, the last one with more of it; returns the end. */
+static RTS_UI8 *put_body(NS_REPLY_0400 *reply, const SYS_TARGET *target, bool is_0400, RTS_UI8 driver_type)
 {
+    NS_REPLY_0103 *old = &reply->old;
     RTS_UI32 serial = CMUtlStrNLen(target->serial_number, NS_MAX_SERIAL);
-    NAMES names = {reply + (is_0400 ? REPLY_0400_SIZE : REPLY_0103_SIZE), (ROOM_FOR_TEXTS - serial) / 2};
+    NAMES names = {is_0400 ? (RTS_UI8 *)(reply + 1) : (RTS_UI8 *)(old + 1), (ROOM_FOR_TEXTS - serial) / 2};
 
-    BytesPut16(reply + 8, COMM_MAX_CLIENTS);
-    reply[10] = 1; /* little endian */
-    BytesPut16(reply + 14, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
+    BytesPut16(old->max_channels, COMM_MAX_CLIENTS);
+    old->little_endian = 1;
+    BytesPut16(old->node_length, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
     RTS_UI32 device = put_name(&names, target->device_name, NS_MAX_TYPE_NAMES);
-    BytesPut16(reply + 16, device);
-    BytesPut16(reply + 18, put_name(&names, target->vendor_name, NS_MAX_TYPE_NAMES - device));
-    BytesPut32(reply + 20, target->type);
-    BytesPut32(reply + 24, target->id);
-    BytesPut32(reply + 28, target->version);
+    BytesPut16(old->device_length, device);
+    BytesPut16(old->vendor_length, put_name(&names, target->vendor_name, NS_MAX_TYPE_NAMES - device));
+    BytesPut32(old->target_type, target->type);
+    BytesPut32(old->target_id, target->id);
+    BytesPut32(old->target_version, target->version);
     if (!is_0400)
         return names.place;
-    reply[36] = (RTS_UI8)serial;
-    reply[38] = driver_type;
+    reply->serial_length = (RTS_UI8)serial;
+    reply->driver_type = driver_type;
     memcpy(names.place, target->serial_number, serial); /* the NUL is there */
     return names.place + serial + 1;
 }
 
-static RTS_UI8 *put_body_0101(RTS_UI8 *reply, const SYS_TARGET *target)
+static RTS_UI8 *put_body_0101(NS_REPLY_0101 *reply, const SYS_TARGET *target)
 {
-    NAMES names = {reply + REPLY_0101_SIZE, ROOM_FOR_TEXTS / 2};
+    NAMES names = {(RTS_UI8 *)(reply + 1), ROOM_FOR_TEXTS / 2};
 
-    BytesPut32(reply + 8, target->type);
-    BytesPut16(reply + 12, COMM_MAX_CLIENTS);
-    reply[14] = 1; /* little endian */
-    BytesPut16(reply + 18, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
-    BytesPut16(reply + 20, put_name(&names, target->device_name, NS_MAX_TYPE_NAMES));
+    BytesPut32(reply->target_type, target->type);
+    BytesPut16(reply->max_channels, COMM_MAX_CLIENTS);
+    reply->little_endian = 1;
+    BytesPut16(reply->node_length, put_name(&names, target->node_name, NS_MAX_NODE_NAME));
+    BytesPut16(reply->device_length, put_name(&names, target->device_name, NS_MAX_TYPE_NAMES));
     return names.place;
 }
 
@@ -106,15 +105,17 @@ static bool is_our_name(const RTS_UI8 *text, RTS_UI32 size)
 static void answer(const ROUTER_PEER *peer, RTS_UI16 version, const RTS_UI8 *request_id)
 {
     RTS_UI8 reply[NS_REPLY_SIZE] = {0};
+    NS_REQUEST *head = (NS_REQUEST *)reply; /* replies start like requests */
     RTS_UI8 *end;
 
-    BytesPut16(reply, NS_IDENTIFICATION);
-    BytesPut16(reply + 2, version);
-    memcpy(reply + 4, request_id, 4);
+    BytesPut16(head->type, NS_IDENTIFICATION);
+    BytesPut16(head->version, version);
+    memcpy(head->request_id, request_id, sizeof(head->request_id));
     if (NS_OLD_VERSIONS && version == NS_VERSION_0101)
-        end = put_body_0101(reply, SysTargetGet());
+        end = put_body_0101((NS_REPLY_0101 *)reply, SysTargetGet());
     else
-        end = put_body(reply, SysTargetGet(), !NS_OLD_VERSIONS || version == NS_VERSION_0400, peer->driver->type);
+        end = put_body((NS_REPLY_0400 *)reply, SysTargetGet(), !NS_OLD_VERSIONS || version == NS_VERSION_0400,
+                       peer->driver->type);
     BLK_PART part = {reply, (RTS_UI32)(end - reply)};
     /* Without room in the driver the scan goes unanswered; scanners ask again. */
     (void)RouterSend(peer, ROUTER_SVC_NAME_RESPONSE, &part, 1);
@@ -122,14 +123,16 @@ static void answer(const ROUTER_PEER *peer, RTS_UI16 version, const RTS_UI8 *req
 
 RTS_NOINLINE void NSHandleRequest(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
 {
-    if (size < NS_REQUEST_SIZE)
+    const NS_REQUEST *request = (const NS_REQUEST *)data;
+
+    if (size < sizeof(*request))
         return;
-    RTS_UI16 type = BytesGet16(data);
-    RTS_UI16 version = choose_version(BytesGet16(data + 2));
+    RTS_UI16 type = BytesGet16(request->type);
+    RTS_UI16 version = choose_version(BytesGet16(request->version));
     bool asked = type == NS_RESOLVE_ADDRESS ||
-                 (type == NS_RESOLVE_NAME && is_our_name(data + NS_REQUEST_SIZE, size - NS_REQUEST_SIZE));
+                 (type == NS_RESOLVE_NAME && is_our_name(data + sizeof(*request), size - (RTS_UI32)sizeof(*request)));
     if (asked && version != 0)
-        answer(peer, version, data + 4);
+        answer(peer, version, request->request_id);
 }
 
 RTS_RESULT CmpNameServiceServer_Hook(CMP_HOOK hook)

@@ -7,14 +7,9 @@
 
 #include <string.h>
 
-enum {
-    HEADER_SIZE = 2 * ROUTER_HEADER_WORDS,
-    FLAG_SIGNAL = 0x20,
-    FLAG_RELATIVE = 0x10,
-    PRIO_SHIFT = 6,
-    HOP_SHIFT = 3,
-    BLOCK_UNIT = 32, /* bytes per step of BlkLenMax */
-};
+#include "CmpPackets.h"
+
+enum { HEADER_WORDS = sizeof(ROUTER_HEADER) / 2, WORDS_MASK = (1 << ROUTER_HOP_SHIFT) - 1 };
 
 /* A parsed header. */
 typedef struct {
@@ -35,24 +30,26 @@ static RTS_UI32 header_size(RTS_UI32 fixed, RTS_UI32 words)
 
 static bool parse_header(const RTS_UI8 *data, RTS_UI32 size, HEADER *header)
 {
-    if (size < HEADER_SIZE || size > BLK_MAX_SIZE || data[0] != ROUTER_MAGIC)
+    const ROUTER_HEADER *fixed = (const ROUTER_HEADER *)data;
+
+    if (size < sizeof(*fixed) || size > BLK_MAX_SIZE || fixed->magic != ROUTER_MAGIC)
         return false;
-    RTS_UI32 fixed = 2 * (data[1] & 7u);
-    if (fixed < HEADER_SIZE)
+    RTS_UI32 words = fixed->hops & WORDS_MASK;
+    if (words < HEADER_WORDS)
         return false;
-    header->receiver_words = data[5] & 0x0F;
-    header->sender_words = data[5] >> 4;
-    header->size = header_size(fixed, header->receiver_words + header->sender_words);
+    header->receiver_words = fixed->lengths & 0x0F;
+    header->sender_words = fixed->lengths >> 4;
+    header->size = header_size(2 * words, header->receiver_words + header->sender_words);
     if (header->size > size)
         return false;
-    header->receiver = data + fixed;
+    header->receiver = data + 2 * words;
     header->sender = header->receiver + 2 * header->receiver_words;
     return true;
 }
 
-static bool is_for_us(const BLK_DRV *driver, const RTS_UI8 *data, const HEADER *header)
+static bool is_for_us(const BLK_DRV *driver, const ROUTER_HEADER *fixed, const HEADER *header)
 {
-    if ((data[2] & FLAG_RELATIVE) != 0 || data[1] >> HOP_SHIFT == 0)
+    if ((fixed->flags & ROUTER_FLAG_RELATIVE) != 0 || fixed->hops >> ROUTER_HOP_SHIFT == 0)
         return false;
     if (driver->point_to_point || header->receiver_words == 0)
         return true;
@@ -65,7 +62,7 @@ static RTS_UI16 max_packet(RTS_UI8 flags)
 {
     RTS_UI32 units = flags & 0x0F;
 
-    return (RTS_UI16)(units == 0 ? BLK_MAX_SIZE : (units + 1) * BLOCK_UNIT);
+    return (RTS_UI16)(units == 0 ? BLK_MAX_SIZE : (units + 1) * ROUTER_BLOCK_UNIT);
 }
 
 /* Services without a handler: address requests are for parents, and a notification would make its sender our parent. */
@@ -83,6 +80,7 @@ static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *pay
 
 void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
 {
+    const ROUTER_HEADER *fixed = (const ROUTER_HEADER *)data;
     HEADER header;
     ROUTER_PEER peer;
 
@@ -90,24 +88,24 @@ void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
         COMM_COUNT(counters.malformed);
         return;
     }
-    if (!is_for_us(driver, data, &header)) {
+    if (!is_for_us(driver, fixed, &header)) {
         COMM_COUNT(counters.not_for_us);
         return;
     }
-    if ((data[2] & FLAG_SIGNAL) != 0 || header.sender_words == 0) {
+    if ((fixed->flags & ROUTER_FLAG_SIGNAL) != 0 || header.sender_words == 0) {
         COMM_COUNT(counters.ignored);
         return;
     }
     peer.driver = driver;
-    peer.max_packet = max_packet(data[2]);
+    peer.max_packet = max_packet(fixed->flags);
     peer.address_words = (RTS_UI8)header.sender_words;
     memcpy(peer.address, header.sender, 2 * header.sender_words);
-    deliver(&peer, data[3], data + header.size, size - header.size);
+    deliver(&peer, fixed->service, data + header.size, size - header.size);
 }
 
 RTS_UI32 RouterGetMaxPayload(const ROUTER_PEER *peer, RTS_UI32 address_words)
 {
-    RTS_UI32 header = header_size(HEADER_SIZE, address_words);
+    RTS_UI32 header = header_size(sizeof(ROUTER_HEADER), address_words);
 
     return peer->max_packet > header ? peer->max_packet - header : 0;
 }
@@ -115,22 +113,27 @@ RTS_UI32 RouterGetMaxPayload(const ROUTER_PEER *peer, RTS_UI32 address_words)
 RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *parts, RTS_UI32 count)
 {
     const BLK_DRV *driver = peer->driver;
-    RTS_UI8 header[HEADER_SIZE + 4 * ROUTER_MAX_ADDRESS + 2] = {
-        ROUTER_MAGIC,
-        ROUTER_HOP_COUNT << HOP_SHIFT | ROUTER_HEADER_WORDS,
-        ROUTER_PRIO_NORMAL << PRIO_SHIFT,
-        service,
-    };
+    struct {
+        ROUTER_HEADER fixed;
+        RTS_UI8 addresses[4 * ROUTER_MAX_ADDRESS + 2];
+    } header = {{
+                    ROUTER_MAGIC,
+                    ROUTER_HOP_COUNT << ROUTER_HOP_SHIFT | HEADER_WORDS,
+                    ROUTER_PRIO_NORMAL << ROUTER_PRIO_SHIFT,
+                    service,
+                    0,
+                    (RTS_UI8)(driver->address_words << 4 | peer->address_words),
+                },
+                {0}};
     BLK_PART all[1 + ROUTER_MAX_PARTS];
     RTS_UI32 receiver = 2u * peer->address_words;
-    RTS_UI32 size = header_size(HEADER_SIZE, (RTS_UI32)peer->address_words + driver->address_words);
+    RTS_UI32 size = header_size(sizeof(header.fixed), (RTS_UI32)peer->address_words + driver->address_words);
 
     if (count > ROUTER_MAX_PARTS)
         return ERR_PARAMETER;
-    header[5] = (RTS_UI8)(driver->address_words << 4 | peer->address_words);
-    memcpy(header + HEADER_SIZE, peer->address, receiver);
-    memcpy(header + HEADER_SIZE + receiver, driver->address, 2u * driver->address_words);
-    all[0].data = header;
+    memcpy(header.addresses, peer->address, receiver);
+    memcpy(header.addresses + receiver, driver->address, 2u * driver->address_words);
+    all[0].data = (const RTS_UI8 *)&header;
     all[0].size = size;
     for (RTS_UI32 i = 0; i < count; i++) {
         all[1 + i] = parts[i];

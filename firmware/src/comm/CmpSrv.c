@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "CmpBytes.h"
+#include "CmpPackets.h"
 #include "SysTarget.h"
 #include "rts_config.h"
 
@@ -136,56 +137,62 @@ static RTS_RESULT dispatch(RTS_UI16 group_id, RTS_UI16 service_id, SRV_REQUEST *
     return result;
 }
 
+/* The length in a header counts from after itself. */
+enum { PREFIX = offsetof(L7_HEADER, group) };
+
 /* Offset of the content; 0 when the header is wrong. */
-static RTS_UI32 check_header(const RTS_UI8 *message, RTS_UI32 size)
+static RTS_UI32 check_header(const L7_HEADER *header, RTS_UI32 size)
 {
-    if (size < L7_HEADER_PREFIX + L7_HEADER_LENGTH_SHORT || BytesGet16(message) != L7_PROTOCOL)
+    if (size < PREFIX + L7_HEADER_LENGTH_SHORT || BytesGet16(header->protocol) != L7_PROTOCOL)
         return 0;
-    RTS_UI32 length = BytesGet16(message + 2);
-    if (length < L7_HEADER_LENGTH_SHORT || length > L7_HEADER_LENGTH_MAX || L7_HEADER_PREFIX + length > size)
+    RTS_UI32 length = BytesGet16(header->length);
+    if (length < L7_HEADER_LENGTH_SHORT || length > L7_HEADER_LENGTH_MAX || PREFIX + length > size)
         return 0;
-    return L7_HEADER_PREFIX + length;
+    return PREFIX + length;
 }
 
-static void put_header(RTS_UI8 *reply, RTS_UI32 header, const RTS_UI8 *message, RTS_UI32 session, RTS_UI32 content)
+/* `size` of the header, long or short. */
+static void put_header(L7_HEADER *reply, RTS_UI32 size, const L7_HEADER *request, RTS_UI32 session, RTS_UI32 content)
 {
-    BytesPut32(reply + header - 4, 0); /* customer id, if the header has one; else the content length below */
-    BytesPut16(reply, L7_PROTOCOL);
-    BytesPut16(reply + 2, header - L7_HEADER_PREFIX);
-    BytesPut16(reply + 4, BytesGet16(message + 4) | L7_REPLY);
-    BytesPut16(reply + 6, BytesGet16(message + 6));
-    BytesPut32(reply + 8, session);
-    BytesPut32(reply + 12, content);
+    if (size == sizeof(*reply))
+        BytesPut32(reply->customer, 0);
+    BytesPut16(reply->protocol, L7_PROTOCOL);
+    BytesPut16(reply->length, size - PREFIX);
+    BytesPut16(reply->group, BytesGet16(request->group) | L7_REPLY);
+    BytesPut16(reply->service, BytesGet16(request->service));
+    BytesPut32(reply->session, session);
+    BytesPut32(reply->size, content);
 }
 
 RTS_NOINLINE RTS_UI32 SrvHandleMessage(COMM_CLIENT *client, const RTS_UI8 *message, RTS_UI32 size, RTS_UI8 *reply,
                                        RTS_UI32 capacity)
 {
     enum { ERROR_CONTENT = 8 };
-    RTS_UI32 start = check_header(message, size);
-    RTS_UI32 header = L7_HEADER_PREFIX + L7_HEADER_LENGTH;
+    const L7_HEADER *head = (const L7_HEADER *)message;
+    RTS_UI32 start = check_header(head, size);
+    RTS_UI32 header = sizeof(*head);
     SRV_REQUEST request;
     BTAG_WRITER writer;
     RTS_RESULT result = ERR_L7_INCOMPLETE;
 
-    if (start == L7_HEADER_PREFIX + L7_HEADER_LENGTH_SHORT)
+    if (start == PREFIX + L7_HEADER_LENGTH_SHORT)
         header = start;
     if (start == 0 || capacity < header + ERROR_CONTENT)
         return 0;
     request.client = client;
-    request.session = BytesGet32(message + 8);
+    request.session = BytesGet32(head->session);
     request.reply_session = request.session;
-    RTS_UI32 content = BytesGet32(message + 12);
+    RTS_UI32 content = BytesGet32(head->size);
     BTagWriterInit(&writer, reply + header, capacity - header);
     if (content <= size - start) {
         BTagReaderInit(&request.tags, message + start, content);
-        result = dispatch(BytesGet16(message + 4), BytesGet16(message + 6), &request, &writer);
+        result = dispatch(BytesGet16(head->group), BytesGet16(head->service), &request, &writer);
     }
     if (result != ERR_OK) {
         BTagWriterInit(&writer, reply + header, capacity - header);
         BTagWrite16(&writer, TAG_ERROR, result);
     }
-    put_header(reply, header, message, request.reply_session, writer.size);
+    put_header((L7_HEADER *)reply, header, head, request.reply_session, writer.size);
     return header + writer.size;
 }
 

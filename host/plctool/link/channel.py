@@ -14,7 +14,6 @@ does not idle while the device works.
 from __future__ import annotations
 
 import math
-import struct
 import zlib
 from collections import deque
 from dataclasses import dataclass
@@ -22,15 +21,16 @@ from enum import Enum, auto
 
 from plctool.core import error_name, lib
 from plctool.errors import LinkError
+from plctool.link.wire import Layout
 
-_META = struct.Struct("<BBHI")
-_OPEN_REQUEST = struct.Struct("<IIBBH")
-_OPEN_RESPONSE = struct.Struct("<IHHI")  # the rest is of no interest to us, and missing in version 1.0
-_CLOSE = struct.Struct("<HH")
-_CHANNEL = struct.Struct("<BBH")  # how every channel package starts
-_DATA = struct.Struct("<BBHII")
-_FIRST = struct.Struct("<II")
-_ACK = struct.Struct("<BBHI")
+_META = Layout("CHANNEL_META_HEADER")
+_OPEN_REQUEST = Layout("CHANNEL_OPEN_REQUEST")
+_OPEN_RESPONSE = Layout("CHANNEL_OPEN_RESPONSE", before="byte_order")  # version 1.0 has no more
+_CLOSE = Layout("CHANNEL_CLOSE")
+_CHANNEL = Layout("CHANNEL_HEADER")  # how every channel package starts
+_DATA = Layout("CHANNEL_DATA")
+_MESSAGE = Layout("CHANNEL_MESSAGE")
+_ACK = Layout("CHANNEL_ACK")
 
 WANTED_BUFFER = 0x4000  # longest message we would like to send or get, bytes
 MAX_REQUESTS = 2  # requests under way at the same time
@@ -179,7 +179,7 @@ class Channel:
     @property
     def best_size(self) -> int:
         """Longest message that fills its blocks: a short last block costs as much as a full one."""
-        first = self._line.max_package - _DATA.size - _FIRST.size
+        first = self._line.max_package - _DATA.size - _MESSAGE.size
         more = max(0, self.buffer_size - first) // (self._line.max_package - _DATA.size)
         return min(self.buffer_size, first + more * (self._line.max_package - _DATA.size))
 
@@ -201,7 +201,7 @@ class Channel:
     def close(self) -> None:
         """Says good-bye; nothing answers."""
         if self.state is State.OPEN:
-            self._control.append(_meta(lib.CHANNEL_PKG_CLOSE_REQ, _CLOSE.pack(self._id, lib.ERR_OK)))
+            self._control.append(_meta(_CLOSE, lib.CHANNEL_PKG_CLOSE_REQ, id=self._id, error=lib.ERR_OK))
         self._shut()
 
     def _shut(self) -> None:
@@ -261,9 +261,9 @@ class Channel:
         number = self._newest.number + 1
         first = self._cut == 0
         flags = lib.CHANNEL_FLAG_TO_SERVER | (lib.CHANNEL_FLAG_FIRST if first else 0)
-        head = _DATA.pack(lib.CHANNEL_PKG_DATA, flags, self._id, number, self._received)
+        head = self._data_head(flags, number)
         if first:
-            head += _FIRST.pack(len(message), zlib.crc32(message))
+            head += _MESSAGE.pack(size=len(message), crc=zlib.crc32(message))
         size = self._error_rate.best_payload(self._line.overhead + len(head), self._line.max_package - len(head))
         end = min(self._cut + size, len(message))
         package = head + message[self._cut : end]
@@ -279,8 +279,8 @@ class Channel:
 
     def _on_timeout(self, now: float) -> None:
         if self.state is State.OPENING:
-            body = _OPEN_REQUEST.pack(self._request_id, WANTED_BUFFER, self._address_words, 0, 0)
-            self._control.append(_meta(lib.CHANNEL_PKG_OPEN_REQ, body))
+            wanted = {"request_id": self._request_id, "limit": WANTED_BUFFER, "address_words": self._address_words}
+            self._control.append(_meta(_OPEN_REQUEST, lib.CHANNEL_PKG_OPEN_REQ, **wanted))
             self._opens += 1
             self._timer = now + min(_OPEN_RETRY * self._opens, _LONGEST_RETRY)
             return
@@ -296,9 +296,14 @@ class Channel:
         """Makes the device say what it has, with a block it has already."""
         known = self._flight[0].number - 1 if self._flight else self._newest.number
         flags = lib.CHANNEL_FLAG_TO_SERVER
-        self._control.append(_DATA.pack(lib.CHANNEL_PKG_DATA, flags, self._id, known, self._received))
+        self._control.append(self._data_head(flags, known))
         self._polls.append(known + self._next)
         self._unpolled = 0
+
+    def _data_head(self, flags: int, number: int) -> bytes:
+        return _DATA.pack(
+            type=lib.CHANNEL_PKG_DATA, flags=flags, id=self._id, block=number, acknowledged=self._received
+        )
 
     def _ask_missing(self, now: float) -> None:
         self._asked_at = now
@@ -306,7 +311,7 @@ class Channel:
 
     def _acknowledge(self, flags: int = 0) -> None:
         flags |= lib.CHANNEL_FLAG_TO_SERVER
-        self._control.append(_ACK.pack(lib.CHANNEL_PKG_ACK, flags, self._id, self._received))
+        self._control.append(_ACK.pack(type=lib.CHANNEL_PKG_ACK, flags=flags, id=self._id, acknowledged=self._received))
 
     # ---- input ----
 
@@ -315,41 +320,42 @@ class Channel:
         if len(package) < _CHANNEL.size:
             return
         self._heard = now
-        kind, flags, channel_id = _CHANNEL.unpack_from(package)
-        if kind in (lib.CHANNEL_PKG_OPEN_RESP, lib.CHANNEL_PKG_CLOSE):
-            self._receive_meta(kind, package, now)
-        elif self.state is not State.OPEN or channel_id != self._id:
+        head = _CHANNEL.unpack(package)
+        if head.type in (lib.CHANNEL_PKG_OPEN_RESP, lib.CHANNEL_PKG_CLOSE):
+            self._receive_meta(head.type, package, now)
+        elif self.state is not State.OPEN or head.id != self._id:
             return
-        elif kind == lib.CHANNEL_PKG_DATA and len(package) >= _DATA.size:
+        elif head.type == lib.CHANNEL_PKG_DATA and len(package) >= _DATA.size:
             self._receive_data(package, now)
-        elif kind == lib.CHANNEL_PKG_ACK and len(package) >= _ACK.size:
-            number = _ACK.unpack_from(package)[3]
+        elif head.type == lib.CHANNEL_PKG_ACK and len(package) >= _ACK.size:
+            number = _ACK.unpack(package).acknowledged
             self._receive_ack(number, now)
-            if flags & lib.CHANNEL_FLAG_MISSING:
+            if head.flags & lib.CHANNEL_FLAG_MISSING:
                 self._go_back(number, now, anew=True)
             else:
                 self._receive_poll_answer(number, now)
 
     def _receive_meta(self, kind: int, package: bytes, now: float) -> None:
-        body = _meta_body(package)
-        if kind == lib.CHANNEL_PKG_OPEN_RESP and self.state is State.OPENING and len(body) >= _OPEN_RESPONSE.size:
-            self._receive_opened(body, now)
-        elif kind == lib.CHANNEL_PKG_CLOSE and self.state is State.OPEN and len(body) >= _CLOSE.size:
-            channel_id, error = _CLOSE.unpack_from(body)
-            if channel_id == self._id:
+        size = len(package) if _is_whole(package) else 0
+        if kind == lib.CHANNEL_PKG_OPEN_RESP and self.state is State.OPENING and size >= _OPEN_RESPONSE.size:
+            self._receive_opened(package, now)
+        elif kind == lib.CHANNEL_PKG_CLOSE and self.state is State.OPEN and size >= _CLOSE.size:
+            close = _CLOSE.unpack(package)
+            if close.id == self._id:
                 self._shut()
-                raise ChannelLost(f"The device closed the connection ({error_name(error)}); try again.", "closed")
+                reason = error_name(close.error)
+                raise ChannelLost(f"The device closed the connection ({reason}); try again.", "closed")
 
-    def _receive_opened(self, body: bytes, now: float) -> None:
-        request_id, result, channel_id, granted = _OPEN_RESPONSE.unpack_from(body)
-        if request_id != self._request_id:
+    def _receive_opened(self, package: bytes, now: float) -> None:
+        opened = _OPEN_RESPONSE.unpack(package)
+        if opened.request_id != self._request_id:
             return
-        if result != lib.CHANNEL_OPEN_OK:
+        if opened.result != lib.CHANNEL_OPEN_OK:
             self._shut()
             raise LinkError("The device is busy with another tool; close that one or wait a few seconds.", "busy")
         if self._opens == 1:
             self._round_trip.sample(now - self._line_free)
-        self._id, self.buffer_size = channel_id, min(granted, WANTED_BUFFER)
+        self._id, self.buffer_size = opened.id, min(opened.limit, WANTED_BUFFER)
         self.state, self._timer = State.OPEN, math.inf
 
     def _receive_ack(self, number: int, now: float) -> None:
@@ -405,9 +411,10 @@ class Channel:
         self._flight.clear()
 
     def _receive_data(self, package: bytes, now: float) -> None:
-        _, flags, _, number, acknowledged = _DATA.unpack_from(package)
-        first = bool(flags & lib.CHANNEL_FLAG_FIRST)
-        self._receive_ack(acknowledged, now)
+        head = _DATA.unpack(package)
+        number = head.block
+        first = bool(head.flags & lib.CHANNEL_FLAG_FIRST)
+        self._receive_ack(head.acknowledged, now)
         if number <= self._received:
             self._acknowledge()  # our acknowledgement was lost
         elif number > self._received + 1 and not (first and self._unanswered == MAX_REQUESTS):
@@ -425,14 +432,14 @@ class Channel:
     def _take(self, content: bytes, first: bool) -> bool:
         """Adds a block to the reply; False when it does not fit there."""
         if first:
-            if len(content) < _FIRST.size:
+            if len(content) < _MESSAGE.size:
                 return False
-            length, crc = _FIRST.unpack_from(content)
-            if length > WANTED_BUFFER:
+            message = _MESSAGE.unpack(content)
+            if message.size > WANTED_BUFFER:
                 return False
-            self._expected = length, crc
+            self._expected = message.size, message.crc
             self._incoming.clear()
-            content = content[_FIRST.size :]
+            content = content[_MESSAGE.size :]
         elif not self._expected:
             return False
         self._incoming += content
@@ -461,16 +468,15 @@ class Channel:
         self._unanswered -= 1
 
 
-def _meta(kind: int, body: bytes) -> bytes:
+def _meta(layout: Layout, kind: int, **body: int) -> bytes:
     """A meta package; its CRC covers all of it with the CRC field zero."""
-    crc = zlib.crc32(_META.pack(kind, 0, lib.CHANNEL_VERSION, 0) + body)
-    return _META.pack(kind, 0, lib.CHANNEL_VERSION, crc) + body
+    crc = zlib.crc32(layout.pack(type=kind, version=lib.CHANNEL_VERSION, **body))
+    return layout.pack(type=kind, version=lib.CHANNEL_VERSION, crc=crc, **body)
 
 
-def _meta_body(package: bytes) -> bytes:
-    """What follows the head of a meta package; nothing when the package is damaged."""
+def _is_whole(package: bytes) -> bool:
+    """Whether the CRC of a meta package is right."""
     if len(package) < _META.size:
-        return b""
-    kind, flags, version, crc = _META.unpack_from(package)
-    body = package[_META.size :]
-    return body if zlib.crc32(_META.pack(kind, flags, version, 0) + body) == crc else b""
+        return False
+    head = _META.unpack(package)
+    return zlib.crc32(_META.pack(**head._replace(crc=0)._asdict()) + package[_META.size :]) == int(head.crc)

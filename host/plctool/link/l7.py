@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 
 from plctool.core import error_name, lib
 from plctool.errors import DeviceError, LinkError
 from plctool.link import bintag
+from plctool.link.wire import Layout
 
-_HEADER = struct.Struct("<HHHHIIHH")
-_SHORT_LENGTH, _LONGEST_LENGTH = 12, 64
-_LENGTH_BASE = 4  # the header length field counts from here
+_HEADER = Layout("L7_HEADER")
+_SHORT_HEADER = Layout("L7_HEADER", before="customer")
+_LENGTH_BASE = Layout("L7_HEADER", before="group").size  # the length of the header counts from here
 
 _ADVICE = {
     lib.ERR_INVALID_STATE: "it stopped with an exception, reset it first",
@@ -31,27 +31,25 @@ class Message:
 
 def encode(message: Message) -> bytes:
     head = _HEADER.pack(
-        lib.L7_PROTOCOL,
-        lib.L7_HEADER_LENGTH,
-        message.group,
-        message.service,
-        message.session,
-        len(message.content),
-        0,
-        0,
+        protocol=lib.L7_PROTOCOL,
+        length=lib.L7_HEADER_LENGTH,
+        group=message.group,
+        service=message.service,
+        session=message.session,
+        size=len(message.content),
     )
     return head + message.content
 
 
 def decode(data: bytes) -> Message:
-    """The message in `data`; raises LinkError when it is none."""
-    if len(data) >= _LENGTH_BASE + _SHORT_LENGTH:
-        protocol, length, group, service, session, size = struct.unpack_from("<HHHHII", data)
-        content_at = _LENGTH_BASE + length
-        fits = _SHORT_LENGTH <= length <= _LONGEST_LENGTH and content_at + size <= len(data)
-        if protocol == lib.L7_PROTOCOL and fits:
-            return Message(group, service, session, data[content_at : content_at + size])
-    raise LinkError("The device sent an answer that is none; update plctool or the device.", "protocol")
+    """The message in `data`; raises LinkError when it is malformed."""
+    if len(data) >= _SHORT_HEADER.size:
+        head = _SHORT_HEADER.unpack(data)
+        content_at = _LENGTH_BASE + head.length
+        known_length = lib.L7_HEADER_LENGTH_SHORT <= head.length <= lib.L7_HEADER_LENGTH_MAX
+        if head.protocol == lib.L7_PROTOCOL and known_length and content_at + head.size <= len(data):
+            return Message(head.group, head.service, head.session, data[content_at : content_at + head.size])
+    raise LinkError("The device sent a malformed message; update plctool or the device.", "protocol")
 
 
 def decode_reply(data: bytes, request: Message) -> bintag.Tags:

@@ -1,4 +1,4 @@
-"""Monitoring: reads and writes the memory of the application (codesys-v3-protocol 4.9 and CmpSrvNumbers.h)."""
+"""Monitoring: reads and writes the memory of the application (codesys-v3-protocol 4.9 and docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from plctool.core import lib
 from plctool.errors import DeviceError
 from plctool.link import bintag, l7
 from plctool.link.session import Session
+from plctool.link.wire import Layout
 
-_VALUE_HEAD = struct.Struct("<HI")  # id and size before each value
+_VALUE_HEAD = Layout("MON2_VALUE")  # before each value
+_APPLICATION = Layout("MON2_APPLICATION")
 _MESSAGE_OVERHEAD = 96  # layer 7 header, application tag and list heads, bytes
 _TRIES = 5  # to read values while no task runs
 _ALL_BITS = 0xFF
@@ -136,9 +138,10 @@ def _read_batch(session: Session, image_crc: int, batch: Sequence[AreaRange]) ->
     for index, piece in enumerate(batch):
         if len(content) < _VALUE_HEAD.size:
             break
-        value_id, size = _VALUE_HEAD.unpack_from(content)
-        value = content[_VALUE_HEAD.size : _VALUE_HEAD.size + size]
-        content = content[_VALUE_HEAD.size + size :]
+        head = _VALUE_HEAD.unpack(content)
+        value_id = head.id
+        value = content[_VALUE_HEAD.size : _VALUE_HEAD.size + head.size]
+        content = content[_VALUE_HEAD.size + head.size :]
         if value_id == index | lib.MON2_ID_FAILED and value:
             if not _leads_nowhere(piece, value[0]):
                 raise _monitoring_error("read", value[0])
@@ -179,7 +182,7 @@ def write_memory(session: Session, image_crc: int, values: Sequence[Write]) -> N
         code = _address_code(write.where)
         if write.mask != _ALL_BITS:
             code += bytes([lib.MON2_OP_MASK, write.mask])
-        entry = _VALUE_HEAD.pack(index, len(write.value)) + write.value + struct.pack("<H", len(code)) + code
+        entry = _VALUE_HEAD.pack(id=index, size=len(write.value)) + write.value + struct.pack("<H", len(code)) + code
         if message and len(message) + len(entry) > room:
             _write_batch(session, image_crc, message)
             message = b""
@@ -200,7 +203,8 @@ def _application_tag(session: Session, image_crc: int) -> bintag.Tag:
     application = session.application()
     if application.image_crc != image_crc:
         raise _application_changed(session)
-    return bintag.raw(lib.TAG_MON2_APPLICATION, struct.pack("<I", application.session) + application.data_guid)
+    content = _APPLICATION.pack(session=application.session, data_guid=application.data_guid)
+    return bintag.raw(lib.TAG_MON2_APPLICATION, content)
 
 
 def _application_changed(session: Session) -> DeviceError:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
+from typing import Any
 
 from plctool.core import lib
+from plctool.link.wire import Layout
 
-_REQUEST = struct.Struct("<HHI")
-_REPLY_0400 = struct.Struct("<HHIHBBHHHHIIIIBBBBII")
-_REPLY_0103 = struct.Struct("<HHIHBBHHHHIII")
+_REQUEST = Layout("NS_REQUEST")
+_REPLY_0400 = Layout("NS_REPLY_0400")
+_REPLY_0103 = Layout("NS_REPLY_0103")
 
 
 @dataclass(frozen=True)
@@ -33,46 +34,47 @@ class Node:
 
 def encode_request(request_id: int) -> bytes:
     """A request to all nodes to name themselves."""
-    return _REQUEST.pack(lib.NS_RESOLVE_ADDRESS, lib.NS_VERSION_0400, request_id)
+    return _REQUEST.pack(type=lib.NS_RESOLVE_ADDRESS, version=lib.NS_VERSION_0400, request_id=request_id)
 
 
 def decode_reply(payload: bytes, request_id: int, address: bytes) -> Node | None:
     """The node that answered request `request_id`; None when the payload is something else or malformed."""
     if len(payload) < _REPLY_0103.size:
         return None
-    kind, version, echoed = _REQUEST.unpack_from(payload)
-    if kind != lib.NS_IDENTIFICATION or echoed != request_id:
+    head = _REQUEST.unpack(payload)
+    if head.type != lib.NS_IDENTIFICATION or head.request_id != request_id:
         return None
-    if version >= lib.NS_VERSION_0400:
+    if head.version >= lib.NS_VERSION_0400:
         return _decode_0400(payload, address)
-    return _decode_older(payload, address) if version in (lib.NS_VERSION_0102, lib.NS_VERSION_0103) else None
+    return _decode_older(payload, address) if head.version in (lib.NS_VERSION_0102, lib.NS_VERSION_0103) else None
 
 
 def _decode_0400(payload: bytes, address: bytes) -> Node | None:
     if len(payload) < _REPLY_0400.size:
         return None
-    fields = _REPLY_0400.unpack_from(payload)
-    parents, *lengths = fields[6:10]
-    serial_length = fields[14]
-    strings = _strings(payload, _REPLY_0400.size + 2 * parents, lengths)
+    head = _REPLY_0400.unpack(payload)
+    strings = _strings(payload, _REPLY_0400.size, head)
     if strings is None:
         return None
     names, end = strings
-    serial = payload[end : end + serial_length].decode("ascii", "replace")
-    return Node(address, *names, fields[10], fields[11], version_text(fields[12]), serial)
+    serial = payload[end : end + head.serial_length].decode("ascii", "replace")
+    return Node(address, *names, head.target_type, head.target_id, version_text(head.target_version), serial)
 
 
 def _decode_older(payload: bytes, address: bytes) -> Node | None:
-    fields = _REPLY_0103.unpack_from(payload)
-    parents, *lengths = fields[6:10]
-    strings = _strings(payload, _REPLY_0103.size + 2 * parents, lengths)
-    return Node(address, *strings[0], fields[10], fields[11], version_text(fields[12])) if strings else None
+    head = _REPLY_0103.unpack(payload)
+    strings = _strings(payload, _REPLY_0103.size, head)
+    if strings is None:
+        return None
+    return Node(address, *strings[0], head.target_type, head.target_id, version_text(head.target_version))
 
 
-def _strings(payload: bytes, at: int, lengths: list[int]) -> tuple[tuple[str, str, str], int] | None:
-    """The three UTF-16 names at `at` and the position after them, None when they do not fit."""
+def _strings(payload: bytes, at: int, head: Any) -> tuple[tuple[str, str, str], int] | None:
+    """The three UTF-16 names after the parent's address at `at`, and the position after them; None when they do not
+    fit."""
     names = []
-    for length in lengths:
+    at += 2 * head.parent_words
+    for length in (head.node_length, head.device_length, head.vendor_length):
         end = at + 2 * length
         if end + 2 > len(payload):
             return None

@@ -8,19 +8,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from plctool.core import lib
+from plctool.link.wire import Layout
 
 _WORD = 2
-_FIXED_SIZE: int = _WORD * lib.ROUTER_HEADER_WORDS
+_HEADER = Layout("ROUTER_HEADER")
+_HEADER_WORDS = _HEADER.size // _WORD
+_HEADER_WORDS_MASK = (1 << lib.ROUTER_HOP_SHIFT) - 1
 _PAYLOAD_ALIGN = 4
-_SIGNAL_FLAG = 0x20
-_RELATIVE_FLAG = 0x10
 
 BROADCAST = b""
 
 
 @dataclass(frozen=True)
 class Packet:
-    """A packet between two nodes. An empty receiver means everybody."""
+    """A packet between two nodes. An empty receiver means all nodes."""
 
     service: int
     receiver: bytes
@@ -31,7 +32,7 @@ class Packet:
 
 def header_size(receiver: bytes, sender: bytes) -> int:
     """Bytes before the payload, filler included."""
-    size = _FIXED_SIZE + len(receiver) + len(sender)
+    size = _HEADER.size + len(receiver) + len(sender)
     return _aligned(size)
 
 
@@ -41,15 +42,13 @@ def _aligned(size: int) -> int:
 
 def encode(packet: Packet) -> bytes:
     """The bytes of a packet, ready for a block driver."""
-    head = bytes(
-        [
-            lib.ROUTER_MAGIC,
-            lib.ROUTER_HOP_COUNT << 3 | lib.ROUTER_HEADER_WORDS,
-            lib.ROUTER_PRIO_NORMAL << 6,
-            packet.service,
-            packet.message_id,
-            len(packet.sender) // _WORD << 4 | len(packet.receiver) // _WORD,
-        ]
+    head = _HEADER.pack(
+        magic=lib.ROUTER_MAGIC,
+        hops=lib.ROUTER_HOP_COUNT << lib.ROUTER_HOP_SHIFT | _HEADER_WORDS,
+        flags=lib.ROUTER_PRIO_NORMAL << lib.ROUTER_PRIO_SHIFT,
+        service=packet.service,
+        message=packet.message_id,
+        lengths=len(packet.sender) // _WORD << 4 | len(packet.receiver) // _WORD,
     )
     head += packet.receiver + packet.sender
     return head.ljust(header_size(packet.receiver, packet.sender), b"\0") + packet.payload
@@ -57,11 +56,13 @@ def encode(packet: Packet) -> bytes:
 
 def decode(data: bytes) -> Packet | None:
     """The packet in `data`; None when malformed or nothing for an end node (router signals, relative addresses)."""
-    if len(data) < _FIXED_SIZE or data[0] != lib.ROUTER_MAGIC or data[2] & (_SIGNAL_FLAG | _RELATIVE_FLAG):
+    if len(data) < _HEADER.size:
         return None
-    header_words = data[1] & 0x07
-    sender_words, receiver_words = data[5] >> 4, data[5] & 0x0F
-    if header_words < lib.ROUTER_HEADER_WORDS:
+    head = _HEADER.unpack(data)
+    header_words = head.hops & _HEADER_WORDS_MASK
+    sender_words, receiver_words = head.lengths >> 4, head.lengths & 0x0F
+    signal = head.flags & (lib.ROUTER_FLAG_SIGNAL | lib.ROUTER_FLAG_RELATIVE)
+    if head.magic != lib.ROUTER_MAGIC or signal or header_words < _HEADER_WORDS:
         return None
     receiver_at = _WORD * header_words
     sender_at = receiver_at + _WORD * receiver_words
@@ -69,4 +70,4 @@ def decode(data: bytes) -> Packet | None:
     payload_at = _aligned(end)
     if payload_at > len(data):
         return None
-    return Packet(data[3], data[receiver_at:sender_at], data[sender_at:end], data[payload_at:], data[4])
+    return Packet(head.service, data[receiver_at:sender_at], data[sender_at:end], data[payload_at:], head.message)

@@ -1,4 +1,4 @@
-"""The services of a device as typed functions (codesys-v3-protocol 4.4 .. 4.10 and CmpSrvNumbers.h); monitoring has a
+"""The services of a device as typed functions (codesys-v3-protocol 4.4 .. 4.10 and docs/protocol.md); monitoring has a
 module of its own.
 
 Every function takes a `Session`; requests that were lost with their channel are repeated unless said otherwise.
@@ -6,7 +6,6 @@ Every function takes a `Session`; requests that were lost with their channel are
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -18,11 +17,22 @@ from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
 from plctool.link.names import version_text
 from plctool.link.session import Session
+from plctool.link.wire import Layout, signed32
 
 _SLOW = 30.0  # patience for what may erase flash or run initialisation code [s]
 _TRANSFER_PATIENCE = 10.0  # longer than flash takes to erase a sector [s]
 _DOWNLOAD_TRIES = 4  # without any progress
 _NO_OFFSET = 0xFFFFFFFF
+
+_IDENT = Layout("DEV_IDENT")
+_STACK = Layout("DEV_STACK")
+_STATE = Layout("APP_STATE")
+_LAST_EXCEPTION = Layout("APP_LAST_EXCEPTION")
+_IMAGE = Layout("APP_IMAGE_IDENTITY")
+_CALL = Layout("EXCEPT_CALL")
+_TASK = Layout("TASK_INFO")
+_POSITION = Layout("CDL_POSITION")
+_LOG_RECORD = Layout("LOG_RECORD")
 
 
 @dataclass(frozen=True)
@@ -128,16 +138,16 @@ class LogEntry:
 
 def read_identity(session: Session) -> Identity:
     tags = session.recover(lambda: session.call(lib.SG_DEVICE, lib.SRV_DEV_GET_TARGET_IDENT))
-    target_type, target_id, version = struct.unpack_from("<3I", tags.bytes(lib.TAG_DEV_IDENT, 12))
+    ident = _IDENT.unpack(tags.bytes(lib.TAG_DEV_IDENT, _IDENT.size))
     serial = tags.find(lib.TAG_DEV_SERIAL_NUMBER) or b"\0\0"
     return Identity(
         device_name=_wide_text(tags.bytes(lib.TAG_DEV_DEVICE_NAME, 4)),
         vendor_name=_wide_text(tags.bytes(lib.TAG_DEV_VENDOR_NAME, 4)),
         node_name=_wide_text(tags.bytes(lib.TAG_DEV_NODE_NAME, 4)),
         serial_number=serial[2 : 2 + int.from_bytes(serial[:2], "little")].decode("ascii", "replace"),
-        target_type=target_type,
-        target_id=target_id,
-        version=version_text(version),
+        target_type=ident.type,
+        target_id=ident.id,
+        version=version_text(ident.version),
         runtime_version=version_text(tags.u32(lib.TAG_DEV_RTS_VERSION)),
     )
 
@@ -147,7 +157,7 @@ def read_stack(session: Session) -> Stack | None:
     tags = session.recover(lambda: session.call(lib.SG_DEVICE, lib.SRV_DEV_GET_TARGET_IDENT))
     if tags.find(lib.TAG_DEV_STACK) is None:
         return None
-    stack = Stack(*struct.unpack_from("<2I", tags.bytes(lib.TAG_DEV_STACK, 8)))
+    stack = Stack(*_STACK.unpack(tags.bytes(lib.TAG_DEV_STACK, _STACK.size)))
     return stack if stack.size else None
 
 
@@ -173,15 +183,16 @@ def echo(session: Session, data: bytes) -> bytes:
 def read_status(session: Session) -> Status:
     tags = session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_STATUS))
     status = tags.container(lib.TAG_APP_STATUS)
-    result, state, operating = struct.unpack_from("<HII", status.bytes(lib.TAG_APP_STATE, 10))
-    l7.check_result(result, "status")
-    code, offset, task = struct.unpack_from("<IIi", status.bytes(lib.TAG_APP_LAST_EXCEPTION, 12))
-    crc, size = struct.unpack_from("<II", status.bytes(lib.TAG_APP_IMAGE, 8))
+    state = _STATE.unpack(status.bytes(lib.TAG_APP_STATE, _STATE.size))
+    l7.check_result(state.result, "status")
+    last = _LAST_EXCEPTION.unpack(status.bytes(lib.TAG_APP_LAST_EXCEPTION, _LAST_EXCEPTION.size))
+    image = _IMAGE.unpack(status.bytes(lib.TAG_APP_IMAGE, _IMAGE.size))
     exception = None
-    if code != lib.RTSEXCPT_NOEXCEPTION:
-        trace = Trace.of(struct.iter_unpack("<II", status.find(lib.TAG_APP_CALLS) or b""))
-        exception = AppException(code, None if offset == _NO_OFFSET else offset, task, trace)
-    return Status(_app_state(state, operating), crc, size, exception, operating)
+    if last.code != lib.RTSEXCPT_NOEXCEPTION:
+        trace = Trace.of(_CALL.unpack_each(status.find(lib.TAG_APP_CALLS) or b""))
+        offset = None if last.code_offset == _NO_OFFSET else last.code_offset
+        exception = AppException(last.code, offset, signed32(last.task), trace)
+    return Status(_app_state(state.state, state.op_state), image.crc, image.size, exception, state.op_state)
 
 
 def _app_state(state: int, operating: int) -> AppState:
@@ -228,12 +239,11 @@ def read_application_info(session: Session) -> dict[str, str]:
 
 def read_tasks(session: Session) -> list[TaskInfo]:
     tags = session.recover(lambda: session.call(lib.SG_APPLICATION, lib.SRV_APP_READ_TASK_INFO))
-    numbers = struct.Struct(f"<{lib.TASK_INFO_WORDS}I")
     tasks = []
     for tag, content in tags:
-        if tag == lib.TAG_TASK_INFO and isinstance(content, bytes) and len(content) >= numbers.size:
-            name = content[numbers.size :].split(b"\0", 1)[0].decode(errors="replace")
-            tasks.append(TaskInfo(name, *numbers.unpack_from(content)))
+        if tag == lib.TAG_TASK_INFO and isinstance(content, bytes) and len(content) >= _TASK.size:
+            name = content[_TASK.size :].split(b"\0", 1)[0].decode(errors="replace")
+            tasks.append(TaskInfo(name, *_TASK.unpack(content)))
     return tasks
 
 
@@ -304,7 +314,8 @@ class _Transfer:
             yield l7.encode(self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, content))
 
     def _position(self, flags: int, offset: int) -> bintag.Tag:
-        return bintag.u32(lib.TAG_CDL_POSITION, flags, offset, len(self._image), self._crc)
+        content = _POSITION.pack(flags=flags, offset=offset, total_size=len(self._image), crc=self._crc)
+        return bintag.raw(lib.TAG_CDL_POSITION, content)
 
     def _take(self, tags: bintag.Tags) -> None:
         l7.check_result(tags.u16(lib.TAG_SERVICE_RESULT), "download", tags.text(lib.TAG_CDL_REASON))
@@ -328,10 +339,11 @@ def _read_log_batch(session: Session, start_handle: int) -> list[LogEntry]:
     tags = session.call(lib.SG_LOG, lib.SRV_LOG_GET_ENTRIES, [bintag.u32(lib.TAG_LOG_START_HANDLE, start_handle)])
     entries = []
     for record in tags.containers(lib.TAG_LOG_RECORD):
-        _, log_class, error, _ = struct.unpack_from("<4I", record.bytes(lib.TAG_LOG_ENTRY, 16))
+        entry = _LOG_RECORD.unpack(record.bytes(lib.TAG_LOG_ENTRY, _LOG_RECORD.size))
         handle = record.u32(lib.TAG_LOG_HANDLE)
         if handle >= start_handle:
             time_ns = int.from_bytes(record.bytes(lib.TAG_LOG_TIME_NS, 8)[:8], "little", signed=True)
             component = record.text(lib.TAG_LOG_COMPONENT_NAME)
-            entries.append(LogEntry(handle, time_ns, component, log_class, error, record.text(lib.TAG_LOG_TEXT)))
+            text = record.text(lib.TAG_LOG_TEXT)
+            entries.append(LogEntry(handle, time_ns, component, entry.log_class, entry.error, text))
     return entries

@@ -12,11 +12,12 @@ from plctool.errors import DeviceError
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import PATIENCE, MessageLink
+from plctool.link.wire import Layout
 
 _T = TypeVar("_T")
 _TRIES = 3
 _APPLICATION = "Application"
-_GUID_SIZE = 16
+_LOGIN_REPLY = Layout("APP_LOGIN_REPLY")
 
 
 @dataclass(frozen=True)
@@ -120,13 +121,12 @@ class Session:
 
     def _login_application(self) -> Application:
         tags = self.call(lib.SG_APPLICATION, lib.SRV_APP_LOGIN, [bintag.text(lib.TAG_APP_LOGIN_NAME, _APPLICATION)])
-        content = tags.container(lib.TAG_APP_DESCRIPTOR).bytes(lib.TAG_APP_OPTION, lib.APP_LOGIN_REPLY_SIZE)
-        result = int.from_bytes(content[:2], "little")
-        if result == lib.ERR_APP_NOT_EXIST:
-            raise DeviceError("There is no application on the device; flash one first.", "app-not-exist", result)
-        l7.check_result(result, "login to the application")
-        guid = content[lib.APP_LOGIN_REPLY_SIZE - _GUID_SIZE : lib.APP_LOGIN_REPLY_SIZE]
-        return Application(int.from_bytes(content[2:6], "little"), guid)
+        content = tags.container(lib.TAG_APP_DESCRIPTOR).bytes(lib.TAG_APP_OPTION, _LOGIN_REPLY.size)
+        login = _LOGIN_REPLY.unpack(content)
+        if login.result == lib.ERR_APP_NOT_EXIST:
+            raise DeviceError("There is no application on the device; flash one first.", "app-not-exist", login.result)
+        l7.check_result(login.result, "login to the application")
+        return Application(login.session, login.data_guid)
 
 
 def _wants_application_login(group: int, reply: bintag.Tags) -> bool:

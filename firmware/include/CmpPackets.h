@@ -1,0 +1,288 @@
+/*
+ * CmpPackets.h - layouts of the communication protocol (shared with the host); numbers are in CmpSrvNumbers.h, what
+ * happens with them in docs/protocol.md.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Names as in codesys-v3-protocol, sections in brackets. All integers are little-endian and lie where the packet has
+ * them, aligned or not: so they are arrays of bytes, read and written by CmpBytes.h, and a layout has no padding. A
+ * pointer to any byte may be cast to a pointer to a layout, once the length is checked against its size.
+ */
+#ifndef CMPPACKETS_H
+#define CMPPACKETS_H
+
+#include "CmpStd.h"
+
+typedef RTS_UI8 WIRE_UI16[2];
+typedef RTS_UI8 WIRE_UI32[4];
+typedef RTS_UI8 WIRE_UI64[8];
+
+/* ---- layer 3: router [2.1] ---- */
+
+/* Then the receiver's address, the sender's, and zeros up to a multiple of 4. */
+typedef struct {
+    RTS_UI8 magic;   /* ROUTER_MAGIC */
+    RTS_UI8 hops;    /* hop count << 3 | words of this header: a sender may have more than these three */
+    RTS_UI8 flags;   /* priority << 6, ROUTER_FLAG_*, longest packet / 32 - 1, or 0 when nothing is said of that */
+    RTS_UI8 service; /* ROUTER_SVC_* */
+    RTS_UI8 message;
+    RTS_UI8 lengths; /* of the addresses, words: sender << 4 | receiver; no receiver: all nodes */
+} ROUTER_HEADER;
+
+/* ---- name service [2.6] ---- */
+
+/* Then, for NS_RESOLVE_NAME, the name in UTF-16. */
+typedef struct {
+    WIRE_UI16 type;    /* NS_RESOLVE_* */
+    WIRE_UI16 version; /* newest that is understood */
+    WIRE_UI32 request_id;
+} NS_REQUEST;
+
+/* Versions 1.02 and 1.03. Then the parent's address, node, device and vendor name, each in UTF-16 with NUL. */
+typedef struct {
+    WIRE_UI16 type; /* NS_IDENTIFICATION */
+    WIRE_UI16 version;
+    WIRE_UI32 request_id;
+    WIRE_UI16 max_channels;
+    RTS_UI8 little_endian;
+    RTS_UI8 address_difference;
+    WIRE_UI16 parent_words;
+    WIRE_UI16 node_length; /* of the names, characters without NUL */
+    WIRE_UI16 device_length;
+    WIRE_UI16 vendor_length;
+    WIRE_UI32 target_type;
+    WIRE_UI32 target_id; /* vendor << 16 | device */
+    WIRE_UI32 target_version;
+} NS_REPLY_0103;
+
+/* Then as 1.03, and after that the serial number with NUL. */
+typedef struct {
+    NS_REPLY_0103 old;
+    WIRE_UI32 flags;
+    RTS_UI8 serial_length;
+    RTS_UI8 oem_length;
+    RTS_UI8 driver_type; /* BLK_DRV_TYPE_* */
+    RTS_UI8 reserved[9];
+} NS_REPLY_0400;
+
+/* Then the parent's address, node and device name. */
+typedef struct {
+    WIRE_UI16 type;
+    WIRE_UI16 version;
+    WIRE_UI32 request_id;
+    WIRE_UI32 target_type;
+    WIRE_UI16 max_channels;
+    RTS_UI8 little_endian;
+    RTS_UI8 reserved;
+    WIRE_UI16 parent_words;
+    WIRE_UI16 node_length;
+    WIRE_UI16 device_length;
+} NS_REPLY_0101;
+
+/* ---- layer 4: channel [3] ---- */
+
+/* How every meta package starts. */
+typedef struct {
+    RTS_UI8 type; /* CHANNEL_PKG_*, with CHANNEL_META */
+    RTS_UI8 flags;
+    WIRE_UI16 version; /* CHANNEL_VERSION */
+    WIRE_UI32 crc;     /* CRC-32 of the whole package with zeros here */
+} CHANNEL_META_HEADER;
+
+/* Clients of version 1.0 leave out what follows `limit`. */
+typedef struct {
+    CHANNEL_META_HEADER meta;
+    WIRE_UI32 request_id;
+    WIRE_UI32 limit;       /* longest message, bytes */
+    RTS_UI8 address_words; /* of both addresses together */
+    RTS_UI8 reserved[3];
+} CHANNEL_OPEN_REQUEST;
+
+typedef struct {
+    CHANNEL_META_HEADER meta;
+    WIRE_UI32 request_id;
+    WIRE_UI16 result; /* CHANNEL_OPEN_* */
+    WIRE_UI16 id;     /* CHANNEL_ID_NONE when refused */
+    WIRE_UI32 limit;
+    RTS_UI8 byte_order; /* 1: the device is big-endian */
+    RTS_UI8 address_words;
+    RTS_UI8 reserved[2];
+} CHANNEL_OPEN_RESPONSE;
+
+/* From both sides. */
+typedef struct {
+    CHANNEL_META_HEADER meta;
+    WIRE_UI16 id;
+    WIRE_UI16 error; /* ERR_CHS_*, 0 for an orderly end */
+} CHANNEL_CLOSE;
+
+typedef struct {
+    CHANNEL_META_HEADER meta;
+    WIRE_UI16 max_channels;
+} CHANNEL_RTS_INFO;
+
+/* How every other package starts; the whole of a keepalive. */
+typedef struct {
+    RTS_UI8 type;  /* CHANNEL_PKG_* */
+    RTS_UI8 flags; /* CHANNEL_FLAG_* */
+    WIRE_UI16 id;
+} CHANNEL_HEADER;
+
+typedef struct {
+    CHANNEL_HEADER head;
+    WIRE_UI32 acknowledged; /* highest block received in order */
+} CHANNEL_ACK;
+
+/* Then a part of a message. */
+typedef struct {
+    CHANNEL_HEADER head;
+    WIRE_UI32 block;
+    WIRE_UI32 acknowledged;
+} CHANNEL_DATA;
+
+/* At the beginning of the part in a block with CHANNEL_FLAG_FIRST. */
+typedef struct {
+    WIRE_UI32 size; /* of the message, bytes */
+    WIRE_UI32 crc;  /* CRC-32 of the message */
+} CHANNEL_MESSAGE;
+
+/* ---- layer 7 [4.1] ---- */
+
+/* Then the content, `length` bytes after that member. With L7_HEADER_LENGTH_SHORT there is no `customer`. */
+typedef struct {
+    WIRE_UI16 protocol; /* L7_PROTOCOL */
+    WIRE_UI16 length;   /* L7_HEADER_LENGTH, counted from after this member */
+    WIRE_UI16 group;    /* SG_*, in a reply with L7_REPLY */
+    WIRE_UI16 service;  /* SRV_* */
+    WIRE_UI32 session;
+    WIRE_UI32 size; /* of the content, bytes */
+    WIRE_UI32 customer;
+} L7_HEADER;
+
+/* ---- contents of elements [4.4 .. 4.10] ---- */
+
+/* TAG_DEV_IDENT. */
+typedef struct {
+    WIRE_UI32 type;
+    WIRE_UI32 id;
+    WIRE_UI32 version;
+} DEV_IDENT;
+
+/* TAG_DEV_STACK (own). */
+typedef struct {
+    WIRE_UI32 size;   /* of the main stack, bytes; 0: not known */
+    WIRE_UI32 unused; /* bytes of it that were never used */
+} DEV_STACK;
+
+/* The reply to SRV_APP_LOGIN and SRV_APP_CREATE. */
+typedef struct {
+    WIRE_UI16 result;
+    WIRE_UI32 session;     /* of the application */
+    RTS_UI8 code_guid[16]; /* CRC of the image, zeros */
+    RTS_UI8 data_guid[16];
+} APP_LOGIN_REPLY;
+
+/* TAG_APP_STATE. */
+typedef struct {
+    WIRE_UI16 result;
+    WIRE_UI32 state;    /* AS_* */
+    WIRE_UI32 op_state; /* OS_* */
+} APP_STATE;
+
+/* TAG_APP_EXECUTION_POSITION. */
+typedef struct {
+    WIRE_UI16 area;
+    WIRE_UI32 offset;
+} APP_POSITION;
+
+/* TAG_APP_LAST_EXCEPTION (own). */
+typedef struct {
+    WIRE_UI32 code; /* RTSEXCPT_* */
+    WIRE_UI32 code_offset;
+    WIRE_UI32 task; /* index, -1: none */
+} APP_LAST_EXCEPTION;
+
+/* TAG_APP_IMAGE (own). */
+typedef struct {
+    WIRE_UI32 crc;
+    WIRE_UI32 size;
+} APP_IMAGE_IDENTITY;
+
+/* TAG_CDL_POSITION (own). */
+typedef struct {
+    WIRE_UI32 flags; /* DLF_* */
+    WIRE_UI32 offset;
+    WIRE_UI32 total_size;
+    WIRE_UI32 crc; /* of the image */
+} CDL_POSITION;
+
+/* TAG_TASK_INFO (own). Then the name with NUL. Times in us. */
+typedef struct {
+    WIRE_UI32 kind; /* KIND_* */
+    WIRE_UI32 priority;
+    WIRE_UI32 interval_us;
+    WIRE_UI32 cycles;
+    WIRE_UI32 last_us;
+    WIRE_UI32 avg_us;
+    WIRE_UI32 min_us;
+    WIRE_UI32 max_us;
+    WIRE_UI32 jitter_us;
+    WIRE_UI32 overruns;
+} TASK_INFO;
+
+/* TAG_MON2_APPLICATION. */
+typedef struct {
+    WIRE_UI32 session;
+    RTS_UI8 data_guid[16];
+} MON2_APPLICATION;
+
+/* Before each value that was read or is to be written. */
+typedef struct {
+    WIRE_UI16 id;
+    WIRE_UI32 size;
+} MON2_VALUE;
+
+/* TAG_LOG_ENTRY. */
+typedef struct {
+    WIRE_UI32 component;
+    WIRE_UI32 log_class;
+    WIRE_UI32 error; /* ERR_* */
+    WIRE_UI32 info;
+} LOG_RECORD;
+
+#ifndef RTS_CFFI
+#define WIRE_SIZE(layout, size) RTS_STATIC_ASSERT(sizeof(layout) == (size), layout##_has_no_padding)
+WIRE_SIZE(ROUTER_HEADER, 6);
+WIRE_SIZE(NS_REQUEST, 8);
+WIRE_SIZE(NS_REPLY_0103, 32);
+WIRE_SIZE(NS_REPLY_0400, 48);
+WIRE_SIZE(NS_REPLY_0101, 22);
+WIRE_SIZE(CHANNEL_META_HEADER, 8);
+WIRE_SIZE(CHANNEL_OPEN_REQUEST, 20);
+WIRE_SIZE(CHANNEL_OPEN_RESPONSE, 24);
+WIRE_SIZE(CHANNEL_CLOSE, 12);
+WIRE_SIZE(CHANNEL_RTS_INFO, 10);
+WIRE_SIZE(CHANNEL_HEADER, 4);
+WIRE_SIZE(CHANNEL_ACK, 8);
+WIRE_SIZE(CHANNEL_DATA, 12);
+WIRE_SIZE(CHANNEL_MESSAGE, 8);
+WIRE_SIZE(L7_HEADER, 20);
+WIRE_SIZE(DEV_IDENT, 12);
+WIRE_SIZE(DEV_STACK, 8);
+WIRE_SIZE(APP_LOGIN_REPLY, 38);
+WIRE_SIZE(APP_STATE, 10);
+WIRE_SIZE(APP_POSITION, 6);
+WIRE_SIZE(APP_LAST_EXCEPTION, 12);
+WIRE_SIZE(APP_IMAGE_IDENTITY, 8);
+WIRE_SIZE(CDL_POSITION, 16);
+WIRE_SIZE(TASK_INFO, 40);
+WIRE_SIZE(MON2_APPLICATION, 20);
+WIRE_SIZE(MON2_VALUE, 6);
+WIRE_SIZE(LOG_RECORD, 16);
+#undef WIRE_SIZE
+
+/* Head of a block that begins a message. */
+enum { CHANNEL_FIRST_SIZE = sizeof(CHANNEL_DATA) + sizeof(CHANNEL_MESSAGE) };
+#endif
+
+#endif
