@@ -25,6 +25,7 @@ WARNINGS = {
     "integer-division": "an integer division drops its fraction before the result becomes a REAL",
     "kept": "a variable is RETAIN or PERSISTENT, but what it holds is an address, which is not kept",
     "layout": "a type takes more memory than it does in other systems",
+    "left-out": "a part of an export, such as a visualisation, has no meaning here",
     "lifetime": "an instance of a function block lives for one call only, and starts anew in the next one",
     "narrowing": "an integer or an LREAL goes where not all of its values fit",
     "no-effect": "an attribute, pragma or qualifier changes nothing here, though it does in other systems",

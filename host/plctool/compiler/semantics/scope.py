@@ -159,6 +159,26 @@ class Scope:
         """Reports an error at an offset."""
         self.globals.diagnostics.error(self.source.pos(offset), code, message)
 
+    def missing(self, offset: int, name: str, message: str) -> None:
+        """Reports that nothing is known by a name."""
+        self.globals.diagnostics.missing(self.source.pos(offset), name, message)
+
+    def is_incomplete(self, unit: str) -> bool:
+        """Whether a unit lacks something because of an error that was reported, so that more would follow from it."""
+        return unit.casefold() in self.globals.diagnostics.incomplete
+
+    def inherits_unknown(self, cls: ClassInfo | None) -> bool:
+        """Whether a class may have members that are not known, because a base of it is not."""
+        while cls is not None and cls.name.casefold() not in self.globals.diagnostics.baseless:
+            cls = cls.base
+        return cls is not None
+
+    def lacks(self, unit: str, *, base: bool = False) -> None:
+        """Notes that a unit is incomplete: a variable has an unknown type, or its `base` is unknown."""
+        self.globals.diagnostics.incomplete.add(unit.casefold())
+        if base:
+            self.globals.diagnostics.baseless.add(unit.casefold())
+
     def warning(self, offset: int, code: str, message: str) -> None:
         """Reports a warning at an offset."""
         self.globals.diagnostics.warning(self.source.pos(offset), code, message)

@@ -26,7 +26,7 @@ _GLOBALS = re.compile(r"\bVAR_GLOBAL\b(.*?)\bEND_VAR\b", re.IGNORECASE | re.DOTA
 _VARIABLE = re.compile(r"([A-Za-z_]\w*)\s*(?:AT\s*%[\w.*]+\s*)?:(?!=)")
 
 
-def declared_names(texts: Sequence[str], library: Callable[[], Iterable[str]]) -> frozenset[str]:
+def names_asked_for(texts: Sequence[str], library: Callable[[], Iterable[str]]) -> frozenset[str]:
     """What `defined(pou: NAME)` finds in the texts of a program and in the library, in capitals; nothing when nobody
     asks. Branches that are left out count as well."""
     if not any(map(_ASKS.search, texts)):

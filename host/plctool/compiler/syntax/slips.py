@@ -71,6 +71,8 @@ REFUSED = {
     "VAR_GENERIC": Refusal("blocks of any size are not supported; write one with VAR CONSTANT for each", "END_VAR"),
     "_LD_BODY": Refusal(_GRAPHIC),
     "_FBD_BODY": Refusal(_GRAPHIC),
+    "_CFC_BODY": Refusal(_GRAPHIC),
+    "_SFC_BODY": Refusal(_GRAPHIC),
 }
 """Words that begin what this compiler leaves out."""
 

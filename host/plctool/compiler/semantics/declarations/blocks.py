@@ -136,6 +136,7 @@ class Blocks:
                 if alias:
                     info.members[alias.casefold()] = symbol
                 if t is ERROR:
+                    scope.lacks(info.pou.name)
                     continue
                 self._variables.check_kept(name, t, keep, scope, offset)
                 reference = role is Role.IN_OUT

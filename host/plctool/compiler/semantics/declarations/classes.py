@@ -111,13 +111,17 @@ class Classes:
         if isinstance(base, PouSymbol) and base.keyword == "INTERFACE":
             scope.error(offset, "inheritance", f"{name} is an interface; write IMPLEMENTS {name}")
         else:
+            scope.lacks(symbol.decl.full_name, base=True)
             self._no_such(offset, name, scope, "function block", base is None)
         return None
 
     def _no_such(self, offset: int, name: str, scope: Scope, what: str, unknown: bool) -> None:
         if unknown:
             hint = did_you_mean(name, self._world.names.type_names())
-            scope.error(offset, "unknown", f"unknown {what} {name}{hint}")
+            if hint:
+                scope.error(offset, "unknown", f"unknown {what} {name}{hint}")
+            else:
+                scope.missing(offset, name, f"unknown {what} {name}")
         else:
             scope.error(offset, "type", f"{name} is not {'an' if what[0] in 'aeiou' else 'a'} {what}")
 

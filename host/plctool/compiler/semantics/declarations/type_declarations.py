@@ -196,7 +196,10 @@ class TypeDeclarations:
             hint = f"; write {TYPES[upper]}" if upper in TYPES else hint
             if upper == "ENUM":
                 hint = "; an enumeration is written Name : (First, Second);"
-            scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
+            if hint:
+                scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
+            else:
+                scope.missing(spec.pos, spec.name, f"unknown type {spec.name}")
         else:
             scope.error(spec.pos, "type", f"{spec.name} is not a type")
         return ERROR, None

@@ -103,7 +103,7 @@ class Variables:
         keep: Keep = Keep.UNSAID,
     ) -> Variable:
         """A variable that exists once for all instances of its POU."""
-        key = (scope.source.path, offset)
+        key = (scope.source.path, scope.source.name, offset)
         variable = self._world.shared.get(key)
         if variable is None:
             area = self._area(t, keep)

@@ -110,6 +110,8 @@ def bind(
     c: Checker, args: list[ast.Argument], names: list[tuple[str, Direction]], what: str, offset: int
 ) -> dict[int, ast.Argument] | None:
     """Arguments by index of their parameter, without the empty ones (`PT := `); None after a diagnosis."""
+    if c.scope.is_incomplete(what):
+        return None
     if not args:
         return {}
     if all(a.name is None for a in args):

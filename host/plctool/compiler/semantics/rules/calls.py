@@ -101,7 +101,9 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
         message = f"{name} is a type; a conversion is written TO_{name.upper()}({shown})"
         return c.error(callee.pos, "unknown", message)
     hint = f"; {FUNCTIONS[name.upper()]}" if name.upper() in FUNCTIONS else function_hint(c, name)
-    return c.error(callee.pos, "unknown", f"unknown function {name}{hint}")
+    if hint:
+        return c.error(callee.pos, "unknown", f"unknown function {name}{hint}")
+    return c.missing(callee.pos, name, f"unknown function {name}")
 
 
 def _written(node: ast.Call) -> str:

@@ -79,6 +79,10 @@ def member_of(c: Checker, base: Expr, node: ast.Member) -> Expr:
 
 def _block_member(c: Checker, base: Expr, members: dict[str, VarSymbol], node: ast.Member) -> Expr:
     symbol = members.get(node.name.casefold())
+    if symbol is None and (
+        c.scope.is_incomplete(str(base.type)) or c.scope.inherits_unknown(c.world.class_of(base.type))
+    ):
+        return error_value(c.pos(node.pos))
     if symbol is None:
         names = [m.name for m in members.values() if m.role in (Role.INPUT, Role.OUTPUT)]
         cls = c.world.class_of(base.type)

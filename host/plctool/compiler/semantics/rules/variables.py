@@ -114,6 +114,8 @@ def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
         return None
     if name == "THIS":
         return SelfPlace(cls.type, c.pos(node.pos))
+    if cls.base is None and c.scope.inherits_unknown(cls):
+        return None
     if cls.base is None or cls.base.type is None:
         c.error(node.pos, "name", f"SUPER stands for the base, but {cls.name} extends nothing")
         return None
@@ -121,6 +123,8 @@ def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
 
 
 def _unknown(c: Checker, node: ast.Name) -> Expr:
+    if c.scope.inherits_unknown(c.scope.cls):
+        return error_value(c.pos(node.pos))  # it may be inherited
     longer = c.world.names.qualified_names(node.name)
     if longer:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(longer)}")
@@ -134,6 +138,8 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(inside)}")
     names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
     hint = did_you_mean(node.name, {_written(c, n) for n in names} - {""})
+    if node.name and not hint:
+        return c.missing(node.pos, node.name, f"unknown name {node.name}")
     return c.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")
 
 
