@@ -100,6 +100,8 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
         shown = _written(node)
         message = f"{name} is a type; a conversion is written TO_{name.upper()}({shown})"
         return c.error(callee.pos, "unknown", message)
+    if c.scope.inherits_unknown(c.scope.cls):
+        return error_value(c.pos(node.pos))  # it may be an inherited method
     hint = f"; {FUNCTIONS[name.upper()]}" if name.upper() in FUNCTIONS else function_hint(c, name)
     if hint:
         return c.error(callee.pos, "unknown", f"unknown function {name}{hint}")
