@@ -49,7 +49,7 @@ o.Start();
 b := o.ready;
 END_PROGRAM
 """
-    assert errors(text) == ["unknown function block Nowhere", "unknown function other"]
+    assert errors(text) == ["unknown function block Nowhere"]
 
 
 def test_errors_that_follow_from_nothing_stay() -> None:

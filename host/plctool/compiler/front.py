@@ -24,6 +24,7 @@ from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.ast import Declaration
 from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
+from plctool.compiler.syntax.conditions import names_asked_for
 from plctool.compiler.syntax.parser import Parsed, parse_all
 from plctool.compiler.task_images import plan_images
 from plctool.compiler.typed import Pos, TypedProgram
@@ -94,11 +95,12 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
 
 def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
     world = program.world
+    declared = names_asked_for([source.text for source in sources], world.names.library.names)
     texts: list[tuple[Source, Parsed]] = []
     broken: list[Source] = []
     for source in sources:
         before = world.diagnostics.errors
-        texts.append((source, parse_all(source, world.diagnostics.at(source).error)))
+        texts.append((source, parse_all(source, world.diagnostics.at(source).error, declared=declared)))
         if world.diagnostics.errors > before or any(found.code == "xml" for found in source.findings):
             broken.append(source)
     for source in sources:

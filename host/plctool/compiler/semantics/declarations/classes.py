@@ -31,7 +31,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
-from plctool.iec.types import CLASS_NUMBER, UDINT, Field, InterfaceType, Keep, StructType
+from plctool.iec.types import CLASS_NUMBER, UDINT, EnumType, Field, InterfaceType, Keep, StructType
 
 _LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
 
@@ -45,6 +45,11 @@ def _member_key(decl: ast.PouDecl) -> str:
 def _named(interfaces: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
     """Without the interface that __QUERYINTERFACE needs elsewhere; here every instance can be asked."""
     return ((offset, name) for offset, name in interfaces if name.casefold() != "__system.iqueryinterface")
+
+
+def _is_enumeration_value(symbol: VarSymbol) -> bool:
+    """Whether a name is that of a value, as `Idle` of `state : (Idle, Run);`"""
+    return isinstance(symbol.type, EnumType) and symbol.value is not None and symbol.name in symbol.type.values
 
 
 class Classes:
@@ -183,6 +188,8 @@ class Classes:
 
     def _see(self, cls: ClassInfo, key: str, symbol: VarSymbol) -> None:
         other = cls.names.get(key)
+        if isinstance(other, MemberSymbol) and _is_enumeration_value(symbol):
+            return  # the member comes first; where the enumeration is wanted, its value does
         if isinstance(other, MemberSymbol):
             message = f"{symbol.name} is a variable of {cls.name} and a method, action or property as well"
             self._world.diagnostics.error(symbol.pos, "duplicate", message)
