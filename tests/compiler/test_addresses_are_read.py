@@ -40,8 +40,8 @@ def test_addresses_are_read_as_the_program_names_them_or_otherwise(plc: Simulato
 
 def test_addresses_are_written(plc: Simulator) -> None:
     with plc:
-        plc.write("%IW0", 77)
-        plc.write("%MX8.1", True)
+        plc.write({"%IW0": 77})
+        plc.write({"%MX8.1": True})
         plc.run_cycles(2)
         assert plc.read("Main.seen") == 77
         assert plc.read("Main.bit") is True
