@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
-from environment import TARGET, eventually
+from environment import IEC_STACK_SIZE, TARGET, eventually
 from programs import Built, compile_text
 
 from plctool.core import lib
@@ -114,7 +114,9 @@ FAULTS = {
     "bus fault, write": Fault("f[i] := 1;", "ACCESS_VIOLATION", FAR, "none"),
     "bus fault, read": Fault("x := f[i];", "ACCESS_VIOLATION", FAR, "none"),
     "undefined instruction": Fault("x := 4711;", "ILLEGAL_INSTRUCTION", spoil=undefined_instruction),
-    "stack overflow": Fault("x := Large(n);", "STACK_OVERFLOW", checks="none", before=FUNCTION.format(last=299)),
+    "stack overflow": Fault(
+        "x := Large(n);", "STACK_OVERFLOW", checks="none", before=FUNCTION.format(last=IEC_STACK_SIZE // 4 + 43)
+    ),
     "stack overflow, past all stacks": Fault(
         "x := Large(n);", "STACK_OVERFLOW", checks="none", before=FUNCTION.format(last=999)
     ),

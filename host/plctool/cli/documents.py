@@ -78,13 +78,20 @@ def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
 
 
 def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, list[str]]:
-    """Every diagnostic of a program, also as users read them."""
+    """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
     from plctool.compiler import check_with_tests, load_sources
     from plctool.compiler.diagnostics import render_all
+    from plctool.compiler.missing_names import Use, missing_names
 
     sources = load_sources(paths)
     result = check_with_tests(sources, warnings)
-    document = {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}
+    uses = [Use(d.missing, d.file, d.line) for d in result.diagnostics if d.missing]
+    document: Document = {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}
+    if uses:
+        document["missing"] = [
+            {"name": m.name, "library": m.library, "count": m.count, "file": m.first.file, "line": m.first.line}
+            for m in missing_names(uses)
+        ]
     return document, render_all(result.diagnostics, sources)
 
 
@@ -128,7 +135,7 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
 
 
 def diagnostic_document(diagnostic: Diagnostic) -> Document:
-    return vars(diagnostic)
+    return {name: value for name, value in vars(diagnostic).items() if name != "missing"}
 
 
 def info(path: Path) -> Document:

@@ -145,6 +145,17 @@ class EnumType(Type):
     name: str
     base: Elementary
     values: dict[str, int]  # in order of declaration, names as declared
+    strict: bool = False  # only its own values may be assigned
+    named: bool = False  # TO_STRING gives the name of a value, not its number
+
+    @property
+    def inline(self) -> bool:
+        """Whether it is declared with a variable, without a name of its own."""
+        return self.name.startswith("(")
+
+    def has(self, name: str) -> bool:
+        """Whether it has a value of that name."""
+        return name.casefold() in map(str.casefold, self.values)
 
     @property
     def choices(self) -> str:
