@@ -216,7 +216,7 @@ static void the_time_goes_on_over_stop_and_start(void)
     CHECK(read_u32(APP_AREA_DATA, 8) == 0);
 }
 
-/* Milliseconds are counted on from cycle to cycle; they must be those of the division, whatever the steps are. */
+/* Milliseconds are accumulated from cycle to cycle; they must be those of the division, whatever the steps are. */
 static void milliseconds_follow_the_nanoseconds(void)
 {
     static const RTS_I64 steps[] = {1,          999999,     1000000,    1234567,      10000000,

@@ -1,4 +1,4 @@
-"""The texts of CODESYS 3 objects, which do not end with END_PROGRAM and such."""
+"""The text of CODESYS 3 objects, which do not end with END_PROGRAM and such."""
 
 from __future__ import annotations
 

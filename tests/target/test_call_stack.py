@@ -1,4 +1,4 @@
-"""The calls that led to an exception: a checked error, a fault, and a loop that is broken, with and without an FPU."""
+"""The calls that led to an exception: a checked error, a fault, and a loop that is aborted, with and without an FPU."""
 
 from __future__ import annotations
 

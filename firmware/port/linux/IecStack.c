@@ -61,7 +61,7 @@ bool IecStackIsOverflow(const IEC_STACK *stack, uintptr_t address)
     return stack->bottom - address - 1 < GUARD_SIZE;
 }
 
-/* ---- the address sanitizer has to be told which stack is in use: nothing may be left in the middle of that ---- */
+/* ---- the address sanitizer must know which stack is in use: nothing may be left in the middle of that ---- */
 
 #if defined(__SANITIZE_ADDRESS__)
 

@@ -15,7 +15,7 @@
 /* The layout of the first three is known to IecStackSwitch.S. */
 typedef struct {
     uintptr_t back;   /* stack pointer of the thread, saved while IEC code runs */
-    uintptr_t top;    /* behind the highest address of the IEC stack */
+    uintptr_t top;    /* past the highest address of the IEC stack */
     RTS_UI32 running; /* IEC code runs; atomic */
     uintptr_t bottom; /* lowest address */
     struct {

@@ -54,7 +54,7 @@ RTS_RESULT SimCommCycle(void);
 /* Virtual time since SimStart [ns]. */
 RTS_I64 SimNow(void);
 
-/* Cycles that take longer than this in real time [ms] are broken out of as endless; the default is
+/* Cycles that take longer than this in real time [ms] are aborted as endless; the default is
  * SIM_CYCLE_LIMIT_MS. */
 void SimSetCycleLimit(RTS_UI32 ms);
 
@@ -103,7 +103,7 @@ RTS_UI8 *SimFlashData(void);
 RTS_UI32 SimFlashSize(void);
 
 /* Sets the whole content, e.g. of a flash file; what is not erased counts as programmed. From power off.
- * ERR_PARAMETER for another size than SimFlashConfigure was told. */
+ * ERR_PARAMETER for another size than SimFlashConfigure got. */
 RTS_RESULT SimFlashLoad(const RTS_UI8 *data, RTS_UI32 size);
 
 /* Keeps the content, and brings back what was kept (nothing, when the geometry changed since). From power off. */

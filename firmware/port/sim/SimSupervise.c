@@ -27,7 +27,7 @@ typedef struct {
 } SEEN;
 
 static struct {
-    pid_t process; /* whose thread it is: a fork leaves it behind */
+    pid_t process; /* whose thread it is: a fork does not have it */
     RTS_UI32 limit_ms;
 } supervisor = {0, SIM_CYCLE_LIMIT_MS};
 

@@ -1,5 +1,5 @@
 /*
- * AppBoot.c - what runs after a start-up: the boot project, or the application before it when that died.
+ * AppBoot.c - what runs after a start-up: the boot project, or the previous application if that failed.
  *
  * SPDX-License-Identifier: Apache-2.0
  *

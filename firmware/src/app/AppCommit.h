@@ -63,7 +63,7 @@ RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
 RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after);
 
 /*
- * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the one before
+ * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the previous one
  * stays, or it is this one but may be lost when power is.
  */
 

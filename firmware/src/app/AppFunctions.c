@@ -139,7 +139,7 @@ static RTS_RESULT check_iec_function(LOADER *l)
     return ERR_OK;
 }
 
-/* Names for tools that ask about the application; nobody calls what they stand for. */
+/* Names for tools that ask about the application; what they stand for is not called. */
 RTS_RESULT LoaderCheckIecFunctions(LOADER *l)
 {
     return SRV_INFORMATION ? LoaderCheckEntries(l, SEGMENT_IEC_FUNCTIONS, check_iec_function) : (RTS_RESULT)ERR_OK;

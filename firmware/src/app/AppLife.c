@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * An application that is new has to prove itself by running for a while. Until it has, dying makes the next start-up go
- * back to the one before (AppBoot.c). Losing power is no way to die.
+ * back to the previous one (AppBoot.c). A loss of power is not a failure.
  */
 #include "AppLife.h"
 

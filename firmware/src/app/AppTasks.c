@@ -54,7 +54,7 @@ static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)
     return result;
 }
 
-/* Of two tables the last one counts. Values of variables that are out of order are not found, which harms nobody. */
+/* Of two tables the last one counts. Values of variables that are out of order are not found, which does no harm. */
 static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
 {
     RETAIN_TABLE table;
@@ -72,7 +72,7 @@ static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
 }
 
 #if APP_IMAGE_SIZE > 0
-/* Behind the list of tasks: what each of them uses of inputs and outputs. */
+/* After the list of tasks: what each of them uses of inputs and outputs. */
 static RTS_RESULT check_images(LOADER *l, RTS_UI32 size)
 {
     IMAGE_PART *part = l->image->task_image[0].part;

@@ -137,7 +137,7 @@ static int compare(const KEPT *a, const KEPT *b)
     return memcmp(a->variable.hash, b->variable.hash, CDL_KEPT_HASH_SIZE);
 }
 
-/* Whether a value that the same variable had goes into `to`. A string that is shorter now begins anew. */
+/* Whether a value that the same variable had goes into `to`. A string that is shorter now is initialised. */
 static bool is_taken(const KEPT *to, const KEPT *from)
 {
     return compare(to, from) == 0 && to->run.size >= from->run.size && (is_persistent(to) || !kept.persistent_only);

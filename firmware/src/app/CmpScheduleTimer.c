@@ -194,7 +194,7 @@ void SchedRequestEnd(void)
     SysAtomicStore(&stop.end_asked, 1);
 }
 
-/* Looks whether somebody waits for tasks, and since when. */
+/* Looks whether a stop waits for tasks, and since when. */
 static void look_for_stop(RTS_I64 now_ns)
 {
     RTS_UI32 asked = SysAtomicLoad(&stop.asked);
@@ -233,7 +233,7 @@ static RTS_I64 find_latest_start(void)
 }
 
 /* Time stands still for a cycle as long as one that started later, and may have interrupted it, goes on from one check
- * to the next. Of several tasks that take too long the one that holds up the others is broken first, and they
+ * to the next. Of several tasks that take too long the blocking one is aborted first, so that the others can
  * finish. */
 static void check_time(RTS_I64 now_ns)
 {

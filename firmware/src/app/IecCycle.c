@@ -65,7 +65,7 @@ static GUARD_INLINE void guard_begin(GUARD *guard, RTS_I64 now_ns)
 {
     guard->start_ns = now_ns;
     SysAtomicStore(&guard->phase, guard->phase + 1);
-    SysAtomicFence(); /* whoever sees a write of the cycle sees that it runs */
+    SysAtomicFence(); /* what sees a write of the cycle sees that it runs */
 }
 
 static GUARD_INLINE void guard_end(GUARD *guard)
@@ -146,7 +146,7 @@ static RTS_UI32 divide(RTS_UI64 dividend, RTS_UI32 divisor, RTS_UI32 *rest)
     return quotient;
 }
 
-/* Sets the time of the cycle. Milliseconds are counted on, since dividing 64 bits is slow on small cores. */
+/* Sets the time of the cycle. Milliseconds are accumulated, since dividing 64 bits is slow on small cores. */
 static void set_time(TASK *task, RTS_I64 time_ns)
 {
     IEC_CONTEXT *context = &task->context;
@@ -237,7 +237,7 @@ static void run_phases_after(TASK *task)
     }
 }
 
-/* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
+/* Not inlined, because the compiler then computes the place of the task in the list again for each field. */
 static __attribute__((noinline)) bool run_cycle(TASK *task, RTS_I64 due_ns)
 {
     RTS_I64 start_ns = SysTimeGetNs();

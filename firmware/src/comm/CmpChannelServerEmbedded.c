@@ -382,7 +382,7 @@ static RTS_RESULT handle_message(COMM_CLIENT *client)
     return ERR_OK;
 }
 
-/* A new request, whatever has become of the one before. */
+/* A new request, whatever has become of the previous one. */
 static RTS_RESULT start_message(CHANNEL *channel, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 length = size < COMM_PREFIX_SIZE ? 0 : BytesGet32(((const CHANNEL_MESSAGE *)data)->size);

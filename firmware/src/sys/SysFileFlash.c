@@ -49,7 +49,7 @@ static bool is_valid(RTS_UI32 i)
     return true;
 }
 
-/* False when the flash has no room for the files, or they lie badly. */
+/* False when the flash has no room for the files, or the layout is invalid. */
 static bool map_files(void)
 {
     static const FILE_AREA map[FILE_COUNT] = {FILE_MAP};
@@ -66,7 +66,7 @@ static bool map_files(void)
 #else
 
 /*
- * Both logs lie behind the slots, which share what is left. A half of the retain log is a sixteenth of the flash and
+ * Both logs are after the slots, which share what is left. A half of the retain log is a sixteenth of the flash and
  * a sector. Nothing else has a say, so that firmware of other sizes finds what this one has written. False when
  * nothing is left for the slots.
  */

@@ -82,7 +82,7 @@ enum { IEC_STACK_ALIGN = STACK_GUARD, IEC_STACK_GUARD = STACK_GUARD };
 __attribute__((section(".bss.iec_stack"), aligned(IEC_STACK_ALIGN))) static IEC_STACK stacks[APP_MAX_TASKS];
 
 static struct {
-    TRY *top; /* behind the innermost that runs */
+    TRY *top; /* past the innermost that runs */
     TRY tries[APP_MAX_TASKS];
 } state;
 
@@ -190,7 +190,7 @@ static void drop_fpu_context(void)
 #endif
 }
 
-/* The slot of the depth below lies above; of main, which has all rights, none does, but nobody runs that it matters to. */
+/* The slot of the depth below lies above; of main, which has all rights, none does, but no task runs then. */
 static void give_back_rights(const TRY *try)
 {
     drop_fpu_context();
@@ -325,7 +325,7 @@ __attribute__((used)) static void open_gate(FRAME *frame)
     set_control(0);
 }
 
-/* Goes to 1 unless the SVC was that of a gate. Most code lies behind the gates. */
+/* Goes to 1 unless the SVC was that of a gate. Most code is past the gates. */
 #define LOOK_FOR_A_GATE                                                                                          \
     "mrs r0, psp\n\tldr r2, [r0, #24]\n\tmovw r3, #:lower16:gates_end\n\tmovt r3, #:upper16:gates_end\n\t"       \
     "cmp r2, r3\n\tbhs 1f\n\tmovw r3, #:lower16:gates_start\n\tmovt r3, #:upper16:gates_start\n\tcmp r2, r3\n\t" \
@@ -472,7 +472,7 @@ void SysExceptShutdown(void)
 {
 }
 
-/* Where a function that is broken goes on: it leaves the running Try. By then the processor has taken its frame back,
+/* Where a function that is aborted goes on: it leaves the running Try. By then the processor has taken its frame back,
  * so that the stack pointer is as it was. */
 __attribute__((naked, noreturn)) static void try_break(RTS_UI32 code, uintptr_t address, RTS_UI32 unused,
                                                        uintptr_t link)
@@ -514,7 +514,7 @@ void SysExceptBreak(const void *arg, RTS_UI32 code)
     }
 }
 
-/* When a large frame leaves no room for that of the fault, its place is lost: then find_caller finds the entry, behind
+/* When a large frame leaves no room for that of the fault, its place is lost: then find_caller finds the entry, after
  * the instructions that make its frame and have no line. */
 #if RTS_IEC_UNPRIVILEGED
 #define PUSH_ENTRY "add r3, r2, #10\n\tpush {r3, r9}\n\tpush {r9, lr}\n\t"

@@ -173,7 +173,7 @@ class Function:
         self.terminate(f"br i1 {condition}, label %{then}, label %{otherwise}")
 
     def begin_detached(self, label: str) -> None:
-        """Starts a block behind a terminator, reached only by branches written earlier."""
+        """Starts a block after a terminator, reached only by branches written earlier."""
         assert self._dead, "the block before is open"
         self.begin(label)
 

@@ -31,7 +31,7 @@ class Ref:
 
     `tag`: alias tag or "". `direct`: reached by name only, not through a pointer. `capacity`: of a STRING
     [characters], as an i32 operand. `bit`: the bit of an integer that a BOOL lives in, -1 for none; `type` is then that
-    integer's. `loose`: a character that may never have been written (behind the NUL).
+    integer's. `loose`: a character that may never have been written (after the NUL).
     """
 
     pointer: str

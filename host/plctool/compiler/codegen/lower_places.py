@@ -144,7 +144,7 @@ def indexed(frame: Frame, place: IndexPlace) -> Ref:
 
 
 def _open_index(frame: Frame, place: IndexPlace, limits: list[tuple[Expr, Expr]]) -> str:
-    """The number of an element of an ARRAY[*] as a pointer-sized integer. It is worked out in 64 bits, where
+    """The number of an element of an ARRAY[*] as a pointer-sized integer. It is computed in 64 bits, where
     nothing wraps."""
     fn, number = frame.fn, "0"
     for expr, (low_bound, high_bound) in zip(place.indices, limits, strict=True):

@@ -1,7 +1,7 @@
 """Strings: copying with cutting, comparing.
 
 A STRING is a run of bytes up to a NUL or the capacity, whichever comes first: no memory content makes these functions
-read or write outside of it. Bytes behind the NUL have no meaning and may be overwritten.
+read or write outside of it. Bytes after the NUL have no meaning and may be overwritten.
 """
 
 from __future__ import annotations

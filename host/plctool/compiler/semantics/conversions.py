@@ -58,7 +58,7 @@ NUMBERS = (Kind.INT, Kind.BIT)
 
 
 def elementary(t: Type) -> Elementary | None:
-    """The scalar behind a type (of an enum or subrange: its base); None for strings, arrays, structs and pointers."""
+    """The scalar of a type (of an enum or subrange: its base); None for strings, arrays, structs and pointers."""
     base = base_of(t)
     return base if isinstance(base, Elementary) else None
 

@@ -40,7 +40,7 @@ def _is_meant(one: Variable, other: Variable) -> bool:
 
 
 def _bits(variable: Variable) -> tuple[int, int]:
-    """The first bit, and the first one behind the variable."""
+    """The first bit, and the one past the end of the variable."""
     first = variable.offset * 8
     if variable.bit is not None:
         return first + variable.bit, first + variable.bit + 1

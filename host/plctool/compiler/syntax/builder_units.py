@@ -12,7 +12,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.lexer import Report, Token
 
 MEMBERS = frozenset(("METHOD", "ACTION", "GET", "SET"))
-"""Keywords of PouDecls that stand in another unit, or behind it."""
+"""Keywords of PouDecls that stand in another POU, or after it."""
 
 _OWNERS = frozenset(("FUNCTION_BLOCK", "PROGRAM", "INTERFACE"))
 

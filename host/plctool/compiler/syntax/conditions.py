@@ -27,7 +27,7 @@ _VARIABLE = re.compile(r"([A-Za-z_]\w*)\s*(?:AT\s*%[\w.*]+\s*)?:(?!=)")
 
 
 def names_asked_for(texts: Sequence[str], library: Callable[[], Iterable[str]]) -> frozenset[str]:
-    """What `defined(pou: NAME)` finds in the texts of a program and in the library, in capitals; nothing when nobody
+    """What `defined(pou: NAME)` finds in the sources of a program and in the library, in capitals; nothing when nothing
     asks. Branches that are left out count as well."""
     if not any(map(_ASKS.search, texts)):
         return frozenset()

@@ -62,7 +62,7 @@ _PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",)}
 _RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
 _BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
 _ELSE_IF = re.compile(r"\bELSE\s+IF\b", re.IGNORECASE)
-_APART = 3  # an error closer than so many tokens to the one before is a consequence of it
+_APART = 3  # an error closer than so many tokens to the previous one is a consequence of it
 
 Stack = list[int]
 
@@ -100,7 +100,7 @@ class Recovery:
         self._skip(token)
 
     def report_token(self, offset: int, code: str, message: str) -> None:
-        """Reports a fault of the text; what does not fit right behind it is a consequence."""
+        """Reports a fault of the text; what does not fit right after it is a consequence."""
         self._report(offset, code, message)
         self._accepted = 0
 
@@ -113,7 +113,7 @@ class Recovery:
     def report_in_front(self, token: Token, keyword: str, name: str) -> None:
         """Reports a modifier that stands in front of the keyword of a unit, and leaves it out."""
         word = token.text.upper()
-        self._report(token.pos, "syntax", f"{word} stands behind {keyword}: {keyword} {word} {name}")
+        self._report(token.pos, "syntax", f"{word} comes after {keyword}: {keyword} {word} {name}")
         token.type = "LEFT_OUT"
 
     def refuse(self, token: Token) -> None:
@@ -251,7 +251,7 @@ class Recovery:
             self._quiet = True
 
     def _leave_out(self, token: Token, message: str, end: str) -> None:
-        """Reports `token`, and goes on behind the word or sign `end`."""
+        """Reports `token`, and goes on after the word or sign `end`."""
         self._say(token.pos, message)
         self.skipping, self._skip_to = True, end
 

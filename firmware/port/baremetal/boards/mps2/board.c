@@ -66,7 +66,7 @@ void BoardWatchdogKick(void)
 enum { SERIAL_NUMBER_SIZE = 16 };
 static char serial_number[SERIAL_NUMBER_SIZE];
 
-/* The number the factory left behind the file area, or a default when nobody did. */
+/* The number the factory wrote after the file area, or a default when there is none. */
 static const char *read_serial_number(void)
 {
     extern const char factory_data[];

@@ -2,7 +2,7 @@
 
 A variable of a program, or a global one, with `AT %I*` lies at the address that VAR_CONFIG gives. One of a function
 block lies in the instance like any other; the task copies it from its address before the programs, or to its address
-behind them. Without an entry it is plain memory.
+after them. Without an entry it is plain memory.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -72,7 +72,7 @@ class _Copy:
         return None if self.area is Area.OUTPUT else Assign(self.place, load(self.outside), self.place.pos)
 
     def outwards(self) -> Assign | None:
-        """What is done behind them."""
+        """What is done after them."""
         return None if self.area is Area.INPUT else Assign(self.outside, load(self.place), self.place.pos)
 
 
@@ -269,7 +269,7 @@ class InstanceConfig:
     # ---- both ----
 
     def _find(self, path: ast.Expr, spec: ast.TypeSpec, scope: Scope, use: str) -> tuple[Place, FixedPlace] | None:
-        """The variable of a path, which has to be of the type given; None after a diagnosis."""
+        """The variable of a path, which has to be of the type given; None after an error."""
         wanted, _ = self._types.type_of(spec, scope)
         place = named_place(Checker(self._world, scope), path, use)
         if place is None or wanted is ERROR:

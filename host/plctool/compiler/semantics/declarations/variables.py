@@ -54,7 +54,7 @@ class Variables:
         self._world = world
         self._types = types
         self._config = config
-        self._calculated: set[Variable] = set()  # constants whose value is worked out when the application starts
+        self._calculated: set[Variable] = set()  # constants whose value is computed when the application starts
 
     def _is_calculated(self, e: Expr) -> bool:
         """Whether a value is made of constants by functions of the library alone, as LOG(2.0) is."""

@@ -94,7 +94,7 @@ def named_function(c: Checker, callee: ast.Expr) -> PouSymbol | None:
 
 
 def plain_arguments(c: Checker, node: ast.Call, declared: Container[str] = ()) -> list[ast.Argument] | None:
-    """The arguments of a call that is part of an expression; None after a diagnosis. `EN := TRUE` says nothing."""
+    """The arguments of a call that is part of an expression; None after an error. `EN := TRUE` says nothing."""
     args, enable = split_enable(node, declared)
     if enable.eno is None and (enable.en is None or _is_true(enable.en)):
         return args
@@ -109,7 +109,7 @@ def _is_true(node: ast.Expr) -> bool:
 def bind(
     c: Checker, args: list[ast.Argument], names: list[tuple[str, Direction]], what: str, offset: int
 ) -> dict[int, ast.Argument] | None:
-    """Arguments by index of their parameter, without the empty ones (`PT := `); None after a diagnosis."""
+    """Arguments by index of their parameter, without the empty ones (`PT := `); None after an error."""
     if c.scope.is_incomplete(what):
         return None
     if not args:
@@ -234,7 +234,7 @@ def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: 
 def _actual_argument(
     c: Checker, actual: Actual, symbol: VarSymbol, direction: Direction, parameter: Parameter
 ) -> Expr | Place | None:
-    """One argument as its parameter needs it; None after a diagnosis."""
+    """One argument as its parameter needs it; None after an error."""
     t = symbol.type
     if isinstance(actual, ast.Argument):
         if actual.value is None:
