@@ -9,6 +9,8 @@
 #ifndef CMPERRORS_H
 #define CMPERRORS_H
 
+#include "CmpStd.h"
+
 enum {
     ERR_OK = 0x0000,
     ERR_FAILED = 0x0001,
@@ -138,7 +140,8 @@ enum {
     ERR_FT_CRC_MISMATCH = 0x0801,
 };
 
-/* One-byte errors of the monitoring services. */
+/* What finding and accessing a variable may say, one byte on the wire: another list than ERR_*, so a type of its own. */
+typedef RTS_UI8 MON_RESULT;
 enum {
     MONITORING_ERR_OK = 0x0000,
     MONITORING_ERR_INVALID_AREA = 0x0001,

@@ -1,5 +1,5 @@
 /*
- * CmpItf.h - component manager (CmpMgr): the life of the runtime.
+ * CmpItf.h - component manager (CmpMgr): the life of the runtime (component numbers and names: shared with the host).
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -76,26 +76,20 @@ enum {
     CMPID_SysEvent = 0x001C,
 };
 
+/* Name of a component, "" when unknown. */
+const char *CMGetComponentName(RTS_UI32 id);
+
+#ifndef RTS_CFFI
 typedef struct {
     RTS_UI32 id; /* CMPID_* */
     const char *name;
 } CMP_NAME;
 
-/* The port's list, system components first. Names are apart from the hooks: where nobody asks for them they take no
+/* The port's list, in the order of CmpOrder.h. Names are apart from the hooks: where nobody asks for them they take no
  * flash. */
 extern const PF_HOOK_FUNCTION cmp_hooks[];
 extern const CMP_NAME cmp_names[];
 extern const RTS_SIZE cmp_component_count;
-
-/* Defines the list from a macro of the port that names the components, COMPONENTS(X) being X(CmpLog) X(CmpSrv) and so
- * on. CmpLog has the hook CmpLog_Hook and the number CMPID_CmpLog. */
-#define CMP_LIST(components)                                                                \
-    components(CMP_DECLARE) const PF_HOOK_FUNCTION cmp_hooks[] = {components(CMP_HOOK_OF)}; \
-    const CMP_NAME cmp_names[] = {components(CMP_NAME_OF)};                                 \
-    const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_hooks)
-#define CMP_DECLARE(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
-#define CMP_HOOK_OF(component) component##_Hook,
-#define CMP_NAME_OF(component) {CMPID_##component, #component},
 
 /* Runs all CH_INIT_* hooks. On an error the ones that ran are undone by their CH_EXIT_* and the error is returned. */
 RTS_RESULT CMInit(void);
@@ -105,9 +99,6 @@ RTS_RESULT CMExit(void);
 
 /* Calls one hook of every component; CH_COMM_CYCLE is what a main loop calls. Returns the first error. */
 RTS_RESULT CMCallHook(CMP_HOOK hook);
-
-/* Name of a component, "" when unknown. */
-const char *CMGetComponentName(RTS_UI32 id);
 
 /* ---- external functions: C functions offered to IEC code ---- */
 
@@ -123,5 +114,6 @@ RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count);
 
 /* Finds a function by name; NULL when there is none. Signature and version are compared by the caller. */
 const CMP_EXT_FUNCTION *CMFindExternal(const char *name);
+#endif
 
 #endif

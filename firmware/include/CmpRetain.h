@@ -19,15 +19,8 @@
 #include "CmpErrors.h"
 #include "CmpItf.h"
 #include "CmpStd.h"
+#include "RetainTable.h"
 #include "SysFlashLog.h"
-
-/* Where in flash the table of kept variables of an image is (CDL_KEPT), and how large its retain area. */
-typedef struct {
-    RTS_UI32 file;
-    RTS_UI32 offset;
-    RTS_UI32 size;      /* of the table in bytes, 0: nothing is kept */
-    RTS_UI32 area_size; /* bytes */
-} RETAIN_TABLE;
 
 /* The largest retain area that can be saved, bytes. */
 RTS_UI32 RetainCapacity(void);

@@ -19,6 +19,7 @@
 #include "CmpItf.h"
 #include "CmpStd.h"
 #include "CompactDownload.h"
+#include "SchedEvents.h"
 
 /* Creates what the tasks need, stopped; deletes that of the tasks before. `areas` are the base addresses by APP_AREA_*.
  * Called by CmpIecTask from main. ERR_NOMEMORY when the port has no timer left. */
@@ -33,10 +34,6 @@ void SchedStop(void);
  * out of like that. For good; from any context, signal handlers too. */
 void SchedRequestEnd(void);
 
-/* Looks at the variables of event tasks. From any context, when they may have changed: CmpIecTask calls it at the end
- * of each cycle; who copies inputs calls it afterwards. */
-void SchedNoteEvents(void);
-
 /* How many due times of a task were skipped since SchedCreateTasks, because a cycle took too long, or events lost,
  * because too many waited. From main. */
 RTS_UI32 SchedGetOverruns(RTS_UI32 task);
@@ -45,17 +42,6 @@ RTS_UI32 SchedGetOverruns(RTS_UI32 task);
 void SchedBackgroundCycle(void);
 /* Whether there are such tasks. */
 bool SchedHasBackgroundTasks(void);
-
-/*
- * External events. A KIND_EXTERNAL task runs once for each post of the event it names. Register and unregister from main
- * (CH_INIT3, CH_EXIT3); `result` may be NULL. RTS_INVALID_HANDLE with ERR_NOMEMORY or ERR_DUPLICATE.
- */
-RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result);
-RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE event);
-/* From any context, interrupts too. ERR_INVALID_HANDLE when it is not registered. */
-RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event);
-/* Whether an event is registered whose name has this CRC-32, see CDL_TASK. From main. */
-bool SchedHasExternalEvent(RTS_UI32 id);
 
 /*
  * Breaks IEC code that runs for too long: longer than watchdog time * sensitivity of its task, or than

@@ -10,6 +10,7 @@
 #define CMPSRVNUMBERS_H
 
 #include "CmpStd.h"
+#include "CompactDownload.h"
 
 /* ---- layer 2: serial framing (1.3) ---- */
 enum {
@@ -202,7 +203,7 @@ enum {
     TAG_MON2_ERROR = 0x41,
     TAG_MON2_ERROR_INDEX = 0x42, /* own */
     TAG_MON2_CONSISTENT = 0x43,  /* own */
-    MON2_POINTER_SIZE = 8,
+    MON2_POINTER_SIZE = APP_POINTER_SIZE,
     MON2_ONE_STEP_SIZE = 64,
     MON2_ID_FAILED = 0x8000, /* own */
     MON2_OP_HALT = 0x01,

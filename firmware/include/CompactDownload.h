@@ -17,9 +17,17 @@ enum {
     CDL_HEADER_VERSION = 1,
     CDL_HEADER_SIZE = 104,
     CDL_CRC_OFFSET = 100,
-    CDL_BLOB_MAGIC = -1223966498, /* 0xB70BC0DE as a signed enum constant */
     APP_CODE_ALIGN = 16,
+    APP_POINTER_SIZE = 8, /* what a variable that is a pointer takes, on every target; the address comes first */
+    APP_NAME_SIZE = 60,   /* of a name or text in an image that the runtime reads, with NUL */
 };
+
+/* What a blob begins with; no enum constant of C is so large. */
+#ifdef RTS_CFFI
+static const RTS_UI32 CDL_BLOB_MAGIC;
+#else
+#define CDL_BLOB_MAGIC 0xB70BC0DEu
+#endif
 
 /* Area indices. Code is position independent and holds the constants; the other areas are RAM owned by the runtime. */
 enum {
@@ -150,7 +158,9 @@ typedef struct {
 
 enum { CDL_TASK_NAME_SIZE = 32 };
 
-/* A task. `kind` is KIND_* of CmpIecTask.h. A KIND_EVENT task runs when the byte at `event_offset` of `event_area`, without
+enum { KIND_CYCLIC = 0, KIND_EVENT = 1, KIND_EXTERNAL = 2, KIND_FREEWHEELING = 3 };
+
+/* A task. `kind` is KIND_*. A KIND_EVENT task runs when the byte at `event_offset` of `event_area`, without
  * the bits `event_ignored`, was 0 and is so no more; a KIND_EXTERNAL task on the external event whose
  * name has the CRC-32 `event_offset`. */
 typedef struct {

@@ -195,6 +195,11 @@
 #define CM_MAX_EXT_TABLES 4
 #endif
 
+/* Phases of the cycle of every task that components may register (CyclePhases.h); two words each. 0: none. */
+#ifndef CYCLE_MAX_PHASES
+#define CYCLE_MAX_PHASES 8
+#endif
+
 /* Event callbacks that may be registered; five words each. 0: the application sends no events. */
 #ifndef EVENT_MAX_CALLBACKS
 #define EVENT_MAX_CALLBACKS 4
@@ -210,7 +215,8 @@
 #define CHECKSUM_TABLE_ENTRIES 16
 #endif
 
-/* Settings of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. */
+/* Settings of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. plcrt looks for
+ * {"SysTarget", "NodeName", 0, "name in a scan"}. */
 #ifndef SETTINGS_TABLE
 #define SETTINGS_TABLE
 #endif

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../../firmware/src/app/AppLife.h"
 #include "CmpAppSrv.h"
 #include "CmpBlkDrvSimpleCom.h"
 #include "CmpChannelServerEmbedded.h"
@@ -141,27 +142,38 @@ RTS_UI8 *fakes_area(RTS_UI32 index)
     return (RTS_UI8 *)fakes.area[index];
 }
 
-RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size)
+/* AppAddress.c finds addresses in these. */
+const APP_IMAGE *AppGetImage(void)
 {
-    if (index >= APP_AREA_COUNT || offset > fakes.area_size[index] || size > fakes.area_size[index] - offset)
-        return NULL;
-    return fakes_area(index) + offset;
+    static APP_IMAGE image;
+
+    memcpy(image.area_size, fakes.area_size, sizeof(image.area_size));
+    return &image;
 }
 
-RTS_UI32 AppGetAreaSize(RTS_UI32 index)
+const IEC_CONTEXT *AppGetContext(void)
 {
-    return index < APP_AREA_COUNT ? fakes.area_size[index] : 0;
+    static IEC_CONTEXT context;
+
+    for (RTS_UI32 i = 0; i < APP_AREA_COUNT; i++)
+        context.area[i] = fakes_area(i);
+    return &context;
 }
 
-bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
+RTS_UI32 AppGetState(void)
 {
-    for (*index = 0; *index < APP_AREA_COUNT; ++*index) {
-        *offset = (RTS_UI32)(address - (uintptr_t)fakes_area(*index));
-        if (address - (uintptr_t)fakes_area(*index) < fakes.area_size[*index])
-            return true;
-    }
+    return AS_STOP;
+}
+
+#if APP_IMAGE_SIZE > 0
+bool AppImageFind(uintptr_t address, RTS_UI32 *area, RTS_UI32 *offset)
+{
+    RTS_UNUSED(address);
+    RTS_UNUSED(area);
+    RTS_UNUSED(offset);
     return false;
 }
+#endif
 
 void AppGetStatus(APP_STATUS *status)
 {

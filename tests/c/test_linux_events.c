@@ -8,7 +8,7 @@
  */
 #define _GNU_SOURCE
 #include "../../firmware/src/app/AppAreas.h"
-#include "../../firmware/src/app/AppException.h"
+#include "AppException.h"
 #include "../../firmware/src/app/AppImage.h"
 #include "CmpAppEmbedded.h"
 #include "CmpChecksum.h"
@@ -330,7 +330,7 @@ static void a_cycle_that_ends_in_time_is_not_broken_by_a_stop(void)
 static void *run_init(void *broken)
 {
     RTS_EXCEPTION exception;
-    *(bool *)broken = IecTaskRunGuarded((void (*)(void *))(uintptr_t)loop, NULL, &exception) != 0 &&
+    *(bool *)broken = !IecTaskRunGuarded((void (*)(void *))(uintptr_t)loop, NULL, &exception) &&
                       exception.code == RTSEXCPT_STOP_TIMEOUT;
     return NULL;
 }

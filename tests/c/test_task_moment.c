@@ -4,14 +4,14 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * CmpIecTask is compiled a second time here, on fakes of what it calls. Each task is a thread that starts its next cycle
+ * IecCycle is compiled a second time here, on fakes of what it calls. Each task is a thread that starts its next cycle
  * at once and fills a part of the area with one number per cycle: a copy taken within a cycle would hold two.
  */
 #define _GNU_SOURCE
 #include <pthread.h>
 #include <time.h>
 
-#include "../../firmware/src/app/CmpIecTask.c"
+#include "../../firmware/src/app/IecCycle.c"
 
 #include "test.h"
 
@@ -52,18 +52,11 @@ void SysTimePause(void)
         guard_end(&tasks.list[1].guard);
 }
 
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     RTS_UNUSED(exception);
     fn(arg);
-    return 0;
-}
-
-void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *frame)
-{
-    RTS_UNUSED(code);
-    RTS_UNUSED(address);
-    RTS_UNUSED(frame);
+    return true;
 }
 
 void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)
@@ -73,36 +66,6 @@ void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)
     RTS_UNUSED(address);
 }
 
-RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count)
-{
-    RTS_UNUSED(table);
-    RTS_UNUSED(count);
-    return ERR_OK;
-}
-
-RTS_RESULT SchedCreateTasks(const CDL_TASK *list, RTS_UI32 count, RTS_UI8 *const *areas)
-{
-    RTS_UNUSED(list);
-    RTS_UNUSED(count);
-    RTS_UNUSED(areas);
-    return ERR_OK;
-}
-
-RTS_RESULT SchedStart(void)
-{
-    return ERR_OK;
-}
-
-void SchedStop(void)
-{
-}
-
-RTS_UI32 SchedGetOverruns(RTS_UI32 task)
-{
-    RTS_UNUSED(task);
-    return 0;
-}
-
 void SchedNoteEvents(void)
 {
 }
@@ -110,6 +73,26 @@ void SchedNoteEvents(void)
 RTS_I64 SysTimeGetUsedNs(void)
 {
     return 0;
+}
+
+void AppEnterSafeState(void)
+{
+}
+
+bool CyclePhasesExist(void)
+{
+    return false;
+}
+
+void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task, const IEC_CONTEXT *context)
+{
+    RTS_UNUSED(when);
+    RTS_UNUSED(task);
+    RTS_UNUSED(context);
+}
+
+void CyclePhasesForget(void)
+{
 }
 
 #if APP_IMAGE_SIZE > 0
@@ -168,11 +151,11 @@ static void begin(RTS_UI32 count)
     IEC_CONTEXT context = {0};
     RTS_UI32 i;
 
-    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
+    IecCycleForget();
     context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)fill_part;
     memset(rounds, 0, sizeof rounds);
-    CHECK(IecTaskCreateAll(records, count, &context) == ERR_OK);
-    CHECK(IecTaskStartAll() == ERR_OK);
+    IecCycleCreate(records, count, &context);
+    IecCycleStart();
     thread_count = count;
     for (i = 0; i < count; i++)
         CHECK(pthread_create(&threads[i], NULL, run_task, (void *)(uintptr_t)i) == 0);
@@ -189,7 +172,8 @@ static void end(void)
     SysAtomicStore(&tasks.running, 0);
     for (i = 0; i < thread_count; i++)
         pthread_join(threads[i], NULL);
-    IecTaskStopAll();
+    IecCycleStop();
+    IecCycleCallOff();
 }
 
 static bool copy_now(void)
@@ -245,10 +229,10 @@ static RTS_UI32 pauses_of(RTS_UI32 own_ms, RTS_UI32 other_ms, RTS_UI32 since_ms,
     enum { MS = 1000000 };
     IEC_CONTEXT context = {0};
 
-    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
-    CHECK(IecTaskCreateAll(records, 2, &context) == ERR_OK);
+    IecCycleForget();
+    IecCycleCreate(records, 2, &context);
     fixed_ns = 1000 * (RTS_I64)MS;
-    CHECK(IecTaskStartAll() == ERR_OK);
+    IecCycleStart();
     tasks.list[0].last_ns = own_ms * MS;
     tasks.list[1].last_ns = other_ms * MS;
     guard_begin(&tasks.list[1].guard, fixed_ns - (RTS_I64)since_ms * MS);
@@ -291,8 +275,8 @@ static void a_copy_of_stopped_tasks_is_taken_at_once(void)
 {
     IEC_CONTEXT context = {0};
 
-    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
-    CHECK(IecTaskCreateAll(records, TASKS, &context) == ERR_OK);
+    IecCycleForget();
+    IecCycleCreate(records, TASKS, &context);
     memset(area, 7, sizeof area);
     CHECK(IecTaskBetweenCycles(copy_area));
     CHECK(memcmp(copied, area, sizeof area) == 0);
@@ -303,10 +287,10 @@ static void what_runs_is_waited_for(void)
 {
     IEC_CONTEXT context = {0};
 
-    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
+    IecCycleForget();
     context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)fill_part;
-    CHECK(IecTaskCreateAll(records, 1, &context) == ERR_OK);
-    CHECK(IecTaskStartAll() == ERR_OK);
+    IecCycleCreate(records, 1, &context);
+    IecCycleStart();
     length[0] = 0;
     me = 0;
     guard_begin(&tasks.list[0].guard, 0);
@@ -331,7 +315,8 @@ static void stopping_calls_a_copy_off(void)
     guard_begin(&tasks.list[0].guard, 0);
     CHECK(!IecTaskBetweenCycles(copy_area));
     guard_end(&tasks.list[0].guard);
-    IecTaskStopAll();
+    IecCycleStop();
+    IecCycleCallOff();
     memset(copied, 0xEE, sizeof copied);
     CHECK(IecTaskCycle(0, SysTimeGetNs()) == 0);
     CHECK(copied[0] == 0xEE);
@@ -356,10 +341,10 @@ static void a_cycle_that_interrupts_the_copy_spoils_it(void)
     IEC_CONTEXT context = {0};
     RTS_UI32 i;
 
-    CHECK(CmpIecTask_Hook(CH_INIT) == ERR_OK);
+    IecCycleForget();
     context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)fill_part;
-    CHECK(IecTaskCreateAll(records, 1, &context) == ERR_OK);
-    CHECK(IecTaskStartAll() == ERR_OK);
+    IecCycleCreate(records, 1, &context);
+    IecCycleStart();
     length[0] = 0;
     me = 0;
     for (i = 0; i < 20; i++) {
@@ -369,7 +354,8 @@ static void a_cycle_that_interrupts_the_copy_spoils_it(void)
         CHECK(interruptions == 0);
         CHECK(memcmp(copied, area, sizeof area) == 0);
     }
-    IecTaskStopAll();
+    IecCycleStop();
+    IecCycleCallOff();
 }
 
 int main(void)

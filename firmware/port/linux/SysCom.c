@@ -27,14 +27,12 @@ static struct {
     char path[256]; /* of the device, "" for a pseudo terminal */
     char pty_name[64];
     speed_t speed;
-    int line;  /* what is read and written; -1 while the device is away */
-    int slave; /* of a pseudo terminal */
+    PORT_SOURCE line; /* what is read and written; no file while the device is away */
+    int slave;        /* of a pseudo terminal */
     bool configured;
     bool open;
-    bool full; /* the line took less than was offered */
-    RTS_UI32 moved;
     RTS_UI32 tried_ms;
-} state = {.line = -1, .slave = -1};
+} state = {.line = {.file = -1}, .slave = -1};
 
 /* ---- opening ---- */
 
@@ -92,26 +90,26 @@ static bool make_exclusive(int line)
 
 static bool open_device(void)
 {
-    state.line = open(state.path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (state.line < 0) {
+    state.line.file = open(state.path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (state.line.file < 0) {
         return false;
     }
-    if (!make_exclusive(state.line) || !make_raw(state.line)) {
+    if (!make_exclusive(state.line.file) || !make_raw(state.line.file)) {
         int error = errno;
-        close(state.line);
-        state.line = -1;
+        close(state.line.file);
+        state.line.file = -1;
         errno = error;
         return false;
     }
-    (void)tcflush(state.line, TCIOFLUSH);
+    (void)tcflush(state.line.file, TCIOFLUSH);
     return true;
 }
 
 static bool open_pty(void)
 {
-    state.line = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (state.line < 0 || grantpt(state.line) != 0 || unlockpt(state.line) != 0 ||
-        ptsname_r(state.line, state.pty_name, sizeof(state.pty_name)) != 0) {
+    state.line.file = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (state.line.file < 0 || grantpt(state.line.file) != 0 || unlockpt(state.line.file) != 0 ||
+        ptsname_r(state.line.file, state.pty_name, sizeof(state.pty_name)) != 0) {
         return false;
     }
     state.slave = open(state.pty_name, O_RDWR | O_NOCTTY | O_CLOEXEC);
@@ -127,7 +125,7 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
         return false;
     }
     memset(&state, 0, sizeof(state));
-    state.line = -1;
+    state.line = (PORT_SOURCE){.file = -1, .events = POLLIN};
     state.slave = -1;
     state.speed = *speed;
     memcpy(state.path, pty ? "" : path, pty ? 1 : strlen(path) + 1);
@@ -138,28 +136,34 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
         PortComClose();
         return false;
     }
+    if (!PortWaitAdd(&state.line)) {
+        PortReason(reason, "cannot wait for %s: PORT_MAX_SOURCES are in use", path);
+        PortComClose();
+        return false;
+    }
     state.configured = true;
     return true;
 }
 
 void PortComClose(void)
 {
-    if (state.line >= 0) {
-        close(state.line);
+    PortWaitRemove(&state.line);
+    if (state.line.file >= 0) {
+        close(state.line.file);
     }
     if (state.slave >= 0) {
         close(state.slave);
     }
-    state.line = -1;
+    state.line.file = -1;
     state.slave = -1;
     state.configured = false;
 }
 
 void PortComHandOver(void)
 {
-    if (state.line >= 0 && state.slave < 0) {
-        close(state.line);
-        state.line = -1;
+    if (state.line.file >= 0 && state.slave < 0) {
+        close(state.line.file);
+        state.line.file = -1;
     }
 }
 
@@ -173,9 +177,9 @@ const char *PortComPtyName(void)
 static void lose_device(void)
 {
     LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is gone", state.path);
-    close(state.line);
-    state.line = -1;
-    state.full = false;
+    close(state.line.file);
+    state.line.file = -1;
+    state.line.events = POLLIN;
     state.tried_ms = SysTimeGetMs();
 }
 
@@ -196,10 +200,10 @@ static bool ready(RTS_UI32 index)
     if (index != 0 || !state.open) {
         return false;
     }
-    if (state.line < 0) {
+    if (state.line.file < 0) {
         look_for_device();
     }
-    return state.line >= 0;
+    return state.line.file >= 0;
 }
 
 /* The bytes a read or write moved. Nothing to read and no room are not errors; all else means that the device is
@@ -207,7 +211,7 @@ static bool ready(RTS_UI32 index)
 static RTS_UI32 moved(ssize_t count)
 {
     if (count > 0) {
-        state.moved += (RTS_UI32)count;
+        PortWaitNotNow();
         return (RTS_UI32)count;
     }
     bool later = count < 0 && (errno == EAGAIN || errno == EINTR);
@@ -230,7 +234,7 @@ RTS_RESULT SysComOpen(RTS_UI32 index)
         return ERR_DEVICE;
     }
     state.open = true;
-    if (state.line < 0 && !open_device()) {
+    if (state.line.file < 0 && !open_device()) {
         LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is away: %s", state.path, strerror(errno));
     }
     return ERR_OK;
@@ -245,7 +249,7 @@ void SysComClose(RTS_UI32 index)
 
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
 {
-    return size > 0 && ready(index) ? moved(read(state.line, data, size)) : 0;
+    return size > 0 && ready(index) ? moved(read(state.line.file, data, size)) : 0;
 }
 
 RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
@@ -253,20 +257,7 @@ RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
     if (size == 0 || !ready(index)) {
         return 0;
     }
-    RTS_UI32 taken = moved(write(state.line, data, size));
-    state.full = taken < size;
+    RTS_UI32 taken = moved(write(state.line.file, data, size));
+    state.line.events = taken < size ? POLLIN | POLLOUT : POLLIN;
     return taken;
-}
-
-/* ---- for main ---- */
-
-RTS_UI32 PortComMoved(void)
-{
-    return state.moved;
-}
-
-void PortComWait(int timeout_ms)
-{
-    struct pollfd line = {.fd = state.line, .events = state.full ? POLLIN | POLLOUT : POLLIN};
-    (void)poll(&line, 1, timeout_ms);
 }

@@ -1,33 +1,18 @@
 /*
- * cmp_list.c - the components of plcrt, system components first.
+ * cmp_list.c - the components of plcrt.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CmpItf.h"
-
-#define COMPONENTS(X)       \
-    X(SysTime)              \
-    X(CmpLog)               \
-    X(SysTarget)            \
-    X(SysLock)              \
-    X(SysTimer)             \
-    X(SysFileFlash)         \
-    X(CmpEventMgrEmbedded)  \
-    X(SysWatchdog)          \
-    X(SysEvent)             \
-    X(CmpMath)              \
-    X(CmpRetain)            \
-    X(CmpIecTask)           \
-    X(CmpScheduleTimer)     \
-    X(CmpAppEmbedded)       \
-    X(CmpSrv)               \
-    X(CmpDevice)            \
-    X(CmpAppSrv)            \
-    X(CmpMonitor2)          \
-    X(CmpLogSrv)            \
-    X(CmpBlkDrvSimpleCom)   \
-    X(CmpRouterEmbedded)    \
-    X(CmpNameServiceServer) \
-    X(CmpChannelServerEmbedded)
-
-CMP_LIST(COMPONENTS);
+#define HAS_SysTime 1
+#define HAS_CmpLog 1
+#define HAS_CmpEventMgrEmbedded 1
+#define HAS_SysWatchdog 1
+#define HAS_CmpRetain 1
+#define HAS_CmpMath 1
+#define HAS_COMMUNICATION 1
+#define HAS_CmpLogSrv 1
+#define HAS_CmpMonitor2 1
+#define HAS_CmpBlkDrvSimpleCom 1
+#define PORT_SYSTEM(X) X(SysTarget) X(SysLock) X(SysTimer)
+#define PORT_COMPONENTS(X) X(SysEvent)
+#include "CmpList.h"

@@ -278,11 +278,8 @@ static void main_loop(void)
 {
     while (!quit) {
         PortMainPass();
-        RTS_UI32 before = PortComMoved();
         (void)CMCallHook(CH_COMM_CYCLE);
-        if (PortComMoved() == before) {
-            PortComWait(PORT_IDLE_MS);
-        }
+        (void)PortWait(PORT_IDLE_MS);
     }
 }
 

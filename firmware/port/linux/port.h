@@ -17,6 +17,27 @@ typedef struct {
 
 void PortReason(PORT_REASON *reason, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* ---- the wait of main ---- */
+
+/*
+ * Something that main waits for between two passes of CH_COMM_CYCLE: a serial line, a socket, an edge of an input. Whoever
+ * opened it keeps the record, may change it at any time, and looks in CH_COMM_CYCLE whether there is something to do.
+ * So its latency is that of a pass, not PORT_IDLE_MS, which is how often main looks at time. All from main.
+ */
+typedef struct {
+    int file;     /* -1: there is nothing to wait for now */
+    short events; /* POLLIN; with POLLOUT while it has to take more, POLLPRI for what says so */
+} PORT_SOURCE;
+
+/* False when PORT_MAX_SOURCES are there. Adding one again does nothing, as does removing one that is not there. */
+bool PortWaitAdd(const PORT_SOURCE *source);
+void PortWaitRemove(const PORT_SOURCE *source);
+/* In this pass something was done after which there may be more to do: the next PortWait does not wait. */
+void PortWaitNotNow(void);
+/* Waits until one of them is ready, or a signal comes, `timeout_ms` at most. Returns whether there may be something to
+ * do. */
+bool PortWait(int timeout_ms);
+
 /* ---- SysTime ---- */
 
 /* Sets the start of SysTimeGetNs to now. */
@@ -59,9 +80,5 @@ void PortComClose(void);
 void PortComHandOver(void);
 /* Name of the pseudo terminal, NULL when the line is none. */
 const char *PortComPtyName(void);
-/* Bytes read and written so far: main sees from it whether there may be more to do. */
-RTS_UI32 PortComMoved(void);
-/* Sleeps until the line has something to read (or takes more after it was full), `timeout_ms` at most. */
-void PortComWait(int timeout_ms);
 
 #endif

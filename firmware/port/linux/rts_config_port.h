@@ -69,6 +69,9 @@
  * found at its end.) */
 #define PORT_WATCHDOG_US 5000
 
+/* What main may wait for at a time: lines, sockets, inputs. */
+#define PORT_MAX_SOURCES 16
+
 /* Longest sleep of the main loop with nothing to do [ms]. */
 #define PORT_IDLE_MS 10
 

@@ -3,27 +3,13 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CmpItf.h"
-
-/* In the order of start-up: a component comes after those it uses. */
-#define COMPONENTS(X)           \
-    X(CmpLog)                   \
-    X(SysSim)                   \
-    X(SysFileFlash)             \
-    X(CmpEventMgrEmbedded)      \
-    X(CmpMath)                  \
-    X(CmpRetain)                \
-    X(CmpScheduleTimer)         \
-    X(CmpIecTask)               \
-    X(CmpAppEmbedded)           \
-    X(CmpSrv)                   \
-    X(CmpDevice)                \
-    X(CmpAppSrv)                \
-    X(CmpMonitor2)              \
-    X(CmpLogSrv)                \
-    X(CmpChannelServerEmbedded) \
-    X(CmpNameServiceServer)     \
-    X(CmpRouterEmbedded)        \
-    X(CmpBlkDrvSimpleCom)
-
-CMP_LIST(COMPONENTS);
+#define HAS_CmpLog 1
+#define HAS_CmpEventMgrEmbedded 1
+#define HAS_CmpRetain 1
+#define HAS_CmpMath 1
+#define HAS_COMMUNICATION 1
+#define HAS_CmpLogSrv 1
+#define HAS_CmpMonitor2 1
+#define HAS_CmpBlkDrvSimpleCom 1
+#define PORT_COMPONENTS(X) X(SysSim)
+#include "CmpList.h"

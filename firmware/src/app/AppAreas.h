@@ -19,7 +19,7 @@ RTS_RESULT AppAreasInit(void);
 /* Sets all areas to zero. */
 void AppAreasClear(void);
 
-/* Sets the outputs to zero. From main or a task, outside of SysExceptTry. */
+/* Sets the outputs to zero, for AppEnterSafeState. From main or a task, outside of SysExceptTry. */
 void AppAreasClearOutputs(void);
 
 /* Where APP_AREA_DATA .. APP_AREA_MEMORY, or the copies of the tasks (AppImage.h), begins. */

@@ -7,9 +7,12 @@
  * be loaded for another reason (a fault of the flash, a function that this firmware lacks), nothing is written and
  * nothing runs: the next start finds all as it was.
  */
-#include "App.h"
+#include "AppBoot.h"
+
 #include "AppCommit.h"
 #include "AppException.h"
+#include "AppLife.h"
+#include "AppLoader.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
 #include "SysExcept.h"

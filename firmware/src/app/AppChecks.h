@@ -3,12 +3,14 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * AppLoader.c checks header, segments and areas, AppFunctions.c what is called, AppTasks.c the tasks.
+ * AppLoader.c checks header and areas, AppFunctions.c what is called, AppTasks.c the tasks.
  */
 #ifndef APPCHECKS_H
 #define APPCHECKS_H
 
-#include "AppLoader.h"
+#include "AppLoaded.h"
+#include "AppRefusal.h"
+#include "CmpErrors.h"
 
 /* The segments of an image. */
 enum {
@@ -52,14 +54,10 @@ RTS_RESULT LoaderReadNext(LOADER *l, void *data, RTS_UI32 size);
 /* Has every entry of a segment checked by `check_entry`, which reads it. */
 RTS_RESULT LoaderCheckEntries(LOADER *l, RTS_UI32 segment, CHECK check_entry);
 
+/* Whether all segments lie within the image. */
+RTS_RESULT LoaderCheckSegments(LOADER *l);
+
 /* Whether a reference leads into the code segment. */
 bool LoaderIsCode(const LOADER *l, RTS_UI32 area, RTS_UI32 offset);
-
-/* The checks of the other two files. */
-RTS_RESULT LoaderCheckFunctions(LOADER *l);
-RTS_RESULT LoaderCheckImports(LOADER *l);
-RTS_RESULT LoaderCheckIecFunctions(LOADER *l);
-RTS_RESULT LoaderCheckInfo(LOADER *l);
-RTS_RESULT LoaderCheckBlobs(LOADER *l);
 
 #endif

@@ -11,7 +11,6 @@
 #ifndef APPCOMMIT_H
 #define APPCOMMIT_H
 
-#include "CmpAppEmbedded.h"
 #include "CmpErrors.h"
 #include "CmpStd.h"
 

@@ -6,8 +6,13 @@
  * An image is written to the slot that is not what boots, checked there, mapped, sealed (from here on it is what
  * boots), and only then is the old application stopped and this one loaded.
  */
-#include "App.h"
+#include "AppDownload.h"
+
+#include "AppBoot.h"
 #include "AppCommit.h"
+#include "AppLife.h"
+#include "AppLoader.h"
+#include "AppState.h"
 #include "CmpLog.h"
 #include "CmpRetain.h"
 #include "SysFileFlash.h"

@@ -7,7 +7,6 @@
 
 #include <string.h>
 
-#include "AppAreas.h"
 #include "CmpLog.h"
 #include "SysAtomic.h"
 #include "SysExcept.h"
@@ -51,7 +50,6 @@ const char *AppExceptionName(RTS_UI32 code)
 
 void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)
 {
-    AppAreasClearOutputs(); /* at once: main may be busy with the flash */
     if (SysAtomicAdd(&state.claims, 1) != 0)
         return; /* another task was first: one exception stops everything */
     state.raised.task = task;

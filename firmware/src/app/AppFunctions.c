@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "AppChecks.h"
+#include "AppFunctions.h"
 
 #include <string.h>
 

@@ -5,92 +5,17 @@
  *
  * A row of checks, each may rely on the ones before it. Every refusal is a sentence of its own.
  */
-#include "AppChecks.h"
+#include "AppLoader.h"
 
 #include <string.h>
 
-#include "CMUtils.h"
+#include "AppChecks.h"
+#include "AppFunctions.h"
+#include "AppTasks.h"
 #include "CmpChecksum.h"
 #include "CmpRetain.h"
 #include "SysFileFlash.h"
 #include "SysTarget.h"
-
-RTS_RESULT AppRefuse(APP_REFUSAL *refusal, RTS_RESULT result, const char *format, ...)
-{
-    va_list arguments;
-
-    va_start(arguments, format);
-    CMUtlvsnprintf(refusal->text, sizeof refusal->text, format, arguments);
-    va_end(arguments);
-    return result;
-}
-
-RTS_RESULT LoaderRead(LOADER *l, RTS_UI32 offset, void *data, RTS_UI32 size)
-{
-    RTS_RESULT result = SysFileRead(l->image->file, offset, data, size);
-
-    return result == ERR_OK ? ERR_OK : refuse(l, result, "Flash cannot be read at offset %u.", U(offset));
-}
-
-/* ---- segments ---- */
-
-static const char *const segment_names[SEGMENT_COUNT] = {
-    "Code", "Application info", "Area table", "Function table", "External function table", "IEC function table", "Blob",
-};
-
-static const CDL_SEGMENT *find_segment(const LOADER *l, RTS_UI32 segment)
-{
-    static const RTS_UI8 places[SEGMENT_COUNT] = {
-        offsetof(CDL_HEADER, code),
-        offsetof(CDL_HEADER, application_info),
-        offsetof(CDL_HEADER, area_table),
-        offsetof(CDL_HEADER, function_table),
-        offsetof(CDL_HEADER, external_function_table),
-        offsetof(CDL_HEADER, iec_function_table),
-        offsetof(CDL_HEADER, blob),
-    };
-
-    return (const CDL_SEGMENT *)((const RTS_UI8 *)&l->header + places[segment]);
-}
-
-RTS_UI32 LoaderAlign(RTS_UI32 offset)
-{
-    return (offset + 3) & ~(RTS_UI32)3;
-}
-
-RTS_RESULT LoaderReadNext(LOADER *l, void *data, RTS_UI32 size)
-{
-    RTS_UI32 offset = l->offset;
-
-    if (size > l->end - offset)
-        return refuse(l, ERR_SIZE_MISMATCH, "%s segment ends within an entry.", segment_names[l->segment]);
-    l->offset = offset + size;
-    return LoaderRead(l, offset, data, size);
-}
-
-void LoaderOpen(LOADER *l, RTS_UI32 segment)
-{
-    const CDL_SEGMENT *place = find_segment(l, segment);
-
-    l->segment = segment;
-    l->offset = place->offset;
-    l->end = place->offset + place->size;
-}
-
-RTS_RESULT LoaderCheckEntries(LOADER *l, RTS_UI32 segment, CHECK check_entry)
-{
-    RTS_RESULT result = ERR_OK;
-
-    LoaderOpen(l, segment);
-    while (l->offset < l->end && result == ERR_OK)
-        result = check_entry(l);
-    return result;
-}
-
-bool LoaderIsCode(const LOADER *l, RTS_UI32 area, RTS_UI32 offset)
-{
-    return area == APP_AREA_CODE && offset < l->image->code.size;
-}
 
 /* ---- header, CRC, target ---- */
 
@@ -151,34 +76,7 @@ static RTS_RESULT check_target(LOADER *l)
     return ERR_OK;
 }
 
-/* ---- places of segments, areas ---- */
-
-static RTS_RESULT check_segment(LOADER *l, RTS_UI32 segment)
-{
-    const CDL_SEGMENT *place = find_segment(l, segment);
-    const char *name = segment_names[segment];
-    RTS_UI32 align = segment == SEGMENT_CODE ? APP_CODE_ALIGN : 4;
-
-    if (place->size == 0)
-        return ERR_OK;
-    if (place->offset < CDL_HEADER_SIZE)
-        return refuse(l, ERR_OUT_OF_LIMITS, "%s segment overlaps the header.", name);
-    if (place->offset > l->image->size || place->size > l->image->size - place->offset)
-        return refuse(l, ERR_OUT_OF_LIMITS, "%s segment ends beyond the image.", name);
-    if (place->offset % align != 0)
-        return refuse(l, ERR_ALIGNMENT, "%s segment is not aligned to %u bytes.", name, U(align));
-    return ERR_OK;
-}
-
-static RTS_RESULT check_segments(LOADER *l)
-{
-    RTS_RESULT result = ERR_OK;
-    RTS_UI32 i;
-
-    for (i = 0; i < SEGMENT_COUNT && result == ERR_OK; i++)
-        result = check_segment(l, i);
-    return result;
-}
+/* ---- areas ---- */
 
 static RTS_RESULT check_code(LOADER *l)
 {
@@ -229,7 +127,7 @@ RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE 
 {
     static const CHECK checks[] = {
         check_header,         check_crc,          check_target,
-        check_segments,       check_code,         check_areas,
+        LoaderCheckSegments,  check_code,         check_areas,
         LoaderCheckFunctions, LoaderCheckImports, LoaderCheckIecFunctions,
         LoaderCheckInfo,      LoaderCheckBlobs,
     };

@@ -8,7 +8,8 @@
 #ifndef APPRETAIN_H
 #define APPRETAIN_H
 
-#include "AppLoader.h"
+#include "AppLoaded.h"
+#include "CmpErrors.h"
 
 /*
  * Finds where the retain variables of an image, in the area at `area`, come from: its own record up to number

@@ -1,311 +1,49 @@
 /*
- * CmpAppEmbedded.c - the life of the application: load, start, stop, reset, exceptions.
+ * CmpAppEmbedded.c - the component of the application: start, stop, reset, status.
  *
  * SPDX-License-Identifier: Apache-2.0
- *
- * An application that is new has to prove itself by running for a while. Until it has, dying makes the next start-up go
- * back to the one before (AppBoot.c). Losing power is no way to die.
  */
 #include "CmpAppEmbedded.h"
 
 #include <string.h>
 
-#include "App.h"
 #include "AppAreas.h"
+#include "AppBoot.h"
 #include "AppCommit.h"
-#include "AppException.h"
-#include "AppRetain.h"
-#include "CmpEventMgr.h"
-#include "CmpIecTask.h"
+#include "AppFunctions.h"
+#include "AppLife.h"
 #include "CmpLog.h"
-#include "CmpRetain.h"
 #include "SysFileFlash.h"
-#include "SysFlash.h"
-#include "SysTime.h"
-
-#define PROVE_MS (APP_PROVE_US / 1000)
-
-/* What a loaded application waits for: nothing, its initial values, those of retain variables too. */
-enum { INIT_DONE = 0, INIT_WARM = 1, INIT_COLD = 2 };
-
-static struct {
-    RTS_UI8 state;   /* AS_* */
-    RTS_UI8 pending; /* INIT_* */
-    const RTS_UI8 *code;
-    APP_IMAGE image;
-    APP_TABLES tables;
-    IEC_CONTEXT context; /* what every task starts from */
-    RTS_UI32 run_since_ms;
-} app;
-
-void AppPostEvent(RTS_UI32 event)
-{
-    if (EVENT_MAX_CALLBACKS > 0)
-        EventPost(CMPID_CmpAppEmbedded, event, NULL);
-}
+#include "rts_config.h"
 
 static bool is_loaded(void)
 {
-    return app.state != AS_NONE;
-}
-
-RTS_UI32 AppGetSlot(void)
-{
-    return is_loaded() ? app.image.file : SLOT_NONE;
-}
-
-bool AppHasException(void)
-{
-    return AppExceptionGet()->code != RTSEXCPT_NOEXCEPTION;
-}
-
-/* Its last cycle was broken off for a stop. That says nothing against the program, but it starts from a reset only. */
-static bool was_broken_off(void)
-{
-    return !RTS_ONE_CORE && AppExceptionGet()->code == RTSEXCPT_STOP_TIMEOUT;
-}
-
-static bool is_proven(void)
-{
-    return AppCommitIsProven(app.image.file);
-}
-
-/* ---- exceptions ---- */
-
-/* No IEC code runs. */
-static void record_exception(const APP_RAISED *raised)
-{
-    APP_EXCEPTION exception = {raised->code, APP_NO_CODE_OFFSET, raised->task};
-
-    if (SysExceptIsCode(raised->address))
-        exception.code_offset = (RTS_UI32)(raised->address - (uintptr_t)app.code);
-    SysExceptKeepTrace(raised->address);
-    AppExceptionSet(&exception, raised->task < 0 ? "Initialisation" : app.tables.tasks[raised->task].name);
-}
-
-/* The safe state after an exception: outputs are zero (again, since other tasks have finished their cycle), and an
- * application that is new will not be booted. */
-static void enter_exception_state(void)
-{
-    AppAreasClearOutputs();
-    app.state = AS_STOP;
-    if (!was_broken_off())
-        (void)AppCommitSetState(app.image.file, SLOT_FAILED);
-    AppPostEvent(EVT_CmpApp_Exception);
-}
-
-void AppHandlePendingException(void)
-{
-    APP_RAISED raised;
-
-    if (!AppExceptionTake(&raised))
-        return;
-    IecTaskStopAll();
-    record_exception(&raised);
-    enter_exception_state();
-    (void)RetainSave(false);
-}
-
-/* ---- code outside of tasks ---- */
-
-typedef struct {
-    RTS_UI32 function; /* CDL_FUNCTION_* */
-    bool init_retains; /* for GlobalInit */
-} INIT_CALL;
-
-static void call_init(void *arg)
-{
-    const INIT_CALL *call = arg;
-    uintptr_t entry = ((uintptr_t)app.code + app.image.entry[call->function]) | APP_ENTRY_MODE_BIT;
-
-    if (call->function == CDL_FUNCTION_GLOBAL_INIT)
-        APP_CALL_GLOBAL_INIT((IEC_GLOBAL_INIT)entry, &app.context, call->init_retains);
-    else
-        APP_CALL_ENTRY((IEC_ENTRY)entry, &app.context);
-}
-
-/* Runs a function of the function table when the image has it; false when it failed. */
-static bool run_function(RTS_UI32 function, bool init_retains)
-{
-    INIT_CALL call = {function, init_retains};
-    APP_RAISED raised = {-1, RTSEXCPT_NOEXCEPTION, 0};
-    RTS_EXCEPTION exception;
-
-    if (app.image.entry[function] == IMAGE_NO_ENTRY || !IecTaskRunGuarded(call_init, &call, &exception))
-        return true;
-    raised.code = exception.code;
-    raised.address = exception.address;
-    record_exception(&raised);
-    return false;
-}
-
-/* ---- load and unload ---- */
-
-static void set_context(void)
-{
-    memset(&app.context, 0, sizeof app.context);
-    AppAreasSet(&app.context);
-    app.context.area[APP_AREA_CODE] = (RTS_UI8 *)(uintptr_t)app.code;
-    app.context.imports = app.tables.imports;
-}
-
-/* Gives up what is loaded, as it is. */
-static void unload(void)
-{
-    (void)IecTaskCreateAll(NULL, 0, &app.context);
-    RetainDetach();
-    SysFlashReleaseCode(app.image.file);
-    AppExceptionClear();
-    app.state = AS_NONE;
-    app.pending = INIT_DONE;
-    app.code = NULL;
-    SysExceptCodeRange(NULL, 0);
-    memset(&app.image, 0, sizeof app.image);
-}
-
-/* Initial values, what is kept, and fresh tasks. What the flash says meanwhile is that it was begun: nothing else tells
- * of a program that ends the runtime here. */
-static RTS_RESULT initialise(bool init_retains)
-{
-    RTS_RESULT result;
-
-    AppExceptionClear();
-    AppAreasClear();
-    app.pending = INIT_DONE;
-    AppImageAttach(app.image.task_image);
-    result = IecTaskCreateAll(app.tables.tasks, app.image.task_count, &app.context);
-    if (result != ERR_OK) {
-        unload();
-        return result;
-    }
-    AppCommitBegin();
-    if (run_function(CDL_FUNCTION_CODE_INIT, false))
-        RetainPutBack();
-    if (AppHasException() || !run_function(CDL_FUNCTION_GLOBAL_INIT, init_retains))
-        enter_exception_state();
-    RetainSettle(AppHasException());
-    AppCommitDone();
-    return ERR_OK;
-}
-
-RTS_RESULT AppInitialise(void)
-{
-    RetainCapture(false); /* they may have been written meanwhile */
-    return initialise(app.pending == INIT_COLD);
-}
-
-static void run_global_exit(void)
-{
-    if (app.pending == INIT_DONE && !AppHasException())
-        (void)run_function(CDL_FUNCTION_GLOBAL_EXIT, false);
-}
-
-void AppUnload(void)
-{
-    if (!is_loaded())
-        return;
-    run_global_exit();
-    unload();
-}
-
-const RTS_UI8 *AppMapCode(const APP_IMAGE *image)
-{
-    return SysFlashMapCode(image->file, SysFileGetArea(image->file)->offset + image->code.offset, image->code.size);
-}
-
-RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until)
-{
-    RTS_RESULT restored;
-    RTS_RESULT result = AppLoaderRead(image, &app.tables);
-
-    if (result != ERR_OK) {
-        SysFlashReleaseCode(image->file);
-        return result;
-    }
-    app.image = *image;
-    app.code = code;
-    app.state = AS_STOP;
-    SysExceptCodeRange(code, image->code.size);
-    set_context();
-    AppAreasClear();
-    restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until);
-    app.pending = restored == ERR_OK ? INIT_WARM : INIT_COLD;
-    return ERR_OK;
+    return AppGetState() != AS_NONE;
 }
 
 /* ---- start and stop ---- */
-
-bool AppStopTasks(void)
-{
-    AppHandlePendingException();
-    if (app.state != AS_RUN)
-        return false;
-    AppPostEvent(EVT_PrepareStop);
-    IecTaskStopAll();
-    AppHandlePendingException(); /* one may have come in the last cycle */
-    if (app.state == AS_RUN) {
-        AppAreasClearOutputs();
-        app.state = AS_STOP;
-        (void)RetainSave(false);
-    }
-    AppPostEvent(EVT_StopDone);
-    return true;
-}
-
-RTS_RESULT AppStart(void)
-{
-    RTS_RESULT result = app.pending == INIT_DONE ? ERR_OK : AppInitialise();
-
-    if (result == ERR_OK && AppHasException())
-        result = ERR_EXCEPTION;
-    if (result != ERR_OK)
-        return result;
-    AppPostEvent(EVT_PrepareStart);
-    (void)AppCommitSetState(app.image.file, SLOT_STARTED);
-    app.run_since_ms = SysTimeGetMs();
-    result = IecTaskStartAll();
-    if (result != ERR_OK) {
-        IecTaskStopAll();
-        AppAreasClearOutputs(); /* some tasks may have run */
-        return result;
-    }
-    app.state = AS_RUN;
-    LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application started");
-    AppPostEvent(EVT_StartDone);
-    return ERR_OK;
-}
 
 RTS_RESULT AppStartApplication(void)
 {
     AppHandlePendingException();
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
-    if (app.pending != INIT_DONE)
+    if (!AppIsInitialised())
         return AppBootByHand();
     if (AppHasException())
         return ERR_INVALID_STATE;
-    return app.state == AS_RUN ? ERR_OK : AppStart();
+    return AppGetState() == AS_RUN ? ERR_OK : AppStart();
 }
 
 RTS_RESULT AppStopApplication(void)
 {
     if (!is_loaded())
         return ERR_APP_NOT_LOADED;
-    if (AppStopTasks() && (!AppHasException() || was_broken_off())) {
-        (void)AppCommitSetState(app.image.file, SLOT_TRIAL);
+    if (AppStopTasks() && (!AppHasException() || AppWasBrokenOff())) {
+        (void)AppCommitSetState(AppGetSlot(), SLOT_TRIAL);
         LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application stopped");
     }
     return ERR_OK;
-}
-
-static void check_proof(void)
-{
-    if (app.state != AS_RUN || is_proven() || SysTimeGetMs() - app.run_since_ms < PROVE_MS)
-        return;
-    if (AppCommitSetState(app.image.file, SLOT_PROVEN) == ERR_OK)
-        RetainKeepNone();
-    else
-        app.run_since_ms = SysTimeGetMs(); /* try again later, not in every pass */
 }
 
 /* ---- reset ---- */
@@ -335,13 +73,7 @@ RTS_RESULT AppReset(RTS_UI32 option)
     AppPostEvent(EVT_PrepareReset);
     if (is_loaded())
         (void)AppStopApplication();
-    if (option == RESET_OPTION_ORIGIN) {
-        result = reset_origin();
-    } else {
-        run_global_exit();
-        RetainCapture(option == RESET_OPTION_COLD);
-        result = initialise(option == RESET_OPTION_COLD || app.pending == INIT_COLD);
-    }
+    result = option == RESET_OPTION_ORIGIN ? reset_origin() : AppReinitialise(option == RESET_OPTION_COLD);
     LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, result, "Reset %s",
            option == RESET_OPTION_WARM   ? "warm"
            : option == RESET_OPTION_COLD ? "cold"
@@ -356,9 +88,9 @@ void AppGetStatus(APP_STATUS *status)
 {
     AppHandlePendingException();
     memset(status, 0, sizeof *status);
-    status->state = app.state;
-    status->image_crc = app.image.crc;
-    status->image_size = app.image.size;
+    status->state = AppGetState();
+    status->image_crc = AppGetImage()->crc;
+    status->image_size = AppGetImage()->size;
     status->exception = *AppExceptionGet();
     if (is_loaded())
         status->op_state |= OS_PROGRAM_LOADED;
@@ -372,51 +104,15 @@ void AppGetStatus(APP_STATUS *status)
 
 const char *AppGetInfo(RTS_UI32 index)
 {
-    static char info[APP_NAME_SIZE]; /* not in `app`: without the service that asks it takes no RAM */
+    static char info[APP_NAME_SIZE]; /* without the service that asks it takes no RAM */
 
     if (!is_loaded() || index >= IMAGE_INFO_COUNT)
         return "";
-    AppLoaderReadInfo(&app.image, index, info, sizeof info);
+    AppLoaderReadInfo(AppGetImage(), index, info, sizeof info);
     return info;
 }
 
-RTS_UI32 AppGetAreaSize(RTS_UI32 index)
-{
-    return index < APP_AREA_COUNT ? app.image.area_size[index] : 0;
-}
-
-RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size)
-{
-    RTS_UI32 area_size = AppGetAreaSize(index);
-
-    if (size > area_size || offset > area_size - size || index >= APP_AREA_COUNT || !is_loaded())
-        return NULL;
-    return app.context.area[index] + offset;
-}
-
-bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
-{
-    for (*index = 0; *index < APP_AREA_COUNT; ++*index) {
-        uintptr_t distance = address - (uintptr_t)app.context.area[*index];
-        if (distance < app.image.area_size[*index]) {
-            *offset = (RTS_UI32)distance;
-            return true;
-        }
-    }
-    return AppImageFind(address, index, offset);
-}
-
-/* ---- life ---- */
-
-/* The state of all parts, as after a reset. */
-static void forget_all(void)
-{
-    CMP_CLEAR(app);
-    AppExceptionClear();
-    AppAreasClear();
-    AppDownloadAbort();
-    SysExceptCodeRange(NULL, 0);
-}
+/* ---- the hook ---- */
 
 RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
 {
@@ -424,15 +120,17 @@ RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)
     case CH_INIT:
         if (AppAreasInit() != ERR_OK)
             return ERR_NOMEMORY;
-        if (!RTS_STARTS_ONCE)
-            forget_all();
+        if (!RTS_STARTS_ONCE) {
+            AppForget();
+            AppDownloadAbort();
+        }
         break;
     case CH_INIT_TASKS:
         AppBoot();
         break;
     case CH_COMM_CYCLE:
         AppHandlePendingException();
-        check_proof();
+        AppCheckProof();
         break;
     case CH_EXIT_TASKS:
         (void)AppStopApplication();

@@ -1,58 +1,13 @@
 /*
- * CmpIecTask.c - the cycle of a task, its statistics and its watchdog.
+ * CmpIecTask.c - the tasks of the application.
  *
  * SPDX-License-Identifier: Apache-2.0
- *
- * A task record is written by the context the task runs in; main, monitoring and the supervisor read it. Times are kept
- * in ns and 32 bits, which saturate at 4.29 s: no division in a cycle.
  */
 #include "CmpIecTask.h"
 
-#include <string.h>
-
-#include "AppImage.h"
-#include "CmpAppEmbedded.h"
 #include "CmpScheduleTimer.h"
-#include "SysAtomic.h"
-#include "SysTime.h"
+#include "SysExcept.h"
 #include "rts_config.h"
-
-/* IEC code that may be running. `phase` is odd while it does, and the other fields hold still then. */
-typedef struct {
-    RTS_UI32 phase;
-    RTS_I64 start_ns;
-    RTS_I64 limit_ns;
-} GUARD;
-
-typedef struct {
-    IEC_CONTEXT context;
-    IEC_ENTRY entry;
-    const CDL_TASK *record;
-    GUARD guard;
-    RTS_I64 watchdog_ns; /* 0: none */
-    RTS_UI16 sensitivity;
-    bool has_copies;   /* of inputs and outputs */
-    RTS_UI32 exceeded; /* cycles in a row longer than watchdog_ns */
-    RTS_UI32 ms_rest;  /* ns of context.time_ns beyond context.time_ms */
-    RTS_UI32 cycles;
-    RTS_UI32 last_ns;
-    RTS_UI32 min_ns;
-    RTS_UI32 max_ns;
-    RTS_UI32 jitter_ns;
-    RTS_UI64 sum_ns;
-} TASK;
-
-static struct {
-    RTS_UI32 running; /* cycles may start */
-    RTS_UI32 count;
-    bool time_started;
-    RTS_I64 time_zero; /* SysTimeGetNs at which the time of the application is 0 */
-    GUARD init_guard;
-    const void *init_arg;
-    TASK list[APP_MAX_TASKS];
-} tasks;
-
-enum { NS_PER_MS = 1000000, NS_PER_US = 1000 };
 
 /* ---- the external function for checks in compiled code ---- */
 
@@ -68,390 +23,42 @@ static const CMP_EXT_FUNCTION externals[] = {
     {"iecraise", 0x703B892E, 0x00010000, (RTS_PFN)iecraise}, /* iecraise(UDINT) */
 };
 
-/* ---- guards: a few instructions, shorter than a call ---- */
-
-#define GUARD_INLINE static inline __attribute__((always_inline))
-
-GUARD_INLINE void guard_begin(GUARD *guard, RTS_I64 now_ns)
-{
-    guard->start_ns = now_ns;
-    SysAtomicStore(&guard->phase, guard->phase + 1);
-    SysAtomicFence(); /* whoever sees a write of the cycle sees that it runs */
-}
-
-GUARD_INLINE void guard_end(GUARD *guard)
-{
-    SysAtomicStore(&guard->phase, guard->phase + 1);
-}
-
-int IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
-{
-    const GUARD *guard = &tasks.init_guard;
-
-    out->arg = tasks.init_arg;
-    if (index < tasks.count) {
-        guard = &tasks.list[index].guard;
-        out->arg = &tasks.list[index];
-    }
-    out->serial = SysAtomicLoad(&guard->phase);
-    if ((out->serial & 1) == 0)
-        return 0;
-    out->start_ns = guard->start_ns;
-    out->limit_ns = guard->limit_ns;
-    SysAtomicFence();
-    return SysAtomicLoad(&guard->phase) == out->serial;
-}
-
-RTS_UI32 IecTaskGetActivity(bool *busy)
-{
-    RTS_UI32 sum = 0;
-    RTS_UI32 i;
-
-    *busy = false;
-    SysAtomicFence(); /* a copy taken before is complete */
-    for (i = 0; i < tasks.count; i++) {
-        RTS_UI32 phase = SysAtomicLoad(&tasks.list[i].guard.phase);
-        sum += phase;
-        *busy = *busy || (phase & 1) != 0;
-    }
-    return sum;
-}
-
-int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
-{
-    int failed;
-
-    tasks.init_arg = arg;
-    guard_begin(&tasks.init_guard, SysTimeGetNs());
-    failed = SysExceptTry(fn, arg, exception);
-    guard_end(&tasks.init_guard);
-    return failed;
-}
-
-/* ---- the cycle ---- */
-
-static RTS_UI32 saturate(RTS_I64 ns)
-{
-    if (ns >> 32 == 0)
-        return (RTS_UI32)ns;
-    return ns < 0 ? 0 : 0xFFFFFFFFu;
-}
-
-/* The low half of a quotient. Bit by bit, since the compiler's own division takes 1 KiB on cores that have none. */
-static RTS_UI32 divide(RTS_UI64 dividend, RTS_UI32 divisor, RTS_UI32 *rest)
-{
-    RTS_UI64 part = 0;
-    RTS_UI32 quotient = 0;
-    int bit;
-
-    for (bit = 0; bit < 64; bit++) {
-        part = part << 1 | dividend >> 63;
-        dividend <<= 1;
-        quotient <<= 1;
-        if (part >= divisor) {
-            part -= divisor;
-            quotient |= 1;
-        }
-    }
-    *rest = (RTS_UI32)part;
-    return quotient;
-}
-
-/* Sets the time of the cycle. Milliseconds are counted on, since dividing 64 bits is slow on small cores. */
-static void set_time(TASK *task, RTS_I64 time_ns)
-{
-    IEC_CONTEXT *context = &task->context;
-    RTS_UI64 sum = (RTS_UI64)(time_ns - context->time_ns) + task->ms_rest;
-    RTS_UI32 ms = (RTS_UI32)sum / NS_PER_MS;
-
-    context->time_ns = time_ns;
-    task->ms_rest = (RTS_UI32)sum % NS_PER_MS;
-    if (sum > 0xFFFFFFFF)
-        ms = divide(sum, NS_PER_MS, &task->ms_rest);
-    context->time_ms = (RTS_I32)((RTS_UI32)context->time_ms + ms);
-}
-
-static RTS_UI32 index_of(const TASK *task)
-{
-    return (RTS_UI32)(task - tasks.list);
-}
-
-static void run_entry(void *arg)
-{
-    TASK *task = arg;
-
-    APP_CALL_ENTRY(task->entry, &task->context);
-}
-
-static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
-{
-    RTS_UI32 elapsed = saturate(elapsed_ns);
-    RTS_UI32 late = saturate(late_ns);
-
-    task->last_ns = elapsed;
-    task->sum_ns += elapsed;
-    if (elapsed < task->min_ns)
-        task->min_ns = elapsed;
-    if (elapsed > task->max_ns)
-        task->max_ns = elapsed;
-    if (late > task->jitter_ns)
-        task->jitter_ns = late;
-    SysAtomicStore(&task->cycles, task->cycles + 1);
-}
-
-/* What SysTimeGetNs does not tell: how long this context had the processor. It costs more. */
-static RTS_I64 used_ns(const TASK *task)
-{
-    return SCHED_PROCESSOR_TIME && task->watchdog_ns != 0 ? SysTimeGetUsedNs() : 0;
-}
-
-/* Both rules of manual 3.4: too many cycles in a row that are too long, or one that is far too long. */
-static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
-{
-    if (task->watchdog_ns == 0)
-        return false;
-    if (elapsed_ns <= task->watchdog_ns) {
-        task->exceeded = 0;
-        return false;
-    }
-    task->exceeded++;
-    return task->exceeded >= task->sensitivity || elapsed_ns > task->guard.limit_ns;
-}
-
-/* No other cycle starts, which is settled before the guard says that this one is over. The rest of stopping the
- * application is main's. */
-static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
-{
-    SysAtomicStore(&tasks.running, 0);
-    guard_end(&task->guard);
-    AppHandleException((RTS_I32)index_of(task), code, address);
-    return 0;
-}
-
-/* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
-static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
-{
-    RTS_I64 start_ns = SysTimeGetNs();
-    RTS_I64 used_before_ns = used_ns(task);
-    RTS_EXCEPTION exception;
-    RTS_I64 elapsed_ns;
-
-    set_time(task, start_ns - tasks.time_zero);
-    guard_begin(&task->guard, start_ns);
-    if (task->has_copies)
-        AppImageCopyIn(index_of(task));
-    if (SysExceptTry(run_entry, task, &exception))
-        return end_with_exception(task, exception.code, exception.address);
-    if (task->has_copies)
-        AppImageCopyOut(index_of(task), &tasks.running);
-    elapsed_ns = SysTimeGetNs() - start_ns;
-    account(task, start_ns - due_ns, elapsed_ns);
-    if (watchdog_expired(task, SCHED_PROCESSOR_TIME ? used_ns(task) - used_before_ns : elapsed_ns))
-        return end_with_exception(task, RTSEXCPT_WATCHDOG, 0);
-    guard_end(&task->guard);
-    SchedNoteEvents();
-    return 1;
-}
-
-/* ---- a moment between all cycles ---- */
-
-/*
- * A copy counts when no task was in its cycle from its beginning to its end. On one core main finds such a moment by
- * itself, unless cycles follow each other faster than the copy takes: tasks only interrupt it. Elsewhere tasks may never
- * pause together, so they make such a moment: while it is wanted, a task whose cycle is due waits as long as others are
- * in theirs, unless one of them takes longer than its own. So the longest wait first and the shortest not at all, and
- * none waits longer than its own cycle lasts for each of the others.
- */
-enum { MOMENT_NONE, MOMENT_WANTED, MOMENT_USED };
-
-static struct {
-    RTS_UI32 state;  /* MOMENT_* */
-    RTS_UI32 claims; /* who wants to copy now; the first one may */
-    void (*copy)(void);
-} moment;
-
-/* Between cycles; true when there was none meanwhile. */
-static bool copy_alone(void (*copy)(void))
-{
-    bool busy;
-    RTS_UI32 before = IecTaskGetActivity(&busy);
-
-    if (busy)
-        return false;
-    copy();
-    return IecTaskGetActivity(&busy) == before;
-}
-
-static bool is_wanted(void)
-{
-    return SysAtomicLoad(&moment.state) == MOMENT_WANTED;
-}
-
-static void use_moment(void)
-{
-    if (SysAtomicAdd(&moment.claims, 1) == 0 && is_wanted() && copy_alone(moment.copy))
-        SysAtomicStore(&moment.state, MOMENT_USED);
-    (void)SysAtomicAdd(&moment.claims, 0xFFFFFFFF);
-}
-
-/* Whether a cycle that lasts longer than that of `task` is running. */
-static bool longer_runs(const TASK *task, RTS_I64 now_ns)
-{
-    IEC_GUARD guard;
-    RTS_UI32 i;
-
-    for (i = 0; i < tasks.count; i++) {
-        if (IecTaskReadGuard(i, &guard) &&
-            (tasks.list[i].last_ns > task->last_ns || now_ns - guard.start_ns > task->last_ns))
-            return true;
-    }
-    return false;
-}
-
-static RTS_NOINLINE void make_moment(const TASK *task)
-{
-    use_moment();
-    while (is_wanted() && SysAtomicLoad(&tasks.running) && !longer_runs(task, SysTimeGetNs())) {
-        SysTimePause();
-        use_moment();
-    }
-}
-
-bool IecTaskBetweenCycles(void (*copy)(void))
-{
-    if (RTS_ONE_CORE)
-        return copy_alone(copy);
-    if (moment.state == MOMENT_NONE) {
-        moment.copy = copy;
-        SysAtomicStore(&moment.state, MOMENT_WANTED);
-    }
-    use_moment();
-    if (is_wanted())
-        return false;
-    moment.state = MOMENT_NONE;
-    return true;
-}
-
-int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
-{
-    TASK *task = &tasks.list[index];
-
-    if (!RTS_ONE_CORE && APP_RETAIN_SIZE > 0 && is_wanted())
-        make_moment(task);
-    return SysAtomicLoad(&tasks.running) ? run_cycle(task, due_ns) : 0;
-}
-
 /* ---- all tasks ---- */
-
-/* How long a cycle of the task may take. */
-static RTS_I64 limit_of(const TASK *task)
-{
-    const RTS_I64 most_ns = (RTS_I64)APP_MAX_CYCLE_US * NS_PER_US;
-    RTS_I64 limit_ns = task->watchdog_ns * (RTS_I64)task->sensitivity;
-
-    if (limit_ns == 0)
-        return (RTS_I64)APP_DEFAULT_WATCHDOG_US * NS_PER_US;
-    return most_ns != 0 && limit_ns > most_ns ? most_ns : limit_ns;
-}
-
-static void create(TASK *task, const CDL_TASK *record, const IEC_CONTEXT *prototype)
-{
-    RTS_UI32 phase = task->guard.phase;
-    uintptr_t entry = (uintptr_t)prototype->area[APP_AREA_CODE] + record->entry_offset;
-
-    memset(task, 0, sizeof *task);
-    task->guard.phase = phase; /* goes on, so that a supervisor never takes a new cycle for an old one */
-    task->context = *prototype;
-    task->has_copies = AppImageSetContext(index_of(task), &task->context);
-    task->entry = (IEC_ENTRY)(entry | APP_ENTRY_MODE_BIT);
-    task->record = record;
-    task->min_ns = 0xFFFFFFFFu;
-    task->watchdog_ns = (RTS_I64)record->watchdog_us * NS_PER_US;
-    task->sensitivity = record->watchdog_sensitivity > 1 ? record->watchdog_sensitivity : 1;
-    task->guard.limit_ns = limit_of(task);
-}
 
 RTS_RESULT IecTaskCreateAll(const CDL_TASK *records, RTS_UI32 count, const IEC_CONTEXT *prototype)
 {
-    RTS_UI32 i;
-
     if (count > APP_MAX_TASKS)
         return ERR_NOMEMORY;
-    for (i = 0; i < count; i++)
-        create(&tasks.list[i], &records[i], prototype);
-    tasks.count = count;
-    tasks.time_started = false;
+    IecCycleCreate(records, count, prototype);
     return SchedCreateTasks(records, count, count > 0 ? prototype->area : NULL);
 }
 
 RTS_RESULT IecTaskStartAll(void)
 {
-    if (!tasks.time_started)
-        tasks.time_zero = SysTimeGetNs();
-    tasks.time_started = true;
-    SysAtomicStore(&tasks.running, 1);
+    IecCycleStart();
     return SchedStart();
 }
 
-void IecTaskStopAll(void)
+/* Not inlined: it is called from three places. */
+__attribute__((noinline)) void IecTaskStopAll(void)
 {
-    SysAtomicStore(&tasks.running, 0);
+    IecCycleStop();
     SchedStop();
-    if (!RTS_ONE_CORE)
-        moment.state = MOMENT_NONE;
-}
-
-RTS_UI32 IecTaskGetCount(void)
-{
-    return tasks.count;
+    IecCycleCallOff();
 }
 
 RTS_RESULT IecTaskGetInfo(RTS_UI32 index, IEC_TASK_INFO *info)
 {
-    const TASK *task;
-    RTS_UI64 sum_ns;
-    RTS_UI32 rest;
+    RTS_RESULT result = IecCycleGetInfo(index, info);
 
-    if (index >= tasks.count)
-        return ERR_INVALIDID;
-    task = &tasks.list[index];
-    memset(info, 0, sizeof *info);
-    memcpy(info->name, task->record->name, sizeof info->name);
-    info->kind = task->record->kind;
-    info->priority = task->record->priority;
-    info->interval_us = task->record->interval_us;
-    do { /* again when a cycle ended meanwhile: a 64-bit number may have been read in two halves */
-        info->cycles = SysAtomicLoad(&task->cycles);
-        sum_ns = task->sum_ns;
-        SysAtomicFence();
-    } while (SysAtomicLoad(&task->cycles) != info->cycles);
-    if (info->cycles == 0)
-        return ERR_OK;
-    info->last_us = task->last_ns / NS_PER_US;
-    info->avg_us = divide(sum_ns, info->cycles, &rest) / NS_PER_US;
-    info->min_us = task->min_ns / NS_PER_US;
-    info->max_us = task->max_ns / NS_PER_US;
-    info->jitter_us = task->jitter_ns / NS_PER_US;
-    info->overruns = SchedGetOverruns(index);
-    return ERR_OK;
-}
-
-RTS_RESULT IecTaskGetEntry(RTS_UI32 index, IEC_ENTRY *entry, IEC_CONTEXT **context)
-{
-    if (index >= tasks.count)
-        return ERR_INVALIDID;
-    *entry = tasks.list[index].entry;
-    *context = &tasks.list[index].context;
-    return ERR_OK;
+    if (result == ERR_OK && info->cycles > 0)
+        info->overruns = SchedGetOverruns(index);
+    return result;
 }
 
 RTS_RESULT CmpIecTask_Hook(CMP_HOOK hook)
 {
-    if (hook == CH_INIT) {
-        CMP_CLEAR(tasks);
-        if (!RTS_ONE_CORE)
-            CMP_CLEAR(moment);
-        tasks.init_guard.limit_ns = (RTS_I64)APP_INIT_WATCHDOG_US * NS_PER_US;
-    }
+    if (hook == CH_INIT)
+        IecCycleForget();
     return hook == CH_INIT3 ? CMRegisterExternal(externals, RTS_COUNT(externals)) : ERR_OK;
 }

@@ -10,8 +10,8 @@
 
 #include <string.h>
 
-#include "CmpIecTask.h"
 #include "CmpLog.h"
+#include "IecCycle.h"
 #include "RetainTable.h"
 #include "SysFileFlash.h"
 #include "SysTime.h"

@@ -6,10 +6,11 @@
  *
  * Needs no SysTimer. A task waits for those that run and for communication: what it is late is its jitter.
  */
+#include "CmpScheduleTimer.h"
+
 #include <string.h>
 
-#include "CmpIecTask.h"
-#include "CmpScheduleTimer.h"
+#include "IecCycle.h"
 #include "SysExcept.h"
 #include "SysTime.h"
 #include "TaskTrigger.h"
@@ -45,12 +46,6 @@ static void run_cyclic(RTS_UI32 index)
 RTS_UI32 SchedGetOverruns(RTS_UI32 task)
 {
     return schedule.task[task].overruns + TriggerGetLost(task);
-}
-
-/* A pass of the loop comes soon. */
-void SchedWake(RTS_UI32 task)
-{
-    RTS_UNUSED(task);
 }
 
 void SchedBackgroundCycle(void)
@@ -92,7 +87,7 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
 {
     RTS_UI32 i;
 
-    TriggerCreate(tasks, count, areas);
+    TriggerCreate(tasks, count, areas, NULL);
     schedule.count = 0;
     for (i = 0; i < count; i++)
         add_task(tasks);

@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#include "CmpIecTask.h"
+#include "IecCycle.h"
 #include "SysAtomic.h"
 #include "SysExcept.h"
 #include "SysTime.h"
@@ -74,12 +74,6 @@ static SYS_TIMER_CALLBACK callback_of(RTS_UI32 kind)
     return SCHED_EVENTS_IN_TIMERS ? run_events : NULL;
 }
 
-void SchedWake(RTS_UI32 task)
-{
-    if (SCHED_EVENTS_IN_TIMERS)
-        SysTimerTrigger(schedule.timer[task], 0);
-}
-
 RTS_UI32 SchedGetOverruns(RTS_UI32 task)
 {
     return SysTimerGetOverruns(schedule.timer[task]) + TriggerGetLost(task);
@@ -134,7 +128,7 @@ static RTS_RESULT add_task(const CDL_TASK *task)
     RTS_UI32 index = schedule.count++;
     SYS_TIMER_CALLBACK callback = callback_of(task->kind);
 
-    schedule.timer[index] = (RTS_HANDLE)RTS_INVALID_HANDLE;
+    schedule.timer[index] = RTS_INVALID_HANDLE;
     if (callback != NULL)
         return SysTimerCreate(callback, (void *)(uintptr_t)index, task->kind == KIND_CYCLIC ? task->interval_us : 0,
                               task->priority, &schedule.timer[index]);
@@ -148,7 +142,7 @@ RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *cons
     RTS_UI32 i;
 
     delete_timers();
-    TriggerCreate(tasks, count, areas);
+    TriggerCreate(tasks, count, areas, schedule.timer);
     for (i = 0; i < count && result == ERR_OK; i++)
         result = add_task(&tasks[i]);
     if (result != ERR_OK)
@@ -165,7 +159,7 @@ RTS_RESULT SchedStart(void)
     TriggerForget();
     schedule.started = true;
     for (i = 0; i < schedule.count && result == ERR_OK; i++) {
-        if (schedule.timer[i] != (RTS_HANDLE)RTS_INVALID_HANDLE)
+        if (schedule.timer[i] != RTS_INVALID_HANDLE)
             result = SysTimerStart(schedule.timer[i]);
     }
     return result;

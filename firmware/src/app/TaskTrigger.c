@@ -13,9 +13,10 @@
 #include <string.h>
 
 #include "CmpChecksum.h"
-#include "CmpIecTask.h"
-#include "CmpScheduleTimer.h"
+#include "CmpItf.h"
+#include "SchedEvents.h"
 #include "SysAtomic.h"
+#include "SysTimer.h"
 #include "rts_config.h"
 
 /* Events are counted modulo 65536: fewer may wait. */
@@ -33,6 +34,8 @@ static struct {
     TRIGGER list[APP_MAX_TASKS];
 } triggers;
 
+static const RTS_HANDLE *timers; /* of the tasks, where SCHED_EVENTS_IN_TIMERS */
+
 enum { PLACES = SCHED_MAX_EXTERNAL_EVENTS > 0 ? SCHED_MAX_EXTERNAL_EVENTS : 1 };
 static RTS_UI32 events[PLACES]; /* CRC of the name, 0: free */
 
@@ -44,6 +47,13 @@ void TriggerReset(void)
 }
 
 /* ---- counting ---- */
+
+/* Where tasks that wait for events run in main, a pass of it comes soon. */
+static void wake(RTS_UI32 task)
+{
+    if (SCHED_EVENTS_IN_TIMERS && timers != NULL)
+        SysTimerTrigger(timers[task], 0);
+}
 
 static RTS_UI32 is_true(const CDL_TASK *task)
 {
@@ -60,7 +70,7 @@ static void note(RTS_UI32 task)
     for (; is_true(&triggers.tasks[task]) != (before & 1); before = SysAtomicLoad(changes)) {
         (void)SysAtomicReplace(changes, before, before + 1); /* or another context did; and may not have woken it yet */
         if ((before & 1) == 0)
-            SchedWake(task);
+            wake(task);
     }
 }
 
@@ -82,24 +92,21 @@ void SchedNoteEvents(void)
 }
 
 /* Events so far: a variable that is TRUE has risen once more than it fell. */
-static RTS_UI16 count_events(const TRIGGER *trigger)
+static RTS_UI32 count_events(const TRIGGER *trigger)
 {
-    return (RTS_UI16)((SysAtomicLoad(&trigger->changes) + 1) / 2);
+    return (SysAtomicLoad(&trigger->changes) + 1) / 2;
 }
 
 bool TriggerTake(RTS_UI32 task)
 {
     TRIGGER *trigger = &triggers.list[task];
-    RTS_UI16 waiting = (RTS_UI16)(count_events(trigger) - trigger->answered);
+    RTS_UI32 waiting = (RTS_UI16)(count_events(trigger) - trigger->answered);
+    RTS_UI32 lost = waiting > SCHED_MAX_WAITING_EVENTS ? waiting - SCHED_MAX_WAITING_EVENTS : 0;
 
     if (waiting == 0)
         return false;
-    trigger->answered++;
-    if (waiting > SCHED_MAX_WAITING_EVENTS) {
-        waiting = (RTS_UI16)(waiting - SCHED_MAX_WAITING_EVENTS);
-        trigger->answered = (RTS_UI16)(trigger->answered + waiting);
-        trigger->lost = (RTS_UI16)(trigger->lost + waiting);
-    }
+    trigger->answered = (RTS_UI16)(trigger->answered + 1 + lost);
+    trigger->lost = (RTS_UI16)(trigger->lost + lost);
     return true;
 }
 
@@ -110,12 +117,13 @@ RTS_UI32 TriggerGetLost(RTS_UI32 task)
 
 /* ---- the tasks ---- */
 
-void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas)
+void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas, const RTS_HANDLE *task_timers)
 {
     memset(&triggers, 0, sizeof triggers);
     triggers.tasks = tasks;
     triggers.areas = areas;
     triggers.count = count;
+    timers = task_timers;
 }
 
 const CDL_TASK *TriggerGetTask(RTS_UI32 task)
@@ -164,7 +172,7 @@ static RTS_HANDLE no_event(RTS_RESULT *result, RTS_RESULT reason)
 {
     if (result != NULL)
         *result = reason;
-    return (RTS_HANDLE)RTS_INVALID_HANDLE;
+    return RTS_INVALID_HANDLE;
 }
 
 RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result)
@@ -204,7 +212,7 @@ RTS_RESULT SchedPostExternalEvent(RTS_HANDLE event)
         const CDL_TASK *task = &triggers.tasks[i];
         if (task->kind == KIND_EXTERNAL && task->event_offset == events[event]) {
             (void)SysAtomicAdd(&triggers.list[i].changes, 2);
-            SchedWake(i);
+            wake(i);
         }
     }
     return ERR_OK;

@@ -10,8 +10,9 @@
 #include "CompactDownload.h"
 
 /* Replaces all triggers by those of `count` tasks; nothing has happened yet. Records and areas (base addresses by
- * APP_AREA_*) stay valid until the next call. From main, while no task runs. */
-void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas);
+ * APP_AREA_*) stay valid until the next call, as do the timers of the tasks, which an event triggers on ports with
+ * SCHED_EVENTS_IN_TIMERS (NULL: there are none). From main, while no task runs. */
+void TriggerCreate(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas, const RTS_HANDLE *timers);
 
 const CDL_TASK *TriggerGetTask(RTS_UI32 task);
 
@@ -27,8 +28,5 @@ RTS_UI32 TriggerGetLost(RTS_UI32 task);
 
 /* Forgets all external events. */
 void TriggerReset(void);
-
-/* The scheduler's: an event waits for the task. From any context. */
-void SchedWake(RTS_UI32 task);
 
 #endif

@@ -12,6 +12,7 @@
 
 #include <string.h>
 
+#include "AppAddress.h"
 #include "CmpAppEmbedded.h"
 #include "CmpBytes.h"
 #include "CmpIecTask.h"
@@ -26,36 +27,6 @@ enum {
     CONSISTENT_SIZE = 8, /* its element, with what aligns it */
     ALL_BITS = 0xFF,
 };
-
-typedef struct {
-    RTS_UI32 area;
-    RTS_UI32 offset;
-} AREA_ADDRESS;
-
-/* ---- addresses ---- */
-
-static RTS_RESULT resolve(const AREA_ADDRESS *address, RTS_UI32 size, RTS_UI8 **memory)
-{
-    if (size == 0)
-        return MONITORING_ERR_SIZE_0;
-    if (AppGetAreaSize(address->area) == 0)
-        return MONITORING_ERR_INVALID_AREA;
-    *memory = AppGetAreaAddress(address->area, address->offset, size);
-    return *memory != NULL ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_INDEX;
-}
-
-/* Goes on at where the pointer at `address` leads: again an area and an offset, whatever the pointer holds. */
-static RTS_RESULT follow(AREA_ADDRESS *address)
-{
-    RTS_UI8 *memory;
-    uintptr_t pointer;
-    RTS_RESULT result = resolve(address, MON2_POINTER_SIZE, &memory);
-
-    if (result != MONITORING_ERR_OK)
-        return result;
-    memcpy(&pointer, memory, sizeof(pointer));
-    return AppFindArea(pointer, &address->area, &address->offset) ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_POINTER;
-}
 
 /* ---- programs ---- */
 
@@ -92,7 +63,7 @@ static RTS_UI32 take(PROGRAM *program, RTS_UI32 size)
 }
 
 /* Takes "Ld16/Ld32 offset, Rao area" and any number of "Der pointer, Ld16/Ld32 offset, Add". */
-static RTS_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address)
+static MON_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address)
 {
     static const RTS_UI8 der[] = {MON2_OP_DER, MON2_POINTER_SIZE};
     RTS_UI32 wanted = MON2_OP_RAO;
@@ -109,7 +80,7 @@ static RTS_RESULT take_address(PROGRAM *program, AREA_ADDRESS *address)
         if (!goes_on_with(program, der, sizeof(der)))
             return MONITORING_ERR_OK;
         skip(program, sizeof(der));
-        RTS_RESULT result = follow(address);
+        MON_RESULT result = AppAddressFollow(address);
         if (result != MONITORING_ERR_OK)
             return result;
         wanted = MON2_OP_ADD;
@@ -143,7 +114,7 @@ static RTS_UI32 take_mask(PROGRAM *program)
 
 /* The address alone; to write also some bits at it, or the programming system's program: allocate a frame, address, and
  * unless disabled copy to it. *mask: NULL when this is not to write. */
-static RTS_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask)
+static MON_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask)
 {
     static const RTS_UI8 head[] = {0x15, 0x0C, 0x00};
     /* clang-format off */
@@ -156,7 +127,7 @@ static RTS_RESULT parse(PROGRAM program, AREA_ADDRESS *address, RTS_UI32 *mask)
         skip(&program, sizeof(head));
         tail_size = sizeof(tail);
     }
-    RTS_RESULT result = take_address(&program, address);
+    MON_RESULT result = take_address(&program, address);
     if (result != MONITORING_ERR_OK)
         return result;
     if (!goes_on_with(&program, tail, tail_size))
@@ -207,8 +178,9 @@ static void store(RTS_UI8 *memory, const RTS_UI8 *value, RTS_UI32 size)
 
 /* ---- requests ---- */
 
-/* ERR_* below 0x100 never occur here, so the number says which list it is from. */
-static RTS_RESULT check_application(const SRV_REQUEST *request, RTS_UI32 *error)
+/* Why a request is answered with an error alone. On the wire it shares its place with MON_RESULT; no such ERR_* is below
+ * 0x100, so the number says which list it is from. */
+static RTS_RESULT check_application(const SRV_REQUEST *request, RTS_RESULT *error)
 {
     APP_STATUS status;
     const MON2_APPLICATION *application;
@@ -287,10 +259,10 @@ static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 rese
     RTS_UI32 room = BTagGetRoom(reply);
     RTS_UI32 id = var->id;
     RTS_UI32 size = var->size;
-    RTS_RESULT result = parse(var->program, &address, NULL);
+    MON_RESULT result = parse(var->program, &address, NULL);
 
     if (result == MONITORING_ERR_OK)
-        result = resolve(&address, size, &memory);
+        result = AppAddressResolve(&address, size, &memory);
     if (result == MONITORING_ERR_OK && (room < ENTRY_HEAD + reserved || size > room - ENTRY_HEAD - reserved))
         result = MONITORING_ERR_BUFFERSIZE_EXCEEDED;
     if (result != MONITORING_ERR_OK) {
@@ -306,7 +278,7 @@ static void read_variable(BTAG_WRITER *reply, const READ_VAR *var, RTS_UI32 rese
     if (result == MONITORING_ERR_OK)
         load(value, memory, size);
     else
-        *value = (RTS_UI8)result;
+        *value = result;
 }
 
 static RTS_RESULT count_variables(BTAG_READER list, RTS_UI32 *count)
@@ -345,7 +317,7 @@ static RTS_RESULT read_list(BTAG_READER *list, BTAG_WRITER *reply)
 static RTS_RESULT mon_read(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     BTAG_READER list;
-    RTS_UI32 error;
+    RTS_RESULT error;
     bool busy;
     RTS_RESULT result = check_application(request, &error);
 
@@ -407,14 +379,14 @@ static void write_memory(RTS_UI8 *memory, const WRITE_VAR *var)
         SysLockLeave(lock);
 }
 
-static RTS_RESULT write_variable(WRITE_VAR *var, bool commit)
+static MON_RESULT write_variable(WRITE_VAR *var, bool commit)
 {
     AREA_ADDRESS address;
     RTS_UI8 *memory = NULL;
-    RTS_RESULT result = parse(var->program, &address, &var->mask);
+    MON_RESULT result = parse(var->program, &address, &var->mask);
 
     if (result == MONITORING_ERR_OK)
-        result = resolve(&address, var->size, &memory);
+        result = AppAddressResolve(&address, var->size, &memory);
     if (result == MONITORING_ERR_OK && address.area == APP_AREA_CODE)
         result = MONITORING_ERR_OPERATION_DENIED;
     if (result == MONITORING_ERR_OK && commit)
@@ -423,7 +395,7 @@ static RTS_RESULT write_variable(WRITE_VAR *var, bool commit)
 }
 
 /* One pass over the list; stops at the first bad entry. */
-static RTS_RESULT write_list(const BTAG *list, bool commit, RTS_UI32 *error, RTS_UI32 *index)
+static RTS_RESULT write_list(const BTAG *list, bool commit, MON_RESULT *error, RTS_UI32 *index)
 {
     const RTS_UI8 *data = list->data;
     RTS_UI32 size = list->size;
@@ -440,21 +412,30 @@ static RTS_RESULT write_list(const BTAG *list, bool commit, RTS_UI32 *error, RTS
     return ERR_OK;
 }
 
+static void write_error(BTAG_WRITER *reply, RTS_UI32 error, RTS_UI32 index)
+{
+    BTagWrite32(reply, TAG_MON2_ERROR, error);
+    BTagWrite32(reply, TAG_MON2_ERROR_INDEX, index);
+}
+
 static RTS_RESULT mon_write(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     BTAG list;
-    RTS_UI32 error;
+    RTS_RESULT refused;
+    MON_RESULT error = MONITORING_ERR_OK;
     RTS_UI32 index = 0;
-    RTS_RESULT result = check_application(request, &error);
+    RTS_RESULT result = check_application(request, &refused);
 
     if (result == ERR_OK)
         result = BTagFind(&request->tags, TAG_MON2_WRITE_LIST, 1, request->tags.size, &list);
-    for (int commit = 0; result == ERR_OK && error == ERR_OK && commit <= 1; commit++)
-        result = write_list(&list, commit, &error, &index);
-    if (result == ERR_OK && error != ERR_OK) {
-        BTagWrite32(reply, TAG_MON2_ERROR, error);
-        BTagWrite32(reply, TAG_MON2_ERROR_INDEX, index);
+    if (result == ERR_OK && refused != ERR_OK) {
+        write_error(reply, refused, index);
+        return ERR_OK;
     }
+    for (int commit = 0; result == ERR_OK && error == MONITORING_ERR_OK && commit <= 1; commit++)
+        result = write_list(&list, commit, &error, &index);
+    if (result == ERR_OK && error != MONITORING_ERR_OK)
+        write_error(reply, error, index);
     return result;
 }
 

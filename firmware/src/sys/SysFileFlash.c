@@ -10,7 +10,6 @@
 #include "CmpChecksum.h"
 #include "CmpLog.h"
 #include "SysFlash.h"
-#include "SysFlashLog.h"
 #include "rts_config.h"
 
 typedef struct {

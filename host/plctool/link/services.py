@@ -97,7 +97,7 @@ class Status:
 
 @dataclass(frozen=True)
 class TaskInfo:
-    """Statistics of a task; `kind` is KIND_* of CmpIecTask.h, times in us."""
+    """Statistics of a task; `kind` is KIND_* of CompactDownload.h, times in us."""
 
     name: str
     kind: int

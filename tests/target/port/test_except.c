@@ -235,7 +235,7 @@ static int is_within(uintptr_t address, void (*function)(void *arg))
 static void normal_end_is_no_exception(void)
 {
     RTS_EXCEPTION exception;
-    CHECK_EQUAL(SysExceptTry(end_normally, (void *)&areas.all.argument, &exception), 0);
+    CHECK_EQUAL(SysExceptTry(end_normally, (void *)&areas.all.argument, &exception), true);
     CHECK_EQUAL(exception.code, RTSEXCPT_NOEXCEPTION);
     CHECK_EQUAL(areas.all.argument, 77);
 }
@@ -243,7 +243,7 @@ static void normal_end_is_no_exception(void)
 static void raised_exception_brings_code_and_address_without_thumb_bit(void)
 {
     RTS_EXCEPTION exception;
-    CHECK_EQUAL(SysExceptTry(raise, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(raise, NULL, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ARRAYBOUNDS);
     CHECK_EQUAL(exception.address, 0x1234);
 }
@@ -253,7 +253,7 @@ static void every_failure_in_main_is_caught_with_its_code(void)
     for (RTS_UI32 i = 0; i < RTS_COUNT(failures); i++) {
         RTS_EXCEPTION exception = {0, 0};
         SysExceptForgetTrace(); /* so that the stack of each is read */
-        CHECK_EQUAL(SysExceptTry(failures[i].function, NULL, &exception), 1);
+        CHECK_EQUAL(SysExceptTry(failures[i].function, NULL, &exception), false);
         CHECK_EQUAL(exception.code, failures[i].code);
     }
 }
@@ -292,9 +292,9 @@ static void overflow_stops_at_the_guard(void)
 static void no_room_for_the_leaving_frame_is_a_stack_overflow(void)
 {
     RTS_EXCEPTION exception;
-    CHECK_EQUAL(SysExceptTry(leave_near_the_end_of_the_stack, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(leave_near_the_end_of_the_stack, NULL, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_STACK_OVERFLOW);
-    CHECK_EQUAL(SysExceptTry(raise, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(raise, NULL, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ARRAYBOUNDS);
 }
 
@@ -326,9 +326,9 @@ static void on_timer(void *param, RTS_I64 due)
     task->calls++;
     task->running = 1;
     if (SysExceptTry(task->function, task, &task->exception))
-        task->caught++;
-    else
         task->passed++;
+    else
+        task->caught++;
     task->running = 0;
 }
 
@@ -438,7 +438,7 @@ static void guarded_code_in_main_survives_failing_tasks(void)
     RTS_EXCEPTION exception;
     areas.all.bad = 0;
     RTS_HANDLE timer = start(&fast, overflow_the_stack_with_fpu, 200, 3);
-    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&areas.all.bad, &exception), 0);
+    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&areas.all.bad, &exception), true);
     SysTimerDelete(timer);
     CHECK_EQUAL(areas.all.bad, 0);
     CHECK(fast.caught > 3);
@@ -520,7 +520,7 @@ static void endless_loop_in_main_is_broken(void)
     RTS_EXCEPTION exception;
     slow.running = 1;
     ClockSetCallback(break_the_slow_task);
-    CHECK_EQUAL(SysExceptTry(loop_forever, &slow, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(loop_forever, &slow, &exception), false);
     ClockSetCallback(NULL);
     slow.running = 0;
     CHECK_EQUAL(exception.code, RTSEXCPT_WATCHDOG);
@@ -538,7 +538,7 @@ static void break_of_what_does_not_run_does_nothing(void)
     areas.all.bad = 0;
     SysExceptBreak(&slow, RTSEXCPT_WATCHDOG);
     ClockSetCallback(break_something_else);
-    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&areas.all.bad, &exception), 0);
+    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&areas.all.bad, &exception), true);
     ClockSetCallback(NULL);
     CHECK_EQUAL(areas.all.bad, 0);
 }
@@ -582,7 +582,7 @@ static void trace_of_a_fault_starts_at_its_stack_pointer(void)
     RTS_EXCEPTION exception;
     SysExceptForgetTrace();
     SysExceptCodeRange(program, sizeof(program));
-    CHECK_EQUAL(SysExceptTry(fail_below_a_return_address, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(fail_below_a_return_address, NULL, &exception), false);
     expect_return_address();
 }
 

@@ -1,27 +1,13 @@
 /*
- * cmp_list.c - the components of your device. Strike what it does not need; add your own.
+ * cmp_list.c - the components of your device. Strike what it does not need; add your own (CmpList.h).
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CmpItf.h"
-
-/* System components first; services before the components that register with them. */
-#define COMPONENTS(X)           \
-    X(CmpLog)                   \
-    X(CmpEventMgrEmbedded)      \
-    X(SysFileFlash)             \
-    X(CmpRetain)                \
-    X(CmpScheduleTimer)         \
-    X(CmpIecTask)               \
-    X(CmpAppEmbedded)           \
-    X(CmpSrv)                   \
-    X(CmpDevice)                \
-    X(CmpAppSrv)                \
-    X(CmpLogSrv)                \
-    X(CmpMonitor2)              \
-    X(CmpRouterEmbedded)        \
-    X(CmpNameServiceServer)     \
-    X(CmpChannelServerEmbedded) \
-    X(CmpBlkDrvSimpleCom)
-
-CMP_LIST(COMPONENTS);
+#define HAS_CmpLog 1
+#define HAS_CmpEventMgrEmbedded 1
+#define HAS_CmpRetain 1
+#define HAS_COMMUNICATION 1
+#define HAS_CmpLogSrv 1
+#define HAS_CmpMonitor2 1
+#define HAS_CmpBlkDrvSimpleCom 1
+#include "CmpList.h"

@@ -11,8 +11,8 @@
 /* Component numbers from 0x1000 on are the port's. */
 enum { CMPID_CmpIntCalls = 0x1000, CMPID_CmpRealCalls = 0x1001, CMPID_CmpLrealCalls = 0x1002 };
 
-CMP_DECLARE(CmpIntCalls)
-CMP_DECLARE(CmpRealCalls)
-CMP_DECLARE(CmpLrealCalls)
+RTS_RESULT CmpIntCalls_Hook(CMP_HOOK hook);
+RTS_RESULT CmpRealCalls_Hook(CMP_HOOK hook);
+RTS_RESULT CmpLrealCalls_Hook(CMP_HOOK hook);
 
 #endif

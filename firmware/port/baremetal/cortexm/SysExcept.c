@@ -446,12 +446,12 @@ void NmiHandler(void)
 
 /* ---- for the runtime ---- */
 
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     RTS_UI64 result = try_enter(fn, arg);
     exception->code = (RTS_UI32)result;
     exception->address = (uintptr_t)(result >> 32);
-    return exception->code != RTSEXCPT_NOEXCEPTION;
+    return exception->code == RTSEXCPT_NOEXCEPTION;
 }
 
 static int in_try(void)

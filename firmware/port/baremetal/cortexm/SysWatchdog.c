@@ -7,7 +7,7 @@
 #include "CmpScheduleTimer.h"
 #include "CortexM.h"
 
-CMP_DECLARE(SysWatchdog)
+RTS_RESULT SysWatchdog_Hook(CMP_HOOK hook);
 
 RTS_RESULT SysWatchdog_Hook(CMP_HOOK hook)
 {

@@ -36,7 +36,9 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #endif
 
 /* Tasks that wait for an event run in a line of their own, too. */
+#ifndef SCHED_EVENTS_IN_TIMERS
 #define SCHED_EVENTS_IN_TIMERS 1
+#endif
 
 /* 1: IEC code may write its areas and its stack only, and meets an exception elsewhere, if the chip has an MPU
  * (SysExcept.c). The areas are rounded up to a multiple of an eighth of the power of 2 that holds them: make APP_DATA_SIZE

@@ -5,18 +5,9 @@
  */
 #include "CmpCompilerCalls.h"
 
-#define COMPONENTS(X)      \
-    X(CmpLog)              \
-    X(SysSim)              \
-    X(CmpEventMgrEmbedded) \
-    X(SysFileFlash)        \
-    X(CmpRetain)           \
-    X(CmpScheduleTimer)    \
-    X(CmpIecTask)          \
-    X(CmpMath)             \
-    X(CmpIntCalls)         \
-    X(CmpRealCalls)        \
-    X(CmpLrealCalls)       \
-    X(CmpAppEmbedded)
-
-CMP_LIST(COMPONENTS);
+#define HAS_CmpLog 1
+#define HAS_CmpEventMgrEmbedded 1
+#define HAS_CmpRetain 1
+#define HAS_CmpMath 1
+#define PORT_COMPONENTS(X) X(CmpIntCalls) X(CmpRealCalls) X(CmpLrealCalls) X(SysSim)
+#include "CmpList.h"

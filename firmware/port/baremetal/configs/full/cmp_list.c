@@ -5,28 +5,14 @@
  */
 #include "CmpCompilerCalls.h"
 
-/* System components first; services before the components that register with them. */
-#define COMPONENTS(X)           \
-    X(CmpLog)                   \
-    X(CmpEventMgrEmbedded)      \
-    X(SysFileFlash)             \
-    X(CmpRetain)                \
-    X(CmpScheduleTimer)         \
-    X(CmpIecTask)               \
-    X(SysWatchdog)              \
-    X(CmpMath)                  \
-    X(CmpIntCalls)              \
-    X(CmpRealCalls)             \
-    X(CmpLrealCalls)            \
-    X(CmpAppEmbedded)           \
-    X(CmpSrv)                   \
-    X(CmpDevice)                \
-    X(CmpAppSrv)                \
-    X(CmpLogSrv)                \
-    X(CmpMonitor2)              \
-    X(CmpRouterEmbedded)        \
-    X(CmpNameServiceServer)     \
-    X(CmpChannelServerEmbedded) \
-    X(CmpBlkDrvSimpleCom)
-
-CMP_LIST(COMPONENTS);
+#define HAS_CmpLog 1
+#define HAS_CmpEventMgrEmbedded 1
+#define HAS_SysWatchdog 1
+#define HAS_CmpRetain 1
+#define HAS_CmpMath 1
+#define HAS_COMMUNICATION 1
+#define HAS_CmpLogSrv 1
+#define HAS_CmpMonitor2 1
+#define HAS_CmpBlkDrvSimpleCom 1
+#define PORT_COMPONENTS(X) X(CmpIntCalls) X(CmpRealCalls) X(CmpLrealCalls)
+#include "CmpList.h"

@@ -12,7 +12,9 @@
 #define APP_MAX_IMPORTS 16
 #define CM_MAX_EXT_TABLES 2
 #define EVENT_MAX_CALLBACKS 0
+#define CYCLE_MAX_PHASES 0
 #define SCHED_MAX_EXTERNAL_EVENTS 0
+#define SCHED_EVENTS_IN_TIMERS 0   /* the super loop has no timers */
 #define NETSERVER_MESSAGE_SIZE 232 /* who it is, with names of 19 characters and a serial number of 24 */
 #define COM_QUEUE_SIZE 324
 #define LOG_MAX_ENTRIES 0

@@ -3,12 +3,28 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * From main only; AppHandleException, which tasks call, is in CmpAppEmbedded.h.
+ * From main only, unless said otherwise. (Shared with the host.)
  */
 #ifndef APPEXCEPTION_H
 #define APPEXCEPTION_H
 
-#include "CmpAppEmbedded.h"
+#include "CmpStd.h"
+#include "SysStart.h"
+
+/* The last exception; code RTSEXCPT_NOEXCEPTION when there is none. */
+typedef struct {
+    RTS_UI32 code;
+    RTS_UI32 code_offset; /* fault address in the code segment, APP_NO_CODE_OFFSET when it was elsewhere */
+    RTS_I32 task;         /* index of the task, -1 when in initialisation code */
+} APP_EXCEPTION;
+
+#ifndef RTS_CFFI
+/* Called by the cycle in the context of the task that failed, when the application is in its safe state: records the
+ * exception. The rest (log, outputs that other tasks have written meanwhile, events) follows in CH_COMM_CYCLE. */
+void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address);
+
+/* The words for an RTSEXCPT_* code, for the log. From any context. */
+const char *AppExceptionName(RTS_UI32 code);
 
 /* What has happened. `task`: index, -1 in initialisation code. */
 typedef struct {
@@ -29,5 +45,6 @@ const APP_EXCEPTION *AppExceptionGet(void);
 
 /* Forgets it, and what a task may have raised; no task runs. */
 void AppExceptionClear(void);
+#endif
 
 #endif

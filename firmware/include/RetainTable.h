@@ -6,8 +6,17 @@
 #ifndef RETAINTABLE_H
 #define RETAINTABLE_H
 
-#include "CmpRetain.h"
+#include "CmpErrors.h"
+#include "CmpStd.h"
 #include "CompactDownload.h"
+
+/* Where in flash the table of kept variables of an image is (CDL_KEPT), and how large its retain area. */
+typedef struct {
+    RTS_UI32 file;
+    RTS_UI32 offset;
+    RTS_UI32 size;      /* of the table in bytes, 0: nothing is kept */
+    RTS_UI32 area_size; /* bytes */
+} RETAIN_TABLE;
 
 /* An entry; of a single variable `run` says that it is one of its size. */
 typedef struct {

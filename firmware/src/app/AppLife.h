@@ -1,21 +1,34 @@
 /*
- * App.h - the loaded application, for the parts CmpAppEmbedded is made of.
+ * AppLife.h - the loaded application: load, start, stop, exceptions.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * CmpAppEmbedded.c is its life: load, start, stop, reset, exceptions. AppDownload.c puts another one in its place,
- * AppBoot.c loads what is in flash; both call the life. All from main.
+ * CmpAppEmbedded.c is the component, AppDownload.c puts another application in its place, AppBoot.c loads what is in
+ * flash; all of them call the life, which calls none of them. All from main.
  */
-#ifndef APP_H
-#define APP_H
+#ifndef APPLIFE_H
+#define APPLIFE_H
 
-#include "AppLoader.h"
-
-/* ---- life ---- */
+#include "AppLoaded.h"
+#include "CmpErrors.h"
 
 /* Slot of the loaded application, SLOT_NONE without one. */
 RTS_UI32 AppGetSlot(void);
 bool AppHasException(void);
+
+/* Whether its last cycle was broken off for a stop. That says nothing against the program, but it starts from a reset
+ * only. */
+bool AppWasBrokenOff(void);
+
+/* AS_* of AppState.h. */
+RTS_UI32 AppGetState(void);
+
+/* False while it waits for its initial values. */
+bool AppIsInitialised(void);
+
+/* What the loader knows about it, all zero without one, and what each of its tasks starts from. */
+const APP_IMAGE *AppGetImage(void);
+const IEC_CONTEXT *AppGetContext(void);
 
 /* Makes the code of a checked image executable and returns where; NULL when the port cannot. */
 const RTS_UI8 *AppMapCode(const APP_IMAGE *image);
@@ -29,6 +42,9 @@ void AppUnload(void);
  * is given up when its tasks cannot be created: ERR_NOMEMORY. */
 RTS_RESULT AppInitialise(void);
 
+/* The same for one that has them, after its own code for the end. Cold: also for its retain variables. */
+RTS_RESULT AppReinitialise(bool cold);
+
 /* Starts the loaded application, initialised before if it was not yet. ERR_EXCEPTION: that failed. */
 RTS_RESULT AppStart(void);
 
@@ -40,22 +56,10 @@ void AppHandlePendingException(void);
 
 void AppPostEvent(RTS_UI32 event);
 
-/* ---- boot project ---- */
+/* An application that has run for APP_PROVE_US has proven itself. In each pass of main. */
+void AppCheckProof(void);
 
-/* Loads what is in flash, and starts it unless it died before. */
-void AppBoot(void);
-
-/* Starts what was loaded and not started, because a user asks for it: also what died before, when there is none to go
- * back to. */
-RTS_RESULT AppBootByHand(void);
-
-/* Whether the slot that is not `failed` has an application that may run. */
-bool AppCanRollBack(RTS_UI32 failed);
-
-/*
- * Loads the other slot instead of `failed`, from now on, without calling anything of it; false when it holds nothing
- * that can run. Its retain variables are those it had when the failed application came.
- */
-bool AppRollBack(RTS_UI32 failed);
+/* The state as after power on, without an application. */
+void AppForget(void);
 
 #endif

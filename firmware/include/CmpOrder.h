@@ -1,0 +1,54 @@
+/*
+ * CmpOrder.h - the components of a runtime, in the one order of all ports; included by CmpList.h, once for each table.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A component comes after those it uses: its hooks are called after theirs, and undone before them. No include guard.
+ */
+/* clang-format off */
+#if HAS_SysTime
+X(SysTime)
+#endif
+#if HAS_CmpLog
+X(CmpLog)
+#endif
+#ifdef PORT_SYSTEM
+PORT_SYSTEM(X)
+#endif
+X(SysFileFlash)
+#if HAS_CmpEventMgrEmbedded
+X(CmpEventMgrEmbedded)
+#endif
+X(CmpScheduleTimer)
+X(CmpIecTask)
+#if HAS_SysWatchdog
+X(SysWatchdog)
+#endif
+#if HAS_CmpRetain
+X(CmpRetain)
+#endif
+#if HAS_CmpMath
+X(CmpMath)
+#endif
+#ifdef PORT_COMPONENTS
+PORT_COMPONENTS(X)
+#endif
+X(CmpAppEmbedded)
+#if HAS_COMMUNICATION
+X(CmpSrv)
+X(CmpDevice)
+X(CmpAppSrv)
+#if HAS_CmpLogSrv
+X(CmpLogSrv)
+#endif
+#if HAS_CmpMonitor2
+X(CmpMonitor2)
+#endif
+X(CmpRouterEmbedded)
+X(CmpNameServiceServer)
+X(CmpChannelServerEmbedded)
+#if HAS_CmpBlkDrvSimpleCom
+X(CmpBlkDrvSimpleCom)
+#endif
+#endif
+/* clang-format on */

@@ -1,0 +1,60 @@
+/*
+ * CyclePhases.h - what components do in the cycle of every task, before and after its code, and the safe state.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A cycle is a row of phases: inputs, the process image of the task (AppImage.h), before the code, the code, after the
+ * code, the process image, outputs, record. A component registers what it does in a phase in CH_INIT3, for good. While
+ * none is registered, a task without process image pays one compare before its code and one after it.
+ *
+ * All phases of a cycle run in the context of its task, which may be interrupted by tasks of a higher priority and, on
+ * several cores, run at the same time as others: a phase that shares data with other tasks locks them itself
+ * (SysLock.h; no lock is held when it is called). They belong to the cycle: monitoring and retain wait for their end,
+ * statistics and watchdog count their time. But what goes wrong in them is no exception of the program: a phase does
+ * not block, and ends by itself, within the time that its component documents. After code that failed there are no
+ * phases; the last two are left out when the application was stopped meanwhile: it may be in its safe state.
+ */
+#ifndef CYCLEPHASES_H
+#define CYCLEPHASES_H
+
+#include "CmpErrors.h"
+#include "CmpIecAbi.h"
+#include "CmpStd.h"
+
+/* In the order of a cycle; of two that are registered for the same phase, the first registered comes first. */
+typedef enum {
+    CYCLE_INPUTS,      /* drivers fill the shared inputs, before the task gets its copy */
+    CYCLE_BEFORE_CODE, /* inputs are forced, in what the task sees */
+    CYCLE_AFTER_CODE,  /* outputs are forced, in what the task has written */
+    CYCLE_OUTPUTS,     /* drivers take the shared outputs, which have what the task changed */
+    CYCLE_RECORD,      /* trace */
+    CYCLE_SAFE_STATE,  /* in no cycle: outputs are zero and stay so, see AppEnterSafeState */
+} CYCLE_PHASE;
+
+/* `task`: its index; `context`: the areas as the task sees them, and the time of the cycle. Of CYCLE_SAFE_STATE: 0 and
+ * NULL. */
+typedef void (*PF_CYCLE_PHASE)(RTS_UI32 task, const IEC_CONTEXT *context);
+
+/* From main, in CH_INIT3. ERR_NOMEMORY when CYCLE_MAX_PHASES are registered. */
+RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run);
+
+/*
+ * Puts the application into its safe state: outputs are zero, and the phases registered for CYCLE_SAFE_STATE have made
+ * the hardware agree. The one way there: after an exception (in the context of the task that had it, at once, and again
+ * from main when all tasks have ended their cycle), at a stop, and when a start failed. No task starts another cycle by
+ * then, and what those that still run have changed does not reach the outputs any more. From main or a task.
+ */
+void AppEnterSafeState(void);
+
+/* ---- for IecCycle.c ---- */
+
+/* Whether any are registered. */
+bool CyclePhasesExist(void);
+
+/* Calls those registered for `when`. */
+void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task, const IEC_CONTEXT *context);
+
+/* Forgets all, as after power on. */
+void CyclePhasesForget(void);
+
+#endif

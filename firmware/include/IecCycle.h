@@ -1,0 +1,89 @@
+/*
+ * IecCycle.h - the cycle of a task and its statistics (shared with the host).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A cycle is: the phases before the code (CyclePhases.h), with them a copy of the inputs and outputs that others use too,
+ * IEC code, the phases after it, with them the changed outputs, statistics, watchdog (manual 3.4, 3.5, 8.9), events for
+ * other tasks.
+ */
+#ifndef IECCYCLE_H
+#define IECCYCLE_H
+
+#include "CmpErrors.h"
+#include "CmpIecAbi.h"
+#include "CmpStd.h"
+#ifndef RTS_CFFI
+#include "SysExcept.h"
+#endif
+
+/* Statistics of a task; times in us. Jitter is the largest deviation of a start from its due time. */
+typedef struct {
+    char name[CDL_TASK_NAME_SIZE];
+    RTS_UI32 kind;
+    RTS_UI32 priority;
+    RTS_UI32 interval_us;
+    RTS_UI32 cycles;
+    RTS_UI32 last_us;
+    RTS_UI32 avg_us;
+    RTS_UI32 min_us;
+    RTS_UI32 max_us;
+    RTS_UI32 jitter_us;
+    RTS_UI32 overruns; /* due times missed because the cycle before took too long; of events, those that were lost */
+} IEC_TASK_INFO;
+
+/* One cycle of a task that is due since `due_ns` (SysTimeGetNs). Called by the scheduler in the context of the task.
+ * Returns false when the task must not be scheduled again (exception). */
+bool IecTaskCycle(RTS_UI32 task, RTS_I64 due_ns);
+
+RTS_UI32 IecTaskGetCount(void);
+
+#ifndef RTS_CFFI
+/* ---- for CmpIecTask, from main ---- */
+
+/* The tasks from now on, at most APP_MAX_TASKS; while none runs. As IecTaskCreateAll. */
+void IecCycleCreate(const CDL_TASK *records, RTS_UI32 count, const IEC_CONTEXT *prototype);
+/* Cycles may start from now on, and no more from now on. */
+void IecCycleStart(void);
+void IecCycleStop(void);
+/* The moment that IecTaskBetweenCycles waits for does not come: no task runs any more. */
+void IecCycleCallOff(void);
+/* All but the overruns. ERR_INVALIDID when there is no such task. */
+RTS_RESULT IecCycleGetInfo(RTS_UI32 task, IEC_TASK_INFO *info);
+/* The state as after power on. */
+void IecCycleForget(void);
+
+/* ---- for all ---- */
+
+/* Runs fn(arg), code of the application other than a task (initialisation), from main, watched and caught like a cycle.
+ * Returns as SysExceptTry. */
+bool IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
+
+/* Counts starts and ends of cycles of all tasks, so that a reader can tell whether one ran meanwhile. *busy: a task is
+ * in its cycle now. From any context. */
+RTS_UI32 IecTaskGetActivity(bool *busy);
+
+/* Has `copy` called at a moment when no task is in its cycle, so that what it copies is the work of whole cycles. True:
+ * it was; when a cycle came in between, more than once. False: not yet, call again; where several tasks run at a time
+ * they do it, in the context of one of them, as soon as there is such a moment. It is called off when the tasks are
+ * stopped. From main. */
+bool IecTaskBetweenCycles(void (*copy)(void));
+
+/* For measurements: the entry of a task and the context it gets. From main while the application is stopped or, on the
+ * simulator, between cycles. */
+RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **context);
+
+/* IEC code that runs right now, for who supervises it. */
+typedef struct {
+    RTS_UI32 serial; /* differs from one cycle of the task to its next */
+    RTS_I64 start_ns;
+    RTS_I64 limit_ns; /* how long it may take */
+    const void *arg;  /* for SysExceptBreak */
+} IEC_GUARD;
+
+/* Reads guard `index`: one for each task, and one at IecTaskGetCount() for code that IecTaskRunGuarded runs. False
+ * when it does not run. From any context. */
+bool IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *guard);
+#endif
+
+#endif

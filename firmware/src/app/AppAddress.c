@@ -1,0 +1,61 @@
+/*
+ * AppAddress.c - finds addresses in the areas of the loaded application.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "AppAddress.h"
+
+#include <string.h>
+
+#include "AppImage.h"
+#include "AppLife.h"
+#include "AppState.h"
+#include "CompactDownload.h"
+
+RTS_UI32 AppGetAreaSize(RTS_UI32 index)
+{
+    return index < APP_AREA_COUNT ? AppGetImage()->area_size[index] : 0;
+}
+
+RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size)
+{
+    RTS_UI32 area_size = AppGetAreaSize(index);
+
+    if (size > area_size || offset > area_size - size || index >= APP_AREA_COUNT || AppGetState() == AS_NONE)
+        return NULL;
+    return AppGetContext()->area[index] + offset;
+}
+
+bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset)
+{
+    for (*index = 0; *index < APP_AREA_COUNT; ++*index) {
+        uintptr_t distance = address - (uintptr_t)AppGetContext()->area[*index];
+        if (distance < AppGetImage()->area_size[*index]) {
+            *offset = (RTS_UI32)distance;
+            return true;
+        }
+    }
+    return AppImageFind(address, index, offset);
+}
+
+MON_RESULT AppAddressResolve(const AREA_ADDRESS *address, RTS_UI32 size, RTS_UI8 **memory)
+{
+    if (size == 0)
+        return MONITORING_ERR_SIZE_0;
+    if (AppGetAreaSize(address->area) == 0)
+        return MONITORING_ERR_INVALID_AREA;
+    *memory = AppGetAreaAddress(address->area, address->offset, size);
+    return *memory != NULL ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_INDEX;
+}
+
+MON_RESULT AppAddressFollow(AREA_ADDRESS *address)
+{
+    RTS_UI8 *memory;
+    uintptr_t pointer;
+    MON_RESULT result = AppAddressResolve(address, APP_POINTER_SIZE, &memory);
+
+    if (result != MONITORING_ERR_OK)
+        return result;
+    memcpy(&pointer, memory, sizeof(pointer));
+    return AppFindArea(pointer, &address->area, &address->offset) ? MONITORING_ERR_OK : MONITORING_ERR_INVALID_POINTER;
+}
