@@ -32,7 +32,7 @@ typedef struct {
     RTS_UI32 offset;  /* of its next entry */
     RTS_UI32 end;
     RTS_UI32 areas_seen;   /* a bit for each */
-    RTS_RESULT unresolved; /* what was wrong with the first import that was */
+    RTS_RESULT unresolved; /* the error of the first bad import */
 } LOADER;
 
 /* Returns ERR_OK, or refuses. */

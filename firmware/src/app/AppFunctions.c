@@ -80,7 +80,7 @@ static const char *problem_text(RTS_RESULT result)
                                                   : "other version";
 }
 
-/* Adds an import that cannot be resolved to the refusal, which is to name all of them. */
+/* Adds an import that cannot be resolved to the refusal, which names all of them. */
 static void add_unresolved(LOADER *l, const char *name, RTS_RESULT result)
 {
     APP_REFUSAL *refusal = l->refusal;

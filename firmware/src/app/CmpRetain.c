@@ -244,7 +244,7 @@ RTS_RESULT RetainSave(bool always)
     copy();
     if (kept.saved_valid && !always)
         return ERR_OK;
-    retain.failed = false; /* a stop that loses them is said, also after saves in between that failed */
+    retain.failed = false; /* a stop that loses them is logged, also after saves in between that failed */
     return save_copy();
 }
 
@@ -296,7 +296,7 @@ static void save_when_due(void)
         (void)save_copy();
 }
 
-/* A device whose retain flash is broken still runs, with initial values. */
+/* A device whose retain flash fails still runs, with initial values. */
 static void open_log(void)
 {
     RTS_RESULT result = FlashLogOpen(&retain.log, FILE_RETAIN);

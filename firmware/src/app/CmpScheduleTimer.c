@@ -218,7 +218,7 @@ static bool holds_up_stop(const IEC_GUARD *guard, RTS_I64 now_ns)
 
 enum { NOTHING_RUNS = -1 };
 
-/* Of the cycles that run; on one core the one that started last is the only one that gets on. */
+/* Of the cycles that run; on one core the one that started last is the only one that makes progress. */
 static RTS_I64 find_latest_start(void)
 {
     RTS_I64 latest_ns = NOTHING_RUNS;

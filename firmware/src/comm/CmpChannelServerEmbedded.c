@@ -457,7 +457,7 @@ static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 
 
 /* ---- packages ---- */
 
-/* Tells a peer that its channel does not exist (any more), so that it need not wait for a time-out. */
+/* Informs a peer that its channel does not exist (any more), so that it need not wait for a time-out. */
 static void complain(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
 {
     COMM_COUNT(counters.foreign);

@@ -67,7 +67,7 @@ static bool map_files(void)
 
 /*
  * Both logs are after the slots, which share what is left. A half of the retain log is a sixteenth of the flash and
- * a sector. Nothing else has a say, so that firmware of other sizes finds what this one has written. False when
+ * a sector. Nothing else counts, so that firmware of other sizes finds what this one has written. False when
  * nothing is left for the slots.
  */
 static bool map_files(void)

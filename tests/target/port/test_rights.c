@@ -64,7 +64,7 @@ static void store_four_words(void *arg)
                      : "r0", "r1", "r2", "r3", "memory");
 }
 
-/* With the stack pointer past it: then it is the frame of the fault that has no room. */
+/* With the stack pointer just above it: then it is the frame of the fault that has no room. */
 static void push_there(void *arg)
 {
     const STORE *store = arg;
@@ -85,11 +85,11 @@ static void (*const stores[])(void *) = {
 };
 
 /* Of one word, without effects on the stack. */
-static int may_store(uintptr_t address, RTS_UI32 value)
+static bool may_store(uintptr_t address, RTS_UI32 value)
 {
     STORE store = {address, value};
     RTS_EXCEPTION exception;
-    return !SysExceptTry(store_word, &store, &exception);
+    return SysExceptTry(store_word, &store, &exception);
 }
 
 static void expect_stopped(uintptr_t address)
@@ -99,7 +99,7 @@ static void expect_stopped(uintptr_t address)
         RTS_UI32 before = is_memory && address >= 0x400 ? REG32(address) : 0;
         STORE store = {address, ~before};
         RTS_EXCEPTION exception = {0, 0};
-        CHECK_EQUAL(SysExceptTry(stores[i], &store, &exception), 1);
+        CHECK_EQUAL(SysExceptTry(stores[i], &store, &exception), false);
         if (stores[i] != push_there)
             CHECK_EQUAL(exception.code, RTSEXCPT_ACCESS_VIOLATION);
         if (is_memory && address >= 0x400)
@@ -191,7 +191,7 @@ static void data_is_not_executed(void)
     RTS_EXCEPTION exception;
     areas.bytes[0] = 0x70; /* bx lr */
     areas.bytes[1] = 0x47;
-    CHECK_EQUAL(SysExceptTry(jump_there, &areas, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(jump_there, &areas, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ACCESS_VIOLATION);
 }
 
@@ -207,7 +207,7 @@ static void rights_cannot_be_taken(void)
     RTS_EXCEPTION exception;
     RTS_UI32 primask, basepri;
     in_bss[0] = 0;
-    CHECK_EQUAL(SysExceptTry(take_all_rights, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(take_all_rights, NULL, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ACCESS_VIOLATION);
     CHECK_EQUAL(in_bss[0], 0);
     __asm__ volatile("mrs %0, primask\n\tmrs %1, basepri" : "=r"(primask), "=r"(basepri));
@@ -256,7 +256,7 @@ static void store_lands_in_the_areas_or_on_the_stack_or_is_stopped(void)
         int is_stack = address - stack < RTS_IEC_STACK_SIZE;
         STORE store = {address, is_stack ? 0 : 0x57A7E000 + round};
         RTS_EXCEPTION exception = {0, 0};
-        int stopped = SysExceptTry(replace_word, &store, &exception);
+        bool stopped = !SysExceptTry(replace_word, &store, &exception);
         CHECK_EQUAL(stopped, !is_areas && !is_stack);
         if (is_readable && !is_stack)
             CHECK_EQUAL(REG32(address) == ~store.value, is_areas);
@@ -280,9 +280,9 @@ static void on_timer(void *param, RTS_I64 due)
     TASK *task = param;
     RTS_UNUSED(due);
     if (SysExceptTry(task->function, task, &task->exception))
-        task->caught++;
-    else
         task->passed++;
+    else
+        task->caught++;
 }
 
 static RTS_HANDLE start(TASK *task, void (*function)(void *arg), RTS_UI32 interval_us, RTS_UI32 priority)
@@ -374,7 +374,7 @@ static void function_with_a_gate_has_all_rights(void)
 {
     RTS_EXCEPTION exception;
     in_bss[2] = 0;
-    CHECK_EQUAL(SysExceptTry(call_by_gate, &areas, &exception), 0);
+    CHECK_EQUAL(SysExceptTry(call_by_gate, &areas, &exception), true);
     CHECK_EQUAL(in_bss[2], 1);
     CHECK_EQUAL(*(volatile RTS_I64 *)(void *)&areas, ((RTS_I64)1 << 40) + 4320);
 }
@@ -389,7 +389,7 @@ static void after_the_call_it_has_not(void)
 {
     RTS_EXCEPTION exception;
     in_bss[3] = 0;
-    CHECK_EQUAL(SysExceptTry(write_after_a_gate, &areas, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(write_after_a_gate, &areas, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ACCESS_VIOLATION);
     CHECK_EQUAL(in_bss[3], 0);
 }
@@ -411,7 +411,7 @@ static void function_with_a_gate_may_call_another_by_its_gate(void)
 {
     RTS_EXCEPTION exception;
     in_bss[2] = 0;
-    CHECK_EQUAL(SysExceptTry(call_two_gates, &areas, &exception), 0);
+    CHECK_EQUAL(SysExceptTry(call_two_gates, &areas, &exception), true);
     CHECK_EQUAL(in_bss[2], 2);
     CHECK_EQUAL(*(volatile RTS_I32 *)(void *)&areas, 10);
 }
@@ -447,7 +447,7 @@ static void call_what_fails(void *arg)
 static void failure_behind_a_gate_takes_the_rights_back(void)
 {
     RTS_EXCEPTION exception;
-    CHECK_EQUAL(SysExceptTry(call_what_fails, &areas, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(call_what_fails, &areas, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ILLEGAL_INSTRUCTION);
     CHECK(!may_store((uintptr_t)&in_bss[0], 1));
     function_with_a_gate_has_all_rights();
