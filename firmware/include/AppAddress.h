@@ -12,7 +12,7 @@
 #include "CmpStd.h"
 
 /*
- * Checks that [offset, offset + size) lies in area `index` of the loaded application and returns its address, NULL
+ * Checks that [offset, offset + size) is in area `index` of the loaded application and returns its address, NULL
  * otherwise. The only way to turn an area reference from outside into a pointer. APP_AREA_CODE may only be read.
  */
 RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size);
@@ -29,7 +29,7 @@ typedef struct {
 } AREA_ADDRESS;
 
 /* Where the `size` bytes at a location are. MONITORING_ERR_SIZE_0, _INVALID_AREA (the application has none), or
- * _INVALID_INDEX: not all of them lie in it. */
+ * _INVALID_INDEX: not all of them are in it. */
 MON_RESULT AppAddressResolve(const AREA_ADDRESS *address, RTS_UI32 size, RTS_UI8 **memory);
 
 /* Follows the pointer at *address: the result is again an area and an offset, whatever the pointer holds. The same

@@ -193,7 +193,7 @@ enum {
     CDL_KEPT_OFFSET_SHIFT = 4,
 };
 
-/* Elements of an array that lie `stride` bytes apart, or members of them; a string is a run of one. */
+/* Elements of an array that are `stride` bytes apart, or members of them; a string is a run of one. */
 typedef struct {
     RTS_UI16 size;   /* of an element, bytes */
     RTS_UI16 stride; /* at least `size` */

@@ -122,7 +122,7 @@ void SysExceptShutdown(void);
 
 /* ---- SysExceptTrace.c, for all ports ---- */
 
-/* Where the code of the application lies; size 0: there is none. From main, while no IEC code runs. */
+/* Where the code of the application is; size 0: there is none. From main, while no IEC code runs. */
 void SysExceptCodeRange(const RTS_UI8 *start, RTS_UI32 size);
 bool SysExceptIsCode(uintptr_t address);
 /* The offset in it of an address for which SysExceptIsCode is true. */

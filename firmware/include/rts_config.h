@@ -56,7 +56,7 @@
 #define APP_AREAS_FROM_PORT 0
 #endif
 
-/* How a port wants the areas aligned, and their `size` rounded up, and where they lie, to let programs write nothing but
+/* How a port wants the areas aligned, and their `size` rounded up, and where they are, to let programs write nothing but
  * them. */
 #ifndef APP_AREAS_ALIGNED
 #define APP_AREAS_ALIGNED(size)
@@ -221,7 +221,7 @@
 #define SETTINGS_TABLE
 #endif
 
-/* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log lie in flash, if not where
+/* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log are in flash, if not where
  * SysFileFlash computes it. No default. */
 
 /* Receive and send buffer of a connection, bytes each; the largest L7 message. The field's compact

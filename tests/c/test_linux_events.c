@@ -30,7 +30,7 @@ RTS_RESULT SysWatchdog_Hook(CMP_HOOK hook);
 enum { VARIABLES = 4, PATIENCE_S = 20, STOP_MS = 3000 };
 #define NS_PER_MS 1000000LL
 
-/* The code area: all functions of this program lie within it. */
+/* The code area: all functions of this program are within it. */
 extern const char __executable_start[];
 #define CODE ((uintptr_t)__executable_start)
 

@@ -169,7 +169,7 @@ def test_globals_of_a_configuration_are_known_everywhere() -> None:
         ("PROGRAM one : P; PROGRAM one : P;", "2:26: there is a program instance one already"),
         ("TASK t(INTERVAL := T#1s); TASK T(INTERVAL := T#1s);", "2:32: there is a task T already"),
         ("TASK t(INTERVAL := 5);", "2:20: INTERVAL is a duration such as T#10ms, not integer constant"),
-        ("TASK t(INTERVAL := T#-1s);", "2:20: INTERVAL has to lie between 0 and 35 minutes"),
+        ("TASK t(INTERVAL := T#-1s);", "2:20: INTERVAL must be between 0 and 35 minutes"),
         ("TASK t(PRIORITY := 32);", "2:20: PRIORITY is 0 (highest) to 31, not 32"),
         ("TASK t(SINGLE := 5);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
         ("TASK t(SINGLE := TRUE);", "2:18: SINGLE is a global BOOL variable or a bit such as %IX0.3"),
@@ -191,7 +191,7 @@ def test_globals_of_a_configuration_are_known_everywhere() -> None:
             "2:8: a TASK has INTERVAL, PRIORITY, SINGLE, EVENT, WATCHDOG and SENSITIVITY, not SPEED",
         ),
         ("TASK t(WATCHDOG := 5);", "2:20: WATCHDOG is a duration such as T#10ms, not integer constant"),
-        ("TASK t(WATCHDOG := T#2h);", "2:20: WATCHDOG has to lie between 0 and 35 minutes"),
+        ("TASK t(WATCHDOG := T#2h);", "2:20: WATCHDOG must be between 0 and 35 minutes"),
         ("TASK t(WATCHDOG := T#1s, SENSITIVITY := 0);", "2:41: SENSITIVITY is 1 to 65535, not 0"),
         (
             "TASK t(SENSITIVITY := 2);",

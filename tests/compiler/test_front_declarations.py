@@ -1,4 +1,4 @@
-"""Types, variables, initial values and where things lie in memory."""
+"""Types, variables, initial values and where things are in memory."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """A download looks at PERSISTENT values one by one: what has the same name and type in the new program is kept,
-whatever lies around it, and only that."""
+whatever is around it, and only that."""
 
 from __future__ import annotations
 

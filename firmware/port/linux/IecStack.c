@@ -99,7 +99,7 @@ bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
     return !left;
 }
 
-/* The frames that are given up have poisoned what lies between their variables: here, and where handlers run. */
+/* The frames that are given up have poisoned what is between their variables: here, and where handlers run. */
 NOT_CHECKED void IecStackLeave(IEC_STACK *stack)
 {
     __asan_handle_no_return();

@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Time passes only in SimAdvance and SimRunCycles. Everything but one supervising thread runs in the caller's thread:
- * call from one thread only. What lies in flash survives SimStart; all else is lost, as it is when power comes back.
+ * call from one thread only. What is in flash survives SimStart; all else is lost, as it is when power comes back.
  *
  * A function that runs the runtime returns SIM_POWER_CUT when a planned power cut hit it, and does nothing but return
  * that until SimStart.

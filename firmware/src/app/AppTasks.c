@@ -23,10 +23,10 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
     if (task->kind == KIND_CYCLIC && task->interval_us == 0)
         return refuse(l, ERR_PARAMETER, "Cyclic task %s has no interval.", name);
     if (task->entry_offset >= l->image->code.size)
-        return refuse(l, ERR_INVALID_REFERENCE, "Task %s lies outside the code.", name);
+        return refuse(l, ERR_INVALID_REFERENCE, "Task %s is outside the code.", name);
     if (task->kind == KIND_EVENT &&
         (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
-        return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s lies outside its area.", name);
+        return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s is outside its area.", name);
     if (task->kind == KIND_EXTERNAL && !SchedHasExternalEvent(task->event_offset))
         return refuse(l, ERR_NO_OBJECT, "Task %s waits for an event that is not here.", name);
     return ERR_OK;

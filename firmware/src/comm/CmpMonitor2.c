@@ -155,7 +155,7 @@ static void copy(void *to, const void *from, RTS_UI32 size)
         memcpy(to, from, size);
 }
 
-/* Copies between the application's memory and a message, where numbers lie anywhere. */
+/* Copies between the application's memory and a message, where numbers are anywhere. */
 static void load(RTS_UI8 *value, const RTS_UI8 *memory, RTS_UI32 size)
 {
     RTS_UI64 number;

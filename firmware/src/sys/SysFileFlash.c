@@ -21,7 +21,7 @@ typedef struct {
 
 static FLASH_FILE files[FILE_COUNT];
 
-/* ---- where the files lie ---- */
+/* ---- where the files are ---- */
 
 #ifdef FILE_MAP
 
@@ -30,7 +30,7 @@ static bool overlap(const FILE_AREA *a, const FILE_AREA *b)
     return a->offset < b->offset + b->size && b->offset < a->offset + a->size;
 }
 
-/* Whether file `i` lies in the flash, on borders of its sectors, apart from the files before it. */
+/* Whether file `i` is in the flash, on borders of its sectors, apart from the files before it. */
 static bool is_valid(RTS_UI32 i)
 {
     const SYS_FLASH *flash = SysFlashGet();

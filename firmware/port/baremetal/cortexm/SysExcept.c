@@ -6,7 +6,7 @@
  * SysExceptTry is called in handler mode (a timer's interrupt) or in main, both on the main stack. It enters the
  * function by SVC in *thread mode on the process stack*, at the priority of the interrupt it came from
  * (CCR.NONBASETHRDENA), and leaves it by another SVC. So whatever goes wrong in it, the frames of faults and interrupts
- * that need to be trusted lie on the main stack, and leaving is the same exception return for a normal end, a checked
+ * that need to be trusted are on the main stack, and leaving is the same exception return for a normal end, a checked
  * error, a fault, and a broken loop:
  *
  *   main stack:    ... interrupt | SysExceptTry | frame of the SVC that entered      <- leaving returns to it
@@ -190,7 +190,7 @@ static void drop_fpu_context(void)
 #endif
 }
 
-/* The slot of the depth below lies above; of main, which has all rights, none does, but no task runs then. */
+/* The slot of the depth below is above; of main, which has all rights, none does, but no task runs then. */
 static void give_back_rights(const TRY *try)
 {
     drop_fpu_context();
@@ -372,7 +372,7 @@ static uintptr_t find_caller(const TRY *try)
     return 0;
 }
 
-/* The frame could not be pushed, was pushed below the end, or what lies there was hit by the last push that had no
+/* The frame could not be pushed, was pushed below the end, or what is there was hit by the last push that had no
  * room: of 16 registers of an FPU, say. */
 static int is_overflow(RTS_UI32 cfsr, const FRAME *frame, uintptr_t end)
 {
@@ -503,7 +503,7 @@ static void redirect(FRAME *frame, RTS_UI32 code)
     frame->xpsr = (frame->xpsr & XPSR_ALIGNED) | XPSR_THUMB;
 }
 
-/* We run above the Try, so it is interrupted, and where it is to go on lies on its process stack. */
+/* We run above the Try, so it is interrupted, and where it is to go on is on its process stack. */
 void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     FRAME *frame = process_stack();

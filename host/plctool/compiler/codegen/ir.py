@@ -128,7 +128,7 @@ class Function:
         self._lines.append(f"  {text}{self.debug}")
 
     def prologue(self, text: str) -> str:
-        """Writes an instruction in front of all others of the function; returns its name."""
+        """Writes an instruction before all others of the function; returns its name."""
         self._count += 1
         name = f"%v{self._count}"
         self._prologue.append(f"  {name} = {text}{self.debug}")

@@ -93,7 +93,7 @@ class Frame:
         return REFS[type(place)](self, place)
 
     def aggregate(self, e: Expr) -> Ref:
-        """Where the value of a string, array or struct expression lies; valid until the end of the statement."""
+        """Where the value of a string, array or struct expression is; valid until the end of the statement."""
         return AGGREGATES[type(e)](self, e)
 
     # ---- context ----

@@ -1,6 +1,6 @@
 """Functions in LLVM IR that images need: the loops all string functions are made of, and what LLVM calls by name.
 
-Templates. Strings are walked in chunks of CHUNK bytes (a vector, or an integer) as long as a whole chunk lies within
+Templates. Strings are walked in chunks of CHUNK bytes (a vector, or an integer) as long as a whole chunk is within
 the capacity, then byte by byte. PTR stands for the integer type of an address, START for the index at which the byte
 loop takes over (0 when the target has no chunks). Bytes after a NUL are frozen, as they may never have been written.
 """

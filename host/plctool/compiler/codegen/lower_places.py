@@ -112,7 +112,7 @@ def own_instance(frame: Frame, place: SelfPlace) -> Ref:
 
 @rule(REFS, ValuePlace)
 def temporary(frame: Frame, place: ValuePlace) -> Ref:
-    """Where a value lies that is no variable."""
+    """Where a value is that is no variable."""
     return materialised(frame, place.value)
 
 

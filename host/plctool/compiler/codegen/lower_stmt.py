@@ -103,7 +103,7 @@ def return_statement(frame: Body, s: Return) -> None:
 
 @rule(STATEMENTS, Case)
 def case_statement(frame: Body, s: Case) -> None:
-    """A switch; wide ranges are compared in front of it."""
+    """A switch; wide ranges are compared before it."""
     fn, t = frame.fn, s.selector.type
     text = value_type(t)
     selector = frame.value(s.selector)

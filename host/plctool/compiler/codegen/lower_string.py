@@ -95,7 +95,7 @@ def equals_literal(frame: Frame, ref: Ref, text: str) -> str | None:
 
 
 def encode_text(text: str, t: StringType) -> bytes:
-    """The characters as they lie in memory."""
+    """The characters as they are in memory."""
     return text.encode("utf-16-le", "surrogatepass") if t.wide else text.encode("latin-1")
 
 

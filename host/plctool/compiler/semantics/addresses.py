@@ -1,4 +1,4 @@
-"""The variables that lie at addresses such as %IX0.3 (AT), and those that statements use without a declaration.
+"""The variables that are at addresses such as %IX0.3 (AT), and those that statements use without a declaration.
 
 SPDX-License-Identifier: Apache-2.0
 """

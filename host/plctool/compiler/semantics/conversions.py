@@ -80,7 +80,7 @@ def same_type(a: Type, b: Type) -> bool:
 
 
 def takes_array(t: Type, actual: Type) -> bool:
-    """Whether `t` is an ARRAY[*] and an array of type `actual` can be handed over for it."""
+    """Whether `t` is an ARRAY[*] and an array of type `actual` can be passed for it."""
     if not isinstance(t, OpenArrayType) or not isinstance(actual, ArrayType):
         return False
     return len(t.bounds) == len(actual.bounds) and same_type(t.element, actual.element)

@@ -1,6 +1,6 @@
 """Inputs with R_EDGE and F_EDGE: where the program reads one, it gets whether the input has just risen or fallen.
 
-Beside such an input lie two more variables: what it was at the call before, and the edge. The body begins by working
+Beside such an input are two more variables: what it was at the call before, and the edge. The body begins by working
 the edge out, and sees it under the name of the input; everybody else sees the input itself.
 
 SPDX-License-Identifier: Apache-2.0

@@ -141,7 +141,7 @@ def _may_change(loop: While | Repeat, variable: Variable, pou: Pou, effects: Eff
 
 
 def _may_reach(node: object, effects: Effects) -> bool:
-    """Whether a call may write more than what it is handed."""
+    """Whether a call may write more than what it is passed."""
     if isinstance(node, Call):
         return node.dispatch is not None or not effects.is_local(node.function)
     return isinstance(node, FbCall)

@@ -1,4 +1,4 @@
-"""The names of a program, in front of those of the library: which declaration each stands for.
+"""The names of a program, before those of the library: which declaration each stands for.
 
 Nothing is declared here; a declaration of the library is parsed when its name is first asked for.
 
@@ -34,7 +34,7 @@ def _is_in_namespace(decl: ast.GlobalBlock) -> bool:
 
 
 def enclosing(full_name: str) -> list[str]:
-    """The namespaces a dotted name lies in: `a.b` and `a` for `a.b.c`."""
+    """The namespaces a dotted name is in: `a.b` and `a` for `a.b.c`."""
     parts = full_name.split(".")
     return [".".join(parts[:n]) for n in range(len(parts) - 1, 0, -1)]
 

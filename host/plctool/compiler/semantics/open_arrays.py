@@ -1,4 +1,4 @@
-"""ARRAY[*]: a parameter that takes arrays of any size. The array is handed over by its address, the bounds of its
+"""ARRAY[*]: a parameter that takes arrays of any size. The array is passed by its address, the bounds of its
 dimensions beside it, as inputs that have no name in the program: lower and upper one, DINT.
 
 SPDX-License-Identifier: Apache-2.0

@@ -59,7 +59,7 @@ MODIFIERS: dict[str, frozenset[str]] = {
     "TYPE": frozenset(("PUBLIC", "INTERNAL")),
     "NAMESPACE": frozenset(("PUBLIC", "INTERNAL")),
 }
-"""For each kind of unit the words that may stand in front of its name."""
+"""For each kind of unit the words that may stand before its name."""
 
 _INSTEAD_OF_SECTION = {
     ("FUNCTION", "VAR_INST"): "VAR_STAT keeps a value from call to call",

@@ -254,7 +254,7 @@ class VarBlock:
 
 @dataclass(slots=True, eq=False)
 class TypeDecl:
-    """A type with what stands in front of it or of its TYPE."""
+    """A type with what stands before it or of its TYPE."""
 
     pos: int
     name: str

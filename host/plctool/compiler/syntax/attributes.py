@@ -14,7 +14,7 @@ from difflib import get_close_matches
 from typing import Protocol
 
 Attributes = dict[int, dict[str, str]]
-"""Attributes by the offset of what they stand in front of; name in lower case -> text."""
+"""Attributes by the offset of what they stand before; name in lower case -> text."""
 
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
@@ -26,7 +26,7 @@ HEEDED: dict[str, frozenset[str]] = {
     "version": frozenset(("FUNCTION",)),
     "shared_output": frozenset(("variable",)),
 }
-"""What does something, and in front of what."""
+"""What does something, and before what."""
 
 OF_THE_LIBRARY = frozenset((
     "no_checks", "no_init", "by_reference", "cuts_result", "in_place", "alias", "extensible",
@@ -40,7 +40,7 @@ REFUSED = {
 }
 """What leaves a unit without its code where it is not heeded."""
 
-_LAYOUT = "members lie at multiples of their size, or of 8 bytes"
+_LAYOUT = "members are at multiples of their size, or of 8 bytes"
 _CALL_IT = "call it in the first cycle, or do its work in FB_Init"
 UNHEEDED = {
     "call_after_global_init_slot": _CALL_IT,

@@ -76,7 +76,7 @@ class Conditions:
             holds = self.active and self._holds(rest, pos)
             self._open.append(_Branches(pos, holds, holds))
         elif not self._open or (self._open[-1].last and word != "END_IF"):
-            self._report(pos, "pragma", f"{{{word}}} without an {{IF}} in front of it")
+            self._report(pos, "pragma", f"{{{word}}} without an {{IF}} before it")
         elif word == "END_IF":
             self._open.pop()
         else:

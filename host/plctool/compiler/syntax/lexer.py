@@ -286,7 +286,7 @@ def meant(token: Token, text: str) -> str:
 
 
 def modified(token: Token, text: str) -> tuple[str, str] | None:
-    """Keyword and name of a unit whose modifier stands in front of it, as in `PUBLIC METHOD m`."""
+    """Keyword and name of a unit whose modifier stands before it, as in `PUBLIC METHOD m`."""
     match = _MODIFIED.match(text, token.end)
     return None if match is None else (match[1].upper(), match[2])
 

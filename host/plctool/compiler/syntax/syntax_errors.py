@@ -111,7 +111,7 @@ class Recovery:
         token.type, token.text = kind, right.split()[0]
 
     def report_in_front(self, token: Token, keyword: str, name: str) -> None:
-        """Reports a modifier that stands in front of the keyword of a unit, and leaves it out."""
+        """Reports a modifier that stands before the keyword of a unit, and leaves it out."""
         word = token.text.upper()
         self._report(token.pos, "syntax", f"{word} comes after {keyword}: {keyword} {word} {name}")
         token.type = "LEFT_OUT"
@@ -144,7 +144,7 @@ class Recovery:
     # ---- repairs ----
 
     def _insert(self, token: Token) -> bool:
-        """Puts in one missing token before `token`, or before the name in front of it."""
+        """Puts in one missing token before `token`, or before the name before it."""
         stack, values = self._parser.states, self._parser.values
         if token.type == "EQ" and self._shift(stack, "_ASSIGN"):
             what = "an assignment" if self._item(stack) == "stmt" else "an initial value"
@@ -259,7 +259,7 @@ class Recovery:
         """Variables declared between statements."""
         if token.type != "VAR" or self._item(self._parser.states) != "stmt":
             return False
-        self._leave_out(token, f"{token.text} stands in front of the first statement", "END_VAR")
+        self._leave_out(token, f"{token.text} stands before the first statement", "END_VAR")
         return True
 
     def _stray_end(self, token: Token) -> bool:

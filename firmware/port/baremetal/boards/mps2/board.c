@@ -17,7 +17,7 @@
 #define WATCHDOG_INTCLR REG32(WATCHDOG + 0xC)
 #define WATCHDOG_LOCK REG32(WATCHDOG + 0xC00)
 
-/* What lies below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
+/* What is below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
 enum { MPU_BELOW_RAM = MPU_BOARD + 1, BELOW_RAM_LOG2 = 16 };
 #define RAM_BASE 0x20000000u
 RTS_STATIC_ASSERT(MPU_BELOW_RAM < 8, the_mpu_has_a_region_left);

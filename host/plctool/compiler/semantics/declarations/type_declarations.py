@@ -75,7 +75,7 @@ class TypeDeclarations:
         self, decl: ast.VarDecl, scope: Scope, may: May = May.BE_PLAIN, *, overrides: bool = False
     ) -> tuple[Type, Initial | None]:
         """Type and initial value of a declaration line; None for all zero, unless it says 0 where memory may hold
-        something else: it lies at an address, or `overrides` another initial value."""
+        something else: it is at an address, or `overrides` another initial value."""
         overrides = overrides or decl.location is not None
         self._check_extras(decl, may, scope)
         spec, init = self._with_arguments(decl, scope)

@@ -196,7 +196,7 @@ def typed_call(
 
 
 def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tuple[Expr, list[Expr]] | None:
-    """What is handed over for a parameter of type ANY_...: a variable, or a value for the time of the call."""
+    """What is passed for a parameter of type ANY_...: a variable, or a value for the time of the call."""
     if isinstance(actual, ast.Argument):
         offset = actual.pos
         e = None if actual.value is None else settle(c.expr(actual.value))
@@ -280,7 +280,7 @@ def refer(place: Place, t: ReferenceType) -> Expr:
 def referenced_place(
     c: Checker, node: ast.Expr, t: Type, name: str, *, output: bool, constant: bool = False
 ) -> Place | None:
-    """A variable handed over by reference; a value will do when it is `constant`. Strings may have any length."""
+    """A variable passed by reference; a value will do when it is `constant`. Strings may have any length."""
     what = "the output" if output else "the VAR_IN_OUT"
     if constant:
         e = c.expr(node, t)

@@ -40,7 +40,7 @@ from plctool.iec.types import BOOL, StringType, StructType
 
 @dataclass
 class _Arguments:
-    """What a call of a function block hands over."""
+    """What a call of a function block passes."""
 
     inputs: list[tuple[Variable, Expr]] = field(default_factory=list)
     in_outs: list[tuple[Variable, Place]] = field(default_factory=list)
