@@ -1,5 +1,5 @@
 /*
- * SysTarget.h - who this device is.
+ * SysTarget.h - the identity of this device.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -28,7 +28,7 @@
 #define APP_REFUSAL_TEXT_SIZE (64 + 6 * APP_MAX_IMPORTS)
 #endif
 
-/* Words of the stack that are kept of an exception, from which the host tells the calls that led there; 8 bytes each.
+/* Words of the stack that are kept of an exception, from which the host finds the calls that led there; 8 bytes each.
  * 0: only the place is known. */
 #ifndef EXCEPT_MAX_CALLS
 #define EXCEPT_MAX_CALLS 16
@@ -259,7 +259,7 @@
 #define SRV_MAX_GROUPS 8
 #endif
 
-/* Services that only tell about the application (its name and list, its tasks), the room on the stack, and the echo
+/* Services that only inform about the application (its name and list, its tasks), the room on the stack, and the echo
  * service; 1.3 KiB of flash. 0: none. */
 #ifndef SRV_INFORMATION
 #define SRV_INFORMATION 1

@@ -109,7 +109,7 @@ static PLACE place_of(const void *ucontext)
 /* The stack is read as it is, whatever a sanitizer thinks of the gaps between its variables. */
 #define READS_STACK __attribute__((no_sanitize("address")))
 
-/* What a stack that overflowed tells: below what the running calls have left is what earlier ones have, so only as
+/* What a stack that overflowed shows: below what the running calls have left is what earlier ones have, so only as
  * many words as are kept. */
 READS_STACK static const uintptr_t *highest_calls(const IEC_STACK *stack)
 {

@@ -1,5 +1,5 @@
 /*
- * port.h - what main.c tells the Sys components of the Linux port, and they offer it beyond their Sys headers.
+ * port.h - what main.c passes to the Sys components of the Linux port, and they offer it beyond their Sys headers.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -90,7 +90,7 @@ RTS_RESULT SimBench(RTS_UI32 task, RTS_UI32 cycles, double *code_ns, double *cyc
 /* When power is cut, relative to a flash operation (program or erase): it did not happen; it did; half of its bytes
  * did. */
 enum { SIM_CUT_BEFORE = 0, SIM_CUT_AFTER = 1, SIM_CUT_TORN = 2, SIM_FAULT = 3 };
-/* SIM_FAULT is no cut: half of the bytes are done, the operation returns ERR_DEVICE, power stays. */
+/* SIM_FAULT is not a cut: half of the bytes are done, the operation returns ERR_DEVICE, power stays. */
 
 /* A new, erased flash. From power off. ERR_PARAMETER for a geometry that SysFlash.h does not allow, ERR_NOMEMORY. */
 RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 program_size, RTS_UI8 erased);

@@ -1,5 +1,5 @@
 /*
- * SimSupervise.c - breaks endless loops; what else takes threads.
+ * SimSupervise.c - aborts endless loops; what else takes threads.
  *
  * SPDX-License-Identifier: Apache-2.0
  *

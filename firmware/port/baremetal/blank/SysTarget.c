@@ -1,5 +1,5 @@
 /*
- * SysTarget.c - who this device is. Contract: SysTarget.h.
+ * SysTarget.c - the identity of this device. Contract: SysTarget.h.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

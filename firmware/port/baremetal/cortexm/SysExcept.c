@@ -7,7 +7,7 @@
  * function by SVC in *thread mode on the process stack*, at the priority of the interrupt it came from
  * (CCR.NONBASETHRDENA), and leaves it by another SVC. So whatever goes wrong in it, the frames of faults and interrupts
  * that need to be trusted are on the main stack, and leaving is the same exception return for a normal end, a checked
- * error, a fault, and a broken loop:
+ * error, a fault, and an aborted loop:
  *
  *   main stack:    ... interrupt | SysExceptTry | frame of the SVC that entered      <- leaving returns to it
  *   process stack: slot of this nesting depth
@@ -19,7 +19,7 @@
  *   vectors, where NULL points                      nothing, as to all else
  *   areas of the application (AppAreas.c)           read, write
  *   stack slot of the depth that runs               read, write
- * and nothing of the rest: peripherals, the processor's own registers. So a wild store ends in an exception that names
+ * and nothing else: peripherals, the processor's own registers. So a wild store ends in an exception that names
  * it, and has changed nothing but the program's own data. Entering and leaving a Try move one region, that of the
  * stack, and set CONTROL.nPRIV, which says how thread mode goes on; handlers are privileged whatever it says.
  *

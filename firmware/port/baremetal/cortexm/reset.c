@@ -44,7 +44,7 @@ void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
 }
 
 /* Which reset it was, and where, main has put into the log. An unannounced one may have been the reset pin, or the
- * watchdog of a chip that does not tell. */
+ * watchdog of a chip that does not report it. */
 const SYS_START *SysStartGet(void)
 {
     static const SYS_START starts[] = {

@@ -263,7 +263,7 @@ class Names:
 
     @cached_property
     def planned(self) -> dict[str, PlannedInstance]:
-        """Every instance by its name; the sources are known before anybody asks."""
+        """Every instance by its name; the sources are known before the first use."""
         planned: dict[str, PlannedInstance] = {}
         for instance in (i for decl in self.configurations for i in decl.programs):
             symbol = self.lookup_program(instance.type_name)

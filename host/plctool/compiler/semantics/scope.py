@@ -26,7 +26,7 @@ from plctool.iec.types import Type
 
 
 def _internal_to(symbol: Symbol) -> str | None:
-    """The namespace that alone may use a unit or global; None when everybody may."""
+    """The namespace that alone may use a unit or global; None if all may."""
     if isinstance(symbol, GlobalSymbol):
         space, marked = symbol.namespace, "INTERNAL" in symbol.qualifiers
     elif isinstance(symbol, TypeSymbol | PouSymbol):

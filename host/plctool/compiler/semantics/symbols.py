@@ -88,7 +88,7 @@ class VarSymbol:
 
 @dataclass(slots=True, eq=False)
 class GlobalSymbol:
-    """A global variable before anybody asked for it; `symbol` once it is declared."""
+    """A global variable before its first use; `symbol` once it is declared."""
 
     name: str
     full_name: str
