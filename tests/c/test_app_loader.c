@@ -150,7 +150,7 @@ typedef struct {
     RTS_UI32 align;
 } SEGMENT_CASE;
 
-static void every_segment_lies_behind_the_header_and_within_the_image(void)
+static void every_segment_is_after_the_header_and_within_the_image(void)
 {
     const SEGMENT_CASE cases[] = {
         {&header.code, "Code", 16},
@@ -696,7 +696,7 @@ static void copies_that_need_more_than_the_device_has(void)
     check_accepted();
 }
 
-static void a_blob_nobody_knows_is_left_alone(void)
+static void an_unknown_blob_is_left_alone(void)
 {
     begin_image();
     image.bytes[header.blob.offset + 12 + sizeof(CDL_TASK) + 4] = 99;
@@ -732,7 +732,7 @@ int main(void)
     RUN(another_device_type);
     RUN(another_device_id);
     RUN(another_major_version);
-    RUN(every_segment_lies_behind_the_header_and_within_the_image);
+    RUN(every_segment_is_after_the_header_and_within_the_image);
     RUN(an_image_without_code);
     RUN(code_in_another_area_or_larger_than_it);
     RUN(areas_larger_than_the_device_has);
@@ -768,7 +768,7 @@ int main(void)
     RUN(a_task_that_uses_more_than_there_is);
     RUN(a_list_of_what_fewer_or_more_tasks_use);
     RUN(copies_that_need_more_than_the_device_has);
-    RUN(a_blob_nobody_knows_is_left_alone);
+    RUN(an_unknown_blob_is_left_alone);
     RUN(a_flash_that_cannot_be_mapped_is_read_instead);
     return test_result();
 }

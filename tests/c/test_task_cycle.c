@@ -286,7 +286,7 @@ static void without_a_watchdog_nothing_trips(void)
     CHECK(cycles_until_trip(0, 1, 60000000) == 0);
 }
 
-static void one_good_cycle_starts_the_count_anew(void)
+static void one_good_cycle_starts_the_count_again(void)
 {
     CDL_TASK *task = begin(100000, 1500);
     int i;
@@ -651,7 +651,7 @@ int main(void)
     RUN(a_single_cycle_longer_than_time_times_sensitivity_trips_at_once);
     RUN(cycles_within_the_time_never_trip);
     RUN(without_a_watchdog_nothing_trips);
-    RUN(one_good_cycle_starts_the_count_anew);
+    RUN(one_good_cycle_starts_the_count_again);
     RUN(outputs_are_zero_when_the_failing_task_returns);
     RUN(the_watchdog_stops_the_application_with_its_outputs_at_zero);
     RUN(reset_gives_the_watchdog_its_count_back);

@@ -342,7 +342,7 @@ def test_function_block_takes_positional_arguments() -> None:
     assert [v.name for v, _ in c.inputs] == ["UP", "LIMIT"]
 
 
-def test_output_of_another_type_is_converted_behind_the_call() -> None:
+def test_output_of_another_type_is_converted_after_the_call() -> None:
     block, assign = statements("c(TOTAL := d, N => d);")
     assert isinstance(block, FbCall)
     assert block.outputs == []

@@ -48,7 +48,7 @@ def test_case_branch_goes_on_to_the_next_label() -> None:
     assert [len(body) for _, body in s.branches] == [3, 0]
 
 
-def test_for_counts_by_one_unless_told_otherwise() -> None:
+def test_for_counts_by_one_by_default() -> None:
     s = statement("FOR u := 1 TO 10 DO i := u; END_FOR;")
     assert isinstance(s, For)
     assert isinstance(s.step, Const)

@@ -181,7 +181,7 @@ def test_pointers_and_references_are_part_of_the_place(
     assert (symbol.place, symbol.type) == (place, t)
 
 
-def test_bits_behind_pointers_are_read() -> None:
+def test_bits_through_pointers_are_read() -> None:
     symbol = table().resolve("Main.raw^.9")
     assert (symbol.place, symbol.bit) == ((0, 160, (0,)), 9)
     assert symbol.decode(b"\0\2") is True

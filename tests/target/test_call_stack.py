@@ -61,7 +61,7 @@ FAULTS = {1: "DIVIDEBYZERO", 2: "ACCESS_VIOLATION", 3: "WATCHDOG", 4: "WATCHDOG"
 
 
 @pytest.mark.parametrize("level", [0, 2])
-def test_each_call_is_told(plc: Plc, tmp_path: Path, level: Level) -> None:
+def test_each_call_is_reported(plc: Plc, tmp_path: Path, level: Level) -> None:
     plc.flash(compile_text(TEXT, TARGET, tmp_path, checks="div", level=level).path)
     for how, name in FAULTS.items():
         plc.write({"Main.how": how})

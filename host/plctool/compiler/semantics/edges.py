@@ -1,6 +1,6 @@
 """Inputs with R_EDGE and F_EDGE: where the program reads one, it gets whether the input has just risen or fallen.
 
-Beside such an input are two more variables: what it was at the previous call, and the edge. The body begins by computing
+Beside such an input are two more variables: its value at the previous call, and the edge. The body begins by computing
 the edge, and sees it under the name of the input; all others see the input itself.
 
 SPDX-License-Identifier: Apache-2.0
