@@ -4,14 +4,12 @@ It reads what people read (`prose.py`), not code. An exception is a file and the
 """
 
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import prose
 
-ROOT = Path(__file__).parents[2]
 COLUMNS = 120
 
 # What not to write, and what to write instead.
@@ -59,8 +57,7 @@ def complaints(path: Path, name: str) -> Iterator[str]:
 
 
 def main() -> int:
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    wrong = [text for name in listed.splitlines() if (ROOT / name).is_file() for text in complaints(ROOT / name, name)]
+    wrong = [text for name in prose.project_files() for text in complaints(prose.ROOT / name, name)]
     print("\n".join(wrong), end="\n" if wrong else "")
     return 1 if wrong else 0
 
