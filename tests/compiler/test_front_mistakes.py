@@ -59,7 +59,7 @@ def in_declaration(line: str) -> list[str]:
             "1: %IX is not an address such as %IX0.3 or %QW2", "2: unknown name unknown1"
         ]),
         ("a := Nothing(1);", ["1: Nothing gives no result; call it as a statement, or declare FUNCTION Nothing : INT"]),
-        ("s := 'it''s';", ["1: a quote within a text is written $'"]),
+        ("s := 'it''s';", ["1: a quote within a string is written $'"]),
         ("FOR (a = 0; a < 10; a++) b := 1;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
         ("FOR a IN arr DO b := 1; END_FOR;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
         ("CASE a OF\n1: b := 1; BREAK;\nEND_CASE;", [

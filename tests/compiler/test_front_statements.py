@@ -125,7 +125,7 @@ def test_wrong_statement_is_explained(text: str, message: str) -> None:
         ("ABS(i);", "1: the result of this call is not used"),
         (
             "s := '1234567890123456789012345678901234567890123456789012345678901234567890123456789012345';",
-            "6: this text has 85 characters, STRING[80] holds 80",
+            "6: this string has 85 characters, STRING[80] holds 80",
         ),
     ],
 )

@@ -278,7 +278,7 @@ def test_a_file_without_text_says_what_to_export(tmp_path: Path, name: str, mess
     assert {d.code for d in found} == {"unknown", "file"}
     assert message in next(d.message for d in found if d.code == "file")
     (tmp_path / "main.st").unlink()
-    with pytest.raises(UsageError, match=f"There is no source file .*{name} is no text: .*"):
+    with pytest.raises(UsageError, match=f"There is no source file .*{name} is not text: .*"):
         load_sources([tmp_path])
 
 
