@@ -219,6 +219,34 @@
 #define COMM_MAX_CLIENTS 1
 #endif
 
+/* 1: there are block drivers with many peers (UDP), or that know when a peer is gone (TCP). 16 bytes per connection of a
+ * tool, 10 per driver. */
+#ifndef COMM_ENDPOINTS
+#define COMM_ENDPOINTS 0
+#endif
+
+/* TCP connections at a time: one more than tools that may be logged in, so that a new one is always taken. Each costs
+ * its two buffers and 90 bytes. */
+#ifndef TCP_MAX_CONNECTIONS
+#define TCP_MAX_CONNECTIONS (COMM_MAX_CLIENTS + 1)
+#endif
+
+/* Receive and send buffer of a TCP connection, bytes each: one largest frame (520) at least. */
+#ifndef TCP_BUFFER_SIZE
+#define TCP_BUFFER_SIZE 1040
+#endif
+
+/* A TCP connection on which nothing moves for so long is closed [ms]. */
+#ifndef TCP_IDLE_MS
+#define TCP_IDLE_MS 60000
+#endif
+
+/* A TCP frame that has begun is complete after so long, and so is the first frame of a connection; else it is closed
+ * [ms]. */
+#ifndef TCP_FRAME_MS
+#define TCP_FRAME_MS 3000
+#endif
+
 /* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is
  * below 424), COM_QUEUE_SIZE and about 150 bytes. */
 #ifndef COM_MAX_LINES

@@ -7,6 +7,7 @@
 #define PORT_H
 
 #include "CmpItf.h"
+#include "SysSocket.h"
 #include "SysTimer.h"
 
 /* Where a Port function writes why it failed: one sentence. */
@@ -80,5 +81,16 @@ void PortComClose(void);
 void PortComHandOver(void);
 /* Name of the pseudo terminal, NULL when the line is none. */
 const char *PortComPtyName(void);
+
+/* ---- SysSocket ---- */
+
+/* Opens the socket for TCP, "[ADDRESS:]PORT" or "ADDRESS", or those for UDP, "ADDRESS[:INDEX]". Without an address that
+ * is loopback; the address 0.0.0.0 is all of the machine. Port 0 is one that is free; without an index it is the first
+ * that is. Before CMInit. */
+bool PortTcpOpen(const char *text, PORT_REASON *reason);
+bool PortUdpOpen(const char *text, PORT_REASON *reason);
+void PortSockClose(void);
+/* "127.0.0.1:11740"; false when there is no such socket. */
+bool PortSockName(SYSSOCK_PURPOSE purpose, char *name, size_t size);
 
 #endif

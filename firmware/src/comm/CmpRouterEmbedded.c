@@ -78,11 +78,23 @@ static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *pay
     COMM_COUNT(counters.ignored);
 }
 
-void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
+/* The sender's network address is at the beginning of its address. What it says of it may be wrong, or a lie. */
+static void correct_sender(ROUTER_PEER *peer)
 {
+#if COMM_ENDPOINTS
+    if (peer->address_words >= peer->driver->peer_words)
+        memcpy(peer->address, peer->driver->peer_address, 2u * peer->driver->peer_words);
+#else
+    RTS_UNUSED(peer);
+#endif
+}
+
+/* `peer` has its driver and endpoint. */
+static void handle(ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
+{
+    const BLK_DRV *driver = peer->driver;
     const ROUTER_HEADER *fixed = (const ROUTER_HEADER *)data;
     HEADER header;
-    ROUTER_PEER peer;
 
     if (!parse_header(data, size, &header)) {
         COMM_COUNT(counters.malformed);
@@ -96,12 +108,42 @@ void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
         COMM_COUNT(counters.ignored);
         return;
     }
-    peer.driver = driver;
-    peer.max_packet = max_packet(fixed->flags);
-    peer.address_words = (RTS_UI8)header.sender_words;
-    memcpy(peer.address, header.sender, 2 * header.sender_words);
-    deliver(&peer, fixed->service, data + header.size, size - header.size);
+    peer->max_packet = max_packet(fixed->flags);
+    peer->address_words = (RTS_UI8)header.sender_words;
+    memcpy(peer->address, header.sender, 2 * header.sender_words);
+    correct_sender(peer);
+    deliver(peer, fixed->service, data + header.size, size - header.size);
 }
+
+void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
+{
+    ROUTER_PEER peer;
+
+    peer.driver = driver;
+#if COMM_ENDPOINTS
+    peer.endpoint = 0;
+#endif
+    handle(&peer, data, size);
+}
+
+#if COMM_ENDPOINTS
+void RouterHandleDataFrom(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI8 *data, RTS_UI32 size)
+{
+    ROUTER_PEER peer;
+
+    peer.driver = driver;
+    peer.endpoint = endpoint;
+    handle(&peer, data, size);
+}
+
+bool RouterNeeds(const BLK_DRV *driver)
+{
+    for (RTS_UI32 i = 0; i < RouterServiceCount; i++)
+        if (RouterServices[i].needs != NULL && RouterServices[i].needs(driver))
+            return true;
+    return false;
+}
+#endif
 
 RTS_UI32 RouterGetMaxPayload(const ROUTER_PEER *peer, RTS_UI32 address_words)
 {
@@ -139,11 +181,15 @@ RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *
         all[1 + i] = parts[i];
         size += parts[i].size;
     }
-    return size > peer->max_packet ? ERR_NET_MSGSIZE : driver->send(driver, all, 1 + count);
+    return size > peer->max_packet ? ERR_NET_MSGSIZE : driver->send(peer, all, 1 + count);
 }
 
 bool RouterIsSamePeer(const ROUTER_PEER *a, const ROUTER_PEER *b)
 {
+#if COMM_ENDPOINTS
+    if (a->endpoint != b->endpoint)
+        return false;
+#endif
     return a->driver == b->driver && a->address_words == b->address_words &&
            memcmp(a->address, b->address, 2u * a->address_words) == 0;
 }
