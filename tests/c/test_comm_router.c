@@ -19,7 +19,7 @@ static RTS_UI32 sent_count;
 
 static RTS_RESULT keep(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_UI32 count)
 {
-    RTS_UNUSED(driver);
+    RTS_UNUSED(peer);
     sent_count++;
     sent_size = 0;
     for (RTS_UI32 i = 0; i < count; i++) {
