@@ -61,7 +61,7 @@ def flash_share(image: bytes) -> tuple[float, float]:
         with (
             Plcrt(Path(folder) / "flash") as runtime,
             SerialLine(runtime.port, BAUD) as serial,
-            plctool.connect(f"serial:{serial.path}", baud=BAUD) as plc,
+            plctool.connect(f"serial:{serial.path}?baud={BAUD}") as plc,
         ):
             begin = time.monotonic()
             plc.flash(path)

@@ -17,7 +17,6 @@
 
 enum { LOG_INFO = 1, LOG_WARNING = 2, LOG_ERROR = 4, LOG_EXCEPTION = 8, LOG_DEBUG = 0x10 };
 
-#ifndef RTS_CFFI
 typedef struct {
     RTS_UI32 handle; /* counts from 1, never reused */
     RTS_UI32 component;
@@ -27,6 +26,7 @@ typedef struct {
     char text[LOG_TEXT_SIZE];
 } LOG_ENTRY;
 
+#ifndef RTS_CFFI
 /* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. Without log
  * its arguments are not evaluated, and the texts take no flash. */
 #define LogAdd(...)                   \
@@ -36,10 +36,12 @@ typedef struct {
     } while (0)
 void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...);
 
+RTS_RESULT CmpLog_Hook(CMP_HOOK hook);
+#else
+const char *CMGetComponentName(RTS_UI32 id); /* of CmpItf.h */
+#endif
+
 /* Copies the first entry with a handle >= `handle`. ERR_END_OF_OBJECT when there is none. */
 RTS_RESULT LogGetEntry(RTS_UI32 handle, LOG_ENTRY *entry);
-
-RTS_RESULT CmpLog_Hook(CMP_HOOK hook);
-#endif
 
 #endif

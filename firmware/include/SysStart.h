@@ -24,7 +24,11 @@ enum {
 };
 
 /* The code offset is not known, or not that of application code. */
+#ifdef RTS_CFFI
+static const RTS_UI32 APP_NO_CODE_OFFSET;
+#else
 #define APP_NO_CODE_OFFSET 0xFFFFFFFFu
+#endif
 
 typedef struct {
     RTS_UI8 cause; /* SYS_START_* */

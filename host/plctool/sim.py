@@ -5,19 +5,23 @@ It is the same C core that runs on a controller, with the simulator port: a day 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from plctool.controller import Controller
 from plctool.core import error_name, ffi, lib
 from plctool.debug.symbols import SymbolTable, find_symbols
-from plctool.debug.variables import Reading, Symbol, unreachable
+from plctool.debug.trace import Trace
+from plctool.debug.variables import Change, Symbol, unreachable
 from plctool.errors import DeviceError, UsageError
 from plctool.files import read_image
-from plctool.image.file import parse_image
-from plctool.link.l7 import why
-from plctool.link.services import AppException, AppState, Status, TaskInfo, Trace
+from plctool.image.file import image_crc, parse_image
+from plctool.link import l7
+from plctool.link.monitoring import Contents
+from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
+from plctool.link.session import no_application
 
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _SECTOR = 4096
@@ -25,10 +29,11 @@ _PROGRAM_UNIT = 8
 MAX_NS = 2**62  # at once; the clock goes twice as far
 
 
-class Simulator:
-    """One controller with a program in it, started. There can be only one at a time in a process.
+class Simulator(Controller):
+    """A controller in this process, with a program in it, started. There can be only one at a time in a process.
 
-    Use it as a context manager. Raises UsageError for an image that is refused, DeviceError when the program fails.
+    Its symbols are `symbols`, else what is found by the CRC of the image. Raises DeviceError for an image that is
+    refused and when the program fails.
     """
 
     _running: Simulator | None = None
@@ -36,13 +41,15 @@ class Simulator:
     def __init__(self, image: bytes, symbols: SymbolTable | None = None, *, start: bool = True) -> None:
         if Simulator._running is not None:
             raise UsageError("There is a simulator already; close it first, one process has one controller.", "busy")
-        self.symbols = symbols
+        super().__init__()
+        if symbols is not None:
+            self.add_symbols(symbols)
         _check(lib.SimFlashConfigure(_FLASH_SIZE, _SECTOR, _PROGRAM_UNIT, 0xFF), "The simulated flash cannot be made")
         _check(lib.SimStart(), "The simulator does not start")
         Simulator._running = self
         lib.SimForgetEvents()
         try:
-            self.download(image)
+            self._download(image, afresh=True, progress=lambda done: None)
             if start:
                 self.start()
         except BaseException:
@@ -56,12 +63,6 @@ class Simulator:
         image = read_image(file)
         return cls(image, find_symbols(parse_image(image).crc, file), start=start)
 
-    def __enter__(self) -> Simulator:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
-
     def close(self) -> None:
         """Shuts the runtime down; another Simulator may be made then."""
         if Simulator._running is self:
@@ -70,18 +71,14 @@ class Simulator:
 
     # ---- the program ----
 
-    def download(self, image: bytes) -> None:
-        """Replaces the program, stopped. Raises DeviceError with the reason when it is refused; the old one runs on
-        then."""
-        self._add_events(image)
-        crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
-        _check(lib.AppDownloadBegin(len(image), crc), "The image is refused")
-        _check(lib.AppDownloadWrite(0, image, len(image)), "The image cannot be stored")
+    def _download(self, data: bytes, afresh: bool, progress: Callable[[int], None]) -> None:
+        self._add_events(data)
+        _check(lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
+        _check(lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")
         refusal = ffi.new("APP_REFUSAL *")
         result = lib.AppDownloadEnd(refusal)
-        if result != lib.ERR_OK:
-            text = ffi.string(refusal.text).decode("latin-1")
-            raise DeviceError(f"The image is refused: {why(result, text)}.", "refused", result)
+        l7.check_result(result, "download", ffi.string(refusal.text).decode("latin-1") if result else "")
+        progress(len(data))
 
     def _add_events(self, image: bytes) -> None:
         """The simulated device has every external event that the program waits for."""
@@ -96,32 +93,38 @@ class Simulator:
 
     def start(self) -> None:
         """Starts the program; the first cycle of each task is due at once."""
-        _check(lib.AppStartApplication(), "The program does not start")
+        self._application_crc()
+        l7.check_result(lib.AppStartApplication(), "start")
 
     def stop(self) -> None:
-        _check(lib.AppStopApplication(), "The program does not stop")
+        self._application_crc()
+        l7.check_result(lib.AppStopApplication(), "stop")
 
-    def reset(self, option: int) -> None:
-        """`option`: lib.RESET_OPTION_WARM, _COLD or _ORIGIN."""
-        _check(lib.AppReset(option), "The reset failed")
+    def _reset(self, option: int) -> None:
+        self._application_crc()
+        l7.check_result(lib.AppReset(option), "reset")
 
     def restart(self) -> None:
         """Power off and on again: what is in flash survives."""
         lib.SimStop()
         _check(lib.SimStart(), "The simulator does not start")
 
-    def status(self) -> Status:
+    def raw_status(self) -> Status:
         c = ffi.new("APP_STATUS *")
         lib.AppGetStatus(c)
-        states = {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}
-        state = states.get(c.state, AppState.EXCEPTION if c.op_state & lib.OS_EXCEPTION else AppState.STOP)
         exception = None
         if c.exception.code != lib.RTSEXCPT_NOEXCEPTION:
-            offset = None if c.exception.code_offset == 0xFFFFFFFF else c.exception.code_offset
             found = lib.SysExceptGetTrace()
             trace = Trace.of((call.target, call.distance) for call in found.call[0 : found.count])
-            exception = AppException(c.exception.code, offset, c.exception.task, trace)
-        return Status(state, c.image_crc, c.image_size, exception, c.op_state)
+            exception = AppException.of(c.exception.code, c.exception.code_offset, c.exception.task, trace)
+        return Status(app_state(c.state, c.op_state), c.image_crc, c.image_size, exception, c.op_state)
+
+    def _application_crc(self) -> int:
+        c = ffi.new("APP_STATUS *")
+        lib.AppGetStatus(c)
+        if c.state == lib.AS_NONE:
+            raise no_application()
+        return int(c.image_crc)
 
     def tasks(self) -> list[TaskInfo]:
         """Statistics of the tasks; the times are real, measured on this machine."""
@@ -138,7 +141,21 @@ class Simulator:
             )  # fmt: skip
         return infos
 
+    def log(self, after: int = 0) -> list[LogEntry]:
+        entries = []
+        c = ffi.new("LOG_ENTRY *")
+        while lib.LogGetEntry(after + 1, c) == lib.ERR_OK:
+            after = c.handle
+            component, text = ffi.string(lib.CMGetComponentName(c.component)), ffi.string(c.text)
+            entries.append(
+                LogEntry(after, c.time_ns, component.decode("latin-1"), c.log_class, c.error, text.decode("latin-1"))
+            )
+        return entries
+
     # ---- time ----
+
+    def _now(self) -> float:
+        return self.now_ns / 1e9
 
     @property
     def now_ns(self) -> int:
@@ -171,38 +188,20 @@ class Simulator:
 
     # ---- variables ----
 
-    def read(self, name: str) -> Any:
-        """The value of a variable, a member or an element; structs and arrays come as dicts and lists."""
-        return self.read_all([name])[name]
+    def _read(self, table: SymbolTable, symbols: Sequence[Symbol]) -> Contents:
+        """As they are between two cycles."""
+        return Contents([self._content(symbol) for symbol in symbols], consistent=True)
 
-    def read_all(self, names: Iterable[str]) -> dict[str, Any]:
-        return self.sample(names).values
-
-    def sample(self, names: Iterable[str]) -> Reading:
-        """The variables with these names, as they are between two cycles. Raises DeviceError when a pointer leads to no
-        variable."""
-        symbols = {name: self._resolve(name) for name in names}
-        reading = Reading(symbols, {name: self._content(symbol) for name, symbol in symbols.items()})
-        reading.check(self._content)
-        return reading
-
-    def write(self, name: str, value: Any) -> None:
-        """Sets a variable; `value` as Python value or as text such as 'T#80ms'. Bits of a word can be set too."""
-        symbol = self._resolve(name)
-        place = self._place(symbol)
-        symbol.check_writable(symbol.area if place is None else place[0])
-        memory = self._memory(symbol)
-        if memory is None:
-            raise unreachable(symbol, self._content)
-        change = symbol.change(value)
-        place = memory[change.offset : change.offset + len(change.data)]
-        masked = (new & change.mask | old & ~change.mask for new, old in zip(change.data, place, strict=True))
-        memory[change.offset : change.offset + len(change.data)] = bytes(masked)
-
-    def _resolve(self, name: str) -> Symbol:
-        if self.symbols is None:
-            raise UsageError("The program was loaded without symbols; variables cannot be named.", "no-symbols")
-        return self.symbols.resolve(name)
+    def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
+        for symbol, change in changes:
+            place = self._place(symbol)
+            symbol.check_writable(symbol.area if place is None else place[0])
+            memory = self._memory(symbol)
+            if memory is None:
+                raise unreachable(symbol, self._content)
+            part = slice(change.offset, change.offset + len(change.data))
+            both = zip(change.data, memory[part], strict=True)
+            memory[part] = bytes(new & change.mask | old & ~change.mask for new, old in both)
 
     def _content(self, symbol: Symbol) -> bytes | None:
         if symbol.fixed is not None:
@@ -235,4 +234,4 @@ class Simulator:
 
 def _check(result: int, what: str) -> None:
     if result != lib.ERR_OK:
-        raise DeviceError(f"{what}: {why(result)}.", error_name(result), result)
+        raise DeviceError(f"{what}: {l7.why(result)}.", l7.slug(error_name(result)), result)

@@ -23,9 +23,10 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host"), str(ROOT / "build" / "host"), str(ROOT / "tests" / "target")]
 
-from plctool.compiler import DEFAULT_TARGET, compile_sources  # noqa: E402
+from plctool.compiler import compile_sources  # noqa: E402
 from plctool.debug.symbols import symbol_path  # noqa: E402
 from plctool.device import Plc, connect  # noqa: E402
+from plctool.image.targets import DEFAULT_TARGET  # noqa: E402
 from plctool.link.connection import Connection  # noqa: E402
 from plctool.testing.plcrt import Plcrt  # noqa: E402
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "link"))
 from fake_device import FakeDevice, FakeLine, FakePlc
 from small_app import make_application
 
-from plctool import device
 from plctool.cli import main as cli
 from plctool.debug.symbols import symbol_path
 from plctool.link.transport import BlockTransport
+from plctool.link.transports import TRANSPORTS, Link
 
 
 @dataclass
@@ -61,18 +61,31 @@ def tool(capsys: pytest.CaptureFixture[str]) -> Tool:
     return run
 
 
+Opener = Callable[[Callable[[Link], BlockTransport]], None]
+
+
 @pytest.fixture
-def plc(monkeypatch: pytest.MonkeyPatch) -> FakePlc:
+def serial_opened_by(monkeypatch: pytest.MonkeyPatch) -> Opener:
+    """Has serial links opened by a function of the test."""
+
+    def use(function: Callable[[Link], BlockTransport]) -> None:
+        monkeypatch.setitem(TRANSPORTS, "serial", replace(TRANSPORTS["serial"], open=function))
+
+    return use
+
+
+@pytest.fixture
+def plc(serial_opened_by: Opener) -> FakePlc:
     """A fake controller without application on every port."""
     fake = FakePlc()
     fake.image = b""
     controller = FakeDevice(fake.handle)
 
-    def open_transport(link: str, baud: int) -> BlockTransport:
-        assert link == "serial:/dev/fake"
-        return FakeLine(controller, baud=baud)
+    def open_transport(link: Link) -> BlockTransport:
+        assert link.place == "/dev/fake"
+        return FakeLine(controller, baud=int(link.options["baud"]))
 
-    monkeypatch.setattr(device, "open_transport", open_transport)
+    serial_opened_by(open_transport)
     return fake
 
 

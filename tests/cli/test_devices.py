@@ -290,14 +290,12 @@ def test_links_of_later_versions_exit_2(tool: Any, link: tuple[str, str]) -> Non
     assert f"{link[0]} is not in this version" in done.json["error"]["message"]
 
 
-def test_a_silent_device_exits_3(tool: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_silent_device_exits_3(tool: Any, serial_opened_by: Any) -> None:
     from fake_device import FakeDevice, FakeLine
-
-    from plctool import device
 
     line = FakeLine(FakeDevice())
     line.cut = True
-    monkeypatch.setattr(device, "open_transport", lambda link, baud: line)
+    serial_opened_by(lambda link: line)
     done = tool("status", *PORT, "--json")
     assert done.status == 3
     assert done.json["error"]["code"] == "no-answer"

@@ -13,7 +13,6 @@ import pytest
 from conftest import Tool
 
 from plctool.core import lib
-from plctool.debug.symbols import find_symbols
 from plctool.sim import Simulator
 
 ROOT = Path(__file__).parents[2]
@@ -208,9 +207,7 @@ def test_compiled_code_calls_the_implementation(tool: Tool) -> None:
     assert tool("build", "small.st", "-o", "small.cdl").status == 0
     with Simulator(Path("small.cdl").read_bytes()) as plc:
         assert register() == lib.ERR_OK
-        plc.download(image)
-        plc.symbols = find_symbols(int.from_bytes(image[lib.CDL_CRC_OFFSET :][:4], "little"), Path("app.cdl"))
-        plc.start()
+        plc.flash(image)
         plc.run_cycles(2)
         names = ["Main.sum", "Main.text", "Main.length", "Main.is_long", "Main.height", "Main.place.steps"]
         assert list(plc.read_all(names).values()) == [-33766, "fits", 4, True, 2.0, 2]

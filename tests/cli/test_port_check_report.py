@@ -9,6 +9,7 @@ import pytest
 
 from plctool.errors import LinkError
 from plctool.link.services import Identity
+from plctool.link.transports import parse_link
 from plctool.port_check.report import Check, CheckFailed, NotAvailable, Report, judge, outcome_text, summary_text
 
 IDENTITY = Identity("Device", "Vendor", "node", "1", 0x1000, 0x9001, "1.0.0.0", "1.0.0.0")
@@ -38,7 +39,14 @@ def test_the_end_of_a_check_is_its_verdict(error, verdict, text, figures):
 def test_report_counts_verdicts():
     good = judge(Check("good", lambda: ("fine", {"share": 0.7}), {"share": ("min", 0.5)}))
     outcomes = [good, ends_with(CheckFailed("bad")), ends_with(NotAvailable("silent"))]
-    report = Report(IDENTITY, "x86_64-linux", 115200, outcomes, "0.1.0", datetime(2026, 11, 21, 8, 5, tzinfo=UTC))
+    report = Report(
+        IDENTITY,
+        "x86_64-linux",
+        parse_link("serial:/dev/ttyS0"),
+        outcomes,
+        "0.1.0",
+        datetime(2026, 11, 21, 8, 5, tzinfo=UTC),
+    )
     document = json.loads(json.dumps(report.document()))
     assert (document["format"], document["date"]) == (1, "2026-11-21T08:05:00+00:00")
     assert (document["plctool"], document["baud"], document["device"]["vendor_name"]) == ("0.1.0", 115200, "Vendor")

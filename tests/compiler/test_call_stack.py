@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from plctool.compiler import Level, compile_sources
 from plctool.debug.symbols import SymbolTable
+from plctool.debug.trace import Trace
 from plctool.image.file import parse_image
-from plctool.link.services import Trace
 from plctool.sim import Simulator
 
 LEVELS: list[Level] = [0, 1, 2, 3, "s"]
@@ -89,7 +89,7 @@ class Program:
 
 def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
     """Unit and line where the program stopped, and of the calls that led there."""
-    exception = plc.status().exception
+    exception = plc.raw_status().exception
     assert exception is not None
     return [(place.pou, place.line) for place in symbols.call_stack(exception.code_offset, exception.trace)]
 
@@ -184,7 +184,7 @@ def test_an_exception_in_initialisation_names_unit_and_line(tmp_path, level: Lev
     (tmp_path / "main.st").write_text(MAIN.format(variable))
     built = compile_sources([tmp_path], level=level)
     with Simulator(built.image, built.symbols, start=False) as plc:
-        exception = plc.status().exception
+        exception = plc.raw_status().exception
         assert exception is not None
         found = built.symbols.call_stack(exception.code_offset, exception.trace)
     told = [(place.pou, place.file.rpartition("/")[2], place.line) for place in found]

@@ -14,7 +14,6 @@ from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
 from plctool.compiler.source import Source
 from plctool.compiler.typed import TypedProgram
-from plctool.core import lib
 from plctool.debug.symbols import SymbolTable
 from plctool.errors import UsageError
 from plctool.image.targets import TARGETS, find_target
@@ -170,7 +169,7 @@ def test_fb_exit_runs_in_the_opposite_order_of_fb_init_before_a_reset(tmp_path: 
     with Simulator(built.image, built.symbols) as plc:
         plc.run_cycles(2)
         assert plc.read("log") == ""
-        plc.reset(lib.RESET_OPTION_WARM)
+        plc.reset("warm")
         assert plc.read("log") == "b8b7hb5d2b2b1"
 
 

@@ -317,7 +317,7 @@ def outcome(program: TypedProgram, level: int) -> list[object]:
     with Simulator(built.image, built.symbols) as plc:
         for _ in range(2):
             plc.run_cycles(1)
-            exception = plc.status().exception
+            exception = plc.raw_status().exception
             line = exception and built.symbols.address_to_line(exception.code_offset or 0)
             size = program.area_sizes[Area.DATA]
             memory = bytes(ffi.buffer(lib.AppGetAreaAddress(Area.DATA.value, 0, size), size))

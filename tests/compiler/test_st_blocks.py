@@ -63,7 +63,7 @@ def run(built: BuildResult, inputs: dict[str, Sequence[object]], outputs: Sequen
     with Simulator(built.image, built.symbols) as plc:
         for cycle in range(CYCLES):
             for name, values in inputs.items():
-                plc.write(f"Main.{name}", values[cycle])
+                plc.write({f"Main.{name}": values[cycle]})
             plc.run_cycles(1)
             rows.append(tuple(plain(plc.read(f"Main.{name}")) for name in outputs))
     return rows

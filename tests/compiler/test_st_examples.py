@@ -73,14 +73,14 @@ def test_traffic_light_shortens_green_for_the_button() -> None:
     with started("traffic_light") as plc:
         plc.run_for(8000)
         assert plc.read("Main.text").startswith("green since T#")
-        plc.write("Main.button", True)
+        plc.write({"Main.button": True})
         plc.run_for(5000)
         assert plc.read("Main.state") in ("Yellow", "Red")
 
 
 def test_tanks_level_settles_at_the_set_point_within_fifteen_seconds(tanks: Simulator) -> None:
     for setpoint in (50.0, 65.0, 30.0):
-        tanks.write("Control.setpoint", setpoint)
+        tanks.write({"Control.setpoint": setpoint})
         tanks.run_for(seconds=15)
         levels = []
         for _ in range(50):
@@ -92,7 +92,7 @@ def test_tanks_level_settles_at_the_set_point_within_fifteen_seconds(tanks: Simu
 def test_tanks_pump_does_not_run_dry(tanks: Simulator) -> None:
     tanks.run_for(seconds=2)
     assert tanks.read("Control.pump")
-    tanks.write("Plant.supply.volume", 10.0)  # 2.5 %
+    tanks.write({"Plant.supply.volume": 10.0})  # 2.5 %
     tanks.run_for(50)
     assert not tanks.read("Control.pump")
     assert tanks.read("Control.inlet")
@@ -109,20 +109,20 @@ def test_tanks_pump_stays_off_for_its_least_time(tanks: Simulator) -> None:
 
 
 def test_tanks_alarm_waits_and_is_acknowledged(tanks: Simulator) -> None:
-    tanks.write("Control.mode", "Off")
+    tanks.write({"Control.mode": "Off"})
     tanks.run_for(seconds=1.9)
     assert not tanks.read("Control.alarm_low")
     tanks.run_for(200)
     assert tanks.read("Control.alarm_low")
     assert tanks.read("Control.horn")
-    tanks.write("Control.acknowledge", True)
+    tanks.write({"Control.acknowledge": True})
     tanks.run_for(50)
     assert tanks.read("Control.alarm_low")
     assert not tanks.read("Control.horn")
 
 
 def test_tanks_set_point_survives_a_warm_start(tanks: Simulator) -> None:
-    tanks.write("Control.setpoint", 42.0)
+    tanks.write({"Control.setpoint": 42.0})
     tanks.run_for(seconds=1)
     tanks.restart()
     assert tanks.read("Control.setpoint") == 42.0
@@ -157,7 +157,7 @@ def checksum(plc: Simulator) -> int:
 def test_tanks_have_the_levels_of_the_twin_in_c_bit_by_bit(tanks: Simulator, twin: ctypes.CDLL) -> None:
     for cycle in range(3000):
         if cycle == 1500:
-            tanks.write("Control.setpoint", 75.0)
+            tanks.write({"Control.setpoint": 75.0})
             twin.tanks_set(75.0)
         tanks.run_cycles(1)
         for now in range(CONTROL_MS * cycle - PLANT_MS, CONTROL_MS * cycle + 1, PLANT_MS):

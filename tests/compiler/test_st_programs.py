@@ -115,7 +115,7 @@ def run_cycle(plc: Simulator, script: Script, cycle: int) -> None:
     for name, values in script.sets.items():
         text = values[min(cycle, len(values) - 1)]
         if text != SKIP and (cycle < len(values)):
-            plc.write(name, parse_value(text))
+            plc.write({name: parse_value(text)})
     plc.run_cycles(1)
 
 
@@ -130,7 +130,7 @@ def differences(plc: Simulator, expected: dict[str, str], cycle: int) -> list[st
 
 def exception_of(plc: Simulator, symbols: SymbolTable) -> tuple[str, int] | None:
     """Name and source line of the exception that stopped the program."""
-    exception = plc.status().exception
+    exception = plc.raw_status().exception
     if exception is None:
         return None
     assert exception.code_offset is not None

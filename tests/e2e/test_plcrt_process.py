@@ -325,6 +325,7 @@ class Wire:
 
     name = "wire"
     local_address = b"\x00\x02"
+    max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     byte_rate = math.inf
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 
 from plctool import connect
+from plctool.link.transports import parse_link
 from plctool.port_check import run_port_check
 from plctool.testing.plcrt import Plcrt
 
@@ -24,7 +25,8 @@ def test_this_machine_keeps_what_the_runtime_expects(tool, tmp_path, monkeypatch
         plc.start()
 
     with plc:
-        report = run_port_check(lambda: connect(f"serial:{plc.port}"), baud=115200, power_cycle=power_cycle)
+        link = parse_link(f"serial:{plc.port}")
+        report = run_port_check(lambda: connect(link), link=link, power_cycle=power_cycle)
         document = report.document()
         assert failures(document) == []
         assert document["device"]["target"] == "x86_64-linux"

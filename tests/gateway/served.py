@@ -22,6 +22,7 @@ from plctool.gateway.frames import PROTOCOL, Frame, Kind, Pipe, document_frame
 from plctool.gateway.place import Place, find_place
 from plctool.gateway.server import Gateway
 from plctool.link.connection import Connection
+from plctool.link.transports import make_link, parse_link
 
 PORT = "/dev/no-such-line"
 BAUD = 115200
@@ -49,7 +50,7 @@ class Served:
         listener.bind(str(self.place.socket))
         listener.listen()
         listener.setblocking(False)
-        self.gateway = Gateway(Connection(self.line), listener, baud=BAUD, idle=idle)
+        self.gateway = Gateway(Connection(self.line), listener, link=parse_link(f"serial:{PORT}"), idle=idle)
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -64,7 +65,7 @@ class Served:
 
     def tool(self, words: str = "a tool", baud: int = BAUD) -> GatewayConnection:
         """A connection of a tool, below the session."""
-        connection = connect_gateway(PORT, baud, words)
+        connection = connect_gateway(make_link("serial", PORT, baud=baud), words)
         self._open.append(connection)
         return connection
 

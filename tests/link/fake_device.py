@@ -45,6 +45,7 @@ class FakeLine:
     ) -> None:
         self.name = "fake line"
         self.local_address = CLIENT_ADDRESS
+        self.max_packet = simplecom.MAX_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.rate = baud / BITS_PER_BYTE
         self.byte_rate = self.rate if known_rate else math.inf
@@ -63,6 +64,9 @@ class FakeLine:
         device.attach(self)
 
     # ---- what the client sees ----
+
+    def fileno(self) -> int | None:
+        return None
 
     def now(self) -> float:
         return self._time

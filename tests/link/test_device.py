@@ -11,9 +11,10 @@ from small_app import make_application
 import plctool
 from plctool.core import lib
 from plctool.debug.symbols import SymbolTable, cache_path, symbol_path
-from plctool.device import Plc, open_transport
+from plctool.device import Plc
 from plctool.errors import DeviceError, LinkError, UsageError
 from plctool.link.connection import Connection
+from plctool.link.transports import parse_link
 
 
 class Controller:
@@ -282,7 +283,7 @@ def test_tasks_log_and_info(running: Controller) -> None:
 )
 def test_links_that_are_none_are_usage_errors(link: str) -> None:
     with pytest.raises(UsageError):
-        open_transport(link)
+        parse_link(link)
 
 
 @pytest.mark.parametrize(

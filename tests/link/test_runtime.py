@@ -18,8 +18,8 @@ from plctool.link import services, simplecom
 from plctool.link.connection import Connection
 from plctool.link.session import Session
 from plctool.link.sim import SimTransport
-from plctool.link.transport import BlockTransport
-from plctool.testing.line import BITS_PER_BYTE, Damage
+from plctool.link.transport import BITS_PER_BYTE, BlockTransport
+from plctool.testing.line import Damage
 
 TICK_NS = 500_000
 
@@ -29,6 +29,7 @@ class SimSerial:
 
     name = "simulated serial line"
     local_address = b"\x00\x02"
+    max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     byte_rate = 115200 / BITS_PER_BYTE
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -77,12 +77,12 @@ class Recorder(Simulator):
         self.writes: list[tuple[int, int, bytes]] = []
         super().__init__(recording.built.image, recording.built.symbols)
 
-    def write(self, name: str, value: object) -> None:
-        super().write(name, value)
-        symbol = self._resolve(name)
-        place = self._place(symbol)
-        assert place is not None
-        self.writes.append((*place, bytes(self._memory(symbol))))
+    def write(self, values: Mapping[str, object]) -> None:
+        super().write(values)
+        for symbol in map(self.symbols().resolve, values):
+            place = self._place(symbol)
+            assert place is not None
+            self.writes.append((*place, bytes(self._memory(symbol))))
 
     def run_cycles(self, count: int) -> None:
         super().run_cycles(count)
@@ -95,7 +95,7 @@ class Recorder(Simulator):
     def _remember(self, step: Step) -> None:
         self.writes = []
         self.recording.steps.append(step)
-        exception = self.status().exception
+        exception = self.raw_status().exception
         sizes = [lib.AppGetAreaSize(area.value) for area in AREAS]
         areas = (bytes(ffi.buffer(lib.AppGetAreaAddress(a.value, 0, n), n)) for a, n in zip(AREAS, sizes, strict=True))
         seen = None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from plctool.testing.children import ends_with_us
@@ -98,11 +101,19 @@ class Runner:
         """The results of a batch, see runner.c."""
         folder.mkdir(exist_ok=True)
         (folder / "batch").write_bytes(batch)
-        command = ends_with_us([*self.command, self.compile(folder)])
+        command = ends_with_us([*self.command, _compile_once(self)])
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT)
         if done.returncode:
             raise RuntimeError(f"the runner for {self.target} failed: {done.stdout}{done.stderr}")
         return (folder / "results").read_bytes()
+
+
+@cache
+def _compile_once(runner: Runner) -> Path:
+    """The runner's program, for all tests of this process."""
+    folder = Path(tempfile.mkdtemp(prefix="runner-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return runner.compile(folder)
 
 
 def _cortex_m(target: str, flags: tuple[str, ...], machine: str) -> Runner:

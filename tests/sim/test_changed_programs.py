@@ -139,9 +139,9 @@ def test_only_what_changed_begins_anew(build, old, new, cut) -> None:
     old_leaves, new_leaves = leaves(old), leaves(new)
     with Simulator(before.image, before.symbols) as plc:
         for number, (path, (kind, _)) in enumerate(old_leaves.items()):
-            plc.write(path, written_value(kind, number))
-        plc.download(after.image)
-        plc.symbols = after.symbols
+            plc.write({path: written_value(kind, number)})
+        plc.flash(after.image, start=False)
+        plc.add_symbols(after.symbols)
         if cut:
             assert lib.SimStart() == lib.ERR_OK
         assert plc.read_all(new_leaves) == expected_values(old_leaves, new_leaves)

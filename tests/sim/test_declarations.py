@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.core import lib
 from plctool.errors import UsageError
 from plctool.sim import Simulator
 
@@ -71,7 +70,7 @@ def test_calculated_initial_values_are_there_in_the_first_cycle(plc):
 
 
 def test_retained_variables_keep_their_values_though_the_initial_ones_are_calculated(plc):
-    plc.reset(lib.RESET_OPTION_WARM)
+    plc.reset("warm")
     plc.start()
     plc.run_cycles(1)
     assert [plc.read(name) for name in NAMES] == [7, 10, 3, 6, 5]
@@ -80,7 +79,7 @@ def test_retained_variables_keep_their_values_though_the_initial_ones_are_calcul
 
 def test_a_cold_start_calculates_all_that_are_not_persistent(plc):
     plc.run_cycles(3)
-    plc.reset(lib.RESET_OPTION_COLD)
+    plc.reset("cold")
     plc.start()
     plc.run_cycles(1)
     assert [plc.read(name) for name in NAMES] == [6, 9, 2, 9, 5]
@@ -130,9 +129,9 @@ def test_access_names_are_only_read_unless_they_say_read_write(tmp_path: Path):
     path.write_text(ACCESS)
     built = compile_sources([path])
     with Simulator(built.image, built.symbols) as simulator:
-        simulator.write("step", 3)
+        simulator.write({"step": 3})
         simulator.run_cycles(2)
         assert simulator.read("total") == simulator.read("sum") == 6
         for name in ("total", "sum"):
             with pytest.raises(UsageError, match="READ_ONLY"):
-                simulator.write(name, 1)
+                simulator.write({name: 1})

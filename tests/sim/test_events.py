@@ -115,8 +115,8 @@ SCRIPT = st.lists(st.integers(0, 7), min_size=LENGTH, max_size=LENGTH)
 @given(first=SCRIPT, second=SCRIPT, ms=st.integers(0, 80))
 def test_every_rise_between_cycles_is_a_run_at_every_priority(scripted, first, second, ms):
     with Simulator(scripted.image, scripted.symbols, start=False) as plc:
-        plc.write("first", first)
-        plc.write("second", second)
+        plc.write({"first": first})
+        plc.write({"second": second})
         plc.start()
         plc.run_for(ms=ms)
         expected = rises(first, second, ms)

@@ -64,12 +64,12 @@ class Bench:
         if who == "PC":
             self.plc.write({BITS[bit]: value})
         elif who == "test":
-            self.simulator.write(BITS[bit], value)
+            self.simulator.write({BITS[bit]: value})
         else:
-            self.simulator.write(f"{who}.value", value)
-            self.simulator.write(f"{who}.which", bit + 1)
+            self.simulator.write({f"{who}.value": value})
+            self.simulator.write({f"{who}.which": bit + 1})
             self.simulator.run_for(ms=5)
-            self.simulator.write(f"{who}.which", 0)
+            self.simulator.write({f"{who}.which": 0})
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,7 @@ STEPS = st.lists(st.tuples(st.sampled_from(WRITERS), st.integers(0, len(BITS) - 
 @given(start=st.lists(st.booleans(), min_size=len(BITS), max_size=len(BITS)), steps=STEPS)
 def test_whoever_writes_in_whatever_order(bench: Bench, start: list[bool], steps: list[tuple[str, int, bool]]) -> None:
     for n, value in enumerate(start):
-        bench.simulator.write(BITS[n], value)
+        bench.simulator.write({BITS[n]: value})
     expected = list(start)
     for who, n, value in steps:
         bench.write(who, n, value)

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.core import lib
 from plctool.sim import Simulator
 
 PROGRAM = """
@@ -62,4 +61,4 @@ def bring_about(plc: Simulator, event: str) -> None:
         plc.restart()
         plc.run_cycles(1)
     elif event != "download":
-        plc.reset(lib.RESET_OPTION_WARM if event == "warm" else lib.RESET_OPTION_COLD)
+        plc.reset("warm" if event == "warm" else "cold")

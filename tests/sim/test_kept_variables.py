@@ -36,10 +36,10 @@ def bring_about(plc: Simulator, event: str, qualifier: str, build) -> None:
         plc.stop()
         plc.start()
     elif event == "exception, reset warm":
-        plc.write("Main.trip", True)
+        plc.write({"Main.trip": True})
         plc.run_cycles(2)
         assert plc.status().state is AppState.EXCEPTION
-        plc.reset(lib.RESET_OPTION_WARM)
+        plc.reset("warm")
     elif event == "power off and on":
         plc.run_for(2500)
         assert lib.SimStart() == lib.ERR_OK  # without a warning
@@ -48,24 +48,23 @@ def bring_about(plc: Simulator, event: str, qualifier: str, build) -> None:
     elif event == "download, rolled back":
         bad = program(qualifier, changed=True).replace("Seven := 7", "Seven := Seven / Seven")
         bad = bad.replace("zero : DINT", "zero : DINT := Seven()")
-        symbols = plc.symbols
+        crc = plc.status().image_crc
         download(plc, build(bad))
         assert plc.status().state is AppState.EXCEPTION
         assert lib.SimStart() == lib.ERR_OK
-        plc.symbols = symbols
-        assert plc.status().image_crc == symbols.image_crc
+        assert plc.status().image_crc == crc
     elif event == "reset origin":
         image = build(program(qualifier))
-        plc.reset(lib.RESET_OPTION_ORIGIN)
+        plc.reset("origin")
         download(plc, image)
     else:
-        option = {"reset warm": lib.RESET_OPTION_WARM, "reset cold": lib.RESET_OPTION_COLD}[event]
+        option = {"reset warm": "warm", "reset cold": "cold"}[event]
         plc.reset(option)
 
 
 def download(plc: Simulator, built: BuildResult) -> None:
-    plc.download(built.image)
-    plc.symbols = built.symbols
+    plc.flash(built.image, start=False)
+    plc.add_symbols(built.symbols)
 
 
 @contextmanager
@@ -75,7 +74,7 @@ def changed_everything(build, qualifier: str) -> Iterator[Simulator]:
     with Simulator(built.image, built.symbols) as plc:
         assert plc.read_all(KEPT + LOST) == dict.fromkeys(KEPT + LOST, INITIAL)
         for name in KEPT + LOST:
-            plc.write(name, CHANGED)
+            plc.write({name: CHANGED})
         yield plc
 
 
@@ -140,7 +139,7 @@ def test_variables_of_methods_that_last_are_kept_with_their_instance(build) -> N
     built = build(METHODS)
     with Simulator(built.image, built.symbols) as plc:
         plc.run_cycles(3)
-        plc.reset(lib.RESET_OPTION_WARM)
+        plc.reset("warm")
         plc.start()
         plc.run_cycles(1)
         assert plc.read("Main.seen") == 11008

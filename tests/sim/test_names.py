@@ -177,12 +177,12 @@ def test_a_pointer_that_changes_is_followed_each_time(plc: Simulator) -> None:
     ],
 )
 def test_what_pointers_lead_to_is_written(plc: Simulator, name: str, value: object, seen_as: str) -> None:
-    plc.write(name, value)
+    plc.write({name: value})
     assert plc.read(seen_as) == value
 
 
 def test_a_bit_behind_a_pointer_is_written(plc: Simulator) -> None:
-    plc.write("Main.raw^.2", True)
+    plc.write({"Main.raw^.2": True})
     assert plc.read("Main.list[1]") == 14
 
 
@@ -200,8 +200,7 @@ def test_a_bit_behind_a_pointer_is_written(plc: Simulator) -> None:
     ],
 )
 def test_texts_are_written_as_they_are_shown(plc: Simulator, name: str, text: str, seen: object) -> None:
-    assert plc.symbols
-    plc.write(name, plc.symbols.resolve(name).parse(text))
+    plc.write({name: plc.symbols().resolve(name).parse(text)})
     assert plc.read(name) == seen
 
 
@@ -218,7 +217,7 @@ def test_a_pointer_to_nothing_is_a_device_error_that_names_it(plc: Simulator, na
     with pytest.raises(DeviceError) as read:
         plc.read(name)
     with pytest.raises(DeviceError) as written:
-        plc.write(name, 1)
+        plc.write({name: 1})
     assert words in read.value.message and words in written.value.message
 
 
@@ -252,10 +251,10 @@ def test_a_name_that_leads_nowhere_gets_advice(plc: Simulator, name: str, words:
 )
 def test_what_only_the_program_may_set_is_not_written(plc: Simulator, name: str, value: object) -> None:
     with pytest.raises(UsageError):
-        plc.write(name, value)
+        plc.write({name: value})
 
 
 def test_a_subrange_keeps_its_limits(plc: Simulator) -> None:
-    plc.write("Main.level", 100)
+    plc.write({"Main.level": 100})
     with pytest.raises(UsageError, match="0 to 100"):
-        plc.write("Main.level", 101)
+        plc.write({"Main.level": 101})

@@ -52,15 +52,15 @@ def test_any_overrun_of_a_local_array_in_a_cycle_is_an_exception(tmp_path: Path,
         @settings(max_examples=60, deadline=None)
         @given(over=st.integers(20, 4096) | st.integers(4096, 9_000_000), value=st.integers(0, 255))
         def overrun(over: int, value: int) -> None:
-            plc.reset(lib.RESET_OPTION_COLD)
+            plc.reset("cold")
             plc.start()
-            plc.write("bytes", ARRAY_BYTES + over)
-            plc.write("value", value)
-            plc.write("go", True)
+            plc.write({"bytes": ARRAY_BYTES + over})
+            plc.write({"value": value})
+            plc.write({"go": True})
             assert code_after(plc) in CAUGHT
 
         overrun()
-        plc.reset(lib.RESET_OPTION_COLD)
+        plc.reset("cold")
         plc.start()
         assert code_after(plc) == lib.RTSEXCPT_NOEXCEPTION and plc.read("Main.n") > 0
 
@@ -71,7 +71,7 @@ def test_an_overrun_of_a_local_array_in_initialisation_is_an_exception(tmp_path:
     call = f"Clear({ARRAY_BYTES + over}, {value})"
     built = build(tmp_path, CLEAR + f"PROGRAM Main VAR v : DINT := {call}; END_VAR END_PROGRAM")
     with Simulator(built.image, built.symbols, start=False) as plc:
-        exception = plc.status().exception
+        exception = plc.raw_status().exception
         assert exception is not None and exception.code in CAUGHT and exception.task == -1
 
 
@@ -92,9 +92,9 @@ def test_a_wild_write_is_an_exception_before_it_reaches_the_runtime(tmp_path: Pa
     bad, good = build(tmp_path, text), build(tmp_path, CLEAR + BODY)
     with Simulator(bad.image, bad.symbols) as plc:
         assert code_after(plc) == lib.RTSEXCPT_ACCESS_VIOLATION
-        plc.reset(lib.RESET_OPTION_COLD)
-        plc.download(good.image)
-        plc.symbols = good.symbols
+        plc.reset("cold")
+        plc.flash(good.image, start=False)
+        plc.add_symbols(good.symbols)
         plc.start()
         assert code_after(plc) == lib.RTSEXCPT_NOEXCEPTION
         plc.restart()

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
-from plctool.core import lib
 from plctool.errors import DeviceError
 from plctool.sim import Simulator
 
@@ -67,9 +66,9 @@ def test_an_input_that_a_task_writes_is_seen_by_the_others(start: Start) -> None
 def test_what_the_pc_writes_is_seen_in_the_next_cycle_and_holds(start: Start) -> None:
     plc = start("seen := in; out := out;", "seen := in; flag := flag;")
     plc.run_for(ms=5)
-    plc.write("in", 77)
-    plc.write("flag", False)
-    plc.write("out", 5)
+    plc.write({"in": 77})
+    plc.write({"flag": False})
+    plc.write({"out": 5})
     assert plc.read("in") == 77
     plc.run_for(ms=15)
     assert plc.read_all(["Fast.seen", "Slow.seen", "flag", "out"]) == {
@@ -83,11 +82,11 @@ def test_what_the_pc_writes_is_seen_in_the_next_cycle_and_holds(start: Start) ->
 def test_outputs_are_zero_after_an_exception_whatever_the_failing_cycle_had_written(start: Start) -> None:
     plc = start("out := 16#FFFF; seen := 1 / divisor;", "flag := TRUE;")
     plc.run_for(ms=5)
-    plc.write("divisor", 0)
+    plc.write({"divisor": 0})
     plc.run_for(ms=20)
     assert plc.status().exception is not None
     assert plc.read_all(["out", "flag"]) == {"out": 0, "flag": False}
-    plc.reset(lib.RESET_OPTION_WARM)
+    plc.reset("warm")
     assert plc.read_all(["out", "flag"]) == {"out": 0x100, "flag": True}
 
 
@@ -105,8 +104,8 @@ def test_a_pointer_into_the_outputs_is_followed_by_the_pc(start: Start) -> None:
     plc = start("p := ADR(out); p^ := p^ + 1;", "w := out;", "p : POINTER TO WORD;")
     plc.run_for(ms=3)
     assert plc.read("Fast.p^") == plc.read("out") == 0x103
-    plc.write("Fast.p^", 7)
-    plc.write("Fast.p^.0", False)
+    plc.write({"Fast.p^": 7})
+    plc.write({"Fast.p^.0": False})
     assert plc.read("out") == 6
     plc.run_for(ms=1)
     assert plc.read("out") == 7

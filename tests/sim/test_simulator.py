@@ -87,14 +87,14 @@ def test_timers_follow_the_virtual_clock(plc):
 
 def test_structures_and_arrays_come_as_dicts_and_lists(plc):
     assert plc.read("Main.points") == [{"x": 0, "y": 1.5}] * 3
-    plc.write("main.POINTS[2].X", 4)
+    plc.write({"main.POINTS[2].X": 4})
     assert plc.read("Main.points[2]") == {"x": 4, "y": 1.5}
     assert plc.read_all(["Main.name", "Main.pulse.PT"]) == {"Main.name": "tank", "Main.pulse.PT": "T#0ms"}
 
 
 def test_values_are_written_as_python_values_or_as_text(plc):
-    plc.write("Main.name", "pump")
-    plc.write("Main.pulse.PT", "T#80ms")
+    plc.write({"Main.name": "pump"})
+    plc.write({"Main.pulse.PT": "T#80ms"})
     assert plc.read("Main.name") == "pump" and plc.read("Main.pulse.PT") == "T#80ms"
 
 
@@ -107,25 +107,25 @@ def test_a_name_that_is_not_there_is_refused_with_a_hint(plc, name, hint):
 def test_values_that_do_not_fit_are_refused(plc):
     for name, value in (("Main.divisor", 40_000), ("Main.divisor", "abc"), ("Main.name", "x" * 81)):
         with pytest.raises(UsageError):
-            plc.write(name, value)
+            plc.write({name: value})
     assert plc.read("Main.divisor") == 1
 
 
 @pytest.mark.parametrize("value", [1, "1", "Stop", "Mode#2"])
 def test_a_value_that_an_enumeration_has_not_is_refused(plc, value):
-    plc.write("Main.mode", "Run")
+    plc.write({"Main.mode": "Run"})
     with pytest.raises(UsageError, match=r"choose one of Idle \(0\), Run \(5\)\."):
-        plc.write("Main.mode", value)
+        plc.write({"Main.mode": value})
     assert plc.read("Main.mode") == "Run"
 
 
 def test_an_exception_stops_the_program_and_a_reset_lets_it_start_again(plc):
-    plc.write("Main.divisor", 0)
+    plc.write({"Main.divisor": 0})
     plc.run_cycles(3)
     assert plc.status().exception.name == "DIVIDEBYZERO"
     with pytest.raises(DeviceError, match="reset it first"):
         plc.start()
-    plc.reset(lib.RESET_OPTION_WARM)
+    plc.reset("warm")
     plc.start()
     plc.run_cycles(2)
     assert plc.read("Main.n") == 2
@@ -145,7 +145,7 @@ def test_a_refused_image_leaves_the_program_running(plc, built):
     damaged = bytearray(built.image)
     damaged[200] ^= 1
     with pytest.raises(DeviceError, match="CRC"):
-        plc.download(bytes(damaged))
+        plc.flash(bytes(damaged), unchecked=True)
     plc.run_cycles(5)
     assert plc.read("Main.n") == 10
 

@@ -51,6 +51,7 @@ def _machine_options(machine: str, flash_file: Path) -> list[str]:
 class SocketSerial:
     """Block transport over a serial line that QEMU offers as a socket."""
 
+    max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
     byte_rate = math.inf
     local_address = b"\x00\x02"

@@ -8,12 +8,14 @@ import pytest
 
 from plctool.device import Plc
 from plctool.link.connection import Connection
+from plctool.link.transports import make_link
 from plctool.port_check import outcome_text, run_port_check
 
 # On a quiet host QEMU's clock is the host's, and its line is faster than 115200 baud. On a busy one it counts
 # instructions, and its time stands still whenever it gets no processor.
 QUIET = os.getloadavg()[0] < 1
 CLOCK, BAUD, MAX_DRIFT = ("host", 115200, 0.05) if QUIET else ("follow", 9600, 0.9)
+LINK = make_link("serial", "the board's", baud=BAUD)
 
 # Configuration, its clock (without monitoring nothing looks at it), and what cannot be checked there.
 CONFIGURATIONS = {
@@ -34,7 +36,7 @@ def test_board_keeps_what_the_runtime_expects(make_board, tmp_path, monkeypatch,
         board.power_on(clock)
 
     report = run_port_check(
-        lambda: Plc(Connection(board.line())), baud=BAUD, max_drift=MAX_DRIFT, power_cycle=power_cycle
+        lambda: Plc(Connection(board.line())), link=LINK, max_drift=MAX_DRIFT, power_cycle=power_cycle
     )
     print(*map(outcome_text, report.outcomes), sep="\n")
     assert [(o.name, o.text) for o in report.outcomes if o.verdict == "failed"] == []

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from plctool.errors import DeviceError, UsageError
-from plctool.files import read_image
+from plctool.files import read_image, write_atomically
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.warnings import WarningOptions
-    from plctool.device import ExceptionInfo, Plc, PlcStatus
-    from plctool.sim import Simulator
+    from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
+    from plctool.device import Plc
+    from plctool.link.transports import Link
+    from plctool.port_check import Outcome
+    from plctool.port_check import Report as PortReport
+    from plctool.st_tests import Report as TestReport
 
 Document = dict[str, Any]
 Texts = dict[str, str]
@@ -93,7 +97,7 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
     from plctool.compiler.export_itf import export_interface as export
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
-    from plctool.files import make_folder, write_atomically
+    from plctool.files import make_folder
 
     sources = load_sources(paths)
     with bugs_reported():
@@ -165,6 +169,20 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
     }
 
 
+def test(
+    paths: Sequence[Path], pattern: str, level: int, junit: Path | None, warnings: WarningOptions
+) -> tuple[Document, TestReport]:
+    """Runs the unit tests of a program, and writes their report to `junit` as well."""
+    from plctool import st_tests
+
+    if junit:
+        check_output(junit, paths, "--junit report.xml")
+    report = st_tests.run_tests(paths, pattern=pattern, level=level, warnings=warnings)
+    if junit:
+        write_atomically(junit, st_tests.junit_xml(report))
+    return report.document(), report
+
+
 # ---- in this process -------------------------------------------------------------------------------------------------
 
 
@@ -179,11 +197,10 @@ def run(
     from plctool.sim import Simulator
 
     with Simulator.from_file(path) as plc:
-        assert plc.symbols
+        table = plc.symbols()
         for name in gets:
-            plc.symbols.resolve(name)  # a wrong name is told before the run
-        for name, text in sets.items():
-            plc.write(name, plc.symbols.resolve(name).parse(text))
+            table.resolve(name)  # a wrong name is reported before the run
+        plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
         if time_ms is None:
             plc.run_cycles(1 if cycles is None else cycles)
         else:
@@ -198,15 +215,9 @@ def run(
         return document, reading.texts
 
 
-def _raise_exception(plc: Simulator) -> None:
-    from plctool.device import explain_exception
-
-    exception = plc.status().exception
-    if exception is None:
-        return
-    tasks = plc.tasks()
-    task = tasks[exception.task].name if 0 <= exception.task < len(tasks) else None
-    raise ProgramStopped(explain_exception(exception, task, plc.symbols))
+def _raise_exception(plc: Controller) -> None:
+    if exception := plc.status().exception:
+        raise ProgramStopped(exception)
 
 
 def bench(path: Path, cycles: int) -> Document:
@@ -227,10 +238,52 @@ def bench(path: Path, cycles: int) -> Document:
         return {"tasks": tasks}
 
 
-# ---- on a device -----------------------------------------------------------------------------------------------------
+# ---- on a controller -------------------------------------------------------------------------------------------------
 
 
-def status(plc: Plc) -> Document:
+def flash(
+    plc: Controller,
+    image: Path,
+    *,
+    start: bool = True,
+    force: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    announce: Callable[[Sequence[OtherTool]], None] = lambda others: None,
+) -> Document:
+    """Brings an image onto a controller; see `Controller.flash`. `announce` gets the other tools on the line first."""
+    others = plc.others()
+    announce(others)
+    result = plc.flash(image, start=start, force=force, progress=progress)
+    return {
+        "bytes": result.bytes,
+        "seconds": round(result.seconds, 3),
+        "skipped": result.skipped,
+        "state": str(result.state),
+        "others": [vars(other) for other in others],
+        "persistent": None if result.persistent is None else vars(result.persistent),
+    }
+
+
+def start(plc: Controller) -> Document:
+    """Starts the program; the state that it leads to."""
+    plc.start()
+    return status(plc)
+
+
+def stop(plc: Controller) -> Document:
+    """Stops the program; the state that it leads to."""
+    plc.stop()
+    return status(plc)
+
+
+def reset(plc: Controller, option: str) -> Document:
+    """Resets the program; the state that it leads to."""
+    plc.reset(option)
+    return status(plc)
+
+
+def status(plc: Controller) -> Document:
+    """What the program does."""
     return status_document(plc.status())
 
 
@@ -248,16 +301,18 @@ def _exception_document(exception: ExceptionInfo) -> Document:
     return {**vars(exception), "calls": [vars(call) for call in exception.calls]}
 
 
-def tasks(plc: Plc) -> Document:
+def tasks(plc: Controller) -> Document:
+    """Statistics of the tasks."""
     return {"tasks": [vars(task) for task in plc.tasks()]}
 
 
-def read(plc: Plc, names: Sequence[str]) -> tuple[Document, Texts]:
+def read(plc: Controller, names: Sequence[str]) -> tuple[Document, Texts]:
+    """The values of variables, and how ST writes them."""
     reading = plc.sample(names)
     return {"values": reading.values, "consistent": reading.consistent}, reading.texts
 
 
-def write(plc: Plc, texts: Mapping[str, str]) -> tuple[Document, Texts]:
+def write(plc: Controller, texts: Mapping[str, str]) -> tuple[Document, Texts]:
     """Writes values as typed and reads them back."""
     table = plc.symbols()
     plc.write({name: table.resolve(name).parse(text) for name, text in texts.items()})
@@ -265,7 +320,7 @@ def write(plc: Plc, texts: Mapping[str, str]) -> tuple[Document, Texts]:
     return {"values": reading.values}, reading.texts
 
 
-def log(plc: Plc) -> Document:
+def log(plc: Controller) -> Document:
     """The log; the exception that holds the program at present comes with its source line."""
     from plctool.core import lib
 
@@ -288,3 +343,68 @@ def log(plc: Plc) -> Document:
         known = _exception_document(exception)
         last |= {name: known[name] for name in ("pou", "file", "line", "calls")}
     return {"entries": entries}
+
+
+# ---- on a link -------------------------------------------------------------------------------------------------------
+
+
+def scan(link: Link, gateway: bool | None, tool: str) -> Document:
+    """The controllers that answer on a link. Raises LinkError when there are none."""
+    from plctool.device import scan as nodes_on
+    from plctool.image.file import target_name
+
+    return {
+        "devices": [
+            {
+                "address": node.address_text,
+                "node_name": node.node_name,
+                "device_name": node.device_name,
+                "vendor_name": node.vendor_name,
+                "target": target_name(node.target_id),
+                "version": node.version,
+                "serial_number": node.serial_number,
+            }
+            for node in nodes_on(link, gateway=gateway, tool=tool)
+        ]
+    }
+
+
+def watch(
+    plc: Plc, names: Sequence[str], interval: float, count: int | None, waiting: Callable[[str], None]
+) -> Iterator[tuple[Document, Texts]]:
+    """Readings, one after the other; see `Plc.watch`."""
+    for seconds, reading in plc.watch(names, interval, count, waiting):
+        document = {"time_s": round(seconds, 6), "values": reading.values, "consistent": reading.consistent}
+        yield document, reading.texts
+
+
+def port_check(
+    connect: Callable[[], Plc],
+    *,
+    link: Link,
+    replace: bool,
+    max_drift: float,
+    power_cycle: Callable[[], None] | None,
+    show: Callable[[Outcome], None],
+) -> tuple[Document, PortReport]:
+    """Checks a port; see `port_check.run_port_check`."""
+    from plctool.port_check import run_port_check
+
+    report = run_port_check(
+        connect, link=link, replace=replace, max_drift=max_drift, power_cycle=power_cycle, show=show
+    )
+    return report.document(), report
+
+
+def gateways(port: str | None) -> Document:
+    """What each gateway of this user does, or the one of a port."""
+    from plctool.gateway.control import gateways as found
+
+    return {"gateways": found(port)}
+
+
+def stop_gateways(port: str | None) -> Document:
+    """Ends the gateways of this user, or the one of a port."""
+    from plctool.gateway.control import stop_gateways as stopped
+
+    return {"stopped": stopped(port)}

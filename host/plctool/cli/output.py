@@ -46,6 +46,40 @@ def calls_text(place: dict[str, Any], column: int = 2) -> str:
     )
 
 
+def variables_text(document: dict[str, Any]) -> str:
+    """A line for each variable of an image."""
+    return table(document["variables"], ("name", "type", "area"))
+
+
+def run_text(document: dict[str, Any], texts: dict[str, str]) -> str:
+    """Values as ST writes them, and how long it ran."""
+    return f"{values_text(texts)}\n{document['cycles']} cycles, {document['time_ms']:.10g} ms".lstrip()
+
+
+def interface_text(document: dict[str, Any]) -> str:
+    """The functions of a C interface, and the files."""
+    kept = "" if document["source_written"] else " (kept as it is; --force replaces it)"
+    functions = table(document["functions"], document["functions"][0])
+    return f"{functions}\n{document['header']}\n{document['source']}{kept}"
+
+
+def flash_text(document: dict[str, Any]) -> str:
+    """What a download did, and what became of PERSISTENT values."""
+    size, seconds = document["bytes"], document["seconds"]
+    done = "already on the device" if document["skipped"] else f"{size} bytes in {seconds:.2f} s"
+    lines = [f"{done}; state: {document['state']}"]
+    if document["persistent"]:
+        lines += [f"PERSISTENT value lost: {name} {why}" for name, why in document["persistent"]["lost"].items()]
+        lines += [f"PERSISTENT value new: {name}" for name in document["persistent"]["new"]]
+    return "\n".join(lines)
+
+
+def tasks_text(document: dict[str, Any]) -> str:
+    """A line for each task."""
+    columns = ("name", "cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns")
+    return table(document["tasks"], columns)
+
+
 def status_text(document: dict[str, Any]) -> str:
     lines = [f"state: {document['state']}"]
     if document["image_crc"]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from plctool.errors import UsageError
+from plctool.image.targets import DEFAULT_TARGET
 
 if TYPE_CHECKING:
     from plctool.compiler.build import BuildResult
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from plctool.compiler.source import Source
     from plctool.compiler.warnings import WarningOptions
 
-DEFAULT_TARGET = "x86_64-linux"
 Level = int | Literal["s"]
 """How much is optimised: 0 .. 3, or "s" for small code."""
 

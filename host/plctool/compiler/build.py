@@ -9,7 +9,6 @@ from pathlib import Path
 from plctool.compiler.codegen.emit import emit_objects
 from plctool.compiler.codegen.link import Linked, link
 from plctool.compiler.codegen.lower import Lowered, lower
-from plctool.compiler.codegen.lower_classes import CLASS_NUMBER
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
@@ -21,9 +20,9 @@ from plctool.debug.symbols import CodeUnit, KeptName, SymbolTable, symbol_path
 from plctool.debug.variables import Symbol, constant_symbol
 from plctool.files import write_atomically
 from plctool.iec.areas import Area
-from plctool.iec.types import base_of
+from plctool.iec.types import CLASS_NUMBER, base_of
 from plctool.iec.values import encode
-from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image
+from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image, image_crc
 from plctool.image.targets import Machine, Target
 
 _UNIT = int(lib.CDL_IMAGE_UNIT)
@@ -80,7 +79,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
         kept=kept_variables(kept),
     )
     built = build_image(image)
-    symbols.image_crc = int.from_bytes(built[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+    symbols.image_crc = image_crc(built)
     return BuildResult(built, symbols, code_sizes(symbols, len(linked.code)))
 
 

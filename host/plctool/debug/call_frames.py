@@ -10,14 +10,13 @@ import io
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from elftools.dwarf.callframe import FDE
 from elftools.dwarf.ranges import BaseAddressEntry
 from elftools.elf.elffile import ELFFile
 
-if TYPE_CHECKING:
-    from plctool.link.services import Trace
+from plctool.debug.trace import Trace
 
 # Registers of the stack pointer in DWARF.
 _STACK_POINTER = {"EM_X86_64": 7, "EM_ARM": 13, "EM_AARCH64": 31, "EM_RISCV": 2}

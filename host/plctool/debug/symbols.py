@@ -18,6 +18,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from plctool.debug.trace import Trace
 from plctool.debug.variables import Symbol, Units, constant_symbol, walk
 from plctool.errors import UsageError
 from plctool.files import write_atomically
@@ -26,7 +27,6 @@ from plctool.iec.types import ArrayType
 
 if TYPE_CHECKING:
     from plctool.debug.call_frames import DebugInfo
-    from plctool.link.services import Trace
 
 FORMAT = 3
 

@@ -1,4 +1,4 @@
-"""The process of a gateway: `python -m plctool.gateway LINE BAUD FOLDER`, started by the first tool (`client.py`).
+"""The process of a gateway: `python -m plctool.gateway LINK FOLDER`, started by the first tool (`client.py`).
 
 It says on stdout, in one line of JSON, that it serves the line or why it cannot, and lives on without a terminal.
 """
@@ -16,6 +16,7 @@ from typing import Any
 
 from plctool.errors import PlcError
 from plctool.gateway.place import Place, locked
+from plctool.link.transports import Link, open_transport, parse_link
 
 DEFAULT_IDLE = 3.0  # seconds without tools after which a gateway ends
 _LOCK_PATIENCE = 5.0  # for the gateway before, which may just be ending
@@ -23,7 +24,8 @@ _BACKLOG = 64
 
 
 def main(arguments: list[str]) -> int:
-    line, baud, folder = arguments
+    link, folder = parse_link(arguments[0]), arguments[1]
+    line = link.place
     os.umask(0o077)
     if os.fork():  # the tool has no child that it would have to wait for
         os._exit(0)
@@ -32,7 +34,7 @@ def main(arguments: list[str]) -> int:
         with locked(place.lock, _LOCK_PATIENCE) as lock:
             os.ftruncate(lock, 0)
             os.write(lock, f"{os.getpid()} {line}".encode(errors="surrogateescape"))
-            _serve(place, int(baud))
+            _serve(place, link)
     except TimeoutError:
         _say({"busy": f"The gateway of {line} that is running takes no tools; end it with 'plctool gateway stop'."})
     except PlcError as error:
@@ -40,15 +42,14 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _serve(place: Place, baud: int) -> None:
+def _serve(place: Place, link: Link) -> None:
     """Raises LinkError when the line cannot be opened."""
     from plctool.gateway.server import Gateway
     from plctool.link.connection import Connection
-    from plctool.link.serial import SerialTransport
 
-    connection = Connection(SerialTransport(place.line, baud))
+    connection = Connection(open_transport(link))
     listener = _listen(place.socket)
-    gateway = Gateway(connection, listener, baud=baud, idle=_idle_seconds())
+    gateway = Gateway(connection, listener, link=link, idle=_idle_seconds())
     end = f"The gateway of {place.line} was ended (SIGTERM)."
     signal.signal(signal.SIGTERM, lambda number, frame: gateway.stop(end, "gateway-stopped"))
     _say({})

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import replace
 from typing import Any
 
 from plctool.errors import DeviceError, LinkError
@@ -34,6 +35,7 @@ from plctool.link.channel import ChannelLost
 from plctool.link.connection import PATIENCE, SCAN_SECONDS
 from plctool.link.names import Node
 from plctool.link.session import Application, Session
+from plctool.link.transports import Link
 
 _ATTACH_PATIENCE = 30.0  # to find or start a gateway [s]
 _START_PATIENCE = 20.0  # from its start to its first word [s]
@@ -49,22 +51,22 @@ class Ended(Exception):
 # ---- finding and starting ----
 
 
-def connect_gateway(port: str, baud: int, words: str) -> GatewayConnection:
-    """A connection through the gateway of a port, which is started when it does not run. `words`: what other tools are
+def connect_gateway(link: Link, words: str) -> GatewayConnection:
+    """A connection through the gateway of a link, which is started when it does not run. `words`: what other tools are
     told this one is.
 
     Raises NoGateway when there can be none, LinkError when the line cannot be opened or not be shared.
     """
-    return GatewayConnection(find_place(port), port, baud, words)
+    return GatewayConnection(find_place(link.place), link, words)
 
 
-def _attach(place: Place, baud: int, words: str) -> Pipe:
+def _attach(place: Place, link: Link, words: str) -> Pipe:
     """Raises NoGateway, LinkError."""
     end = time.monotonic() + _ATTACH_PATIENCE
     while True:
         try:
-            pipe = connect(place) or _start_once(place, baud)
-            greet(pipe, place, {"baud": baud, "tool": words})
+            pipe = connect(place) or _start_once(place, link)
+            greet(pipe, place, {**link.options, "tool": words})
             return pipe
         except Ended:
             if time.monotonic() >= end:
@@ -90,13 +92,13 @@ def connect(place: Place) -> Pipe | None:
     return Pipe(connected)
 
 
-def _start_once(place: Place, baud: int) -> Pipe:
+def _start_once(place: Place, link: Link) -> Pipe:
     """Starts the gateway unless another tool has just done that. Raises Ended when it has ended already."""
     try:
         with locked(place.start_lock, _ATTACH_PATIENCE):
             pipe = connect(place)
             if pipe is None:
-                _start(place, baud)
+                _start(place, link)
                 pipe = connect(place)
     except TimeoutError:
         raise _stuck(place) from None
@@ -107,12 +109,13 @@ def _start_once(place: Place, baud: int) -> Pipe:
     return pipe
 
 
-def _start(place: Place, baud: int) -> None:
+def _start(place: Place, link: Link) -> None:
     """Returns when the gateway listens. Raises NoGateway when it does not start, LinkError when it cannot open the
     line."""
     if not sys.executable or getattr(sys, "frozen", False):
         raise NoGateway("this program cannot start Python")
-    command = [sys.executable, "-P", "-m", "plctool.gateway", place.line, str(baud), str(place.folder)]
+    here = replace(link, place=place.line)  # it works in another folder
+    command = [sys.executable, "-P", "-m", "plctool.gateway", str(here), str(place.folder)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(os.path.abspath(p) for p in sys.path if p)}
     with open(place.log, "wb") as log, suppress(subprocess.TimeoutExpired):
         process = subprocess.Popen(
@@ -204,22 +207,21 @@ def failure(said: dict[str, Any]) -> LinkError | DeviceError:
 class GatewayConnection:
     """A MessageLink through the gateway of a line. Finds the gateway again, or starts another one, when it was lost."""
 
-    def __init__(self, place: Place, port: str, baud: int, words: str) -> None:
+    def __init__(self, place: Place, link: Link, words: str) -> None:
         self.session = 0  # id of the device's session, while the channel is open
         self.buffer_size = 0
         self.best_size = 0
         self._place = place
-        self._port = port
-        self._baud = baud
+        self._link = link
         self._words = words
         self._numbers = itertools.count(1)
         self._generation: int | None = None  # of the channel; None while none is open
         self._purpose: str | None = None  # why we keep the device to ourselves
-        self._pipe: Pipe | None = _attach(place, baud, words)
+        self._pipe: Pipe | None = _attach(place, link, words)
 
     @property
     def name(self) -> str:
-        return self._port
+        return self._link.place
 
     @property
     def is_open(self) -> bool:
@@ -330,9 +332,9 @@ class GatewayConnection:
 
     def _attach_again(self) -> None:
         try:
-            self._pipe = _attach(self._place, self._baud, self._words)
+            self._pipe = _attach(self._place, self._link, self._words)
         except NoGateway as error:
-            raise LinkError(f"The gateway of {self._port} cannot be started again ({error}); try again.") from error
+            raise LinkError(f"The gateway of {self.name} cannot be started again ({error}); try again.") from error
         if self._purpose:
             self._call_once("claim", PATIENCE, {"purpose": self._purpose})
 
@@ -392,7 +394,7 @@ class GatewayConnection:
         except Closed:
             self._drop()
             raise ChannelLost(
-                f"The gateway of {self._port} ended while it worked on a request, which may have been carried out; "
+                f"The gateway of {self.name} ended while it worked on a request, which may have been carried out; "
                 "look, and try again.",
                 "gateway-lost",
             ) from None
@@ -411,13 +413,13 @@ class GatewayConnection:
     def _nonsense(self) -> LinkError:
         self._drop()
         return LinkError(
-            f"The gateway of {self._port} sent what plctool does not understand; end it with 'plctool gateway stop'.",
+            f"The gateway of {self.name} sent what plctool does not understand; end it with 'plctool gateway stop'.",
             "gateway-protocol",
         )
 
     def _not_taken(self) -> ChannelLost:
         self._drop()
-        return ChannelLost(f"The gateway of {self._port} has ended; try again.", "closed")
+        return ChannelLost(f"The gateway of {self.name} has ended; try again.", "closed")
 
     def _drop(self) -> None:
         pipe, self._pipe, self._generation = self._pipe, None, None

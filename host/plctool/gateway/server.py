@@ -37,6 +37,7 @@ from plctool.gateway.frames import (
 from plctool.gateway.shared import CLAIM_SILENCE, SharedDevice, Tool
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import Connection
+from plctool.link.transports import Link
 from plctool.version import plctool_version
 
 MAX_TOOLS = 32
@@ -54,13 +55,13 @@ _LOST = "link-lost"
 class Gateway:
     """Serves tools on `listener` until none has been there for `idle` seconds, the line is lost, or `stop`."""
 
-    def __init__(self, connection: Connection, listener: socket.socket, *, baud: int, idle: float) -> None:
+    def __init__(self, connection: Connection, listener: socket.socket, *, link: Link, idle: float) -> None:
         self.line = connection.name
-        self.baud = baud
+        self.options = link.options
         self.device = SharedDevice(connection)
         self._listener = listener
         self._idle = idle
-        self._line_descriptor = _descriptor(connection)
+        self._line_descriptor = connection.transport.fileno()
         self._lock = threading.Lock()
         self._guests: set[_Guest] = set()
         self._idle_since = time.monotonic()
@@ -155,11 +156,12 @@ class Gateway:
                 f"serves {users}; end that first, or the gateway with 'plctool gateway stop'.",
                 "gateway-version",
             )
-        if hello.get("baud") != self.baud:
-            return LinkError(
-                f"{self.line} is in use with {self.baud} baud by {users}; say --baud {self.baud}, or end that first.",
-                "other-baud",
-            )
+        for name, value in self.options.items():
+            if hello.get(name) != value:
+                return LinkError(
+                    f"{self.line} is in use with {value} {name} by {users}; say --{name} {value}, or end that first.",
+                    f"other-{name}",
+                )
         return None
 
     # ---- about the gateway ----
@@ -168,7 +170,7 @@ class Gateway:
         claim = self.device.claim
         return {
             "line": self.line,
-            "baud": self.baud,
+            **self.options,
             "pid": os.getpid(),
             "version": plctool_version(),
             "requests": self.device.requests,
@@ -416,9 +418,3 @@ def _peer_pid(connected: socket.socket) -> int:
         return 0
     credentials = struct.Struct("3i")
     return int(credentials.unpack(connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, credentials.size))[0])
-
-
-def _descriptor(connection: Connection) -> int | None:
-    """What poll tells the end of the line by; None when there is no such thing."""
-    fileno = getattr(connection.transport, "fileno", None)
-    return fileno() if fileno else None

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from enum import Enum
 
+from plctool.core import lib
+
 
 class Area(Enum):
-    """Memory areas, numbered as in firmware/include/CompactDownload.h (APP_AREA_*)."""
+    """Memory areas, by their numbers in an image."""
 
-    DATA = 0
-    RETAIN = 1
-    INPUT = 2
-    OUTPUT = 3
-    MEMORY = 4
-    CODE = 5
+    DATA = int(lib.APP_AREA_DATA)
+    RETAIN = int(lib.APP_AREA_RETAIN)
+    INPUT = int(lib.APP_AREA_INPUT)
+    OUTPUT = int(lib.APP_AREA_OUTPUT)
+    MEMORY = int(lib.APP_AREA_MEMORY)
+    CODE = int(lib.APP_AREA_CODE)

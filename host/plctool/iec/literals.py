@@ -25,12 +25,13 @@ _DATE_TYPES = {
 }  # fmt: skip
 _CALENDAR = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})", re.ASCII)
 _CLOCK = re.compile(r"(\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:\.(\d{1,9}))?)?", re.ASCII)
-_EPOCH = datetime.date(1970, 1, 1)
+EPOCH = datetime.date(1970, 1, 1)
 _BASES = {"2": 2, "8": 8, "16": 16}
 
-_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
-       "us": 1_000, "ns": 1}  # fmt: skip
-_UNITS = list(_NS)
+UNITS_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
+            "us": 1_000, "ns": 1}  # fmt: skip
+"""Nanoseconds of each unit of a duration, the longest first."""
+_UNITS = list(UNITS_NS)
 _TIME_PART = re.compile(r"(\d+(?:\.\d+)?)(d|h|ms|us|ns|m|s)", re.IGNORECASE | re.ASCII)
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?\Z", re.ASCII)
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
@@ -130,7 +131,7 @@ def duration(text: str) -> int:
         if fraction:
             raise LiteralError(f"only the last unit of {text} may have a fraction")
         last_unit, fraction, at = unit, "." in number, part.end()
-        total += Decimal(number) * _NS[_UNITS[unit]]
+        total += Decimal(number) * UNITS_NS[_UNITS[unit]]
     if last_unit < 0:
         raise LiteralError("a duration needs a number and a unit, such as T#10ms")
     return sign * int(total)
@@ -148,12 +149,12 @@ def date(name: str, text: str) -> int:
             form = "2024-02-29-12:30:15" if kind == "DT" else "2024-02-29"
             raise LiteralError(f"a date is written {name}#{form}, not {name}#{text}")
         try:
-            days = (datetime.date(*(int(part) for part in match.groups())) - _EPOCH).days
+            days = (datetime.date(*(int(part) for part in match.groups())) - EPOCH).days
         except ValueError:
             raise LiteralError(f"there is no day {day}") from None
         if days < 0:
             raise LiteralError("dates begin with 1970-01-01")
-        total = days * _NS["d"]
+        total = days * UNITS_NS["d"]
     return total if kind == "DATE" else total + _clock(name, clock)
 
 
@@ -164,7 +165,7 @@ def _clock(name: str, text: str) -> int:
     hours, minutes, seconds, fraction = match.groups()
     if int(hours) > 23 or int(minutes) > 59 or int(seconds or 0) > 59:
         raise LiteralError(f"there is no time {text}; the last of a day is 23:59:59.999")
-    total = int(hours) * _NS["h"] + int(minutes) * _NS["m"] + int(seconds or 0) * _NS["s"]
+    total = int(hours) * UNITS_NS["h"] + int(minutes) * UNITS_NS["m"] + int(seconds or 0) * UNITS_NS["s"]
     return total + int((fraction or "").ljust(9, "0"))
 
 

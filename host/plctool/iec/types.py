@@ -101,6 +101,7 @@ ELEMENTARY: dict[str, Elementary] = {
 
 DEFAULT_STRING_LENGTH = 80
 MAX_CHOICES = 12  # values of an enumeration that a message lists
+CLASS_NUMBER = "%class"  # hidden member with the number of a class; no identifier, so nothing else has its name
 MAX_SIZE = 0x7FFF_FFFF  # of a variable and of an area; offsets are signed 32-bit numbers on the targets
 
 

@@ -10,7 +10,7 @@ import re
 from typing import Any
 
 from plctool.errors import UsageError
-from plctool.iec.literals import LiteralError, string
+from plctool.iec.literals import EPOCH, UNITS_NS, LiteralError, string
 from plctool.iec.types import (
     ELEMENTARY,
     ArrayType,
@@ -24,10 +24,7 @@ from plctool.iec.types import (
     base_of,
 )
 
-_UNITS_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
-             "us": 1_000, "ns": 1}  # fmt: skip
 _DATE_UNITS_NS = {"DATE": 1_000_000_000, "DT": 1_000_000_000, "TOD": 1_000_000}
-_EPOCH = datetime.date(1970, 1, 1)
 _DAY = r"(?P<y>\d{4})-(?P<mo>\d{1,2})-(?P<d>\d{1,2})"
 _CLOCK = r"(?P<h>\d{1,2}):(?P<mi>\d{1,2})(?::(?P<s>\d{1,2})(?:\.(?P<f>\d{1,9}))?)?"
 _DATE_FORMS = {"DATE": re.compile(_DAY), "TOD": re.compile(_CLOCK), "DT": re.compile(f"{_DAY}-{_CLOCK}")}
@@ -96,7 +93,7 @@ def format_time(value: int, t: Type) -> str:
     wide = base_of(t).size == 8
     prefix, left = ("LTIME#", abs(value)) if wide else ("T#", abs(value) * 1_000_000)
     text = ""
-    for unit, size in _UNITS_NS.items():
+    for unit, size in UNITS_NS.items():
         if left >= size:
             text += f"{left // size}{unit}"
             left %= size
@@ -109,15 +106,15 @@ def format_date(value: int, t: Type) -> str:
     name = base_of(t).name
     kind = name.removeprefix("L")
     nanoseconds = value * _DATE_UNITS_NS.get(name, 1)
-    days, in_day = divmod(nanoseconds, _UNITS_NS["d"])
-    seconds, fraction = divmod(in_day, _UNITS_NS["s"])
+    days, in_day = divmod(nanoseconds, UNITS_NS["d"])
+    seconds, fraction = divmod(in_day, UNITS_NS["s"])
     clock = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
     if fraction:
         digits = f"{fraction:09}"
         clock += "." + (digits[:3] if digits.endswith("000000") else digits[:6] if digits.endswith("000") else digits)
     if kind == "TOD":
         return f"{name}#{clock}"
-    day = (_EPOCH + datetime.timedelta(days)).isoformat()
+    day = (EPOCH + datetime.timedelta(days)).isoformat()
     return f"D#{day}" if name == "DATE" else f"{name}#{day}" + (f"-{clock}" if kind == "DT" else "")
 
 
@@ -133,7 +130,7 @@ def parse_time(text: str, t: Type = ELEMENTARY["TIME"]) -> int:
     matches = list(_PART.finditer(parts))
     if not matches or "".join(m.group(0) for m in matches) != parts:
         raise bad_value(text, t, "write a duration such as T#1s500ms")
-    nanoseconds = sum(_scaled(m.group(1), _UNITS_NS[m.group(2)]) for m in matches)
+    nanoseconds = sum(_scaled(m.group(1), UNITS_NS[m.group(2)]) for m in matches)
     return sign * (nanoseconds if base_of(t).size == 8 else nanoseconds // 1_000_000)
 
 
@@ -149,12 +146,12 @@ def parse_date(text: str, t: Type) -> int:
         raise bad_value(text, t, f"write {example}")
     part = match.groupdict(default="0")
     try:
-        day = datetime.date(int(part["y"]), int(part["mo"]), int(part["d"])) if kind != "TOD" else _EPOCH
+        day = datetime.date(int(part["y"]), int(part["mo"]), int(part["d"])) if kind != "TOD" else EPOCH
         clock = datetime.time(int(part["h"]), int(part["mi"]), int(part["s"])) if kind != "DATE" else datetime.time()
     except ValueError:
         raise bad_value(text, t, f"there is no such day or time; write {example}") from None
     seconds = (clock.hour * 60 + clock.minute) * 60 + clock.second
-    total = (day - _EPOCH).days * _UNITS_NS["d"] + seconds * _UNITS_NS["s"]
+    total = (day - EPOCH).days * UNITS_NS["d"] + seconds * UNITS_NS["s"]
     total += int(part["f"].ljust(9, "0")) if kind != "DATE" else 0
     return total // _DATE_UNITS_NS.get(name, 1)
 

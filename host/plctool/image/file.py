@@ -13,12 +13,12 @@ from typing import Any
 
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
+from plctool.iec.areas import Area
 
 NO_AREA = int(lib.APP_AREA_NONE)
 DEVICE_VERSION = 0x01000000
 COMPILER_VERSION = 0x00010000
 
-AREA_NAMES = ("data", "retain", "input", "output", "memory", "code")
 _AREA_TYPES = (
     lib.AREA_TYPE_DATA,
     lib.AREA_TYPE_RETAIN,
@@ -307,6 +307,11 @@ def parse_image(data: bytes) -> Image:
     )
 
 
+def image_crc(data: bytes) -> int:
+    """The checksum that the header of an image carries; 0 for what is too short to have one."""
+    return int.from_bytes(data[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+
+
 def _parse_header(data: bytes) -> Any:
     size = int(lib.CDL_HEADER_SIZE)
     if len(data) < size:
@@ -457,13 +462,16 @@ def target_name(device_id: int) -> str:
     return f"0x{device_id:08X}"
 
 
+def _numbered(prefix: str) -> dict[int, str]:
+    """The names of an enumeration of the firmware, in small letters and without their prefix, by number."""
+    return {int(getattr(lib, name)): name.removeprefix(prefix).lower() for name in dir(lib) if name.startswith(prefix)}
+
+
 def describe_image(data: bytes) -> dict[str, Any]:
     """What `plctool info` shows, ready for JSON. Raises UsageError for what is not an image."""
     image = parse_image(data)
-    kinds = {
-        int(getattr(lib, name)): name.removeprefix("KIND_").lower() for name in dir(lib) if name.startswith("KIND_")
-    }
-    functions = {0: "code_init", 1: "global_init", 2: "global_exit", 3: "reloc", 4: "download_code", 5: "target_info"}
+    kinds = _numbered("KIND_")
+    functions = _numbered("CDL_FUNCTION_")
     info = image.info
     return {
         "size": len(data),
@@ -482,7 +490,7 @@ def describe_image(data: bytes) -> dict[str, Any]:
             "profile": info.profile,
             "date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(info.date)) if info.date else "",
         },
-        "areas": [{"name": AREA_NAMES[index], "size": size} for index, size in sorted(image.areas.items())],
+        "areas": [{"name": Area(index).name.lower(), "size": size} for index, size in sorted(image.areas.items())],
         "functions": [
             {"name": functions[number], "offset": offset} for number, offset in sorted(image.functions.items())
         ],

@@ -19,6 +19,11 @@ _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
 SCAN_SECONDS = 1.5
 
 
+def no_answer(name: str) -> ChannelLost:
+    """The error of a link on which no device answers."""
+    return ChannelLost(f"No device answers on {name}; check cable, baud rate and power.", "no-answer")
+
+
 class MessageLink(Protocol):
     """Whole messages to one device and back, over a line of one's own (Connection) or through a gateway."""
 
@@ -85,10 +90,12 @@ class Connection:
         if self._peer is None:
             found = self.scan(_OPEN_PATIENCE, enough=1)
             if not found:
-                raise self._error("No device answers on {}; check cable, baud rate and power.", "no-answer")
+                raise no_answer(self.name)
             self._peer = found[0].address
         header = router.header_size(self._peer, self.transport.local_address)
-        line = Line(lib.BLK_MAX_SIZE - header, header + self.transport.packet_overhead, self.transport.byte_rate)
+        line = Line(
+            self.transport.max_packet - header, header + self.transport.packet_overhead, self.transport.byte_rate
+        )
         words = (len(self._peer) + len(self.transport.local_address)) // 2
         channel = Channel(line, words, secrets.randbits(32))
         channel.open(self.transport.now())
@@ -173,7 +180,7 @@ class Connection:
             now = self.transport.now()
             give_up = channel.give_up_at(patience)
             if now >= give_up:
-                raise self._error("The device on {} does not answer any more; check the line.", "timeout")
+                raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
             packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
             if packet and packet.service == lib.ROUTER_SVC_CHANNEL and packet.sender == self._peer:
                 channel.receive(packet.payload, self.transport.now())
@@ -188,9 +195,6 @@ class Connection:
         assert self._peer is not None
         self._send(lib.ROUTER_SVC_CHANNEL, self._peer, package)
         return True
-
-    def _error(self, message: str, code: str) -> ChannelLost:
-        return ChannelLost(message.format(self.transport.name), code)
 
     def _send(self, service: int, receiver: bytes, payload: bytes) -> None:
         self.transport.send(router.encode(router.Packet(service, receiver, self.transport.local_address, payload)))

@@ -12,12 +12,10 @@ from typing import Any
 
 from plctool.errors import LinkError
 from plctool.link import simplecom
+from plctool.link.transport import BITS_PER_BYTE, DEFAULT_BAUD, TOOL_ADDRESS
 
-DEFAULT_BAUD = 115200
-_BITS_PER_BYTE = 10  # 8N1
 _POLL = 0.01  # longest single wait for a byte [s]
 _WRITE_TIMEOUT = 5.0
-_LOCAL_ADDRESS = b"\x00\x02"
 _ESCAPE_SHARE = 256  # one byte in so many is escaped, on average
 
 
@@ -26,9 +24,10 @@ class SerialTransport:
 
     def __init__(self, url: str, baud: int = DEFAULT_BAUD) -> None:
         self.name = url
-        self.local_address = _LOCAL_ADDRESS
+        self.local_address = TOOL_ADDRESS
+        self.max_packet = simplecom.MAX_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
-        self.byte_rate = baud / _BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if _is_real_line(url) else math.inf
+        self.byte_rate = baud / BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if _is_real_line(url) else math.inf
         self._decoder = simplecom.Decoder()
         self._packets: deque[bytes] = deque()
         self._port = _open(url, baud)
@@ -37,7 +36,7 @@ class SerialTransport:
         return time.monotonic()
 
     def fileno(self) -> int | None:
-        """What tells by poll that the line is gone; None for a URL that has no such thing."""
+        """None for a URL that has no such thing."""
         with suppress(AttributeError, OSError):  # io.UnsupportedOperation is an OSError
             return int(self._port.fileno())
         return None

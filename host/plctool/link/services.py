@@ -6,13 +6,15 @@ Every function takes a `Session`; requests that were lost with their channel are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
 
 from plctool.core import exception_name, lib
+from plctool.debug.trace import Trace
 from plctool.errors import DeviceError
+from plctool.image.file import image_crc
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
 from plctool.link.names import version_text
@@ -22,7 +24,6 @@ from plctool.link.wire import Layout, signed32
 _SLOW = 30.0  # patience for what may erase flash or run initialisation code [s]
 _TRANSFER_PATIENCE = 10.0  # longer than flash takes to erase a sector [s]
 _DOWNLOAD_TRIES = 4  # without any progress
-_NO_OFFSET = 0xFFFFFFFF
 
 _IDENT = Layout("DEV_IDENT")
 _STACK = Layout("DEV_STACK")
@@ -65,21 +66,6 @@ class AppState(StrEnum):
 
 
 @dataclass(frozen=True)
-class Trace:
-    """What the stack had when the application stopped. `words`: by distance from the stack pointer in bytes, the code
-    offsets to which calls may return. `link`: the same of the link register of processors that have one."""
-
-    words: dict[int, int] = field(default_factory=dict)
-    link: int | None = None
-
-    @staticmethod
-    def of(calls: Iterable[tuple[int, int]]) -> Trace:
-        """From (target, distance) of each EXCEPT_CALL."""
-        words = {distance: target for target, distance in calls}
-        return Trace({d: t for d, t in words.items() if d != lib.EXCEPT_LINK}, words.get(lib.EXCEPT_LINK))
-
-
-@dataclass(frozen=True)
 class AppException:
     """The last exception. `code_offset` is None when it was outside the application's code, `task` an index or -1."""
 
@@ -87,6 +73,11 @@ class AppException:
     code_offset: int | None
     task: int
     trace: Trace = field(default_factory=Trace)
+
+    @staticmethod
+    def of(code: int, code_offset: int, task: int, trace: Trace) -> AppException:
+        """From what the device has for it (APP_EXCEPTION)."""
+        return AppException(code, None if code_offset == lib.APP_NO_CODE_OFFSET else code_offset, task, trace)
 
     @property
     def name(self) -> str:
@@ -190,12 +181,12 @@ def read_status(session: Session) -> Status:
     exception = None
     if last.code != lib.RTSEXCPT_NOEXCEPTION:
         trace = Trace.of(_CALL.unpack_each(status.find(lib.TAG_APP_CALLS) or b""))
-        offset = None if last.code_offset == _NO_OFFSET else last.code_offset
-        exception = AppException(last.code, offset, signed32(last.task), trace)
-    return Status(_app_state(state.state, state.op_state), image.crc, image.size, exception, state.op_state)
+        exception = AppException.of(last.code, last.code_offset, signed32(last.task), trace)
+    return Status(app_state(state.state, state.op_state), image.crc, image.size, exception, state.op_state)
 
 
-def _app_state(state: int, operating: int) -> AppState:
+def app_state(state: int, operating: int) -> AppState:
+    """From AS_* and the OS_* flags."""
     if operating & lib.OS_EXCEPTION:
         return AppState.EXCEPTION
     return {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}.get(state, AppState.STOP)
@@ -286,7 +277,7 @@ class _Transfer:
         self.arrived = 0
         self._session = session
         self._image = image
-        self._crc = int.from_bytes(image[lib.CDL_CRC_OFFSET : lib.CDL_CRC_OFFSET + 4], "little")
+        self._crc = image_crc(image)
         self._progress = progress
 
     def ask(self) -> int:

@@ -124,9 +124,15 @@ class Session:
         content = tags.container(lib.TAG_APP_DESCRIPTOR).bytes(lib.TAG_APP_OPTION, _LOGIN_REPLY.size)
         login = _LOGIN_REPLY.unpack(content)
         if login.result == lib.ERR_APP_NOT_EXIST:
-            raise DeviceError("There is no application on the device; flash one first.", "app-not-exist", login.result)
+            raise no_application()
         l7.check_result(login.result, "login to the application")
         return Application(login.session, login.data_guid)
+
+
+def no_application() -> DeviceError:
+    """The error of what needs an application when there is none."""
+    result = lib.ERR_APP_NOT_EXIST
+    return DeviceError("There is no application on the device; flash one first.", "app-not-exist", result)
 
 
 def _wants_application_login(group: int, reply: bintag.Tags) -> bool:

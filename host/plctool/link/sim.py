@@ -6,6 +6,7 @@ import math
 
 from plctool.core import error_name, ffi, lib
 from plctool.errors import LinkError
+from plctool.link.transport import TOOL_ADDRESS
 
 _STEP_NS = 1_000_000  # longest piece of virtual time between two looks at the queue
 
@@ -14,9 +15,13 @@ class SimTransport:
     """Packets by function calls. The simulator has to be on (see plctool.sim); time passes only while waiting."""
 
     name = "the simulator"
-    local_address = b"\x00\x02"
+    local_address = TOOL_ADDRESS
+    max_packet = int(lib.BLK_MAX_SIZE)
     packet_overhead = 0
     byte_rate = math.inf
+
+    def fileno(self) -> int | None:
+        return None  # the simulator runs in this thread
 
     def now(self) -> float:
         return float(lib.SimNow()) / 1e9
@@ -25,9 +30,9 @@ class SimTransport:
         _check(lib.SimLinkSend(packet, len(packet)))
 
     def receive(self, timeout: float) -> bytes | None:
-        buffer = ffi.new("RTS_UI8[]", lib.BLK_MAX_SIZE)
+        buffer = ffi.new("RTS_UI8[]", self.max_packet)
         left = round(timeout * 1e9)
-        while not (size := lib.SimLinkReceive(buffer, lib.BLK_MAX_SIZE)):
+        while not (size := lib.SimLinkReceive(buffer, self.max_packet)):
             if left < 0:
                 return None
             _check(lib.SimAdvance(min(left, _STEP_NS)))

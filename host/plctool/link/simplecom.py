@@ -19,7 +19,8 @@ _END = bytes([lib.SIMPLECOM_ESCAPE, lib.SIMPLECOM_END_2])
 _STUFFED = bytes([lib.SIMPLECOM_ESCAPE, lib.SIMPLECOM_STUFF])
 
 FRAME_OVERHEAD = len(_START) + CRC_SIZE + len(_END)  # bytes a frame adds, besides escapes
-MAX_FRAME = 2 * (lib.BLK_MAX_SIZE + CRC_SIZE) + len(_START) + len(_END)
+MAX_PACKET = int(lib.BLK_MAX_SIZE)
+MAX_FRAME = 2 * (MAX_PACKET + CRC_SIZE) + len(_START) + len(_END)
 
 
 def crc16(data: bytes) -> int:
@@ -82,6 +83,6 @@ def _unpack(body: bytes) -> bytes | None:
         return None
     data = body.replace(_STUFFED, _ESCAPE)
     packet, crc = data[:-CRC_SIZE], data[-CRC_SIZE:]
-    if not packet or len(packet) > lib.BLK_MAX_SIZE or crc16(packet) != int.from_bytes(crc, "little"):
+    if not packet or len(packet) > MAX_PACKET or crc16(packet) != int.from_bytes(crc, "little"):
         return None
     return packet

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from typing import Protocol
 
+TOOL_ADDRESS = b"\x00\x02"  # router address of a tool on a line of its own
+BITS_PER_BYTE = 10  # of a serial line, 8N1: start bit, eight data bits, stop bit
+DEFAULT_BAUD = 115200  # of a serial line if the user names none
+
 
 class BlockTransport(Protocol):
     """A block driver: sends and receives router packets, unreliably, and never delivers a damaged one on purpose."""
 
     name: str  # for messages: the port or address the user named
     local_address: bytes  # router address of this end
+    max_packet: int  # longest packet it takes and gives, in bytes
     packet_overhead: int  # bytes the line carries for a packet besides the packet itself
     byte_rate: float  # bytes the line carries per second; math.inf when it is not known or no matter
 
@@ -18,6 +23,9 @@ class BlockTransport(Protocol):
 
     def receive(self, timeout: float) -> bytes | None:
         """The next packet, None after `timeout` seconds without one; raises LinkError when the line is gone."""
+
+    def fileno(self) -> int | None:
+        """What poll tells by that packets come, or that the line is gone; None if there is no such thing."""
 
     def now(self) -> float:
         """Monotonic time in seconds; virtual for virtual lines."""

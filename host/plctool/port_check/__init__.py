@@ -12,6 +12,7 @@ from pathlib import Path
 from plctool.device import Plc
 from plctool.errors import UsageError
 from plctool.link.services import AppState
+from plctool.link.transports import Link
 from plctool.port_check.bench import Bench, target_of
 from plctool.port_check.checks import MAX_DRIFT, Checks
 from plctool.port_check.report import Outcome, Report, judge, outcome_text, summary_text
@@ -22,7 +23,7 @@ __all__ = ["MAX_DRIFT", "Outcome", "Report", "outcome_text", "run_port_check", "
 def run_port_check(
     connect: Callable[[], Plc],
     *,
-    baud: int,
+    link: Link,
     replace: bool = False,
     max_drift: float = MAX_DRIFT,
     power_cycle: Callable[[], None] | None = None,
@@ -43,13 +44,13 @@ def run_port_check(
                 f"There is an application on {identity.node_name} that the check would replace; say --yes.", "occupied"
             )
         with tempfile.TemporaryDirectory(prefix="port-check-") as folder:
-            bench = Bench(connect, plc, target_of(identity), Path(folder), baud)
+            bench = Bench(connect, plc, target_of(identity), Path(folder), link)
             checks = Checks(bench, power_cycle, max_drift)
             outcomes = []
             for check in checks.all():
                 outcomes.append(judge(check))
                 show(outcomes[-1])
             plc = bench.plc
-        return Report(identity, bench.target, baud, outcomes)
+        return Report(identity, bench.target, link, outcomes)
     finally:
         plc.close()

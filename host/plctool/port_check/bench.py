@@ -8,10 +8,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from plctool.controller import FlashResult
 from plctool.core import lib
-from plctool.device import FlashResult, Plc
+from plctool.device import Plc
 from plctool.errors import DeviceError, UsageError
 from plctool.link.services import AppState, Identity, TaskInfo
+from plctool.link.transports import Link
 from plctool.port_check.report import CheckFailed, NotAvailable
 
 INTERVAL_US = 10_000  # of the programs' task
@@ -58,10 +60,10 @@ END_CONFIGURATION
 class Bench:
     """The controller under test, its target, and where programs for it are built."""
 
-    def __init__(self, connect: Callable[[], Plc], plc: Plc, target: str, folder: Path, baud: int) -> None:
+    def __init__(self, connect: Callable[[], Plc], plc: Plc, target: str, folder: Path, link: Link) -> None:
         self.plc = plc
         self.target = target
-        self.baud = baud
+        self.link = link
         self._connect = connect
         self._folder = folder
         self._built: dict[str, Path] = {}

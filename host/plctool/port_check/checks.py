@@ -12,6 +12,7 @@ from functools import partial
 from plctool.device import Plc
 from plctool.errors import LinkError
 from plctool.link.services import AppState, TaskInfo
+from plctool.link.transport import BITS_PER_BYTE
 from plctool.port_check.bench import INTERVAL_US, TASK, Bench, program
 from plctool.port_check.clock import Rate, Reading, measure
 from plctool.port_check.report import Check, CheckFailed, NotAvailable, Result
@@ -25,7 +26,6 @@ TIMER_TRIES = 3  # the best counts: hosts and simulated boards are sometimes kep
 MAX_MISSED = 0.01  # share of due times
 DOWNLOAD_UNITS = (20, 200, 1, 300, 50, 150, 5)  # sizes of the programs, in statements
 COMMITS = 300  # changes of the commit record: several times what two sectors of 4 KiB hold
-BITS_PER_BYTE = 10
 MIN_LINE_SHARE = 0.5  # of the byte rate, downloads with their writing to flash
 INITIAL, KEPT = 7, 4711  # values of the retain variable
 FAULT_PATIENCE = 60.0  # the default watchdog needs 10 s, simulated boards are slower
@@ -170,9 +170,12 @@ class Checks:
 
     def throughput(self) -> Result:
         """How much of the line's byte rate a download gets."""
+        baud = self._bench.link.options.get("baud")
+        if baud is None:
+            raise NotAvailable("this link has no fixed byte rate")
         result = self._bench.flash(_padded(max(DOWNLOAD_UNITS)))
         rate = result.bytes / max(result.seconds, 1e-6)
-        share = rate / (self._bench.baud / BITS_PER_BYTE)
+        share = rate / (int(baud) / BITS_PER_BYTE)
         figures = {"bytes": result.bytes, "bytes_per_s": round(rate), "share": round(share, 3)}
         text = f"{result.bytes} bytes at {rate:.0f} bytes/s: {share * 100:.0f} % of the byte rate"
         if share < MIN_LINE_SHARE:

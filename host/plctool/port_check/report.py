@@ -10,6 +10,7 @@ from typing import Any
 
 from plctool.errors import PlcError
 from plctool.link.services import Identity
+from plctool.link.transports import Link
 from plctool.version import plctool_version
 
 FORMAT = 1  # of the document; grows when something is named or meant otherwise than before
@@ -60,7 +61,7 @@ class Report:
 
     identity: Identity
     target: str
-    baud: int
+    link: Link
     outcomes: list[Outcome]
     plctool: str = field(default_factory=plctool_version)
     date: datetime = field(default_factory=lambda: datetime.now(UTC))
@@ -74,7 +75,7 @@ class Report:
             "format": FORMAT,
             "date": self.date.isoformat(timespec="seconds"),
             "plctool": self.plctool,
-            "baud": self.baud,
+            **self.link.options,
             "device": vars(self.identity) | {"target": self.target},
             "checks": [outcome.document() for outcome in self.outcomes],
             "passed": self.count("passed"),
@@ -92,11 +93,12 @@ def summary_text(report: Report) -> str:
     """The last lines: who was checked, and how often each verdict was given."""
     who = report.identity
     missing = report.count("not available")
+    options = "".join(f", {value} {name}" for name, value in report.link.options.items())
     tail = f", {missing} not available" if missing else ""
     return (
         f"{who.device_name} of {who.vendor_name}, version {who.version}, serial number {who.serial_number}, "
         f"runtime {who.runtime_version}, {report.target}\n"
-        f"{report.date:%Y-%m-%d %H:%M} UTC, plctool {report.plctool}, {report.baud} baud\n"
+        f"{report.date:%Y-%m-%d %H:%M} UTC, plctool {report.plctool}{options}\n"
         f"{report.count('passed')} passed, {report.count('failed')} failed{tail}"
     )
 

@@ -16,7 +16,8 @@ import time
 import tty
 from dataclasses import dataclass, field
 
-BITS_PER_BYTE = 10  # 8N1: start bit, eight data bits, stop bit
+from plctool.link.transport import BITS_PER_BYTE
+
 CHUNK = 4096
 
 

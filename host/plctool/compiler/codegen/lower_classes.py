@@ -9,9 +9,7 @@ from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame
 from plctool.compiler.codegen.lower_unit import Unit, value_type
 from plctool.compiler.codegen.signatures import parameter_list
 from plctool.compiler.typed import Dispatch
-from plctool.iec.types import is_scalar
-
-CLASS_NUMBER = "%class"
+from plctool.iec.types import CLASS_NUMBER, is_scalar
 
 
 def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:

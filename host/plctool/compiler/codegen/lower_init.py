@@ -113,17 +113,18 @@ def _initialise_array(frame: Frame, ref: Ref, t: ArrayType, initial: Initial | N
 
 def _initialise_scalars(frame: Frame, ref: Ref, t: ArrayType, initial: Initial | None) -> None:
     data, size = image_of(frame.unit, t, initial), t.element.size
-    used = [i for i in range(t.count) if any(data[i * size : (i + 1) * size])]
-    if not used:
+    first, last = (len(data) - len(data.lstrip(b"\0"))) // size, -(-len(data.rstrip(b"\0")) // size)
+    if first >= last:
         return
-    first, last = used[0], used[-1] + 1
     part = data[first * size : last * size]
     if last - first >= _LOOP_FROM and part == part[:size] * (last - first):
         value = next(
             v for n, v in array_runs(t, initial) if isinstance(v, ScalarInit) and any(encode_scalar(v.value, t.element))
         )
         _repeat(frame, ref.member(first * size, t), t.element, last - first, value)
-    elif len(used) >= _CONSTANT_FROM:
+        return
+    used = [i for i in range(first, last) if any(data[i * size : (i + 1) * size])]
+    if len(used) >= _CONSTANT_FROM:
         pointer = frame.unit.module.constant(part, t.element.align)
         source = Ref(pointer, 0, t.element, direct=True)
         frame.copy(ref.member(first * size, t.element), source, len(part))

@@ -31,10 +31,9 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
-from plctool.iec.types import UDINT, Field, InterfaceType, Keep, StructType
+from plctool.iec.types import CLASS_NUMBER, UDINT, Field, InterfaceType, Keep, StructType
 
 _LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
-CLASS_NUMBER = "%class"  # the hidden member; no identifier, so nothing else can have its name
 
 
 def _member_key(decl: ast.PouDecl) -> str:

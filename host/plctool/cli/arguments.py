@@ -1,0 +1,238 @@
+"""The arguments of the command line. What reads values is imported when it is needed, so that every start is quick."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from plctool.errors import UsageError
+from plctool.image.targets import DEFAULT_TARGET
+from plctool.link.transports import LATER, TRANSPORTS
+
+if TYPE_CHECKING:
+    from plctool.compiler import Level
+
+DEFAULT_INTERVAL = 0.5  # seconds between two readings
+BENCH_CYCLES = 10000
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports wrong arguments as UsageError, like everything else that is wrong."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message[:1].upper()}{message[1:]}; see '{self.prog} --help'.", "usage")
+
+
+def parser() -> argparse.ArgumentParser:
+    """Reads the words after `plctool`; `command` is the name of one in the result, "" if there is none."""
+    root = _Parser(prog="plctool", description="Compile IEC 61131-3 Structured Text and run it on small controllers.")
+    root.add_argument("--version", action="store_true", help="print the version and end")
+    root.set_defaults(command="")
+    commands = root.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
+
+    def command(name: str, text: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=text, description=text[:1].upper() + text[1:] + ".")
+        sub.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+        sub.set_defaults(command=name)
+        return sub
+
+    _add_file_commands(command)
+    _add_device_commands(command)
+    command("demo", "show the whole story on this machine")
+    return root
+
+
+def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
+    build = command("build", "compile a program to an image")
+    _add_sources(build)
+    build.add_argument("-o", "--output", type=Path, default=Path("app.cdl"), metavar="IMAGE", help="default: app.cdl")
+    build.add_argument("--target", default=DEFAULT_TARGET, metavar="NAME", help=f"processor; default: {DEFAULT_TARGET}")
+    build.add_argument(
+        "-O", dest="level", type=_level, metavar="0..3|s", default=2, help="optimisation, s for small code; default: 2"
+    )
+    build.add_argument(
+        "--checks",
+        default="all",
+        metavar="all|none|LIST",
+        help="run-time checks: div, bounds, subrange, null; default: all",
+    )
+    build.add_argument("--debug", action="store_true", help="keep the code close to its source")
+    _add_warnings(build)
+
+    check = command("check", "print every diagnosis of a program")
+    _add_sources(check)
+    _add_warnings(check)
+
+    info = command("info", "describe an image")
+    _add_image(info)
+
+    symbols = command("symbols", "list the variables of an image with their types")
+    _add_image(symbols)
+    symbols.add_argument("patterns", nargs="*", metavar="PATTERN", help="names with * and ?: 'Main.pump.*'")
+
+    run = command("run", "run an image in this process, on a virtual clock")
+    _add_image(run)
+    length = run.add_mutually_exclusive_group()
+    length.add_argument("--cycles", type=_count, metavar="N", help="cycles of the first task; default: 1")
+    length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="virtual time instead")
+    run.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="before the first cycle; may be repeated"
+    )
+    run.add_argument("--get", action="append", default=[], metavar="NAME", help="after the last cycle; may be repeated")
+
+    test = command("test", "run the unit tests of a program in this process, on a virtual clock")
+    _add_sources(test)
+    test.add_argument(
+        "-k",
+        "--filter",
+        default="*",
+        metavar="PATTERN",
+        help="only tests whose name holds this, or fits it with * and ?",
+    )
+    test.add_argument("--junit", type=Path, metavar="FILE", help="write a report in JUnit's format as well")
+    test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
+    _add_warnings(test)
+
+    export = command("export-itf", "write the C header and frame for functions implemented in C")
+    _add_sources(export)
+    export.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
+    export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
+
+    bench = command("bench", "measure the time of a cycle on this machine")
+    _add_image(bench)
+    bench.add_argument("--cycles", type=_count, default=BENCH_CYCLES, metavar="N", help=f"default: {BENCH_CYCLES}")
+
+
+def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
+    flash = command("flash", "bring an image onto a device and start it")
+    _add_image(flash)
+    flash.add_argument("--no-start", action="store_true", help="leave it stopped until it is started or power returns")
+    flash.add_argument("--force", action="store_true", help="also when the device has this image already")
+    _add_link(flash)
+
+    _add_link(command("scan", "list the devices that answer"))
+    _add_link(command("status", "tell what the program on a device does"))
+    _add_link(command("start", "start the program"))
+    _add_link(command("stop", "stop the program"))
+    reset = command("reset", "reset the program; it is stopped afterwards")
+    reset.add_argument(
+        "option", choices=["warm", "cold", "origin"],
+        help="warm keeps RETAIN variables, cold only PERSISTENT ones, origin deletes the program",
+    )  # fmt: skip
+    _add_link(reset)
+    _add_link(command("tasks", "show the times of the tasks"))
+    _add_link(command("log", "print the log of a device"))
+
+    port = command("port-check", "check a port: run programs on a board and compare with what is expected")
+    port.add_argument("--yes", action="store_true", help="replace the program that is on the board")
+    port.add_argument("--power-cycle", action="store_true", help="ask for the board to be switched off and on, too")
+    port.add_argument(
+        "--max-drift", type=_percent, default=0.01, metavar="PERCENT",
+        help="of its clock, default: 1; a simulated board on a busy host needs more",
+    )  # fmt: skip
+    _add_link(port)
+
+    read = command("read", "print values of variables")
+    _add_names(read)
+    _add_link(read, symbols=True)
+    write = command("write", "set variables")
+    write.add_argument("values", nargs="+", metavar="NAME=VALUE", help="value as 'read' shows it: Main.pause=T#2s")
+    _add_link(write, symbols=True)
+    watch = command("watch", "print values of variables again and again")
+    _add_names(watch)
+    watch.add_argument("--interval", type=_seconds, default=DEFAULT_INTERVAL, metavar="S", help="seconds; default: 0.5")
+    watch.add_argument("--count", type=_count, metavar="N", help="readings; default: until Ctrl-C")
+    _add_link(watch, symbols=True)
+
+    gateway = command("gateway", "show or end the processes that share a serial line among tools")
+    gateway.add_argument(
+        "what", choices=["status", "stop"], help="status: who uses which line; stop: end it and tell its tools"
+    )
+    gateway.add_argument("--port", metavar="PORT", help="of this port only; default: all of this user")
+
+
+def _add_sources(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "sources", nargs="+", type=Path, metavar="FILE.st|DIR", help="of a folder all sources are taken"
+    )
+
+
+def _add_image(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("image", type=Path, help="what 'plctool build' wrote")
+
+
+def _add_names(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("names", nargs="+", metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.level")
+
+
+def _add_warnings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--no-warn", action="append", default=[], metavar="NAME,...", help="without these warnings; may be repeated"
+    )
+    parser.add_argument("--werror", action="store_true", help="treat warnings as errors")
+
+
+def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
+    link = parser.add_argument_group("link")
+    for kind in TRANSPORTS.values():
+        if kind.flag:
+            link.add_argument(f"--{kind.flag}", metavar=kind.flag.upper(), help=kind.help)
+        for name, option in kind.options.items():
+            link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
+    link.add_argument(
+        "--no-gateway", action="store_true", help="do not share the port; default: with PLCTOOL_GATEWAY=off"
+    )
+    for scheme, place in LATER.items():
+        link.add_argument(f"--{scheme}", metavar=place, help="not in this version")
+    link.add_argument("--node", type=int, metavar="N", help="not in this version")
+    if symbols:
+        parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="when they are not found by themselves")
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    with suppress(ValueError):
+        if 0 <= (seconds := float(text)) < 1e6:
+            return seconds
+    raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds")
+
+
+def _level(text: str) -> Level:
+    if text == "s":
+        return "s"
+    if text not in ("0", "1", "2", "3"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a level of optimisation; use 0, 1, 2, 3 or s")
+    return int(text)
+
+
+def _percent(text: str) -> float:
+    return _seconds(text.removesuffix("%")) / 100
+
+
+def _duration_ms(text: str) -> int:
+    from plctool.iec.value_texts import parse_time
+
+    milliseconds = parse_time(text)
+    if milliseconds < 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is in the past")
+    return milliseconds
+
+
+def pairs(texts: Sequence[str]) -> dict[str, str]:
+    """NAME=VALUE or NAME:=VALUE arguments."""
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        name = name.strip().removesuffix(":").strip()
+        if not equals or not name:
+            raise UsageError(f"'{text}' is not NAME=VALUE; write for example Main.speed=5.", "usage")
+        found[name] = value
+    return found

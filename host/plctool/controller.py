@@ -1,0 +1,302 @@
+"""A controller, whatever reaches it: on a link (`device.Plc`) or in this process (`sim.Simulator`).
+
+`Controller` is all that an operation may use, so that it works on both. What both do the same way is done here; what
+each does its own way is abstract.
+"""
+
+from __future__ import annotations
+
+import shutil
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self, overload
+
+from plctool.core import lib
+from plctool.debug.kept_changes import KeptChanges, kept_changes
+from plctool.debug.symbols import SourceLine, SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
+from plctool.debug.variables import Change, Reading, Symbol
+from plctool.errors import DeviceError, UsageError
+from plctool.files import read_image
+from plctool.image.file import image_crc, parse_image
+from plctool.link.monitoring import Contents
+from plctool.link.services import AppException, AppState, LogEntry, Status, TaskInfo
+
+RESET_OPTIONS = {
+    "warm": lib.RESET_OPTION_WARM,
+    "cold": lib.RESET_OPTION_COLD,
+    "origin": lib.RESET_OPTION_ORIGIN,
+}
+
+
+@dataclass(frozen=True)
+class ExceptionInfo:
+    """What stopped the program. `task` is None for initialisation code; the place is None without symbols. `calls`
+    led there, the nearest first."""
+
+    code: int
+    name: str
+    task: str | None
+    pou: str | None = None
+    file: str | None = None
+    line: int | None = None
+    calls: list[SourceLine] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        task = f" in task {self.task}" if self.task else ""
+        place = f", {self.pou}, {self.file}:{self.line}" if self.file else ""
+        calls = "".join(f", called from {c.pou}, {c.file}:{c.line}" for c in self.calls)
+        return f"{self.name}{task}{place}{calls}"
+
+
+@dataclass(frozen=True)
+class PlcStatus:
+    """`state` is "run", "stop", "exception" or "none"; `image_crc` is 0 without application."""
+
+    state: AppState
+    image_crc: int
+    image_size: int
+    exception: ExceptionInfo | None
+
+
+@dataclass(frozen=True)
+class FlashResult:
+    """`skipped`: the controller had this very image already. `seconds` is the time the transfer took. `persistent`:
+    what became of PERSISTENT values, None when the symbols of one of the programs are not there."""
+
+    bytes: int
+    seconds: float
+    skipped: bool
+    state: AppState
+    persistent: KeptChanges | None = None
+
+
+@dataclass(frozen=True)
+class OtherTool:
+    """Another tool of this machine that uses the same line: how its user called it, and its process number."""
+
+    tool: str
+    pid: int
+
+    def __str__(self) -> str:
+        return f"{self.tool} (pid {self.pid})"
+
+
+class Controller(ABC):
+    """One controller. Use it as a context manager."""
+
+    def __init__(self) -> None:
+        self._tables: dict[int, SymbolTable] = {}  # by CRC of the image
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    @abstractmethod
+    def close(self) -> None:
+        """Ends the use of the controller; never raises, harmless when repeated."""
+
+    def others(self) -> list[OtherTool]:
+        """The other tools that use the same line at present; none when this process has it to itself."""
+        return []
+
+    @abstractmethod
+    def log(self, after: int = 0) -> list[LogEntry]:
+        """The log entries with a handle above `after` that the controller still has, oldest first."""
+
+    # ---- the application ----
+
+    def flash(
+        self,
+        image: Path | str | bytes,
+        *,
+        start: bool = True,
+        force: bool = False,
+        unchecked: bool = False,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> FlashResult:
+        """Replaces the application and starts it. The old one runs until the new one has arrived and passed all checks.
+
+        `force`: also when the controller has this very image already. `unchecked`: without a look at the image here;
+        the controller checks it anyway. `progress` gets the bytes that have arrived and their total. Other tools are
+        kept away meanwhile; raises LinkError when one of them is downloading, UsageError for what is not an image,
+        DeviceError when the controller refuses it.
+        """
+        data = image if isinstance(image, bytes) else read_image(Path(image))
+        if not unchecked:
+            parse_image(data)
+        what = "a program" if isinstance(image, bytes) else Path(image).name
+        with self._alone(f"downloading {what}"):
+            if not isinstance(image, bytes):
+                _keep_symbols(Path(image), image_crc(data))
+            return self._flash(data, start, force, unchecked, progress)
+
+    def _flash(
+        self, data: bytes, start: bool, force: bool, unchecked: bool, progress: Callable[[int, int], None]
+    ) -> FlashResult:
+        crc = image_crc(data)
+        status = self.raw_status()
+        is_there = (status.image_crc, status.image_size) == (crc, len(data))
+        skipped = is_there and status.exception is None and not force and not unchecked
+        begin = self._now()
+        if not skipped:
+            self._download(data, is_there or unchecked, lambda done: progress(done, len(data)))
+            found = self.raw_status().image_crc
+            if found != crc:
+                raise DeviceError(f"The device has image {found:08X} instead of {crc:08X}; flash again.", "verify")
+        seconds = self._now() - begin
+        persistent = None if skipped else self._kept_changes(status.image_crc, crc)
+        if start and not (skipped and status.state is AppState.RUN):
+            self.start()
+        return FlashResult(len(data), seconds, skipped, self.raw_status().state, persistent)
+
+    def _kept_changes(self, before: int, after: int) -> KeptChanges | None:
+        """By the CRCs of both images."""
+        with suppress(UsageError):
+            had, has = (self._tables.get(crc) or find_symbols(crc) for crc in (before, after))
+            return kept_changes(had.kept, has.kept)
+        return None
+
+    @abstractmethod
+    def start(self) -> None:
+        """Starts the application. Raises DeviceError when it stopped with an exception, or there is none."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Stops the application after the cycles that run just now. Raises DeviceError when there is none."""
+
+    def reset(self, option: str = "warm") -> None:
+        """Stops it; `warm` keeps RETAIN variables, `cold` only PERSISTENT ones, `origin` deletes the application."""
+        if option not in RESET_OPTIONS:
+            raise UsageError(f"There is no reset '{option}'; choose one of {', '.join(RESET_OPTIONS)}.", "bad-reset")
+        self._reset(RESET_OPTIONS[option])
+
+    def status(self) -> PlcStatus:
+        """What the application does, and the exception that holds it, in the words of its symbols."""
+        status = self.raw_status()
+        exception = self._explain(status.image_crc, status.exception) if status.exception else None
+        return PlcStatus(status.state, status.image_crc, status.image_size, exception)
+
+    @abstractmethod
+    def raw_status(self) -> Status:
+        """The same as the controller says it: an exception has a code offset and words of the stack."""
+
+    def _explain(self, crc: int, exception: AppException) -> ExceptionInfo:
+        """Adds the names and places that the symbols know."""
+        try:
+            table = self._symbols_of(crc)
+        except UsageError:
+            table = None
+        task = None
+        with suppress(DeviceError):  # a device may be built without task information
+            task = next((t.name for i, t in enumerate(self.tasks()) if i == exception.task), None)
+        places = table.call_stack(exception.code_offset, exception.trace) if table else []
+        if not places:
+            return ExceptionInfo(exception.code, exception.name, task)
+        place = places[0]
+        return ExceptionInfo(exception.code, exception.name, task, place.pou, place.file, place.line, places[1:])
+
+    @abstractmethod
+    def tasks(self) -> list[TaskInfo]:
+        """Statistics of the tasks."""
+
+    # ---- variables ----
+
+    def symbols(self) -> SymbolTable:
+        """The symbols of the application on the controller. Raises UsageError when they cannot be found, DeviceError
+        when there is no application."""
+        return self._symbols_of(self._application_crc())
+
+    def add_symbols(self, table: SymbolTable) -> None:
+        """Symbols of an image that are neither in the cache nor beside it."""
+        self._tables[table.image_crc] = table
+
+    def _symbols_of(self, crc: int) -> SymbolTable:
+        if crc not in self._tables:
+            self._tables[crc] = self._find_symbols(crc)
+        return self._tables[crc]
+
+    def _find_symbols(self, crc: int) -> SymbolTable:
+        return find_symbols(crc)
+
+    @overload
+    def read(self, name: str, /) -> Any: ...
+    @overload
+    def read(self, name: str, other: str, /, *more: str) -> dict[str, Any]: ...
+    def read(self, *names: str) -> Any:
+        """The value of one variable, or the values of several by the names given."""
+        values = self.read_all(names)
+        return values if len(names) > 1 else values[names[0]]
+
+    def read_all(self, names: Sequence[str]) -> dict[str, Any]:
+        """Values by name. Structs and arrays come as dicts and lists, TIME as text."""
+        return self.sample(names).values
+
+    def sample(self, names: Sequence[str]) -> Reading:
+        """The variables with these names as they are now; of one moment between two cycles if the reading says so.
+
+        Raises UsageError for a name that is unknown, DeviceError when a pointer leads to no variable.
+        """
+        table = self.symbols()
+        reading = self._sample(table, names)
+        reading.check(lambda pointer: self._read(table, [pointer]).values[0])
+        return reading
+
+    def _sample(self, table: SymbolTable, names: Sequence[str]) -> Reading:
+        symbols = {name: table.resolve(name) for name in names}
+        contents = self._read(table, list(symbols.values()))
+        return Reading(symbols, dict(zip(symbols, contents.values, strict=True)), contents.consistent)
+
+    def write(self, values: Mapping[str, Any]) -> None:
+        """Sets variables, at once if they fit a message; texts such as 'T#80ms' are understood. Of a single bit the
+        remaining byte stays as it is. Raises UsageError, and writes nothing, when a value does not fit or is a
+        constant; DeviceError when a pointer leads to no variable."""
+        table = self.symbols()
+        named = [(table.resolve(name), value) for name, value in values.items()]
+        for symbol, _ in named:
+            symbol.check_writable(symbol.area)
+        self._write(table, [(symbol, symbol.change(value)) for symbol, value in named])
+
+    # ---- what each kind does its own way ----
+
+    @abstractmethod
+    def _now(self) -> float:
+        """Seconds, for the time a transfer takes."""
+
+    def _alone(self, purpose: str) -> AbstractContextManager[None]:
+        """Keeps other tools away; `purpose`, such as "downloading app.cdl", is what they are told."""
+        return nullcontext()
+
+    @abstractmethod
+    def _download(self, data: bytes, afresh: bool, progress: Callable[[int], None]) -> None:
+        """Makes an image the application, stopped. `afresh`: also what has arrived already. Raises DeviceError with the
+        reason when it is refused."""
+
+    @abstractmethod
+    def _reset(self, option: int) -> None:
+        """`option`: RESET_OPTION_*."""
+
+    @abstractmethod
+    def _application_crc(self) -> int:
+        """The CRC of the application's image. Raises DeviceError when there is none."""
+
+    @abstractmethod
+    def _read(self, table: SymbolTable, symbols: Sequence[Symbol]) -> Contents:
+        """Their bytes. Raises DeviceError when the symbols are no longer those of the application."""
+
+    @abstractmethod
+    def _write(self, table: SymbolTable, changes: Sequence[tuple[Symbol, Change]]) -> None:
+        """Raises DeviceError when a pointer to one of the variables leads to no variable."""
+
+
+def _keep_symbols(image: Path, crc: int) -> None:
+    """Puts the symbols beside an image where they are found later, also from another folder."""
+    source, kept = symbol_path(image), cache_path(crc)
+    with suppress(OSError, UsageError):
+        if load_symbols(source).image_crc == crc:
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, kept)

@@ -1,0 +1,169 @@
+"""Runs the tests, each from a cold start."""
+
+from __future__ import annotations
+
+import platform
+import re
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+from plctool.compiler import CompileError, load_sources
+from plctool.compiler.build import BuildResult, build_program
+from plctool.compiler.codegen.lower_init import encode_scalar
+from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.front import check_sources
+from plctool.compiler.internal import bugs_reported
+from plctool.compiler.semantics.unit_test_statements import FAILED, NUMBER, Assertion, Operand
+from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
+from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
+from plctool.controller import ExceptionInfo
+from plctool.core import ffi, lib
+from plctool.debug.symbols import SourceLine
+from plctool.errors import UsageError
+from plctool.iec.areas import Area
+from plctool.iec.value_texts import literal
+from plctool.iec.values import decode
+from plctool.image.targets import DEFAULT_TARGET, TARGETS, find_target
+from plctool.sim import Simulator
+from plctool.st_tests.report import TEST_NAME, Failure, Outcome, Report
+
+_IN_TEST = re.compile(rf"{TEST_NAME.pattern}|SETUP|TEARDOWN")
+_COMPARED = {"ASSERT_GT": "> ", "ASSERT_GE": ">= ", "ASSERT_LT": "< ", "ASSERT_LE": "<= "}
+_EXCEPTIONS = {
+    lib.RTSEXCPT_DIVIDEBYZERO: "division by zero",
+    lib.RTSEXCPT_ARRAYBOUNDS: "an index or value is out of bounds",
+    lib.RTSEXCPT_ACCESS_VIOLATION: "access to memory that is not there, perhaps through a NULL pointer",
+    lib.RTSEXCPT_WATCHDOG: "this takes too long, perhaps it is an endless loop",
+    lib.RTSEXCPT_STACK_OVERFLOW: "the stack is too small for this",
+    lib.RTSEXCPT_UNRESOLVED_EXTREFS: "this function is implemented in C and not here; mock it with MOCK_FUNCTION",
+}
+
+
+def run_tests(
+    paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0, warnings: WarningOptions = ALL_WARNINGS
+) -> Report:
+    """Runs the tests in sources whose name fits `pattern`: with * and ? all of it, else it holds the pattern; upper and
+    lower case are the same.
+
+    `level`: optimisation; the lowest compiles fastest, and the results are the same. Raises CompileError when the
+    program has errors, UsageError when there are no tests.
+    """
+    begin = time.perf_counter()
+    sources = load_sources(paths)
+    suite = TestSuite()
+    with _power(), bugs_reported():
+        checked = check_sources(sources, tests=suite, warnings=warnings)
+    if checked.program is None:
+        raise CompileError([d for d in checked.diagnostics if d.severity == "error"], sources)
+    chosen = [i for i, case in enumerate(suite.cases) if _fits(case.name.casefold(), pattern.casefold())]
+    if not chosen:
+        what = f"no test fits '{pattern}'" if suite.cases else "there are no tests: write TEST 'name' ... END_TEST"
+        raise UsageError(f"{what[:1].upper()}{what[1:]}.", "no-tests")
+    here = f"{platform.machine()}-linux"
+    target = find_target(here if here in TARGETS else DEFAULT_TARGET)
+    with bugs_reported():
+        built = build_program(checked.program, Options(target, level))
+    with Simulator(built.image, built.symbols, start=False) as plc:
+        bench = _Bench(plc, built, suite, checked.program.area_sizes)
+        outcomes = [bench.run(number) for number in chosen]
+    return Report(outcomes, time.perf_counter() - begin, sources, checked.diagnostics)
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return fnmatch(name, pattern) if any(c in pattern for c in "*?[") else pattern in name
+
+
+@contextmanager
+def _power() -> Iterator[None]:
+    """The simulator without a program: so that the compiler can see which C functions there are."""
+    lib.SimStart()
+    try:
+        yield
+    finally:
+        lib.SimStop()
+
+
+class _Bench:
+    """Runs one test after the other."""
+
+    def __init__(self, plc: Simulator, built: BuildResult, suite: TestSuite, sizes: dict[Area, int]) -> None:
+        self._plc = plc
+        self._sizes = sizes
+        self._built = built
+        self._suite = suite
+
+    def run(self, number: int) -> Outcome:
+        plc, case = self._plc, self._suite.cases[number]
+        begin = time.perf_counter()
+        plc.reset("cold")
+        failure = self._exception(case)
+        if failure is None:
+            self._cycle(number)
+            failure = self._exception(case) or self._assert()
+            teardown = self._suite.teardown_of(case)
+            if failure is not None and failure.is_exception and teardown is not None:
+                self._continue(teardown)
+        return Outcome(case.name, case.pos.file, case.pos.line, time.perf_counter() - begin, failure)
+
+    def _cycle(self, number: int) -> None:
+        self._plc.write({NUMBER: number})
+        self._plc.start()
+        self._plc.run_cycles(1)
+
+    def _continue(self, number: int) -> None:
+        """Runs what has this number on the variables as they are after an exception."""
+        areas = {lib.AppGetAreaAddress(area.value, 0, size): size for area, size in self._sizes.items() if size}
+        kept = {address: bytes(ffi.buffer(address, size)) for address, size in areas.items()}
+        self._plc.reset("cold")
+        for address, content in kept.items():
+            ffi.memmove(address, content, len(content))
+        self._cycle(number)
+
+    def _exception(self, case: TestCase) -> Failure | None:
+        info = self._plc.status().exception
+        if info is None:
+            return None
+        where = f" in {info.pou}" if info.pou and not TEST_NAME.fullmatch(info.pou) else ""
+        text = _EXCEPTIONS.get(info.code, "run-time exception") + where
+        place = (info.file, info.line) if info.file and info.line else (case.pos.file, case.pos.line)
+        return Failure(info.name, text, *place, is_exception=True, pou=info.pou, calls=_calls(info))
+
+    def _assert(self) -> Failure | None:
+        number = self._plc.read(FAILED)
+        if number == 0:
+            return None
+        assertion = self._suite.asserts[number - 1]
+        actual, expected = self._value(assertion.actual), self._value(assertion.expected)
+        message = str(self._value(assertion.message)) if assertion.message else ""
+        text = self._text(assertion, actual, expected)
+        return Failure(assertion.name, text, assertion.pos.file, assertion.pos.line, message, actual, expected)
+
+    def _value(self, operand: Operand) -> Any:
+        if operand.variable:
+            return self._plc.read(operand.variable)
+        return decode(operand.type, encode_scalar(operand.value, operand.type))
+
+    def _text(self, assertion: Assertion, actual: Any, expected: Any) -> str:
+        name, got = assertion.name, literal(assertion.actual.type, actual)
+        if name == "MOCK_VERIFY_CALLED":
+            return "expected a call, got none"
+        wanted = _COMPARED.get(name, "") + literal(assertion.expected.type, expected)
+        if name == "MOCK_VERIFY_CALL_COUNT":
+            return f"expected {wanted} calls, got {got}"
+        if name == "ASSERT_NEQ":
+            return f"expected anything but {wanted}"
+        if assertion.tolerance is not None:
+            wanted += f" +- {literal(assertion.tolerance.type, self._value(assertion.tolerance))}"
+        return f"expected {wanted}, got {got}"
+
+
+def _calls(exception: ExceptionInfo) -> list[SourceLine]:
+    """The calls between the test and the exception. What calls the test is ours."""
+    if _IN_TEST.fullmatch(exception.pou or ""):
+        return []
+    first = next((i for i, call in enumerate(exception.calls) if _IN_TEST.fullmatch(call.pou)), len(exception.calls))
+    return exception.calls[: first + 1]

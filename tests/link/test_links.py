@@ -1,0 +1,96 @@
+"""LINK: what a user writes for a link, and the table of the kinds of links."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from fake_device import FakeDevice, FakeLine
+
+from plctool.core import lib
+from plctool.errors import UsageError
+from plctool.link import services
+from plctool.link.connection import Connection
+from plctool.link.session import Session
+from plctool.link.transport import DEFAULT_BAUD
+from plctool.link.transports import LATER, TRANSPORTS, Link, make_link, open_transport, parse_link
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "baud"),
+    [
+        ("serial:/dev/ttyS0", "/dev/ttyS0", DEFAULT_BAUD),
+        ("serial:/dev/ttyS0?baud=9600", "/dev/ttyS0", 9600),
+        ("serial:COM3", "COM3", DEFAULT_BAUD),
+        ("serial:socket://host:4711", "socket://host:4711", DEFAULT_BAUD),
+        ("serial:spy:///dev/ttyS0?file=log.txt", "spy:///dev/ttyS0?file=log.txt", DEFAULT_BAUD),
+        ("serial:spy:///dev/ttyS0?file=log.txt?baud=1200", "spy:///dev/ttyS0?file=log.txt", 1200),
+        ("serial:/dev/serial/by-id/usb:1-if00", "/dev/serial/by-id/usb:1-if00", DEFAULT_BAUD),
+    ],
+)
+def test_a_link_is_its_kind_its_place_and_its_options(text: str, place: str, baud: int) -> None:
+    link = parse_link(text)
+    assert link == Link("serial", place, {"baud": baud})
+    assert parse_link(str(link)) == link
+    assert make_link("serial", place, baud=baud) == link
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("/dev/ttyS0", "serial:/dev/ttyS0"),
+        ("", "serial:/dev/ttyS0"),
+        ("serial:", "serial:/dev/ttyS0"),
+        ("bus:1", "serial:/dev/ttyS0"),
+        ("serial:?baud=9600", "serial:/dev/ttyS0"),
+        ("sim:here", "'sim:here' is not a link"),
+        ("serial:/dev/ttyS0?speed=9600", "no option 'speed'; it has baud"),
+        ("serial:/dev/ttyS0?baud=fast", "'fast' is not a number above 0"),
+        ("serial:/dev/ttyS0?baud=", "'' is not a number above 0"),
+        ("sim:?baud=1", "it has none"),
+        *((f"{scheme}:x", "is not in this version; use a serial line") for scheme in LATER),
+    ],
+)
+def test_what_is_no_link_is_refused_with_what_to_write(text: str, said: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        parse_link(text)
+    assert said in caught.value.message
+    assert caught.value.code == "no-such-link"
+
+
+def test_no_kind_of_link_is_there_and_to_come() -> None:
+    assert not TRANSPORTS.keys() & LATER.keys()
+    flags = [kind.flag for kind in TRANSPORTS.values() if kind.flag]
+    assert len({*flags, *LATER}) == len(flags) + len(LATER)
+
+
+def test_the_simulator_of_this_process_is_a_link() -> None:
+    assert lib.SimStart() == lib.ERR_OK
+    try:
+        with Connection(open_transport(parse_link("sim:"))) as connection:
+            assert services.read_identity(Session(connection)).device_name
+    finally:
+        lib.SimStop()
+
+
+def test_a_new_kind_of_link_is_one_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = FakeLine(FakeDevice())
+    row = replace(TRANSPORTS["serial"], open=lambda link: line, flag="wire", options={}, is_shared=False)
+    monkeypatch.setitem(TRANSPORTS, "wire", row)
+    link = parse_link("wire:7")
+    assert (link.scheme, link.place, link.is_shared) == ("wire", "7", False)
+    assert open_transport(link) is line
+
+
+@pytest.mark.parametrize("size", [64, 100, 256])
+def test_no_packet_is_longer_than_the_transport_takes(size: int) -> None:
+    line = FakeLine(FakeDevice())
+    line.max_packet = size
+    sent: list[int] = []
+    send = line.send
+    line.send = lambda packet: (sent.append(len(packet)), send(packet))[1]  # type: ignore[method-assign]
+    with Connection(line) as connection:
+        connection.open()
+        message = bytes(range(256)) * 4
+        assert connection.exchange(message) == message
+    assert size - 8 <= max(sent) <= size

@@ -1,0 +1,139 @@
+"""The modules of plctool stand on each other in one direction: no circle, and none imports what is declared above it.
+
+Every import counts: at the head of a module, in a function, and for the type checker.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+
+import plctool
+
+ROOT = Path(plctool.__file__).parent
+
+# From the ground up; the packages and modules of one line do not know each other. "" is what `import plctool` gives.
+FLOORS = (
+    ("errors", "core", "version"),
+    ("files", "iec"),
+    ("image",),
+    ("debug",),
+    ("link",),
+    ("gateway",),
+    ("controller", "compiler"),
+    ("device", "sim"),
+    ("",),
+    ("port_check", "st_tests", "testing"),
+    ("cli",),
+    ("__main__",),
+)
+# What floors alone do not say: (package, what it does not know although that lies below it).
+APART = (
+    ("compiler", ("link", "gateway")),
+    ("device", ("compiler",)),
+    ("sim", ("compiler", "gateway")),
+    ("controller", ("gateway",)),
+    ("testing", ("compiler", "device", "sim")),
+)
+# The same within the compiler.
+NOT_BELOW = {
+    "compiler.syntax": ("compiler.semantics", "compiler.codegen"),
+    "compiler.semantics": ("compiler.codegen",),
+    "compiler.semantics.rules": ("compiler.semantics.declarations", "compiler.semantics.program"),
+    "compiler.semantics.declarations": ("compiler.semantics.program",),
+    "compiler.codegen": ("compiler.syntax", "compiler.semantics"),
+}
+
+
+def _module(path: Path) -> str:
+    """The name of a module below plctool; of a package that of its folder."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix("__init__").removesuffix(".")
+
+
+MODULES = {_module(path): path for path in ROOT.rglob("*.py")}
+
+
+@cache
+def imports(module: str) -> frozenset[str]:
+    """The modules of plctool that a module imports."""
+    return frozenset(i for i in _named_in(MODULES[module].read_text()) if i != module)
+
+
+def _named_in(source: str) -> Iterator[str]:
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute here"
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        for name in names:
+            if name.split(".")[0] == "plctool":
+                yield _found(name.removeprefix("plctool").removeprefix("."))
+
+
+def _found(name: str) -> str:
+    """The module that a dotted name below plctool means, or that it is a name in."""
+    return name if name in MODULES else name.rpartition(".")[0]
+
+
+def _is_in(module: str, package: str) -> bool:
+    return module == package or (package != "" and module.startswith(package + "."))
+
+
+def _edges(package: str, others: Iterable[str]) -> set[tuple[str, str]]:
+    """The imports of a package that lead into one of `others`."""
+    modules = [m for m in MODULES if _is_in(m, package)]
+    assert modules, f"there is no {package}"
+    return {(m, i) for m in modules for i in imports(m) if any(_is_in(i, other) for other in others)}
+
+
+def _circle(modules: Iterable[str]) -> list[str]:
+    """Modules that import each other in a circle; none if there is no circle."""
+    wanted = set(modules)
+    try:
+        TopologicalSorter({m: imports(m) & wanted for m in wanted}).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_every_module_is_on_one_floor() -> None:
+    packages = [p for floor in FLOORS for p in floor]
+    homes = {m: [p for p in packages if _is_in(m, p)] for m in MODULES}
+    assert {m: h for m, h in homes.items() if len(h) != 1} == {}
+
+
+def test_imports_are_found_wherever_they_are() -> None:
+    source = "from plctool.a import b\ndef f():\n    import plctool.c.d\nif TYPE_CHECKING:\n    from plctool import e"
+    assert len(list(_named_in(source))) == 3
+    assert "compiler" in imports("cli.documents")  # in a function only
+    assert "debug.symbols" in imports("device")
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    assert _circle(MODULES) == []
+
+
+@pytest.mark.parametrize(("lower", "upper"), list(combinations(range(len(FLOORS)), 2)))
+def test_no_floor_knows_one_above_it(lower: int, upper: int) -> None:
+    wrong = [_edges(package, FLOORS[upper]) for package in FLOORS[lower]]
+    assert set().union(*wrong) == set()
+
+
+@pytest.mark.parametrize("floor", FLOORS, ids=str)
+def test_packages_of_a_floor_do_not_know_each_other(floor: tuple[str, ...]) -> None:
+    wrong = [_edges(package, set(floor) - {package}) for package in floor]
+    assert set().union(*wrong) == set()
+
+
+@pytest.mark.parametrize(("package", "others"), [*APART, *NOT_BELOW.items()])
+def test_package_does_not_know_what_is_kept_apart(package: str, others: tuple[str, ...]) -> None:
+    assert _edges(package, others) == set()
