@@ -24,6 +24,7 @@ from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
 from plctool.link.services import read_identity, read_status
 from plctool.link.session import Session
+from plctool.link.transport import NO_PLACES
 from plctool.testing.plcrt import Plcrt, find_plcrt
 
 IDLE_SHARE = 0.05  # of one processor; 0.005 is usual, but machines under load count otherwise
@@ -327,6 +328,8 @@ class Wire:
     local_address = b"\x00\x02"
     max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
+    point_to_point = False
+    places = NO_PLACES
     byte_rate = math.inf
 
     def __init__(self, fd: int) -> None:

@@ -17,6 +17,7 @@ from elftools.elf.elffile import ELFFile
 
 from plctool.errors import LinkError
 from plctool.link import simplecom
+from plctool.link.transport import NO_PLACES
 from plctool.testing.children import ends_with_us
 
 FLASH_SIZE = 16 * 1024 * 1024  # of the file; what is behind the file area holds the serial number in its last 4 KiB
@@ -53,6 +54,8 @@ class SocketSerial:
 
     max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
+    point_to_point = False
+    places = NO_PLACES
     byte_rate = math.inf
     local_address = b"\x00\x02"
 

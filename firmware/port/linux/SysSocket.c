@@ -184,16 +184,22 @@ static bool keep(SYSSOCK_PURPOSE purpose, int file, const char *option, const ch
     return true;
 }
 
+bool PortTcpKnows(const char *text, SOCKADDRESS *place)
+{
+    bool numbered;
+    *place = (SOCKADDRESS){INADDR_LOOPBACK, TCP_PORT};
+    return parse_number(text, UINT16_MAX, &place->port) || parse_place(text, UINT16_MAX, place, &numbered);
+}
+
 bool PortTcpOpen(const char *text, PORT_REASON *reason)
 {
-    SOCKADDRESS address = {INADDR_LOOPBACK, TCP_PORT};
-    bool numbered;
+    SOCKADDRESS place;
     make_ready();
-    if (!parse_number(text, UINT16_MAX, &address.port) && !parse_place(text, UINT16_MAX, &address, &numbered)) {
-        PortReason(reason, "--tcp %s is no address: write for example 11740, or 192.168.1.5:11740", text);
+    if (!PortTcpKnows(text, &place)) {
+        PortReason(reason, "--tcp %s is no address", text);
         return false;
     }
-    return keep(SYSSOCK_TCP, bind_socket(SOCK_STREAM, address, true), "--tcp", text, reason);
+    return keep(SYSSOCK_TCP, bind_socket(SOCK_STREAM, place, true), "--tcp", text, reason);
 }
 
 /* The port of that index, or the first of the four that is free. */
@@ -220,17 +226,22 @@ static bool open_broadcast(SOCKADDRESS own, const char *text, PORT_REASON *reaso
     return keep(SYSSOCK_UDP_BROADCAST, bind_socket(SOCK_DGRAM, own, true), "--udp", text, reason);
 }
 
+bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *indexed)
+{
+    *place = (SOCKADDRESS){INADDR_LOOPBACK, 0};
+    return parse_place(text, UDP_PORTS - 1, place, indexed);
+}
+
 bool PortUdpOpen(const char *text, PORT_REASON *reason)
 {
-    SOCKADDRESS address = {INADDR_LOOPBACK, 0};
+    SOCKADDRESS place;
     bool indexed;
     make_ready();
-    if (!parse_place(text, UDP_PORTS - 1, &address, &indexed)) {
-        PortReason(reason, "--udp %s is no address: write for example 192.168.1.5, or 192.168.1.5:1 for port %d", text,
-                   UDP_PORT + 1);
+    if (!PortUdpKnows(text, &place, &indexed)) {
+        PortReason(reason, "--udp %s is no address", text);
         return false;
     }
-    return keep(SYSSOCK_UDP, bind_udp(address, indexed), "--udp", text, reason) &&
+    return keep(SYSSOCK_UDP, bind_udp(place, indexed), "--udp", text, reason) &&
            open_broadcast(own_address(sockets.source[SYSSOCK_UDP].file), text, reason);
 }
 

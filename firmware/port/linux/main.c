@@ -122,6 +122,26 @@ static const struct option long_options[] = {
     {NULL, 0, NULL, 0},
 };
 
+static const char *take_tcp(const char *text)
+{
+    SOCKADDRESS place;
+    if (!PortTcpKnows(text, &place)) {
+        refuse("--tcp %s is no place: write for example 11740, or 192.168.1.5:11740", text);
+    }
+    return text;
+}
+
+static const char *take_udp(const char *text)
+{
+    SOCKADDRESS place;
+    bool indexed;
+    if (!PortUdpKnows(text, &place, &indexed)) {
+        refuse("--udp %s is no place: write for example 192.168.1.5, or 192.168.1.5:1 for the second of its ports",
+               text);
+    }
+    return text;
+}
+
 static void take_event(OPTIONS *options, char *text)
 {
     if (options->event_count == RTS_COUNT(options->event)) {
@@ -155,10 +175,10 @@ static void take_option(OPTIONS *options, int option)
         print_and_exit(usage);
         break;
     case OPTION_TCP:
-        options->tcp = optarg != NULL ? optarg : "127.0.0.1";
+        options->tcp = take_tcp(optarg != NULL ? optarg : "127.0.0.1");
         break;
     case OPTION_UDP:
-        options->udp = optarg != NULL ? optarg : "127.0.0.1";
+        options->udp = take_udp(optarg != NULL ? optarg : "127.0.0.1");
         break;
     case OPTION_CAN:
         refuse("CAN is not in this version: use --serial, --tcp or --udp");

@@ -84,9 +84,11 @@ const char *PortComPtyName(void);
 
 /* ---- SysSocket ---- */
 
-/* Opens the socket for TCP, "[ADDRESS:]PORT" or "ADDRESS", or those for UDP, "ADDRESS[:INDEX]". Without an address that
+/* The place in a text, and the socket there, or those: for TCP "[ADDRESS:]PORT" or "ADDRESS", for UDP "ADDRESS[:INDEX]". Without an address that
  * is loopback; the address 0.0.0.0 is all of the machine. Port 0 is one that is free; without an index it is the first
  * that is. Before CMInit. */
+bool PortTcpKnows(const char *text, SOCKADDRESS *place);
+bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *indexed);
 bool PortTcpOpen(const char *text, PORT_REASON *reason);
 bool PortUdpOpen(const char *text, PORT_REASON *reason);
 void PortSockClose(void);

@@ -79,22 +79,23 @@ static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *pay
 }
 
 /* The sender's network address is at the beginning of its address. What it says of it may be wrong, or a lie. */
-static void correct_sender(ROUTER_PEER *peer)
+static void locate(ROUTER_PEER *peer, RTS_UI64 endpoint)
 {
 #if COMM_ENDPOINTS
+    peer->endpoint = endpoint;
     if (peer->address_words >= peer->driver->peer_words)
         memcpy(peer->address, peer->driver->peer_address, 2u * peer->driver->peer_words);
 #else
     RTS_UNUSED(peer);
+    RTS_UNUSED(endpoint);
 #endif
 }
 
-/* `peer` has its driver and endpoint. */
-static void handle(ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
+static void handle(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI8 *data, RTS_UI32 size)
 {
-    const BLK_DRV *driver = peer->driver;
     const ROUTER_HEADER *fixed = (const ROUTER_HEADER *)data;
     HEADER header;
+    ROUTER_PEER peer;
 
     if (!parse_header(data, size, &header)) {
         COMM_COUNT(counters.malformed);
@@ -108,32 +109,23 @@ static void handle(ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size)
         COMM_COUNT(counters.ignored);
         return;
     }
-    peer->max_packet = max_packet(fixed->flags);
-    peer->address_words = (RTS_UI8)header.sender_words;
-    memcpy(peer->address, header.sender, 2 * header.sender_words);
-    correct_sender(peer);
-    deliver(peer, fixed->service, data + header.size, size - header.size);
+    peer.driver = driver;
+    peer.max_packet = max_packet(fixed->flags);
+    peer.address_words = (RTS_UI8)header.sender_words;
+    memcpy(peer.address, header.sender, 2 * header.sender_words);
+    locate(&peer, endpoint);
+    deliver(&peer, fixed->service, data + header.size, size - header.size);
 }
 
 void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
 {
-    ROUTER_PEER peer;
-
-    peer.driver = driver;
-#if COMM_ENDPOINTS
-    peer.endpoint = 0;
-#endif
-    handle(&peer, data, size);
+    handle(driver, 0, data, size);
 }
 
 #if COMM_ENDPOINTS
 void RouterHandleDataFrom(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI8 *data, RTS_UI32 size)
 {
-    ROUTER_PEER peer;
-
-    peer.driver = driver;
-    peer.endpoint = endpoint;
-    handle(&peer, data, size);
+    handle(driver, endpoint, data, size);
 }
 
 bool RouterNeeds(const BLK_DRV *driver)
@@ -172,7 +164,7 @@ RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *
     RTS_UI32 size = header_size(sizeof(header.fixed), (RTS_UI32)peer->address_words + driver->address_words);
 
     if (count > ROUTER_MAX_PARTS)
-        return ERR_PARAMETER;
+        return ERR_NET_MSGSIZE;
     memcpy(header.addresses, peer->address, receiver);
     memcpy(header.addresses + receiver, driver->address, 2u * driver->address_words);
     all[0].data = (const RTS_UI8 *)&header;
@@ -181,7 +173,7 @@ RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *
         all[1 + i] = parts[i];
         size += parts[i].size;
     }
-    return size > peer->max_packet ? ERR_NET_MSGSIZE : driver->send(peer, all, 1 + count);
+    return size > peer->max_packet ? ERR_NET_MSGSIZE : peer->driver->send(peer, all, 1 + count);
 }
 
 bool RouterIsSamePeer(const ROUTER_PEER *a, const ROUTER_PEER *b)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from typing import Protocol
 
 from plctool.core import lib
@@ -15,13 +16,14 @@ from plctool.link.transport import BlockTransport
 
 PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
 _OPEN_PATIENCE = 5.0
+_AT_ONCE = 16  # packages sent before it is looked whether something has come
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
 SCAN_SECONDS = 1.5
 
 
 def no_answer(name: str) -> ChannelLost:
     """The error of a link on which no device answers."""
-    return ChannelLost(f"No device answers on {name}; check cable, baud rate and power.", "no-answer")
+    return ChannelLost(f"No device answers on {name}; check that it is on, the cable, and the baud rate or address.", "no-answer")
 
 
 class MessageLink(Protocol):
@@ -153,7 +155,7 @@ class Connection:
             if packet and packet.service == lib.ROUTER_SVC_NAME_RESPONSE:
                 node = names.decode_reply(packet.payload, request_id, packet.sender)
                 if node:
-                    found[node.address] = node
+                    found[node.address] = replace(node, place=self.transport.places.get(node.address, ""))
             now = self.transport.now()
         return list(found.values())
 
@@ -176,16 +178,20 @@ class Connection:
         """Moves packages until `done`. Raises ChannelLost after `patience` seconds of silence."""
         while not done():
             check()
-            sent = self._send_next(channel)
+            sent = self._send_some(channel)
             now = self.transport.now()
             give_up = channel.give_up_at(patience)
             if now >= give_up:
                 raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
             packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
-            if packet and packet.service == lib.ROUTER_SVC_CHANNEL and packet.sender == self._peer:
+            if packet and packet.service == lib.ROUTER_SVC_CHANNEL and self._is_from_peer(packet):
                 channel.receive(packet.payload, self.transport.now())
         while self._send_next(channel):
             pass  # the acknowledgement of the reply
+
+    def _send_some(self, channel: Channel) -> bool:
+        """Sends a few packages; looks for what has come after each of them would cost a fast link half its time."""
+        return any([self._send_next(channel) for _ in range(_AT_ONCE)])
 
     def _send_next(self, channel: Channel) -> bool:
         """Sends one package if there is one to be sent now."""
@@ -203,4 +209,10 @@ class Connection:
         """The next packet for us, None when none came in time."""
         data = self.transport.receive(timeout)
         packet = router.decode(data) if data is not None else None
-        return packet if packet and packet.receiver in (router.BROADCAST, self.transport.local_address) else None
+        return packet if packet and self._is_for_us(packet) else None
+
+    def _is_for_us(self, packet: router.Packet) -> bool:
+        return self.transport.point_to_point or packet.receiver in (router.BROADCAST, self.transport.local_address)
+
+    def _is_from_peer(self, packet: router.Packet) -> bool:
+        return self.transport.point_to_point or packet.sender == self._peer

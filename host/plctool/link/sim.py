@@ -6,7 +6,7 @@ import math
 
 from plctool.core import error_name, ffi, lib
 from plctool.errors import LinkError
-from plctool.link.transport import TOOL_ADDRESS
+from plctool.link.transport import NO_PLACES, TOOL_ADDRESS
 
 _STEP_NS = 1_000_000  # longest piece of virtual time between two looks at the queue
 
@@ -19,6 +19,8 @@ class SimTransport:
     max_packet = int(lib.BLK_MAX_SIZE)
     packet_overhead = 0
     byte_rate = math.inf
+    point_to_point = False
+    places = NO_PLACES
 
     def fileno(self) -> int | None:
         return None  # the simulator runs in this thread

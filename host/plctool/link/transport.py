@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Protocol
+
+NO_PLACES: Mapping[bytes, str] = MappingProxyType({})
 
 TOOL_ADDRESS = b"\x00\x02"  # router address of a tool on a line of its own
 BITS_PER_BYTE = 10  # of a serial line, 8N1: start bit, eight data bits, stop bit
@@ -17,6 +21,8 @@ class BlockTransport(Protocol):
     max_packet: int  # longest packet it takes and gives, in bytes
     packet_overhead: int  # bytes the line carries for a packet besides the packet itself
     byte_rate: float  # bytes the line carries per second; math.inf when it is not known or no matter
+    point_to_point: bool  # what arrives comes from the one device there, and is for us, whatever addresses it has
+    places: Mapping[bytes, str]  # on a link to several devices, where those are that have answered, by router address
 
     def send(self, packet: bytes) -> None:
         """Queues a packet; raises LinkError when the line is gone."""

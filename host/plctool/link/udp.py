@@ -1,0 +1,125 @@
+"""Block transport over UDP: a datagram is a packet (codesys-v3-protocol 1.1).
+
+What is for all goes to the place that the user named: a device, or all of a network when it is a broadcast address.
+Who has answered a name request is known by the address it gave itself, and where it has answered from; only from there
+anything else is taken, and there goes what is for it.
+"""
+
+from __future__ import annotations
+
+import math
+import select
+import socket
+import time
+
+from plctool.core import lib
+from plctool.errors import LinkError
+from plctool.link import network, router
+
+_BUFFER = 1 << 20  # bytes the system keeps for us
+_READ = 2048
+
+Place = tuple[str, int]
+
+
+class UdpTransport:
+    """Packets to and from the devices at one place."""
+
+    def __init__(self, place: str) -> None:
+        host, port = network.split_place(place)
+        ip = network.find_host(host)
+        first = int(lib.UDP_PORT)
+        self.name = place
+        self.max_packet = int(lib.BLK_MAX_SIZE)
+        self.packet_overhead = 0
+        self.byte_rate = math.inf
+        self.point_to_point = False
+        self.places: dict[bytes, str] = {}
+        self._all: list[Place] = [(ip, p) for p in ([port] if port else range(first, first + int(lib.UDP_PORTS)))]
+        self._homes: dict[bytes, Place] = {}  # where devices have answered from, by router address
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        self._socket.setblocking(False)
+        self.local_address = self._find_own_address()
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def fileno(self) -> int | None:
+        return self._socket.fileno()
+
+    def send(self, packet: bytes) -> None:
+        header = router.decode(packet)
+        receiver = header.receiver if header else router.BROADCAST
+        for place in self._all if receiver == router.BROADCAST else [self._home(receiver)]:
+            self._send(packet, place)
+
+    def receive(self, timeout: float) -> bytes | None:
+        end = time.monotonic() + timeout
+        while True:
+            try:
+                data, place = self._socket.recvfrom(_READ)
+            except BlockingIOError:
+                if not select.select([self._socket], [], [], max(0.0, end - time.monotonic()))[0]:
+                    return None
+                continue
+            except OSError as error:
+                raise self._failed(error) from error
+            if self._is_expected(data, place):
+                return data
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _find_own_address(self) -> bytes:
+        """Binds the socket; the address is the one that packets to the place have."""
+        self._socket.bind(("", 0))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as way:
+            way.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            try:
+                way.connect(self._all[0])
+            except OSError as error:
+                self.close()
+                raise LinkError(f"Cannot reach {self.name}: {network.advice(error)}", "open") from error
+            ip = network.own_address(way)[2:]
+        return network.own_address(self._socket)[:2] + ip
+
+    def _home(self, receiver: bytes) -> Place:
+        """Where a device is. Raises LinkError when the user has named all of a network instead of one."""
+        home = self._homes.get(receiver)
+        if home is None:
+            raise LinkError(f"No device answers on {self.name}.", "no-answer")
+        if home[0] != self._all[0][0]:
+            raise LinkError(
+                f"{self.name} is not the address of a device, but one at {_text(home)} has answered; name that one, "
+                f"or see 'plctool scan --udp {self.name}'.",
+                "several",
+            )
+        return home
+
+    def _is_expected(self, data: bytes, place: Place) -> bool:
+        packet = router.decode(data)
+        if packet is None:
+            return False
+        if packet.service == lib.ROUTER_SVC_NAME_RESPONSE:
+            self._homes.setdefault(packet.sender, place)
+            self.places.setdefault(packet.sender, _text(place))
+        return self._homes.get(packet.sender) == place
+
+    def _send(self, packet: bytes, place: Place) -> None:
+        while True:
+            try:
+                self._socket.sendto(packet, place)
+                return
+            except BlockingIOError:
+                select.select([], [self._socket], [])
+            except OSError as error:
+                raise self._failed(error) from error
+
+    def _failed(self, error: OSError) -> LinkError:
+        return LinkError(f"Cannot reach {self.name}: {network.advice(error)}", "link-lost")
+
+
+def _text(place: Place) -> str:
+    return f"{place[0]}:{place[1]}"
