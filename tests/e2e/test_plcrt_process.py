@@ -340,8 +340,8 @@ class Wire:
     def now(self) -> float:
         return time.monotonic()
 
-    def send(self, packet: bytes) -> None:
-        os.write(self.fd, simplecom.encode(packet))
+    def send(self, *packets: bytes) -> None:
+        os.write(self.fd, b"".join(map(simplecom.encode, packets)))
 
     def receive(self, timeout: float) -> bytes | None:
         if not self.packets and select.select([self.fd], [], [], timeout)[0]:

@@ -74,7 +74,11 @@ class FakeLine:
     def now(self) -> float:
         return self._time
 
-    def send(self, packet: bytes) -> None:
+    def send(self, *packets: bytes) -> None:
+        for packet in packets:
+            self._send(packet)
+
+    def _send(self, packet: bytes) -> None:
         if self.gone:
             raise LinkError("The serial line fake line was lost.", "link-lost")
         frame = simplecom.encode(packet)

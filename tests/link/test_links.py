@@ -88,7 +88,7 @@ def test_no_packet_is_longer_than_the_transport_takes(size: int) -> None:
     line.max_packet = size
     sent: list[int] = []
     send = line.send
-    line.send = lambda packet: (sent.append(len(packet)), send(packet))[1]  # type: ignore[method-assign]
+    line.send = lambda *packets: (sent.extend(map(len, packets)), send(*packets))[1]  # type: ignore[method-assign]
     with Connection(line) as connection:
         connection.open()
         message = bytes(range(256)) * 4

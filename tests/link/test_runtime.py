@@ -18,7 +18,7 @@ from plctool.link import services, simplecom
 from plctool.link.connection import Connection
 from plctool.link.session import Session
 from plctool.link.sim import SimTransport
-from plctool.link.transport import NO_PLACES, BITS_PER_BYTE, BlockTransport
+from plctool.link.transport import BITS_PER_BYTE, NO_PLACES, BlockTransport
 from plctool.testing.line import Damage
 
 TICK_NS = 500_000
@@ -45,8 +45,8 @@ class SimSerial:
     def now(self) -> float:
         return float(lib.SimNow()) / 1e9
 
-    def send(self, packet: bytes) -> None:
-        self._out += simplecom.encode(packet)
+    def send(self, *packets: bytes) -> None:
+        self._out += b"".join(map(simplecom.encode, packets))
 
     def receive(self, timeout: float) -> bytes | None:
         end = self.now() + timeout

@@ -69,8 +69,8 @@ class SocketSerial:
     def now(self) -> float:
         return time.monotonic()
 
-    def send(self, packet: bytes) -> None:
-        self.send_raw(simplecom.encode(packet))
+    def send(self, *packets: bytes) -> None:
+        self.send_raw(b"".join(map(simplecom.encode, packets)))
 
     def send_raw(self, data: bytes) -> None:
         """Bytes as they are, also damaged ones."""

@@ -6,6 +6,7 @@ import secrets
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from itertools import islice
 from typing import Protocol
 
 from plctool.core import lib
@@ -23,7 +24,9 @@ SCAN_SECONDS = 1.5
 
 def no_answer(name: str) -> ChannelLost:
     """The error of a link on which no device answers."""
-    return ChannelLost(f"No device answers on {name}; check that it is on, the cable, and the baud rate or address.", "no-answer")
+    return ChannelLost(
+        f"No device answers on {name}; check that it is on, the cable, and the baud rate or address.", "no-answer"
+    )
 
 
 class MessageLink(Protocol):
@@ -149,7 +152,8 @@ class Connection:
         end, ask_at = now + seconds, now
         while now < end and not (enough and len(found) >= enough):
             if now >= ask_at:
-                self._send(lib.ROUTER_SVC_NAME_REQUEST, router.BROADCAST, names.encode_request(request_id))
+                request = names.encode_request(request_id)
+                self.transport.send(self._packet(lib.ROUTER_SVC_NAME_REQUEST, router.BROADCAST, request))
                 ask_at = now + _ASK_EVERY
             packet = self._receive(min(ask_at, end) - now)
             if packet and packet.service == lib.ROUTER_SVC_NAME_RESPONSE:
@@ -169,41 +173,47 @@ class Connection:
         if channel:
             channel.close()
             with suppress(LinkError):  # the device notices by itself
-                while self._send_next(channel):
+                while self._send_some(channel):
                     pass
 
     def _run(
         self, channel: Channel, done: Callable[[], bool], patience: float, check: Callable[[], None] = lambda: None
     ) -> None:
         """Moves packages until `done`. Raises ChannelLost after `patience` seconds of silence."""
-        while not done():
-            check()
-            sent = self._send_some(channel)
-            now = self.transport.now()
-            give_up = channel.give_up_at(patience)
-            if now >= give_up:
-                raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
-            packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
-            if packet and packet.service == lib.ROUTER_SVC_CHANNEL and self._is_from_peer(packet):
-                channel.receive(packet.payload, self.transport.now())
-        while self._send_next(channel):
-            pass  # the acknowledgement of the reply
+        try:
+            while not done():
+                check()
+                self._move(channel, patience)
+            while self._send_some(channel):
+                pass  # the acknowledgement of the reply
+        except LinkError as error:
+            if error.code == "link-lost":
+                self._channel = None  # there is no line to say good-bye on
+            raise
+
+    def _move(self, channel: Channel, patience: float) -> None:
+        """Sends some packages, and takes one or waits for it."""
+        sent = self._send_some(channel)
+        now = self.transport.now()
+        give_up = channel.give_up_at(patience)
+        if now >= give_up:
+            raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
+        packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
+        if packet and packet.service == lib.ROUTER_SVC_CHANNEL and self._is_from_peer(packet):
+            channel.receive(packet.payload, self.transport.now())
 
     def _send_some(self, channel: Channel) -> bool:
-        """Sends a few packages; looks for what has come after each of them would cost a fast link half its time."""
-        return any([self._send_next(channel) for _ in range(_AT_ONCE)])
+        """Sends what there is to be sent now, so many that looking for what has come costs little beside.
+        False when there was nothing."""
+        packages = iter(lambda: channel.next_package(self.transport.now()), None)
+        packets = [self._packet(lib.ROUTER_SVC_CHANNEL, self._peer, package) for package in islice(packages, _AT_ONCE)]
+        if packets:
+            self.transport.send(*packets)
+        return bool(packets)
 
-    def _send_next(self, channel: Channel) -> bool:
-        """Sends one package if there is one to be sent now."""
-        package = channel.next_package(self.transport.now())
-        if package is None:
-            return False
-        assert self._peer is not None
-        self._send(lib.ROUTER_SVC_CHANNEL, self._peer, package)
-        return True
-
-    def _send(self, service: int, receiver: bytes, payload: bytes) -> None:
-        self.transport.send(router.encode(router.Packet(service, receiver, self.transport.local_address, payload)))
+    def _packet(self, service: int, receiver: bytes | None, payload: bytes) -> bytes:
+        assert receiver is not None
+        return router.encode(router.Packet(service, receiver, self.transport.local_address, payload))
 
     def _receive(self, timeout: float) -> router.Packet | None:
         """The next packet for us, None when none came in time."""

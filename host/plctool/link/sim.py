@@ -28,8 +28,9 @@ class SimTransport:
     def now(self) -> float:
         return float(lib.SimNow()) / 1e9
 
-    def send(self, packet: bytes) -> None:
-        _check(lib.SimLinkSend(packet, len(packet)))
+    def send(self, *packets: bytes) -> None:
+        for packet in packets:
+            _check(lib.SimLinkSend(packet, len(packet)))
 
     def receive(self, timeout: float) -> bytes | None:
         buffer = ffi.new("RTS_UI8[]", self.max_packet)

@@ -45,11 +45,11 @@ class TcpTransport:
     def fileno(self) -> int | None:
         return self._socket.fileno() if self._socket else None
 
-    def send(self, packet: bytes) -> None:
-        frame = _HEADER.pack(magic=_MAGIC, size=_HEADER.size + len(packet)) + packet
+    def send(self, *packets: bytes) -> None:
+        frames = b"".join(_HEADER.pack(magic=_MAGIC, size=_HEADER.size + len(packet)) + packet for packet in packets)
         connected = self._socket or self._connect()
         try:
-            connected.sendall(frame)
+            connected.sendall(frames)
         except OSError as error:
             raise self._lost(error) from error
 

@@ -24,8 +24,8 @@ class BlockTransport(Protocol):
     point_to_point: bool  # what arrives comes from the one device there, and is for us, whatever addresses it has
     places: Mapping[bytes, str]  # on a link to several devices, where those are that have answered, by router address
 
-    def send(self, packet: bytes) -> None:
-        """Queues a packet; raises LinkError when the line is gone."""
+    def send(self, *packets: bytes) -> None:
+        """Queues packets; raises LinkError when the line is gone."""
 
     def receive(self, timeout: float) -> bytes | None:
         """The next packet, None after `timeout` seconds without one; raises LinkError when the line is gone."""

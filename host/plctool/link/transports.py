@@ -162,7 +162,9 @@ def open_transport(link: Link) -> BlockTransport:
 
 def not_yet(what: str) -> UsageError:
     """The error about a kind of link, or an option for one, that is still to come."""
-    return UsageError(f"{what} is not in this version; use a serial line (--port) or the network (--tcp, --udp).", "no-such-link")
+    return UsageError(
+        f"{what} is not in this version; use a serial line (--port) or the network (--tcp, --udp).", "no-such-link"
+    )
 
 
 def _no_link(text: str) -> UsageError:

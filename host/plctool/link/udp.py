@@ -11,6 +11,8 @@ import math
 import select
 import socket
 import time
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from plctool.core import lib
 from plctool.errors import LinkError
@@ -34,7 +36,8 @@ class UdpTransport:
         self.packet_overhead = 0
         self.byte_rate = math.inf
         self.point_to_point = False
-        self.places: dict[bytes, str] = {}
+        self._places: dict[bytes, str] = {}
+        self.places: Mapping[bytes, str] = MappingProxyType(self._places)
         self._all: list[Place] = [(ip, p) for p in ([port] if port else range(first, first + int(lib.UDP_PORTS)))]
         self._homes: dict[bytes, Place] = {}  # where devices have answered from, by router address
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -49,11 +52,12 @@ class UdpTransport:
     def fileno(self) -> int | None:
         return self._socket.fileno()
 
-    def send(self, packet: bytes) -> None:
-        header = router.decode(packet)
-        receiver = header.receiver if header else router.BROADCAST
-        for place in self._all if receiver == router.BROADCAST else [self._home(receiver)]:
-            self._send(packet, place)
+    def send(self, *packets: bytes) -> None:
+        for packet in packets:
+            header = router.decode(packet)
+            receiver = header.receiver if header else router.BROADCAST
+            for place in self._all if receiver == router.BROADCAST else [self._home(receiver)]:
+                self._send(packet, place)
 
     def receive(self, timeout: float) -> bytes | None:
         end = time.monotonic() + timeout
@@ -104,7 +108,7 @@ class UdpTransport:
             return False
         if packet.service == lib.ROUTER_SVC_NAME_RESPONSE:
             self._homes.setdefault(packet.sender, place)
-            self.places.setdefault(packet.sender, _text(place))
+            self._places.setdefault(packet.sender, _text(place))
         return self._homes.get(packet.sender) == place
 
     def _send(self, packet: bytes, place: Place) -> None:
