@@ -60,8 +60,10 @@ def processor_ns(pid: int) -> int:
         (["--flash", "f", "--baud", "115201"], "115200"),
         (["--flash", "f", "--baud", "fast"], "--baud fast"),
         (["--flash", "f", "--can", "can0"], "--serial"),
-        (["--flash", "f", "--udp"], "--serial"),
-        (["--flash", "f", "--tcp=127.0.0.1:11740"], "--serial"),
+        (["--flash", "f", "--udp", "127.0.0.1:4"], "--udp 127.0.0.1:4 is no place"),
+        (["--flash", "f", "--udp=1740"], "192.168.1.5:1"),
+        (["--flash", "f", "--tcp", "host:1"], "--tcp host:1 is no place"),
+        (["--flash", "f", "--tcp=65536"], "192.168.1.5:11740"),
     ],
 )
 def test_wrong_use_is_said_in_one_sentence_and_exits_2(tmp_path, monkeypatch, options, advice):
