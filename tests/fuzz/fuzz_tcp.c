@@ -60,6 +60,8 @@ RTS_RESULT SysSockRecv(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, RTS_UI32
 
     FUZZ_CHECK(socket < CONNECTIONS && !connection->closed && size != 0);
     *received = size < connection->in_size ? size : connection->in_size;
+    if (*received == 0)
+        return ERR_OK;
     memcpy(data, connection->in, *received);
     connection->in += *received;
     connection->in_size -= *received;
