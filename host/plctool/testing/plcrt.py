@@ -33,8 +33,8 @@ def _is_child(pid: int, parent: int) -> bool:
 
 
 class Plcrt:
-    """Context manager around one process; `port` is the pseudo terminal it serves, `tcp` and `udp` are the places on the
-    network if `options` ask for some (`--tcp 0`)."""
+    """Context manager around one process; `port` is the pseudo terminal it serves, `tcp` and `udp` are its places on
+    the network if `options` ask for some (`--tcp 0`)."""
 
     def __init__(self, flash: Path | str, *options: str) -> None:
         self.flash = Path(flash)
