@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "CmpBytes.h"
 #include "CmpPackets.h"
 
 enum { HEADER_WORDS = sizeof(ROUTER_HEADER) / 2, WORDS_MASK = (1 << ROUTER_HOP_SHIFT) - 1 };
@@ -144,46 +145,54 @@ RTS_UI32 RouterGetMaxPayload(const ROUTER_PEER *peer, RTS_UI32 address_words)
     return peer->max_packet > header ? peer->max_packet - header : 0;
 }
 
+static RTS_UI8 *append(RTS_UI8 *end, const void *data, RTS_UI32 size)
+{
+    memcpy(end, data, size);
+    return end + size;
+}
+
 RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *parts, RTS_UI32 count)
 {
     const BLK_DRV *driver = peer->driver;
-    struct {
-        ROUTER_HEADER fixed;
-        RTS_UI8 addresses[4 * ROUTER_MAX_ADDRESS + 2];
-    } header = {{
-                    ROUTER_MAGIC,
-                    ROUTER_HOP_COUNT << ROUTER_HOP_SHIFT | HEADER_WORDS,
-                    ROUTER_PRIO_NORMAL << ROUTER_PRIO_SHIFT,
-                    service,
-                    0,
-                    (RTS_UI8)(driver->address_words << 4 | peer->address_words),
-                },
-                {0}};
+    const ROUTER_HEADER fixed = {
+        ROUTER_MAGIC,
+        ROUTER_HOP_COUNT << ROUTER_HOP_SHIFT | HEADER_WORDS,
+        ROUTER_PRIO_NORMAL << ROUTER_PRIO_SHIFT,
+        service,
+        0,
+        (RTS_UI8)(driver->address_words << 4 | peer->address_words),
+    };
+    RTS_UI8 header[sizeof(fixed) + 4 * ROUTER_MAX_ADDRESS + 2];
     BLK_PART all[1 + ROUTER_MAX_PARTS];
-    RTS_UI32 receiver = 2u * peer->address_words;
-    RTS_UI32 size = header_size(sizeof(header.fixed), (RTS_UI32)peer->address_words + driver->address_words);
+    RTS_UI8 *end = header;
 
     if (count > ROUTER_MAX_PARTS)
         return ERR_NET_MSGSIZE;
-    memcpy(header.addresses, peer->address, receiver);
-    memcpy(header.addresses + receiver, driver->address, 2u * driver->address_words);
-    all[0].data = (const RTS_UI8 *)&header;
+    end = append(end, &fixed, sizeof(fixed));
+    end = append(end, peer->address, 2u * peer->address_words);
+    end = append(end, driver->address, 2u * driver->address_words);
+    BytesPut16(end, 0); /* the filler, if there is one */
+    RTS_UI32 size = header_size(0, (RTS_UI32)(end - header) / 2);
+    all[0].data = header;
     all[0].size = size;
     for (RTS_UI32 i = 0; i < count; i++) {
         all[1 + i] = parts[i];
         size += parts[i].size;
     }
-    return size > peer->max_packet ? ERR_NET_MSGSIZE : peer->driver->send(peer, all, 1 + count);
+    return size > peer->max_packet ? ERR_NET_MSGSIZE : driver->send(peer, all, 1 + count);
 }
 
+/* The length of an address and the address are compared in one piece. */
 bool RouterIsSamePeer(const ROUTER_PEER *a, const ROUTER_PEER *b)
 {
+    enum { ADDRESS = offsetof(ROUTER_PEER, address_words) };
+
 #if COMM_ENDPOINTS
     if (a->endpoint != b->endpoint)
         return false;
 #endif
-    return a->driver == b->driver && a->address_words == b->address_words &&
-           memcmp(a->address, b->address, 2u * a->address_words) == 0;
+    return a->driver == b->driver && memcmp((const RTS_UI8 *)a + ADDRESS, (const RTS_UI8 *)b + ADDRESS,
+                                            sizeof(a->address_words) + 2u * a->address_words) == 0;
 }
 
 const ROUTER_COUNTERS *RouterGetCounters(void)
