@@ -26,6 +26,7 @@ from plctool.link.transports import open_transport, parse_link
 from plctool.testing.plcrt import Plcrt
 
 KINDS = ["serial", "tcp", "udp"]
+PATIENCE = 30.0  # for what is bound to happen [s]
 CLIENTS = 4  # tools that may be logged in at a time on Linux: COMM_MAX_CLIENTS
 
 
@@ -133,35 +134,30 @@ def test_clients_that_were_killed_leave_their_places_at_once(plcrt: Plcrt) -> No
 
 
 def test_who_watches_while_another_one_flashes_sees_the_new_program(plcrt: Plcrt, tool: Any, counter: Path) -> None:
-    """The login to the application is the watcher's until the flasher takes it; each gets it back when it asks."""
     other = tool.build("other", "PROGRAM Main VAR count : DINT := 1000000; END_VAR count := count + 1; END_PROGRAM")
-    seen: list[int] = []
+    old, new = threading.Event(), threading.Event()
     errors: list[PlcError] = []
-    enough = threading.Event()
 
     def watch() -> None:
         with plctool.connect(f"tcp:{plcrt.tcp}") as plc:
-            while not enough.is_set():
-                try:
-                    seen.append(plc.read("Main.count"))
-                except PlcError as error:
-                    errors.append(error)
-                    break
-                if seen[-1] >= 1000000:
-                    break
+            try:
+                for _, reading in plc.watch(["Main.count"], interval=0.0):
+                    old.set()
+                    if reading.values["Main.count"] >= 1000000:
+                        new.set()
+                        return
+            except PlcError as error:
+                errors.append(error)
 
     with plctool.connect(f"udp:{plcrt.udp}") as plc:
         plc.flash(counter)
-        watcher = threading.Thread(target=watch)
+        watcher = threading.Thread(target=watch, daemon=True)
         watcher.start()
-        try:
-            plc.flash(other)
-            watcher.join(30)
-        finally:
-            enough.set()
-            watcher.join()
+        assert old.wait(PATIENCE)
+        plc.flash(other)
+        watcher.join(PATIENCE)
     assert errors == []
-    assert seen[-1] >= 1000000
+    assert new.is_set()
 
 
 def test_two_flashers_do_not_mix(plcrt: Plcrt, tool: Any, counter: Path) -> None:
