@@ -20,6 +20,7 @@ SHARED = [
     "SysStart.h",
     "CmpAppEmbedded.h",
     "CmpIecTask.h",
+    "CmpItf.h",
     "CmpLog.h",
     "CmpPackets.h",
     "CmpSrvNumbers.h",

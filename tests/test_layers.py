@@ -43,11 +43,12 @@ APART = (
 )
 # The same within the compiler.
 NOT_BELOW = {
-    "compiler.syntax": ("compiler.semantics", "compiler.codegen"),
-    "compiler.semantics": ("compiler.codegen",),
+    "compiler.formats": ("compiler.semantics", "compiler.codegen"),
+    "compiler.syntax": ("compiler.formats", "compiler.semantics", "compiler.codegen"),
+    "compiler.semantics": ("compiler.formats", "compiler.codegen"),
     "compiler.semantics.rules": ("compiler.semantics.declarations", "compiler.semantics.program"),
     "compiler.semantics.declarations": ("compiler.semantics.program",),
-    "compiler.codegen": ("compiler.syntax", "compiler.semantics"),
+    "compiler.codegen": ("compiler.formats", "compiler.syntax", "compiler.semantics"),
 }
 
 

@@ -1,5 +1,5 @@
 /*
- * CmpItf.h - component manager (CmpMgr): the life of the runtime.
+ * CmpItf.h - component manager (CmpMgr): the life of the runtime (component numbers and names: shared with the host).
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -78,6 +78,10 @@ enum {
     CMPID_CmpBlkDrvUdp = 0x001E,
 };
 
+/* Name of a component, "" when unknown. */
+const char *CMGetComponentName(RTS_UI32 id);
+
+#ifndef RTS_CFFI
 typedef struct {
     RTS_UI32 id; /* CMPID_* */
     const char *name;
@@ -98,9 +102,6 @@ RTS_RESULT CMExit(void);
 /* Calls one hook of every component; CH_COMM_CYCLE is what a main loop calls. Returns the first error. */
 RTS_RESULT CMCallHook(CMP_HOOK hook);
 
-/* Name of a component, "" when unknown. */
-const char *CMGetComponentName(RTS_UI32 id);
-
 /* ---- external functions: C functions offered to IEC code ---- */
 
 typedef struct {
@@ -115,5 +116,6 @@ RTS_RESULT CMRegisterExternal(const CMP_EXT_FUNCTION *table, RTS_SIZE count);
 
 /* Finds a function by name; NULL when there is none. Signature and version are compared by the caller. */
 const CMP_EXT_FUNCTION *CMFindExternal(const char *name);
+#endif
 
 #endif

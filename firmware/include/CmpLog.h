@@ -37,8 +37,6 @@ typedef struct {
 void LogAddEntry(RTS_UI32 component, RTS_UI32 log_class, RTS_UI32 error, const char *format, ...);
 
 RTS_RESULT CmpLog_Hook(CMP_HOOK hook);
-#else
-const char *CMGetComponentName(RTS_UI32 id); /* of CmpItf.h */
 #endif
 
 /* Copies the first entry with a handle >= `handle`. ERR_END_OF_OBJECT when there is none. */

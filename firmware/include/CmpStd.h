@@ -33,7 +33,7 @@ typedef RTS_UI32 RTS_RESULT;
 
 /* Names an object of a component: a small index (plus generation), never a pointer. */
 typedef RTS_UI32 RTS_HANDLE;
-enum { RTS_INVALID_HANDLE = -1 };
+#define RTS_INVALID_HANDLE ((RTS_HANDLE) - 1)
 
 /* Any function; cast to the right type before the call. */
 typedef void (*RTS_PFN)(void);

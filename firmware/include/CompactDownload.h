@@ -17,11 +17,17 @@ enum {
     CDL_HEADER_VERSION = 1,
     CDL_HEADER_SIZE = 104,
     CDL_CRC_OFFSET = 100,
-    CDL_BLOB_MAGIC = -1223966498, /* 0xB70BC0DE as a signed enum constant */
     APP_CODE_ALIGN = 16,
     APP_POINTER_SIZE = 8, /* what a variable that is a pointer takes, on every target; the address comes first */
     APP_NAME_SIZE = 60,   /* of a name or text in an image that the runtime reads, with NUL */
 };
+
+/* What a blob begins with; no enum constant of C is so large. */
+#ifdef RTS_CFFI
+static const RTS_UI32 CDL_BLOB_MAGIC;
+#else
+#define CDL_BLOB_MAGIC 0xB70BC0DEu
+#endif
 
 /* Area indices. Code is position independent and holds the constants; the other areas are RAM owned by the runtime. */
 enum {

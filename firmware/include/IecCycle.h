@@ -33,8 +33,8 @@ typedef struct {
 } IEC_TASK_INFO;
 
 /* One cycle of a task that is due since `due_ns` (SysTimeGetNs). Called by the scheduler in the context of the task.
- * Returns 0 when the task must not be scheduled again (exception), 1 otherwise. */
-int IecTaskCycle(RTS_UI32 task, RTS_I64 due_ns);
+ * Returns false when the task must not be scheduled again (exception). */
+bool IecTaskCycle(RTS_UI32 task, RTS_I64 due_ns);
 
 RTS_UI32 IecTaskGetCount(void);
 
@@ -57,7 +57,7 @@ void IecCycleForget(void);
 
 /* Runs fn(arg), code of the application other than a task (initialisation), from main, watched and caught like a cycle.
  * Returns as SysExceptTry. */
-int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
+bool IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
 
 /* Counts starts and ends of cycles of all tasks, so that a reader can tell whether one ran meanwhile. *busy: a task is
  * in its cycle now. From any context. */
@@ -81,9 +81,9 @@ typedef struct {
     const void *arg;  /* for SysExceptBreak */
 } IEC_GUARD;
 
-/* Reads guard `index`: one for each task, and one at IecTaskGetCount() for code that IecTaskRunGuarded runs. Returns 0
+/* Reads guard `index`: one for each task, and one at IecTaskGetCount() for code that IecTaskRunGuarded runs. False
  * when it does not run. From any context. */
-int IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *guard);
+bool IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *guard);
 #endif
 
 #endif

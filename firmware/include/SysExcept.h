@@ -97,10 +97,10 @@ const EXCEPT_TRACE *SysExceptGetTrace(void);
  * Runs fn(arg) and catches what goes wrong in it. Not nested. Called by CmpIecTask in the context of a task (timer
  * interrupt or thread) and by CmpAppEmbedded from main for the init code.
  *
- * Returns 1 and fills *exception when fn was left by an exception, 0 otherwise. After an exception no lock is held that
- * was taken within fn, because IEC code takes none.
+ * Returns true when fn returned; false when it was left by an exception, which *exception tells then. After an exception
+ * no lock is held that was taken within fn, because IEC code takes none.
  */
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
 
 /* Leaves the running SysExceptTry of this context with RTSEXCPT_* `code`. `address`: where the error was seen; `stack`:
  * the stack pointer there. Does not return. Outside a SysExceptTry it is a fatal error of the runtime. */

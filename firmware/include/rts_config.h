@@ -56,6 +56,21 @@
 #define APP_AREAS_FROM_PORT 0
 #endif
 
+/* How a port wants the areas aligned, and their `size` rounded up, and where they lie, to let programs write nothing but
+ * them. */
+#ifndef APP_AREAS_ALIGNED
+#define APP_AREAS_ALIGNED(size)
+#define APP_AREAS_SECTION
+#endif
+
+/* APP_GATE(function); stands behind an external function that does more than compute: it writes variables of its own,
+ * or needs hardware or a lock of the runtime. APP_GATED(function) is what its table offers. Where IEC code may write its
+ * areas and its stack only, and so may the functions it calls, the gate gives it the rights of the runtime. */
+#ifndef APP_GATE
+#define APP_GATE(function) RTS_STATIC_ASSERT(1, function##_needs_no_gate)
+#define APP_GATED(function) function
+#endif
+
 /* RAM for the tasks' own copies of the inputs and outputs that they share, bytes: a task takes as many as it uses of
  * them, rounded to 8, and once more as many of what it writes. An application that needs more is refused. The
  * default holds any application that does not write inputs. 0: no copies, 500 bytes of flash less; only where tasks do
@@ -200,7 +215,8 @@
 #define CHECKSUM_TABLE_ENTRIES 16
 #endif
 
-/* Settings of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. */
+/* Settings of the port, see CmpSettings.h; each {"component", "key", number, text}, with a comma after it. plcrt looks for
+ * {"SysTarget", "NodeName", 0, "name in a scan"}. */
 #ifndef SETTINGS_TABLE
 #define SETTINGS_TABLE
 #endif

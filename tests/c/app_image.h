@@ -228,7 +228,7 @@ static inline void pad(APP_BYTES *image, RTS_UI32 align)
 
 static inline void append_blob(APP_BYTES *image, RTS_UI32 id, const void *data, RTS_UI32 size)
 {
-    CDL_BLOB blob = {(RTS_UI32)CDL_BLOB_MAGIC, id, size};
+    CDL_BLOB blob = {CDL_BLOB_MAGIC, id, size};
 
     append(image, &blob, sizeof blob);
     append(image, data, size);

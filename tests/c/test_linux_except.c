@@ -86,7 +86,7 @@ static void loop_forever(void *arg)
 static RTS_UI32 code_of(void (*fn)(void *))
 {
     RTS_EXCEPTION exception = {0xDEAD, 0};
-    int left = SysExceptTry(fn, NULL, &exception);
+    bool left = !SysExceptTry(fn, NULL, &exception);
     CHECK(left == (exception.code != RTSEXCPT_NOEXCEPTION));
     return exception.code;
 }
@@ -95,7 +95,7 @@ static void a_normal_return_is_no_exception(void)
 {
     int calls = 0;
     RTS_EXCEPTION exception = {1, 1};
-    CHECK(SysExceptTry(count_up, &calls, &exception) == 0);
+    CHECK(SysExceptTry(count_up, &calls, &exception));
     CHECK(calls == 1);
     CHECK(exception.code == RTSEXCPT_NOEXCEPTION && exception.address == 0);
 }
@@ -103,7 +103,7 @@ static void a_normal_return_is_no_exception(void)
 static void reading_null_is_an_access_violation_at_its_instruction(void)
 {
     RTS_EXCEPTION exception;
-    CHECK(SysExceptTry(read_null, NULL, &exception) == 1);
+    CHECK(!SysExceptTry(read_null, NULL, &exception));
     CHECK(exception.code == RTSEXCPT_ACCESS_VIOLATION);
     CHECK(exception.address - (uintptr_t)read_null < 128);
 }
@@ -121,7 +121,7 @@ static void an_illegal_instruction_is_caught(void)
 static void raise_gives_its_code_and_address(void)
 {
     RTS_EXCEPTION exception;
-    CHECK(SysExceptTry(raise_bounds, NULL, &exception) == 1);
+    CHECK(!SysExceptTry(raise_bounds, NULL, &exception));
     CHECK(exception.code == RTSEXCPT_ARRAYBOUNDS);
     CHECK(exception.address == 0x1234);
 }
@@ -172,7 +172,7 @@ static void an_endless_loop_is_broken(void)
     VICTIM victim = {0, 0};
     pthread_create(&thread, NULL, breaker, &victim);
     RTS_EXCEPTION exception;
-    CHECK(SysExceptTry(loop_forever, &victim.calls, &exception) == 1);
+    CHECK(!SysExceptTry(loop_forever, &victim.calls, &exception));
     __atomic_store_n(&victim.done, 1, __ATOMIC_RELEASE);
     pthread_join(thread, NULL);
     CHECK(exception.code == RTSEXCPT_WATCHDOG);
@@ -185,7 +185,7 @@ static void breaks_at_any_moment_do_no_harm(void)
     pthread_create(&thread, NULL, breaker, &victim);
     for (int i = 0; i < 200000; i++) {
         RTS_EXCEPTION exception;
-        int left = SysExceptTry(count_up, &victim.calls, &exception);
+        bool left = !SysExceptTry(count_up, &victim.calls, &exception);
         CHECK(exception.code == (left ? (RTS_UI32)RTSEXCPT_WATCHDOG : (RTS_UI32)RTSEXCPT_NOEXCEPTION));
     }
     __atomic_store_n(&victim.done, 1, __ATOMIC_RELEASE);
@@ -251,7 +251,7 @@ static void a_break_of_something_else_does_nothing(void)
 {
     char here[2];
     RTS_EXCEPTION exception;
-    CHECK(SysExceptTry(break_something_else, here, &exception) == 0);
+    CHECK(SysExceptTry(break_something_else, here, &exception));
 }
 
 /* ---- many of them ---- */
@@ -288,12 +288,12 @@ static void a_hundred_thousand_tries_work(void)
     int calls = 0;
     RTS_EXCEPTION exception;
     for (int i = 0; i < 100000; i++) {
-        CHECK(SysExceptTry(count_up, &calls, &exception) == 0);
+        CHECK(SysExceptTry(count_up, &calls, &exception));
     }
     CHECK(calls == 100000);
 }
 
-/* ---- living in a process of somebody else ---- */
+/* ---- living in a process of another program ---- */
 
 /* Exit status of a child that runs `fn`, or 1000 + the signal that ended it. */
 static int run_child(void (*fn)(void))

@@ -67,7 +67,7 @@ static void wait_for_calls(RTS_UI32 count)
 
 static RTS_HANDLE create(RTS_UI32 interval_us, RTS_UI32 takes_ms)
 {
-    RTS_HANDLE timer = (RTS_HANDLE)RTS_INVALID_HANDLE;
+    RTS_HANDLE timer = RTS_INVALID_HANDLE;
     record = (RECORD){.sleep_ms = takes_ms};
     CHECK(SysTimerCreate(note, &record, interval_us, 5, &timer) == ERR_OK);
     record.timer = timer;
@@ -225,7 +225,7 @@ static void wrong_arguments_are_refused(void)
     RTS_HANDLE timer = 7;
     CHECK(SysTimerCreate(NULL, &record, 1000, 0, &timer) == ERR_PARAMETER);
     CHECK(SysTimerCreate(note, &record, 1000, 32, &timer) == ERR_PARAMETER);
-    CHECK(SysTimerStart((RTS_HANDLE)RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
+    CHECK(SysTimerStart(RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
     CHECK(SysTimerStop(3) == ERR_INVALID_HANDLE);
     CHECK(SysTimerDelete(3) == ERR_INVALID_HANDLE);
 }

@@ -52,11 +52,11 @@ void SysTimePause(void)
         guard_end(&tasks.list[1].guard);
 }
 
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     RTS_UNUSED(exception);
     fn(arg);
-    return 0;
+    return true;
 }
 
 void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address)

@@ -289,15 +289,15 @@ static void external_events_are_limited_and_unique(void)
     begin();
     for (i = 0; i < SCHED_MAX_EXTERNAL_EVENTS; i++, name[0]++)
         event = SchedRegisterExternalEvent(name, NULL);
-    CHECK(SchedRegisterExternalEvent("a", &result) == (RTS_HANDLE)RTS_INVALID_HANDLE);
+    CHECK(SchedRegisterExternalEvent("a", &result) == RTS_INVALID_HANDLE);
     CHECK(result == ERR_DUPLICATE);
-    CHECK(SchedRegisterExternalEvent(name, &result) == (RTS_HANDLE)RTS_INVALID_HANDLE);
+    CHECK(SchedRegisterExternalEvent(name, &result) == RTS_INVALID_HANDLE);
     CHECK(result == ERR_NOMEMORY);
     CHECK(SchedUnregisterExternalEvent(event) == ERR_OK);
     CHECK(SchedUnregisterExternalEvent(event) == ERR_INVALID_HANDLE);
     CHECK(SchedUnregisterExternalEvent(99) == ERR_INVALID_HANDLE);
-    CHECK(SchedPostExternalEvent((RTS_HANDLE)RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
-    CHECK(SchedRegisterExternalEvent(name, &result) != (RTS_HANDLE)RTS_INVALID_HANDLE);
+    CHECK(SchedPostExternalEvent(RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
+    CHECK(SchedRegisterExternalEvent(name, &result) != RTS_INVALID_HANDLE);
     CHECK(result == ERR_OK);
 }
 

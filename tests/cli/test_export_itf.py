@@ -17,7 +17,8 @@ from plctool.sim import Simulator
 
 ROOT = Path(__file__).parents[2]
 CC = shutil.which("gcc") or shutil.which("cc")
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", f"-I{ROOT / 'firmware/include'}"]
+INCLUDE = [f"-I{ROOT / 'firmware' / folder}" for folder in ("port/sim", "include")]
+FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", *INCLUDE]
 
 LIBRARY = """
 TYPE
@@ -113,7 +114,7 @@ def test_the_table_has_what_images_ask_for(tool: Tool) -> None:
     Path("main.st").write_text(program, "utf-8")
     assert tool("build", "main.st", "sensors.st").status == 0
     wanted = {e["name"]: (e["signature"], e["version"]) for e in tool("info", "app.cdl", "--json").json["externals"]}
-    entry = re.compile(r'\{"(\w+)", 0x(\w+), 0x(\w+), \(RTS_PFN\)\1\}')
+    entry = re.compile(r'\{"(\w+)", 0x(\w+), 0x(\w+), \(RTS_PFN\)APP_GATED\(\1\)\}')
     offered = {n: (s, int(v, 16)) for n, s, v in entry.findall(Path("sensorsItf.h").read_text("utf-8"))}
     assert set(wanted) - {"iecraise"} == {"sensor_reset", "sensor_scale", "sensor_best"}
     for name in set(wanted) - {"iecraise"}:

@@ -205,7 +205,8 @@ def test_of_a_very_long_line_the_part_around_the_finding_is_shown() -> None:
 
 
 def test_many_errors_may_be_followed_by_more() -> None:
-    source = Source("f.st", "PROGRAM Main\n" + "".join(f"x{i} := 1;\n" for i in range(MAX_ERRORS + 1)) + "END_PROGRAM")
+    wrong = "x := 'text';\n" * (MAX_ERRORS + 1)
+    source = Source("f.st", f"PROGRAM Main\nVAR x : INT; END_VAR\n{wrong}END_PROGRAM")
     texts = render_all(check_sources([source]).diagnostics, [source])
     assert len(texts) == MAX_ERRORS + 1
     assert texts[-1].startswith("There may be more")

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources, load_sources
+from plctool.compiler.diagnostics import render_all
+from plctool.compiler.formats.twincat import read_object
 from plctool.compiler.front import check_sources
-from plctool.compiler.source_files import structured_text
 from plctool.errors import UsageError
 from plctool.sim import Simulator
 
@@ -134,21 +135,262 @@ def test_errors_in_twincat_files_have_the_line_and_column_of_the_file(tmp_path: 
     assert line[found[0].column - 1 :].startswith("FB_Missing")
 
 
-def test_lines_of_twincat_files_stay_where_they_are() -> None:
-    text = structured_text(BLOCK, Path("FB_Counter.TcPOU"))
-    for number, line in enumerate(BLOCK.splitlines()):
-        if "CDATA" not in line and "<" not in line:
-            assert text.splitlines()[number] == line
+def test_every_line_of_a_twincat_file_is_found_again() -> None:
+    source = read_object("FB_Counter.TcPOU", BLOCK)
+    at = 0
+    found = 0
+    for line in source.text.splitlines(keepends=True):
+        pos = source.pos(at)
+        at += len(line)
+        if not line.startswith(("END_", "ACTION", "GET")) or line == "END_VAR\n":
+            assert source.line_text(pos.line)[pos.column - 1 :].startswith(line.strip("\n")) or not line.strip()
+            found += bool(line.strip())
+    assert found > 20
 
 
-def test_charts_and_diagrams_of_twincat_are_refused_by_name(tmp_path: Path) -> None:
+def test_a_chart_of_twincat_is_named_and_the_rest_is_checked(tmp_path: Path) -> None:
+    (tmp_path / "FB_Chart.TcPOU").write_text(
+        xml("""  <POU Name="FB_Chart"><Declaration><![CDATA[FUNCTION_BLOCK FB_Chart
+VAR_OUTPUT ready : BOOL; END_VAR]]></Declaration>
+    <Implementation><CFC><XmlArchive/></CFC></Implementation></POU>""")
+    )
+    (tmp_path / "MAIN.st").write_text(
+        "PROGRAM MAIN\nVAR f : FB_Chart; b : BOOL; END_VAR\nf();\nb := f.redy;\nEND_PROGRAM"
+    )
+    found = [d for d in check_sources(load_sources([tmp_path])).diagnostics if d.severity == "error"]
+    assert [(d.line, d.code) for d in found] == [(5, "language"), (4, "unknown")]
+    assert found[0].message == "FB_Chart is written in CFC; only Structured Text can be compiled"
+
+
+def test_all_diagrams_are_listed_however_many_there_are(tmp_path: Path) -> None:
+    for i in range(30):
+        (tmp_path / f"P{i}.TcPOU").write_text(
+            MAIN.replace("MAIN", f"P{i}").replace("<ST>", "<NWL>").replace("</ST>", "</NWL>")
+        )
+    result = check_sources(load_sources([tmp_path]))
+    assert sum(d.code == "language" for d in result.diagnostics) == 30
+    assert not result.ok
+
+
+def test_a_cut_off_twincat_file_is_an_error_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "MAIN.TcPOU"
-    path.write_text(MAIN.replace("<ST>", "<SFC>").replace("</ST>", "</SFC>"), "utf-8")
-    with pytest.raises(UsageError, match="holds SFC; only Structured Text"):
-        load_sources([path])
+    path.write_text(MAIN[: MAIN.index("</POU>")])
+    (found,) = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
+    assert found.code == "xml"
+    assert found.line == len(path.read_text().splitlines())
+
+
+TASK = xml("""  <Task Name="Fast Task" Id="{1}">
+    <!--CycleTime in micro seconds.-->
+    <CycleTime>2000</CycleTime>
+    <Priority>20</Priority>
+    <PouCall>
+      <Name>MAIN</Name>
+    </PouCall>
+    <PouCall>
+      <Name>VisuElems.Visu_Prg</Name>
+    </PouCall>
+  </Task>""")
+COUNTING = MAIN.replace("counter : FB_Counter;\n    ", "").replace(
+    "counter();\nsum := counter.Add(GVL_Limits.highest);\nwidth := counter.Step;", "sum := sum + 1;"
+)
+
+
+def test_a_task_of_twincat_has_its_cycle_time_and_programs(tmp_path: Path) -> None:
+    (tmp_path / "MAIN.TcPOU").write_text(COUNTING)
+    (tmp_path / "Fast.TcTTO").write_text(TASK)
+    program = check_sources(load_sources([tmp_path])).program
+    assert program is not None
+    (task,) = program.tasks
+    assert (task.name, task.interval_us, task.priority) == ("Fast_Task", 2000, 20)
+    with started(tmp_path) as plc:
+        plc.run_cycles(3)
+        assert plc.read("MAIN.sum") == 3
+
+
+def test_a_program_that_a_task_of_twincat_misses_is_reported_in_the_task_file(tmp_path: Path) -> None:
+    (tmp_path / "MAIN.TcPOU").write_text(COUNTING)
+    (tmp_path / "Fast.TcTTO").write_text(TASK.replace("MAIN", "MIAN"))
+    (found,) = [d for d in check_sources(load_sources([tmp_path])).diagnostics if d.severity == "error"]
+    assert Path(found.file).name == "Fast.TcTTO"
+    assert "MIAN" in TASK.splitlines()[found.line] or "PouCall" in TASK.splitlines()[found.line]
+
+
+PROJECT = """<Project>
+  <ItemGroup>
+    <Compile Include="POUs\\Main.TcPOU"><SubType>Code</SubType></Compile>
+    <Compile Include="Old.TcPOU"><ExcludeFromBuild>true</ExcludeFromBuild></Compile>
+  </ItemGroup>
+</Project>
+"""
+
+
+def test_the_project_file_of_twincat_says_which_files_belong(tmp_path: Path) -> None:
+    (tmp_path / "pous").mkdir()
+    (tmp_path / "pous" / "MAIN.TcPOU").write_text(COUNTING)
+    (tmp_path / "Old.TcPOU").write_text("garbage")
+    (tmp_path / "Forgotten.TcPOU").write_text("garbage")
+    project = tmp_path / "plant.plcproj"
+    project.write_text(PROJECT)
+    assert [Path(s.path).name for s in load_sources([tmp_path])] == ["MAIN.TcPOU"]
+    assert [Path(s.path).name for s in load_sources([project])] == ["MAIN.TcPOU"]
+    solution = tmp_path / "plant.tsproj"
+    solution.write_text('<TcSmProject><Project PrjFilePath="plant.plcproj"/></TcSmProject>')
+    assert [Path(s.path).name for s in load_sources([solution])] == ["MAIN.TcPOU"]
+
+
+def test_a_missing_file_of_a_twincat_project_is_named(tmp_path: Path) -> None:
+    (tmp_path / "plant.plcproj").write_text(PROJECT)
+    with pytest.raises(UsageError, match=r"plant.plcproj:3: POUs.Main.TcPOU belongs to the project but is missing"):
+        load_sources([tmp_path])
+
+
+def test_several_twincat_projects_in_a_folder_are_named(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.plcproj").write_text(PROJECT)
+    with pytest.raises(UsageError, match=r"several PLC projects .* give one of them: .*a.plcproj, .*b.plcproj"):
+        load_sources([tmp_path])
 
 
 def test_a_folder_without_sources_says_what_sources_are(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("nothing")
     with pytest.raises(UsageError, match=r"no source file \(.st, .exp, .TcPOU"):
         load_sources([tmp_path])
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("plant.project", "export the units with Project, Export PLCopenXML"),
+        ("plant.projectarchive", "export the units with Project, Export PLCopenXML"),
+        ("plant.export", "export the units with Project, Export PLCopenXML"),
+        ("Util.library", "give the sources of the library"),
+        ("Util.compiled-library", "give the sources of the library"),
+        ("plant.pro", "open it in CODESYS 2.3 and export it"),
+        ("plant.tnzip", "give the folder of the PLC project in it"),
+    ],
+)
+def test_a_file_without_text_says_what_to_export(tmp_path: Path, name: str, message: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(b"PK\x03\x04\0\0\0\xff" * 30)
+    (tmp_path / "main.st").write_text(PROGRAM.replace("LEN(text)", "k"))
+    found = [d for d in check_sources(load_sources([path, tmp_path / "main.st"])).diagnostics if d.severity == "error"]
+    assert {d.code for d in found} == {"unknown", "file"}
+    assert message in next(d.message for d in found if d.code == "file")
+    (tmp_path / "main.st").unlink()
+    with pytest.raises(UsageError, match=f"There is no source file .*{name} is no text: .*"):
+        load_sources([tmp_path])
+
+
+def test_a_binary_file_is_one_error_whatever_it_is_called(tmp_path: Path) -> None:
+    path = tmp_path / "main.st"
+    path.write_bytes(bytes(range(256)) * 4)
+    (found,) = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
+    assert found.message.startswith("this is a binary file")
+
+
+@pytest.mark.parametrize("suffix", [".ST", ".iecst", ".scl"])
+def test_other_suffixes_of_program_texts_are_taken_from_folders(tmp_path: Path, suffix: str) -> None:
+    (tmp_path / f"main{suffix}").write_text(PROGRAM, "utf-8")
+    with started(tmp_path) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.n") == 5
+
+
+def test_variables_and_types_of_automation_studio_are_globals(tmp_path: Path) -> None:
+    declared = "(* all *)\nVAR\n    speed : Level := 3;\nEND_VAR\nVAR CONSTANT\n    k : INT := 4;\nEND_VAR\n"
+    (tmp_path / "Global.var").write_text(declared)
+    (tmp_path / "Global.typ").write_text("TYPE\n    Level : INT;\nEND_TYPE\n")
+    (tmp_path / "main.st").write_text("PROGRAM Main\nspeed := speed + k;\nEND_PROGRAM\n")
+    with started(tmp_path) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Global.speed") == 7
+
+
+GENERATED = """FUNCTION_BLOCK LOGGER
+  VAR_INPUT
+    TRIG : BOOL;
+  END_VAR
+  IF TRIG THEN
+  {{
+   LogMessage(1);
+  }}
+  END_IF;
+END_FUNCTION_BLOCK
+
+FUNCTION_BLOCK python_eval
+  VAR_INPUT
+    TRIG : BOOL;
+  END_VAR
+  {extern void eval(int);eval(0);}
+END_FUNCTION_BLOCK
+
+FUNCTION_BLOCK python_gear
+  VAR
+    py_eval : python_eval;
+  END_VAR
+  py_eval(TRIG := TRUE);
+END_FUNCTION_BLOCK
+
+PROGRAM Main
+  VAR
+    n : INT;
+  END_VAR
+  n := n + 1;
+END_PROGRAM
+"""
+
+
+def test_the_blocks_in_c_in_front_of_an_openplc_program_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "plc.st"
+    path.write_text(GENERATED)
+    with started(path) as plc:
+        plc.run_cycles(2)
+        assert plc.read("Main.n") == 2
+
+
+def test_a_program_that_uses_a_block_in_c_is_told_so(tmp_path: Path) -> None:
+    path = tmp_path / "plc.st"
+    path.write_text(GENERATED.replace("n : INT;", "n : INT; log : LOGGER;"))
+    found = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
+    assert any("code in C cannot be compiled" in d.message for d in found)
+
+
+def test_structured_text_beside_a_twincat_project_belongs_to_it(tmp_path: Path) -> None:
+    (tmp_path / "POUs").mkdir()
+    (tmp_path / "POUs" / "MAIN.TcPOU").write_text(COUNTING)
+    (tmp_path / "more.st").write_text("TYPE T : INT; END_TYPE")
+    (tmp_path / "Forgotten.TcPOU").write_text("garbage")
+    (tmp_path / "plant.plcproj").write_text(PROJECT)
+    assert {Path(s.path).name for s in load_sources([tmp_path])} == {"MAIN.TcPOU", "more.st"}
+
+
+def test_a_diagram_is_listed_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "A.TcPOU").write_text(MAIN.replace("<ST>", "<CFC>").replace("</ST>", "</CFC>"))
+    sources = load_sources([tmp_path])
+    listed = [text for text in render_all(check_sources(sources).diagnostics, sources) if "CFC" in text]
+    assert [text.count("\n") for text in listed] == [0]
+
+
+def test_a_list_of_globals_has_the_name_in_the_file_of_twincat(tmp_path: Path) -> None:
+    (tmp_path / "Limits.TcGVL").write_text(GLOBALS)
+    (tmp_path / "main.st").write_text("PROGRAM Main\nVAR n : INT; END_VAR\nn := GVL_Limits.highest;\nEND_PROGRAM\n")
+    with started(tmp_path) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.n") == 5
+
+
+@pytest.mark.parametrize("tag", ["NWL", "SFC"])
+def test_a_diagram_of_twincat_says_how_it_can_be_read(tmp_path: Path, tag: str) -> None:
+    path = tmp_path / "A.TcPOU"
+    path.write_text(MAIN.replace("<ST>", f"<{tag}>").replace("</ST>", f"</{tag}>"))
+    found = next(d for d in check_sources(load_sources([path])).diagnostics if d.code == "language")
+    assert found.message.endswith("; export the project as PLCopen XML, of which SFC, LD and FBD are read")
+
+
+def test_what_a_cut_off_file_declares_is_not_missing(tmp_path: Path) -> None:
+    (tmp_path / "FB_Counter.TcPOU").write_text(BLOCK[: BLOCK.index("<Action")])
+    (tmp_path / "MAIN.st").write_text("PROGRAM MAIN\nVAR f : FB_Counter; p : MC_Power; END_VAR\nf();\nEND_PROGRAM")
+    errors = [d for d in check_sources(load_sources([tmp_path])).diagnostics if d.severity == "error"]
+    assert [d.code for d in errors] == ["xml", "unknown"]
+    assert errors[1].message == "unknown type MC_Power"

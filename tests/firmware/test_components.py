@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from test_layers import DEFINED, FIRMWARE, INSTEAD_OF, MODULES, stands_on
+from test_firmware_layers import DEFINED, FIRMWARE, INSTEAD_OF, MODULES, stands_on
 
 ROOT = FIRMWARE.parent
 ORDER = re.findall(r"^X\((\w+)\)", (FIRMWARE / "include/CmpOrder.h").read_text(), re.MULTILINE)

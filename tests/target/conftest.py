@@ -14,7 +14,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).resolve().parent))
 
-from environment import FIRMWARE, MACHINE, ROOT, TARGET, firmware
+from environment import CONFIG, FIRMWARE, MACHINE, ROOT, TARGET, firmware
 
 SKIPPED = 77  # exit status that Meson counts as skipped
 
@@ -55,7 +55,7 @@ def make_board(tmp_path: Path) -> Iterator[Callable[..., Board]]:
     """Makes boards that are off: `make_board("full")`. They are switched off at the end."""
     boards: list[Board] = []
 
-    def make(config: str = "standard") -> Board:
+    def make(config: str = CONFIG) -> Board:
         folder = tmp_path / f"board{len(boards)}"
         folder.mkdir()
         boards.append(Board(MACHINE, firmware(config), folder))
@@ -68,7 +68,7 @@ def make_board(tmp_path: Path) -> Iterator[Callable[..., Board]]:
 
 @pytest.fixture
 def board(make_board: Callable[..., Board]) -> Board:
-    """A board with the standard configuration, on."""
+    """A board with the configuration under test, on."""
     board = make_board()
     board.power_on()
     return board

@@ -1,4 +1,5 @@
-"""What the tests run on. Environment: FIRMWARE_DIR (where firmware-*.elf are), QEMU_MACHINE."""
+"""What the tests run on. Environment: FIRMWARE_DIR (where firmware-*.elf are), QEMU_MACHINE,
+FIRMWARE_CONFIG (the configuration of tests that do not ask for one)."""
 
 from __future__ import annotations
 
@@ -18,6 +19,8 @@ TARGETS = {
     "lm3s6965evb": "cortex-m3",
 }
 TARGET = TARGETS.get(MACHINE, "")
+CONFIG = os.environ.get("FIRMWARE_CONFIG", "standard")
+IEC_STACK_SIZE = {"standard": 1024, "full": 2048}[CONFIG]  # of a task [bytes]
 PATIENCE = 60.0  # [s]; machines under load are slow
 
 

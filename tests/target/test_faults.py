@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
-from environment import TARGET, eventually
+from environment import IEC_STACK_SIZE, TARGET, eventually
 from programs import Built, compile_text
 
 from plctool.core import lib
@@ -114,7 +114,9 @@ FAULTS = {
     "bus fault, write": Fault("f[i] := 1;", "ACCESS_VIOLATION", FAR, "none"),
     "bus fault, read": Fault("x := f[i];", "ACCESS_VIOLATION", FAR, "none"),
     "undefined instruction": Fault("x := 4711;", "ILLEGAL_INSTRUCTION", spoil=undefined_instruction),
-    "stack overflow": Fault("x := Large(n);", "STACK_OVERFLOW", checks="none", before=FUNCTION.format(last=299)),
+    "stack overflow": Fault(
+        "x := Large(n);", "STACK_OVERFLOW", checks="none", before=FUNCTION.format(last=IEC_STACK_SIZE // 4 + 43)
+    ),
     "stack overflow, past all stacks": Fault(
         "x := Large(n);", "STACK_OVERFLOW", checks="none", before=FUNCTION.format(last=999)
     ),
@@ -229,7 +231,7 @@ def has_stopped(plc: Plc) -> bool:
 
 
 def test_two_tasks_with_real_arithmetic_do_not_disturb_each_other(plc, build) -> None:
-    """Each computes the same over and over; a register that the other one leaves behind makes it another result."""
+    """Each computes the same over and over; a register that the other one has changed makes it another result."""
     text = """
 FUNCTION Series : REAL
 VAR_INPUT

@@ -90,13 +90,13 @@ static void call(void *arg)
     before_back(stack);
 }
 
-int IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
+bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
     CALL arguments = {stack, fn, arg};
     __sanitizer_start_switch_fiber(&stack->sanitizer.own_state, (void *)stack->bottom, STACK_SIZE);
-    int left = IecStackSwitch(call, &arguments, stack, 0);
+    bool left = IecStackSwitch(call, &arguments, stack, 0);
     __sanitizer_finish_switch_fiber(stack->sanitizer.own_state, NULL, NULL);
-    return left;
+    return !left;
 }
 
 /* The frames that are given up have poisoned what lies between their variables: here, and where handlers run. */
@@ -110,9 +110,9 @@ NOT_CHECKED void IecStackLeave(IEC_STACK *stack)
 
 #else
 
-int IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
+bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
 {
-    return IecStackSwitch(fn, arg, stack, 1);
+    return IecStackSwitch(fn, arg, stack, 1) == 0;
 }
 
 void IecStackLeave(IEC_STACK *stack)

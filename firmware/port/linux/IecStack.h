@@ -32,8 +32,8 @@ void *IecStackSignalMemory(const IEC_STACK *stack, size_t *size);
 /* Whether the address lies in the guard below the stack, where it grows into. */
 bool IecStackIsOverflow(const IEC_STACK *stack, uintptr_t address);
 
-/* Runs fn(arg) on the IEC stack: 0 when it returned, 1 when IecStackLeave was called. */
-int IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
+/* Runs fn(arg) on the IEC stack: true when it returned, false when IecStackLeave was called. */
+bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
 /* Ends the running IecStackRun of this thread, from the IEC stack or from a signal handler. */
 void IecStackLeave(IEC_STACK *stack) __attribute__((noreturn));
 

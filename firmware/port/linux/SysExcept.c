@@ -362,17 +362,17 @@ static void begin_round(CONTEXT *context, const void *arg)
     __atomic_store_n(&context->arg, arg, __ATOMIC_RELEASE);
 }
 
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     CONTEXT *context = own_context();
     begin_round(context, arg);
-    if (IecStackRun(&context->stack, fn, arg) != 0) {
+    if (!IecStackRun(&context->stack, fn, arg)) {
         *exception = context->exception;
-        return 1;
+        return false;
     }
     exception->code = RTSEXCPT_NOEXCEPTION;
     exception->address = 0;
-    return 0;
+    return true;
 }
 
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)

@@ -6,6 +6,7 @@
 #define _GNU_SOURCE
 #include "SysTarget.h"
 
+#include "CmpSettings.h"
 #include "CompactDownload.h"
 #include "port.h"
 
@@ -95,12 +96,23 @@ static void read_machine_id(char *text, int size)
     }
 }
 
+/* As the settings of a product say, or that of the machine. */
+static void name_node(void)
+{
+    const char *name = SettgGetStringValue("SysTarget", "NodeName", NULL);
+    if (name != NULL) {
+        snprintf(state.node_name, sizeof(state.node_name), "%s", name);
+    } else {
+        gethostname(state.node_name, sizeof(state.node_name) - 1);
+    }
+}
+
 RTS_RESULT SysTarget_Hook(CMP_HOOK hook)
 {
     char id[80];
     if (hook == CH_INIT_SYSTEM) {
         memset(&state, 0, sizeof(state));
-        gethostname(state.node_name, sizeof(state.node_name) - 1);
+        name_node();
         read_machine_id(id, sizeof(id));
         snprintf(state.serial_number, sizeof(state.serial_number), "%016llX", (unsigned long long)hash(id));
     }

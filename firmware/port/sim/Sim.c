@@ -528,7 +528,7 @@ static void code_batch(BENCH *bench)
 {
     RTS_EXCEPTION exception;
 
-    bench->failed = SysExceptTry(call_entry, bench, &exception) != 0;
+    bench->failed = !SysExceptTry(call_entry, bench, &exception);
     sim.now_ns += bench->interval_ns * bench->cycles;
 }
 
@@ -652,7 +652,7 @@ static const CMP_EXT_FUNCTION externals[] = {
     {"simburn", 0x76DDCD81, 0x00010000, (RTS_PFN)simburn}, /* simburn(UDINT) */
 };
 
-int SimHasExternal(const char *name)
+bool SimHasExternal(const char *name)
 {
     return sim.on && CMFindExternal(name) != NULL;
 }

@@ -76,7 +76,7 @@ void SimForgetEvents(void);
 RTS_RESULT SimPostEvent(const char *name);
 
 /* Whether IEC code can call a C function of this name (lower case). While power is off nothing can be called. */
-int SimHasExternal(const char *name);
+bool SimHasExternal(const char *name);
 
 /*
  * Real time one call of a task takes [ns], both the best of several batches: its code alone, called back to back with

@@ -24,8 +24,12 @@ typedef struct {
     RTS_I64 retain[WORDS(APP_RETAIN_SIZE)];
 } AREAS;
 
+typedef struct {
+    AREAS all;
+} APP_AREAS_ALIGNED(sizeof(AREAS)) PLACED;
+
 #if APP_AREAS_FROM_PORT
-static AREAS *areas_of_port;
+static PLACED *areas_of_port;
 #define areas (*areas_of_port)
 
 RTS_RESULT AppAreasInit(void)
@@ -34,7 +38,7 @@ RTS_RESULT AppAreasInit(void)
     return areas_of_port != NULL ? ERR_OK : ERR_NOMEMORY;
 }
 #else
-static AREAS areas;
+static PLACED areas APP_AREAS_SECTION;
 #endif
 
 void AppAreasClear(void)
@@ -47,7 +51,7 @@ void AppAreasClearOutputs(void)
 {
     RTS_UI32 lock = SysLockEnter();
 
-    memset(areas.output, 0, sizeof areas.output);
+    memset(areas.all.output, 0, sizeof areas.all.output);
     SysLockLeave(lock);
 }
 

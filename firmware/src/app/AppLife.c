@@ -153,7 +153,7 @@ static bool run_function(RTS_UI32 function, bool init_retains)
     APP_RAISED raised = {-1, RTSEXCPT_NOEXCEPTION, 0};
     RTS_EXCEPTION exception;
 
-    if (app.image.entry[function] == IMAGE_NO_ENTRY || !IecTaskRunGuarded(call_init, &call, &exception))
+    if (app.image.entry[function] == IMAGE_NO_ENTRY || IecTaskRunGuarded(call_init, &call, &exception))
         return true;
     raised.code = exception.code;
     raised.address = exception.address;

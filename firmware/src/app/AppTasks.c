@@ -107,7 +107,7 @@ static RTS_RESULT check_blob(LOADER *l)
 
     if (result != ERR_OK)
         return result;
-    if (blob.magic != (RTS_UI32)CDL_BLOB_MAGIC)
+    if (blob.magic != CDL_BLOB_MAGIC)
         return refuse(l, ERR_TYPE_MISMATCH, "There is no blob at offset %u.", U(l->offset - sizeof blob));
     if (blob.size > l->end - l->offset)
         return refuse(l, ERR_OUT_OF_LIMITS, "Blob %u ends beyond its segment.", U(blob.id));

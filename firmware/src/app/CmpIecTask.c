@@ -39,7 +39,8 @@ RTS_RESULT IecTaskStartAll(void)
     return SchedStart();
 }
 
-void IecTaskStopAll(void)
+/* Not inlined: it is called from three places. */
+__attribute__((noinline)) void IecTaskStopAll(void)
 {
     IecCycleStop();
     SchedStop();

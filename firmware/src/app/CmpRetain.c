@@ -214,9 +214,10 @@ static RTS_UI8 ieckept(const RTS_UI8 *address, RTS_UI32 size)
     (void)take_all(&query, &dropped);
     return query.found;
 }
+APP_GATE(ieckept); /* reads the flash */
 
 static const CMP_EXT_FUNCTION externals[] = {
-    {"ieckept", 0xEBCA3613, 0x00010000, (RTS_PFN)ieckept}, /* ieckept(POINTER TO BYTE,UDINT):BOOL */
+    {"ieckept", 0xEBCA3613, 0x00010000, (RTS_PFN)APP_GATED(ieckept)}, /* ieckept(POINTER TO BYTE,UDINT):BOOL */
 };
 
 /* ---- saving ---- */

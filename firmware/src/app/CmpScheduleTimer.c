@@ -128,7 +128,7 @@ static RTS_RESULT add_task(const CDL_TASK *task)
     RTS_UI32 index = schedule.count++;
     SYS_TIMER_CALLBACK callback = callback_of(task->kind);
 
-    schedule.timer[index] = (RTS_HANDLE)RTS_INVALID_HANDLE;
+    schedule.timer[index] = RTS_INVALID_HANDLE;
     if (callback != NULL)
         return SysTimerCreate(callback, (void *)(uintptr_t)index, task->kind == KIND_CYCLIC ? task->interval_us : 0,
                               task->priority, &schedule.timer[index]);
@@ -159,7 +159,7 @@ RTS_RESULT SchedStart(void)
     TriggerForget();
     schedule.started = true;
     for (i = 0; i < schedule.count && result == ERR_OK; i++) {
-        if (schedule.timer[i] != (RTS_HANDLE)RTS_INVALID_HANDLE)
+        if (schedule.timer[i] != RTS_INVALID_HANDLE)
             result = SysTimerStart(schedule.timer[i]);
     }
     return result;

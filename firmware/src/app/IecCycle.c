@@ -73,7 +73,7 @@ static GUARD_INLINE void guard_end(GUARD *guard)
     SysAtomicStore(&guard->phase, guard->phase + 1);
 }
 
-int IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
+bool IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
 {
     const GUARD *guard = &tasks.init_guard;
 
@@ -84,7 +84,7 @@ int IecTaskReadGuard(RTS_UI32 index, IEC_GUARD *out)
     }
     out->serial = SysAtomicLoad(&guard->phase);
     if ((out->serial & 1) == 0)
-        return 0;
+        return false;
     out->start_ns = guard->start_ns;
     out->limit_ns = guard->limit_ns;
     SysAtomicFence();
@@ -106,15 +106,15 @@ RTS_UI32 IecTaskGetActivity(bool *busy)
     return sum;
 }
 
-int IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool IecTaskRunGuarded(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
-    int failed;
+    bool ended;
 
     tasks.init_arg = arg;
     guard_begin(&tasks.init_guard, SysTimeGetNs());
-    failed = SysExceptTry(fn, arg, exception);
+    ended = SysExceptTry(fn, arg, exception);
     guard_end(&tasks.init_guard);
-    return failed;
+    return ended;
 }
 
 /* ---- the cycle ---- */
@@ -209,13 +209,13 @@ static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
 
 /* No other cycle starts, which is settled before the guard says that this one is over. The rest of stopping the
  * application is main's. */
-static int end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
+static bool end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
     SysAtomicStore(&tasks.running, 0);
     guard_end(&task->guard);
     AppEnterSafeState(); /* at once: main may be busy with the flash */
     AppHandleException((RTS_I32)index_of(task), code, address);
-    return 0;
+    return false;
 }
 
 static void run_phases_before(TASK *task)
@@ -238,7 +238,7 @@ static void run_phases_after(TASK *task)
 }
 
 /* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
-static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
+static __attribute__((noinline)) bool run_cycle(TASK *task, RTS_I64 due_ns)
 {
     RTS_I64 start_ns = SysTimeGetNs();
     RTS_I64 used_before_ns = used_ns(task);
@@ -249,7 +249,7 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
     guard_begin(&task->guard, start_ns);
     if (task->has_phases)
         run_phases_before(task);
-    if (SysExceptTry(run_entry, task, &exception))
+    if (!SysExceptTry(run_entry, task, &exception))
         return end_with_exception(task, exception.code, exception.address);
     if (task->has_phases)
         run_phases_after(task);
@@ -259,7 +259,7 @@ static __attribute__((noinline)) int run_cycle(TASK *task, RTS_I64 due_ns)
         return end_with_exception(task, RTSEXCPT_WATCHDOG, 0);
     guard_end(&task->guard);
     SchedNoteEvents();
-    return 1;
+    return true;
 }
 
 /* ---- a moment between all cycles ---- */
@@ -341,13 +341,13 @@ bool IecTaskBetweenCycles(void (*copy)(void))
     return true;
 }
 
-int IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
+bool IecTaskCycle(RTS_UI32 index, RTS_I64 due_ns)
 {
     TASK *task = &tasks.list[index];
 
     if (!RTS_ONE_CORE && APP_RETAIN_SIZE > 0 && is_wanted())
         make_moment(task);
-    return SysAtomicLoad(&tasks.running) ? run_cycle(task, due_ns) : 0;
+    return SysAtomicLoad(&tasks.running) ? run_cycle(task, due_ns) : false;
 }
 
 /* ---- all tasks ---- */

@@ -92,24 +92,21 @@ void SchedNoteEvents(void)
 }
 
 /* Events so far: a variable that is TRUE has risen once more than it fell. */
-static RTS_UI16 count_events(const TRIGGER *trigger)
+static RTS_UI32 count_events(const TRIGGER *trigger)
 {
-    return (RTS_UI16)((SysAtomicLoad(&trigger->changes) + 1) / 2);
+    return (SysAtomicLoad(&trigger->changes) + 1) / 2;
 }
 
 bool TriggerTake(RTS_UI32 task)
 {
     TRIGGER *trigger = &triggers.list[task];
-    RTS_UI16 waiting = (RTS_UI16)(count_events(trigger) - trigger->answered);
+    RTS_UI32 waiting = (RTS_UI16)(count_events(trigger) - trigger->answered);
+    RTS_UI32 lost = waiting > SCHED_MAX_WAITING_EVENTS ? waiting - SCHED_MAX_WAITING_EVENTS : 0;
 
     if (waiting == 0)
         return false;
-    trigger->answered++;
-    if (waiting > SCHED_MAX_WAITING_EVENTS) {
-        waiting = (RTS_UI16)(waiting - SCHED_MAX_WAITING_EVENTS);
-        trigger->answered = (RTS_UI16)(trigger->answered + waiting);
-        trigger->lost = (RTS_UI16)(trigger->lost + waiting);
-    }
+    trigger->answered = (RTS_UI16)(trigger->answered + 1 + lost);
+    trigger->lost = (RTS_UI16)(trigger->lost + lost);
     return true;
 }
 
@@ -175,7 +172,7 @@ static RTS_HANDLE no_event(RTS_RESULT *result, RTS_RESULT reason)
 {
     if (result != NULL)
         *result = reason;
-    return (RTS_HANDLE)RTS_INVALID_HANDLE;
+    return RTS_INVALID_HANDLE;
 }
 
 RTS_HANDLE SchedRegisterExternalEvent(const char *name, RTS_RESULT *result)

@@ -37,19 +37,10 @@ class CompileError(UsageError):
 
 def load_sources(paths: Sequence[Path | str]) -> list[Source]:
     """The files named, and all sources in the folders named. Raises UsageError when there is nothing to read."""
-    from plctool.compiler.source_files import find_sources, read_source
+    from plctool.compiler.source_files import load
 
-    files: dict[Path, None] = {}
-    for path in map(Path, paths):
-        if path.is_dir():
-            found = find_sources(path)
-            if not found:
-                raise UsageError(f"There is no source file (.st, .exp, .TcPOU ...) in {path}.", "no-source")
-            files.update(dict.fromkeys(found))
-        else:
-            files[path] = None
     try:
-        return [read_source(file) for file in files]
+        return load(map(Path, paths))
     except OSError as error:
         raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
 

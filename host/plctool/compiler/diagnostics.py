@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Literal
 
+from plctool.compiler.missing_names import Use, table
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Pos
 from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
@@ -17,7 +18,9 @@ from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
 Severity = Literal["error", "warning"]
 
 MAX_ERRORS = 20  # what follows is seldom news
+MAX_MISSING = 10  # places of unknown names that are shown each; of more there is a table
 MAX_MESSAGE = 300  # characters; names may be of any length
+_UNCOUNTED = frozenset(("language",))  # errors that hide no others
 MAX_LINE = 160  # characters of a source line that are shown with a finding
 
 
@@ -31,6 +34,7 @@ class Diagnostic:
     severity: Severity
     code: str
     message: str
+    missing: str = ""  # the name that nothing declares and that no other is like: maybe of a library
 
 
 class TooManyErrors(Exception):
@@ -46,11 +50,19 @@ class Diagnostics:
         self.options = ALL_WARNINGS
         self._muted: dict[tuple[str, str], LineRanges] = {}
         self._found: dict[Diagnostic, None] = {}
+        self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
+        self.baseless: set[str] = set()  # those of them whose base is unknown
         self.errors = 0
+        self._counted = 0  # errors that are counted to the limit
+        self.limit = MAX_ERRORS
 
     def error(self, pos: Pos, code: str, message: str) -> None:
         """Records an error; raises TooManyErrors when it is one too many."""
         self._add(pos, "error", code, message)
+
+    def missing(self, pos: Pos, name: str, message: str) -> None:
+        """Records that nothing is known by a name. These do not count: what a program needs is said in full."""
+        self._add(pos, "error", "unknown", message, missing=name)
 
     def warning(self, pos: Pos, code: str, message: str) -> None:
         """Records a warning, unless it is not wanted; `code` is one of WARNINGS."""
@@ -65,22 +77,34 @@ class Diagnostics:
     def mute(self, source: Source) -> None:
         """Heeds the pragmas of a text that turn warnings off."""
         for code, ranges in switched_off(source).items():
-            self._muted[source.path, code] = ranges
+            self._muted.setdefault((source.path, code), []).extend(ranges)
+
+    def found_by_reader(self, source: Source) -> None:
+        """Takes over what the reader of a file found. Diagrams do not count: all are named, and the rest is checked."""
+        for found in source.findings:
+            pos = Pos(source.path, found.line, found.column)
+            if found.severity == "warning":
+                self.warning(pos, found.code, found.message)
+            else:
+                self._add(pos, "error", found.code, found.message, counts=found.code not in _UNCOUNTED)
 
     def at(self, source: Source) -> SourceDiagnostics:
         """Reports by offset in a source."""
         return SourceDiagnostics(self, source)
 
-    def _add(self, pos: Pos, severity: Severity, code: str, message: str) -> None:
+    def _add(
+        self, pos: Pos, severity: Severity, code: str, message: str, *, counts: bool = True, missing: str = ""
+    ) -> None:
         if len(message) > MAX_MESSAGE:
             message = message[: MAX_MESSAGE - 3] + "..."
-        diagnostic = Diagnostic(pos.file, pos.line, pos.column, severity, code, message)
+        diagnostic = Diagnostic(pos.file, pos.line, pos.column, severity, code, message, missing)
         if diagnostic in self._found:
             return
         self._found[diagnostic] = None
         if severity == "error":
             self.errors += 1
-            if self.errors >= MAX_ERRORS:
+            self._counted += counts and not missing
+            if self._counted >= self.limit:
                 raise TooManyErrors
 
     def sorted(self) -> list[Diagnostic]:
@@ -117,11 +141,19 @@ def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
 
 
 def render_all(diagnostics: Sequence[Diagnostic], sources: Iterable[Source]) -> list[str]:
-    """All findings as people read them, and whether there may be more."""
-    texts = [render(d, sources) for d in diagnostics]
-    if sum(d.severity == "error" for d in diagnostics) >= MAX_ERRORS:
+    """All findings as people read them, and whether there may be more. Many missing names become one table."""
+    missing = [d for d in diagnostics if d.missing]
+    listed = len(missing) > MAX_MISSING
+    texts = [render(d, () if d.code in _UNCOUNTED else sources) for d in diagnostics if not (listed and d.missing)]
+    texts += missing_names_text(missing) if listed else []
+    if sum(d.severity == "error" and d.code not in _UNCOUNTED and not d.missing for d in diagnostics) >= MAX_ERRORS:
         texts.append(f"There may be more than these {MAX_ERRORS} errors; correct some and check again.")
     return texts
+
+
+def missing_names_text(missing: Sequence[Diagnostic]) -> list[str]:
+    """What a program needs and nothing declares, by library."""
+    return table([Use(d.missing, d.file, d.line) for d in missing])
 
 
 def _part_of(line: str, column: int) -> tuple[str, int]:

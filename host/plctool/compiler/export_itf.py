@@ -90,6 +90,7 @@ def _header(name: str, functions: list[Pou]) -> str:
         f"#define {guard}",
         "",
         '#include "CmpItf.h"',
+        '#include "rts_config.h"',
         "",
         "/* The number of the component in log entries; any that no other component has. */",
         f"enum {{ CMPID_{name} = 0x{0x8000 | zlib.crc32(name.encode()) & 0x7FFF:04X} }};",
@@ -102,6 +103,8 @@ def _header(name: str, functions: list[Pou]) -> str:
         text = interface_text(pou.external.name, pou)
         place = f"{text}, version {version >> 16}.{version & 0xFFFF}"
         lines += ["", f"/* {place} */", f"{_prototype(pou)};"]
+    lines += ["", "/* They have all rights of the runtime, also where the program that calls them has not. */"]
+    lines += [f"APP_GATE({pou.external.name});" for pou in functions if pou.external is not None]
     lines += ["", "/* The entries of the table for CMRegisterExternal: name, signature, version, function. */"]
     entries = [_entry(pou) for pou in functions]
     lines.append(f"#define {name.upper()}_EXT_FUNCTIONS \\")
@@ -113,7 +116,8 @@ def _header(name: str, functions: list[Pou]) -> str:
 def _entry(pou: Pou) -> str:
     external = pou.external
     assert external is not None
-    return f'{{"{external.name}", 0x{external.signature:08X}, 0x{external.version:08X}, (RTS_PFN){external.name}}}'
+    function = f"(RTS_PFN)APP_GATED({external.name})"
+    return f'{{"{external.name}", 0x{external.signature:08X}, 0x{external.version:08X}, {function}}}'
 
 
 def _prototype(pou: Pou) -> str:

@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 from plctool.compiler.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.library import Library, standard_library
+from plctool.compiler.missing_names import declared_names
 from plctool.compiler.nesting import NestingError, room_for_nesting
 from plctool.compiler.semantics.configuration import configure
 from plctool.compiler.semantics.overlaps import report_overlaps
@@ -22,9 +24,10 @@ from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.ast import Declaration
 from plctool.compiler.syntax.attributes import check_attributes, check_pragmas
+from plctool.compiler.syntax.conditions import names_asked_for
 from plctool.compiler.syntax.parser import Parsed, parse_all
 from plctool.compiler.task_images import plan_images
-from plctool.compiler.typed import TypedProgram
+from plctool.compiler.typed import Pos, TypedProgram
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.iec.areas import Area
 from plctool.iec.types import MAX_SIZE
@@ -92,8 +95,18 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
 
 def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
     world = program.world
-    texts = [(source, parse_all(source, world.diagnostics.at(source).error)) for source in sources]
-    if world.diagnostics.errors:
+    declared = names_asked_for([source.text for source in sources], world.names.library.names)
+    texts: list[tuple[Source, Parsed]] = []
+    broken: list[Source] = []
+    for source in sources:
+        before = world.diagnostics.errors
+        texts.append((source, parse_all(source, world.diagnostics.at(source).error, declared=declared)))
+        if world.diagnostics.errors > before or any(found.code == "xml" for found in source.findings):
+            broken.append(source)
+    for source in sources:
+        world.diagnostics.found_by_reader(source)
+    if broken:
+        _name_what_is_missing(program, sources, broken)
         return None
     parsed = [(source, _looked_at(source, text, world.diagnostics)) for source, text in texts]
     tests = None if suite is None else suite.begin(program)
@@ -136,6 +149,22 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     if not world.diagnostics.errors:
         plan_images(typed, world.diagnostics)
     return typed
+
+
+def _name_what_is_missing(program: Program, sources: Sequence[Source], broken: Sequence[Source]) -> None:
+    """Names that nothing declares in the files without syntax errors: a mistake in one file hides no library that the
+    others need. Other errors wait, because they may follow from what the `broken` files declare."""
+    found = program.world.diagnostics
+    whole = [source for source in sources if source not in broken]
+    if not whole:
+        return
+    declared = {name for s in sources if s not in whole for name in declared_names(s.original or s.text)}
+    other = Program(program.world.names.library)
+    other.world.diagnostics.limit = sys.maxsize
+    _check(other, whole, None)
+    for d in other.world.diagnostics.sorted():
+        if d.missing and d.missing.casefold() not in declared:
+            found.missing(Pos(d.file, d.line, d.column), d.missing, d.message)
 
 
 def _looked_at(source: Source, parsed: Parsed, diagnostics: Diagnostics) -> list[Declaration]:

@@ -20,13 +20,16 @@ _FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
 _OPENING = re.compile(
     r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
 )
-_QUALIFIED = re.compile(r"(?:standard|tc2_standard|tc2_system)\.(?=\w+$)")
+_NAMESPACES = (
+    "standard", "standard64", "util", "tc2_standard", "tc2_system", "tc2_utilities", "__system", "ibaselibrary",
+)  # fmt: skip
+_QUALIFIED = re.compile(rf"(?:{'|'.join(_NAMESPACES)})\.(?=\w+$)", re.IGNORECASE)
 _STRUCT = re.compile(r"\bSTRUCT\b.*?\bEND_STRUCT\b", re.DOTALL)
 _DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
 
 
 def without_library(key: str) -> str:
-    """A case-folded name without the library of other systems in front of it: there is one library here."""
+    """A name without the library of other systems in front of it: there is one library here."""
     return _QUALIFIED.sub("", key, count=1) if "." in key else key
 
 

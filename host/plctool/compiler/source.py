@@ -1,6 +1,8 @@
 """Source texts and places in them.
 
 Inside the front end a place is a character offset into one text; lines and columns are worked out when somebody asks.
+A text that was made from a file of another kind (XML, an export of a whole project) knows where in that file each of
+its parts stands, so that diagnostics, breakpoints and warnings that are turned off have the lines of the file.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -8,46 +10,93 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import PurePath
+from typing import Literal
 
 from plctool.compiler.typed import Pos
 
 
 @dataclass(frozen=True)
+class Finding:
+    """What the reader of a file has to say about it. `line` and `column` count from 1."""
+
+    line: int
+    column: int
+    code: str
+    message: str
+    severity: Literal["error", "warning"] = "error"
+
+
+@dataclass(frozen=True)
+class Piece:
+    """From character `offset` on, a text stands in line and column (from 1) of the file, or of another one at `path`.
+
+    A piece that is `copied` is within one line of it. What is not was made up for what stands there, all of it at that
+    one place."""
+
+    offset: int
+    line: int
+    column: int
+    copied: bool
+    path: str = ""
+
+
+@dataclass(frozen=True)
 class Source:
-    """A text to compile; `path` is what diagnoses and debug information call it."""
+    """A text to compile; `path` is what diagnostics and debug information call it.
+
+    `name`: what the list of globals in it is called, unless by the file. `original`: the file, when the text was made
+    from it, in `pieces` that begin at offset 0.
+    """
 
     path: str
     text: str
+    name: str = ""
+    original: str | None = field(default=None, repr=False)
+    pieces: tuple[Piece, ...] = field(default=(), repr=False, compare=False)
+    findings: tuple[Finding, ...] = field(default=(), compare=False)
 
     @cached_property
     def line_starts(self) -> list[int]:
-        """Offsets of the first character of each line."""
+        """Offsets of the first character of each line of the file."""
+        text = self.text if self.original is None else self.original
         starts = [0]
-        find = self.text.find
+        find = text.find
         at = find("\n")
         while at >= 0:
             starts.append(at + 1)
             at = find("\n", at + 1)
         return starts
 
+    @cached_property
+    def _offsets(self) -> list[int]:
+        return [piece.offset for piece in self.pieces]
+
     @property
     def stem(self) -> str:
-        """The file name without folder and extension: how a list of globals is qualified."""
-        return PurePath(self.path).stem
+        """How a list of globals is qualified: by default the file name without folder and extension."""
+        return self.name or PurePath(self.path).stem
 
     def pos(self, offset: int) -> Pos:
         """Line and column (from 1) of a character offset."""
+        if self.pieces:
+            return self._pos_in_pieces(offset)
         starts = self.line_starts
         line = bisect_right(starts, offset)
         return Pos(self.path, line, offset - starts[line - 1] + 1)
 
+    def _pos_in_pieces(self, offset: int) -> Pos:
+        piece = self.pieces[max(0, bisect_right(self._offsets, offset) - 1)]
+        more = offset - piece.offset if piece.copied else 0
+        return Pos(piece.path or self.path, piece.line, piece.column + more)
+
     def line_text(self, line: int) -> str:
-        """The text of a line (from 1) without its end."""
+        """The text of a line (from 1) of the file, without its end."""
+        text = self.text if self.original is None else self.original
         starts = self.line_starts
         if not 1 <= line <= len(starts):
             return ""
-        end = starts[line] - 1 if line < len(starts) else len(self.text)
-        return self.text[starts[line - 1] : end].rstrip("\r")
+        end = starts[line] - 1 if line < len(starts) else len(text)
+        return text[starts[line - 1] : end].rstrip("\r")

@@ -1,4 +1,4 @@
-"""Reads source files: Structured Text in any usual encoding, and the XML that TwinCAT 3 keeps it in.
+"""Finds and reads source files: Structured Text in any usual encoding, and what other systems keep it in.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -6,34 +6,149 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import codecs
-import re
-from collections.abc import Iterator
+from collections.abc import Callable, Container, Iterable, Mapping
 from pathlib import Path
 
-from plctool.compiler.source import Source
-from plctool.compiler.syntax.lexer import Lexer
+from plctool.compiler.formats import beremiz, codesys2, global_lists, object_text, plcopen, twincat, unreadable
+from plctool.compiler.garbage import no_collection
+from plctool.compiler.source import Finding, Source
 from plctool.errors import UsageError
 
-SUFFIXES = frozenset((".st", ".exp", ".tcpou", ".tcgvl", ".tcdut", ".tcio"))
-"""Of files that are taken from folders, in lower case: Structured Text, exports of CODESYS 2, TwinCAT 3."""
+Reader = Callable[[str, str], list[Source]]
+"""Makes sources from the path and the text of a file."""
 
-_UNITS = frozenset(("FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "INTERFACE"))
-_PART = re.compile(
-    r"<!\[CDATA\[(?P<code>.*?)\]\]>|<(?P<tag>/?\w+)(?:[^>]*?\bName=\"(?P<name>[^\"]*)\")?[^>]*?(?P<empty>/?)>",
-    re.DOTALL,
-)
-_OTHER_LANGUAGES = frozenset(("SFC", "NWL", "FBD", "LD", "IL", "CFC"))
+
+def _structured_text(path: str, text: str) -> list[Source]:
+    return [beremiz.without_blocks_in_c(object_text.read_object(path, text))]
+
+
+def _export(path: str, text: str) -> list[Source]:
+    return [codesys2.read_export(path, text)]
+
+
+def _twincat(path: str, text: str) -> list[Source]:
+    return [twincat.read_object(path, text)]
+
+
+def _xml(path: str, text: str) -> list[Source]:
+    return plcopen.read_project(path, text)
+
+
+def _variables(path: str, text: str) -> list[Source]:
+    return [global_lists.read_list(path, text)]
+
+
+READERS: dict[str, Reader] = {
+    **dict.fromkeys((".st", ".iecst", ".scl", ".fun", ".typ"), _structured_text),
+    ".var": _variables,
+    ".exp": _export,
+    ".xml": _xml,
+    **dict.fromkeys((".tcpou", ".tcgvl", ".tcdut", ".tcio", ".tctto"), _twincat),
+}
+"""How a file is read, by its suffix in lower case."""
+
+SUFFIXES = frozenset(READERS) - {".xml"}
+"""That sources alone have, in lower case. An .xml is taken from a folder when it is a project."""
+
+
+def load(paths: Iterable[Path]) -> list[Source]:
+    """The files named, those of projects named, and all sources in folders named.
+
+    Raises OSError when one cannot be read, UsageError when there is nothing to read.
+    """
+    files: dict[Path, None] = {}
+    for path in paths:
+        files.update(dict.fromkeys(_files(path)))
+    with no_collection():
+        read = {file: read_file(file) for file in files}
+    for owner, members in _members(read).items():
+        read[owner] = object_text.with_members(read[owner][0], [read.pop(member)[0] for member in members])
+    return [source for sources in read.values() for source in sources]
+
+
+def _members(read: Mapping[Path, list[Source]]) -> dict[Path, list[Path]]:
+    """The files that hold members of the unit in another one, by that."""
+    found: dict[Path, list[Path]] = {}
+    for file, sources in read.items():
+        owner = _owner(file)
+        if owner is not None and owner in read and object_text.is_member(sources):
+            found.setdefault(owner, []).append(file)
+    return found
+
+
+def _owner(file: Path) -> Path | None:
+    """The file of the unit to which a member in a file of its own belongs: `Pump.st` for `Pump.Start.st`, and for
+    `Pump/Start.st`."""
+    unit, dot, _ = file.stem.rpartition(".")
+    if dot:
+        return file.with_name(unit + file.suffix) if unit else None
+    return file.parent.with_suffix(file.suffix) if file.parent.name else None
+
+
+def read_file(path: Path) -> list[Source]:
+    """What a file holds."""
+    data = path.read_bytes()
+    refused = unreadable.refusal(path, data)
+    if refused:
+        return [Source(str(path), "", findings=(Finding(1, 1, "file", refused),))]
+    return READERS.get(path.suffix.lower(), _structured_text)(str(path), decode(data))
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        return find_sources(path)
+    suffix = path.suffix.lower()
+    if suffix == ".plcproj":
+        return [p for p in twincat.project_files(path, decode(path.read_bytes())) if p.suffix.lower() in SUFFIXES]
+    if suffix == ".tsproj":
+        projects = twincat.projects_of_solution(path, decode(path.read_bytes()))
+        if not projects:
+            raise UsageError(f"{path} names no PLC project (.plcproj) that is there.", "no-source")
+        return [file for project in projects for file in _files(project)]
+    return [path]
 
 
 def find_sources(folder: Path) -> list[Path]:
-    """All source files in a folder and those below it."""
-    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
+    """The source files in a folder and those below it; of a TwinCAT project, those that belong to it.
+
+    Raises UsageError when there are none, or several projects.
+    """
+    projects = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".plcproj" and path.is_file())
+    if len(projects) > 1:
+        names = ", ".join(str(path) for path in projects)
+        raise UsageError(f"There are several PLC projects in {folder}; give one of them: {names}.", "no-source")
+    found = sorted(path for path in folder.rglob("*") if _is_source(path))
+    found = [path for path in found if not _is_generated(path, found)]
+    if projects:
+        home = projects[0].parent
+        others = (path for path in found if home not in path.parents or not path.suffix.lower().startswith(".tc"))
+        found = sorted({*_files(projects[0]), *others})
+    if not found:
+        raise UsageError(
+            f"There is no source file (.st, .exp, .TcPOU ...) in {folder}{_other_files(folder)}.", "no-source"
+        )
+    return found
 
 
-def read_source(path: Path) -> Source:
-    """The text of a file. Raises OSError when it cannot be read, UsageError when it holds another language."""
-    text = decode(path.read_bytes())
-    return Source(str(path), structured_text(text, path) if path.suffix.lower().startswith(".tc") else text)
+def _other_files(folder: Path) -> str:
+    """What to do with the files that hold programs but no text."""
+    others = (path for path in sorted(folder.rglob("*")) if path.suffix.lower() in unreadable.WHAT_TO_DO)
+    return next((f"; {path.name} is no text: {unreadable.WHAT_TO_DO[path.suffix.lower()]}" for path in others), "")
+
+
+def _is_source(path: Path) -> bool:
+    suffix = path.suffix.lower()
+    if suffix not in READERS or not path.is_file():
+        return False
+    if suffix != ".xml":
+        return True
+    with path.open("rb") as file:
+        return plcopen.is_project(decode(file.read(plcopen.HEAD)))
+
+
+def _is_generated(path: Path, found: Container[Path]) -> bool:
+    """Whether OpenPLC Editor or Beremiz made a file from the plc.xml beside its folder."""
+    return path.parent.name == "build" and path.parent.with_name("plc.xml") in found
 
 
 def decode(data: bytes) -> str:
@@ -44,47 +159,3 @@ def decode(data: bytes) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
-
-
-def structured_text(xml: str, path: Path) -> str:
-    """The code in a file of TwinCAT 3, each line where it was, with the END_... that are not written there."""
-    return "".join(_pieces(xml, path))
-
-
-def _pieces(xml: str, path: Path) -> Iterator[str]:
-    at, unit = 0, ""
-    for match in _PART.finditer(xml):
-        yield _blank(xml[at : match.start()])
-        at = match.end()
-        code, tag = match["code"], match["tag"]
-        if code is not None:
-            unit = unit or _unit_keyword(code)
-            yield f"{_blank('<![CDATA[')}{code}{_blank(']]>')}"
-            continue
-        if tag in _OTHER_LANGUAGES:
-            raise UsageError(f"{path} holds {tag}; only Structured Text can be compiled.", "language")
-        yield f"{_blank(match[0])}{'' if match['empty'] else _keyword(tag, match['name'], unit)}"
-    yield _blank(xml[at:])
-
-
-def _keyword(tag: str, name: str | None, unit: str) -> str:
-    """What stands for a tag in Structured Text."""
-    if tag in ("/POU", "/Itf"):
-        return f"END_{unit}\n"
-    if tag == "Action":
-        return f"ACTION {name}:"
-    if tag in ("Get", "Set"):
-        return tag.upper()
-    return f"END_{tag[1:].upper()}" if tag in ("/Method", "/Action", "/Property", "/Get", "/Set") else ""
-
-
-def _unit_keyword(declaration: str) -> str:
-    """Which unit a declaration begins."""
-    tokens = Lexer(declaration, lambda offset, code, message: None)
-    return next((token.type for token in tokens if token.type in _UNITS), "")
-
-
-def _blank(text: str) -> str:
-    """As many lines, and as many characters in the last one."""
-    head, newline, last = text.rpartition("\n")
-    return "\n" * (head.count("\n") + len(newline)) + " " * len(last)

@@ -76,10 +76,11 @@ class ArrayInit:
 @dataclass
 class StructInit:
     """Only the members given, spelt as in the type; the rest take its defaults (`TypedProgram.defaults`). `arguments`:
-    what the FB_Init of an instance gets besides."""
+    what the FB_Init of an instance gets besides; `properties`: what its properties are set to after it, by name."""
 
     members: dict[str, Initial]
     arguments: dict[str, Expr] = field(default_factory=dict)
+    properties: dict[str, Expr] = field(default_factory=dict)
 
 
 @dataclass
@@ -97,7 +98,8 @@ def overlay(given: Initial, default: Initial | None) -> Initial:
     """An initial value that is complete: members that `given` does not name, at any depth, are as in `default`."""
     if isinstance(given, StructInit) and isinstance(default, StructInit):
         named = {name: overlay(value, default.members.get(name)) for name, value in given.members.items()}
-        return StructInit({**default.members, **named}, {**default.arguments, **given.arguments})
+        arguments = {**default.arguments, **given.arguments}
+        return StructInit({**default.members, **named}, arguments, {**default.properties, **given.properties})
     return given
 
 

@@ -22,8 +22,9 @@ from plctool.debug.trace import Trace
 from plctool.debug.variables import Symbol, Units, constant_symbol, walk
 from plctool.errors import UsageError
 from plctool.files import write_atomically
+from plctool.iec.addresses import parse_address
 from plctool.iec.type_descriptions import DescribedTypes, describe
-from plctool.iec.types import ArrayType
+from plctool.iec.types import ELEMENTARY, ArrayType
 
 if TYPE_CHECKING:
     from plctool.debug.call_frames import DebugInfo
@@ -66,9 +67,9 @@ class KeptName:
 
 @dataclass
 class SymbolTable:
-    """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry holds up to
-    the next one. `aliases`: other names of variables. `classes`: the numbers by which instances tell their class.
-    `constants`: those that have no place in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
+    """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry goes up to
+    the next one. `aliases`: other names of variables. `classes`: the numbers by which instances show their class.
+    `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
     lose."""
 
     image_crc: int
@@ -96,8 +97,8 @@ class SymbolTable:
     # ---- variables ----
 
     def resolve(self, path: str) -> Symbol:
-        """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5'. Upper and lower
-        case are the same. Raises UsageError with a suggestion."""
+        """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5', or what is at an
+        address such as %MW0. Upper and lower case are the same. Raises UsageError with a suggestion."""
         text = path.strip()
         at = len(text)
         while at > 0:
@@ -105,6 +106,10 @@ class SymbolTable:
             if symbol is not None:
                 return walk(symbol, text, at, self._units)
             at = max(text.rfind(".", 0, at), text.rfind("[", 0, at), text.rfind("^", 0, at))
+        address = parse_address(text)
+        if address is not None:
+            bit, t = (None, address.type) if address.width else (address.bit, ELEMENTARY["BYTE"])
+            return Symbol(text.upper(), address.area.value, address.offset, t, bit)
         raise self._unknown(text)
 
     def _unknown(self, text: str) -> UsageError:
@@ -282,7 +287,7 @@ def load_symbols(path: Path) -> SymbolTable:
     except OSError as error:
         raise UsageError(f"The symbol file {path} cannot be read: {error.strerror}.", "no-symbols") from None
     except UnicodeDecodeError:
-        raise UsageError(f"{path} is no symbol file; name the .sym that build wrote.", "bad-symbols") from None
+        raise UsageError(f"{path} is not a symbol file; name the .sym that build wrote.", "bad-symbols") from None
     return SymbolTable.from_json(text, f"The symbol file {path}")
 
 

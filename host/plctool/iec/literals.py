@@ -33,7 +33,7 @@ UNITS_NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000
 """Nanoseconds of each unit of a duration, the longest first."""
 _UNITS = list(UNITS_NS)
 _TIME_PART = re.compile(r"(\d+(?:\.\d+)?)(d|h|ms|us|ns|m|s)", re.IGNORECASE | re.ASCII)
-_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?\Z", re.ASCII)
+_NUMBER = re.compile(r"\d+(?:\.\d*)?(?:[eE][+-]?\d+)?\Z", re.ASCII)
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _NOT_ENUMS = {*ELEMENTARY, *_TIME_TYPES, *_DATE_TYPES, "STRING", "WSTRING"}
 _UNDERSCORES = re.compile(r"__|_\Z|\A_|_\.|\._")
@@ -61,13 +61,13 @@ class BitPattern(int):
 
 
 class LiteralError(Exception):
-    """The text is no literal; the message says why in one sentence."""
+    """Not a valid literal; the message says why in one sentence."""
 
 
 def unsigned(text: str) -> tuple[LiteralKind, Value]:
     """`12`, `1_000`, `16#FF`, `1.5e3`."""
     if not text:
-        raise LiteralError("the value behind # is missing")
+        raise LiteralError("the value after # is missing")
     if len(text) > MAX_DIGITS:
         raise LiteralError("this number is too long")
     if _UNDERSCORES.search(text):
@@ -170,7 +170,7 @@ def _clock(name: str, text: str) -> int:
 
 
 def string(text: str) -> str:
-    """The characters of a quoted text with its $ escapes resolved: of a WSTRING as UTF-16 code units when the quotes
+    """The characters of a quoted string with its $ escapes resolved: of a WSTRING as UTF-16 code units when the quotes
     are
     double."""
     wide = text.startswith('"')
@@ -188,10 +188,18 @@ def string(text: str) -> str:
     if wide:
         units = value.encode("utf-16-le", "surrogatepass")
         return "".join(chr(units[i] | units[i + 1] << 8) for i in range(0, len(units), 2))
-    for character in value:
-        if ord(character) > 255:
-            raise LiteralError(f"{character} is not a latin-1 character, so it does not fit a STRING")
-    return value
+    return "".join(map(_one_byte, value))
+
+
+def _one_byte(character: str) -> str:
+    """The character of a STRING: what Windows-1252 has beyond Latin-1 (the euro sign, a dash) has its number there."""
+    if ord(character) <= 255:
+        return character
+    try:
+        return character.encode("cp1252").decode("latin-1")
+    except UnicodeEncodeError:
+        message = f"{character} is not a character of Windows-1252, so it does not fit a STRING"
+        raise LiteralError(f'{message}; write a WSTRING: "..."') from None
 
 
 def is_enum_value(prefix: str, rest: str) -> bool:

@@ -145,6 +145,17 @@ class EnumType(Type):
     name: str
     base: Elementary
     values: dict[str, int]  # in order of declaration, names as declared
+    strict: bool = False  # only its own values may be assigned
+    named: bool = False  # TO_STRING gives the name of a value, not its number
+
+    @property
+    def inline(self) -> bool:
+        """Whether it is declared with a variable, without a name of its own."""
+        return self.name.startswith("(")
+
+    def has(self, name: str) -> bool:
+        """Whether it has a value of that name."""
+        return name.casefold() in map(str.casefold, self.values)
 
     @property
     def choices(self) -> str:
@@ -315,7 +326,7 @@ class StructType(Type):
     _align: int = 1
     base: StructType | None = None
     interfaces: list[StructType] = field(default_factory=list)
-    properties: list[str] = field(default_factory=list)  # what looks like a member and is none
+    properties: list[str] = field(default_factory=list)  # what looks like a member but is not
 
     @property
     def root(self) -> StructType:
@@ -365,5 +376,5 @@ def is_scalar(t: Type) -> bool:
 
 
 def base_of(t: Type) -> Type:
-    """The elementary type behind an enum or subrange; other types are returned as they are."""
+    """The elementary type of an enum or subrange; other types are returned as they are."""
     return t.base if isinstance(t, EnumType | SubrangeType) else t

@@ -31,12 +31,11 @@ _SEGMENTS = (
     "application_info", "area_table", "function_table", "external_function_table", "iec_function_table", "blob", "code",
 )  # fmt: skip
 _MAX_NAME = 255
-_BLOB_MAGIC = lib.CDL_BLOB_MAGIC & 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
 class ApplicationInfo:
-    """Texts for people; `date` in seconds since 1970 (UTC), 0 when unknown."""
+    """Strings for users; `date` in seconds since 1970 (UTC), 0 when unknown."""
 
     project: str = ""
     author: str = ""
@@ -227,7 +226,7 @@ def _blobs(image: Image) -> Iterator[bytes]:
 
 
 def _blob(number: int, payload: bytes) -> bytes:
-    return _pack("CDL_BLOB", {"magic": _BLOB_MAGIC, "id": number, "size": len(payload)}) + _padded(payload)
+    return _pack("CDL_BLOB", {"magic": lib.CDL_BLOB_MAGIC, "id": number, "size": len(payload)}) + _padded(payload)
 
 
 def _event_name(task: ImageTask) -> bytes:
@@ -382,7 +381,7 @@ def _parse_blobs(data: bytes) -> dict[int, bytes]:
             raise _refuse("its blob is cut off")
         ffi.buffer(blob)[:] = data[at : at + head]
         payload = data[at + head : at + head + blob.size]
-        if blob.magic != _BLOB_MAGIC or len(payload) != blob.size:
+        if blob.magic != lib.CDL_BLOB_MAGIC or len(payload) != blob.size:
             raise _refuse("its blob is damaged")
         blobs[int(blob.id)] = payload
         at += head + len(payload) + -len(payload) % 4

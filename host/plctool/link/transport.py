@@ -20,9 +20,9 @@ class BlockTransport(Protocol):
     local_address: bytes  # router address of this end
     max_packet: int  # longest packet it takes and gives, in bytes
     packet_overhead: int  # bytes the line carries for a packet besides the packet itself
-    byte_rate: float  # bytes the line carries per second; math.inf when it is not known or no matter
-    point_to_point: bool  # what arrives comes from the one device there, and is for us, whatever addresses it has
-    places: Mapping[bytes, str]  # on a link to several devices, where those are that have answered, by router address
+    byte_rate: float  # bytes the line carries per second; math.inf if unknown or irrelevant
+    point_to_point: bool  # all that arrives comes from the only device there, and is for us, whatever addresses it has
+    places: Mapping[bytes, str]  # on a link to several devices, where those that have answered are, by router address
 
     def send(self, *packets: bytes) -> None:
         """Queues packets; raises LinkError when the line is gone."""
@@ -31,7 +31,7 @@ class BlockTransport(Protocol):
         """The next packet, None after `timeout` seconds without one; raises LinkError when the line is gone."""
 
     def fileno(self) -> int | None:
-        """What poll tells by that packets come, or that the line is gone; None if there is no such thing."""
+        """The file descriptor that poll watches for packets, or for the loss of the line; None if there is none."""
 
     def now(self) -> float:
         """Monotonic time in seconds; virtual for virtual lines."""

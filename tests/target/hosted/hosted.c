@@ -23,7 +23,7 @@ static struct {
     RTS_EXCEPTION exception;
 } except;
 
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     jmp_buf jump;
 
@@ -34,7 +34,7 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     }
     except.jump = NULL;
     *exception = except.exception;
-    return exception->code != RTSEXCPT_NOEXCEPTION;
+    return exception->code == RTSEXCPT_NOEXCEPTION;
 }
 
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)

@@ -11,7 +11,17 @@
 #include "SysTimer.h"
 #include "check.h"
 
-static volatile RTS_UI32 zero, sink;
+/* What guarded code may write. */
+typedef struct {
+    volatile RTS_UI32 sink, argument, bad, wrong_registers;
+} VARIABLES;
+typedef struct {
+    VARIABLES all;
+} APP_AREAS_ALIGNED(sizeof(VARIABLES)) PLACED;
+static PLACED areas APP_AREAS_SECTION;
+#define sink areas.all.sink
+
+static volatile RTS_UI32 zero;
 
 /* ---- ways to fail ---- */
 
@@ -159,11 +169,14 @@ static void overflow_the_stack_with_fpu(void *arg)
 /* Moves the stack pointer to the bottom of the stack of this depth (stack slots are as aligned as large). */
 #define GO_TO_THE_BOTTOM "mov r0, sp\n\tsubs r0, #1\n\tldr r1, =%0\n\tbic r0, r0, r1\n\tmov sp, r0\n\t"
 
+enum { IEC_STACK_GUARD = RTS_IEC_UNPRIVILEGED ? 0 : STACK_GUARD };
+
 /* The SVC that leaves finds 16 bytes above the guard. */
 static void leave_near_the_end_of_the_stack(void *arg)
 {
     RTS_UNUSED(arg);
-    __asm__ volatile(GO_TO_THE_BOTTOM "add sp, #48\n\tmov r0, #1\n\tsvc 0" ::"i"(RTS_IEC_STACK_SIZE - 1));
+    __asm__ volatile(GO_TO_THE_BOTTOM "add sp, %1\n\tmov r0, #1\n\tsvc 0" ::"i"(RTS_IEC_STACK_SIZE - 1),
+                     "i"(IEC_STACK_GUARD + 16));
 }
 
 /* A large frame that ends at the bottom of the guard. What the fault pushes lies below, on a stack that is idle. */
@@ -222,16 +235,15 @@ static int is_within(uintptr_t address, void (*function)(void *arg))
 static void normal_end_is_no_exception(void)
 {
     RTS_EXCEPTION exception;
-    volatile RTS_UI32 argument = 0;
-    CHECK_EQUAL(SysExceptTry(end_normally, (void *)&argument, &exception), 0);
+    CHECK_EQUAL(SysExceptTry(end_normally, (void *)&areas.all.argument, &exception), true);
     CHECK_EQUAL(exception.code, RTSEXCPT_NOEXCEPTION);
-    CHECK_EQUAL(argument, 77);
+    CHECK_EQUAL(areas.all.argument, 77);
 }
 
 static void raised_exception_brings_code_and_address_without_thumb_bit(void)
 {
     RTS_EXCEPTION exception;
-    CHECK_EQUAL(SysExceptTry(raise, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(raise, NULL, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ARRAYBOUNDS);
     CHECK_EQUAL(exception.address, 0x1234);
 }
@@ -241,7 +253,7 @@ static void every_failure_in_main_is_caught_with_its_code(void)
     for (RTS_UI32 i = 0; i < RTS_COUNT(failures); i++) {
         RTS_EXCEPTION exception = {0, 0};
         SysExceptForgetTrace(); /* so that the stack of each is read */
-        CHECK_EQUAL(SysExceptTry(failures[i].function, NULL, &exception), 1);
+        CHECK_EQUAL(SysExceptTry(failures[i].function, NULL, &exception), false);
         CHECK_EQUAL(exception.code, failures[i].code);
     }
 }
@@ -280,9 +292,9 @@ static void overflow_stops_at_the_guard(void)
 static void no_room_for_the_leaving_frame_is_a_stack_overflow(void)
 {
     RTS_EXCEPTION exception;
-    CHECK_EQUAL(SysExceptTry(leave_near_the_end_of_the_stack, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(leave_near_the_end_of_the_stack, NULL, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_STACK_OVERFLOW);
-    CHECK_EQUAL(SysExceptTry(raise, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(raise, NULL, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ARRAYBOUNDS);
 }
 
@@ -314,9 +326,9 @@ static void on_timer(void *param, RTS_I64 due)
     task->calls++;
     task->running = 1;
     if (SysExceptTry(task->function, task, &task->exception))
-        task->caught++;
-    else
         task->passed++;
+    else
+        task->caught++;
     task->running = 0;
 }
 
@@ -389,25 +401,23 @@ static void keep_registers_busy(void *arg)
     *(volatile RTS_UI32 *)arg += bad;
 }
 
-static volatile RTS_UI32 wrong_registers;
-
 static void keep_registers_busy_in_a_task(void *arg)
 {
     RTS_UNUSED(arg);
-    keep_registers_busy((void *)&wrong_registers);
+    keep_registers_busy((void *)&areas.all.wrong_registers);
 }
 
 static void interrupted_task_finishes_when_a_faster_one_fails(void)
 {
     for (RTS_UI32 i = 0; i < RTS_COUNT(failures); i++) {
-        wrong_registers = 0;
+        areas.all.wrong_registers = 0;
         RTS_HANDLE high = start(&fast, failures[i].function, 200, 3);
         RTS_HANDLE low = start(&slow, keep_registers_busy_in_a_task, 2000, 10);
         wait_for(&slow.passed, 1);
         SysTimerDelete(low);
         SysTimerDelete(high);
         CHECK_EQUAL(slow.caught, 0);
-        CHECK_EQUAL(wrong_registers, 0);
+        CHECK_EQUAL(areas.all.wrong_registers, 0);
         CHECK(fast.caught >= 5);
         CHECK_EQUAL(fast.exception.code, failures[i].code);
     }
@@ -426,11 +436,11 @@ static void main_keeps_its_registers_when_tasks_fail(void)
 static void guarded_code_in_main_survives_failing_tasks(void)
 {
     RTS_EXCEPTION exception;
-    volatile RTS_UI32 bad = 0;
+    areas.all.bad = 0;
     RTS_HANDLE timer = start(&fast, overflow_the_stack_with_fpu, 200, 3);
-    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&bad, &exception), 0);
+    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&areas.all.bad, &exception), true);
     SysTimerDelete(timer);
-    CHECK_EQUAL(bad, 0);
+    CHECK_EQUAL(areas.all.bad, 0);
     CHECK(fast.caught > 3);
 }
 
@@ -510,7 +520,7 @@ static void endless_loop_in_main_is_broken(void)
     RTS_EXCEPTION exception;
     slow.running = 1;
     ClockSetCallback(break_the_slow_task);
-    CHECK_EQUAL(SysExceptTry(loop_forever, &slow, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(loop_forever, &slow, &exception), false);
     ClockSetCallback(NULL);
     slow.running = 0;
     CHECK_EQUAL(exception.code, RTSEXCPT_WATCHDOG);
@@ -525,12 +535,12 @@ static void break_something_else(RTS_I64 now)
 static void break_of_what_does_not_run_does_nothing(void)
 {
     RTS_EXCEPTION exception;
-    volatile RTS_UI32 bad = 0;
+    areas.all.bad = 0;
     SysExceptBreak(&slow, RTSEXCPT_WATCHDOG);
     ClockSetCallback(break_something_else);
-    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&bad, &exception), 0);
+    CHECK_EQUAL(SysExceptTry(keep_registers_busy, (void *)&areas.all.bad, &exception), true);
     ClockSetCallback(NULL);
-    CHECK_EQUAL(bad, 0);
+    CHECK_EQUAL(areas.all.bad, 0);
 }
 
 /* ---- what the stack tells ---- */
@@ -572,18 +582,24 @@ static void trace_of_a_fault_starts_at_its_stack_pointer(void)
     RTS_EXCEPTION exception;
     SysExceptForgetTrace();
     SysExceptCodeRange(program, sizeof(program));
-    CHECK_EQUAL(SysExceptTry(fail_below_a_return_address, NULL, &exception), 1);
+    CHECK_EQUAL(SysExceptTry(fail_below_a_return_address, NULL, &exception), false);
     expect_return_address();
 }
 
-static void break_the_task_below(void *arg)
+static void break_after_two_milliseconds(void)
 {
     RTS_UI32 from = SysTimeGetMs();
-    RTS_UNUSED(arg);
     __asm__ volatile(USE_FPU); /* the clock's interrupt stacks its registers, too */
     while (SysTimeGetMs() - from < 2)
         ;
     SysExceptBreak(&slow, RTSEXCPT_WATCHDOG);
+}
+APP_GATE(break_after_two_milliseconds);
+
+static void break_the_task_below(void *arg)
+{
+    RTS_UNUSED(arg);
+    APP_GATED(break_after_two_milliseconds)();
 }
 
 static void trace_of_a_broken_task_below_another_starts_at_its_stack_pointer(void)

@@ -10,12 +10,12 @@
  * SysExceptBreak left it. The fault handlers redirect the interrupted program to that place. All registers that a
  * function must keep have to be as before: the task that was interrupted below needs its own.
  */
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     fn(arg);
     exception->code = RTSEXCPT_NOEXCEPTION;
     exception->address = 0;
-    return 0;
+    return true;
 }
 
 /* Write here: leave the SysExceptTry of this context, after a call of SysExceptTrace, as from the fault handlers, for

@@ -8,6 +8,7 @@
  *
  * Priorities, highest first: level 0 faults and SVC; level 1 clock, alarm and board interrupts (short, never foreign
  * code); from level 2 one level per timer, so that tasks pre-empt each other; thread mode: the communication loop.
+ * Application code runs in thread mode at the level of its timer, without privileges (SysExcept.c).
  */
 #ifndef CORTEXM_H
 #define CORTEXM_H
@@ -50,10 +51,12 @@ enum { LEVEL_FAULT = 0, LEVEL_DEVICE = 1, LEVEL_TIMER = 2 };
 #define SCB_HFSR REG32(0xE000ED2Cu)
 #define SCB_MMFAR REG32(0xE000ED34u)
 #define SCB_CPACR REG32(0xE000ED88u)
+#define FPU_FPCCR REG32(0xE000EF34u)
 #define MPU_TYPE REG32(0xE000ED90u)
 #define MPU_CTRL REG32(0xE000ED94u)
 #define MPU_RBAR REG32(0xE000ED9Cu)
 #define MPU_RASR REG32(0xE000EDA0u)
+enum { MPU_RBAR_VALID = 1 << 4 };
 
 enum { VECTOR_SVCALL = 11, VECTOR_SYSTICK = 15, VECTOR_IRQ = 16 };
 #define IRQ_VECTOR(irq) (VECTOR_IRQ + (irq))
@@ -104,15 +107,19 @@ static inline void CpuBarrier(void)
 /* ---- memory protection ---- */
 
 /* Attributes: access, and eighths of the region that are left out of it (bit 0 the lowest). */
-enum { MPU_NO_ACCESS = 0, MPU_READ_ONLY = 6 << 24 };
+enum { MPU_NO_ACCESS = 0, MPU_READ_ONLY = 6 << 24, MPU_WRITE_PRIVILEGED = 2 << 24, MPU_DATA = 1 << 28 | 3 << 24 };
 #define MPU_WITHOUT_EIGHTHS(mask) ((RTS_UI32)((mask) & 0xFF) << 8)
 
-/* Regions; a board may use what is left from MPU_BOARD up to 7 (higher ones win over lower ones). */
-enum { MPU_NULL = 0, MPU_STACK = 1, MPU_IEC_STACK = 2, MPU_BOARD = MPU_IEC_STACK + APP_MAX_TASKS };
+/* Regions; a board may use what is left from MPU_BOARD up to 7 (higher ones win over lower ones). Unprivileged code has
+ * no access where there is none. */
+#if RTS_IEC_UNPRIVILEGED
+enum { MPU_MEMORY, MPU_NULL, MPU_STACK, MPU_AREAS, MPU_IEC_STACK = MPU_AREAS + 2, MPU_BOARD };
+#else
+enum { MPU_NULL, MPU_STACK, MPU_IEC_STACK, MPU_BOARD = MPU_IEC_STACK + APP_MAX_TASKS };
+#endif
 
-/* Protects 2^log2_size bytes at `base`, a multiple of that size; does nothing on a chip without MPU. */
+/* Gives 2^log2_size bytes at `base`, a multiple of that size, these attributes; does nothing on a chip without MPU. */
 void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 attributes);
-void MpuRelease(RTS_UI32 region);
 
 /* ---- for boards ---- */
 

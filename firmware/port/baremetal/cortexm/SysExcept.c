@@ -10,9 +10,26 @@
  * error, a fault, and a broken loop:
  *
  *   main stack:    ... interrupt | SysExceptTry | frame of the SVC that entered      <- leaving returns to it
- *   process stack: slot of this nesting depth, with a guard of the MPU below
+ *   process stack: slot of this nesting depth
  *
  * Nested only by pre-emption, last in first out: depth d is interrupted while depth d + 1 runs.
+ *
+ * Rights (RTS_IEC_UNPRIVILEGED). What runs in a Try is unprivileged. To such code the MPU gives
+ *   code and RAM of the architecture (below 1 GiB)  read, execute; writing them takes privileges
+ *   vectors, where NULL points                      nothing, as to all else
+ *   areas of the application (AppAreas.c)           read, write
+ *   stack slot of the depth that runs               read, write
+ * and nothing of the rest: peripherals, the processor's own registers. So a wild store ends in an exception that names
+ * it, and has changed nothing but the program's own data. Entering and leaving a Try move one region, that of the
+ * stack, and set CONTROL.nPRIV, which says how thread mode goes on; handlers are privileged whatever it says.
+ *
+ * C functions that a program calls run in the Try, too, with its rights: arithmetic and mathematics as they are. What
+ * writes variables of its own, or needs hardware, has a gate (APP_GATE, 8 bytes): an SVC in the section of gates, and a
+ * jump to the function. The SVC of no other place gives privileges, so there is no way to them but to call such a
+ * function. It runs on the program's stack, and returns through gate_return, which gives the privileges up. That the
+ * program called it is the only thing kept of it (TRY.gate): tasks interrupt it, faults and breaks leave it as ever.
+ *
+ * Otherwise all code is privileged, and each slot has a guard of the MPU at its lower end.
  */
 #include "SysExcept.h"
 
@@ -22,7 +39,7 @@
 enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_PSP = 4, EXC_RETURN_BASIC = 16 };
 enum { XPSR_THUMB = 1 << 24, XPSR_ALIGNED = 1 << 9 };
 enum { SHCSR_PENDING = 0xF << 12 }; /* UsageFault, MemManage, BusFault, SVCall */
-enum { CONTROL_SPSEL = 2 };
+enum { CONTROL_NPRIV = 1, CONTROL_SPSEL = 2 };
 
 enum {
     CFSR_IACCVIOL = 1 << 0,
@@ -45,13 +62,24 @@ typedef struct {
     FRAME *entered;       /* on the main stack */
     FRAME *outer_process; /* process stack pointer of the depth below */
     RTS_UI32 exc_return;
+#if RTS_IEC_UNPRIVILEGED
+    RTS_UI32 outer_control; /* of the depth below, or of main */
+    RTS_UI32 gate;          /* where a function that has a gate returns to; 0: none runs */
+#endif
 } TRY;
 
 typedef RTS_UI8 IEC_STACK[RTS_IEC_STACK_SIZE];
 RTS_STATIC_ASSERT(RTS_IEC_STACK_SIZE % 32 == 0 && RTS_IEC_STACK_SIZE >= 256, iec_stack_holds_guard_and_frame);
 
-/* At the bottom of RAM, the deepest first: what gets past a guard hits a slot that is idle now, or no memory at all. */
-__attribute__((section(".bss.iec_stack"), aligned(STACK_GUARD))) static IEC_STACK stacks[APP_MAX_TASKS];
+#if RTS_IEC_UNPRIVILEGED
+RTS_STATIC_ASSERT((RTS_IEC_STACK_SIZE & (RTS_IEC_STACK_SIZE - 1)) == 0, iec_stack_is_a_region);
+enum { IEC_STACK_ALIGN = RTS_IEC_STACK_SIZE, IEC_STACK_GUARD = 0 };
+#else
+enum { IEC_STACK_ALIGN = STACK_GUARD, IEC_STACK_GUARD = STACK_GUARD };
+#endif
+
+/* At the bottom of RAM, the deepest first: what gets past its slot hits one that is idle now, or no memory at all. */
+__attribute__((section(".bss.iec_stack"), aligned(IEC_STACK_ALIGN))) static IEC_STACK stacks[APP_MAX_TASKS];
 
 static struct {
     TRY *top; /* behind the innermost that runs */
@@ -70,31 +98,111 @@ static void set_process_stack(FRAME *pointer)
     __asm__ volatile("msr psp, %0" ::"r"(pointer) : "memory");
 }
 
-/* Where the stack of a depth ends. */
 static uintptr_t stack_slot(const TRY *try)
 {
     return (uintptr_t)(try->first + 1) - RTS_IEC_STACK_SIZE;
 }
 
-void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 attributes)
+/* Where the stack of a depth ends. */
+static uintptr_t stack_end(const TRY *try)
 {
-    enum { RBAR_VALID = 1 << 4, RASR_ENABLE = 1, RASR_NORMAL_MEMORY = 6 << 16 };
-    if (region >= ((MPU_TYPE >> 8) & 0xFFu))
-        return;
-    MPU_RBAR = base | RBAR_VALID | region;
-    MPU_RASR = attributes | RASR_NORMAL_MEMORY | (log2_size - 1) << 1 | RASR_ENABLE;
-    CpuBarrier();
+    return stack_slot(try) + IEC_STACK_GUARD;
 }
 
-void MpuRelease(RTS_UI32 region)
+/* A task that interrupts it moves a region too. */
+RTS_NOINLINE void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 attributes)
 {
-    enum { RBAR_VALID = 1 << 4 };
+    enum { RASR_ENABLE = 1, RASR_NORMAL_MEMORY = 3 << 16 };
     if (region >= ((MPU_TYPE >> 8) & 0xFFu))
         return;
-    MPU_RBAR = RBAR_VALID | region;
-    MPU_RASR = 0;
+    RTS_UI32 mask = RTS_IEC_UNPRIVILEGED ? CpuMask() : 0;
+    MPU_RBAR = base | MPU_RBAR_VALID | region;
+    MPU_RASR = attributes | RASR_NORMAL_MEMORY | (log2_size - 1) << 1 | RASR_ENABLE;
     CpuBarrier();
+    if (RTS_IEC_UNPRIVILEGED)
+        CpuRestore(mask);
 }
+
+/* ---- rights ---- */
+
+#if RTS_IEC_UNPRIVILEGED
+
+/* Of the linker script. Where the areas begin and end is a multiple of an eighth of their size, rounded up to a power
+ * of 2 (APP_AREAS_ALIGNED): so two regions of that size next to each other hold them. */
+extern RTS_UI8 areas_start[], areas_end[];
+
+static void allow_areas(void)
+{
+    uintptr_t start = (uintptr_t)areas_start;
+    RTS_UI32 size = (RTS_UI32)(areas_end - areas_start);
+    RTS_UI32 log2 = 32u - (RTS_UI32)__builtin_clz((size - 1) | 0xFF);
+    uintptr_t region = start >> log2;
+    RTS_UI32 others = ~(((1u << (size >> (log2 - 3))) - 1) << (start >> (log2 - 3) & 7));
+    for (RTS_UI32 i = 0; i < 2; i++, others >>= 8)
+        MpuProtect(MPU_AREAS + i, (region + i) << log2, log2, MPU_DATA | MPU_WITHOUT_EIGHTHS(others));
+}
+
+static void protect_runtime(void)
+{
+    enum { CODE_AND_RAM_LOG2 = 30, STACK_LOG2 = RTS_LOG2(RTS_IEC_STACK_SIZE) };
+    MpuProtect(MPU_MEMORY, 0, CODE_AND_RAM_LOG2, MPU_WRITE_PRIVILEGED);
+    MpuProtect(MPU_IEC_STACK, (uintptr_t)stacks, STACK_LOG2, MPU_DATA);
+    allow_areas();
+}
+
+/* The region's size stays. That it moved is seen after the exception return that follows. */
+static void allow_stack(uintptr_t slot)
+{
+    MPU_RBAR = slot | MPU_RBAR_VALID | MPU_IEC_STACK;
+}
+
+static RTS_UI32 get_control(void)
+{
+    RTS_UI32 control;
+    __asm__ volatile("mrs %0, control" : "=r"(control));
+    return control;
+}
+
+/* In a handler, for thread mode: nothing in it but nPRIV is of effect. */
+static void set_control(RTS_UI32 control)
+{
+    __asm__ volatile("msr control, %0" ::"r"(control) : "memory");
+}
+
+static void take_rights(TRY *try)
+{
+    try->outer_control = get_control();
+    try->gate = 0;
+    set_control(CONTROL_NPRIV);
+    allow_stack(stack_slot(try));
+}
+
+/* FPU registers of the function that is left may still wait to be saved on its stack, with its rights. Another interrupt
+ * may come before the exception return that gives them up: it would save them where these rights do not reach any more.
+ * Those that wait for privileged code are of the frame that is returned to. */
+static void drop_fpu_context(void)
+{
+#ifdef __ARM_FP
+    enum { FPCCR_LSPACT = 1, FPCCR_USER = 2 };
+    RTS_UI32 control = FPU_FPCCR;
+    if ((control & (FPCCR_LSPACT | FPCCR_USER)) == (FPCCR_LSPACT | FPCCR_USER))
+        FPU_FPCCR = control & ~(RTS_UI32)FPCCR_LSPACT;
+#endif
+}
+
+/* The slot of the depth below lies above; of main, which has all rights, none does, but nobody runs that it matters to. */
+static void give_back_rights(const TRY *try)
+{
+    drop_fpu_context();
+    set_control(try->outer_control);
+    allow_stack((uintptr_t)(try->first + 1));
+}
+
+#else
+#define protect_runtime() ((void)0)
+#define take_rights(try) ((void)(try))
+#define give_back_rights(try) ((void)(try))
+#endif
 
 void SysExceptInit(void)
 {
@@ -104,11 +212,13 @@ void SysExceptInit(void)
     const RTS_UI32 behind_vectors = NULL_EIGHTHS < 8 ? MPU_WITHOUT_EIGHTHS(0xFF << NULL_EIGHTHS) : 0;
     extern RTS_UI8 stack_bottom[];
     state.top = state.tries;
+    protect_runtime();
     MpuProtect(MPU_NULL, 0, NULL_LOG2, MPU_NO_ACCESS | behind_vectors);
     MpuProtect(MPU_STACK, (uintptr_t)stack_bottom, STACK_GUARD_LOG2, MPU_NO_ACCESS);
     for (RTS_UI32 i = 0; i < APP_MAX_TASKS; i++) {
         state.tries[i].first = (FRAME *)stacks[APP_MAX_TASKS - i] - 1;
-        MpuProtect(MPU_IEC_STACK + i, (uintptr_t)stacks[i], STACK_GUARD_LOG2, MPU_NO_ACCESS);
+        if (!RTS_IEC_UNPRIVILEGED)
+            MpuProtect(MPU_IEC_STACK + i, (uintptr_t)stacks[i], STACK_GUARD_LOG2, MPU_NO_ACCESS);
     }
     if (MPU_TYPE != 0)
         MPU_CTRL = MPU_ENABLE_WITH_BACKGROUND;
@@ -166,13 +276,14 @@ __attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
     frame->pc = caller->r0 & ~1u;
     frame->xpsr = XPSR_THUMB;
     set_process_stack(frame);
+    take_rights(try);
     return (RTS_UI32)EXC_RETURN_THREAD_PSP;
 }
 
 /* Whether the stack can be read from there on: it may be in the guard, below it, or not known. */
 static int is_readable(const TRY *try, uintptr_t stack)
 {
-    return stack - (stack_slot(try) + STACK_GUARD) < RTS_IEC_STACK_SIZE - STACK_GUARD;
+    return stack - stack_end(try) < RTS_IEC_STACK_SIZE - IEC_STACK_GUARD;
 }
 
 /* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return,
@@ -185,20 +296,58 @@ __attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, uin
     try->entered->r0 = code;
     try->entered->r1 = address;
     set_process_stack(try->outer_process);
+    give_back_rights(try);
     return try->exc_return;
 }
+
+/* ---- gates ---- */
+
+#if RTS_IEC_UNPRIVILEGED
+
+/* Where a function that has a gate returns to: it gives the privileges up, and goes on where the gate was called. The
+ * result is in r0, r1. */
+__attribute__((naked)) static void gate_return(void)
+{
+    __asm__ volatile("movw r2, #:lower16:%c0\n\tmovt r2, #:upper16:%c0\n\tldr r2, [r2]\n\t"
+                     "ldr lr, [r2, %1]\n\tmov r3, #0\n\tstr r3, [r2, %1]\n\t"
+                     "mrs r3, control\n\torr r3, %2\n\tmsr control, r3\n\tisb\n\tbx lr" ::"i"(&state.top),
+                     "i"((int)offsetof(TRY, gate) - (int)sizeof(TRY)), "i"(CONTROL_NPRIV));
+}
+
+/* A function with a gate that calls another by its gate has the privileges. */
+__attribute__((used)) static void open_gate(FRAME *frame)
+{
+    TRY *try = state.top - 1;
+    if (try->gate != 0)
+        return;
+    try->gate = frame->lr;
+    frame->lr = (RTS_UI32)(uintptr_t)gate_return;
+    set_control(0);
+}
+
+/* Goes to 1 unless the SVC was that of a gate. Most code lies behind the gates. */
+#define LOOK_FOR_A_GATE                                                                                          \
+    "mrs r0, psp\n\tldr r2, [r0, #24]\n\tmovw r3, #:lower16:gates_end\n\tmovt r3, #:upper16:gates_end\n\t"       \
+    "cmp r2, r3\n\tbhs 1f\n\tmovw r3, #:lower16:gates_start\n\tmovt r3, #:upper16:gates_start\n\tcmp r2, r3\n\t" \
+    "blo 1f\n\tpush {r3, lr}\n\tbl open_gate\n\tpop {r3, pc}\n"
+#else
+#define LOOK_FOR_A_GATE ""
+#endif
+
+/* ---- handlers ---- */
 
 /* Hands the frame that the exception pushed, and EXC_RETURN, to `function`, and returns to where that says. */
 #define DISPATCH(function)                                                                      \
     __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\t" \
                      "bl " #function "\n\tbx r0")
 
-/* From the process stack the call leaves, with what is in r0 to r3 of its frame; from the main stack it enters. */
+/* From the main stack the call enters. From the process stack it leaves, with what is in r0 to r3 of its frame, unless
+ * it is that of a gate. */
 __attribute__((naked)) void SvcHandler(void);
 void SvcHandler(void)
 {
-    __asm__ volatile("tst lr, #4\n\tbne 1f\n\tmrs r0, msp\n\tmov r1, lr\n\tbl enter\n\tbx r0\n"
-                     "1:\n\tmrs r12, psp\n\tldm r12, {r0-r3}\n\tbl leave\n\tbx r0");
+    __asm__ volatile("tst lr, #4\n\tbne 2f\n\tmrs r0, msp\n\tmov r1, lr\n\tbl enter\n\tbx r0\n"
+                     "2:\n\t" LOOK_FOR_A_GATE "1:\n\tmrs r12, psp\n\tldm r12, {r0-r3}\n\tbl leave\n\tbx r0");
 }
 
 /* The stack pointer before the exception pushed its frame, with or without the FPU's registers; for the trace alone. */
@@ -214,20 +363,22 @@ static uintptr_t stack_before(const FRAME *frame, RTS_UI32 exc_return)
 /* ---- faults ---- */
 
 /* The return address on the process stack that is next to its end: the fault's own frame was lost. */
-static uintptr_t find_caller(uintptr_t slot)
+static uintptr_t find_caller(const TRY *try)
 {
-    const RTS_UI32 *end = (const RTS_UI32 *)(slot + RTS_IEC_STACK_SIZE);
-    for (const RTS_UI32 *word = (const RTS_UI32 *)(slot + STACK_GUARD); word < end; word++)
+    const RTS_UI32 *end = (const RTS_UI32 *)(try->first + 1);
+    for (const RTS_UI32 *word = (const RTS_UI32 *)stack_end(try); word < end; word++)
         if (SysExceptIsReturn(*word))
             return (*word & ~1u) - 2;
     return 0;
 }
 
-/* The frame could not be pushed, was pushed below the slot, or the guard was hit by the last push that had no room. */
-static int is_overflow(RTS_UI32 cfsr, const FRAME *frame, uintptr_t slot)
+/* The frame could not be pushed, was pushed below the end, or what lies there was hit by the last push that had no
+ * room: of 16 registers of an FPU, say. */
+static int is_overflow(RTS_UI32 cfsr, const FRAME *frame, uintptr_t end)
 {
-    return (cfsr & CFSR_STACKING) || (uintptr_t)frame < slot + STACK_GUARD ||
-           ((cfsr & CFSR_MMARVALID) && SCB_MMFAR - slot < STACK_GUARD);
+    enum { PUSH_MAX = IEC_STACK_GUARD != 0 ? IEC_STACK_GUARD : 64 };
+    return (cfsr & CFSR_STACKING) || (uintptr_t)frame < end ||
+           ((cfsr & CFSR_MMARVALID) && end - 1 - SCB_MMFAR < PUSH_MAX);
 }
 
 static RTS_UI32 code_of(RTS_UI32 cfsr)
@@ -243,10 +394,10 @@ static RTS_UI32 code_of(RTS_UI32 cfsr)
 
 /* After a jump to nowhere the caller says more than the program counter. So it does when the stack overflows: that is
  * mostly noticed by what clears the variables of a function, which is no function of the application. */
-static uintptr_t address_of(RTS_UI32 cfsr, RTS_UI32 code, const FRAME *frame, uintptr_t slot)
+static uintptr_t address_of(RTS_UI32 cfsr, RTS_UI32 code, const FRAME *frame, const TRY *try)
 {
     if (cfsr & CFSR_STACKING)
-        return find_caller(slot);
+        return find_caller(try);
     if ((cfsr & (CFSR_IACCVIOL | CFSR_IBUSERR | CFSR_INVSTATE)) ||
         (code == RTSEXCPT_STACK_OVERFLOW && SysExceptIsCode(frame->lr)))
         return (frame->lr & ~1u) - 2;
@@ -258,9 +409,9 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     RTS_UI32 cfsr = SCB_CFSR;
     if (!(exc_return & EXC_RETURN_PSP) || state.top == state.tries)
         ResetNow(RESET_FATAL, cfsr & CFSR_STACKING ? 0 : frame->pc);
-    uintptr_t slot = stack_slot(state.top - 1);
-    RTS_UI32 code = is_overflow(cfsr, frame, slot) ? RTSEXCPT_STACK_OVERFLOW : code_of(cfsr);
-    uintptr_t address = address_of(cfsr, code, frame, slot);
+    const TRY *try = state.top - 1;
+    RTS_UI32 code = is_overflow(cfsr, frame, stack_end(try)) ? RTSEXCPT_STACK_OVERFLOW : code_of(cfsr);
+    uintptr_t address = address_of(cfsr, code, frame, try);
     SCB_CFSR = cfsr;
     SCB_HFSR = SCB_HFSR;
     /* What could not be stacked stays pending: it belongs to the function that is left now. */
@@ -295,12 +446,12 @@ void NmiHandler(void)
 
 /* ---- for the runtime ---- */
 
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     RTS_UI64 result = try_enter(fn, arg);
     exception->code = (RTS_UI32)result;
     exception->address = (uintptr_t)(result >> 32);
-    return exception->code != RTSEXCPT_NOEXCEPTION;
+    return exception->code == RTSEXCPT_NOEXCEPTION;
 }
 
 static int in_try(void)
@@ -363,13 +514,21 @@ void SysExceptBreak(const void *arg, RTS_UI32 code)
     }
 }
 
+/* When a large frame leaves no room for that of the fault, its place is lost: then find_caller finds the entry, behind
+ * the instructions that make its frame and have no line. */
+#if RTS_IEC_UNPRIVILEGED
+#define PUSH_ENTRY "add r3, r2, #10\n\tpush {r3, r9}\n\tpush {r9, lr}\n\t"
+#define RETURN "pop {r9, lr}\n\tadd sp, #8\n\tbx lr"
+#else
+#define PUSH_ENTRY "push {r9, lr}\n\t"
+#define RETURN "pop {r9, pc}"
+#endif
+
 __attribute__((naked)) void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry)
 {
     RTS_UNUSED(context);
     RTS_UNUSED(argument);
     RTS_UNUSED(entry);
-    __asm__ volatile("push {r9, lr}\n\t"
-                     "ldr r9, [r0, %0]\n\t"
-                     "blx r2\n\t"
-                     "pop {r9, pc}" ::"i"(offsetof(IEC_CONTEXT, imports)));
+    __asm__ volatile(PUSH_ENTRY "ldr r9, [r0, %0]\n\t"
+                                "blx r2\n\t" RETURN ::"i"(offsetof(IEC_CONTEXT, imports)));
 }

@@ -40,9 +40,31 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #define SCHED_EVENTS_IN_TIMERS 1
 #endif
 
-/* Stack of the application code of one task, bytes: a multiple of 32, which are lost to the guard below it. */
+/* 1: IEC code may write its areas and its stack only, and meets an exception elsewhere, if the chip has an MPU
+ * (SysExcept.c). The areas are rounded up to a multiple of an eighth of the power of 2 that holds them: make APP_DATA_SIZE
+ * so large that nothing is lost. 0: it may write all RAM and each peripheral. */
+#ifndef RTS_IEC_UNPRIVILEGED
+#define RTS_IEC_UNPRIVILEGED 1
+#endif
+
+/* Stack of the application code of one task, bytes. RTS_IEC_UNPRIVILEGED 1: a power of 2; 0: a multiple of 32, which are
+ * lost to the guard below it. */
 #ifndef RTS_IEC_STACK_SIZE
 #define RTS_IEC_STACK_SIZE 1024
+#endif
+
+#if RTS_IEC_UNPRIVILEGED
+#define RTS_LOG2(size) (31 - __builtin_clz(size))
+#define APP_AREAS_ALIGNED(size) __attribute__((aligned((size) > 256 ? 1 << (RTS_LOG2((size) - 1) - 2) : 32)))
+#define APP_AREAS_SECTION __attribute__((section(".bss.areas")))
+
+#define APP_GATE(function)                                                                             \
+    __attribute__((naked, unused, section(".text.gate." #function))) static void function##_gate(void) \
+    {                                                                                                  \
+        __asm__ volatile("svc 1\n\tb %c0" ::"i"(function));                                            \
+    }                                                                                                  \
+    RTS_STATIC_ASSERT(1, function##_has_a_gate)
+#define APP_GATED(function) function##_gate
 #endif
 
 /* With CodeInRam.c: RAM for the code of an application, bytes for each of the two slots. */

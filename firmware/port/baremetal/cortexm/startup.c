@@ -25,7 +25,7 @@ enum { FPU_CONTEXTS_SIZE = 0 };
 #endif
 
 /* Of main, and of everything that interrupts it but application code. */
-__attribute__((section(".bss.main_stack"), aligned(32),
+__attribute__((section(".noinit.main_stack"), aligned(32),
                used)) static RTS_UI8 main_stack[RTS_MAIN_STACK_SIZE + FPU_CONTEXTS_SIZE];
 
 int main(void);

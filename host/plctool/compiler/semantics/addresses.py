@@ -1,13 +1,9 @@
-"""Addresses such as %IX0.3, and the variables that lie at them (AT). Words, double words ... are numbered, as CODESYS
-does it: %IW1 is bytes 2 and 3.
+"""The variables that lie at addresses such as %IX0.3 (AT), and those that statements use without a declaration.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
-
-import re
-from dataclasses import dataclass
 
 from plctool.compiler.semantics.allocation import Allocation
 from plctool.compiler.semantics.conversions import elementary
@@ -15,31 +11,10 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Storage, Variable
-from plctool.iec.areas import Area
-from plctool.iec.types import BOOL, ELEMENTARY, Elementary, Type, base_of
+from plctool.iec.addresses import Address, parse_address
+from plctool.iec.types import BOOL, Type, base_of
 
 MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
-AREAS = {"I": Area.INPUT, "Q": Area.OUTPUT, "M": Area.MEMORY}
-_ADDRESS = re.compile(r"%([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?")
-_WIDTHS = {"X": 0, "": 0, "B": 8, "W": 16, "D": 32, "L": 64}
-_TYPES: dict[int, Elementary] = {
-    0: BOOL, 8: ELEMENTARY["BYTE"], 16: ELEMENTARY["WORD"], 32: ELEMENTARY["DWORD"], 64: ELEMENTARY["LWORD"],
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Address:
-    """`width` in bits, 0 for a single one; `offset` in bytes."""
-
-    area: Area
-    width: int
-    offset: int
-    bit: int
-
-    @property
-    def type(self) -> Elementary:
-        """Of what is there when no declaration says otherwise."""
-        return _TYPES[self.width]
 
 
 def is_open(location: ast.DirectAddress | None) -> bool:
@@ -49,18 +24,10 @@ def is_open(location: ast.DirectAddress | None) -> bool:
 
 def _read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
     """What `%IW2` means; None after a diagnosis."""
-    match = _ADDRESS.fullmatch(node.text.upper())
-    letter, size, first, second = match.groups() if match is not None else ("", "", "", None)
-    width = _WIDTHS[size]
-    too_long = len(first) > 6 or len(second or "") > 3
-    if match is None or too_long or (second is not None and (width or int(second) > 7)):
+    address = parse_address(node.text)
+    if address is None:
         scope.error(node.pos, "location", f"{node.text} is not an address such as %IX0.3 or %QW2")
-        return None
-    number = int(first)
-    if width:
-        return Address(AREAS[letter], width, number * width // 8, 0)
-    byte, bit = (number, int(second)) if second is not None else divmod(number, 8)
-    return Address(AREAS[letter], 0, byte, bit)
+    return address
 
 
 def located(

@@ -95,6 +95,11 @@ class Checker:
         self.scope.error(offset, code, message)
         return error_value(self.pos(offset))
 
+    def missing(self, offset: int, name: str, message: str) -> Expr:
+        """Reports that nothing is known by a name; the value that stands for the expression."""
+        self.scope.missing(offset, name, message)
+        return error_value(self.pos(offset))
+
     def warning(self, offset: int, code: str, message: str) -> None:
         """Reports a warning."""
         self.scope.warning(offset, code, message)

@@ -46,7 +46,7 @@ from plctool.iec.types import (
     Type,
 )  # fmt: skip
 
-_EXAMPLES = {Kind.DATE: "a literal such as DT#2024-02-29-12:30:15, or ULINT_TO_{}(...)", Kind.CHAR: "{}#'A'"}
+_FORMS = {"DATE": "2024-02-29", "TOD": "12:30:15", "DT": "2024-02-29-12:30:15"}
 
 
 class Coercion:
@@ -146,7 +146,7 @@ class Coercion:
                 e.pos, "type", f"{value} is not a duration; write {'T' if to is TIME else 'LTIME'}#{value}{unit}"
             )
         if to.kind in (Kind.DATE, Kind.CHAR):
-            return self._error(e.pos, "type", f"{value} is not a {to}; write {_EXAMPLES[to.kind].format(to)}")
+            return self._error(e.pos, "type", f"{value} is not a {to}; write {_example(to)}")
         if isinstance(value, BitPattern) and to.signed and value >> to.bits == 0 and not constants.fits(value, to):
             negative = constants.wrap(value, to)
             self._warn(e.pos, "narrowing", f"{value} becomes {target} {negative}, which has the same bits")
@@ -173,8 +173,12 @@ class Coercion:
 
     def _to_enum(self, e: Expr, target: EnumType) -> Expr:
         source = elementary(e.type)
-        if isinstance(e.type, EnumType) or source is None or source.kind not in NUMBERS:
+        if source is None or source.kind not in NUMBERS:
             return self._mismatch(e, target)
+        if isinstance(e.type, EnumType):
+            return self._other_enum(e, e.type, target)
+        if target.strict and not isinstance(e, Const):
+            return self._error(e.pos, "type", f"{e.type} does not fit {target}, which is 'strict'; use its values")
         if isinstance(e, Const):
             assert isinstance(e.value, int)
             if e.value not in target.values.values():
@@ -183,6 +187,14 @@ class Coercion:
             self._warn(e.pos, "enum", f"the number {e.value} stands for a value of {target}; write {target}#{name}")
             return Const(e.value, target, e.pos)
         self._warn(e.pos, "enum", f"{e.type} becomes {target} without a check whether it is one of its values")
+        return convert(e, target)
+
+    def _other_enum(self, e: Expr, source: EnumType, target: EnumType) -> Expr:
+        """A value of another enumeration: its number."""
+        if source.strict or target.strict:
+            strict = target if target.strict else source
+            return self._error(e.pos, "type", f"{source} does not fit {target}, because {strict} is 'strict'")
+        self._warn(e.pos, "enum", f"a value of {source} becomes one of {target} by its number")
         return convert(e, target)
 
     def _string(self, e: Expr, target: StringType) -> Expr:
@@ -311,3 +323,10 @@ class Coercion:
         elif source.bits > (16 if target is REAL else 32) and not isinstance(e, Const):
             self._warn(e.pos, "precision", f"{e.type} becomes {target}: large values are rounded")
         return convert(e, target)
+
+
+def _example(t: Elementary) -> str:
+    """How a value of a date or character type is written."""
+    if t.kind is Kind.CHAR:
+        return f"{t}#'A'"
+    return f"a literal such as {t}#{_FORMS[t.name.removeprefix('L')]}, or ULINT_TO_{t}(...)"

@@ -16,7 +16,7 @@ from plctool.compiler.semantics.symbols import PouSymbol, ProgramInfo
 from plctool.compiler.semantics.tasks import background, read_task
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pou, PouKind, Task, TaskKind
+from plctool.compiler.typed import Direction, Pos, Pou, PouKind, Task, TaskKind
 
 DEFAULT_INTERVAL_US = 10_000
 DEFAULT_TASK = "Main"
@@ -74,6 +74,7 @@ class _Builder:
             )  # fmt: skip
             return
         program = self._instance(chosen[0].decl.full_name)
+        self._check_in_outs(program, [], chosen[0].decl.source.pos(chosen[0].decl.pos))
         self._application.tasks.append(Task(DEFAULT_TASK, TaskKind.CYCLIC, 1, DEFAULT_INTERVAL_US, [program.pou]))
 
     def _instance(self, name: str) -> ProgramInfo:
@@ -150,8 +151,18 @@ class _Builder:
         self._names.add(instance.name.casefold())
         program = self._instance(instance.name)
         task.programs.append(program.pou)
+        self._check_in_outs(program, instance.args, scope.pos(instance.pos))
         if instance.args:
             self._connections.append((instance, program, task))
+
+    def _check_in_outs(self, program: ProgramInfo, args: list[ast.Argument], pos: Pos) -> None:
+        """A task gives a program no variables; only a call, or the line of the CONFIGURATION, does."""
+        given = {(a.name or "").casefold() for a in args}
+        for symbol, direction in program.parameters:
+            if direction is Direction.IN_OUT and symbol.name.casefold() not in given:
+                message = f"{program.name} has the VAR_IN_OUT {symbol.name}, so no task runs it; call it in a program"
+                self._world.diagnostics.error(pos, "configuration", message)
+                return
 
     def _connect(self, instance: ast.ProgramInstance, program: ProgramInfo, task: Task, scope: Scope) -> None:
         """`PROGRAM p WITH t : Type(input := x, output => y)`: small programs before and behind do the assignments."""

@@ -12,8 +12,16 @@ from dataclasses import replace
 from typing import Any
 
 from plctool.compiler.kept import is_kept
-from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, finalisers, initialisers, instances_in
-from plctool.compiler.semantics.symbols import Member
+from plctool.compiler.semantics.instances import (
+    COPY_CODE,
+    INIT_RETAINS,
+    finalisers,
+    initialisers,
+    instances_in,
+    path_members,
+    starters,
+)
+from plctool.compiler.semantics.symbols import NOTHING, Member
 from plctool.compiler.semantics.values import whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.typed import (
@@ -115,7 +123,8 @@ class _Construction:
     def variable(self, variable: Variable) -> list[Statement]:
         """What a variable and all instances in it need."""
         keep = variable.keep if variable.area is Area.RETAIN else None
-        return self._place(whole(variable, variable.pos), variable.initial, variable.pos, keep)
+        path = variable.name if variable.storage is Storage.AREA else f"{self._pou.name}.{variable.name}"
+        return self._place(whole(variable, variable.pos), variable.initial, variable.pos, keep, path)
 
     def _needs(self, t: Type) -> bool:
         while isinstance(t, ArrayType):
@@ -124,13 +133,14 @@ class _Construction:
             return False
         known = self._needed.get(t)
         if known is None:
-            known = bool(initialisers(self._world, t)) or any(self._needs(f.type) for f in t.fields)
+            known = bool(initialisers(self._world, t) or starters(self._world, t) or path_members(self._world, t))
+            known = known or any(self._needs(f.type) for f in t.fields)
             known = known or _is_computed(self._world.defaults.get(t.name))
             self._needed[t] = known
         return known
 
-    def _place(self, place: Place, initial: Initial | None, pos: Pos, keep: Keep | None) -> list[Statement]:
-        """`keep`: None outside of the retain area."""
+    def _place(self, place: Place, initial: Initial | None, pos: Pos, keep: Keep | None, path: str) -> list[Statement]:
+        """`keep`: None outside of the retain area; `path`: the name of the place."""
         t = place.type
         if isinstance(initial, ComputedInit):
             assign = Assign(place, initial.value, pos)
@@ -139,18 +149,42 @@ class _Construction:
         if not self._needs(t) and not _is_computed(initial):
             return []
         if isinstance(t, ArrayType):
-            return self._array(place, t, initial, pos, keep)
+            return self._array(place, t, initial, pos, keep, path)
         assert isinstance(t, StructType)
         given = initial if isinstance(initial, StructInit) else StructInit({})
         complete = overlay(given, _moved_initial(self._world.defaults.get(t.name), place))
         assert isinstance(complete, StructInit)
         statements: list[Statement] = []
+        named = path_members(self._world, t)
         for f in t.fields:
             part, own = MemberPlace(place, f.offset, f.type, pos), None if keep is None else keep.of_member(f.keep)
-            statements += self._place(part, complete.members.get(f.name), pos, own)
+            statements += self._place(part, complete.members.get(f.name), pos, own, f"{path}.{f.name}")
+            if f.name in named and isinstance(f.type, StringType):
+                statements.append(Assign(part, Const(path[: f.type.length], f.type, pos), pos))
         for member in initialisers(self._world, t):
             statements.append(self._call(member, place, complete.arguments, pos, keep))
+        statements += [self._set(t, place, key, value, pos) for key, value in complete.properties.items()]
+        statements += [self._start(member, place, pos) for member in starters(self._world, t)]
         return statements
+
+    def _set(self, t: StructType, place: Place, key: str, value: Expr, pos: Pos) -> Statement:
+        """The SET of a property that the declaration gives a value."""
+        cls = self._world.class_of(t)
+        setter = None if cls is None else cls.find(f"{key}.set")
+        assert setter is not None
+        return CallStatement(Call(self._world.declared.member(setter).pou, [value], NOTHING, pos, instance=place), pos)
+
+    def _start(self, member: Member, place: Place, pos: Pos) -> Statement:
+        """The call of a method with {attribute 'call_after_init'}."""
+        info = self._world.declared.member(member)
+        if info.parameters:
+            message = f"{member.name} is called after the initialisation, so it has no inputs and outputs"
+            self._world.diagnostics.error(info.pou.pos, "attribute", message)
+        return CallStatement(Call(info.pou, [], info.result or NOTHING, pos, instance=place), pos)
+
+    def _is_named(self, t: Type) -> bool:
+        """Whether something in a variable of the type gets its path."""
+        return any(path_members(self._world, part) for part in instances_in(t))
 
     def _is_fresh(self, place: Place, keep: Keep | None) -> Expr | None:
         """Whether nothing was put back into a place, so that it begins anew; None when nothing in it is ever kept."""
@@ -162,7 +196,7 @@ class _Construction:
         return Unary(UnaryOp.NOT, kept, BOOL, pos)
 
     def _array(
-        self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos, keep: Keep | None
+        self, place: Place, t: ArrayType, initial: Initial | None, pos: Pos, keep: Keep | None, path: str
     ) -> list[Statement]:
         base = _flat(place, t, pos)
         runs = list(initial.runs) if isinstance(initial, ArrayInit) else []
@@ -170,14 +204,14 @@ class _Construction:
         statements: list[Statement] = []
         first = 0
         for count, value in runs:
-            if count >= _LOOP_FROM:
+            if count >= _LOOP_FROM and not self._is_named(t.element):
                 loop, element = _loop(self._pou, base, t.element, first, first + count - 1)
-                loop.body = self._place(element, value, pos, keep)
+                loop.body = self._place(element, value, pos, keep, path)
                 statements.append(loop)
             else:
                 for n in range(first, first + count):
                     element = IndexPlace(base, [Const(n, DINT, pos)], t.element, pos)
-                    statements += self._place(element, value, pos, keep)
+                    statements += self._place(element, value, pos, keep, f"{path}[{_index_text(t, n)}]")
             first += count
         return statements
 
@@ -196,6 +230,9 @@ class _Construction:
                 args.append(arguments[key])
             elif isinstance(symbol.default, ScalarInit):
                 args.append(Const(symbol.default.value, symbol.type, pos))
+            elif symbol.given and isinstance(symbol.type, StructType | ArrayType):
+                constant = VarPlace(self._world.default_of(symbol), symbol.type, pos)
+                args.append(Load(constant, symbol.type, pos))
             elif symbol.given:
                 args.append(Const("" if isinstance(symbol.type, StringType) else 0, symbol.type, pos))
             elif direction is Direction.INPUT:
@@ -244,6 +281,15 @@ def _flat(place: Place, t: ArrayType, pos: Pos) -> Place:
     return MemberPlace(place, 0, ArrayType(t.element, ((0, t.count - 1),)), pos)
 
 
+def _index_text(t: ArrayType, number: int) -> str:
+    """The indices of an element, counted from 0: `2,1`."""
+    found: list[str] = []
+    for low, high in reversed(t.bounds):
+        number, at = divmod(number, high - low + 1)
+        found.append(str(low + at))
+    return ",".join(reversed(found))
+
+
 def _loop(pou: Pou, base: Place, t: Type, first: int, last: int) -> tuple[For, Place]:
     """A loop over elements of an array, upwards or downwards, without a body; and the element it is about."""
     pos = base.pos
@@ -257,7 +303,7 @@ def _loop(pou: Pou, base: Place, t: Type, first: int, last: int) -> tuple[For, P
 def _is_computed(initial: Initial | None) -> bool:
     """Whether something in an initial value is not constant."""
     if isinstance(initial, StructInit):
-        return any(map(_is_computed, initial.members.values()))
+        return bool(initial.properties) or any(map(_is_computed, initial.members.values()))
     if isinstance(initial, ArrayInit):
         return any(_is_computed(value) for _, value in initial.runs)
     return isinstance(initial, ComputedInit)
@@ -268,7 +314,11 @@ def _moved_initial(initial: Initial | None, instance: Place) -> Initial | None:
     if isinstance(initial, StructInit):
         moved = {name: _moved_initial(value, instance) for name, value in initial.members.items()}
         members = {name: value for name, value in moved.items() if value is not None}
-        return StructInit(members, {name: _moved(e, instance) for name, e in initial.arguments.items()})
+        arguments, properties = (
+            {name: _moved(e, instance) for name, e in given.items()}
+            for given in (initial.arguments, initial.properties)
+        )
+        return StructInit(members, arguments, properties)
     if isinstance(initial, ArrayInit):
         return ArrayInit([(count, _moved_initial(value, instance)) for count, value in initial.runs])
     return ComputedInit(_moved(initial.value, instance)) if isinstance(initial, ComputedInit) else initial

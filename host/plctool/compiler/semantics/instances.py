@@ -49,6 +49,27 @@ def finalisers(world: World, t: StructType) -> list[Member]:
     return _each(world, t, "fb_exit")
 
 
+def starters(world: World, t: StructType) -> list[Member]:
+    """The methods with {attribute 'call_after_init'} of a block, those of the base first; of one that is overridden,
+    what overrides it."""
+    chain, cls = [], world.class_of(t)
+    while cls is not None:
+        chain.append(cls)
+        cls = cls.base
+    found: dict[str, Member] = {}
+    for cls in reversed(chain):
+        for key, member in cls.members.items():
+            if "call_after_init" in member.decl.attributes and member.decl.keyword == "METHOD":
+                found.setdefault(key, member)
+    return [chain[0].find(key) or member for key, member in found.items()]
+
+
+def path_members(world: World, t: StructType) -> set[str]:
+    """The members of a block that hold the path of the instance: those with {attribute 'instance-path'}."""
+    block = world.blocks.get(t)
+    return set() if block is None else {symbol.name for symbol in block.members.values() if symbol.is_path}
+
+
 def _each(world: World, t: StructType, key: str) -> list[Member]:
     """The methods of that name of a block and of its bases."""
     found: list[Member] = []

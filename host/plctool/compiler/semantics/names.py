@@ -191,6 +191,14 @@ class Names:
         other = self._library_symbol(key)
         return own if other is None or isinstance(other, GlobalSymbol) else other
 
+    def own_unit(self, key: str) -> Unit | None:
+        """What the program itself declares under that name."""
+        return self._units.get(key)
+
+    def own_list(self, key: str) -> Namespace | None:
+        """The list of globals of that name."""
+        return self._lists.get(key)
+
     def _library_symbol(self, key: str) -> Unit | GlobalSymbol | None:
         key = without_library(key)
         if key not in self._library_names:

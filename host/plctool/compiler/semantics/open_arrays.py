@@ -8,7 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from plctool.compiler.typed import Const, Direction, Expr, Load, Parameter, Place, Pos, Storage, Variable, VarPlace
+from plctool.compiler.typed import (
+    Binary,
+    BinaryOp,
+    Const,
+    Direction,
+    Expr,
+    Load,
+    Parameter,
+    Place,
+    Pos,
+    Storage,
+    Variable,
+    VarPlace,
+)
 from plctool.iec.types import DINT, ArrayType, OpenArrayType
 
 Bounds = list[tuple[Expr, Expr]]
@@ -39,6 +52,18 @@ def bounds_of(place: Expr | Place) -> Bounds:
     if isinstance(t, OpenArrayType) and isinstance(place, VarPlace):
         return [(_load(low, pos), _load(high, pos)) for low, high in place.var.bounds]
     return _constants(t, pos)
+
+
+def total_size(place: Place) -> Expr:
+    """The bytes of a place, which of an ARRAY[*] are known when it runs (DINT)."""
+    t, pos = place.type, place.pos
+    if not isinstance(t, OpenArrayType):
+        return Const(t.size, DINT, pos)
+    size: Expr = Const(t.element.size, DINT, pos)
+    for low, high in bounds_of(place):
+        count = Binary(BinaryOp.ADD, Binary(BinaryOp.SUB, high, low, DINT, pos), Const(1, DINT, pos), DINT, pos)
+        size = Binary(BinaryOp.MUL, size, count, DINT, pos)
+    return size
 
 
 def handed_bounds(parameter: Variable, argument: Expr | Place | None, pos: Pos) -> list[tuple[Variable, Expr]]:

@@ -56,6 +56,7 @@ MODIFIERS: dict[str, frozenset[str]] = {
     "method of an INTERFACE": frozenset(("PUBLIC", "ABSTRACT")),
     "property of an INTERFACE": frozenset(("PUBLIC", "ABSTRACT")),
     "ACTION": _NONE,
+    "TYPE": frozenset(("PUBLIC", "INTERNAL")),
     "NAMESPACE": frozenset(("PUBLIC", "INTERNAL")),
 }
 """For each kind of unit the words that may stand in front of its name."""
@@ -68,7 +69,6 @@ _INSTEAD_OF_SECTION = {
     ("CLASS", "VAR_INPUT"): "nothing calls a CLASS itself; write VAR PUBLIC, or an input of a METHOD",
     ("CLASS", "VAR_OUTPUT"): "nothing calls a CLASS itself; write VAR PUBLIC, or an output of a METHOD",
     ("CLASS", "VAR_IN_OUT"): "nothing calls a CLASS itself; write it into a METHOD",
-    ("PROGRAM", "VAR_IN_OUT"): "use VAR_EXTERNAL or a global variable",
 }
 
 
@@ -93,6 +93,9 @@ class _Check:
     def declaration(self, decl: ast.Declaration) -> None:
         if isinstance(decl, ast.PouDecl):
             self._unit(decl, _kind(decl))
+        elif isinstance(decl, ast.TypeDecl):
+            for word in sorted(decl.modifiers - MODIFIERS["TYPE"]):
+                self._error(decl.pos, _wrong_modifier("TYPE", word))
         elif isinstance(decl, ast.GlobalBlock):
             self._section("file", decl.block)
         elif isinstance(decl, ast.TestDecl):

@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.library import Library
+from plctool.compiler.semantics.any_values import describes_any
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.construction import construct
 from plctool.compiler.semantics.declarations.blocks import Blocks
@@ -61,7 +62,7 @@ class Program:
                 self.types.type_of_symbol(symbol)
             elif symbol.keyword == "FUNCTION_BLOCK":
                 self._blocks.block(symbol)
-            elif symbol.keyword == "FUNCTION" and not is_generic(symbol.decl):
+            elif symbol.keyword == "FUNCTION" and (not is_generic(symbol.decl) or describes_any(symbol.decl)):
                 self._functions.function(symbol, {})
         for variable in self.world.names.globals():
             self.variables.global_variable(variable)

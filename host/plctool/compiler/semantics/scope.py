@@ -31,7 +31,7 @@ def _internal_to(symbol: Symbol) -> str | None:
         space, marked = symbol.namespace, "INTERNAL" in symbol.qualifiers
     elif isinstance(symbol, TypeSymbol | PouSymbol):
         decl = symbol.decl
-        space, marked = decl.namespace, isinstance(decl, ast.PouDecl) and "INTERNAL" in decl.modifiers
+        space, marked = decl.namespace, "INTERNAL" in decl.modifiers
     else:
         return None
     if space is None or not space.name or not (marked or space.internal is not None):
@@ -129,7 +129,9 @@ class Scope:
             symbol = self.globals.lookup(f"{space}.{key}", library=self.library)
             if symbol is not None:
                 return symbol
-        return self.globals.lookup(key.removeprefix("."), library=self.library)
+        found = self.globals.lookup(key.removeprefix("."), library=self.library)
+        bare = self._without_foreign(key) if found is None else ""
+        return self.globals.own_unit(bare) or self.globals.own_list(bare) if bare else found
 
     def unit(self, name: str) -> Unit | None:
         """A type, function, function block or program, whatever variables have its name."""
@@ -138,7 +140,16 @@ class Scope:
             return self.programs[key]
         spaces = (f"{space}.{key}" for space in self.path)
         found = (self.globals.unit(k, library=self.library) for k in (*spaces, key))
-        return next((symbol for symbol in found if symbol is not None), None)
+        symbol = next((symbol for symbol in found if symbol is not None), None)
+        return symbol or self.globals.own_unit(self._without_foreign(key))
+
+    def _without_foreign(self, key: str) -> str:
+        """A name without the namespace of a library that is given as source: `tcunit.x` is `x` where nothing else is
+        known as `tcunit`. "" when it has none."""
+        first, _, rest = key.partition(".")
+        known = not first or not rest or first in self.names or first in self.outer
+        known = known or first in self.globals.namespaces
+        return "" if known or self.globals.lookup(first, library=self.library) is not None else rest
 
     def pos(self, offset: int) -> Pos:
         """Line and column of an offset in this source."""
@@ -147,6 +158,26 @@ class Scope:
     def error(self, offset: int, code: str, message: str) -> None:
         """Reports an error at an offset."""
         self.globals.diagnostics.error(self.source.pos(offset), code, message)
+
+    def missing(self, offset: int, name: str, message: str) -> None:
+        """Reports that nothing is known by a name."""
+        self.globals.diagnostics.missing(self.source.pos(offset), name, message)
+
+    def is_incomplete(self, unit: str) -> bool:
+        """Whether a unit lacks something because of an error that was reported, so that more would follow from it."""
+        return unit.casefold() in self.globals.diagnostics.incomplete
+
+    def inherits_unknown(self, cls: ClassInfo | None) -> bool:
+        """Whether a class may have members that are not known, because a base of it is not."""
+        while cls is not None and cls.name.casefold() not in self.globals.diagnostics.baseless:
+            cls = cls.base
+        return cls is not None
+
+    def lacks(self, unit: str, *, base: bool = False) -> None:
+        """Notes that a unit is incomplete: a variable has an unknown type, or its `base` is unknown."""
+        self.globals.diagnostics.incomplete.add(unit.casefold())
+        if base:
+            self.globals.diagnostics.baseless.add(unit.casefold())
 
     def warning(self, offset: int, code: str, message: str) -> None:
         """Reports a warning at an offset."""

@@ -81,6 +81,8 @@ class VarSymbol:
     used: bool = False
     access: str = ""  # PUBLIC, PRIVATE, PROTECTED or INTERNAL, where it is written
     keep: Keep = Keep.UNSAID  # what the section of a member says
+    is_path: bool = False  # starts with the path of its instance
+    group: str = ""  # ANY_... of a parameter that describes its argument (any_values.py)
     open_area: str = ""  # I, Q or M: of a member of a function block AT %I*, %Q* or %M*
 
 
@@ -242,11 +244,16 @@ class ClassInfo:
         return list(found)
 
     def find(self, key: str) -> Member | None:
-        """A member, own or inherited: `name`, or `name.get` and `name.set` of a property."""
+        """A member, own or inherited: `name`, or `name.get` and `name.set` of a property. A property hides a PRIVATE
+        method of a base, and the other way round."""
+        name, _, accessor = key.partition(".")
+        others = (name,) if accessor else (f"{name}.get", f"{name}.set")
         cls: ClassInfo | None = self
         while cls is not None:
             if key in cls.members:
                 return cls.members[key]
+            if any(other in cls.members for other in others):
+                return None
             cls = cls.base
         return next((i.members[key] for i in self.all_interfaces() if key in i.members), None)
 

@@ -14,6 +14,7 @@ from plctool.compiler.typed import (
     Place,
     Pos,
     SelfPlace,
+    Storage,
     ValuePlace,
     Variable,
     VarPlace,
@@ -43,6 +44,15 @@ def is_temporary(place: Place) -> bool:
     while not isinstance(place, VarPlace | DerefPlace | ValuePlace | SelfPlace):
         place = place.base
     return isinstance(place, ValuePlace)
+
+
+def is_exact(place: Place) -> bool:
+    """Whether an instance is of just the type it is declared with: it is not reached through a reference."""
+    if isinstance(place, VarPlace):
+        return place.var.storage is not Storage.REFERENCE
+    if isinstance(place, SelfPlace):
+        return place.exact
+    return not isinstance(place, DerefPlace)
 
 
 def load(place: Place) -> Load:

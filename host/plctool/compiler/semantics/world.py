@@ -18,10 +18,10 @@ from plctool.compiler.semantics.dispatches import Dispatches
 from plctool.compiler.semantics.endless import Loop
 from plctool.compiler.semantics.names import Names
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, PouSymbol
+from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, PouSymbol, VarSymbol
 from plctool.compiler.source import Source
-from plctool.compiler.typed import Call, Const, Expr, Pou, StructInit, Variable
-from plctool.iec.types import WCHAR, StructType, Type
+from plctool.compiler.typed import Call, Const, Expr, Pou, ScalarInit, Storage, StructInit, Variable
+from plctool.iec.types import WCHAR, EnumType, StructType, Type
 
 
 class World:
@@ -40,9 +40,13 @@ class World:
         self.direct = DirectVariables(self.allocation)
         self.bodies = BodyQueue()
         self.blocks: dict[StructType, BlockInfo] = {}
+        self.open_members: dict[StructType, dict[str, VarSymbol]] = {}  # of structures: AT %I*, %Q*, %M*
         self.interfaces: dict[StructType, ClassInfo] = {}
         self.defaults: dict[str, StructInit] = {}
-        self.shared: dict[tuple[str, int], Variable] = {}
+        self.shared: dict[tuple[str, str, int], Variable] = {}
+        self.enumeration_texts: dict[EnumType, PouSymbol] = {}  # what gives the names of values
+        self._texts: dict[tuple[int | float | str, Type], Variable] = {}
+        self._parameter_defaults: dict[tuple[str, int], Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
         self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
         self.pous: list[Pou] = []
@@ -64,6 +68,28 @@ class World:
             return None
         block = self.blocks.get(t)
         return block.cls if block is not None else self.interfaces.get(t)
+
+    def default_of(self, symbol: VarSymbol) -> Variable:
+        """What a parameter that is a structure or an array holds when a call leaves it out: a constant in memory."""
+        key = (symbol.pos.file, symbol.pos.line << 16 | symbol.pos.column)
+        variable = self._parameter_defaults.get(key)
+        if variable is None:
+            name = f"{symbol.name} default {symbol.pos.line}.{symbol.pos.column}"
+            variable = Variable(name, symbol.type, Storage.AREA, symbol.pos, initial=symbol.default, constant=True)
+            self._parameter_defaults[key] = variable
+            self.allocation.add(variable)
+        return variable
+
+    def text(self, constant: Const) -> Variable:
+        """Memory that holds a text for those who ask for its address."""
+        variable = self._texts.get((constant.value, constant.type))
+        if variable is None:
+            initial = ScalarInit(constant.value)
+            name = f"text {len(self._texts) + 1}"
+            variable = Variable(name, constant.type, Storage.AREA, constant.pos, initial=initial, constant=True)
+            self._texts[constant.value, constant.type] = variable
+            self.allocation.add(variable)
+        return variable
 
     def nested_too_deeply(self, error: NestingError) -> None:
         """Reports what goes beyond MAX_DEPTH."""

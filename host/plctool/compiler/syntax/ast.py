@@ -101,9 +101,17 @@ class Argument:
 
 @dataclass(slots=True, eq=False)
 class Call:
+    """`had_enable`: EN or ENO were among the arguments and are handled already."""
+
     pos: int
     callee: Expr
     args: list[Argument]
+    had_enable: bool = False
+
+    @property
+    def formal(self) -> bool:
+        """Whether arguments are given by name, so that others may be left out."""
+        return self.had_enable or any(argument.name is not None for argument in self.args)
 
 
 @dataclass(slots=True, eq=False)
@@ -149,10 +157,12 @@ class ArrayInit:
 
 @dataclass(slots=True, eq=False)
 class StructInit:
-    """`(member := value, ...)`"""
+    """`(member := value, ...)`. `arguments`: it stands behind the name of a type, `Pump(limit := 5)`, where the inputs
+    of FB_Init come before members of the same name; a value without a name ("") is always one of them."""
 
     pos: int
     members: list[tuple[int, str, Init]]
+    arguments: bool = False
 
 
 Init = Expr | ArrayInit | StructInit
@@ -244,7 +254,7 @@ class VarBlock:
 
 @dataclass(slots=True, eq=False)
 class TypeDecl:
-    """`qualified`: the values of the enumeration need its name in front, {attribute 'qualified_only'}."""
+    """A type with what stands in front of it or of its TYPE."""
 
     pos: int
     name: str
@@ -252,7 +262,13 @@ class TypeDecl:
     init: Init | None
     source: Source
     namespace: Namespace | None = None
-    qualified: bool = False
+    attributes: dict[str, str] = field(default_factory=dict)
+    modifiers: set[str] = field(default_factory=set)  # PUBLIC, INTERNAL
+
+    @property
+    def qualified(self) -> bool:
+        """Whether the values of the enumeration need its name in front."""
+        return "qualified_only" in self.attributes
 
 
 @dataclass(slots=True, eq=False)
@@ -509,7 +525,10 @@ class Continue:
 
 @dataclass(slots=True, eq=False)
 class Return:
+    """`RETURN`, or `RETURN(condition)` as CODESYS has it."""
+
     pos: int
+    condition: Expr | None = None
 
 
 Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return

@@ -18,6 +18,10 @@ Attributes = dict[int, dict[str, str]]
 
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
+    "strict": frozenset(("enumeration",)),
+    "to_string": frozenset(("enumeration",)),
+    "call_after_init": frozenset(("FUNCTION_BLOCK", "METHOD")),
+    "instance-path": frozenset(("variable",)),
     "external": frozenset(("FUNCTION",)),
     "version": frozenset(("FUNCTION",)),
     "shared_output": frozenset(("variable",)),
@@ -39,13 +43,11 @@ REFUSED = {
 _LAYOUT = "members lie at multiples of their size, or of 8 bytes"
 _CALL_IT = "call it in the first cycle, or do its work in FB_Init"
 UNHEEDED = {
-    "call_after_init": _CALL_IT,
     "call_after_global_init_slot": _CALL_IT,
     "call_before_global_exit_slot": "write FB_Exit",
     "global_init_slot": "variables get their initial values in the order of their declarations",
     "init_namespace": "give the text itself as the initial value",
     "initialize_on_call": "assign the inputs in the call",
-    "instance-path": "give the text itself as the initial value",
     "is_connected": "add a BOOL input that the caller sets",
     "no-exit": "FB_Exit is called for every instance",
     "no_exit": "FB_Exit is called for every instance",
@@ -58,7 +60,6 @@ UNHEEDED = {
     "c++_compatible": _LAYOUT,
     "relative_offset": _LAYOUT,
     "subsequent": "write a STRUCT, whose members follow each other",
-    "to_string": "TO_STRING gives the number; write a CASE for the names",
     "tccallafteroutputupdate": "inputs are read before the programs and outputs are written after them",
     "tcinitonreset": "every variable but RETAIN and PERSISTENT starts anew at a reset",
     "tcinitsymbol": "give the initial value in the declaration",
@@ -83,11 +84,13 @@ SILENT = frozenset((
     "nameprefix", "namespace", "no_assign", "no_assign_warning", "no_copy", "no_explicit_call",
     "no_instance_in_retain", "no_override", "object_name", "obsolete", "parameterstringof",
     "pin_presentation_order_inputs", "pin_presentation_order_outputs", "pingroup", "processvalue", "pytmc",
-    "reflection", "signature_flag", "strict", "symbol", "sysobject", "tc2gvlvarnames",
+    "reflection", "signature_flag", "symbol", "sysobject", "tc2gvlvarnames",
     "tccontextid", "tccontextname", "tcdisplayscale", "tcdisplaytypeguid", "tcencapsulate", "tcnosymbol",
     "tcrpcenable", "tctypesystem", "unit", "usage", "warning",
 ))  # fmt: skip
 """What changes nothing that a program does."""
+
+_NO_INIT = ("noinit", "no-init", "no_init")  # goes with instance-path: the initial value is the path
 
 _TEXT_PRAGMA = re.compile(r"\{\s*(error|warning)\s+'([^']*)'\s*\}", re.IGNORECASE)
 _IN_C = re.compile(r"\{\s*external\b[^{}]*\}", re.IGNORECASE)
@@ -115,22 +118,22 @@ def check_attributes(attributes: Attributes, places: Mapping[int, str], reports:
                         offset, "no-effect", _no_effect(name, "it belongs to {attribute 'external' := 'name'}")
                     )
                 continue
-            _check(name, place, offset, reports)
+            _check(name, place, offset, given, reports)
             if name in OF_THE_LIBRARY:
                 del given[name]
 
 
-def _check(name: str, place: str, offset: int, reports: Reports) -> None:
+def _check(name: str, place: str, offset: int, given: Mapping[str, str], reports: Reports) -> None:
     if name in REFUSED:
         where = f", not a {place}" if name in HEEDED and place else ""
         reports.error(offset, "attribute", f"{REFUSED[name]}{where}")
     elif name in HEEDED:
         reports.warning(offset, "no-effect", _no_effect(name, f"it stands in front of {_listed(name)}"))
-    elif name in UNHEEDED:
+    elif name in UNHEEDED and not (name in _NO_INIT and "instance-path" in given):
         reports.warning(offset, "no-effect", _no_effect(name, UNHEEDED[name]))
     elif name in OF_THE_LIBRARY:
         reports.warning(offset, "no-effect", _no_effect(name, "it is for the standard library"))
-    elif name not in SILENT:
+    elif name not in SILENT and name not in UNHEEDED:
         meant = get_close_matches(name, [*HEEDED, *UNHEEDED], n=1, cutoff=0.8)
         if meant:
             reports.warning(offset, "no-effect", _no_effect(name, f"did you mean '{meant[0]}'?"))

@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
@@ -15,6 +15,8 @@ from plctool.compiler.syntax.builder_chart import read_action, read_priority
 from plctool.compiler.syntax.builder_units import Arrangement
 from plctool.compiler.syntax.lexer import Report, Token
 from plctool.iec import literals
+
+_Init = TypeVar("_Init", bound="ast.Init | None")
 
 _PRECEDENCE = {
     "**": 7, "*": 6, "/": 6, "MOD": 6, "+": 5, "-": 5, "<": 4, ">": 4, "<=": 4, ">=": 4, "=": 3, "<>": 3,
@@ -47,6 +49,13 @@ def _listed(children: tuple[Any, ...]) -> list[Any]:
     return [c for c in children if c is not None]
 
 
+def _placed(init: _Init, pos: int) -> _Init:
+    """An initial value; `()` has no token of its own, so it stands where its name does."""
+    if isinstance(init, ast.StructInit) and init.pos < 0:
+        init.pos = pos
+    return init
+
+
 class Builder:
     """One method per grammar rule. What an optional part left out is None; so is what error recovery put in."""
 
@@ -73,31 +82,32 @@ class Builder:
     def types(self, keyword: Token, *decls: Any) -> list[Any]:
         kinds = {decl: "enumeration" if isinstance(decl.spec, ast.EnumSpec) else "TYPE" for decl in _listed(decls)}
         first = "enumeration" if "enumeration" in kinds.values() else "TYPE"
-        all_qualified = "qualified_only" in self._attributes_at(keyword.pos, first)
+        of_all = self._attributes_at(keyword.pos, first)
         for decl, kind in kinds.items():
-            decl.qualified = "qualified_only" in self._attributes_at(decl.pos, kind) or all_qualified
+            decl.attributes = {**of_all, **self._attributes_at(decl.pos, kind)}
         return list(kinds)
 
-    def type_decl(
-        self, name: Token, base: tuple[int, str] | None, spec: ast.TypeSpec, init: ast.Init | None
-    ) -> ast.TypeDecl:
+    def type_decl(self, *rest: Any) -> ast.TypeDecl:
+        *modifiers, name, base, spec, init = rest
         if base is not None and isinstance(spec, ast.StructSpec):
             spec.base = ast.NamedType(*base)
         elif base is not None:
             self.report(base[0], "syntax", "only a STRUCT or UNION can extend another one")
-        return ast.TypeDecl(name.pos, name.text, spec, init, self.source)
+        decl = ast.TypeDecl(name.pos, name.text, spec, init, self.source)
+        decl.modifiers = {token.text.upper() for token in modifiers}
+        return decl
 
     def named_type(self, name: tuple[int, str]) -> ast.NamedType:
         return ast.NamedType(*name)
 
-    def initialised_type(self, name: Token, inits: ast.ArrayInit) -> ast.NamedType:
-        return ast.NamedType(name.pos, name.text, inits=inits)
+    def initialised_type(self, name: tuple[int, str], inits: ast.ArrayInit) -> ast.NamedType:
+        return ast.NamedType(*name, inits=inits)
 
     def text_type(self, name: Token, length: ast.Expr | None) -> ast.NamedType:
         return ast.NamedType(name.pos, name.text, length)
 
-    def subrange(self, base: Token, low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
-        return ast.SubrangeSpec(base.pos, base.text, low, high)
+    def subrange(self, base: tuple[int, str], low: ast.Expr, high: ast.Expr) -> ast.SubrangeSpec:
+        return ast.SubrangeSpec(*base, low, high)
 
     def enum(self, values: list[tuple[int, str, ast.Init | None]]) -> ast.EnumSpec:
         return ast.EnumSpec(values[0][0] if values else 0, None, values)
@@ -105,10 +115,10 @@ class Builder:
     def enum_with_base(self, values: list[tuple[int, str, ast.Init | None]], base: Token) -> ast.EnumSpec:
         return ast.EnumSpec(base.pos, base.text, values)
 
-    def enum_of_base(self, base: Token, values: list[Any]) -> ast.EnumSpec:
+    def enum_of_base(self, base: tuple[int, str], values: list[Any]) -> ast.EnumSpec:
         """`INT (red, green := 5)`, or an instance with values, perhaps without names: `Pump(valve, limit := 5)`."""
         named = [(v.pos, v.name, None) if isinstance(v, ast.Name) else v for v in values]
-        return ast.EnumSpec(base.pos, base.text, [v if isinstance(v, tuple) else (v.pos, "", v) for v in named])
+        return ast.EnumSpec(*base, [v if isinstance(v, tuple) else (v.pos, "", v) for v in named])
 
     def enum_values(self, *values: Any) -> list[Any]:
         return [v for v in values if v is not None]
@@ -158,6 +168,7 @@ class Builder:
         pos = names[0].pos
         address = self.direct(location) if location else None
         attributes = self._attributes_at(pos, "variable")
+        init = _placed(init, pos)
         written = [(t.pos, t.text) for t in names]
         return ast.VarDecl(pos, written, address, spec, init, attributes, edge.text.upper() if edge else "")
 
@@ -193,10 +204,15 @@ class Builder:
                 members[-1] = offset, name, listed
             else:
                 listed.items.append(item)
-        return ast.StructInit(members[0][0], members)
+        return ast.StructInit(members[0][0] if members else -1, members)
+
+    def positional_init(self, *values: Any) -> ast.StructInit:
+        """`(1, 2)`: the inputs of FB_Init in their order."""
+        given = _listed(values)
+        return ast.StructInit(given[0].pos, [v if isinstance(v, tuple) else (v.pos, "", v) for v in given])
 
     def member_init(self, name: Token, value: ast.Init) -> tuple[int, str, ast.Init]:
-        return name.pos, name.text, value
+        return name.pos, name.text, _placed(value, name.pos)
 
     # ---- units ----
 
@@ -435,8 +451,8 @@ class Builder:
     def continue_stmt(self, keyword: Token) -> ast.Continue:
         return ast.Continue(keyword.pos)
 
-    def return_stmt(self, keyword: Token) -> ast.Return:
-        return ast.Return(keyword.pos)
+    def return_stmt(self, keyword: Token, condition: ast.Expr | None) -> ast.Return:
+        return ast.Return(keyword.pos, condition)
 
     # ---- expressions ----
 
@@ -529,7 +545,7 @@ class Builder:
     def positional(self, value: ast.Expr) -> ast.Argument:
         return ast.Argument(value.pos, None, value)
 
-    def input(self, name: Token, value: ast.Expr) -> ast.Argument:
+    def input(self, name: Token, value: ast.Expr | None = None) -> ast.Argument:
         return ast.Argument(name.pos, name.text, value)
 
     def output(self, name: Token, target: ast.Expr | None = None) -> ast.Argument:

@@ -1,4 +1,5 @@
-"""Conditional pragmas: {define NAME}, {undefine NAME}, {IF defined(NAME)}, {ELSIF ...}, {ELSE}, {END_IF}.
+"""Conditional pragmas: {define NAME}, {undefine NAME}, {IF defined(NAME)}, {ELSIF ...}, {ELSE}, {END_IF}. In a
+condition also defined(pou: NAME), (type: NAME), (variable: NAME): whether the program or the library declares it.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -6,12 +7,33 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 _DIRECTIVE = re.compile(r"\{\s*(define|undefine|IF|ELSIF|ELSE|END_IF)\b(.*)\}", re.IGNORECASE | re.DOTALL)
 _DEFINE = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:'.*')?\s*", re.DOTALL)
-_TOKEN = re.compile(r"\s*(?:defined\s*\(\s*(?P<name>[A-Za-z_]\w*)\s*\)|(?P<word>AND|OR|NOT|\(|\)))", re.IGNORECASE)
+_TOKEN = re.compile(
+    r"\s*(?:defined\s*\(\s*(?:(?P<kind>pou|type|variable)\s*:\s*)?(?P<name>[A-Za-z_]\w*)\s*\)|(?P<word>AND|OR|NOT|\(|\)))",
+    re.IGNORECASE,
+)
+_ASKS = re.compile(r"\bdefined\s*\(\s*(?:pou|type|variable)\s*:", re.IGNORECASE)
+_UNIT = re.compile(
+    r"^\s*(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|INTERFACE|CLASS|TYPE)\s+"
+    r"(?:(?:PUBLIC|PRIVATE|INTERNAL|ABSTRACT|FINAL)\s+)*([A-Za-z_]\w*)",
+    re.IGNORECASE | re.MULTILINE,
+)
+_GLOBALS = re.compile(r"\bVAR_GLOBAL\b(.*?)\bEND_VAR\b", re.IGNORECASE | re.DOTALL)
+_VARIABLE = re.compile(r"([A-Za-z_]\w*)\s*(?:AT\s*%[\w.*]+\s*)?:(?!=)")
+
+
+def names_asked_for(texts: Sequence[str], library: Callable[[], Iterable[str]]) -> frozenset[str]:
+    """What `defined(pou: NAME)` finds in the texts of a program and in the library, in capitals; nothing when nobody
+    asks. Branches that are left out count as well."""
+    if not any(map(_ASKS.search, texts)):
+        return frozenset()
+    found = {name for text in texts for name in _UNIT.findall(text)}
+    found.update(name for text in texts for block in _GLOBALS.findall(text) for name in _VARIABLE.findall(block))
+    return frozenset(name.upper() for name in (*found, *library()))
 
 
 class _NotUnderstood(Exception):
@@ -31,8 +53,9 @@ class _Branches:
 class Conditions:
     """Which parts of a text count."""
 
-    def __init__(self, report: Callable[[int, str, str], None]) -> None:
+    def __init__(self, report: Callable[[int, str, str], None], declared: frozenset[str]) -> None:
         self._report = report
+        self._declared = declared
         self._defined: set[str] = set()
         self._open: list[_Branches] = []
 
@@ -87,11 +110,12 @@ class Conditions:
                 match = _TOKEN.match(condition, at)
                 if match is None:
                     raise _NotUnderstood
-                tokens.append(match["word"].upper() if match["word"] else match["name"].upper() in self._defined)
+                known = self._declared if match["kind"] else self._defined
+                tokens.append(match["word"].upper() if match["word"] else match["name"].upper() in known)
                 at = match.end()
             return _Evaluation(tokens).value()
         except _NotUnderstood:
-            message = "a condition here is made of defined(NAME), NOT, AND, OR and parentheses"
+            message = "a condition here is made of defined(NAME), defined(pou: NAME), NOT, AND, OR and parentheses"
             self._report(pos, "pragma", message)
             return False
 

@@ -15,7 +15,7 @@ _TOKEN = re.compile(
     r"""\s*(?:
     (?P<WORD>[A-Za-z_\xC0-\uFFFF][\w\xC0-\uFFFF]*+(?!\#))
   | (?P<PUNCT>:=|\?=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*)\[\]:;,.<>^]|=(?!=)|&(?!&))
-  | (?P<NUMBER>\d[\d_]*+(?:\#\w++|(?:\.\d[\d_]*+)?(?:[eE][+-]?\d++)?)(?!\w))
+  | (?P<NUMBER>\d[\d_]*+(?:\#\w++|(?:\.\d[\d_]*+|\.(?=[eE][+-]?\d|[^\w.]))?(?:[eE][+-]?\d++)?)(?!\w))
   | (?P<SKIP>//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/)
   | (?P<DATE>(?i:L?(?:DATE_AND_TIME|DATE|DT|D|TIME_OF_DAY|TOD))\#[\d:._-]+)
   | (?P<STRING>(?i:(?:W?STRING|W?CHAR)\#)?(?:'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*"))
@@ -124,7 +124,15 @@ class Lexer:
     """Iterates over the tokens of a text; `attributes` collects the attributes by the offset of the token they precede,
     `pragmas` all other pragmas with their own."""
 
-    def __init__(self, text: str, report: Report, start: int = 0, end: int | None = None) -> None:
+    def __init__(
+        self,
+        text: str,
+        report: Report,
+        start: int = 0,
+        end: int | None = None,
+        declared: frozenset[str] = frozenset(),
+    ) -> None:
+        """`declared`: what {IF defined(pou: NAME)} finds."""
         self.text = text
         self.attributes: dict[int, dict[str, str]] = {}
         self.pragmas: list[tuple[int, str]] = []
@@ -132,7 +140,7 @@ class Lexer:
         self._start = start
         self._end = len(text) if end is None else end
         self._pending: dict[str, str] = {}
-        self._conditions = Conditions(report)
+        self._conditions = Conditions(report, declared)
 
     def __iter__(self) -> Iterator[Token]:
         """All tokens, last one of type $END."""
@@ -180,12 +188,19 @@ class Lexer:
                     return
 
     def _skip_comment(self, mark: str, at: int) -> int:
-        """The end of a comment that holds comments, or of the text."""
-        start, depth = at - 2, 1
+        """The end of a comment that holds comments, or of the text. One that is not closed ends at the first mark:
+        there are systems where comments do not nest."""
+        start, depth, first = at - 2, 1, 0
         for match in _COMMENT_MARK[mark].finditer(self.text, at, self._end):
             depth += 1 if match.group() == mark else -1
+            first = first or (match.end() if match.group() != mark else 0)
             if depth == 0:
                 return match.end()
+        if first:
+            opened = self.text.find(mark, at, first)
+            message = f"a comment in a comment: this {mark} is not closed, so the outer comment ends where it would end"
+            self.pragmas.append((opened, f"{{warning '{message}'}}"))
+            return first
         self._report(start, "comment", "this comment is not closed")
         return self._end
 

@@ -15,6 +15,7 @@ from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.automaton import Parser, Reducer
 from plctool.compiler.syntax.builder import Builder
 from plctool.compiler.syntax.lexer import (
+    KEYWORDS,
     OPENING,
     SOFT,
     Lexer,
@@ -113,6 +114,19 @@ def _decide(token: Token, parser: Parser, recovery: Recovery, text: str) -> None
         token.type = "IDENT"
 
 
+_NAMES_ELSEWHERE = frozenset(("NULL", "CONFIGURATION"))  # variables of existing programs have these names
+
+
+def _is_name_after_all(token: Token, parser: Parser, text: str) -> bool:
+    """Makes a keyword that does not fit a name, behind a point and where such a variable is declared or used."""
+    last = parser.values[-1] if parser.values else None
+    behind_point = isinstance(last, Token) and last.type == "_DOT" and KEYWORDS.get(token.text.upper()) == token.type
+    if not behind_point and (token.type not in _NAMES_ELSEWHERE or is_followed_by_name(token, text)):
+        return False
+    token.type = "IDENT"
+    return True
+
+
 @dataclass
 class Parsed:
     """A text: its declarations, the attributes in it and what is declared behind them, its other pragmas."""
@@ -128,12 +142,18 @@ def parse(source: Source, report: Report, start: int = 0, end: int | None = None
     return parse_all(source, report, start, end).declarations
 
 
-def parse_all(source: Source, report: Report, start: int = 0, end: int | None = None) -> Parsed:
-    """All that a text holds."""
+def parse_all(
+    source: Source,
+    report: Report,
+    start: int = 0,
+    end: int | None = None,
+    declared: frozenset[str] = frozenset(),
+) -> Parsed:
+    """All that a text holds. `declared`: what {IF defined(pou: NAME)} finds."""
     tables, builder, reducers = _machine()
     parser = Parser(tables, reducers)
     recovery = Recovery(parser, source, report)
-    lexer = Lexer(source.text, recovery.report_token, start, end)
+    lexer = Lexer(source.text, recovery.report_token, start, end, declared)
     places: dict[int, str] = {}
     builder.source, builder.attributes, builder.places, builder.report = source, lexer.attributes, places, report
     feed = parser.feed
@@ -144,7 +164,7 @@ def parse_all(source: Source, report: Report, start: int = 0, end: int | None = 
                 continue
         if recovery.skipping and not recovery.resume(token):
             continue
-        if feed(token):
+        if feed(token) or (_is_name_after_all(token, parser, source.text) and feed(token)):
             recovery.accept(token)
         else:
             recovery.handle(token)

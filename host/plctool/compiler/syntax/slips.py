@@ -68,8 +68,11 @@ _GRAPHIC = "this is a diagram; only Structured Text can be compiled"
 REFUSED = {
     "JMP": Refusal("JMP and labels are not supported; write a loop, IF, EXIT or RETURN", ";"),
     "__TRY": Refusal("exceptions cannot be caught, they stop the program; test beforehand what may fail", "__ENDTRY"),
+    "VAR_GENERIC": Refusal("blocks of any size are not supported; write one with VAR CONSTANT for each", "END_VAR"),
     "_LD_BODY": Refusal(_GRAPHIC),
     "_FBD_BODY": Refusal(_GRAPHIC),
+    "_CFC_BODY": Refusal(_GRAPHIC),
+    "_SFC_BODY": Refusal(_GRAPHIC),
 }
 """Words that begin what this compiler leaves out."""
 

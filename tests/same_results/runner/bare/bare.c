@@ -135,7 +135,7 @@ static struct {
     RTS_EXCEPTION raised;
 } try;
 
-int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
+bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 {
     memset(&try.raised, 0, sizeof try.raised);
     if (setjmp(try.landing) == 0) {
@@ -144,7 +144,7 @@ int SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     }
     try.running = false;
     *exception = try.raised;
-    return exception->code != RTSEXCPT_NOEXCEPTION;
+    return exception->code == RTSEXCPT_NOEXCEPTION;
 }
 
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)

@@ -16,6 +16,11 @@ extern RTS_UI8 file_flash[]; /* of the linker script */
 enum { SECTOR_SIZE = 4096, PROGRAM_SIZE = 8, ERASED = 0xFF, FLASH_LOG2 = 24 };
 #define ERASED_WORD (ERASED * 0x01010101u)
 
+static void protect(RTS_UI32 attributes)
+{
+    MpuProtect(MPU_BOARD, (uintptr_t)file_flash, FLASH_LOG2, attributes);
+}
+
 static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 {
     if (offset > BOARD_FLASH_SIZE || size > BOARD_FLASH_SIZE - offset)
@@ -37,13 +42,13 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
         return ERR_DEVICE;
     if (offset % PROGRAM_SIZE || size % PROGRAM_SIZE || !is_erased(file_flash + offset, size))
         return ERR_DEVICE;
-    MpuRelease(MPU_BOARD);
+    protect(MPU_WRITE_PRIVILEGED);
     for (RTS_UI32 done = 0; done < size; done += sizeof(RTS_UI32)) {
         RTS_UI32 word;
         memcpy(&word, (const RTS_UI8 *)data + done, sizeof(word));
         *(volatile RTS_UI32 *)(uintptr_t)(file_flash + offset + done) = word;
     }
-    MpuProtect(MPU_BOARD, (uintptr_t)file_flash, FLASH_LOG2, MPU_READ_ONLY);
+    protect(MPU_READ_ONLY);
     return ERR_OK;
 }
 
@@ -51,10 +56,10 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
 {
     if (offset >= BOARD_FLASH_SIZE || offset % SECTOR_SIZE)
         return ERR_DEVICE;
-    MpuRelease(MPU_BOARD);
+    protect(MPU_WRITE_PRIVILEGED);
     for (RTS_UI32 done = 0; done < SECTOR_SIZE; done += sizeof(RTS_UI32))
         *(volatile RTS_UI32 *)(uintptr_t)(file_flash + offset + done) = ERASED_WORD;
-    MpuProtect(MPU_BOARD, (uintptr_t)file_flash, FLASH_LOG2, MPU_READ_ONLY);
+    protect(MPU_READ_ONLY);
     return ERR_OK;
 }
 
@@ -67,7 +72,7 @@ static RTS_RESULT flash_sync(void)
 
 void FlashInit(void)
 {
-    MpuProtect(MPU_BOARD, (uintptr_t)file_flash, FLASH_LOG2, MPU_READ_ONLY);
+    protect(MPU_READ_ONLY);
 }
 
 const SYS_FLASH *SysFlashGet(void)

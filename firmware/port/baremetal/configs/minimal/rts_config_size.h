@@ -27,6 +27,7 @@
 #define COMM_COUNTERS 0
 #define NS_REPLY_SIZE 196 /* the same in a scan */
 #define SRV_MAX_GROUPS 2
+#define RTS_IEC_UNPRIVILEGED 0
 #define RTS_MAIN_STACK_SIZE 1312 /* no task interrupts main */
 
 #define BOARD_UART_COUNT 1

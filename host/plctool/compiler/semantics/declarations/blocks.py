@@ -34,6 +34,7 @@ from plctool.iec.types import (
     Field,
     Keep,
     ReferenceType,
+    StringType,
     StructType,
 )  # fmt: skip
 
@@ -124,6 +125,10 @@ class Blocks:
                 symbol.access = next(iter(block.qualifiers & _ACCESS), "")
                 symbol.open_area = line.location.text[1] if line.location is not None else ""
                 symbol.constant = "CONSTANT" in block.qualifiers
+                symbol.is_path = "instance-path" in line.attributes
+                symbol.used = symbol.used or symbol.is_path
+                if symbol.is_path and not isinstance(t, StringType):
+                    scope.error(offset, "attribute", f"the path of the instance needs a STRING, not {t}")
                 if not scope.declare(symbol, offset):
                     continue
                 info.members[name.casefold()] = symbol
@@ -131,6 +136,7 @@ class Blocks:
                 if alias:
                     info.members[alias.casefold()] = symbol
                 if t is ERROR:
+                    scope.lacks(info.pou.name)
                     continue
                 self._variables.check_kept(name, t, keep, scope, offset)
                 reference = role is Role.IN_OUT

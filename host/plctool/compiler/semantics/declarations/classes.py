@@ -31,7 +31,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
-from plctool.iec.types import CLASS_NUMBER, UDINT, Field, InterfaceType, Keep, StructType
+from plctool.iec.types import CLASS_NUMBER, UDINT, EnumType, Field, InterfaceType, Keep, StructType
 
 _LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
 
@@ -45,6 +45,11 @@ def _member_key(decl: ast.PouDecl) -> str:
 def _named(interfaces: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
     """Without the interface that __QUERYINTERFACE needs elsewhere; here every instance can be asked."""
     return ((offset, name) for offset, name in interfaces if name.casefold() != "__system.iqueryinterface")
+
+
+def _is_enumeration_value(symbol: VarSymbol) -> bool:
+    """Whether a name is that of a value, as `Idle` of `state : (Idle, Run);`"""
+    return isinstance(symbol.type, EnumType) and symbol.value is not None and symbol.name in symbol.type.values
 
 
 class Classes:
@@ -106,13 +111,17 @@ class Classes:
         if isinstance(base, PouSymbol) and base.keyword == "INTERFACE":
             scope.error(offset, "inheritance", f"{name} is an interface; write IMPLEMENTS {name}")
         else:
+            scope.lacks(symbol.decl.full_name, base=True)
             self._no_such(offset, name, scope, "function block", base is None)
         return None
 
     def _no_such(self, offset: int, name: str, scope: Scope, what: str, unknown: bool) -> None:
         if unknown:
             hint = did_you_mean(name, self._world.names.type_names())
-            scope.error(offset, "unknown", f"unknown {what} {name}{hint}")
+            if hint:
+                scope.error(offset, "unknown", f"unknown {what} {name}{hint}")
+            else:
+                scope.missing(offset, name, f"unknown {what} {name}")
         else:
             scope.error(offset, "type", f"{name} is not {'an' if what[0] in 'aeiou' else 'a'} {what}")
 
@@ -179,6 +188,8 @@ class Classes:
 
     def _see(self, cls: ClassInfo, key: str, symbol: VarSymbol) -> None:
         other = cls.names.get(key)
+        if isinstance(other, MemberSymbol) and _is_enumeration_value(symbol):
+            return  # the member comes first; where the enumeration is wanted, its value does
         if isinstance(other, MemberSymbol):
             message = f"{symbol.name} is a variable of {cls.name} and a method, action or property as well"
             self._world.diagnostics.error(symbol.pos, "duplicate", message)

@@ -88,7 +88,7 @@ def with_part(
         member = t.member(step)
         assert member is not None
         changed = with_part(member.type, part, rest, value, defaults)
-        return StructInit({**given.members, step: changed}, given.arguments)
+        return StructInit({**given.members, step: changed}, given.arguments, given.properties)
     assert isinstance(t, ArrayType) and isinstance(step, int)
     runs: list[tuple[int, Initial | None]] = []
     first = 0

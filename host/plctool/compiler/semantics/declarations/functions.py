@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import re
 import zlib
+from dataclasses import replace
 
+from plctool.compiler.semantics.any_values import NAME, describes_any, is_any, parameter
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
 from plctool.compiler.semantics.declarations.unit_variables import ROLES, UnitVariables, new_pou
 from plctool.compiler.semantics.generics import LIBRARY_STRING, WIDE_LIBRARY_STRING
-from plctool.compiler.semantics.instances import is_instance
 from plctool.compiler.semantics.open_arrays import bound_parameters
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import (
@@ -90,18 +91,44 @@ class Functions:
         """Declares result, parameters and variables of a function or method."""
         if decl.result is not None:
             self._declare_result(info, decl, decl.result, scope)
+        behind: list[Parameter] = []
+        described = describes_any(decl)
         for block in self._units.declare_alike(decl, info.pou, scope):
             if block.keyword in DIRECTIONS:
-                self._parameters(block, info, scope)
+                for line in block.decls:
+                    if described and is_any(line.type):
+                        behind += self._any_parameters(block, line, info, scope)
+                    else:
+                        self._parameters(replace(block, decls=[line]), info, scope)
             elif block.keyword not in ("VAR_INST", "STEP"):
                 self._units.declare_stack_variables(block, info.pou, scope)
-        info.pou.parameters += bound_parameters(info.pou.parameters)
+        info.pou.parameters += [*bound_parameters(info.pou.parameters), *behind]
+
+    def _any_parameters(
+        self, block: ast.VarBlock, line: ast.VarDecl, info: FunctionInfo, scope: Scope
+    ) -> list[Parameter]:
+        """Inputs that describe their arguments; what is handed over behind all other parameters."""
+        assert isinstance(line.type, ast.NamedType)
+        if block.keyword != "VAR_INPUT" or line.init is not None:
+            scope.error(line.pos, "type", f"{line.type.name} is for inputs here, without an initial value")
+            return []
+        t, behind = self._world.declared.type_named(line.pos, f"__SYSTEM.{NAME}", scope), list[Parameter]()
+        for offset, name in line.names:
+            symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword])
+            symbol.used, symbol.group = True, line.type.name.upper()
+            if not scope.declare(symbol, offset):
+                continue
+            symbol.variable = Variable(name, t, Storage.LOCAL, symbol.pos)
+            info.pou.locals.append(symbol.variable)
+            own, more, begin = parameter(name, symbol.variable)
+            info.parameters.append((symbol, Direction.INPUT))
+            info.pou.parameters.append(own)
+            behind += more
+            scope.prologue += begin
+        return behind
 
     def _declare_result(self, info: FunctionInfo, decl: ast.PouDecl, spec: ast.TypeSpec, scope: Scope) -> None:
         t, default = self._parameter_type(spec, scope)
-        if is_instance(self._world, t):
-            scope.error(spec.pos, "type", f"a function cannot return the function block {t}")
-            t = ERROR
         info.result = t
         symbol = VarSymbol(decl.name, scope.pos(decl.pos), t, Role.RESULT)
         if t is not ERROR:
@@ -132,9 +159,6 @@ class Functions:
                 symbol.constant = "CONSTANT" in block.qualifiers
                 if not scope.declare(symbol, offset):
                     continue
-                if direction is not Direction.IN_OUT and is_instance(self._world, t):
-                    scope.error(offset, "type", f"pass the function block {name} as VAR_IN_OUT")
-                    symbol.type = ERROR
                 storage = Storage.REFERENCE if by_reference else Storage.LOCAL
                 symbol.variable = Variable(name, t, storage, symbol.pos)
                 info.parameters.append((symbol, direction))

@@ -11,8 +11,9 @@ from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, initialisers
 from plctool.compiler.semantics.rules.arguments import input_value
+from plctool.compiler.semantics.rules.qualified_names import dotted_name
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
+from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Namespace, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import ArrayInit, ComputedInit, Const, Expr, Initial, Load, ScalarInit, StructInit, VarPlace
@@ -70,7 +71,7 @@ class InitialValues:
         for count in counts[1:]:
             inner *= count
         for item in items:
-            if isinstance(item, ast.Call) and isinstance(item.callee, ast.Name) and self._is_repeat(item, scope):
+            if isinstance(item, ast.Call) and self._is_repeat(item, scope):
                 item = ast.Repeat(item.pos, item.callee, [a.value for a in item.args if a.value is not None])
             if isinstance(item, ast.Repeat):
                 more = self._repeated(item, counts, element, scope)
@@ -87,9 +88,17 @@ class InitialValues:
         return runs
 
     def _is_repeat(self, item: ast.Call, scope: Scope) -> bool:
-        assert isinstance(item.callee, ast.Name)
-        symbol = scope.lookup(item.callee.name)
-        return isinstance(symbol, VarSymbol | GlobalSymbol)
+        """Whether the callee is a variable: `N(TRUE)`, `Sizes.N(TRUE)`."""
+        if isinstance(item.callee, ast.Name):
+            return isinstance(scope.lookup(item.callee.name), VarSymbol | GlobalSymbol)
+        name = dotted_name(Checker(self._world, scope), item.callee)
+        if name is None:
+            return False
+        owner, _, own = name.rpartition(".")
+        space = scope.lookup(owner)
+        return isinstance(scope.lookup(name), GlobalSymbol) or (
+            isinstance(space, Namespace) and own.casefold() in space.members
+        )
 
     def _repeated(
         self, item: ast.Repeat, counts: list[int], element: Type, scope: Scope
@@ -117,9 +126,12 @@ class InitialValues:
         block = self._world.blocks.get(t)
         members: dict[str, Initial] = {}
         arguments: dict[str, Expr] = {}
-        for offset, name, value in self._named(node, t, scope):
+        properties: dict[str, Expr] = {}
+        for offset, name, value, first in self._named(node, t, scope):
             field = t.member(name)
-            if field is None and self._initialiser_argument(name, value, t, arguments, scope):
+            if (field is None or first) and self._initialiser_argument(name, value, t, arguments, scope):
+                continue
+            if field is None and self._property(name, value, t, properties, scope):
                 continue
             if field is None or (block is not None and block.members[name.casefold()].role is Role.IN_OUT):
                 hint = did_you_mean(name, (f.name for f in t.fields))
@@ -130,20 +142,31 @@ class InitialValues:
             given = self.initial(value, field.type, scope)
             if given is not None:
                 members[field.name] = given
-        return StructInit(members, arguments)
+        return StructInit(members, arguments, properties)
 
-    def _named(self, node: ast.StructInit, t: StructType, scope: Scope) -> list[tuple[int, str, ast.Init]]:
-        """The members with names: values without one are for the inputs of FB_Init, in their order."""
+    def _property(self, name: str, node: ast.Init, t: StructType, properties: dict[str, Expr], scope: Scope) -> bool:
+        """`fb : MyFB := (Mode := 3)` for a property with a SET; False when there is none."""
+        cls, key = self._world.class_of(t), name.casefold()
+        setter = None if cls is None else cls.find(f"{key}.set")
+        if setter is None or isinstance(node, ast.ArrayInit | ast.StructInit):
+            return False
+        symbol, _ = self._world.declared.member(setter).parameters[0]
+        properties[key] = input_value(Checker(self._world, scope), node, symbol.type, name)
+        return True
+
+    def _named(self, node: ast.StructInit, t: StructType, scope: Scope) -> list[tuple[int, str, ast.Init, bool]]:
+        """The members with names: values without one are for the inputs of FB_Init, in their order. With each, whether
+        such an input comes before a member of that name."""
         names: list[str] = []
         for member in initialisers(self._world, t)[-1:]:
             inputs = [symbol.name for symbol, _ in self._world.declared.member(member).parameters]
             names = [name for name in inputs if name.casefold() not in (INIT_RETAINS, COPY_CODE)]
-        found: list[tuple[int, str, ast.Init]] = []
+        found: list[tuple[int, str, ast.Init, bool]] = []
         for offset, name, value in node.members:
             if not name and not names:
                 scope.error(offset, "arguments", f"{t} has no FB_Init that takes this value; give the value a name")
                 continue
-            found.append((offset, name or names.pop(0), value))
+            found.append((offset, name or names.pop(0), value, node.arguments or not name))
         return found
 
     def _initialiser_argument(

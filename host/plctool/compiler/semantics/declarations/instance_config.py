@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-from plctool.compiler.semantics.addresses import AREAS, located
+from plctool.compiler.semantics.addresses import located
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.declarations.fixed_places import FixedPlace, fixed_place, with_part
@@ -37,6 +37,7 @@ from plctool.compiler.typed import (
     Task,
     Variable,
 )  # fmt: skip
+from plctool.iec.addresses import AREAS
 from plctool.iec.areas import Area
 from plctool.iec.types import BOOL, ArrayType, StructType, Type, base_of
 
@@ -203,9 +204,13 @@ class InstanceConfig:
         """The variable of a function block that a place is."""
         if not isinstance(place, MemberPlace) or not isinstance(place.base.type, StructType):
             return None
-        block = self._world.blocks.get(place.base.type)
-        symbols = block.members.values() if block is not None else ()
+        symbols = self._symbols(place.base.type).values()
         return next((s for s in symbols if s.variable is not None and _lies_at(s.variable, place.offset)), None)
+
+    def _symbols(self, t: StructType) -> dict[str, VarSymbol]:
+        """The members of a function block, or those of a structure that may have addresses, by case-folded name."""
+        block = self._world.blocks.get(t)
+        return block.members if block is not None else self._world.open_members.get(t, {})
 
     # ---- variables without an address ----
 
@@ -234,9 +239,9 @@ class InstanceConfig:
             indices = product(*(range(low, high + 1) for low, high in t.bounds)) if inside else ()
             found = [(f"[{','.join(map(str, i))}]{part}", s) for i in indices for part, s in inside]
         elif isinstance(t, StructType):
-            block = self._world.blocks.get(t)
+            symbols = self._symbols(t)
             for f in t.fields:
-                symbol = block.members.get(f.name.casefold()) if block is not None else None
+                symbol = symbols.get(f.name.casefold())
                 if symbol is not None and symbol.open_area:
                     found.append((f".{f.name}", symbol))
                 found += [(f".{f.name}{part}", s) for part, s in self._open_members(f.type)]

@@ -33,10 +33,11 @@ from plctool.compiler.typed import (
     Pou,
     Variable,
 )  # fmt: skip
-from plctool.iec.types import Keep
+from plctool.iec.types import Keep, ReferenceType
 
 _PROGRAM_MAY = {
     Direction.INPUT: May.HAVE_ADDRESS | May.BE_EDGE, Direction.OUTPUT: May.HAVE_ADDRESS, None: May.HAVE_ADDRESS,
+    Direction.IN_OUT: May.BE_PLAIN,
 }  # fmt: skip
 
 
@@ -101,12 +102,7 @@ class Programs:
         scope = self._world.scope_of(symbol)
         scope.pou = pou
         for block in self._units.declare_alike(decl, pou, scope):
-            if block.keyword == "VAR_IN_OUT":
-                scope.error(
-                    block.pos, "unsupported", "a PROGRAM has no VAR_IN_OUT; use VAR_EXTERNAL or a global variable"
-                )
-            else:
-                self._program_variables(block, info, scope, allocation, keep)
+            self._program_variables(block, info, scope, allocation, keep)
 
         def place(member: str, variable: VarSymbol) -> Variable | None:
             full_name, t = f"{name}.{member}", variable.type
@@ -127,11 +123,14 @@ class Programs:
         keep = keep.of_member(own)
         for line in block.decls:
             t, init = self._types.declared_type(line, scope, _PROGRAM_MAY[direction])
-            require_instances(self._world, t, scope, line.pos)
+            if direction is Direction.IN_OUT and t is not ERROR:  # a call leaves its address here
+                t, init = ReferenceType(t), None
+            else:
+                require_instances(self._world, t, scope, line.pos)
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=init)
                 symbol.used = direction is not None or line.location is not None
-                symbol.constant = direction is Direction.INPUT and "CONSTANT" in block.qualifiers
+                symbol.constant = direction is not None and "CONSTANT" in block.qualifiers
                 if not scope.declare(symbol, offset) or t is ERROR:
                     continue
                 self._variables.check_kept(name, t, own, scope, offset)

@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import Flag, auto
 
 from plctool.compiler.diagnostics import did_you_mean
@@ -20,7 +21,7 @@ from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbo
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import TYPES
-from plctool.compiler.typed import ArrayInit, Const, Initial, ScalarInit, StructInit, overlay
+from plctool.compiler.typed import ArrayInit, Const, Initial, Pos, ScalarInit, Storage, StructInit, Variable, overlay
 from plctool.iec.types import (
     BOOL,
     BYTE,
@@ -93,19 +94,13 @@ class TypeDeclarations:
         return t, overlay(given, default)
 
     def _with_arguments(self, decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
-        """Type and initial value with what stands behind the name of a type: `TON(PT := T#1s)` and `TON[(PT := T#1s)]`
-        are initial values."""
+        """Type and initial value with what stands in brackets behind the type of an array: `F[(1), (2)]`."""
         spec, init = decl.type, decl.init
         given: ast.Init | None = None
-        if isinstance(spec, ast.EnumSpec) and isinstance(scope.unit(spec.base or ""), PouSymbol | TypeSymbol):
-            members = [(o, name, v) if v is not None else (o, "", ast.Name(o, name)) for o, name, v in spec.values]
-            given, spec = ast.StructInit(spec.pos, members), ast.NamedType(spec.pos, spec.base or "")
-            if isinstance(init, ast.StructInit):
-                return spec, ast.StructInit(init.pos, [*given.members, *init.members])
-        elif isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
+        if isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
             element = spec.element
-            given = element.inits
-            if given is not None:
+            if element.inits is not None:
+                given = ast.ArrayInit(element.inits.pos, [_of_instance(item) for item in element.inits.items])
                 spec = ast.ArraySpec(spec.pos, spec.bounds, ast.NamedType(element.pos, element.name))
         if given is not None and init is not None:
             scope.error(init.pos, "duplicate", "there are two initial values; write the second one into the first")
@@ -143,6 +138,8 @@ class TypeDeclarations:
         if isinstance(spec, ast.ArraySpec):
             return self._array(spec, scope)
         if isinstance(spec, ast.EnumSpec):
+            if name is None and isinstance(scope.unit(spec.base or ""), PouSymbol | TypeSymbol):
+                return self._instance(spec, scope)
             return self._enum(spec, scope, name)
         if isinstance(spec, ast.SubrangeSpec):
             return self._subrange(spec, scope, name)
@@ -199,7 +196,10 @@ class TypeDeclarations:
             hint = f"; write {TYPES[upper]}" if upper in TYPES else hint
             if upper == "ENUM":
                 hint = "; an enumeration is written Name : (First, Second);"
-            scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
+            if hint:
+                scope.error(spec.pos, "unknown", f"unknown type {spec.name}{hint}")
+            else:
+                scope.missing(spec.pos, spec.name, f"unknown type {spec.name}")
         else:
             scope.error(spec.pos, "type", f"{spec.name} is not a type")
         return ERROR, None
@@ -215,9 +215,13 @@ class TypeDeclarations:
             return ERROR
         symbol.busy = True
         t, default = self.type_of(decl.spec, scope, decl.name)
+        if isinstance(t, EnumType) and isinstance(decl.spec, ast.EnumSpec):
+            t.strict, t.named = "strict" in decl.attributes, "to_string" in decl.attributes
         if symbol.type is None:
             symbol.type, symbol.default = t, default
         if decl.init is not None and t is not ERROR:  # it may name a value of this very enumeration
+            if isinstance(t, EnumType) and isinstance(decl.spec, ast.EnumSpec):
+                scope.names.update(_values_of(t, scope.pos(decl.pos)))
             given = self._initials.initial(decl.init, t, scope)
             symbol.default = default if given is None else overlay(given, default)
         symbol.busy = False
@@ -293,14 +297,20 @@ class TypeDeclarations:
                 scope.error(offset, "range", f"{value} does not fit {base}")
                 value = 0
             t.values[value_name] = value
-            constant = Const(value, t, scope.pos(offset))
-            inner.names[key] = VarSymbol(
-                value_name, constant.pos, t, Role.LOCAL, value=constant, constant=True, used=True
-            )
+            inner.names[key] = _value_symbol(t, value_name, scope.pos(offset))
             if name is None:
                 scope.names.setdefault(key, inner.names[key])
         first = next(iter(t.values.values()), 0)
         return t, ScalarInit(first) if first else None
+
+    def _instance(self, spec: ast.EnumSpec, scope: Scope) -> tuple[Type, Initial | None]:
+        """`TON(PT := T#1s)`, `Pump(valve, 3)`: a type with initial values and inputs of FB_Init."""
+        members = [(o, name, v) if v is not None else (o, "", ast.Name(o, name)) for o, name, v in spec.values]
+        t, default = self._named(ast.NamedType(spec.pos, spec.base or ""), scope)
+        if t is ERROR or not members:
+            return t, default
+        given = self._initials.initial(ast.StructInit(spec.pos, members, arguments=True), t, scope)
+        return t, default if given is None else overlay(given, default)
 
     def _subrange(self, spec: ast.SubrangeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
         base = self.named_type(spec.pos, spec.base, scope)
@@ -344,8 +354,9 @@ class TypeDeclarations:
         if spec.base is not None and not self._extend(t, spec.base, defaults, scope):
             return ERROR, None
         seen.update(f.name.casefold() for f in t.fields)
+        located: dict[str, VarSymbol] = dict(self._world.open_members.get(t.base, {})) if t.base is not None else {}
         for decl in spec.fields:
-            field_type, default = self.declared_type(decl, scope)
+            field_type, default = self.declared_type(decl, scope, May.HAVE_OPEN_ADDRESS)
             require_instances(self._world, field_type, scope, decl.pos)
             for offset, field_name in decl.names:
                 if field_name.casefold() in seen:
@@ -353,17 +364,32 @@ class TypeDeclarations:
                     continue
                 seen.add(field_name.casefold())
                 t.fields.append(Field(field_name, field_type))
+                if decl.location is not None and field_type is not ERROR:
+                    symbol = VarSymbol(field_name, scope.pos(offset), field_type, Role.LOCAL, default=default)
+                    symbol.variable = Variable(field_name, field_type, Storage.SELF, symbol.pos)
+                    symbol.open_area = decl.location.text[1]
+                    located[field_name.casefold()] = symbol
                 if default is not None and not (spec.union and defaults):  # of a union the first one counts
                     defaults[field_name] = default
         if any(f.type is ERROR for f in t.fields):
             return ERROR, None
         t.lay_out(behind_base=True)
+        self._place_members(t, located)
         if t.size > MAX_SIZE:
             scope.error(spec.pos, "size", f"a struct of {t.size} bytes is too large")
             return ERROR, None
         if defaults:
             self._world.defaults[name] = StructInit(defaults)
         return t, self.struct_default(t)
+
+    def _place_members(self, t: StructType, located: dict[str, VarSymbol]) -> None:
+        """Notes the members with AT %I* and the like, now that they have their offsets."""
+        for key, symbol in located.items():
+            field = t.member(key)
+            if field is not None and symbol.variable is not None:
+                symbol.variable.offset = field.offset
+        if located:
+            self._world.open_members[t] = located
 
     def _extend(self, t: StructType, spec: ast.NamedType, defaults: dict[str, Initial], scope: Scope) -> bool:
         """Begins a struct with the members of the one it EXTENDS."""
@@ -382,3 +408,22 @@ class TypeDeclarations:
     def struct_default(self, t: StructType) -> Initial | None:
         """What a struct or instance starts with: None for all zero."""
         return StructInit({}) if t.name in self._world.defaults else None
+
+
+def _of_instance(item: ast.Init | ast.Repeat) -> ast.Init | ast.Repeat:
+    """`(1)` behind the type of an array of instances: the input of one FB_Init."""
+    if isinstance(item, ast.StructInit):
+        return replace(item, arguments=True)
+    if isinstance(item, ast.ArrayInit | ast.Repeat):
+        return item
+    return ast.StructInit(item.pos, [(item.pos, "", item)], arguments=True)
+
+
+def _value_symbol(t: EnumType, name: str, pos: Pos) -> VarSymbol:
+    constant = Const(t.values[name], t, pos)
+    return VarSymbol(name, pos, t, Role.LOCAL, value=constant, constant=True, used=True)
+
+
+def _values_of(t: EnumType, pos: Pos) -> dict[str, VarSymbol]:
+    """The values of an enumeration as names, case-folded."""
+    return {name.casefold(): _value_symbol(t, name, pos) for name in t.values}

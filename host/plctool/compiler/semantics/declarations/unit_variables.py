@@ -15,7 +15,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, GlobalSymbol, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pou, PouKind, Storage, Variable
+from plctool.compiler.typed import Assign, Load, Pou, PouKind, Storage, Variable, VarPlace
 from plctool.iec.types import Keep
 
 ROLES = {
@@ -58,6 +58,13 @@ def _names_used(node: object) -> set[str]:
     return set()
 
 
+def _seen_by_actions(block: ast.VarBlock, decl: ast.PouDecl) -> bool:
+    """Whether an ACTION of the unit uses a name that the block declares."""
+    names = {name.casefold() for line in block.decls for _, name in line.names}
+    actions = [member.body for member in decl.members if member.keyword == "ACTION"]
+    return any(name.name.casefold() in names for name in ast.every(ast.Name, actions))
+
+
 def new_pou(symbol: PouSymbol, name: str) -> Pou:
     """The unit that a declaration becomes, still empty."""
     decl = symbol.decl
@@ -87,10 +94,21 @@ class UnitVariables:
                 self._declare_externals(block, scope)
             elif block.keyword == "VAR_STAT":
                 self._declare_statics(block, decl, scope)
-            elif block.keyword == "VAR_TEMP":
+            elif block.keyword == "VAR_TEMP" and not _seen_by_actions(block, decl):
                 self.declare_stack_variables(block, pou, scope)
+            elif block.keyword == "VAR_TEMP":
+                yield replace(block, keyword="VAR")
+                self._start_anew(block, scope)
             else:
                 yield block
+
+    def _start_anew(self, block: ast.VarBlock, scope: Scope) -> None:
+        """Lets the body begin with the initial values of VAR_TEMP that actions see, and that are kept for them."""
+        for symbol in (scope.names.get(name.casefold()) for line in block.decls for _, name in line.names):
+            if isinstance(symbol, VarSymbol) and symbol.variable is not None and symbol.type not in self._world.blocks:
+                pos, t = symbol.pos, symbol.type
+                first = VarPlace(self._world.default_of(symbol), t, pos)
+                scope.prologue.append(Assign(VarPlace(symbol.variable, t, pos), Load(first, t, pos), pos))
 
     def _declare_constants(self, decl: ast.PouDecl, scope: Scope) -> None:
         """VAR CONSTANT comes first, wherever it stands: array bounds and initial values may use it."""

@@ -14,7 +14,25 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import ComputedInit, Const, Initial, Pos, ScalarInit, Storage, Variable
+from plctool.compiler.typed import (
+    Binary,
+    Call,
+    ComputedInit,
+    Const,
+    Convert,
+    Expr,
+    Initial,
+    IntrinsicCall,
+    Load,
+    Pos,
+    ScalarInit,
+    Storage,
+    Unary,
+    ValuePlace,
+    Variable,
+    VarPlace,
+)
+from plctool.compiler.typed_nodes import walk
 from plctool.iec.areas import Area
 from plctool.iec.types import (
     ArrayType,
@@ -36,6 +54,18 @@ class Variables:
         self._world = world
         self._types = types
         self._config = config
+        self._calculated: set[Variable] = set()  # constants whose value is worked out when the application starts
+
+    def _is_calculated(self, e: Expr) -> bool:
+        """Whether a value is made of constants by functions of the library alone, as LOG(2.0) is."""
+        for node in walk(e):
+            if isinstance(node, Call) and not node.function.pos.file.startswith("stdlib/"):
+                return False
+            if isinstance(node, VarPlace) and node.var not in self._calculated:
+                return False
+            if not isinstance(node, Call | VarPlace | ValuePlace | Load | Unary | Binary | Convert | IntrinsicCall):
+                return False
+        return True
 
     def constant_symbol(
         self, offset: int, name: str, t: Type, init: Initial | None, scope: Scope, owner: str, role: Role
@@ -43,12 +73,16 @@ class Variables:
         """A constant: scalars and strings are folded, arrays and structs get memory once, however many instances there
         are."""
         pos, full_name = scope.pos(offset), f"{owner}.{name}" if owner else name
-        if isinstance(init, ComputedInit):
+        calculated = isinstance(init, ComputedInit) and self._is_calculated(init.value)
+        if isinstance(init, ComputedInit) and not calculated:
             scope.error(offset, "constant", f"the value of the constant {name} is not known before the program runs")
         if any(instance in self._world.blocks for instance in instances_in(t)):
             scope.error(offset, "constant", f"{name} changes when it is called; declare it without CONSTANT")
         symbol = VarSymbol(name, pos, t, role, constant=True, default=init)
-        if is_scalar(t) or isinstance(t, StringType):
+        if calculated:  # by functions of the library: once, when the application starts
+            symbol.variable = self.shared_variable(full_name, t, init, scope, offset)
+            self._calculated.add(symbol.variable)
+        elif is_scalar(t) or isinstance(t, StringType):
             zero: int | float | str = "" if isinstance(t, StringType) else 0.0 if _is_real(t) else 0
             symbol.value = Const(init.value if isinstance(init, ScalarInit) else zero, t, pos)
             if not scope.library:
@@ -69,7 +103,7 @@ class Variables:
         keep: Keep = Keep.UNSAID,
     ) -> Variable:
         """A variable that exists once for all instances of its POU."""
-        key = (scope.source.path, offset)
+        key = (scope.source.path, scope.source.name, offset)
         variable = self._world.shared.get(key)
         if variable is None:
             area = self._area(t, keep)

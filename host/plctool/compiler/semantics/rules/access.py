@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.symbols import ClassInfo, Member, Role, VarSymbol
+from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, Member, Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.iec.types import Type
 
@@ -18,16 +18,27 @@ def may_see(c: Checker, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
     if plain and (symbol.role is not Role.LOCAL or symbol.constant or c.scope.sees_inside):
         return True
     cls = c.world.class_of(t)
-    key = symbol.name.casefold()
-    while cls is not None and cls.base is not None and cls.base.block is not None:
-        if cls.base.block.members.get(key) is not symbol:
-            break
-        cls = cls.base
+    cls = None if cls is None else declaring_class(symbol, cls)
     here = c.scope.cls
     if plain and cls is not None and (here is None or not here.derives(cls)):
         message = f"{symbol.name} is a VAR of {cls.name} for its own use; make it VAR_OUTPUT to read it outside"
         c.warning(node.name_pos, "access", message)
     return cls is None or plain or _permitted(c, {symbol.access}, cls, f"{cls.name}.{symbol.name}", node.name_pos)
+
+
+def declaring_class(symbol: VarSymbol, cls: ClassInfo) -> ClassInfo:
+    """The class or base of it that declares a variable of its instances."""
+    key = symbol.name.casefold()
+    while cls.base is not None and cls.base.block is not None and cls.base.block.members.get(key) is symbol:
+        cls = cls.base
+    return cls
+
+
+def is_inside(c: Checker, symbol: VarSymbol, block: BlockInfo) -> bool:
+    """Whether this is part of the block that declares a variable, or of one derived from it: then the variables of
+    other instances may be written as its own."""
+    here = c.scope.cls
+    return here is not None and block.cls is not None and here.derives(declaring_class(symbol, block.cls))
 
 
 def accessible(c: Checker, member: Member, offset: int) -> bool:

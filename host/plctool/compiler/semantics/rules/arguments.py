@@ -9,11 +9,13 @@ from collections.abc import Container
 from dataclasses import dataclass, replace
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics.any_values import handed
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import elementary, error_value, same_type, takes_array
-from plctool.compiler.semantics.generics import is_group
-from plctool.compiler.semantics.open_arrays import handed_bounds
-from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, same_type, settle, takes_array
+from plctool.compiler.semantics.generics import accepts, group_name, is_group
+from plctool.compiler.semantics.open_arrays import handed_bounds, total_size
+from plctool.compiler.semantics.rules.places import changeable_place, may_copy
+from plctool.compiler.semantics.rules.qualified_names import dotted_name
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
 from plctool.compiler.semantics.values import place_of
 from plctool.compiler.syntax import ast
@@ -22,6 +24,7 @@ from plctool.compiler.typed import (
     BitPlace,
     Call,
     Const,
+    Convert,
     DerefPlace,
     Direction,
     Expr,
@@ -30,11 +33,14 @@ from plctool.compiler.typed import (
     Place,
     ScalarInit,
     ValuePlace,
+    VarPlace,
 )
 from plctool.iec.types import (
     BOOL,
     LREAL,
     REAL,
+    ArrayType,
+    Kind,
     ReferenceType,
     StringType,
     StructType,
@@ -71,27 +77,41 @@ def split_enable(node: ast.Call, declared: Container[str] = ()) -> tuple[list[as
 
 def parameter_names(c: Checker, callee: ast.Expr) -> set[str]:
     """What the function of that name declares, folded; nothing for one that is built in."""
-    if not isinstance(callee, ast.Name):
-        return set()
-    symbol = c.world.names.unit(callee.name.casefold(), library=c.scope.library)
+    if isinstance(callee, ast.Name):
+        symbol = c.world.names.unit(callee.name.casefold(), library=c.scope.library)
+    else:
+        symbol = named_function(c, callee)
     if not isinstance(symbol, PouSymbol):
         return set()
     return {name.casefold() for name, _, _ in parameter_lines(symbol.decl)}
 
 
+def named_function(c: Checker, callee: ast.Expr) -> PouSymbol | None:
+    """The FUNCTION that a name with a namespace or library in front stands for."""
+    dotted = dotted_name(c, callee)
+    symbol = None if dotted is None else c.scope.unit(dotted)
+    return symbol if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION" else None
+
+
 def plain_arguments(c: Checker, node: ast.Call, declared: Container[str] = ()) -> list[ast.Argument] | None:
-    """The arguments of a call that is part of an expression; None after a diagnosis."""
+    """The arguments of a call that is part of an expression; None after a diagnosis. `EN := TRUE` says nothing."""
     args, enable = split_enable(node, declared)
-    if enable.en is None and enable.eno is None:
+    if enable.eno is None and (enable.en is None or _is_true(enable.en)):
         return args
     c.error(node.pos, "arguments", "EN and ENO need the call to be a statement or the whole right side of :=")
     return None
 
 
+def _is_true(node: ast.Expr) -> bool:
+    return isinstance(node, ast.Literal) and node.kind is ast.LiteralKind.BOOL and node.value == 1
+
+
 def bind(
     c: Checker, args: list[ast.Argument], names: list[tuple[str, Direction]], what: str, offset: int
 ) -> dict[int, ast.Argument] | None:
-    """Arguments by index of their parameter; None after a diagnosis."""
+    """Arguments by index of their parameter, without the empty ones (`PT := `); None after a diagnosis."""
+    if c.scope.is_incomplete(what):
+        return None
     if not args:
         return {}
     if all(a.name is None for a in args):
@@ -107,44 +127,60 @@ def bind(
     index = {name.casefold(): i for i, (name, _) in enumerate(names)}
     inputs = [i for i, (_, direction) in enumerate(names) if direction is not Direction.OUTPUT]
     for position, argument in enumerate(args):
-        if argument.name is None:  # arguments without a name come first
-            if position >= len(inputs) or any(a.name is not None for a in args[:position]):
-                c.error(argument.pos, "arguments", "arguments without a name come before those with one")
+        if argument.name is None:  # it counts from the first, whether those before it have names or not
+            if position >= len(inputs):
+                takes = arguments_text(len(inputs))
+                c.error(argument.pos, "arguments", f"{what} takes {takes} without a name; give this one its name")
                 return None
-            bound[inputs[position]] = argument
-            continue
-        i = index.get(argument.name.casefold())
+            i: int | None = inputs[position]
+        else:
+            i = index.get(argument.name.casefold())
         if i is None:
-            hint = did_you_mean(argument.name, (n for n, _ in names))
+            hint = did_you_mean(argument.name or "", (n for n, _ in names))
             c.error(argument.pos, "arguments", f"{what} has no parameter {argument.name}{hint}")
             return None
         if i in bound:
-            c.error(argument.pos, "arguments", f"{argument.name} is given twice")
+            c.error(argument.pos, "arguments", f"{names[i][0]} is given twice")
             return None
         is_output = names[i][1] is Direction.OUTPUT
-        if argument.output is not is_output:
+        if argument.name is not None and argument.output is not is_output:
             arrow = "=>" if is_output else ":="
             c.error(argument.pos, "arguments", f"{argument.name} is given with {arrow}")
             return None
         bound[i] = argument
-    return bound
+    return {i: argument for i, argument in bound.items() if argument.value is not None or argument.output}
 
 
-def typed_call(c: Checker, info: FunctionInfo, actuals: dict[int, Actual], offset: int, *, noted: bool = True) -> Expr:
-    """The call node: arguments in order of the parameters, defaults filled in. `noted`: a call that leads back is
-    recursion."""
+def typed_call(
+    c: Checker,
+    info: FunctionInfo,
+    actuals: dict[int, Actual],
+    offset: int,
+    *,
+    formal: bool = False,
+    noted: bool = True,
+) -> Expr:
+    """The call node: arguments in order of the parameters, defaults filled in. `formal`: arguments are given by name,
+    so that others may be left out. `noted`: a call that leads back is recursion."""
     pos, name, ok = c.pos(offset), info.pou.name, True
     args: list[Expr | Place | None] = []
-    formal = any(isinstance(a, ast.Argument) and a.name is not None for a in actuals.values())
+    behind: list[Expr] = []
     parameters = list(zip(info.parameters, info.pou.parameters, strict=False))
     for i, ((symbol, direction), parameter) in enumerate(parameters):
         actual = actuals.get(i)
         if actual is None and direction is not Direction.OUTPUT:
-            if direction is Direction.IN_OUT or not (formal or symbol.given):
+            if direction is Direction.IN_OUT or symbol.group or not (formal or symbol.given):
                 c.error(offset, "arguments", f"the argument {symbol.name} of {name} is missing")
                 ok = False
                 continue
             args.append(_default_value(c, symbol, parameter, offset))
+            continue
+        if symbol.group and actual is not None:
+            described = _described(c, actual, symbol, offset)
+            ok = ok and described is not None
+            if described is not None:
+                args.append(described[0])
+                behind += described[1]
             continue
         argument = None if actual is None else _actual_argument(c, actual, symbol, direction, parameter)
         ok = ok and (actual is None or argument is not None)
@@ -153,13 +189,36 @@ def typed_call(c: Checker, info: FunctionInfo, actuals: dict[int, Actual], offse
         return error_value(pos)
     for parameter, argument in zip(info.pou.parameters, list(args), strict=False):
         args += [bound for _, bound in handed_bounds(parameter.variable, argument, pos)]
+    args += behind
     if noted:
         c.world.calls.add(c.scope.pou, info.pou, pos)
     return Call(info.pou, args, info.result if info.result is not None else NOTHING, pos)
 
 
+def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tuple[Expr, list[Expr]] | None:
+    """What is handed over for a parameter of type ANY_...: a variable, or a value for the time of the call."""
+    if isinstance(actual, ast.Argument):
+        offset = actual.pos
+        e = None if actual.value is None else settle(c.expr(actual.value))
+    else:
+        e = actual
+    if e is None or e.type is ERROR:
+        return None
+    if not accepts(symbol.group, e.type) and symbol.type is not e.type:
+        c.error(offset, "type", f"{symbol.name} takes {group_name(symbol.group)}, not {e.type}")
+        return None
+    place = place_of(e)
+    if isinstance(place, BitPlace):
+        place = ValuePlace(e, e.type, e.pos)
+    return handed(place, e.type, total_size(place))
+
+
 def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: int) -> Expr | Place:
     pos, t = c.pos(offset), symbol.type
+    if isinstance(t, StructType | ArrayType) and t not in c.world.blocks:
+        variable = c.world.default_of(symbol)
+        place = VarPlace(variable, t, pos)
+        return place if parameter.by_reference else Load(place, t, pos)
     value: int | float | str = "" if isinstance(t, StringType) else 0
     if isinstance(symbol.default, ScalarInit):
         value = symbol.default.value
@@ -198,7 +257,8 @@ def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
         if _is_slip(node, t, name):
             return c.error(node.pos, "arguments", f"the input {name} is given with :=, not with =")
         e = c.expr(node, t)
-        return e if takes_array(t, e.type) else c.coerce(e, t)
+        e = e if takes_array(t, e.type) else c.coerce(e, t)
+        return e if may_copy(c, e, node.pos) else error_value(c.pos(node.pos))
     place = referenced_place(c, node, t.target, name, output=False)
     return error_value(c.pos(node.pos)) if place is None else refer(place, t)
 
@@ -243,9 +303,21 @@ def referenced_place(
     if not same_type(place.type, t) and not (
         isinstance(place.type, SubrangeType) and place.type.base is t and not output
     ):
+        if output and _becomes(c, place, t):
+            return place
         c.error(node.pos, "type", f"{what} {name} is {t} and needs a variable of this type, not {place.type}")
         return None
     return place
+
+
+def _becomes(c: Checker, place: Place, t: Type) -> bool:
+    """Whether an output of a function can be converted when it is written back: numbers of all types."""
+    source, target = elementary(t), elementary(place.type)
+    kinds = (*NUMBERS, Kind.REAL)
+    if source is None or target is None or source.kind not in kinds or target.kind not in kinds:
+        return False
+    value = c.coerce(Load(place, t, place.pos), place.type)  # warns as an assignment would
+    return value.type is not ERROR and not (isinstance(value, Convert) and value.check is not None)
 
 
 def parameter_lines(decl: ast.PouDecl) -> list[tuple[str, Direction, str | None]]:

@@ -12,11 +12,13 @@ from plctool.compiler.semantics.rules.arguments import input_value, parameter_na
 from plctool.compiler.semantics.rules.call_statements import enabled, has_enable
 from plctool.compiler.semantics.rules.instance_queries import attempt
 from plctool.compiler.semantics.rules.methods import assign_property, assigned_property
-from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.rules.places import changeable_place, may_copy
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Assign, Const, DerefPlace, If, Load, Pos, Statement
 from plctool.iec.types import BOOL, OpenArrayType, ReferenceType
+
+_NOTHING = (ast.LiteralKind.NULL, ast.LiteralKind.INT)
 
 
 @checks_statement(ast.Assign)
@@ -56,22 +58,25 @@ def _assign_one(c: Checker, target: ast.Expr, source: ast.Expr, pos: Pos) -> Sta
     if isinstance(place.type, OpenArrayType):
         c.error(target.pos, "type", "an ARRAY[*] cannot be assigned as a whole; assign its elements in a loop")
         return None
-    if place.type in c.world.blocks:
-        c.error(target.pos, "type", f"an instance of the function block {place.type} cannot be assigned")
+    if not may_copy(c, value, target.pos, place):
         return None
     return Assign(place, value, pos)
 
 
 def _assign_reference(c: Checker, node: ast.Assign) -> list[Statement]:
-    """`r REF= x` lets r refer to x; `r REF= NULL` to nothing."""
+    """`r REF= x` lets r refer to x; `r REF= NULL`, as `r REF= 0`, to nothing."""
     target, pos = node.targets[0], c.pos(node.pos)
+    bound = assigned_property(c, target, referring=True)
+    if bound is not None:
+        statement = assign_property(c, bound, target, node.value, pos)
+        return [] if statement is None else [statement]
     place = changeable_place(c, target, "the left side of REF=", "be assigned to")
     pointer = place.pointer if isinstance(place, DerefPlace) else None
     if not isinstance(pointer, Load) or not isinstance(pointer.type, ReferenceType):
         if place is not None:
             c.error(target.pos, "type", f"the left side of REF= is a REFERENCE TO, not {place.type}")
         return []
-    if isinstance(node.value, ast.Literal) and node.value.kind is ast.LiteralKind.NULL:
+    if isinstance(node.value, ast.Literal) and node.value.value == 0 and node.value.kind in _NOTHING:
         return [Assign(pointer.place, Const(0, pointer.type, pos), pos)]
     value = input_value(c, node.value, pointer.type, "reference")
     return [] if value.type is ERROR else [Assign(pointer.place, value, pos)]

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field, replace
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.open_arrays import handed_bounds
-from plctool.compiler.semantics.rules.arguments import bind, input_value, referenced_place
+from plctool.compiler.semantics.rules.arguments import bind, input_value, named_function, referenced_place
 from plctool.compiler.semantics.rules.members import bound_member
 from plctool.compiler.semantics.rules.methods import body_dispatch
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.rules.qualified_names import variable_value
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, BlockInfo, GlobalSymbol, ProgramInfo, Role, VarSymbol
-from plctool.compiler.semantics.values import load, place_of
+from plctool.compiler.semantics.values import load, place_of, whole
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Assign,
@@ -68,6 +68,10 @@ def program_arguments(
     if bound is None:
         return None
     before, behind, ok = list[Statement](), list[Statement](), True
+    for i, (symbol, direction) in enumerate(program.parameters):
+        if direction is Direction.IN_OUT and i not in bound:
+            c.error(offset, "arguments", f"the VAR_IN_OUT {symbol.name} of {program.name} is missing")
+            ok = False
     for i, argument in bound.items():
         (symbol, direction), pos = program.parameters[i], c.pos(argument.pos)
         if argument.value is None or symbol.variable is None:
@@ -77,6 +81,11 @@ def program_arguments(
             e = input_value(c, argument.value, symbol.type, symbol.name)
             ok = ok and e.type is not ERROR
             before.append(Assign(place_of(own), e, pos))
+            continue
+        if direction is Direction.IN_OUT:
+            e = input_value(c, argument.value, symbol.type, symbol.name)
+            ok = ok and e.type is not ERROR
+            before.append(Assign(whole(symbol.variable, pos), e, pos))
             continue
         taken = _taken(c, symbol.name, own, argument)
         ok = ok and taken is not None
@@ -88,7 +97,7 @@ def program_arguments(
 def called_instance(c: Checker, call: ast.Call) -> Expr | None:
     """The instance a call statement is about; None when it calls a function."""
     callee = call.callee
-    if bound_member(c, callee, called=True) is not None:
+    if bound_member(c, callee, called=True) is not None or named_function(c, callee) is not None:
         return None
     if isinstance(callee, ast.Name):
         symbol = c.scope.lookup(callee.name)

@@ -13,12 +13,14 @@ from plctool.compiler.semantics.rules.applied import Applied, BuiltIn
 from plctool.compiler.semantics.rules.conversion_calls import conversion, conversion_hint
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Expr
+from plctool.compiler.typed import Const, Expr
 from plctool.iec.types import (
     BOOL,
+    StringType,
     Type,
 )
 
+_PLACES = ("__POUNAME", "__POSITION")
 _FUNCTIONS = operator_functions.FUNCTIONS | intrinsics.FUNCTIONS | variable_questions.FUNCTIONS
 
 
@@ -26,6 +28,8 @@ def built_in_call(c: Checker, name: str, node: ast.Call, expected: Type | None) 
     """The call of a built-in function; None when there is none of that name."""
     if name in variable_questions.OF_VARIABLES:
         return variable_questions.of_variable(c, name, node)
+    if name in _PLACES:
+        return _place(c, name, node)
     function = _FUNCTIONS.get(name)
     if function is None:
         return conversion(c, name, node, expected)
@@ -35,6 +39,16 @@ def built_in_call(c: Checker, name: str, node: ast.Call, expected: Type | None) 
     if not function.takes(len(args)):
         return c.error(node.pos, "arguments", f"{name} takes {function.needs}, not {len(args)}")
     return function.rule(c, Applied(name, args, node, expected))
+
+
+def _place(c: Checker, name: str, node: ast.Call) -> Expr:
+    """`__POUNAME()`: the name of the unit around; `__POSITION()`: line and column, as a text."""
+    if node.args:
+        return c.error(node.pos, "arguments", f"{name} takes no arguments")
+    pos = c.pos(node.pos)
+    pou = c.scope.source.stem if c.scope.pou is None else c.scope.pou.name
+    text = pou if name == "__POUNAME" else f"Line {pos.line}, Column {pos.column}"
+    return Const(text, StringType(max(len(text), 1)), pos)
 
 
 def function_hint(c: Checker, name: str) -> str:

@@ -69,7 +69,7 @@ def enabled(
     if not has_enable(node, declared):
         return make(node)
     args, enable = split_enable(node, declared)
-    statements = make(ast.Call(node.pos, node.callee, args))
+    statements = make(ast.Call(node.pos, node.callee, args, had_enable=True))
     pos = c.pos(node.pos)
     done: list[Statement] = []
     skipped: list[Statement] = []

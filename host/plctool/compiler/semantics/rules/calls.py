@@ -5,6 +5,9 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from plctool.compiler.library import without_library
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import error_value
 from plctool.compiler.semantics.rules.arguments import parameter_lines, plain_arguments
@@ -37,12 +40,21 @@ def call(c: Checker, node: ast.Call, expected: Type | None) -> Expr:
     if bound is not None:
         return method_call(c, bound, node)
     dotted = dotted_name(c, callee)
+    if dotted is not None and (bare := _of_library(c, dotted)) is not None:
+        return _call_by_bare_name(c, replace(node, callee=ast.Name(callee.pos, bare)), expected)
     symbol = c.scope.unit(dotted) if dotted is not None else None
     if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION":
         return _call_function(c, symbol, node, expected)
     if isinstance(symbol, PouSymbol):
         return c.error(node.pos, "call", _not_callable(c, symbol, symbol.decl.full_name))
     return _call_by_bare_name(c, node, expected)
+
+
+def _of_library(c: Checker, dotted: str) -> str | None:
+    """`LEN` of `Standard.LEN`; None when the program has a LEN of its own, or the name has no library in front."""
+    bare = without_library(dotted)
+    known = bare == dotted or c.world.names.is_user_name(bare) or c.world.names.is_user_name(dotted)
+    return None if known else bare
 
 
 def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Expr:
@@ -62,8 +74,10 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
     is_function = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION"
     if isinstance(symbol, PouSymbol) and is_function and (not symbol.library or c.scope.library):
         return _call_function(c, symbol, node, expected)
-    if plain_arguments(c, node) is None:
+    args = plain_arguments(c, node)
+    if args is None:
         return error_value(c.pos(node.pos))
+    node = replace(node, args=args)
     if symbol is None or isinstance(symbol, PouSymbol):
         built_in = built_in_call(c, name.upper(), node, expected)
         if built_in is not None:
@@ -86,8 +100,12 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
         shown = _written(node)
         message = f"{name} is a type; a conversion is written TO_{name.upper()}({shown})"
         return c.error(callee.pos, "unknown", message)
+    if c.scope.inherits_unknown(c.scope.cls):
+        return error_value(c.pos(node.pos))  # it may be an inherited method
     hint = f"; {FUNCTIONS[name.upper()]}" if name.upper() in FUNCTIONS else function_hint(c, name)
-    return c.error(callee.pos, "unknown", f"unknown function {name}{hint}")
+    if hint:
+        return c.error(callee.pos, "unknown", f"unknown function {name}{hint}")
+    return c.missing(callee.pos, name, f"unknown function {name}")
 
 
 def _written(node: ast.Call) -> str:
@@ -126,4 +144,6 @@ def _call_function(c: Checker, symbol: PouSymbol, node: ast.Call, expected: Type
     if not c.scope.may_use(symbol, symbol.decl.name, node.callee.pos):
         return error_value(c.pos(node.pos))
     args = plain_arguments(c, node, {name.casefold() for name, _, _ in parameter_lines(symbol.decl)})
-    return error_value(c.pos(node.pos)) if args is None else call_symbol(c, symbol, args, node.pos, expected)
+    if args is None:
+        return error_value(c.pos(node.pos))
+    return call_symbol(c, symbol, args, node.pos, expected, formal=node.formal)

@@ -14,8 +14,22 @@ from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Case, Const, Continue, Exit, Expr, For, If, Repeat, Return, Statement, While
-from plctool.iec.types import EnumType, Type
+from plctool.compiler.typed import (
+    Case,
+    Const,
+    Continue,
+    Exit,
+    Expr,
+    For,
+    If,
+    Repeat,
+    Return,
+    Statement,
+    VarPlace,
+    While,
+)
+from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.iec.types import BOOL, EnumType, Type, is_scalar
 
 
 class _Labels:
@@ -127,8 +141,8 @@ def _label_value(c: Checker, node: ast.Expr, t: Type) -> int | None:
     if e is None:
         return None
     if not is_untyped(e) and isinstance(t, EnumType) and e.type is not t and isinstance(e.type, EnumType):
-        c.error(node.pos, "type", f"this is a value of {e.type}, CASE is about {t}")
-        return None
+        c.warning(node.pos, "enum", f"this is a value of {e.type}, CASE is about {t}: the number counts")
+        return e.value if isinstance(e.value, int) else None
     if isinstance(t, EnumType) and is_untyped(e) and isinstance(e.value, int):
         return e.value
     target = elementary(t)
@@ -158,7 +172,20 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
     body = _loop_body(c, node.body)
     if place is None or ERROR in (start.type, stop.type, step.type):
         return []
+    _report_changes(c, node, stop if node.step is None else [stop, step], body)
     return [_noted(c, For(place, start, stop, step, body, pos))]
+
+
+def _report_changes(c: Checker, node: ast.For, limits: Expr | list[Expr], body: list[Statement]) -> None:
+    """Warns of a body that changes what end or step were worked out from: other systems look at it in each turn."""
+    read = {place.var for place in walk(limits) if isinstance(place, VarPlace) and is_scalar(place.type)}
+    written = {root_of(place) for part in walk(body) for place in written_places(part)} if read else set()
+    changed = sorted(variable.name for variable in read & written if variable is not None)
+    if changed:
+        message = (
+            f"{changed[0].rpartition('.')[2]} changes in this loop, but end and step are worked out once, at its start"
+        )
+        c.warning(node.pos, "for-bound", f"{message}; write WHILE if the new value shall count")
 
 
 def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:
@@ -217,5 +244,14 @@ def continue_statement(c: Checker, node: ast.Continue) -> list[Statement]:
 
 @checks_statement(ast.Return)
 def return_statement(c: Checker, node: ast.Return) -> list[Statement]:
-    """RETURN"""
-    return [Return(c.pos(node.pos))]
+    """RETURN, RETURN(condition)"""
+    pos = c.pos(node.pos)
+    if node.condition is None:
+        return [Return(pos)]
+    condition = c.settled(node.condition)
+    if condition.type is not BOOL or isinstance(condition, Const):
+        if condition.type is not ERROR:
+            message = "RETURN takes no value; assign it to the name of the function, then RETURN"
+            c.error(node.condition.pos, "syntax", message)
+        return []
+    return [If([(condition, [Return(pos)])], [], pos)]

@@ -12,6 +12,7 @@ from plctool.compiler.semantics import dates
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import BITS, NUMBERS, SIGNED, UNSIGNED, convert, elementary, settle
 from plctool.compiler.semantics.divisions import lost_fraction
+from plctool.compiler.semantics.rules.enumeration_texts import value_name
 from plctool.compiler.semantics.rules.library_calls import call_by_name
 from plctool.compiler.semantics.symbols import ERROR, TypeSymbol
 from plctool.compiler.semantics.values import is_untyped
@@ -127,7 +128,8 @@ def _text_conversion(c: Checker, e: Expr, target: Type, node: ast.Call) -> Expr:
         name = "WCHAR_TO_WSTRING" if isinstance(target, StringType) else "WSTRING_TO_WCHAR"
         return call_by_name(c, name, [e], node.pos, None)
     if isinstance(target, StringType):
-        text = _text_of(c, convert(e, base), base, node)
+        named = isinstance(e.type, EnumType) and e.type.named
+        text = value_name(c, e, node.pos) if named else _text_of(c, convert(e, base), base, node)
         return call_by_name(c, "STRING_TO_WSTRING", [text], node.pos, None) if target.wide else text
     if isinstance(e.type, StringType) and e.type.wide:
         e = call_by_name(c, "WSTRING_TO_STRING", [e], node.pos, None)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from plctool.compiler.semantics.any_values import describes_any
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import common_type, elementary, error_value, settle
 from plctool.compiler.semantics.generics import (
@@ -31,31 +32,52 @@ _TEXT_PARAMETERS = {"STR": "IN", "STR1": "IN1", "STR2": "IN2", "SIZE": "L", "LEN
 """Names that CODESYS gives the parameters of string functions, and those of the standard."""
 
 
-def call_symbol(c: Checker, symbol: PouSymbol, args: list[ast.Argument], offset: int, expected: Type | None) -> Expr:
-    """A call of a declared function."""
+def call_symbol(
+    c: Checker,
+    symbol: PouSymbol,
+    args: list[ast.Argument],
+    offset: int,
+    expected: Type | None,
+    *,
+    formal: bool = False,
+) -> Expr:
+    """A call of a declared function. `formal`: arguments are given by name."""
     if "extensible" in symbol.decl.attributes and len(args) > 2 and all(a.name is None for a in args):
         result = call_symbol(c, symbol, args[:2], offset, expected)
         for argument in args[2:]:
             assert argument.value is not None
             result = _call_checked(c, symbol, [result, c.expr(argument.value, expected)], offset, expected)
         return result
-    if is_generic(symbol.decl):
-        return _call_generic(c, symbol, args, offset, expected)
+    if is_generic(symbol.decl) and not describes_any(symbol.decl):
+        return _call_generic(c, symbol, args, offset, expected, formal=formal)
     info = c.world.declared.function(symbol, {})
     if info is None:
         return c.error(offset, "recursion", f"{symbol.decl.name} is used in its own declaration")
     names = [(s.name, d) for s, d in info.parameters]
+    if symbol.library:
+        args = _standard_names(args, {name.casefold() for name, _ in names})
     bound = bind(c, args, names, info.pou.name, offset)
     if bound is None:
         return error_value(c.pos(offset))
-    return typed_call(c, info, dict(bound), offset)
+    return typed_call(c, info, dict(bound), offset, formal=formal)
+
+
+def _standard_names(args: list[ast.Argument], declared: set[str]) -> list[ast.Argument]:
+    """The arguments with the names of the standard in place of those of CODESYS."""
+    return [
+        a if a.name is None or a.name.casefold() in declared else replace(a, name=_standard_name(a.name)) for a in args
+    ]
+
+
+def _standard_name(name: str) -> str:
+    return _TEXT_PARAMETERS.get(name.upper(), name)
 
 
 def _call_checked(c: Checker, symbol: PouSymbol, values: list[Expr], offset: int, expected: Type | None) -> Expr:
     """A call with arguments that are checked already."""
     if any(v.type is ERROR for v in values):
         return error_value(c.pos(offset))
-    if is_generic(symbol.decl):
+    if is_generic(symbol.decl) and not describes_any(symbol.decl):
         return _instantiate(c, symbol, dict(enumerate(values)), offset, expected)
     info = c.world.declared.function(symbol, {})
     if info is None or len(info.parameters) != len(values):
@@ -88,7 +110,7 @@ def call_text_function(c: Checker, symbol: PouSymbol, node: ast.Call) -> Expr:
         return _joined(c, symbol, name, node, values)
     info = c.world.declared.function(symbol, {})
     assert info is not None
-    args = [replace(a, name=_TEXT_PARAMETERS.get((a.name or "").upper(), a.name)) for a in node.args]
+    args = _standard_names(node.args, {s.name.casefold() for s, _ in info.parameters})
     bound = bind(c, args, [(s.name, d) for s, d in info.parameters], name, node.pos)
     if bound is None:
         return error_value(c.pos(node.pos))
@@ -111,7 +133,7 @@ def _joined(c: Checker, symbol: PouSymbol, name: str, node: ast.Call, values: li
     """`CONCAT(a, b, c)`, `CONCAT(IN1 := a, IN2 := b, IN3 := c)`"""
     ordered: dict[int, Expr] = {}
     for i, (argument, value) in enumerate(zip(node.args, values, strict=True), 1):
-        match = re.fullmatch(r"IN([1-9]\d{0,2})", (argument.name or f"IN{i}").upper())
+        match = re.fullmatch(r"(?:IN|STR)([1-9]\d{0,2})", (argument.name or f"IN{i}").upper())
         place = int(match[1]) if match else 0
         if argument.output or not 1 <= place <= len(values) or place in ordered:
             return c.error(argument.pos, "arguments", f"{name} has no parameter {argument.name or i} here")
@@ -122,7 +144,15 @@ def _joined(c: Checker, symbol: PouSymbol, name: str, node: ast.Call, values: li
     return result
 
 
-def _call_generic(c: Checker, symbol: PouSymbol, args: list[ast.Argument], offset: int, expected: Type | None) -> Expr:
+def _call_generic(
+    c: Checker,
+    symbol: PouSymbol,
+    args: list[ast.Argument],
+    offset: int,
+    expected: Type | None,
+    *,
+    formal: bool,
+) -> Expr:
     lines = parameter_lines(symbol.decl)
     bound = bind(c, args, [(name, d) for name, d, _ in lines], symbol.decl.name, offset)
     if bound is None:
@@ -133,10 +163,18 @@ def _call_generic(c: Checker, symbol: PouSymbol, args: list[ast.Argument], offse
             values[i] = c.expr(argument.value, expected if lines[i][2] else None)
         else:
             values[i] = argument
-    return _instantiate(c, symbol, values, offset, expected)
+    return _instantiate(c, symbol, values, offset, expected, formal=formal)
 
 
-def _instantiate(c: Checker, symbol: PouSymbol, values: dict[int, Actual], offset: int, expected: Type | None) -> Expr:
+def _instantiate(
+    c: Checker,
+    symbol: PouSymbol,
+    values: dict[int, Actual],
+    offset: int,
+    expected: Type | None,
+    *,
+    formal: bool = False,
+) -> Expr:
     """Finds the types the ANY_... parameters stand for, and calls that instance."""
     groups: dict[str, list[Expr]] = {}
     name = symbol.decl.name
@@ -171,7 +209,7 @@ def _instantiate(c: Checker, symbol: PouSymbol, values: dict[int, Actual], offse
     info = c.world.declared.function(symbol, bindings)
     if info is None:
         return c.error(offset, "recursion", f"{name} calls itself, which is not possible on a controller")
-    return typed_call(c, info, values, offset)
+    return typed_call(c, info, values, offset, formal=formal)
 
 
 def _group_type(

@@ -70,7 +70,13 @@ def _duration(c: Checker, node: ast.Literal, pos: Pos) -> Expr:
         if value * NS_PER_MS != node.value:
             c.warning(node.pos, "precision", "TIME counts milliseconds; write LTIME#... for less")
     if not constants.fits(value, target):
-        return c.error(node.pos, "range", f"this duration is too long for {target}")
+        longest = constants.limits(target)[1]
+        if not 0 <= value <= 2 * longest + 1:
+            return c.error(node.pos, "range", f"this duration is too long for {target}")
+        days = longest * dates.UNIT_NS[target] // (86400 * 1000 * NS_PER_MS)
+        message = f"{target} has a sign, so it ends after {days} days; this is the longest one"
+        c.warning(node.pos, "precision", message if target is LTIME else f"{message}; write LTIME#... for more")
+        value = longest
     return Const(value, target, pos)
 
 

@@ -124,6 +124,8 @@ def usable(c: Checker, bound: Bound, member: Member | None, offset: int) -> Memb
     """The member of those that `bound` may be, if it exists and may be used here; None after a diagnosis."""
     if member is not None:
         return member if accessible(c, member, offset) else None
+    if c.scope.inherits_unknown(bound.cls):
+        return None
     hint = did_you_mean(bound.key, bound.cls.member_names())
     c.error(offset, "unknown", f"{bound.cls.name} has no method {bound.key}{hint}")
     return None

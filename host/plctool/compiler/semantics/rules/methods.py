@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value
-from plctool.compiler.semantics.rules.arguments import bind, split_enable, typed_call
+from plctool.compiler.semantics.rules.arguments import bind, plain_arguments, typed_call
 from plctool.compiler.semantics.rules.members import Bound, bound_member, instance_member, usable
 from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, Member
-from plctool.compiler.semantics.values import load
+from plctool.compiler.semantics.values import is_exact, load
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Call,
@@ -23,28 +23,33 @@ from plctool.compiler.typed import (
     Pou,
     SelfPlace,
     Statement,
-    Storage,
-    VarPlace,
 )
 from plctool.iec.types import ReferenceType
 
 
 def method_call(c: Checker, bound: Bound, node: ast.Call) -> Expr:
     """A call of a method or action."""
-    args, enable = split_enable(node)
+    args = plain_arguments(c, node)
     offset = node.callee.name_pos if isinstance(node.callee, ast.Member) else node.pos
-    if enable.en is not None or enable.eno is not None:
-        return c.error(node.pos, "arguments", "EN and ENO need the call to be a statement")
+    if args is None:
+        return error_value(c.pos(node.pos))
     if bound.callable is None and bound.getter is not None:
         return c.error(offset, "call", f"{bound.cls.name}.{bound.key} is a property and is used without ()")
     member = usable(c, bound, bound.callable, offset)
     if member is None:
         return error_value(c.pos(node.pos))
-    return _member_call(c, bound, member, args, node.pos, offset)
+    return _member_call(c, bound, member, args, node.pos, offset, formal=node.formal)
 
 
 def _member_call(
-    c: Checker, bound: Bound, member: Member, args: list[ast.Argument], offset: int, name_offset: int
+    c: Checker,
+    bound: Bound,
+    member: Member,
+    args: list[ast.Argument],
+    offset: int,
+    name_offset: int,
+    *,
+    formal: bool = False,
 ) -> Expr:
     place = bound.place
     if isinstance(place, SelfPlace) and place.exact and member.abstract:
@@ -55,7 +60,7 @@ def _member_call(
     if bound_args is None:
         return error_value(c.pos(offset))
     elsewhere = dispatch is not None or isinstance(place, DerefPlace)
-    e = typed_call(c, info, dict(bound_args), offset, noted=not elsewhere)
+    e = typed_call(c, info, dict(bound_args), offset, formal=formal, noted=not elsewhere)
     if isinstance(e, Call):
         e.instance, e.dispatch = place, dispatch
         if dispatch is not None and isinstance(place, SelfPlace):
@@ -72,7 +77,7 @@ def _member_key(member: Member) -> str:
 
 def _dispatch_of(c: Checker, cls: ClassInfo, key: str, place: Place | None, function: Pou) -> Dispatch | None:
     """None when the type of the instance is known."""
-    if place is None or _is_exact(place):
+    if place is None or is_exact(place):
         return None
     return c.world.dispatches.dispatch(cls, key, function)
 
@@ -101,17 +106,20 @@ def followed(e: Expr) -> Expr:
     return e
 
 
-def assigned_property(c: Checker, target: ast.Expr) -> Bound | None:
-    """The property that an assignment is about; None when it is a variable."""
+def assigned_property(c: Checker, target: ast.Expr, *, referring: bool = False) -> Bound | None:
+    """The property that an assignment is about; None when it is a variable, or what the property refers to.
+    `referring`: for REF=, which gives a property that is a REFERENCE TO another target."""
     if not isinstance(target, ast.Name | ast.Member):
         return None
     bound = bound_member(c, target)
     if bound is None or bound.callable is not None:
         return None
-    if bound.getter is None or bound.setter is not None:
+    if bound.getter is None:
         return bound
     refers = isinstance(c.world.declared.member(bound.getter).result, ReferenceType)
-    return None if refers else bound  # what it refers to is assigned
+    if referring:
+        return bound if refers and bound.setter is not None else None
+    return None if refers else bound
 
 
 def assign_property(c: Checker, bound: Bound, target: ast.Expr, source: ast.Expr, pos: Pos) -> Statement | None:
@@ -135,12 +143,3 @@ def property_of(c: Checker, base: Expr, node: ast.Member) -> Expr | None:
     if bound.callable is not None:
         return c.error(node.name_pos, "call", f"{bound.cls.name}.{node.name} is called with ()")
     return property_value(c, bound, node.pos, node.name_pos)
-
-
-def _is_exact(place: Place) -> bool:
-    """Whether an instance is of just the type it is declared with: it is not reached through a reference."""
-    if isinstance(place, VarPlace):
-        return place.var.storage is not Storage.REFERENCE
-    if isinstance(place, SelfPlace):
-        return place.exact
-    return not isinstance(place, DerefPlace)

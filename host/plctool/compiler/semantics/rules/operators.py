@@ -35,6 +35,7 @@ from plctool.iec.types import (
     TOD,
     ArrayType,
     Elementary,
+    EnumType,
     InterfaceType,
     Kind,
     PointerType,
@@ -89,6 +90,8 @@ def binary_operator(c: Checker, node: ast.Binary, expected: Type | None) -> Expr
     arithmetic = node.op in ("+", "-", "*", "/", "MOD", "AND", "OR", "XOR")
     wanted = expected if arithmetic else None
     left = c.expr(node.left, wanted)
+    if node.op in ("=", "<>", "<", ">", "<=", ">=") and isinstance(left.type, EnumType):
+        wanted = left.type  # its values may be written without its name
     right = c.expr(node.right, wanted)
     if node.op == "**":
         return _power(c, left, right, node.pos, expected)
@@ -231,6 +234,9 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
     elif isinstance(right.type, InterfaceType) and isinstance(left.type, StructType):
         left = c.coerce(left, right.type)
     left, right = character(left, right.type) or left, character(right, left.type) or right
+    if isinstance(left.type, EnumType) and isinstance(right.type, EnumType) and left.type is not right.type:
+        c.warning(offset, "enum", f"{left.type} and {right.type} are compared by the numbers of their values")
+        left, right = convert(left, left.type.base), convert(right, right.type.base)
     if is_untyped(left):
         t: Type | None = left.type if left.type is right.type else UNTYPED_REAL
     else:

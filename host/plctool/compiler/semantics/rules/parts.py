@@ -23,9 +23,11 @@ from plctool.compiler.typed import (
     DerefPlace,
     Expr,
     IndexPlace,
+    Load,
     MemberPlace,
     SelfPlace,
     Storage,
+    Variable,
 )
 from plctool.iec.types import (
     BOOL,
@@ -39,6 +41,7 @@ from plctool.iec.types import (
     InterfaceType,
     OpenArrayType,
     PointerType,
+    ReferenceType,
     StringType,
     StructType,
     Type,
@@ -76,6 +79,10 @@ def member_of(c: Checker, base: Expr, node: ast.Member) -> Expr:
 
 def _block_member(c: Checker, base: Expr, members: dict[str, VarSymbol], node: ast.Member) -> Expr:
     symbol = members.get(node.name.casefold())
+    if symbol is None and (
+        c.scope.is_incomplete(str(base.type)) or c.scope.inherits_unknown(c.world.class_of(base.type))
+    ):
+        return error_value(c.pos(node.pos))
     if symbol is None:
         names = [m.name for m in members.values() if m.role in (Role.INPUT, Role.OUTPUT)]
         cls = c.world.class_of(base.type)
@@ -86,12 +93,23 @@ def _block_member(c: Checker, base: Expr, members: dict[str, VarSymbol], node: a
     symbol.used = True
     if not may_see(c, symbol, base.type, node):
         return error_value(c.pos(node.pos))
-    if symbol.role is Role.IN_OUT:
-        return c.error(node.name_pos, "access", f"{symbol.name} is a VAR_IN_OUT; it can only be given in a call")
     variable = symbol.variable
+    if symbol.role is Role.IN_OUT and variable is not None:
+        return _in_out_of(c, base, symbol, variable, node)
     if variable is None or variable.storage is Storage.AREA:  # a constant, VAR_STAT, VAR_EXTERNAL
         return variable_value(symbol, c.pos(node.pos))
     return load(MemberPlace(place_of(base), variable.offset, symbol.type, c.pos(node.pos)))
+
+
+def _in_out_of(c: Checker, base: Expr, symbol: VarSymbol, variable: Variable, node: ast.Member) -> Expr:
+    """`THIS^.x`, or what the last call gave an instance for its VAR_IN_OUT."""
+    place, pos = place_of(base), c.pos(node.pos)
+    if isinstance(place, SelfPlace):
+        return variable_value(symbol, pos)
+    if isinstance(symbol.type, OpenArrayType):
+        return c.error(node.name_pos, "access", f"{symbol.name} is an ARRAY[*]; it can only be given in a call")
+    t = ReferenceType(symbol.type)
+    return load(DerefPlace(Load(MemberPlace(place, variable.offset, t, pos), t, pos), symbol.type, pos))
 
 
 def _bit_number(c: Checker, node: ast.Member, t: Elementary) -> ast.BitAccess | None:

@@ -6,12 +6,13 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
+from plctool.compiler.semantics.rules.access import is_inside
 from plctool.compiler.semantics.rules.members import Bound, bound_member
 from plctool.compiler.semantics.rules.qualified_names import space_of
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
-from plctool.compiler.semantics.values import is_temporary
+from plctool.compiler.semantics.values import is_exact, is_temporary, place_of
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import AddressOf, DerefPlace, Load, Place, SelfPlace
+from plctool.compiler.typed import AddressOf, DerefPlace, Expr, Load, Place, SelfPlace
 from plctool.iec.types import StructType
 
 
@@ -46,6 +47,19 @@ def changeable_place(c: Checker, node: ast.Expr, what: str, use: str) -> Place |
         c.error(node.pos, "read-only", f"{reason} and cannot {use}")
         return None
     return named_place(c, node, what)
+
+
+def may_copy(c: Checker, value: Expr, offset: int, target: Place | None = None) -> bool:
+    """Whether a value may be copied to a place, or into a new variable. Of a function block only where both are of just
+    this block, not of one derived from it, whose number would be copied as well. Reports it when not."""
+    block = c.world.blocks.get(value.type) if isinstance(value.type, StructType) else None
+    if block is None or block.cls is None or not block.cls.number:
+        return True
+    if is_exact(place_of(value)) and (target is None or is_exact(target)):
+        return True
+    message = f"what is reached through a pointer, reference or VAR_IN_OUT may be of a block derived from {block.type}"
+    c.error(offset, "type", f"{message}, so it cannot be copied as a whole")
+    return False
 
 
 def _read_only(c: Checker, node: ast.Expr) -> str | None:
@@ -83,11 +97,14 @@ def _member_read_only(c: Checker, node: ast.Member) -> str | None:
         return _symbol_read_only(c, variable)
     base = c.expr(node.base)
     own = base.place if isinstance(base, AddressOf | Load) and isinstance(base.place, SelfPlace) else None
-    block = c.world.blocks.get(base.type) if isinstance(base.type, StructType) else None
+    t = base.type if own is None else own.type
+    block = c.world.blocks.get(t) if isinstance(t, StructType) else None
     if own is not None:
-        return None
+        return None if block is None else _symbol_read_only(c, block.members.get(node.name.casefold()))
     if block is not None:
         member = block.members.get(node.name.casefold())
+        if member is not None and member.role is Role.LOCAL and not member.constant and is_inside(c, member, block):
+            return _read_only(c, node.base)
         if member is not None and member.role is not Role.INPUT and member.access != "PUBLIC":
             article = "an" if member.role is Role.OUTPUT else "a"
             return f"{node.name} is {article} {member.role.value} of {base.type}"

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value, settle
-from plctool.compiler.semantics.open_arrays import bounds_of
+from plctool.compiler.semantics.open_arrays import bounds_of, total_size
 from plctool.compiler.semantics.rules.applied import Applied, BuiltIn, named
-from plctool.compiler.semantics.rules.operators import operate
 from plctool.compiler.semantics.rules.places import named_place
-from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, PouSymbol, TypeSymbol
+from plctool.compiler.semantics.rules.qualified_names import space_of
+from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, GlobalSymbol, PouSymbol, TypeSymbol, VarSymbol
 from plctool.compiler.semantics.values import place_of
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -25,10 +25,13 @@ from plctool.compiler.typed import (
     Intrinsic,
     IntrinsicCall,
     Load,
+    Storage,
+    Variable,
+    VarPlace,
 )
 from plctool.iec.types import (
     BOOL,
-    DINT,
+    BYTE,
     ELEMENTARY,
     UDINT,
     ArrayType,
@@ -61,27 +64,35 @@ def of_variable(c: Checker, name: str, node: ast.Call) -> Expr:
             return error_value(c.pos(node.pos)) if t is ERROR else _size(c, t, node)
     e = settle(c.expr(argument))
     if isinstance(e.type, OpenArrayType):
-        return _open_size(c, e, e.type, node.pos)
+        return total_size(place_of(e))
     return e if e.type is ERROR else _size(c, e.type, node)
-
-
-def _open_size(c: Checker, e: Expr, t: OpenArrayType, offset: int) -> Expr:
-    """The bytes of an ARRAY[*], which are known when it runs."""
-    size: Expr = Const(t.element.size, DINT, e.pos)
-    for low, high in bounds_of(place_of(e)):
-        last = operate(c, BinaryOp.SUB, high, low, offset)
-        count = operate(c, BinaryOp.ADD, last, Const(1, DINT, e.pos), offset)
-        size = operate(c, BinaryOp.MUL, size, count, offset)
-    return size
 
 
 def _is_valid(c: Checker, node: ast.Expr) -> Expr:
     """Whether a reference refers to something."""
     e, pos = c.expr(node), c.pos(node.pos)
+    in_out = _in_out_given(c, e)
+    if in_out is not None:
+        return in_out
     pointer = e.place.pointer if isinstance(e, Load) and isinstance(e.place, DerefPlace) else None
     if pointer is None or not isinstance(pointer.type, ReferenceType):
         return e if e.type is ERROR else c.error(node.pos, "type", f"{e.type} is not a REFERENCE TO")
     return Binary(BinaryOp.NE, pointer, Const(0, pointer.type, pos), BOOL, pos)
+
+
+def _in_out_given(c: Checker, e: Expr) -> Expr | None:
+    """Whether a VAR_IN_OUT was given: that of a function always is, that of an instance from its first call on. None
+    when it is none."""
+    variable = e.place.var if isinstance(e, Load) and isinstance(e.place, VarPlace) else None
+    if variable is None or variable.storage is not Storage.REFERENCE:
+        return None
+    block = None if c.scope.cls is None else c.scope.cls.block
+    symbol = None if block is None else block.members.get(variable.name.casefold())
+    if block is None or symbol is None or symbol.variable is not variable:
+        return Const(1, BOOL, e.pos)
+    t = RawPointerType(BYTE)
+    slot = Load(VarPlace(Variable(variable.name, t, Storage.SELF, e.pos, offset=variable.offset), t, e.pos), t, e.pos)
+    return Binary(BinaryOp.NE, slot, Const(0, t, e.pos), BOOL, e.pos)
 
 
 def _size(c: Checker, t: Type, node: ast.Call) -> Expr:
@@ -89,7 +100,12 @@ def _size(c: Checker, t: Type, node: ast.Call) -> Expr:
 
 
 def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
-    """ADR(x), REF(x)"""
+    """ADR(x), REF(x); of a constant, the address of a variable that holds it."""
+    constant = _constant_text(c, node)
+    if constant is not None and isinstance(constant.type, StringType):
+        return AddressOf(
+            VarPlace(c.world.text(constant), constant.type, constant.pos), kind(constant.type), constant.pos
+        )
     place = named_place(c, node, "an address")
     if place is None:
         return error_value(c.pos(node.pos))
@@ -97,6 +113,24 @@ def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
         return c.error(node.pos, "type", "a single bit has no address")
     t = place.type.element if isinstance(place.type, OpenArrayType) else place.type
     return AddressOf(place, kind(t), c.pos(node.pos))
+
+
+def _constant_text(c: Checker, node: ast.Expr) -> Const | None:
+    """The value of a text, or of a constant that is one; None for anything else."""
+    symbol: object = None
+    if isinstance(node, ast.Name):
+        symbol = c.scope.lookup(node.name)
+    elif isinstance(node, ast.Member):
+        space = space_of(c, node.base)
+        symbol = None if space is None else space.members.get(node.name.casefold())
+    elif not isinstance(node, ast.Literal) or node.kind not in (ast.LiteralKind.STRING, ast.LiteralKind.WSTRING):
+        return None
+    if isinstance(symbol, GlobalSymbol):
+        symbol = c.world.declared.variable(symbol)
+    if not isinstance(node, ast.Literal) and not (isinstance(symbol, VarSymbol) and symbol.value is not None):
+        return None
+    e = c.expr(node)
+    return e if isinstance(e, Const) and isinstance(e.type, StringType) else None
 
 
 def _string_size(c: Checker, f: Applied) -> Expr:

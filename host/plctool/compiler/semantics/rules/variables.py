@@ -11,7 +11,7 @@ from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import error_value
 from plctool.compiler.semantics.rules.chart_flags import action_flag
-from plctool.compiler.semantics.rules.members import own_member
+from plctool.compiler.semantics.rules.members import bound_member, own_member
 from plctool.compiler.semantics.rules.methods import property_value
 from plctool.compiler.semantics.rules.parts import member_of
 from plctool.compiler.semantics.rules.qualified_names import (
@@ -19,6 +19,7 @@ from plctool.compiler.semantics.rules.qualified_names import (
     is_namespace,
     namespace_member,
     qualified,
+    space_of,
     variable_value,
 )
 from plctool.compiler.semantics.symbols import (
@@ -27,6 +28,7 @@ from plctool.compiler.semantics.symbols import (
     MemberSymbol,
     Namespace,
     PouSymbol,
+    Role,
     TypeSymbol,
     VarSymbol,
 )
@@ -51,6 +53,8 @@ def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
         if not c.scope.may_use(symbol, node.name, node.pos):
             return error_value(c.pos(node.pos))
         symbol = c.world.declared.variable(symbol)
+    if isinstance(expected, EnumType) and _yields(c, symbol, node.name, expected):
+        return _value_of(c, expected, node.name, node.pos, node.pos)
     if isinstance(symbol, VarSymbol):
         return variable_value(symbol, c.pos(node.pos))
     own = _own_name(c, node, symbol)
@@ -63,8 +67,20 @@ def name_value(c: Checker, node: ast.Name, expected: Type | None) -> Expr:
     return c.error(node.pos, "name", f"{node.name} is {describe(symbol)}, not a value")
 
 
+def _yields(c: Checker, symbol: object, name: str, wanted: EnumType) -> bool:
+    """Whether a name is that of a method and of a value of the enumeration that is wanted here."""
+    if not wanted.has(name):
+        return False
+    if isinstance(symbol, VarSymbol):
+        return symbol.role is Role.RESULT and symbol.type is not wanted
+    bound = own_member(c, name) if isinstance(symbol, MemberSymbol) else None
+    return bound is not None and bound.callable is not None
+
+
 def _enumerated(c: Checker, node: ast.Name, expected: Type | None) -> Expr | None:
     """The value of an enumeration by its bare name; None when there is none of that name."""
+    if isinstance(expected, EnumType) and expected.inline and expected.has(node.name):
+        return _value_of(c, expected, node.name, node.pos, node.pos)
     symbols = c.world.names.enumerations_with(node.name)
     types = [t for s in symbols if isinstance(t := c.world.declared.type_of(s), EnumType)]
     if len(types) > 1 and expected in types:
@@ -98,6 +114,8 @@ def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
         return None
     if name == "THIS":
         return SelfPlace(cls.type, c.pos(node.pos))
+    if cls.base is None and c.scope.inherits_unknown(cls):
+        return None
     if cls.base is None or cls.base.type is None:
         c.error(node.pos, "name", f"SUPER stands for the base, but {cls.name} extends nothing")
         return None
@@ -105,6 +123,8 @@ def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
 
 
 def _unknown(c: Checker, node: ast.Name) -> Expr:
+    if c.scope.inherits_unknown(c.scope.cls):
+        return error_value(c.pos(node.pos))  # it may be inherited
     longer = c.world.names.qualified_names(node.name)
     if longer:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(longer)}")
@@ -118,12 +138,23 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(inside)}")
     names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
     hint = did_you_mean(node.name, {_written(c, n) for n in names} - {""})
+    if node.name and not hint:
+        return c.missing(node.pos, node.name, f"unknown name {node.name}")
     return c.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")
 
 
 def _written(c: Checker, key: str) -> str:
     symbol = c.scope.names.get(key)
     return symbol.name if isinstance(symbol, VarSymbol | GlobalSymbol) else key
+
+
+def constant_of_block(c: Checker, symbol: object, name: str) -> VarSymbol | None:
+    """`Block.LIMIT`: a constant, which is the same in all instances."""
+    if not isinstance(symbol, PouSymbol) or symbol.keyword != "FUNCTION_BLOCK":
+        return None
+    block = c.world.declared.block(symbol)
+    member = block.members.get(name.casefold()) if block is not None else None
+    return member if member is not None and member.constant and member.value is not None else None
 
 
 @checks(ast.EnumValue)
@@ -159,10 +190,18 @@ def direct_address(c: Checker, node: ast.DirectAddress, expected: Type | None) -
 @checks(ast.Member)
 def member_value(c: Checker, node: ast.Member, expected: Type | None) -> Expr:
     """`a.b`: a name with a namespace, list, program or type in front, or a part of what `a` is."""
+    space = space_of(c, node.base)
+    if space is not None and space.cls is not None:
+        bound = bound_member(c, node)
+        if bound is not None and bound.callable is None:
+            return property_value(c, bound, node.pos, node.name_pos)
     if isinstance(node.base, ast.Name):
         symbol = c.scope.lookup(node.base.name)
         if isinstance(symbol, Namespace):
             return namespace_member(c, symbol, node)
+        constant = constant_of_block(c, symbol, node.name)
+        if constant is not None:
+            return variable_value(constant, c.pos(node.pos))
         if isinstance(symbol, TypeSymbol):
             t = c.world.declared.type_of(symbol)
             if isinstance(t, EnumType):

@@ -1,0 +1,236 @@
+"""Exports of CODESYS 2.3 and TwinCAT 2 (.EXP): units in Structured Text, and sections that describe the project.
+
+Tasks become a CONFIGURATION and the names in the hardware configuration become globals at their addresses. Libraries,
+visualisations and settings of the editor are left out and named. A body that is a diagram is refused by name.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from plctool.compiler.formats.text import Findings, Place, Text
+from plctool.compiler.source import Source
+
+_ENDS = {
+    "PROGRAM": "END_PROGRAM", "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "FUNCTION": "END_FUNCTION", "TYPE": "END_TYPE",
+    "ACTION": "END_ACTION", "VAR_GLOBAL": "END_VAR", "VAR_CONFIG": "END_VAR", "CONFIGURATION": "END_CONFIGURATION",
+    "INTERFACE": "END_INTERFACE", "METHOD": "END_METHOD",
+}  # fmt: skip
+_SECTIONS = frozenset(("LIBRARY", "VISUALISATION", "PLC_CONFIGURATION", "RESOURCE", "TASK", "TASK_CONFIGURATION"))
+_TASKS = frozenset(("RESOURCE", "TASK", "TASK_CONFIGURATION"))
+
+_WORD = re.compile(r"\s*(\w+)[ \t]*(\w*)")
+_OUTSIDE = re.compile(r"\(\*|'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\"")
+_INSIDE = re.compile(r"\(\*|\*\)")
+_NESTED = re.compile(r"\(\*\s*@NESTEDCOMMENTS\s*:=\s*'(\w+)'\s*\*\)", re.IGNORECASE)
+_DIAGRAM = re.compile(r"^[ \t]*_(LD|FBD|CFC|SFC)_?\w*[ \t]*\r?$", re.MULTILINE)
+_TASK = re.compile(r"\bTASK\s+(\w+)\s*\(([^()]*)\)", re.IGNORECASE)
+_PROPERTY = re.compile(r"(\w+)\s*:=\s*([^,()]+)")
+_INSTANCE = re.compile(r"\bPROGRAM\s+(\w+)(?:\s+WITH\s+\w+)?\s*:\s*(\w+)", re.IGNORECASE)
+_CALL = re.compile(r"^[ \t{]*([A-Za-z_]\w*)[ \t]*(?:\([^()\n]*\)[ \t]*;?|;)", re.MULTILINE)
+_ENTRY = re.compile(r"^[ \t]*_(\w+)[ \t]*:?[ \t]*'?([^'\n\r]*)'?", re.MULTILINE)
+_TYPES = {"X": "BOOL", "": "BOOL", "B": "BYTE", "W": "WORD", "D": "DWORD", "L": "LWORD"}
+_ADDRESS = re.compile(r"%[IQM]([XBWDL]?)\d+(?:\.\d+)*", re.IGNORECASE)
+_NAME = re.compile(r"[A-Za-z_]\w*")
+_LIBRARY = re.compile(r"[\w.\- ]+\.lib\b", re.IGNORECASE)
+
+
+@dataclass
+class _Span:
+    """A part of the file: what it is, what it is called, and where it begins and ends."""
+
+    kind: str
+    name: str
+    start: int
+    end: int
+
+
+def read_export(path: str, text: str) -> Source:
+    """What a file holds."""
+    return _Export(path, text).source()
+
+
+class _Export:
+    def __init__(self, path: str, text: str) -> None:
+        self._path = path
+        self._text = text
+        self._edits: list[tuple[int, int, str]] = []
+        self._findings = Findings()
+        self._masked = self._without_comments()
+
+    def source(self) -> Source:
+        left_out: list[str] = []
+        first: _Span | None = None
+        for span in self._spans():
+            if span.kind in _ENDS:
+                self._diagram(span)
+                continue
+            first = first or span
+            made = self._instead_of(span)
+            self._edits.append((span.start, span.end, made))
+            if not made:
+                left_out += self._names(span)
+        if first is not None and left_out:
+            message = f"left out: {', '.join(dict.fromkeys(left_out))}"
+            self._findings.warning(self._place(first.start), "left-out", message)
+        if not self._edits:
+            return Source(self._path, self._text)
+        made_text = Text()
+        made_text.spliced(self._text, _apart(self._edits))
+        return made_text.source(self._path, self._text, findings=self._findings.all)
+
+    def _place(self, offset: int) -> Place:
+        line = self._text.count("\n", 0, offset) + 1
+        return Place(line, offset - self._text.rfind("\n", 0, offset))
+
+    # ---- comments ----
+
+    def _without_comments(self) -> str:
+        """The text with blanks for comments and strings. Where comments do not nest, a mark in one is left out."""
+        parts: list[str] = []
+        at, nests = 0, True
+        while (match := _OUTSIDE.search(self._text, at)) is not None:
+            end = match.end()
+            if match.group() == "(*":
+                nests = self._nests(match.start(), nests)
+                end = self._comment_end(end, nests=nests)
+            parts += [self._text[at : match.start()], _blank(self._text[match.start() : end])]
+            at = end
+        return "".join([*parts, self._text[at:]])
+
+    def _comment_end(self, at: int, *, nests: bool) -> int:
+        depth = 1
+        for match in _INSIDE.finditer(self._text, at):
+            if match.group() == "*)":
+                depth -= 1
+            elif nests:
+                depth += 1
+            else:
+                self._edits.append((match.start(), match.end(), "  "))
+            if depth == 0:
+                return match.end()
+        return len(self._text)
+
+    def _nests(self, offset: int, before: bool) -> bool:
+        match = _NESTED.match(self._text, offset)
+        return before if match is None else match[1].lower() != "no"
+
+    # ---- parts of the file ----
+
+    def _spans(self) -> list[_Span]:
+        """The units and sections, in order."""
+        found: list[_Span] = []
+        at = 0
+        while at < len(self._masked):
+            end_of_line = self._line_end(at)
+            match = _WORD.match(self._masked, at, end_of_line)
+            kind = match[1].upper() if match else ""
+            if match is None or not (kind in _ENDS or kind in _SECTIONS or kind.startswith("_")):
+                at = end_of_line
+                continue
+            end = self._unit_end(kind, match.end(1)) if kind in _ENDS else self._section_end(kind, end_of_line)
+            found.append(_Span(kind, match[2], match.start(1), end))
+            at = max(end, end_of_line) if kind in _ENDS else end
+        return found
+
+    def _line_end(self, at: int) -> int:
+        end = self._masked.find("\n", at)
+        return len(self._masked) if end < 0 else end + 1
+
+    def _unit_end(self, kind: str, at: int) -> int:
+        match = re.compile(rf"\b{_ENDS[kind]}\b", re.IGNORECASE).search(self._masked, at)
+        return len(self._masked) if match is None else match.end()
+
+    def _section_end(self, kind: str, at: int) -> int:
+        """Its own end, or else the next unit or section."""
+        name = kind.lstrip("_")
+        ends = rf"END_{name}|_END_{name}|{kind}_END" + ("|PLC_END" if kind == "PLC_CONFIGURATION" else "")
+        own = re.compile(rf"^[ \t]*(?:{ends})\b.*", re.MULTILINE | re.IGNORECASE).search(self._masked, at)
+        if own is not None:
+            return own.end()
+        words = "|".join([*_ENDS, *(_SECTIONS - {kind, "TASK"})])
+        other = re.compile(rf"^[ \t]*(?:{words})\b", re.MULTILINE | re.IGNORECASE)
+        at_header = self._text.find("(* @NESTEDCOMMENTS", at)
+        match = other.search(self._masked, at) if kind not in _TASKS else None
+        ends_at = [end for end in (at_header, match.start() if match else -1) if end >= 0]
+        return min(ends_at, default=len(self._masked))
+
+    def _names(self, span: _Span) -> list[str]:
+        """How what is left out is called."""
+        if span.kind == "LIBRARY":
+            libraries = _LIBRARY.findall(self._text[span.start + len("LIBRARY") : span.end])
+            return [f"the library {name.strip()}" for name in libraries] or ["a library"]
+        return [f"{span.kind} {span.name}".strip() if span.kind == "VISUALISATION" else span.kind]
+
+    def _diagram(self, span: _Span) -> None:
+        match = _DIAGRAM.search(self._masked, span.start, span.end)
+        if match is None:
+            return
+        self._findings.refuse(self._place(match.start(1) - 1), span.name or span.kind, match[1])
+        end = span.end - len(_ENDS[span.kind])
+        self._edits.append((match.start(), max(match.start(), end), "\n"))
+
+    # ---- what sections become ----
+
+    def _instead_of(self, span: _Span) -> str:
+        if span.kind in _TASKS:
+            return self._tasks(span)
+        if span.kind == "PLC_CONFIGURATION":
+            return self._hardware(span)
+        return ""
+
+    def _tasks(self, span: _Span) -> str:
+        text = self._masked[span.start : span.end]
+        tasks = list(_TASK.finditer(text))
+        lines = []
+        starts = [task.start() for task in tasks]
+        for task, end in zip(tasks, [*starts[1:], len(text)], strict=False):
+            body = text[task.end() : end]
+            properties = {m[1].upper(): m[2].strip() for m in _PROPERTY.finditer(task[2])}
+            known = [f"{k} := {v}" for k, v in properties.items() if k in ("INTERVAL", "PRIORITY", "SINGLE") and v]
+            programs = [(m[1], m[2]) for m in _INSTANCE.finditer(body)]
+            programs = programs or [(m[1], m[1]) for m in _CALL.finditer(body) if not m[1].upper().startswith("END_")]
+            if programs:
+                lines.append(f"TASK {task[1]}({', '.join(known)});")
+                lines += [f"PROGRAM {name} WITH {task[1]} : {program};" for name, program in programs]
+        if not lines:
+            return ""
+        return "\n".join(["CONFIGURATION Tasks", *lines, "END_CONFIGURATION\n"])
+
+    def _hardware(self, span: _Span) -> str:
+        """Channels of modules that have a name and an address."""
+        lines: list[str] = []
+        name = address = section = ""
+        for match in _ENTRY.finditer(self._text, span.start, span.end):
+            key, value = match[1].upper(), match[2].strip()
+            if key in ("CHANNEL", "MODULE") or key.startswith("END_"):
+                name = address = section = ""
+            elif key == "SECTION_NAME":
+                section = value.lower()
+            elif key == "SYMBOLIC_NAME":
+                name = value
+            elif key == "IECADR":
+                address = value
+            located = _ADDRESS.fullmatch(address)
+            if located and _NAME.fullmatch(name):
+                size = located[1].upper()
+                spec = "REAL" if size == "D" and section.startswith(("float", "real")) else _TYPES[size]
+                lines.append(f"    {name} AT {address} : {spec};")
+                name = address = ""
+        return "\n".join(["VAR_GLOBAL", *dict.fromkeys(lines), "END_VAR\n"]) if lines else ""
+
+
+def _apart(edits: list[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
+    """In order, without those within another one: marks in comments of a section that is left out."""
+    found: list[tuple[int, int, str]] = []
+    for edit in sorted(edits, key=lambda e: (e[0], -e[1])):
+        if not found or edit[0] >= found[-1][1]:
+            found.append(edit)
+    return found
+
+
+def _blank(text: str) -> str:
+    return re.sub(r"[^\n]", " ", text)

@@ -1,0 +1,171 @@
+"""PLCopen XML: Sequential Function Charts, written as steps, transitions and actions.
+
+Blocks that are drawn beside a chart are executed in every cycle, by an action that the first step starts, as OpenPLC
+Editor and Beremiz do.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
+from plctool.compiler.formats.plcopen_graph import Network
+from plctool.compiler.formats.text import Chunk, Place
+from plctool.compiler.formats.xml_tree import Element
+
+_BRANCHES = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")
+_COMPUTE = "COMPUTE_FUNCTION_BLOCKS"
+
+
+class Chart:
+    """One chart. `statements`: makes a body of the one in an inline action."""
+
+    def __init__(self, element: Element, unit: Unit, body: Body) -> None:
+        self._unit = unit
+        self._body = body
+        self._elements = {e.get("localId"): e for e in element.children if e.get("localId")}
+        self._root = element
+        self._following: dict[str, list[Element]] = {}
+        for e in element.children:
+            for connection in _connections(e):
+                self._following.setdefault(connection, []).append(e)
+        blocks = Body()
+        self._network = Network(element, unit, blocks)
+        self._blocks = blocks
+
+    def translate(self) -> None:
+        """Adds steps, transitions and actions. Raises NotTranslatedError."""
+        for macro in self._root.all("macroStep"):
+            raise NotTranslatedError(macro.at, "it has a macro step")
+        self._network.translate()
+        transitions = sorted(self._root.all("transition"), key=_column)
+        conditions = [self._condition(t) for t in transitions]
+        self._body.variables |= self._blocks.variables
+        computes = bool(self._blocks.parts)
+        if computes:
+            self._body.actions.append((_COMPUTE, Body(self._blocks.parts), self._root.at))
+        for step in self._root.all("step"):
+            self._step(step, computes=computes)
+        for transition, condition in zip(transitions, conditions, strict=True):
+            self._transition(transition, condition)
+
+    def _step(self, step: Element, *, computes: bool) -> None:
+        self._check_actions(step)
+        name = step.get("name")
+        initial = step.get("initialStep") == "true"
+        self._body.line(f"{'INITIAL_STEP' if initial else 'STEP'} {name}:", step.at)
+        for block in self._root.all("actionBlock"):
+            if step.get("localId") in _connections(block):
+                for action in block.all("action"):
+                    self._action(action, name)
+        if initial and computes:
+            self._body.line(f"    {_COMPUTE}(S);", step.at)
+        self._body.line("END_STEP", step.at)
+
+    def _check_actions(self, step: Element) -> None:
+        """CODESYS has actions of a step (entry, active, exit) among its attributes."""
+        for attribute in step.every("attribute"):
+            if attribute.text.casefold() in self._unit.actions:
+                what = f"the step {step.get('name')} has an action of CODESYS, {attribute.text}"
+                raise NotTranslatedError(step.at, f"{what}; use an action block")
+
+    def _action(self, action: Element, step: str) -> None:
+        reference, inline = action.child("reference"), action.child("inline", "ST")
+        if reference is not None:
+            name = reference.get("name")
+        elif inline is not None:
+            name = f"{step}_inline{len(self._body.actions)}"
+            self._body.actions.append((name, Body(list(inline.every_chunk())), action.at))
+        else:
+            raise NotTranslatedError(action.at, f"an action of the step {step} is drawn inside the chart")
+        qualifier = action.get("qualifier", "N") or "N"
+        duration = f", {action.get('duration')}" if action.get("duration") else ""
+        self._body.line(f"    {name}({qualifier}{duration});", action.at)
+
+    # ---- transitions ----
+
+    def _transition(self, transition: Element, condition: list[Chunk | tuple[str, Place]]) -> None:
+        sources = list(dict.fromkeys(self._steps_before(transition)))
+        targets = list(dict.fromkeys(self._steps_behind(transition)))
+        if not sources or not targets:
+            raise NotTranslatedError(transition.at, "a transition has no step before or behind it")
+        priority = transition.get("priority")
+        order = f" (PRIORITY := {priority})" if priority.isdecimal() and priority != "0" else ""
+        head = f"TRANSITION{order} FROM {_listed(sources)} TO {_listed(targets)} := "
+        self._body.parts.append((head, transition.at))
+        self._body.parts += condition
+        self._body.line(";\nEND_TRANSITION", transition.at)
+
+    def _condition(self, transition: Element) -> list[Chunk | tuple[str, Place]]:
+        condition = transition.child("condition")
+        if condition is None:
+            raise NotTranslatedError(transition.at, "a transition has no condition")
+        negated = "true" in (condition.get("negated"), *(c.get("negated") for c in condition.children))
+        reference, inline = condition.child("reference"), condition.child("inline")
+        body = self._unit.transitions.get(reference.get("name").casefold()) if reference is not None else inline
+        text = next(iter(body.every("ST")), None) if body is not None else None
+        if text is not None:
+            found = expression(text)
+        elif body is not None:
+            raise NotTranslatedError(body.at, "a condition is drawn")
+        elif reference is not None:
+            found = [(reference.get("name"), reference.at)]
+        else:
+            value = self._network.point(condition.child("connectionPointIn"))
+            found = [] if value is None else [(value, transition.at)]
+        if not found:
+            raise NotTranslatedError(transition.at, "a transition has no condition")
+        return [("NOT (", transition.at), *found, (")", transition.at)] if negated else found
+
+    def _steps_before(self, element: Element, depth: int = 0) -> Iterator[str]:
+        for ref in _connections(element):
+            before = self._elements.get(ref)
+            if before is not None and before.tag == "step":
+                yield before.get("name")
+            elif before is not None and before.tag in _BRANCHES and depth < len(self._elements):
+                yield from self._steps_before(before, depth + 1)
+
+    def _steps_behind(self, element: Element, depth: int = 0) -> Iterator[str]:
+        for behind in self._following.get(element.get("localId"), []):
+            if behind.tag == "step":
+                yield behind.get("name")
+            elif behind.tag == "jumpStep":
+                yield behind.get("targetName")
+            elif behind.tag in _BRANCHES and depth < len(self._elements):
+                yield from self._steps_behind(behind, depth + 1)
+
+
+def expression(text: Element) -> list[Chunk | tuple[str, Place]]:
+    """The condition in a body of Structured Text: `x`, `:= x` or `:= x;`."""
+    chunks = [chunk for chunk in text.every_chunk() if chunk.text.strip()]
+    if not chunks:
+        return []
+    first = chunks[0]
+    head = len(first.text) - len(first.text.lstrip().removeprefix(":="))
+    skipped = first.text[:head]
+    if "\n" not in skipped:
+        chunks[0] = Chunk(first.text[head:], first.line, first.column + head)
+    else:
+        chunks[0] = Chunk(first.text[head:], first.line + skipped.count("\n"), len(skipped) - skipped.rfind("\n"))
+    last = chunks[-1]
+    chunks[-1] = last._replace(text=last.text.rstrip().removesuffix(";"))
+    return [chunk for chunk in chunks if chunk.text]
+
+
+def _connections(element: Element) -> list[str]:
+    return [c.get("refLocalId") for point in element.all("connectionPointIn") for c in point.all("connection")]
+
+
+def _column(transition: Element) -> float:
+    """Branches are looked at from left to right."""
+    position = transition.child("position")
+    try:
+        return 0.0 if position is None else float(position.get("x", "0"))
+    except ValueError:
+        return 0.0
+
+
+def _listed(steps: list[str]) -> str:
+    return steps[0] if len(steps) == 1 else f"({', '.join(steps)})"

@@ -1,0 +1,384 @@
+"""PLCopen XML: networks of Function Block Diagram and Ladder Diagram, written as statements.
+
+The order is that of OpenPLC Editor and Beremiz: elements with an execution number first; then coils and output
+variables from top to bottom, each with all that it needs; then the blocks that nothing needed. An export without
+positions (CODESYS, TwinCAT) is taken in the order of the file. A function is computed once, into a variable.
+
+What has no such order, or needs a type that is not known here, is refused, never guessed.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cmp_to_key
+
+from plctool.compiler.formats.plcopen_body import Body, NotTranslatedError, Unit
+from plctool.compiler.formats.xml_tree import Element
+
+_SIMPLE = re.compile(r"[\w.#%\[\]^$:']+")
+_SAME_ROW = 10  # units of the editor by which elements of one row may differ
+_SINKS = frozenset(("outVariable", "inOutVariable", "coil", "return"))
+_REFUSED = {"jump": "a jump", "label": "a label", "error": "an error block"}
+_TRIGGERS = {"rising": "R_TRIG", "falling": "F_TRIG"}
+
+_OF_FIRST = frozenset((
+    "ADD", "SUB", "MUL", "DIV", "MOD", "MOVE", "MAX", "MIN", "LIMIT", "ABS", "AND", "OR", "XOR", "NOT", "SEL", "MUX",
+    "SHL", "SHR", "ROL", "ROR", "NEG", "SQRT", "EXPT",
+))  # fmt: skip
+"""Functions whose result has the type of what they are given."""
+
+_COMPARISONS = frozenset(("GT", "GE", "EQ", "LE", "LT", "NE"))
+_RESULTS = {"LEN": "INT", "FIND": "INT"}
+_CHOOSERS = frozenset(("SEL", "MUX"))  # the first input says which of the others
+_OUTPUTS = {"Q": "BOOL", "QU": "BOOL", "QD": "BOOL", "Q1": "BOOL", "ET": "TIME", "CV": "INT"}
+_LITERALS = ((re.compile(r"(?i)TRUE|FALSE"), "BOOL"), (re.compile(r"(?i)T(?:IME)?#.*"), "TIME"))
+_TYPED = re.compile(r"(?i)([A-Z]+)#[^#]+")
+_PATH = re.compile(r"\w+(?:\[[^\[\]]*\])?(?:\.\w+(?:\[[^\[\]]*\])?)*")
+_PART = re.compile(r"(\w+)(\[[^\[\]]*\])?(?:\.|$)")
+_ARRAY = re.compile(r"ARRAY\[[^\[\]]*\] OF (.*)")
+_CONVERSION = re.compile(r"(?i)\w+_TO_([A-Z]+)|TO_([A-Z]+)")
+
+
+class Network:
+    """The networks of one body."""
+
+    def __init__(self, element: Element, unit: Unit, body: Body) -> None:
+        self._unit = unit
+        self._body = body
+        self._elements = {e.get("localId"): e for e in element.children if e.get("localId")}
+        self._order = list(self._elements.values())
+        self._consumers: dict[str, list[Element]] = {}
+        for consumer in self._order:
+            for connection in consumer.every("connection"):
+                self._consumers.setdefault(connection.get("refLocalId"), []).append(consumer)
+        self._done: dict[str, str] = {}  # results of functions, and "" for called blocks, by local id
+        self._busy: set[str] = set()
+
+    # ---- all of it ----
+
+    def translate(self) -> None:
+        """Adds the statements of all networks. Raises NotTranslatedError."""
+        for element in self._order:
+            if element.tag in _REFUSED:
+                raise NotTranslatedError(element.at, f"it has {_REFUSED[element.tag]}")
+        for element in self._in_order():
+            self._execute(element)
+
+    @property
+    def has_blocks(self) -> bool:
+        """Whether there is anything to execute."""
+        return any(e.tag in _SINKS or e.tag == "block" for e in self._order)
+
+    def _in_order(self) -> list[Element]:
+        numbered = sorted((e for e in self._order if _number(e) > 0), key=_number)
+        rest = [e for e in self._order if _number(e) <= 0 and (e.tag in _SINKS or e.tag == "block")]
+        if len({_position(e) for e in rest}) > 1:
+            rest.sort(key=cmp_to_key(_by_position))
+            rest.sort(key=lambda e: e.tag == "block")
+        return [*numbered, *rest]
+
+    def _execute(self, element: Element) -> None:
+        if element.tag == "block":
+            self._called(element)
+        elif element.tag == "return":
+            self._body.line(f"IF {self._power(element)} THEN RETURN; END_IF;", element.at)
+        elif element.tag == "coil":
+            self._assign(element, (element.child("variable") or element).text, self._power(element))
+        elif element.tag in _SINKS and (value := self.point(element.child("connectionPointIn"))) is not None:
+            self._assign(element, (element.child("expression") or element).text, value)
+
+    def _assign(self, element: Element, target: str, value: str) -> None:
+        if _is(element, "negated"):
+            value = _negated(value)
+        value = self._edge(element, value)
+        storage = element.get("storage")
+        if storage in ("set", "reset"):
+            stored = "TRUE" if storage == "set" else "FALSE"
+            self._body.line(f"IF {value} THEN {target} := {stored}; END_IF;", element.at)
+        else:
+            self._body.line(f"{target} := {value};", element.at)
+
+    # ---- values ----
+
+    def _power(self, element: Element) -> str:
+        value = self.point(element.child("connectionPointIn"))
+        if value is None:
+            raise NotTranslatedError(element.at, "a part of it is connected to nothing")
+        return value
+
+    def point(self, point: Element | None) -> str | None:
+        """The value at an input: all that is connected to it, in parallel. None for nothing."""
+        if point is None:
+            return None
+        expression = point.child("expression")
+        if expression is not None and expression.text:
+            return _operand(expression.text)
+        values = [self._value(c, c.get("refLocalId"), c.get("formalParameter")) for c in point.all("connection")]
+        if not values:
+            return None
+        return values[0] if len(values) == 1 else "TRUE" if "TRUE" in values else f"({' OR '.join(values)})"
+
+    def _value(self, connection: Element, ref: str, formal: str) -> str:
+        element = self._elements.get(ref)
+        if element is None:
+            raise NotTranslatedError(connection.at, f"a line comes from element {ref}, which is not there")
+        if element.tag == "leftPowerRail":
+            return "TRUE"
+        if element.tag in ("inVariable", "inOutVariable"):
+            value = _operand((element.child("expression") or element).text)
+            return _negated(value) if _is(element, "negated") else value
+        if element.tag == "block":
+            return self._output(element, formal)
+        if ref in self._busy:
+            raise NotTranslatedError(element.at, "it has a loop without a function block")
+        self._busy.add(ref)
+        try:
+            return self._passed(element)
+        finally:
+            self._busy.discard(ref)
+
+    def _passed(self, element: Element) -> str:
+        """The value behind what only passes it on."""
+        if element.tag == "contact":
+            return self._contact(element)
+        if element.tag == "coil":
+            return self._power(element)
+        if element.tag == "continuation":
+            for other in self._order:
+                if other.tag == "connector" and other.get("name") == element.get("name"):
+                    return self._power(other)
+        raise NotTranslatedError(element.at, f"a line comes from a {element.tag}")
+
+    def _contact(self, contact: Element) -> str:
+        name = _operand((contact.child("variable") or contact).text)
+        value = self._edge(contact, name)
+        if _is(contact, "negated"):
+            value = _negated(value)
+        power = self._power(contact)
+        return value if power == "TRUE" else f"({power} AND {value})"
+
+    def _edge(self, element: Element, value: str) -> str:
+        """The value, or whether it has an edge now."""
+        trigger = _TRIGGERS.get(element.get("edge"))
+        if trigger is None:
+            return value
+        if not self._unit.keeps:
+            raise NotTranslatedError(element.at, "it looks for an edge, but keeps nothing between its calls")
+        name = f"_{trigger}{len(self._body.variables)}_{element.at.line}"
+        key = f"{element.at.line}:{element.at.column}"
+        if key not in self._done:
+            self._body.variables[name] = (trigger, element.at)
+            self._body.line(f"{name}(CLK := {value});", element.at)
+            self._done[key] = name
+        return f"{self._done[key]}.Q"
+
+    # ---- blocks ----
+
+    def _output(self, block: Element, formal: str) -> str:
+        output = next((v for v in _parameters(block, "outputVariables") if v.get("formalParameter") == formal), None)
+        self._called(block, wanted=True)
+        if formal.upper() == "ENO":
+            value = self._done.get(f"{block.get('localId')}.EN", "TRUE")
+        elif block.get("instanceName"):
+            value = f"{block.get('instanceName')}.{formal}"
+        else:
+            value = self._done[block.get("localId")]
+        return _negated(value) if output is not None and _is(output, "negated") else value
+
+    def _called(self, block: Element, *, wanted: bool = False) -> None:
+        """Sees to it that a block is executed before its outputs are read."""
+        key = block.get("localId")
+        if key in self._done:
+            return
+        if key in self._busy:
+            if block.get("instanceName"):
+                return  # its outputs of the cycle before
+            raise NotTranslatedError(block.at, "it has a loop without a function block")
+        self._busy.add(key)
+        if block.get("instanceName"):
+            self._call_instance(block, key)
+        elif wanted or self._unit.blocks.get(block.get("typeName").casefold()) is not None:
+            self._call_function(block, key)
+        self._busy.discard(key)
+        for output in _parameters(block, "outputVariables"):
+            expression = output.child("connectionPointOut", "expression")
+            if expression is not None and expression.text:
+                self._body.line(
+                    f"{expression.text} := {self._output(block, output.get('formalParameter'))};", output.at
+                )
+
+    def _inputs(self, block: Element, key: str) -> tuple[str, list[tuple[str, str]]]:
+        """EN, "" without one, and the other inputs that are connected, with their values."""
+        enable, found = "", []
+        for item in [*_parameters(block, "inputVariables"), *_parameters(block, "inOutVariables")]:
+            value = self.point(item.child("connectionPointIn"))
+            if value is None:
+                continue
+            value = self._edge(item, value)
+            if _is(item, "negated"):
+                value = _negated(value)
+            if item.get("formalParameter").upper() != "EN":
+                found.append((item.get("formalParameter"), value))
+            elif value != "TRUE":
+                enable = f"_TMP_EN{key}"
+                self._body.variables[enable] = ("BOOL", block.at)
+                self._body.line(f"{enable} := {value};", block.at)
+                self._done[f"{key}.EN"] = enable
+        return enable, found
+
+    def _call_instance(self, block: Element, key: str) -> None:
+        enable, inputs = self._inputs(block, key)
+        call = f"{block.get('instanceName')}({', '.join(f'{n} := {v}' for n, v in inputs)});"
+        self._done[key] = ""
+        self._body.line(f"IF {enable} THEN {call} END_IF;" if enable else call, block.at)
+
+    def _call_function(self, block: Element, key: str) -> None:
+        name = block.get("typeName")
+        enable, inputs = self._inputs(block, key)
+        outputs = [v for v in _parameters(block, "outputVariables") if v.get("formalParameter").upper() != "ENO"]
+        used = {c.get("formalParameter") for e in self._consumers.get(key, []) for c in e.every("connection")
+                if c.get("refLocalId") == key}  # fmt: skip
+        if any(v.get("formalParameter") in used for v in outputs[1:]):
+            raise NotTranslatedError(block.at, f"more than one output of the function {name} is used")
+        own = self._unit.blocks.get(name.casefold())
+        values = [f"{n} := {v}" for n, v in inputs] if own is not None else [v for _, v in inputs]
+        call = f"{name}({', '.join(values)})"
+        spec = self._result_of(block) if own is None else own.get("", "")
+        if own is not None and not spec:
+            self._body.line(f"IF {enable} THEN {call}; END_IF;" if enable else f"{call};", block.at)
+            self._done[key] = "FALSE"
+            return
+        if not spec and (enable or self._reads(block) > 1):
+            raise NotTranslatedError(block.at, f"the type of the result of {name} is not known")
+        if not spec:
+            self._done[key] = call
+            return
+        result = f"_TMP_{name}{key}_OUT"
+        self._body.variables[result] = (spec, block.at)
+        if enable and spec == "BOOL" and not _has_output(block, "ENO"):
+            call, enable = f"{enable} AND {_operand(call)}", ""  # a comparison in a rung
+        statement = f"{result} := {call};"
+        self._body.line(f"IF {enable} THEN {statement} END_IF;" if enable else statement, block.at)
+        self._done[key] = result
+
+    def _reads(self, element: Element) -> int:
+        """How often the value of an element is evaluated."""
+        count, seen = 0, set()
+        waiting = [element]
+        while waiting:
+            at = waiting.pop()
+            for consumer in self._consumers.get(at.get("localId"), []):
+                passes = consumer.tag in ("contact", "coil", "connector")
+                count += consumer.tag == "coil" or not passes
+                if consumer.tag == "connector":
+                    count = 2  # its continuations may be many
+                elif passes and consumer.get("localId") not in seen:
+                    seen.add(consumer.get("localId"))
+                    waiting.append(consumer)
+                elif passes:
+                    count = 2  # there are two ways to it
+        return count
+
+    # ---- types ----
+
+    def _result_of(self, block: Element, depth: int = 0) -> str:
+        """The type of the result of a standard function; "" when it is not known."""
+        name = block.get("typeName").upper()
+        if name in _COMPARISONS:
+            return "BOOL"
+        if name in _RESULTS:
+            return _RESULTS[name]
+        conversion = _CONVERSION.fullmatch(name)
+        if conversion:
+            return (conversion[1] or conversion[2]).upper()
+        if name not in _OF_FIRST or depth > 100:
+            return ""
+        inputs = [v for v in _parameters(block, "inputVariables") if v.get("formalParameter").upper() != "EN"]
+        for item in inputs[name in _CHOOSERS :]:
+            for connection in item.every("connection"):
+                spec = self._type_of(connection, depth + 1)
+                if spec:
+                    return spec
+        return ""
+
+    def _type_of(self, connection: Element, depth: int) -> str:
+        element = self._elements.get(connection.get("refLocalId"))
+        if element is None:
+            return ""
+        if element.tag in ("contact", "coil", "leftPowerRail"):
+            return "BOOL"
+        if element.tag in ("inVariable", "inOutVariable"):
+            return self._type_of_expression((element.child("expression") or element).text)
+        if element.tag != "block":
+            return ""
+        formal, own = connection.get("formalParameter"), self._unit.blocks.get(element.get("typeName").casefold())
+        if formal.upper() == "ENO":
+            return "BOOL"
+        if element.get("instanceName"):
+            return own.get(formal.casefold(), "") if own is not None else _OUTPUTS.get(formal.upper(), "")
+        return own.get("", "") if own is not None else self._result_of(element, depth)
+
+    def _type_of_expression(self, text: str) -> str:
+        for pattern, spec in _LITERALS:
+            if pattern.fullmatch(text):
+                return spec
+        typed = _TYPED.fullmatch(text)
+        return typed[1].upper() if typed else self._type_of_variable(text.casefold())
+
+    def _type_of_variable(self, text: str) -> str:
+        """Of `x`, `x.member`, `x[1].member`; "" when a part of it is not known."""
+        if not _PATH.fullmatch(text):
+            return ""
+        spec = ""
+        for i, (name, indices) in enumerate(_PART.findall(text)):
+            if i:
+                members = self._unit.blocks.get(spec.casefold())
+                spec = _OUTPUTS.get(name.upper(), "") if members is None else members.get(name, "")
+            else:
+                spec = self._unit.types.get(name, "")
+            if indices:
+                array = _ARRAY.fullmatch(spec)
+                spec = array[1] if array is not None else ""
+        return spec
+
+
+def _parameters(block: Element, which: str) -> list[Element]:
+    return [v for part in block.all(which) for v in part.all("variable")]
+
+
+def _has_output(block: Element, name: str) -> bool:
+    return any(v.get("formalParameter").upper() == name for v in _parameters(block, "outputVariables"))
+
+
+def _number(element: Element) -> int:
+    text = element.get("executionOrderId")
+    return int(text) if text.isascii() and text.isdecimal() and len(text) < 10 else 0
+
+
+def _position(element: Element) -> tuple[float, float]:
+    """Row and column."""
+    position = element.child("position")
+    try:
+        return (0.0, 0.0) if position is None else (float(position.get("y", "0")), float(position.get("x", "0")))
+    except ValueError:
+        return 0.0, 0.0
+
+
+def _by_position(a: Element, b: Element) -> int:
+    (row, column), (other_row, other_column) = _position(a), _position(b)
+    first, second = (column, other_column) if abs(row - other_row) < _SAME_ROW else (row, other_row)
+    return (first > second) - (first < second)
+
+
+def _is(element: Element, attribute: str) -> bool:
+    return element.get(attribute) == "true"
+
+
+def _operand(text: str) -> str:
+    return text if _SIMPLE.fullmatch(text) else f"({text})"
+
+
+def _negated(value: str) -> str:
+    return f"NOT {_operand(value)}" if _SIMPLE.fullmatch(value) else f"NOT ({value})"

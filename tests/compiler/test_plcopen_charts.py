@@ -1,0 +1,191 @@
+"""PLCopen XML: charts become steps, transitions and actions."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from plcopen_support import data, errors, pou, project, st, started, variables
+
+CYCLE = """<configuration name="c"><resource name="r"><task name="t" priority="1" interval="T#10ms">
+<pouInstance name="Main" typeName="Main"/></task></resource></configuration>"""
+
+
+def into(*sources: str) -> str:
+    """What is above, by local id."""
+    connections = [f'<connection refLocalId="{s}"/>' for s in sources]
+    return f"<connectionPointIn>{''.join(connections)}</connectionPointIn>"
+
+
+def step(number: int, name: str, *sources: str, initial: bool = False, more: str = "") -> str:
+    """A step."""
+    first = ' initialStep="true"' if initial else ""
+    return f'<step localId="{number}" name="{name}"{first}>{into(*sources)}{more}</step>\n'
+
+
+def transition(number: int, source: str, condition: str, column: int = 0, more: str = "") -> str:
+    """A transition with a condition in Structured Text."""
+    inline = f'<condition {more}><inline name="">{st(condition)}</inline></condition>'
+    return f'<transition localId="{number}"><position x="{column}" y="0"/>{into(source)}{inline}</transition>\n'
+
+
+def jump(number: int, source: str, target: str) -> str:
+    """A jump to a step."""
+    return f'<jumpStep localId="{number}" targetName="{target}">{into(source)}</jumpStep>\n'
+
+
+def actions(number: int, source: str, *listed: str) -> str:
+    """A block of actions."""
+    return f'<actionBlock localId="{number}">{into(source)}{"".join(listed)}</actionBlock>\n'
+
+
+def action(name: str, qualifier: str = "N", more: str = "") -> str:
+    """An action by its name."""
+    return f'<action qualifier="{qualifier}" {more}><reference name="{name}"/></action>'
+
+
+def branch(kind: str, number: int, *sources: str) -> str:
+    """A divergence or convergence."""
+    return f'<{kind} localId="{number}">{into(*sources)}</{kind}>\n'
+
+
+def chart(*elements: str, more: str = "", local: tuple[str, ...] = ("n:INT", "a:BOOL", "b:BOOL")) -> str:
+    """A project with a chart."""
+    body = f"<SFC>\n{''.join(elements)}</SFC>"
+    return project(pou("Main", body, variables("localVars", *local), more=more), instances=CYCLE)
+
+
+LOOP = (
+    step(1, "Start", initial=True),
+    transition(2, "1", "n >= 2"),
+    step(3, "Busy", "2"),
+    actions(4, "3", action("a"), action("Count")),
+    transition(5, "3", ":= n > 4;"),
+    jump(6, "5", "Start"),
+    actions(7, "1", '<action qualifier="N"><inline name="">' + st("n := n + 1;") + "</inline></action>"),
+)
+COUNT = f'<actions><action name="Count"><body>{st("n := n + 1;")}</body></action></actions>'
+
+
+def test_a_chart_goes_round(tmp_path: Path) -> None:
+    seen = []
+    with started(tmp_path, chart(*LOOP, more=COUNT)) as plc:
+        for _ in range(20):
+            plc.run_cycles(1)
+            seen.append((plc.read("Main.Busy.X"), plc.read("Main.a")))
+    changes = [b for a, b in pairwise(seen) if a != b]
+    assert changes[:3] == [(True, True), (False, False), (True, True)]
+
+
+def test_branches_are_looked_at_from_left_to_right(tmp_path: Path) -> None:
+    elements = (
+        step(1, "Start", initial=True),
+        branch("selectionDivergence", 2, "1"),
+        transition(3, "2", "TRUE", column=200),
+        transition(4, "2", "TRUE", column=100),
+        step(5, "Right", "3"),
+        step(6, "Left", "4"),
+        transition(7, "5", "FALSE"),
+        transition(8, "6", "FALSE"),
+        branch("selectionConvergence", 9, "7", "8"),
+        jump(10, "9", "Start"),
+    )
+    with started(tmp_path, chart(*elements)) as plc:
+        plc.run_cycles(3)
+        assert plc.read("Main.Left.X") is True
+        assert plc.read("Main.Right.X") is False
+
+
+def test_simultaneous_branches_wait_for_each_other(tmp_path: Path) -> None:
+    elements = (
+        step(1, "Start", initial=True),
+        transition(2, "1", "TRUE"),
+        branch("simultaneousDivergence", 3, "2"),
+        step(4, "One", "3"),
+        step(5, "Two", "3"),
+        transition(6, "5", "TRUE"),
+        step(7, "Three", "6"),
+        branch("simultaneousConvergence", 8, "4", "7"),
+        transition(9, "8", "n > 0"),
+        step(10, "End", "9"),
+        transition(11, "10", "FALSE"),
+        jump(12, "11", "Start"),
+    )
+    with started(tmp_path, chart(*elements)) as plc:
+        plc.run_cycles(6)
+        assert [plc.read(f"Main.{s}.X") for s in ("One", "Two", "Three", "End")] == [True, False, True, False]
+        plc.write({"Main.n": 1})
+        plc.run_cycles(2)
+        assert [plc.read(f"Main.{s}.X") for s in ("One", "Three", "End")] == [False, False, True]
+
+
+def test_blocks_beside_a_chart_run_in_every_cycle(tmp_path: Path) -> None:
+    timer = (
+        '<block localId="20" typeName="TON" instanceName="timer"><position x="9" y="9"/><inputVariables>'
+        f'<variable formalParameter="IN">{into("21")}</variable><variable formalParameter="PT">{into("22")}</variable>'
+        '</inputVariables><outputVariables><variable formalParameter="Q"/></outputVariables></block>\n'
+        '<inVariable localId="21"><expression>Start.X</expression></inVariable>\n'
+        '<inVariable localId="22"><expression>T#30ms</expression></inVariable>\n'
+    )
+    point = '<connectionPointIn><connection refLocalId="20" formalParameter="Q"/></connectionPointIn>'
+    wired = f'<transition localId="2">{into("1")}<condition>{point}</condition></transition>\n'
+    elements = (
+        step(1, "Start", initial=True), wired, step(3, "End", "2"), transition(4, "3", "FALSE"), jump(5, "4", "Start"),
+        timer,
+    )  # fmt: skip
+    with started(tmp_path, chart(*elements, local=("timer:TON",))) as plc:
+        plc.run_cycles(3)
+        assert plc.read("Main.Start.X") is True
+        plc.run_cycles(4)
+        assert plc.read("Main.End.X") is True
+
+
+def test_a_condition_may_be_a_named_transition_or_a_variable(tmp_path: Path) -> None:
+    named = '<transition localId="2">' + into("1") + '<condition><reference name="Go"/></condition></transition>\n'
+    variable = '<transition localId="4">' + into("3") + '<condition><reference name="a"/></condition></transition>\n'
+    elements = (step(1, "Start", initial=True), named, step(3, "Busy", "2"), variable, jump(5, "4", "Start"))
+    go = f'<transitions><transition name="Go"><body>{st("n = 0")}</body></transition></transitions>'
+    with started(tmp_path, chart(*elements, more=go)) as plc:
+        plc.run_cycles(3)
+        assert plc.read("Main.Busy.X") is True
+        plc.write({"Main.n": 1})
+        plc.write({"Main.a": True})
+        plc.run_cycles(3)
+        assert plc.read("Main.Start.X") is True
+
+
+def test_an_action_may_have_a_qualifier_with_a_time(tmp_path: Path) -> None:
+    elements = (*LOOP[:3], actions(4, "3", action("b", "L", 'duration="T#20ms"')), *LOOP[4:])
+    with started(tmp_path, chart(*elements[:4], transition(5, "3", "FALSE"), *elements[5:])) as plc:
+        seen = []
+        for _ in range(10):
+            plc.run_cycles(1)
+            seen.append(plc.read("Main.b"))
+        assert True in seen
+        assert seen[-1] is False
+        assert plc.read("Main.Busy.X") is True
+
+
+@pytest.mark.parametrize(
+    ("extra", "why"),
+    [
+        ('<macroStep localId="9" name="m"/>', "it has a macro step"),
+        (transition(9, "77", "TRUE"), "a transition has no step before or behind it"),
+        ('<transition localId="9">' + into("1") + "</transition>", "a transition has no condition"),
+        (
+            step(9, "CS", "5", more=f"<addData>{data('sfc/element', '<attribute>Count</attribute>')}</addData>"),
+            "the step CS has an action of CODESYS, Count; use an action block",
+        ),
+    ],
+)  # fmt: skip
+def test_what_has_no_translation_is_refused_by_name(tmp_path: Path, extra: str, why: str) -> None:
+    found = errors(tmp_path, chart(*LOOP, extra, more=COUNT))
+    assert found[0][1] == f"the diagram Main (SFC) cannot be compiled: {why}"
+
+
+def test_an_error_in_a_condition_has_its_place(tmp_path: Path) -> None:
+    text = chart(*LOOP, more=COUNT).replace("n &gt; 4", "nn &gt; 4")
+    ((line, message),) = errors(tmp_path, text)
+    assert "nn" in message
+    assert "nn &gt; 4" in text.splitlines()[line - 1]

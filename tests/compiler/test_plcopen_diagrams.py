@@ -1,0 +1,300 @@
+"""PLCopen XML: Ladder and Function Block Diagrams become statements in the order in which the editors execute them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from plcopen_support import errors, pou, project, st, started, variables
+
+
+def at(row: int, column: int = 0) -> str:
+    """A position in the diagram."""
+    return f'<position x="{column}" y="{row}"/>'
+
+
+def lines(*sources: str) -> str:
+    """What is connected to an input: local ids, `id.output` of blocks."""
+    found = []
+    for source in sources:
+        ref, _, formal = source.partition(".")
+        found.append(f'<connection refLocalId="{ref}"' + (f' formalParameter="{formal}"' if formal else "") + "/>")
+    return f"<connectionPointIn>{''.join(found)}</connectionPointIn>"
+
+
+def contact(number: int, name: str, *sources: str, more: str = "") -> str:
+    """A contact."""
+    return f'<contact localId="{number}" {more}>{at(0)}{lines(*sources)}<variable>{name}</variable></contact>\n'
+
+
+def coil(number: int, name: str, *sources: str, row: int = 0, more: str = "") -> str:
+    """A coil."""
+    return f'<coil localId="{number}" {more}>{at(row, 90)}{lines(*sources)}<variable>{name}</variable></coil>\n'
+
+
+def given(number: int, text: str, more: str = "") -> str:
+    """An input variable or literal."""
+    return f'<inVariable localId="{number}" {more}>{at(0)}<expression>{text}</expression></inVariable>\n'
+
+
+def taken(number: int, name: str, source: str, row: int = 0, more: str = "") -> str:
+    """An output variable."""
+    head = f'<outVariable localId="{number}" {more}>{at(row, 90)}'
+    return f"{head}{lines(source)}<expression>{name}</expression></outVariable>\n"
+
+
+def block(
+    number: int, kind: str, inputs: dict[str, str], outputs: str = "OUT", instance: str = "", row: int = 0
+) -> str:
+    """A block; an input may be `!id` for a negated one."""
+    name = f' instanceName="{instance}"' if instance else ""
+    read = "".join(
+        f'<variable formalParameter="{n}"{" negated=" + chr(34) + "true" + chr(34) if s.startswith("!") else ""}>'
+        f"{lines(s.lstrip('!')) if s else ''}</variable>"
+        for n, s in inputs.items()
+    )
+    written = "".join(f'<variable formalParameter="{n}"/>' for n in outputs.split())
+    return (
+        f'<block localId="{number}" typeName="{kind}"{name}>{at(row, 50)}<inputVariables>{read}</inputVariables>'
+        f"<inOutVariables/><outputVariables>{written}</outputVariables></block>\n"
+    )
+
+
+RAIL = '<leftPowerRail localId="1"><position x="0" y="0"/></leftPowerRail>\n'
+
+
+def ladder(*elements: str) -> str:
+    """A body."""
+    return f"<LD>\n{RAIL}{''.join(elements)}</LD>"
+
+
+def network(*elements: str) -> str:
+    """A body."""
+    return f"<FBD>\n{''.join(elements)}</FBD>"
+
+
+def run(folder: Path, body: str, local: list[str], cycles: int = 1, other: str = "") -> dict[str, object]:
+    """The variables after some cycles, by name."""
+    main = pou("Main", body, variables("localVars", *local))
+    with started(folder, project(other + main, instances=CYCLE)) as plc:
+        plc.run_cycles(cycles)
+        return {name: plc.read(f"Main.{name}") for name in (d.partition(":")[0] for d in local) if "TON" not in name}
+
+
+CYCLE = """<configuration name="c"><resource name="r"><task name="t" priority="1" interval="T#10ms">
+<pouInstance name="Main" typeName="Main"/></task></resource></configuration>"""
+
+
+@pytest.mark.parametrize(("start", "stop", "runs"), [("TRUE", "FALSE", True), ("TRUE", "TRUE", False)])
+def test_a_rung_with_a_seal_in_contact(tmp_path: Path, start: str, stop: str, runs: bool) -> None:
+    body = ladder(
+        contact(2, "start", "1"),
+        contact(3, "motor", "1"),
+        contact(4, "stop", "2", "3", more='negated="true"'),
+        coil(5, "motor", "4"),
+        coil(6, "lamp", "4", row=40, more='negated="true"'),
+    )
+    found = run(tmp_path, body, [f"start:BOOL:={start}", f"stop:BOOL:={stop}", "motor:BOOL", "lamp:BOOL"])
+    assert (found["motor"], found["lamp"]) == (runs, not runs)
+
+
+def test_coils_that_set_and_reset_keep_their_value(tmp_path: Path) -> None:
+    body = ladder(
+        contact(2, "a", "1"),
+        coil(3, "x", "2", more='storage="set"'),
+        coil(4, "y", "2", row=30, more='storage="reset"'),
+        coil(5, "a", "1", row=60, more='negated="true"'),
+    )
+    found = run(tmp_path, body, ["a:BOOL:=TRUE", "x:BOOL", "y:BOOL:=TRUE"], cycles=3)
+    assert found == {"a": False, "x": True, "y": False}
+
+
+def test_a_contact_for_an_edge_is_true_for_one_cycle(tmp_path: Path) -> None:
+    body = ladder(
+        contact(2, "a", "1", more='edge="rising"'),
+        block(3, "ADD", {"EN": "2", "IN1": "4", "IN2": "5"}, "ENO OUT"),
+        given(4, "n"),
+        given(5, "1"),
+        taken(6, "n", "3.OUT", row=20),
+    )
+    assert run(tmp_path, body, ["a:BOOL:=TRUE", "n:INT"], cycles=4)["n"] == 1
+
+
+def test_rungs_are_executed_from_top_to_bottom_whatever_their_order_in_the_file(tmp_path: Path) -> None:
+    body = ladder(contact(2, "b", "1"), contact(3, "a", "1"), coil(4, "c", "2", row=90), coil(5, "b", "3", row=10))
+    assert run(tmp_path, body, ["a:BOOL:=TRUE", "b:BOOL", "c:BOOL"])["c"] is True
+
+
+def test_execution_numbers_come_before_positions(tmp_path: Path) -> None:
+    body = network(
+        given(1, "a"),
+        given(2, "b"),
+        taken(3, "b", "1", row=50, more='executionOrderId="1"'),
+        taken(4, "c", "2", row=10, more='executionOrderId="2"'),
+    )
+    assert run(tmp_path, body, ["a:INT:=7", "b:INT", "c:INT"])["c"] == 7
+
+
+def test_a_function_is_computed_once_for_all_that_read_it(tmp_path: Path) -> None:
+    body = network(
+        given(1, "n"),
+        given(2, "1"),
+        block(3, "ADD", {"IN1": "1", "IN2": "2"}),
+        taken(4, "n", "3.OUT", row=10),
+        taken(5, "m", "3.OUT", row=60),
+    )
+    assert run(tmp_path, body, ["n:INT:=4", "m:INT"]) == {"n": 5, "m": 5}
+
+
+def test_functions_and_comparisons_in_each_other(tmp_path: Path) -> None:
+    body = network(
+        given(1, "r"),
+        given(2, "10.0"),
+        block(3, "GT", {"IN1": "1", "IN2": "2"}),
+        block(4, "REAL_TO_INT", {"IN": "1"}),
+        block(5, "SEL", {"G": "!3.OUT", "IN0": "4.OUT", "IN1": "6"}),
+        given(6, "INT#-1"),
+        taken(7, "n", "5.OUT"),
+        taken(8, "big", "3.OUT", row=30, more='negated="true"'),
+    )
+    assert run(tmp_path, body, ["r:REAL:=12.0", "n:INT", "big:BOOL"]) == {"r": 12.0, "n": 12, "big": False}
+
+
+def test_function_blocks_are_called_once_in_a_cycle_before_they_are_read(tmp_path: Path) -> None:
+    body = ladder(
+        contact(2, "go", "1"),
+        block(3, "TON", {"IN": "2", "PT": "4"}, "Q ET", "TON0"),
+        given(4, "T#20ms"),
+        coil(5, "done", "3.Q"),
+        taken(6, "elapsed", "3.ET", row=50),
+        block(7, "CTU", {"CU": "8", "R": "", "PV": "9"}, "Q CV", "count", row=80),
+        given(8, "done"),
+        given(9, "1"),
+    )
+    local = ["go:BOOL:=TRUE", "done:BOOL", "elapsed:TIME", "TON0:TON", "count:CTU"]
+    main = pou("Main", body, variables("localVars", *local))
+    with started(tmp_path, project(main, instances=CYCLE)) as plc:
+        plc.run_cycles(5)
+        assert plc.read("Main.done") is True
+        assert plc.read("Main.count.CV") == 1
+
+
+def test_a_block_that_feeds_itself_sees_the_cycle_before(tmp_path: Path) -> None:
+    own = pou(
+        "Step", st("n := i + 1;"), variables("inputVars", "i:INT") + variables("outputVars", "n:INT"), "functionBlock"
+    )
+    body = network(block(1, "Step", {"i": "1.n"}, "n", "s"), taken(2, "m", "1.n"))
+    main = pou("Main", body, variables("localVars", "s:Step", "m:INT"))
+    with started(tmp_path, project(own + main, instances=CYCLE)) as plc:
+        plc.run_cycles(4)
+        assert plc.read("Main.m") == 4
+
+
+def test_functions_of_the_project_are_called_by_their_parameters(tmp_path: Path) -> None:
+    own = pou(
+        "Less",
+        st("Less := a - b;"),
+        "<returnType><INT/></returnType>" + variables("inputVars", "a:INT", "b:INT"),
+        "function",
+    )
+    body = network(
+        given(1, "9"), given(2, "2"), block(3, "Less", {"b": "2", "a": "1"}, "Less"), taken(4, "n", "3.Less")
+    )
+    assert run(tmp_path, body, ["n:INT"], 1, own)["n"] == 7
+
+
+def test_connectors_are_followed(tmp_path: Path) -> None:
+    body = network(
+        given(1, "5"),
+        f'<connector name="wire" localId="2">{at(0)}{lines("1")}</connector>',
+        f'<continuation name="wire" localId="3">{at(0)}</continuation>',
+        taken(4, "n", "3"),
+    )
+    assert run(tmp_path, body, ["n:INT"])["n"] == 5
+
+
+def test_a_rung_may_return(tmp_path: Path) -> None:
+    body = ladder(
+        contact(2, "a", "1"),
+        f'<return localId="3">{at(20)}{lines("2")}</return>',
+        coil(4, "b", "1", row=10),
+        coil(5, "c", "1", row=30),
+    )
+    assert run(tmp_path, body, ["a:BOOL:=TRUE", "b:BOOL", "c:BOOL"]) == {"a": True, "b": True, "c": False}
+
+
+def test_an_export_without_positions_is_executed_in_the_order_of_the_file(tmp_path: Path) -> None:
+    body = (
+        ladder(
+            contact(2, "a", "1"),
+            coil(3, "b", "2"),
+            block(4, "GT", {"EN": "2", "In2": "5", "In3": "6"}, "Out1"),
+            given(5, "n"),
+            given(6, "3"),
+            coil(7, "c", "4.Out1"),
+            '<rightPowerRail localId="2147483646"><position x="0" y="0"/><connectionPointIn/></rightPowerRail>',
+        )
+        .replace('x="90"', 'x="0"')
+        .replace('x="50"', 'x="0"')
+    )
+    assert run(tmp_path, body, ["a:BOOL:=TRUE", "b:BOOL", "c:BOOL", "n:INT:=4"])["c"] is True
+    assert run(tmp_path, body, ["a:BOOL:=FALSE", "b:BOOL", "c:BOOL", "n:INT:=4"])["c"] is False
+
+
+@pytest.mark.parametrize(
+    ("elements", "why"),
+    [
+        ((f'<jump label="x" localId="2">{at(0)}{lines("1")}</jump>',), "it has a jump"),
+        ((coil(2, "a"),), "a part of it is connected to nothing"),
+        ((coil(2, "a", "77"),), "a line comes from element 77, which is not there"),
+        ((contact(2, "a", "3"), contact(3, "a", "2"), coil(4, "a", "3")), "it has a loop without a function block"),
+        ((block(2, "AND", {"IN1": "2.OUT", "IN2": "1"}), coil(4, "a", "2.OUT")), "a loop without a function block"),
+        (
+            (given(2, "x.y"), block(3, "ABS", {"IN": "2"}), taken(4, "n", "3.OUT"), taken(5, "n", "3.OUT", row=40)),
+            "the type of the result of ABS is not known",
+        ),
+    ],
+)
+def test_what_has_no_translation_is_refused_by_name(tmp_path: Path, elements: tuple[str, ...], why: str) -> None:
+    text = project(pou("Main", ladder(*elements), variables("localVars", "a:BOOL", "n:INT")))
+    ((line, message),) = errors(tmp_path, text)
+    assert message.startswith("the diagram Main (LD) cannot be compiled: ")
+    assert why in message
+    assert 1 < line <= len(text.splitlines())
+
+
+def test_an_error_in_a_diagram_has_the_line_of_its_element(tmp_path: Path) -> None:
+    text = project(pou("Main", ladder(contact(2, "a", "1"), coil(3, "nobody", "2")), variables("localVars", "a:BOOL")))
+    ((line, message),) = errors(tmp_path, text)
+    assert "nobody" in message
+    assert "nobody" in text.splitlines()[line - 1]
+
+
+def test_an_output_may_name_its_variable_in_the_block(tmp_path: Path) -> None:
+    point = "<connectionPointOut><expression>el</expression></connectionPointOut>"
+    timer = block(3, "TON", {"IN": "2", "PT": "4"}, "Q ET", "TON0").replace(
+        '<variable formalParameter="ET"/>', f'<variable formalParameter="ET">{point}</variable>'
+    )
+    body = ladder(contact(2, "go", "1"), given(4, "T#1s"), timer, coil(5, "done", "3.Q"))
+    found = run(tmp_path, body, ["go:BOOL:=TRUE", "done:BOOL", "el:TIME", "TON0:TON"], cycles=4)
+    assert found["el"] not in (0, "T#0s", "T#0ms")
+
+
+@pytest.mark.parametrize(("variable", "declared"), [("p.x", "p:Point"), ("r[2]", "r:Row"), ("c.CV", "c:CTU")])
+def test_the_type_of_a_member_or_element_is_known(tmp_path: Path, variable: str, declared: str) -> None:
+    types = """<dataType name="Point"><baseType><struct><variable name="x"><type><INT/></type></variable></struct>
+</baseType></dataType>"""
+    body = network(
+        given(1, variable),
+        given(2, "5"),
+        block(3, "ADD", {"IN1": "1", "IN2": "2"}),
+        taken(4, "n", "3.OUT", row=10),
+        taken(5, "m", "3.OUT", row=60),
+    )
+    row = '<array><dimension lower="1" upper="3"/><baseType><INT/></baseType></array>'
+    array = f'<localVars><variable name="r"><type>{row}</type></variable></localVars>'
+    own = array if declared == "r:Row" else variables("localVars", declared)
+    main = pou("Main", body, variables("localVars", "n:INT", "m:INT") + own)
+    with started(tmp_path, project(main, types, CYCLE)) as plc:
+        plc.run_cycles(1)
+        assert (plc.read("Main.n"), plc.read("Main.m")) == (5, 5)
