@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * What a connection may do before somebody has logged in over it is limited, so that nobody keeps others out: its first
- * frame has to come in time, and when all are taken a new one replaces the one that is of least use.
+ * Connections without a login cannot block others: the first frame has to arrive in time, and if all places are in use
+ * a new connection replaces the least useful one.
  */
 #ifndef CMPBLKDRVTCP_H
 #define CMPBLKDRVTCP_H
@@ -14,10 +14,10 @@
 typedef struct {
     RTS_UI32 accepted;
     RTS_UI32 frames;    /* received */
-    RTS_UI32 displaced; /* connections closed for a new one; those below were closed, too */
+    RTS_UI32 displaced; /* closed because a new one needed the place; those below: for other reasons */
     RTS_UI32 bad_magic;
     RTS_UI32 bad_length;   /* of a frame */
-    RTS_UI32 late_frames;  /* begun, or expected, and not complete after TCP_FRAME_MS */
+    RTS_UI32 late_frames;  /* a frame, or the first one, was not complete after TCP_FRAME_MS */
     RTS_UI32 idle;         /* for TCP_IDLE_MS */
     RTS_UI32 disconnected; /* by the peer */
 } TCP_COUNTERS;

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * An answer goes to where the datagram came from, whatever addresses the packet has.
+ * A reply goes to the source of the datagram, never to an address inside the packet.
  */
 #ifndef CMPBLKDRVUDP_H
 #define CMPBLKDRVUDP_H
@@ -13,11 +13,12 @@
 typedef struct {
     RTS_UI32 packets;  /* received */
     RTS_UI32 too_long; /* longer than any packet */
-    RTS_UI32 no_reply; /* from where no answer can go: port 0, or everybody */
+    RTS_UI32 no_reply; /* the source cannot be replied to: port 0, multicast */
 } UDP_COUNTERS;
 
-/* The network address of a host: the bits of `ip` after `prefix` (0..32), before them the index of the port (UDP_PORT
- * has 0). Big-endian, at the end of as many words as it needs, which are returned. */
+/* Writes the network address of a node: the host bits of `ip` (those after `prefix`, 0..32), preceded by the port index
+ * (port - UDP_PORT). Big-endian, right-aligned in as few words as possible; returns their number, at most
+ * ROUTER_MAX_NETWORK. */
 RTS_UI32 BlkDrvUdpPutAddress(RTS_UI32 ip, RTS_UI32 prefix, RTS_UI32 index, RTS_UI8 *address);
 
 const UDP_COUNTERS *BlkDrvUdpGetCounters(void);

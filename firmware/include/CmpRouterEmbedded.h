@@ -31,9 +31,8 @@ typedef struct {
     RTS_UI8 address[2 * ROUTER_MAX_ADDRESS];
 #if COMM_ENDPOINTS
     bool reliable; /* what it takes arrives, once and in order, or the peer is gone */
-    bool gone;     /* its only peer is: nothing arrives there any more. For one pass of CH_COMM_CYCLE at least */
-    /* The network address of its only peer, words and bytes, which takes the place of the one that peer gives itself;
-     * 0: not known. */
+    bool gone;     /* its only peer has gone; true for one pass of CH_COMM_CYCLE at least */
+    /* Network address of its only peer; it replaces the one in the packets of that peer. 0 words: not known. */
     RTS_UI8 peer_words;
     RTS_UI8 peer_address[2 * ROUTER_MAX_NETWORK];
 #endif
@@ -71,7 +70,7 @@ typedef struct {
     RTS_UI8 number; /* ROUTER_SVC_* */
     ROUTER_HANDLER handler;
 #if COMM_ENDPOINTS
-    bool (*needs)(const BLK_DRV *driver); /* whether somebody works with it over this driver; NULL: nobody ever */
+    bool (*needs)(const BLK_DRV *driver); /* whether a client of it is logged in over this driver; NULL: never */
 #endif
 } ROUTER_SERVICE;
 extern const ROUTER_SERVICE RouterServices[];
@@ -81,10 +80,10 @@ extern const RTS_UI32 RouterServiceCount;
 void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size);
 
 #if COMM_ENDPOINTS
-/* The same for a driver with several peers: it comes from this one. */
+/* The same for a driver with several peers: the packet comes from this one. */
 void RouterHandleDataFrom(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI8 *data, RTS_UI32 size);
 
-/* Whether a service has work over this driver that would be lost with it. */
+/* Whether a service has a client on this driver that would lose its login with it. */
 bool RouterNeeds(const BLK_DRV *driver);
 #endif
 

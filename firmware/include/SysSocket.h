@@ -3,10 +3,10 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Called by CmpBlkDrvTcp and CmpBlkDrvUdp from main. Nothing blocks, and a call takes no longer than copying its data.
- * The port decides which networks the device is reached by, as it decides on baud rates: it has opened the sockets, or
- * opens them when it is asked. Addresses and ports are numbers: 127.0.0.1 is 0x7F000001. After start no memory is
- * allocated; a port has room for TCP_MAX_CONNECTIONS accepted sockets and its own.
+ * Called by CmpBlkDrvTcp and CmpBlkDrvUdp from main. No function blocks; each takes no longer than copying its data. The
+ * port decides at which addresses the device listens, as it decides on baud rates: SysSockOpen returns sockets that are
+ * bound. Addresses and port numbers are in the byte order of the CPU: 127.0.0.1 is 0x7F000001. No memory is allocated
+ * after start; a port has room for its own sockets and TCP_MAX_CONNECTIONS + 1 accepted ones.
  */
 #ifndef SYSSOCKET_H
 #define SYSSOCKET_H
@@ -22,33 +22,32 @@ typedef struct {
 typedef enum {
     SYSSOCK_TCP,           /* listens */
     SYSSOCK_UDP,           /* sends and receives */
-    SYSSOCK_UDP_BROADCAST, /* receives what is sent to all, when SYSSOCK_UDP does not; shares its port */
+    SYSSOCK_UDP_BROADCAST, /* receives broadcasts, if SYSSOCK_UDP does not; the same port number */
 } SYSSOCK_PURPOSE;
 
 /* The socket for this purpose; RTS_INVALID_HANDLE when the port has none. */
 RTS_HANDLE SysSockOpen(SYSSOCK_PURPOSE purpose);
 
-/* The address of a socket's own end, and how many bits of it are those of the network (0..32). */
+/* The local address of a socket, and the length of its network prefix in bits (0..32). ERR_INVALID_HANDLE. */
 RTS_RESULT SysSockGetOwn(RTS_HANDLE socket, SOCKADDRESS *own, RTS_UI32 *prefix);
 
-/* A connection that was made to a listening socket, and who made it; RTS_INVALID_HANDLE when there is none, or no room
- * for it. It sends without delay (TCP_NODELAY). */
+/* Accepts a connection and returns the address of its peer; RTS_INVALID_HANDLE if none is waiting, or there is no room.
+ * It sends without delay (TCP_NODELAY). */
 RTS_HANDLE SysSockAccept(RTS_HANDLE listener, SOCKADDRESS *peer);
 
-/* Of a connection: ERR_OK with the number of bytes received or taken, 0 when there is nothing, or no room, now;
- * ERR_NET_NOTCONNECTED when the peer has ended it or cannot be reached any more. */
+/* Receives from or sends to a connection. ERR_OK with the number of bytes received or taken, 0 if there is no data, or no
+ * room, now; ERR_NET_NOTCONNECTED if the peer has closed or reset the connection. */
 RTS_RESULT SysSockRecv(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *received);
 RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *taken);
 
-/* A datagram: ERR_OK with its size, of which no more than `size` bytes are in `data`; ERR_NOTHING_TO_DO when there is
- * none. */
+/* Receives a datagram. ERR_OK with its size; only the first `size` bytes are copied to `data`. ERR_NOTHING_TO_DO if none
+ * is waiting. */
 RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received);
 
-/* ERR_NOBUFFER when there is no room now. ERR_OK does not say that it arrives. */
+/* Sends a datagram. ERR_NOBUFFER if there is no room now. ERR_OK does not mean that it arrives. */
 RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to);
 
-/* Ends a connection, which still sends what it has taken; or gives back a socket of SysSockOpen, which may be asked for
- * again. */
+/* Closes a connection, after sending what was taken; or returns a socket of SysSockOpen, which may be opened again. */
 void SysSockClose(RTS_HANDLE socket);
 
 #endif

@@ -235,14 +235,14 @@
 #define COMM_MAX_CLIENTS 1
 #endif
 
-/* 1: there are block drivers with many peers (UDP), or that know when a peer is gone (TCP). 16 bytes per connection of a
- * tool, 10 per driver. */
+/* 1: there are block drivers with several peers (UDP), or that know when their peer has gone (TCP). 16 bytes per client,
+ * 10 per driver. */
 #ifndef COMM_ENDPOINTS
 #define COMM_ENDPOINTS 0
 #endif
 
-/* TCP connections at a time: one more than tools that may be logged in, so that a new one is always taken. Each costs
- * its two buffers and 90 bytes. */
+/* TCP connections at a time: one more than clients that may be logged in, so that a new one is always accepted. Each
+ * costs its two buffers and 90 bytes. */
 #ifndef TCP_MAX_CONNECTIONS
 #define TCP_MAX_CONNECTIONS (COMM_MAX_CLIENTS + 1)
 #endif
@@ -252,13 +252,12 @@
 #define TCP_BUFFER_SIZE 1040
 #endif
 
-/* A TCP connection on which nothing moves for so long is closed [ms]. */
+/* A TCP connection is closed if no byte is received or sent for so long [ms]. */
 #ifndef TCP_IDLE_MS
 #define TCP_IDLE_MS 60000
 #endif
 
-/* A TCP frame that has begun is complete after so long, and so is the first frame of a connection; else it is closed
- * [ms]. */
+/* A TCP connection is closed if a frame, or its first one, is not complete after so long [ms]. */
 #ifndef TCP_FRAME_MS
 #define TCP_FRAME_MS 3000
 #endif

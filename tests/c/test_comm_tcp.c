@@ -16,7 +16,7 @@
 #include "net_client.h"
 #include "test.h"
 
-/* "How many channels?", from an address of four words, as a programming system behind another address sends it. */
+/* "How many channels?", from an address of four words with another network address, as captured. */
 static const RTS_UI8 question[] = {0xC5, 0x6B, 0x40, 0x40, 0x00, 0x43, 0x2D, 0xDC, 0xC0, 0xA8, 0x38, 0x72, 0x2D, 0xDF,
                                    0x0A, 0x00, 0x02, 0x0F, 0x83, 0x0F, 0xC2, 0x00, 0x01, 0x01, 0x36, 0x65, 0x9D, 0xAB};
 enum { QUESTION = sizeof(question), ANSWER = 30 };

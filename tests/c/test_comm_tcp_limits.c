@@ -1,5 +1,5 @@
 /*
- * test_comm_tcp_limits.c - CmpBlkDrvTcp: nobody keeps others out, with slow, silent or many connections.
+ * test_comm_tcp_limits.c - CmpBlkDrvTcp: slow, silent or many connections do not block others.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -108,7 +108,7 @@ static void an_idle_connection_ends_and_one_in_use_does_not(void)
     net_end();
 }
 
-static void a_crowd_keeps_nobody_out(void)
+static void a_crowd_blocks_no_client(void)
 {
     int files[CROWD];
     REPLY reply;
@@ -137,7 +137,7 @@ static void a_crowd_keeps_nobody_out(void)
 }
 
 /* A crowd that comes at once, before the device has looked. */
-static void a_crowd_at_once_keeps_nobody_out(void)
+static void a_crowd_at_once_blocks_no_client(void)
 {
     enum { AT_ONCE = 12 }; /* what fits the queue of the system */
     int files[AT_ONCE];
@@ -180,8 +180,8 @@ static void who_has_said_something_stays_longer_than_who_has_not(void)
     net_end();
 }
 
-/* All logged in: the connection that is left is for the next one, who is told that the device is in use. */
-static void when_all_are_in_use_the_next_is_told_so(void)
+/* All logged in: the connection that is left is for the next one, which is refused: the device is in use. */
+static void when_all_are_in_use_the_next_is_refused(void)
 {
     CLIENT clients[COMM_MAX_CLIENTS];
     CLIENT_LINK links[COMM_MAX_CLIENTS + 1];
@@ -216,9 +216,9 @@ int main(void)
     RUN(half_a_frame_after_a_whole_one_is_not_waited_for);
     RUN(a_byte_now_and_then_is_too_slow);
     RUN(an_idle_connection_ends_and_one_in_use_does_not);
-    RUN(a_crowd_keeps_nobody_out);
-    RUN(a_crowd_at_once_keeps_nobody_out);
+    RUN(a_crowd_blocks_no_client);
+    RUN(a_crowd_at_once_blocks_no_client);
     RUN(who_has_said_something_stays_longer_than_who_has_not);
-    RUN(when_all_are_in_use_the_next_is_told_so);
+    RUN(when_all_are_in_use_the_next_is_refused);
     return test_result();
 }

@@ -1,5 +1,5 @@
 /*
- * test_comm_udp.c - CmpBlkDrvUdp: addresses, scan, and answers that go to the sender and to nobody else.
+ * test_comm_udp.c - CmpBlkDrvUdp: addresses, scan, and replies that go to the sender only.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -96,7 +96,7 @@ static void an_answer_to_a_broadcast_comes_from_the_own_address_of_the_device(vo
     net_end();
 }
 
-/* Behind a router the sender knows another address of the device than the device does. */
+/* With NAT the sender knows another address of the device than the device does. */
 static void what_is_sent_to_us_is_for_us_and_what_is_sent_to_all_need_not_be(void)
 {
     net_start("", "@");
@@ -109,7 +109,7 @@ static void what_is_sent_to_us_is_for_us_and_what_is_sent_to_all_need_not_be(voi
     net_end();
 }
 
-/* The sender's address in the packet is that of somebody else, who is not to hear of it. */
+/* The sender's address in the packet is that of a victim, which must not receive anything. */
 static void it_reflects_nothing(void)
 {
     RTS_UI8 forged[] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x20, 0, 0, 0, 0, 0, 0, 0x02, 0xC2, 0x00, 0x04, 1, 2, 3, 4};

@@ -36,7 +36,7 @@ def no_gateway(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _own_loopback() -> str:
-    """An address of loopback that nobody else uses, as the ports of UDP are the protocol's."""
+    """A loopback address of this test alone, because the UDP ports are fixed by the protocol."""
     return f"127.{random.randint(1, 250)}.{random.randint(1, 250)}.{random.randint(1, 250)}"
 
 
@@ -196,7 +196,7 @@ def test_a_scan_by_broadcast_finds_all_devices(plcrt: Plcrt, tmp_path: Path, too
 
 
 def test_a_connection_through_a_forwarded_port_works(plcrt: Plcrt, counter: Path) -> None:
-    """As behind a router that translates addresses: the device sees another peer than the tool thinks it is."""
+    """As with NAT: the device sees another peer address than the tool has."""
     host, port = plcrt.tcp.split(":")
     with socket.create_server(("127.0.0.1", 0)) as server:
         forward = threading.Thread(target=_forward, args=(server, (host, int(port))))
@@ -271,12 +271,12 @@ def test_what_cannot_be_reached_is_told(tool: Any, plcrt: Plcrt) -> None:
     with socket.create_server(("127.0.0.1", 0)) as mute:
         free = mute.getsockname()[1]
     for where, status, said in (
-        (["--tcp", f"127.0.0.1:{free}"], 3, "serves no such port"),
+        (["--tcp", f"127.0.0.1:{free}"], 3, "refuses connections"),
         (["--tcp", "no-such-host.invalid"], 3, "unknown"),
         (["--udp", "no-such-host.invalid"], 3, "unknown"),
         (["--udp", _own_loopback()], 3, "No device answers"),
-        (["--tcp", "127.0.0.1:0"], 2, "is no place"),
-        (["--udp", "127.0.0.1:99999"], 2, "is no place"),
+        (["--tcp", "127.0.0.1:0"], 2, "is not a valid HOST"),
+        (["--udp", "127.0.0.1:99999"], 2, "is not a valid HOST"),
         (["--tcp", plcrt.tcp, "--udp", plcrt.udp], 2, "Name one link only"),
     ):
         done = tool("status", *where)
@@ -289,7 +289,7 @@ def test_what_answers_and_is_no_controller_is_told() -> None:
         thread = threading.Thread(target=_answer_http, args=(server,))
         thread.start()
         link = f"tcp:127.0.0.1:{server.getsockname()[1]}"
-        with plctool.connect(link) as plc, pytest.raises(LinkError, match="is no controller"):
+        with plctool.connect(link) as plc, pytest.raises(LinkError, match="is not the protocol"):
             plc.identity()
         thread.join()
 

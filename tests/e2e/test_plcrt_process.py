@@ -60,9 +60,9 @@ def processor_ns(pid: int) -> int:
         (["--flash", "f", "--baud", "115201"], "115200"),
         (["--flash", "f", "--baud", "fast"], "--baud fast"),
         (["--flash", "f", "--can", "can0"], "--serial"),
-        (["--flash", "f", "--udp", "127.0.0.1:4"], "--udp 127.0.0.1:4 is no place"),
+        (["--flash", "f", "--udp", "127.0.0.1:4"], "--udp 127.0.0.1:4 is not a valid"),
         (["--flash", "f", "--udp=1740"], "192.168.1.5:1"),
-        (["--flash", "f", "--tcp", "host:1"], "--tcp host:1 is no place"),
+        (["--flash", "f", "--tcp", "host:1"], "--tcp host:1 is not a valid"),
         (["--flash", "f", "--tcp=65536"], "192.168.1.5:11740"),
     ],
 )

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The sockets of the device are opened before the controller is a process of its own, and stay open when that dies and
- * is started again: its port remains the same, and who asks meanwhile is answered later.
+ * The sockets that the device listens on are opened in the supervisor, before the worker is forked, and stay open when
+ * the worker dies: its successor listens on the same ports, and connections made meanwhile wait for it.
  */
 #define _GNU_SOURCE
 #include "SysSocket.h"
@@ -27,12 +27,12 @@
 
 enum {
     PURPOSES = SYSSOCK_UDP_BROADCAST + 1,
-    SOCKETS = PURPOSES + TCP_MAX_CONNECTIONS + 1, /* one waits for its place */
+    SOCKETS = PURPOSES + TCP_MAX_CONNECTIONS + 1, /* one waits for a place */
     BACKLOG = 16,
     IP_BITS = 32,
 };
 
-/* The first ones are those of the device, in the order of SYSSOCK_PURPOSE. */
+/* The first ones are those the device listens on, in the order of SYSSOCK_PURPOSE. */
 static struct {
     PORT_SOURCE source[SOCKETS];
     bool ready;
@@ -85,7 +85,7 @@ typedef struct {
     bool can_broadcast;
 } NETWORK;
 
-/* The network that an address is in; for the address 0, which is all of them, the first but loopback. */
+/* The network that an address belongs to; for 0.0.0.0 the first network that is not loopback. */
 static NETWORK find_network(RTS_UI32 ip)
 {
     NETWORK found = {.ip = ip, .mask = 0xFFFFFFFF};
@@ -114,7 +114,7 @@ static RTS_UI32 prefix_of(RTS_UI32 mask)
     return (RTS_UI32)__builtin_popcount(mask);
 }
 
-/* ---- opening those of the device ---- */
+/* ---- sockets that the device listens on ---- */
 
 static bool parse_number(const char *text, unsigned long most, RTS_UI16 *number)
 {
@@ -215,7 +215,8 @@ static int bind_udp(SOCKADDRESS address, bool indexed)
     return file;
 }
 
-/* Linux gives a socket with an address no broadcasts: another one takes them. Several devices share its port. */
+/* On Linux a socket bound to an address receives no broadcasts: they need another socket, and several devices share its
+ * port. */
 static bool open_broadcast(SOCKADDRESS own, const char *text, PORT_REASON *reason)
 {
     NETWORK network = find_network(own.ip);
@@ -356,7 +357,7 @@ RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RT
     return ERR_OK;
 }
 
-/* An error that an earlier datagram met (nobody listens there) is told here: it is not this one's. */
+/* An error here is of a datagram sent earlier (its port is closed): nothing to do. */
 RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received)
 {
     struct sockaddr_in sender = {.sin_family = AF_INET};

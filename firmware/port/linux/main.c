@@ -126,7 +126,7 @@ static const char *take_tcp(const char *text)
 {
     SOCKADDRESS place;
     if (!PortTcpKnows(text, &place)) {
-        refuse("--tcp %s is no place: write for example 11740, or 192.168.1.5:11740", text);
+        refuse("--tcp %s is not a valid address: write for example 11740, or 192.168.1.5:11740", text);
     }
     return text;
 }
@@ -136,8 +136,7 @@ static const char *take_udp(const char *text)
     SOCKADDRESS place;
     bool indexed;
     if (!PortUdpKnows(text, &place, &indexed)) {
-        refuse("--udp %s is no place: write for example 192.168.1.5, or 192.168.1.5:1 for the second of its ports",
-               text);
+        refuse("--udp %s is not a valid address: write for example 192.168.1.5, or 192.168.1.5:1 for port 1741", text);
     }
     return text;
 }
@@ -194,7 +193,7 @@ static void refuse_option(const char *argument)
     refuse("%s is not an option or lacks its value: see plcrt --help", argument);
 }
 
-/* getopt takes a value that may be missing only when it stands behind "=". */
+/* getopt_long takes an optional value only after "="; this takes the next argument, too. */
 static void take_place(int argc, char **argv, int option)
 {
     bool may_be_missing = option == OPTION_TCP || option == OPTION_UDP;
@@ -350,7 +349,7 @@ static void print_socket(const char *what, SYSSOCK_PURPOSE purpose)
     }
 }
 
-/* What whoever started us cannot know. */
+/* Where the device can be reached, as far as the options do not say it. */
 static void print_lines(void)
 {
     if (PortComPtyName() != NULL) {

@@ -84,15 +84,15 @@ const char *PortComPtyName(void);
 
 /* ---- SysSocket ---- */
 
-/* The place in a text, and the socket there, or those: for TCP "[ADDRESS:]PORT" or "ADDRESS", for UDP "ADDRESS[:INDEX]". Without an address that
- * is loopback; the address 0.0.0.0 is all of the machine. Port 0 is one that is free; without an index it is the first
- * that is. Before CMInit. */
+/* For TCP "[ADDRESS:]PORT" or "ADDRESS", for UDP "ADDRESS[:INDEX]" (port UDP_PORT + INDEX). Without an address it is
+ * 127.0.0.1; 0.0.0.0 means all addresses of the machine. TCP port 0 is a free port; without INDEX the first free port is
+ * used. ...Knows: whether the text is valid; ...Open: opens the socket. Before CMInit. */
 bool PortTcpKnows(const char *text, SOCKADDRESS *place);
 bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *indexed);
 bool PortTcpOpen(const char *text, PORT_REASON *reason);
 bool PortUdpOpen(const char *text, PORT_REASON *reason);
 void PortSockClose(void);
-/* "127.0.0.1:11740"; false when there is no such socket. */
+/* Where a socket listens, as "127.0.0.1:11740"; false if it is not open. */
 bool PortSockName(SYSSOCK_PURPOSE purpose, char *name, size_t size);
 
 #endif

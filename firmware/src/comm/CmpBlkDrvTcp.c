@@ -3,9 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Bytes are read as they come and handed up in whole frames. Sending fills a buffer that the socket takes from, all of
- * it or a part. A connection that has ended stays in its place, as one that is gone, until the next cycle: so all
- * layers above have seen it before the place is given to somebody else.
+ * Received bytes are collected in a buffer, complete frames are passed to the router. Sending fills a second buffer, from
+ * which the socket takes as much as it has room for. A connection that has ended keeps its place, with `gone` set,
+ * until the next cycle: so the layers above have seen that before a new connection gets the place.
  */
 #include "CmpBlkDrvTcp.h"
 
@@ -33,7 +33,7 @@ typedef struct {
     bool heard;         /* a frame has come */
     RTS_UI32 began_at;  /* when the frame that is on its way began, the first one with the connection; SysTimeGetMs */
     RTS_UI32 moved_at;  /* when something was received or taken last */
-    RTS_UI32 in_size;   /* received, not yet a whole frame */
+    RTS_UI32 in_size;   /* received, not yet a complete frame */
     RTS_UI32 out_begin; /* what is still to be sent */
     RTS_UI32 out_end;
     BLK_DRV driver;
@@ -62,7 +62,7 @@ static bool is_free(const CONNECTION *connection)
 
 /* ---- the end of a connection ---- */
 
-/* The peer is told at once; the place is free in the next cycle. */
+/* Closed at once; the place is free in the next cycle. */
 static void end(CONNECTION *connection)
 {
     if (connection->ended)
@@ -115,7 +115,7 @@ static void append(CONNECTION *connection, const void *data, RTS_UI32 size)
     connection->out_end += size;
 }
 
-/* Frames that are queued before the socket is asked are sent in one go. */
+/* Queues a frame; `transmit` sends all queued frames with one call. */
 static RTS_RESULT tcp_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_UI32 count)
 {
     CONNECTION *connection = peer->driver->instance;
@@ -140,7 +140,7 @@ static RTS_RESULT tcp_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_U
 
 /* ---- receiving ---- */
 
-/* Of the frame with this header; 0 when there is none like it, and the connection has ended. */
+/* The size of the frame with this header; 0 if the header is invalid, which ends the connection. */
 static RTS_UI32 frame_size(CONNECTION *connection, const TCP_HEADER *header)
 {
     RTS_UI32 size = BytesGet32(header->size);
@@ -152,7 +152,7 @@ static RTS_UI32 frame_size(CONNECTION *connection, const TCP_HEADER *header)
     return connection->ended ? 0 : size;
 }
 
-/* Hands up the frame that begins at `at`; returns its size, 0 when it is not there yet, or is none. */
+/* Passes the frame at `at` to the router; returns its size, 0 if it is not complete or invalid. */
 static RTS_UI32 take_frame(CONNECTION *connection, RTS_UI32 at)
 {
     const TCP_HEADER *header = (const TCP_HEADER *)(connection->in + at);
@@ -181,7 +181,7 @@ static void take_frames(CONNECTION *connection)
     connection->began_at = connection->moved_at;
 }
 
-/* Returns the bytes that came. The buffer has room: it holds less than a frame. */
+/* Returns the number of bytes received. The buffer has room: it holds less than a frame. */
 static RTS_UI32 receive_some(CONNECTION *connection)
 {
     RTS_UI32 size;
@@ -259,7 +259,7 @@ static void begin(CONNECTION *connection, RTS_HANDLE socket, const SOCKADDRESS *
     driver->send = tcp_send;
 }
 
-/* Whether `a` is of less use than `b`: nothing sensible came from it, or it has been silent longer. */
+/* Whether `a` is less useful than `b`: it has not sent a frame, or has been silent longer. */
 static bool is_less(const CONNECTION *a, const CONNECTION *b)
 {
     RTS_UI32 now_ms = SysTimeGetMs();
@@ -267,7 +267,7 @@ static bool is_less(const CONNECTION *a, const CONNECTION *b)
     return a->heard != b->heard ? !a->heard : now_ms - a->moved_at > now_ms - b->moved_at;
 }
 
-/* A free place, or the one of least use: one there is, as there are fewer clients than places. */
+/* A free place, or the least useful one that no client needs: there are fewer clients than places. */
 static CONNECTION *find_place(void)
 {
     CONNECTION *least = NULL;
@@ -282,7 +282,8 @@ static CONNECTION *find_place(void)
     return least;
 }
 
-/* Gives the connection that waits a place. When none is free one is made so, for the next cycle; true when it has it. */
+/* Gives the waiting connection a place. If none is free, ends another connection, so that there is one in the next
+ * cycle; false then. */
 static bool place_waiting(void)
 {
     CONNECTION *place = find_place();

@@ -3,8 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * What comes to our own address is for us, whatever receiver it names: behind a router that translates addresses the
- * sender knows another one. What comes to all has to name us, or nobody.
+ * A datagram to the device's own address is for the device, whatever receiver the packet has: if a router translates
+ * addresses (NAT), the sender knows another one. A broadcast is for the device if the packet has its address as receiver,
+ * or no receiver.
  */
 #include "CmpBlkDrvUdp.h"
 
@@ -26,7 +27,7 @@ typedef struct {
     BLK_DRV driver;
 } LISTENER;
 
-/* Both answer by the first one's socket. */
+/* Replies to both are sent from the socket of the first. */
 static struct {
     LISTENER own;
     LISTENER broadcast;
@@ -62,7 +63,7 @@ static SOCKADDRESS address_of(RTS_UI64 endpoint)
     return address;
 }
 
-/* An answer to a multicast or broadcast address would be one to many. */
+/* A reply to a multicast or broadcast address would go to many nodes. */
 static bool can_be_answered(const SOCKADDRESS *from)
 {
     return from->port != 0 && from->ip != 0 && from->ip < 0xE0000000u;

@@ -79,7 +79,7 @@ static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *pay
     COMM_COUNT(counters.ignored);
 }
 
-/* The sender's network address is at the beginning of its address. What it says of it may be wrong, or a lie. */
+/* The sender's address begins with its network address, which is replaced if the driver knows the real one. */
 static void locate(ROUTER_PEER *peer, RTS_UI64 endpoint)
 {
 #if COMM_ENDPOINTS

@@ -17,7 +17,7 @@ from plctool.link.transport import BlockTransport
 
 PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
 _OPEN_PATIENCE = 5.0
-_AT_ONCE = 16  # packages sent before it is looked whether something has come
+_AT_ONCE = 16  # packages sent before the next look at the input
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
 SCAN_SECONDS = 1.5
 
@@ -188,7 +188,7 @@ class Connection:
                 pass  # the acknowledgement of the reply
         except LinkError as error:
             if error.code == "link-lost":
-                self._channel = None  # there is no line to say good-bye on
+                self._channel = None  # a close package could not be sent
             raise
 
     def _move(self, channel: Channel, patience: float) -> None:
@@ -203,8 +203,7 @@ class Connection:
             channel.receive(packet.payload, self.transport.now())
 
     def _send_some(self, channel: Channel) -> bool:
-        """Sends what there is to be sent now, so many that looking for what has come costs little beside.
-        False when there was nothing."""
+        """Sends the packages that are due, up to _AT_ONCE. False if there were none."""
         packages = iter(lambda: channel.next_package(self.transport.now()), None)
         packets = [self._packet(lib.ROUTER_SVC_CHANNEL, self._peer, package) for package in islice(packages, _AT_ONCE)]
         if packets:

@@ -25,7 +25,7 @@ class Node:
     target_id: int
     version: str
     serial_number: str = ""
-    place: str = ""  # of the device, as LINK names it, on a link to several
+    place: str = ""  # host and port of the device, on a link to several
 
     @property
     def address_text(self) -> str:

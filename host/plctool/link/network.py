@@ -1,4 +1,4 @@
-"""Places on a network: what a user writes for one, and what is wrong with it when it cannot be reached."""
+"""Hosts and ports: what a user writes for a place on a network, and advice if it cannot be reached."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def split_place(text: str) -> tuple[str, int | None]:
     known = re.fullmatch(r"[0-9]{1,5}", port) and 0 < int(port) < _PORTS
     if not host or (colon and not known):
         raise UsageError(
-            f"'{text}' is no place on a network; write for example 192.168.1.5 or 192.168.1.5:11740.", "no-such-link"
+            f"'{text}' is not a valid HOST[:PORT]; write for example 192.168.1.5 or 192.168.1.5:11740.", "no-such-link"
         )
     return host, int(port) if colon else None
 
@@ -37,13 +37,13 @@ def own_address(connected: socket.socket) -> bytes:
 
 
 def advice(error: OSError) -> str:
-    """What is wrong and what to do about it, as the end of a sentence."""
+    """The end of a sentence: what is wrong and what to do."""
     if isinstance(error, TimeoutError):
-        return "nothing answers there; check the address, and that the device is on."
+        return "there is no reply; check the address, and that the device is on."
     known = {
-        errno.ECONNREFUSED: "the device is there and serves no such port; check the port.",
-        errno.EHOSTUNREACH: "nothing answers there; check the address, and that the device is on.",
-        errno.ENETUNREACH: "there is no way to that network; check the address, and that of this machine.",
+        errno.ECONNREFUSED: "the host refuses connections to this port; check the port, and that the device serves it.",
+        errno.EHOSTUNREACH: "there is no reply; check the address, and that the device is on.",
+        errno.ENETUNREACH: "the network is not reachable; check the address and the network settings of this machine.",
         errno.EACCES: "the system does not allow it; check the address and the firewall.",
     }
     return known.get(error.errno or 0, f"{error.strerror or error}.")

@@ -23,7 +23,7 @@ _READ = 65536
 
 
 class TcpTransport:
-    """Packets over one connection. It is made anew when it was lost, at the next packet to be sent."""
+    """Packets over one connection. If it was lost, the next packet to be sent opens a new one."""
 
     def __init__(self, place: str) -> None:
         host, port = network.split_place(place)
@@ -31,7 +31,7 @@ class TcpTransport:
         self.max_packet = int(lib.BLK_MAX_SIZE)
         self.packet_overhead = _HEADER.size
         self.byte_rate = math.inf
-        self.point_to_point = True  # the device may know this end by another address: that of a router between
+        self.point_to_point = True  # with NAT the device knows this end by another address
         self.places = NO_PLACES
         self._place = network.find_host(host), port or int(lib.TCP_PORT)
         self._socket: socket.socket | None = None
@@ -95,17 +95,19 @@ class TcpTransport:
         del self._buffer[:at]
 
     def _frame_size(self, at: int) -> int:
-        """Of the frame at this place, header included; 0 while that is not there yet."""
+        """Size of the frame at `at` with its header; 0 if the header is not complete."""
         if len(self._buffer) - at < _HEADER.size:
             return 0
         header = _HEADER.unpack(memoryview(self._buffer)[at : at + _HEADER.size])
         if header.magic != _MAGIC or not _HEADER.size < header.size <= _HEADER.size + self.max_packet:
             self.close()
-            raise LinkError(f"What answers at {self.name} is no controller; check the port.", "protocol")
+            raise LinkError(
+                f"The reply from {self.name} is not the protocol of a controller; check the port.", "protocol"
+            )
         return int(header.size)
 
     def _lost(self, error: OSError | None = None) -> ChannelLost:
-        """The error of a connection that has ended; the next packet makes another one."""
+        """Closes the connection and returns the error to raise."""
         self.close()
         reason = f" ({error.strerror or error})" if error else ""
-        return ChannelLost(f"The device at {self.name} ended the connection{reason}; try again.", "link-lost")
+        return ChannelLost(f"The device at {self.name} closed the connection{reason}; try again.", "link-lost")

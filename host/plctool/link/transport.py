@@ -21,8 +21,8 @@ class BlockTransport(Protocol):
     max_packet: int  # longest packet it takes and gives, in bytes
     packet_overhead: int  # bytes the line carries for a packet besides the packet itself
     byte_rate: float  # bytes the line carries per second; math.inf if unknown or irrelevant
-    point_to_point: bool  # all that arrives comes from the only device there, and is for us, whatever addresses it has
-    places: Mapping[bytes, str]  # on a link to several devices, where those that have answered are, by router address
+    point_to_point: bool  # every packet is from the one device to this end, whatever its addresses
+    places: Mapping[bytes, str]  # of the devices that replied on a link to several, by router address
 
     def send(self, *packets: bytes) -> None:
         """Queues packets; raises LinkError when the line is gone."""

@@ -114,7 +114,7 @@ TRANSPORTS: dict[str, Transport] = {
         shape="HOST[:PORT]",
         example="192.168.1.5",
         help=f"the same over UDP, ports {lib.UDP_PORT}..{lib.UDP_PORT + lib.UDP_PORTS - 1} if none is given; "
-        "the broadcast address of a network for a scan",
+        "for scan also the broadcast address of a network",
     ),
     "sim": Transport(_open_sim),  # the simulator of this process, which has to be on
 }

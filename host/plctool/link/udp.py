@@ -1,8 +1,8 @@
 """Block transport over UDP: a datagram is a packet (codesys-v3-protocol 1.1).
 
-What is for all goes to the place that the user named: a device, or all of a network when it is a broadcast address.
-Who has answered a name request is known by the address it gave itself, and where it has answered from; only from there
-anything else is taken, and there goes what is for it.
+Requests to all nodes go to the host that the user named: a device, or the broadcast address of a network. A device that
+has replied to a name request is known by its router address; packets for it go to the source of that reply, and packets
+with its address are taken from there only.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Place = tuple[str, int]
 
 
 class UdpTransport:
-    """Packets to and from the devices at one place."""
+    """Packets to and from the devices at one host, or on one network."""
 
     def __init__(self, place: str) -> None:
         host, port = network.split_place(place)
@@ -39,7 +39,7 @@ class UdpTransport:
         self._places: dict[bytes, str] = {}
         self.places: Mapping[bytes, str] = MappingProxyType(self._places)
         self._all: list[Place] = [(ip, p) for p in ([port] if port else range(first, first + int(lib.UDP_PORTS)))]
-        self._homes: dict[bytes, Place] = {}  # where devices have answered from, by router address
+        self._homes: dict[bytes, Place] = {}  # source of the first reply of each device, by router address
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
@@ -77,7 +77,7 @@ class UdpTransport:
         self._socket.close()
 
     def _find_own_address(self) -> bytes:
-        """Binds the socket; the address is the one that packets to the place have."""
+        """Binds the socket; returns the address that packets to the host are sent from."""
         self._socket.bind(("", 0))
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as way:
             way.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
@@ -90,14 +90,14 @@ class UdpTransport:
         return network.own_address(self._socket)[:2] + ip
 
     def _home(self, receiver: bytes) -> Place:
-        """Where a device is. Raises LinkError when the user has named all of a network instead of one."""
+        """Where a device is. Raises LinkError if the user named a network instead of a device."""
         home = self._homes.get(receiver)
         if home is None:
             raise LinkError(f"No device answers on {self.name}.", "no-answer")
         if home[0] != self._all[0][0]:
             raise LinkError(
-                f"{self.name} is not the address of a device, but one at {_text(home)} has answered; name that one, "
-                f"or see 'plctool scan --udp {self.name}'.",
+                f"{self.name} is not the address of a device, but the device at {_text(home)} replied; use that "
+                f"address, or run 'plctool scan --udp {self.name}'.",
                 "several",
             )
         return home
