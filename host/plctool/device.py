@@ -184,7 +184,7 @@ class Plc(Controller):
 
         Pointers are followed again each time; a value whose pointer leads to no variable is None. While another
         tool downloads a program through the gateway there are no readings; `waiting` is called with the reason when
-        that begins. After a download the readings are of the new program.
+        that begins. After a download the readings are of the new program, if its symbols are found; else DeviceError.
         """
         begin = time.monotonic()
         due, readings, waits = begin, 0, False
@@ -201,11 +201,18 @@ class Plc(Controller):
                     waiting(error.message)
                 waits, due = True, max(due, time.monotonic() + _BUSY_POLL)
             except DeviceError as error:
-                if error.code != APP_CHANGED:  # after its symbols were found
+                if error.code != APP_CHANGED or not self._has_symbols():
                     raise
             else:
                 waits, readings = False, readings + 1
                 yield at, reading
+
+    def _has_symbols(self) -> bool:
+        """Whether the symbols of the application on the device can be found."""
+        with suppress(UsageError):
+            self.symbols()
+            return True
+        return False
 
 
 def _range(symbol: Symbol) -> AreaRange:
