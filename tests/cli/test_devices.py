@@ -302,6 +302,11 @@ def test_a_silent_device_exits_3(tool: Any, serial_opened_by: Any) -> None:
     assert done.json["error"]["code"] == "no-answer"
 
 
+def test_an_option_of_another_kind_of_link_exits_2(tool: Any) -> None:
+    done = tool("status", "--tcp", "localhost", "--baud", "9600")
+    assert (done.status, done.err) == (2, "plctool: A tcp link has no option 'baud'; it has none.\n")
+
+
 # ---- bugs ------------------------------------------------------------------------------------------------------------
 
 

@@ -184,8 +184,9 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
     for kind in TRANSPORTS.values():
         if kind.flag:
             link.add_argument(f"--{kind.flag}", metavar=kind.shape, help=kind.help)
-        for name, option in kind.options.items():
-            link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
+    options = {name: option for kind in TRANSPORTS.values() for name, option in kind.options.items()}
+    for name, option in options.items():
+        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
     link.add_argument("--no-gateway", action="store_true", help="do not share the port, as with PLCTOOL_GATEWAY=off")
     for scheme, place in LATER.items():
         link.add_argument(f"--{scheme}", metavar=place, help="not in this version")
