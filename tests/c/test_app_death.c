@@ -30,13 +30,13 @@ static void die_in_initialisation(RTS_UI8 cause)
 {
     RTS_UI32 operations;
 
-    CHECK(SimFlashSave() == ERR_OK);
-    CHECK(restart(cause, RUN_AT_ONCE) == ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
+    CHECK_EQUAL(restart(cause, RUN_AT_ONCE), ERR_OK);
     operations = SimFlashOps();
-    CHECK(SimFlashRestore() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
     SimFlashCut(operations, SIM_CUT_BEFORE);
     SimFlashAtStart();
-    CHECK(restart(cause, RUN_AT_ONCE) == SIM_POWER_CUT);
+    CHECK_EQUAL(restart(cause, RUN_AT_ONCE), SIM_POWER_CUT);
 }
 
 static RTS_UI32 running_step(void)
@@ -56,7 +56,7 @@ static RTS_UI32 loaded_crc(void)
 static void start_proven(void)
 {
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
 }
 
 /* Application 1 is proven, 2 has just been started in its place. */
@@ -66,9 +66,9 @@ static void start_unproven_after_proven(void)
 
     start_proven();
     build_counter(&image, 2);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
 }
 
 /* ---- in its cycles ---- */
@@ -76,12 +76,12 @@ static void start_unproven_after_proven(void)
 static void one_crash_of_an_unproven_application_rolls_it_back(void)
 {
     start_unproven_after_proven();
-    CHECK(restart(SYS_START_CRASH, RUN_AT_ONCE) == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
     CHECK(log_has("signal SIGSEGV: access violation at code offset 0x12"));
     CHECK(log_has("Back to the application before"));
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 static void a_first_application_that_crashed_stays_stopped_until_it_is_started_by_hand(void)
@@ -89,36 +89,36 @@ static void a_first_application_that_crashed_stays_stopped_until_it_is_started_b
     int i;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(restart(SYS_START_CRASH, RUN_AT_ONCE) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
     for (i = 0; i < 3; i++) {
-        CHECK(app_state() == AS_STOP);
-        CHECK(app_exception() == RTSEXCPT_ACCESS_VIOLATION);
+        CHECK_EQUAL(app_state(), AS_STOP);
+        CHECK_EQUAL(app_exception(), RTSEXCPT_ACCESS_VIOLATION);
         CHECK(log_has("signal SIGSEGV"));
         CHECK(log_has("not started: it failed before"));
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 0); /* nothing of it was called */
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 0); /* nothing of it was called */
+        CHECK_EQUAL(SimStart(), ERR_OK);
     }
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 static void a_proven_application_that_crashed_runs_again(void)
 {
     start_proven();
-    CHECK(restart(SYS_START_CRASH, RUN_AT_ONCE) == ERR_OK);
-    CHECK(running_step() == 1);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
 }
 
 static void a_crash_of_the_runtime_beside_a_stopped_application_is_not_its_own(void)
 {
     start_unproven_after_proven();
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(restart(SYS_START_CRASH, RUN_AT_ONCE) == ERR_OK);
-    CHECK(running_step() == 2);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(running_step(), 2);
 }
 
 static void a_reset_of_unknown_cause_counts_nothing_in_its_cycles(void)
@@ -127,8 +127,8 @@ static void a_reset_of_unknown_cause_counts_nothing_in_its_cycles(void)
 
     start_unproven_after_proven();
     for (i = 0; i < 5; i++) {
-        CHECK(restart(SYS_START_UNKNOWN, RUN_AT_ONCE) == ERR_OK);
-        CHECK(running_step() == 2);
+        CHECK_EQUAL(restart(SYS_START_UNKNOWN, RUN_AT_ONCE), ERR_OK);
+        CHECK_EQUAL(running_step(), 2);
     }
 }
 
@@ -138,8 +138,8 @@ static void a_crash_without_a_known_exception_is_a_crash(void)
 
     start_with_counter(1);
     SimSetStart(&start);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_BOOTPROJECT_CRASH);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_BOOTPROJECT_CRASH);
     CHECK(log_has("Before this start: crash"));
 }
 
@@ -148,15 +148,15 @@ static void a_crash_without_a_known_exception_is_a_crash(void)
 static void what_stays_stopped_is_not_called(void)
 {
     start_unproven_after_proven();
-    CHECK(restart(SYS_START_CRASH, STAY_STOPPED) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(app_exception() == RTSEXCPT_ACCESS_VIOLATION);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 0);
-    CHECK(SimAdvance(ms(3000)) == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
+    CHECK_EQUAL(restart(SYS_START_CRASH, STAY_STOPPED), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_ACCESS_VIOLATION);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 0);
+    CHECK_EQUAL(SimAdvance(ms(3000)), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
     SimStop(); /* nor at the end */
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);                                             /* and the next start decides */
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);                                         /* and the next start decides */
     CHECK(log_has("signal SIGSEGV: access violation at code offset 0x12")); /* which knows why */
     CHECK(log_has("Back to the application before"));
 }
@@ -164,34 +164,34 @@ static void what_stays_stopped_is_not_called(void)
 static void starting_what_stayed_stopped_rolls_it_back_too(void)
 {
     start_unproven_after_proven();
-    CHECK(restart(SYS_START_CRASH, STAY_STOPPED) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(restart(SYS_START_CRASH, STAY_STOPPED), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 static void a_proven_application_that_stayed_stopped_runs_at_the_next_start_or_by_hand(void)
 {
     start_proven();
-    CHECK(restart(SYS_START_CRASH, STAY_STOPPED) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(app_exception() == RTSEXCPT_ACCESS_VIOLATION);
+    CHECK_EQUAL(restart(SYS_START_CRASH, STAY_STOPPED), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_ACCESS_VIOLATION);
     CHECK(log_has("Boot project not started"));
-    CHECK(SimFlashSave() == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(running_step() == 1);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 static void crashing_while_it_stays_stopped_changes_nothing(void)
 {
     start_proven();
-    CHECK(restart(SYS_START_CRASH, STAY_STOPPED) == ERR_OK);
-    CHECK(restart(SYS_START_CRASH, STAY_STOPPED) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(restart(SYS_START_CRASH, STAY_STOPPED), ERR_OK);
+    CHECK_EQUAL(restart(SYS_START_CRASH, STAY_STOPPED), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 /* Its variables are all zero until it is initialised: that is not to be saved. */
@@ -202,12 +202,12 @@ static void retain_variables_without_a_record_get_their_initial_values_when_it_i
     start_proven();
     area = SysFileGetArea(FILE_RETAIN);
     memset(SimFlashData() + area->offset, 0, area->size);
-    CHECK(restart(SYS_START_CRASH, STAY_STOPPED) == ERR_OK);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 100);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 100);
+    CHECK_EQUAL(restart(SYS_START_CRASH, STAY_STOPPED), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 100);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 100);
 }
 
 /* A value that kills the application can be corrected before it is started again. */
@@ -216,12 +216,12 @@ static void retain_variables_can_be_written_while_it_stays_stopped(void)
     static const RTS_UI32 value = 7000;
 
     start_proven();
-    CHECK(restart(SYS_START_CRASH, STAY_STOPPED) == ERR_OK);
+    CHECK_EQUAL(restart(SYS_START_CRASH, STAY_STOPPED), ERR_OK);
     CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) >= 500);
     memcpy(AppGetAreaAddress(APP_AREA_RETAIN, RETAIN_A_OFFSET, 4), &value, 4);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == value + 1);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), value + 1);
 }
 
 /* ---- in its initialisation ---- */
@@ -230,18 +230,18 @@ static void an_unproven_application_that_crashes_in_its_initialisation_is_rolled
 {
     start_unproven_after_proven();
     die_in_initialisation(SYS_START_POWER);
-    CHECK(restart(SYS_START_CRASH, RUN_AT_ONCE) == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 static void a_first_application_that_crashes_in_its_initialisation_stays_stopped(void)
 {
     start_with_counter(1);
-    CHECK(AppStopApplication() == ERR_OK); /* so that only the initialisation is left to count */
-    CHECK(AppStartApplication() == ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK); /* so that only the initialisation is left to count */
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
     die_in_initialisation(SYS_START_POWER);
-    CHECK(restart(SYS_START_CRASH, RUN_AT_ONCE) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
     CHECK(log_has("not started: it failed before"));
 }
 
@@ -250,9 +250,9 @@ static void halt_proven(void)
 {
     start_proven();
     die_in_initialisation(SYS_START_POWER);
-    CHECK(restart(SYS_START_CRASH, RUN_AT_ONCE) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(SimStart(), ERR_OK);
 }
 
 static void a_proven_application_that_crashes_in_its_initialisation_stays_stopped(void)
@@ -261,34 +261,34 @@ static void a_proven_application_that_crashes_in_its_initialisation_stays_stoppe
 
     halt_proven();
     for (i = 0; i < 3; i++) {
-        CHECK(app_state() == AS_STOP);
-        CHECK(app_exception() == RTSEXCPT_ACCESS_VIOLATION);
+        CHECK_EQUAL(app_state(), AS_STOP);
+        CHECK_EQUAL(app_exception(), RTSEXCPT_ACCESS_VIOLATION);
         CHECK(log_has("signal SIGSEGV"));
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 0);
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 0);
+        CHECK_EQUAL(SimStart(), ERR_OK);
     }
 }
 
 static void start_is_a_way_out(void)
 {
     halt_proven();
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(running_step() == 1);
-    CHECK(SimStart() == ERR_OK); /* it came through its initialisation */
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* it came through its initialisation */
+    CHECK_EQUAL(running_step(), 1);
 }
 
 static void cold_reset_is_a_way_out(void)
 {
     halt_proven();
-    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 100);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(running_step() == 1);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(AppReset(RESET_OPTION_COLD), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 100);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 static void a_download_is_a_way_out(void)
@@ -297,21 +297,21 @@ static void a_download_is_a_way_out(void)
 
     halt_proven();
     build_counter(&image, 3);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 3);
-    CHECK(loaded_crc() == image_crc(&image));
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 3);
+    CHECK_EQUAL(loaded_crc(), image_crc(&image));
 }
 
 static void what_dies_again_by_hand_stays_stopped_again(void)
 {
     halt_proven();
-    CHECK(AppStartApplication() == ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
     die_in_initialisation(SYS_START_POWER);
-    CHECK(restart(SYS_START_CRASH, STAY_STOPPED) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_STOP);
+    CHECK_EQUAL(restart(SYS_START_CRASH, STAY_STOPPED), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
 }
 
 static void losing_power_in_initialisation_is_not_dying(void)
@@ -321,19 +321,19 @@ static void losing_power_in_initialisation_is_not_dying(void)
     start_unproven_after_proven();
     for (i = 0; i < 300; i++)
         die_in_initialisation(SYS_START_POWER);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 2);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 2);
 }
 
 static void one_reset_of_unknown_cause_in_initialisation_is_forgiven(void)
 {
     start_unproven_after_proven();
     die_in_initialisation(SYS_START_UNKNOWN);
-    CHECK(restart(SYS_START_UNKNOWN, RUN_AT_ONCE) == ERR_OK);
-    CHECK(running_step() == 2);
+    CHECK_EQUAL(restart(SYS_START_UNKNOWN, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(running_step(), 2);
     die_in_initialisation(SYS_START_UNKNOWN); /* not the second in a row */
-    CHECK(restart(SYS_START_UNKNOWN, RUN_AT_ONCE) == ERR_OK);
-    CHECK(running_step() == 2);
+    CHECK_EQUAL(restart(SYS_START_UNKNOWN, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(running_step(), 2);
 }
 
 static void two_resets_of_unknown_cause_in_initialisation_are_a_death(void)
@@ -341,15 +341,15 @@ static void two_resets_of_unknown_cause_in_initialisation_are_a_death(void)
     start_unproven_after_proven();
     die_in_initialisation(SYS_START_UNKNOWN);
     die_in_initialisation(SYS_START_UNKNOWN);
-    CHECK(restart(SYS_START_UNKNOWN, RUN_AT_ONCE) == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(restart(SYS_START_UNKNOWN, RUN_AT_ONCE), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
     CHECK(log_has("Before this start: crash"));
     die_in_initialisation(SYS_START_UNKNOWN);
     die_in_initialisation(SYS_START_UNKNOWN);
-    CHECK(restart(SYS_START_UNKNOWN, RUN_AT_ONCE) == ERR_OK); /* this one is proven */
-    CHECK(app_state() == AS_STOP);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_STOP);
+    CHECK_EQUAL(restart(SYS_START_UNKNOWN, RUN_AT_ONCE), ERR_OK); /* this one is proven */
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
 }
 
 /* ---- by an exception ---- */
@@ -365,10 +365,10 @@ static void an_exception_in_initialisation_rolls_back_and_says_why(void)
     spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
     emit_divide_by_zero(&spec);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
     CHECK(log_has("Before this start: division by zero at code offset 0x"));
 }
 
@@ -380,12 +380,12 @@ static void a_program_that_was_never_started_is_the_boot_project(void)
 
     start_blank();
     build_counter(&image, 1);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
-    CHECK(AppStopApplication() == ERR_OK); /* nor does it matter that a user stopped it */
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK); /* nor does it matter that a user stopped it */
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 int main(void)

@@ -16,8 +16,8 @@ static APP_BYTES image;
 /* The counter application with a second task "Bad" of 5 ms, at the end of the code: the test adds what it does. */
 static void begin_bad_task(void)
 {
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     spec_counter(&spec, 1);
     add_task(&spec, "Bad", KIND_CYCLIC, 5000, here(&spec));
 }
@@ -25,9 +25,9 @@ static void begin_bad_task(void)
 static void run_bad_task(void)
 {
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
 }
 
 static bool last_log_is(const char *text)
@@ -46,13 +46,13 @@ static void check_exception(RTS_UI32 code, RTS_UI32 code_offset, RTS_I32 task)
     APP_STATUS status;
 
     AppGetStatus(&status);
-    CHECK(status.state == AS_STOP);
+    CHECK_EQUAL(status.state, AS_STOP);
     CHECK((status.op_state & OS_EXCEPTION) != 0);
-    CHECK(status.exception.code == code);
-    CHECK(status.exception.code_offset == code_offset);
-    CHECK(status.exception.task == task);
-    CHECK(AppStartApplication() == ERR_INVALID_STATE);
-    CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 0);
+    CHECK_EQUAL(status.exception.code, code);
+    CHECK_EQUAL(status.exception.code_offset, code_offset);
+    CHECK_EQUAL(status.exception.task, task);
+    CHECK_EQUAL(AppStartApplication(), ERR_INVALID_STATE);
+    CHECK_EQUAL(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET), 0);
 }
 
 static void division_by_zero_stops_the_application(void)
@@ -119,15 +119,15 @@ static void an_endless_loop_is_broken(void)
 
 static void an_endless_loop_in_an_event_task_is_broken(void)
 {
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     spec_counter(&spec, 1);
     add_task(&spec, "Free", KIND_FREEWHEELING, 0, here(&spec));
     emit_endless_loop(&spec);
     SimSetCycleLimit(100);
     run_bad_task();
     SimSetCycleLimit(2000);
-    CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_WATCHDOG);
 }
 
 static void other_tasks_do_not_start_another_cycle(void)
@@ -136,8 +136,8 @@ static void other_tasks_do_not_start_another_cycle(void)
     emit_divide_by_zero(&spec);
     spec.tasks[0].priority = 11; /* after the bad one */
     run_bad_task();
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 0);
 }
 
 static void reset_clears_the_exception(void)
@@ -145,14 +145,14 @@ static void reset_clears_the_exception(void)
     begin_bad_task();
     emit_divide_by_zero(&spec);
     run_bad_task();
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
-    CHECK(app_state() == AS_STOP);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO); /* and it can happen again */
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 0);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO); /* and it can happen again */
 }
 
 static void an_application_with_an_exception_can_be_replaced(void)
@@ -163,11 +163,11 @@ static void an_application_with_an_exception_can_be_replaced(void)
     emit_divide_by_zero(&spec);
     run_bad_task();
     build_counter(&good, 4);
-    CHECK(download(&good) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(10)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 8);
+    CHECK_EQUAL(download(&good), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 8);
 }
 
 static void initialisation_may_fail_too(void)
@@ -179,10 +179,10 @@ static void initialisation_may_fail_too(void)
     spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
     emit_divide_by_zero(&spec);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     check_exception(RTSEXCPT_DIVIDEBYZERO, at, -1);
-    CHECK(SimStart() == ERR_OK); /* it does not start at power on, the device does */
-    CHECK(app_state() == AS_STOP);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* it does not start at power on, the device does */
+    CHECK_EQUAL(app_state(), AS_STOP);
 }
 
 static void an_endless_initialisation_is_broken(void)
@@ -192,9 +192,9 @@ static void an_endless_initialisation_is_broken(void)
     emit_endless_loop(&spec);
     build_image(&image, &spec);
     SimSetCycleLimit(100);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     SimSetCycleLimit(2000);
-    CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_WATCHDOG);
 }
 
 static void of_two_exceptions_the_first_counts(void)
@@ -203,9 +203,9 @@ static void of_two_exceptions_the_first_counts(void)
     emit_divide_by_zero(&spec);
     run_bad_task();
     AppHandleException(0, RTSEXCPT_ACCESS_VIOLATION, 0);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
     AppHandleException(0, RTSEXCPT_ACCESS_VIOLATION, 0); /* as a task of the next run would */
     AppHandleException(1, RTSEXCPT_DIVIDEBYZERO, 0);
     check_exception(RTSEXCPT_ACCESS_VIOLATION, 0xFFFFFFFF, 0);
@@ -227,8 +227,8 @@ static void the_exception_is_posted_once(void)
     exceptions_seen = 0;
     CHECK(EventRegisterCallback(CMPID_CmpAppEmbedded, EVT_CmpApp_Exception, count_exception, NULL) == ERR_OK);
     run_bad_task();
-    CHECK(SimAdvance(ms(3000)) == ERR_OK);
-    CHECK(exceptions_seen == 1);
+    CHECK_EQUAL(SimAdvance(ms(3000)), ERR_OK);
+    CHECK_EQUAL(exceptions_seen, 1);
 }
 
 static void every_exception_has_words(void)

@@ -22,9 +22,9 @@ static RTS_UI32 running_step(void)
 
 static void install(RTS_UI32 step)
 {
-    CHECK(download(&images[step]) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(PROVEN_MS)) == ERR_OK);
+    CHECK_EQUAL(download(&images[step]), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(PROVEN_MS)), ERR_OK);
 }
 
 /* `newest` proven applications 1, 2 .. one after the other; the last is in slot A for 1 and 3, in B for 2. */
@@ -33,12 +33,12 @@ static void prepare(RTS_UI32 newest, int mapped)
     RTS_UI32 step;
 
     SimFlashSetMapped(mapped);
-    CHECK(SimFlashConfigure(32 * 1024, 512, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(32 * 1024, 512, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     for (step = 1; step <= newest; step++)
         install(step);
     SimStop();
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
 }
 
 /* ---- a fault at a start ---- */
@@ -72,8 +72,8 @@ static void try_meanwhile(void *arg)
 /* Calls of `kind` that a start makes when nothing fails. */
 static RTS_UI32 calls_of_start(RTS_UI32 kind)
 {
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     return SimFlashCalls(kind);
 }
 
@@ -82,18 +82,18 @@ static void fail_one_call_at_a_start(RTS_UI32 newest, RTS_UI32 kind, RTS_UI32 ca
     int failures = test_failures;
 
     tried++;
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK); /* forgets plans */
-    CHECK(SimFlashRestore() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* forgets plans */
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
     SimFlashFail(kind, call);
     SimFlashAtStart();
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(running_step() == newest || app_state() == AS_STOP || app_state() == AS_NONE);
     CHECK(running_step() == newest || log_has("Boot project refused: ") || log_has("cannot be read"));
-    CHECK(SimCall(try_meanwhile, &meanwhile) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == newest);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimCall(try_meanwhile, &meanwhile), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), newest);
+    CHECK_EQUAL(SimFlashViolations(), 0);
     if (test_failures != failures)
         fprintf(stderr, "^ newest %u, kind %u, call %u, then %u\n", (unsigned)newest, (unsigned)kind, (unsigned)call,
                 (unsigned)meanwhile);
@@ -128,19 +128,19 @@ static void firmware_that_refuses_it_for_some_starts_costs_nothing(void)
     RTS_UI32 i;
 
     prepare(1, 1);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     SimSetTarget(TARGET_TYPE_PROGRAMMABLE, 7, 0x01000000);
     for (i = 0; i < 3; i++) {
-        CHECK(SimStart() == ERR_OK);
-        CHECK(app_state() == AS_NONE);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_NONE);
         CHECK(log_has("Boot project refused: The image is for device id"));
         spec_counter(&spec, 2);
         build_image(&image, &spec);
         CHECK(download(&image) != ERR_OK); /* it is not for this device either */
     }
     SimSetTarget(TARGET_TYPE_PROGRAMMABLE, TARGET_ID_X86_64_LINUX, 0x01000000);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
 }
 
 /* ---- a fault in a download, and in what follows ---- */
@@ -162,11 +162,11 @@ static RTS_UI32 calls_of_story(RTS_UI32 kind)
 {
     RTS_UI32 before;
 
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     before = SimFlashCalls(kind);
     CHECK(SimCall(story, NULL) == ERR_OK);
-    CHECK(story_result == ERR_OK);
+    CHECK_EQUAL(story_result, ERR_OK);
     return SimFlashCalls(kind) - before;
 }
 
@@ -177,17 +177,17 @@ static void fail_one_call_of_the_story(RTS_UI32 kind, RTS_UI32 call)
     RTS_UI32 step;
 
     tried++;
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     SimFlashFail(kind, call);
     CHECK(SimCall(story, NULL) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     step = running_step();
     CHECK(step == 2 || (step == 1 && story_result != ERR_OK));
     install(3);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 3);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 3);
+    CHECK_EQUAL(SimFlashViolations(), 0);
     if (test_failures != failures)
         fprintf(stderr, "^ kind %u, call %u\n", (unsigned)kind, (unsigned)call);
 }
@@ -217,17 +217,17 @@ static void a_download_whose_commit_is_not_synced_is_refused(void)
 
     prepare(1, 1);
     for (call = 1; call <= 2; call++) { /* the image, its seal */
-        CHECK(SimFlashRestore() == ERR_OK);
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
         SimFlashFail(SIM_SYNC, call);
         if (download_part(&image, image.size, &refusal) != ERR_OK)
             refused++;
         CHECK(strcmp(refusal.text, "The flash cannot be written.") == 0);
-        CHECK(running_step() == 1);
-        CHECK(SimStart() == ERR_OK);
-        CHECK(running_step() == 1);
+        CHECK_EQUAL(running_step(), 1);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(running_step(), 1);
     }
-    CHECK(refused == 2);
+    CHECK_EQUAL(refused, 2);
 }
 
 /* ---- a fault in a rollback ---- */
@@ -237,19 +237,19 @@ static void fail_one_call_of_a_rollback(RTS_UI32 kind, RTS_UI32 call)
     SYS_START start = {SYS_START_CRASH, 0, 0, RTSEXCPT_ACCESS_VIOLATION, 0, "crash"};
     int failures = test_failures;
 
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(SimFlashRestore() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
     SimFlashFail(kind, call);
     SimFlashAtStart();
     SimSetStart(&start);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(running_step() != 2);
     SimSetStart(&start);
-    CHECK(SimStart() == ERR_OK); /* when the death could not be read or written, it dies again */
-    CHECK(running_step() == 1);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* when the death could not be read or written, it dies again */
+    CHECK_EQUAL(running_step(), 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
     if (test_failures != failures)
         fprintf(stderr, "^ kind %u, call %u\n", (unsigned)kind, (unsigned)call);
 }
@@ -257,10 +257,10 @@ static void fail_one_call_of_a_rollback(RTS_UI32 kind, RTS_UI32 call)
 static void prepare_death(void)
 {
     prepare(1, 0);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(download(&images[2]) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(download(&images[2]), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
 }
 
 static void a_call_that_fails_in_a_rollback_delays_it_at_most(void)
@@ -285,16 +285,16 @@ static void a_cut_in_a_rollback_leaves_it_to_the_next_start(void)
     for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
         for (operation = 1; operation < 100; operation++) {
             RTS_RESULT result;
-            CHECK(SimFlashRestore() == ERR_OK);
-            CHECK(SimStart() == ERR_OK);
-            CHECK(SimFlashRestore() == ERR_OK);
+            CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            CHECK_EQUAL(SimFlashRestore(), ERR_OK);
             SimFlashCut(operation, mode);
             SimFlashAtStart();
             SimSetStart(&start);
             result = SimStart();
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             CHECK(running_step() == 1 || (running_step() == 2 && operation <= 7)); /* its death was not noted */
-            CHECK(SimFlashViolations() == 0);
+            CHECK_EQUAL(SimFlashViolations(), 0);
             if (result == ERR_OK)
                 break;
         }
@@ -329,25 +329,25 @@ static void a_lost_commit_log_costs_no_application(void)
             for (which = 1; which <= 3; which++) {
                 for (how = 0; how < 3; how++) {
                     const FILE_AREA *area;
-                    CHECK(SimFlashRestore() == ERR_OK);
-                    CHECK(SimStart() == ERR_OK);
+                    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+                    CHECK_EQUAL(SimStart(), ERR_OK);
                     area = SysFileGetArea(FILE_COMMIT);
                     if ((which & 1) != 0)
                         spoil(area->offset, area->size / 2, how);
                     if ((which & 2) != 0)
                         spoil(area->offset + area->size / 2, area->size / 2, how);
-                    CHECK(SimStart() == ERR_OK);
-                    CHECK(running_step() == newest);
+                    CHECK_EQUAL(SimStart(), ERR_OK);
+                    CHECK_EQUAL(running_step(), newest);
                     CHECK(which != 3 || log_has("No commit record"));
                     install(newest % 3 + 1);
-                    CHECK(SimStart() == ERR_OK);
-                    CHECK(running_step() == newest % 3 + 1);
+                    CHECK_EQUAL(SimStart(), ERR_OK);
+                    CHECK_EQUAL(running_step(), newest % 3 + 1);
                 }
             }
-            CHECK(SimFlashRestore() == ERR_OK);
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             SimStop();
-            CHECK(SimFlashSave() == ERR_OK);
+            CHECK_EQUAL(SimFlashSave(), ERR_OK);
         }
     }
 }
@@ -357,12 +357,12 @@ static void with_a_lost_commit_log_the_older_application_is_there_to_go_back_to(
     const FILE_AREA *area;
 
     prepare(2, 1);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     area = SysFileGetArea(FILE_COMMIT);
     spoil(area->offset, area->size, 2);
     SimFlashData()[SysFileGetArea(FILE_SLOT_B)->offset + 400] ^= 1;
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
     CHECK(log_has("Boot project refused: The image is damaged"));
 }
 
@@ -373,16 +373,16 @@ static void a_lost_commit_log_does_not_bring_back_what_was_given_up(void)
 
     prepare_death();
     SimSetStart(&start);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
     area = SysFileGetArea(FILE_COMMIT);
     spoil(area->offset, area->size, 0);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 1);
-    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 1);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
     spoil(area->offset, area->size, 0);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_NONE);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_NONE);
     CHECK(log_has("No boot project"));
 }
 
@@ -396,9 +396,9 @@ static void a_lost_sector_anywhere_costs_at_most_what_lay_there(void)
     for (offset = 0; offset < SimFlashSize(); offset += 512) {
         for (how = 0; how < 3; how++) {
             RTS_UI32 step;
-            CHECK(SimFlashRestore() == ERR_OK);
+            CHECK_EQUAL(SimFlashRestore(), ERR_OK);
             spoil(offset, 512, how);
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             step = running_step();
             CHECK(step == 2 || (step == 1 && offset >= SysFileGetArea(FILE_SLOT_B)->offset &&
                                 offset < SysFileGetArea(FILE_SLOT_B)->offset + images[2].size));
@@ -415,14 +415,14 @@ static void records_of_another_firmware_are_said_and_survived(void)
     FLASH_LOG log;
 
     prepare(2, 1);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(FlashLogOpen(&log, FILE_COMMIT) == ERR_OK);
-    CHECK(FlashLogAppend(&log, 0x12345678, other, sizeof other) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(running_step() == 2);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(FlashLogOpen(&log, FILE_COMMIT), ERR_OK);
+    CHECK_EQUAL(FlashLogAppend(&log, 0x12345678, other, sizeof other), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(running_step(), 2);
     CHECK(log_has("laid out by another firmware"));
-    CHECK(SimStart() == ERR_OK); /* and from then on there are records again */
-    CHECK(running_step() == 2);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* and from then on there are records again */
+    CHECK_EQUAL(running_step(), 2);
     CHECK(!log_has("laid out by another firmware"));
 }
 
@@ -441,23 +441,24 @@ static void hostile_records_are_survived(void)
         RTS_UI8 *bytes = (RTS_UI8 *)&record;
         RTS_UI32 k;
         FLASH_LOG log;
-        CHECK(SimFlashRestore() == ERR_OK);
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
         memset(&record, 0, sizeof record);
         record.commit = *AppCommitGet();
         for (k = 0; k < i % 40 + 1; k++) {
             state = state * 1664525 + 1013904223;
             bytes[state % (i % 3 == 0 ? 8 : sizeof record)] = (RTS_UI8)(state >> 24);
         }
-        CHECK(FlashLogOpen(&log, FILE_COMMIT) == ERR_OK);
-        CHECK(FlashLogAppend(&log, 0x324D4D43 + SysFileGetArea(FILE_SLOT_B)->offset, &record, sizeof record) == ERR_OK);
-        CHECK(SimStart() == ERR_OK);
-        CHECK(SimAdvance(ms(100)) == ERR_OK);
+        CHECK_EQUAL(FlashLogOpen(&log, FILE_COMMIT), ERR_OK);
+        CHECK_EQUAL(FlashLogAppend(&log, 0x324D4D43 + SysFileGetArea(FILE_SLOT_B)->offset, &record, sizeof record),
+                    ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
         if (AppReset(RESET_OPTION_ORIGIN) == ERR_OK)
             install(3);
-        CHECK(running_step() == 3);
-        CHECK(SimStart() == ERR_OK);
-        CHECK(running_step() == 3);
+        CHECK_EQUAL(running_step(), 3);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(running_step(), 3);
     }
 }
 

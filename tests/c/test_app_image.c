@@ -198,8 +198,8 @@ static void two_tasks_never_undo_each_others_bits(void)
 {
     with_copies = true;
     lost = 0;
-    CHECK(at_every_step(begin_bits, low_bits, high_cycle, check_bits) == 10);
-    CHECK(lost == 0);
+    CHECK_EQUAL(at_every_step(begin_bits, low_bits, high_cycle, check_bits), 10);
+    CHECK_EQUAL(lost, 0);
 }
 
 /* The test would see it. */
@@ -228,15 +228,15 @@ static void begin_alone(void)
     uses[LOW][1] = (CDL_IMAGE){1, 1, CDL_IMAGE_WRITTEN};
     always = true;
     start(true);
-    CHECK(used * CDL_IMAGE_UNIT == 16);
+    CHECK_EQUAL(used * CDL_IMAGE_UNIT, 16);
 }
 
 static void what_main_writes_is_neither_lost_nor_undoes_anything(void)
 {
     with_copies = true;
     lost = 0;
-    CHECK(at_every_step(begin_alone, low_bits, write_bits, check_bits) == 10);
-    CHECK(lost == 0);
+    CHECK_EQUAL(at_every_step(begin_alone, low_bits, write_bits, check_bits), 10);
+    CHECK_EQUAL(lost, 0);
 }
 
 /* ---- inputs hold still ---- */
@@ -291,7 +291,7 @@ static void inputs_hold_still_for_a_cycle_and_a_task_that_writes_them_is_heard(v
 {
     changed = 0;
     (void)at_every_step(begin_inputs, look_often, high_writes_inputs, check_inputs);
-    CHECK(changed == 0);
+    CHECK_EQUAL(changed, 0);
 }
 
 /* ---- several words are seen together ---- */
@@ -332,14 +332,14 @@ static void begin_fill(void)
 static void check_fill(void)
 {
     for (RTS_UI32 i = 0; i < AREA_SIZE; i++)
-        CHECK(fake_area(APP_AREA_OUTPUT)[i] == (i >= 3 && i < 43 ? 0x5A : 0));
+        CHECK_EQUAL(fake_area(APP_AREA_OUTPUT)[i], (i >= 3 && i < 43 ? 0x5A : 0));
 }
 
 static void what_a_cycle_changes_is_seen_as_a_whole(void)
 {
     changed = 0;
     (void)at_every_step(begin_fill, low_fills, high_reads_outputs, check_fill);
-    CHECK(changed == 0);
+    CHECK_EQUAL(changed, 0);
 }
 
 /* ---- the safe state ---- */
@@ -363,7 +363,7 @@ static void a_cycle_that_ends_after_the_stop_leaves_the_outputs_at_zero(void)
     with_copies = true;
     lost = 0;
     (void)at_every_step(begin_bits, low_bits, stop, check_zero);
-    CHECK(lost == 0);
+    CHECK_EQUAL(lost, 0);
 }
 
 /* ---- the plan ---- */
@@ -375,9 +375,9 @@ static void a_task_that_uses_a_part_alone_works_on_the_shared_one(void)
     uses[HIGH][1] = (CDL_IMAGE){1, 1, CDL_IMAGE_WRITTEN};
     always = false;
     start(true);
-    CHECK(used == 0);
-    CHECK(context[LOW].area[APP_AREA_OUTPUT] == fake_area(APP_AREA_OUTPUT));
-    CHECK(context[HIGH].area[APP_AREA_OUTPUT] == fake_area(APP_AREA_OUTPUT));
+    CHECK_EQUAL(used, 0);
+    CHECK_EQUAL(context[LOW].area[APP_AREA_OUTPUT], fake_area(APP_AREA_OUTPUT));
+    CHECK_EQUAL(context[HIGH].area[APP_AREA_OUTPUT], fake_area(APP_AREA_OUTPUT));
 }
 
 static void what_is_written_takes_its_copy_twice(void)
@@ -386,10 +386,10 @@ static void what_is_written_takes_its_copy_twice(void)
     use(LOW, APP_AREA_OUTPUT, 0, 16, CDL_IMAGE_WRITTEN);
     use(HIGH, APP_AREA_OUTPUT, 8, 8, 0);
     start(true);
-    CHECK(used * CDL_IMAGE_UNIT == 2 * 16 + 8);
-    CHECK(context[LOW].area[APP_AREA_INPUT] == fake_area(APP_AREA_INPUT));
-    CHECK(byte_of(LOW, APP_AREA_OUTPUT, 0) == (RTS_UI8 *)copies);
-    CHECK(byte_of(HIGH, APP_AREA_OUTPUT, 8) == (RTS_UI8 *)copies + 32);
+    CHECK_EQUAL(used * CDL_IMAGE_UNIT, 2 * 16 + 8);
+    CHECK_EQUAL(context[LOW].area[APP_AREA_INPUT], fake_area(APP_AREA_INPUT));
+    CHECK_EQUAL(byte_of(LOW, APP_AREA_OUTPUT, 0), (RTS_UI8 *)copies);
+    CHECK_EQUAL(byte_of(HIGH, APP_AREA_OUTPUT, 8), (RTS_UI8 *)copies + 32);
 }
 
 static void an_address_in_a_copy_is_that_of_the_area(void)
@@ -431,7 +431,7 @@ static void every_bit_goes_both_ways_and_no_other_changes(void)
             start(true);
             cycle(LOW, low_one_bit);
             for (i = 0; i < 8 * AREA_SIZE; i++)
-                CHECK((fake_area(APP_AREA_OUTPUT)[i / 8] >> i % 8 & 1u) == (i == bit ? on : 1 - on));
+                CHECK_EQUAL((fake_area(APP_AREA_OUTPUT)[i / 8] >> i % 8 & 1u), (i == bit ? on : 1 - on));
         }
     }
 }

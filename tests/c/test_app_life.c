@@ -13,17 +13,17 @@ static void a_blank_device_has_no_application(void)
 
     start_blank();
     AppGetStatus(&status);
-    CHECK(status.state == AS_NONE);
-    CHECK(status.op_state == 0);
-    CHECK(AppStartApplication() == ERR_APP_NOT_LOADED);
-    CHECK(AppStopApplication() == ERR_APP_NOT_LOADED);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_APP_NOT_LOADED);
-    CHECK(AppReset(RESET_OPTION_COLD) == ERR_APP_NOT_LOADED);
-    CHECK(AppReset(3) == ERR_PARAMETER);
+    CHECK_EQUAL(status.state, AS_NONE);
+    CHECK_EQUAL(status.op_state, 0);
+    CHECK_EQUAL(AppStartApplication(), ERR_APP_NOT_LOADED);
+    CHECK_EQUAL(AppStopApplication(), ERR_APP_NOT_LOADED);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_APP_NOT_LOADED);
+    CHECK_EQUAL(AppReset(RESET_OPTION_COLD), ERR_APP_NOT_LOADED);
+    CHECK_EQUAL(AppReset(3), ERR_PARAMETER);
     CHECK(AppGetAreaAddress(APP_AREA_DATA, 0, 0) == NULL);
-    CHECK(AppGetAreaSize(APP_AREA_DATA) == 0);
-    CHECK(AppGetInfo(0)[0] == '\0');
-    CHECK(IecTaskGetCount() == 0);
+    CHECK_EQUAL(AppGetAreaSize(APP_AREA_DATA), 0);
+    CHECK_EQUAL(AppGetInfo(0)[0], '\0');
+    CHECK_EQUAL(IecTaskGetCount(), 0);
 }
 
 static void a_download_leaves_the_application_stopped_and_initialised(void)
@@ -33,66 +33,66 @@ static void a_download_leaves_the_application_stopped_and_initialised(void)
 
     start_blank();
     build_counter(&image, 3);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     AppGetStatus(&status);
-    CHECK(status.state == AS_STOP);
-    CHECK(status.op_state == (OS_PROGRAM_LOADED | OS_BOOTPROJECT_VALID));
-    CHECK(status.image_crc == image_crc(&image));
-    CHECK(status.image_size == image.size);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 3);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 300);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
+    CHECK_EQUAL(status.state, AS_STOP);
+    CHECK_EQUAL(status.op_state, (OS_PROGRAM_LOADED | OS_BOOTPROJECT_VALID));
+    CHECK_EQUAL(status.image_crc, image_crc(&image));
+    CHECK_EQUAL(status.image_size, image.size);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 3);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 300);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 0);
 }
 
 static void the_first_cycle_runs_at_the_start_and_then_one_per_interval(void)
 {
     start_with_counter(1);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 1);
-    CHECK(SimAdvance(ms(10) - 1) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 1);
-    CHECK(SimAdvance(1) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 2);
-    CHECK(SimAdvance(ms(990)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 101);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 1);
+    CHECK_EQUAL(SimAdvance(ms(10) - 1), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 1);
+    CHECK_EQUAL(SimAdvance(1), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 2);
+    CHECK_EQUAL(SimAdvance(ms(990)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 101);
 }
 
 static void stop_ends_the_cycles_and_zeroes_the_outputs(void)
 {
     start_with_counter(5);
-    CHECK(SimAdvance(ms(20)) == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 5);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 0);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 15);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 20);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET), 5);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET), 0);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 15);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 20);
 }
 
 static void warm_reset_keeps_retain_and_clears_the_rest(void)
 {
     start_with_counter(1);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 106);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 0);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 106);
 }
 
 static void cold_reset_clears_retain_too(void)
 {
     start_with_counter(1);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 100);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_COLD), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 0);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 100);
 }
 
 static void origin_reset_deletes_the_application_and_its_boot_project(void)
@@ -100,24 +100,24 @@ static void origin_reset_deletes_the_application_and_its_boot_project(void)
     APP_STATUS status;
 
     start_with_counter(1);
-    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
     AppGetStatus(&status);
-    CHECK(status.state == AS_NONE);
-    CHECK(status.op_state == 0);
-    CHECK(status.image_crc == 0);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_NONE);
-    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    CHECK_EQUAL(status.state, AS_NONE);
+    CHECK_EQUAL(status.op_state, 0);
+    CHECK_EQUAL(status.image_crc, 0);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_NONE);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
 }
 
 static void the_boot_project_runs_after_power_on(void)
 {
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(SimAdvance(ms(30)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 4);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(SimAdvance(ms(30)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 4);
 }
 
 static void a_second_download_replaces_the_first(void)
@@ -125,15 +125,15 @@ static void a_second_download_replaces_the_first(void)
     APP_BYTES second;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
     build_counter(&second, 7);
-    CHECK(download(&second) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 7);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 0);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 700);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 7);
+    CHECK_EQUAL(download(&second), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 7);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 0);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 700);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 7);
 }
 
 static void the_old_application_runs_on_while_a_new_one_arrives(void)
@@ -143,17 +143,17 @@ static void the_old_application_runs_on_while_a_new_one_arrives(void)
 
     start_with_counter(1);
     build_counter(&second, 7);
-    CHECK(AppDownloadBegin(second.size, image_crc(&second)) == ERR_OK);
-    CHECK(AppDownloadWrite(0, second.bytes, 100) == ERR_OK);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK_EQUAL(AppDownloadBegin(second.size, image_crc(&second)), ERR_OK);
+    CHECK_EQUAL(AppDownloadWrite(0, second.bytes, 100), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
     AppGetStatus(&status);
-    CHECK(status.state == AS_RUN);
+    CHECK_EQUAL(status.state, AS_RUN);
     CHECK((status.op_state & OS_DOWNLOAD) != 0);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 11);
-    CHECK(AppDownloadOffset() == 100);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 11);
+    CHECK_EQUAL(AppDownloadOffset(), 100);
     AppDownloadAbort();
-    CHECK(AppDownloadOffset() == 0);
-    CHECK(AppDownloadWrite(100, second.bytes + 100, 100) == ERR_INVALID_SEQUENCE);
+    CHECK_EQUAL(AppDownloadOffset(), 0);
+    CHECK_EQUAL(AppDownloadWrite(100, second.bytes + 100, 100), ERR_INVALID_SEQUENCE);
 }
 
 static void download_calls_out_of_order_are_refused(void)
@@ -163,17 +163,17 @@ static void download_calls_out_of_order_are_refused(void)
 
     start_with_counter(1);
     build_counter(&image, 2);
-    CHECK(AppDownloadEnd(&refusal) == ERR_INVALID_SEQUENCE);
+    CHECK_EQUAL(AppDownloadEnd(&refusal), ERR_INVALID_SEQUENCE);
     CHECK(refusal.text[0] != '\0');
-    CHECK(AppDownloadWrite(0, image.bytes, 8) == ERR_INVALID_SEQUENCE);
-    CHECK(AppDownloadBegin(1000000, 0) == ERR_NOMEMORY);
-    CHECK(AppDownloadBegin(image.size, image_crc(&image)) == ERR_OK);
-    CHECK(AppDownloadWrite(8, image.bytes, 8) == ERR_INVALID_SEQUENCE);
-    CHECK(AppDownloadWrite(0, image.bytes, image.size + 1) == ERR_OUT_OF_LIMITS);
-    CHECK(AppDownloadEnd(&refusal) == ERR_SIZE_MISMATCH);
-    CHECK(AppDownloadWrite(0, image.bytes, image.size) == ERR_OK);
-    CHECK(AppDownloadEnd(&refusal) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+    CHECK_EQUAL(AppDownloadWrite(0, image.bytes, 8), ERR_INVALID_SEQUENCE);
+    CHECK_EQUAL(AppDownloadBegin(1000000, 0), ERR_NOMEMORY);
+    CHECK_EQUAL(AppDownloadBegin(image.size, image_crc(&image)), ERR_OK);
+    CHECK_EQUAL(AppDownloadWrite(8, image.bytes, 8), ERR_INVALID_SEQUENCE);
+    CHECK_EQUAL(AppDownloadWrite(0, image.bytes, image.size + 1), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(AppDownloadEnd(&refusal), ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(AppDownloadWrite(0, image.bytes, image.size), ERR_OK);
+    CHECK_EQUAL(AppDownloadEnd(&refusal), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 2);
 }
 
 static void begin_again_starts_from_zero(void)
@@ -182,11 +182,11 @@ static void begin_again_starts_from_zero(void)
 
     start_with_counter(1);
     build_counter(&image, 2);
-    CHECK(AppDownloadBegin(image.size, image_crc(&image)) == ERR_OK);
-    CHECK(AppDownloadWrite(0, image.bytes, 300) == ERR_OK);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(AppDownloadBegin(image.size, image_crc(&image)), ERR_OK);
+    CHECK_EQUAL(AppDownloadWrite(0, image.bytes, 300), ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 2);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 /* The application before fails as well, when it comes back with the retain variables it had: both are known to fail
@@ -204,18 +204,18 @@ static void a_rollback_to_an_application_that_fails_too_is_written_down(void)
     emit_ret(&spec);
     emit_divide_by_zero(&spec);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
     spec_counter(&spec, 2);
     spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
     emit_divide_by_zero(&spec);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     for (i = 0; i < 3; i++) {
-        CHECK(SimStart() == ERR_OK);
-        CHECK(app_state() == AS_STOP);
-        CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-        CHECK((SimFlashOps() != 0) == (i == 0));
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_STOP);
+        CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+        CHECK_EQUAL((SimFlashOps() != 0), (i == 0));
     }
 }
 
@@ -232,7 +232,7 @@ static void an_application_without_timers_for_its_tasks_makes_room_for_the_old_o
     APP_SPEC spec;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5330)), ERR_OK);
     while (SysTimerCreate((SYS_TIMER_CALLBACK)never_called, NULL, 1000, 0, &timer) == ERR_OK)
         ;
     spec_counter(&spec, 2);
@@ -240,16 +240,16 @@ static void an_application_without_timers_for_its_tasks_makes_room_for_the_old_o
     spec.function[CDL_FUNCTION_GLOBAL_EXIT] = (RTS_I32)here(&spec); /* of what was never initialised: not called */
     emit_divide_by_zero(&spec);
     build_image(&image, &spec);
-    CHECK(download_part(&image, image.size, &refusal) == ERR_NOMEMORY);
+    CHECK_EQUAL(download_part(&image, image.size, &refusal), ERR_NOMEMORY);
     CHECK(strstr(refusal.text, "timers") != NULL);
     CHECK(!log_has("division by zero"));
-    CHECK(app_state() == AS_RUN);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 100 + 534 + 11);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 100 + 534 + 11);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
 }
 
 static void a_start_that_fails_leaves_no_outputs(void)
@@ -257,15 +257,15 @@ static void a_start_that_fails_leaves_no_outputs(void)
     RTS_HANDLE timer;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5)) == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5)), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
     for (timer = 0; SysTimerDelete(timer) == ERR_OK; timer++)
         ;
     CHECK(timer > 0);
     *AppGetAreaAddress(APP_AREA_OUTPUT, OUTPUT_OFFSET, 1) = 1; /* as if a task had run and the next failed to start */
     CHECK(AppStartApplication() != ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET) == 0);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(read_u32(APP_AREA_OUTPUT, OUTPUT_OFFSET), 0);
 }
 
 static void the_application_info_can_be_read(void)
@@ -276,7 +276,7 @@ static void the_application_info_can_be_read(void)
     CHECK(strcmp(AppGetInfo(2), "1.2.3") == 0);
     CHECK(strcmp(AppGetInfo(3), "Description") == 0);
     CHECK(strcmp(AppGetInfo(4), "Profile") == 0);
-    CHECK(AppGetInfo(5)[0] == '\0');
+    CHECK_EQUAL(AppGetInfo(5)[0], '\0');
 }
 
 static void info_longer_than_its_buffer_is_cut(void)
@@ -291,15 +291,15 @@ static void info_longer_than_its_buffer_is_cut(void)
     spec_counter(&spec, 1);
     spec.info[0] = text;
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(strlen(AppGetInfo(0)) == APP_NAME_SIZE - 1);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(strlen(AppGetInfo(0)), APP_NAME_SIZE - 1);
     CHECK(strcmp(AppGetInfo(1), "Author") == 0);
 }
 
 static void area_addresses_are_checked_to_the_byte(void)
 {
     start_with_counter(1);
-    CHECK(AppGetAreaSize(APP_AREA_RETAIN) == 16);
+    CHECK_EQUAL(AppGetAreaSize(APP_AREA_RETAIN), 16);
     CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 0, 16) != NULL);
     CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 16, 0) != NULL);
     CHECK(AppGetAreaAddress(APP_AREA_RETAIN, 0, 17) == NULL);
@@ -327,7 +327,7 @@ static void pointers_are_found_in_their_area_to_the_byte(void)
     CHECK(area == APP_AREA_CODE && offset == 4);
     CHECK(!AppFindArea(0, &area, &offset));
     CHECK(!AppFindArea(UINTPTR_MAX, &area, &offset));
-    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
     CHECK(!AppFindArea(retain, &area, &offset) && !AppFindArea(0, &area, &offset));
 }
 
@@ -354,12 +354,12 @@ static void start_stop_reset_and_download_are_announced(void)
     seen_count = 0;
     for (i = 0; i < RTS_COUNT(events); i++)
         CHECK(EventRegisterCallback(CMPID_CmpAppEmbedded, events[i], note_event, NULL) == ERR_OK);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK); /* runs already: nothing happens */
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
-    CHECK(seen_count == RTS_COUNT(expected));
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK); /* runs already: nothing happens */
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(seen_count, RTS_COUNT(expected));
     CHECK(memcmp(seen_events, expected, sizeof expected) == 0);
 }
 
@@ -378,15 +378,15 @@ static void start_with_exit(APP_BYTES *image)
     APP_SPEC spec;
 
     start_blank();
-    CHECK(CMRegisterExternal(exit_counter, 1) == ERR_OK);
+    CHECK_EQUAL(CMRegisterExternal(exit_counter, 1), ERR_OK);
     spec_counter(&spec, 1);
     add_import(&spec, "countexit", 1, 0x00010000);
     spec.function[CDL_FUNCTION_GLOBAL_EXIT] = (RTS_I32)here(&spec);
     emit_call(&spec, 0, 1);
     emit_ret(&spec);
     build_image(image, &spec);
-    CHECK(download(image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
+    CHECK_EQUAL(download(image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
     exits = 0;
 }
 
@@ -395,19 +395,19 @@ static void global_exit_runs_before_the_application_goes(void)
     APP_BYTES image;
 
     start_with_exit(&image);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(exits == 0);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
-    CHECK(exits == 1);
-    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
-    CHECK(exits == 2);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(exits == 3);
-    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
-    CHECK(exits == 4);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(exits, 0);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(exits, 1);
+    CHECK_EQUAL(AppReset(RESET_OPTION_COLD), ERR_OK);
+    CHECK_EQUAL(exits, 2);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(exits, 3);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    CHECK_EQUAL(exits, 4);
     start_with_exit(&image);
     SimStop();
-    CHECK(exits == 1);
+    CHECK_EQUAL(exits, 1);
 }
 
 static void global_exit_does_not_run_after_an_exception(void)
@@ -416,18 +416,18 @@ static void global_exit_does_not_run_after_an_exception(void)
 
     start_with_exit(&image);
     AppHandleException(0, RTSEXCPT_WATCHDOG, 0);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
-    CHECK(exits == 0);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(exits, 0);
 }
 
 static void reset_of_a_running_application_stops_it_first(void)
 {
     start_with_counter(1);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
     seen_count = 0;
     CHECK(EventRegisterCallback(CMPID_CmpAppEmbedded, EVT_StopDone, note_event, NULL) == ERR_OK);
-    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
-    CHECK(seen_count == 1);
+    CHECK_EQUAL(AppReset(RESET_OPTION_COLD), ERR_OK);
+    CHECK_EQUAL(seen_count, 1);
 }
 
 static void power_on_of_a_proven_application_writes_one_record(void)
@@ -435,16 +435,16 @@ static void power_on_of_a_proven_application_writes_one_record(void)
     RTS_UI32 operations;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     SimStop();
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
     operations = SimFlashOps();
     CHECK(operations <= (20 + 32 + 12 + APP_CRASH_TEXT_SIZE + 15) / 16 + 1); /* and marks it */
-    CHECK(SimFlashCalls(SIM_ERASE) == 0);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimFlashOps() == operations);
+    CHECK_EQUAL(SimFlashCalls(SIM_ERASE), 0);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimFlashOps(), operations);
 }
 
 int main(void)

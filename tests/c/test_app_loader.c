@@ -17,11 +17,11 @@ static void begin(void)
 {
     APP_BYTES first;
 
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     build_counter(&first, 1);
-    CHECK(download(&first) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
+    CHECK_EQUAL(download(&first), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
     spec_counter(&spec, 2);
 }
 
@@ -37,13 +37,13 @@ static void check_refused(RTS_RESULT result, const char *text)
 {
     RTS_UI32 before = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
 
-    CHECK(download_part(&image, image.size, &refusal) == result);
+    CHECK_EQUAL(download_part(&image, image.size, &refusal), result);
     if (strstr(refusal.text, text) == NULL)
         fprintf(stderr, "refused with: %s\n", refusal.text);
     CHECK(strstr(refusal.text, text) != NULL);
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
     CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) >= before + 10);
 }
 
@@ -61,8 +61,8 @@ static void check_header_refused(RTS_RESULT result, const char *text)
 
 static void check_accepted(void)
 {
-    CHECK(download_part(&image, image.size, &refusal) == ERR_OK);
-    CHECK(refusal.text[0] == '\0');
+    CHECK_EQUAL(download_part(&image, image.size, &refusal), ERR_OK);
+    CHECK_EQUAL(refusal.text[0], '\0');
 }
 
 /* ---- header ---- */
@@ -110,9 +110,9 @@ static void a_wrong_crc(void)
 static void another_image_than_announced(void)
 {
     begin_image();
-    CHECK(AppDownloadBegin(image.size, image_crc(&image) + 1) == ERR_OK);
-    CHECK(AppDownloadWrite(0, image.bytes, image.size) == ERR_OK);
-    CHECK(AppDownloadEnd(&refusal) == ERR_CRC_FAILED);
+    CHECK_EQUAL(AppDownloadBegin(image.size, image_crc(&image) + 1), ERR_OK);
+    CHECK_EQUAL(AppDownloadWrite(0, image.bytes, image.size), ERR_OK);
+    CHECK_EQUAL(AppDownloadEnd(&refusal), ERR_CRC_FAILED);
     CHECK(strstr(refusal.text, "not the announced one") != NULL);
 }
 
@@ -357,7 +357,7 @@ static void a_list_of_missing_functions_that_is_too_long_is_cut(void)
     for (i = 0; i < 40; i++)
         add_import(&spec, "function_that_does_not_exist", 1, 0x00010000);
     check_spec_refused(ERR_APP_UNRESOLVED_REFERENCE, "function_that_does_not_exist (missing), function");
-    CHECK(strlen(refusal.text) == APP_REFUSAL_SIZE - 1);
+    CHECK_EQUAL(strlen(refusal.text), APP_REFUSAL_SIZE - 1);
 }
 
 static void as_many_functions_as_the_device_can_link_but_not_one_more(void)
@@ -712,11 +712,11 @@ static void a_flash_that_cannot_be_mapped_is_read_instead(void)
     begin_image();
     check_accepted();
     CHECK(strcmp(AppGetInfo(3), "Description") == 0);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(20)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 6);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 6);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
     SimFlashSetMapped(1);
 }
 

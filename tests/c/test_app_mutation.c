@@ -17,22 +17,22 @@ static void begin(void)
 {
     APP_BYTES first;
 
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     build_counter(&first, 1);
-    CHECK(download(&first) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(download(&first), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
 }
 
 static void check_old_runs(void)
 {
     RTS_UI32 before = read_u32(APP_AREA_DATA, COUNTER_OFFSET);
 
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
-    CHECK(SimAdvance(ms(20)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == before + 2);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), before + 2);
 }
 
 static void check_refused(RTS_UI32 where)
@@ -51,7 +51,7 @@ static void every_truncation_is_refused(void)
     begin();
     for (bad = good, bad.size = 0; bad.size < good.size; bad.size++)
         check_refused(bad.size);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 /* As above, but the image says that it is as short as that, and its CRC is right: now the tables are what is cut. */
@@ -80,7 +80,7 @@ static void every_flipped_bit_is_refused(void)
         bad.bytes[bit / 8] ^= (RTS_UI8)(1 << bit % 8);
         check_refused(bit);
     }
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
     printf("     %u bits\n", (unsigned)bit);
 }
 
@@ -97,17 +97,17 @@ static void try_image(void)
         check_old_runs();
         return;
     }
-    CHECK(app_state() == AS_STOP);
+    CHECK_EQUAL(app_state(), AS_STOP);
     for (i = 0; i < 5; i++)
         CHECK(strlen(AppGetInfo(i)) < APP_NAME_SIZE);
     for (i = 0; i < IecTaskGetCount(); i++) {
         IEC_TASK_INFO info;
-        CHECK(IecTaskGetInfo(i, &info) == ERR_OK);
+        CHECK_EQUAL(IecTaskGetInfo(i, &info), ERR_OK);
         CHECK(memchr(info.name, '\0', sizeof info.name) != NULL);
     }
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
 }
 
 /* Bits of the entry offsets would change what runs in GlobalInit; those images are left out. */
@@ -126,7 +126,7 @@ static void every_flipped_bit_with_a_right_crc_is_survived(void)
     RTS_UI32 bit;
 
     begin();
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
     for (bit = 0; bit < good.size * 8; bit++) {
         bad = good;
         bad.bytes[bit / 8] ^= (RTS_UI8)(1 << bit % 8);
@@ -134,7 +134,7 @@ static void every_flipped_bit_with_a_right_crc_is_survived(void)
         if (!changes_code_that_runs(bit / 8))
             try_image();
     }
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static RTS_UI32 next_random(void)
@@ -151,7 +151,7 @@ static void random_changes_with_a_right_crc_are_survived(void)
     RTS_UI32 round;
 
     begin();
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
     for (round = 0; round < 20000; round++) {
         RTS_UI32 changes = next_random() % 4 + 1;
         bool runs = false;

@@ -21,13 +21,13 @@ static RTS_UI32 cuts;       /* that were tried in all */
 
 static void prepare(const GEOMETRY *g)
 {
-    CHECK(SimFlashConfigure(32 * 1024, g->sector_size, g->program_size, g->erased) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(download(&images[1]) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(6000)) == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(32 * 1024, g->sector_size, g->program_size, g->erased), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(download(&images[1]), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(6000)), ERR_OK);
     SimStop();
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
 }
 
 static RTS_RESULT story_result;
@@ -57,11 +57,11 @@ static RTS_UI32 count_operations(void)
 {
     RTS_UI32 before;
 
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     before = SimFlashOps();
     CHECK(SimCall(story, NULL) == ERR_OK);
-    CHECK(story_result == ERR_OK);
+    CHECK_EQUAL(story_result, ERR_OK);
     return SimFlashOps() - before;
 }
 
@@ -73,28 +73,28 @@ static RTS_UI32 check_whole(void)
     APP_STATUS status;
 
     AppGetStatus(&status);
-    CHECK(status.state == AS_RUN);
+    CHECK_EQUAL(status.state, AS_RUN);
     CHECK(step == 1 || step == 2);
     if (step != 1 && step != 2)
         return 0;
-    CHECK(status.image_crc == image_crc(&images[step]));
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET) == retain);
+    CHECK_EQUAL(status.image_crc, image_crc(&images[step]));
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET), retain);
     CHECK(retain >= 100 * step);
-    CHECK(retain % step == 0);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 11 * step);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == retain + 11 * step);
+    CHECK_EQUAL(retain % step, 0);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 11 * step);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), retain + 11 * step);
     return step;
 }
 
 static void check_can_be_flashed_again(void)
 {
-    CHECK(download(&images[3]) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 3);
+    CHECK_EQUAL(download(&images[3]), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 3);
 }
 
 /* Returns which application runs afterwards. */
@@ -104,14 +104,14 @@ static RTS_UI32 cut_once(RTS_UI32 operation, RTS_UI32 mode)
     int failures = test_failures;
 
     cuts++;
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     SimFlashCut(operation, mode);
     CHECK(SimCall(story, NULL) == SIM_POWER_CUT);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     step = check_whole();
     check_can_be_flashed_again();
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
     if (test_failures != failures)
         fprintf(stderr, "^ operation %u, mode %u: %s\n", (unsigned)operation, (unsigned)mode, SimFlashViolation());
     return step;
@@ -133,8 +133,8 @@ static void sweep(const GEOMETRY *g)
             changes += step != last;
             last = step;
         }
-        CHECK(changes == 1); /* one operation commits: before it the old, after it the new */
-        CHECK(last == 2);
+        CHECK_EQUAL(changes, 1); /* one operation commits: before it the old, after it the new */
+        CHECK_EQUAL(last, 2);
     }
     printf("     program size %2u, erased 0x%02X, sector %4u: %u operations\n", (unsigned)g->program_size, g->erased,
            (unsigned)g->sector_size, (unsigned)operations);
@@ -164,17 +164,17 @@ static void a_second_cut_during_recovery_changes_nothing(void)
     operations = count_operations();
     for (first = 1; first <= operations; first++) {
         for (second = 1; second <= 6; second++) {
-            CHECK(SimFlashRestore() == ERR_OK);
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             SimFlashCut(first, SIM_CUT_TORN);
             CHECK(SimCall(story, NULL) == SIM_POWER_CUT);
             if (SimStart() == ERR_OK) {
                 SimFlashCut(second, SIM_CUT_TORN);
                 (void)SimAdvance(ms(2000));
             }
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             (void)check_whole();
-            CHECK(SimFlashViolations() == 0);
+            CHECK_EQUAL(SimFlashViolations(), 0);
         }
     }
 }
@@ -190,17 +190,17 @@ static void fault_at_any_operation(const GEOMETRY *g)
     operations = count_operations();
     for (k = 1; k <= operations; k++) {
         RTS_RESULT result;
-        CHECK(SimFlashRestore() == ERR_OK);
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
         SimFlashCut(k, SIM_FAULT);
         CHECK(SimCall(story, NULL) == ERR_OK);
         result = story_result;
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == (result == ERR_OK ? 2 : 1));
-        CHECK(app_state() == AS_RUN);
-        CHECK(SimFlashViolations() == 0);
-        CHECK(SimStart() == ERR_OK);
-        CHECK(app_state() == AS_RUN);
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == (result == ERR_OK ? 2 : 1));
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), (result == ERR_OK ? 2 : 1));
+        CHECK_EQUAL(app_state(), AS_RUN);
+        CHECK_EQUAL(SimFlashViolations(), 0);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_RUN);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), (result == ERR_OK ? 2 : 1));
         check_can_be_flashed_again();
     }
 }
@@ -222,15 +222,15 @@ static void the_first_download_can_be_cut_anywhere(void)
 
     for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
         for (k = 1; k < 1000; k++) {
-            CHECK(SimFlashConfigure(32 * 1024, 512, 8, 0xFF) == ERR_OK);
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimFlashConfigure(32 * 1024, 512, 8, 0xFF), ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             SimFlashCut(k, mode);
             if (SimCall(story, NULL) == ERR_OK)
                 break;
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             CHECK(app_state() == AS_NONE || read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
             check_can_be_flashed_again();
-            CHECK(SimFlashViolations() == 0);
+            CHECK_EQUAL(SimFlashViolations(), 0);
         }
         CHECK(k > 20 && k < 1000);
     }
@@ -252,18 +252,18 @@ static void an_origin_reset_can_be_cut_anywhere(void)
     prepare(&g);
     for (mode = SIM_CUT_BEFORE; mode <= SIM_CUT_TORN; mode++) {
         for (k = 1; k < 100; k++) {
-            CHECK(SimFlashRestore() == ERR_OK);
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             SimFlashCut(k, mode);
             if (SimCall(origin_reset, NULL) == ERR_OK)
                 break;
-            CHECK(SimStart() == ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
             if (app_state() != AS_NONE)
-                CHECK(check_whole() == 1);
+                CHECK_EQUAL(check_whole(), 1);
         }
         CHECK(k > 1 && k < 100);
-        CHECK(SimStart() == ERR_OK);
-        CHECK(app_state() == AS_NONE);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_NONE);
     }
 }
 
@@ -274,23 +274,23 @@ static void cuts_go_on_for_ever(void)
     RTS_UI32 round;
 
     prepare(&g);
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     for (round = 0; round < 1500; round++) {
         RTS_UI32 next = round % 3 + 1;
         RTS_UI32 step;
         SimFlashCut(round * 7 % 41 + 1, round % 3);
         if (download(&images[next]) == ERR_OK && AppStartApplication() == ERR_OK)
             (void)SimAdvance(ms(4000 + round % 7 * 500));
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
         step = read_u32(APP_AREA_DATA, STEP_OFFSET);
         CHECK(step >= 1 && step <= 3);
-        CHECK(app_state() == AS_RUN);
-        CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET));
+        CHECK_EQUAL(app_state(), AS_RUN);
+        CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET));
         if (SimFlashViolations() != 0)
             break;
     }
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 int main(void)

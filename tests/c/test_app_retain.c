@@ -14,8 +14,8 @@ static APP_BYTES image;
 static void load(void)
 {
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
 }
 
 /* The counter, as `spec`, which a test may go on from. */
@@ -47,7 +47,7 @@ static RTS_UI32 retain_value(void)
 {
     RTS_UI32 a = read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET);
 
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET) == a);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET), a);
     return a;
 }
 
@@ -56,9 +56,9 @@ static void a_power_cut_loses_at_most_a_second(void)
     RTS_UI32 before;
 
     start_and_load(1);
-    CHECK(SimAdvance(ms(7350)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(7350)), ERR_OK);
     before = retain_value();
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(retain_value() <= before);
     CHECK(retain_value() >= before - 101);
     CHECK(retain_value() > 100);
@@ -67,19 +67,19 @@ static void a_power_cut_loses_at_most_a_second(void)
 static void stop_saves_at_once(void)
 {
     start_and_load(1);
-    CHECK(SimAdvance(ms(330)) == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(retain_value() == 134);
+    CHECK_EQUAL(SimAdvance(ms(330)), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 134);
 }
 
 static void shutdown_saves(void)
 {
     start_and_load(1);
-    CHECK(SimAdvance(ms(330)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(330)), ERR_OK);
     SimStop();
-    CHECK(SimStart() == ERR_OK);
-    CHECK(retain_value() == 134);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 134);
 }
 
 static void an_exception_saves(void)
@@ -88,12 +88,12 @@ static void an_exception_saves(void)
     spec_counter(&spec, 1);
     add_trip();
     load();
-    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5330)), ERR_OK);
     trip();
-    CHECK(SimAdvance(ms(9)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(9)), ERR_OK);
     CHECK(app_exception() != RTSEXCPT_NOEXCEPTION);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(retain_value() == 634);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 634);
 }
 
 static void unchanged_variables_are_not_saved_again(void)
@@ -104,11 +104,11 @@ static void unchanged_variables_are_not_saved_again(void)
     spec_counter(&spec, 1);
     spec.tasks[0].interval_us = 3600000000u; /* runs once at the start */
     load();
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     operations = SimFlashOps();
-    CHECK(SimAdvance(ms(3000000)) == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(SimFlashOps() == operations);
+    CHECK_EQUAL(SimAdvance(ms(3000000)), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(SimFlashOps(), operations);
 }
 
 static void changing_variables_are_saved_once_per_second(void)
@@ -116,9 +116,9 @@ static void changing_variables_are_saved_once_per_second(void)
     RTS_UI32 operations;
 
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     operations = SimFlashOps();
-    CHECK(SimAdvance(ms(10000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10000)), ERR_OK);
     CHECK(SimFlashOps() - operations >= 9 * 2);      /* a record is two to four programs */
     CHECK(SimFlashOps() - operations <= 10 * 4 + 8); /* and at most one change of the half */
 }
@@ -133,12 +133,12 @@ static void an_application_without_retain_variables_saves_nothing(void)
     add_task(&spec, "Main", KIND_CYCLIC, 1000, here(&spec));
     emit_ret(&spec);
     load();
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     operations = SimFlashOps();
-    CHECK(SimAdvance(ms(10000)) == ERR_OK);
-    CHECK(SimFlashOps() == operations);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
+    CHECK_EQUAL(SimAdvance(ms(10000)), ERR_OK);
+    CHECK_EQUAL(SimFlashOps(), operations);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
 }
 
 static void values_go_on_over_many_power_cuts(void)
@@ -147,45 +147,45 @@ static void values_go_on_over_many_power_cuts(void)
     int i;
 
     start_and_load(1);
-    CHECK(SimAdvance(ms(4100)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(4100)), ERR_OK);
     for (i = 0; i < 300; i++) {
         CHECK(retain_value() >= before);
         before = retain_value();
-        CHECK(SimAdvance(ms(1010)) == ERR_OK);
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(SimAdvance(ms(1010)), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
     }
     CHECK(before > 300 * 95);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void a_download_gives_initial_values(void)
 {
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     load();
-    CHECK(retain_value() == 100);
-    CHECK(SimStart() == ERR_OK); /* also when power is lost right after it */
-    CHECK(retain_value() == 100);
+    CHECK_EQUAL(retain_value(), 100);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* also when power is lost right after it */
+    CHECK_EQUAL(retain_value(), 100);
 }
 
 static void a_cold_reset_gives_initial_values_for_good(void)
 {
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(AppReset(RESET_OPTION_COLD) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(retain_value() == 100);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_COLD), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 100);
 }
 
 static void another_layout_is_not_restored(void)
 {
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     spec_counter(&spec, 2);
     spec.kept[1].variable.hash[1]++;
     load();
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(retain_value() > 1000);
     CHECK(!log_has("initial values"));
 }
@@ -204,20 +204,20 @@ static void values_of_the_application_before_are_not_taken_over(void)
     RTS_UI32 k;
 
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
     spec_counter(&spec, 2);
     build_image(&image, &spec);
     for (k = 1; k < 1000; k++) {
-        CHECK(SimFlashRestore() == ERR_OK);
-        CHECK(SimStart() == ERR_OK);
-        CHECK(SimAdvance(ms(330)) == ERR_OK);
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(SimAdvance(ms(330)), ERR_OK);
         SimFlashCut(k, SIM_CUT_AFTER);
         if (SimCall(download_image, NULL) == ERR_OK)
             break;
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
         if (read_u32(APP_AREA_DATA, STEP_OFFSET) == 2) {
-            CHECK(retain_value() == 200);
+            CHECK_EQUAL(retain_value(), 200);
             taken_over++;
         }
     }
@@ -231,22 +231,22 @@ static void a_rollback_brings_back_the_values_of_its_application(void)
     int i;
 
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(retain_value() == 601);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 601);
     spec_counter(&spec, 2);
     add_trip();
     load();
-    CHECK(SimAdvance(ms(2500)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(2500)), ERR_OK);
     trip();
-    CHECK(SimAdvance(ms(10)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
     for (i = 0; i < 3; i++) {
-        CHECK(SimStart() == ERR_OK);
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
-        CHECK(retain_value() == 601);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+        CHECK_EQUAL(retain_value(), 601);
     }
-    CHECK(SimAdvance(ms(2000)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(2000)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(retain_value() > 700);
 }
 
@@ -255,17 +255,17 @@ static void a_rollback_brings_back_the_values_of_its_application(void)
 static void a_rollback_brings_back_the_last_values_of_an_application_that_ran(void)
 {
     start_and_load(1);
-    CHECK(SimAdvance(ms(5330)) == ERR_OK);
-    CHECK(retain_value() == 634);
+    CHECK_EQUAL(SimAdvance(ms(5330)), ERR_OK);
+    CHECK_EQUAL(retain_value(), 634);
     spec_counter(&spec, 2);
     spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
     emit_divide_by_zero(&spec);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
-    CHECK(retain_value() == 634);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+    CHECK_EQUAL(retain_value(), 634);
 }
 
 static void start_up(void *unused)
@@ -281,34 +281,34 @@ static void a_rollback_brings_back_large_values_too(void)
     RTS_UI32 k;
     int i;
 
-    CHECK(SimFlashConfigure(1024 * 1024, 4096, 16, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(1024 * 1024, 4096, 16, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     spec_counter(&spec, 1);
     spec.areas[APP_AREA_RETAIN] = APP_RETAIN_SIZE;
     load();
-    CHECK(SimAdvance(ms(5330)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5330)), ERR_OK);
     spec_counter(&spec, 2);
     spec.areas[APP_AREA_RETAIN] = APP_RETAIN_SIZE;
     add_trip();
     load();
-    CHECK(SimAdvance(ms(2500)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(2500)), ERR_OK);
     trip();
-    CHECK(SimAdvance(ms(10)) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
     for (k = 1; k < 10000; k += k < 40 ? 1 : 97) {
-        CHECK(SimFlashRestore() == ERR_OK);
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
         SimFlashCut(k, SIM_CUT_AFTER);
         if (SimCall(start_up, NULL) == ERR_OK)
             break;
         for (i = 0; i < 2; i++) {
-            CHECK(SimStart() == ERR_OK);
-            CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
-            CHECK(retain_value() == 634);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+            CHECK_EQUAL(retain_value(), 634);
         }
     }
     CHECK(k > 40 && k < 10000);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 /* The retain log is gone, the commit record is not: saving starts again and works. */
@@ -317,14 +317,14 @@ static void a_lost_log_costs_its_values_only(void)
     const FILE_AREA *area = SysFileGetArea(FILE_RETAIN);
 
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     load(); /* the records of this download are numbered from six or so */
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     memset(SimFlashData() + area->offset, 0x55, area->size);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(retain_value() == 100);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 100);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(retain_value() > 500);
 }
 
@@ -334,19 +334,19 @@ static void damaged_values_give_way_to_initial_ones(void)
     RTS_UI32 i;
 
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     for (i = 0; i < area->size; i += 4) {
         RTS_UI32 word;
         memcpy(&word, SimFlashData() + area->offset + i, sizeof word);
         if (word == RECORD_MAGIC)
             SimFlashData()[area->offset + i + 16] ^= 1; /* the CRC of the record */
     }
-    CHECK(SimStart() == ERR_OK);
-    CHECK(retain_value() == 100);
-    CHECK(SimAdvance(ms(2000)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(retain_value(), 100);
+    CHECK_EQUAL(SimAdvance(ms(2000)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(retain_value() > 200);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 /* ---- PERSISTENT ---- */
@@ -361,8 +361,8 @@ static void prepare_take_over(void)
     spec_counter(&spec, 1);
     spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
     load();
-    CHECK(SimAdvance(ms(5330)) == ERR_OK);
-    CHECK(retain_value() == 634);
+    CHECK_EQUAL(SimAdvance(ms(5330)), ERR_OK);
+    CHECK_EQUAL(retain_value(), 634);
     spec_counter(&spec, 2);
     spec.kept_count = 0;
     add_kept(&spec, 'A', MOVED_OFFSET, CDL_KEPT_PERSISTENT);
@@ -388,10 +388,10 @@ static void a_download_keeps_persistent_values_wherever_they_lie_then(void)
 {
     prepare_take_over();
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     CHECK(moved() == 634 && plain() == 200);
     CHECK(log_has("1 taken over, 0 dropped"));
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(is_application(2) && moved() == 634 && plain() == 200);
 }
 
@@ -400,10 +400,10 @@ static void what_a_download_drops_is_counted(void)
     prepare_take_over();
     spec.kept[0].variable.hash[1]++; /* another type */
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     CHECK(moved() == 200 && plain() == 200);
     CHECK(log_has("0 taken over, 1 dropped"));
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(is_application(2));
     CHECK(!log_has("dropped")); /* it has values of its own now */
 }
@@ -425,16 +425,16 @@ static void a_take_over_survives_every_power_cut(void)
 
     prepare_take_over();
     build_image(&image, &spec);
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
     for (k = 1; k < 1000; k++) {
-        CHECK(SimFlashRestore() == ERR_OK);
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
         SimFlashCut(k, k % 2 != 0 ? SIM_CUT_AFTER : SIM_CUT_TORN);
         if (SimCall(download_and_run, NULL) == ERR_OK)
             break;
         SimFlashCut(k % 7 + 1, SIM_CUT_AFTER);
         (void)SimCall(start_up, NULL);
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
         if (is_application(1)) {
             CHECK(retain_value() >= 534);
         } else {
@@ -445,7 +445,7 @@ static void a_take_over_survives_every_power_cut(void)
         }
     }
     CHECK(k < 1000 && taken_over > 3);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 /* Application 2 dies in its initialisation; application 3 takes its slot's place and finds the value all the same. */
@@ -455,12 +455,12 @@ static void a_program_that_fails_at_once_hands_values_on(void)
     spec.function[CDL_FUNCTION_GLOBAL_INIT] = (RTS_I32)here(&spec);
     emit_divide_by_zero(&spec);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
     spec_counter(&spec, 3);
     spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     CHECK(is_application(3));
     CHECK(plain() == 634 && moved() == 300);
 }
@@ -471,23 +471,23 @@ static void a_value_that_was_dropped_does_not_come_back(void)
     prepare_take_over();
     spec.kept_count = 0;
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
     CHECK(log_has("0 taken over, 1 dropped"));
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     spec_counter(&spec, 1);
     spec.kept[0].variable.place |= CDL_KEPT_PERSISTENT;
     load();
-    CHECK(retain_value() == 100);
+    CHECK_EQUAL(retain_value(), 100);
 }
 
 static void origin_ends_persistent_values_too(void)
 {
     prepare_take_over();
-    CHECK(AppReset(RESET_OPTION_ORIGIN) == ERR_OK);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(moved() == 200);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(moved(), 200);
 }
 
 /* Elements by their index, a text that has more room: in a table of runs. */
@@ -507,7 +507,7 @@ static void runs_are_taken_over_by_index(void)
     add_kept_run(&spec, 'E', 16, CDL_KEPT_PERSISTENT, old_array);
     add_kept_run(&spec, 'F', 24, CDL_KEPT_PERSISTENT, old_text);
     load();
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
     area = AppGetAreaAddress(APP_AREA_RETAIN, 0, 32);
     memcpy(area + 16, values, sizeof values);
     spec.kept_count = 0;
@@ -518,7 +518,7 @@ static void runs_are_taken_over_by_index(void)
     emit_set(&spec, APP_AREA_RETAIN, 20, 0xEEEEEEEE);
     emit_ret(&spec);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     CHECK(memcmp(AppGetAreaAddress(APP_AREA_RETAIN, 16, sizeof expected), expected, sizeof expected) == 0);
 }
 
@@ -528,24 +528,24 @@ static void what_is_not_in_the_table_is_not_kept(void)
     spec_counter(&spec, 1);
     spec.kept_count = 1;
     load();
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET) == 601);
-    CHECK(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET) == 100);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_A_OFFSET), 601);
+    CHECK_EQUAL(read_u32(APP_AREA_RETAIN, RETAIN_B_OFFSET), 100);
 }
 
 static void a_flash_fault_does_not_stop_the_application(void)
 {
     start_and_load(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     SimFlashCut(1, SIM_FAULT);
-    CHECK(SimAdvance(ms(10000)) == ERR_OK);
-    CHECK(app_state() == AS_RUN);
+    CHECK_EQUAL(SimAdvance(ms(10000)), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
     CHECK(log_has("cannot be saved"));
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(retain_value() > 1300); /* and it was saved again afterwards */
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void a_large_retain_area_is_saved_whole(void)
@@ -555,8 +555,8 @@ static void a_large_retain_area_is_saved_whole(void)
     RTS_UI8 *area;
     RTS_UI32 i;
 
-    CHECK(SimFlashConfigure(1024 * 1024, 4096, 16, 0) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(1024 * 1024, 4096, 16, 0), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     spec_counter(&spec, 1);
     spec.areas[APP_AREA_RETAIN] = size;
     add_kept_run(&spec, 'C', 16, 0, rest);
@@ -564,13 +564,13 @@ static void a_large_retain_area_is_saved_whole(void)
     area = AppGetAreaAddress(APP_AREA_RETAIN, 0, size);
     for (i = 16; i < size; i++)
         area[i] = (RTS_UI8)(i * 7 >> 3);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     area = AppGetAreaAddress(APP_AREA_RETAIN, 0, size);
     for (i = 16; i < size && area[i] == (RTS_UI8)(i * 7 >> 3); i++)
         ;
-    CHECK(i == size);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(i, size);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 int main(void)

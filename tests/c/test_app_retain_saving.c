@@ -116,8 +116,8 @@ static void begin(RTS_UI32 ms)
 
     now_ns = 0;
     moment = false;
-    CHECK(CmpRetain_Hook(CH_INIT) == ERR_OK);
-    CHECK(CmpRetain_Hook(CH_INIT2) == ERR_OK);
+    CHECK_EQUAL(CmpRetain_Hook(CH_INIT), ERR_OK);
+    CHECK_EQUAL(CmpRetain_Hook(CH_INIT2), ERR_OK);
     RetainAttach(area, &table, 1);
     RetainSettle(false);
     saves = 0;
@@ -127,7 +127,7 @@ static void begin(RTS_UI32 ms)
 
 static void pass(void)
 {
-    CHECK(CmpRetain_Hook(CH_COMM_CYCLE) == ERR_OK);
+    CHECK_EQUAL(CmpRetain_Hook(CH_COMM_CYCLE), ERR_OK);
 }
 
 static void a_copy_is_asked_for_until_it_is_there_and_saved_once(void)
@@ -151,10 +151,10 @@ static void what_did_not_change_is_not_asked_for(void)
     area[0]++;
     now_ns += 999999999;
     pass();
-    CHECK(asked == 0);
+    CHECK_EQUAL(asked, 0);
     now_ns++;
     pass();
-    CHECK(asked == 1);
+    CHECK_EQUAL(asked, 1);
 }
 
 /* What the tasks copied meanwhile is not what is saved. */
@@ -165,7 +165,7 @@ static void a_stop_while_a_copy_is_asked_for_saves_what_is_there(void)
     pass();
     memset(saved_area, 0xEE, AREA_SIZE);
     area[0]++;
-    CHECK(RetainSave(false) == ERR_OK);
+    CHECK_EQUAL(RetainSave(false), ERR_OK);
     CHECK(saves == 1 && memcmp(written, area, AREA_SIZE) == 0);
     now_ns += 1000000000;
     pass();
@@ -180,13 +180,13 @@ static void nothing_is_saved_before_the_initialisation_is_over(void)
     RetainAttach(area, &table, 1);
     now_ns += 5000000000;
     pass();
-    CHECK(RetainSave(false) == ERR_OK);
+    CHECK_EQUAL(RetainSave(false), ERR_OK);
     RetainSettle(true); /* it failed */
     pass();
-    CHECK(RetainSave(true) == ERR_OK);
+    CHECK_EQUAL(RetainSave(true), ERR_OK);
     CHECK(asked == 0 && saves == 0);
     RetainSettle(false);
-    CHECK(saves == 1);
+    CHECK_EQUAL(saves, 1);
 }
 
 int main(void)

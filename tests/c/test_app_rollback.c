@@ -22,20 +22,20 @@ static void an_application_that_dies_before_it_proved_itself_is_rolled_back(void
     APP_BYTES image;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     build_dying(&image);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(10)) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
     CHECK(log_has("Back to the application before"));
     CHECK(log_has("division by zero at code offset 0x")); /* and why */
-    CHECK(SimStart() == ERR_OK);                          /* and it stays so */
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);                      /* and it stays so */
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
     CHECK(!log_has("Back to"));
     CHECK(!log_has("division by zero"));
 }
@@ -46,25 +46,25 @@ static void a_download_after_a_death_leaves_the_last_good_application(void)
     APP_BYTES third;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     build_dying(&image);
     build_counter(&third, 3);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(10)) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(AppDownloadBegin(third.size, image_crc(&third)) == ERR_OK);
-    CHECK(AppDownloadWrite(0, third.bytes, third.size / 2) == ERR_OK);
-    CHECK(SimStart() == ERR_OK); /* the download is cut */
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
-    CHECK(download(&third) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 3);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(AppDownloadBegin(third.size, image_crc(&third)), ERR_OK);
+    CHECK_EQUAL(AppDownloadWrite(0, third.bytes, third.size / 2), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* the download is cut */
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+    CHECK_EQUAL(download(&third), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 3);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 /* Ten times within the time of its proof; then it proves itself. */
@@ -74,15 +74,15 @@ static void losing_power_is_not_dying(void)
     int i;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     build_counter(&image, 2);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
     for (i = 0; i < 10; i++) {
-        CHECK(SimAdvance(ms(2900)) == ERR_OK);
-        CHECK(SimStart() == ERR_OK);
-        CHECK(app_state() == AS_RUN);
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+        CHECK_EQUAL(SimAdvance(ms(2900)), ERR_OK);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_RUN);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 2);
     }
 }
 
@@ -92,8 +92,8 @@ static void a_first_application_may_lose_power_as_often_as_it_likes(void)
 
     start_with_counter(1);
     for (i = 0; i < 300; i++) { /* numbers of starts wrapped at 256 */
-        CHECK(SimStart() == ERR_OK);
-        CHECK(app_state() == AS_RUN);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_RUN);
     }
 }
 
@@ -103,15 +103,15 @@ static void an_application_that_ran_long_enough_is_not_rolled_back(void)
     int i;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     build_counter(&image, 2);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(4100)) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(4100)), ERR_OK);
     for (i = 0; i < 5; i++) {
-        CHECK(SimStart() == ERR_OK);
-        CHECK(app_state() == AS_RUN);
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(app_state(), AS_RUN);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 2);
     }
 }
 
@@ -121,16 +121,16 @@ static void stopping_in_good_order_is_not_dying(void)
     int i;
 
     start_with_counter(1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     build_counter(&image, 2);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     for (i = 0; i < 5; i++) {
-        CHECK(AppStartApplication() == ERR_OK);
-        CHECK(SimAdvance(ms(100)) == ERR_OK);
-        CHECK(AppStopApplication() == ERR_OK);
+        CHECK_EQUAL(AppStartApplication(), ERR_OK);
+        CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+        CHECK_EQUAL(AppStopApplication(), ERR_OK);
         SimStop();
-        CHECK(SimStart() == ERR_OK);
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
+        CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 2);
     }
 }
 
@@ -140,20 +140,20 @@ static void a_first_application_that_died_stays_loaded_but_stopped(void)
 
     start_blank();
     build_dying(&image);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO); /* it still says why */
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO); /* it still says why */
     CHECK(log_has("not started: it failed before"));
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(AppStartApplication() == ERR_OK); /* by hand it starts */
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 9);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK); /* by hand it starts */
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 9);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
 }
 
 static void a_proven_application_that_had_an_exception_starts_again(void)
@@ -169,14 +169,14 @@ static void a_proven_application_that_had_an_exception_starts_again(void)
     task->event_offset = 32;
     emit_divide_by_zero(&spec);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(4100)) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(4100)), ERR_OK);
     *AppGetAreaAddress(APP_AREA_DATA, 32, 1) = 1;
-    CHECK(SimAdvance(ms(20)) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_DIVIDEBYZERO);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
 }
 
 static void a_damaged_boot_project_gives_way_to_the_other_slot(void)
@@ -186,15 +186,15 @@ static void a_damaged_boot_project_gives_way_to_the_other_slot(void)
 
     start_with_counter(1);
     build_counter(&first, 1);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     build_counter(&second, 2);
-    CHECK(download(&second) == ERR_OK); /* slot B */
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(5000)) == ERR_OK);
+    CHECK_EQUAL(download(&second), ERR_OK); /* slot B */
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(5000)), ERR_OK);
     SimFlashData()[SysFileGetArea(FILE_SLOT_B)->offset + 200] ^= 1;
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
     CHECK(log_has("Boot project refused: The image is damaged"));
 }
 
@@ -202,10 +202,10 @@ static void a_device_without_any_good_image_still_starts(void)
 {
     start_with_counter(1);
     SimFlashData()[200] ^= 1;
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_NONE);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_NONE);
     start_with_counter(1);
-    CHECK(app_state() == AS_RUN);
+    CHECK_EQUAL(app_state(), AS_RUN);
 }
 
 static void many_downloads_wrap_the_commit_log(void)
@@ -216,26 +216,26 @@ static void many_downloads_wrap_the_commit_log(void)
     start_blank();
     for (i = 1; i <= 200; i++) {
         build_counter(&image, i);
-        CHECK(download(&image) == ERR_OK);
-        CHECK(AppStartApplication() == ERR_OK);
-        CHECK(SimAdvance(ms(4100)) == ERR_OK);
+        CHECK_EQUAL(download(&image), ERR_OK);
+        CHECK_EQUAL(AppStartApplication(), ERR_OK);
+        CHECK_EQUAL(SimAdvance(ms(4100)), ERR_OK);
         if (i % 7 == 0)
-            CHECK(SimStart() == ERR_OK);
-        CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == i);
-        CHECK(app_state() == AS_RUN);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), i);
+        CHECK_EQUAL(app_state(), AS_RUN);
     }
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void shutdown_is_orderly_and_can_be_repeated(void)
 {
     start_with_counter(1);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
     SimStop();
     SimStop();
-    CHECK(SimAdvance(1) == ERR_NOTINITIALIZED);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(app_state() == AS_RUN);
+    CHECK_EQUAL(SimAdvance(1), ERR_NOTINITIALIZED);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
 }
 
 int main(void)

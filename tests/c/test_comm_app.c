@@ -66,12 +66,12 @@ static void login_gives_a_session_and_the_image_crc_as_guids(void)
     BTagWriteText(begin_content(), TAG_APP_LOGIN_NAME, "Application", 20);
     CHECK(call(SRV_APP_LOGIN));
     CHECK(take_login_reply(&option));
-    CHECK(BytesGet16(option.data) == ERR_OK);
+    CHECK_EQUAL(BytesGet16(option.data), ERR_OK);
     CHECK(SrvIsAppSession(ChannelGetClient(0), BytesGet32(option.data + 2)));
-    CHECK(BytesGet32(option.data + 6) == FAKE_IMAGE_CRC);
-    CHECK(BytesGet32(option.data + 22) == FAKE_IMAGE_CRC);
+    CHECK_EQUAL(BytesGet32(option.data + 6), FAKE_IMAGE_CRC);
+    CHECK_EQUAL(BytesGet32(option.data + 22), FAKE_IMAGE_CRC);
     CHECK(memcmp(option.data + 10, "\0\0\0\0\0\0\0\0\0\0\0\0", 12) == 0);
-    CHECK(((option.data - (reply.message + 20)) & 3) == 2);
+    CHECK_EQUAL(((option.data - (reply.message + 20)) & 3), 2);
 }
 
 static void login_without_application_says_so(void)
@@ -86,9 +86,9 @@ static void login_without_application_says_so(void)
     BTagWriteText(begin_content(), TAG_APP_LOGIN_NAME, "Application", 20);
     CHECK(call(SRV_APP_LOGIN));
     CHECK(take_login_reply(&option));
-    CHECK(BytesGet16(option.data) == ERR_APP_NOT_EXIST);
-    CHECK(BytesGet32(option.data + 2) == 0);
-    CHECK(BytesGet32(option.data + 6) == 0);
+    CHECK_EQUAL(BytesGet16(option.data), ERR_APP_NOT_EXIST);
+    CHECK_EQUAL(BytesGet32(option.data + 2), 0);
+    CHECK_EQUAL(BytesGet32(option.data + 6), 0);
 }
 
 static void names_are_bounded(void)
@@ -98,13 +98,13 @@ static void names_are_bounded(void)
     setup();
     BTagWriteText(begin_content(), TAG_APP_LOGIN_NAME, name, 59);
     CHECK(call(SRV_APP_LOGIN));
-    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
     BTagWriteText(begin_content(), TAG_APP_LOGIN_NAME, name, 63);
     CHECK(call(SRV_APP_LOGIN));
-    CHECK(reply_error(&reply) == ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(reply_error(&reply), ERR_SIZE_MISMATCH);
     begin_content();
     CHECK(call(SRV_APP_LOGIN));
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
 }
 
 static void captured_create_request_gives_a_session(void)
@@ -119,7 +119,7 @@ static void captured_create_request_gives_a_session(void)
     CHECK(client_open(&client) && client_login(&client));
     CHECK(client_request(&client, SG_APPLICATION, SRV_APP_CREATE, request, sizeof(request), &reply));
     CHECK(take_login_reply(&option));
-    CHECK(BytesGet16(option.data) == ERR_OK);
+    CHECK_EQUAL(BytesGet16(option.data), ERR_OK);
     CHECK(BytesGet32(option.data + 2) != 0);
 }
 
@@ -128,10 +128,10 @@ static void create_without_a_name_is_an_error(void)
     setup();
     put_descriptor(1, NULL);
     CHECK(call(SRV_APP_CREATE));
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
     begin_content();
     CHECK(call(SRV_APP_CREATE));
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
 }
 
 static void logout_ends_the_application_session_only(void)
@@ -139,13 +139,13 @@ static void logout_ends_the_application_session_only(void)
     setup();
     BTagWrite32(begin_content(), TAG_APP_LOGOUT, client.app_session ^ 2);
     CHECK(call(SRV_APP_LOGOUT));
-    CHECK(reply_number(&reply, TAG_APP_LOGOUT) == ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(reply_number(&reply, TAG_APP_LOGOUT), ERR_APP_INVALID_SESSIONID);
     BTagWrite32(begin_content(), TAG_APP_LOGOUT, client.app_session);
     CHECK(call(SRV_APP_LOGOUT));
-    CHECK(reply_number(&reply, TAG_APP_LOGOUT) == ERR_OK);
+    CHECK_EQUAL(reply_number(&reply, TAG_APP_LOGOUT), ERR_OK);
     put_descriptor(client.app_session, NULL);
     CHECK(call(SRV_APP_START));
-    CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_APP_INVALID_SESSIONID);
     CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
@@ -156,11 +156,11 @@ static void start_and_stop_reach_the_application(void)
     setup();
     put_descriptor(client.app_session, NULL);
     CHECK(call(SRV_APP_START));
-    CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_OK);
-    CHECK(fakes.starts == 1);
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_OK);
+    CHECK_EQUAL(fakes.starts, 1);
     put_descriptor(client.app_session, NULL);
     CHECK(call(SRV_APP_STOP));
-    CHECK(fakes.stops == 1);
+    CHECK_EQUAL(fakes.stops, 1);
 }
 
 static void refusal_of_the_application_is_the_result(void)
@@ -169,8 +169,8 @@ static void refusal_of_the_application_is_the_result(void)
     fakes.control_result = ERR_INVALID_STATE;
     put_descriptor(client.app_session, NULL);
     CHECK(call(SRV_APP_START));
-    CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_INVALID_STATE);
-    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_INVALID_STATE);
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
 }
 
 static void wrong_application_session_changes_nothing(void)
@@ -180,14 +180,14 @@ static void wrong_application_session_changes_nothing(void)
     setup();
     put_descriptor(client.app_session ^ 2, NULL);
     CHECK(call(SRV_APP_START));
-    CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_APP_INVALID_SESSIONID);
     put_descriptor(0, &option);
     CHECK(call(SRV_APP_RESET));
-    CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_APP_INVALID_SESSIONID);
     begin_content();
     CHECK(call(SRV_APP_STOP));
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
-    CHECK(fakes.starts + fakes.stops + fakes.resets == 0);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(fakes.starts + fakes.stops + fakes.resets, 0);
 }
 
 static void reset_passes_its_option(void)
@@ -196,17 +196,17 @@ static void reset_passes_its_option(void)
     for (RTS_UI32 option = 0; option <= 2; option++) {
         put_descriptor(client.app_session, &option);
         CHECK(call(SRV_APP_RESET));
-        CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_OK);
-        CHECK(fakes.reset_option == option);
+        CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_OK);
+        CHECK_EQUAL(fakes.reset_option, option);
     }
     RTS_UI32 unknown = 3;
     put_descriptor(client.app_session, &unknown);
     CHECK(call(SRV_APP_RESET));
-    CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_NOT_SUPPORTED);
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_NOT_SUPPORTED);
     put_descriptor(client.app_session, NULL);
     CHECK(call(SRV_APP_RESET));
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
-    CHECK(fakes.resets == 3);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(fakes.resets, 3);
 }
 
 /* ---- what is there ---- */
@@ -226,14 +226,14 @@ static void status_needs_no_login_and_tells_state_and_image(void)
     client_init(&client, 1);
     CHECK(client_open(&client));
     CHECK(take_status(&status));
-    CHECK(BTagFind(&status, TAG_APP_STATE, 10, 10, &tag) == ERR_OK);
-    CHECK(((tag.data - (reply.message + 20)) & 3) == 2);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_STATE, 10, 10, &tag), ERR_OK);
+    CHECK_EQUAL(((tag.data - (reply.message + 20)) & 3), 2);
     CHECK(memcmp(tag.data, "\0\0\x02\0\0\0\x01\x10\0\0", 10) == 0);
-    CHECK(BTagFind(&status, TAG_APP_IMAGE, 8, 8, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_IMAGE, 8, 8, &tag), ERR_OK);
     CHECK(BytesGet32(tag.data) == FAKE_IMAGE_CRC && BytesGet32(tag.data + 4) == 3000);
-    CHECK(BTagFind(&status, TAG_APP_EXECUTION_POSITION, 0, 99, &tag) == ERR_L7_TAG_MISSING);
-    CHECK(BTagFind(&status, TAG_APP_LAST_EXCEPTION, 12, 12, &tag) == ERR_OK);
-    CHECK(BytesGet32(tag.data) == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_EXECUTION_POSITION, 0, 99, &tag), ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_LAST_EXCEPTION, 12, 12, &tag), ERR_OK);
+    CHECK_EQUAL(BytesGet32(tag.data), RTSEXCPT_NOEXCEPTION);
 }
 
 static void status_tells_where_the_exception_was(void)
@@ -246,13 +246,13 @@ static void status_tells_where_the_exception_was(void)
     fakes.status.exception.code_offset = 0x1234;
     fakes.status.exception.task = -1;
     CHECK(take_status(&status));
-    CHECK(BTagFind(&status, TAG_APP_EXECUTION_POSITION, 6, 6, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_EXECUTION_POSITION, 6, 6, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\x05\0\x34\x12\0\0", 6) == 0);
-    CHECK(BTagFind(&status, TAG_APP_LAST_EXCEPTION, 12, 12, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_LAST_EXCEPTION, 12, 12, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\x02\x01\0\0\x34\x12\0\0\xFF\xFF\xFF\xFF", 12) == 0);
     fakes.status.exception.code_offset = 0xFFFFFFFF;
     CHECK(take_status(&status));
-    CHECK(BTagFind(&status, TAG_APP_EXECUTION_POSITION, 0, 99, &tag) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_EXECUTION_POSITION, 0, 99, &tag), ERR_L7_TAG_MISSING);
 }
 
 static void status_tells_what_the_stack_had_when_there_is_an_exception(void)
@@ -263,10 +263,10 @@ static void status_tells_what_the_stack_had_when_there_is_an_exception(void)
     setup();
     fakes.trace = (EXCEPT_TRACE){.count = 2, .call = {{0x1234, EXCEPT_LINK}, {0x5678, 12}}};
     CHECK(take_status(&status));
-    CHECK(BTagFind(&status, TAG_APP_CALLS, 0, 99, &tag) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_CALLS, 0, 99, &tag), ERR_L7_TAG_MISSING);
     fakes.status.exception.code = RTSEXCPT_DIVIDEBYZERO;
     CHECK(take_status(&status));
-    CHECK(BTagFind(&status, TAG_APP_CALLS, 16, 16, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_CALLS, 16, 16, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\x34\x12\0\0\xFF\xFF\xFF\0\x78\x56\0\0\x0C\0\0\0", 16) == 0);
 }
 
@@ -278,11 +278,11 @@ static void status_fits_the_smallest_message_with_the_calls_it_has_room_for(void
     fakes_start();
     client_init(&client, 1);
     client_send_open(&client, 1, CHANNEL_MIN_MESSAGE);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     fakes.status.exception = (APP_EXCEPTION){RTSEXCPT_DIVIDEBYZERO, 0x1234, 0};
     fakes.trace.count = EXCEPT_MAX_CALLS;
     CHECK(take_status(&status));
-    CHECK(BTagFind(&status, TAG_APP_IMAGE, 8, 8, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_IMAGE, 8, 8, &tag), ERR_OK);
     CHECK(BTagFind(&status, TAG_APP_CALLS, 8, 8 * EXCEPT_MAX_CALLS - 1, &tag) == ERR_OK && tag.size % 8 == 0);
 }
 
@@ -335,7 +335,7 @@ static void info_reports_the_strings_of_the_image(void)
     fakes.status.state = AS_NONE;
     begin_content();
     CHECK(call(SRV_APP_READ_APPLICATION_INFO));
-    CHECK(reply_error(&reply) == ERR_APP_NOT_LOADED);
+    CHECK_EQUAL(reply_error(&reply), ERR_APP_NOT_LOADED);
 }
 
 static void tasks_are_reported_with_their_times(void)
@@ -346,7 +346,7 @@ static void tasks_are_reported_with_their_times(void)
     setup();
     begin_content();
     CHECK(call(SRV_APP_READ_TASK_INFO));
-    CHECK(reply.size == 20);
+    CHECK_EQUAL(reply.size, 20);
     fakes.task_count = 2;
     memset(fakes.tasks[1].name, 'x', sizeof(fakes.tasks[1].name)); /* without NUL */
     strcpy(fakes.tasks[0].name, "Main");
@@ -356,13 +356,13 @@ static void tasks_are_reported_with_their_times(void)
     begin_content();
     CHECK(call(SRV_APP_READ_TASK_INFO));
     list = reply.tags;
-    CHECK(BTagReadNext(&list, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_OK);
     CHECK(tag.id == TAG_TASK_INFO && tag.size == 48);
     CHECK(BytesGet32(tag.data) == 0x100 && BytesGet32(tag.data + 8) == 0x102 && BytesGet32(tag.data + 36) == 0x109);
     CHECK(strcmp((const char *)tag.data + 40, "Main") == 0);
-    CHECK(BTagReadNext(&list, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_OK);
     CHECK(tag.size == 72 && strlen((const char *)tag.data + 40) == 31);
-    CHECK(BTagReadNext(&list, &tag) == ERR_END_OF_OBJECT);
+    CHECK_EQUAL(BTagReadNext(&list, &tag), ERR_END_OF_OBJECT);
 }
 
 /* ---- download ---- */
@@ -384,7 +384,7 @@ static RTS_UI32 download(RTS_UI32 flags, RTS_UI32 offset, RTS_UI32 total, RTS_UI
     BTagAppend(&writer, image + offset % TOTAL, size);
     BTagClose(&writer);
     CHECK(call(SRV_APP_DOWNLOAD_COMPACT));
-    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
     *next = reply_number(&reply, TAG_CDL_NEXT);
     return reply_number(&reply, TAG_SERVICE_RESULT);
 }
@@ -413,7 +413,7 @@ static void image_arrives_block_by_block(void)
     setup_image();
     CHECK(put(0, 300, &next) == ERR_OK && next == 300);
     CHECK(put(300, 300, &next) == ERR_OK && next == 600);
-    CHECK(fakes.download_ends == 0);
+    CHECK_EQUAL(fakes.download_ends, 0);
     CHECK(put(600, 400, &next) == ERR_OK && next == TOTAL);
     CHECK(fakes.download_begins == 1 && fakes.download_writes == 3 && fakes.download_ends == 1);
     CHECK(memcmp(fakes.image, image, TOTAL) == 0);
@@ -425,7 +425,7 @@ static void image_in_one_block_is_complete_at_once(void)
 
     setup_image();
     CHECK(download(0, 0, 200, CRC, 200, &next) == ERR_OK && next == 200);
-    CHECK(fakes.download_ends == 1);
+    CHECK_EQUAL(fakes.download_ends, 1);
 }
 
 static void repeated_block_is_acknowledged_and_not_written(void)
@@ -433,11 +433,11 @@ static void repeated_block_is_acknowledged_and_not_written(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, 300, &next) == ERR_OK);
-    CHECK(put(300, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
+    CHECK_EQUAL(put(300, 300, &next), ERR_OK);
     CHECK(put(300, 300, &next) == ERR_OK && next == 600);
     CHECK(download(DLF_CONTINUEDOWNLOAD, 0, TOTAL, CRC, 300, &next) == ERR_OK && next == 600);
-    CHECK(fakes.download_writes == 2);
+    CHECK_EQUAL(fakes.download_writes, 2);
 }
 
 static void overlapping_block_is_written_from_where_it_is_new(void)
@@ -445,7 +445,7 @@ static void overlapping_block_is_written_from_where_it_is_new(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
     CHECK(put(100, 400, &next) == ERR_OK && next == 500);
     CHECK(put(500, 500, &next) == ERR_OK && next == TOTAL);
     CHECK(memcmp(fakes.image, image, TOTAL) == 0);
@@ -456,7 +456,7 @@ static void block_beyond_the_next_is_out_of_sequence(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
     CHECK(put(301, 10, &next) == ERR_INVALID_SEQUENCE && next == 300);
     CHECK(put(300, 10, &next) == ERR_OK && next == 310);
 }
@@ -468,7 +468,7 @@ static void block_without_beginning_is_out_of_sequence(void)
     setup_image();
     CHECK(put(300, 10, &next) == ERR_INVALID_SEQUENCE && next == 0);
     CHECK(download(DLF_CONTINUEDOWNLOAD, 0, TOTAL, CRC, 10, &next) == ERR_INVALID_SEQUENCE && next == 0);
-    CHECK(fakes.download_begins == 0);
+    CHECK_EQUAL(fakes.download_begins, 0);
 }
 
 static void block_of_another_image_is_out_of_sequence(void)
@@ -476,7 +476,7 @@ static void block_of_another_image_is_out_of_sequence(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
     CHECK(download(DLF_CONTINUEDOWNLOAD, 300, TOTAL, CRC + 1, 10, &next) == ERR_INVALID_SEQUENCE && next == 0);
     CHECK(download(DLF_CONTINUEDOWNLOAD, 300, TOTAL + 1, CRC, 10, &next) == ERR_INVALID_SEQUENCE && next == 0);
     CHECK(put(300, 10, &next) == ERR_OK && next == 310);
@@ -489,7 +489,7 @@ static void block_outside_the_image_is_refused(void)
 
     setup_image();
     for (RTS_UI32 i = 0; i < RTS_COUNT(wrong); i++)
-        CHECK(download(0, wrong[i][0], 200, CRC, wrong[i][1], &next) == ERR_OUT_OF_LIMITS);
+        CHECK_EQUAL(download(0, wrong[i][0], 200, CRC, wrong[i][1], &next), ERR_OUT_OF_LIMITS);
     CHECK(fakes.download_begins == 0 && fakes.download_writes == 0);
 }
 
@@ -498,9 +498,9 @@ static void beginning_again_starts_from_zero(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
     CHECK(put(0, 100, &next) == ERR_OK && next == 100);
-    CHECK(fakes.download_begins == 2);
+    CHECK_EQUAL(fakes.download_begins, 2);
 }
 
 static void image_too_large_for_the_slot_is_refused(void)
@@ -517,11 +517,11 @@ static void question_tells_how_much_has_arrived(void)
 
     setup_image();
     CHECK(ask(&next) == ERR_OK && next == 0);
-    CHECK(put(0, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
     CHECK(ask(&next) == ERR_OK && next == 300);
     CHECK(download(0, 0, TOTAL, CRC, 0, &next) == ERR_OK && next == 300);
     CHECK(download(0, 0, TOTAL, CRC + 1, 0, &next) == ERR_OK && next == 0);
-    CHECK(fakes.download_begins == 1);
+    CHECK_EQUAL(fakes.download_begins, 1);
 }
 
 static void question_for_the_installed_image_tells_its_size(void)
@@ -539,7 +539,7 @@ static void transfer_continues_on_a_new_channel(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
     client_send_close(&client);
     CHECK(client_connect(&client));
     CHECK(ask(&next) == ERR_OK && next == 300);
@@ -553,7 +553,7 @@ static void last_block_repeated_after_a_lost_reply_is_acknowledged(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, TOTAL, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, TOTAL, &next), ERR_OK);
     fakes.status.image_crc = CRC; /* it is the application now */
     CHECK(ask(&next) == ERR_OK && next == TOTAL);
     CHECK(put(500, 500, &next) == ERR_OK && next == TOTAL);
@@ -568,7 +568,7 @@ static void refused_image_is_reported_with_its_reason(void)
     setup_image();
     fakes.end_result = ERR_TYPE_MISMATCH;
     CHECK(put(0, TOTAL, &next) == ERR_TYPE_MISMATCH && next == TOTAL);
-    CHECK(BTagFind(&reply.tags, TAG_CDL_REASON, 1, 200, &reason) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_CDL_REASON, 1, 200, &reason), ERR_OK);
     CHECK(strcmp((const char *)reason.data, "This image is for another device.") == 0);
     CHECK(ask(&next) == ERR_OK && next == 0);
 }
@@ -586,7 +586,7 @@ static void long_reason_is_cut_to_the_message(void)
     fakes.end_text = "This image needs functions that this runtime does not have: first, second, third, fourth, fifth, "
                      "sixth, seventh, eighth, ninth, tenth, eleventh; update the runtime.";
     CHECK(download(0, 0, 8, CRC, 8, &next) == ERR_APP_UNRESOLVED_REFERENCE && next == 8);
-    CHECK(BTagFind(&reply.tags, TAG_CDL_REASON, 60, CHANNEL_MIN_MESSAGE, &reason) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_CDL_REASON, 60, CHANNEL_MIN_MESSAGE, &reason), ERR_OK);
     CHECK(memcmp(reason.data, fakes.end_text, 60) == 0 && reason.data[reason.size - 1] == '\0');
 }
 
@@ -595,7 +595,7 @@ static void flash_fault_ends_the_transfer(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
     fakes.write_result = ERR_DEVICE;
     CHECK(put(300, 300, &next) == ERR_DEVICE && next == 0);
     CHECK(put(300, 300, &next) == ERR_INVALID_SEQUENCE && next == 0);
@@ -606,7 +606,7 @@ static void malformed_position_is_an_error(void)
     setup_image();
     begin_content();
     CHECK(call(SRV_APP_DOWNLOAD_COMPACT));
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
     for (RTS_UI32 size = 1; size < 20; size++) {
         if (size == sizeof(CDL_POSITION))
             continue;
@@ -614,9 +614,9 @@ static void malformed_position_is_an_error(void)
         BTagAppendZeros(&writer, size);
         BTagClose(&writer);
         CHECK(call(SRV_APP_DOWNLOAD_COMPACT));
-        CHECK(reply_error(&reply) == ERR_SIZE_MISMATCH);
+        CHECK_EQUAL(reply_error(&reply), ERR_SIZE_MISMATCH);
     }
-    CHECK(fakes.download_begins == 0);
+    CHECK_EQUAL(fakes.download_begins, 0);
 }
 
 static void next_block_may_be_sent_before_the_reply_has_arrived(void)
@@ -643,9 +643,9 @@ static void next_block_may_be_sent_before_the_reply_has_arrived(void)
     for (RTS_UI32 i = 1; i <= 4; i++) {
         CHECK(client_take_message(&client, answer) != 0);
         BTagReaderInit(&reply.tags, answer + 20, BytesGet32(answer + 12));
-        CHECK(reply_number(&reply, TAG_CDL_NEXT) == 250 * i);
+        CHECK_EQUAL(reply_number(&reply, TAG_CDL_NEXT), 250 * i);
     }
-    CHECK(fakes.download_ends == 1);
+    CHECK_EQUAL(fakes.download_ends, 1);
     CHECK(memcmp(fakes.image, image, TOTAL) == 0);
 }
 
@@ -654,10 +654,10 @@ static void restart_forgets_the_transfer(void)
     RTS_UI32 next;
 
     setup_image();
-    CHECK(put(0, 300, &next) == ERR_OK);
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
     setup();
     CHECK(ask(&next) == ERR_OK && next == 0);
-    CHECK(download(DLF_CONTINUEDOWNLOAD, 0, TOTAL, CRC, 10, &next) == ERR_INVALID_SEQUENCE);
+    CHECK_EQUAL(download(DLF_CONTINUEDOWNLOAD, 0, TOTAL, CRC, 10, &next), ERR_INVALID_SEQUENCE);
 }
 
 int main(void)

@@ -24,14 +24,14 @@ static void samples_of_the_specification_are_read(void)
                     "abcdefghijklmnopqr"
                     "\x82\xFF\x03\x04"
                     "wxyz");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
     CHECK(tag.id == 0x01 && tag.size == 12);
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
     CHECK(tag.id == 0x0A && tag.size == 18);
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
     CHECK(tag.id == 0xFF82 && tag.size == 4);
     CHECK(memcmp(tag.data, "wxyz", 4) == 0);
-    CHECK(BTagReadNext(&reader, &tag) == ERR_END_OF_OBJECT);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_END_OF_OBJECT);
 }
 
 static void container_with_an_eight_byte_head_is_read(void)
@@ -41,7 +41,7 @@ static void container_with_an_eight_byte_head_is_read(void)
     BTAG tag;
 
     BTagReaderInit(&reader, data, sizeof(data));
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
     CHECK(tag.id == 0x82 && tag.size == 32 && tag.data == data + 8);
 }
 
@@ -52,7 +52,7 @@ static void length_of_264_takes_two_bytes(void)
     BTAG tag;
 
     BTagReaderInit(&reader, data, sizeof(data));
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
     CHECK(tag.id == 0x81 && tag.size == 264);
 }
 
@@ -73,10 +73,10 @@ static void over_long_numbers_are_read_up_to_ten_bytes(void)
     BTAG tag;
 
     READER(&reader, "\x90\x80\x80\x80\x80\x80\x80\x80\x80\x00\x81\x80\x80\x80\x80\x80\x80\x80\x80\x00x");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
     CHECK(tag.id == 0x10 && tag.size == 1);
     READER(&reader, "\x90\x80\x80\x80\x80\x80\x80\x80\x80\x80\x00\x01x");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_BTAG_BUFFEROVERRUN);
 }
 
 static void numbers_beyond_32_bits_are_refused(void)
@@ -85,12 +85,12 @@ static void numbers_beyond_32_bits_are_refused(void)
     BTAG tag;
 
     READER(&reader, "\xFF\xFF\xFF\xFF\x0F\x00");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
-    CHECK(tag.id == 0xFFFFFFFF);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
+    CHECK_EQUAL(tag.id, 0xFFFFFFFF);
     READER(&reader, "\xFF\xFF\xFF\xFF\x1F\x00");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_BTAG_BUFFEROVERRUN);
     READER(&reader, "\x01\x81\x80\x80\x80\x80\x01x");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_BTAG_BUFFEROVERRUN);
 }
 
 static void length_beyond_the_rest_is_refused(void)
@@ -100,10 +100,10 @@ static void length_beyond_the_rest_is_refused(void)
 
     READER(&reader, "\x01\x04"
                     "abc");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_BTAG_BUFFEROVERRUN);
     READER(&reader, "\x01\xFF\xFF\xFF\xFF\x0F"
                     "abc");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_BTAG_BUFFEROVERRUN);
 }
 
 static void every_cut_element_is_refused(void)
@@ -116,7 +116,7 @@ static void every_cut_element_is_refused(void)
         BTAG tag;
         memcpy(copy, data, size);
         BTagReaderInit(&reader, copy, size);
-        CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
+        CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_BTAG_BUFFEROVERRUN);
         free(copy);
     }
 }
@@ -127,7 +127,7 @@ static void element_without_a_length_is_refused(void)
     BTAG tag;
 
     READER(&reader, "\x90\x80\x80\x00"); /* what a real client sends for an empty user name */
-    CHECK(BTagReadNext(&reader, &tag) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_BTAG_BUFFEROVERRUN);
 }
 
 static void element_of_length_zero_is_legal(void)
@@ -136,10 +136,10 @@ static void element_of_length_zero_is_legal(void)
     BTAG tag;
 
     READER(&reader, "\x01\x00\x02\x01x");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
-    CHECK(tag.size == 0);
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
-    CHECK(tag.id == 2);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
+    CHECK_EQUAL(tag.size, 0);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
+    CHECK_EQUAL(tag.id, 2);
 }
 
 static void missing_element_is_distinguished_from_one_of_wrong_size(void)
@@ -149,10 +149,10 @@ static void missing_element_is_distinguished_from_one_of_wrong_size(void)
 
     READER(&reader, "\x01\x03"
                     "abc");
-    CHECK(BTagFind(&reader, 2, 0, 100, &tag) == ERR_L7_TAG_MISSING);
-    CHECK(BTagFind(&reader, 1, 4, 100, &tag) == ERR_SIZE_MISMATCH);
-    CHECK(BTagFind(&reader, 1, 0, 2, &tag) == ERR_SIZE_MISMATCH);
-    CHECK(BTagFind(&reader, 1, 3, 3, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reader, 2, 0, 100, &tag), ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(BTagFind(&reader, 1, 4, 100, &tag), ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(BTagFind(&reader, 1, 0, 2, &tag), ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(BTagFind(&reader, 1, 3, 3, &tag), ERR_OK);
 }
 
 static void integers_have_one_two_or_four_bytes(void)
@@ -165,10 +165,10 @@ static void integers_have_one_two_or_four_bytes(void)
                     "\x02\x08"
                     "abcdefgh"
                     "\x03\x00");
-    CHECK(BTagFindUnsigned(&reader, 1, &value) == ERR_SIZE_MISMATCH);
-    CHECK(BTagFindUnsigned(&reader, 2, &value) == ERR_SIZE_MISMATCH);
-    CHECK(BTagFindUnsigned(&reader, 3, &value) == ERR_SIZE_MISMATCH);
-    CHECK(value == 5);
+    CHECK_EQUAL(BTagFindUnsigned(&reader, 1, &value), ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(BTagFindUnsigned(&reader, 2, &value), ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(BTagFindUnsigned(&reader, 3, &value), ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(value, 5);
 }
 
 static void optional_integer_keeps_its_default_when_absent(void)
@@ -179,7 +179,7 @@ static void optional_integer_keeps_its_default_when_absent(void)
     READER(&reader, "\x01\x03"
                     "abc");
     CHECK(BTagFindOptional(&reader, 9, &value) == ERR_OK && value == 5);
-    CHECK(BTagFindOptional(&reader, 1, &value) == ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(BTagFindOptional(&reader, 1, &value), ERR_SIZE_MISMATCH);
 }
 
 static void find_begins_at_the_start_wherever_the_reader_stands(void)
@@ -191,10 +191,10 @@ static void find_begins_at_the_start_wherever_the_reader_stands(void)
                     "a"
                     "\x02\x01"
                     "b");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
-    CHECK(BTagFind(&reader, 1, 1, 1, &tag) == ERR_OK);
-    CHECK(tag.data[0] == 'a');
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
+    CHECK_EQUAL(BTagFind(&reader, 1, 1, 1, &tag), ERR_OK);
+    CHECK_EQUAL(tag.data[0], 'a');
 }
 
 static void find_stops_at_a_broken_element(void)
@@ -206,8 +206,8 @@ static void find_stops_at_a_broken_element(void)
                     "a"
                     "\x02\x09"
                     "b");
-    CHECK(BTagFind(&reader, 1, 1, 1, &tag) == ERR_OK);
-    CHECK(BTagFind(&reader, 3, 1, 1, &tag) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(BTagFind(&reader, 1, 1, 1, &tag), ERR_OK);
+    CHECK_EQUAL(BTagFind(&reader, 3, 1, 1, &tag), ERR_BTAG_BUFFEROVERRUN);
 }
 
 static void data_element_is_no_container(void)
@@ -220,13 +220,13 @@ static void data_element_is_no_container(void)
                     "a"
                     "\xFF\xFE\x03\x00"
                     "\x82\xFF\x03\x00");
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
-    CHECK(BTagReadContainer(&reader, &tag, &content) == ERR_BTAG_NOCONTAINERTAG);
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
-    CHECK(tag.id == 0xFF7F);
-    CHECK(BTagReadContainer(&reader, &tag, &content) == ERR_BTAG_NOCONTAINERTAG);
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
-    CHECK(BTagReadContainer(&reader, &tag, &content) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
+    CHECK_EQUAL(BTagReadContainer(&reader, &tag, &content), ERR_BTAG_NOCONTAINERTAG);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
+    CHECK_EQUAL(tag.id, 0xFF7F);
+    CHECK_EQUAL(BTagReadContainer(&reader, &tag, &content), ERR_BTAG_NOCONTAINERTAG);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
+    CHECK_EQUAL(BTagReadContainer(&reader, &tag, &content), ERR_OK);
 }
 
 static void content_ends_with_its_container(void)
@@ -236,13 +236,13 @@ static void content_ends_with_its_container(void)
     BTAG_READER content;
 
     READER(&reader, "\x81\x01\x03\x10\x01\x05\x11\x01\x06");
-    CHECK(BTagFindContainer(&reader, 0x81, &content) == ERR_OK);
+    CHECK_EQUAL(BTagFindContainer(&reader, 0x81, &content), ERR_OK);
     CHECK(BTagFindUnsigned(&content, 0x10, &value) == ERR_OK && value == 5);
-    CHECK(BTagFindUnsigned(&content, 0x11, &value) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(BTagFindUnsigned(&content, 0x11, &value), ERR_L7_TAG_MISSING);
     /* An inner length may not reach beyond the container. */
     READER(&reader, "\x81\x01\x03\x10\x02\x05\x11\x01\x06");
-    CHECK(BTagFindContainer(&reader, 0x81, &content) == ERR_OK);
-    CHECK(BTagFindUnsigned(&content, 0x10, &value) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(BTagFindContainer(&reader, 0x81, &content), ERR_OK);
+    CHECK_EQUAL(BTagFindUnsigned(&content, 0x10, &value), ERR_BTAG_BUFFEROVERRUN);
 }
 
 static void nesting_ends_at_five_levels(void)
@@ -263,8 +263,8 @@ static void nesting_ends_at_five_levels(void)
         result = BTagReadContainer(&reader, &tag, &reader);
         depth += result == ERR_OK;
     }
-    CHECK(result == ERR_BTAG_MAXNESTINGDEPTH);
-    CHECK(depth == BTAG_MAX_NESTING);
+    CHECK_EQUAL(result, ERR_BTAG_MAXNESTINGDEPTH);
+    CHECK_EQUAL(depth, BTAG_MAX_NESTING);
 }
 
 /* ---- writer ---- */
@@ -279,7 +279,7 @@ static void integers_are_written_as_clients_expect_them(void)
     BTagWrite16(&writer, 0x46, 0x0102);
     BTagWrite32(&writer, 0x21, 0x11223344);
     CHECK(BTagIsComplete(&writer));
-    CHECK(writer.size == 12);
+    CHECK_EQUAL(writer.size, 12);
     CHECK(memcmp(buffer, "\x46\x02\x02\x01\x21\x84\x80\x00\x44\x33\x22\x11", 12) == 0);
 }
 
@@ -289,7 +289,7 @@ static void error_tag_with_its_long_id_is_aligned(void)
 
     BTagWriterInit(&writer, buffer, sizeof(buffer));
     BTagWrite16(&writer, 0xFF7F, 0x0301);
-    CHECK(writer.size == 8);
+    CHECK_EQUAL(writer.size, 8);
     CHECK(memcmp(buffer, "\xFF\xFE\x03\x82\x80\x00\x01\x03", 8) == 0);
 }
 
@@ -305,11 +305,11 @@ static void content_is_aligned_whatever_came_before(void)
                 BTagWriterInit(&writer, buffer, sizeof(buffer));
                 BTagAppendZeros(&writer, before);
                 BTagOpen(&writer, ids[i], (BTAG_ALIGN)align);
-                CHECK((writer.size & 3) == align);
+                CHECK_EQUAL((writer.size & 3), align);
                 BTagAppend(&writer, "abc", 3);
                 BTagClose(&writer);
                 BTagReaderInit(&reader, buffer + before, writer.size - before);
-                CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+                CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
                 CHECK(tag.id == ids[i] && tag.size == 3 && memcmp(tag.data, "abc", 3) == 0);
             }
         }
@@ -326,7 +326,7 @@ static void containers_get_their_length_when_closed(void)
         BTagWrite32(&writer, 0x21, 0);
     BTagClose(&writer);
     CHECK(memcmp(buffer, "\x81\x01\x88\x02", 4) == 0);
-    CHECK(writer.size == 4 + 264);
+    CHECK_EQUAL(writer.size, 4 + 264);
 }
 
 static void empty_elements_vanish(void)
@@ -340,7 +340,7 @@ static void empty_elements_vanish(void)
     BTagClose(&writer);
     BTagClose(&writer);
     CHECK(BTagIsComplete(&writer));
-    CHECK(writer.size == 4);
+    CHECK_EQUAL(writer.size, 4);
 }
 
 static void text_has_a_nul_and_ends_aligned(void)
@@ -354,9 +354,9 @@ static void text_has_a_nul_and_ends_aligned(void)
         text[length] = '\0';
         BTagWriterInit(&writer, buffer, sizeof(buffer));
         BTagWriteText(&writer, 0x10, text, 100);
-        CHECK((writer.size & 3) == 0);
+        CHECK_EQUAL((writer.size & 3), 0);
         BTagReaderInit(&reader, buffer, writer.size);
-        CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+        CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
         CHECK(tag.size >= length + 1 && strcmp((const char *)tag.data, text) == 0);
     }
 }
@@ -370,7 +370,7 @@ static void text_is_cut_to_its_limit(void)
     BTagWriterInit(&writer, buffer, sizeof(buffer));
     BTagWriteText(&writer, 0x10, "abcdef", 3);
     BTagReaderInit(&reader, buffer, writer.size);
-    CHECK(BTagReadNext(&reader, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagReadNext(&reader, &tag), ERR_OK);
     CHECK(strcmp((const char *)tag.data, "abc") == 0);
 }
 
@@ -402,7 +402,7 @@ static void writer_never_passes_its_end_and_says_so(void)
         RTS_UI8 *data = malloc(capacity + 1);
         BTagWriterInit(&writer, data, capacity);
         write_something_of_each(&writer);
-        CHECK(BTagIsComplete(&writer) == (capacity == needed));
+        CHECK_EQUAL(BTagIsComplete(&writer), (capacity == needed));
         CHECK(writer.size <= capacity);
         free(data);
     }

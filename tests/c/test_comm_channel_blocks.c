@@ -10,10 +10,10 @@ static void captured_message_gets_the_blocks_of_the_specification(void)
     static const RTS_UI8 request[] = {0x55, 0xCD, 0x10, 0x00, 0x01, 0x00, 0x07, 0x00, 0x0B, 0x56,
                                       0xEF, 0x8E, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00};
 
-    CHECK(CRC32Update(0, request, sizeof(request)) == 0x7DB2BDE7);
+    CHECK_EQUAL(CRC32Update(0, request, sizeof(request)), 0x7DB2BDE7);
     setup();
     client_send_message(&client, request, sizeof(request));
-    CHECK(client_take_message(&client, reply) == 28);
+    CHECK_EQUAL(client_take_message(&client, reply), 28);
     CHECK(memcmp(reply, "\x55\xCD\x10\x00\x81\x00\x07\x00\x0B\x56\xEF\x8E\x08\x00\x00\x00\x00\x00\x00\x00", 20) == 0);
     CHECK(memcmp(reply + 20, "\xFF\xFE\x03\x82\x80\x00\x02\x03", 8) == 0);
 }
@@ -35,7 +35,7 @@ static void largest_message_fills_the_buffer_exactly(void)
     RTS_UI32 data = NETSERVER_MESSAGE_SIZE - 20 - 8 - 4;
 
     setup();
-    CHECK(echo_message(data) == NETSERVER_MESSAGE_SIZE);
+    CHECK_EQUAL(echo_message(data), NETSERVER_MESSAGE_SIZE);
     client_send_message(&client, message, NETSERVER_MESSAGE_SIZE);
     CHECK(client_take_message(&client, reply) > 0);
 }
@@ -48,7 +48,7 @@ static void message_larger_than_granted_closes_the_channel(void)
     CHECK(!works(&client));
     fakes_start();
     client_send_open(&client, 1, 500);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     client_send_block(&client, 1, FIRST, message, 501, 0, 400);
     CHECK(is_close(ERR_CHS_MESSAGESIZE));
 }
@@ -60,9 +60,9 @@ static void reply_larger_than_granted_is_an_error_reply(void)
     fakes_start();
     client_init(&client, 0x0102);
     client_send_open(&client, 1, CHANNEL_MIN_MESSAGE);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &answer));
-    CHECK(reply_error(&answer) == ERR_BUFFERSIZE);
+    CHECK_EQUAL(reply_error(&answer), ERR_BUFFERSIZE);
 }
 
 static void wrong_message_crc_closes_the_channel(void)
@@ -99,7 +99,7 @@ static void new_channel_knows_nothing_of_half_a_message_before(void)
     setup();
     client_send_block(&client, 1, FIRST, message, 600, 0, 300);
     client_send_open(&client, 8, 2048);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     client_send_block(&client, 1, NEXT, message, 600, 300, 300);
     CHECK(is_close(ERR_CHS_PROTOCOL));
 }
@@ -131,7 +131,7 @@ static void cut_packages_are_dropped(void)
     for (RTS_UI32 size = 0; size < sizeof(CHANNEL_ACK); size++)
         client_send_package(&client, block, size);
     CHECK(is_silent());
-    CHECK(counters()->malformed == sizeof(CHANNEL_DATA) + sizeof(CHANNEL_ACK));
+    CHECK_EQUAL(counters()->malformed, sizeof(CHANNEL_DATA) + sizeof(CHANNEL_ACK));
     CHECK(works(&client));
 }
 

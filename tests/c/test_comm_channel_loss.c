@@ -15,7 +15,7 @@ static void duplicate_blocks_are_acknowledged_again_and_not_taken_twice(void)
     CHECK(is_ack(1, 0));
     client_send_block(&client, 2, NEXT, message, size, 300, size - 300);
     CHECK(client_take_message(&client, reply) > 600);
-    CHECK(counters()->duplicates == 1);
+    CHECK_EQUAL(counters()->duplicates, 1);
 }
 
 static void gap_is_reported_at_once_and_only_once(void)
@@ -31,7 +31,7 @@ static void gap_is_reported_at_once_and_only_once(void)
     client_send_block(&client, 3, NEXT, message, size, 600, 300);
     client_send_block(&client, 4, NEXT, message, size, 900, size - 900);
     CHECK(client_take_message(&client, reply) > 1200);
-    CHECK(counters()->gaps == 2);
+    CHECK_EQUAL(counters()->gaps, 2);
 }
 
 static void each_gap_is_reported(void)
@@ -74,8 +74,8 @@ static void reply_is_repeated_until_acknowledged(void)
     for (int i = 0; i < 20; i++)
         fakes_cycle(900);
     while (client_take(&client, NULL, package) != 0)
-        CHECK(package[0] == CHANNEL_PKG_KEEPALIVE);
-    CHECK(counters()->repeats == 1);
+        CHECK_EQUAL(package[0], CHANNEL_PKG_KEEPALIVE);
+    CHECK_EQUAL(counters()->repeats, 1);
 }
 
 static void reply_of_a_slow_service_is_not_repeated_before_its_time(void)
@@ -92,7 +92,7 @@ static void reply_of_a_slow_service_is_not_repeated_before_its_time(void)
     BTagWrite32(&writer, TAG_APP_SESSION, client.app_session);
     BTagClose(&writer);
     CHECK(client_call(&client, SG_APPLICATION, SRV_APP_STOP, &writer, &answer));
-    CHECK(fakes.stops == 1);
+    CHECK_EQUAL(fakes.stops, 1);
     fakes_cycle(999);
     CHECK(is_silent());
 }
@@ -108,7 +108,7 @@ static void repetitions_become_rarer_and_end(void)
         while (client_take(&client, NULL, package) != 0)
             blocks += package[0] == CHANNEL_PKG_DATA;
     }
-    CHECK(blocks == 1 + 4);
+    CHECK_EQUAL(blocks, 1 + 4);
 }
 
 static void partly_acknowledged_reply_is_repeated_from_there(void)
@@ -149,7 +149,7 @@ static void acknowledgement_overtakes_a_waiting_repetition(void)
     fakes_cycle(1000); /* time to repeat, but there is no room */
     client_send_ack(&client, 2, 0);
     while (client_take(&client, NULL, drop) != 0)
-        CHECK(drop[0] == CHANNEL_PKG_ACK);
+        CHECK_EQUAL(drop[0], CHANNEL_PKG_ACK);
     fakes_cycle(1);
     CHECK(is_block(3) && is_silent());
 }
@@ -166,7 +166,7 @@ static void new_request_abandons_a_reply_that_still_waits(void)
     client_send_message(&client, message, size);
     client_send_message(&client, message, size);
     while (client_take(&client, NULL, drop) != 0)
-        CHECK(drop[0] == CHANNEL_PKG_ACK);
+        CHECK_EQUAL(drop[0], CHANNEL_PKG_ACK);
     fakes_cycle(1);
     CHECK(is_block(7) && is_block(8) && is_block(9) && is_silent());
 }
@@ -183,7 +183,7 @@ static void repetitions_stay_few_while_the_client_lives(void)
         while (client_take(&client, NULL, package) != 0)
             blocks += package[0] == CHANNEL_PKG_DATA;
     }
-    CHECK(blocks == 1 + 4);
+    CHECK_EQUAL(blocks, 1 + 4);
 }
 
 static void nonsense_acknowledgements_change_nothing(void)
@@ -218,7 +218,7 @@ static void repeated_request_brings_the_lost_reply_again(void)
     for (int i = 0; i < 5; i++)
         client_send_block(&client, 1, FIRST, message, size, 0, size);
     while (client_take(&client, NULL, package) != 0)
-        CHECK(package[0] == CHANNEL_PKG_ACK);
+        CHECK_EQUAL(package[0], CHANNEL_PKG_ACK);
 }
 
 static void new_request_acknowledges_the_reply_before(void)
@@ -246,9 +246,9 @@ static void acknowledgement_travels_with_the_reply(void)
 {
     setup();
     client_send_message(&client, message, echo_message(1200));
-    CHECK(client.sent == 3);
+    CHECK_EQUAL(client.sent, 3);
     CHECK(is_block(1));
-    CHECK(BytesGet32(package + 8) == 3);
+    CHECK_EQUAL(BytesGet32(package + 8), 3);
 }
 
 static void full_driver_delays_blocks_and_loses_none(void)
@@ -261,7 +261,7 @@ static void full_driver_delays_blocks_and_loses_none(void)
     client_send_block(&client, 2, NEXT, message, size, 480, 480);
     client_send_block(&client, 3, NEXT, message, size, 960, size - 960);
     for (int i = 0; i < SIM_LINK_PACKETS; i++)
-        CHECK(SimLinkReceive(drop, sizeof(drop)) == 12 + sizeof(CHANNEL_ACK));
+        CHECK_EQUAL(SimLinkReceive(drop, sizeof(drop)), 12 + sizeof(CHANNEL_ACK));
     fakes_cycle(1);
     CHECK(client_take_message(&client, reply) > 1200);
 }

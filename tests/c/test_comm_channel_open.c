@@ -15,10 +15,10 @@ static void captured_open_request_is_answered(void)
     fakes_start();
     client_init(&client, 0x0102);
     client_send_package(&client, request, sizeof(request));
-    CHECK(take(CHANNEL_PKG_OPEN_RESP) == 24);
+    CHECK_EQUAL(take(CHANNEL_PKG_OPEN_RESP), 24);
     CHECK(memcmp(package, "\x83\x00\x01\x01", 4) == 0);
     CHECK(memcmp(package + 8, "\x81\xD4\x21\x83\x00\x00", 6) == 0);
-    CHECK(BytesGet32(package + 16) == NETSERVER_MESSAGE_SIZE);
+    CHECK_EQUAL(BytesGet32(package + 16), NETSERVER_MESSAGE_SIZE);
     CHECK(memcmp(package + 20, "\x00\x05\x00\x00", 4) == 0);
     /* The specification's worked response has channel DBD8 and buffer 2048. */
     BytesPut16(package + 14, 0xDBD8);
@@ -35,7 +35,7 @@ static void old_short_open_request_is_answered(void)
     client_init(&client, 0x0102);
     BytesPut32(request + 4, CRC32Update(0, request, sizeof(request)));
     client_send_package(&client, request, sizeof(request));
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     CHECK(works(&client));
 }
 
@@ -44,11 +44,11 @@ static void granted_buffer_is_the_smaller_of_wanted_and_own(void)
     fakes_start();
     client_init(&client, 0x0102);
     client_send_open(&client, 1, 0xFFFFFFFF);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
-    CHECK(client.limit == NETSERVER_MESSAGE_SIZE);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client.limit, NETSERVER_MESSAGE_SIZE);
     client_send_open(&client, 2, 500);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
-    CHECK(client.limit == 500);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client.limit, 500);
 }
 
 static void address_size_is_never_less_than_the_addresses(void)
@@ -64,7 +64,7 @@ static void address_size_is_never_less_than_the_addresses(void)
         client_seal(request, sizeof(request));
         client_send_package(&client, request, sizeof(request));
         CHECK(take(CHANNEL_PKG_OPEN_RESP) != 0);
-        CHECK(package[21] == (words < 2 ? 2 : words < 30 ? words : 30));
+        CHECK_EQUAL(package[21], (words < 2 ? 2 : words < 30 ? words : 30));
     }
 }
 
@@ -97,8 +97,8 @@ static void meta_packages_with_wrong_crc_version_or_length_are_dropped(void)
     BytesPut32(request + 4, CRC32Update(0, request, sizeof(request)));
     client_send_package(&client, request, sizeof(request));
     CHECK(is_silent());
-    CHECK(counters()->malformed == 17);
-    CHECK(counters()->opened == 0);
+    CHECK_EQUAL(counters()->malformed, 17);
+    CHECK_EQUAL(counters()->opened, 0);
 }
 
 static void channel_ids_are_valid_and_change(void)
@@ -110,7 +110,7 @@ static void channel_ids_are_valid_and_change(void)
     for (RTS_UI32 i = 0; i < 2000; i++) {
         fakes.random = i * 0x9E3779B9u;
         client_send_open(&client, i, 2048);
-        CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+        CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
         CHECK(client.channel != 0 && client.channel <= CHANNEL_ID_MAX && client.channel != last);
         last = client.channel;
     }
@@ -123,8 +123,8 @@ static void repeated_open_request_gets_the_same_channel(void)
     setup();
     client_init(&again, 0x0102);
     CHECK(client_open(&again));
-    CHECK(again.channel == client.channel);
-    CHECK(counters()->opened == 1);
+    CHECK_EQUAL(again.channel, client.channel);
+    CHECK_EQUAL(counters()->opened, 1);
 }
 
 static void same_request_id_after_traffic_is_a_new_client(void)
@@ -144,7 +144,7 @@ static void new_open_from_the_same_peer_replaces_its_channel(void)
     setup();
     CHECK(client_login(&client));
     client_send_open(&client, 8, 2048);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
     CHECK(works(&client));
 }
@@ -157,7 +157,7 @@ static void channel_without_login_is_given_to_another_peer(void)
     client_init(&other, 0x0203);
     client_send_open(&other, 1, 2048);
     CHECK(is_close(ERR_CHS_CLOSED)); /* the old owner gets a close */
-    CHECK(client_take_open(&other) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&other), CHANNEL_OPEN_OK);
     CHECK(works(&other));
 }
 
@@ -169,9 +169,9 @@ static void channel_with_login_in_use_is_refused_to_another_peer(void)
     CHECK(client_login(&client));
     client_init(&other, 0x0203);
     client_send_open(&other, 1, 2048);
-    CHECK(client_take_open(&other) == CHANNEL_OPEN_NO_CHANNEL);
-    CHECK(other.channel == CHANNEL_ID_NONE);
-    CHECK(counters()->refused == 1);
+    CHECK_EQUAL(client_take_open(&other), CHANNEL_OPEN_NO_CHANNEL);
+    CHECK_EQUAL(other.channel, CHANNEL_ID_NONE);
+    CHECK_EQUAL(counters()->refused, 1);
     CHECK(works(&client));
 }
 
@@ -185,7 +185,7 @@ static void idle_channel_with_login_is_given_to_another_peer(void)
     client_init(&other, 0x0203);
     client_send_open(&other, 1, 2048);
     CHECK(is_close(ERR_CHS_CLOSED));
-    CHECK(client_take_open(&other) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&other), CHANNEL_OPEN_OK);
     CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
@@ -208,7 +208,7 @@ static void captured_close_request_has_the_right_form(void)
     setup();
     client.channel = 0xDBD8;
     client_send_package(&client, request, sizeof(request));
-    CHECK(counters()->foreign == 1);
+    CHECK_EQUAL(counters()->foreign, 1);
 }
 
 static void close_request_from_another_peer_is_ignored(void)
@@ -230,8 +230,8 @@ static void rts_info_tells_the_number_of_channels(void)
     client_init(&client, 0x0102);
     client_seal(request, sizeof(request));
     client_send_package(&client, request, sizeof(request));
-    CHECK(take(CHANNEL_PKG_RTSINFO_RESP) == 10);
-    CHECK(BytesGet16(package + 8) == 1);
+    CHECK_EQUAL(take(CHANNEL_PKG_RTSINFO_RESP), 10);
+    CHECK_EQUAL(BytesGet16(package + 8), 1);
 }
 
 /* ---- owner ---- */
@@ -245,9 +245,9 @@ static void blocks_from_another_peer_are_refused(void)
     other.address = 0x0203;
     RTS_UI32 size = echo_message(4);
     client_send_block(&other, 1, FIRST, message, size, 0, size);
-    CHECK(counters()->foreign == 1);
+    CHECK_EQUAL(counters()->foreign, 1);
     CHECK(client_take(&other, NULL, package) == sizeof(CHANNEL_CLOSE));
-    CHECK(BytesGet16(package + 10) == ERR_CHS_CHINVALID);
+    CHECK_EQUAL(BytesGet16(package + 10), ERR_CHS_CHINVALID);
     CHECK(works(&client));
 }
 
@@ -263,7 +263,7 @@ static void complaints_about_unknown_channels_are_limited(void)
     fakes.now_ms += CHANNEL_COMPLAINT_MS;
     client_send_ack(&lost, 0, 0);
     CHECK(is_close(ERR_CHS_CHINVALID));
-    CHECK(counters()->foreign == 51);
+    CHECK_EQUAL(counters()->foreign, 51);
     CHECK(works(&client));
 }
 

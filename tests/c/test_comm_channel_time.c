@@ -11,7 +11,7 @@ static void keepalives_are_sent_when_there_is_nothing_else(void)
     fakes_cycle(999);
     CHECK(is_silent());
     fakes_cycle(1);
-    CHECK(take(CHANNEL_PKG_KEEPALIVE) == sizeof(CHANNEL_HEADER));
+    CHECK_EQUAL(take(CHANNEL_PKG_KEEPALIVE), sizeof(CHANNEL_HEADER));
     CHECK(BytesGet16(package + 2) == client.channel && package[1] == 0);
     fakes_cycle(999);
     CHECK(is_silent());
@@ -40,7 +40,7 @@ static void keepalives_of_the_client_keep_the_channel(void)
         fakes_cycle(1000);
         client_send_package(&client, keepalive, sizeof(keepalive));
         while (client_take(&client, NULL, package) != 0)
-            CHECK(package[0] == CHANNEL_PKG_KEEPALIVE);
+            CHECK_EQUAL(package[0], CHANNEL_PKG_KEEPALIVE);
     }
     CHECK(works(&client));
 }
@@ -108,7 +108,7 @@ static void messages_survive_random_loss(void)
                 client_send_ack(&client, client.received, fill != 0 ? CHANNEL_FLAG_MISSING : 0);
         }
         client.sent = first + blocks - 1;
-        CHECK(fill == length);
+        CHECK_EQUAL(fill, length);
         RTS_UI32 data = 900 + 20 * (RTS_UI32)round;
         CHECK(memcmp(reply + length - data, message + size - data, data) == 0);
         while (client_take(&client, NULL, package) != 0)

@@ -50,7 +50,7 @@ static void all_places_are_used_and_the_next_client_is_refused(void)
 {
     connect_all();
     CHECK(!client_open(&client[COUNT]));
-    CHECK(ChannelGetCounters()->refused == 1);
+    CHECK_EQUAL(ChannelGetCounters()->refused, 1);
     for (int i = 0; i < COUNT; i++) {
         CHECK(works(&client[i]));
         for (int j = 0; j < i; j++)
@@ -105,7 +105,7 @@ static void of_the_places_without_login_the_one_silent_for_longest_is_given_away
     CHECK(works(&client[0])); /* so number 1 is the most silent one */
     client_send_open(&client[COUNT], 1, 2048);
     CHECK(client_take(&client[1], NULL, answer) == sizeof(CHANNEL_CLOSE) && answer[0] == CHANNEL_PKG_CLOSE);
-    CHECK(client_take_open(&client[COUNT]) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client[COUNT]), CHANNEL_OPEN_OK);
     CHECK(works(&client[0]) && works(&client[2]) && works(&client[3]) && works(&client[COUNT]));
 }
 
@@ -117,8 +117,8 @@ static void session_of_one_client_is_not_valid_for_another(void)
     own = client[1].session;
     client[1].session = client[0].session;
     CHECK(client_request(&client[1], SG_APPLICATION, SRV_APP_STOP, NULL, 0, &reply));
-    CHECK(reply_error(&reply) == ERR_INVALID_SESSION_ID);
-    CHECK(fakes.stops == 0);
+    CHECK_EQUAL(reply_error(&reply), ERR_INVALID_SESSION_ID);
+    CHECK_EQUAL(fakes.stops, 0);
     client[1].session = own;
     CHECK(!SrvIsAppSession(ChannelGetClient(1), client[0].app_session));
     CHECK(SrvIsAppSession(ChannelGetClient(0), client[0].app_session));
@@ -175,23 +175,23 @@ static void download_of_one_is_neither_replaced_nor_continued_by_another(void)
     BTAG reason;
 
     connect_all();
-    CHECK(put(&client[0], 0, 0, 300) == ERR_OK);
-    CHECK(put(&client[1], 0, 0, 300) == ERR_INVALID_STATE);
-    CHECK(BTagFind(&reply.tags, TAG_CDL_REASON, 10, 200, &reason) == ERR_OK);
-    CHECK(put(&client[1], DLF_CONTINUEDOWNLOAD, 300, 300) == ERR_INVALID_STATE);
-    CHECK(put(&client[0], DLF_CONTINUEDOWNLOAD, 300, 300) == ERR_OK);
+    CHECK_EQUAL(put(&client[0], 0, 0, 300), ERR_OK);
+    CHECK_EQUAL(put(&client[1], 0, 0, 300), ERR_INVALID_STATE);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_CDL_REASON, 10, 200, &reason), ERR_OK);
+    CHECK_EQUAL(put(&client[1], DLF_CONTINUEDOWNLOAD, 300, 300), ERR_INVALID_STATE);
+    CHECK_EQUAL(put(&client[0], DLF_CONTINUEDOWNLOAD, 300, 300), ERR_OK);
     CHECK(fakes.download_begins == 1 && fakes.download_offset == 600);
 }
 
 static void download_whose_client_is_gone_can_be_continued_by_another(void)
 {
     connect_all();
-    CHECK(put(&client[0], 0, 0, 300) == ERR_OK);
+    CHECK_EQUAL(put(&client[0], 0, 0, 300), ERR_OK);
     client_send_close(&client[0]);
-    CHECK(put(&client[1], DLF_CONTINUEDOWNLOAD, 300, 300) == ERR_OK);
+    CHECK_EQUAL(put(&client[1], DLF_CONTINUEDOWNLOAD, 300, 300), ERR_OK);
     CHECK(connects(&client[COUNT])); /* in the place of the first one */
-    CHECK(put(&client[COUNT], DLF_CONTINUEDOWNLOAD, 600, 300) == ERR_OK);
-    CHECK(fakes.download_ends == 1);
+    CHECK_EQUAL(put(&client[COUNT], DLF_CONTINUEDOWNLOAD, 600, 300), ERR_OK);
+    CHECK_EQUAL(fakes.download_ends, 1);
 }
 
 int main(void)

@@ -25,8 +25,8 @@ static bool reconnect(void)
 
 static void start_blank(void)
 {
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(reconnect());
 }
 
@@ -89,7 +89,7 @@ static void start_with_counter(void)
 
     start_blank();
     build_counter(&image, 1);
-    CHECK(send_image(&image, 0) == ERR_OK);
+    CHECK_EQUAL(send_image(&image, 0), ERR_OK);
     CHECK(client_login_app(&client));
 }
 
@@ -98,15 +98,15 @@ static void blank_device_takes_an_image_and_runs_it(void)
     start_blank();
     CHECK(!client_login_app(&client));
     start_with_counter();
-    CHECK(app_state() == AS_STOP);
-    CHECK(control(SRV_APP_START) == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 11); /* the first at once */
-    CHECK(control(SRV_APP_STOP) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(control(SRV_APP_RESET) == ERR_OK);
-    CHECK(app_state() == AS_NONE);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(control(SRV_APP_START), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 11); /* the first at once */
+    CHECK_EQUAL(control(SRV_APP_STOP), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(control(SRV_APP_RESET), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_NONE);
 }
 
 static void broken_transfer_continues_on_a_new_channel(void)
@@ -115,11 +115,11 @@ static void broken_transfer_continues_on_a_new_channel(void)
 
     start_blank();
     build_counter(&image, 1);
-    CHECK(send_block(&image, 0, 200) == ERR_OK);
+    CHECK_EQUAL(send_block(&image, 0, 200), ERR_OK);
     CHECK(reconnect());
-    CHECK(ask_next(&image) == 200);
-    CHECK(send_image(&image, 200) == ERR_OK);
-    CHECK(ask_next(&image) == image.size); /* it is the application now */
+    CHECK_EQUAL(ask_next(&image), 200);
+    CHECK_EQUAL(send_image(&image, 200), ERR_OK);
+    CHECK_EQUAL(ask_next(&image), image.size); /* it is the application now */
 }
 
 static void refused_image_names_its_reason_and_the_old_one_runs_on(void)
@@ -129,16 +129,16 @@ static void refused_image_names_its_reason_and_the_old_one_runs_on(void)
     BTAG reason;
 
     start_with_counter();
-    CHECK(control(SRV_APP_START) == ERR_OK);
+    CHECK_EQUAL(control(SRV_APP_START), ERR_OK);
     build_counter(&image, 2);
     header = image_header(&image);
     header.device_id = TARGET_ID_CORTEX_M3;
     image_set_header(&image, header);
     CHECK(send_image(&image, 0) != ERR_OK);
-    CHECK(BTagFind(&reply.tags, TAG_CDL_REASON, 10, APP_REFUSAL_SIZE, &reason) == ERR_OK);
-    CHECK(app_state() == AS_RUN);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, COUNTER_OFFSET) == 6);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_CDL_REASON, 10, APP_REFUSAL_SIZE, &reason), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, COUNTER_OFFSET), 6);
 }
 
 /* The power goes at every flash operation of a download: the device comes back and takes the image. */
@@ -150,7 +150,7 @@ static void power_cut_anywhere_in_a_download_needs_only_another_one(void)
     start_blank();
     build_counter(&image, 1);
     operations = SimFlashOps();
-    CHECK(send_image(&image, 0) == ERR_OK);
+    CHECK_EQUAL(send_image(&image, 0), ERR_OK);
     operations = SimFlashOps() - operations;
     for (RTS_UI32 operation = 1; operation <= operations; operation++) {
         RTS_RESULT result = ERR_OK;
@@ -165,8 +165,8 @@ static void power_cut_anywhere_in_a_download_needs_only_another_one(void)
             result = SimCommCycle();
             (void)client_take_message(&client, reply.message);
         }
-        CHECK(result == SIM_POWER_CUT);
-        CHECK(SimStart() == ERR_OK);
+        CHECK_EQUAL(result, SIM_POWER_CUT);
+        CHECK_EQUAL(SimStart(), ERR_OK);
         CHECK(reconnect());
         CHECK(ask_next(&image) == image.size || send_image(&image, 0) == ERR_OK);
         CHECK(client_login_app(&client));
@@ -219,17 +219,17 @@ static void variable_is_read_and_written_while_the_program_runs(void)
     RTS_UI8 entry[] = {0, 0, 4, 0, 0, 0, 0x00, 0x01, 0, 0, 5, 0, MON2_OP_LD16, COUNTER_OFFSET, 0, MON2_OP_RAO, 0};
 
     start_with_counter();
-    CHECK(control(SRV_APP_START) == ERR_OK);
-    CHECK(SimAdvance(ms(30)) == ERR_OK);
-    CHECK(read_over_wire(running_crc(), COUNTER_OFFSET) == 4);
+    CHECK_EQUAL(control(SRV_APP_START), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(30)), ERR_OK);
+    CHECK_EQUAL(read_over_wire(running_crc(), COUNTER_OFFSET), 4);
     put_application(running_crc());
     BTagOpen(&writer, TAG_MON2_WRITE_LIST, BTAG_ALIGN_0);
     BTagAppend(&writer, entry, sizeof(entry));
     BTagClose(&writer);
     CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_WRITE, &writer, &reply));
-    CHECK(reply.size == 20);
-    CHECK(SimAdvance(ms(20)) == ERR_OK);
-    CHECK(read_over_wire(running_crc(), COUNTER_OFFSET) == 0x102);
+    CHECK_EQUAL(reply.size, 20);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_over_wire(running_crc(), COUNTER_OFFSET), 0x102);
 }
 
 static void monitoring_notices_that_another_image_was_loaded(void)
@@ -239,12 +239,12 @@ static void monitoring_notices_that_another_image_was_loaded(void)
 
     start_with_counter();
     before = running_crc();
-    CHECK(read_over_wire(before, STEP_OFFSET) == 1);
+    CHECK_EQUAL(read_over_wire(before, STEP_OFFSET), 1);
     build_counter(&other, 2);
-    CHECK(send_image(&other, 0) == ERR_OK);
-    CHECK(read_over_wire(before, STEP_OFFSET) == 0xFFFFFFFF);
-    CHECK(reply_number(&reply, TAG_MON2_ERROR) == ERR_APP_INVALID_DATAID);
-    CHECK(read_over_wire(running_crc(), STEP_OFFSET) == 2);
+    CHECK_EQUAL(send_image(&other, 0), ERR_OK);
+    CHECK_EQUAL(read_over_wire(before, STEP_OFFSET), 0xFFFFFFFF);
+    CHECK_EQUAL(reply_number(&reply, TAG_MON2_ERROR), ERR_APP_INVALID_DATAID);
+    CHECK_EQUAL(read_over_wire(running_crc(), STEP_OFFSET), 2);
 }
 
 /* ---- what happened ---- */
@@ -262,15 +262,15 @@ static void exception_is_reported_and_communication_goes_on(void)
     add_task(&spec, "Main", KIND_CYCLIC, 10000, 0);
     build_image(&image, &spec);
     start_blank();
-    CHECK(send_image(&image, 0) == ERR_OK);
+    CHECK_EQUAL(send_image(&image, 0), ERR_OK);
     CHECK(client_login_app(&client));
-    CHECK(control(SRV_APP_START) == ERR_OK);
+    CHECK_EQUAL(control(SRV_APP_START), ERR_OK);
     (void)SimAdvance(ms(20));
     CHECK(client_request(&client, SG_APPLICATION, SRV_APP_READ_STATUS, NULL, 0, &reply));
-    CHECK(BTagFindContainer(&reply.tags, TAG_APP_STATUS, &status) == ERR_OK);
-    CHECK(BTagFind(&status, TAG_APP_STATE, 10, 10, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFindContainer(&reply.tags, TAG_APP_STATUS, &status), ERR_OK);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_STATE, 10, 10, &tag), ERR_OK);
     CHECK(BytesGet32(tag.data + 2) == AS_STOP && (BytesGet32(tag.data + 6) & OS_EXCEPTION) != 0);
-    CHECK(BTagFind(&status, TAG_APP_LAST_EXCEPTION, 12, 12, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&status, TAG_APP_LAST_EXCEPTION, 12, 12, &tag), ERR_OK);
     CHECK(BytesGet32(tag.data) == RTSEXCPT_DIVIDEBYZERO && BytesGet32(tag.data + 4) == 2);
     CHECK(client_request(&client, SG_LOG, SRV_LOG_GET_ENTRIES, NULL, 0, &reply));
     CHECK(reply.size > 20);
@@ -281,10 +281,10 @@ static void tasks_are_reported(void)
     BTAG tag;
 
     start_with_counter();
-    CHECK(control(SRV_APP_START) == ERR_OK);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
+    CHECK_EQUAL(control(SRV_APP_START), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
     CHECK(client_request(&client, SG_APPLICATION, SRV_APP_READ_TASK_INFO, NULL, 0, &reply));
-    CHECK(BTagFind(&reply.tags, TAG_TASK_INFO, 48, 48, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_TASK_INFO, 48, 48, &tag), ERR_OK);
     CHECK(BytesGet32(tag.data + 8) == 10000 && BytesGet32(tag.data + 12) == 11);
     CHECK(strcmp((const char *)tag.data + 40, "Main") == 0);
 }

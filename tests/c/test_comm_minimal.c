@@ -50,12 +50,12 @@ static void names_that_do_not_fit_are_cut_and_the_serial_number_is_whole(void)
     fakes.target.serial_number = serial;
     RTS_UI32 size = scan(NS_VERSION_0400);
     CHECK(size != 0 && size <= NS_REPLY_SIZE);
-    CHECK(BytesGet16(reply + 14) == 4);
+    CHECK_EQUAL(BytesGet16(reply + 14), 4);
     RTS_UI32 device = BytesGet16(reply + 16);
     CHECK(device > 4 && device < sizeof(name) - 1);
-    CHECK(BytesGet16(reply + 18) == 0);
-    CHECK(reply[36] == sizeof(serial) - 1);
-    CHECK(size == DEVICE_NAME_OFFSET + 2 * (5 + device + 1 + 1) + sizeof(serial));
+    CHECK_EQUAL(BytesGet16(reply + 18), 0);
+    CHECK_EQUAL(reply[36], sizeof(serial) - 1);
+    CHECK_EQUAL(size, DEVICE_NAME_OFFSET + 2 * (5 + device + 1 + 1) + sizeof(serial));
     CHECK(memcmp(reply + size - sizeof(serial), serial, sizeof(serial)) == 0);
 }
 
@@ -63,8 +63,8 @@ static void only_the_newest_version_of_the_name_service_is_answered(void)
 {
     setup();
     CHECK(scan(NS_VERSION_0400) != 0);
-    CHECK(scan(NS_VERSION_0103) == 0);
-    CHECK(scan(NS_VERSION_0101) == 0);
+    CHECK_EQUAL(scan(NS_VERSION_0103), 0);
+    CHECK_EQUAL(scan(NS_VERSION_0101), 0);
 }
 
 static void names_of_19_characters_and_a_serial_number_of_24_are_reported_whole(void)
@@ -76,8 +76,8 @@ static void names_of_19_characters_and_a_serial_number_of_24_are_reported_whole(
     fakes.target.serial_number = "0123456789ABCDEF01234567"; /* of an STM32 */
     CHECK(client_open(&client));
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &answer));
-    CHECK(reply_error(&answer) == ERR_OK);
-    CHECK(scan(NS_VERSION_0400) == DEVICE_NAME_OFFSET + 3 * 2 * 20 + 25);
+    CHECK_EQUAL(reply_error(&answer), ERR_OK);
+    CHECK_EQUAL(scan(NS_VERSION_0400), DEVICE_NAME_OFFSET + 3 * 2 * 20 + 25);
 }
 
 static void largest_message_goes_to_and_fro(void)
@@ -91,7 +91,7 @@ static void largest_message_goes_to_and_fro(void)
     content[1] = 0x80 | (sizeof(content) - 3) % 0x80;
     content[2] = (sizeof(content) - 3) / 0x80;
     CHECK(client_request(&client, SG_APPLICATION, SRV_APP_READ_STATUS, content, sizeof(content), &answer));
-    CHECK(reply_error(&answer) == ERR_OK);
+    CHECK_EQUAL(reply_error(&answer), ERR_OK);
 }
 
 static void services_that_only_inform_are_unknown(void)
@@ -101,9 +101,9 @@ static void services_that_only_inform_are_unknown(void)
     setup();
     CHECK(client_open(&client));
     CHECK(client_request(&client, SG_APPLICATION, SRV_APP_READ_TASK_INFO, NULL, 0, &answer));
-    CHECK(reply_error(&answer) == ERR_L7_UNKNOWNCMD);
+    CHECK_EQUAL(reply_error(&answer), ERR_L7_UNKNOWNCMD);
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_ECHO, NULL, 0, &answer));
-    CHECK(reply_error(&answer) == ERR_L7_UNKNOWNCMD);
+    CHECK_EQUAL(reply_error(&answer), ERR_L7_UNKNOWNCMD);
 }
 
 int main(void)

@@ -112,7 +112,7 @@ static RTS_UI32 read_error(const RTS_UI8 *code, RTS_UI32 code_size, RTS_UI32 siz
     begin_read();
     add_program(5, size, code, code_size);
     CHECK(send_read());
-    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
     if (take_value(5, size) != NULL)
         return 0;
     CHECK(values_size == 7 && BytesGet16(values) == (5 | MON2_ID_FAILED) && BytesGet32(values + 2) == 1);
@@ -140,7 +140,7 @@ static void variables_of_all_sizes_are_read(void)
     CHECK((value = take_value(4, 8)) != NULL && memcmp(value, fakes_area(APP_AREA_OUTPUT) + 16, 8) == 0);
     CHECK((value = take_value(5, 13)) != NULL && memcmp(value, fakes_area(APP_AREA_MEMORY) + 5, 13) == 0);
     CHECK((value = take_value(6, 4)) != NULL && memcmp(value, fakes_area(APP_AREA_CODE) + 1, 4) == 0);
-    CHECK(values_size == 0);
+    CHECK_EQUAL(values_size, 0);
 }
 
 static void every_alignment_and_size_is_read_right(void)
@@ -160,28 +160,29 @@ static void every_alignment_and_size_is_read_right(void)
 static void recognised_read_programs(void)
 {
     setup();
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00", 2) == 0);
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01", 2) == 0);
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01\x00\x00", 2) == 0);
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x00\x00", 2) == 0);
-    CHECK(READ_ERROR("\x03\x10\x00\x00\x00\x06\x00", 2) == 0);
-    CHECK(READ_ERROR("\x03\x10\x00\x00\x00\x06\x00\x01", 2) == 0);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00", 2), 0);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00\x01", 2), 0);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00\x01\x00\x00", 2), 0);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00\x00\x00", 2), 0);
+    CHECK_EQUAL(READ_ERROR("\x03\x10\x00\x00\x00\x06\x00", 2), 0);
+    CHECK_EQUAL(READ_ERROR("\x03\x10\x00\x00\x00\x06\x00\x01", 2), 0);
 }
 
 static void every_other_program_is_refused(void)
 {
     setup();
-    CHECK(READ_ERROR("\x02\x10\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(READ_ERROR("\x02\x10\x00\x06", 2) == MONITORING_ERR_INVALID_AREA);
-    CHECK(READ_ERROR("\x02\x10\x00\x07\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(READ_ERROR("\x1C\x10\x00\x06\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x09\x04", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR); /* Der */
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01\x18", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR); /* Call after Halt */
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x01\x01", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(READ_ERROR("\x03\x10\x00\x00\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(READ_ERROR("\x03\x10\x00\x00\x00\x06", 2) == MONITORING_ERR_INVALID_AREA);
-    CHECK(READ_ERROR("\x18\x00\x00\x00\x00\x00\x01", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(READ_ERROR("\x00", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06", 2), MONITORING_ERR_INVALID_AREA);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x07\x00", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x1C\x10\x00\x06\x00", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00\x09\x04", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR); /* Der */
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00\x01\x18", 2),
+                MONITORING_ERR_UNSUPPORTED_OPERATOR); /* Call after Halt */
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00\x01\x01", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x03\x10\x00\x00\x00", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x03\x10\x00\x00\x00\x06", 2), MONITORING_ERR_INVALID_AREA);
+    CHECK_EQUAL(READ_ERROR("\x18\x00\x00\x00\x00\x00\x01", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x00", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
 }
 
 static void single_bytes_of_a_program_cannot_be_changed_unnoticed(void)
@@ -195,7 +196,7 @@ static void single_bytes_of_a_program_cannot_be_changed_unnoticed(void)
             code[i] = (RTS_UI8)byte;
             RTS_UI32 error = read_error(code, sizeof(code), 2);
             bool legal = i == 1 || i == 2 || i == 4 /* the address */ || byte == right || (i == 5 && byte == 0);
-            CHECK((error == MONITORING_ERR_UNSUPPORTED_OPERATOR) == !legal);
+            CHECK_EQUAL((error == MONITORING_ERR_UNSUPPORTED_OPERATOR), !legal);
         }
         code[i] = right;
     }
@@ -254,7 +255,7 @@ static void compact_form_reads_150_variables_at_once(void)
     CHECK(client_request(&client, SG_MONITORING2, SRV_MON2_READ, content, size, &reply));
     CHECK(reply.size <= 2048);
     BTAG tag;
-    CHECK(BTagFind(&reply.tags, TAG_MON2_VALUES, 10 * COUNT, 10 * COUNT, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_MON2_VALUES, 10 * COUNT, 10 * COUNT, &tag), ERR_OK);
     values = tag.data;
     values_size = tag.size;
     for (RTS_UI32 i = 0; i < COUNT; i++) {
@@ -270,7 +271,7 @@ static void what_does_not_fit_fails_alone(void)
     fakes_start();
     client_init(&client, 1);
     client_send_open(&client, 1, 700);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     CHECK(client_login(&client) && client_login_app(&client));
     begin_read();
     add_read(1, 600, APP_AREA_DATA, 0);
@@ -279,7 +280,7 @@ static void what_does_not_fit_fails_alone(void)
     for (RTS_UI32 id = 4; id < 12; id++)
         add_read(id, 4, APP_AREA_DATA, 0);
     CHECK(send_read());
-    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
     CHECK(reply.size <= 700);
     CHECK(take_failure(1, MONITORING_ERR_BUFFERSIZE_EXCEEDED) || values_size > 600);
 }
@@ -291,7 +292,7 @@ static void large_value_leaves_room_for_the_answers_after_it(void)
     fakes_start();
     client_init(&client, 1);
     client_send_open(&client, 1, 700);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     CHECK(client_login(&client) && client_login_app(&client));
     for (RTS_UI32 size = 560; size < 700; size++) {
         begin_read();
@@ -308,7 +309,7 @@ static void large_value_leaves_room_for_the_answers_after_it(void)
             CHECK(take_failure(id, MONITORING_ERR_BUFFERSIZE_EXCEEDED));
             failures++;
         }
-        CHECK(values_size == 0);
+        CHECK_EQUAL(values_size, 0);
     }
     CHECK(failures > 0);
 }
@@ -320,8 +321,8 @@ static void empty_list_has_no_values(void)
     BTagAppend(&writer, "\x81\x01\x00", 3);
     CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_READ, &writer, &reply));
     BTAG tag;
-    CHECK(reply_error(&reply) == ERR_OK);
-    CHECK(BTagFind(&reply.tags, TAG_MON2_VALUES, 0, NETSERVER_MESSAGE_SIZE, &tag) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_MON2_VALUES, 0, NETSERVER_MESSAGE_SIZE, &tag), ERR_L7_TAG_MISSING);
 }
 
 /* ---- pointers ---- */
@@ -345,7 +346,7 @@ static RTS_UI32 read_behind(uintptr_t pointer)
 static void pointers_are_followed_into_every_area(void)
 {
     for (RTS_UI32 area = 0; area < APP_AREA_COUNT; area++) {
-        CHECK(read_behind((uintptr_t)fakes_area(area) + TARGET_AT) == 0);
+        CHECK_EQUAL(read_behind((uintptr_t)fakes_area(area) + TARGET_AT), 0);
         CHECK(memcmp(values - 2, fakes_area(area) + TARGET_AT + 4, 2) == 0);
     }
 }
@@ -355,7 +356,7 @@ static void pointers_to_pointers_are_followed(void)
     setup();
     put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);
     put_pointer(APP_AREA_MEMORY, TARGET_AT + 8, (uintptr_t)fakes_area(APP_AREA_RETAIN));
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x09\x08\x02\x08\x00\x0E\x09\x08\x03\x30\x00\x00\x00\x0E\x01", 2) == 0);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00\x09\x08\x02\x08\x00\x0E\x09\x08\x03\x30\x00\x00\x00\x0E\x01", 2), 0);
     CHECK(memcmp(values - 2, fakes_area(APP_AREA_RETAIN) + 0x30, 2) == 0);
 }
 
@@ -363,30 +364,31 @@ static void pointers_that_lead_outside_are_refused(void)
 {
     RTS_UI32 outside = 0;
 
-    CHECK(read_behind(0) == MONITORING_ERR_INVALID_POINTER);
-    CHECK(read_behind((uintptr_t)&outside) == MONITORING_ERR_INVALID_POINTER);
-    CHECK(read_behind((uintptr_t)&fakes) == MONITORING_ERR_INVALID_POINTER);
-    CHECK(read_behind(UINTPTR_MAX) == MONITORING_ERR_INVALID_POINTER);
-    CHECK(read_behind((uintptr_t)fakes_area(0) - 1) == MONITORING_ERR_INVALID_POINTER);
-    CHECK(read_behind((uintptr_t)fakes_area(APP_AREA_COUNT - 1) + FAKE_AREA_SIZE) == MONITORING_ERR_INVALID_POINTER);
+    CHECK_EQUAL(read_behind(0), MONITORING_ERR_INVALID_POINTER);
+    CHECK_EQUAL(read_behind((uintptr_t)&outside), MONITORING_ERR_INVALID_POINTER);
+    CHECK_EQUAL(read_behind((uintptr_t)&fakes), MONITORING_ERR_INVALID_POINTER);
+    CHECK_EQUAL(read_behind(UINTPTR_MAX), MONITORING_ERR_INVALID_POINTER);
+    CHECK_EQUAL(read_behind((uintptr_t)fakes_area(0) - 1), MONITORING_ERR_INVALID_POINTER);
+    CHECK_EQUAL(read_behind((uintptr_t)fakes_area(APP_AREA_COUNT - 1) + FAKE_AREA_SIZE),
+                MONITORING_ERR_INVALID_POINTER);
 }
 
 static void what_a_pointer_leads_to_ends_with_its_area(void)
 {
-    CHECK(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 6) == 0);
-    CHECK(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 5) == MONITORING_ERR_INVALID_INDEX);
-    CHECK(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 1) == MONITORING_ERR_INVALID_INDEX);
+    CHECK_EQUAL(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 6), 0);
+    CHECK_EQUAL(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 5), MONITORING_ERR_INVALID_INDEX);
+    CHECK_EQUAL(read_behind((uintptr_t)fakes_area(APP_AREA_DATA) + FAKE_AREA_SIZE - 1), MONITORING_ERR_INVALID_INDEX);
     setup();
     put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x00\x09\x08\x03\x00\x00\x00\x80\x0E", 2) == MONITORING_ERR_INVALID_INDEX);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x00\x09\x08\x03\x00\x00\x00\x80\x0E", 2), MONITORING_ERR_INVALID_INDEX);
 }
 
 static void pointer_itself_must_lie_in_an_area(void)
 {
     setup();
-    CHECK(READ_ERROR("\x02\xF9\x03\x06\x00\x09\x08\x02\x00\x00\x0E", 2) == MONITORING_ERR_INVALID_INDEX);
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x06\x09\x08\x02\x00\x00\x0E", 2) == MONITORING_ERR_INVALID_AREA);
-    CHECK(READ_ERROR("\x02\x10\x00\x06\x09\x08\x02\x00\x00\x0E", 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x02\xF9\x03\x06\x00\x09\x08\x02\x00\x00\x0E", 2), MONITORING_ERR_INVALID_INDEX);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x06\x09\x08\x02\x00\x00\x0E", 2), MONITORING_ERR_INVALID_AREA);
+    CHECK_EQUAL(READ_ERROR("\x02\x10\x00\x06\x09\x08\x02\x00\x00\x0E", 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
 }
 
 static void every_other_step_is_refused(void)
@@ -401,13 +403,13 @@ static void every_other_step_is_refused(void)
         for (RTS_UI32 byte = 0; byte < 256; byte++) {
             code[i] = (RTS_UI8)byte;
             bool legal = i == 8 || i == 9 /* the offset */ || byte == right;
-            CHECK((read_error(code, sizeof(code), 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR) == !legal);
+            CHECK_EQUAL((read_error(code, sizeof(code), 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR), !legal);
         }
         code[i] = right;
     }
     for (RTS_UI32 size = 6; size < sizeof(code); size++)
-        CHECK(read_error(code, size, 2) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(read_error(code, sizeof(code), 2) == 0);
+        CHECK_EQUAL(read_error(code, size, 2), MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(read_error(code, sizeof(code), 2), 0);
 }
 
 /* ---- consistency ---- */
@@ -451,11 +453,11 @@ static void malformed_variables_fail_the_request(void)
     BTagWrite32(&writer, TAG_MON2_VAR_SIZE, 4);
     BTagClose(&writer);
     CHECK(send_read());
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
     begin_read();
     add_program(MON2_ID_FAILED, 1, code, sizeof(code));
     CHECK(send_read());
-    CHECK(reply_error(&reply) == ERR_PARAMETER);
+    CHECK_EQUAL(reply_error(&reply), ERR_PARAMETER);
     begin_read();
     BTagOpen(&writer, TAG_MON2_READ_VAR, BTAG_ALIGN_0);
     BTagWrite32(&writer, TAG_MON2_VAR_SIZE, 4);
@@ -465,14 +467,14 @@ static void malformed_variables_fail_the_request(void)
     BTagClose(&writer);
     BTagClose(&writer);
     CHECK(send_read());
-    CHECK(reply_error(&reply) == ERR_PARAMETER);
+    CHECK_EQUAL(reply_error(&reply), ERR_PARAMETER);
     begin_request();
     BTagAppend(&writer, "\x81\x01\x05\x82\x01\x09", 6);
     CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_READ, &writer, &reply));
-    CHECK(reply_error(&reply) == ERR_BTAG_BUFFEROVERRUN);
+    CHECK_EQUAL(reply_error(&reply), ERR_BTAG_BUFFEROVERRUN);
     begin_request();
     CHECK(client_call(&client, SG_MONITORING2, SRV_MON2_READ, &writer, &reply));
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
 }
 
 /* ---- which application ---- */
@@ -488,21 +490,21 @@ static RTS_UI32 error_for(RTS_UI32 session, RTS_UI32 data_id)
     BTagOpen(&writer, TAG_MON2_READ_LIST, BTAG_ALIGN_0);
     add_read(1, 1, APP_AREA_DATA, 0);
     CHECK(send_read());
-    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
     return values_size != 0 ? ERR_OK : reply_number(&reply, TAG_MON2_ERROR);
 }
 
 static void application_header_is_checked(void)
 {
     setup();
-    CHECK(error_for(client.app_session, FAKE_IMAGE_CRC) == ERR_OK);
-    CHECK(error_for(client.app_session ^ 2, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
-    CHECK(error_for(0, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
-    CHECK(error_for(client.app_session, FAKE_IMAGE_CRC + 1) == ERR_APP_INVALID_DATAID);
+    CHECK_EQUAL(error_for(client.app_session, FAKE_IMAGE_CRC), ERR_OK);
+    CHECK_EQUAL(error_for(client.app_session ^ 2, FAKE_IMAGE_CRC), ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(error_for(0, FAKE_IMAGE_CRC), ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(error_for(client.app_session, FAKE_IMAGE_CRC + 1), ERR_APP_INVALID_DATAID);
     SrvEndAppSession(ChannelGetClient(0));
-    CHECK(error_for(0, FAKE_IMAGE_CRC) == ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(error_for(0, FAKE_IMAGE_CRC), ERR_APP_INVALID_SESSIONID);
     fakes.status.state = AS_NONE;
-    CHECK(error_for(client.app_session, FAKE_IMAGE_CRC) == ERR_APP_NOT_LOADED);
+    CHECK_EQUAL(error_for(client.app_session, FAKE_IMAGE_CRC), ERR_APP_NOT_LOADED);
 }
 
 /* ---- writing ---- */
@@ -558,10 +560,10 @@ static void variables_of_all_sizes_and_alignments_are_written(void)
             setup();
             begin_write();
             add_write(size, value, APP_AREA_DATA, offset);
-            CHECK(send_write() == ERR_OK);
+            CHECK_EQUAL(send_write(), ERR_OK);
             CHECK(memcmp(fakes_area(APP_AREA_DATA) + offset, value, size) == 0);
-            CHECK(fakes_area(APP_AREA_DATA)[offset - 1] == offset - 1);
-            CHECK(fakes_area(APP_AREA_DATA)[offset + size] == offset + size);
+            CHECK_EQUAL(fakes_area(APP_AREA_DATA)[offset - 1], offset - 1);
+            CHECK_EQUAL(fakes_area(APP_AREA_DATA)[offset + size], offset + size);
         }
     }
 }
@@ -575,8 +577,8 @@ static void several_variables_are_written_by_one_request(void)
     add_write(4, "\xA4\xA5\xA6\xA7", APP_AREA_OUTPUT, 4);
     add_write(3, "\xA8\xA9\xAA", APP_AREA_MEMORY, 0);
     BTagPad(&writer);
-    CHECK(send_write() == ERR_OK);
-    CHECK(fakes_area(APP_AREA_RETAIN)[1] == 0xA1);
+    CHECK_EQUAL(send_write(), ERR_OK);
+    CHECK_EQUAL(fakes_area(APP_AREA_RETAIN)[1], 0xA1);
     CHECK(memcmp(fakes_area(APP_AREA_INPUT) + 2, "\xA2\xA3", 2) == 0);
     CHECK(memcmp(fakes_area(APP_AREA_OUTPUT) + 4, "\xA4\xA5\xA6\xA7", 4) == 0);
     CHECK(memcmp(fakes_area(APP_AREA_MEMORY), "\xA8\xA9\xAA", 3) == 0);
@@ -585,11 +587,13 @@ static void several_variables_are_written_by_one_request(void)
 static void program_of_the_programming_system_is_recognised(void)
 {
     setup();
-    CHECK(WRITE_PROGRAM("\x15\x0C\x00\x02\x10\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00\x17\x04\x09\x04"
-                        "\x17\x08\x09\x04\x04") == ERR_OK);
+    CHECK_EQUAL(WRITE_PROGRAM("\x15\x0C\x00\x02\x10\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00\x17\x04\x09\x04"
+                              "\x17\x08\x09\x04\x04"),
+                ERR_OK);
     CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x10, "\xAA\xBB", 2) == 0);
-    CHECK(WRITE_PROGRAM("\x15\x0C\x00\x03\x20\x00\x00\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00"
-                        "\x17\x04\x09\x04\x17\x08\x09\x04\x04\x01") == ERR_OK);
+    CHECK_EQUAL(WRITE_PROGRAM("\x15\x0C\x00\x03\x20\x00\x00\x00\x06\x00\x17\x0C\x09\x04\x1B\x06\x00\x01\x00\x00"
+                              "\x17\x04\x09\x04\x17\x08\x09\x04\x04\x01"),
+                ERR_OK);
     CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x20, "\xAA\xBB", 2) == 0);
 }
 
@@ -604,14 +608,14 @@ static void every_other_write_program_is_refused(void)
             continue;
         for (RTS_UI32 bit = 0; bit < 8; bit++) {
             code[i] ^= (RTS_UI8)(1u << bit);
-            CHECK(write_program(code, sizeof(code)) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+            CHECK_EQUAL(write_program(code, sizeof(code)), MONITORING_ERR_UNSUPPORTED_OPERATOR);
             code[i] ^= (RTS_UI8)(1u << bit);
         }
     }
     for (RTS_UI32 size = 0; size < sizeof(code); size++)
-        CHECK(write_program(code, size) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+        CHECK_EQUAL(write_program(code, size), MONITORING_ERR_UNSUPPORTED_OPERATOR);
     CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x10, "\x10\x11", 2) == 0);
-    CHECK(write_program(code, sizeof(code)) == ERR_OK);
+    CHECK_EQUAL(write_program(code, sizeof(code)), ERR_OK);
 }
 
 /* ---- writing bits ---- */
@@ -636,8 +640,8 @@ static void every_bit_is_written_and_no_other_changes(void)
             fakes_area(area)[5] = before;
             begin_write();
             add_write_bits(1, on ? 0xFF : 0x00, area, 5, mask);
-            CHECK(send_write() == ERR_OK);
-            CHECK(fakes_area(area)[5] == (on ? before | mask : before & ~mask));
+            CHECK_EQUAL(send_write(), ERR_OK);
+            CHECK_EQUAL(fakes_area(area)[5], (on ? before | mask : before & ~mask));
             CHECK(fakes_area(area)[4] == 4 + 16 * area && fakes_area(area)[6] == 6 + 16 * area);
         }
     }
@@ -650,8 +654,8 @@ static void bits_are_written_through_pointers(void)
     begin_write();
     add_write_program(1, (const RTS_UI8 *)"\xFF",
                       (const RTS_UI8 *)"\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E\x40\x80", 13);
-    CHECK(send_write() == ERR_OK);
-    CHECK(fakes_area(APP_AREA_MEMORY)[TARGET_AT + 4] == (0x80 | (TARGET_AT + 4 + 16 * APP_AREA_MEMORY)));
+    CHECK_EQUAL(send_write(), ERR_OK);
+    CHECK_EQUAL(fakes_area(APP_AREA_MEMORY)[TARGET_AT + 4], (0x80 | (TARGET_AT + 4 + 16 * APP_AREA_MEMORY)));
 }
 
 static void bits_are_those_of_one_byte_and_only_written(void)
@@ -659,15 +663,15 @@ static void bits_are_those_of_one_byte_and_only_written(void)
     setup();
     begin_write();
     add_write_bits(2, 0xFF, APP_AREA_DATA, 5, 0x01);
-    CHECK(send_write() == ERR_OK);
+    CHECK_EQUAL(send_write(), ERR_OK);
     CHECK(fakes_area(APP_AREA_DATA)[5] == 5 && fakes_area(APP_AREA_DATA)[6] == 6);
-    CHECK(WRITE_PROGRAM("\x02\x05\x00\x06\x00\x40") == MONITORING_ERR_UNSUPPORTED_OPERATOR);
-    CHECK(WRITE_PROGRAM("\x02\x05\x00\x06\x00\x40\x01\x01\x01") == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(WRITE_PROGRAM("\x02\x05\x00\x06\x00\x40"), MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(WRITE_PROGRAM("\x02\x05\x00\x06\x00\x40\x01\x01\x01"), MONITORING_ERR_UNSUPPORTED_OPERATOR);
     begin_write();
     add_write_bits(1, 0xFF, APP_AREA_CODE, 5, 0x01);
-    CHECK(send_write() == MONITORING_ERR_OPERATION_DENIED);
+    CHECK_EQUAL(send_write(), MONITORING_ERR_OPERATION_DENIED);
     CHECK(fakes_area(APP_AREA_DATA)[5] == 5 && fakes_area(APP_AREA_CODE)[5] == 0x55);
-    CHECK(READ_ERROR("\x02\x05\x00\x06\x00\x40\x01", 1) == MONITORING_ERR_UNSUPPORTED_OPERATOR);
+    CHECK_EQUAL(READ_ERROR("\x02\x05\x00\x06\x00\x40\x01", 1), MONITORING_ERR_UNSUPPORTED_OPERATOR);
 }
 
 /* Tasks do not have to wait for what is long. */
@@ -680,7 +684,7 @@ static void what_is_written_in_one_step(void)
         fakes.locks = 0;
         begin_write();
         add_write(size, value, APP_AREA_INPUT, 0);
-        CHECK(send_write() == ERR_OK);
+        CHECK_EQUAL(send_write(), ERR_OK);
         CHECK(fakes.locks == (size <= MON2_ONE_STEP_SIZE) && fakes.lock_depth == 0);
     }
 }
@@ -690,21 +694,21 @@ static void code_cannot_be_written(void)
     setup();
     begin_write();
     add_write(1, "\xEE", APP_AREA_CODE, 0);
-    CHECK(send_write() == MONITORING_ERR_OPERATION_DENIED);
-    CHECK(fakes_area(APP_AREA_CODE)[0] == 0x50);
+    CHECK_EQUAL(send_write(), MONITORING_ERR_OPERATION_DENIED);
+    CHECK_EQUAL(fakes_area(APP_AREA_CODE)[0], 0x50);
 }
 
 static void variables_are_written_through_pointers(void)
 {
     setup();
     put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_MEMORY) + TARGET_AT);
-    CHECK(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E") == ERR_OK);
+    CHECK_EQUAL(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E"), ERR_OK);
     CHECK(memcmp(fakes_area(APP_AREA_MEMORY) + TARGET_AT + 4, "\xAA\xBB", 2) == 0);
     put_pointer(APP_AREA_DATA, POINTER_AT, 0);
-    CHECK(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E") == MONITORING_ERR_INVALID_POINTER);
+    CHECK_EQUAL(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E"), MONITORING_ERR_INVALID_POINTER);
     put_pointer(APP_AREA_DATA, POINTER_AT, (uintptr_t)fakes_area(APP_AREA_CODE));
-    CHECK(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E") == MONITORING_ERR_OPERATION_DENIED);
-    CHECK(fakes_area(APP_AREA_CODE)[4] == 0x54);
+    CHECK_EQUAL(WRITE_PROGRAM("\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E"), MONITORING_ERR_OPERATION_DENIED);
+    CHECK_EQUAL(fakes_area(APP_AREA_CODE)[4], 0x54);
 }
 
 static void one_bad_entry_leaves_everything_unwritten(void)
@@ -715,8 +719,8 @@ static void one_bad_entry_leaves_everything_unwritten(void)
     add_write(1, "\xA2", APP_AREA_DATA, 2);
     add_write(4, "\xA3\xA4\xA5\xA6", APP_AREA_DATA, FAKE_AREA_SIZE - 3);
     add_write(1, "\xA7", APP_AREA_DATA, 3);
-    CHECK(send_write() == MONITORING_ERR_INVALID_INDEX);
-    CHECK(reply_number(&reply, TAG_MON2_ERROR_INDEX) == 2);
+    CHECK_EQUAL(send_write(), MONITORING_ERR_INVALID_INDEX);
+    CHECK_EQUAL(reply_number(&reply, TAG_MON2_ERROR_INDEX), 2);
     CHECK(memcmp(fakes_area(APP_AREA_DATA), "\0\1\2\3", 4) == 0);
 }
 
@@ -725,7 +729,7 @@ static void size_zero_is_refused(void)
     setup();
     begin_write();
     add_write(0, "", APP_AREA_DATA, 1);
-    CHECK(send_write() == MONITORING_ERR_SIZE_0);
+    CHECK_EQUAL(send_write(), MONITORING_ERR_SIZE_0);
 }
 
 static void cut_entries_are_refused_and_nothing_is_written(void)
@@ -737,16 +741,16 @@ static void cut_entries_are_refused_and_nothing_is_written(void)
         begin_write();
         BTagAppend(&writer, entry, size);
         /* Up to three zeros are padding. */
-        CHECK(send_write() == (size < 3 ? ERR_OK : ERR_L7_INCOMPLETE));
+        CHECK_EQUAL(send_write(), (size < 3 ? ERR_OK : ERR_L7_INCOMPLETE));
     }
     BytesPut32(entry + 2, 0xFFFFFFFF);
     begin_write();
     BTagAppend(&writer, entry, sizeof(entry));
-    CHECK(send_write() == ERR_L7_INCOMPLETE);
+    CHECK_EQUAL(send_write(), ERR_L7_INCOMPLETE);
     BytesPut32(entry + 2, 9);
     begin_write();
     BTagAppend(&writer, entry, sizeof(entry));
-    CHECK(send_write() == ERR_L7_INCOMPLETE);
+    CHECK_EQUAL(send_write(), ERR_L7_INCOMPLETE);
     CHECK(memcmp(fakes_area(APP_AREA_DATA) + 0x10, "\x10\x11", 2) == 0);
 }
 
@@ -756,8 +760,8 @@ static void writing_needs_the_right_application(void)
     client.app_session ^= 2;
     begin_write();
     add_write(1, "\xA1", APP_AREA_DATA, 1);
-    CHECK(send_write() == ERR_APP_INVALID_SESSIONID);
-    CHECK(fakes_area(APP_AREA_DATA)[1] == 1);
+    CHECK_EQUAL(send_write(), ERR_APP_INVALID_SESSIONID);
+    CHECK_EQUAL(fakes_area(APP_AREA_DATA)[1], 1);
 }
 
 int main(void)

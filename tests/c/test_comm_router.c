@@ -75,46 +75,47 @@ static void captured_tcp_header_is_read_and_answered_as_captured(void)
     setup();
     memcpy(driver.address, own, sizeof(own));
     driver.address_words = 3;
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x43"
-              "\x2D\xDC\xC0\xA8\x38\x72"
-              "\xC4\x12\xC0\xA8\x38\x73\x83\x0F") == 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x43"
+                    "\x2D\xDC\xC0\xA8\x38\x72"
+                    "\xC4\x12\xC0\xA8\x38\x73\x83\x0F"),
+                1);
     CHECK(memcmp(sent,
                  "\xC5\x73\x40\x40\x00\x34"
                  "\xC4\x12\xC0\xA8\x38\x73\x83\x0F"
                  "\x2D\xDC\x0A\x00\x02\x0F",
                  20) == 0);
-    CHECK(sent[20] == 0x82);
-    CHECK(sent_size == 30);
+    CHECK_EQUAL(sent[20], 0x82);
+    CHECK_EQUAL(sent_size, 30);
 }
 
 static void payload_starts_at_a_multiple_of_four(void)
 {
     setup();
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x11\x00\xAF\x00\x01\x00\x00") == 1);
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x21\x00\xAF\x00\x01\x00\x02") == 1);
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x10\x00\x01") == 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x11\x00\xAF\x00\x01\x00\x00"), 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x21\x00\xAF\x00\x01\x00\x02"), 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x10\x00\x01"), 1);
 }
 
 static void longer_static_header_is_honoured(void)
 {
     setup();
-    CHECK(ASK("\xC5\x7C\x40\x40\x00\x10\x12\x34\x00\x32\x00\x00") == 1);
-    CHECK(BytesGet16(sent + 6) == 0x3200);
+    CHECK_EQUAL(ASK("\xC5\x7C\x40\x40\x00\x10\x12\x34\x00\x32\x00\x00"), 1);
+    CHECK_EQUAL(BytesGet16(sent + 6), 0x3200);
 }
 
 static void header_shorter_than_three_words_is_rejected(void)
 {
     setup();
-    CHECK(ASK("\xC5\x6A\x40\x40\x00\x10\x00\x01") == 0);
-    CHECK(ASK("\xC5\x68\x40\x40\x00\x10\x00\x01") == 0);
-    CHECK(RouterGetCounters()->malformed == 2);
+    CHECK_EQUAL(ASK("\xC5\x6A\x40\x40\x00\x10\x00\x01"), 0);
+    CHECK_EQUAL(ASK("\xC5\x68\x40\x40\x00\x10\x00\x01"), 0);
+    CHECK_EQUAL(RouterGetCounters()->malformed, 2);
 }
 
 static void wrong_magic_is_rejected(void)
 {
     setup();
-    CHECK(ASK("\xC4\x6B\x40\x40\x00\x10\x00\x01") == 0);
-    CHECK(RouterGetCounters()->malformed == 1);
+    CHECK_EQUAL(ASK("\xC4\x6B\x40\x40\x00\x10\x00\x01"), 0);
+    CHECK_EQUAL(RouterGetCounters()->malformed, 1);
 }
 
 static void addresses_of_fifteen_words_are_answered(void)
@@ -123,8 +124,8 @@ static void addresses_of_fifteen_words_are_answered(void)
 
     setup();
     memset(header + 6, 0x5A, 60);
-    CHECK(ask_cut(header, 68, 68 + sizeof(question)) == 1);
-    CHECK(sent[5] == 0x1F);
+    CHECK_EQUAL(ask_cut(header, 68, 68 + sizeof(question)), 1);
+    CHECK_EQUAL(sent[5], 0x1F);
     CHECK(memcmp(sent + 6, header + 36, 30) == 0);
 }
 
@@ -138,8 +139,8 @@ static void every_cut_packet_is_rejected(void)
         RTS_UI32 whole = (6 + 2 * (words & 15) + 2 * (words >> 4) + 3) & ~3u;
         for (RTS_UI32 size = 0; size < whole; size++) {
             RTS_UI32 before = RouterGetCounters()->malformed;
-            CHECK(ask_cut(header, sizeof(header), size) == 0);
-            CHECK(RouterGetCounters()->malformed == before + 1);
+            CHECK_EQUAL(ask_cut(header, sizeof(header), size), 0);
+            CHECK_EQUAL(RouterGetCounters()->malformed, before + 1);
         }
     }
 }
@@ -150,47 +151,47 @@ static void packet_longer_than_a_block_is_rejected(void)
 
     setup();
     RouterHandleData(&driver, packet, BLK_MAX_SIZE);
-    CHECK(sent_count == 1);
+    CHECK_EQUAL(sent_count, 1);
     RouterHandleData(&driver, packet, BLK_MAX_SIZE + 1);
-    CHECK(sent_count == 1);
+    CHECK_EQUAL(sent_count, 1);
 }
 
 static void signal_packets_are_never_answered(void)
 {
     setup();
-    CHECK(ASK("\xC5\x6B\x60\x40\x00\x10\x00\x01") == 0);
-    CHECK(RouterGetCounters()->ignored == 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x60\x40\x00\x10\x00\x01"), 0);
+    CHECK_EQUAL(RouterGetCounters()->ignored, 1);
 }
 
 static void packets_without_sender_are_never_answered(void)
 {
     setup();
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x01\x00\xAF") == 0);
-    CHECK(RouterGetCounters()->ignored == 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x01\x00\xAF"), 0);
+    CHECK_EQUAL(RouterGetCounters()->ignored, 1);
 }
 
 static void hop_count_zero_and_relative_addresses_are_not_delivered(void)
 {
     setup();
-    CHECK(ASK("\xC5\x03\x40\x40\x00\x10\x00\x01") == 0);
-    CHECK(ASK("\xC5\x6B\x50\x40\x00\x10\x00\x01") == 0);
-    CHECK(RouterGetCounters()->not_for_us == 2);
+    CHECK_EQUAL(ASK("\xC5\x03\x40\x40\x00\x10\x00\x01"), 0);
+    CHECK_EQUAL(ASK("\xC5\x6B\x50\x40\x00\x10\x00\x01"), 0);
+    CHECK_EQUAL(RouterGetCounters()->not_for_us, 2);
 }
 
 static void bus_driver_takes_only_its_own_address_and_broadcasts(void)
 {
     setup();
     driver.point_to_point = 0;
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x11\x00\xAF\x00\x01\x00\x00") == 1);
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x10\x00\x01") == 1);
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x11\x00\xAE\x00\x01\x00\x00") == 0);
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x12\x00\xAF\x00\x00\x00\x01") == 0);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x11\x00\xAF\x00\x01\x00\x00"), 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x10\x00\x01"), 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x11\x00\xAE\x00\x01\x00\x00"), 0);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x12\x00\xAF\x00\x00\x00\x01"), 0);
 }
 
 static void point_to_point_driver_takes_any_receiver(void)
 {
     setup();
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x13\x00\x00\x00\x00\x00\x00\x00\x01\x00\x00") == 1);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x13\x00\x00\x00\x00\x00\x00\x00\x01\x00\x00"), 1);
 }
 
 static void address_service_is_ignored_so_no_peer_becomes_parent(void)
@@ -204,30 +205,30 @@ static void address_service_is_ignored_so_no_peer_becomes_parent(void)
         packet[3] = (RTS_UI8)service;
         RouterHandleData(&driver, packet, sizeof(packet));
     }
-    CHECK(sent_count == 0);
-    CHECK(RouterGetCounters()->ignored == 254);
-    CHECK(ASK("\xC5\x6B\x40\x40\x00\x10\x00\x01") == 1);
-    CHECK(BytesGet16(sent + 8) == 0xAF00); /* still our own address */
+    CHECK_EQUAL(sent_count, 0);
+    CHECK_EQUAL(RouterGetCounters()->ignored, 254);
+    CHECK_EQUAL(ASK("\xC5\x6B\x40\x40\x00\x10\x00\x01"), 1);
+    CHECK_EQUAL(BytesGet16(sent + 8), 0xAF00); /* still our own address */
 }
 
 static void announced_block_length_limits_the_answer(void)
 {
     setup();
     /* Name request with BlkLenMax 2, 96 bytes: our reply has 106. 3 means 128, 15 means 512. */
-    CHECK(ask("\xC5\x6B\x42\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16) == 0);
-    CHECK(ask("\xC5\x6B\x43\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16) == 1);
-    CHECK(ask("\xC5\x6B\x4F\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16) == 1);
+    CHECK_EQUAL(ask("\xC5\x6B\x42\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16), 0);
+    CHECK_EQUAL(ask("\xC5\x6B\x43\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16), 1);
+    CHECK_EQUAL(ask("\xC5\x6B\x4F\x03\x00\x10\x00\x01\x02\xC2\x00\x04\x00\x00\x00\x00", 16), 1);
 }
 
 static void payload_room_counts_the_header_in_steps_of_four(void)
 {
     ROUTER_PEER peer = {&driver, 512, 1, {0}};
 
-    CHECK(RouterGetMaxPayload(&peer, 2) == 500);
-    CHECK(RouterGetMaxPayload(&peer, 8) == 488); /* as seen with the field's tools */
-    CHECK(RouterGetMaxPayload(&peer, 30) == 444);
+    CHECK_EQUAL(RouterGetMaxPayload(&peer, 2), 500);
+    CHECK_EQUAL(RouterGetMaxPayload(&peer, 8), 488); /* as seen with the field's tools */
+    CHECK_EQUAL(RouterGetMaxPayload(&peer, 30), 444);
     peer.max_packet = 64;
-    CHECK(RouterGetMaxPayload(&peer, 30) == 0);
+    CHECK_EQUAL(RouterGetMaxPayload(&peer, 30), 0);
 }
 
 static void peers_are_distinguished_by_driver_and_address(void)
@@ -286,7 +287,7 @@ static void captured_scan_is_answered_in_the_captured_form(void)
 
     setup();
     RouterHandleData(&driver, request, sizeof(request));
-    CHECK(sent_size == sizeof(reply) + 2 * (6 + 7 + 7) + 6);
+    CHECK_EQUAL(sent_size, sizeof(reply) + 2 * (6 + 7 + 7) + 6);
     CHECK(memcmp(sent, reply, sizeof(reply)) == 0);
     CHECK(is_wide(sent + 60, "Node7"));
     CHECK(is_wide(sent + 72, "Device"));
@@ -300,7 +301,7 @@ static void third_party_scanner_with_a_longer_header_is_answered(void)
     static const RTS_UI8 request[] = {0xC5, 0x7C, 0x40, 0x03, 0x00, 0x10, 0x12, 0x34, 0x00, 0x32,
                                       0x00, 0x00, 0x02, 0xC2, 0x00, 0x04, 0x69, 0x69, 0x20, 0x04};
     RouterHandleData(&driver, request, sizeof(request));
-    CHECK(sent_count == 1);
+    CHECK_EQUAL(sent_count, 1);
     CHECK(memcmp(sent + 16, "\x69\x69\x20\x04", 4) == 0);
 }
 
@@ -310,34 +311,34 @@ static void broadcast_scan_is_answered(void)
     static const RTS_UI8 request[] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x10, 0x00, 0x01,
                                       0x02, 0xC2, 0x00, 0x04, 0x00, 0x00, 0x00, 0x00};
     RouterHandleData(&driver, request, sizeof(request));
-    CHECK(sent_count == 1);
+    CHECK_EQUAL(sent_count, 1);
 }
 
 static void version_0103_has_its_own_layout(void)
 {
     setup();
-    CHECK(scan(NS_RESOLVE_ADDRESS, 0x0103, "", 0) == 1);
-    CHECK(BytesGet16(sent + 14) == 0x0103);
-    CHECK(BytesGet32(sent + 16) == 0x11223344);
-    CHECK(BytesGet16(sent + 20) == 1);
-    CHECK(sent[22] == 1);
-    CHECK(BytesGet32(sent + 12 + 28) == 0x030E0514);
+    CHECK_EQUAL(scan(NS_RESOLVE_ADDRESS, 0x0103, "", 0), 1);
+    CHECK_EQUAL(BytesGet16(sent + 14), 0x0103);
+    CHECK_EQUAL(BytesGet32(sent + 16), 0x11223344);
+    CHECK_EQUAL(BytesGet16(sent + 20), 1);
+    CHECK_EQUAL(sent[22], 1);
+    CHECK_EQUAL(BytesGet32(sent + 12 + 28), 0x030E0514);
     CHECK(is_wide(sent + 12 + 32, "Node7"));
-    CHECK(sent_size == 12 + 32 + 40);
+    CHECK_EQUAL(sent_size, 12 + 32 + 40);
 }
 
 static void version_0101_has_its_own_layout(void)
 {
     setup();
-    CHECK(scan(NS_RESOLVE_ADDRESS, 0x0101, "", 0) == 1);
-    CHECK(BytesGet16(sent + 14) == 0x0101);
-    CHECK(BytesGet32(sent + 12 + 8) == 0x1000);
-    CHECK(BytesGet16(sent + 12 + 12) == 1);
-    CHECK(BytesGet16(sent + 12 + 18) == 5);
-    CHECK(BytesGet16(sent + 12 + 20) == 6);
+    CHECK_EQUAL(scan(NS_RESOLVE_ADDRESS, 0x0101, "", 0), 1);
+    CHECK_EQUAL(BytesGet16(sent + 14), 0x0101);
+    CHECK_EQUAL(BytesGet32(sent + 12 + 8), 0x1000);
+    CHECK_EQUAL(BytesGet16(sent + 12 + 12), 1);
+    CHECK_EQUAL(BytesGet16(sent + 12 + 18), 5);
+    CHECK_EQUAL(BytesGet16(sent + 12 + 20), 6);
     CHECK(is_wide(sent + 12 + 22, "Node7"));
     CHECK(is_wide(sent + 12 + 34, "Device"));
-    CHECK(sent_size == 12 + 22 + 26);
+    CHECK_EQUAL(sent_size, 12 + 22 + 26);
 }
 
 static void reply_has_the_wanted_version_or_a_lower_one(void)
@@ -347,39 +348,44 @@ static void reply_has_the_wanted_version_or_a_lower_one(void)
 
     setup();
     for (RTS_UI32 i = 0; i < RTS_COUNT(versions); i++) {
-        CHECK(scan(NS_RESOLVE_ADDRESS, versions[i][0], "", 0) == 1);
-        CHECK(BytesGet16(sent + 14) == versions[i][1]);
+        CHECK_EQUAL(scan(NS_RESOLVE_ADDRESS, versions[i][0], "", 0), 1);
+        CHECK_EQUAL(BytesGet16(sent + 14), versions[i][1]);
     }
-    CHECK(scan(NS_RESOLVE_ADDRESS, 0x0100, "", 0) == 0);
-    CHECK(scan(NS_RESOLVE_ADDRESS, 0x0000, "", 0) == 0);
+    CHECK_EQUAL(scan(NS_RESOLVE_ADDRESS, 0x0100, "", 0), 0);
+    CHECK_EQUAL(scan(NS_RESOLVE_ADDRESS, 0x0000, "", 0), 0);
 }
 
 static void name_request_is_answered_by_the_node_of_that_name_only(void)
 {
     setup();
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
-               "N\0o\0d\0e\0"
-               "7\0\0\0",
-               12) == 1);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
-               "N\0o\0d\0e\0"
-               "7\0",
-               10) == 1);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
-               "N\0o\0d\0e\0"
-               "8\0\0\0",
-               12) == 0);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400, "N\0o\0d\0e\0", 8) == 0);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
-               "N\0o\0d\0e\0"
-               "7\0"
-               "7\0",
-               12) == 0);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400,
-               "N\0o\0d\0e\0"
-               "7",
-               9) == 0);
-    CHECK(scan(NS_RESOLVE_NAME, 0x0400, "", 0) == 0);
+    CHECK_EQUAL(scan(NS_RESOLVE_NAME, 0x0400,
+                     "N\0o\0d\0e\0"
+                     "7\0\0\0",
+                     12),
+                1);
+    CHECK_EQUAL(scan(NS_RESOLVE_NAME, 0x0400,
+                     "N\0o\0d\0e\0"
+                     "7\0",
+                     10),
+                1);
+    CHECK_EQUAL(scan(NS_RESOLVE_NAME, 0x0400,
+                     "N\0o\0d\0e\0"
+                     "8\0\0\0",
+                     12),
+                0);
+    CHECK_EQUAL(scan(NS_RESOLVE_NAME, 0x0400, "N\0o\0d\0e\0", 8), 0);
+    CHECK_EQUAL(scan(NS_RESOLVE_NAME, 0x0400,
+                     "N\0o\0d\0e\0"
+                     "7\0"
+                     "7\0",
+                     12),
+                0);
+    CHECK_EQUAL(scan(NS_RESOLVE_NAME, 0x0400,
+                     "N\0o\0d\0e\0"
+                     "7",
+                     9),
+                0);
+    CHECK_EQUAL(scan(NS_RESOLVE_NAME, 0x0400, "", 0), 0);
 }
 
 static void other_name_packages_and_cut_ones_are_ignored(void)
@@ -387,11 +393,11 @@ static void other_name_packages_and_cut_ones_are_ignored(void)
     RTS_UI8 packet[] = {0xC5, 0x6B, 0x40, 0x03, 0x00, 0x10, 0x00, 0x01, 0x02, 0xC2, 0x00, 0x04, 0x00, 0x00, 0x00, 0x00};
 
     setup();
-    CHECK(scan(NS_IDENTIFICATION, 0x0400, "", 0) == 0);
-    CHECK(scan(0xC203, 0x0400, "", 0) == 0);
+    CHECK_EQUAL(scan(NS_IDENTIFICATION, 0x0400, "", 0), 0);
+    CHECK_EQUAL(scan(0xC203, 0x0400, "", 0), 0);
     for (RTS_UI32 size = 8; size < sizeof(packet); size++)
         RouterHandleData(&driver, packet, size);
-    CHECK(sent_count == 0);
+    CHECK_EQUAL(sent_count, 0);
 }
 
 static void longest_names_are_reported_whole_and_longer_ones_cut(void)
@@ -404,14 +410,14 @@ static void longest_names_are_reported_whole_and_longer_ones_cut(void)
     fakes.target.device_name = name + sizeof(name) - 1 - 60;
     fakes.target.vendor_name = name;
     fakes.target.serial_number = name;
-    CHECK(scan(NS_RESOLVE_ADDRESS, 0x0400, "", 0) == 1);
-    CHECK(BytesGet16(sent + 12 + 14) == NS_MAX_NODE_NAME);
-    CHECK(BytesGet16(sent + 12 + 16) == 60);
-    CHECK(BytesGet16(sent + 12 + 18) == NS_MAX_TYPE_NAMES - 60);
-    CHECK(sent[12 + 36] == NS_MAX_SERIAL);
+    CHECK_EQUAL(scan(NS_RESOLVE_ADDRESS, 0x0400, "", 0), 1);
+    CHECK_EQUAL(BytesGet16(sent + 12 + 14), NS_MAX_NODE_NAME);
+    CHECK_EQUAL(BytesGet16(sent + 12 + 16), 60);
+    CHECK_EQUAL(BytesGet16(sent + 12 + 18), NS_MAX_TYPE_NAMES - 60);
+    CHECK_EQUAL(sent[12 + 36], NS_MAX_SERIAL);
     CHECK(sent_size == 12 + 48 + 2 * (50 + 61 + 39) + 65 && sent_size <= 12 + NS_REPLY_SIZE);
-    CHECK(scan(NS_RESOLVE_ADDRESS, 0x0103, "", 0) == 1);
-    CHECK(scan(NS_RESOLVE_ADDRESS, 0x0101, "", 0) == 1);
+    CHECK_EQUAL(scan(NS_RESOLVE_ADDRESS, 0x0103, "", 0), 1);
+    CHECK_EQUAL(scan(NS_RESOLVE_ADDRESS, 0x0101, "", 0), 1);
 }
 
 int main(void)

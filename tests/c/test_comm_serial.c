@@ -107,7 +107,7 @@ static const COM_COUNTERS *counters(void)
 
 static void reference_crc_has_the_published_check_value(void)
 {
-    CHECK(reference_crc((const RTS_UI8 *)"123456789", 9) == 0xE5CC);
+    CHECK_EQUAL(reference_crc((const RTS_UI8 *)"123456789", 9), 0xE5CC);
 }
 
 static void worked_frames_of_the_specification_are_accepted(void)
@@ -120,8 +120,8 @@ static void worked_frames_of_the_specification_are_accepted(void)
     put_bytes(short_frame, sizeof(short_frame));
     put_bytes(address_request, sizeof(address_request));
     fakes_cycle(1);
-    CHECK(counters()->frames == 2);
-    CHECK(counters()->crc_errors == 0);
+    CHECK_EQUAL(counters()->frames, 2);
+    CHECK_EQUAL(counters()->crc_errors, 0);
 }
 
 static void answer_is_sent_in_the_cycle_of_the_last_byte(void)
@@ -132,8 +132,8 @@ static void answer_is_sent_in_the_cycle_of_the_last_byte(void)
     fakes_start();
     put_question();
     fakes_cycle(1);
-    CHECK(take_frame(&position, packet) == 12 + 10);
-    CHECK(position == fakes.line_out_size);
+    CHECK_EQUAL(take_frame(&position, packet), 12 + 10);
+    CHECK_EQUAL(position, fakes.line_out_size);
     CHECK(memcmp(packet, "\xC5\x73\x40\x40\x00\x11\x00\x23\x00\x01\x00\x00\x82", 13) == 0);
 }
 
@@ -153,7 +153,7 @@ static void receiver_address_does_not_matter_on_a_line_with_two_ends(void)
     memcpy(packet + 12, rts_info_package, sizeof(rts_info_package));
     put_frame(packet, sizeof(packet), 0);
     fakes_cycle(1);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void bytes_may_arrive_one_per_cycle(void)
@@ -162,11 +162,11 @@ static void bytes_may_arrive_one_per_cycle(void)
     put_question();
     RTS_UI32 size = fakes.line_in_size;
     for (fakes.line_in_size = 0; fakes.line_in_size < size;) {
-        CHECK(answers() == 0);
+        CHECK_EQUAL(answers(), 0);
         fakes.line_in_size++;
         fakes_cycle(1);
     }
-    CHECK(answers() == 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void frame_with_wrong_crc_is_dropped(void)
@@ -177,8 +177,8 @@ static void frame_with_wrong_crc_is_dropped(void)
     put_frame(data, sizeof(data), 0x0100);
     put_question();
     fakes_cycle(1);
-    CHECK(counters()->crc_errors == 1);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(counters()->crc_errors, 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void crc_with_its_bytes_swapped_is_dropped(void)
@@ -188,8 +188,8 @@ static void crc_with_its_bytes_swapped_is_dropped(void)
     fakes_start();
     put_bytes(swapped, sizeof(swapped));
     fakes_cycle(1);
-    CHECK(counters()->crc_errors == 1);
-    CHECK(counters()->frames == 0);
+    CHECK_EQUAL(counters()->crc_errors, 1);
+    CHECK_EQUAL(counters()->frames, 0);
 }
 
 static void every_single_bit_error_is_noticed(void)
@@ -202,10 +202,10 @@ static void every_single_bit_error_is_noticed(void)
         put_question();
         fakes.line_in[bit / 8] ^= (RTS_UI8)(1u << bit % 8);
         fakes_cycle(1);
-        CHECK(answers() == 0);
+        CHECK_EQUAL(answers(), 0);
         put_question();
         fakes_cycle(1);
-        CHECK(answers() == 1);
+        CHECK_EQUAL(answers(), 1);
     }
 }
 
@@ -220,9 +220,9 @@ static void largest_packet_passes_and_one_byte_more_overflows(void)
     put_question();
     fakes_cycle(1);
     fakes_cycle(1);
-    CHECK(counters()->frames == 2);
-    CHECK(counters()->overflows == 1);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(counters()->frames, 2);
+    CHECK_EQUAL(counters()->overflows, 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void frame_without_end_never_overflows_the_buffer(void)
@@ -234,8 +234,8 @@ static void frame_without_end_never_overflows_the_buffer(void)
     put_question();
     fakes_cycle(1);
     fakes_cycle(1);
-    CHECK(counters()->overflows == 1);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(counters()->overflows, 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void wrong_escape_ends_the_frame(void)
@@ -244,9 +244,9 @@ static void wrong_escape_ends_the_frame(void)
     put_bytes((const RTS_UI8 *)"#<abc#xdef#>", 12);
     put_question();
     fakes_cycle(1);
-    CHECK(counters()->bad_escapes == 1);
-    CHECK(counters()->ends_without_start == 1);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(counters()->bad_escapes, 1);
+    CHECK_EQUAL(counters()->ends_without_start, 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void doubled_hash_is_a_wrong_escape_and_may_begin_a_frame(void)
@@ -255,8 +255,8 @@ static void doubled_hash_is_a_wrong_escape_and_may_begin_a_frame(void)
     put_bytes((const RTS_UI8 *)"#<abc#", 6);
     put_question();
     fakes_cycle(1);
-    CHECK(counters()->bad_escapes == 1);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(counters()->bad_escapes, 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void start_within_a_frame_begins_again(void)
@@ -265,8 +265,8 @@ static void start_within_a_frame_begins_again(void)
     put_bytes((const RTS_UI8 *)"#<abc", 5);
     put_question();
     fakes_cycle(1);
-    CHECK(counters()->unfinished == 1);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(counters()->unfinished, 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void end_without_start_is_counted(void)
@@ -274,7 +274,7 @@ static void end_without_start_is_counted(void)
     fakes_start();
     put_bytes((const RTS_UI8 *)"noise#>##>", 10);
     fakes_cycle(1);
-    CHECK(counters()->ends_without_start == 2);
+    CHECK_EQUAL(counters()->ends_without_start, 2);
 }
 
 static void frames_too_short_for_a_crc_are_counted(void)
@@ -282,7 +282,7 @@ static void frames_too_short_for_a_crc_are_counted(void)
     fakes_start();
     put_bytes((const RTS_UI8 *)"#<#>#<a#>#<ab#>", 15);
     fakes_cycle(1);
-    CHECK(counters()->too_short == 3);
+    CHECK_EQUAL(counters()->too_short, 3);
 }
 
 static void port_that_takes_a_byte_at_a_time_gets_the_same_bytes(void)
@@ -300,7 +300,7 @@ static void port_that_takes_a_byte_at_a_time_gets_the_same_bytes(void)
     put_question();
     for (int i = 0; i < 200; i++)
         fakes_cycle(1);
-    CHECK(fakes.line_out_size == size);
+    CHECK_EQUAL(fakes.line_out_size, size);
     CHECK(memcmp(fakes.line_out, whole, size) == 0);
 }
 
@@ -320,7 +320,7 @@ static void full_queue_loses_whole_packets_only(void)
     fakes_cycle(1);
     while (take_frame(&position, packet) == 22)
         frames++;
-    CHECK(position == fakes.line_out_size);
+    CHECK_EQUAL(position, fakes.line_out_size);
     CHECK(frames >= COM_QUEUE_SIZE / 26); /* length, packet, CRC */
     CHECK(frames < 60);
 }
@@ -354,10 +354,10 @@ static void closing_the_line_sends_what_is_queued(void)
     fakes.line_write_limit = FAKE_LINE_SIZE;
     for (int hook = CH_EXIT_COMM; hook <= CH_EXIT_SYSTEM; hook++)
         fakes_hook((CMP_HOOK)hook);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(answers(), 1);
     put_question();
     fakes_cycle(1);
-    CHECK(answers() == 1);
+    CHECK_EQUAL(answers(), 1);
 }
 
 static void restart_forgets_half_a_frame_and_the_counters(void)
@@ -365,12 +365,12 @@ static void restart_forgets_half_a_frame_and_the_counters(void)
     fakes_start();
     put_bytes((const RTS_UI8 *)"#>#<ab", 6);
     fakes_cycle(1);
-    CHECK(counters()->ends_without_start == 1);
+    CHECK_EQUAL(counters()->ends_without_start, 1);
     fakes_start();
     put_bytes((const RTS_UI8 *)"#>", 2);
     fakes_cycle(1);
-    CHECK(counters()->ends_without_start == 1);
-    CHECK(counters()->too_short == 0);
+    CHECK_EQUAL(counters()->ends_without_start, 1);
+    CHECK_EQUAL(counters()->too_short, 0);
 }
 
 int main(void)

@@ -52,7 +52,7 @@ static void cut_headers_are_not_answered(void)
 {
     fakes_start();
     for (RTS_UI32 size = 0; size < 20; size++)
-        CHECK(handle(ident, size) == 0);
+        CHECK_EQUAL(handle(ident, size), 0);
     CHECK(handle(ident, 20) > 20);
 }
 
@@ -63,7 +63,7 @@ static void other_protocols_are_not_answered(void)
     fakes_start();
     memcpy(message, ident, 20);
     BytesPut16(message, 0x7557);
-    CHECK(handle(message, 20) == 0);
+    CHECK_EQUAL(handle(message, 20), 0);
 }
 
 static void header_length_is_checked(void)
@@ -74,7 +74,7 @@ static void header_length_is_checked(void)
     memcpy(message, ident, 20);
     for (RTS_UI32 length = 0; length < 0x10000; length += length < 100 ? 1 : 97) {
         BytesPut16(message + 2, length);
-        CHECK((handle(message, sizeof(message)) != 0) == (length >= 12 && length <= 64));
+        CHECK_EQUAL((handle(message, sizeof(message)) != 0), (length >= 12 && length <= 64));
     }
 }
 
@@ -86,8 +86,8 @@ static void short_header_is_answered_with_a_short_header(void)
     memcpy(message, ident, 16);
     message[2] = 12;
     CHECK(handle(message, 16) > 16);
-    CHECK(BytesGet16(reply.message + 2) == 12);
-    CHECK(reply.message[16] == TAG_DEV_RESULT);
+    CHECK_EQUAL(BytesGet16(reply.message + 2), 12);
+    CHECK_EQUAL(reply.message[16], TAG_DEV_RESULT);
 }
 
 static void content_longer_than_the_message_is_an_error(void)
@@ -97,22 +97,22 @@ static void content_longer_than_the_message_is_an_error(void)
     fakes_start();
     memcpy(message, ident, 20);
     BytesPut32(message + 12, 5);
-    CHECK(handle(message, 24) == 28);
-    CHECK(error_of(20) == ERR_L7_INCOMPLETE);
+    CHECK_EQUAL(handle(message, 24), 28);
+    CHECK_EQUAL(error_of(20), ERR_L7_INCOMPLETE);
     BytesPut32(message + 12, 0xFFFFFFFF);
-    CHECK(handle(message, 24) == 28);
-    CHECK(error_of(20) == ERR_L7_INCOMPLETE);
+    CHECK_EQUAL(handle(message, 24), 28);
+    CHECK_EQUAL(error_of(20), ERR_L7_INCOMPLETE);
 }
 
 static void unknown_groups_and_services_have_their_errors(void)
 {
     setup();
     CHECK(client_request(&client, 0x77, 1, NULL, 0, &reply));
-    CHECK(reply_error(&reply) == ERR_L7_UNKNOWNCMDGROUP);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_UNKNOWNCMDGROUP);
     CHECK(client_request(&client, SG_DEVICE, 0x77, NULL, 0, &reply));
-    CHECK(reply_error(&reply) == ERR_L7_UNKNOWNCMD);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_UNKNOWNCMD);
     CHECK(client_request(&client, SG_DEVICE | L7_REPLY, 1, NULL, 0, &reply));
-    CHECK(reply_error(&reply) == ERR_L7_UNKNOWNCMDGROUP);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_UNKNOWNCMDGROUP);
 }
 
 static void reply_echoes_the_session_of_the_request(void)
@@ -120,7 +120,7 @@ static void reply_echoes_the_session_of_the_request(void)
     setup();
     client.session = 0x12345678;
     CHECK(client_request(&client, SG_APPLICATION, SRV_APP_READ_STATUS, NULL, 0, &reply));
-    CHECK(reply.session == 0x12345678);
+    CHECK_EQUAL(reply.session, 0x12345678);
 }
 
 static void too_small_reply_buffer_is_not_overrun(void)
@@ -130,7 +130,7 @@ static void too_small_reply_buffer_is_not_overrun(void)
         RTS_UI8 *buffer = malloc(capacity + 1);
         RTS_UI32 size = SrvHandleMessage(ChannelGetClient(0), ident, 20, buffer, capacity);
         CHECK(size <= capacity);
-        CHECK((size == 0) == (capacity < 28));
+        CHECK_EQUAL((size == 0), (capacity < 28));
         free(buffer);
     }
 }
@@ -155,7 +155,7 @@ static void every_service_survives_missing_session_and_content(void)
             }
         }
     }
-    CHECK(fakes.starts + fakes.stops + fakes.resets + fakes.download_begins == 0);
+    CHECK_EQUAL(fakes.starts + fakes.stops + fakes.resets + fakes.download_begins, 0);
 }
 
 /* ---- sessions ---- */
@@ -174,7 +174,7 @@ static void changing_services_need_a_login(void)
         for (RTS_UI32 k = 0; k < RTS_COUNT(sessions); k++) {
             client.session = sessions[k];
             CHECK(client_request(&client, services[i][0], services[i][1], NULL, 0, &reply));
-            CHECK(reply_error(&reply) == ERR_INVALID_SESSION_ID);
+            CHECK_EQUAL(reply_error(&reply), ERR_INVALID_SESSION_ID);
         }
     }
 }
@@ -183,12 +183,12 @@ static void session_without_login_has_no_rights(void)
 {
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_SESSION_CREATE, NULL, 0, &reply));
-    CHECK(reply.session == L7_SESSION_INITIAL);
+    CHECK_EQUAL(reply.session, L7_SESSION_INITIAL);
     client.session = reply_number(&reply, TAG_DEV_SESSION_ID);
-    CHECK(client.session >> 31 == 1);
-    CHECK(reply_number(&reply, TAG_DEV_AUTH_TYPE) == DEV_CRYPT_XOR);
+    CHECK_EQUAL(client.session >> 31, 1);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_AUTH_TYPE), DEV_CRYPT_XOR);
     CHECK(client_request(&client, SG_APPLICATION, SRV_APP_START, NULL, 0, &reply));
-    CHECK(reply_error(&reply) == ERR_NO_ACCESS_RIGHTS);
+    CHECK_EQUAL(reply_error(&reply), ERR_NO_ACCESS_RIGHTS);
 }
 
 static void login_with_a_created_session_keeps_its_id(void)
@@ -199,7 +199,7 @@ static void login_with_a_created_session_keeps_its_id(void)
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_SESSION_CREATE, NULL, 0, &reply));
     created = client.session = reply_number(&reply, TAG_DEV_SESSION_ID);
     CHECK(client_login(&client));
-    CHECK(client.session == created);
+    CHECK_EQUAL(client.session, created);
     CHECK(client_login_app(&client));
 }
 
@@ -207,7 +207,7 @@ static void anonymous_login_gives_a_session_with_the_validation_bit(void)
 {
     setup();
     CHECK(client_login(&client));
-    CHECK(client.session >> 31 == 1);
+    CHECK_EQUAL(client.session >> 31, 1);
     CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
@@ -219,7 +219,7 @@ static void login_reply_tells_the_settings(void)
 
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply));
-    CHECK(BTagFindContainer(&reply.tags, TAG_DEV_LOGIN_REPLY, &login) == ERR_OK);
+    CHECK_EQUAL(BTagFindContainer(&reply.tags, TAG_DEV_LOGIN_REPLY, &login), ERR_OK);
     CHECK(BTagFindUnsigned(&login, TAG_DEV_LOGIN_RESULT, &value) == ERR_OK && value == ERR_OK);
     CHECK(BTagFindUnsigned(&login, TAG_DEV_SETTINGS, &value) == ERR_OK && value == DEV_SETTING_MONITOR2);
 }
@@ -231,7 +231,7 @@ static void malformed_empty_user_of_a_real_client_does_not_hurt(void)
 
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply));
-    CHECK(reply_error(&reply) == ERR_OK);
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
     CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
@@ -243,7 +243,7 @@ static void asymmetric_login_is_refused(void)
 
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply));
-    CHECK(BTagFindContainer(&reply.tags, TAG_DEV_LOGIN_REPLY, &login) == ERR_OK);
+    CHECK_EQUAL(BTagFindContainer(&reply.tags, TAG_DEV_LOGIN_REPLY, &login), ERR_OK);
     CHECK(BTagFindUnsigned(&login, TAG_DEV_LOGIN_RESULT, &value) == ERR_OK && value == ERR_NOT_SUPPORTED);
     CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
@@ -252,7 +252,7 @@ static void login_without_type_is_an_error(void)
 {
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, NULL, 0, &reply));
-    CHECK(reply_error(&reply) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
     CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
@@ -280,11 +280,11 @@ static void logout_ends_the_session(void)
     CHECK(client_login(&client));
     BytesPut32(content + 2, client.session ^ 1);
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGOUT, content, sizeof(content), &reply));
-    CHECK(reply_number(&reply, TAG_DEV_LOGOUT_REPLY) == ERR_INVALID_SESSION_ID);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_LOGOUT_REPLY), ERR_INVALID_SESSION_ID);
     CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
     BytesPut32(content + 2, client.session);
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_LOGOUT, content, sizeof(content), &reply));
-    CHECK(reply_number(&reply, TAG_DEV_LOGOUT_REPLY) == ERR_OK);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_LOGOUT_REPLY), ERR_OK);
     CHECK(!SrvIsLoggedIn(ChannelGetClient(0)));
     CHECK(!client_login_app(&client));
 }
@@ -297,7 +297,7 @@ static void session_does_not_survive_its_channel(void)
     CHECK(client_login(&client));
     old = client;
     client_send_open(&client, 99, NETSERVER_MESSAGE_SIZE);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     client.session = old.session;
     CHECK(!client_login_app(&client));
     CHECK(reply_error(&reply) != ERR_OK || !SrvIsLoggedIn(ChannelGetClient(0)));
@@ -321,7 +321,7 @@ static void components_start_and_end_without_error(void)
     fakes_cycle(1);
     for (int hook = CH_EXIT_COMM; hook <= CH_EXIT_SYSTEM; hook++)
         fakes_hook((CMP_HOOK)hook);
-    CHECK(fakes.hook_errors == 0);
+    CHECK_EQUAL(fakes.hook_errors, 0);
 }
 
 static void a_full_group_table_is_an_error(void)
@@ -331,7 +331,7 @@ static void a_full_group_table_is_an_error(void)
     fakes_start();
     for (int i = 0; i < 100 && result == ERR_OK; i++)
         result = SrvRegisterGroup(0x100, NULL, 0);
-    CHECK(result == ERR_NOMEMORY);
+    CHECK_EQUAL(result, ERR_NOMEMORY);
 }
 
 /* ---- device ---- */
@@ -343,23 +343,23 @@ static void identity_is_reported_in_the_layout_of_the_field(void)
     setup();
     client.session = 0x12345678;
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &reply));
-    CHECK(reply.session == 0);
-    CHECK(reply_number(&reply, TAG_DEV_RESULT) == ERR_OK);
-    CHECK(BTagFind(&reply.tags, TAG_DEV_IDENT, 12, 12, &tag) == ERR_OK);
+    CHECK_EQUAL(reply.session, 0);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_RESULT), ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_IDENT, 12, 12, &tag), ERR_OK);
     CHECK(BytesGet32(tag.data) == 0x1000 && BytesGet32(tag.data + 4) == 0x10002);
-    CHECK(BytesGet32(tag.data + 8) == 0x030E0514);
-    CHECK(reply_number(&reply, TAG_DEV_RTS_VERSION) == RTS_VERSION);
-    CHECK(BTagFind(&reply.tags, TAG_DEV_NODE_NAME, 16, 16, &tag) == ERR_OK);
+    CHECK_EQUAL(BytesGet32(tag.data + 8), 0x030E0514);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_RTS_VERSION), RTS_VERSION);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_NODE_NAME, 16, 16, &tag), ERR_OK);
     CHECK(memcmp(tag.data,
                  "\x0C\0\0\0N\0o\0d\0e\0"
                  "7\0\0\0",
                  16) == 0);
-    CHECK(BTagFind(&reply.tags, TAG_DEV_VENDOR_NAME, 18, 20, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_VENDOR_NAME, 18, 20, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\x0E\0\0\0V\0e\0n\0d\0o\0r\0\0\0", 18) == 0);
-    CHECK(BTagFind(&reply.tags, TAG_DEV_SERIAL_NUMBER, 8, 10, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_SERIAL_NUMBER, 8, 10, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\x05\0SN-42", 8) == 0);
-    CHECK(reply_number(&reply, TAG_DEV_MAX_CHANNELS) == 1);
-    CHECK(BTagFind(&reply.tags, TAG_DEV_STACK, 8, 8, &tag) == ERR_OK);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_MAX_CHANNELS), 1);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_STACK, 8, 8, &tag), ERR_OK);
     CHECK(BytesGet32(tag.data) == 2000 && BytesGet32(tag.data + 4) == 500);
 }
 
@@ -371,9 +371,9 @@ static void empty_names_are_empty(void)
     fakes.target.device_name = "";
     fakes.target.serial_number = "";
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &reply));
-    CHECK(BTagFind(&reply.tags, TAG_DEV_DEVICE_NAME, 8, 8, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_DEVICE_NAME, 8, 8, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\2\0\0\0\0\0\0\0", 8) == 0);
-    CHECK(BTagFind(&reply.tags, TAG_DEV_SERIAL_NUMBER, 3, 6, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_SERIAL_NUMBER, 3, 6, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\0\0\0", 3) == 0);
 }
 
@@ -383,13 +383,13 @@ static void other_expected_identity_is_a_type_mismatch(void)
 
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, content, sizeof(content), &reply));
-    CHECK(reply_number(&reply, TAG_DEV_RESULT) == ERR_OK);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_RESULT), ERR_OK);
     content[6] = 3;
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, content, sizeof(content), &reply));
-    CHECK(reply_number(&reply, TAG_DEV_RESULT) == ERR_TYPE_MISMATCH);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_RESULT), ERR_TYPE_MISMATCH);
     content[1] = 4;
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, content, 6, &reply));
-    CHECK(reply_error(&reply) == ERR_SIZE_MISMATCH);
+    CHECK_EQUAL(reply_error(&reply), ERR_SIZE_MISMATCH);
 }
 
 static void echo_returns_the_data_and_zeros(void)
@@ -399,9 +399,9 @@ static void echo_returns_the_data_and_zeros(void)
 
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_ECHO, content, sizeof(content), &reply));
-    CHECK(reply_number(&reply, TAG_SERVICE_RESULT) == ERR_OK);
-    CHECK(reply_number(&reply, TAG_DEV_ECHO_REPLY_LENGTH) == 6);
-    CHECK(BTagFind(&reply.tags, TAG_DEV_ECHO_DATA, 6, 6, &tag) == ERR_OK);
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_OK);
+    CHECK_EQUAL(reply_number(&reply, TAG_DEV_ECHO_REPLY_LENGTH), 6);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_ECHO_DATA, 6, 6, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "abc\0\0\0", 6) == 0);
 }
 
@@ -419,7 +419,7 @@ static void echo_without_wanted_length_is_empty(void)
 {
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_ECHO, NULL, 0, &reply));
-    CHECK(reply.size == 20);
+    CHECK_EQUAL(reply.size, 20);
 }
 
 static void echo_of_nothing_has_no_data(void)
@@ -429,7 +429,7 @@ static void echo_of_nothing_has_no_data(void)
 
     setup();
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_ECHO, content, sizeof(content), &reply));
-    CHECK(BTagFind(&reply.tags, TAG_DEV_ECHO_DATA, 0, 9, &tag) == ERR_L7_TAG_MISSING);
+    CHECK_EQUAL(BTagFind(&reply.tags, TAG_DEV_ECHO_DATA, 0, 9, &tag), ERR_L7_TAG_MISSING);
 }
 
 /* ---- log ---- */
@@ -466,9 +466,9 @@ static RTS_UI32 records(RTS_UI32 *handle)
     RTS_UI32 count = 0;
 
     for (; BTagReadNext(&list, &tag) == ERR_OK; count++) {
-        CHECK(tag.id == TAG_LOG_RECORD);
-        CHECK(BTagReadContainer(&list, &tag, &record) == ERR_OK);
-        CHECK(BTagFindUnsigned(&record, TAG_LOG_HANDLE, handle) == ERR_OK);
+        CHECK_EQUAL(tag.id, TAG_LOG_RECORD);
+        CHECK_EQUAL(BTagReadContainer(&list, &tag, &record), ERR_OK);
+        CHECK_EQUAL(BTagFindUnsigned(&record, TAG_LOG_HANDLE, handle), ERR_OK);
     }
     return count;
 }
@@ -482,14 +482,14 @@ static void log_record_has_all_its_parts(void)
     fill_log(1);
     strcpy(fakes.log[0].text, "It is %s.");
     CHECK(client_request(&client, SG_LOG, SRV_LOG_GET_ENTRIES, NULL, 0, &reply));
-    CHECK(BTagFindContainer(&reply.tags, TAG_LOG_RECORD, &record) == ERR_OK);
-    CHECK(BTagFind(&record, TAG_LOG_TIME_NS, 8, 8, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFindContainer(&reply.tags, TAG_LOG_RECORD, &record), ERR_OK);
+    CHECK_EQUAL(BTagFind(&record, TAG_LOG_TIME_NS, 8, 8, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\x55\x44\x33\x22\x11\0\0\0", 8) == 0);
-    CHECK(BTagFind(&record, TAG_LOG_ENTRY, 16, 16, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&record, TAG_LOG_ENTRY, 16, 16, &tag), ERR_OK);
     CHECK(memcmp(tag.data, "\x02\0\0\0\x04\0\0\0\x06\x05\0\0\0\0\0\0", 16) == 0);
-    CHECK(BTagFind(&record, TAG_LOG_TEXT, 12, 12, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&record, TAG_LOG_TEXT, 12, 12, &tag), ERR_OK);
     CHECK(strcmp((const char *)tag.data, "It is %s.") == 0);
-    CHECK(BTagFind(&record, TAG_LOG_COMPONENT_NAME, 16, 16, &tag) == ERR_OK);
+    CHECK_EQUAL(BTagFind(&record, TAG_LOG_COMPONENT_NAME, 16, 16, &tag), ERR_OK);
     CHECK(strcmp((const char *)tag.data, "CmpAppEmbedded") == 0);
 }
 
@@ -497,7 +497,7 @@ static void empty_log_is_an_empty_reply(void)
 {
     setup();
     CHECK(ask_log(0, 100));
-    CHECK(reply.size == 20);
+    CHECK_EQUAL(reply.size, 20);
 }
 
 static void log_is_read_in_pieces_that_fit(void)
@@ -509,16 +509,16 @@ static void log_is_read_in_pieces_that_fit(void)
     fakes_start();
     client_init(&client, 0x0102);
     client_send_open(&client, 1, 1024);
-    CHECK(client_take_open(&client) == CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
     fill_log(16);
     do {
         CHECK(ask_log(handle + 1, 100));
-        CHECK(reply_error(&reply) == ERR_OK);
+        CHECK_EQUAL(reply_error(&reply), ERR_OK);
         got = records(&handle);
         total += got;
     } while (got != 0);
-    CHECK(total == 16);
-    CHECK(handle == 25);
+    CHECK_EQUAL(total, 16);
+    CHECK_EQUAL(handle, 25);
 }
 
 static void log_request_is_limited_by_count_and_start(void)
@@ -528,10 +528,10 @@ static void log_request_is_limited_by_count_and_start(void)
     setup();
     fill_log(16);
     CHECK(ask_log(20, 2));
-    CHECK(records(&handle) == 2);
-    CHECK(handle == 21);
+    CHECK_EQUAL(records(&handle), 2);
+    CHECK_EQUAL(handle, 21);
     CHECK(ask_log(26, 2));
-    CHECK(records(&handle) == 0);
+    CHECK_EQUAL(records(&handle), 0);
 }
 
 int main(void)

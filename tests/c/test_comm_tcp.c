@@ -57,9 +57,9 @@ static void an_answer_goes_to_the_real_peer_and_keeps_the_rest_of_its_address(vo
     put_end(expected + 6, net_name(file));
     put_end(expected + 14, net_device(SYSSOCK_TCP));
     net_write(file, frame, net_frame(question, QUESTION, frame));
-    CHECK(net_read_packet(file, packet) == ANSWER);
+    CHECK_EQUAL(net_read_packet(file, packet), ANSWER);
     CHECK(memcmp(packet, expected, sizeof(expected)) == 0);
-    CHECK(BytesGet16(packet + 28) == COMM_MAX_CLIENTS);
+    CHECK_EQUAL(BytesGet16(packet + 28), COMM_MAX_CLIENTS);
     close(file);
     net_end();
 }
@@ -113,7 +113,7 @@ static void what_is_no_frame_ends_the_connection(void)
         BytesPut32(frame + 4, lengths[i]);
         net_write(file, frame, size);
         CHECK(net_is_closed(file));
-        CHECK(BlkDrvTcpGetCounters()->bad_length == i + 1);
+        CHECK_EQUAL(BlkDrvTcpGetCounters()->bad_length, i + 1);
         close(file);
     }
     for (RTS_UI32 i = 0; i < 4; i++) {
@@ -122,7 +122,7 @@ static void what_is_no_frame_ends_the_connection(void)
         frame[i] ^= 1;
         net_write(file, frame, size);
         CHECK(net_is_closed(file));
-        CHECK(BlkDrvTcpGetCounters()->bad_magic == i + 1);
+        CHECK_EQUAL(BlkDrvTcpGetCounters()->bad_magic, i + 1);
         close(file);
     }
     int file = net_dial();
@@ -157,7 +157,7 @@ static void long_replies_arrive_although_the_buffer_is_short(void)
     CHECK(client_open(&client) && client_login(&client));
     CHECK(echoes(&client, 100));
     CHECK(echoes(&client, 15000));
-    CHECK(ChannelGetCounters()->repeats == 0);
+    CHECK_EQUAL(ChannelGetCounters()->repeats, 0);
     close(file);
     net_end();
 }
@@ -174,7 +174,7 @@ static void a_peer_that_does_not_read_loses_nothing(void)
     net_start("@:0", "");
     int lazy = net_dial();
     int other = net_dial();
-    CHECK(setsockopt(lazy, SOL_SOCKET, SO_RCVBUF, &small, sizeof(small)) == 0);
+    CHECK_EQUAL(setsockopt(lazy, SOL_SOCKET, SO_RCVBUF, &small, sizeof(small)), 0);
     CHECK(works(lazy));
     for (int i = 0; i < QUESTIONS; i++) {
         if (send(lazy, frame, size, MSG_DONTWAIT | MSG_NOSIGNAL) != (ssize_t)size)
@@ -217,7 +217,7 @@ static void the_next_login_need_not_wait_for_those_that_ended_abruptly(void)
     net_settle(); /* without any time */
     CHECK(client_open(&next) && client_login(&next));
     for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS; i++)
-        CHECK(ChannelIsOpen(ChannelGetClient(i)) == (ChannelGetClient(i)->channel.id == next.channel));
+        CHECK_EQUAL(ChannelIsOpen(ChannelGetClient(i)), (ChannelGetClient(i)->channel.id == next.channel));
     close(file);
     net_end();
 }
@@ -241,7 +241,7 @@ static void a_reset_in_the_middle_of_a_reply_frees_the_channel(void)
     net_reset(file);
     net_settle();
     CHECK(!ChannelIsOpen(ChannelGetClient(0)));
-    CHECK(BlkDrvTcpGetCounters()->disconnected == 1);
+    CHECK_EQUAL(BlkDrvTcpGetCounters()->disconnected, 1);
     file = net_dial();
     net_client(&client, &link, &file);
     CHECK(client_open(&client) && client_login(&client) && echoes(&client, 1000));
@@ -262,7 +262,7 @@ static void a_reply_is_not_repeated_because_time_passes(void)
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &reply)); /* not acknowledged */
     for (int i = 0; i < 25; i++)
         fakes_cycle(1000);
-    CHECK(ChannelGetCounters()->repeats == 0);
+    CHECK_EQUAL(ChannelGetCounters()->repeats, 0);
     CHECK(client_request(&client, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &reply) ||
           ChannelIsOpen(ChannelGetClient(0)));
     close(file);
@@ -283,7 +283,7 @@ static void the_end_of_the_runtime_is_told(void)
     RTS_UI8 data[512];
     ssize_t size = recv(file, data, sizeof(data), 0);
     CHECK(size == 8 + 16 + 12 && data[8 + 16] == CHANNEL_PKG_CLOSE);
-    CHECK(recv(file, packet, sizeof(packet), 0) == 0);
+    CHECK_EQUAL(recv(file, packet, sizeof(packet), 0), 0);
     close(file);
 }
 

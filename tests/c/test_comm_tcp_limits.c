@@ -49,7 +49,7 @@ static void who_says_nothing_is_not_waited_for(void)
     int file = net_dial();
     net_settle();
     ends_after(file, TCP_FRAME_MS);
-    CHECK(BlkDrvTcpGetCounters()->late_frames == 1);
+    CHECK_EQUAL(BlkDrvTcpGetCounters()->late_frames, 1);
     net_end();
 }
 
@@ -88,7 +88,7 @@ static void a_byte_now_and_then_is_too_slow(void)
         net_settle();
         fakes_cycle(TCP_FRAME_MS / 10);
     }
-    CHECK(sent == 10);
+    CHECK_EQUAL(sent, 10);
     CHECK(net_is_closed(file));
     close(file);
     net_end();
@@ -104,7 +104,7 @@ static void an_idle_connection_ends_and_one_in_use_does_not(void)
     }
     CHECK(works(file));
     ends_after(file, TCP_IDLE_MS);
-    CHECK(BlkDrvTcpGetCounters()->idle == 1);
+    CHECK_EQUAL(BlkDrvTcpGetCounters()->idle, 1);
     net_end();
 }
 
@@ -130,7 +130,7 @@ static void a_crowd_blocks_no_client(void)
     CHECK(client_request(&first, SG_DEVICE, SRV_DEV_GET_TARGET_IDENT, NULL, 0, &reply)); /* it had to stay */
     for (int i = 0; i < CROWD; i++)
         close(files[i]);
-    CHECK(BlkDrvTcpGetCounters()->displaced == CROWD + 2 - TCP_MAX_CONNECTIONS);
+    CHECK_EQUAL(BlkDrvTcpGetCounters()->displaced, CROWD + 2 - TCP_MAX_CONNECTIONS);
     close(one);
     close(two);
     net_end();
@@ -199,7 +199,7 @@ static void when_all_are_in_use_the_next_is_refused(void)
         int file = net_dial();
         net_client(&next, &links[COMM_MAX_CLIENTS], &file);
         client_send_open(&next, 1, NETSERVER_MESSAGE_SIZE);
-        CHECK(client_take_open(&next) == CHANNEL_OPEN_NO_CHANNEL);
+        CHECK_EQUAL(client_take_open(&next), CHANNEL_OPEN_NO_CHANNEL);
         close(file);
     }
     for (int i = 0; i < COMM_MAX_CLIENTS; i++) {

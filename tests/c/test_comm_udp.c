@@ -104,7 +104,7 @@ static void what_is_sent_to_us_is_for_us_and_what_is_sent_to_all_need_not_be(voi
     net_send_to(file, net_device(SYSSOCK_UDP), to_another, sizeof(to_another));
     CHECK(net_datagram(file, packet, sizeof(packet)) != 0);
     net_send_to(file, to_all(), to_another, sizeof(to_another));
-    CHECK(net_datagram(file, packet, sizeof(packet)) == 0);
+    CHECK_EQUAL(net_datagram(file, packet, sizeof(packet)), 0);
     close(file);
     net_end();
 }
@@ -123,7 +123,7 @@ static void it_reflects_nothing(void)
         net_send_to(attacker, net_device(SYSSOCK_UDP), forged, sizeof(forged));
         CHECK(net_datagram(attacker, packet, sizeof(packet)) != 0);
         CHECK(memcmp(packet + 6, forged + 6, 4) == 0);
-        CHECK(net_datagram(victim, packet, sizeof(packet)) == 0);
+        CHECK_EQUAL(net_datagram(victim, packet, sizeof(packet)), 0);
     }
     close(victim);
     close(attacker);
@@ -179,9 +179,9 @@ static void what_is_no_packet_is_dropped(void)
     int file = net_udp(0);
     for (RTS_UI32 i = 0; i < RTS_COUNT(sizes); i++) {
         net_send_to(file, net_device(SYSSOCK_UDP), data, sizes[i]);
-        CHECK(net_datagram(file, packet, sizeof(packet)) == 0);
+        CHECK_EQUAL(net_datagram(file, packet, sizeof(packet)), 0);
     }
-    CHECK(BlkDrvUdpGetCounters()->too_long == 2);
+    CHECK_EQUAL(BlkDrvUdpGetCounters()->too_long, 2);
     net_send_to(file, net_device(SYSSOCK_UDP), data, BLK_MAX_SIZE);
     CHECK(is_node(net_datagram(file, packet, sizeof(packet))));
     close(file);
@@ -201,7 +201,7 @@ static void a_flood_is_worked_off_in_pieces(void)
     CHECK(BlkDrvUdpGetCounters()->packets < FLOOD);
     while (net_datagram(file, packet, sizeof(packet)) != 0)
         answers++;
-    CHECK(answers == FLOOD);
+    CHECK_EQUAL(answers, FLOOD);
     close(file);
     net_end();
 }
@@ -213,7 +213,7 @@ static void the_first_free_port_is_taken_or_the_one_asked_for(void)
     char name[64];
 
     net_start("", "@:2");
-    CHECK(net_device(SYSSOCK_UDP).port == UDP_PORT + 2);
+    CHECK_EQUAL(net_device(SYSSOCK_UDP).port, UDP_PORT + 2);
     int file = net_udp(0);
     net_send_to(file, to_all(), scan, sizeof(scan)); /* to its port */
     CHECK(is_node(net_datagram(file, packet, sizeof(packet))));
@@ -225,7 +225,7 @@ static void the_first_free_port_is_taken_or_the_one_asked_for(void)
     int files[UDP_PORTS];
     for (RTS_UI16 i = 0; i < UDP_PORTS; i++) {
         net_start("", "@");
-        CHECK(net_device(SYSSOCK_UDP).port == UDP_PORT + i);
+        CHECK_EQUAL(net_device(SYSSOCK_UDP).port, UDP_PORT + i);
         net_end();
         files[i] = net_udp(UDP_PORT + i);
         snprintf(text, sizeof(text), "%s:%d", net_own(), i);

@@ -67,9 +67,9 @@ static void message_and_reply_pass(void)
 
     setup();
     client_send_message(&client, message, message_size);
-    CHECK(client.sent == 1);
+    CHECK_EQUAL(client.sent, 1);
     CHECK(client_take_message(&client, reply) > 1200);
-    CHECK(client.received == 1);
+    CHECK_EQUAL(client.received, 1);
     client_send_message(&client, message, message_size);
     CHECK(client_take_message(&client, reply) > 1200);
 }

@@ -66,18 +66,18 @@ static RTS_UI16 slow_crc16(const RTS_UI8 *data, RTS_SIZE size)
 
 static void check_values_are_those_of_the_catalogue(void)
 {
-    CHECK(crc32_by_byte(0, digits, 9) == 0xCBF43926);
-    CHECK(crc32_by_nibble(0, digits, 9) == 0xCBF43926);
-    CHECK(crc16_by_byte(CRC16_INIT, digits, 9) == 0xE5CC);
-    CHECK(crc16_by_nibble(CRC16_INIT, digits, 9) == 0xE5CC);
+    CHECK_EQUAL(crc32_by_byte(0, digits, 9), 0xCBF43926);
+    CHECK_EQUAL(crc32_by_nibble(0, digits, 9), 0xCBF43926);
+    CHECK_EQUAL(crc16_by_byte(CRC16_INIT, digits, 9), 0xE5CC);
+    CHECK_EQUAL(crc16_by_nibble(CRC16_INIT, digits, 9), 0xE5CC);
 }
 
 static void nothing_changes_nothing(void)
 {
-    CHECK(crc32_by_byte(0, "", 0) == 0);
-    CHECK(crc32_by_nibble(0x12345678, "", 0) == 0x12345678);
-    CHECK(crc16_by_byte(CRC16_INIT, "", 0) == CRC16_INIT);
-    CHECK(crc16_by_nibble(7, "", 0) == 7);
+    CHECK_EQUAL(crc32_by_byte(0, "", 0), 0);
+    CHECK_EQUAL(crc32_by_nibble(0x12345678, "", 0), 0x12345678);
+    CHECK_EQUAL(crc16_by_byte(CRC16_INIT, "", 0), CRC16_INIT);
+    CHECK_EQUAL(crc16_by_nibble(7, "", 0), 7);
 }
 
 static void both_tables_follow_the_definition(void)
@@ -88,10 +88,10 @@ static void both_tables_follow_the_definition(void)
     for (i = 0; i < sizeof data; i++)
         data[i] = (RTS_UI8)(i * 167 + i / 7);
     for (i = 0; i < sizeof data; i++) {
-        CHECK(crc32_by_byte(0, data, i) == slow_crc32(data, i));
-        CHECK(crc32_by_nibble(0, data, i) == slow_crc32(data, i));
-        CHECK(crc16_by_byte(CRC16_INIT, data, i) == slow_crc16(data, i));
-        CHECK(crc16_by_nibble(CRC16_INIT, data, i) == slow_crc16(data, i));
+        CHECK_EQUAL(crc32_by_byte(0, data, i), slow_crc32(data, i));
+        CHECK_EQUAL(crc32_by_nibble(0, data, i), slow_crc32(data, i));
+        CHECK_EQUAL(crc16_by_byte(CRC16_INIT, data, i), slow_crc16(data, i));
+        CHECK_EQUAL(crc16_by_nibble(CRC16_INIT, data, i), slow_crc16(data, i));
     }
 }
 
@@ -100,8 +100,8 @@ static void pieces_give_the_same_as_the_whole(void)
     RTS_SIZE cut;
 
     for (cut = 0; cut <= 9; cut++) {
-        CHECK(crc32_by_byte(crc32_by_byte(0, digits, cut), digits + cut, 9 - cut) == 0xCBF43926);
-        CHECK(crc16_by_nibble(crc16_by_nibble(CRC16_INIT, digits, cut), digits + cut, 9 - cut) == 0xE5CC);
+        CHECK_EQUAL(crc32_by_byte(crc32_by_byte(0, digits, cut), digits + cut, 9 - cut), 0xCBF43926);
+        CHECK_EQUAL(crc16_by_nibble(crc16_by_nibble(CRC16_INIT, digits, cut), digits + cut, 9 - cut), 0xE5CC);
     }
 }
 

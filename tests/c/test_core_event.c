@@ -23,12 +23,12 @@ static void note(const EVENT_PARAM *event)
 static void note_once(const EVENT_PARAM *event)
 {
     note(event);
-    CHECK(EventUnregisterCallback(event->provider, event->event, note_once, event->user) == ERR_OK);
+    CHECK_EQUAL(EventUnregisterCallback(event->provider, event->event, note_once, event->user), ERR_OK);
 }
 
 static void begin(void)
 {
-    CHECK(CmpEventMgrEmbedded_Hook(CH_INIT_SYSTEM) == ERR_OK);
+    CHECK_EQUAL(CmpEventMgrEmbedded_Hook(CH_INIT_SYSTEM), ERR_OK);
     order[0] = '\0';
     last_parameter = NULL;
 }
@@ -38,9 +38,9 @@ static void callbacks_run_in_the_order_of_registration(void)
     int parameter;
 
     begin();
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "a") == ERR_OK);
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "b") == ERR_OK);
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "c") == ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "a"), ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "b"), ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "c"), ERR_OK);
     EventPost(CMPID_CmpMgr, EVENT, &parameter);
     CHECK(strcmp(order, "abc") == 0);
     CHECK(last_parameter == &parameter);
@@ -49,9 +49,9 @@ static void callbacks_run_in_the_order_of_registration(void)
 static void provider_and_event_together_name_an_event(void)
 {
     begin();
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "a") == ERR_OK);
-    CHECK(EventRegisterCallback(CMPID_CmpLog, EVENT, note, "b") == ERR_OK);
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, OTHER_EVENT, note, "c") == ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "a"), ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpLog, EVENT, note, "b"), ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, OTHER_EVENT, note, "c"), ERR_OK);
     EventPost(CMPID_CmpLog, EVENT, NULL);
     CHECK(strcmp(order, "b") == 0);
     EventPost(CMPID_CmpLog, OTHER_EVENT, NULL);
@@ -61,11 +61,11 @@ static void provider_and_event_together_name_an_event(void)
 static void what_was_unregistered_is_not_called(void)
 {
     begin();
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "a") == ERR_OK);
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "b") == ERR_OK);
-    CHECK(EventUnregisterCallback(CMPID_CmpMgr, EVENT, note, "c") == ERR_NO_OBJECT);
-    CHECK(EventUnregisterCallback(CMPID_CmpMgr, EVENT, note, "a") == ERR_OK);
-    CHECK(EventUnregisterCallback(CMPID_CmpMgr, EVENT, note, "a") == ERR_NO_OBJECT);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "a"), ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "b"), ERR_OK);
+    CHECK_EQUAL(EventUnregisterCallback(CMPID_CmpMgr, EVENT, note, "c"), ERR_NO_OBJECT);
+    CHECK_EQUAL(EventUnregisterCallback(CMPID_CmpMgr, EVENT, note, "a"), ERR_OK);
+    CHECK_EQUAL(EventUnregisterCallback(CMPID_CmpMgr, EVENT, note, "a"), ERR_NO_OBJECT);
     EventPost(CMPID_CmpMgr, EVENT, NULL);
     CHECK(strcmp(order, "b") == 0);
 }
@@ -73,8 +73,8 @@ static void what_was_unregistered_is_not_called(void)
 static void a_callback_may_unregister_itself(void)
 {
     begin();
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note_once, "a") == ERR_OK);
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "b") == ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note_once, "a"), ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "b"), ERR_OK);
     EventPost(CMPID_CmpMgr, EVENT, NULL);
     EventPost(CMPID_CmpMgr, EVENT, NULL);
     CHECK(strcmp(order, "abb") == 0);
@@ -86,10 +86,10 @@ static void callbacks_are_limited(void)
 
     begin();
     for (i = 0; i < EVENT_MAX_CALLBACKS; i++)
-        CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "x") == ERR_OK);
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "x") == ERR_NOMEMORY);
-    CHECK(EventUnregisterCallback(CMPID_CmpMgr, EVENT, note, "x") == ERR_OK);
-    CHECK(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "x") == ERR_OK);
+        CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "x"), ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "x"), ERR_NOMEMORY);
+    CHECK_EQUAL(EventUnregisterCallback(CMPID_CmpMgr, EVENT, note, "x"), ERR_OK);
+    CHECK_EQUAL(EventRegisterCallback(CMPID_CmpMgr, EVENT, note, "x"), ERR_OK);
 }
 
 int main(void)

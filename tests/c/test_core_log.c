@@ -15,7 +15,7 @@
 
 static void clear(void)
 {
-    CHECK(CmpLog_Hook(CH_INIT_SYSTEM) == ERR_OK);
+    CHECK_EQUAL(CmpLog_Hook(CH_INIT_SYSTEM), ERR_OK);
 }
 
 static void entries_come_back_in_order(void)
@@ -23,20 +23,20 @@ static void entries_come_back_in_order(void)
     LOG_ENTRY entry;
 
     clear();
-    CHECK(LogGetEntry(0, &entry) == ERR_END_OF_OBJECT);
+    CHECK_EQUAL(LogGetEntry(0, &entry), ERR_END_OF_OBJECT);
     LogAdd(CMPID_CmpLog, LOG_INFO, 0, "first %u", 1u);
     LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_FAILED, "second %s", "two");
-    CHECK(LogGetEntry(0, &entry) == ERR_OK);
-    CHECK(entry.handle == 1);
-    CHECK(entry.component == CMPID_CmpLog);
-    CHECK(entry.log_class == LOG_INFO);
+    CHECK_EQUAL(LogGetEntry(0, &entry), ERR_OK);
+    CHECK_EQUAL(entry.handle, 1);
+    CHECK_EQUAL(entry.component, CMPID_CmpLog);
+    CHECK_EQUAL(entry.log_class, LOG_INFO);
     CHECK(strcmp(entry.text, "first 1") == 0);
-    CHECK(LogGetEntry(2, &entry) == ERR_OK);
-    CHECK(entry.handle == 2);
-    CHECK(entry.error == ERR_FAILED);
+    CHECK_EQUAL(LogGetEntry(2, &entry), ERR_OK);
+    CHECK_EQUAL(entry.handle, 2);
+    CHECK_EQUAL(entry.error, ERR_FAILED);
     CHECK(strcmp(entry.text, "second two") == 0);
-    CHECK(LogGetEntry(3, &entry) == ERR_END_OF_OBJECT);
-    CHECK(LogGetEntry(0xFFFFFFFF, &entry) == ERR_END_OF_OBJECT);
+    CHECK_EQUAL(LogGetEntry(3, &entry), ERR_END_OF_OBJECT);
+    CHECK_EQUAL(LogGetEntry(0xFFFFFFFF, &entry), ERR_END_OF_OBJECT);
 }
 
 static void the_oldest_entries_are_overwritten(void)
@@ -50,12 +50,12 @@ static void the_oldest_entries_are_overwritten(void)
         LogAdd(CMPID_CmpLog, LOG_INFO, i, "entry %u", (unsigned)i);
     handle = 0;
     for (i = 2 * LOG_MAX_ENTRIES + 6; i <= 3 * LOG_MAX_ENTRIES + 5; i++) {
-        CHECK(LogGetEntry(handle, &entry) == ERR_OK);
-        CHECK(entry.handle == i);
-        CHECK(entry.error == i);
+        CHECK_EQUAL(LogGetEntry(handle, &entry), ERR_OK);
+        CHECK_EQUAL(entry.handle, i);
+        CHECK_EQUAL(entry.error, i);
         handle = entry.handle + 1;
     }
-    CHECK(LogGetEntry(handle, &entry) == ERR_END_OF_OBJECT);
+    CHECK_EQUAL(LogGetEntry(handle, &entry), ERR_END_OF_OBJECT);
 }
 
 static void long_strings_are_cut(void)
@@ -67,8 +67,8 @@ static void long_strings_are_cut(void)
     memset(text, 'a', sizeof text);
     text[sizeof text - 1] = '\0';
     LogAdd(CMPID_CmpLog, LOG_INFO, 0, "%s", text);
-    CHECK(LogGetEntry(1, &entry) == ERR_OK);
-    CHECK(strlen(entry.text) == LOG_TEXT_SIZE - 1);
+    CHECK_EQUAL(LogGetEntry(1, &entry), ERR_OK);
+    CHECK_EQUAL(strlen(entry.text), LOG_TEXT_SIZE - 1);
 }
 
 static void a_text_is_never_taken_for_a_format(void)
@@ -77,7 +77,7 @@ static void a_text_is_never_taken_for_a_format(void)
 
     clear();
     LogAdd(CMPID_CmpLog, LOG_INFO, 0, "%s", "%s%s%x");
-    CHECK(LogGetEntry(1, &entry) == ERR_OK);
+    CHECK_EQUAL(LogGetEntry(1, &entry), ERR_OK);
     CHECK(strcmp(entry.text, "%s%s%x") == 0);
 }
 
@@ -85,12 +85,12 @@ static void entries_carry_the_time(void)
 {
     LOG_ENTRY entry;
 
-    CHECK(SimStart() == ERR_OK);
-    CHECK(SimAdvance(1234567) == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(1234567), ERR_OK);
     clear();
     LogAdd(CMPID_CmpLog, LOG_INFO, 0, "now");
-    CHECK(LogGetEntry(1, &entry) == ERR_OK);
-    CHECK(entry.time_ns == 1234567);
+    CHECK_EQUAL(LogGetEntry(1, &entry), ERR_OK);
+    CHECK_EQUAL(entry.time_ns, 1234567);
 }
 
 enum { WRITERS = 3, ENTRIES_TO_READ = 2000 };
@@ -134,8 +134,8 @@ static void writers_and_a_reader_do_not_disturb_each_other(void)
     SysAtomicStore(&reader_done, 1);
     for (i = 0; i < WRITERS; i++)
         pthread_join(thread[i], NULL);
-    CHECK(torn == 0);
-    CHECK(LogGetEntry(handle, &entry) == ERR_OK);
+    CHECK_EQUAL(torn, 0);
+    CHECK_EQUAL(LogGetEntry(handle, &entry), ERR_OK);
 }
 
 int main(void)

@@ -64,14 +64,14 @@ static void begin(char name, CMP_HOOK hook)
 static void start_up_calls_every_hook_of_all_components_in_order(void)
 {
     begin(0, 0);
-    CHECK(CMInit() == ERR_OK);
+    CHECK_EQUAL(CMInit(), ERR_OK);
     CHECK(strcmp(trace, "a0 b0 c0 a1 b1 c1 a2 b2 c2 a3 b3 c3 a4 b4 c4 a5 b5 c5 a6 b6 c6 a7 b7 c7 a8 b8 c8 ") == 0);
 }
 
 static void shutdown_goes_backwards(void)
 {
     begin(0, 0);
-    CHECK(CMExit() == ERR_OK);
+    CHECK_EQUAL(CMExit(), ERR_OK);
     CHECK(strcmp(trace, "c10 b10 a10 c11 b11 a11 c12 b12 a12 c13 b13 a13 c14 b14 a14 c15 b15 a15 c16 b16 a16 "
                         "c17 b17 a17 ") == 0);
 }
@@ -79,20 +79,20 @@ static void shutdown_goes_backwards(void)
 static void errors_at_shutdown_stop_nothing(void)
 {
     begin('c', CH_EXIT_COMM);
-    CHECK(CMExit() == ERR_OK);
+    CHECK_EQUAL(CMExit(), ERR_OK);
     CHECK(strstr(trace, "a17") != NULL);
 }
 
 static void a_start_up_that_fails_undoes_what_was_done(void)
 {
     begin('b', CH_INIT);
-    CHECK(CMInit() == ERR_TIMEOUT);
+    CHECK_EQUAL(CMInit(), ERR_TIMEOUT);
     CHECK(strcmp(trace, "a0 b0 c0 a1 b1 c1 a2 b2 a15 c16 b16 a16 c17 b17 a17 ") == 0);
     begin('a', CH_INIT_SYSTEM);
-    CHECK(CMInit() == ERR_TIMEOUT);
+    CHECK_EQUAL(CMInit(), ERR_TIMEOUT);
     CHECK(strcmp(trace, "a0 ") == 0);
     begin('c', CH_INIT_FINISHED);
-    CHECK(CMInit() == ERR_TIMEOUT);
+    CHECK_EQUAL(CMInit(), ERR_TIMEOUT);
     CHECK(strstr(trace, "a8 b8 c8 c10 b10 a10 ") != NULL);
     CHECK(strstr(trace, "c17 b17 a17 ") != NULL);
 }
@@ -100,7 +100,7 @@ static void a_start_up_that_fails_undoes_what_was_done(void)
 static void the_main_loop_calls_everybody_and_returns_the_first_error(void)
 {
     begin('b', CH_COMM_CYCLE);
-    CHECK(CMCallHook(CH_COMM_CYCLE) == ERR_TIMEOUT);
+    CHECK_EQUAL(CMCallHook(CH_COMM_CYCLE), ERR_TIMEOUT);
     CHECK(strcmp(trace, "a9 b9 c9 ") == 0);
 }
 
@@ -121,10 +121,10 @@ static void external_functions_are_found_by_name(void)
     static const CMP_EXT_FUNCTION second[] = {{"three", 3, 0x10000, some_function}};
 
     begin(0, 0);
-    CHECK(CMInit() == ERR_OK);
+    CHECK_EQUAL(CMInit(), ERR_OK);
     CHECK(CMFindExternal("one") == NULL);
-    CHECK(CMRegisterExternal(first, RTS_COUNT(first)) == ERR_OK);
-    CHECK(CMRegisterExternal(second, RTS_COUNT(second)) == ERR_OK);
+    CHECK_EQUAL(CMRegisterExternal(first, RTS_COUNT(first)), ERR_OK);
+    CHECK_EQUAL(CMRegisterExternal(second, RTS_COUNT(second)), ERR_OK);
     CHECK(CMFindExternal("two") == &first[1]);
     CHECK(CMFindExternal("three") == &second[0]);
     CHECK(CMFindExternal("thre") == NULL);
@@ -137,13 +137,13 @@ static void tables_are_limited_and_forgotten_at_start_up(void)
     int i;
 
     begin(0, 0);
-    CHECK(CMInit() == ERR_OK);
+    CHECK_EQUAL(CMInit(), ERR_OK);
     for (i = 0; i < CM_MAX_EXT_TABLES; i++)
-        CHECK(CMRegisterExternal(table, 1) == ERR_OK);
-    CHECK(CMRegisterExternal(table, 1) == ERR_NOMEMORY);
-    CHECK(CMInit() == ERR_OK);
+        CHECK_EQUAL(CMRegisterExternal(table, 1), ERR_OK);
+    CHECK_EQUAL(CMRegisterExternal(table, 1), ERR_NOMEMORY);
+    CHECK_EQUAL(CMInit(), ERR_OK);
     CHECK(CMFindExternal("one") == NULL);
-    CHECK(CMRegisterExternal(table, 1) == ERR_OK);
+    CHECK_EQUAL(CMRegisterExternal(table, 1), ERR_OK);
 }
 
 int main(void)

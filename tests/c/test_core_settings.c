@@ -14,21 +14,21 @@
 
 static void values_are_found_by_component_and_key(void)
 {
-    CHECK(SettgGetIntValue("CmpA", "Number", 1) == 42);
-    CHECK(SettgGetIntValue("CmpB", "Number", 1) == -1);
+    CHECK_EQUAL(SettgGetIntValue("CmpA", "Number", 1), 42);
+    CHECK_EQUAL(SettgGetIntValue("CmpB", "Number", 1), -1);
     CHECK(strcmp(SettgGetStringValue("CmpA", "Text", ""), "forty-two") == 0);
 }
 
 static void what_is_not_in_the_table_has_the_default(void)
 {
-    CHECK(SettgGetIntValue("CmpA", "Nothing", 5) == 5);
-    CHECK(SettgGetIntValue("CmpC", "Number", -5) == -5);
+    CHECK_EQUAL(SettgGetIntValue("CmpA", "Nothing", 5), 5);
+    CHECK_EQUAL(SettgGetIntValue("CmpC", "Number", -5), -5);
     CHECK(SettgGetStringValue("CmpB", "Text", NULL) == NULL);
 }
 
 static void a_value_of_the_other_type_does_not_count(void)
 {
-    CHECK(SettgGetIntValue("CmpA", "Text", 7) == 7);
+    CHECK_EQUAL(SettgGetIntValue("CmpA", "Text", 7), 7);
     CHECK(strcmp(SettgGetStringValue("CmpA", "Number", "none"), "none") == 0);
 }
 

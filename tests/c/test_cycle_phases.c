@@ -33,7 +33,7 @@ static void read_inputs(RTS_UI32 task, const IEC_CONTEXT *context)
 static void force_input(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     RTS_UNUSED(task);
-    CHECK(context->area[APP_AREA_INPUT][0] == INPUT_VALUE);
+    CHECK_EQUAL(context->area[APP_AREA_INPUT][0], INPUT_VALUE);
     context->area[APP_AREA_INPUT][1] = FORCED;
     note('f');
 }
@@ -41,7 +41,7 @@ static void force_input(RTS_UI32 task, const IEC_CONTEXT *context)
 static void force_output(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     RTS_UNUSED(task);
-    CHECK(context->area[APP_AREA_OUTPUT][0] == 1); /* what the code has written */
+    CHECK_EQUAL(context->area[APP_AREA_OUTPUT][0], 1); /* what the code has written */
     context->area[APP_AREA_OUTPUT][0] = FORCED;
     note('F');
 }
@@ -50,7 +50,7 @@ static void write_outputs(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     RTS_UNUSED(task);
     RTS_UNUSED(context);
-    CHECK(*AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1) == FORCED);
+    CHECK_EQUAL(*AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1), FORCED);
     note('o');
 }
 
@@ -65,7 +65,7 @@ static void be_safe(RTS_UI32 task, const IEC_CONTEXT *context)
 {
     RTS_UNUSED(task);
     RTS_UNUSED(context);
-    CHECK(*AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1) == 0);
+    CHECK_EQUAL(*AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1), 0);
     note('s');
 }
 
@@ -89,15 +89,15 @@ static void begin_with(bool fails)
 static void a_cycle_has_its_phases_in_order(void)
 {
     begin_with(false);
-    CHECK(CyclePhaseRegister(CYCLE_RECORD, record) == ERR_OK); /* whatever the order of registration */
-    CHECK(CyclePhaseRegister(CYCLE_OUTPUTS, write_outputs) == ERR_OK);
-    CHECK(CyclePhaseRegister(CYCLE_INPUTS, read_inputs) == ERR_OK);
-    CHECK(CyclePhaseRegister(CYCLE_BEFORE_CODE, force_input) == ERR_OK);
-    CHECK(CyclePhaseRegister(CYCLE_AFTER_CODE, force_output) == ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_RECORD, record), ERR_OK); /* whatever the order of registration */
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_OUTPUTS, write_outputs), ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_INPUTS, read_inputs), ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_BEFORE_CODE, force_input), ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_AFTER_CODE, force_output), ERR_OK);
     load();
-    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
     CHECK(strcmp(order, "ifFor") == 0);
-    CHECK(tasks_seen == 1);
+    CHECK_EQUAL(tasks_seen, 1);
 }
 
 static void no_more_phases_than_there_is_room_for(void)
@@ -106,34 +106,34 @@ static void no_more_phases_than_there_is_room_for(void)
 
     begin_with(false);
     for (i = 0; i < CYCLE_MAX_PHASES; i++)
-        CHECK(CyclePhaseRegister(CYCLE_RECORD, record) == ERR_OK);
-    CHECK(CyclePhaseRegister(CYCLE_RECORD, record) == ERR_NOMEMORY);
+        CHECK_EQUAL(CyclePhaseRegister(CYCLE_RECORD, record), ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_RECORD, record), ERR_NOMEMORY);
     SimStop();
-    CHECK(SimStart() == ERR_OK); /* a start forgets them */
-    CHECK(CyclePhaseRegister(CYCLE_RECORD, record) == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* a start forgets them */
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_RECORD, record), ERR_OK);
 }
 
 static void a_stop_enters_the_safe_state(void)
 {
     begin_with(false);
-    CHECK(CyclePhaseRegister(CYCLE_SAFE_STATE, be_safe) == ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_SAFE_STATE, be_safe), ERR_OK);
     load();
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(*AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1) == 1);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(*AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1), 1);
     CHECK(strcmp(order, "") == 0);
-    CHECK(AppStopApplication() == ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
     CHECK(strcmp(order, "s") == 0);
 }
 
 static void after_code_that_failed_there_is_nothing_but_the_safe_state(void)
 {
     begin_with(true);
-    CHECK(CyclePhaseRegister(CYCLE_INPUTS, read_inputs) == ERR_OK);
-    CHECK(CyclePhaseRegister(CYCLE_OUTPUTS, write_outputs) == ERR_OK);
-    CHECK(CyclePhaseRegister(CYCLE_RECORD, record) == ERR_OK);
-    CHECK(CyclePhaseRegister(CYCLE_SAFE_STATE, be_safe) == ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_INPUTS, read_inputs), ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_OUTPUTS, write_outputs), ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_RECORD, record), ERR_OK);
+    CHECK_EQUAL(CyclePhaseRegister(CYCLE_SAFE_STATE, be_safe), ERR_OK);
     load();
-    CHECK(SimAdvance(0) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
     CHECK(strcmp(order, "iss") == 0); /* from the task at once, and from main when no task is in its cycle */
     CHECK(output_at[1] == 0 && output_at[2] == 0);
 }

@@ -34,7 +34,7 @@ static void only_words_that_lead_into_the_code_are_kept(void)
     stack[2] = in_code(64);
     stack[3] = in_code(0);
     SysExceptTrace(in_code(5), stack, stack + 4, 0);
-    CHECK(trace->count == 2);
+    CHECK_EQUAL(trace->count, 2);
     CHECK(trace->call[0].target == 63 && trace->call[0].distance == sizeof stack[0]);
     CHECK(trace->call[1].target == 0 && trace->call[1].distance == 3 * sizeof stack[0]);
 }
@@ -57,8 +57,8 @@ static void a_full_trace_keeps_the_nearest(void)
     for (i = 0; i < RTS_COUNT(stack); i++)
         stack[i] = in_code(i);
     SysExceptTrace(in_code(5), stack, stack + RTS_COUNT(stack), 0);
-    CHECK(trace->count == EXCEPT_MAX_CALLS);
-    CHECK(trace->call[EXCEPT_MAX_CALLS - 1].target == EXCEPT_MAX_CALLS - 1);
+    CHECK_EQUAL(trace->count, EXCEPT_MAX_CALLS);
+    CHECK_EQUAL(trace->call[EXCEPT_MAX_CALLS - 1].target, EXCEPT_MAX_CALLS - 1);
 }
 
 static void the_first_exception_counts_until_it_is_forgotten(void)
@@ -70,9 +70,9 @@ static void the_first_exception_counts_until_it_is_forgotten(void)
     SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
     CHECK(trace->count == 1 && trace->call[0].target == 7);
     SysExceptKeepTrace(in_code(5));
-    CHECK(trace->count == 1);
+    CHECK_EQUAL(trace->count, 1);
     SysExceptForgetTrace();
-    CHECK(trace->count == 0);
+    CHECK_EQUAL(trace->count, 0);
     SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
     CHECK(trace->count == 1 && trace->call[0].target == 8);
 }
@@ -82,7 +82,7 @@ static void the_trace_of_another_exception_is_not_kept(void)
     setup();
     SysExceptTrace(in_code(5), NULL, NULL, in_code(7));
     SysExceptKeepTrace(in_code(6));
-    CHECK(SysExceptGetTrace()->count == 0);
+    CHECK_EQUAL(SysExceptGetTrace()->count, 0);
 }
 
 /* A call by a pointer that is NULL: the address of the exception is 0. */
@@ -93,11 +93,11 @@ static void an_exception_at_null_is_kept_and_forgotten_like_any_other(void)
     setup();
     SysExceptTrace(0, NULL, NULL, in_code(7));
     SysExceptKeepTrace(0);
-    CHECK(trace->count == 1);
+    CHECK_EQUAL(trace->count, 1);
     SysExceptForgetTrace();
-    CHECK(trace->count == 0);
+    CHECK_EQUAL(trace->count, 0);
     SysExceptTrace(in_code(6), NULL, NULL, in_code(8));
-    CHECK(trace->count == 1);
+    CHECK_EQUAL(trace->count, 1);
 }
 
 static void without_code_there_are_no_calls(void)
@@ -106,7 +106,7 @@ static void without_code_there_are_no_calls(void)
     stack[0] = in_code(3);
     SysExceptCodeRange(NULL, 0);
     SysExceptTrace(in_code(5), stack, stack + 1, 0);
-    CHECK(SysExceptGetTrace()->count == 0);
+    CHECK_EQUAL(SysExceptGetTrace()->count, 0);
 }
 
 int main(void)

@@ -25,8 +25,8 @@ static void start(GEOMETRY g)
 
     for (i = 0; i < sizeof pattern; i++)
         pattern[i] = (RTS_UI8)(i * 13 + i / 256);
-    CHECK(SimFlashConfigure(64 * 1024, 512, g.program_size, g.erased) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 512, g.program_size, g.erased), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
 }
 
 static bool holds_pattern(RTS_UI32 file, RTS_UI32 size)
@@ -44,26 +44,26 @@ static void files_lie_side_by_side_on_sector_borders(void)
     start(geometries[0]);
     for (i = 0; i < FILE_COUNT; i++) {
         const FILE_AREA *area = SysFileGetArea(i);
-        CHECK(area->offset == end);
+        CHECK_EQUAL(area->offset, end);
         CHECK(area->size > 0 && area->size % 512 == 0);
         end = area->offset + area->size;
     }
     CHECK(end <= 64 * 1024);
-    CHECK(SysFileGetArea(FILE_SLOT_A)->size == SysFileGetArea(FILE_SLOT_B)->size);
+    CHECK_EQUAL(SysFileGetArea(FILE_SLOT_A)->size, SysFileGetArea(FILE_SLOT_B)->size);
     CHECK(SysFileGetArea(FILE_SLOT_A)->size > 20 * 1024);
-    CHECK(SysFileGetArea(FILE_COMMIT)->size == 2 * 512);
+    CHECK_EQUAL(SysFileGetArea(FILE_COMMIT)->size, 2 * 512);
 }
 
 static void a_flash_that_is_too_small_stops_the_start_up(void)
 {
-    CHECK(SimFlashConfigure(1024, 256, 1, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_NOMEMORY);
-    CHECK(SimAdvance(1) == ERR_NOTINITIALIZED);
-    CHECK(SimFlashConfigure(2048, 256, 1, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK); /* 2 commit, 2 retain, 2 x 2 slots */
-    CHECK(SysFileGetArea(FILE_SLOT_B)->size == 512);
-    CHECK(SimFlashConfigure(2048, 8, 1, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_PARAMETER); /* sectors smaller than what files are aligned to */
+    CHECK_EQUAL(SimFlashConfigure(1024, 256, 1, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_NOMEMORY);
+    CHECK_EQUAL(SimAdvance(1), ERR_NOTINITIALIZED);
+    CHECK_EQUAL(SimFlashConfigure(2048, 256, 1, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK); /* 2 commit, 2 retain, 2 x 2 slots */
+    CHECK_EQUAL(SysFileGetArea(FILE_SLOT_B)->size, 512);
+    CHECK_EQUAL(SimFlashConfigure(2048, 8, 1, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_PARAMETER); /* sectors smaller than what files are aligned to */
 }
 
 /* Blocks of all sizes, in a pattern that has nothing to do with units and sectors. */
@@ -81,13 +81,13 @@ static void what_is_written_in_pieces_can_be_read(void)
             while (done < sizeof pattern) {
                 RTS_UI32 size =
                     (RTS_UI32)sizeof pattern - done < blocks[b] ? (RTS_UI32)sizeof pattern - done : blocks[b];
-                CHECK(SysFileWrite(FILE_SLOT_B, pattern + done, size) == ERR_OK);
+                CHECK_EQUAL(SysFileWrite(FILE_SLOT_B, pattern + done, size), ERR_OK);
                 done += size;
-                CHECK(SysFileGetPos(FILE_SLOT_B) == done);
+                CHECK_EQUAL(SysFileGetPos(FILE_SLOT_B), done);
             }
-            CHECK(SysFileClose(FILE_SLOT_B) == ERR_OK);
+            CHECK_EQUAL(SysFileClose(FILE_SLOT_B), ERR_OK);
             CHECK(holds_pattern(FILE_SLOT_B, sizeof pattern));
-            CHECK(SimFlashViolations() == 0);
+            CHECK_EQUAL(SimFlashViolations(), 0);
         }
     }
 }
@@ -100,12 +100,12 @@ static void an_odd_end_is_padded_with_the_erased_value(void)
     for (g = 0; g < RTS_COUNT(geometries); g++) {
         start(geometries[g]);
         SysFileCreate(FILE_SLOT_A);
-        CHECK(SysFileWrite(FILE_SLOT_A, pattern, 17) == ERR_OK);
-        CHECK(SysFileClose(FILE_SLOT_A) == ERR_OK);
+        CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, 17), ERR_OK);
+        CHECK_EQUAL(SysFileClose(FILE_SLOT_A), ERR_OK);
         CHECK(holds_pattern(FILE_SLOT_A, 17));
-        CHECK(SysFileRead(FILE_SLOT_A, 17, data, 15) == ERR_OK);
+        CHECK_EQUAL(SysFileRead(FILE_SLOT_A, 17, data, 15), ERR_OK);
         CHECK(data[0] == geometries[g].erased && data[14] == geometries[g].erased);
-        CHECK(SimFlashViolations() == 0);
+        CHECK_EQUAL(SimFlashViolations(), 0);
     }
 }
 
@@ -115,26 +115,26 @@ static void sectors_are_erased_when_their_first_unit_is_due(void)
 
     start((GEOMETRY){1, 0xFF});
     SysFileCreate(FILE_SLOT_A);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 512) == ERR_OK);
-    CHECK(SimFlashOps() == 1 + UNITS); /* one erase, all units programmed */
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN - 1) == ERR_OK);
-    CHECK(SimFlashOps() == 1 + UNITS);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 1) == ERR_OK);
-    CHECK(SimFlashOps() == 1 + UNITS + 2);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 512 - FILE_ALIGN) == ERR_OK);
-    CHECK(SimFlashOps() == 2 * (1 + UNITS));
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, 512), ERR_OK);
+    CHECK_EQUAL(SimFlashOps(), 1 + UNITS); /* one erase, all units programmed */
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN - 1), ERR_OK);
+    CHECK_EQUAL(SimFlashOps(), 1 + UNITS);
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, 1), ERR_OK);
+    CHECK_EQUAL(SimFlashOps(), 1 + UNITS + 2);
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, 512 - FILE_ALIGN), ERR_OK);
+    CHECK_EQUAL(SimFlashOps(), 2 * (1 + UNITS));
 }
 
 static void a_second_writing_replaces_the_first(void)
 {
     start((GEOMETRY){8, 0xFF});
     SysFileCreate(FILE_SLOT_A);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern + 1, 2000) == ERR_OK);
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern + 1, 2000), ERR_OK);
     SysFileCreate(FILE_SLOT_A);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 1000) == ERR_OK);
-    CHECK(SysFileClose(FILE_SLOT_A) == ERR_OK);
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, 1000), ERR_OK);
+    CHECK_EQUAL(SysFileClose(FILE_SLOT_A), ERR_OK);
     CHECK(holds_pattern(FILE_SLOT_A, 1000));
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void a_file_ends_where_its_area_ends(void)
@@ -145,13 +145,13 @@ static void a_file_ends_where_its_area_ends(void)
     start((GEOMETRY){8, 0xFF});
     size = SysFileGetArea(FILE_COMMIT)->size;
     SysFileCreate(FILE_COMMIT);
-    CHECK(SysFileWrite(FILE_COMMIT, pattern, size + 1) == ERR_DISK_FULL);
-    CHECK(SysFileGetPos(FILE_COMMIT) == 0);
+    CHECK_EQUAL(SysFileWrite(FILE_COMMIT, pattern, size + 1), ERR_DISK_FULL);
+    CHECK_EQUAL(SysFileGetPos(FILE_COMMIT), 0);
     for (i = 0; i < size; i += 64)
-        CHECK(SysFileWrite(FILE_COMMIT, pattern, 64) == ERR_OK);
-    CHECK(SysFileWrite(FILE_COMMIT, pattern, 1) == ERR_DISK_FULL);
-    CHECK(SysFileClose(FILE_COMMIT) == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
+        CHECK_EQUAL(SysFileWrite(FILE_COMMIT, pattern, 64), ERR_OK);
+    CHECK_EQUAL(SysFileWrite(FILE_COMMIT, pattern, 1), ERR_DISK_FULL);
+    CHECK_EQUAL(SysFileClose(FILE_COMMIT), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void reading_stays_within_the_file(void)
@@ -161,10 +161,10 @@ static void reading_stays_within_the_file(void)
 
     start((GEOMETRY){8, 0xFF});
     size = SysFileGetArea(FILE_SLOT_A)->size;
-    CHECK(SysFileRead(FILE_SLOT_A, size - 8, data, 8) == ERR_OK);
-    CHECK(SysFileRead(FILE_SLOT_A, size - 7, data, 8) == ERR_OUT_OF_LIMITS);
-    CHECK(SysFileRead(FILE_SLOT_A, 0xFFFFFFFF, data, 1) == ERR_OUT_OF_LIMITS);
-    CHECK(SysFileRead(FILE_SLOT_A, 1, data, 0xFFFFFFFF) == ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(SysFileRead(FILE_SLOT_A, size - 8, data, 8), ERR_OK);
+    CHECK_EQUAL(SysFileRead(FILE_SLOT_A, size - 7, data, 8), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(SysFileRead(FILE_SLOT_A, 0xFFFFFFFF, data, 1), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(SysFileRead(FILE_SLOT_A, 1, data, 0xFFFFFFFF), ERR_OUT_OF_LIMITS);
 }
 
 static void faults_are_reported(void)
@@ -172,17 +172,17 @@ static void faults_are_reported(void)
     start((GEOMETRY){8, 0xFF});
     SysFileCreate(FILE_SLOT_A);
     SimFlashCut(1, SIM_FAULT);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN) == ERR_DEVICE);
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN), ERR_DEVICE);
     SysFileCreate(FILE_SLOT_A);
     SimFlashCut(2, SIM_FAULT);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN) == ERR_DEVICE);
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, FILE_ALIGN), ERR_DEVICE);
     SysFileCreate(FILE_SLOT_A);
-    CHECK(SysFileWrite(FILE_SLOT_A, pattern, 1) == ERR_OK);
+    CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, 1), ERR_OK);
     SimFlashCut(2, SIM_FAULT);
-    CHECK(SysFileClose(FILE_SLOT_A) == ERR_DEVICE);
+    CHECK_EQUAL(SysFileClose(FILE_SLOT_A), ERR_DEVICE);
     SimFlashCut(1, SIM_FAULT);
-    CHECK(SysFileErase(FILE_SLOT_A, 0, 1024) == ERR_DEVICE);
-    CHECK(SysFileErase(FILE_SLOT_A, 0, 1024) == ERR_OK);
+    CHECK_EQUAL(SysFileErase(FILE_SLOT_A, 0, 1024), ERR_DEVICE);
+    CHECK_EQUAL(SysFileErase(FILE_SLOT_A, 0, 1024), ERR_OK);
 }
 
 int main(void)

@@ -25,9 +25,9 @@ static FLASH_LOG log_file;
 
 static void start(GEOMETRY g)
 {
-    CHECK(SimFlashConfigure(16 * 1024, 256, g.program_size, g.erased) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(16 * 1024, 256, g.program_size, g.erased), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
 }
 
 static void fill(RTS_UI8 data[DATA_SIZE], RTS_UI32 number)
@@ -62,8 +62,8 @@ static RTS_UI32 newest(void)
 static void a_blank_log_has_no_record(void)
 {
     start(geometries[0]);
-    CHECK(newest() == 0);
-    CHECK(log_file.sequence == 0);
+    CHECK_EQUAL(newest(), 0);
+    CHECK_EQUAL(log_file.sequence, 0);
 }
 
 static void the_newest_record_wins_over_many_wraps(void)
@@ -74,15 +74,15 @@ static void the_newest_record_wins_over_many_wraps(void)
     for (g = 0; g < RTS_COUNT(geometries); g++) {
         start(geometries[g]);
         for (i = 1; i <= 100; i++) {
-            CHECK(append(i) == ERR_OK);
-            CHECK(newest() == i);
+            CHECK_EQUAL(append(i), ERR_OK);
+            CHECK_EQUAL(newest(), i);
             if (i % 3 == 0) {
-                CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
-                CHECK(newest() == i);
-                CHECK(log_file.sequence == i);
+                CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
+                CHECK_EQUAL(newest(), i);
+                CHECK_EQUAL(log_file.sequence, i);
             }
         }
-        CHECK(SimFlashViolations() == 0);
+        CHECK_EQUAL(SimFlashViolations(), 0);
     }
 }
 
@@ -102,14 +102,14 @@ static void nothing_is_appended_to_a_log_that_cannot_be_read(void)
 
     SimFlashSetMapped(0);
     start(geometries[0]);
-    CHECK(append(1) == ERR_OK);
-    CHECK(append(2) == ERR_OK);
+    CHECK_EQUAL(append(1), ERR_OK);
+    CHECK_EQUAL(append(2), ERR_OK);
     flash->read = broken_read;
-    CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_DEVICE);
+    CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_DEVICE);
     flash->read = read;
-    CHECK(append(3) == ERR_DEVICE);
-    CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
-    CHECK(newest() == 2);
+    CHECK_EQUAL(append(3), ERR_DEVICE);
+    CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
+    CHECK_EQUAL(newest(), 2);
     SimFlashSetMapped(1);
 }
 
@@ -130,7 +130,7 @@ static void a_cut_at_any_operation_leaves_the_old_or_the_new_record(void)
     for (g = 0; g < RTS_COUNT(geometries); g++) {
         RTS_UI32 number;
         start(geometries[g]);
-        CHECK(append(1) == ERR_OK);
+        CHECK_EQUAL(append(1), ERR_OK);
         for (number = 2; number < 60; number++) {
             RTS_UI32 k = number % 6 + 1;
             RTS_UI32 found;
@@ -138,14 +138,14 @@ static void a_cut_at_any_operation_leaves_the_old_or_the_new_record(void)
             SimFlashCut(k, number / 6 % 3);
             if (SimCall(append_number, NULL) == SIM_POWER_CUT)
                 cuts++;
-            CHECK(SimStart() == ERR_OK);
-            CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
             found = newest();
             CHECK(found == number || found == number - 1);
-            CHECK(append(number) == ERR_OK);
-            CHECK(newest() == number);
+            CHECK_EQUAL(append(number), ERR_OK);
+            CHECK_EQUAL(newest(), number);
         }
-        CHECK(SimFlashViolations() == 0);
+        CHECK_EQUAL(SimFlashViolations(), 0);
         if (SimFlashViolations() != 0)
             fprintf(stderr, "geometry %u: %s\n", (unsigned)g, SimFlashViolation());
     }
@@ -163,14 +163,14 @@ static void a_record_of_erased_bytes_is_not_taken_for_free_space(void)
         memset(data, geometries[g].erased, sizeof data);
         for (k = 1; k < 9; k++) {
             start(geometries[g]);
-            CHECK(append(1) == ERR_OK);
+            CHECK_EQUAL(append(1), ERR_OK);
             SimFlashCut(k, SIM_CUT_AFTER);
             (void)FlashLogAppend(&log_file, TAG, data, sizeof data);
-            CHECK(SimStart() == ERR_OK);
-            CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
-            CHECK(append(2) == ERR_OK);
-            CHECK(newest() == 2);
-            CHECK(SimFlashViolations() == 0);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
+            CHECK_EQUAL(append(2), ERR_OK);
+            CHECK_EQUAL(newest(), 2);
+            CHECK_EQUAL(SimFlashViolations(), 0);
         }
     }
 }
@@ -180,15 +180,15 @@ static void records_are_distinguished_by_tag_and_size(void)
     RTS_UI8 data[DATA_SIZE] = {7};
 
     start(geometries[2]);
-    CHECK(append(1) == ERR_OK);
-    CHECK(FlashLogAppend(&log_file, TAG + 1, data, DATA_SIZE) == ERR_OK);
-    CHECK(FlashLogAppend(&log_file, TAG, data, DATA_SIZE - 1) == ERR_OK);
-    CHECK(newest() == 1);
-    CHECK(FlashLogRead(&log_file, everything, TAG + 1, data, DATA_SIZE) == ERR_OK);
-    CHECK(data[0] == 7);
-    CHECK(FlashLogRead(&log_file, everything, TAG + 2, data, DATA_SIZE) == ERR_NO_OBJECT);
-    CHECK(FlashLogRead(&log_file, everything, TAG, data, DATA_SIZE - 2) == ERR_NO_OBJECT);
-    CHECK(data[0] == 7);
+    CHECK_EQUAL(append(1), ERR_OK);
+    CHECK_EQUAL(FlashLogAppend(&log_file, TAG + 1, data, DATA_SIZE), ERR_OK);
+    CHECK_EQUAL(FlashLogAppend(&log_file, TAG, data, DATA_SIZE - 1), ERR_OK);
+    CHECK_EQUAL(newest(), 1);
+    CHECK_EQUAL(FlashLogRead(&log_file, everything, TAG + 1, data, DATA_SIZE), ERR_OK);
+    CHECK_EQUAL(data[0], 7);
+    CHECK_EQUAL(FlashLogRead(&log_file, everything, TAG + 2, data, DATA_SIZE), ERR_NO_OBJECT);
+    CHECK_EQUAL(FlashLogRead(&log_file, everything, TAG, data, DATA_SIZE - 2), ERR_NO_OBJECT);
+    CHECK_EQUAL(data[0], 7);
 }
 
 static void a_range_limits_what_is_read(void)
@@ -197,14 +197,14 @@ static void a_range_limits_what_is_read(void)
     RTS_UI8 data[DATA_SIZE];
 
     start(geometries[0]);
-    CHECK(append(1) == ERR_OK);
-    CHECK(append(2) == ERR_OK);
-    CHECK(append(3) == ERR_OK);
-    CHECK(FlashLogRead(&log_file, range, TAG, data, DATA_SIZE) == ERR_OK);
-    CHECK(data[0] == 2);
+    CHECK_EQUAL(append(1), ERR_OK);
+    CHECK_EQUAL(append(2), ERR_OK);
+    CHECK_EQUAL(append(3), ERR_OK);
+    CHECK_EQUAL(FlashLogRead(&log_file, range, TAG, data, DATA_SIZE), ERR_OK);
+    CHECK_EQUAL(data[0], 2);
     range.until = 3;
     range.after = 3;
-    CHECK(FlashLogRead(&log_file, range, TAG, data, DATA_SIZE) == ERR_NO_OBJECT);
+    CHECK_EQUAL(FlashLogRead(&log_file, range, TAG, data, DATA_SIZE), ERR_NO_OBJECT);
 }
 
 static void numbers_wrap(void)
@@ -217,12 +217,12 @@ static void numbers_wrap(void)
         FLASH_LOG_RANGE range = {0xFFFFFF00, 0x100};
         RTS_UI8 data[DATA_SIZE];
         RTS_UI32 number;
-        CHECK(append(i) == ERR_OK);
-        CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
-        CHECK(log_file.sequence == 0xFFFFFFF0 + i);
-        CHECK(FlashLogRead(&log_file, range, TAG, data, DATA_SIZE) == ERR_OK);
+        CHECK_EQUAL(append(i), ERR_OK);
+        CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
+        CHECK_EQUAL(log_file.sequence, 0xFFFFFFF0 + i);
+        CHECK_EQUAL(FlashLogRead(&log_file, range, TAG, data, DATA_SIZE), ERR_OK);
         memcpy(&number, data, sizeof number);
-        CHECK(number == i);
+        CHECK_EQUAL(number, i);
     }
 }
 
@@ -234,18 +234,18 @@ static void the_largest_record_fills_a_half(void)
 
     start(geometries[4]);
     capacity = FlashLogCapacity(&log_file);
-    CHECK(capacity == 256 - FLASH_LOG_HEAD_SIZE);
-    CHECK(FlashLogAppend(&log_file, TAG, data, capacity + 1) == ERR_DISK_FULL);
+    CHECK_EQUAL(capacity, 256 - FLASH_LOG_HEAD_SIZE);
+    CHECK_EQUAL(FlashLogAppend(&log_file, TAG, data, capacity + 1), ERR_DISK_FULL);
     for (i = 1; i < 10; i++) {
         data[0] = (RTS_UI8)i;
-        CHECK(FlashLogAppend(&log_file, TAG, data, capacity) == ERR_OK);
-        CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
+        CHECK_EQUAL(FlashLogAppend(&log_file, TAG, data, capacity), ERR_OK);
+        CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
         data[0] = 0;
-        CHECK(FlashLogRead(&log_file, everything, TAG, data, capacity) == ERR_OK);
-        CHECK(data[0] == i);
+        CHECK_EQUAL(FlashLogRead(&log_file, everything, TAG, data, capacity), ERR_OK);
+        CHECK_EQUAL(data[0], i);
     }
-    CHECK(FlashLogAppend(&log_file, TAG, data, 0) == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(FlashLogAppend(&log_file, TAG, data, 0), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void a_damaged_record_gives_way_to_the_one_before(void)
@@ -254,14 +254,14 @@ static void a_damaged_record_gives_way_to_the_one_before(void)
     RTS_UI32 byte;
 
     start(geometries[0]);
-    CHECK(append(1) == ERR_OK);
-    CHECK(append(2) == ERR_OK);
-    CHECK(SimFlashSave() == ERR_OK);
+    CHECK_EQUAL(append(1), ERR_OK);
+    CHECK_EQUAL(append(2), ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
     for (byte = 0; byte < FLASH_LOG_HEAD_SIZE + DATA_SIZE; byte++) {
-        CHECK(SimFlashRestore() == ERR_OK);
+        CHECK_EQUAL(SimFlashRestore(), ERR_OK);
         SimFlashData()[area->offset + log_file.start + 64 + byte] ^= 0x10;
-        CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
-        CHECK(newest() == 1);
+        CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
+        CHECK_EQUAL(newest(), 1);
     }
 }
 
@@ -279,10 +279,10 @@ static void garbage_is_survived(void)
             state = state * 1664525 + 1013904223;
             SimFlashData()[area->offset + i] = (RTS_UI8)(state >> 24);
         }
-        CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
-        CHECK(newest() == 0);
-        CHECK(append(5) == ERR_OK);
-        CHECK(newest() == 5);
+        CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
+        CHECK_EQUAL(newest(), 0);
+        CHECK_EQUAL(append(5), ERR_OK);
+        CHECK_EQUAL(newest(), 5);
     }
 }
 
@@ -292,15 +292,15 @@ static void a_fault_uses_up_its_place_only(void)
 
     for (k = 1; k <= 4; k++) {
         start(geometries[2]);
-        CHECK(append(1) == ERR_OK);
+        CHECK_EQUAL(append(1), ERR_OK);
         SimFlashCut(k, SIM_FAULT);
-        CHECK(append(2) == ERR_DEVICE);
-        CHECK(newest() == (k < 4 ? 1 : 2)); /* the last one lost only padding */
-        CHECK(append(3) == ERR_OK);
-        CHECK(newest() == 3);
-        CHECK(FlashLogOpen(&log_file, FILE_COMMIT) == ERR_OK);
-        CHECK(newest() == 3);
-        CHECK(SimFlashViolations() == 0);
+        CHECK_EQUAL(append(2), ERR_DEVICE);
+        CHECK_EQUAL(newest(), (k < 4 ? 1 : 2)); /* the last one lost only padding */
+        CHECK_EQUAL(append(3), ERR_OK);
+        CHECK_EQUAL(newest(), 3);
+        CHECK_EQUAL(FlashLogOpen(&log_file, FILE_COMMIT), ERR_OK);
+        CHECK_EQUAL(newest(), 3);
+        CHECK_EQUAL(SimFlashViolations(), 0);
     }
 }
 

@@ -27,8 +27,8 @@
 
 static RTS_RESULT start(RTS_UI32 size, RTS_UI32 sector_size)
 {
-    CHECK(SimFlashConfigure(size, sector_size, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(size, sector_size, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     return SysFileFlash_Hook(CH_INIT_SYSTEM2);
 }
 
@@ -36,24 +36,24 @@ static void files_lie_where_the_map_says(void)
 {
     RTS_UI8 data[FILE_ALIGN] = "1234567";
 
-    CHECK(start(0xC000, 512) == ERR_OK);
-    CHECK(SysFileGetArea(FILE_SLOT_B)->offset == 0x8000);
-    CHECK(SysFileGetArea(FILE_SLOT_B)->size == 0x4000);
+    CHECK_EQUAL(start(0xC000, 512), ERR_OK);
+    CHECK_EQUAL(SysFileGetArea(FILE_SLOT_B)->offset, 0x8000);
+    CHECK_EQUAL(SysFileGetArea(FILE_SLOT_B)->size, 0x4000);
     SysFileCreate(FILE_RETAIN);
-    CHECK(SysFileWrite(FILE_RETAIN, data, sizeof data) == ERR_OK);
+    CHECK_EQUAL(SysFileWrite(FILE_RETAIN, data, sizeof data), ERR_OK);
     CHECK(memcmp(SimFlashData() + 0x1000, data, sizeof data) == 0);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void a_map_beyond_the_flash_is_refused(void)
 {
-    CHECK(start(0xBE00, 512) == ERR_NOMEMORY);
+    CHECK_EQUAL(start(0xBE00, 512), ERR_NOMEMORY);
 }
 
 static void a_map_off_the_sector_borders_is_refused(void)
 {
-    CHECK(start(0x10000, 1024) == ERR_NOMEMORY); /* the commit log would have one sector only */
-    CHECK(start(0x40000, 0x4000) == ERR_NOMEMORY);
+    CHECK_EQUAL(start(0x10000, 1024), ERR_NOMEMORY); /* the commit log would have one sector only */
+    CHECK_EQUAL(start(0x40000, 0x4000), ERR_NOMEMORY);
 }
 
 int main(void)

@@ -16,23 +16,23 @@ static const RTS_UI8 ones[64] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1}
 
 static const SYS_FLASH *blank(RTS_UI32 program_size, RTS_UI8 erased)
 {
-    CHECK(SimFlashConfigure(16 * 1024, 256, program_size, erased) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(SimFlashConfigure(16 * 1024, 256, program_size, erased), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
     return SysFlashGet();
 }
 
 static void only_possible_geometries_are_accepted(void)
 {
-    CHECK(SimFlashConfigure(0, 256, 1, 0xFF) == ERR_PARAMETER);
-    CHECK(SimFlashConfigure(1000, 256, 1, 0xFF) == ERR_PARAMETER);
-    CHECK(SimFlashConfigure(1024, 300, 1, 0xFF) == ERR_PARAMETER);
-    CHECK(SimFlashConfigure(1024, 256, 3, 0xFF) == ERR_PARAMETER);
-    CHECK(SimFlashConfigure(1024, 256, 32, 0xFF) == ERR_PARAMETER);
-    CHECK(SimFlashConfigure(1024, 256, 1, 0x55) == ERR_PARAMETER);
-    CHECK(SimFlashConfigure(1024, 256, 16, 0x00) == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(0, 256, 1, 0xFF), ERR_PARAMETER);
+    CHECK_EQUAL(SimFlashConfigure(1000, 256, 1, 0xFF), ERR_PARAMETER);
+    CHECK_EQUAL(SimFlashConfigure(1024, 300, 1, 0xFF), ERR_PARAMETER);
+    CHECK_EQUAL(SimFlashConfigure(1024, 256, 3, 0xFF), ERR_PARAMETER);
+    CHECK_EQUAL(SimFlashConfigure(1024, 256, 32, 0xFF), ERR_PARAMETER);
+    CHECK_EQUAL(SimFlashConfigure(1024, 256, 1, 0x55), ERR_PARAMETER);
+    CHECK_EQUAL(SimFlashConfigure(1024, 256, 16, 0x00), ERR_OK);
     CHECK(SimFlashData()[0] == 0 && SimFlashData()[1023] == 0);
-    CHECK(SimFlashSize() == 1024);
+    CHECK_EQUAL(SimFlashSize(), 1024);
 }
 
 static void a_byte_is_programmed_once(void)
@@ -40,17 +40,17 @@ static void a_byte_is_programmed_once(void)
     const SYS_FLASH *flash = blank(1, 0xFF);
     RTS_UI8 value = 0xFF;
 
-    CHECK(flash->program(100, ones, 4) == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
-    CHECK(flash->program(103, ones, 1) == ERR_OK);
-    CHECK(SimFlashViolations() == 1);
+    CHECK_EQUAL(flash->program(100, ones, 4), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
+    CHECK_EQUAL(flash->program(103, ones, 1), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 1);
     CHECK(strcmp(SimFlashViolation(), "programmed twice at offset 103") == 0);
-    CHECK(flash->program(200, &value, 1) == ERR_OK); /* also when nothing changes */
-    CHECK(flash->program(200, &value, 1) == ERR_OK);
-    CHECK(SimFlashViolations() == 2);
-    CHECK(flash->erase(0) == ERR_OK);
-    CHECK(flash->program(103, ones, 1) == ERR_OK);
-    CHECK(SimFlashViolations() == 2);
+    CHECK_EQUAL(flash->program(200, &value, 1), ERR_OK); /* also when nothing changes */
+    CHECK_EQUAL(flash->program(200, &value, 1), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 2);
+    CHECK_EQUAL(flash->erase(0), ERR_OK);
+    CHECK_EQUAL(flash->program(103, ones, 1), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 2);
 }
 
 static void programming_only_changes_bits_away_from_erased(void)
@@ -59,13 +59,13 @@ static void programming_only_changes_bits_away_from_erased(void)
     RTS_UI8 a = 0xF0;
     RTS_UI8 b = 0x3C;
 
-    CHECK(flash->program(0, &a, 1) == ERR_OK);
-    CHECK(flash->program(0, &b, 1) == ERR_OK);
-    CHECK(SimFlashData()[0] == 0x30);
+    CHECK_EQUAL(flash->program(0, &a, 1), ERR_OK);
+    CHECK_EQUAL(flash->program(0, &b, 1), ERR_OK);
+    CHECK_EQUAL(SimFlashData()[0], 0x30);
     flash = blank(1, 0x00);
-    CHECK(flash->program(0, &a, 1) == ERR_OK);
-    CHECK(flash->program(0, &b, 1) == ERR_OK);
-    CHECK(SimFlashData()[0] == 0xFC);
+    CHECK_EQUAL(flash->program(0, &a, 1), ERR_OK);
+    CHECK_EQUAL(flash->program(0, &b, 1), ERR_OK);
+    CHECK_EQUAL(SimFlashData()[0], 0xFC);
 }
 
 static void misaligned_and_outside_operations_are_refused(void)
@@ -73,28 +73,28 @@ static void misaligned_and_outside_operations_are_refused(void)
     const SYS_FLASH *flash = blank(8, 0xFF);
     RTS_UI8 data[16];
 
-    CHECK(flash->program(4, ones, 8) == ERR_DEVICE);
-    CHECK(flash->program(8, ones, 4) == ERR_DEVICE);
-    CHECK(flash->program(16 * 1024, ones, 8) == ERR_DEVICE);
-    CHECK(flash->program(16 * 1024 - 8, ones, 16) == ERR_DEVICE);
-    CHECK(flash->program(0xFFFFFFF8, ones, 16) == ERR_DEVICE);
-    CHECK(flash->program(0, ones, 0) == ERR_DEVICE);
-    CHECK(flash->erase(128) == ERR_DEVICE);
-    CHECK(flash->erase(16 * 1024) == ERR_DEVICE);
-    CHECK(flash->read(16 * 1024 - 8, data, 9) == ERR_DEVICE);
-    CHECK(SimFlashViolations() == 9);
-    CHECK(SimFlashOps() == 0);
+    CHECK_EQUAL(flash->program(4, ones, 8), ERR_DEVICE);
+    CHECK_EQUAL(flash->program(8, ones, 4), ERR_DEVICE);
+    CHECK_EQUAL(flash->program(16 * 1024, ones, 8), ERR_DEVICE);
+    CHECK_EQUAL(flash->program(16 * 1024 - 8, ones, 16), ERR_DEVICE);
+    CHECK_EQUAL(flash->program(0xFFFFFFF8, ones, 16), ERR_DEVICE);
+    CHECK_EQUAL(flash->program(0, ones, 0), ERR_DEVICE);
+    CHECK_EQUAL(flash->erase(128), ERR_DEVICE);
+    CHECK_EQUAL(flash->erase(16 * 1024), ERR_DEVICE);
+    CHECK_EQUAL(flash->read(16 * 1024 - 8, data, 9), ERR_DEVICE);
+    CHECK_EQUAL(SimFlashViolations(), 9);
+    CHECK_EQUAL(SimFlashOps(), 0);
 }
 
 static void an_erase_takes_one_sector(void)
 {
     const SYS_FLASH *flash = blank(1, 0xFF);
 
-    CHECK(flash->program(255, ones, 3) == ERR_OK);
-    CHECK(flash->erase(256) == ERR_OK);
-    CHECK(SimFlashData()[255] == 1);
-    CHECK(SimFlashData()[256] == 0xFF);
-    CHECK(SimFlashOps() == 2);
+    CHECK_EQUAL(flash->program(255, ones, 3), ERR_OK);
+    CHECK_EQUAL(flash->erase(256), ERR_OK);
+    CHECK_EQUAL(SimFlashData()[255], 1);
+    CHECK_EQUAL(SimFlashData()[256], 0xFF);
+    CHECK_EQUAL(SimFlashOps(), 2);
 }
 
 static void program_16(void *unused)
@@ -126,13 +126,13 @@ static void a_cut_hits_the_operation_it_was_planned_for(void)
             (void)blank(1, 0xFF);
             SimFlashCut(k, mode);
             CHECK(SimCall(program_16, NULL) == SIM_POWER_CUT);
-            CHECK(programmed_bytes() == expected[mode][k - 1]);
+            CHECK_EQUAL(programmed_bytes(), expected[mode][k - 1]);
             CHECK(SimCall(program_16, NULL) == SIM_POWER_CUT);
-            CHECK(SimAdvance(1) == SIM_POWER_CUT);
-            CHECK(SimCommCycle() == SIM_POWER_CUT);
-            CHECK(SimRunCycles(1) == SIM_POWER_CUT);
-            CHECK(SimStart() == ERR_OK);
-            CHECK(SimAdvance(1) == ERR_OK);
+            CHECK_EQUAL(SimAdvance(1), SIM_POWER_CUT);
+            CHECK_EQUAL(SimCommCycle(), SIM_POWER_CUT);
+            CHECK_EQUAL(SimRunCycles(1), SIM_POWER_CUT);
+            CHECK_EQUAL(SimStart(), ERR_OK);
+            CHECK_EQUAL(SimAdvance(1), ERR_OK);
         }
     }
 }
@@ -141,12 +141,12 @@ static void a_torn_erase_takes_half_a_sector(void)
 {
     const SYS_FLASH *flash = blank(1, 0xFF);
 
-    CHECK(flash->program(0, ones, 1) == ERR_OK);
-    CHECK(flash->program(255, ones, 1) == ERR_OK);
+    CHECK_EQUAL(flash->program(0, ones, 1), ERR_OK);
+    CHECK_EQUAL(flash->program(255, ones, 1), ERR_OK);
     SimFlashCut(1, SIM_CUT_TORN);
-    CHECK(flash->erase(0) == ERR_DEVICE);
-    CHECK(SimFlashData()[0] == 0xFF);
-    CHECK(SimFlashData()[255] == 1);
+    CHECK_EQUAL(flash->erase(0), ERR_DEVICE);
+    CHECK_EQUAL(SimFlashData()[0], 0xFF);
+    CHECK_EQUAL(SimFlashData()[255], 1);
 }
 
 static void a_half_programmed_unit_is_used_up(void)
@@ -154,12 +154,12 @@ static void a_half_programmed_unit_is_used_up(void)
     const SYS_FLASH *flash = blank(8, 0xFF);
 
     SimFlashCut(1, SIM_FAULT);
-    CHECK(flash->program(0, ones, 8) == ERR_DEVICE);
-    CHECK(programmed_bytes() == 4);
-    CHECK(flash->program(8, ones, 8) == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
-    CHECK(flash->program(0, ones, 8) == ERR_OK);
-    CHECK(SimFlashViolations() == 1);
+    CHECK_EQUAL(flash->program(0, ones, 8), ERR_DEVICE);
+    CHECK_EQUAL(programmed_bytes(), 4);
+    CHECK_EQUAL(flash->program(8, ones, 8), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
+    CHECK_EQUAL(flash->program(0, ones, 8), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 1);
 }
 
 static void outside_of_a_call_a_cut_leaves_the_flash_dead_until_power_on(void)
@@ -167,34 +167,34 @@ static void outside_of_a_call_a_cut_leaves_the_flash_dead_until_power_on(void)
     const SYS_FLASH *flash = blank(1, 0xFF);
 
     SimFlashCut(1, SIM_CUT_AFTER);
-    CHECK(flash->program(0, ones, 4) == ERR_DEVICE);
-    CHECK(flash->program(4, ones, 4) == ERR_DEVICE);
-    CHECK(flash->erase(0) == ERR_DEVICE);
-    CHECK(flash->sync() == ERR_DEVICE);
-    CHECK(SimFlashData()[3] == 1);
-    CHECK(SimFlashData()[4] == 0xFF);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(flash->program(4, ones, 4) == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(flash->program(0, ones, 4), ERR_DEVICE);
+    CHECK_EQUAL(flash->program(4, ones, 4), ERR_DEVICE);
+    CHECK_EQUAL(flash->erase(0), ERR_DEVICE);
+    CHECK_EQUAL(flash->sync(), ERR_DEVICE);
+    CHECK_EQUAL(SimFlashData()[3], 1);
+    CHECK_EQUAL(SimFlashData()[4], 0xFF);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(flash->program(4, ones, 4), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void content_is_kept_and_brought_back_with_what_was_programmed(void)
 {
     const SYS_FLASH *flash = blank(1, 0xFF);
 
-    CHECK(flash->program(0, ones, 4) == ERR_OK);
-    CHECK(SimFlashSave() == ERR_OK);
-    CHECK(flash->erase(0) == ERR_OK);
-    CHECK(flash->program(8, ones, 4) == ERR_OK);
-    CHECK(SimFlashRestore() == ERR_OK);
-    CHECK(SimFlashData()[0] == 1);
-    CHECK(SimFlashData()[8] == 0xFF);
-    CHECK(flash->program(8, ones, 4) == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
-    CHECK(flash->program(0, ones, 4) == ERR_OK);
-    CHECK(SimFlashViolations() == 1);
-    CHECK(SimFlashConfigure(1024, 256, 1, 0xFF) == ERR_OK);
-    CHECK(SimFlashRestore() == ERR_NO_OBJECT);
+    CHECK_EQUAL(flash->program(0, ones, 4), ERR_OK);
+    CHECK_EQUAL(SimFlashSave(), ERR_OK);
+    CHECK_EQUAL(flash->erase(0), ERR_OK);
+    CHECK_EQUAL(flash->program(8, ones, 4), ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_OK);
+    CHECK_EQUAL(SimFlashData()[0], 1);
+    CHECK_EQUAL(SimFlashData()[8], 0xFF);
+    CHECK_EQUAL(flash->program(8, ones, 4), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
+    CHECK_EQUAL(flash->program(0, ones, 4), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 1);
+    CHECK_EQUAL(SimFlashConfigure(1024, 256, 1, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimFlashRestore(), ERR_NO_OBJECT);
 }
 
 static void code_is_mapped_per_slot_and_aligned(void)
@@ -203,15 +203,15 @@ static void code_is_mapped_per_slot_and_aligned(void)
     const RTS_UI8 *a;
     const RTS_UI8 *b;
 
-    CHECK(flash->program(0x20, ones, 16) == ERR_OK);
+    CHECK_EQUAL(flash->program(0x20, ones, 16), ERR_OK);
     a = SysFlashMapCode(0, 0x20, 64);
     b = SysFlashMapCode(1, 0x20, 64);
     CHECK(a != NULL && b != NULL && a != b);
-    CHECK((uintptr_t)a % 16 == 0);
+    CHECK_EQUAL((uintptr_t)a % 16, 0);
     CHECK(memcmp(a, ones, 16) == 0 && memcmp(b, ones, 16) == 0);
     SysFlashReleaseCode(0);
     SysFlashReleaseCode(0);
-    CHECK(b[0] == 1);
+    CHECK_EQUAL(b[0], 1);
     CHECK(SysFlashMapCode(2, 0, 16) == NULL);
     CHECK(SysFlashMapCode(0, 0, 0) == NULL);
     CHECK(SysFlashMapCode(0, 16 * 1024 - 8, 16) == NULL);
@@ -227,15 +227,15 @@ static void a_call_that_is_planned_to_fail_fails_once_and_does_nothing(void)
     SimFlashFail(SIM_PROGRAM, 2);
     SimFlashFail(SIM_ERASE, 1);
     SimFlashFail(SIM_READ, 1);
-    CHECK(flash->program(0, ones, 8) == ERR_OK);
-    CHECK(flash->program(8, ones, 8) == ERR_DEVICE);
-    CHECK(SimFlashData()[8] == 0xFF);
-    CHECK(flash->program(8, ones, 8) == ERR_OK); /* not programmed twice */
-    CHECK(flash->erase(0) == ERR_DEVICE);
-    CHECK(SimFlashData()[0] == 1);
-    CHECK(flash->read(0, data, 8) == ERR_DEVICE);
-    CHECK(flash->read(0, data, 8) == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
+    CHECK_EQUAL(flash->program(0, ones, 8), ERR_OK);
+    CHECK_EQUAL(flash->program(8, ones, 8), ERR_DEVICE);
+    CHECK_EQUAL(SimFlashData()[8], 0xFF);
+    CHECK_EQUAL(flash->program(8, ones, 8), ERR_OK); /* not programmed twice */
+    CHECK_EQUAL(flash->erase(0), ERR_DEVICE);
+    CHECK_EQUAL(SimFlashData()[0], 1);
+    CHECK_EQUAL(flash->read(0, data, 8), ERR_DEVICE);
+    CHECK_EQUAL(flash->read(0, data, 8), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
 static void what_a_sync_did_not_save_is_lost_with_power(void)
@@ -243,14 +243,14 @@ static void what_a_sync_did_not_save_is_lost_with_power(void)
     const SYS_FLASH *flash = blank(8, 0xFF);
 
     SimFlashFail(SIM_SYNC, 2);
-    CHECK(flash->program(0, ones, 8) == ERR_OK);
-    CHECK(flash->sync() == ERR_OK);
-    CHECK(flash->program(8, ones, 8) == ERR_OK);
-    CHECK(flash->sync() == ERR_DEVICE);
-    CHECK(SimFlashData()[8] == 1);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(SimFlashData()[0] == 1);
-    CHECK(SimFlashData()[8] == 0xFF);
+    CHECK_EQUAL(flash->program(0, ones, 8), ERR_OK);
+    CHECK_EQUAL(flash->sync(), ERR_OK);
+    CHECK_EQUAL(flash->program(8, ones, 8), ERR_OK);
+    CHECK_EQUAL(flash->sync(), ERR_DEVICE);
+    CHECK_EQUAL(SimFlashData()[8], 1);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(SimFlashData()[0], 1);
+    CHECK_EQUAL(SimFlashData()[8], 0xFF);
 }
 
 static void a_plan_for_the_next_start_counts_from_there(void)
@@ -261,9 +261,9 @@ static void a_plan_for_the_next_start_counts_from_there(void)
     SimFlashSetMapped(0);
     SimFlashFail(SIM_READ, 1);
     SimFlashAtStart();
-    CHECK(SimStart() == ERR_OK); /* a log cannot be read, so less is read in all */
+    CHECK_EQUAL(SimStart(), ERR_OK); /* a log cannot be read, so less is read in all */
     calls = SimFlashCalls(SIM_READ);
-    CHECK(SimStart() == ERR_OK); /* and the plan is over */
+    CHECK_EQUAL(SimStart(), ERR_OK); /* and the plan is over */
     CHECK(calls < SimFlashCalls(SIM_READ));
     SimFlashSetMapped(1);
 }
@@ -273,13 +273,13 @@ static void calls_can_fail_from_one_on(void)
     const SYS_FLASH *flash = blank(1, 0xFF);
 
     SimFlashFailFrom(SIM_PROGRAM, 2);
-    CHECK(flash->program(8, ones, 1) == ERR_OK);
+    CHECK_EQUAL(flash->program(8, ones, 1), ERR_OK);
     CHECK(flash->program(9, ones, 1) == ERR_DEVICE && flash->program(9, ones, 1) == ERR_DEVICE);
     SimFlashFail(SIM_PROGRAM, 0);
-    CHECK(flash->program(9, ones, 1) == ERR_OK);
+    CHECK_EQUAL(flash->program(9, ones, 1), ERR_OK);
     SimFlashFailFrom(SIM_PROGRAM, 1);
     SimFlashAtStart();
-    CHECK(SimStart() == ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK(flash->program(10, ones, 1) == ERR_DEVICE && flash->program(10, ones, 1) == ERR_DEVICE);
     SimFlashFail(SIM_MAP_CODE, 1);
     CHECK(SysFlashMapCode(0, 0, 16) == NULL && SysFlashMapCode(0, 0, 16) != NULL);
@@ -292,13 +292,13 @@ static void what_is_loaded_counts_as_programmed(void)
 
     memset(content, 0xFF, sizeof content);
     content[5] = 1;
-    CHECK(SimFlashLoad(content, 100) == ERR_PARAMETER);
-    CHECK(SimFlashLoad(content, sizeof content) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(flash->program(4, ones, 1) == ERR_OK);
-    CHECK(SimFlashViolations() == 0);
-    CHECK(flash->program(5, ones, 1) == ERR_OK);
-    CHECK(SimFlashViolations() == 1);
+    CHECK_EQUAL(SimFlashLoad(content, 100), ERR_PARAMETER);
+    CHECK_EQUAL(SimFlashLoad(content, sizeof content), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(flash->program(4, ones, 1), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 0);
+    CHECK_EQUAL(flash->program(5, ones, 1), ERR_OK);
+    CHECK_EQUAL(SimFlashViolations(), 1);
 }
 
 /* What a process programmed is there after it died; a store of its own into the flash is what it dies of. */
@@ -315,7 +315,7 @@ static void cells_survive_the_process_and_are_not_written_by_stores(void)
     }
     CHECK(child > 0 && waitpid(child, &status, 0) == child);
     CHECK(!WIFEXITED(status) || WEXITSTATUS(status) != 0);
-    CHECK(SimFlashData()[0] == 1);
+    CHECK_EQUAL(SimFlashData()[0], 1);
 }
 
 int main(void)

@@ -65,12 +65,12 @@ static RTS_UI32 read_client(int client, RTS_UI8 *data, RTS_UI32 size)
 static void check_round_trip(int client)
 {
     RTS_UI8 back[256] = {0};
-    CHECK(write(client, every_byte, sizeof(every_byte)) == sizeof(every_byte));
-    CHECK(read_com(back, sizeof(back)) == sizeof(back));
+    CHECK_EQUAL(write(client, every_byte, sizeof(every_byte)), sizeof(every_byte));
+    CHECK_EQUAL(read_com(back, sizeof(back)), sizeof(back));
     CHECK(memcmp(back, every_byte, sizeof(back)) == 0);
     memset(back, 0, sizeof(back));
-    CHECK(SysComWrite(0, every_byte, sizeof(every_byte)) == sizeof(every_byte));
-    CHECK(read_client(client, back, sizeof(back)) == sizeof(back));
+    CHECK_EQUAL(SysComWrite(0, every_byte, sizeof(every_byte)), sizeof(every_byte));
+    CHECK_EQUAL(read_client(client, back, sizeof(back)), sizeof(back));
     CHECK(memcmp(back, every_byte, sizeof(back)) == 0);
 }
 
@@ -78,15 +78,15 @@ static void open_com(const char *path)
 {
     PORT_REASON reason = {"", false};
     CHECK(PortComOpen(path, 115200, &reason));
-    CHECK(SysComGetCount() == 1);
-    CHECK(SysComOpen(0) == ERR_OK);
+    CHECK_EQUAL(SysComGetCount(), 1);
+    CHECK_EQUAL(SysComOpen(0), ERR_OK);
 }
 
 static void close_com(void)
 {
     SysComClose(0);
     PortComClose();
-    CHECK(SysComGetCount() == 0);
+    CHECK_EQUAL(SysComGetCount(), 0);
 }
 
 static int open_client(const char *path)
@@ -113,7 +113,7 @@ static void clients_of_a_pty_come_and_go(void)
         int client = open_client(PortComPtyName());
         check_round_trip(client);
         close(client);
-        CHECK(SysComRead(0, &byte, 1) == 0);
+        CHECK_EQUAL(SysComRead(0, &byte, 1), 0);
     }
     close_com();
 }
@@ -127,7 +127,7 @@ static void a_line_without_listener_never_blocks(void)
         taken = SysComWrite(0, every_byte, sizeof(every_byte));
         sent += taken;
     } while (taken > 0 && sent < 10000000);
-    CHECK(taken == 0);
+    CHECK_EQUAL(taken, 0);
     (void)PortWait(1);
     int client = open_client(PortComPtyName());
     tcflush(client, TCIFLUSH);
@@ -142,12 +142,12 @@ static void after_a_moved_byte_main_does_not_wait(void)
     int client = open_client(PortComPtyName());
     RTS_UI8 byte;
     (void)PortWait(0); /* for what the tests before have moved */
-    CHECK(SysComRead(0, &byte, 1) == 0);
+    CHECK_EQUAL(SysComRead(0, &byte, 1), 0);
     CHECK(!PortWait(1));
-    CHECK(SysComWrite(0, every_byte, sizeof(every_byte)) == sizeof(every_byte));
+    CHECK_EQUAL(SysComWrite(0, every_byte, sizeof(every_byte)), sizeof(every_byte));
     CHECK(PortWait(-1)); /* would wait for ever */
     CHECK(!PortWait(1));
-    CHECK(write(client, "x", 1) == 1);
+    CHECK_EQUAL(write(client, "x", 1), 1);
     CHECK(PortWait(-1));
     CHECK(SysComRead(0, &byte, 1) == 1 && byte == 'x');
     CHECK(PortWait(-1));
@@ -162,7 +162,7 @@ static int plug_in(const char *name)
     int end = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
     CHECK(end >= 0 && grantpt(end) == 0 && unlockpt(end) == 0);
     unlink(name);
-    CHECK(symlink(ptsname(end), name) == 0);
+    CHECK_EQUAL(symlink(ptsname(end), name), 0);
     return end;
 }
 
@@ -178,8 +178,8 @@ static void a_device_that_goes_away_is_taken_up_again(void)
     CHECK(PortComPtyName() == NULL);
     check_round_trip(end);
     close(end);
-    CHECK(SysComRead(0, &byte, 1) == 0);
-    CHECK(SysComWrite(0, &byte, 1) == 0);
+    CHECK_EQUAL(SysComRead(0, &byte, 1), 0);
+    CHECK_EQUAL(SysComWrite(0, &byte, 1), 0);
     end = plug_in(name);
     RTS_I64 deadline = SysTimeGetNs() + 10000000000;
     while (SysComWrite(0, (const RTS_UI8 *)"!", 1) == 0 && SysTimeGetNs() < deadline) {
@@ -200,8 +200,8 @@ static void what_cannot_be_opened_is_said(void)
     CHECK(strstr(reason.text, "/dev/does-not-exist") != NULL);
     CHECK(!PortComOpen("/dev/null", 115200, &reason));
     CHECK(!PortComOpen("pty", 12345, &reason));
-    CHECK(SysComGetCount() == 0);
-    CHECK(SysComOpen(0) == ERR_DEVICE);
+    CHECK_EQUAL(SysComGetCount(), 0);
+    CHECK_EQUAL(SysComOpen(0), ERR_DEVICE);
 }
 
 static void a_device_that_keeps_another_speed_is_refused(void)
@@ -222,7 +222,7 @@ static void a_device_that_another_program_uses_is_refused(void)
     int end = posix_openpt(O_RDWR | O_NOCTTY);
     CHECK(end >= 0 && grantpt(end) == 0 && unlockpt(end) == 0 && ptsname_r(end, name, sizeof(name)) == 0);
     int user = open(name, O_RDWR | O_NOCTTY);
-    CHECK(flock(user, LOCK_EX | LOCK_NB) == 0);
+    CHECK_EQUAL(flock(user, LOCK_EX | LOCK_NB), 0);
     CHECK(!PortComOpen(name, 9600, &reason));
     CHECK(strstr(reason.text, "busy") != NULL);
     close(user);
@@ -244,11 +244,11 @@ static void a_line_that_does_not_exist_gives_nothing(void)
 {
     RTS_UI8 byte = 0;
     open_com("pty");
-    CHECK(SysComOpen(1) == ERR_DEVICE);
-    CHECK(SysComRead(1, &byte, 1) == 0);
-    CHECK(SysComWrite(1, &byte, 1) == 0);
+    CHECK_EQUAL(SysComOpen(1), ERR_DEVICE);
+    CHECK_EQUAL(SysComRead(1, &byte, 1), 0);
+    CHECK_EQUAL(SysComWrite(1, &byte, 1), 0);
     close_com();
-    CHECK(SysComRead(0, &byte, 1) == 0);
+    CHECK_EQUAL(SysComRead(0, &byte, 1), 0);
 }
 
 int main(void)
@@ -256,7 +256,7 @@ int main(void)
     for (int i = 0; i < 256; i++) {
         every_byte[i] = (RTS_UI8)i;
     }
-    CHECK(SysTime_Hook(CH_INIT_SYSTEM) == ERR_OK);
+    CHECK_EQUAL(SysTime_Hook(CH_INIT_SYSTEM), ERR_OK);
     RUN(bytes_go_through_a_pty_unchanged);
     RUN(clients_of_a_pty_come_and_go);
     RUN(a_line_without_listener_never_blocks);

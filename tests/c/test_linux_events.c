@@ -155,8 +155,8 @@ static void start(void)
     AppImageAttach(no_copies);
     context.area[APP_AREA_DATA] = app.variable;
     context.area[APP_AREA_CODE] = (RTS_UI8 *)CODE;
-    CHECK(IecTaskCreateAll(app.task, app.count, &context) == ERR_OK);
-    CHECK(IecTaskStartAll() == ERR_OK);
+    CHECK_EQUAL(IecTaskCreateAll(app.task, app.count, &context), ERR_OK);
+    CHECK_EQUAL(IecTaskStartAll(), ERR_OK);
 }
 
 static void sleep_ms(long ms)
@@ -178,7 +178,7 @@ static bool reaches(RTS_UI32 *number, RTS_UI32 least)
 static RTS_UI32 lost_by(RTS_UI32 task)
 {
     IEC_TASK_INFO info;
-    CHECK(IecTaskGetInfo(task, &info) == ERR_OK);
+    CHECK_EQUAL(IecTaskGetInfo(task, &info), ERR_OK);
     return info.overruns;
 }
 
@@ -236,7 +236,7 @@ static void *post(void *unused)
 {
     RTS_UNUSED(unused);
     for (int i = 0; i < POSTS; i++) {
-        CHECK(SchedPostExternalEvent(posted) == ERR_OK);
+        CHECK_EQUAL(SchedPostExternalEvent(posted), ERR_OK);
     }
     return NULL;
 }
@@ -259,8 +259,8 @@ static void posts_of_several_threads_are_all_answered(void)
         sleep_ms(1);
     }
     IecTaskStopAll();
-    CHECK(app.runs[0] + lost_by(0) == POSTERS * POSTS);
-    CHECK(SchedUnregisterExternalEvent(posted) == ERR_OK);
+    CHECK_EQUAL(app.runs[0] + lost_by(0), POSTERS * POSTS);
+    CHECK_EQUAL(SchedUnregisterExternalEvent(posted), ERR_OK);
 }
 
 /* ---- stops ---- */
@@ -275,8 +275,8 @@ static void stop_in_time(RTS_UI32 loops)
     IecTaskStopAll();
     CHECK(SysTimeGetNs() - start_ns < STOP_MS * NS_PER_MS);
     CHECK(AppExceptionTake(&raised));
-    CHECK(raised.code == RTSEXCPT_STOP_TIMEOUT);
-    CHECK(app.task[raised.task].entry_offset == (RTS_UI32)((uintptr_t)loop - CODE));
+    CHECK_EQUAL(raised.code, RTSEXCPT_STOP_TIMEOUT);
+    CHECK_EQUAL(app.task[raised.task].entry_offset, (RTS_UI32)((uintptr_t)loop - CODE));
     CHECK(raised.address - (uintptr_t)loop < 256); /* where it was */
 }
 
@@ -353,13 +353,13 @@ static void the_end_of_the_runtime_breaks_initialisation_too(void)
 int main(void)
 {
     static const CMP_HOOK hooks[] = {CH_INIT_SYSTEM, CH_INIT, CH_INIT_SYSTEM_TASKS};
-    CHECK(AppAreasInit() == ERR_OK);
+    CHECK_EQUAL(AppAreasInit(), ERR_OK);
     for (size_t i = 0; i < RTS_COUNT(hooks); i++) {
-        CHECK(SysTime_Hook(hooks[i]) == ERR_OK);
-        CHECK(SysTimer_Hook(hooks[i]) == ERR_OK);
-        CHECK(CmpIecTask_Hook(hooks[i]) == ERR_OK);
-        CHECK(CmpScheduleTimer_Hook(hooks[i]) == ERR_OK);
-        CHECK(SysWatchdog_Hook(hooks[i]) == ERR_OK);
+        CHECK_EQUAL(SysTime_Hook(hooks[i]), ERR_OK);
+        CHECK_EQUAL(SysTimer_Hook(hooks[i]), ERR_OK);
+        CHECK_EQUAL(CmpIecTask_Hook(hooks[i]), ERR_OK);
+        CHECK_EQUAL(CmpScheduleTimer_Hook(hooks[i]), ERR_OK);
+        CHECK_EQUAL(SysWatchdog_Hook(hooks[i]), ERR_OK);
     }
     RUN(every_rise_at_the_end_of_a_cycle_is_a_run_or_counted_as_lost);
     RUN(several_tasks_may_write_and_several_answer);
@@ -370,7 +370,7 @@ int main(void)
     RUN(a_stop_breaks_several_endless_tasks);
     RUN(a_cycle_that_ends_in_time_is_not_broken_by_a_stop);
     RUN(the_end_of_the_runtime_breaks_initialisation_too);
-    CHECK(SysWatchdog_Hook(CH_EXIT_SYSTEM_TASKS) == ERR_OK);
-    CHECK(SysTimer_Hook(CH_EXIT_SYSTEM) == ERR_OK);
+    CHECK_EQUAL(SysWatchdog_Hook(CH_EXIT_SYSTEM_TASKS), ERR_OK);
+    CHECK_EQUAL(SysTimer_Hook(CH_EXIT_SYSTEM), ERR_OK);
     return test_result();
 }

@@ -87,7 +87,7 @@ static RTS_UI32 code_of(void (*fn)(void *))
 {
     RTS_EXCEPTION exception = {0xDEAD, 0};
     bool left = !SysExceptTry(fn, NULL, &exception);
-    CHECK(left == (exception.code != RTSEXCPT_NOEXCEPTION));
+    CHECK_EQUAL(left, (exception.code != RTSEXCPT_NOEXCEPTION));
     return exception.code;
 }
 
@@ -96,7 +96,7 @@ static void a_normal_return_is_no_exception(void)
     int calls = 0;
     RTS_EXCEPTION exception = {1, 1};
     CHECK(SysExceptTry(count_up, &calls, &exception));
-    CHECK(calls == 1);
+    CHECK_EQUAL(calls, 1);
     CHECK(exception.code == RTSEXCPT_NOEXCEPTION && exception.address == 0);
 }
 
@@ -104,33 +104,33 @@ static void reading_null_is_an_access_violation_at_its_instruction(void)
 {
     RTS_EXCEPTION exception;
     CHECK(!SysExceptTry(read_null, NULL, &exception));
-    CHECK(exception.code == RTSEXCPT_ACCESS_VIOLATION);
+    CHECK_EQUAL(exception.code, RTSEXCPT_ACCESS_VIOLATION);
     CHECK(exception.address - (uintptr_t)read_null < 128);
 }
 
 static void dividing_by_zero_is_caught(void)
 {
-    CHECK(code_of(divide_by_zero) == RTSEXCPT_DIVIDEBYZERO);
+    CHECK_EQUAL(code_of(divide_by_zero), RTSEXCPT_DIVIDEBYZERO);
 }
 
 static void an_illegal_instruction_is_caught(void)
 {
-    CHECK(code_of(run_illegal_instruction) == RTSEXCPT_ILLEGAL_INSTRUCTION);
+    CHECK_EQUAL(code_of(run_illegal_instruction), RTSEXCPT_ILLEGAL_INSTRUCTION);
 }
 
 static void raise_gives_its_code_and_address(void)
 {
     RTS_EXCEPTION exception;
     CHECK(!SysExceptTry(raise_bounds, NULL, &exception));
-    CHECK(exception.code == RTSEXCPT_ARRAYBOUNDS);
-    CHECK(exception.address == 0x1234);
+    CHECK_EQUAL(exception.code, RTSEXCPT_ARRAYBOUNDS);
+    CHECK_EQUAL(exception.address, 0x1234);
 }
 
 static void a_stack_overflow_of_main_is_caught_twice(void)
 {
-    CHECK(code_of(overflow_stack) == RTSEXCPT_STACK_OVERFLOW);
-    CHECK(code_of(overflow_stack) == RTSEXCPT_STACK_OVERFLOW);
-    CHECK(code_of(read_null) == RTSEXCPT_ACCESS_VIOLATION);
+    CHECK_EQUAL(code_of(overflow_stack), RTSEXCPT_STACK_OVERFLOW);
+    CHECK_EQUAL(code_of(overflow_stack), RTSEXCPT_STACK_OVERFLOW);
+    CHECK_EQUAL(code_of(read_null), RTSEXCPT_ACCESS_VIOLATION);
 }
 
 static void *overflow_in_thread(void *arg)
@@ -145,7 +145,7 @@ static void a_stack_overflow_of_a_thread_is_caught(void)
     RTS_UI32 code = 0;
     pthread_create(&thread, NULL, overflow_in_thread, &code);
     pthread_join(thread, NULL);
-    CHECK(code == RTSEXCPT_STACK_OVERFLOW);
+    CHECK_EQUAL(code, RTSEXCPT_STACK_OVERFLOW);
 }
 
 /* ---- the watchdog's break ---- */
@@ -175,7 +175,7 @@ static void an_endless_loop_is_broken(void)
     CHECK(!SysExceptTry(loop_forever, &victim.calls, &exception));
     __atomic_store_n(&victim.done, 1, __ATOMIC_RELEASE);
     pthread_join(thread, NULL);
-    CHECK(exception.code == RTSEXCPT_WATCHDOG);
+    CHECK_EQUAL(exception.code, RTSEXCPT_WATCHDOG);
 }
 
 static void breaks_at_any_moment_do_no_harm(void)
@@ -186,18 +186,18 @@ static void breaks_at_any_moment_do_no_harm(void)
     for (int i = 0; i < 200000; i++) {
         RTS_EXCEPTION exception;
         bool left = !SysExceptTry(count_up, &victim.calls, &exception);
-        CHECK(exception.code == (left ? (RTS_UI32)RTSEXCPT_WATCHDOG : (RTS_UI32)RTSEXCPT_NOEXCEPTION));
+        CHECK_EQUAL(exception.code, (left ? (RTS_UI32)RTSEXCPT_WATCHDOG : (RTS_UI32)RTSEXCPT_NOEXCEPTION));
     }
     __atomic_store_n(&victim.done, 1, __ATOMIC_RELEASE);
     pthread_join(thread, NULL);
     CHECK(victim.calls > 0);
-    CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(code_of(do_nothing), RTSEXCPT_NOEXCEPTION);
 }
 
 static void a_break_outside_of_try_does_nothing(void)
 {
     SysExceptBreak(NULL, RTSEXCPT_WATCHDOG);
-    CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(code_of(do_nothing), RTSEXCPT_NOEXCEPTION);
 }
 
 static void mask_all(int how)
@@ -221,8 +221,8 @@ static void let_signals_come(void *arg)
 
 static void a_break_that_comes_late_does_not_hit_the_next_try(void)
 {
-    CHECK(code_of(break_itself_with_signals_held) == RTSEXCPT_NOEXCEPTION);
-    CHECK(code_of(let_signals_come) == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(code_of(break_itself_with_signals_held), RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(code_of(let_signals_come), RTSEXCPT_NOEXCEPTION);
 }
 
 static void *try_once(void *arg)
@@ -239,7 +239,7 @@ static void a_break_of_a_thread_that_ended_does_nothing(void)
     pthread_create(&thread, NULL, try_once, &gone);
     pthread_join(thread, NULL);
     SysExceptBreak(&gone, RTSEXCPT_WATCHDOG);
-    CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(code_of(do_nothing), RTSEXCPT_NOEXCEPTION);
 }
 
 static void break_something_else(void *arg)
@@ -259,8 +259,8 @@ static void a_break_of_something_else_does_nothing(void)
 static void *fault_often(void *arg)
 {
     for (int i = 0; i < 2000; i++) {
-        CHECK(code_of(read_null) == RTSEXCPT_ACCESS_VIOLATION);
-        CHECK(code_of(do_nothing) == RTSEXCPT_NOEXCEPTION);
+        CHECK_EQUAL(code_of(read_null), RTSEXCPT_ACCESS_VIOLATION);
+        CHECK_EQUAL(code_of(do_nothing), RTSEXCPT_NOEXCEPTION);
     }
     return arg;
 }
@@ -290,7 +290,7 @@ static void a_hundred_thousand_tries_work(void)
     for (int i = 0; i < 100000; i++) {
         CHECK(SysExceptTry(count_up, &calls, &exception));
     }
-    CHECK(calls == 100000);
+    CHECK_EQUAL(calls, 100000);
 }
 
 /* ---- living in a process of another program ---- */
@@ -346,18 +346,18 @@ static void raise_outside(void)
 
 static void a_fault_outside_of_try_ends_the_process_as_ever(void)
 {
-    CHECK(run_child(fault_outside) == 1000 + SIGSEGV);
-    CHECK(run_child(be_sent_a_fault) == 1000 + SIGBUS);
+    CHECK_EQUAL(run_child(fault_outside), 1000 + SIGSEGV);
+    CHECK_EQUAL(run_child(be_sent_a_fault), 1000 + SIGBUS);
 }
 
 static void a_fault_outside_of_try_goes_to_the_handler_before(void)
 {
-    CHECK(run_child(fault_outside_with_handler) == 42);
+    CHECK_EQUAL(run_child(fault_outside_with_handler), 42);
 }
 
 static void raise_outside_of_try_is_fatal(void)
 {
-    CHECK(run_child(raise_outside) == 1000 + SIGABRT);
+    CHECK_EQUAL(run_child(raise_outside), 1000 + SIGABRT);
 }
 
 static void shutdown_gives_the_handlers_back(void)
@@ -365,12 +365,12 @@ static void shutdown_gives_the_handlers_back(void)
     struct sigaction now;
     SysExceptShutdown();
     signal(SIGSEGV, exit_42);
-    CHECK(code_of(read_null) == RTSEXCPT_ACCESS_VIOLATION);
+    CHECK_EQUAL(code_of(read_null), RTSEXCPT_ACCESS_VIOLATION);
     SysExceptShutdown();
     sigaction(SIGSEGV, NULL, &now);
-    CHECK(now.sa_handler == exit_42);
+    CHECK_EQUAL(now.sa_handler, exit_42);
     signal(SIGSEGV, SIG_DFL);
-    CHECK(code_of(read_null) == RTSEXCPT_ACCESS_VIOLATION);
+    CHECK_EQUAL(code_of(read_null), RTSEXCPT_ACCESS_VIOLATION);
 }
 
 int main(void)

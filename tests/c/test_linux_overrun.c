@@ -80,7 +80,7 @@ static void *try_write(void *arg)
     RTS_EXCEPTION first, normal, raised;
     volatile int own = 4711;
     SysExceptTry(run_write, arg, &first);
-    CHECK(own == 4711);
+    CHECK_EQUAL(own, 4711);
     CHECK(SysExceptTry(do_nothing, NULL, &normal));
     CHECK(!SysExceptTry(raise_bounds, NULL, &raised) && raised.code == RTSEXCPT_ARRAYBOUNDS);
     code = first.code;
@@ -201,7 +201,7 @@ static void registers_that_were_not_preserved_do_no_harm(void)
     RTS_EXCEPTION exception;
     for (int i = 0; i < 3; i++) {
         CHECK(SysExceptTry(destroy_registers, NULL, &exception));
-        CHECK(exception.code == RTSEXCPT_NOEXCEPTION);
+        CHECK_EQUAL(exception.code, RTSEXCPT_NOEXCEPTION);
     }
 }
 

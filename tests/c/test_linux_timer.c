@@ -69,7 +69,7 @@ static RTS_HANDLE create(RTS_UI32 interval_us, RTS_UI32 takes_ms)
 {
     RTS_HANDLE timer = RTS_INVALID_HANDLE;
     record = (RECORD){.sleep_ms = takes_ms};
-    CHECK(SysTimerCreate(note, &record, interval_us, 5, &timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerCreate(note, &record, interval_us, 5, &timer), ERR_OK);
     record.timer = timer;
     return timer;
 }
@@ -79,9 +79,9 @@ static RTS_I64 run_timer(RTS_UI32 interval_us, RTS_UI32 takes_ms, RTS_UI32 calls
 {
     RTS_HANDLE timer = create(interval_us, takes_ms);
     RTS_I64 start_ns = SysTimeGetNs();
-    CHECK(SysTimerStart(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerStart(timer), ERR_OK);
     wait_for_calls(calls);
-    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerDelete(timer), ERR_OK);
     return start_ns;
 }
 
@@ -97,7 +97,7 @@ static void check_due_times(RTS_I64 interval_ns)
         CHECK(record.call[i].called_ns >= record.call[i].due_ns);
         if (i > 0) {
             RTS_I64 step = record.call[i].due_ns - record.call[i - 1].due_ns;
-            CHECK(step == (RTS_I64)(missed_before(i) + 1) * interval_ns);
+            CHECK_EQUAL(step, (RTS_I64)(missed_before(i) + 1) * interval_ns);
         }
     }
 }
@@ -105,7 +105,7 @@ static void check_due_times(RTS_I64 interval_ns)
 static void calls_come_at_the_start_and_at_multiples_of_the_interval(void)
 {
     RTS_I64 start_ns = run_timer(3000, 0, 20);
-    CHECK(record.call[0].overruns == 0);
+    CHECK_EQUAL(record.call[0].overruns, 0);
     CHECK(record.call[0].due_ns >= start_ns && record.call[0].due_ns <= record.call[0].called_ns);
     check_due_times(3000000);
 }
@@ -123,26 +123,26 @@ static void due_times_that_pass_during_a_call_are_skipped_and_counted(void)
 static void stop_waits_for_the_callback_and_none_comes_after(void)
 {
     RTS_HANDLE timer = create(1000, 30);
-    CHECK(SysTimerStart(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerStart(timer), ERR_OK);
     wait_for_calls(1);
-    CHECK(SysTimerStop(timer) == ERR_OK);
-    CHECK(__atomic_load_n(&record.inside, __ATOMIC_SEQ_CST) == 0);
+    CHECK_EQUAL(SysTimerStop(timer), ERR_OK);
+    CHECK_EQUAL(__atomic_load_n(&record.inside, __ATOMIC_SEQ_CST), 0);
     RTS_UI32 count = record.count;
     sleep_ms(20);
-    CHECK(record.count == count);
-    CHECK(SysTimerStop(timer) == ERR_OK);
-    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK_EQUAL(record.count, count);
+    CHECK_EQUAL(SysTimerStop(timer), ERR_OK);
+    CHECK_EQUAL(SysTimerDelete(timer), ERR_OK);
 }
 
 static void stop_does_not_wait_for_the_next_due_time(void)
 {
     RTS_HANDLE timer = create(60000000, 0);
     RTS_I64 start_ns = SysTimeGetNs();
-    CHECK(SysTimerStart(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerStart(timer), ERR_OK);
     wait_for_calls(1);
-    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerDelete(timer), ERR_OK);
     CHECK(SysTimeGetNs() - start_ns < 30000000000);
-    CHECK(record.count == 1);
+    CHECK_EQUAL(record.count, 1);
 }
 
 static void a_timer_starts_again_after_a_stop(void)
@@ -151,13 +151,13 @@ static void a_timer_starts_again_after_a_stop(void)
     for (int i = 0; i < 3; i++) {
         record.count = 0;
         RTS_I64 start_ns = SysTimeGetNs();
-        CHECK(SysTimerStart(timer) == ERR_OK);
-        CHECK(SysTimerStart(timer) == ERR_INVALID_STATE);
+        CHECK_EQUAL(SysTimerStart(timer), ERR_OK);
+        CHECK_EQUAL(SysTimerStart(timer), ERR_INVALID_STATE);
         wait_for_calls(2);
-        CHECK(SysTimerStop(timer) == ERR_OK);
+        CHECK_EQUAL(SysTimerStop(timer), ERR_OK);
         CHECK(record.call[0].due_ns >= start_ns);
     }
-    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerDelete(timer), ERR_OK);
 }
 
 static void there_is_a_timer_for_every_task_and_then_no_more(void)
@@ -169,9 +169,9 @@ static void there_is_a_timer_for_every_task_and_then_no_more(void)
     }
     CHECK(count >= APP_MAX_TASKS);
     CHECK(count < RTS_COUNT(timers));
-    CHECK(SysTimerCreate(note, &record, 1000, 0, &timers[count]) == ERR_NOMEMORY);
+    CHECK_EQUAL(SysTimerCreate(note, &record, 1000, 0, &timers[count]), ERR_NOMEMORY);
     while (count > 0) {
-        CHECK(SysTimerDelete(timers[--count]) == ERR_OK);
+        CHECK_EQUAL(SysTimerDelete(timers[--count]), ERR_OK);
     }
 }
 
@@ -179,15 +179,15 @@ static void without_an_interval_each_trigger_is_one_call(void)
 {
     RTS_HANDLE timer = create(0, 0);
     SysTimerTrigger(timer, 0); /* not started: nothing happens */
-    CHECK(SysTimerStart(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerStart(timer), ERR_OK);
     for (RTS_UI32 i = 1; i <= 20; i++) { /* the first comes by itself */
         wait_for_calls(i);
-        CHECK(record.count == i);
+        CHECK_EQUAL(record.count, i);
         SysTimerTrigger(timer, 0);
     }
     wait_for_calls(21);
-    CHECK(SysTimerGetOverruns(timer) == 0);
-    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerGetOverruns(timer), 0);
+    CHECK_EQUAL(SysTimerDelete(timer), ERR_OK);
     SysTimerTrigger(timer, 0);
 }
 
@@ -195,7 +195,7 @@ static void a_trigger_may_be_for_later_and_the_earliest_counts(void)
 {
     RTS_HANDLE timer = create(0, 0);
     RTS_I64 start_ns = SysTimeGetNs();
-    CHECK(SysTimerStart(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerStart(timer), ERR_OK);
     wait_for_calls(1);
     SysTimerTrigger(timer, start_ns + 3600000000000);
     SysTimerTrigger(timer, start_ns + 30000000);
@@ -203,20 +203,20 @@ static void a_trigger_may_be_for_later_and_the_earliest_counts(void)
     wait_for_calls(2);
     CHECK(record.call[1].called_ns >= start_ns + 30000000);
     SysTimerTrigger(timer, start_ns + 3600000000000);
-    CHECK(SysTimerDelete(timer) == ERR_OK);
-    CHECK(record.count == 2);
+    CHECK_EQUAL(SysTimerDelete(timer), ERR_OK);
+    CHECK_EQUAL(record.count, 2);
 }
 
 static void a_trigger_while_the_callback_runs_has_it_run_again(void)
 {
     RTS_HANDLE timer = create(0, 30);
-    CHECK(SysTimerStart(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerStart(timer), ERR_OK);
     wait_for_calls(1);
     while (__atomic_load_n(&record.count, __ATOMIC_SEQ_CST) < 2) {
         SysTimerTrigger(timer, 0);
         sleep_ms(1);
     }
-    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerDelete(timer), ERR_OK);
     CHECK(record.count <= 3);
 }
 
@@ -224,10 +224,10 @@ static void wrong_arguments_are_refused(void)
 {
     RTS_HANDLE timer = 7;
     CHECK(SysTimerCreate(NULL, &record, 1000, 0, &timer) == ERR_PARAMETER);
-    CHECK(SysTimerCreate(note, &record, 1000, 32, &timer) == ERR_PARAMETER);
-    CHECK(SysTimerStart(RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
-    CHECK(SysTimerStop(3) == ERR_INVALID_HANDLE);
-    CHECK(SysTimerDelete(3) == ERR_INVALID_HANDLE);
+    CHECK_EQUAL(SysTimerCreate(note, &record, 1000, 32, &timer), ERR_PARAMETER);
+    CHECK_EQUAL(SysTimerStart(RTS_INVALID_HANDLE), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(SysTimerStop(3), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(SysTimerDelete(3), ERR_INVALID_HANDLE);
 }
 
 static int (*volatile descend_again)(volatile char *above);
@@ -260,9 +260,9 @@ static void overflow_in_callback(void *param, RTS_I64 due_ns)
     RTS_EXCEPTION exception;
     RTS_UNUSED(due_ns);
     (void)SysExceptTry(overflow, &result, &exception);
-    CHECK(exception.code == RTSEXCPT_STACK_OVERFLOW);
+    CHECK_EQUAL(exception.code, RTSEXCPT_STACK_OVERFLOW);
     (void)SysExceptTry(overflow_at_once, &result, &exception);
-    CHECK(exception.code == RTSEXCPT_STACK_OVERFLOW);
+    CHECK_EQUAL(exception.code, RTSEXCPT_STACK_OVERFLOW);
     __atomic_fetch_add(&((RECORD *)param)->count, 1, __ATOMIC_SEQ_CST);
 }
 
@@ -270,10 +270,10 @@ static void a_stack_overflow_in_a_task_is_caught(void)
 {
     RTS_HANDLE timer;
     record = (RECORD){.count = 0};
-    CHECK(SysTimerCreate(overflow_in_callback, &record, 1000, 1, &timer) == ERR_OK);
-    CHECK(SysTimerStart(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerCreate(overflow_in_callback, &record, 1000, 1, &timer), ERR_OK);
+    CHECK_EQUAL(SysTimerStart(timer), ERR_OK);
     wait_for_calls(3);
-    CHECK(SysTimerDelete(timer) == ERR_OK);
+    CHECK_EQUAL(SysTimerDelete(timer), ERR_OK);
 }
 
 static void time_begins_at_zero_and_goes_on(void)
@@ -286,8 +286,8 @@ static void time_begins_at_zero_and_goes_on(void)
 
 int main(void)
 {
-    CHECK(SysTime_Hook(CH_INIT_SYSTEM) == ERR_OK);
-    CHECK(SysTimer_Hook(CH_INIT_SYSTEM) == ERR_OK);
+    CHECK_EQUAL(SysTime_Hook(CH_INIT_SYSTEM), ERR_OK);
+    CHECK_EQUAL(SysTimer_Hook(CH_INIT_SYSTEM), ERR_OK);
     RUN(time_begins_at_zero_and_goes_on);
     RUN(calls_come_at_the_start_and_at_multiples_of_the_interval);
     RUN(due_times_that_pass_during_a_call_are_skipped_and_counted);
@@ -300,6 +300,6 @@ int main(void)
     RUN(a_trigger_while_the_callback_runs_has_it_run_again);
     RUN(wrong_arguments_are_refused);
     RUN(a_stack_overflow_in_a_task_is_caught);
-    CHECK(SysTimer_Hook(CH_EXIT_SYSTEM) == ERR_OK);
+    CHECK_EQUAL(SysTimer_Hook(CH_EXIT_SYSTEM), ERR_OK);
     return test_result();
 }

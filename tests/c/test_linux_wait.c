@@ -23,7 +23,7 @@ static PORT_SOURCE source[PIPES];
 static void begin(void)
 {
     for (int i = 0; i < PIPES; i++) {
-        CHECK(pipe(ends[i]) == 0);
+        CHECK_EQUAL(pipe(ends[i]), 0);
         source[i] = (PORT_SOURCE){.file = ends[i][0], .events = POLLIN};
         CHECK(PortWaitAdd(&source[i]));
     }
@@ -40,13 +40,13 @@ static void end(void)
 
 static void put(int i)
 {
-    CHECK(write(ends[i][1], "x", 1) == 1);
+    CHECK_EQUAL(write(ends[i][1], "x", 1), 1);
 }
 
 static void take(int i)
 {
     char byte;
-    CHECK(read(ends[i][0], &byte, 1) == 1);
+    CHECK_EQUAL(read(ends[i][0], &byte, 1), 1);
 }
 
 static void each_of_them_ends_the_wait(void)
@@ -123,7 +123,7 @@ static void there_is_an_end_to_the_room(void)
     begin();
     for (int i = 0; i < PORT_MAX_SOURCES; i++) {
         many[i] = (PORT_SOURCE){.file = -1};
-        CHECK(PortWaitAdd(&many[i]) == (i < PORT_MAX_SOURCES - PIPES));
+        CHECK_EQUAL(PortWaitAdd(&many[i]), (i < PORT_MAX_SOURCES - PIPES));
     }
     CHECK(PortWaitAdd(&source[0])); /* is there */
     put(PIPES - 1);

@@ -87,7 +87,7 @@ static void every_function_is_the_one_its_name_says(void)
 
 int main(void)
 {
-    CHECK(CmpMath_Hook(CH_INIT3) == ERR_OK);
+    CHECK_EQUAL(CmpMath_Hook(CH_INIT3), ERR_OK);
     RUN(every_signature_is_the_crc_of_its_interface_text);
     RUN(every_function_is_the_one_its_name_says);
     return test_result();

@@ -40,9 +40,9 @@ static CDL_TASK *begin(RTS_UI32 interval_us, RTS_UI32 burn_us)
     CDL_TASK *task;
 
     cycle_us = burn_us;
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(CMRegisterExternal(burner, 1) == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(CMRegisterExternal(burner, 1), ERR_OK);
     spec_init(&spec);
     add_import(&spec, "burncycle", 1, 0x00010000);
     task = add_task(&spec, "Main", KIND_CYCLIC, interval_us, here(&spec));
@@ -63,8 +63,8 @@ static int cycle_of(RTS_UI32 us)
 static void load(void)
 {
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
 }
 
 static IEC_TASK_INFO info_of(RTS_UI32 task)
@@ -72,7 +72,7 @@ static IEC_TASK_INFO info_of(RTS_UI32 task)
     IEC_TASK_INFO info;
 
     memset(&info, 0xEE, sizeof info);
-    CHECK(IecTaskGetInfo(task, &info) == ERR_OK);
+    CHECK_EQUAL(IecTaskGetInfo(task, &info), ERR_OK);
     return info;
 }
 
@@ -85,14 +85,14 @@ static void a_task_that_never_ran_has_empty_statistics(void)
     load();
     info = info_of(0);
     CHECK(strcmp(info.name, "Main") == 0);
-    CHECK(info.kind == KIND_CYCLIC);
-    CHECK(info.priority == 7);
-    CHECK(info.interval_us == 2000);
-    CHECK(info.cycles == 0);
+    CHECK_EQUAL(info.kind, KIND_CYCLIC);
+    CHECK_EQUAL(info.priority, 7);
+    CHECK_EQUAL(info.interval_us, 2000);
+    CHECK_EQUAL(info.cycles, 0);
     CHECK(info.last_us == 0 && info.avg_us == 0 && info.min_us == 0 && info.max_us == 0);
     CHECK(info.jitter_us == 0 && info.overruns == 0);
-    CHECK(IecTaskGetInfo(1, &info) == ERR_INVALIDID);
-    CHECK(IecTaskGetInfo(0xFFFFFFFF, &info) == ERR_INVALIDID);
+    CHECK_EQUAL(IecTaskGetInfo(1, &info), ERR_INVALIDID);
+    CHECK_EQUAL(IecTaskGetInfo(0xFFFFFFFF, &info), ERR_INVALIDID);
 }
 
 static void statistics_count_what_cycles_take(void)
@@ -106,11 +106,11 @@ static void statistics_count_what_cycles_take(void)
         begin(1000, burns[i]);
         load();
         for (k = 0; k < 10; k++)
-            CHECK(IecTaskCycle(0, SimNow()) == 1);
+            CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
         info = info_of(0);
-        CHECK(info.cycles == 10);
+        CHECK_EQUAL(info.cycles, 10);
         CHECK(info.last_us == burns[i] && info.min_us == burns[i] && info.max_us == burns[i]);
-        CHECK(info.avg_us == burns[i]);
+        CHECK_EQUAL(info.avg_us, burns[i]);
     }
 }
 
@@ -120,15 +120,15 @@ static void minimum_maximum_and_average_differ(void)
 
     begin(1000, 0);
     load();
-    CHECK(cycle_of(100) == 1);
-    CHECK(cycle_of(500) == 1);
-    CHECK(cycle_of(150) == 1);
+    CHECK_EQUAL(cycle_of(100), 1);
+    CHECK_EQUAL(cycle_of(500), 1);
+    CHECK_EQUAL(cycle_of(150), 1);
     info = info_of(0);
-    CHECK(info.cycles == 3);
-    CHECK(info.min_us == 100);
-    CHECK(info.max_us == 500);
-    CHECK(info.last_us == 150);
-    CHECK(info.avg_us == 250);
+    CHECK_EQUAL(info.cycles, 3);
+    CHECK_EQUAL(info.min_us, 100);
+    CHECK_EQUAL(info.max_us, 500);
+    CHECK_EQUAL(info.last_us, 150);
+    CHECK_EQUAL(info.avg_us, 250);
 }
 
 static void times_beyond_four_seconds_saturate(void)
@@ -137,21 +137,21 @@ static void times_beyond_four_seconds_saturate(void)
 
     begin(1000, 0);
     load();
-    CHECK(cycle_of(9000000) == 1);
+    CHECK_EQUAL(cycle_of(9000000), 1);
     info = info_of(0);
-    CHECK(info.max_us == 4294967);
+    CHECK_EQUAL(info.max_us, 4294967);
 }
 
 static void jitter_is_the_largest_delay_of_a_start(void)
 {
     begin(1000, 0);
     load();
-    CHECK(IecTaskCycle(0, SimNow() - 7000) == 1);
-    CHECK(IecTaskCycle(0, SimNow() - 20000) == 1);
-    CHECK(IecTaskCycle(0, SimNow() - 3000) == 1);
-    CHECK(info_of(0).jitter_us == 20);
-    CHECK(IecTaskCycle(0, SimNow() + 30000) == 1); /* early does not count */
-    CHECK(info_of(0).jitter_us == 20);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow() - 7000), 1);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow() - 20000), 1);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow() - 3000), 1);
+    CHECK_EQUAL(info_of(0).jitter_us, 20);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow() + 30000), 1); /* early does not count */
+    CHECK_EQUAL(info_of(0).jitter_us, 20);
 }
 
 static void missed_due_times_are_counted_as_overruns(void)
@@ -160,20 +160,20 @@ static void missed_due_times_are_counted_as_overruns(void)
 
     begin(1000, 2500);
     load();
-    CHECK(SimAdvance(ms(12)) == ERR_OK); /* runs at 0, 3, 6, 9, 12 ms */
+    CHECK_EQUAL(SimAdvance(ms(12)), ERR_OK); /* runs at 0, 3, 6, 9, 12 ms */
     info = info_of(0);
-    CHECK(info.cycles == 5);
-    CHECK(info.overruns == 10);
-    CHECK(info.jitter_us == 0);
+    CHECK_EQUAL(info.cycles, 5);
+    CHECK_EQUAL(info.overruns, 10);
+    CHECK_EQUAL(info.jitter_us, 0);
 }
 
 static void a_cycle_that_ends_when_the_next_is_due_misses_nothing(void)
 {
     begin(1000, 1000);
     load();
-    CHECK(SimAdvance(ms(9)) == ERR_OK);
-    CHECK(info_of(0).overruns == 0);
-    CHECK(info_of(0).cycles == 10);
+    CHECK_EQUAL(SimAdvance(ms(9)), ERR_OK);
+    CHECK_EQUAL(info_of(0).overruns, 0);
+    CHECK_EQUAL(info_of(0).cycles, 10);
 }
 
 static void a_lower_task_that_waits_has_jitter(void)
@@ -181,39 +181,39 @@ static void a_lower_task_that_waits_has_jitter(void)
     begin(10000, 3000);
     add_task(&spec, "Low", KIND_CYCLIC, 10000, spec.tasks[0].entry_offset)->priority = 20;
     load();
-    CHECK(SimAdvance(ms(10)) == ERR_OK);
-    CHECK(info_of(0).jitter_us == 0);
-    CHECK(info_of(1).jitter_us == 3000);
-    CHECK(info_of(1).overruns == 0);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(info_of(0).jitter_us, 0);
+    CHECK_EQUAL(info_of(1).jitter_us, 3000);
+    CHECK_EQUAL(info_of(1).overruns, 0);
 }
 
 static void the_time_of_the_application_starts_at_zero(void)
 {
     begin(10000, 0);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(SimAdvance(ms(777)) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, 8) == 0);
-    CHECK(SimAdvance(ms(20)) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, 8) == 20);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(777)), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 8), 0);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 8), 20);
 }
 
 static void the_time_goes_on_over_stop_and_start(void)
 {
     begin(10000, 0);
     load();
-    CHECK(SimAdvance(ms(20)) == ERR_OK);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, 8) == 120);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, 8) == 0);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 8), 120);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 8), 0);
 }
 
 /* Milliseconds are accumulated from cycle to cycle; they must be those of the division, whatever the steps are. */
@@ -231,10 +231,10 @@ static void milliseconds_follow_the_nanoseconds(void)
     for (i = 0; i < RTS_COUNT(steps); i++) {
         for (k = 0; k < 50; k++) {
             IecTaskStopAll(); /* no cycle while time passes */
-            CHECK(SimAdvance(steps[i]) == ERR_OK);
-            CHECK(IecTaskStartAll() == ERR_OK);
-            CHECK(IecTaskCycle(0, SimNow()) == 1);
-            CHECK(read_u32(APP_AREA_DATA, 8) == (RTS_UI32)((SimNow() - zero) / 1000000));
+            CHECK_EQUAL(SimAdvance(steps[i]), ERR_OK);
+            CHECK_EQUAL(IecTaskStartAll(), ERR_OK);
+            CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+            CHECK_EQUAL(read_u32(APP_AREA_DATA, 8), (RTS_UI32)((SimNow() - zero) / 1000000));
         }
     }
 }
@@ -252,38 +252,38 @@ static RTS_UI32 cycles_until_trip(RTS_UI32 watchdog_us, RTS_UI16 sensitivity, RT
     load();
     for (i = 1; i <= 100; i++) {
         if (!IecTaskCycle(0, SimNow())) {
-            CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+            CHECK_EQUAL(app_exception(), RTSEXCPT_WATCHDOG);
             return i;
         }
     }
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
     return 0;
 }
 
 static void consecutive_overruns_trip_in_the_cycle_of_the_sensitivity(void)
 {
-    CHECK(cycles_until_trip(1000, 0, 1001) == 1);
-    CHECK(cycles_until_trip(1000, 1, 1001) == 1);
-    CHECK(cycles_until_trip(1000, 2, 1001) == 2);
-    CHECK(cycles_until_trip(1000, 3, 1001) == 3);
-    CHECK(cycles_until_trip(1000, 10, 1001) == 10);
+    CHECK_EQUAL(cycles_until_trip(1000, 0, 1001), 1);
+    CHECK_EQUAL(cycles_until_trip(1000, 1, 1001), 1);
+    CHECK_EQUAL(cycles_until_trip(1000, 2, 1001), 2);
+    CHECK_EQUAL(cycles_until_trip(1000, 3, 1001), 3);
+    CHECK_EQUAL(cycles_until_trip(1000, 10, 1001), 10);
 }
 
 static void a_single_cycle_longer_than_time_times_sensitivity_trips_at_once(void)
 {
-    CHECK(cycles_until_trip(10000, 5, 50000) == 5);
-    CHECK(cycles_until_trip(10000, 5, 50001) == 1);
+    CHECK_EQUAL(cycles_until_trip(10000, 5, 50000), 5);
+    CHECK_EQUAL(cycles_until_trip(10000, 5, 50001), 1);
 }
 
 static void cycles_within_the_time_never_trip(void)
 {
-    CHECK(cycles_until_trip(1000, 1, 1000) == 0);
-    CHECK(cycles_until_trip(1000, 0, 999) == 0);
+    CHECK_EQUAL(cycles_until_trip(1000, 1, 1000), 0);
+    CHECK_EQUAL(cycles_until_trip(1000, 0, 999), 0);
 }
 
 static void without_a_watchdog_nothing_trips(void)
 {
-    CHECK(cycles_until_trip(0, 1, 60000000) == 0);
+    CHECK_EQUAL(cycles_until_trip(0, 1, 60000000), 0);
 }
 
 static void one_good_cycle_starts_the_count_again(void)
@@ -295,9 +295,9 @@ static void one_good_cycle_starts_the_count_again(void)
     task->watchdog_sensitivity = 3;
     load();
     for (i = 0; i < 20; i++) {
-        CHECK(cycle_of(1500) == 1);
-        CHECK(cycle_of(1500) == 1);
-        CHECK(cycle_of(500) == 1);
+        CHECK_EQUAL(cycle_of(1500), 1);
+        CHECK_EQUAL(cycle_of(1500), 1);
+        CHECK_EQUAL(cycle_of(500), 1);
     }
 }
 
@@ -308,8 +308,8 @@ static void outputs_are_zero_when_the_failing_task_returns(void)
     task->watchdog_us = 1000;
     load();
     AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] = 1;
-    CHECK(IecTaskCycle(0, SimNow()) == 0);
-    CHECK(AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] == 0);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow()), 0);
+    CHECK_EQUAL(AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0], 0);
 }
 
 static void the_watchdog_stops_the_application_with_its_outputs_at_zero(void)
@@ -320,11 +320,11 @@ static void the_watchdog_stops_the_application_with_its_outputs_at_zero(void)
     task->watchdog_us = 1000;
     load();
     AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] = 1;
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(app_state() == AS_STOP);
-    CHECK(app_exception() == RTSEXCPT_WATCHDOG);
-    CHECK(AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0] == 0);
-    CHECK(read_u32(APP_AREA_DATA, 0) == 1);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_STOP);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_WATCHDOG);
+    CHECK_EQUAL(AppGetAreaAddress(APP_AREA_OUTPUT, 0, 1)[0], 0);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 0), 1);
     while (LogGetEntry(entry.handle + 1, &entry) == ERR_OK && entry.log_class != LOG_EXCEPTION)
         ;
     CHECK(strcmp(entry.text, "Main: watchdog expired") == 0);
@@ -337,13 +337,13 @@ static void reset_gives_the_watchdog_its_count_back(void)
     task->watchdog_us = 1000;
     task->watchdog_sensitivity = 3;
     load();
-    CHECK(IecTaskCycle(0, SimNow()) == 1);
-    CHECK(IecTaskCycle(0, SimNow()) == 1);
-    CHECK(AppReset(RESET_OPTION_WARM) == ERR_OK);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(IecTaskCycle(0, SimNow()) == 1);
-    CHECK(IecTaskCycle(0, SimNow()) == 1);
-    CHECK(IecTaskCycle(0, SimNow()) == 0);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+    CHECK_EQUAL(AppReset(RESET_OPTION_WARM), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow()), 1);
+    CHECK_EQUAL(IecTaskCycle(0, SimNow()), 0);
 }
 
 static void the_supervisor_sees_the_limits_of_running_code_only(void)
@@ -357,12 +357,12 @@ static void the_supervisor_sees_the_limits_of_running_code_only(void)
     load();
     CHECK(!IecTaskReadGuard(0, &guard));
     CHECK(!IecTaskReadGuard(1, &guard));
-    CHECK(IecTaskGetActivity(&busy) == 0);
+    CHECK_EQUAL(IecTaskGetActivity(&busy), 0);
     CHECK(!busy);
-    CHECK(IecTaskCycle(0, 0) == 1);
-    CHECK(IecTaskGetActivity(&busy) == 2);
+    CHECK_EQUAL(IecTaskCycle(0, 0), 1);
+    CHECK_EQUAL(IecTaskGetActivity(&busy), 2);
     SchedWatchdogCheck(ms(1000000)); /* nothing runs: nothing happens */
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
 }
 
 static RTS_I64 look_ns;
@@ -387,7 +387,7 @@ static void supervise(RTS_UI32 us)
     look_ns = SimNow() + (RTS_I64)us * 1000;
     SysAtomicStore(&looked, 0);
     CHECK(pthread_create(&thread, NULL, look, NULL) == 0);
-    CHECK(pthread_detach(thread) == 0);
+    CHECK_EQUAL(pthread_detach(thread), 0);
     while ((SysAtomicLoad(&looked) == 0 || break_expected) && time(NULL) - start < 10)
         ;
 }
@@ -400,9 +400,9 @@ static CDL_TASK *begin_supervised(RTS_UI32 us, bool expect_break)
     CDL_TASK *task;
 
     break_expected = expect_break;
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(CMRegisterExternal(supervisor, 1) == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(CMRegisterExternal(supervisor, 1), ERR_OK);
     spec_init(&spec);
     add_import(&spec, "supervise", 1, 0x00010000);
     task = add_task(&spec, "Main", KIND_CYCLIC, 1000, here(&spec));
@@ -422,9 +422,9 @@ static void the_supervisor_breaks_a_cycle_beyond_time_times_sensitivity(void)
         task->watchdog_us = 3000;
         task->watchdog_sensitivity = 4;
         load();
-        CHECK(SimAdvance(0) == ERR_OK);
-        CHECK(app_exception() == (i == 0 ? RTSEXCPT_NOEXCEPTION : RTSEXCPT_WATCHDOG));
-        CHECK(read_u32(APP_AREA_DATA, 0) == 1 - i);
+        CHECK_EQUAL(SimAdvance(0), ERR_OK);
+        CHECK_EQUAL(app_exception(), (i == 0 ? RTSEXCPT_NOEXCEPTION : RTSEXCPT_WATCHDOG));
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, 0), 1 - i);
     }
 }
 
@@ -432,12 +432,12 @@ static void the_supervisor_breaks_a_task_without_watchdog_after_the_default(void
 {
     begin_supervised(APP_DEFAULT_WATCHDOG_US, false);
     load();
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_NOEXCEPTION);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
     begin_supervised(APP_DEFAULT_WATCHDOG_US + 1, true);
     load();
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_WATCHDOG);
 }
 
 /* ---- two tasks, each in a thread, that loop until they are broken or released ---- */
@@ -470,9 +470,9 @@ static void begin_looping(void)
     CDL_TASK *task;
     RTS_UI32 i;
 
-    CHECK(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF) == ERR_OK);
-    CHECK(SimStart() == ERR_OK);
-    CHECK(CMRegisterExternal(looping, 1) == ERR_OK);
+    CHECK_EQUAL(SimFlashConfigure(64 * 1024, 1024, 8, 0xFF), ERR_OK);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(CMRegisterExternal(looping, 1), ERR_OK);
     SimSetCycleLimit(30000); /* the simulator's own supervisor, in real time, stays out of it */
     spec_init(&spec);
     add_import(&spec, "loop", 1, 0x00010000);
@@ -553,13 +553,13 @@ static void only_the_later_of_two_loops_is_broken_and_the_other_cycle_finishes(v
     start_looping(1);
     supervise_for(LOOP_LIMIT_US + 1000);
     CHECK(is_broken(1));
-    CHECK(result_of(1) == 0);
+    CHECK_EQUAL(result_of(1), 0);
     supervise_for(2000);
     CHECK(is_running(0)); /* it had 2 ms before the other began and 2 since */
     SysAtomicStore(&loopers[0].released, 1);
     (void)result_of(0);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(exception_task() == 1);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(exception_task(), 1);
 }
 
 static void of_two_endless_loops_both_are_broken_one_limit_after_the_other(void)
@@ -593,7 +593,7 @@ static void short_cycles_of_another_task_do_not_protect_a_loop(void)
         (void)result_of(1);
     }
     CHECK(is_broken(0));
-    CHECK(result_of(0) == 0);
+    CHECK_EQUAL(result_of(0), 0);
 }
 
 static void the_supervisor_breaks_initialisation_code_too(void)
@@ -601,17 +601,17 @@ static void the_supervisor_breaks_initialisation_code_too(void)
     begin_supervised(APP_DEFAULT_WATCHDOG_US + 1, true);
     spec.function[CDL_FUNCTION_CODE_INIT] = 0;
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(app_exception() == RTSEXCPT_WATCHDOG);
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_WATCHDOG);
 }
 
 static void no_cycle_starts_while_the_application_is_stopped(void)
 {
     begin(1000, 0);
     load();
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(IecTaskCycle(0, 0) == 0);
-    CHECK(read_u32(APP_AREA_DATA, 0) == 0);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(IecTaskCycle(0, 0), 0);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 0), 0);
 }
 
 static void the_bench_measures_real_time_and_keeps_the_schedule(void)
@@ -622,15 +622,15 @@ static void the_bench_measures_real_time_and_keeps_the_schedule(void)
 
     begin(10000, 0);
     load();
-    CHECK(SimAdvance(ms(25)) == ERR_OK);
-    CHECK(SimBench(0, 1000, &code_ns, &cycle_ns) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(25)), ERR_OK);
+    CHECK_EQUAL(SimBench(0, 1000, &code_ns, &cycle_ns), ERR_OK);
     CHECK(code_ns > 0);
     CHECK(cycle_ns > 0);
     before = info_of(0).cycles;
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(info_of(0).cycles == before + 10);
-    CHECK(info_of(0).overruns == 0);
-    CHECK(SimBench(1, 1000, &code_ns, &cycle_ns) == ERR_INVALIDID);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(info_of(0).cycles, before + 10);
+    CHECK_EQUAL(info_of(0).overruns, 0);
+    CHECK_EQUAL(SimBench(1, 1000, &code_ns, &cycle_ns), ERR_INVALIDID);
 }
 
 int main(void)

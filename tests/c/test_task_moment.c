@@ -205,7 +205,7 @@ static void take_copies(RTS_UI32 count)
     for (i = 0; i < count; i++) {
         memset(copied, 0xEE, sizeof copied);
         CHECK(copy_now());
-        CHECK(count_torn() == 0);
+        CHECK_EQUAL(count_torn(), 0);
     }
 }
 
@@ -240,35 +240,35 @@ static RTS_UI32 pauses_of(RTS_UI32 own_ms, RTS_UI32 other_ms, RTS_UI32 since_ms,
     last_pause = ends_in;
     CHECK(!IecTaskBetweenCycles(copy_area));
     make_moment(&tasks.list[0]);
-    CHECK(is_wanted() == (ends_in == 0 || pauses < ends_in));
+    CHECK_EQUAL(is_wanted(), (ends_in == 0 || pauses < ends_in));
     fixed_ns = 0;
     return pauses;
 }
 
 static void a_long_task_waits_for_a_short_one(void)
 {
-    CHECK(pauses_of(10, 1, 0, 7) == 7);
+    CHECK_EQUAL(pauses_of(10, 1, 0, 7), 7);
 }
 
 static void a_short_task_does_not_wait_for_a_long_one(void)
 {
-    CHECK(pauses_of(1, 10, 0, 7) == 0);
+    CHECK_EQUAL(pauses_of(1, 10, 0, 7), 0);
 }
 
 static void a_task_does_not_wait_for_one_that_takes_longer_this_time(void)
 {
-    CHECK(pauses_of(10, 1, 11, 7) == 0);
+    CHECK_EQUAL(pauses_of(10, 1, 11, 7), 0);
 }
 
 static void a_task_waits_no_longer_than_its_own_cycle_takes(void)
 {
-    CHECK(pauses_of(10, 1, 0, 0) == 501);
-    CHECK(pauses_of(10, 1, 9, 0) == 51);
+    CHECK_EQUAL(pauses_of(10, 1, 0, 0), 501);
+    CHECK_EQUAL(pauses_of(10, 1, 9, 0), 51);
 }
 
 static void a_first_cycle_waits_for_no_other(void)
 {
-    CHECK(pauses_of(0, 1, 0, 7) == 0);
+    CHECK_EQUAL(pauses_of(0, 1, 0, 7), 0);
 }
 
 static void a_copy_of_stopped_tasks_is_taken_at_once(void)
@@ -297,14 +297,14 @@ static void what_runs_is_waited_for(void)
     memset(copied, 0xEE, sizeof copied);
     CHECK(!IecTaskBetweenCycles(copy_area));
     CHECK(!IecTaskBetweenCycles(copy_area));
-    CHECK(copied[0] == 0xEE);
+    CHECK_EQUAL(copied[0], 0xEE);
     guard_end(&tasks.list[0].guard);
     memset(area, 77, sizeof area);
-    CHECK(IecTaskCycle(0, SysTimeGetNs()) == 1); /* takes it before it begins */
+    CHECK_EQUAL(IecTaskCycle(0, SysTimeGetNs()), 1); /* takes it before it begins */
     CHECK(copied[0] == 77 && copied[AREA_SIZE - 1] == 77);
-    CHECK(IecTaskCycle(0, SysTimeGetNs()) == 1);
+    CHECK_EQUAL(IecTaskCycle(0, SysTimeGetNs()), 1);
     CHECK(IecTaskBetweenCycles(copy_area));
-    CHECK(copied[0] == 77);
+    CHECK_EQUAL(copied[0], 77);
     CHECK(IecTaskBetweenCycles(copy_area)); /* another one */
     CHECK(copied[0] == area[0] && area[0] != 77);
 }
@@ -318,8 +318,8 @@ static void stopping_calls_a_copy_off(void)
     IecCycleStop();
     IecCycleCallOff();
     memset(copied, 0xEE, sizeof copied);
-    CHECK(IecTaskCycle(0, SysTimeGetNs()) == 0);
-    CHECK(copied[0] == 0xEE);
+    CHECK_EQUAL(IecTaskCycle(0, SysTimeGetNs()), 0);
+    CHECK_EQUAL(copied[0], 0xEE);
 }
 
 static RTS_UI32 interruptions;
@@ -330,7 +330,7 @@ static void copy_interrupted(void)
     memcpy(copied, area, sizeof area / 2);
     if (interruptions > 0) {
         interruptions--;
-        CHECK(IecTaskCycle(0, SysTimeGetNs()) == 1);
+        CHECK_EQUAL(IecTaskCycle(0, SysTimeGetNs()), 1);
         memset(area, area[0], sizeof area);
     }
     memcpy(copied + sizeof area / 2, area + sizeof area / 2, sizeof area / 2);
@@ -351,7 +351,7 @@ static void a_cycle_that_interrupts_the_copy_spoils_it(void)
         interruptions = i;
         while (!IecTaskBetweenCycles(copy_interrupted))
             ;
-        CHECK(interruptions == 0);
+        CHECK_EQUAL(interruptions, 0);
         CHECK(memcmp(copied, area, sizeof area) == 0);
     }
     IecCycleStop();

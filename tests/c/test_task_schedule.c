@@ -20,10 +20,10 @@ static void every_cyclic_task_has_its_own_interval(void)
     add_counting_task("B", KIND_CYCLIC, 3000);
     add_counting_task("C", KIND_CYCLIC, 1000000);
     load();
-    CHECK(SimAdvance(ms(3000)) == ERR_OK);
-    CHECK(count_of(0) == 3001);
-    CHECK(count_of(1) == 1001);
-    CHECK(count_of(2) == 4);
+    CHECK_EQUAL(SimAdvance(ms(3000)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 3001);
+    CHECK_EQUAL(count_of(1), 1001);
+    CHECK_EQUAL(count_of(2), 4);
 }
 
 /* Each task stores how often the other ran: who comes first sees one less. */
@@ -37,8 +37,8 @@ static void of_tasks_that_are_due_the_highest_priority_runs_first(void)
     emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, 10); /* order := 10 */
     emit_ret(&spec);
     load();
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == 11);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, ORDER_OFFSET), 11);
 }
 
 static CDL_TASK *add_event_task(void)
@@ -55,17 +55,17 @@ static void an_event_task_runs_once_per_rising_edge(void)
     begin();
     add_event_task();
     load();
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(count_of(0) == 0);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 0);
     set_event(1);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(count_of(0) == 1);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 1);
     set_event(0);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(count_of(0) == 1);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 1);
     set_event(1);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(count_of(0) == 2);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 2);
 }
 
 static void an_event_that_is_true_at_the_start_is_no_edge(void)
@@ -73,11 +73,11 @@ static void an_event_that_is_true_at_the_start_is_no_edge(void)
     begin();
     add_event_task();
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     set_event(1);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(50)) == ERR_OK);
-    CHECK(count_of(0) == 0);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(50)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 0);
 }
 
 static void an_edge_counts_however_short_the_variable_was_clear_between_cycles(void)
@@ -91,8 +91,8 @@ static void an_edge_counts_however_short_the_variable_was_clear_between_cycles(v
     emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 0);
     emit_ret(&spec);
     load();
-    CHECK(SimAdvance(ms(9)) == ERR_OK);
-    CHECK(count_of(0) == 10); /* though it is TRUE whenever time passes */
+    CHECK_EQUAL(SimAdvance(ms(9)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 10); /* though it is TRUE whenever time passes */
 }
 
 static void what_one_cycle_sets_and_clears_is_no_edge(void)
@@ -104,8 +104,8 @@ static void what_one_cycle_sets_and_clears_is_no_edge(void)
     emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 0);
     emit_ret(&spec);
     load();
-    CHECK(SimAdvance(ms(9)) == ERR_OK);
-    CHECK(count_of(0) == 0);
+    CHECK_EQUAL(SimAdvance(ms(9)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 0);
 }
 
 static void an_event_task_runs_as_soon_as_the_cycle_that_set_its_variable_is_over(void)
@@ -124,8 +124,8 @@ static void an_event_task_runs_as_soon_as_the_cycle_that_set_its_variable_is_ove
     emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 100);
     emit_ret(&spec);
     load();
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == 111);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, ORDER_OFFSET), 111);
 }
 
 /* Though Set takes 2 ms, what was due with it comes by priority. */
@@ -150,8 +150,8 @@ static void an_event_task_takes_its_turn_by_priority(void)
         emit_set(&spec, APP_AREA_DATA, ORDER_OFFSET, BY_OTHER);
         emit_ret(&spec);
         load();
-        CHECK(SimAdvance(0) == ERR_OK);
-        CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == (i == 0 ? BY_EVENT : BY_OTHER)); /* who came last */
+        CHECK_EQUAL(SimAdvance(0), ERR_OK);
+        CHECK_EQUAL(read_u32(APP_AREA_DATA, ORDER_OFFSET), (i == 0 ? BY_EVENT : BY_OTHER)); /* who came last */
     }
 }
 
@@ -161,14 +161,14 @@ static void an_event_may_be_one_bit_of_a_byte(void)
     add_event_task()->event_ignored = 0xFF ^ 1 << 3;
     load();
     set_event(0xF7);
-    CHECK(SimAdvance(ms(1)) == ERR_OK);
-    CHECK(count_of(0) == 0);
+    CHECK_EQUAL(SimAdvance(ms(1)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 0);
     set_event(0x08);
-    CHECK(SimAdvance(ms(1)) == ERR_OK);
-    CHECK(count_of(0) == 1);
+    CHECK_EQUAL(SimAdvance(ms(1)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 1);
     set_event(0xFF); /* it stays as it is */
-    CHECK(SimAdvance(ms(1)) == ERR_OK);
-    CHECK(count_of(0) == 1);
+    CHECK_EQUAL(SimAdvance(ms(1)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 1);
 }
 
 static void several_tasks_may_wait_for_one_variable(void)
@@ -178,7 +178,7 @@ static void several_tasks_may_wait_for_one_variable(void)
     add_event_task()->priority = 5;
     load();
     set_event(1);
-    CHECK(SimAdvance(ms(1)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(1)), ERR_OK);
     CHECK(count_of(0) == 1 && count_of(1) == 1);
 }
 
@@ -193,8 +193,8 @@ static void an_edge_of_one_interval_is_not_missed(void)
     emit_set(&spec, APP_AREA_DATA, EVENT_OFFSET, 0);
     emit_ret(&spec);
     load();
-    CHECK(SimAdvance(ms(11)) == ERR_OK); /* set at 0 2 4 6 8 10, cleared after it at 0 3 6 9: edges at 0 2 4 8 10 */
-    CHECK(count_of(0) == 5);
+    CHECK_EQUAL(SimAdvance(ms(11)), ERR_OK); /* set at 0 2 4 6 8 10, cleared after it at 0 3 6 9: edges at 0 2 4 8 10 */
+    CHECK_EQUAL(count_of(0), 5);
 }
 
 static void freewheeling_tasks_run_again_after_a_pause(void)
@@ -202,14 +202,14 @@ static void freewheeling_tasks_run_again_after_a_pause(void)
     begin();
     add_counting_task("Free", KIND_FREEWHEELING, 0);
     load();
-    CHECK(SimAdvance(ms(1000)) == ERR_OK);
-    CHECK(count_of(0) == 1001);
-    CHECK(AppStopApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(count_of(0) == 1001);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimAdvance(ms(1)) == ERR_OK);
-    CHECK(count_of(0) == 1003);
+    CHECK_EQUAL(SimAdvance(ms(1000)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 1001);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 1001);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(1)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 1003);
 }
 
 /* Cycles of 50 ms and pauses of a fifth of it: a task below, of the same processor, has its share. */
@@ -223,7 +223,7 @@ static void a_freewheeling_task_pauses_for_a_fifth_of_its_cycle(void)
     emit_ret(&spec);
     add_counting_task("Below", KIND_CYCLIC, 10000);
     load();
-    CHECK(SimAdvance(ms(60) * 20) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(60) * 20), ERR_OK);
     CHECK(count_of(0) >= 20 && count_of(0) <= 21);
     CHECK(count_of(1) >= 20);
 }
@@ -241,8 +241,8 @@ static void freewheeling_tasks_run_by_priority(void)
     emit_add(&spec, APP_AREA_DATA, ORDER_OFFSET, 100);
     emit_ret(&spec);
     load();
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(read_u32(APP_AREA_DATA, ORDER_OFFSET) == 111);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, ORDER_OFFSET), 111);
 }
 
 static CDL_TASK *add_external_task(const char *name, const char *event)
@@ -261,22 +261,22 @@ static void an_external_event_runs_its_task_once_per_post(void)
     begin();
     add_external_task("Pulse", "pulse");
     event = SchedRegisterExternalEvent("pulse", &result);
-    CHECK(result == ERR_OK);
-    CHECK(SchedPostExternalEvent(event) == ERR_OK); /* before the start: does not count */
+    CHECK_EQUAL(result, ERR_OK);
+    CHECK_EQUAL(SchedPostExternalEvent(event), ERR_OK); /* before the start: does not count */
     load();
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(count_of(0) == 0);
-    CHECK(SchedPostExternalEvent(event) == ERR_OK);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(count_of(0) == 1);
-    CHECK(SchedPostExternalEvent(event) == ERR_OK);
-    CHECK(SchedPostExternalEvent(event) == ERR_OK);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(count_of(0) == 3);
-    CHECK(SchedUnregisterExternalEvent(event) == ERR_OK);
-    CHECK(SchedPostExternalEvent(event) == ERR_INVALID_HANDLE);
-    CHECK(SimAdvance(ms(100)) == ERR_OK);
-    CHECK(count_of(0) == 3);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 0);
+    CHECK_EQUAL(SchedPostExternalEvent(event), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 1);
+    CHECK_EQUAL(SchedPostExternalEvent(event), ERR_OK);
+    CHECK_EQUAL(SchedPostExternalEvent(event), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 3);
+    CHECK_EQUAL(SchedUnregisterExternalEvent(event), ERR_OK);
+    CHECK_EQUAL(SchedPostExternalEvent(event), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(SimAdvance(ms(100)), ERR_OK);
+    CHECK_EQUAL(count_of(0), 3);
 }
 
 static void external_events_are_limited_and_unique(void)
@@ -289,16 +289,16 @@ static void external_events_are_limited_and_unique(void)
     begin();
     for (i = 0; i < SCHED_MAX_EXTERNAL_EVENTS; i++, name[0]++)
         event = SchedRegisterExternalEvent(name, NULL);
-    CHECK(SchedRegisterExternalEvent("a", &result) == RTS_INVALID_HANDLE);
-    CHECK(result == ERR_DUPLICATE);
-    CHECK(SchedRegisterExternalEvent(name, &result) == RTS_INVALID_HANDLE);
-    CHECK(result == ERR_NOMEMORY);
-    CHECK(SchedUnregisterExternalEvent(event) == ERR_OK);
-    CHECK(SchedUnregisterExternalEvent(event) == ERR_INVALID_HANDLE);
-    CHECK(SchedUnregisterExternalEvent(99) == ERR_INVALID_HANDLE);
-    CHECK(SchedPostExternalEvent(RTS_INVALID_HANDLE) == ERR_INVALID_HANDLE);
+    CHECK_EQUAL(SchedRegisterExternalEvent("a", &result), RTS_INVALID_HANDLE);
+    CHECK_EQUAL(result, ERR_DUPLICATE);
+    CHECK_EQUAL(SchedRegisterExternalEvent(name, &result), RTS_INVALID_HANDLE);
+    CHECK_EQUAL(result, ERR_NOMEMORY);
+    CHECK_EQUAL(SchedUnregisterExternalEvent(event), ERR_OK);
+    CHECK_EQUAL(SchedUnregisterExternalEvent(event), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(SchedUnregisterExternalEvent(99), ERR_INVALID_HANDLE);
+    CHECK_EQUAL(SchedPostExternalEvent(RTS_INVALID_HANDLE), ERR_INVALID_HANDLE);
     CHECK(SchedRegisterExternalEvent(name, &result) != RTS_INVALID_HANDLE);
-    CHECK(result == ERR_OK);
+    CHECK_EQUAL(result, ERR_OK);
 }
 
 static void posts_beyond_what_may_wait_are_lost_and_counted(void)
@@ -309,17 +309,17 @@ static void posts_beyond_what_may_wait_are_lost_and_counted(void)
     begin();
     add_external_task("One", "pulse");
     add_external_task("Other", "pulse");
-    CHECK(SimAddEvent("pulse") == ERR_OK);
+    CHECK_EQUAL(SimAddEvent("pulse"), ERR_OK);
     load();
     for (i = 0; i < SCHED_MAX_WAITING_EVENTS + 7; i++)
-        CHECK(SimPostEvent("pulse") == ERR_OK);
-    CHECK(SimPostEvent("other") == ERR_NO_OBJECT);
-    CHECK(SimAdvance(0) == ERR_OK);
+        CHECK_EQUAL(SimPostEvent("pulse"), ERR_OK);
+    CHECK_EQUAL(SimPostEvent("other"), ERR_NO_OBJECT);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
     CHECK(count_of(0) == SCHED_MAX_WAITING_EVENTS && count_of(1) == SCHED_MAX_WAITING_EVENTS);
     CHECK(IecTaskGetInfo(0, &info) == ERR_OK && info.overruns == 7);
-    CHECK(SimPostEvent("pulse") == ERR_OK);
-    CHECK(SimAdvance(0) == ERR_OK);
-    CHECK(count_of(0) == SCHED_MAX_WAITING_EVENTS + 1);
+    CHECK_EQUAL(SimPostEvent("pulse"), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(count_of(0), SCHED_MAX_WAITING_EVENTS + 1);
     CHECK(IecTaskGetInfo(0, &info) == ERR_OK && info.overruns == 7);
     SimForgetEvents();
 }
@@ -329,9 +329,9 @@ static void a_program_that_waits_for_an_unknown_event_is_refused(void)
     begin();
     add_external_task("Pulse", "pulse");
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_NO_OBJECT);
-    CHECK(SimAddEvent("pulse") == ERR_OK);
-    CHECK(download(&image) == ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_NO_OBJECT);
+    CHECK_EQUAL(SimAddEvent("pulse"), ERR_OK);
+    CHECK_EQUAL(download(&image), ERR_OK);
     SimForgetEvents();
 }
 
@@ -347,9 +347,9 @@ static void as_many_tasks_as_the_device_can_run(void)
         add_counting_task(name, KIND_CYCLIC, 1000 * (i + 1));
     }
     load();
-    CHECK(SimAdvance(ms(720)) == ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(720)), ERR_OK);
     for (i = 0; i < APP_MAX_TASKS; i++)
-        CHECK(count_of(i) == 720 / (i + 1) + 1);
+        CHECK_EQUAL(count_of(i), 720 / (i + 1) + 1);
 }
 
 static void downloads_free_the_timers_of_the_tasks_before(void)
@@ -362,7 +362,7 @@ static void downloads_free_the_timers_of_the_tasks_before(void)
     emit_ret(&spec);
     for (i = 0; i < 10; i++)
         load();
-    CHECK(IecTaskGetCount() == APP_MAX_TASKS);
+    CHECK_EQUAL(IecTaskGetCount(), APP_MAX_TASKS);
 }
 
 static void run_cycles_counts_cycles_of_the_first_task(void)
@@ -371,17 +371,17 @@ static void run_cycles_counts_cycles_of_the_first_task(void)
     add_counting_task("A", KIND_CYCLIC, 7000);
     add_counting_task("B", KIND_CYCLIC, 1000);
     build_image(&image, &spec);
-    CHECK(download(&image) == ERR_OK);
-    CHECK(SimRunCycles(1) == ERR_INVALID_STATE);
-    CHECK(AppStartApplication() == ERR_OK);
-    CHECK(SimRunCycles(1) == ERR_OK);
-    CHECK(SimNow() == 0);
-    CHECK(SimRunCycles(100) == ERR_OK);
-    CHECK(count_of(0) == 101);
-    CHECK(SimNow() == ms(700));
-    CHECK(count_of(1) == 701);
-    CHECK(SimRunCycles(0) == ERR_OK);
-    CHECK(SimNow() == ms(700));
+    CHECK_EQUAL(download(&image), ERR_OK);
+    CHECK_EQUAL(SimRunCycles(1), ERR_INVALID_STATE);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimRunCycles(1), ERR_OK);
+    CHECK_EQUAL(SimNow(), 0);
+    CHECK_EQUAL(SimRunCycles(100), ERR_OK);
+    CHECK_EQUAL(count_of(0), 101);
+    CHECK_EQUAL(SimNow(), ms(700));
+    CHECK_EQUAL(count_of(1), 701);
+    CHECK_EQUAL(SimRunCycles(0), ERR_OK);
+    CHECK_EQUAL(SimNow(), ms(700));
 }
 
 static void run_cycles_gives_up_on_a_task_that_never_runs(void)
@@ -389,7 +389,7 @@ static void run_cycles_gives_up_on_a_task_that_never_runs(void)
     begin();
     add_event_task();
     load();
-    CHECK(SimRunCycles(1) == ERR_TIMEOUT);
+    CHECK_EQUAL(SimRunCycles(1), ERR_TIMEOUT);
 }
 
 static void run_cycles_works_for_freewheeling_tasks(void)
@@ -397,7 +397,7 @@ static void run_cycles_works_for_freewheeling_tasks(void)
     begin();
     add_counting_task("Free", KIND_FREEWHEELING, 0);
     load();
-    CHECK(SimRunCycles(50) == ERR_OK);
+    CHECK_EQUAL(SimRunCycles(50), ERR_OK);
     CHECK(count_of(0) >= 50);
 }
 
