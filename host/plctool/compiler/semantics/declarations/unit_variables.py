@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
 from plctool.compiler.semantics.declarations.variables import Variables
@@ -47,15 +47,9 @@ def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.Va
     return ordered
 
 
-def _names_used(node: object) -> set[str]:
+def _names_used(line: ast.VarDecl) -> set[str]:
     """The names, case-folded, in the type and the initial value of a declaration."""
-    if isinstance(node, ast.Name):
-        return {node.name.casefold()}
-    if isinstance(node, list | tuple):
-        return set().union(*map(_names_used, node))
-    if is_dataclass(node):
-        return set().union(*(_names_used(getattr(node, f.name)) for f in fields(node)))
-    return set()
+    return {name.name.casefold() for name in ast.every(ast.Name, line)}
 
 
 def _seen_by_actions(block: ast.VarBlock, decl: ast.PouDecl) -> bool:
