@@ -1,5 +1,5 @@
 # make demo   the whole story on this machine        make test   all tests
-# make lint   clang-format, ruff, mypy               make bench  figures, side by side
+# make lint   style, types, words                   make bench  figures, side by side
 # make format gives C and Python their one style
 # make size   flash and RAM of the bare-metal runtime, per component
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
@@ -39,6 +39,7 @@ lint: $(VENV)/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	MYPYPATH=host $(BIN)/mypy -p plctool
+	$(BIN)/python tests/docs/words.py
 
 format: $(VENV)/dev
 	$(C_FILES) | xargs -0 $(BIN)/clang-format -i

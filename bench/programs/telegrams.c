@@ -1,5 +1,5 @@
 /*
- * telegrams.c - twin of telegrams.st: texts that know their length, nothing is copied twice.
+ * telegrams.c - twin of telegrams.st: strings that know their length, nothing is copied twice.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

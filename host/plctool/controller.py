@@ -1,6 +1,6 @@
-"""A controller, whatever reaches it: on a link (`device.Plc`) or in this process (`sim.Simulator`).
+"""A controller, on a link (`device.Plc`) or in this process (`sim.Simulator`).
 
-`Controller` is all that an operation may use, so that it works on both. What both do the same way is done here; what
+An operation uses only `Controller`, so it works on both. What both do the same way is done here; what
 each does its own way is abstract.
 """
 
@@ -33,7 +33,7 @@ RESET_OPTIONS = {
 
 @dataclass(frozen=True)
 class ExceptionInfo:
-    """What stopped the program. `task` is None for initialisation code; the place is None without symbols. `calls`
+    """What stopped the program. `task` is None for initialisation code; the location is None without symbols. `calls`
     led there, the nearest first."""
 
     code: int
@@ -64,7 +64,7 @@ class PlcStatus:
 @dataclass(frozen=True)
 class FlashResult:
     """`skipped`: the controller had this very image already. `seconds` is the time the transfer took. `persistent`:
-    what became of PERSISTENT values, None when the symbols of one of the programs are not there."""
+    what became of PERSISTENT values, None if the symbols of one of the programs are missing."""
 
     bytes: int
     seconds: float
@@ -121,9 +121,9 @@ class Controller(ABC):
     ) -> FlashResult:
         """Replaces the application and starts it. The old one runs until the new one has arrived and passed all checks.
 
-        `force`: also when the controller has this very image already. `unchecked`: without a look at the image here;
-        the controller checks it anyway. `progress` gets the bytes that have arrived and their total. Other tools are
-        kept away meanwhile; raises LinkError when one of them is downloading, UsageError for what is not an image,
+        `force`: also when the controller has this very image already. `unchecked`: the image is not checked here;
+        the controller checks it anyway. `progress` gets the bytes that have arrived and their total. Other tools must
+        wait meanwhile. Raises LinkError when one of them is downloading, UsageError for what is not an image,
         DeviceError when the controller refuses it.
         """
         data = image if isinstance(image, bytes) else read_image(Path(image))
@@ -176,17 +176,17 @@ class Controller(ABC):
         self._reset(RESET_OPTIONS[option])
 
     def status(self) -> PlcStatus:
-        """What the application does, and the exception that holds it, in the words of its symbols."""
+        """What the application does, and the exception that stopped it, with the names and lines of its symbols."""
         status = self.raw_status()
         exception = self._explain(status.image_crc, status.exception) if status.exception else None
         return PlcStatus(status.state, status.image_crc, status.image_size, exception)
 
     @abstractmethod
     def raw_status(self) -> Status:
-        """The same as the controller says it: an exception has a code offset and words of the stack."""
+        """The same as the controller reports it: an exception has a code offset and words of the stack."""
 
     def _explain(self, crc: int, exception: AppException) -> ExceptionInfo:
-        """Adds the names and places that the symbols know."""
+        """Adds names and locations from the symbols."""
         try:
             table = self._symbols_of(crc)
         except UsageError:
@@ -233,7 +233,7 @@ class Controller(ABC):
         return values if len(names) > 1 else values[names[0]]
 
     def read_all(self, names: Sequence[str]) -> dict[str, Any]:
-        """Values by name. Structs and arrays come as dicts and lists, TIME as text."""
+        """Values by name. Structs and arrays come as dicts and lists, TIME as a string."""
         return self.sample(names).values
 
     def sample(self, names: Sequence[str]) -> Reading:
@@ -252,8 +252,8 @@ class Controller(ABC):
         return Reading(symbols, dict(zip(symbols, contents.values, strict=True)), contents.consistent)
 
     def write(self, values: Mapping[str, Any]) -> None:
-        """Sets variables, at once if they fit a message; texts such as 'T#80ms' are understood. Of a single bit the
-        remaining byte stays as it is. Raises UsageError, and writes nothing, when a value does not fit or is a
+        """Sets variables, at once if they fit a message; strings such as 'T#80ms' are understood. Writing one bit keeps
+        the others of its byte. Raises UsageError, and writes nothing, when a value does not fit or is a
         constant; DeviceError when a pointer leads to no variable."""
         table = self.symbols()
         named = [(table.resolve(name), value) for name, value in values.items()]
@@ -268,12 +268,12 @@ class Controller(ABC):
         """Seconds, for the time a transfer takes."""
 
     def _alone(self, purpose: str) -> AbstractContextManager[None]:
-        """Keeps other tools away; `purpose`, such as "downloading app.cdl", is what they are told."""
+        """Other tools must wait; `purpose`, such as "downloading app.cdl", is shown to them."""
         return nullcontext()
 
     @abstractmethod
-    def _download(self, data: bytes, afresh: bool, progress: Callable[[int], None]) -> None:
-        """Makes an image the application, stopped. `afresh`: also what has arrived already. Raises DeviceError with the
+    def _download(self, data: bytes, restart: bool, progress: Callable[[int], None]) -> None:
+        """Makes an image the application, stopped. `restart`: from the first byte. Raises DeviceError with the
         reason when it is refused."""
 
     @abstractmethod

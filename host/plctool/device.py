@@ -40,7 +40,7 @@ def connect(
 
     `symbols` names a symbol file when it is neither in the cache nor beside the image. A serial port of this machine is
     shared with other tools through a gateway where there can be one; with `gateway` false, or PLCTOOL_GATEWAY=off, it
-    is opened by this process and locked. `tool` is what other tools are told this one is. Raises UsageError for what is
+    is opened by this process and locked. `tool` is how this one is shown to other tools. Raises UsageError for what is
     not a link, LinkError when it cannot be opened; whether a controller answers shows with the first call.
     """
     return Plc(_open_link(link, gateway, tool), Path(symbols) if symbols else None)
@@ -98,7 +98,7 @@ class Plc(Controller):
         return services.read_identity(self._session)
 
     def stack(self) -> Stack | None:
-        """What the main stack of the controller has left; None when it does not tell."""
+        """What is left of the main stack of the controller; None if it does not report it."""
         return services.read_stack(self._session)
 
     def info(self) -> dict[str, str]:
@@ -131,8 +131,8 @@ class Plc(Controller):
     def _alone(self, purpose: str) -> AbstractContextManager[None]:
         return self._session.exclusive(purpose)
 
-    def _download(self, data: bytes, afresh: bool, progress: Callable[[int], None]) -> None:
-        services.download(self._session, data, afresh, progress)
+    def _download(self, data: bytes, restart: bool, progress: Callable[[int], None]) -> None:
+        services.download(self._session, data, restart, progress)
 
     # ---- variables ----
 
@@ -182,8 +182,8 @@ class Plc(Controller):
     ) -> Iterator[tuple[float, Reading]]:
         """Reads again and again: yields seconds since the first reading, and what was read. Endless without `count`.
 
-        Pointers are followed anew each time; a value whose pointer leads to no variable is None. While another
-        tool downloads a program there are no readings; `waiting` is called with the reason at the begin of that.
+        Pointers are followed again each time; a value whose pointer leads to no variable is None. While another
+        tool downloads a program there are no readings; `waiting` is called with the reason when that begins.
         """
         begin = time.monotonic()
         due, readings, waits = begin, 0, False

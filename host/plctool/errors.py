@@ -1,4 +1,4 @@
-"""Errors that are not our bug: one sentence that says what to do, a short code for machines, an exit code for
+"""Errors that are not bugs of plctool: one sentence that says what to do, a short code for machines, an exit code for
 shells."""
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class DeviceError(PlcError):
 
 
 class InternalError(PlcError):
-    """A bug of ours. `where`: the place in somebody's program that shows it, such as ` at main.st:7`, if known."""
+    """A bug of ours. `where`: the location in the user's program that shows it, such as ` at main.st:7`, if known."""
 
     def __init__(self, error: Exception, where: str = "") -> None:
         what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -49,7 +49,7 @@ class Simulator(Controller):
         Simulator._running = self
         lib.SimForgetEvents()
         try:
-            self._download(image, afresh=True, progress=lambda done: None)
+            self._download(image, restart=True, progress=lambda done: None)
             if start:
                 self.start()
         except BaseException:
@@ -71,7 +71,7 @@ class Simulator(Controller):
 
     # ---- the program ----
 
-    def _download(self, data: bytes, afresh: bool, progress: Callable[[int], None]) -> None:
+    def _download(self, data: bytes, restart: bool, progress: Callable[[int], None]) -> None:
         self._add_events(data)
         _check(lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
         _check(lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")

@@ -22,7 +22,7 @@ ENOUGH = 20  # cycles of a program that goes on whatever it did
 
 class BadPrograms(Campaign):
     name = "program"
-    promise = "a bad program is stopped with the cause in the log, and the one before runs at the next start"
+    promise = "a bad program is stopped with the cause in the log, and the previous one runs at the next start"
     short = 14
 
     def cases(self) -> list[Case]:

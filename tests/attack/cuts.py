@@ -199,7 +199,7 @@ def _live(shop: Workshop, story: Story, device: Device) -> list[str]:
 
 
 def _live_with_faults(shop: Workshop, story: Story, device: Device) -> tuple[str, str]:
-    """The last mark, and what broke the rules of the flash. The device may refuse what it is told, but answers to the
+    """The last mark, and what broke the rules of the flash. The device may refuse a request, but answers to the
     end. What a fault at the start left is attacked once more, by a download that is refused."""
     try:
         story.live(shop, device)

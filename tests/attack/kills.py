@@ -105,7 +105,7 @@ class Kills(Campaign):
 
 
 def _flash(shop: Workshop, port: str, flashed: threading.Event) -> None:
-    """What a user does with plctool, as far as the device lets him."""
+    """What a user does with plctool, as far as the device allows it."""
     with suppress(PlcError), plctool.connect(f"serial:{port}") as plc:
         plc.flash(shop[NEW].image, unchecked=True)
         flashed.set()

@@ -9,7 +9,7 @@
     tests/attack/run.py --sanitized      with what is in build-sanitized instead of build
     tests/attack/run.py --help           more options
 
-Each case ends with a look at the device: the newest good program runs, or the one before where the new one died
+Each case ends with a look at the device: the newest good program runs, or the previous one where the new one died
 before it proved itself, or it is stopped with communication up and the cause in the log. Anything else is a failure,
 and the line that replays it is printed.
 """

@@ -1,7 +1,7 @@
 """The runtime in a child process, on a virtual clock and a flash that outlives the child.
 
 A program that kills the runtime kills a child only. The flash is memory shared with the children, so what the next
-one starts from is what the one before left, as with a real device. This process itself never runs the runtime.
+one starts from is what the previous one left, as with a real device. This process itself never runs the runtime.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Device:
         return Plc(self.connection, symbols)
 
     def reconnect(self) -> None:
-        """What a tool does that comes anew: also after a cut in its own messages."""
+        """What a tool does that starts again: also after a cut in its own messages."""
         lib.SimLinkReset()
         self.__init__()  # type: ignore[misc]
 

@@ -6,7 +6,7 @@ for a change within a cycle, while the PC writes inputs and bits beside those of
     stress_image.py --board mps2-an385 firmware-standard.elf
     stress_image.py --without-copies                       what it looks like when tasks work on the shared areas
 
-Prints what was lost (a bit that somebody wrote and that another one undid), changed (an input within a cycle) and torn
+Prints what was lost (a bit that one side wrote and another one undid), changed (an input within a cycle) and torn
 (words that were written together and seen apart), and exits 1 if anything was.
 """
 
@@ -138,7 +138,7 @@ def build(folder: Path, target: str, fast: int, slow: int, *, copies: bool = Tru
 
 
 def stress(plc: Plc, go_on: Callable[[Counts], bool]) -> Counts:
-    """Writes inputs and bits while the program runs, as long as it is told to."""
+    """Writes inputs and bits while the program runs, until it is stopped."""
     counts = Counts()
     on = False
     while go_on(counts):

@@ -603,7 +603,7 @@ static void kept_variables_outside_the_retain_area(void)
     RTS_UI32 i;
 
     begin();
-    spec.kept[1].variable.place += 1 << CDL_KEPT_OFFSET_SHIFT; /* ends one byte behind it */
+    spec.kept[1].variable.place += 1 << CDL_KEPT_OFFSET_SHIFT; /* ends one byte past it */
     check_kept_refused(ERR_OUT_OF_LIMITS, "Kept variable 1 is out of place");
     spec.kept[0].variable.place |= 0xFFFFFFF0;
     check_kept_refused(ERR_OUT_OF_LIMITS, "Kept variable 0 is out of place");

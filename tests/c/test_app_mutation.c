@@ -85,7 +85,7 @@ static void every_flipped_bit_is_refused(void)
 }
 
 /*
- * Changes that keep the CRC right get past it to the checks behind. Whatever comes of it, the runtime must live: the
+ * Changes that keep the CRC right get past it to the later checks. Whatever comes of it, the runtime must live: the
  * image is refused, or loaded and stopped again. Its code is not started, since it may be anything.
  */
 static void try_image(void)

@@ -311,7 +311,7 @@ static void a_rollback_brings_back_large_values_too(void)
     CHECK(SimFlashViolations() == 0);
 }
 
-/* The retain log is gone, the commit record is not: saving starts anew and works. */
+/* The retain log is gone, the commit record is not: saving starts again and works. */
 static void a_lost_log_costs_its_values_only(void)
 {
     const FILE_AREA *area = SysFileGetArea(FILE_RETAIN);

@@ -156,7 +156,7 @@ static void channel_without_login_is_given_to_another_peer(void)
     setup();
     client_init(&other, 0x0203);
     client_send_open(&other, 1, 2048);
-    CHECK(is_close(ERR_CHS_CLOSED)); /* the old owner is told */
+    CHECK(is_close(ERR_CHS_CLOSED)); /* the old owner gets a close */
     CHECK(client_take_open(&other) == CHANNEL_OPEN_OK);
     CHECK(works(&other));
 }

@@ -334,7 +334,7 @@ static void put_pointer(RTS_UI32 area, RTS_UI32 offset, uintptr_t value)
     memcpy(fakes_area(area) + offset, &value, sizeof(value));
 }
 
-/* What reading 2 bytes behind the pointer at POINTER_AT of the data area ends with. */
+/* What reading 2 bytes through the pointer at POINTER_AT of the data area ends with. */
 static RTS_UI32 read_behind(uintptr_t pointer)
 {
     setup();

@@ -44,7 +44,7 @@ static void setup(void)
 /* RTSINFO request: it is answered on its own. */
 static const RTS_UI8 question[] = {0xC2, 0x00, 0x01, 0x01, 0x36, 0x65, 0x9D, 0xAB};
 
-/* Hands in a header with `question` behind it, or only `size` bytes of it. */
+/* Hands in a header with `question` after it, or only `size` bytes of it. */
 static RTS_UI32 ask_cut(const RTS_UI8 *header, RTS_UI32 header_size, RTS_UI32 size)
 {
     RTS_UI8 *packet; /* own memory of exactly this size, for the sanitizer */
@@ -236,7 +236,7 @@ static void peers_are_told_apart_by_driver_and_address(void)
     ROUTER_PEER other = peer;
 
     other.max_packet = 64;
-    other.address[2] = 0x56; /* behind the address */
+    other.address[2] = 0x56; /* past the address */
     CHECK(RouterIsSamePeer(&peer, &other));
     other.address[1] = 0x35;
     CHECK(!RouterIsSamePeer(&peer, &other));

@@ -40,7 +40,7 @@ static struct {
     CDL_TASK task[APP_MAX_TASKS];
     RTS_UI32 count;
     RTS_UI8 variable[VARIABLES];
-    RTS_UI32 rises[VARIABLES]; /* that tasks left behind */
+    RTS_UI32 rises[VARIABLES]; /* that cycles ended with */
     RTS_UI32 runs[VARIABLES];  /* of the tasks that wait for them */
     RTS_UI32 cycles;
     RTS_UI32 enough; /* rises after which a variable rests */
@@ -50,7 +50,7 @@ static struct {
 
 /* ---- the application ---- */
 
-/* Changes a variable at random; what it leaves behind counts. */
+/* Changes a variable at random; its last value counts. */
 static void change(RTS_UI32 i)
 {
     RTS_UI8 before = __atomic_load_n(&app.variable[i], __ATOMIC_RELAXED);

@@ -293,7 +293,7 @@ static void a_hundred_thousand_tries_work(void)
     CHECK(calls == 100000);
 }
 
-/* ---- living in a process of somebody else ---- */
+/* ---- living in a process of another program ---- */
 
 /* Exit status of a child that runs `fn`, or 1000 + the signal that ended it. */
 static int run_child(void (*fn)(void))

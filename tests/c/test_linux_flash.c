@@ -38,7 +38,7 @@ static const SYS_FLASH *new_flash(void)
     return open_flash();
 }
 
-/* What the port asks the system to make durable, and a disk that fails when told to: in place of the C library's. */
+/* What the port asks the system to make durable, and a disk that fails on request: in place of the C library's. */
 static int synced_folders;
 static bool disk_fails;
 

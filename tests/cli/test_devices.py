@@ -1,4 +1,4 @@
-"""Commands on a controller: their JSON shapes, their texts, their exit statuses."""
+"""Commands on a controller: their JSON shapes, their output, their exit statuses."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_read_shows_values_as_st_writes_them(tool: Any, running: FakePlc) -> Non
 
 def test_read_says_when_the_values_are_not_of_one_cycle(tool: Any, running: FakePlc) -> None:
     running.disturbed = 1000
-    assert "more than one cycle" in tool("read", *PORT, "Main.count", "Main.ok").err
+    assert "different cycles" in tool("read", *PORT, "Main.count", "Main.ok").err
     assert tool("read", *PORT, "Main.count", "Main.ok", "--json").json["consistent"] is False
 
 
@@ -187,7 +187,10 @@ def test_read_with_the_symbols_of_another_image_exits_2(tool: Any, running: Fake
 
 def test_what_is_no_symbol_file_exits_2(tool: Any, running: FakePlc, scratch: Path) -> None:
     (scratch / "bytes.sym").write_bytes(b"\xff")
-    for name, words in (("bytes.sym", "is no symbol file"), ("none.sym", "cannot be read: No such file or directory.")):
+    for name, words in (
+        ("bytes.sym", "is not a symbol file"),
+        ("none.sym", "cannot be read: No such file or directory."),
+    ):
         done = tool("read", *PORT, "Main.count", "--symbols", name)
         assert done.status == 2
         assert words in done.err
@@ -278,7 +281,7 @@ def test_every_device_command_on_a_missing_port_exits_3(tool: Any, image: Path, 
 def test_what_is_no_serial_port_is_told(tool: Any, port: str) -> None:
     done = tool("scan", "--port", port)
     assert (done.status, done.out) == (3, "")
-    assert "it is no serial port" in done.err
+    assert "it is not a serial port" in done.err
 
 
 @pytest.mark.parametrize(

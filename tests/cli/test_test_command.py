@@ -272,7 +272,7 @@ def test_a_block_that_was_not_called_is_told(tool: Tool) -> None:
         ("MOCK i;", "MOCK needs an instance of a function block"),
         ("MOCK_FUNCTION t.Q RETURNS 1;", "a method of an instance"),
         ("MOCK b.m;", "for a method write MOCK_FUNCTION"),
-        ("MOCK_FUNCTION Nobody RETURNS 1;", "there is no function Nobody"),
+        ("MOCK_FUNCTION Missing RETURNS 1;", "there is no function Missing"),
         ("MOCK_FUNCTION F GIVES 1;", "expected RETURNS"),
         ("MOCK_FUNCTION F RETURNS 'a';", "STRING"),
         ("i := 5", "expected ;"),

@@ -105,7 +105,7 @@ class _Writer:
         self.bits.append((name, area, number))
 
     def declare_words(self) -> None:
-        """Integers, whose bits are written by number: alone, in arrays, structures and blocks, behind a pointer."""
+        """Integers, whose bits are written by number: alone, in arrays, structures and blocks, through a pointer."""
         for index, (name, bits) in enumerate(INTEGERS.items()):
             value = self.draw(st.integers(0, (1 << bits) - 1))
             self.locals.append(f"n{index} : {name};")

@@ -261,7 +261,7 @@ class Generator:
 
 
 def meaningful(symbols: SymbolTable, memory: bytes) -> bytes:
-    """The data area without addresses, and without what is behind the NUL of strings."""
+    """The data area without addresses, and without what is after the NUL of strings."""
     data = bytearray(memory)
     for variable in symbols.variables.values():
         for leaf in variable.leaves():

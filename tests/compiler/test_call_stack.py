@@ -1,4 +1,4 @@
-"""Which calls led to an exception is told exactly, whether they were inlined or made, at each level of optimisation."""
+"""The calls that led to an exception are exact, whether they were inlined or made, at each level of optimisation."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ END_PROGRAM
 
 
 def configuration(items: str, before: str = "") -> str:
-    """A configuration with one resource; its items start in line 1 of the text, column 48 behind the programs."""
+    """A configuration with one resource; its items start in line 1 of the text, column 48, after the programs."""
     return f"{before}CONFIGURATION c RESOURCE r ON PLC\n{items}\nEND_RESOURCE END_CONFIGURATION\n{PROGRAMS}"
 
 

@@ -1,4 +1,4 @@
-"""Whatever the text, the answer is a program or diagnoses; and it comes soon."""
+"""Whatever the source, the result is a program or diagnostics; and it comes soon."""
 
 from __future__ import annotations
 

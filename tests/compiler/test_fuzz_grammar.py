@@ -1,4 +1,4 @@
-"""Random programs written from the grammar: the compiler has a diagnosis or a program, and what it builds does the same
+"""Random programs written from the grammar: the result is a diagnostic or a program, and what it builds does the same
 with and without optimisation."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Values of variables: bytes in memory, Python values, texts."""
+"""Values of variables: bytes in memory, Python values, strings."""
 
 from __future__ import annotations
 

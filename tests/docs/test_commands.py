@@ -42,7 +42,7 @@ WITHOUT_RUNNING = (
 
 
 class Reader:
-    """Somebody who types what a document says."""
+    """Types what a document says, as a user would."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

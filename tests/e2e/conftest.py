@@ -22,7 +22,7 @@ PATIENCE = 30.0  # of `eventually`, seconds; machines under load are slow
 
 @dataclass
 class Done:
-    """What a command left: its exit status, and its JSON document or its texts."""
+    """What a command left: its exit status, and its JSON document or its output."""
 
     status: int
     out: str

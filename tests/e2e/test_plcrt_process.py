@@ -247,7 +247,7 @@ def test_it_starts_again_after_being_killed_at_any_moment_of_its_start(tmp_path)
 
 @pytest.mark.parametrize("questions", [1, 2000])
 def test_it_needs_next_to_no_processor_time_when_idle(plcrt, questions):
-    """Also when the line is full of answers that nobody reads, and when it was."""
+    """Also when the line is full of replies that no tool reads, and when it was."""
     transport = SerialTransport(plcrt.port)
     connection = Connection(transport)
     for _ in range(questions):

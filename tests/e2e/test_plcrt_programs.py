@@ -1,4 +1,4 @@
-"""Programs on a real plcrt: what the processor itself catches, what a kill leaves behind, tasks that run in main."""
+"""Programs on a real plcrt: what the processor itself catches, what is left after a kill, tasks that run in main."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_a_kill_during_a_download_leaves_the_old_program(tool, plcrt, counter, s
 
     dismiss_idle(plcrt.port)
     with Connection(SerialTransport(plcrt.port)) as connection, pytest.raises(PowerCut):
-        download(Session(connection), other, afresh=True, progress=kill)
+        download(Session(connection), other, restart=True, progress=kill)
     plcrt.start()
     now = status(tool, plcrt)
     assert now["state"] == "run" and now["image_crc"] == crc

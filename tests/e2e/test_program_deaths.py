@@ -159,7 +159,7 @@ def test_a_death_in_initialisation_leaves_the_device_reachable(tool, plcrt, coun
         session = Session(connection)
         read_status(session)
         killer.start()
-        download(session, image, afresh=True)
+        download(session, image, restart=True)
     killer.join()
     assert status(tool, plcrt)["state"] != "run"
     assert f"signal {number.name}" in log_texts(tool, plcrt)
@@ -186,7 +186,7 @@ def test_a_death_during_a_download_leaves_the_old_program(tool, plcrt, counter, 
 
     dismiss_idle(plcrt.port)  # the gateway of the command before
     with Connection(SerialTransport(plcrt.port)) as connection, pytest.raises(Died):
-        download(Session(connection), other, afresh=True, progress=kill)
+        download(Session(connection), other, restart=True, progress=kill)
     assert status(tool, plcrt)["image_crc"] == crc
     plcrt.stop()
     plcrt.start()

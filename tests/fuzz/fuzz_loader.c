@@ -84,7 +84,7 @@ static void check_old_runs(void)
     FUZZ_CHECK(app_state() == AS_RUN && read_u32(APP_AREA_DATA, STEP_OFFSET) == 1);
 }
 
-/* Whatever it says of itself can be told, and it can be run. */
+/* All its information strings can be read, and it can be run. */
 static void use(void)
 {
     IEC_TASK_INFO info;

@@ -92,7 +92,7 @@ class Served:
         return pipe
 
     def answer(self, answer: Callable[[bytes], bytes]) -> None:
-        """Has the device answer messages that are none of its services' by a function."""
+        """A function gives the device's replies to messages that no service of it takes."""
         begin = struct.pack("<H", lib.L7_PROTOCOL)
         self.device.handler = lambda m: self.plc.handle(m) if m.startswith(begin) else answer(m)
 
@@ -109,7 +109,7 @@ class Served:
 
 
 class Gate:
-    """A handler of a fake device that lets a request through when it is told to."""
+    """A handler of a fake device that holds a request until it is released."""
 
     def __init__(self, handler: Callable[[bytes], bytes]) -> None:
         self.handler = handler

@@ -1,4 +1,4 @@
-"""A download beside other tools: it has the device to itself, the others are told so, and go on after it."""
+"""A download beside other tools: it has the device to itself, others get an error, and go on after it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from plctool.link.services import download
 
 
 class Flashing:
-    """A download that stays at its first block until it is told to go on."""
+    """A download that stays at its first block until it may go on."""
 
     def __init__(self, served: Served, gate: Gate, image: bytes) -> None:
         self.plc = served.connect("plctool flash big.cdl")

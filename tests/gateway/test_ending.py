@@ -1,4 +1,4 @@
-"""The end of a gateway: when it is idle, asked to, or the line is gone; its tools are told, or start another one."""
+"""The end of a gateway: when it is idle, asked to, or the line is gone; its tools get the reason or start another."""
 
 from __future__ import annotations
 

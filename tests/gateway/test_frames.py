@@ -1,4 +1,4 @@
-"""Frames between tools and gateway: what is sent arrives however it is cut, and garbage is told from frames."""
+"""Frames between tools and gateway: what is sent arrives however it is cut, and garbage is not taken for frames."""
 
 from __future__ import annotations
 

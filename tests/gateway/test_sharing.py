@@ -113,7 +113,7 @@ def test_no_application_is_the_devices_own_error(served: Served) -> None:
 
 
 def test_the_login_to_the_application_of_one_tool_is_taken_over_by_the_others(served: Served) -> None:
-    """After a reset the application is logged in to anew, which ends the login that the others have."""
+    """After a reset there is a new login to the application, which ends the login that the others have."""
     first, second = served.connect(), served.connect()
     first.read("Main.count"), second.read("Main.count")
     first.reset()

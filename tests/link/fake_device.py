@@ -1,4 +1,4 @@
-"""A device in Python behind a line on a virtual clock: fast, repeatable, and as bad as a test wants it.
+"""A device in Python on a line with a virtual clock: fast, repeatable, and as bad as a test wants it.
 
 The channel server follows the rules written down in docs/protocol.md, independently of the client's code. Nothing
 sleeps: `FakeLine.receive` moves the clock to the next event.
@@ -21,7 +21,7 @@ from plctool.testing.line import BITS_PER_BYTE, Damage
 
 DEVICE_ADDRESS = b"\x00\x01"
 CLIENT_ADDRESS = b"\x00\x02"
-NODE_NAME, DEVICE_NAME, VENDOR_NAME, SERIAL = "press-3", "Fake controller", "Nobody", "S-0815"
+NODE_NAME, DEVICE_NAME, VENDOR_NAME, SERIAL = "press-3", "Fake controller", "No vendor", "S-0815"
 
 OUTPUT_BUFFER = 4096  # bytes that an operating system takes before a writer has to wait
 
@@ -388,7 +388,7 @@ class FakePlc:
         guid = struct.pack("<I", self.crc) + bytes(12)
         result = lib.ERR_OK if self.image else lib.ERR_APP_NOT_EXIST
         if self.image:
-            self.application_session += 2  # the one before is not valid any more
+            self.application_session += 2  # the previous one is not valid any more
         content = struct.pack("<HI", result, self.application_session if self.image else 0) + guid + guid
         return [bintag.container(lib.TAG_APP_DESCRIPTOR, bintag.Tag(lib.TAG_APP_OPTION, content, shift=2))]
 

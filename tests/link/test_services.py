@@ -76,7 +76,7 @@ def test_broken_headers_are_link_errors(data: bytes) -> None:
 
 def test_the_answer_to_something_else_is_a_link_error() -> None:
     request = l7.Message(1, 2, 0, b"")
-    with pytest.raises(LinkError, match="another request"):
+    with pytest.raises(LinkError, match="not for the request"):
         l7.decode_reply(l7.encode(l7.Message(0x81, 3, 0, b"")), request)
 
 
@@ -406,7 +406,7 @@ def test_an_image_that_is_there_already_is_not_sent_again_unless_asked() -> None
     sent = bench.line.sent_bytes
     services.download(bench.session, bench.plc.image)
     assert bench.line.sent_bytes - sent < 500
-    services.download(bench.session, bench.plc.image, afresh=True)
+    services.download(bench.session, bench.plc.image, restart=True)
     assert bench.line.sent_bytes - sent > 1000
 
 

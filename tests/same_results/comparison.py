@@ -19,7 +19,7 @@ def is_nan(data: bytes) -> bool:
 def value_of(leaf: Symbol, data: bytes) -> bytes:
     """The bytes of a variable without what is not part of its value.
 
-    That is what lies behind the end of a string, which of the many not-a-numbers it is, and an address, of which only
+    That is what is past the end of a string, which of the many not-a-numbers it is, and an address, of which only
     remains whether it is NULL.
     """
     if isinstance(leaf.type, StringType):

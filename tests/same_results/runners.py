@@ -39,7 +39,7 @@ _LINUX_SOURCES = [
     *(FIRMWARE / "port/sim").glob("*.c"),
     *(FIRMWARE / "port/linux" / name for name in ("IecStack.c", "IecStackSwitch.S", "SysExcept.c", "SysMem.c")),
 ]
-# Picolibc keeps the clock to itself unless told that there is one.
+# Picolibc keeps the clock to itself unless a flag says that there is one.
 _BARE_FLAGS = [
     "--specs=picolibc.specs", "--oslib=semihost", "--crt0=hosted", "-Wl,--gc-sections",
     "-D_POSIX_TIMERS", "-D_POSIX_MONOTONIC_CLOCK", f"-I{HERE / 'bare'}", f"-I{FIRMWARE / 'port/baremetal/cortexm'}",

@@ -79,7 +79,7 @@ def declaration(kind: Any) -> str:
 
 
 def leaves(variables: dict[str, tuple[Any, str]]) -> dict[str, tuple[Any, str]]:
-    """Scalars and texts by path, with the qualifier of their variable."""
+    """Scalars and strings by path, with the qualifier of their variable."""
     found = {}
     for name, (kind, qualifier) in variables.items():
         parts = kind.members if isinstance(kind, Struct) else (("", kind),)

@@ -141,7 +141,7 @@ def test_a_sample_is_of_one_moment(plc: Controller) -> None:
 @pytest.mark.parametrize(
     ("values", "code"),
     [
-        ({"Main.nobody": 1}, "unknown-variable"),
+        ({"Main.missing": 1}, "unknown-variable"),
         ({"Main.limit": 1}, "constant"),
         ({"Main.pause": "tomorrow"}, "bad-value"),
         ({"Main.points[4].x": 1}, "no-part"),

@@ -74,7 +74,7 @@ def test_retained_variables_keep_their_values_though_the_initial_ones_are_calcul
     plc.start()
     plc.run_cycles(1)
     assert [plc.read(name) for name in NAMES] == [7, 10, 3, 6, 5]
-    assert plc.read("Main.c.seen") == 4  # addresses are set anew
+    assert plc.read("Main.c.seen") == 4  # addresses are set again
 
 
 def test_a_cold_start_calculates_all_that_are_not_persistent(plc):

@@ -1,4 +1,4 @@
-"""Tasks that wait for events, on the virtual clock: each rise that a cycle leaves behind is a run."""
+"""Tasks that wait for events, on the virtual clock: each rise between the ends of two cycles is a run."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def waits(tmp_path_factory: pytest.TempPathFactory) -> BuildResult:
 
 
 def rises(first: list[int], second: list[int], ms: int) -> int:
-    """How often the bit is TRUE after a cycle and was not after the one before; A comes before B."""
+    """How often the bit is TRUE after a cycle and was not after the previous one; A comes before B."""
     due = sorted([(2 * i, 0, script) for i, script in enumerate(first)] + [(3 * i, 1, s) for i, s in enumerate(second)])
     states = [False] + [bool(script & 4) for at, _, script in due if at < ms]
     return sum(after and not before for before, after in pairwise(states))

@@ -1,4 +1,4 @@
-"""Every bit of every area, written by whoever may: two tasks, the PC over the line, a test in Python. It takes the
+"""Every bit of every area, written by all that may: two tasks, the PC over the line, a test in Python. It takes the
 value it is given and no other bit changes."""
 
 from __future__ import annotations

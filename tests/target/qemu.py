@@ -19,7 +19,7 @@ from plctool.errors import LinkError
 from plctool.link import simplecom
 from plctool.testing.children import ends_with_us
 
-FLASH_SIZE = 16 * 1024 * 1024  # of the file; what is behind the file area holds the serial number in its last 4 KiB
+FLASH_SIZE = 16 * 1024 * 1024  # of the file; after the file area it has the serial number in its last 4 KiB
 EEPROM_SIZE = 64 * 1024
 FACTORY_OFFSET = FLASH_SIZE - 4096
 START_TIMEOUT = 10.0
@@ -131,7 +131,7 @@ class Board:
         if not self.flash_file.exists():
             self.flash_file.touch()
             size = EEPROM_SIZE if machine == "lm3s6965evb" else FLASH_SIZE
-            os.truncate(self.flash_file, size)  # a sparse file: flash that nobody has erased yet
+            os.truncate(self.flash_file, size)  # a sparse file: flash that was never erased
 
     def write_flash(self, offset: int, data: bytes) -> None:
         """What the factory does, while power is off."""

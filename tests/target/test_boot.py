@@ -46,7 +46,7 @@ def test_serial_number_is_what_the_factory_wrote(make_board):
 
 @pytest.mark.skipif(IS_MPS2, reason="a board without Ethernet")
 def test_serial_number_is_the_ethernet_address(plc):
-    assert plc.identity().serial_number == "525400123456"  # QEMU's, unless told otherwise
+    assert plc.identity().serial_number == "525400123456"  # QEMU's default
 
 
 def test_first_start_is_logged_as_power_on(plc):
@@ -125,7 +125,7 @@ def types_log(port: str) -> list[str]:
 
 
 def process_status(pid: int) -> list[str]:
-    """The fields of /proc/PID/stat behind the name."""
+    """The fields of /proc/PID/stat after the name."""
     return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
 
 

@@ -231,7 +231,7 @@ def has_stopped(plc: Plc) -> bool:
 
 
 def test_two_tasks_with_real_arithmetic_do_not_disturb_each_other(plc, build) -> None:
-    """Each computes the same over and over; a register that the other one leaves behind makes it another result."""
+    """Each computes the same over and over; a register that the other one has changed makes it another result."""
     text = """
 FUNCTION Series : REAL
 VAR_INPUT

@@ -64,7 +64,7 @@ def steps() -> Iterator[Step]:
 
 
 class Vendor:
-    """Somebody who types what the guide says, in a copy of the repository."""
+    """Types what the guide says, as a user would, in a copy of the repository."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

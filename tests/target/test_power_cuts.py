@@ -3,7 +3,7 @@
 A plugin of QEMU writes down every store into the flash while a program is stopped, started, replaced, and proves
 itself. The flash after the first n stores is what a power cut there leaves; boards are started with it. Tried are all
 n in the logs of commit records and retain variables and at the end of the program, where its seal makes it count, and
-a selection in the rest of the slot, which nobody reads before. POWER_CUTS=all tries all n.
+a selection in the rest of the slot, which is not read before. POWER_CUTS=all tries all n.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Replacement:
         return flash
 
     def cuts(self) -> Iterator[Cut]:
-        """Every cut that leaves something else than the one before."""
+        """Every cut that leaves something else than the previous one."""
         slot = self.slot
         flash = bytearray(self.before)
         for n, (offset, block) in enumerate(self.stores, 1):

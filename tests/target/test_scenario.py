@@ -41,7 +41,7 @@ n := n + 1;
 END_PROGRAM
 PROGRAM Watch
 VAR
-    n, preempted, share, nobody : DINT;
+    n, preempted, share, zero : DINT;
     trip : BOOL;
 END_VAR
 VAR RETAIN
@@ -52,7 +52,7 @@ kept := kept + 1;
 IF busy THEN
     preempted := preempted + 1;
     IF trip THEN
-        share := n / nobody;
+        share := n / zero;
     END_IF
 END_IF
 END_PROGRAM
@@ -150,7 +150,7 @@ def test_from_an_empty_board_to_one_that_starts_its_program_by_itself(make_board
     # It divides by zero, in the middle of a cycle of the slow task.
     engineer.asks("write", "Watch.trip=TRUE")
     status = eventually(lambda: (now := engineer.asks("status"))["state"] == "exception" and now)
-    line = source.read_text().split("\n").index("        share := n / nobody;") + 1
+    line = source.read_text().split("\n").index("        share := n / zero;") + 1
     fault = status["exception"]
     assert (fault["name"], fault["task"], fault["pou"], fault["line"]) == ("DIVIDEBYZERO", "Fast", "Watch", line)
     entry = engineer.asks("log")["entries"][-1]

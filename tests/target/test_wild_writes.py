@@ -62,7 +62,7 @@ TARGETS: dict[str, Callable[[Board], int]] = {
     "variables": lambda board: board.address_of("tasks"),
     "initialised variables": lambda board: board.address_of("data_start"),
     "saved retain values": lambda board: board.address_of("saved_area"),
-    "behind the areas": lambda board: board.address_of("areas_end"),
+    "past the areas": lambda board: board.address_of("areas_end"),
     "main stack": lambda board: board.address_of("stack_top") - 64,
     "stack of the task below": lambda board: board.address_of("areas_start") - 64,
     "stack of a task above": lambda board: board.address_of("stacks") + STACK_SIZE // 2,

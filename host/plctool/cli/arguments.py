@@ -20,7 +20,7 @@ BENCH_CYCLES = 10000
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports wrong arguments as UsageError, like everything else that is wrong."""
+    """Reports wrong arguments as UsageError, like all other wrong use."""
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message[:1].upper()}{message[1:]}; see '{self.prog} --help'.", "usage")
@@ -29,7 +29,7 @@ class _Parser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """Reads the words after `plctool`; `command` is the name of one in the result, "" if there is none."""
     root = _Parser(prog="plctool", description="Compile IEC 61131-3 Structured Text and run it on small controllers.")
-    root.add_argument("--version", action="store_true", help="print the version and end")
+    root.add_argument("--version", action="store_true", help="print the version and exit")
     root.set_defaults(command="")
     commands = root.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
 
@@ -62,7 +62,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build.add_argument("--debug", action="store_true", help="keep the code close to its source")
     _add_warnings(build)
 
-    check = command("check", "print every diagnosis of a program")
+    check = command("check", "print every diagnostic of a program")
     _add_sources(check)
     _add_warnings(check)
 
@@ -76,12 +76,14 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     run = command("run", "run an image in this process, on a virtual clock")
     _add_image(run)
     length = run.add_mutually_exclusive_group()
-    length.add_argument("--cycles", type=_count, metavar="N", help="cycles of the first task; default: 1")
-    length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="virtual time instead")
+    length.add_argument("--cycles", type=_count, metavar="N", help="number of cycles of the first task; default: 1")
+    length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="how much virtual time, instead of cycles")
     run.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="before the first cycle; may be repeated"
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="set before the first cycle; may be repeated"
     )
-    run.add_argument("--get", action="append", default=[], metavar="NAME", help="after the last cycle; may be repeated")
+    run.add_argument(
+        "--get", action="append", default=[], metavar="NAME", help="print after the last cycle; may be repeated"
+    )
 
     test = command("test", "run the unit tests of a program in this process, on a virtual clock")
     _add_sources(test)
@@ -90,15 +92,15 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--filter",
         default="*",
         metavar="PATTERN",
-        help="only tests whose name holds this, or fits it with * and ?",
+        help="only tests whose name contains PATTERN (or matches it, with * and ?)",
     )
     test.add_argument("--junit", type=Path, metavar="FILE", help="write a report in JUnit's format as well")
     test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
     _add_warnings(test)
 
-    export = command("export-itf", "write the C header and frame for functions implemented in C")
+    export = command("export-itf", "write a C header, and a C file to fill in, for functions implemented in C")
     _add_sources(export)
-    export.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: this folder")
+    export.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: the current folder")
     export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
 
     bench = command("bench", "measure the time of a cycle on this machine")
@@ -114,7 +116,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(flash)
 
     _add_link(command("scan", "list the devices that answer"))
-    _add_link(command("status", "tell what the program on a device does"))
+    _add_link(command("status", "show the state of the program"))
     _add_link(command("start", "start the program"))
     _add_link(command("stop", "stop the program"))
     reset = command("reset", "reset the program; it is stopped afterwards")
@@ -126,12 +128,12 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(command("tasks", "show the times of the tasks"))
     _add_link(command("log", "print the log of a device"))
 
-    port = command("port-check", "check a port: run programs on a board and compare with what is expected")
+    port = command("port-check", "check a port: run programs on a board and compare the results with what is expected")
     port.add_argument("--yes", action="store_true", help="replace the program that is on the board")
-    port.add_argument("--power-cycle", action="store_true", help="ask for the board to be switched off and on, too")
+    port.add_argument("--power-cycle", action="store_true", help="also ask for the board to be switched off and on")
     port.add_argument(
         "--max-drift", type=_percent, default=0.01, metavar="PERCENT",
-        help="of its clock, default: 1; a simulated board on a busy host needs more",
+        help="largest error of its clock; default: 1; a simulated board on a busy host needs more",
     )  # fmt: skip
     _add_link(port)
 
@@ -151,13 +153,11 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     gateway.add_argument(
         "what", choices=["status", "stop"], help="status: who uses which line; stop: end it and tell its tools"
     )
-    gateway.add_argument("--port", metavar="PORT", help="of this port only; default: all of this user")
+    gateway.add_argument("--port", metavar="PORT", help="only the gateway of this port; default: all of this user")
 
 
 def _add_sources(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "sources", nargs="+", type=Path, metavar="FILE.st|DIR", help="of a folder all sources are taken"
-    )
+    parser.add_argument("sources", nargs="+", type=Path, metavar="FILE.st|DIR", help="for a folder, all sources in it")
 
 
 def _add_image(parser: argparse.ArgumentParser) -> None:
@@ -170,7 +170,11 @@ def _add_names(parser: argparse.ArgumentParser) -> None:
 
 def _add_warnings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--no-warn", action="append", default=[], metavar="NAME,...", help="without these warnings; may be repeated"
+        "--no-warn",
+        action="append",
+        default=[],
+        metavar="NAME,...",
+        help="do not report these warnings; may be repeated",
     )
     parser.add_argument("--werror", action="store_true", help="treat warnings as errors")
 
@@ -189,7 +193,7 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
         link.add_argument(f"--{scheme}", metavar=place, help="not in this version")
     link.add_argument("--node", type=int, metavar="N", help="not in this version")
     if symbols:
-        parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="when they are not found by themselves")
+        parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="if they are not found automatically")
 
 
 def _count(text: str) -> int:
@@ -209,7 +213,7 @@ def _level(text: str) -> Level:
     if text == "s":
         return "s"
     if text not in ("0", "1", "2", "3"):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a level of optimisation; use 0, 1, 2, 3 or s")
+        raise argparse.ArgumentTypeError(f"'{text}' is not an optimisation level; use 0, 1, 2, 3 or s")
     return int(text)
 
 

@@ -31,7 +31,7 @@ def examples() -> Path:
 
 
 class Story:
-    """Tells what happens, a headline a step."""
+    """Shows what happens, a headline for each step."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
@@ -68,7 +68,7 @@ def flash(story: Story, plc: Plc, image: Path) -> None:
 
 
 def show_levels(story: Story, plc: Plc, until: Callable[[dict[str, float], float], bool]) -> None:
-    """Prints the controlled level about twice a second until `until(values, seconds)` says so."""
+    """Prints the controlled level about twice a second until `until(values, seconds)` is true."""
     begin = time.monotonic()
     while True:
         values = plc.read(*SHOWN)

@@ -26,7 +26,7 @@ Texts = dict[str, str]
 
 
 class ProgramStopped(DeviceError):
-    """The program ended with an exception. `exception` is for machines, in the words of `plctool status --json`."""
+    """The program ended with an exception. `exception` is for machines, as in `plctool status --json`."""
 
     def __init__(self, exception: ExceptionInfo) -> None:
         super().__init__(f"The program stopped: {exception}.", "exception")
@@ -45,7 +45,7 @@ def build(
     debug: bool,
     warnings: WarningOptions,
 ) -> tuple[Document, list[str]]:
-    """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as people read them.
+    """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as users read them.
 
     Raises CompileError when the program has errors, UsageError when `output` would overwrite a source. Files appear
     complete or not at all.
@@ -68,7 +68,7 @@ def build(
 
 
 def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
-    """A file that is written takes the place of no source and of no symbol file. `better`: what to type instead."""
+    """A file that is written must not replace a source or a symbol file. `better`: what to type instead."""
     from plctool.compiler.source_files import SUFFIXES
 
     is_source = output.suffix.lower() in SUFFIXES or output.resolve() in {source.resolve() for source in sources}
@@ -78,7 +78,7 @@ def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
 
 
 def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, list[str]]:
-    """Every diagnosis of a program, and the names it uses that nothing declares; the texts are as people read them."""
+    """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
     from plctool.compiler import check_with_tests, load_sources
     from plctool.compiler.diagnostics import render_all
     from plctool.compiler.missing_names import Use, missing_names
@@ -96,7 +96,7 @@ def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, li
 
 
 def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:
-    """Writes the C header of the functions that are implemented in C, and a frame for them unless there is one.
+    """Writes the C header of the functions that are implemented in C, and a C file to fill in, unless there is one.
 
     Raises CompileError when the sources have errors, UsageError when no function is implemented in C.
     """
@@ -197,7 +197,7 @@ def run(
     path: Path, cycles: int | None, time_ms: int | None, sets: Mapping[str, str], gets: Sequence[str]
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
-    values as people read them.
+    values as users read them.
 
     Raises DeviceError when the program stops with an exception.
     """

@@ -133,7 +133,7 @@ def _gateway_wanted(args: argparse.Namespace) -> bool | None:
 
 
 def _me(args: argparse.Namespace) -> str:
-    """What other tools on the line are told this one is: the command and its arguments without options."""
+    """How this tool is shown to others on the line: the command and its arguments without options."""
     image = [args.image.name] if "image" in args else []
     option = [args.option] if "option" in args else []
     return " ".join(["plctool", args.command, *option, *image, *getattr(args, "names", getattr(args, "values", []))])
@@ -239,7 +239,7 @@ def _read(args: argparse.Namespace) -> int:
     with _connect(args) as plc:
         document, texts = documents.read(plc, args.names)
     if not (document["consistent"] or args.json):
-        print("plctool: a task ran meanwhile: these values are of more than one cycle.", file=sys.stderr)
+        print("plctool: a task ran during the read; the values may come from different cycles.", file=sys.stderr)
     return _show(args, document, lambda d: output.values_text(texts))
 
 
@@ -313,7 +313,7 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 
 def _show(args: argparse.Namespace, document: Document, text: Callable[[Document], str]) -> int:
-    """Prints a result for machines or for people."""
+    """Prints a result for machines or for users."""
     shown = output.as_json(document) if args.json else text(document)
     if shown:
         print(shown)
@@ -343,7 +343,7 @@ def _report(error: PlcError, as_json: bool) -> int:
             document["exception"] = exception
         print(output.as_json(document))
     else:
-        prefix = "" if hasattr(error, "diagnostics") else "plctool: "  # diagnoses begin with their place
+        prefix = "" if hasattr(error, "diagnostics") else "plctool: "  # diagnostics begin with their location
         print(f"{prefix}{error.message}", file=sys.stderr)
     return error.exit_code
 
@@ -355,7 +355,7 @@ def _internal_error(error: Exception, as_json: bool) -> int:
 
 
 def _show_every_character() -> None:
-    """What the terminal or a pipe has no character for is shown as an escape, like `\\u65e5`, and is no error."""
+    """A character that the terminal or pipe cannot show becomes an escape, like `\\u65e5`, and is not an error."""
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")
 
@@ -370,7 +370,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except BrokenPipeError:
-        # Whoever read our output has gone; nothing may be written any more, also not at exit.
+        # The reader of the output has closed it; nothing may be written any more, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_BROKEN_PIPE
 

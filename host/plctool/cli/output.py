@@ -1,4 +1,4 @@
-"""How documents look to people: short lines and aligned columns, no decoration that gets in the way of other tools."""
+"""How documents look to users: short lines and aligned columns, no decoration that disturbs other tools."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def values_text(texts: dict[str, str], separator: str = "\n") -> str:
 
 
 def table(rows: Sequence[dict[str, Any]], columns: Iterable[str]) -> str:
-    """Rows under their column names; numbers stand right."""
+    """Rows under their column names; numbers are aligned right."""
     names = list(columns)
     cells = [names, *([str(row[name]) for name in names] for row in rows)]
     widths = [max(len(line[i]) for line in cells) for i in range(len(names))]
@@ -40,7 +40,7 @@ def place_text(place: dict[str, Any]) -> str:
 
 
 def calls_text(place: dict[str, Any], column: int = 2) -> str:
-    """A line for each call that led to a place, from a column on."""
+    """A line for each call that led to a location, indented to a column."""
     return "".join(
         f"\n{'':{column}}called from {call['pou']}, {call['file']}:{call['line']}" for call in place.get("calls", [])
     )

@@ -1,7 +1,7 @@
 """What the compiler's debugging information says about a moment of the program: which calls led to it.
 
-A call that was inlined is in the DWARF tree of the function; a call that was made is on the stack, at the place that
-the call frame information (DWARF 4, 6.4) tells for each instruction.
+A call that was inlined is in the DWARF tree of the function; a call that was made is on the stack, at the location that
+the call frame information (DWARF 4, 6.4) gives for each instruction.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class _Frame:
 
 
 class DebugInfo:
-    """Reads the objects of `Linked.debug`; the tables are made at the first question."""
+    """Reads the objects of `Linked.debug`; the tables are made when first needed."""
 
     def __init__(self, objects: list[bytes]) -> None:
         self._scopes: list[tuple[int, int, int, Scope]] = []  # begin, end, depth
@@ -75,7 +75,7 @@ class DebugInfo:
             starts += [(pushed, trace.link) for pushed in range(0, _MOST_PUSHED, self._word)]
         chains = [[target - 1, *self._unwind(target - 1, pointer, trace.words)] for pointer, target in starts]
         if offset is not None and self._function(offset) >= 0 and trace.words:
-            # It makes room on the stack, over what earlier calls have left there. The highest word is no such thing.
+            # It makes room on the stack, over what earlier calls have left there. The highest word is not.
             outermost = trace.words[max(trace.words)] - 1
             chains = [chain for chain in chains if chain[-1] == outermost and self._is_possible([offset, *chain])]
         return max(chains, key=len, default=[])

@@ -1,4 +1,4 @@
-"""What a download does to PERSISTENT values, as far as the symbols of both programs tell.
+"""What a download does to PERSISTENT values, according to the symbols of both programs.
 
 The device does the same by name and type (firmware/src/app/CmpRetain.c) and counts; here the values have names.
 """
@@ -22,7 +22,7 @@ class KeptChanges:
 
 
 def kept_changes(before: Sequence[KeptName], after: Sequence[KeptName]) -> KeptChanges:
-    """Compares what the program before keeps with what the next one does."""
+    """Compares what the previous program keeps with what the new one keeps."""
     had, has = ({k.name.casefold(): k for k in program} for program in (before, after))
     wanted = {name: _why_lost(had.get(name), k) for name, k in has.items() if k.persistent}
     kept = [has[name].name for name, why in wanted.items() if not why]

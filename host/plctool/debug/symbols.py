@@ -67,9 +67,9 @@ class KeptName:
 
 @dataclass
 class SymbolTable:
-    """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry holds up to
-    the next one. `aliases`: other names of variables. `classes`: the numbers by which instances tell their class.
-    `constants`: those that have no place in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
+    """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry goes up to
+    the next one. `aliases`: other names of variables. `classes`: the numbers by which instances show their class.
+    `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
     lose."""
 
     image_crc: int
@@ -287,7 +287,7 @@ def load_symbols(path: Path) -> SymbolTable:
     except OSError as error:
         raise UsageError(f"The symbol file {path} cannot be read: {error.strerror}.", "no-symbols") from None
     except UnicodeDecodeError:
-        raise UsageError(f"{path} is no symbol file; name the .sym that build wrote.", "bad-symbols") from None
+        raise UsageError(f"{path} is not a symbol file; name the .sym that build wrote.", "bad-symbols") from None
     return SymbolTable.from_json(text, f"The symbol file {path}")
 
 

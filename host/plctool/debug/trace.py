@@ -1,4 +1,4 @@
-"""What a device tells about its stack when the application stopped."""
+"""What a device reports about its stack when the application stopped."""
 
 from __future__ import annotations
 

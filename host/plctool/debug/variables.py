@@ -1,6 +1,6 @@
 """Variables by name: the parts of a variable, what a path such as 'Main.fb.arr[3].x' or 'Main.next^.value' leads to.
 
-A path is looked up without a device: what a pointer holds is looked at when the variable is read, each time anew.
+A path is looked up without a device: the value of a pointer is looked at each time the variable is read.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _TOKEN = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]*)\]|\.(\d+)|(\^)")
 
 
 class ClassType(EnumType):
-    """The class of the instance behind an interface variable: its number in memory, its name to people."""
+    """The class of the instance that an interface variable refers to: its number in memory, its name for users."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Change:
 @dataclass(frozen=True)
 class Symbol:
     """A variable or a part of one. `offset` in bytes in the area or, when `pointer` leads to it, from there on; `bit`
-    when it is one bit of an integer; `fixed` is the content of a constant that has no place in memory."""
+    when it is one bit of an integer; `fixed` is the content of a constant that is not in memory."""
 
     name: str
     area: int
@@ -68,7 +68,7 @@ class Symbol:
 
     @property
     def place(self) -> tuple[int, int, tuple[int, ...]]:
-        """Area and offset of where the way begins, and the offset behind each pointer on it."""
+        """Area and offset of where the way begins, and the offset after each pointer on it."""
         if self.pointer is None:
             return self.area, self.offset, ()
         area, offset, hops = self.pointer.place
@@ -100,7 +100,7 @@ class Symbol:
         return self.type if self.bit is None else ELEMENTARY["BOOL"]
 
     def check_writable(self, area: int) -> None:
-        """Raises UsageError when it is a constant, since it lies in `area`, or not for us to write."""
+        """Raises UsageError if it is constant (its area is CODE) or read-only."""
         if isinstance(self.type, ClassType):
             raise UsageError(f"{self.name} is an interface variable: only the program can assign it.", "interface")
         if self.constant or area == Area.CODE.value:
@@ -142,7 +142,7 @@ class Symbol:
 @dataclass(frozen=True)
 class Units:
     """What is known of the units of a program. `classes`: the number of each class that an interface variable may refer
-    to. `temporaries`: of each unit, the variables that live only while it runs; names in small letters."""
+    to. `temporaries`: of each unit, the variables that live only while it runs; names in lower case."""
 
     classes: dict[str, int] = field(default_factory=dict)
     temporaries: dict[str, set[str]] = field(default_factory=dict)
@@ -210,7 +210,7 @@ def _member(symbol: Symbol, member: str, name: str, units: Units) -> Symbol:
 def _target(symbol: Symbol, name: str) -> Symbol:
     t = symbol.type
     if not isinstance(t, PointerType) or isinstance(t, InterfaceType):
-        raise UsageError(f"{symbol.name} is a {t} and no pointer; leave out the ^.", "no-part")
+        raise UsageError(f"{symbol.name} is a {t}, not a pointer; leave out the ^.", "no-part")
     return symbol.target(name, t.target)
 
 
@@ -269,7 +269,7 @@ class Reading:
 
     @property
     def values(self) -> dict[str, Any]:
-        """Ready for JSON. None for what is behind a pointer that leads to no variable."""
+        """Ready for JSON. None if a pointer on the way leads to no variable."""
         return {name: None if data is None else self.symbols[name].decode(data) for name, data in self.contents.items()}
 
     @property
@@ -287,7 +287,7 @@ class Reading:
 
 
 def unreachable(symbol: Symbol, read: Callable[[Symbol], bytes | None]) -> DeviceError:
-    """Says why there is no `symbol`: which of the pointers that lead to it does not. `read` gives what a pointer
+    """Says why `symbol` cannot be reached: which pointer on the way leads to no variable. `read` gives what a pointer
     holds."""
     pointer = symbol.pointer
     while pointer is not None:

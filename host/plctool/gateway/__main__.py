@@ -1,6 +1,6 @@
 """The process of a gateway: `python -m plctool.gateway LINK FOLDER`, started by the first tool (`client.py`).
 
-It says on stdout, in one line of JSON, that it serves the line or why it cannot, and lives on without a terminal.
+It reports on stdout, in one line of JSON, that it serves the line or why it cannot, and goes on without a terminal.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def _serve(place: Place, link: Link) -> None:
 
 
 def _listen(path: Path) -> socket.socket:
-    """The socket; what a killed gateway has left at its place is removed: we hold the lock."""
+    """The socket; what a killed gateway has left there is removed, which is safe with the lock."""
     with suppress(FileNotFoundError):
         path.unlink()
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -81,7 +81,7 @@ def _idle_seconds() -> float:
 
 
 def _say(document: dict[str, Any]) -> None:
-    """Tells the tool that waits, and lets go of it."""
+    """Reports to the tool that waits, and disconnects it."""
     with suppress(OSError):
         os.write(1, json.dumps(document).encode() + b"\n")
     nothing = os.open(os.devnull, os.O_RDWR)

@@ -52,8 +52,8 @@ class Ended(Exception):
 
 
 def connect_gateway(link: Link, words: str) -> GatewayConnection:
-    """A connection through the gateway of a link, which is started when it does not run. `words`: what other tools are
-    told this one is.
+    """A connection through the gateway of a link, which is started when it does not run. `words`: how this one is shown
+    to other tools.
 
     Raises NoGateway when there can be none, LinkError when the line cannot be opened or not be shared.
     """
@@ -130,7 +130,7 @@ def _start(place: Place, link: Link) -> None:
         assert process.stdout
         with process.stdout:
             line = _first_line(process.stdout.fileno(), _START_PATIENCE)
-        process.wait(_START_PATIENCE)  # only what started the gateway, which is no child of ours
+        process.wait(_START_PATIENCE)  # only what started the gateway, which is not our child process
     if line is None:
         raise _stuck(place)
     try:
@@ -160,14 +160,14 @@ def _first_line(descriptor: int, patience: float) -> bytes | None:
 
 
 def greet(pipe: Pipe, place: Place, hello: dict[str, Any], patience: float = _ANSWER_PATIENCE) -> None:
-    """Says who we are. Raises LinkError when the gateway takes no such tool, Ended when it ends."""
+    """Introduces this tool. Raises LinkError when the gateway refuses it, Ended when it ends."""
     ask(pipe, place, document_frame(Kind.HELLO, 1, {"protocol": PROTOCOL, "pid": os.getpid(), **hello}), patience)
 
 
 def ask(pipe: Pipe, place: Place, frame: Frame, patience: float = _ANSWER_PATIENCE) -> dict[str, Any]:
     """Asks the gateway something on a new pipe. Raises LinkError, and Ended when it ends."""
     try:
-        with suppress(Closed):  # it may have said something before
+        with suppress(Closed):  # it may have sent something before
             pipe.send(frame, patience)
         answer = pipe.receive(patience)
         said = answer.document
@@ -216,7 +216,7 @@ class GatewayConnection:
         self._words = words
         self._numbers = itertools.count(1)
         self._generation: int | None = None  # of the channel; None while none is open
-        self._purpose: str | None = None  # why we keep the device to ourselves
+        self._purpose: str | None = None  # why this tool keeps the device to itself
         self._pipe: Pipe | None = _attach(place, link, words)
 
     @property
@@ -295,7 +295,7 @@ class GatewayConnection:
 
     @contextmanager
     def exclusive(self, purpose: str) -> Iterator[None]:
-        """Keeps the other tools away from the device. Raises LinkError when one of them does so already."""
+        """Reserves the device for this tool. Raises LinkError when another one has reserved it."""
         self._call("claim", purpose=purpose)
         self._purpose = purpose  # also for another gateway, should this one be lost
         try:
@@ -369,11 +369,11 @@ class GatewayConnection:
             self._drop()
 
     def _answer(self, number: int, patience: float) -> Frame:
-        """The next answer to a request. Raises what has failed."""
+        """The next reply to a request. Raises what has failed."""
         while True:
             frame = self._next_frame(patience + _ANSWER_PATIENCE)
             if frame.number not in (number, GOODBYE) or frame.kind is Kind.WAIT:
-                continue  # WAIT, or the rest of a stream that was broken off
+                continue  # WAIT, or what remains of a stream that was aborted
             if frame.kind is not Kind.FAILED:
                 return frame
             if frame.number == GOODBYE:

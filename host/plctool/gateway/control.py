@@ -1,4 +1,4 @@
-"""The gateways of this user: which there are, whom they serve, and how they are ended (`plctool gateway`)."""
+"""The gateways of this user: which there are, which tools they serve, and how they are ended (`plctool gateway`)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from plctool.gateway.client import Ended, ask, connect, greet
 from plctool.gateway.frames import Kind, document_frame
 from plctool.gateway.place import Holder, NoGateway, Place, find_holder, find_place, locked, running, runtime_folder
 
-_ANSWER_PATIENCE = 3.0  # for a gateway to say a word [s]
-_END_PATIENCE = 5.0  # for a gateway to let go of its line [s]
+_ANSWER_PATIENCE = 3.0  # for the first frame of a gateway [s]
+_END_PATIENCE = 5.0  # for a gateway to close its line [s]
 _TERM_PATIENCE = 2.0  # for one that does not answer [s]
 
 
@@ -23,7 +23,7 @@ def gateways(port: str | None = None) -> list[dict[str, Any]]:
 
 
 def stop_gateways(port: str | None = None) -> list[dict[str, Any]]:
-    """Ends the gateways of this user, or the one of a port; what was ended. Tools that use one are told so.
+    """Ends the gateways of this user, or the one of a port; what was ended. Their tools get an error that says so.
 
     Raises LinkError while a program is being downloaded.
     """
@@ -40,7 +40,7 @@ def stop_gateways(port: str | None = None) -> list[dict[str, Any]]:
 
 
 def _dismiss(place: Place, only_idle: bool) -> None:
-    """Asks a gateway to end and waits until it has let go of its line. Raises LinkError, TimeoutError."""
+    """Asks a gateway to end and waits until it has closed its line. Raises LinkError, TimeoutError."""
     try:
         ends = _ask(place, {"op": "stop", "only_idle": only_idle})["ends"]
     except Ended:

@@ -2,7 +2,7 @@
 them.
 
 A frame is a head (payload size, kind, request number) and its payload. The frames HELLO and FAILED and the heads keep
-their form in every version, so that a tool and a gateway of different versions can tell each other so.
+their form in every version, so that a tool and a gateway of different versions can report that.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Kind(IntEnum):
     CALL = 2  # JSON: {"op": ...}
     EXCHANGE = 3  # Request: one message to the device
     STREAM = 4  # Request: one of several messages; AHEAD of them are sent before the first reply
-    CANCEL = 5  # the rest of a stream does not come
+    CANCEL = 5  # no more messages of a stream will come
     # From the gateway.
     DONE = 0x81  # JSON: the result of HELLO, CALL or STREAM
     REPLY = 0x82  # Reply: a message of the device
@@ -61,7 +61,7 @@ class Closed(Exception):
 @dataclass(frozen=True)
 class Frame:
     kind: Kind
-    number: int  # of the request, as the tool chose it; an answer has that of its request
+    number: int  # of the request, as the tool chose it; a reply has that of its request
     payload: bytes = b""
 
     @property
@@ -133,7 +133,7 @@ class Decoder:
         self._data = bytearray()
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames that are complete now. Raises FrameError at the first head that is wrong."""
+        """The frames that are complete now. Raises FrameError at the first invalid head."""
         self._data += data
         frames = []
         while (frame := self._next()) is not None:
@@ -217,7 +217,7 @@ class Pipe:
         """Whether the other end has closed, though there may be something left to receive. From any thread."""
         poll = select.poll()
         try:
-            poll.register(self._socket, 0)  # tells only the end
+            poll.register(self._socket, 0)  # reports only the end
         except (OSError, ValueError):
             return True
         return any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, event in poll.poll(0))
@@ -228,7 +228,7 @@ class Pipe:
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        self.shut()  # a process that was forked off meanwhile has the socket, too
+        self.shut()  # a process that was forked meanwhile has the socket, too
         self._socket.close()
 
 

@@ -64,7 +64,7 @@ def find_place(port: str) -> Place:
 
 
 def runtime_folder() -> Path:
-    """A folder that is ours alone, made when it is missing. Raises NoGateway."""
+    """A folder that only this user can use, made if it is missing. Raises NoGateway."""
     if not hasattr(socket, "AF_UNIX") or sys.platform == "win32":
         raise NoGateway("this system has no local sockets")
     failure = "no folder for it"
@@ -95,7 +95,7 @@ def _bases() -> Iterator[tuple[Path, str]]:
 
 
 def _check_ours(folder: Path) -> None:
-    """No other user may put a socket there that takes our programs."""
+    """Raises NoGateway if another user could put a socket there and so receive programs."""
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid() or status.st_mode & 0o077:
         raise NoGateway(f"{folder} is not a folder of this user alone (mode 0700)")

@@ -1,6 +1,6 @@
 """The gateway itself: takes the tools that come to its socket and serves each in a thread of its own.
 
-A thread per tool keeps them apart: whatever a tool sends, does not send or does not read stops its own thread only.
+A thread per tool keeps them apart: what a tool sends, does not send or does not read can stop its own thread only.
 All that they share is the device, for which they queue (`shared.py`).
 """
 
@@ -44,7 +44,7 @@ MAX_TOOLS = 32
 MAX_GUESTS = 2 * MAX_TOOLS  # with those that only ask about the gateway, or have not said who they are
 MAX_WORDS = 100  # of what a tool calls itself
 MAX_PATIENCE = 120.0  # seconds
-MAX_NODES = 50  # that one answer has room for
+MAX_NODES = 50  # that fit one reply
 _HELLO_PATIENCE = 5.0
 _SEND_PATIENCE = 5.0  # of a tool that does not read
 _GOODBYE_PATIENCE = 0.2
@@ -75,7 +75,7 @@ class Gateway:
         poll.register(self._listener, select.POLLIN)
         poll.register(self._woken, select.POLLIN)
         if self._line_descriptor is not None:
-            poll.register(self._line_descriptor, 0)  # tells only that the line is gone
+            poll.register(self._line_descriptor, 0)  # reports only that the line is gone
         while self._end is None and (left := self._idle_left()) > 0:
             for descriptor, event in poll.poll(None if left == math.inf else left * 1000 + 1):
                 if descriptor == self._listener.fileno():
@@ -86,7 +86,7 @@ class Gateway:
                     self.stop(f"The serial line {self.line} was lost; check the cable and try again.", _LOST)
 
     def stop(self, message: str, code: str) -> None:
-        """Makes `run` return, from any thread or signal handler. Tools are told the message."""
+        """Makes `run` return, from any thread or signal handler. Tools get the message."""
         self._end = self._end or LinkError(message, code)
         self._look()
 
@@ -96,7 +96,7 @@ class Gateway:
             self._wake.send(b"!")
 
     def end(self) -> None:
-        """Takes leave of the tools and of the device. The socket's name is gone already."""
+        """Disconnects from the tools and the device. The socket's name is gone already."""
         self._listener.close()
         goodbye = self._end or LinkError(f"The gateway of {self.line} ends; try again.", ENDING)
         with self._lock:
@@ -266,7 +266,7 @@ class _Guest:
                 case Kind.CANCEL:
                     pass  # the stream had ended when it was sent
                 case _:
-                    raise FrameError(f"{frame.kind.name} is no request")
+                    raise FrameError(f"{frame.kind.name} is not a request")
         except PlcError as error:
             self._send(_failure(frame.number, error))
             if error.code == _LOST:
@@ -323,7 +323,7 @@ class _Guest:
             raise FrameError("this is for tools that use the line")
         return self.tool
 
-    # ---- answers ----
+    # ---- replies ----
 
     def _send(self, frame: Frame) -> None:
         self._pipe.send(frame, _SEND_PATIENCE)
@@ -341,13 +341,13 @@ class _Guest:
 
 
 class _Cancelled(Exception):
-    """The tool gives up its stream."""
+    """The tool has cancelled its stream."""
 
 
 class _Source:
     """The messages of a stream, as the tool sends them, and the way back for their replies.
 
-    When the tool gives up or is gone, the stream ends at once by an exception: the device must not get the rest of a
+    When the tool gives up or is gone, the stream ends at once by an exception: the device must not get more of a
     program that is here already.
     """
 
@@ -370,7 +370,7 @@ class _Source:
             self.request = Request.decode(frame.payload)
 
     def check(self) -> None:
-        """Raises _Cancelled or Closed when the rest is not wanted any more."""
+        """Raises _Cancelled or Closed when no more is to be sent."""
         if self._pipe.is_gone():
             raise Closed
         for frame in self._pipe.look(AHEAD):
@@ -401,14 +401,14 @@ def _printable(words: object) -> str:
 def _integer(document: dict[str, Any], name: str) -> int:
     value = document.get(name)
     if not isinstance(value, int):
-        raise FrameError(f"{name} is no number")
+        raise FrameError(f"{name} is not a number")
     return value
 
 
 def _number(document: dict[str, Any], name: str) -> float:
     value = document.get(name)
     if not isinstance(value, (int, float)) or not 0 <= value < math.inf:
-        raise FrameError(f"{name} is no number")
+        raise FrameError(f"{name} is not a number")
     return float(value)
 
 

@@ -19,8 +19,8 @@ from plctool.link.connection import Connection
 from plctool.link.names import Node
 from plctool.link.session import Application, Session
 
-CLAIM_SILENCE = 30.0  # after which a tool that keeps the device to itself and asks nothing has lost it [s]
-_BEAT = 2.0  # how often a tool that waits for its turn is told that it still does [s]
+CLAIM_SILENCE = 30.0  # a tool that has reserved the device and sends nothing for so long loses it [s]
+_BEAT = 2.0  # how often a tool that waits for its turn gets WAIT again [s]
 
 
 class Turns:
@@ -72,7 +72,7 @@ class Tool:
 
 @dataclass(frozen=True)
 class Claim:
-    """`owner` keeps the device to itself. `purpose`: what the others are told, such as "downloading app.cdl"."""
+    """`owner` keeps the device to itself. `purpose`: shown to the others, such as "downloading app.cdl"."""
 
     owner: Tool
     purpose: str
@@ -143,7 +143,7 @@ class SharedDevice:
         reply: Callable[[bytes], None],
         check: Callable[[], None],
     ) -> None:
-        """Requests one after the other; `reply` gets each answer. The device is the tool's alone until the end. `check`
+        """Requests one after the other; `reply` gets each reply. No other tool has the device until the end. `check`
         is called again and again; what it raises, or `reply`, ends the stream and closes the channel."""
         with (
             self._turn(tool, generation),

@@ -61,13 +61,13 @@ class BitPattern(int):
 
 
 class LiteralError(Exception):
-    """The text is no literal; the message says why in one sentence."""
+    """Not a valid literal; the message says why in one sentence."""
 
 
 def unsigned(text: str) -> tuple[LiteralKind, Value]:
     """`12`, `1_000`, `16#FF`, `1.5e3`."""
     if not text:
-        raise LiteralError("the value behind # is missing")
+        raise LiteralError("the value after # is missing")
     if len(text) > MAX_DIGITS:
         raise LiteralError("this number is too long")
     if _UNDERSCORES.search(text):
@@ -170,7 +170,7 @@ def _clock(name: str, text: str) -> int:
 
 
 def string(text: str) -> str:
-    """The characters of a quoted text with its $ escapes resolved: of a WSTRING as UTF-16 code units when the quotes
+    """The characters of a quoted string with its $ escapes resolved: of a WSTRING as UTF-16 code units when the quotes
     are
     double."""
     wide = text.startswith('"')

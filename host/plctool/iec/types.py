@@ -326,7 +326,7 @@ class StructType(Type):
     _align: int = 1
     base: StructType | None = None
     interfaces: list[StructType] = field(default_factory=list)
-    properties: list[str] = field(default_factory=list)  # what looks like a member and is none
+    properties: list[str] = field(default_factory=list)  # what looks like a member but is not
 
     @property
     def root(self) -> StructType:
@@ -376,5 +376,5 @@ def is_scalar(t: Type) -> bool:
 
 
 def base_of(t: Type) -> Type:
-    """The elementary type behind an enum or subrange; other types are returned as they are."""
+    """The elementary type of an enum or subrange; other types are returned as they are."""
     return t.base if isinstance(t, EnumType | SubrangeType) else t

@@ -29,7 +29,7 @@ _DAY = r"(?P<y>\d{4})-(?P<mo>\d{1,2})-(?P<d>\d{1,2})"
 _CLOCK = r"(?P<h>\d{1,2}):(?P<mi>\d{1,2})(?::(?P<s>\d{1,2})(?:\.(?P<f>\d{1,9}))?)?"
 _DATE_FORMS = {"DATE": re.compile(_DAY), "TOD": re.compile(_CLOCK), "DT": re.compile(f"{_DAY}-{_CLOCK}")}
 _PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)")
-_PUNCTUATION = re.compile(r"""'(?:\$.|[^$'])*'|"(?:\$.|[^$"])*"|[][(),]""")  # texts hide what is in them
+_PUNCTUATION = re.compile(r"""'(?:\$.|[^$'])*'|"(?:\$.|[^$"])*"|[][(),]""")  # strings hide what is in them
 _REPEATED = re.compile(r"(?P<count>\d+)\s*\((?P<items>.*)\)", re.DOTALL)
 _TYPED = re.compile(r"^(?P<type>[A-Za-z]\w*)#(?P<rest>.+)$")
 
@@ -172,7 +172,9 @@ def parse_value(t: Type, text: str) -> Any:
         return _parse_struct(t, text)
     if isinstance(t, PointerType):
         if text.upper() not in ("NULL", "0"):
-            raise bad_value(text, t, "only the program gives out addresses; write NULL or what it leads to")
+            raise bad_value(
+                text, t, "only the program can take an address; write NULL, or write the variable it leads to"
+            )
         return None
     base = base_of(t)
     assert isinstance(base, Elementary)

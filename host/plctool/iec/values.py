@@ -1,7 +1,7 @@
 """Values of variables: bytes in memory <-> Python values, which are ready for JSON.
 
-TIME and dates are texts such as 'T#1s500ms', values of enumerations their names, a REAL is the number with the fewest
-digits that reads back as the same. How texts look is in `value_texts`.
+TIME and dates are strings such as 'T#1s500ms', values of enumerations their names, a REAL is the number with the fewest
+digits that reads back as the same. How strings look is in `value_texts`.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _decode_real(base: Elementary, data: bytes) -> float | str:
 
 
 def encode(t: Type, value: Any) -> bytes:
-    """The bytes of a Python value; for all but strings also of a text such as 'T#80ms' or '16#FF' (see `parse_value`).
+    """The bytes of a Python value; for all but STRINGs also of 'T#80ms' or '16#FF' (see `parse_value`).
     Raises UsageError when it does not fit the type."""
     if isinstance(t, ArrayType):
         return b"".join(encode(t.element, item) for item in _flat(t, value))
@@ -98,7 +98,9 @@ def encode(t: Type, value: Any) -> bytes:
         value = parse_value(t, value)
     if isinstance(t, PointerType):
         if value is not None:
-            raise bad_value(value, t, "only the program gives out addresses; write NULL or what it leads to")
+            raise bad_value(
+                value, t, "only the program can take an address; write NULL, or write the variable it leads to"
+            )
         return bytes(t.size)
     base = base_of(t)
     assert isinstance(base, Elementary)
@@ -126,7 +128,7 @@ def _encode_struct(t: StructType, value: Any) -> bytes:
     data = bytearray(t.size)
     for f in t.fields:
         if f.name not in value:
-            hint = "give all members one, or write single ones"
+            hint = "supply every member, or write members individually"
             raise UsageError(f"The member {f.name} of {t} has no value; {hint}.", "bad-value")
         data[f.offset : f.offset + f.type.size] = encode(f.type, value[f.name])
     return bytes(data)

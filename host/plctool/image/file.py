@@ -35,7 +35,7 @@ _MAX_NAME = 255
 
 @dataclass(frozen=True)
 class ApplicationInfo:
-    """Texts for people; `date` in seconds since 1970 (UTC), 0 when unknown."""
+    """Strings for users; `date` in seconds since 1970 (UTC), 0 when unknown."""
 
     project: str = ""
     author: str = ""

@@ -1,4 +1,4 @@
-"""The processors plctool compiles for. A target is one entry of this table; nothing else depends on a target's name."""
+"""The processors plctool compiles for. A target is one entry of this table; other code does not depend on its name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from plctool.errors import UsageError
 
 
 class Machine(Enum):
-    """Instruction sets, as far as the linker has to tell them apart."""
+    """Instruction sets, as far as the linker distinguishes them."""
 
     X86_64 = "x86_64"
     AARCH64 = "aarch64"

@@ -84,8 +84,8 @@ def _widen(varint: bytes, fill: int) -> bytes:
 
 
 def malformed(what: str) -> LinkError:
-    """The error for an answer that breaks the rules."""
-    return LinkError(f"The device sent a malformed answer ({what}); update plctool or the device.", "protocol")
+    """The error for a malformed reply."""
+    return LinkError(f"The device sent a malformed reply ({what}); update plctool or the device.", "protocol")
 
 
 class Tags:

@@ -1,6 +1,6 @@
 """The client end of a channel (codesys-v3-protocol 3): whole messages over a line that loses and damages packets.
 
-No I/O and no clock in here. Whoever drives a channel hands in received packages and the time, sends what `next_package`
+No I/O and no clock in here. The caller hands in received packages and the time, sends what `next_package`
 gives, and calls again when a package arrives or `deadline` is reached. Times are seconds, rates bytes per second.
 
 The device takes blocks in order only and asks once for the first one it misses; the reply acknowledges the request.
@@ -199,7 +199,7 @@ class Channel:
         self._heard = self._progress = now
 
     def close(self) -> None:
-        """Says good-bye; nothing answers."""
+        """Closes the channel; there is no reply."""
         if self.state is State.OPEN:
             self._control.append(_meta(_CLOSE, lib.CHANNEL_PKG_CLOSE_REQ, id=self._id, error=lib.ERR_OK))
         self._shut()
@@ -233,7 +233,7 @@ class Channel:
         self._next += 1
         block.sends += 1
         block.gone_at = self._departure(block.package, now)
-        self._heard = self._progress = now  # only from now on silence means something
+        self._heard = self._progress = now  # silence counts from now on
         self._timer = block.gone_at + self._round_trip.timeout
         self._quiet = False
         self._unpolled += 1
@@ -331,7 +331,7 @@ class Channel:
             number = _ACK.unpack(package).acknowledged
             self._receive_ack(number, now)
             if head.flags & lib.CHANNEL_FLAG_MISSING:
-                self._go_back(number, now, anew=True)
+                self._go_back(number, now, recut=True)
             else:
                 self._receive_poll_answer(number, now)
 
@@ -376,28 +376,28 @@ class Channel:
     def _receive_poll_answer(self, number: int, now: float) -> None:
         """What was sent before the oldest poll without answer and is not in this one is lost."""
         if self._quiet and self._polls and number < self._polls[0]:
-            self._go_back(number, now, anew=False)
+            self._go_back(number, now, recut=False)
         while self._polls and self._polls[0] <= number:
             self._polls.popleft()
 
-    def _go_back(self, number: int, now: float, anew: bool) -> None:
+    def _go_back(self, number: int, now: float, recut: bool) -> None:
         """The device has everything up to `number` and the next block was lost: starts again from there.
 
-        `anew`: what is in flight may be cut anew, because the device drops all of it that is still to come. That holds
-        when it has said that the block is missing and no second copy of it is under way.
+        `recut`: what is in flight may be cut again, because the device drops what of it is still to come. That
+        holds when it has reported the block as missing and no second copy of it is under way.
         """
         if not self._flight or self._flight[0].number != number + 1:
             return
         lost = self._flight[0]
         if now - lost.gone_at < self._round_trip.shortest:
-            return  # said before this copy can have arrived
+            return  # reported before this copy can have arrived
         self._losses += 1
         if self._losses > _MAX_LOSSES:
-            raise ChannelLost("The line is too bad: blocks do not arrive in many tries; check the cable.", "bad-line")
+            raise ChannelLost("Too many retries: blocks keep getting lost; check the cable.", "bad-line")
         self._error_rate.count(len(lost.package) + self._line.overhead, lost=True)
         self._next = self._unpolled = 0
         self._polls.clear()
-        if anew and lost.sends == 1:
+        if recut and lost.sends == 1:
             self._put_back()
 
     def _put_back(self) -> None:
@@ -422,7 +422,7 @@ class Channel:
                 self._ask_missing(now)
         elif self._unanswered and self._take(package[_DATA.size :], first):
             if number > self._received + 1:
-                self._answered()  # the reply before this one was lost for good
+                self._answered()  # the previous reply was lost for good
             self._received = number
             self._asked_at = -math.inf
             self._progress = now
@@ -454,7 +454,7 @@ class Channel:
         self._expected = None
         reply = bytes(self._incoming)
         if len(reply) != length or zlib.crc32(reply) != crc:
-            raise ChannelLost("An answer arrived damaged; try again.", "checksum")
+            raise ChannelLost("A reply arrived damaged; try again.", "checksum")
         self.replies.append(reply)
         self._answered()
         self._round_trip.progress()

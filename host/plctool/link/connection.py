@@ -25,7 +25,7 @@ def no_answer(name: str) -> ChannelLost:
 
 
 class MessageLink(Protocol):
-    """Whole messages to one device and back, over a line of one's own (Connection) or through a gateway."""
+    """Whole messages to one device and back, over a line of this process (Connection) or through a gateway."""
 
     @property
     def name(self) -> str:
@@ -86,7 +86,7 @@ class Connection:
         return self._channel.best_size if self._channel else 0
 
     def open(self) -> None:
-        """Opens a new channel, after a name request on the first time. Raises LinkError when nobody answers."""
+        """Opens a new channel, after a name request on the first time. Raises LinkError if no device answers."""
         if self._peer is None:
             found = self.scan(_OPEN_PATIENCE, enough=1)
             if not found:
@@ -117,7 +117,7 @@ class Connection:
     def stream(
         self, messages: Iterable[bytes], patience: float = PATIENCE, check: Callable[[], None] = lambda: None
     ) -> Generator[bytes, None, None]:
-        """Sends requests, the next one already while the device works on the one before, and yields the replies.
+        """Sends requests, the next one already while the device works on the previous one, and yields the replies.
 
         On a bad line there may be fewer replies than requests, but never none to the last one. When the stream is left
         before its end the channel is closed, so that the device gets no more of it. `check` is called again and again
@@ -136,7 +136,7 @@ class Connection:
                 while channel.replies:
                     yield channel.replies.popleft()
         finally:
-            if channel.outstanding:  # left on the way: whatever is still to come is of no use
+            if channel.outstanding:  # the caller has stopped: further replies are of no use
                 self._drop_channel()
 
     def scan(self, seconds: float = SCAN_SECONDS, enough: int = 0) -> list[names.Node]:

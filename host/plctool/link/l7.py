@@ -56,7 +56,7 @@ def decode_reply(data: bytes, request: Message) -> bintag.Tags:
     """The elements of the reply to `request`. Raises DeviceError when the service was refused."""
     reply = decode(data)
     if (reply.group, reply.service) != (request.group | lib.L7_REPLY, request.service):
-        raise LinkError("The device answered another request than the one sent.", "protocol")
+        raise LinkError("The reply of the device is not for the request that was sent.", "protocol")
     tags = bintag.decode(reply.content)
     if tags.find(lib.TAG_ERROR) is not None:
         check_result(tags.u16(lib.TAG_ERROR), f"service {request.group}/0x{request.service:X}")

@@ -22,8 +22,8 @@ _ALL_BITS = 0xFF
 
 @dataclass(frozen=True)
 class AreaRange:
-    """`size` bytes of memory area `area` (APP_AREA_*) from `offset` on. With `hops` a pointer lies there, and it is
-    `hops[0]` bytes on from where that leads, and so on."""
+    """`size` bytes of memory area `area` (APP_AREA_*) from `offset` on. With `hops` a pointer is there; the value is
+    `hops[0]` bytes after where that leads, and so on."""
 
     area: int
     offset: int
@@ -156,7 +156,7 @@ def _read_batch(session: Session, image_crc: int, batch: Sequence[AreaRange]) ->
 
 
 def _leads_nowhere(piece: AreaRange, error: int) -> bool:
-    """Whether the value of a pointer is the reason of an error."""
+    """Whether the value of a pointer is the reason for an error."""
     outside = (lib.MONITORING_ERR_INVALID_POINTER, lib.MONITORING_ERR_INVALID_INDEX)
     return bool(piece.hops) and error in outside
 

@@ -55,7 +55,7 @@ def encode(packet: Packet) -> bytes:
 
 
 def decode(data: bytes) -> Packet | None:
-    """The packet in `data`; None when malformed or nothing for an end node (router signals, relative addresses)."""
+    """The packet in `data`; None if malformed or not for an end node (router signals, relative addresses)."""
     if len(data) < _HEADER.size:
         return None
     head = _HEADER.unpack(data)

@@ -36,7 +36,7 @@ class SerialTransport:
         return time.monotonic()
 
     def fileno(self) -> int | None:
-        """None for a URL that has no such thing."""
+        """None for a URL that has none."""
         with suppress(AttributeError, OSError):  # io.UnsupportedOperation is an OSError
             return int(self._port.fileno())
         return None
@@ -90,8 +90,8 @@ def _advice(error: OSError) -> str:
         errno.EACCES: "permission denied; add yourself to the port's group (often dialout) and log in again.",
         errno.EBUSY: "another program uses it; close that one first.",
         errno.EAGAIN: "another program uses it; close that one first.",
-        errno.EISDIR: "it is no serial port; name one such as /dev/ttyS0.",
-        errno.ENOTTY: "it is no serial port; name one such as /dev/ttyS0.",
+        errno.EISDIR: "it is not a serial port; name one such as /dev/ttyS0.",
+        errno.ENOTTY: "it is not a serial port; name one such as /dev/ttyS0.",
     }
     return advice.get(_errno(error), f"{error}.")
 

@@ -76,7 +76,7 @@ class AppException:
 
     @staticmethod
     def of(code: int, code_offset: int, task: int, trace: Trace) -> AppException:
-        """From what the device has for it (APP_EXCEPTION)."""
+        """From an APP_EXCEPTION of the device."""
         return AppException(code, None if code_offset == lib.APP_NO_CODE_OFFSET else code_offset, task, trace)
 
     @property
@@ -144,7 +144,7 @@ def read_identity(session: Session) -> Identity:
 
 
 def read_stack(session: Session) -> Stack | None:
-    """What the main stack has left; None from a device that does not tell."""
+    """What the main stack has left; None if the device does not report it."""
     tags = session.recover(lambda: session.call(lib.SG_DEVICE, lib.SRV_DEV_GET_TARGET_IDENT))
     if tags.find(lib.TAG_DEV_STACK) is None:
         return None
@@ -245,11 +245,11 @@ _BLOCK_ALIGN = 16  # flash is written best in whole program units
 
 
 def download(
-    session: Session, image: bytes, afresh: bool = False, progress: Callable[[int], None] = lambda done: None
+    session: Session, image: bytes, restart: bool = False, progress: Callable[[int], None] = lambda done: None
 ) -> None:
     """Sends an image; the device checks it and makes it its application, stopped.
 
-    Continues a transfer of the same image that was broken off, also by itself after the channel was lost; `afresh`
+    Continues an aborted transfer of the same image, also automatically after the channel was lost; `restart`
     begins at the first byte in any case. `progress` is called with the bytes that have arrived. Raises DeviceError with
     the device's reason when it refuses the image; its old application is untouched then.
     """
@@ -258,8 +258,8 @@ def download(
     while True:
         arrived = transfer.arrived
         try:
-            start_at = 0 if afresh else transfer.ask()
-            afresh = False
+            start_at = 0 if restart else transfer.ask()
+            restart = False
             if start_at < len(image):
                 transfer.run(start_at)
             session.forget_application()

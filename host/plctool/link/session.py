@@ -1,4 +1,4 @@
-"""A login on a device, renewed by itself when the channel was lost."""
+"""A login on a device, renewed automatically when the channel was lost."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Session:
         return self._application
 
     def forget_application(self) -> None:
-        """To be called when the application on the device may have become another one."""
+        """To be called when the application on the device may have changed."""
         self._application = None
 
     @property
@@ -83,8 +83,8 @@ class Session:
         return self._application.session if self._application else 0
 
     def exclusive(self, purpose: str) -> AbstractContextManager[None]:
-        """Keeps other tools of this machine away from the device. `purpose`, such as "downloading app.cdl", is what
-        they are told. A line of our own has no other tools."""
+        """Reserves the device: other tools of this machine must wait. `purpose`, such as "downloading app.cdl", is
+        shown to them. Without a gateway there are no other tools."""
         return nullcontext()
 
     def recover(self, action: Callable[[], _T], repeatable: bool = True) -> _T:

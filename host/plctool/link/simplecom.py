@@ -1,6 +1,6 @@
 """Serial framing: router packets as `#<` escaped(packet, CRC-16) `#>` (codesys-v3-protocol 1.3).
 
-Inside a frame every `#` is sent as `#_`, so `#<` and `#>` appear nowhere else and a receiver finds its place again
+Inside a frame every `#` is sent as `#_`, so `#<` and `#>` appear nowhere else and a receiver is in step again
 after any damage. The CRC is sent low byte first.
 """
 

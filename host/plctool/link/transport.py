@@ -16,7 +16,7 @@ class BlockTransport(Protocol):
     local_address: bytes  # router address of this end
     max_packet: int  # longest packet it takes and gives, in bytes
     packet_overhead: int  # bytes the line carries for a packet besides the packet itself
-    byte_rate: float  # bytes the line carries per second; math.inf when it is not known or no matter
+    byte_rate: float  # bytes the line carries per second; math.inf if unknown or irrelevant
 
     def send(self, packet: bytes) -> None:
         """Queues a packet; raises LinkError when the line is gone."""
@@ -25,7 +25,7 @@ class BlockTransport(Protocol):
         """The next packet, None after `timeout` seconds without one; raises LinkError when the line is gone."""
 
     def fileno(self) -> int | None:
-        """What poll tells by that packets come, or that the line is gone; None if there is no such thing."""
+        """The file descriptor that poll watches for packets, or for the loss of the line; None if there is none."""
 
     def now(self) -> float:
         """Monotonic time in seconds; virtual for virtual lines."""

@@ -19,7 +19,7 @@ LATER = {"can": "INTERFACE:CHANNEL", "udp": "HOST[:PORT]", "tcp": "HOST[:PORT]"}
 
 @dataclass(frozen=True)
 class Option:
-    """Something a link may say besides its place, for people `help`. `parse` raises ValueError for what is not a value
+    """An option of a link, described by `help`. `parse` raises ValueError for what is not a value
     of it."""
 
     default: Value

@@ -34,7 +34,7 @@ def run_port_check(
     `replace`: also when there is an application on the controller, which is lost. `power_cycle` returns when the
     controller was without power and is on again; without it that check is left out. `max_drift`: share by which the
     controller's clock may differ from the host's. Raises UsageError when the application may not be replaced or the
-    controller has a processor plctool does not compile for, LinkError when nobody answers.
+    controller has a processor plctool does not compile for, LinkError if no device answers.
     """
     plc = connect()
     try:

@@ -1,4 +1,4 @@
-"""The bench of the port check: a controller under test, programs for it, and what it can tell about them."""
+"""The bench of the port check: a controller under test, programs for it, and what it reports about them."""
 
 from __future__ import annotations
 
@@ -74,11 +74,11 @@ class Bench:
         self.plc = self._connect()
 
     def flash(self, text: str) -> FlashResult:
-        """Builds a program and starts it afresh, with its initial values."""
+        """Builds a program and starts it with its initial values."""
         return self.plc.flash(self.build(text), force=True)
 
     def build(self, text: str) -> Path:
-        """The image of a program; its symbols lie beside it."""
+        """The image of a program; its symbols are beside it."""
         from plctool.compiler import compile_sources
         from plctool.debug.symbols import symbol_path
 
@@ -131,7 +131,7 @@ class Bench:
     # ---- waiting ----
 
     def wait(self, question: Callable[[], bool], what: str, patience: float = PATIENCE) -> float:
-        """Asks until the answer is yes; the seconds that took. Fails with `what` when patience is over."""
+        """Asks until the condition holds; returns the seconds it took. Fails with `what` when patience is over."""
         begin = time.monotonic()
         while not question():
             if time.monotonic() - begin > patience:
@@ -140,7 +140,7 @@ class Bench:
         return time.monotonic() - begin
 
     def wait_until_it_runs(self, cycles: int = 3) -> None:
-        """Waits for so many cycles; without monitoring the controller's word has to do."""
+        """Waits for so many cycles; without monitoring, for the state that the controller reports."""
         if self.has_monitoring:
             self.wait(lambda: bool(self.plc.read(_CYCLES) >= cycles), "The program does not run: no cycles")
         elif (state := self.plc.status().state) is not AppState.RUN:

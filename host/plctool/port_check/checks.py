@@ -222,7 +222,7 @@ class Checks:
         return f"retain variable {value}", {"value": value}
 
     def warm_reset(self) -> Result:
-        """Retain variables stay, others start afresh."""
+        """Retain variables stay, others have their initial values again."""
         self._flash_retain()
         self._plc.reset("warm")
         if (count := self._bench.cycles()) != 0:
@@ -272,7 +272,7 @@ class Checks:
         return f"{found.name} in {place} after {seconds:.2f} s; runs again", figures
 
     def _has_failed(self) -> bool:
-        """An endless loop may keep the controller from answering until it is broken."""
+        """An endless loop may keep the controller from answering until it is aborted."""
         with suppress(LinkError):
             return self._plc.status().state is AppState.EXCEPTION
         return False
@@ -304,7 +304,7 @@ END_FUNCTION
         """What all this has left of the main stack."""
         stack = self._plc.stack()
         if stack is None:
-            raise NotAvailable("the controller does not tell what its stack has left")
+            raise NotAvailable("the controller does not report what is left of its stack")
         share = stack.unused / stack.size
         figures = {"size": stack.size, "unused": stack.unused, "unused_share": round(share, 3)}
         text = f"{stack.unused} of {stack.size} bytes of the main stack were never used"
@@ -321,7 +321,7 @@ END_FUNCTION
 
 
 def _host_load() -> str:
-    """What to say of a host that has more to do than it can; "" of others."""
+    """The remark on a host that is overloaded; "" for others."""
     load, processors = os.getloadavg()[0], os.cpu_count() or 1
     if load <= processors:
         return ""
@@ -329,6 +329,6 @@ def _host_load() -> str:
 
 
 def _padded(units: int) -> str:
-    """A program that is longer the more `units`, and tells them."""
+    """A program that is longer the more `units`, and reports them."""
     lines = "\n".join(f"x := (x XOR {i * 7919 + 1}) * {2 * i + 3};" for i in range(units))
     return program(f"VAR x : DINT; units : DINT := {units}; END_VAR", lines)

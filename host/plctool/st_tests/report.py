@@ -1,4 +1,4 @@
-"""What became of the tests: for programs, for people, and for continuous integration."""
+"""What became of the tests: for programs, for users, and for continuous integration."""
 
 from __future__ import annotations
 

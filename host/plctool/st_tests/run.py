@@ -36,18 +36,17 @@ _COMPARED = {"ASSERT_GT": "> ", "ASSERT_GE": ">= ", "ASSERT_LT": "< ", "ASSERT_L
 _EXCEPTIONS = {
     lib.RTSEXCPT_DIVIDEBYZERO: "division by zero",
     lib.RTSEXCPT_ARRAYBOUNDS: "an index or value is out of bounds",
-    lib.RTSEXCPT_ACCESS_VIOLATION: "access to memory that is not there, perhaps through a NULL pointer",
-    lib.RTSEXCPT_WATCHDOG: "this takes too long, perhaps it is an endless loop",
+    lib.RTSEXCPT_ACCESS_VIOLATION: "access to memory that does not exist, perhaps through a NULL pointer",
+    lib.RTSEXCPT_WATCHDOG: "the test takes too long, perhaps in an endless loop",
     lib.RTSEXCPT_STACK_OVERFLOW: "the stack is too small for this",
-    lib.RTSEXCPT_UNRESOLVED_EXTREFS: "this function is implemented in C and not here; mock it with MOCK_FUNCTION",
+    lib.RTSEXCPT_UNRESOLVED_EXTREFS: "this function is implemented in C on the device; mock it with MOCK_FUNCTION",
 }
 
 
 def run_tests(
     paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0, warnings: WarningOptions = ALL_WARNINGS
 ) -> Report:
-    """Runs the tests in sources whose name fits `pattern`: with * and ? all of it, else it holds the pattern; upper and
-    lower case are the same.
+    """Runs the tests in sources whose name matches `pattern` (with * and ?) or contains it; case does not matter.
 
     `level`: optimisation; the lowest compiles fastest, and the results are the same. Raises CompileError when the
     program has errors, UsageError when there are no tests.
@@ -61,7 +60,7 @@ def run_tests(
         raise CompileError([d for d in checked.diagnostics if d.severity == "error"], sources)
     chosen = [i for i, case in enumerate(suite.cases) if _fits(case.name.casefold(), pattern.casefold())]
     if not chosen:
-        what = f"no test fits '{pattern}'" if suite.cases else "there are no tests: write TEST 'name' ... END_TEST"
+        what = f"no test matches '{pattern}'" if suite.cases else "there are no tests: write TEST 'name' ... END_TEST"
         raise UsageError(f"{what[:1].upper()}{what[1:]}.", "no-tests")
     here = f"{platform.machine()}-linux"
     target = find_target(here if here in TARGETS else DEFAULT_TARGET)
@@ -115,7 +114,7 @@ class _Bench:
         self._plc.run_cycles(1)
 
     def _continue(self, number: int) -> None:
-        """Runs what has this number on the variables as they are after an exception."""
+        """Runs the test with this number on the variables as they are after an exception."""
         areas = {lib.AppGetAreaAddress(area.value, 0, size): size for area, size in self._sizes.items() if size}
         kept = {address: bytes(ffi.buffer(address, size)) for address, size in areas.items()}
         self._plc.reset("cold")

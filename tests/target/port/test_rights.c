@@ -64,7 +64,7 @@ static void store_four_words(void *arg)
                      : "r0", "r1", "r2", "r3", "memory");
 }
 
-/* With the stack pointer behind it: then it is the frame of the fault that has no room. */
+/* With the stack pointer just above it: then it is the frame of the fault that has no room. */
 static void push_there(void *arg)
 {
     const STORE *store = arg;

@@ -213,7 +213,7 @@ static void call_that_does_not_come_is_noticed(void)
 {
     RTS_HANDLE timer;
     CHECK_EQUAL(SysTimerCreate(on_fast, &fast, 500, 5, &timer), ERR_OK);
-    CHECK_EQUAL(SysTimersWork(), 1); /* nobody waits for one that is stopped */
+    CHECK_EQUAL(SysTimersWork(), 1); /* a stopped timer is not waited for */
     SysTimerStart(timer);
     wait_ms(3);
     CHECK_EQUAL(SysTimersWork(), 1);
