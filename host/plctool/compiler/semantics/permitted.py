@@ -198,7 +198,7 @@ def _given(decl: ast.PouDecl) -> int:
 def _kind(decl: ast.PouDecl) -> str:
     if "CLASS" in decl.modifiers:
         return "CLASS"
-    return "PROPERTY" if decl.keyword in ("GET", "SET") else decl.keyword
+    return "PROPERTY" if decl.is_property else decl.keyword
 
 
 def _with_article(kind: str) -> str:

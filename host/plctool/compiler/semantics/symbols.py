@@ -199,7 +199,7 @@ class Member:
     @property
     def is_property(self) -> bool:
         """Whether it reads or writes a property."""
-        return self.decl.keyword in ("GET", "SET")
+        return self.decl.is_property
 
     @property
     def abstract(self) -> bool:

@@ -307,6 +307,17 @@ class PouDecl:
         """With the namespace in front."""
         return f"{self.namespace.name}.{self.name}" if self.namespace and self.namespace.name else self.name
 
+    @property
+    def is_property(self) -> bool:
+        """Whether it reads or writes a property of the unit it is in."""
+        return self.keyword in ("GET", "SET")
+
+    @property
+    def member_key(self) -> str:
+        """Under which it is found among the members of a unit; a property has two."""
+        name = self.name.casefold()
+        return f"{name}.{self.keyword.lower()}" if self.is_property else name
+
 
 @dataclass(slots=True, eq=False)
 class StepAction:

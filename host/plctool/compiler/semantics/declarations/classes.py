@@ -29,17 +29,10 @@ from plctool.compiler.semantics.symbols import (
     VarSymbol,
 )  # fmt: skip
 from plctool.compiler.semantics.world import World
-from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
 from plctool.iec.types import CLASS_NUMBER, UDINT, EnumType, Field, InterfaceType, Keep, StructType
 
 _LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
-
-
-def _member_key(decl: ast.PouDecl) -> str:
-    """Under which a member is found; a property has two."""
-    name = decl.name.casefold()
-    return f"{name}.{decl.keyword.lower()}" if decl.keyword in ("GET", "SET") else name
 
 
 def _named(interfaces: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
@@ -140,7 +133,7 @@ class Classes:
 
     def _add_members(self, cls: ClassInfo) -> None:
         for decl in cls.symbol.decl.members:
-            key = _member_key(decl)
+            key = decl.member_key
             if key in cls.members:
                 pos = decl.source.pos(decl.pos)
                 self._world.diagnostics.error(pos, "duplicate", f"{cls.name} has a {decl.keyword} {decl.name} already")
@@ -265,7 +258,7 @@ class Classes:
         scope.pou, scope.cls, scope.outer = pou, cls, cls.names
         if decl.namespace is not None:
             scope.use(decl.namespace.using)
-        scope.names.update(cls.instance_variables.get(_member_key(decl), {}))
+        scope.names.update(cls.instance_variables.get(decl.member_key, {}))
         self._functions.signature(info, decl, scope)
         if not member.abstract:
             self._world.bodies.add(scope, decl)
