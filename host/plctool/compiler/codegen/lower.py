@@ -15,6 +15,7 @@ from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
 from plctool.compiler.codegen.partition import texts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import CONTEXT, SELF, handed_inputs, parameter_list
+from plctool.compiler.internal import note_position
 from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
 from plctool.iec.areas import Area
@@ -55,7 +56,12 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     done = chosen = 0
     while done < len(unit.pous) or chosen < len(unit.dispatchers):
         if done < len(unit.pous):
-            _pou(unit, list(unit.pous)[done], effects)
+            pou = list(unit.pous)[done]
+            try:
+                _pou(unit, pou, effects)
+            except Exception as error:
+                note_position(error, pou.pos)
+                raise
             done += 1
         else:
             dispatch, name = list(unit.dispatchers.items())[chosen]

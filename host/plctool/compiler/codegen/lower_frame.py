@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import NULL, Function, Value, number
 from plctool.compiler.codegen.lower_unit import RAISE, Check, Unit, value_type
+from plctool.compiler.internal import note_position
 from plctool.compiler.typed import Expr, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
 from plctool.iec.areas import Area
@@ -87,15 +88,22 @@ class Frame:
 
     def value(self, e: Expr) -> Value:
         """The operand that holds the value of a scalar expression."""
-        return VALUES[type(e)](self, e)
+        return self._written(VALUES, e)
 
     def ref(self, place: Place) -> Ref:
         """The address of a place; writes the instructions and checks that it takes."""
-        return REFS[type(place)](self, place)
+        return self._written(REFS, place)
 
     def aggregate(self, e: Expr) -> Ref:
         """Where the value of a string, array or struct expression lies; valid until the end of the statement."""
-        return AGGREGATES[type(e)](self, e)
+        return self._written(AGGREGATES, e)
+
+    def _written(self, table: dict[type, Callable[[Frame, Any], Written]], node: Expr | Place) -> Written:
+        try:
+            return table[type(node)](self, node)
+        except Exception as error:
+            note_position(error, node.pos)
+            raise
 
     # ---- context ----
 
@@ -267,7 +275,11 @@ class Body(Frame):
         for statement in body:
             self.release_temporaries()
             self.at(statement.pos)
-            STATEMENTS[type(statement)](self, statement)
+            try:
+                STATEMENTS[type(statement)](self, statement)
+            except Exception as error:
+                note_position(error, statement.pos)
+                raise
 
 
 VALUES: dict[type, Callable[[Frame, Any], Value]] = {}
