@@ -99,7 +99,7 @@ class Mocks:
             members.append(_member(member, name, chosen=chosen and member.keyword in ("METHOD", "GET")))
         blocks = [*decl.blocks, ast.VarBlock(pos, "VAR", set(), lines)] if lines else decl.blocks
         skip = ast.If(pos, [(ast.Name(pos, MOCKED), [_counted(pos, CALLS), ast.Return(pos)])], [])
-        body = decl.body if "CLASS" in decl.modifiers else [skip, *decl.body]
+        body = decl.body if ast.Modifier.CLASS in decl.modifiers else [skip, *decl.body]
         return replace(decl, blocks=blocks, body=body, members=members)
 
     # ---- functions ----
@@ -127,7 +127,7 @@ class Mocks:
 
 def _member(decl: ast.PouDecl, name: str, *, chosen: bool) -> ast.PouDecl:
     """A method, action or property. `chosen`: it has members of its own."""
-    if "ABSTRACT" in decl.modifiers or decl.name.casefold() in INITIALISERS:
+    if ast.Modifier.ABSTRACT in decl.modifiers or decl.name.casefold() in INITIALISERS:
         return decl
     pos = decl.pos
     condition: ast.Expr = ast.Name(pos, MOCKED)

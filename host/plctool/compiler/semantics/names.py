@@ -45,7 +45,7 @@ class PlannedInstance:
 
     name: str
     symbol: PouSymbol
-    qualifiers: frozenset[str] = frozenset()
+    qualifiers: frozenset[ast.Modifier] = frozenset()
 
 
 class Names:

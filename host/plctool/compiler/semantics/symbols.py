@@ -79,7 +79,7 @@ class VarSymbol:
     given: bool = False  # has an initial value of its own
     by_reference: bool = False
     used: bool = False
-    access: str = ""  # PUBLIC, PRIVATE, PROTECTED or INTERNAL, where it is written
+    access: ast.Modifier | None = None  # PUBLIC, PRIVATE, PROTECTED or INTERNAL, where it is written
     keep: Keep = Keep.UNSAID  # what the section of a member says
     is_path: bool = False  # starts with the path of its instance
     group: str = ""  # ANY_... of a parameter that describes its argument (any_values.py)
@@ -94,7 +94,7 @@ class GlobalSymbol:
     full_name: str
     pos: int
     decl: ast.VarDecl
-    qualifiers: set[str]
+    qualifiers: set[ast.Modifier]
     source: Source
     symbol: VarSymbol | None = None
     busy: bool = False
@@ -204,7 +204,7 @@ class Member:
     @property
     def abstract(self) -> bool:
         """Whether it has no body."""
-        return "ABSTRACT" in self.decl.modifiers or self.owner.is_interface
+        return ast.Modifier.ABSTRACT in self.decl.modifiers or self.owner.is_interface
 
 
 @dataclass(slots=True, eq=False)
@@ -231,7 +231,7 @@ class ClassInfo:
     @property
     def abstract(self) -> bool:
         """Whether only derived blocks have instances."""
-        return "ABSTRACT" in self.symbol.decl.modifiers or self.is_interface
+        return ast.Modifier.ABSTRACT in self.symbol.decl.modifiers or self.is_interface
 
     def all_interfaces(self) -> list[ClassInfo]:
         """Those named, those that they extend, those of the base."""

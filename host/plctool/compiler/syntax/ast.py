@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import TypeVar
 
 from plctool.compiler.source import Source
@@ -229,6 +230,23 @@ TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | Struc
 # ---- declarations --------------------------------------------------------------------------------------------------
 
 
+class Modifier(StrEnum):
+    """A word in front of the name of a unit or type, or behind the keyword of a section: there it is a qualifier."""
+
+    PUBLIC = "PUBLIC"
+    PRIVATE = "PRIVATE"
+    PROTECTED = "PROTECTED"
+    INTERNAL = "INTERNAL"
+    FINAL = "FINAL"
+    ABSTRACT = "ABSTRACT"
+    OVERRIDE = "OVERRIDE"
+    CLASS = "CLASS"  # of a FUNCTION_BLOCK that is one
+    CONSTANT = "CONSTANT"
+    RETAIN = "RETAIN"
+    NON_RETAIN = "NON_RETAIN"
+    PERSISTENT = "PERSISTENT"
+
+
 @dataclass(slots=True, eq=False)
 class VarDecl:
     """One declaration line: `names AT location : type edge := init`; `edge` is R_EDGE, F_EDGE or ""."""
@@ -244,11 +262,11 @@ class VarDecl:
 
 @dataclass(slots=True, eq=False)
 class VarBlock:
-    """`VAR_INPUT RETAIN ... END_VAR`; `keyword` and `qualifiers` in capitals."""
+    """`VAR_INPUT RETAIN ... END_VAR`; `keyword` in capitals."""
 
     pos: int
     keyword: str
-    qualifiers: set[str]
+    qualifiers: set[Modifier]
     decls: list[VarDecl]
 
 
@@ -263,7 +281,7 @@ class TypeDecl:
     source: Source
     namespace: Namespace | None = None
     attributes: dict[str, str] = field(default_factory=dict)
-    modifiers: set[str] = field(default_factory=set)  # PUBLIC, INTERNAL
+    modifiers: set[Modifier] = field(default_factory=set)  # PUBLIC, INTERNAL
 
     @property
     def qualified(self) -> bool:
@@ -295,7 +313,7 @@ class PouDecl:
     body: list[Stmt]
     attributes: dict[str, str]
     source: Source
-    modifiers: set[str] = field(default_factory=set)  # PUBLIC, FINAL ... in capitals
+    modifiers: set[Modifier] = field(default_factory=set)  # PUBLIC, FINAL ...
     bases: list[tuple[int, str]] = field(default_factory=list)  # EXTENDS
     interfaces: list[tuple[int, str]] = field(default_factory=list)  # IMPLEMENTS
     members: list[PouDecl] = field(default_factory=list)
@@ -391,7 +409,7 @@ class ProgramInstance:
     type_pos: int
     type_name: str
     args: list[Argument]
-    qualifiers: set[str]
+    qualifiers: set[Modifier]
 
 
 @dataclass(slots=True, eq=False)

@@ -29,6 +29,7 @@ from plctool.compiler.semantics.symbols import (
     VarSymbol,
 )  # fmt: skip
 from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
 from plctool.iec.types import CLASS_NUMBER, UDINT, EnumType, Field, InterfaceType, Keep, StructType
 
@@ -98,7 +99,7 @@ class Classes:
             info = self._world.declared.block(base)
             if info is None:
                 scope.error(offset, "recursion", f"{symbol.decl.name} extends itself: {self._hierarchy.circle(symbol)}")
-            elif "FINAL" in base.decl.modifiers:
+            elif ast.Modifier.FINAL in base.decl.modifiers:
                 scope.error(offset, "inheritance", f"{name} is FINAL and cannot be extended")
             return info
         if isinstance(base, PouSymbol) and base.keyword == "INTERFACE":
@@ -128,7 +129,9 @@ class Classes:
         if inherited is not None:
             defaults.update(inherited.members)
         assert info.cls is not None and base.cls is not None
-        private = {k for k, s in base.cls.names.items() if isinstance(s, VarSymbol) and s.access == "PRIVATE"}
+        private = {
+            k for k, s in base.cls.names.items() if isinstance(s, VarSymbol) and s.access is ast.Modifier.PRIVATE
+        }
         info.cls.names.update((k, s) for k, s in base.cls.names.items() if k not in private)
 
     def _add_members(self, cls: ClassInfo) -> None:
@@ -174,7 +177,7 @@ class Classes:
         inherited = cls.base.block.members if cls.base is not None and cls.base.block is not None else {}
         own = {member.decl.name.casefold() for member in cls.members.values()}
         for key, symbol in info.members.items():
-            known = inherited.get(key) is symbol and (symbol.access == "PRIVATE" or key not in own)
+            known = inherited.get(key) is symbol and (symbol.access is ast.Modifier.PRIVATE or key not in own)
             if "." not in key and not known:
                 self._see(cls, key, symbol)
         cls.names.update(scope.edges)

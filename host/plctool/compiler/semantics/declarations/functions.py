@@ -156,7 +156,7 @@ class Functions:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=default)
                 symbol.given, symbol.by_reference, symbol.used = line.init is not None, by_reference, True
-                symbol.constant = "CONSTANT" in block.qualifiers
+                symbol.constant = ast.Modifier.CONSTANT in block.qualifiers
                 if not scope.declare(symbol, offset):
                     continue
                 storage = Storage.REFERENCE if by_reference else Storage.LOCAL

@@ -32,7 +32,7 @@ _KEEPING = {
 
 def _holds_constants(block: ast.VarBlock) -> bool:
     """Whether what a block declares has one value for ever. CONSTANT parameters are only read-only."""
-    return "CONSTANT" in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL", "VAR_INST")
+    return ast.Modifier.CONSTANT in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL", "VAR_INST")
 
 
 def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.VarDecl, Role]]:
@@ -132,7 +132,7 @@ class UnitVariables:
                 symbol = self._world.declared.variable(found)
                 if ERROR not in (t, symbol.type) and t != symbol.type:
                     scope.error(offset, "type", f"the VAR_GLOBAL {name} is of type {symbol.type}, not {t}")
-                if "CONSTANT" in block.qualifiers:
+                if ast.Modifier.CONSTANT in block.qualifiers:
                     symbol = replace(symbol, constant=True)
                 scope.names[name.casefold()] = symbol
 
