@@ -79,6 +79,26 @@ def bench_serial() -> None:
         line(f"{name}, {len(result.image)} bytes, to running", f"{seconds:.2f} s", f"{share:.1%} of the line")
 
 
+# ---- network ---------------------------------------------------------------------------------------------------------
+
+
+def bench_network() -> None:
+    print("\nFlashing on this machine, as fast as the tool and plcrt are")
+    result = build(large_program(4000))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bench.cdl"
+        path.write_bytes(result.image)
+        for kind in ("serial", "tcp", "udp"):
+            with Plcrt(Path(folder) / f"{kind}.flash", "--tcp", "0", "--udp", "127.11.74.0") as runtime:
+                place = {"serial": runtime.port, "tcp": runtime.tcp, "udp": runtime.udp}[kind]
+                with plctool.connect(f"{kind}:{place}", gateway=False) as plc:
+                    plc.identity()
+                    begin = time.monotonic()
+                    plc.flash(path, start=False)
+                    seconds = time.monotonic() - begin
+            line(f"{kind}, {len(result.image)} bytes", f"{len(result.image) / seconds / 1e6:.1f} MB/s")
+
+
 # ---- cycles --------------------------------------------------------------------------------------------------------
 
 
@@ -186,6 +206,7 @@ def main() -> None:
     overheads.main()
     bench_day()
     bench_serial()
+    bench_network()
 
 
 if __name__ == "__main__":

@@ -29,6 +29,11 @@ bool ChannelIsOpen(const COMM_CLIENT *client);
 /* ROUTER_HANDLER of service ROUTER_SVC_CHANNEL. */
 void ChannelHandlePackage(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size);
 
+#if COMM_ENDPOINTS
+/* Whether a client that has logged in is reached over this driver. */
+bool ChannelNeeds(const BLK_DRV *driver);
+#endif
+
 const CHANNEL_COUNTERS *ChannelGetCounters(void);
 
 RTS_RESULT CmpChannelServerEmbedded_Hook(CMP_HOOK hook);

@@ -74,6 +74,8 @@ enum {
     CMPID_SysSim = 0x0019,
     CMPID_SysLock = 0x001A,
     CMPID_SysEvent = 0x001C,
+    CMPID_CmpBlkDrvTcp = 0x001D,
+    CMPID_CmpBlkDrvUdp = 0x001E,
 };
 
 /* Name of a component, "" when unknown. */

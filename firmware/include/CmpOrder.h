@@ -50,5 +50,11 @@ X(CmpChannelServerEmbedded)
 #if HAS_CmpBlkDrvSimpleCom
 X(CmpBlkDrvSimpleCom)
 #endif
+#if HAS_CmpBlkDrvTcp
+X(CmpBlkDrvTcp)
+#endif
+#if HAS_CmpBlkDrvUdp
+X(CmpBlkDrvUdp)
+#endif
 #endif
 /* clang-format on */

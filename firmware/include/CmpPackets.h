@@ -17,6 +17,20 @@ typedef RTS_UI8 WIRE_UI16[2];
 typedef RTS_UI8 WIRE_UI32[4];
 typedef RTS_UI8 WIRE_UI64[8];
 
+/* ---- layer 2: TCP [1.2] ---- */
+
+/* Then the packet. */
+typedef struct {
+    WIRE_UI32 magic; /* TCP_MAGIC */
+    WIRE_UI32 size;  /* bytes, this header included */
+} TCP_HEADER;
+
+/* The network address of an end of a connection: big-endian, as all addresses. */
+typedef struct {
+    RTS_UI8 port[2];
+    RTS_UI8 ip[4];
+} TCP_ADDRESS;
+
 /* ---- layer 3: router [2.1] ---- */
 
 /* Then the receiver's address, the sender's, and zeros up to a multiple of 4. */

@@ -21,22 +21,34 @@ typedef struct {
     RTS_UI32 size;
 } BLK_PART;
 
-/* A block driver (layer 2); also the CAN, UDP, TCP and in-process ones. */
-typedef struct BLK_DRV {
+struct ROUTER_PEER;
+
+/* A block driver (layer 2): one of a serial line, a UDP socket, a TCP connection, or in process. */
+typedef struct {
     RTS_UI8 type;           /* BLK_DRV_TYPE_*, in the name service reply */
     RTS_UI8 point_to_point; /* 1: everything that arrives is for this node, whatever its receiver address */
     RTS_UI8 address_words;  /* own network address, 1..ROUTER_MAX_ADDRESS */
     RTS_UI8 address[2 * ROUTER_MAX_ADDRESS];
+#if COMM_ENDPOINTS
+    bool reliable; /* what it takes arrives, once and in order, or the peer is gone */
+    bool gone;     /* its only peer has gone; true for one pass of CH_COMM_CYCLE at least */
+    /* Network address of its only peer; it replaces the one in the packets of that peer. 0 words: not known. */
+    RTS_UI8 peer_words;
+    RTS_UI8 peer_address[2 * ROUTER_MAX_NETWORK];
+#endif
     void *instance; /* the driver's own */
 
-    /* Queues one packet made of `count` parts, BLK_MAX_SIZE bytes at most; the parts are copied. ERR_NOBUFFER: no
-     * room now, offer it again in a later cycle. */
-    RTS_RESULT (*send)(const struct BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count);
+    /* Queues one packet made of `count` parts, BLK_MAX_SIZE bytes at most; the parts are copied. To a peer whose
+     * `driver` this is. ERR_NOBUFFER: no room now, offer it again in a later cycle. */
+    RTS_RESULT (*send)(const struct ROUTER_PEER *peer, const BLK_PART *parts, RTS_UI32 count);
 } BLK_DRV;
 
 /* Where a packet came from, and so where its answer goes. */
-typedef struct {
+typedef struct ROUTER_PEER {
     const BLK_DRV *driver;
+#if COMM_ENDPOINTS
+    RTS_UI64 endpoint; /* the driver's own: which of its peers; 0 when it has only one */
+#endif
     RTS_UI16 max_packet;   /* bytes, what the sender's path can carry */
     RTS_UI8 address_words; /* 1..ROUTER_MAX_ADDRESS */
     RTS_UI8 address[2 * ROUTER_MAX_ADDRESS];
@@ -57,12 +69,23 @@ typedef void (*ROUTER_HANDLER)(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS
 typedef struct {
     RTS_UI8 number; /* ROUTER_SVC_* */
     ROUTER_HANDLER handler;
+#if COMM_ENDPOINTS
+    bool (*needs)(const BLK_DRV *driver); /* whether a client of it is logged in over this driver; NULL: never */
+#endif
 } ROUTER_SERVICE;
 extern const ROUTER_SERVICE RouterServices[];
 extern const RTS_UI32 RouterServiceCount;
 
 /* Called by a block driver for each packet whose check sum was right. `data` may be reused when it returns. */
 void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size);
+
+#if COMM_ENDPOINTS
+/* The same for a driver with several peers: the packet comes from this one. */
+void RouterHandleDataFrom(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI8 *data, RTS_UI32 size);
+
+/* Whether a service has a client on this driver that would lose its login with it. */
+bool RouterNeeds(const BLK_DRV *driver);
+#endif
 
 enum { ROUTER_MAX_PARTS = 2 };
 
@@ -73,7 +96,7 @@ RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *
 /* Largest payload of one packet to this peer when both addresses together have `address_words` words. */
 RTS_UI32 RouterGetMaxPayload(const ROUTER_PEER *peer, RTS_UI32 address_words);
 
-/* Same driver, same address. */
+/* Same driver, same endpoint, same address. */
 bool RouterIsSamePeer(const ROUTER_PEER *a, const ROUTER_PEER *b);
 
 const ROUTER_COUNTERS *RouterGetCounters(void);

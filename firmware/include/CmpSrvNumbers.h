@@ -20,8 +20,20 @@ enum {
     SIMPLECOM_END_2 = 0x3E,
     SIMPLECOM_STUFF = 0x5F,
     BLK_MAX_SIZE = 512, /* largest router packet, bytes */
+    BLK_DRV_TYPE_TCP = 1,
     BLK_DRV_TYPE_COM = 2,
+    BLK_DRV_TYPE_UDP = 5,
     BLK_DRV_TYPE_DIRECT = 8,
+};
+
+/* ---- layer 2: networks (1.1, 1.2) ---- */
+enum {
+    TCP_MAGIC = -401145600, /* 0xE8170100 as a signed enum constant */
+    TCP_PORT = 11740,
+    UDP_PORT = 1740, /* of port index 0 */
+    UDP_PORTS = 4,
+    UDP_INDEX_BITS = 2,     /* of a network address, above those of the host */
+    ROUTER_MAX_NETWORK = 3, /* words of a network address */
 };
 
 /* ---- layer 3: router (2) ---- */

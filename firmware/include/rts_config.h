@@ -235,6 +235,33 @@
 #define COMM_MAX_CLIENTS 1
 #endif
 
+/* 1: there are block drivers with several peers (UDP), or that know when their peer has gone (TCP). 16 bytes per client,
+ * 10 per driver. */
+#ifndef COMM_ENDPOINTS
+#define COMM_ENDPOINTS 0
+#endif
+
+/* TCP connections at a time: one more than clients that may be logged in, so that a new one is always accepted. Each
+ * costs its two buffers and 90 bytes. */
+#ifndef TCP_MAX_CONNECTIONS
+#define TCP_MAX_CONNECTIONS (COMM_MAX_CLIENTS + 1)
+#endif
+
+/* Receive and send buffer of a TCP connection, bytes each: one largest frame (520) at least. */
+#ifndef TCP_BUFFER_SIZE
+#define TCP_BUFFER_SIZE 1040
+#endif
+
+/* A TCP connection is closed if no byte is received or sent for so long [ms]. */
+#ifndef TCP_IDLE_MS
+#define TCP_IDLE_MS 60000
+#endif
+
+/* A TCP connection is closed if a frame, or its first one, is not complete after so long [ms]. */
+#ifndef TCP_FRAME_MS
+#define TCP_FRAME_MS 3000
+#endif
+
 /* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is
  * below 424), COM_QUEUE_SIZE and about 150 bytes. */
 #ifndef COM_MAX_LINES

@@ -19,7 +19,7 @@ from plctool.gateway.frames import BUSY
 from plctool.gateway.place import NoGateway
 from plctool.link import services
 from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink, no_answer
-from plctool.link.monitoring import AreaRange, Contents, Write, read_memory, write_memory
+from plctool.link.monitoring import APP_CHANGED, AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
 from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
 from plctool.link.session import Session
@@ -183,7 +183,8 @@ class Plc(Controller):
         """Reads again and again: yields seconds since the first reading, and what was read. Endless without `count`.
 
         Pointers are followed again each time; a value whose pointer leads to no variable is None. While another
-        tool downloads a program there are no readings; `waiting` is called with the reason when that begins.
+        tool downloads a program through the gateway there are no readings; `waiting` is called with the reason when
+        that begins. After a download the readings are of the new program, if its symbols are found; else DeviceError.
         """
         begin = time.monotonic()
         due, readings, waits = begin, 0, False
@@ -199,9 +200,19 @@ class Plc(Controller):
                 if not waits:
                     waiting(error.message)
                 waits, due = True, max(due, time.monotonic() + _BUSY_POLL)
+            except DeviceError as error:
+                if error.code != APP_CHANGED or not self._has_symbols():
+                    raise
             else:
                 waits, readings = False, readings + 1
                 yield at, reading
+
+    def _has_symbols(self) -> bool:
+        """Whether the symbols of the application on the device can be found."""
+        with suppress(UsageError):
+            self.symbols()
+            return True
+        return False
 
 
 def _range(symbol: Symbol) -> AreaRange:

@@ -28,20 +28,34 @@ void client_send_package(const CLIENT *client, const RTS_UI8 *package, RTS_UI32 
 {
     RTS_UI8 packet[BLK_MAX_SIZE];
 
-    (void)SimLinkSend(packet, client_packet(client, ROUTER_SVC_CHANNEL, package, size, packet));
+    size = client_packet(client, ROUTER_SVC_CHANNEL, package, size, packet);
+    if (client->link != NULL)
+        client->link->send(client->link->instance, packet, size);
+    else
+        (void)SimLinkSend(packet, size);
+}
+
+static RTS_UI32 receive(const CLIENT *client, RTS_UI8 *packet, RTS_UI32 capacity)
+{
+    if (client->link != NULL)
+        return client->link->receive(client->link->instance, packet, capacity);
+    return SimLinkReceive(packet, capacity);
 }
 
 RTS_UI32 client_take(const CLIENT *client, RTS_UI8 *service, RTS_UI8 *payload)
 {
     RTS_UI8 packet[BLK_MAX_SIZE];
-    RTS_UI32 size = SimLinkReceive(packet, sizeof(packet));
+    RTS_UI32 size = receive(client, packet, sizeof(packet));
 
-    if (size < CLIENT_HEADER_SIZE || packet[5] != 0x11 || (packet[6] << 8 | packet[7]) != client->address)
+    if (size < CLIENT_HEADER_SIZE || (packet[5] & 0x0F) != 1 || (packet[6] << 8 | packet[7]) != client->address)
+        return 0;
+    RTS_UI32 header = (8u + 2u * (packet[5] >> 4) + 3) & ~3u; /* with the device's address */
+    if (size < header)
         return 0;
     if (service != NULL)
         *service = packet[3];
-    memcpy(payload, packet + CLIENT_HEADER_SIZE, size - CLIENT_HEADER_SIZE);
-    return size - CLIENT_HEADER_SIZE;
+    memcpy(payload, packet + header, size - header);
+    return size - header;
 }
 
 /* ---- layer 4 ---- */

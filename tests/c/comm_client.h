@@ -1,5 +1,5 @@
 /*
- * comm_client.h - a client in C for the tests of the communication; it talks through SimLink.
+ * comm_client.h - a client in C for the tests of the communication; it talks through SimLink, or another link.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -15,8 +15,16 @@
 /* Tests send messages of several blocks. (The fuzz targets run with any size.) */
 enum { TESTS_NEED_MESSAGE_SIZE = 2048 };
 
+/* How packets go and come; `receive` returns 0 when there is none. */
 typedef struct {
-    RTS_UI16 address; /* one word */
+    void (*send)(void *instance, const RTS_UI8 *packet, RTS_UI32 size);
+    RTS_UI32 (*receive)(void *instance, RTS_UI8 *packet, RTS_UI32 capacity);
+    void *instance;
+} CLIENT_LINK;
+
+typedef struct {
+    const CLIENT_LINK *link; /* NULL: SimLink */
+    RTS_UI16 address;        /* one word */
     RTS_UI16 channel;
     RTS_UI32 limit;    /* granted buffer */
     RTS_UI32 sent;     /* number of the last block sent */

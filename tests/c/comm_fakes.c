@@ -12,6 +12,8 @@
 #include "../../firmware/src/app/AppLife.h"
 #include "CmpAppSrv.h"
 #include "CmpBlkDrvSimpleCom.h"
+#include "CmpBlkDrvTcp.h"
+#include "CmpBlkDrvUdp.h"
 #include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
 #include "CmpLogSrv.h"
@@ -316,6 +318,10 @@ void fakes_hook(CMP_HOOK hook)
         CmpNameServiceServer_Hook,
         CmpRouterEmbedded_Hook,
         CmpBlkDrvSimpleCom_Hook,
+#if COMM_ENDPOINTS
+        CmpBlkDrvTcp_Hook,
+        CmpBlkDrvUdp_Hook,
+#endif
     };
     const RTS_UI32 count = RTS_COUNT(hooks);
 

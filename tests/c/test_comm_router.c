@@ -17,9 +17,9 @@ static RTS_UI8 sent[BLK_MAX_SIZE];
 static RTS_UI32 sent_size;
 static RTS_UI32 sent_count;
 
-static RTS_RESULT keep(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count)
+static RTS_RESULT keep(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_UI32 count)
 {
-    RTS_UNUSED(driver);
+    RTS_UNUSED(peer);
     sent_count++;
     sent_size = 0;
     for (RTS_UI32 i = 0; i < count; i++) {
@@ -33,7 +33,8 @@ static BLK_DRV driver;
 
 static void setup(void)
 {
-    static const BLK_DRV fresh = {BLK_DRV_TYPE_COM, 1, 1, {0x00, 0xAF}, NULL, keep};
+    static const BLK_DRV fresh = {
+        .type = BLK_DRV_TYPE_COM, .point_to_point = 1, .address_words = 1, .address = {0x00, 0xAF}, .send = keep};
 
     fakes_start();
     driver = fresh;

@@ -284,9 +284,7 @@ def test_what_is_no_serial_port_is_told(tool: Any, port: str) -> None:
     assert "it is not a serial port" in done.err
 
 
-@pytest.mark.parametrize(
-    "link", [("--can", "socketcan:can0"), ("--udp", "localhost"), ("--tcp", "localhost:11740"), ("--node", "0")]
-)
+@pytest.mark.parametrize("link", [("--can", "socketcan:can0"), ("--node", "0")])
 def test_links_of_later_versions_exit_2(tool: Any, link: tuple[str, str]) -> None:
     done = tool("status", *link, "--json")
     assert done.status == 2

@@ -9,6 +9,7 @@ here: they are what runs this test (see WITHOUT_RUNNING).
 from __future__ import annotations
 
 import os
+import random
 import re
 import shlex
 import signal
@@ -26,6 +27,8 @@ ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^```(sh|python|iecst \S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN_PORT = "/dev/pts/4"
+SHOWN_ADDRESS, SHOWN_BROADCAST = "192.168.1.5", "192.168.1.255"
+BROADCAST = "127.255.255.255"
 
 # Commands that set up what this test runs in, or run it.
 WITHOUT_RUNNING = (
@@ -48,12 +51,14 @@ class Reader:
         self.folder = folder
         self.runtime: subprocess.Popen[str] | None = None
         self.port = SHOWN_PORT
+        self.address = f"127.{random.randint(1, 250)}.{random.randint(1, 250)}.1"  # all its ports are free
         self.env = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
         os.symlink(ROOT / "examples", folder / "examples")
 
     def type(self, line: str) -> None:
         if line.startswith(WITHOUT_RUNNING):
             return
+        line = line.replace(SHOWN_BROADCAST, BROADCAST).replace(SHOWN_ADDRESS, self.address)
         words = shlex.split(line.replace(SHOWN_PORT, self.port))
         if words[0] == "plcrt":
             self.start_runtime(words[1:])
@@ -71,7 +76,9 @@ class Reader:
             ends_with_us([find_plcrt(), *options]), cwd=self.folder, stdout=subprocess.PIPE, text=True
         )
         assert self.runtime.stdout
-        self.port = self.runtime.stdout.readline().removeprefix("serial: ").strip()
+        kind, _, place = self.runtime.stdout.readline().strip().partition(": ")
+        if kind == "serial":
+            self.port = place
 
     def stop_runtime(self) -> None:
         if self.runtime:

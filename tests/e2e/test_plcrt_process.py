@@ -24,6 +24,7 @@ from plctool.link.connection import Connection
 from plctool.link.serial import SerialTransport
 from plctool.link.services import read_identity, read_status
 from plctool.link.session import Session
+from plctool.link.transport import NO_PLACES
 from plctool.testing.plcrt import Plcrt, find_plcrt
 
 IDLE_SHARE = 0.05  # of one processor; 0.005 is usual, but machines under load count otherwise
@@ -59,8 +60,10 @@ def processor_ns(pid: int) -> int:
         (["--flash", "f", "--baud", "115201"], "115200"),
         (["--flash", "f", "--baud", "fast"], "--baud fast"),
         (["--flash", "f", "--can", "can0"], "--serial"),
-        (["--flash", "f", "--udp"], "--serial"),
-        (["--flash", "f", "--tcp=127.0.0.1:11740"], "--serial"),
+        (["--flash", "f", "--udp", "127.0.0.1:4"], "--udp 127.0.0.1:4 is not a valid"),
+        (["--flash", "f", "--udp=1740"], "192.168.1.5:1"),
+        (["--flash", "f", "--tcp", "host:1"], "--tcp host:1 is not a valid"),
+        (["--flash", "f", "--tcp=65536"], "192.168.1.5:11740"),
     ],
 )
 def test_wrong_use_is_said_in_one_sentence_and_exits_2(tmp_path, monkeypatch, options, advice):
@@ -327,6 +330,8 @@ class Wire:
     local_address = b"\x00\x02"
     max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
+    point_to_point = False
+    places = NO_PLACES
     byte_rate = math.inf
 
     def __init__(self, fd: int) -> None:
@@ -337,8 +342,8 @@ class Wire:
     def now(self) -> float:
         return time.monotonic()
 
-    def send(self, packet: bytes) -> None:
-        os.write(self.fd, simplecom.encode(packet))
+    def send(self, *packets: bytes) -> None:
+        os.write(self.fd, b"".join(map(simplecom.encode, packets)))
 
     def receive(self, timeout: float) -> bytes | None:
         if not self.packets and select.select([self.fd], [], [], timeout)[0]:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from plctool.core import lib
 from plctool.errors import LinkError
 from plctool.link import bintag, router, simplecom
+from plctool.link.transport import NO_PLACES
 from plctool.testing.line import BITS_PER_BYTE, Damage
 
 DEVICE_ADDRESS = b"\x00\x01"
@@ -47,6 +48,8 @@ class FakeLine:
         self.local_address = CLIENT_ADDRESS
         self.max_packet = simplecom.MAX_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
+        self.point_to_point = False
+        self.places = NO_PLACES
         self.rate = baud / BITS_PER_BYTE
         self.byte_rate = self.rate if known_rate else math.inf
         self.cut = False  # a cut line carries nothing
@@ -71,7 +74,11 @@ class FakeLine:
     def now(self) -> float:
         return self._time
 
-    def send(self, packet: bytes) -> None:
+    def send(self, *packets: bytes) -> None:
+        for packet in packets:
+            self._send(packet)
+
+    def _send(self, packet: bytes) -> None:
         if self.gone:
             raise LinkError("The serial line fake line was lost.", "link-lost")
         frame = simplecom.encode(packet)

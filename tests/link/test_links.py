@@ -44,6 +44,9 @@ def test_a_link_is_its_kind_its_place_and_its_options(text: str, place: str, bau
         ("bus:1", "serial:/dev/ttyS0"),
         ("serial:?baud=9600", "serial:/dev/ttyS0"),
         ("sim:here", "'sim:here' is not a link"),
+        ("tcp:", "'tcp:' is not a link"),
+        ("udp:", "'udp:' is not a link"),
+        ("tcp:host?baud=1", "it has none"),
         ("serial:/dev/ttyS0?speed=9600", "no option 'speed'; it has baud"),
         ("serial:/dev/ttyS0?baud=fast", "'fast' is not a number above 0"),
         ("serial:/dev/ttyS0?baud=", "'' is not a number above 0"),
@@ -56,6 +59,12 @@ def test_what_is_no_link_is_refused_with_what_to_write(text: str, said: str) -> 
         parse_link(text)
     assert said in caught.value.message
     assert caught.value.code == "no-such-link"
+
+
+@pytest.mark.parametrize("text", ["tcp:192.168.1.5", "tcp:plc.local:11741", "udp:192.168.1.255", "udp:10.0.0.7:1743"])
+def test_a_network_link_has_a_place_and_needs_no_gateway(text: str) -> None:
+    link = parse_link(text)
+    assert (str(link), link.options, link.is_shared) == (text, {}, False)
 
 
 def test_no_kind_of_link_is_there_and_to_come() -> None:
@@ -88,7 +97,7 @@ def test_no_packet_is_longer_than_the_transport_takes(size: int) -> None:
     line.max_packet = size
     sent: list[int] = []
     send = line.send
-    line.send = lambda packet: (sent.append(len(packet)), send(packet))[1]  # type: ignore[method-assign]
+    line.send = lambda *packets: (sent.extend(map(len, packets)), send(*packets))[1]  # type: ignore[method-assign]
     with Connection(line) as connection:
         connection.open()
         message = bytes(range(256)) * 4

@@ -18,7 +18,7 @@ from plctool.link import services, simplecom
 from plctool.link.connection import Connection
 from plctool.link.session import Session
 from plctool.link.sim import SimTransport
-from plctool.link.transport import BITS_PER_BYTE, BlockTransport
+from plctool.link.transport import BITS_PER_BYTE, NO_PLACES, BlockTransport
 from plctool.testing.line import Damage
 
 TICK_NS = 500_000
@@ -31,6 +31,8 @@ class SimSerial:
     local_address = b"\x00\x02"
     max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
+    point_to_point = False
+    places = NO_PLACES
     byte_rate = 115200 / BITS_PER_BYTE
 
     def __init__(self, to_device: Damage | None = None, to_client: Damage | None = None) -> None:
@@ -43,8 +45,8 @@ class SimSerial:
     def now(self) -> float:
         return float(lib.SimNow()) / 1e9
 
-    def send(self, packet: bytes) -> None:
-        self._out += simplecom.encode(packet)
+    def send(self, *packets: bytes) -> None:
+        self._out += b"".join(map(simplecom.encode, packets))
 
     def receive(self, timeout: float) -> bytes | None:
         end = self.now() + timeout

@@ -17,6 +17,7 @@ from elftools.elf.elffile import ELFFile
 
 from plctool.errors import LinkError
 from plctool.link import simplecom
+from plctool.link.transport import NO_PLACES
 from plctool.testing.children import ends_with_us
 
 FLASH_SIZE = 16 * 1024 * 1024  # of the file; after the file area it has the serial number in its last 4 KiB
@@ -53,6 +54,8 @@ class SocketSerial:
 
     max_packet = simplecom.MAX_PACKET
     packet_overhead = simplecom.FRAME_OVERHEAD
+    point_to_point = False
+    places = NO_PLACES
     byte_rate = math.inf
     local_address = b"\x00\x02"
 
@@ -66,8 +69,8 @@ class SocketSerial:
     def now(self) -> float:
         return time.monotonic()
 
-    def send(self, packet: bytes) -> None:
-        self.send_raw(simplecom.encode(packet))
+    def send(self, *packets: bytes) -> None:
+        self.send_raw(b"".join(map(simplecom.encode, packets)))
 
     def send_raw(self, data: bytes) -> None:
         """Bytes as they are, also damaged ones."""

@@ -13,6 +13,8 @@
 #define HAS_CmpLogSrv 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
+#define HAS_CmpBlkDrvTcp 1
+#define HAS_CmpBlkDrvUdp 1
 #define PORT_SYSTEM(X) X(SysTarget) X(SysLock) X(SysTimer)
 #define PORT_COMPONENTS(X) X(SysEvent)
 #include "CmpList.h"

@@ -34,18 +34,26 @@ typedef struct {
     const char *flash;
     const char *serial;
     RTS_UI32 baud;
+    const char *tcp;
+    const char *udp;
     char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
     RTS_UI32 event_count;
     bool alone;
 } OPTIONS;
 
 static const char usage[] =
-    "usage: plcrt --flash FILE [--serial PATH|pty] [--baud N] [--event NAME=PIPE]...\n"
+    "usage: plcrt --flash FILE [--serial PATH|pty] [--baud N] [--tcp [ADDRESS:]PORT] [--udp ADDRESS[:INDEX]]\n"
+    "             [--event NAME=PIPE]...\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
     "  --serial pty    opens a pseudo terminal and prints its name as \"serial: /dev/pts/N\"\n"
     "  --baud N        speed of the serial device, 115200 if not given\n"
+    "  --tcp PLACE     serves TCP at [ADDRESS:]PORT, 127.0.0.1:11740 if no place is given, and prints where as\n"
+    "                  \"tcp: ADDRESS:PORT\"; port 0 is one that is free, the address 0.0.0.0 all of this machine\n"
+    "  --udp PLACE     serves UDP at ADDRESS[:INDEX], 127.0.0.1 if no place is given, on port 1740 + INDEX (0..3), "
+    "the\n"
+    "                  first one that is free if there is no INDEX, and prints where as \"udp: ADDRESS:PORT\"\n"
     "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
     "  --version       prints the version\n"
@@ -114,6 +122,25 @@ static const struct option long_options[] = {
     {NULL, 0, NULL, 0},
 };
 
+static const char *take_tcp(const char *text)
+{
+    SOCKADDRESS place;
+    if (!PortTcpKnows(text, &place)) {
+        refuse("--tcp %s is not a valid address: write for example 11740, or 192.168.1.5:11740", text);
+    }
+    return text;
+}
+
+static const char *take_udp(const char *text)
+{
+    SOCKADDRESS place;
+    bool indexed;
+    if (!PortUdpKnows(text, &place, &indexed)) {
+        refuse("--udp %s is not a valid address: write for example 192.168.1.5, or 192.168.1.5:1 for port 1741", text);
+    }
+    return text;
+}
+
 static void take_event(OPTIONS *options, char *text)
 {
     if (options->event_count == RTS_COUNT(options->event)) {
@@ -146,10 +173,14 @@ static void take_option(OPTIONS *options, int option)
     case OPTION_HELP:
         print_and_exit(usage);
         break;
-    case OPTION_CAN:
-    case OPTION_UDP:
     case OPTION_TCP:
-        refuse("CAN, UDP and TCP are not in this version: use --serial");
+        options->tcp = take_tcp(optarg != NULL ? optarg : "127.0.0.1");
+        break;
+    case OPTION_UDP:
+        options->udp = take_udp(optarg != NULL ? optarg : "127.0.0.1");
+        break;
+    case OPTION_CAN:
+        refuse("CAN is not in this version: use --serial, --tcp or --udp");
     }
 }
 
@@ -162,6 +193,15 @@ static void refuse_option(const char *argument)
     refuse("%s is not an option or lacks its value: see plcrt --help", argument);
 }
 
+/* getopt_long takes an optional value only after "="; this takes the next argument, too. */
+static void take_place(int argc, char **argv, int option)
+{
+    bool may_be_missing = option == OPTION_TCP || option == OPTION_UDP;
+    if (may_be_missing && optarg == NULL && optind < argc && argv[optind][0] != '-') {
+        optarg = argv[optind++];
+    }
+}
+
 static OPTIONS parse_options(int argc, char **argv)
 {
     OPTIONS options = {.baud = DEFAULT_BAUD};
@@ -171,6 +211,7 @@ static OPTIONS parse_options(int argc, char **argv)
         if (option == '?') {
             refuse_option(argv[optind - 1]);
         }
+        take_place(argc, argv, option);
         take_option(&options, option);
     }
     if (optind < argc) {
@@ -300,6 +341,25 @@ static void log_restart(void)
     }
 }
 
+static void print_socket(const char *what, SYSSOCK_PURPOSE purpose)
+{
+    char name[32];
+    if (PortSockName(purpose, name, sizeof(name))) {
+        printf("%s: %s\n", what, name);
+    }
+}
+
+/* Where the device can be reached, as far as the options do not say it. */
+static void print_lines(void)
+{
+    if (PortComPtyName() != NULL) {
+        printf("serial: %s\n", PortComPtyName());
+    }
+    print_socket("tcp", SYSSOCK_TCP);
+    print_socket("udp", SYSSOCK_UDP);
+    (void)fflush(stdout);
+}
+
 static int run(void)
 {
     if (!start()) {
@@ -307,9 +367,8 @@ static int run(void)
     }
     log_restart();
     lock_memory();
-    if (PortIsUp() && PortComPtyName() != NULL) {
-        printf("serial: %s\n", PortComPtyName());
-        (void)fflush(stdout);
+    if (PortIsUp()) {
+        print_lines();
     }
     main_loop();
     return end() ? EXIT_SUCCESS : EXIT_RUNTIME;
@@ -329,16 +388,27 @@ static int run_supervised(void)
     return run();
 }
 
+static bool open_lines(const OPTIONS *options, PORT_REASON *reason)
+{
+    return (options->serial == NULL || PortComOpen(options->serial, options->baud, reason)) &&
+           (options->tcp == NULL || PortTcpOpen(options->tcp, reason)) &&
+           (options->udp == NULL || PortUdpOpen(options->udp, reason));
+}
+
+static void close_all(void)
+{
+    PortSockClose();
+    PortComClose();
+    PortFlashClose();
+}
+
 static bool open_all(const OPTIONS *options, PORT_REASON *reason)
 {
-    if (!PortFlashOpen(options->flash, reason)) {
-        return false;
+    bool opened = PortFlashOpen(options->flash, reason) && open_lines(options, reason);
+    if (!opened) {
+        close_all();
     }
-    if (options->serial != NULL && !PortComOpen(options->serial, options->baud, reason)) {
-        PortFlashClose();
-        return false;
-    }
-    return true;
+    return opened;
 }
 
 /* What the last plcrt used may be busy for a moment after it was killed. */
@@ -366,7 +436,6 @@ int main(int argc, char **argv)
     int status = options.alone ? run_alone() : PortSupervise(run_supervised);
     SysExceptShutdown();
     PortEventClose();
-    PortComClose();
-    PortFlashClose();
+    close_all();
     return status;
 }

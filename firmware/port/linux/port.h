@@ -7,6 +7,7 @@
 #define PORT_H
 
 #include "CmpItf.h"
+#include "SysSocket.h"
 #include "SysTimer.h"
 
 /* Where a Port function writes why it failed: one sentence. */
@@ -80,5 +81,18 @@ void PortComClose(void);
 void PortComHandOver(void);
 /* Name of the pseudo terminal, NULL when the line is none. */
 const char *PortComPtyName(void);
+
+/* ---- SysSocket ---- */
+
+/* For TCP "[ADDRESS:]PORT" or "ADDRESS", for UDP "ADDRESS[:INDEX]" (port UDP_PORT + INDEX). Without an address it is
+ * 127.0.0.1; 0.0.0.0 means all addresses of the machine. TCP port 0 is a free port; without INDEX the first free port is
+ * used. ...Knows: whether the text is valid; ...Open: opens the socket. Before CMInit. */
+bool PortTcpKnows(const char *text, SOCKADDRESS *place);
+bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *indexed);
+bool PortTcpOpen(const char *text, PORT_REASON *reason);
+bool PortUdpOpen(const char *text, PORT_REASON *reason);
+void PortSockClose(void);
+/* Where a socket listens, as "127.0.0.1:11740"; false if it is not open. */
+bool PortSockName(SYSSOCK_PURPOSE purpose, char *name, size_t size);
 
 #endif

@@ -21,11 +21,11 @@ static struct {
     RTS_UI32 count;
 } queue;
 
-static RTS_RESULT sim_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count)
+static RTS_RESULT sim_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_UI32 count)
 {
     RTS_UI32 size = 0;
 
-    RTS_UNUSED(driver);
+    RTS_UNUSED(peer);
     for (RTS_UI32 i = 0; i < count; i++)
         size += parts[i].size;
     if (size > BLK_MAX_SIZE)
@@ -39,7 +39,13 @@ static RTS_RESULT sim_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI3
     return ERR_OK;
 }
 
-static const BLK_DRV driver = {BLK_DRV_TYPE_DIRECT, 1, 1, {0, 1}, NULL, sim_send};
+static const BLK_DRV driver = {
+    .type = BLK_DRV_TYPE_DIRECT,
+    .point_to_point = 1,
+    .address_words = 1,
+    .address = {0, 1},
+    .send = sim_send,
+};
 
 static void receive(void *arg)
 {

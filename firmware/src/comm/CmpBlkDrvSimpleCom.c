@@ -165,9 +165,9 @@ static void push16(COM_LINE *line, RTS_UI32 value)
     push(line, bytes, sizeof(bytes));
 }
 
-static RTS_RESULT com_send(const BLK_DRV *driver, const BLK_PART *parts, RTS_UI32 count)
+static RTS_RESULT com_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_UI32 count)
 {
-    COM_LINE *line = driver->instance;
+    COM_LINE *line = peer->driver->instance;
     RTS_UI32 size = CRC_SIZE;
     RTS_UI16 crc = CRC16_INIT;
 

@@ -186,10 +186,31 @@ static bool read_open_request(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_
     return request->limit >= CHANNEL_MIN_MESSAGE && payload >= sizeof(CHANNEL_DATA) + MIN_ROOM;
 }
 
+static bool is_gone(const ROUTER_PEER *peer)
+{
+#if COMM_ENDPOINTS
+    return peer->driver->gone;
+#else
+    RTS_UNUSED(peer);
+    return false;
+#endif
+}
+
+static bool is_reliable(const ROUTER_PEER *peer)
+{
+#if COMM_ENDPOINTS
+    return peer->driver->reliable;
+#else
+    RTS_UNUSED(peer);
+    return false;
+#endif
+}
+
 /* The channel is in use by a logged-in client. */
 static bool is_taken(const COMM_CLIENT *client, RTS_UI32 now_ms)
 {
-    return client->channel.id != 0 && SrvIsLoggedIn(client) && now_ms - client->channel.last_received < CHANNEL_IDLE_MS;
+    return client->channel.id != 0 && SrvIsLoggedIn(client) && !is_gone(&client->channel.peer) &&
+           now_ms - client->channel.last_received < CHANNEL_IDLE_MS;
 }
 
 /* Whether `a` is the better one to give to a new peer: it is free, or has been silent longer. */
@@ -564,11 +585,16 @@ static void cycle_client(COMM_CLIENT *client, RTS_UI32 now_ms)
 {
     if (client->channel.id == 0)
         return;
+    if (is_gone(&client->channel.peer)) {
+        forget_channel(client);
+        return;
+    }
     if (now_ms - client->channel.last_received >= CHANNEL_TIMEOUT_MS) {
         close_channel(client, ERR_CHS_TIMEOUT);
         return;
     }
-    repeat_when_overdue(&client->channel.tx, now_ms);
+    if (!is_reliable(&client->channel.peer))
+        repeat_when_overdue(&client->channel.tx, now_ms);
     pump(client, now_ms);
 }
 
@@ -577,6 +603,16 @@ static void cycle(void)
     FOR_EACH_CLIENT (client)
         cycle_client(client, SysTimeGetMs());
 }
+
+#if COMM_ENDPOINTS
+bool ChannelNeeds(const BLK_DRV *driver)
+{
+    FOR_EACH_CLIENT (client)
+        if (client->channel.id != 0 && client->channel.peer.driver == driver && SrvIsLoggedIn(client))
+            return true;
+    return false;
+}
+#endif
 
 const CHANNEL_COUNTERS *ChannelGetCounters(void)
 {

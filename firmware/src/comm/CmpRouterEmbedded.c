@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "CmpBytes.h"
 #include "CmpPackets.h"
 
 enum { HEADER_WORDS = sizeof(ROUTER_HEADER) / 2, WORDS_MASK = (1 << ROUTER_HOP_SHIFT) - 1 };
@@ -78,7 +79,20 @@ static void deliver(const ROUTER_PEER *peer, RTS_UI8 service, const RTS_UI8 *pay
     COMM_COUNT(counters.ignored);
 }
 
-void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
+/* The sender's address begins with its network address, which is replaced if the driver knows the real one. */
+static void locate(ROUTER_PEER *peer, RTS_UI64 endpoint)
+{
+#if COMM_ENDPOINTS
+    peer->endpoint = endpoint;
+    if (peer->address_words >= peer->driver->peer_words)
+        memcpy(peer->address, peer->driver->peer_address, 2u * peer->driver->peer_words);
+#else
+    RTS_UNUSED(peer);
+    RTS_UNUSED(endpoint);
+#endif
+}
+
+static void handle(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI8 *data, RTS_UI32 size)
 {
     const ROUTER_HEADER *fixed = (const ROUTER_HEADER *)data;
     HEADER header;
@@ -100,8 +114,29 @@ void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
     peer.max_packet = max_packet(fixed->flags);
     peer.address_words = (RTS_UI8)header.sender_words;
     memcpy(peer.address, header.sender, 2 * header.sender_words);
+    locate(&peer, endpoint);
     deliver(&peer, fixed->service, data + header.size, size - header.size);
 }
+
+void RouterHandleData(const BLK_DRV *driver, const RTS_UI8 *data, RTS_UI32 size)
+{
+    handle(driver, 0, data, size);
+}
+
+#if COMM_ENDPOINTS
+void RouterHandleDataFrom(const BLK_DRV *driver, RTS_UI64 endpoint, const RTS_UI8 *data, RTS_UI32 size)
+{
+    handle(driver, endpoint, data, size);
+}
+
+bool RouterNeeds(const BLK_DRV *driver)
+{
+    for (RTS_UI32 i = 0; i < RouterServiceCount; i++)
+        if (RouterServices[i].needs != NULL && RouterServices[i].needs(driver))
+            return true;
+    return false;
+}
+#endif
 
 RTS_UI32 RouterGetMaxPayload(const ROUTER_PEER *peer, RTS_UI32 address_words)
 {
@@ -110,42 +145,54 @@ RTS_UI32 RouterGetMaxPayload(const ROUTER_PEER *peer, RTS_UI32 address_words)
     return peer->max_packet > header ? peer->max_packet - header : 0;
 }
 
+static RTS_UI8 *append(RTS_UI8 *end, const void *data, RTS_UI32 size)
+{
+    memcpy(end, data, size);
+    return end + size;
+}
+
 RTS_RESULT RouterSend(const ROUTER_PEER *peer, RTS_UI8 service, const BLK_PART *parts, RTS_UI32 count)
 {
     const BLK_DRV *driver = peer->driver;
-    struct {
-        ROUTER_HEADER fixed;
-        RTS_UI8 addresses[4 * ROUTER_MAX_ADDRESS + 2];
-    } header = {{
-                    ROUTER_MAGIC,
-                    ROUTER_HOP_COUNT << ROUTER_HOP_SHIFT | HEADER_WORDS,
-                    ROUTER_PRIO_NORMAL << ROUTER_PRIO_SHIFT,
-                    service,
-                    0,
-                    (RTS_UI8)(driver->address_words << 4 | peer->address_words),
-                },
-                {0}};
+    const ROUTER_HEADER fixed = {
+        ROUTER_MAGIC,
+        ROUTER_HOP_COUNT << ROUTER_HOP_SHIFT | HEADER_WORDS,
+        ROUTER_PRIO_NORMAL << ROUTER_PRIO_SHIFT,
+        service,
+        0,
+        (RTS_UI8)(driver->address_words << 4 | peer->address_words),
+    };
+    RTS_UI8 header[sizeof(fixed) + 4 * ROUTER_MAX_ADDRESS + 2];
     BLK_PART all[1 + ROUTER_MAX_PARTS];
-    RTS_UI32 receiver = 2u * peer->address_words;
-    RTS_UI32 size = header_size(sizeof(header.fixed), (RTS_UI32)peer->address_words + driver->address_words);
+    RTS_UI8 *end = header;
 
     if (count > ROUTER_MAX_PARTS)
-        return ERR_PARAMETER;
-    memcpy(header.addresses, peer->address, receiver);
-    memcpy(header.addresses + receiver, driver->address, 2u * driver->address_words);
-    all[0].data = (const RTS_UI8 *)&header;
+        return ERR_NET_MSGSIZE;
+    end = append(end, &fixed, sizeof(fixed));
+    end = append(end, peer->address, 2u * peer->address_words);
+    end = append(end, driver->address, 2u * driver->address_words);
+    BytesPut16(end, 0); /* the filler, if there is one */
+    RTS_UI32 size = header_size(0, (RTS_UI32)(end - header) / 2);
+    all[0].data = header;
     all[0].size = size;
     for (RTS_UI32 i = 0; i < count; i++) {
         all[1 + i] = parts[i];
         size += parts[i].size;
     }
-    return size > peer->max_packet ? ERR_NET_MSGSIZE : driver->send(driver, all, 1 + count);
+    return size > peer->max_packet ? ERR_NET_MSGSIZE : driver->send(peer, all, 1 + count);
 }
 
+/* The length of an address and the address are compared in one piece. */
 bool RouterIsSamePeer(const ROUTER_PEER *a, const ROUTER_PEER *b)
 {
-    return a->driver == b->driver && a->address_words == b->address_words &&
-           memcmp(a->address, b->address, 2u * a->address_words) == 0;
+    enum { ADDRESS = offsetof(ROUTER_PEER, address_words) };
+
+#if COMM_ENDPOINTS
+    if (a->endpoint != b->endpoint)
+        return false;
+#endif
+    return a->driver == b->driver && memcmp((const RTS_UI8 *)a + ADDRESS, (const RTS_UI8 *)b + ADDRESS,
+                                            sizeof(a->address_words) + 2u * a->address_words) == 0;
 }
 
 const ROUTER_COUNTERS *RouterGetCounters(void)

@@ -6,8 +6,14 @@
 #include "CmpChannelServerEmbedded.h"
 #include "CmpNameServiceServer.h"
 
+#if COMM_ENDPOINTS
+#define SERVICE(number, handler, needs) {number, handler, needs}
+#else
+#define SERVICE(number, handler, needs) {number, handler}
+#endif
+
 const ROUTER_SERVICE RouterServices[] = {
-    {ROUTER_SVC_CHANNEL, ChannelHandlePackage},
-    {ROUTER_SVC_NAME_REQUEST, NSHandleRequest},
+    SERVICE(ROUTER_SVC_CHANNEL, ChannelHandlePackage, ChannelNeeds),
+    SERVICE(ROUTER_SVC_NAME_REQUEST, NSHandleRequest, NULL),
 };
 const RTS_UI32 RouterServiceCount = RTS_COUNT(RouterServices);

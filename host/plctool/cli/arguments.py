@@ -183,7 +183,7 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
     link = parser.add_argument_group("link")
     for kind in TRANSPORTS.values():
         if kind.flag:
-            link.add_argument(f"--{kind.flag}", metavar=kind.flag.upper(), help=kind.help)
+            link.add_argument(f"--{kind.flag}", metavar=kind.shape, help=kind.help)
         for name, option in kind.options.items():
             link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
     link.add_argument(

@@ -370,6 +370,7 @@ def scan(link: Link, gateway: bool | None, tool: str) -> Document:
                 "target": target_name(node.target_id),
                 "version": node.version,
                 "serial_number": node.serial_number,
+                **({"place": node.place} if node.place else {}),
             }
             for node in nodes_on(link, gateway=gateway, tool=tool)
         ]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
+from dataclasses import replace
+from itertools import islice
 from typing import Protocol
 
 from plctool.core import lib
@@ -15,13 +17,16 @@ from plctool.link.transport import BlockTransport
 
 PATIENCE = 8.0  # default time of silence after which a channel counts as lost [s]
 _OPEN_PATIENCE = 5.0
+_AT_ONCE = 16  # packages sent before the next look at the input
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
 SCAN_SECONDS = 1.5
 
 
 def no_answer(name: str) -> ChannelLost:
     """The error of a link on which no device answers."""
-    return ChannelLost(f"No device answers on {name}; check cable, baud rate and power.", "no-answer")
+    return ChannelLost(
+        f"No device answers on {name}; check that it is on, the cable, and the baud rate or address.", "no-answer"
+    )
 
 
 class MessageLink(Protocol):
@@ -147,13 +152,14 @@ class Connection:
         end, ask_at = now + seconds, now
         while now < end and not (enough and len(found) >= enough):
             if now >= ask_at:
-                self._send(lib.ROUTER_SVC_NAME_REQUEST, router.BROADCAST, names.encode_request(request_id))
+                request = names.encode_request(request_id)
+                self.transport.send(self._packet(lib.ROUTER_SVC_NAME_REQUEST, router.BROADCAST, request))
                 ask_at = now + _ASK_EVERY
             packet = self._receive(min(ask_at, end) - now)
             if packet and packet.service == lib.ROUTER_SVC_NAME_RESPONSE:
                 node = names.decode_reply(packet.payload, request_id, packet.sender)
                 if node:
-                    found[node.address] = node
+                    found[node.address] = replace(node, place=self.transport.places.get(node.address, ""))
             now = self.transport.now()
         return list(found.values())
 
@@ -167,40 +173,55 @@ class Connection:
         if channel:
             channel.close()
             with suppress(LinkError):  # the device notices by itself
-                while self._send_next(channel):
+                while self._send_some(channel):
                     pass
 
     def _run(
         self, channel: Channel, done: Callable[[], bool], patience: float, check: Callable[[], None] = lambda: None
     ) -> None:
         """Moves packages until `done`. Raises ChannelLost after `patience` seconds of silence."""
-        while not done():
-            check()
-            sent = self._send_next(channel)
-            now = self.transport.now()
-            give_up = channel.give_up_at(patience)
-            if now >= give_up:
-                raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
-            packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
-            if packet and packet.service == lib.ROUTER_SVC_CHANNEL and packet.sender == self._peer:
-                channel.receive(packet.payload, self.transport.now())
-        while self._send_next(channel):
-            pass  # the acknowledgement of the reply
+        try:
+            while not done():
+                check()
+                self._move(channel, patience)
+            while self._send_some(channel):
+                pass  # the acknowledgement of the reply
+        except LinkError as error:
+            if error.code == "link-lost":
+                self._channel = None  # a close package could not be sent
+            raise
 
-    def _send_next(self, channel: Channel) -> bool:
-        """Sends one package if there is one to be sent now."""
-        package = channel.next_package(self.transport.now())
-        if package is None:
-            return False
-        assert self._peer is not None
-        self._send(lib.ROUTER_SVC_CHANNEL, self._peer, package)
-        return True
+    def _move(self, channel: Channel, patience: float) -> None:
+        """Sends some packages, and takes one or waits for it."""
+        sent = self._send_some(channel)
+        now = self.transport.now()
+        give_up = channel.give_up_at(patience)
+        if now >= give_up:
+            raise ChannelLost(f"The device on {self.name} does not answer any more; check the line.", "timeout")
+        packet = self._receive(0.0 if sent else max(0.0, min(channel.deadline(), give_up) - now))
+        if packet and packet.service == lib.ROUTER_SVC_CHANNEL and self._is_from_peer(packet):
+            channel.receive(packet.payload, self.transport.now())
 
-    def _send(self, service: int, receiver: bytes, payload: bytes) -> None:
-        self.transport.send(router.encode(router.Packet(service, receiver, self.transport.local_address, payload)))
+    def _send_some(self, channel: Channel) -> bool:
+        """Sends the packages that are due, up to _AT_ONCE. False if there were none."""
+        packages = iter(lambda: channel.next_package(self.transport.now()), None)
+        packets = [self._packet(lib.ROUTER_SVC_CHANNEL, self._peer, package) for package in islice(packages, _AT_ONCE)]
+        if packets:
+            self.transport.send(*packets)
+        return bool(packets)
+
+    def _packet(self, service: int, receiver: bytes | None, payload: bytes) -> bytes:
+        assert receiver is not None
+        return router.encode(router.Packet(service, receiver, self.transport.local_address, payload))
 
     def _receive(self, timeout: float) -> router.Packet | None:
         """The next packet for us, None when none came in time."""
         data = self.transport.receive(timeout)
         packet = router.decode(data) if data is not None else None
-        return packet if packet and packet.receiver in (router.BROADCAST, self.transport.local_address) else None
+        return packet if packet and self._is_for_us(packet) else None
+
+    def _is_for_us(self, packet: router.Packet) -> bool:
+        return self.transport.point_to_point or packet.receiver in (router.BROADCAST, self.transport.local_address)
+
+    def _is_from_peer(self, packet: router.Packet) -> bool:
+        return self.transport.point_to_point or packet.sender == self._peer

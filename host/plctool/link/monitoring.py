@@ -13,6 +13,7 @@ from plctool.link import bintag, l7
 from plctool.link.session import Session
 from plctool.link.wire import Layout
 
+APP_CHANGED = "app-changed"  # code of the error when the application is not the one of the symbols
 _VALUE_HEAD = Layout("MON2_VALUE")  # before each value
 _APPLICATION = Layout("MON2_APPLICATION")
 _MESSAGE_OVERHEAD = 96  # layer 7 header, application tag and list heads, bytes
@@ -209,7 +210,7 @@ def _application_tag(session: Session, image_crc: int) -> bintag.Tag:
 
 def _application_changed(session: Session) -> DeviceError:
     session.forget_application()
-    return DeviceError("Another application was loaded meanwhile; try again with its symbols.", "app-changed")
+    return DeviceError("Another application was loaded meanwhile; try again with its symbols.", APP_CHANGED)
 
 
 def _check_monitoring(session: Session, tags: bintag.Tags, action: str) -> None:

@@ -25,6 +25,7 @@ class Node:
     target_id: int
     version: str
     serial_number: str = ""
+    place: str = ""  # host and port of the device, on a link to several
 
     @property
     def address_text(self) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 from plctool.errors import LinkError
 from plctool.link import simplecom
-from plctool.link.transport import BITS_PER_BYTE, DEFAULT_BAUD, TOOL_ADDRESS
+from plctool.link.transport import BITS_PER_BYTE, DEFAULT_BAUD, NO_PLACES, TOOL_ADDRESS
 
 _POLL = 0.01  # longest single wait for a byte [s]
 _WRITE_TIMEOUT = 5.0
@@ -27,6 +27,8 @@ class SerialTransport:
         self.local_address = TOOL_ADDRESS
         self.max_packet = simplecom.MAX_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
+        self.point_to_point = False
+        self.places = NO_PLACES
         self.byte_rate = baud / BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if _is_real_line(url) else math.inf
         self._decoder = simplecom.Decoder()
         self._packets: deque[bytes] = deque()
@@ -41,9 +43,9 @@ class SerialTransport:
             return int(self._port.fileno())
         return None
 
-    def send(self, packet: bytes) -> None:
+    def send(self, *packets: bytes) -> None:
         try:
-            self._port.write(simplecom.encode(packet))
+            self._port.write(b"".join(map(simplecom.encode, packets)))
         except OSError as error:
             raise self._lost(error) from error
 

@@ -6,7 +6,7 @@ import math
 
 from plctool.core import error_name, ffi, lib
 from plctool.errors import LinkError
-from plctool.link.transport import TOOL_ADDRESS
+from plctool.link.transport import NO_PLACES, TOOL_ADDRESS
 
 _STEP_NS = 1_000_000  # longest piece of virtual time between two looks at the queue
 
@@ -19,6 +19,8 @@ class SimTransport:
     max_packet = int(lib.BLK_MAX_SIZE)
     packet_overhead = 0
     byte_rate = math.inf
+    point_to_point = False
+    places = NO_PLACES
 
     def fileno(self) -> int | None:
         return None  # the simulator runs in this thread
@@ -26,8 +28,9 @@ class SimTransport:
     def now(self) -> float:
         return float(lib.SimNow()) / 1e9
 
-    def send(self, packet: bytes) -> None:
-        _check(lib.SimLinkSend(packet, len(packet)))
+    def send(self, *packets: bytes) -> None:
+        for packet in packets:
+            _check(lib.SimLinkSend(packet, len(packet)))
 
     def receive(self, timeout: float) -> bytes | None:
         buffer = ffi.new("RTS_UI8[]", self.max_packet)

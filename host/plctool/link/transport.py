@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Protocol
+
+NO_PLACES: Mapping[bytes, str] = MappingProxyType({})
 
 TOOL_ADDRESS = b"\x00\x02"  # router address of a tool on a line of its own
 BITS_PER_BYTE = 10  # of a serial line, 8N1: start bit, eight data bits, stop bit
@@ -17,9 +21,11 @@ class BlockTransport(Protocol):
     max_packet: int  # longest packet it takes and gives, in bytes
     packet_overhead: int  # bytes the line carries for a packet besides the packet itself
     byte_rate: float  # bytes the line carries per second; math.inf if unknown or irrelevant
+    point_to_point: bool  # every packet is from the one device to this end, whatever its addresses
+    places: Mapping[bytes, str]  # of the devices that replied on a link to several, by router address
 
-    def send(self, packet: bytes) -> None:
-        """Queues a packet; raises LinkError when the line is gone."""
+    def send(self, *packets: bytes) -> None:
+        """Queues packets; raises LinkError when the line is gone."""
 
     def receive(self, timeout: float) -> bytes | None:
         """The next packet, None after `timeout` seconds without one; raises LinkError when the line is gone."""

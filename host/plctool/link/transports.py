@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from plctool.core import lib
 from plctool.errors import UsageError
 from plctool.link.transport import DEFAULT_BAUD, BlockTransport
 
 Value = int | str
-LATER = {"can": "INTERFACE:CHANNEL", "udp": "HOST[:PORT]", "tcp": "HOST[:PORT]"}
+LATER = {"can": "INTERFACE:CHANNEL"}
 """Kinds of links that are still to come, and what a place looks like."""
 
 
@@ -49,10 +50,11 @@ class Link:
 @dataclass(frozen=True)
 class Transport:
     """A kind of link. `flag`: the option of the command line that takes its place, such as `example`; "" if it has no
-    place. `open` raises LinkError."""
+    place, of the form `shape`. `open` raises LinkError, and UsageError for what is no place."""
 
     open: Callable[[Link], BlockTransport]
     flag: str = ""
+    shape: str = ""
     example: str = ""
     help: str = ""
     options: Mapping[str, Option] = field(default_factory=dict)
@@ -71,6 +73,18 @@ def _open_serial(link: Link) -> BlockTransport:
     return SerialTransport(link.place, int(link.options["baud"]))
 
 
+def _open_tcp(link: Link) -> BlockTransport:
+    from plctool.link.tcp import TcpTransport
+
+    return TcpTransport(link.place)
+
+
+def _open_udp(link: Link) -> BlockTransport:
+    from plctool.link.udp import UdpTransport
+
+    return UdpTransport(link.place)
+
+
 def _open_sim(link: Link) -> BlockTransport:
     from plctool.link.sim import SimTransport
 
@@ -81,10 +95,26 @@ TRANSPORTS: dict[str, Transport] = {
     "serial": Transport(
         _open_serial,
         flag="port",
+        shape="PORT",
         example="/dev/ttyS0",
         help="serial port or pyserial URL, for example /dev/ttyS0",
         options={"baud": Option(DEFAULT_BAUD, _above_zero, "bits per second")},
         is_shared=True,
+    ),
+    "tcp": Transport(
+        _open_tcp,
+        flag="tcp",
+        shape="HOST[:PORT]",
+        example="192.168.1.5",
+        help=f"controller on the network, over TCP; port {lib.TCP_PORT} if none is given",
+    ),
+    "udp": Transport(
+        _open_udp,
+        flag="udp",
+        shape="HOST[:PORT]",
+        example="192.168.1.5",
+        help=f"the same over UDP, ports {lib.UDP_PORT}..{lib.UDP_PORT + lib.UDP_PORTS - 1} if none is given; "
+        "for scan also the broadcast address of a network",
     ),
     "sim": Transport(_open_sim),  # the simulator of this process, which has to be on
 }
@@ -132,7 +162,9 @@ def open_transport(link: Link) -> BlockTransport:
 
 def not_yet(what: str) -> UsageError:
     """The error about a kind of link, or an option for one, that is still to come."""
-    return UsageError(f"{what} is not in this version; use a serial line (--port).", "no-such-link")
+    return UsageError(
+        f"{what} is not in this version; use a serial line (--port) or the network (--tcp, --udp).", "no-such-link"
+    )
 
 
 def _no_link(text: str) -> UsageError:

@@ -1,4 +1,4 @@
-"""A real `plcrt` process on a pseudo terminal, for tests, benchmarks and the demo."""
+"""A real `plcrt` process on a pseudo terminal and the network, for tests, benchmarks and the demo."""
 
 from __future__ import annotations
 
@@ -33,26 +33,34 @@ def _is_child(pid: int, parent: int) -> bool:
 
 
 class Plcrt:
-    """Context manager around one process; `port` is the pseudo terminal it serves."""
+    """Context manager around one process; `port` is the pseudo terminal it serves, `tcp` and `udp` are its places on
+    the network if `options` ask for some (`--tcp 0`)."""
 
     def __init__(self, flash: Path | str, *options: str) -> None:
         self.flash = Path(flash)
         self.options = options
         self.process: subprocess.Popen[str] | None = None
-        self.port = ""
+        self.port = self.tcp = self.udp = ""
 
     def start(self) -> None:
-        """Starts the process and waits for the line that names its pseudo terminal."""
+        """Starts the process and waits for the lines that say where it is."""
         command = [find_plcrt(), "--flash", str(self.flash), "--serial", "pty", *self.options]
         self.process = subprocess.Popen(
             ends_with_us(command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         assert self.process.stdout and self.process.stderr
+        self.port = self._place("serial")
+        self.tcp = self._place("tcp") if "--tcp" in self.options else ""
+        self.udp = self._place("udp") if "--udp" in self.options else ""
+
+    def _place(self, kind: str) -> str:
+        """What the process says next: where it serves one kind of link."""
+        assert self.process and self.process.stdout and self.process.stderr
         line = self.process.stdout.readline()
-        if not line.startswith("serial: "):
+        if not line.startswith(f"{kind}: "):
             self.process.kill()
             raise UsageError(f"plcrt did not start: {self.process.stderr.read().strip() or line.strip()}")
-        self.port = line.removeprefix("serial: ").strip()
+        return line.removeprefix(f"{kind}: ").strip()
 
     @property
     def worker(self) -> int | None:

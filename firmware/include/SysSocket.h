@@ -1,0 +1,53 @@
+/*
+ * SysSocket.h - IPv4 sockets of the block drivers of networks.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Called by CmpBlkDrvTcp and CmpBlkDrvUdp from main. No function blocks; each takes no longer than copying its data. The
+ * port decides at which addresses the device listens, as it decides on baud rates: SysSockOpen returns sockets that are
+ * bound. Addresses and port numbers are in the byte order of the CPU: 127.0.0.1 is 0x7F000001. No memory is allocated
+ * after start; a port has room for its own sockets and TCP_MAX_CONNECTIONS + 1 accepted ones.
+ */
+#ifndef SYSSOCKET_H
+#define SYSSOCKET_H
+
+#include "CmpErrors.h"
+#include "CmpStd.h"
+
+typedef struct {
+    RTS_UI32 ip;
+    RTS_UI16 port;
+} SOCKADDRESS;
+
+typedef enum {
+    SYSSOCK_TCP,           /* listens */
+    SYSSOCK_UDP,           /* sends and receives */
+    SYSSOCK_UDP_BROADCAST, /* receives broadcasts, if SYSSOCK_UDP does not; the same port number */
+} SYSSOCK_PURPOSE;
+
+/* The socket for this purpose; RTS_INVALID_HANDLE when the port has none. */
+RTS_HANDLE SysSockOpen(SYSSOCK_PURPOSE purpose);
+
+/* The local address of a socket, and the length of its network prefix in bits (0..32). ERR_INVALID_HANDLE. */
+RTS_RESULT SysSockGetOwn(RTS_HANDLE socket, SOCKADDRESS *own, RTS_UI32 *prefix);
+
+/* Accepts a connection and returns the address of its peer; RTS_INVALID_HANDLE if none is waiting, or there is no room.
+ * It sends without delay (TCP_NODELAY). */
+RTS_HANDLE SysSockAccept(RTS_HANDLE listener, SOCKADDRESS *peer);
+
+/* Receives from or sends to a connection. ERR_OK with the number of bytes received or taken, 0 if there is no data, or no
+ * room, now; ERR_NET_NOTCONNECTED if the peer has closed or reset the connection. */
+RTS_RESULT SysSockRecv(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *received);
+RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *taken);
+
+/* Receives a datagram. ERR_OK with its size; only the first `size` bytes are copied to `data`. ERR_NOTHING_TO_DO if none
+ * is waiting. */
+RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received);
+
+/* Sends a datagram. ERR_NOBUFFER if there is no room now. ERR_OK does not mean that it arrives. */
+RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to);
+
+/* Closes a connection, after sending what was taken; or returns a socket of SysSockOpen, which may be opened again. */
+void SysSockClose(RTS_HANDLE socket);
+
+#endif

@@ -1,0 +1,393 @@
+/*
+ * SysSocket.c - sockets of the Linux port.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The sockets that the device listens on are opened in the supervisor, before the worker is forked, and stay open when
+ * the worker dies: its successor listens on the same ports, and connections made meanwhile wait for it.
+ */
+#define _GNU_SOURCE
+#include "SysSocket.h"
+
+#include "CmpSrvNumbers.h"
+#include "port.h"
+#include "rts_config.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum {
+    PURPOSES = SYSSOCK_UDP_BROADCAST + 1,
+    SOCKETS = PURPOSES + TCP_MAX_CONNECTIONS + 1, /* one waits for a place */
+    BACKLOG = 16,
+    IP_BITS = 32,
+};
+
+/* The first ones are those the device listens on, in the order of SYSSOCK_PURPOSE. */
+static struct {
+    PORT_SOURCE source[SOCKETS];
+    bool ready;
+} sockets;
+
+static void make_ready(void)
+{
+    for (int i = 0; i < SOCKETS && !sockets.ready; i++) {
+        sockets.source[i].file = -1;
+    }
+    sockets.ready = true;
+}
+
+static PORT_SOURCE *find(RTS_HANDLE socket)
+{
+    return socket < SOCKETS ? &sockets.source[socket] : NULL;
+}
+
+static int file_of(RTS_HANDLE socket)
+{
+    PORT_SOURCE *source = find(socket);
+    return source != NULL ? source->file : -1;
+}
+
+static struct sockaddr_in make_address(RTS_UI32 ip, RTS_UI16 port)
+{
+    struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons(port)};
+    address.sin_addr.s_addr = htonl(ip);
+    return address;
+}
+
+static SOCKADDRESS read_address(const struct sockaddr_in *address)
+{
+    return (SOCKADDRESS){ntohl(address->sin_addr.s_addr), ntohs(address->sin_port)};
+}
+
+static SOCKADDRESS own_address(int file)
+{
+    struct sockaddr_in own = {.sin_family = AF_INET};
+    socklen_t size = sizeof(own);
+    (void)getsockname(file, (struct sockaddr *)&own, &size);
+    return read_address(&own);
+}
+
+/* ---- the networks of this machine ---- */
+
+typedef struct {
+    RTS_UI32 ip;
+    RTS_UI32 mask;
+    bool can_broadcast;
+} NETWORK;
+
+/* The network that an address belongs to; for 0.0.0.0 the first network that is not loopback. */
+static NETWORK find_network(RTS_UI32 ip)
+{
+    NETWORK found = {.ip = ip, .mask = 0xFFFFFFFF};
+    struct ifaddrs *all;
+    if (getifaddrs(&all) != 0) {
+        return found;
+    }
+    for (struct ifaddrs *next = all; next != NULL; next = next->ifa_next) {
+        if (next->ifa_addr == NULL || next->ifa_addr->sa_family != AF_INET || next->ifa_netmask == NULL) {
+            continue;
+        }
+        RTS_UI32 other = ntohl(((struct sockaddr_in *)(void *)next->ifa_addr)->sin_addr.s_addr);
+        RTS_UI32 mask = ntohl(((struct sockaddr_in *)(void *)next->ifa_netmask)->sin_addr.s_addr);
+        bool loopback = (next->ifa_flags & IFF_LOOPBACK) != 0;
+        if (ip == 0 ? !loopback : ((ip ^ other) & mask) == 0) {
+            found = (NETWORK){ip == 0 ? other : ip, mask, loopback || (next->ifa_flags & IFF_BROADCAST) != 0};
+            break;
+        }
+    }
+    freeifaddrs(all);
+    return found;
+}
+
+static RTS_UI32 prefix_of(RTS_UI32 mask)
+{
+    return (RTS_UI32)__builtin_popcount(mask);
+}
+
+/* ---- sockets that the device listens on ---- */
+
+static bool parse_number(const char *text, unsigned long most, RTS_UI16 *number)
+{
+    char *end;
+    errno = 0;
+    unsigned long value = strtoul(text, &end, 10);
+    bool known = text[0] >= '0' && text[0] <= '9' && *end == '\0' && errno == 0 && value <= most;
+    *number = known ? (RTS_UI16)value : *number;
+    return known;
+}
+
+static bool parse_ip(const char *text, size_t size, RTS_UI32 *ip)
+{
+    char host[INET_ADDRSTRLEN];
+    struct in_addr parsed;
+    if (size >= sizeof(host)) {
+        return false;
+    }
+    memcpy(host, text, size);
+    host[size] = '\0';
+    bool known = inet_pton(AF_INET, host, &parsed) == 1;
+    *ip = known ? ntohl(parsed.s_addr) : 0;
+    return known;
+}
+
+/* "ADDRESS" or "ADDRESS:NUMBER"; what is not there stays as it is in `place`. *numbered: the number is there. */
+static bool parse_place(const char *text, unsigned long most, SOCKADDRESS *place, bool *numbered)
+{
+    const char *colon = strchr(text, ':');
+    *numbered = colon != NULL;
+    return parse_ip(text, colon != NULL ? (size_t)(colon - text) : strlen(text), &place->ip) &&
+           (colon == NULL || parse_number(colon + 1, most, &place->port));
+}
+
+/* Closes what could not be bound, and keeps errno. */
+static int bind_socket(int type, SOCKADDRESS address, bool shared)
+{
+    struct sockaddr_in place = make_address(address.ip, address.port);
+    int on = 1;
+    int file = socket(AF_INET, type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (file < 0) {
+        return -1;
+    }
+    if (shared) {
+        (void)setsockopt(file, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
+    }
+    if (bind(file, (struct sockaddr *)&place, sizeof(place)) != 0 ||
+        (type == SOCK_STREAM && listen(file, BACKLOG) != 0)) {
+        int error = errno;
+        close(file);
+        errno = error;
+        return -1;
+    }
+    return file;
+}
+
+/* False, with the reason, when there is no such socket. */
+static bool keep(SYSSOCK_PURPOSE purpose, int file, const char *option, const char *text, PORT_REASON *reason)
+{
+    if (file < 0) {
+        int error = errno;
+        PortReason(reason, "cannot serve %s %s: %s", option, text, strerror(error));
+        reason->busy = error == EADDRINUSE;
+        return false;
+    }
+    sockets.source[purpose] = (PORT_SOURCE){.file = file, .events = POLLIN};
+    return true;
+}
+
+bool PortTcpKnows(const char *text, SOCKADDRESS *place)
+{
+    bool numbered;
+    *place = (SOCKADDRESS){INADDR_LOOPBACK, TCP_PORT};
+    return parse_number(text, UINT16_MAX, &place->port) || parse_place(text, UINT16_MAX, place, &numbered);
+}
+
+bool PortTcpOpen(const char *text, PORT_REASON *reason)
+{
+    SOCKADDRESS place;
+    make_ready();
+    if (!PortTcpKnows(text, &place)) {
+        PortReason(reason, "--tcp %s is no address", text);
+        return false;
+    }
+    return keep(SYSSOCK_TCP, bind_socket(SOCK_STREAM, place, true), "--tcp", text, reason);
+}
+
+/* The port of that index, or the first of the four that is free. */
+static int bind_udp(SOCKADDRESS address, bool indexed)
+{
+    RTS_UI16 first = indexed ? address.port : 0;
+    RTS_UI16 last = indexed ? address.port : UDP_PORTS - 1;
+    int file = -1;
+    for (RTS_UI16 index = first; file < 0 && index <= last; index++) {
+        address.port = (RTS_UI16)(UDP_PORT + index);
+        file = bind_socket(SOCK_DGRAM, address, false);
+    }
+    return file;
+}
+
+/* On Linux a socket bound to an address receives no broadcasts: they need another socket, and several devices share its
+ * port. */
+static bool open_broadcast(SOCKADDRESS own, const char *text, PORT_REASON *reason)
+{
+    NETWORK network = find_network(own.ip);
+    if (own.ip == 0 || !network.can_broadcast) {
+        return true;
+    }
+    own.ip |= ~network.mask;
+    return keep(SYSSOCK_UDP_BROADCAST, bind_socket(SOCK_DGRAM, own, true), "--udp", text, reason);
+}
+
+bool PortUdpKnows(const char *text, SOCKADDRESS *place, bool *indexed)
+{
+    *place = (SOCKADDRESS){INADDR_LOOPBACK, 0};
+    return parse_place(text, UDP_PORTS - 1, place, indexed);
+}
+
+bool PortUdpOpen(const char *text, PORT_REASON *reason)
+{
+    SOCKADDRESS place;
+    bool indexed;
+    make_ready();
+    if (!PortUdpKnows(text, &place, &indexed)) {
+        PortReason(reason, "--udp %s is no address", text);
+        return false;
+    }
+    return keep(SYSSOCK_UDP, bind_udp(place, indexed), "--udp", text, reason) &&
+           open_broadcast(own_address(sockets.source[SYSSOCK_UDP].file), text, reason);
+}
+
+bool PortSockName(SYSSOCK_PURPOSE purpose, char *name, size_t size)
+{
+    make_ready();
+    if (sockets.source[purpose].file < 0) {
+        return false;
+    }
+    SOCKADDRESS own = own_address(sockets.source[purpose].file);
+    snprintf(name, size, "%u.%u.%u.%u:%u", own.ip >> 24, own.ip >> 16 & 0xFF, own.ip >> 8 & 0xFF, own.ip & 0xFF,
+             own.port);
+    return true;
+}
+
+void PortSockClose(void)
+{
+    make_ready();
+    for (int i = 0; i < SOCKETS; i++) {
+        PortWaitRemove(&sockets.source[i]);
+        if (sockets.source[i].file >= 0) {
+            close(sockets.source[i].file);
+        }
+        sockets.source[i].file = -1;
+    }
+}
+
+/* ---- SysSocket.h ---- */
+
+RTS_HANDLE SysSockOpen(SYSSOCK_PURPOSE purpose)
+{
+    make_ready();
+    bool open = sockets.source[purpose].file >= 0 && PortWaitAdd(&sockets.source[purpose]);
+    return open ? (RTS_HANDLE)purpose : (RTS_HANDLE)RTS_INVALID_HANDLE;
+}
+
+RTS_RESULT SysSockGetOwn(RTS_HANDLE socket, SOCKADDRESS *own, RTS_UI32 *prefix)
+{
+    int file = file_of(socket);
+    if (file < 0) {
+        return ERR_INVALID_HANDLE;
+    }
+    *own = own_address(file);
+    NETWORK network = find_network(own->ip);
+    own->ip = network.ip;
+    *prefix = prefix_of(network.mask);
+    return ERR_OK;
+}
+
+static RTS_HANDLE find_free(void)
+{
+    RTS_HANDLE handle = PURPOSES;
+    while (handle < SOCKETS && sockets.source[handle].file >= 0) {
+        handle++;
+    }
+    return handle;
+}
+
+RTS_HANDLE SysSockAccept(RTS_HANDLE listener, SOCKADDRESS *peer)
+{
+    struct sockaddr_in from = {.sin_family = AF_INET};
+    socklen_t size = sizeof(from);
+    int on = 1;
+    RTS_HANDLE handle = find_free();
+    if (handle == SOCKETS) {
+        return RTS_INVALID_HANDLE;
+    }
+    int file = accept4(file_of(listener), (struct sockaddr *)&from, &size, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (file < 0) {
+        return RTS_INVALID_HANDLE;
+    }
+    (void)setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+    sockets.source[handle] = (PORT_SOURCE){.file = file, .events = POLLIN};
+    if (!PortWaitAdd(&sockets.source[handle])) {
+        SysSockClose(handle);
+        return RTS_INVALID_HANDLE;
+    }
+    PortWaitNotNow();
+    *peer = read_address(&from);
+    return handle;
+}
+
+static bool is_later(void)
+{
+    return errno == EAGAIN || errno == EINTR || errno == ENOBUFS || errno == ENOMEM;
+}
+
+RTS_RESULT SysSockRecv(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *received)
+{
+    ssize_t count = recv(file_of(socket), data, size, 0);
+    *received = count > 0 ? (RTS_UI32)count : 0;
+    if (count == 0 || (count < 0 && !is_later())) {
+        return ERR_NET_NOTCONNECTED;
+    }
+    if (count > 0) {
+        PortWaitNotNow();
+    }
+    return ERR_OK;
+}
+
+RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *taken)
+{
+    ssize_t count = send(file_of(socket), data, size, MSG_NOSIGNAL);
+    *taken = count > 0 ? (RTS_UI32)count : 0;
+    if (count < 0 && !is_later()) {
+        return ERR_NET_NOTCONNECTED;
+    }
+    if (count > 0) {
+        PortWaitNotNow();
+    }
+    find(socket)->events = *taken < size ? POLLIN | POLLOUT : POLLIN;
+    return ERR_OK;
+}
+
+/* An error here is of a datagram sent earlier (its port is closed): nothing to do. */
+RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCKADDRESS *from, RTS_UI32 *received)
+{
+    struct sockaddr_in sender = {.sin_family = AF_INET};
+    socklen_t length = sizeof(sender);
+    ssize_t count = recvfrom(file_of(socket), data, size, MSG_TRUNC, (struct sockaddr *)&sender, &length);
+    if (count < 0) {
+        return ERR_NOTHING_TO_DO;
+    }
+    PortWaitNotNow();
+    *received = (RTS_UI32)count;
+    *from = read_address(&sender);
+    return ERR_OK;
+}
+
+RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to)
+{
+    struct sockaddr_in receiver = make_address(to->ip, to->port);
+    bool sent = sendto(file_of(socket), data, size, MSG_NOSIGNAL, (struct sockaddr *)&receiver, sizeof(receiver)) >= 0;
+    return sent || !is_later() ? ERR_OK : ERR_NOBUFFER;
+}
+
+void SysSockClose(RTS_HANDLE socket)
+{
+    PORT_SOURCE *source = find(socket);
+    if (source == NULL) {
+        return;
+    }
+    PortWaitRemove(source);
+    if (socket >= PURPOSES && source->file >= 0) { /* those of the device are the port's */
+        close(source->file);
+        source->file = -1;
+    }
+}

@@ -1,0 +1,179 @@
+/*
+ * CmpBlkDrvUdp.c - the UDP block driver: a datagram is a packet.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A datagram to the device's own address is for the device, whatever receiver the packet has: if a router translates
+ * addresses (NAT), the sender knows another one. A broadcast is for the device if the packet has its address as receiver,
+ * or no receiver.
+ */
+#include "CmpBlkDrvUdp.h"
+
+#include <string.h>
+
+#include "SysSocket.h"
+#include "rts_config.h"
+
+enum {
+    READ_MAX = 64, /* datagrams per cycle, so that a flood does not stop the rest of the runtime */
+    PORT_BITS = 16,
+    IP_BITS = 32,
+};
+
+RTS_STATIC_ASSERT(COMM_ENDPOINTS, udp_needs_endpoints);
+
+typedef struct {
+    RTS_HANDLE socket;
+    BLK_DRV driver;
+} LISTENER;
+
+/* Replies to both are sent from the socket of the first. */
+static struct {
+    LISTENER own;
+    LISTENER broadcast;
+} udp;
+
+static UDP_COUNTERS counters;
+
+static const RTS_HANDLE NO_SOCKET = RTS_INVALID_HANDLE;
+
+RTS_UI32 BlkDrvUdpPutAddress(RTS_UI32 ip, RTS_UI32 prefix, RTS_UI32 index, RTS_UI8 *address)
+{
+    RTS_UI32 host_bits = IP_BITS - prefix;
+    RTS_UI64 host = ip & (((RTS_UI64)1 << host_bits) - 1);
+    RTS_UI64 value = host | (RTS_UI64)index << host_bits;
+    RTS_UI32 words = (host_bits + UDP_INDEX_BITS + 15) / 16;
+
+    for (RTS_UI32 i = 2 * words; i-- > 0; value >>= 8)
+        address[i] = (RTS_UI8)value;
+    return words;
+}
+
+/* ---- endpoints ---- */
+
+static RTS_UI64 endpoint_of(const SOCKADDRESS *address)
+{
+    return (RTS_UI64)address->ip << PORT_BITS | address->port;
+}
+
+static SOCKADDRESS address_of(RTS_UI64 endpoint)
+{
+    SOCKADDRESS address = {(RTS_UI32)(endpoint >> PORT_BITS), (RTS_UI16)endpoint};
+
+    return address;
+}
+
+/* A reply to a multicast or broadcast address would go to many nodes. */
+static bool can_be_answered(const SOCKADDRESS *from)
+{
+    return from->port != 0 && from->ip != 0 && from->ip < 0xE0000000u;
+}
+
+/* ---- packets ---- */
+
+static RTS_RESULT udp_send(const ROUTER_PEER *peer, const BLK_PART *parts, RTS_UI32 count)
+{
+    SOCKADDRESS to = address_of(peer->endpoint);
+    RTS_UI8 packet[BLK_MAX_SIZE];
+    RTS_UI32 size = 0;
+
+    for (RTS_UI32 i = 0; i < count; i++) {
+        if (parts[i].size > sizeof(packet) - size)
+            return ERR_NET_MSGSIZE;
+        memcpy(packet + size, parts[i].data, parts[i].size);
+        size += parts[i].size;
+    }
+    return SysSockSendTo(udp.own.socket, packet, size, &to);
+}
+
+static void take(const LISTENER *listener, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *from)
+{
+    if (size > BLK_MAX_SIZE) {
+        COMM_COUNT(counters.too_long);
+    } else if (!can_be_answered(from)) {
+        COMM_COUNT(counters.no_reply);
+    } else {
+        COMM_COUNT(counters.packets);
+        RouterHandleDataFrom(&listener->driver, endpoint_of(from), data, size);
+    }
+}
+
+static void receive(const LISTENER *listener)
+{
+    RTS_UI8 data[BLK_MAX_SIZE];
+    SOCKADDRESS from;
+    RTS_UI32 size;
+
+    if (listener->socket == NO_SOCKET)
+        return;
+    for (RTS_UI32 i = 0; i < READ_MAX; i++) {
+        if (SysSockRecvFrom(listener->socket, data, sizeof(data), &from, &size) != ERR_OK)
+            return;
+        take(listener, data, size, &from);
+    }
+}
+
+/* ---- life ---- */
+
+static void open_listener(LISTENER *listener, SYSSOCK_PURPOSE purpose)
+{
+    listener->socket = SysSockOpen(purpose);
+    listener->driver.type = BLK_DRV_TYPE_UDP;
+    listener->driver.point_to_point = purpose == SYSSOCK_UDP;
+    listener->driver.send = udp_send;
+}
+
+static void open_all(void)
+{
+    SOCKADDRESS own = {0, UDP_PORT};
+    RTS_UI32 prefix = IP_BITS;
+    BLK_DRV *driver = &udp.own.driver;
+
+    memset(&udp, 0, sizeof(udp));
+    open_listener(&udp.own, SYSSOCK_UDP);
+    open_listener(&udp.broadcast, SYSSOCK_UDP_BROADCAST);
+    if (udp.own.socket == NO_SOCKET)
+        return;
+    (void)SysSockGetOwn(udp.own.socket, &own, &prefix);
+    driver->address_words =
+        (RTS_UI8)BlkDrvUdpPutAddress(own.ip, prefix, (own.port - UDP_PORT) % UDP_PORTS, driver->address);
+    udp.broadcast.driver.address_words = driver->address_words;
+    memcpy(udp.broadcast.driver.address, driver->address, sizeof(driver->address));
+}
+
+static void cycle(void)
+{
+    receive(&udp.own);
+    receive(&udp.broadcast);
+}
+
+static void close_listener(LISTENER *listener)
+{
+    if (listener->socket != NO_SOCKET)
+        SysSockClose(listener->socket);
+    listener->socket = RTS_INVALID_HANDLE;
+}
+
+static void close_all(void)
+{
+    close_listener(&udp.own);
+    close_listener(&udp.broadcast);
+}
+
+const UDP_COUNTERS *BlkDrvUdpGetCounters(void)
+{
+    return &counters;
+}
+
+RTS_RESULT CmpBlkDrvUdp_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT && COMM_COUNTERS)
+        CMP_CLEAR(counters);
+    else if (hook == CH_INIT_COMM)
+        open_all();
+    else if (hook == CH_COMM_CYCLE)
+        cycle();
+    else if (hook == CH_EXIT3) /* not CH_EXIT_COMM: there the channel server takes leave */
+        close_all();
+    return ERR_OK;
+}
