@@ -1,5 +1,5 @@
 """Operands of the IR say what they are: an integer, a pointer that holds in the whole function. And a function of the
-IR knows whom it calls."""
+IR knows the functions it calls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The typed program says of each of its nodes which fields hold others, so that whoever goes through it misses none."""
+"""The typed program says of each of its nodes which fields hold others, so that no walk misses one."""
 
 from __future__ import annotations
 

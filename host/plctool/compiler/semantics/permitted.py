@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.syntax.ast import Modifier
+from plctool.compiler.syntax.ast import Modifier, Section
 
 KEEPING = frozenset((Modifier.RETAIN, Modifier.NON_RETAIN, Modifier.PERSISTENT))
 ACCESS = frozenset((Modifier.PUBLIC, Modifier.PRIVATE, Modifier.PROTECTED, Modifier.INTERNAL))
@@ -179,14 +179,14 @@ class _Check:
 
     def _line(self, block: ast.VarBlock, line: ast.VarDecl) -> None:
         name = line.names[0][1]
-        if line.location is not None and Modifier.CONSTANT in block.qualifiers and block.keyword == "VAR_GLOBAL":
+        if line.location is not None and Modifier.CONSTANT in block.qualifiers and block.keyword == Section.VAR_GLOBAL:
             self._error(line.location.pos, f"the constant {name} has no address; leave out CONSTANT or AT")
         if line.init is None:
             return
-        if block.keyword == "VAR_EXTERNAL":
+        if block.keyword == Section.VAR_EXTERNAL:
             message = f"this initial value has no effect: {name} gets the one of its VAR_GLOBAL; write it there"
             self._warning(line.pos, message)
-        elif block.keyword == "VAR_IN_OUT":
+        elif block.keyword == Section.VAR_IN_OUT:
             message = f"this initial value has no effect: each call gives {name} a variable; leave it out"
             self._warning(line.pos, message)
 
@@ -229,7 +229,7 @@ def _wrong_qualifier(kind: str, keyword: str, word: str) -> str:
     if word in ACCESS:
         return _wrong_access(kind, keyword, word)
     if word == Modifier.CONSTANT:
-        reason = "it is there to be written" if keyword == "VAR_OUTPUT" else "a constant is written VAR CONSTANT"
+        reason = "it is there to be written" if keyword == Section.VAR_OUTPUT else "a constant is written VAR CONSTANT"
         return f"a {keyword} cannot be CONSTANT: {reason}"
     return f"a {keyword} cannot be {word}: {_why_not_kept(kind, keyword)}"
 

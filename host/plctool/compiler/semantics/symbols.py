@@ -10,6 +10,7 @@ from enum import Enum
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.ast import Section
 from plctool.compiler.typed import Const, Direction, Initial, Pos, Pou, Variable
 from plctool.iec.types import Elementary, Keep, Kind, PointerType, StructType, Type
 
@@ -44,7 +45,11 @@ UNTYPED_REAL = Elementary("real constant", Kind.REAL, 64, True, -1)
 NULL_TYPE = PointerType(ERROR)
 
 
-DIRECTIONS = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VAR_IN_OUT": Direction.IN_OUT}
+DIRECTIONS = {
+    Section.VAR_INPUT: Direction.INPUT,
+    Section.VAR_OUTPUT: Direction.OUTPUT,
+    Section.VAR_IN_OUT: Direction.IN_OUT,
+}
 """Of parameters, by the keyword of their section."""
 
 

@@ -198,9 +198,9 @@ class TestProgram:
         # Bounds may need constants.
         blocks = sorted(decl.blocks, key=lambda b: ast.Modifier.CONSTANT not in b.qualifiers)
         for block in blocks:
-            if block.keyword not in ("VAR", "VAR_TEMP", "VAR_EXTERNAL"):
+            if block.keyword not in (ast.Section.VAR, ast.Section.VAR_TEMP, ast.Section.VAR_EXTERNAL):
                 scope.error(block.pos, "unsupported", f"a {decl.keyword} has VAR, not {block.keyword}")
-            elif block.keyword != "VAR_EXTERNAL":  # globals are known anyway
+            elif block.keyword != ast.Section.VAR_EXTERNAL:  # globals are known anyway
                 for line in block.decls:
                     if ast.Modifier.CONSTANT in block.qualifiers:
                         self._constant(line, scope, pou.name)

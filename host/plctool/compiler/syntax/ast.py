@@ -231,7 +231,7 @@ TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | Struc
 
 
 class Modifier(StrEnum):
-    """A word in front of the name of a unit or type, or behind the keyword of a section: there it is a qualifier."""
+    """A word in front of the name of a unit or type, or after the keyword of a section (a qualifier)."""
 
     PUBLIC = "PUBLIC"
     PRIVATE = "PRIVATE"
@@ -245,6 +245,21 @@ class Modifier(StrEnum):
     RETAIN = "RETAIN"
     NON_RETAIN = "NON_RETAIN"
     PERSISTENT = "PERSISTENT"
+
+
+class Section(StrEnum):
+    """A section of declarations, by its keyword."""
+
+    VAR = "VAR"
+    VAR_INPUT = "VAR_INPUT"
+    VAR_OUTPUT = "VAR_OUTPUT"
+    VAR_IN_OUT = "VAR_IN_OUT"
+    VAR_TEMP = "VAR_TEMP"
+    VAR_STAT = "VAR_STAT"
+    VAR_INST = "VAR_INST"
+    VAR_EXTERNAL = "VAR_EXTERNAL"
+    VAR_GLOBAL = "VAR_GLOBAL"
+    STEP = "STEP"  # the steps of a chart, which the compiler declares
 
 
 @dataclass(slots=True, eq=False)
@@ -262,10 +277,10 @@ class VarDecl:
 
 @dataclass(slots=True, eq=False)
 class VarBlock:
-    """`VAR_INPUT RETAIN ... END_VAR`; `keyword` in capitals."""
+    """`VAR_INPUT RETAIN ... END_VAR`"""
 
     pos: int
-    keyword: str
+    keyword: Section
     qualifiers: set[Modifier]
     decls: list[VarDecl]
 

@@ -155,7 +155,7 @@ class Builder:
     def var_block(self, keyword: Token, *items: Any) -> ast.VarBlock:
         qualifiers = {ast.Modifier(t.text.upper()) for t in items if isinstance(t, Token)}
         decls = [d for d in items if isinstance(d, ast.VarDecl)]
-        return ast.VarBlock(keyword.pos, keyword.text.upper(), qualifiers, decls)
+        return ast.VarBlock(keyword.pos, ast.Section(keyword.text.upper()), qualifiers, decls)
 
     def var_decl(
         self,

@@ -33,7 +33,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
 from plctool.iec.types import CLASS_NUMBER, UDINT, EnumType, Field, InterfaceType, Keep, StructType
 
-_LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
+_LASTING = {ast.Section.VAR_INST: Role.LOCAL, ast.Section.STEP: Role.STEP}  # keywords of blocks in members
 
 
 def _named(interfaces: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:

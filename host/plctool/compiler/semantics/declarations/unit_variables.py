@@ -15,14 +15,20 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, GlobalSymbol, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.ast import Section
 from plctool.compiler.typed import Assign, Load, Pou, PouKind, Storage, Variable, VarPlace
 from plctool.iec.types import Keep
 
 ROLES = {
-    "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,
-    "VAR_TEMP": Role.TEMP,
-    "VAR_STAT": Role.LOCAL, "VAR_INST": Role.LOCAL, "STEP": Role.STEP,
-}  # fmt: skip
+    Section.VAR_INPUT: Role.INPUT,
+    Section.VAR_OUTPUT: Role.OUTPUT,
+    Section.VAR_IN_OUT: Role.IN_OUT,
+    Section.VAR: Role.LOCAL,
+    Section.VAR_TEMP: Role.TEMP,
+    Section.VAR_STAT: Role.LOCAL,
+    Section.VAR_INST: Role.LOCAL,
+    Section.STEP: Role.STEP,
+}
 _KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
 _KEEPING = {
     PouKind.FUNCTION: "a FUNCTION_BLOCK", PouKind.METHOD: "VAR_INST", PouKind.FUNCTION_BLOCK: "VAR",
@@ -32,7 +38,11 @@ _KEEPING = {
 
 def _holds_constants(block: ast.VarBlock) -> bool:
     """Whether what a block declares has one value for ever. CONSTANT parameters are only read-only."""
-    return ast.Modifier.CONSTANT in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL", "VAR_INST")
+    return ast.Modifier.CONSTANT in block.qualifiers and block.keyword not in (
+        *DIRECTIONS,
+        Section.VAR_EXTERNAL,
+        Section.VAR_INST,
+    )
 
 
 def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.VarDecl, Role]]:
@@ -84,14 +94,14 @@ class UnitVariables:
         for block in decl.blocks:
             if _holds_constants(block):
                 continue
-            if block.keyword == "VAR_EXTERNAL":
+            if block.keyword == Section.VAR_EXTERNAL:
                 self._declare_externals(block, scope)
-            elif block.keyword == "VAR_STAT":
+            elif block.keyword == Section.VAR_STAT:
                 self._declare_statics(block, decl, scope)
-            elif block.keyword == "VAR_TEMP" and not _seen_by_actions(block, decl):
+            elif block.keyword == Section.VAR_TEMP and not _seen_by_actions(block, decl):
                 self.declare_stack_variables(block, pou, scope)
-            elif block.keyword == "VAR_TEMP":
-                yield replace(block, keyword="VAR")
+            elif block.keyword == Section.VAR_TEMP:
+                yield replace(block, keyword=Section.VAR)
                 self._start_anew(block, scope)
             else:
                 yield block
@@ -152,8 +162,11 @@ class UnitVariables:
 
     def keep_of(self, block: ast.VarBlock, pou: Pou) -> Keep:
         """Whether the variables of a section keep their values; where none can, `permitted` has said so."""
-        short = pou.kind in (PouKind.FUNCTION, PouKind.METHOD) and block.keyword not in ("VAR_STAT", "VAR_INST")
-        if short or block.keyword in ("VAR_TEMP", "VAR_IN_OUT"):
+        short = pou.kind in (PouKind.FUNCTION, PouKind.METHOD) and block.keyword not in (
+            Section.VAR_STAT,
+            Section.VAR_INST,
+        )
+        if short or block.keyword in (Section.VAR_TEMP, Section.VAR_IN_OUT):
             return Keep.UNSAID
         return Keep.of(block.qualifiers)
 
