@@ -44,7 +44,7 @@ GUESTS = ("cortex-m3", "cortex-m4f")
 CHECKS = ("all", "none")
 VARIANTS = (("all", "-O2"), ("none", "-O2"), ("all", "-O3"), ("all", "-Os"))  # on Cortex-M
 C_FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-strict-aliasing")
-SHARED = ROOT.parent / "shared/bench"  # more programs, when this folder lies beside the checkout
+SHARED = ROOT.parent / "shared/bench"  # more programs, when this folder is beside the checkout
 
 
 @dataclass

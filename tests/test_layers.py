@@ -33,7 +33,7 @@ FLOORS = (
     ("cli",),
     ("__main__",),
 )
-# What floors alone do not say: (package, what it does not know although that lies below it).
+# What floors alone do not say: (package, what it does not know although that is below it).
 APART = (
     ("compiler", ("link", "gateway")),
     ("device", ("compiler",)),

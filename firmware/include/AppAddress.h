@@ -12,8 +12,8 @@
 #include "CmpStd.h"
 
 /*
- * Checks that [offset, offset + size) lies in area `index` of the loaded application and returns its address, NULL
- * otherwise. The only way anybody turns an area reference from outside into a pointer. APP_AREA_CODE may only be read.
+ * Checks that [offset, offset + size) is in area `index` of the loaded application and returns its address, NULL
+ * otherwise. The only way to turn an area reference from outside into a pointer. APP_AREA_CODE may only be read.
  */
 RTS_UI8 *AppGetAreaAddress(RTS_UI32 index, RTS_UI32 offset, RTS_UI32 size);
 RTS_UI32 AppGetAreaSize(RTS_UI32 index); /* bytes, as the image asked for */
@@ -21,18 +21,18 @@ RTS_UI32 AppGetAreaSize(RTS_UI32 index); /* bytes, as the image asked for */
  * variables. */
 bool AppFindArea(uintptr_t address, RTS_UI32 *index, RTS_UI32 *offset);
 
-/* A place in the areas as others name it: monitoring, force, trace, maps of inputs and outputs. `offset` is what they
- * say, whatever it is. */
+/* A location in the areas as others name it: monitoring, force, trace, maps of inputs and outputs. `offset` is not
+ * checked. */
 typedef struct {
     RTS_UI32 area; /* APP_AREA_* */
     RTS_UI32 offset;
 } AREA_ADDRESS;
 
-/* Where the `size` bytes at a place are. MONITORING_ERR_SIZE_0, _INVALID_AREA (the application has none), or
- * _INVALID_INDEX: not all of them lie in it. */
+/* Where the `size` bytes at a location are. MONITORING_ERR_SIZE_0, _INVALID_AREA (the application has none), or
+ * _INVALID_INDEX: not all of them are in it. */
 MON_RESULT AppAddressResolve(const AREA_ADDRESS *address, RTS_UI32 size, RTS_UI8 **memory);
 
-/* Goes on at where the pointer at *address leads: again an area and an offset, whatever the pointer holds. The same
+/* Follows the pointer at *address: the result is again an area and an offset, whatever the pointer holds. The same
  * errors, or MONITORING_ERR_INVALID_POINTER: it leads into no area. */
 MON_RESULT AppAddressFollow(AREA_ADDRESS *address);
 

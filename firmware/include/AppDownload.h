@@ -15,7 +15,7 @@
 /*
  * Download. Begin opens the idle slot (erases lazily, sector by sector), Write appends, End checks everything
  * and, only when all is well, commits the slot, stops the old application and loads the new one (state AS_STOP).
- * On any error the old application runs on, untouched; except that when the tasks of the new one cannot be created, it
+ * On any error the old application goes on, untouched; except that when the tasks of the new one cannot be created, it
  * is loaded again, with its retain variables, and started if it ran.
  *
  * Begin: ERR_NOMEMORY too large for the slot. Write: ERR_INVALID_SEQUENCE not begun or `offset` is not what
@@ -24,7 +24,7 @@
  */
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc);
 RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size);
-RTS_UI32 AppDownloadOffset(void); /* bytes received so far; a broken transfer continues here */
+RTS_UI32 AppDownloadOffset(void); /* bytes received so far; an aborted transfer continues here */
 /* Whether the download that has begun is that of this image. It outlives the channel it came through. */
 bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc);
 bool AppDownloadIsOpen(void);

@@ -20,7 +20,7 @@ typedef struct {
 
 #ifndef RTS_CFFI
 /* Called by the cycle in the context of the task that failed, when the application is in its safe state: records the
- * exception. The rest (log, outputs that other tasks have written meanwhile, events) follows in CH_COMM_CYCLE. */
+ * exception. What remains (log, outputs that other tasks have written meanwhile, events) follows in CH_COMM_CYCLE. */
 void AppHandleException(RTS_I32 task, RTS_UI32 code, uintptr_t address);
 
 /* The words for an RTSEXCPT_* code, for the log. From any context. */

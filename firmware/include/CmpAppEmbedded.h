@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * There is one application. It lies in one of two flash slots; a download goes to the other one while the application
+ * There is one application. It is in one of two flash slots; a download goes to the other one while the application
  * runs, and takes over only after every check has passed. Manual 3.3, 2.3.1; design: two slots, one atomic commit
  * record. All functions are called from main only, unless said otherwise. (Shared with the host.)
  */

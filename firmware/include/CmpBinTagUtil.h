@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The reader is the only code that turns a length from outside into a pointer and a size. Nobody gets a tag without
- * saying which sizes he can take.
+ * The reader is the only code that turns a length from outside into a pointer and a size. A caller states which sizes
+ * of a tag it accepts.
  */
 #ifndef CMPBINTAGUTIL_H
 #define CMPBINTAGUTIL_H

@@ -16,7 +16,7 @@
 typedef enum {
     CH_INIT_SYSTEM,       /* system components (log, memory, time): reset all own state */
     CH_INIT_SYSTEM2,      /* what needs other system components */
-    CH_INIT,              /* all other components: reset all own state, call nobody */
+    CH_INIT,              /* all other components: reset all own state, call no other */
     CH_INIT2,             /* all others are initialised; create events */
     CH_INIT3,             /* register for events, services, external functions */
     CH_INIT_SYSTEM_TASKS, /* timers and tasks the application needs */
@@ -87,8 +87,7 @@ typedef struct {
     const char *name;
 } CMP_NAME;
 
-/* The port's list, in the order of CmpOrder.h. Names are apart from the hooks: where nobody asks for them they take no
- * flash. */
+/* The port's list, in the order of CmpOrder.h. Names are apart from the hooks: unused ones take no flash. */
 extern const PF_HOOK_FUNCTION cmp_hooks[];
 extern const CMP_NAME cmp_names[];
 extern const RTS_SIZE cmp_component_count;

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Entries carry component, class, error and a text; the oldest is overwritten. Manual 3.9, codesys-v3-protocol 4.10.
+ * Entries have component, class, error and a message; the oldest is overwritten. Manual 3.9, codesys-v3-protocol 4.10.
  */
 #ifndef CMPLOG_H
 #define CMPLOG_H
@@ -28,7 +28,7 @@ typedef struct {
 
 #ifndef RTS_CFFI
 /* Adds an entry; `format` is always a literal of ours, with %s %d %u %x only. From main or a task context. Without log
- * its arguments are not evaluated, and the texts take no flash. */
+ * its arguments are not evaluated, and the messages take no flash. */
 #define LogAdd(...)                   \
     do {                              \
         if (LOG_MAX_ENTRIES > 0)      \

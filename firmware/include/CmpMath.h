@@ -18,7 +18,7 @@
  *   0x62B830F9  atan2(LREAL,LREAL):LREAL   0x8B5C7723  atan2f(REAL,REAL):REAL
  *   0x0909C5B0  pow(LREAL,LREAL):LREAL     0x4F59F748  powf(REAL,REAL):REAL       EXPT
  *
- * All are pure: no lock, no allocation, the same from any task, so the watchdog may break into them. Arguments
+ * All are pure: no lock, no allocation, the same from any task, so the watchdog may abort them. Arguments
  * outside a function's domain give NaN or infinity as IEEE 754 says, never an exception. Library version 1.0.
  */
 #ifndef CMPMATH_H

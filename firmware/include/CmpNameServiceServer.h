@@ -1,5 +1,5 @@
 /*
- * CmpNameServiceServer.h - answers who this node is (network scan). codesys-v3-protocol 2.6.
+ * CmpNameServiceServer.h - replies with the identity of this node (network scan). codesys-v3-protocol 2.6.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -4,7 +4,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Names as in codesys-v3-protocol, sections in brackets. All integers are little-endian and lie where the packet has
+ * Names as in codesys-v3-protocol, sections in brackets. All integers are little-endian and are where the packet has
  * them, aligned or not: so they are arrays of bytes, read and written by CmpBytes.h, and a layout has no padding. A
  * pointer to any byte may be cast to a pointer to a layout, once the length is checked against its size.
  */

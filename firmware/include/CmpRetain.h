@@ -6,7 +6,7 @@
  * The retain area lives in RAM. It is saved as a whole: on stop and shutdown, and at most every APP_RETAIN_SAVE_US when
  * it changed. A record is the state of one moment between the cycles of all tasks, and belongs to one image.
  *
- * When an application begins, values come from a source: the last record, the record of the application before, or what
+ * When an application begins, values come from a source: the last record, the record of the previous application, or what
  * the variables are at a reset. The source is chosen first (RetainLoad, RetainCapture); the values are put back, variable
  * by variable as the table in the image says, when the initial values are there; and they count, and are saved, when the
  * initialisation is over. Until then all of it can be done again: a power cut loses nothing.
@@ -34,8 +34,8 @@ void RetainDetach(void);
 RTS_UI32 RetainGetSequence(void);
 
 /* The source is the newest record in the range of the application whose checked table is `table`: this one's, all of
- * whose values are kept, or that of the application before, of which PERSISTENT values are kept where name and type are
- * as they were. Those of its own are in the area at once, which is zero, for who looks at an application that waits.
+ * whose values are kept, or that of the previous application, of which PERSISTENT values are kept where name and type are
+ * as they were. Those of its own are in the area at once, which is zero, so that they can be read while the application waits.
  * ERR_NO_OBJECT: there is none. */
 RTS_RESULT RetainLoad(const RETAIN_TABLE *table, RTS_UI32 tag, FLASH_LOG_RANGE range);
 
@@ -47,14 +47,14 @@ void RetainCapture(bool cold);
 void RetainPutBack(void);
 
 /* The initialisation is over: what the variables are now is saved. After one that failed only what comes from the
- * application before, whose own table will be gone. */
+ * previous application, whose own table will be gone. */
 void RetainSettle(bool failed);
 
 /* Saves what counts when it is not what was saved last, or always; no task runs. ERR_DEVICE flash fault. */
 RTS_RESULT RetainSave(bool always);
 
 /* From now on the record numbered `until`, or the newest before it, is kept in flash, whatever is saved. It is that of
- * the application before, as long as the device may go back to it. */
+ * the previous application, as long as the device may go back to it. */
 void RetainKeep(RTS_UI32 until);
 void RetainKeepNone(void);
 

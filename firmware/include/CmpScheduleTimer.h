@@ -9,7 +9,7 @@
  * CmpScheduleTimer.c cyclic tasks do so too: the super loop of a device without a timer to spare.
  *
  * A variable is looked at when a cycle of any task has ended, when inputs were read, and in each pass of main, which is
- * for what communication wrote. So each change from FALSE to TRUE that a cycle leaves behind is one run of the task that
+ * for what communication wrote. So each change from FALSE to TRUE that a cycle ends with is one run of the task that
  * waits for it, and changes within a cycle do not count. SCHED_MAX_WAITING_EVENTS of them may wait for the task.
  */
 #ifndef CMPSCHEDULETIMER_H
@@ -21,17 +21,17 @@
 #include "CompactDownload.h"
 #include "SchedEvents.h"
 
-/* Creates what the tasks need, stopped; deletes that of the tasks before. `areas` are the base addresses by APP_AREA_*.
+/* Creates what the tasks need, stopped; deletes that of the previous tasks. `areas` are the base addresses by APP_AREA_*.
  * Called by CmpIecTask from main. ERR_NOMEMORY when the port has no timer left. */
 RTS_RESULT SchedCreateTasks(const CDL_TASK *tasks, RTS_UI32 count, RTS_UI8 *const *areas);
 
 /* Called by CmpIecTask from main. After SchedStop has returned no task is in its cycle: one that is in it for longer than
- * SCHED_STOP_US is broken out of it, with RTSEXCPT_STOP_TIMEOUT. */
+ * SCHED_STOP_US is aborted, with RTSEXCPT_STOP_TIMEOUT. */
 RTS_RESULT SchedStart(void);
 void SchedStop(void);
 
-/* The runtime is about to end: application code that still runs SCHED_STOP_US later, tasks and initialisation, is broken
- * out of like that. For good; from any context, signal handlers too. */
+/* The runtime is about to end: application code that still runs SCHED_STOP_US later, tasks and initialisation, is aborted
+ * like that. For good; from any context, signal handlers too. */
 void SchedRequestEnd(void);
 
 /* How many due times of a task were skipped since SchedCreateTasks, because a cycle took too long, or events lost,
@@ -44,10 +44,10 @@ void SchedBackgroundCycle(void);
 bool SchedHasBackgroundTasks(void);
 
 /*
- * Breaks IEC code that runs for too long: longer than watchdog time * sensitivity of its task, or than
- * APP_DEFAULT_WATCHDOG_US when it has no watchdog; and code that holds up a stop. The port calls it every few
+ * Aborts IEC code that runs for too long: longer than watchdog time * sensitivity of its task, or than
+ * APP_DEFAULT_WATCHDOG_US when it has no watchdog; and code that delays a stop. The port calls it every few
  * milliseconds from a context that preempts every task and main (a timer interrupt above all tasks, a thread); `now_ns`
- * is SysTimeGetNs. A cycle that another one holds up is not charged for that time, as far as these calls can tell; with
+ * is SysTimeGetNs. A cycle that another one delays is not charged for that time, as far as these calls show it; with
  * SCHED_PROCESSOR_TIME only for the time it had a processor.
  */
 void SchedWatchdogCheck(RTS_I64 now_ns);

@@ -26,7 +26,7 @@ typedef RTS_RESULT (*SRV_HANDLER)(SRV_REQUEST *request, BTAG_WRITER *reply);
 
 /* What a client may do; a set of bits. A login gives all of them, as long as there are no users. */
 enum {
-    RIGHT_NONE = 0,     /* for services that need no login: they tell who the device is and how it is */
+    RIGHT_NONE = 0,     /* for services that need no login: identity and state of the device */
     RIGHT_VIEW = 1,     /* reads variables */
     RIGHT_WRITE = 2,    /* writes variables */
     RIGHT_CONTROL = 4,  /* starts, stops, resets */
@@ -43,14 +43,14 @@ typedef struct {
 /* ERR_NOMEMORY above SRV_MAX_GROUPS. `services` must stay valid. */
 RTS_RESULT SrvRegisterGroup(RTS_UI16 group, const SRV_SERVICE *services, RTS_SIZE count);
 
-/* Handles one message of a client and returns the size of the reply in `reply`; 0 when the header is too broken to be
- * answered. */
+/* Handles one message of a client and returns the size of the reply in `reply`; 0 when the header is invalid, so that
+ * there is no reply. */
 RTS_UI32 SrvHandleMessage(COMM_CLIENT *client, const RTS_UI8 *message, RTS_UI32 size, RTS_UI8 *reply,
                           RTS_UI32 capacity);
 
 /* ---- the session of a client ---- */
 
-/* Creates the session anew (without rights) and returns its id. */
+/* Creates the session (again), without rights, and returns its id. */
 RTS_UI32 SrvCreateSession(COMM_CLIENT *client);
 /* Gives session `id` the rights of a login; another id creates a new session. Returns the session's id. */
 RTS_UI32 SrvLogin(COMM_CLIENT *client, RTS_UI32 id);

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * There are COMM_MAX_CLIENTS of them, held by the channel server. A service is told which one asks. `channel` is
+ * There are COMM_MAX_CLIENTS of them, held by the channel server. A service gets the one that asks. `channel` is
  * changed by CmpChannelServerEmbedded.c only, `session` by CmpSrv.c only. All from main.
  */
 #ifndef COMMCLIENT_H

@@ -4,8 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Layout of manual 2.3.1 and codesys-v3-protocol 5.1..5.4. All little-endian; table entries start at multiples of 4,
- * the code segment at a multiple of APP_CODE_ALIGN. Where the field's format says nothing (tasks), a typed blob carries
- * it.
+ * the code segment at a multiple of APP_CODE_ALIGN. What the field's format lacks (tasks) is in a typed blob.
  */
 #ifndef COMPACTDOWNLOAD_H
 #define COMPACTDOWNLOAD_H
@@ -19,7 +18,7 @@ enum {
     CDL_CRC_OFFSET = 100,
     APP_CODE_ALIGN = 16,
     APP_POINTER_SIZE = 8, /* what a variable that is a pointer takes, on every target; the address comes first */
-    APP_NAME_SIZE = 60,   /* of a name or text in an image that the runtime reads, with NUL */
+    APP_NAME_SIZE = 60,   /* of a name or string in an image that the runtime reads, with NUL */
 };
 
 /* What a blob begins with; no enum constant of C is so large. */
@@ -138,7 +137,7 @@ typedef struct {
 enum {
     CDL_BLOB_TASKS = 1,   /* array of CDL_TASK */
     CDL_BLOB_RETAIN = 2,  /* what is kept: CDL_KEPT, some with a CDL_KEPT_RUN, in ascending order of their hashes */
-    CDL_BLOB_EVENTS = 3,  /* names of the external events tasks wait for, each with NUL; for whoever reads the image */
+    CDL_BLOB_EVENTS = 3,  /* names of the external events tasks wait for, each with NUL; for readers of the image */
     CDL_BLOB_IMAGES = 16, /* CDL_IMAGE for inputs and outputs of each task; those it lacks work on the shared areas */
 };
 
@@ -194,7 +193,7 @@ enum {
     CDL_KEPT_OFFSET_SHIFT = 4,
 };
 
-/* Elements of an array that lie `stride` bytes apart, or members of them; a string is a run of one. */
+/* Elements of an array that are `stride` bytes apart, or members of them; a string is a run of one. */
 typedef struct {
     RTS_UI16 size;   /* of an element, bytes */
     RTS_UI16 stride; /* at least `size` */

@@ -10,7 +10,7 @@
  * All phases of a cycle run in the context of its task, which may be interrupted by tasks of a higher priority and, on
  * several cores, run at the same time as others: a phase that shares data with other tasks locks them itself
  * (SysLock.h; no lock is held when it is called). They belong to the cycle: monitoring and retain wait for their end,
- * statistics and watchdog count their time. But what goes wrong in them is no exception of the program: a phase does
+ * statistics and watchdog count their time. But an error in them is not an exception of the program: a phase does
  * not block, and ends by itself, within the time that its component documents. After code that failed there are no
  * phases; the last two are left out when the application was stopped meanwhile: it may be in its safe state.
  */

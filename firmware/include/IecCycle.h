@@ -29,7 +29,7 @@ typedef struct {
     RTS_UI32 min_us;
     RTS_UI32 max_us;
     RTS_UI32 jitter_us;
-    RTS_UI32 overruns; /* due times missed because the cycle before took too long; of events, those that were lost */
+    RTS_UI32 overruns; /* due times missed because the previous cycle took too long; of events, those that were lost */
 } IEC_TASK_INFO;
 
 /* One cycle of a task that is due since `due_ns` (SysTimeGetNs). Called by the scheduler in the context of the task.
@@ -73,7 +73,7 @@ bool IecTaskBetweenCycles(void (*copy)(void));
  * simulator, between cycles. */
 RTS_RESULT IecTaskGetEntry(RTS_UI32 task, IEC_ENTRY *entry, IEC_CONTEXT **context);
 
-/* IEC code that runs right now, for who supervises it. */
+/* IEC code that runs right now, for the watchdog. */
 typedef struct {
     RTS_UI32 serial; /* differs from one cycle of the task to its next */
     RTS_I64 start_ns;

@@ -24,8 +24,8 @@ typedef struct {
     CDL_KEPT_RUN run;
 } KEPT;
 
-/* Reads the next entry; *table becomes the rest. ERR_NO_OBJECT at the end, ERR_OUT_OF_LIMITS when the entry is cut off
- * or does not lie in the retain area, or an error of the flash. */
+/* Reads the next entry; *table becomes what remains. ERR_NO_OBJECT at the end, ERR_OUT_OF_LIMITS when the entry is cut
+ * off or is not in the retain area, or an error of the flash. */
 RTS_RESULT RetainTableNext(RETAIN_TABLE *table, KEPT *kept);
 
 /* Of the first element in the retain area, bytes. */

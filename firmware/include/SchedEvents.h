@@ -10,7 +10,7 @@
 #include "CmpStd.h"
 
 /* Looks at the variables of event tasks. From any context, when they may have changed: the cycle (IecCycle.c) calls it at the end
- * of each cycle; who copies inputs calls it afterwards. */
+ * of each cycle; code that copies inputs calls it afterwards. */
 void SchedNoteEvents(void);
 
 /*

@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Objects of type RTS_UI32. Load acquires, Store releases: what was written before a Store is seen after the Load that
- * reads it. Add returns the value before, Replace whether it was the one expected and is now the other; a core without
+ * reads it. Add returns the previous value, Replace whether it was the one expected and is now the other; a core without
  * exclusive access instructions (Cortex-M0) supplies __atomic_fetch_add_4 and __atomic_compare_exchange_4 with
  * interrupts masked. Fence keeps reads and writes before it from mixing with those after it,
  * for a number that is changed, or looked at, both before and after the data it stands for.

@@ -23,7 +23,7 @@ void SysComClose(RTS_UI32 index);
 /* Reads what has been received, at most `size` bytes; returns the number, 0 when there is nothing. */
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size);
 
-/* Queues bytes to send; returns how many were taken (0..size), the rest has to be offered again. */
+/* Queues bytes to send; returns how many were taken (0..size), the others have to be offered again. */
 RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size);
 
 #endif

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A port turns hardware faults (signals, fault handlers), checked errors (SysExceptRaise) and the watchdog's break
+ * A port turns hardware faults (signals, fault handlers), checked errors (SysExceptRaise) and the watchdog's abort
  * (SysExceptBreak) into one return from SysExceptTry. Numbers: codesys-v3-protocol 5.8.
  */
 #ifndef SYSEXCEPT_H
@@ -64,7 +64,7 @@ enum {
     RTSEXCPT_LICENSE_INVALID = 0x100D0001,
     RTSEXCPT_WATCHDOG_OMITTED_CYCLE = 0x1000,
     RTSEXCPT_VENDOR_EXCEPTION_BASE = 0x2000,
-    RTSEXCPT_STOP_TIMEOUT = 0x2001, /* was in its cycle for too long after a stop, and broken out of it */
+    RTSEXCPT_STOP_TIMEOUT = 0x2001, /* was in its cycle for too long after a stop, and was aborted */
 };
 
 typedef struct {
@@ -97,7 +97,7 @@ const EXCEPT_TRACE *SysExceptGetTrace(void);
  * Runs fn(arg) and catches what goes wrong in it. Not nested. Called by CmpIecTask in the context of a task (timer
  * interrupt or thread) and by CmpAppEmbedded from main for the init code.
  *
- * Returns true when fn returned; false when it was left by an exception, which *exception tells then. After an exception
+ * Returns true when fn returned; false when it was left by an exception, which is in *exception then. After an exception
  * no lock is held that was taken within fn, because IEC code takes none.
  */
 bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception);
@@ -122,7 +122,7 @@ void SysExceptShutdown(void);
 
 /* ---- SysExceptTrace.c, for all ports ---- */
 
-/* Where the code of the application lies; size 0: there is none. From main, while no IEC code runs. */
+/* Where the code of the application is; size 0: there is none. From main, while no IEC code runs. */
 void SysExceptCodeRange(const RTS_UI8 *start, RTS_UI32 size);
 bool SysExceptIsCode(uintptr_t address);
 /* The offset in it of an address for which SysExceptIsCode is true. */

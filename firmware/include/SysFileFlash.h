@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Where the files lie: FILE_MAP of rts_config_port.h, or computed from the size of the flash. A file is written in
+ * Where the files are: FILE_MAP of rts_config_port.h, or computed from the size of the flash. A file is written in
  * sequence, in units of FILE_ALIGN bytes; sectors are erased when the first unit of them is due, no byte is programmed
  * twice. All from main.
  */
@@ -21,7 +21,7 @@ enum { FILE_SLOT_A = 0, FILE_SLOT_B = 1, FILE_COMMIT = 2, FILE_RETAIN = 3, FILE_
 enum { FILE_ALIGN = 16 };
 #define SysFileAlign(size) (((size) + FILE_ALIGN - 1) & ~(RTS_UI32)(FILE_ALIGN - 1))
 
-/* Where a file lies in flash: both multiples of the sector size. */
+/* Where a file is in flash: both multiples of the sector size. */
 typedef struct {
     RTS_UI32 offset;
     RTS_UI32 size;

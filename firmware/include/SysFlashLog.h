@@ -5,8 +5,7 @@
  *
  * The file is two halves. Records are appended to one half until it is full; then the other is erased and takes over. A
  * record counts when its CRC is right, the one with the newest sequence number wins: a cut leaves the old or the new
- * one, never a mix. Whoever uses it puts all it needs into each record, for the records before may be erased. All from
- * main.
+ * one, never a mix. A user puts all it needs into each record, because previous records may be erased. All from main.
  */
 #ifndef SYSFLASHLOG_H
 #define SYSFLASHLOG_H

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * AppBoot.c decides by it whether the application that ran before may run again: only a death of the program itself
+ * AppBoot.c decides by it whether the application that ran before may run again: only a failure of the program itself
  * counts against it, never the loss of power. From main only; constant after CH_INIT_SYSTEM.
  */
 #ifndef SYSSTART_H
@@ -12,10 +12,10 @@
 #include "CmpStd.h"
 
 enum {
-    /* Power came, a button was pressed, the run before ended in good order, or the whole process was killed from
+    /* Power came, a button was pressed, the previous run ended in good order, or the whole process was killed from
      * outside: counts against nothing. */
     SYS_START_POWER = 0,
-    /* The run before ended by itself: a watchdog reset, a lockup, a signal in the worker. Counts against the application
+    /* The previous run crashed: a watchdog reset, a lockup, a signal in the worker. Counts against the application
      * that ran or was being initialised. */
     SYS_START_CRASH = 1,
     /* The port cannot tell the two apart. Counts only when the initialisation of the application was not finished, and
@@ -33,10 +33,10 @@ static const RTS_UI32 APP_NO_CODE_OFFSET;
 typedef struct {
     RTS_UI8 cause; /* SYS_START_* */
     /* Not 0: the boot project is loaded but not called, until it is started by a user, or until the next start. For a
-     * port whose restart after a crash is no decision of the user's (Linux), and for a button that says so; with
+     * port whose restart after a crash is not a decision of the user (Linux), and for a button that says so; with
      * APP_MAY_STAY_STOPPED. */
     RTS_UI8 stay_stopped;
-    /* The rest tells of a crash. */
+    /* What follows describes a crash. */
     RTS_I16 task;         /* index of the task, -1: in none, but in initialisation or the runtime itself */
     RTS_UI32 exception;   /* RTSEXCPT_*, RTSEXCPT_NOEXCEPTION when it is not known */
     RTS_UI32 code_offset; /* in the code segment of the application, APP_NO_CODE_OFFSET */

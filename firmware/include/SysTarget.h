@@ -1,5 +1,5 @@
 /*
- * SysTarget.h - who this device is.
+ * SysTarget.h - the identity of this device.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -30,7 +30,7 @@ const SYS_TARGET *SysTargetGet(void);
 /* 32 unpredictable bits for channel and session ids. From main. */
 RTS_UI32 SysTargetRandom(void);
 
-/* The stack of main. From main, when somebody asks: may take a while. */
+/* The stack of main. From main, on request: may take a while. */
 SYS_STACK SysTargetGetStack(void);
 
 #endif

@@ -28,7 +28,7 @@
 #define APP_REFUSAL_TEXT_SIZE (64 + 6 * APP_MAX_IMPORTS)
 #endif
 
-/* Words of the stack that are kept of an exception, from which the host tells the calls that led there; 8 bytes each.
+/* Words of the stack that are kept of an exception, from which the host finds the calls that led there; 8 bytes each.
  * 0: only the place is known. */
 #ifndef EXCEPT_MAX_CALLS
 #define EXCEPT_MAX_CALLS 16
@@ -56,14 +56,14 @@
 #define APP_AREAS_FROM_PORT 0
 #endif
 
-/* How a port wants the areas aligned, and their `size` rounded up, and where they lie, to let programs write nothing but
+/* How a port wants the areas aligned, and their `size` rounded up, and where they are, to let programs write nothing but
  * them. */
 #ifndef APP_AREAS_ALIGNED
 #define APP_AREAS_ALIGNED(size)
 #define APP_AREAS_SECTION
 #endif
 
-/* APP_GATE(function); stands behind an external function that does more than compute: it writes variables of its own,
+/* APP_GATE(function); stands after an external function that does more than compute: it writes variables of its own,
  * or needs hardware or a lock of the runtime. APP_GATED(function) is what its table offers. Where IEC code may write its
  * areas and its stack only, and so may the functions it calls, the gate gives it the rights of the runtime. */
 #ifndef APP_GATE
@@ -87,7 +87,7 @@
 #endif
 
 /* A new application has proven itself after running this long without an exception [us]; before that a restart may roll
- * back to the one before it. */
+ * back to the previous one. */
 #ifndef APP_PROVE_US
 #define APP_PROVE_US 3000000
 #endif
@@ -103,13 +103,13 @@
 #define APP_CRASH_TEXT_SIZE 32
 #endif
 
-/* A cycle of a task without watchdog, and initialisation code, is broken out of after this long [us], so that an
+/* A cycle of a task without watchdog, and initialisation code, is aborted after this long [us], so that an
  * endless loop never takes the device away. */
 #ifndef APP_DEFAULT_WATCHDOG_US
 #define APP_DEFAULT_WATCHDOG_US 10000000
 #endif
 
-/* Initialisation code is broken out of after this long [us]: communication waits for it, and so does a reset. */
+/* Initialisation code is aborted after this long [us]: communication waits for it, and so does a reset. */
 #ifndef APP_INIT_WATCHDOG_US
 #define APP_INIT_WATCHDOG_US APP_DEFAULT_WATCHDOG_US
 #endif
@@ -121,7 +121,7 @@
 #endif
 
 /* A task that is in its cycle so long after a stop, a reset, a download or the end of the runtime was asked for is
- * broken out of it [us]: with the code that runs at the end (FB_Exit) it stays within a second. Only where tasks run
+ * aborted [us]: with the code that runs at the end (FB_Exit) it stays within a second. Only where tasks run
  * beside main (RTS_ONE_CORE 0); where they interrupt it, none runs when main stops them. */
 #ifndef SCHED_STOP_US
 #define SCHED_STOP_US 400000
@@ -159,8 +159,8 @@
 /* Changed retain variables are saved at most this often [us]: what a power cut may lose against the wear of the flash.
  * A save takes the size of the area and 20 bytes, rounded up to 16, of one half of the retain log; a half is erased
  * when it is full. So 500 bytes that change all the time, saved every second in two halves of 8 KiB, erase each sector
- * once in 30 s (100 000 erases: 35 days); every 60 s it is almost six years. The retain area is in RAM twice, because
- * what was saved last is compared with. On one core the copy has to fit between two cycles. */
+ * once in 30 s (100 000 erases: 35 days); every 60 s it is almost six years. The retain area is in RAM twice: it is
+ * compared with the last saved copy. On one core the copy has to fit between two cycles. */
 #ifndef APP_RETAIN_SAVE_US
 #define APP_RETAIN_SAVE_US 1000000
 #endif
@@ -221,7 +221,7 @@
 #define SETTINGS_TABLE
 #endif
 
-/* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log lie in flash, if not where
+/* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log are in flash, if not where
  * SysFileFlash computes it. No default. */
 
 /* Receive and send buffer of a connection, bytes each; the largest L7 message. The field's compact
@@ -286,7 +286,7 @@
 #define SRV_MAX_GROUPS 8
 #endif
 
-/* Services that only tell about the application (its name and list, its tasks), the room on the stack, and the echo
+/* Services that only inform about the application (its name and list, its tasks), the room on the stack, and the echo
  * service; 1.3 KiB of flash. 0: none. */
 #ifndef SRV_INFORMATION
 #define SRV_INFORMATION 1
@@ -303,7 +303,7 @@
 #define NS_REPLY_SIZE 444
 #endif
 
-/* Entries of the log ring; each about 100 bytes with its text. 0: no log, whose texts take 3 KiB of flash. */
+/* Entries of the log ring; each about 100 bytes with its message. 0: no log, whose messages take 3 KiB of flash. */
 #ifndef LOG_MAX_ENTRIES
 #define LOG_MAX_ENTRIES 16
 #endif

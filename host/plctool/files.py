@@ -34,7 +34,7 @@ def read_image(path: Path) -> bytes:
 
 
 def make_folder(path: Path) -> None:
-    """Makes a folder and those it lies in, unless they are there."""
+    """Makes a folder and those it is in, unless they are there."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -25,7 +25,7 @@ NO_SLOT = 0xFF  # as the first byte of a commit record: there is no program, by 
 
 @dataclass(frozen=True)
 class Record:
-    """One that lies at `offset` of the flash."""
+    """One that is at `offset` of the flash."""
 
     offset: int
     sequence: int

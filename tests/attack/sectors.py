@@ -18,7 +18,7 @@ PATTERNS = ("FF", "00", "random")
 
 class Sectors(Campaign):
     name = "sector"
-    promise = "a lost sector costs the program that lies in it, and nothing else"
+    promise = "a lost sector costs the program that is in it, and nothing else"
     short = 60
 
     def cases(self) -> list[Case]:
@@ -62,7 +62,7 @@ def _used(content: bytes, geometry: Geometry) -> list[int]:
 
 def _overlaps(content: bytearray, image: bytes, begin: int, end: int) -> bool:
     at = content.find(image)
-    assert at >= 0, "the image lies in flash as it is"
+    assert at >= 0, "the image is in flash as it is"
     return at < end and begin < at + len(image)
 
 

@@ -377,7 +377,7 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
     image_set_header(image, h);
 }
 
-/* ---- an application for everybody: a task of 10 ms that counts up by `step` ---- */
+/* ---- an application for all tests: a task of 10 ms that counts up by `step` ---- */
 
 enum {
     COUNTER_OFFSET = 0,   /* data: DINT, counts */

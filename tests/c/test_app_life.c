@@ -176,7 +176,7 @@ static void download_calls_out_of_order_are_refused(void)
     CHECK(read_u32(APP_AREA_DATA, STEP_OFFSET) == 2);
 }
 
-static void begin_again_starts_anew(void)
+static void begin_again_starts_from_zero(void)
 {
     APP_BYTES image;
 
@@ -461,7 +461,7 @@ int main(void)
     RUN(a_second_download_replaces_the_first);
     RUN(the_old_application_runs_on_while_a_new_one_arrives);
     RUN(download_calls_out_of_order_are_refused);
-    RUN(begin_again_starts_anew);
+    RUN(begin_again_starts_from_zero);
     RUN(a_rollback_to_an_application_that_fails_too_is_written_down);
     RUN(an_application_without_timers_for_its_tasks_makes_room_for_the_old_one);
     RUN(a_start_that_fails_leaves_no_outputs);

@@ -150,7 +150,7 @@ typedef struct {
     RTS_UI32 align;
 } SEGMENT_CASE;
 
-static void every_segment_lies_behind_the_header_and_within_the_image(void)
+static void every_segment_is_after_the_header_and_within_the_image(void)
 {
     const SEGMENT_CASE cases[] = {
         {&header.code, "Code", 16},
@@ -284,10 +284,10 @@ static void a_function_outside_the_code(void)
 {
     begin();
     spec.function[CDL_FUNCTION_CODE_INIT] = (RTS_I32)spec.code_size;
-    check_spec_refused(ERR_INVALID_REFERENCE, "Function 0 lies outside the code");
+    check_spec_refused(ERR_INVALID_REFERENCE, "Function 0 is outside the code");
     spec.function[CDL_FUNCTION_CODE_INIT] = SPEC_NO_ENTRY;
     spec.function[CDL_FUNCTION_GLOBAL_EXIT] = 0x7FFFFFFF;
-    check_spec_refused(ERR_INVALID_REFERENCE, "Function 2 lies outside the code");
+    check_spec_refused(ERR_INVALID_REFERENCE, "Function 2 is outside the code");
 }
 
 static void functions_that_position_independent_code_does_not_need(void)
@@ -458,7 +458,7 @@ static void iec_functions_are_checked_too(void)
     begin_with_iec_function(0, "fn", 3);
     check_accepted();
     begin_with_iec_function(spec.code_size, "fn", 3);
-    check_refused(ERR_INVALID_REFERENCE, "IEC function fn lies outside the code");
+    check_refused(ERR_INVALID_REFERENCE, "IEC function fn is outside the code");
     begin_with_iec_function(0, "fn", 2);
     check_refused(ERR_PARAMETER, "Name in the IEC function table");
     begin_with_iec_function(0, "fn", 3);
@@ -537,7 +537,7 @@ static void a_task_with_wrong_values(void)
     check_spec_refused(ERR_PARAMETER, "Cyclic task Main has no interval");
     spec.tasks[0].interval_us = 1;
     spec.tasks[0].entry_offset = spec.code_size;
-    check_spec_refused(ERR_INVALID_REFERENCE, "Task Main lies outside the code");
+    check_spec_refused(ERR_INVALID_REFERENCE, "Task Main is outside the code");
 }
 
 static void an_event_variable_outside_its_area(void)
@@ -556,7 +556,7 @@ static void an_event_variable_outside_its_area(void)
     for (i = 0; i < RTS_COUNT(cases); i++) {
         spec.tasks[0].event_area = cases[i].area;
         spec.tasks[0].event_offset = cases[i].offset;
-        check_spec_refused(ERR_INVALID_REFERENCE, "Event of task Main lies outside its area");
+        check_spec_refused(ERR_INVALID_REFERENCE, "Event of task Main is outside its area");
     }
     spec.tasks[0].event_area = APP_AREA_DATA;
     spec.tasks[0].event_offset = 63;
@@ -696,7 +696,7 @@ static void copies_that_need_more_than_the_device_has(void)
     check_accepted();
 }
 
-static void a_blob_nobody_knows_is_left_alone(void)
+static void an_unknown_blob_is_left_alone(void)
 {
     begin_image();
     image.bytes[header.blob.offset + 12 + sizeof(CDL_TASK) + 4] = 99;
@@ -732,7 +732,7 @@ int main(void)
     RUN(another_device_type);
     RUN(another_device_id);
     RUN(another_major_version);
-    RUN(every_segment_lies_behind_the_header_and_within_the_image);
+    RUN(every_segment_is_after_the_header_and_within_the_image);
     RUN(an_image_without_code);
     RUN(code_in_another_area_or_larger_than_it);
     RUN(areas_larger_than_the_device_has);
@@ -768,7 +768,7 @@ int main(void)
     RUN(a_task_that_uses_more_than_there_is);
     RUN(a_list_of_what_fewer_or_more_tasks_use);
     RUN(copies_that_need_more_than_the_device_has);
-    RUN(a_blob_nobody_knows_is_left_alone);
+    RUN(an_unknown_blob_is_left_alone);
     RUN(a_flash_that_cannot_be_mapped_is_read_instead);
     return test_result();
 }

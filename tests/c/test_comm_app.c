@@ -322,7 +322,7 @@ static bool is_text(RTS_UI32 id, const char *text)
     return BTagFind(&reply.tags, id, 4, 100, &tag) == ERR_OK && strcmp((const char *)tag.data, text) == 0;
 }
 
-static void info_tells_the_texts_of_the_image(void)
+static void info_reports_the_strings_of_the_image(void)
 {
     setup();
     begin_content();
@@ -338,7 +338,7 @@ static void info_tells_the_texts_of_the_image(void)
     CHECK(reply_error(&reply) == ERR_APP_NOT_LOADED);
 }
 
-static void tasks_are_told_with_their_times(void)
+static void tasks_are_reported_with_their_times(void)
 {
     BTAG_READER list;
     BTAG tag;
@@ -493,7 +493,7 @@ static void block_outside_the_image_is_refused(void)
     CHECK(fakes.download_begins == 0 && fakes.download_writes == 0);
 }
 
-static void beginning_again_starts_anew(void)
+static void beginning_again_starts_from_zero(void)
 {
     RTS_UI32 next;
 
@@ -560,7 +560,7 @@ static void last_block_repeated_after_a_lost_reply_is_acknowledged(void)
     CHECK(fakes.download_begins == 1 && fakes.download_writes == 1 && fakes.download_ends == 1);
 }
 
-static void refused_image_is_told_with_its_reason(void)
+static void refused_image_is_reported_with_its_reason(void)
 {
     RTS_UI32 next;
     BTAG reason;
@@ -677,8 +677,8 @@ int main(void)
     RUN(status_tells_what_the_stack_had_when_there_is_an_exception);
     RUN(status_fits_the_smallest_message_with_the_calls_it_has_room_for);
     RUN(list_names_the_application);
-    RUN(info_tells_the_texts_of_the_image);
-    RUN(tasks_are_told_with_their_times);
+    RUN(info_reports_the_strings_of_the_image);
+    RUN(tasks_are_reported_with_their_times);
     RUN(image_arrives_block_by_block);
     RUN(image_in_one_block_is_complete_at_once);
     RUN(repeated_block_is_acknowledged_and_not_written);
@@ -687,13 +687,13 @@ int main(void)
     RUN(block_without_beginning_is_out_of_sequence);
     RUN(block_of_another_image_is_out_of_sequence);
     RUN(block_outside_the_image_is_refused);
-    RUN(beginning_again_starts_anew);
+    RUN(beginning_again_starts_from_zero);
     RUN(image_too_large_for_the_slot_is_refused);
     RUN(question_tells_how_much_has_arrived);
     RUN(question_for_the_installed_image_tells_its_size);
     RUN(transfer_continues_on_a_new_channel);
     RUN(last_block_repeated_after_a_lost_reply_is_acknowledged);
-    RUN(refused_image_is_told_with_its_reason);
+    RUN(refused_image_is_reported_with_its_reason);
     RUN(long_reason_is_cut_to_the_message);
     RUN(flash_fault_ends_the_transfer);
     RUN(malformed_position_is_an_error);

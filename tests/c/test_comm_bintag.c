@@ -142,7 +142,7 @@ static void element_of_length_zero_is_legal(void)
     CHECK(tag.id == 2);
 }
 
-static void missing_element_is_told_from_one_of_wrong_size(void)
+static void missing_element_is_distinguished_from_one_of_wrong_size(void)
 {
     BTAG_READER reader;
     BTAG tag;
@@ -441,7 +441,7 @@ int main(void)
     RUN(every_cut_element_is_refused);
     RUN(element_without_a_length_is_refused);
     RUN(element_of_length_zero_is_legal);
-    RUN(missing_element_is_told_from_one_of_wrong_size);
+    RUN(missing_element_is_distinguished_from_one_of_wrong_size);
     RUN(integers_have_one_two_or_four_bytes);
     RUN(optional_integer_keeps_its_default_when_absent);
     RUN(find_begins_at_the_start_wherever_the_reader_stands);

@@ -211,7 +211,7 @@ static void captured_close_request_has_the_right_form(void)
     CHECK(counters()->foreign == 1);
 }
 
-static void close_request_from_somebody_else_is_ignored(void)
+static void close_request_from_another_peer_is_ignored(void)
 {
     CLIENT other;
 
@@ -293,7 +293,7 @@ int main(void)
     RUN(idle_channel_with_login_is_given_to_another_peer);
     RUN(close_request_of_the_owner_ends_channel_and_session);
     RUN(captured_close_request_has_the_right_form);
-    RUN(close_request_from_somebody_else_is_ignored);
+    RUN(close_request_from_another_peer_is_ignored);
     RUN(rts_info_tells_the_number_of_channels);
     RUN(blocks_from_another_peer_are_refused);
     RUN(complaints_about_unknown_channels_are_limited);

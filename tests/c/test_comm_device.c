@@ -249,7 +249,7 @@ static void monitoring_notices_that_another_image_was_loaded(void)
 
 /* ---- what happened ---- */
 
-static void exception_is_told_and_communication_goes_on(void)
+static void exception_is_reported_and_communication_goes_on(void)
 {
     APP_SPEC spec;
     APP_BYTES image;
@@ -276,7 +276,7 @@ static void exception_is_told_and_communication_goes_on(void)
     CHECK(reply.size > 20);
 }
 
-static void tasks_are_told(void)
+static void tasks_are_reported(void)
 {
     BTAG tag;
 
@@ -298,7 +298,7 @@ int main(void)
     RUN(power_cut_anywhere_in_a_download_needs_only_another_one);
     RUN(variable_is_read_and_written_while_the_program_runs);
     RUN(monitoring_notices_that_another_image_was_loaded);
-    RUN(exception_is_told_and_communication_goes_on);
-    RUN(tasks_are_told);
+    RUN(exception_is_reported_and_communication_goes_on);
+    RUN(tasks_are_reported);
     return test_result();
 }

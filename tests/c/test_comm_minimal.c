@@ -67,7 +67,7 @@ static void only_the_newest_version_of_the_name_service_is_answered(void)
     CHECK(scan(NS_VERSION_0101) == 0);
 }
 
-static void names_of_19_characters_and_a_serial_number_of_24_are_told_whole(void)
+static void names_of_19_characters_and_a_serial_number_of_24_are_reported_whole(void)
 {
     REPLY answer;
 
@@ -110,7 +110,7 @@ int main(void)
 {
     RUN(names_that_do_not_fit_are_cut_and_the_serial_number_is_whole);
     RUN(only_the_newest_version_of_the_name_service_is_answered);
-    RUN(names_of_19_characters_and_a_serial_number_of_24_are_told_whole);
+    RUN(names_of_19_characters_and_a_serial_number_of_24_are_reported_whole);
     RUN(largest_message_goes_to_and_fro);
     RUN(services_that_only_inform_are_unknown);
     return test_result();

@@ -193,7 +193,7 @@ static void point_to_point_driver_takes_any_receiver(void)
     CHECK(ASK("\xC5\x6B\x40\x40\x00\x13\x00\x00\x00\x00\x00\x00\x00\x01\x00\x00") == 1);
 }
 
-static void address_service_is_ignored_so_nobody_becomes_parent(void)
+static void address_service_is_ignored_so_no_peer_becomes_parent(void)
 {
     RTS_UI8 packet[] = {0xC5, 0x0B, 0x40, 0x01, 0x00, 0x10, 0x00, 0xAF, 0x12, 0x34, 0x12, 0x34};
 
@@ -230,7 +230,7 @@ static void payload_room_counts_the_header_in_steps_of_four(void)
     CHECK(RouterGetMaxPayload(&peer, 30) == 0);
 }
 
-static void peers_are_told_apart_by_driver_and_address(void)
+static void peers_are_distinguished_by_driver_and_address(void)
 {
     const ROUTER_PEER peer = {&driver, 512, 1, {0x12, 0x34}};
     BLK_DRV other_driver = driver;
@@ -394,7 +394,7 @@ static void other_name_packages_and_cut_ones_are_ignored(void)
     CHECK(sent_count == 0);
 }
 
-static void longest_names_are_told_whole_and_longer_ones_cut(void)
+static void longest_names_are_reported_whole_and_longer_ones_cut(void)
 {
     static const char name[] = "0123456789012345678901234567890123456789012345678901234567890123456789"
                                "0123456789012345678901234567890123456789012345678901234567890123456789";
@@ -429,10 +429,10 @@ int main(void)
     RUN(hop_count_zero_and_relative_addresses_are_not_delivered);
     RUN(bus_driver_takes_only_its_own_address_and_broadcasts);
     RUN(point_to_point_driver_takes_any_receiver);
-    RUN(address_service_is_ignored_so_nobody_becomes_parent);
+    RUN(address_service_is_ignored_so_no_peer_becomes_parent);
     RUN(announced_block_length_limits_the_answer);
     RUN(payload_room_counts_the_header_in_steps_of_four);
-    RUN(peers_are_told_apart_by_driver_and_address);
+    RUN(peers_are_distinguished_by_driver_and_address);
     RUN(captured_scan_is_answered_in_the_captured_form);
     RUN(third_party_scanner_with_a_longer_header_is_answered);
     RUN(broadcast_scan_is_answered);
@@ -440,7 +440,7 @@ int main(void)
     RUN(version_0101_has_its_own_layout);
     RUN(reply_has_the_wanted_version_or_a_lower_one);
     RUN(name_request_is_answered_by_the_node_of_that_name_only);
-    RUN(longest_names_are_told_whole_and_longer_ones_cut);
+    RUN(longest_names_are_reported_whole_and_longer_ones_cut);
     RUN(other_name_packages_and_cut_ones_are_ignored);
     return test_result();
 }

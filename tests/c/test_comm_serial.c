@@ -259,7 +259,7 @@ static void doubled_hash_is_a_wrong_escape_and_may_begin_a_frame(void)
     CHECK(answers() == 1);
 }
 
-static void start_within_a_frame_begins_anew(void)
+static void start_within_a_frame_begins_again(void)
 {
     fakes_start();
     put_bytes((const RTS_UI8 *)"#<abc", 5);
@@ -388,7 +388,7 @@ int main(void)
     RUN(frame_without_end_never_overflows_the_buffer);
     RUN(wrong_escape_ends_the_frame);
     RUN(doubled_hash_is_a_wrong_escape_and_may_begin_a_frame);
-    RUN(start_within_a_frame_begins_anew);
+    RUN(start_within_a_frame_begins_again);
     RUN(end_without_start_is_counted);
     RUN(frames_too_short_for_a_crc_are_counted);
     RUN(port_that_takes_a_byte_at_a_time_gets_the_same_bytes);

@@ -336,7 +336,7 @@ static void a_full_group_table_is_an_error(void)
 
 /* ---- device ---- */
 
-static void identity_is_told_in_the_layout_of_the_field(void)
+static void identity_is_reported_in_the_layout_of_the_field(void)
 {
     BTAG tag;
 
@@ -559,7 +559,7 @@ int main(void)
     RUN(session_ids_differ);
     RUN(components_start_and_end_without_error);
     RUN(a_full_group_table_is_an_error);
-    RUN(identity_is_told_in_the_layout_of_the_field);
+    RUN(identity_is_reported_in_the_layout_of_the_field);
     RUN(empty_names_are_empty);
     RUN(other_expected_identity_is_a_type_mismatch);
     RUN(echo_returns_the_data_and_zeros);

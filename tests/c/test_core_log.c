@@ -58,7 +58,7 @@ static void the_oldest_entries_are_overwritten(void)
     CHECK(LogGetEntry(handle, &entry) == ERR_END_OF_OBJECT);
 }
 
-static void long_texts_are_cut(void)
+static void long_strings_are_cut(void)
 {
     char text[2 * LOG_TEXT_SIZE];
     LOG_ENTRY entry;
@@ -142,7 +142,7 @@ int main(void)
 {
     RUN(entries_come_back_in_order);
     RUN(the_oldest_entries_are_overwritten);
-    RUN(long_texts_are_cut);
+    RUN(long_strings_are_cut);
     RUN(a_text_is_never_taken_for_a_format);
     RUN(entries_carry_the_time);
     RUN(writers_and_a_reader_do_not_disturb_each_other);

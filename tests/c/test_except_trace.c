@@ -39,7 +39,7 @@ static void only_words_that_lead_into_the_code_are_kept(void)
     CHECK(trace->call[1].target == 0 && trace->call[1].distance == 3 * sizeof stack[0]);
 }
 
-static void the_link_register_is_told_apart(void)
+static void the_link_register_is_distinguished(void)
 {
     const EXCEPT_TRACE *trace = SysExceptGetTrace();
 
@@ -112,7 +112,7 @@ static void without_code_there_are_no_calls(void)
 int main(void)
 {
     RUN(only_words_that_lead_into_the_code_are_kept);
-    RUN(the_link_register_is_told_apart);
+    RUN(the_link_register_is_distinguished);
     RUN(a_full_trace_keeps_the_nearest);
     RUN(the_first_exception_counts_until_it_is_forgotten);
     RUN(the_trace_of_another_exception_is_not_kept);

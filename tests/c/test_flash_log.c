@@ -175,7 +175,7 @@ static void a_record_of_erased_bytes_is_not_taken_for_free_space(void)
     }
 }
 
-static void records_are_told_apart_by_tag_and_size(void)
+static void records_are_distinguished_by_tag_and_size(void)
 {
     RTS_UI8 data[DATA_SIZE] = {7};
 
@@ -311,7 +311,7 @@ int main(void)
     RUN(nothing_is_appended_to_a_log_that_cannot_be_read);
     RUN(a_cut_at_any_operation_leaves_the_old_or_the_new_record);
     RUN(a_record_of_erased_bytes_is_not_taken_for_free_space);
-    RUN(records_are_told_apart_by_tag_and_size);
+    RUN(records_are_distinguished_by_tag_and_size);
     RUN(a_range_limits_what_is_read);
     RUN(numbers_wrap);
     RUN(the_largest_record_fills_a_half);

@@ -1,5 +1,5 @@
 /*
- * test_flash_map.c - a port that says itself where the files lie in flash (FILE_MAP).
+ * test_flash_map.c - a port that says itself where the files are in flash (FILE_MAP).
  *
  * SPDX-License-Identifier: Apache-2.0
  *

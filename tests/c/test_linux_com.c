@@ -118,7 +118,7 @@ static void clients_of_a_pty_come_and_go(void)
     close_com();
 }
 
-static void nobody_listening_never_blocks(void)
+static void a_line_without_listener_never_blocks(void)
 {
     RTS_UI32 sent = 0;
     RTS_UI32 taken;
@@ -259,7 +259,7 @@ int main(void)
     CHECK(SysTime_Hook(CH_INIT_SYSTEM) == ERR_OK);
     RUN(bytes_go_through_a_pty_unchanged);
     RUN(clients_of_a_pty_come_and_go);
-    RUN(nobody_listening_never_blocks);
+    RUN(a_line_without_listener_never_blocks);
     RUN(after_a_moved_byte_main_does_not_wait);
     RUN(a_device_that_goes_away_is_taken_up_again);
     RUN(what_cannot_be_opened_is_said);

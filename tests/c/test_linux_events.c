@@ -30,7 +30,7 @@ RTS_RESULT SysWatchdog_Hook(CMP_HOOK hook);
 enum { VARIABLES = 4, PATIENCE_S = 20, STOP_MS = 3000 };
 #define NS_PER_MS 1000000LL
 
-/* The code area: all functions of this program lie within it. */
+/* The code area: all functions of this program are within it. */
 extern const char __executable_start[];
 #define CODE ((uintptr_t)__executable_start)
 
@@ -185,7 +185,7 @@ static RTS_UI32 lost_by(RTS_UI32 task)
 /* ---- events ---- */
 
 /* Three tasks that interrupt and outpace each other, above, between and below those that answer. */
-static void every_rise_that_a_cycle_leaves_behind_is_a_run_or_counted_as_lost(void)
+static void every_rise_at_the_end_of_a_cycle_is_a_run_or_counted_as_lost(void)
 {
     begin();
     app.enough = 300;
@@ -361,7 +361,7 @@ int main(void)
         CHECK(CmpScheduleTimer_Hook(hooks[i]) == ERR_OK);
         CHECK(SysWatchdog_Hook(hooks[i]) == ERR_OK);
     }
-    RUN(every_rise_that_a_cycle_leaves_behind_is_a_run_or_counted_as_lost);
+    RUN(every_rise_at_the_end_of_a_cycle_is_a_run_or_counted_as_lost);
     RUN(several_tasks_may_write_and_several_answer);
     RUN(posts_of_several_threads_are_all_answered);
     RUN(a_stop_breaks_an_endless_cyclic_task);

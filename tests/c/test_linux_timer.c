@@ -145,7 +145,7 @@ static void stop_does_not_wait_for_the_next_due_time(void)
     CHECK(record.count == 1);
 }
 
-static void a_timer_starts_anew_after_a_stop(void)
+static void a_timer_starts_again_after_a_stop(void)
 {
     RTS_HANDLE timer = create(2000, 0);
     for (int i = 0; i < 3; i++) {
@@ -293,7 +293,7 @@ int main(void)
     RUN(due_times_that_pass_during_a_call_are_skipped_and_counted);
     RUN(stop_waits_for_the_callback_and_none_comes_after);
     RUN(stop_does_not_wait_for_the_next_due_time);
-    RUN(a_timer_starts_anew_after_a_stop);
+    RUN(a_timer_starts_again_after_a_stop);
     RUN(there_is_a_timer_for_every_task_and_then_no_more);
     RUN(without_an_interval_each_trigger_is_one_call);
     RUN(a_trigger_may_be_for_later_and_the_earliest_counts);

@@ -216,7 +216,7 @@ static void the_time_goes_on_over_stop_and_start(void)
     CHECK(read_u32(APP_AREA_DATA, 8) == 0);
 }
 
-/* Milliseconds are counted on from cycle to cycle; they must be those of the division, whatever the steps are. */
+/* Milliseconds are accumulated from cycle to cycle; they must be those of the division, whatever the steps are. */
 static void milliseconds_follow_the_nanoseconds(void)
 {
     static const RTS_I64 steps[] = {1,          999999,     1000000,    1234567,      10000000,
@@ -286,7 +286,7 @@ static void without_a_watchdog_nothing_trips(void)
     CHECK(cycles_until_trip(0, 1, 60000000) == 0);
 }
 
-static void one_good_cycle_starts_the_count_anew(void)
+static void one_good_cycle_starts_the_count_again(void)
 {
     CDL_TASK *task = begin(100000, 1500);
     int i;
@@ -651,7 +651,7 @@ int main(void)
     RUN(a_single_cycle_longer_than_time_times_sensitivity_trips_at_once);
     RUN(cycles_within_the_time_never_trip);
     RUN(without_a_watchdog_nothing_trips);
-    RUN(one_good_cycle_starts_the_count_anew);
+    RUN(one_good_cycle_starts_the_count_again);
     RUN(outputs_are_zero_when_the_failing_task_returns);
     RUN(the_watchdog_stops_the_application_with_its_outputs_at_zero);
     RUN(reset_gives_the_watchdog_its_count_back);

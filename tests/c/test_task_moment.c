@@ -266,7 +266,7 @@ static void a_task_waits_no_longer_than_its_own_cycle_takes(void)
     CHECK(pauses_of(10, 1, 9, 0) == 51);
 }
 
-static void a_first_cycle_waits_for_nobody(void)
+static void a_first_cycle_waits_for_no_other(void)
 {
     CHECK(pauses_of(0, 1, 0, 7) == 0);
 }
@@ -369,7 +369,7 @@ int main(void)
     RUN(a_short_task_does_not_wait_for_a_long_one);
     RUN(a_task_does_not_wait_for_one_that_takes_longer_this_time);
     RUN(a_task_waits_no_longer_than_its_own_cycle_takes);
-    RUN(a_first_cycle_waits_for_nobody);
+    RUN(a_first_cycle_waits_for_no_other);
     RUN(a_copy_of_stopped_tasks_is_taken_at_once);
     RUN(what_runs_is_waited_for);
     RUN(stopping_calls_a_copy_off);

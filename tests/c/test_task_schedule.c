@@ -324,7 +324,7 @@ static void posts_beyond_what_may_wait_are_lost_and_counted(void)
     SimForgetEvents();
 }
 
-static void a_program_that_waits_for_an_event_nobody_has_is_refused(void)
+static void a_program_that_waits_for_an_unknown_event_is_refused(void)
 {
     begin();
     add_external_task("Pulse", "pulse");
@@ -421,7 +421,7 @@ int main(void)
     RUN(an_external_event_runs_its_task_once_per_post);
     RUN(external_events_are_limited_and_unique);
     RUN(posts_beyond_what_may_wait_are_lost_and_counted);
-    RUN(a_program_that_waits_for_an_event_nobody_has_is_refused);
+    RUN(a_program_that_waits_for_an_unknown_event_is_refused);
     RUN(as_many_tasks_as_the_device_can_run);
     RUN(downloads_free_the_timers_of_the_tasks_before);
     RUN(run_cycles_counts_cycles_of_the_first_task);

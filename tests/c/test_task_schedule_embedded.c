@@ -82,7 +82,7 @@ static void an_event_task_runs_once_per_rising_edge(void)
     CHECK(count_of(0) == 1);
 }
 
-static void stopped_tasks_stay_stopped_and_start_afresh(void)
+static void stopped_tasks_stay_stopped_and_start_again(void)
 {
     RTS_UI32 before;
 
@@ -128,7 +128,7 @@ int main(void)
     RUN(due_times_the_loop_was_too_slow_for_are_overruns);
     RUN(the_highest_priority_runs_first);
     RUN(an_event_task_runs_once_per_rising_edge);
-    RUN(stopped_tasks_stay_stopped_and_start_afresh);
+    RUN(stopped_tasks_stay_stopped_and_start_again);
     RUN(an_exception_ends_all_tasks);
     return test_result();
 }

@@ -71,7 +71,7 @@ def test_status_without_application(tool: Any, plc: FakePlc) -> None:
     assert tool("status", *PORT).out == "state: none\n"
 
 
-def test_status_of_a_running_program_has_the_crc_that_build_told(tool: Any, running: FakePlc) -> None:
+def test_status_of_a_running_program_has_the_crc_that_build_printed(tool: Any, running: FakePlc) -> None:
     document = tool("status", *PORT, "--json").json
     assert document == {"state": "run", "image_crc": f"{running.crc:08X}", "exception": None}
 
@@ -196,7 +196,7 @@ def test_what_is_no_symbol_file_exits_2(tool: Any, running: FakePlc, scratch: Pa
         assert words in done.err
 
 
-def test_write_understands_texts_and_shows_the_values_after(tool: Any, running: FakePlc) -> None:
+def test_write_understands_strings_and_shows_the_values_after(tool: Any, running: FakePlc) -> None:
     done = tool("write", *PORT, "Main.count=16#2A", "Main.pause=T#1s", "Main.name=a=b", "Main.ok=TRUE", "--json")
     assert done.json == {"values": {"Main.count": 42, "Main.pause": "T#1s", "Main.name": "a=b", "Main.ok": True}}
     assert running.memory[0][0] == 42
@@ -278,7 +278,7 @@ def test_every_device_command_on_a_missing_port_exits_3(tool: Any, image: Path, 
 
 
 @pytest.mark.parametrize("port", ["/dev/null", "/tmp"])
-def test_what_is_no_serial_port_is_told(tool: Any, port: str) -> None:
+def test_what_is_no_serial_port_is_reported(tool: Any, port: str) -> None:
     done = tool("scan", "--port", port)
     assert (done.status, done.out) == (3, "")
     assert "it is not a serial port" in done.err
@@ -300,6 +300,11 @@ def test_a_silent_device_exits_3(tool: Any, serial_opened_by: Any) -> None:
     done = tool("status", *PORT, "--json")
     assert done.status == 3
     assert done.json["error"]["code"] == "no-answer"
+
+
+def test_an_option_of_another_kind_of_link_exits_2(tool: Any) -> None:
+    done = tool("status", "--tcp", "localhost", "--baud", "9600")
+    assert (done.status, done.err) == (2, "plctool: A tcp link has no option 'baud'; it has none.\n")
 
 
 # ---- bugs ------------------------------------------------------------------------------------------------------------

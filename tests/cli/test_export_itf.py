@@ -239,7 +239,7 @@ def test_the_document_lists_the_functions(tool: Tool) -> None:
     assert len(functions[0]["signature"]) == 8
 
 
-def test_a_library_without_c_functions_is_told(tool: Tool) -> None:
+def test_a_library_without_c_functions_is_reported(tool: Tool) -> None:
     Path("a.st").write_text("FUNCTION F : INT\nEND_FUNCTION", "utf-8")
     done = tool("export-itf", "a.st")
     assert done.status == 2
@@ -247,7 +247,7 @@ def test_a_library_without_c_functions_is_told(tool: Tool) -> None:
 
 
 @pytest.mark.parametrize("name", ["int", "1st", "a-b"])
-def test_names_that_c_cannot_have_are_told(tool: Tool, name: str) -> None:
+def test_names_that_c_cannot_have_are_reported(tool: Tool, name: str) -> None:
     Path("a.st").write_text(f"{{attribute 'external' := '{name}'}}\nFUNCTION F : INT\nEND_FUNCTION", "utf-8")
     done = tool("export-itf", "a.st")
     assert done.status == 2

@@ -128,7 +128,7 @@ def test_build_of_a_wrong_program_as_json_has_error_and_diagnostics(tool: Any, s
     assert [d["line"] for d in done.json["diagnostics"]] == [5, 6]
 
 
-def test_check_lists_every_diagnosis(tool: Any, scratch: Path) -> None:
+def test_check_lists_every_diagnostic(tool: Any, scratch: Path) -> None:
     (scratch / "broken.st").write_text(BROKEN)
     done = tool("check", "broken.st", "--json")
     assert done.status == 2
@@ -258,7 +258,7 @@ def test_run_of_what_is_no_image_says_so(tool: Any, counter: Path) -> None:
     assert "not a valid application image" in done.err
 
 
-def test_a_refused_image_is_told_in_one_sentence(tool: Any, counter: Path) -> None:
+def test_a_refused_image_is_reported_in_one_sentence(tool: Any, counter: Path) -> None:
     tool("build", "counter.st", "-o", "m3.cdl", "--target", "cortex-m3")
     done = tool("run", "m3.cdl")
     assert done.status == 1
@@ -276,7 +276,7 @@ def test_a_structure_in_part_names_the_member_that_has_no_value(tool: Any, scrat
     assert "The member y " in done.err
 
 
-def test_a_file_that_cannot_be_written_leaves_nothing_behind(
+def test_a_file_that_cannot_be_written_leaves_nothing(
     tool: Any, counter: Path, scratch: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*paths: object) -> None:

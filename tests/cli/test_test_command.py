@@ -132,7 +132,7 @@ def test_operands_are_evaluated_once(tool: Tool) -> None:
     assert found["actual"] == 1
 
 
-def test_the_message_is_told(tool: Tool) -> None:
+def test_the_message_is_reported(tool: Tool) -> None:
     assert failure(tool, "ASSERT_EQ(1, 2, 'one is not two');")["message"] == "one is not two"
 
 
@@ -158,7 +158,7 @@ def test_a_failing_assert_ends_its_test_only(tool: Tool) -> None:
         ("i := p^;", "ACCESS_VIOLATION"),
     ],
 )
-def test_run_time_exceptions_are_told_with_their_line(tool: Tool, statement: str, kind: str, level: int) -> None:
+def test_run_time_exceptions_are_reported_with_their_line(tool: Tool, statement: str, kind: str, level: int) -> None:
     variables = "VAR i : INT; a : ARRAY[0..3] OF INT; p : REF_TO INT; END_VAR"
     path = write(f"TEST 'a'\n{variables}\n{statement}\nASSERT_EQ(i, 77);\nEND_TEST\nTEST 'b'\nEND_TEST")
     tests = tool("test", str(path), "--json", f"-O{level}").json["tests"]
@@ -216,7 +216,7 @@ def test_an_exception_tells_the_calls_from_the_test_to_it(tool: Tool, level: int
     assert lines[4:6] == [f"        called from B, {path}:7", f"        called from {path}:11"]
 
 
-def test_an_exception_in_the_test_itself_was_called_by_nobody(tool: Tool) -> None:
+def test_an_exception_in_the_test_itself_has_no_caller(tool: Tool) -> None:
     assert failure(tool, "VAR i : INT; END_VAR i := 1 / i;")["calls"] == []
 
 
@@ -245,7 +245,7 @@ def test_a_function_that_only_a_device_has_fails_the_test_that_calls_it(tool: To
     assert "MOCK_FUNCTION" in str(found["text"])
 
 
-def test_a_block_that_was_not_called_is_told(tool: Tool) -> None:
+def test_a_block_that_was_not_called_is_reported(tool: Tool) -> None:
     found = failure(tool, "VAR c : Counter; END_VAR\nMOCK c;\nMOCK_VERIFY_CALLED(c);", COUNTER)
     assert found["text"] == "expected a call, got none"
     found = failure(tool, "VAR c : Counter; END_VAR\nMOCK c; c();\nMOCK_VERIFY_CALL_COUNT(c, 2);", COUNTER)
@@ -292,7 +292,7 @@ def test_check_finds_them_too(tool: Tool) -> None:
     assert [d["message"] for d in done.json["diagnostics"]] == ["unknown name x"]
 
 
-def test_errors_of_program_and_test_are_told_once(tool: Tool) -> None:
+def test_errors_of_program_and_test_are_reported_once(tool: Tool) -> None:
     text = "PROGRAM Main VAR i : INT; END_VAR i := x; END_PROGRAM TEST 't' VAR m : Main; END_VAR m(); END_TEST"
     done = tool("check", str(write(text)), "--json")
     assert [d["message"] for d in done.json["diagnostics"]] == ["unknown name x"]
@@ -310,7 +310,7 @@ def test_asserts_are_for_tests_only(tool: Tool) -> None:
     assert "ASSERT_EQ" in done.out + done.err
 
 
-def test_an_unclosed_test_is_told(tool: Tool) -> None:
+def test_an_unclosed_test_is_reported(tool: Tool) -> None:
     assert "END_TEST missing for the TEST in line 1" in diagnoses(tool, "TEST 'a'\nTEST 'b'\nEND_TEST").err
 
 
@@ -347,7 +347,7 @@ def test_a_filter_without_wildcards_is_a_part_of_the_name(tool: Tool) -> None:
     assert [test["name"] for test in done.json["tests"]] == ["good"]
 
 
-def test_warnings_are_told(tool: Tool) -> None:
+def test_warnings_are_reported(tool: Tool) -> None:
     path = str(write("TEST 't' VAR unneeded : INT; END_VAR END_TEST"))
     done = tool("test", path)
     assert "program.st:1:14: warning: unneeded is never used" in done.err
@@ -367,7 +367,7 @@ def test_junit_report_holds_every_test(tool: Tool) -> None:
     assert stops[0].tag == "error"
 
 
-def test_a_report_that_cannot_be_written_is_told(tool: Tool) -> None:
+def test_a_report_that_cannot_be_written_is_reported(tool: Tool) -> None:
     assert tool("test", str(write(TWO)), "--junit", "nowhere/report.xml").status == 2
 
 

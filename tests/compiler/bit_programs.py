@@ -68,7 +68,7 @@ class _Writer:
     # ---- declarations ----
 
     def background(self) -> None:
-        """Whole bytes with initial values, declared before the bits that lie in them."""
+        """Whole bytes with initial values, declared before the bits that are in them."""
         for area in "IQM":
             for byte in range(AREA_BYTES):
                 value = self.draw(st.sampled_from([None, 0x00, 0xFF, 0xA5, 0x5A]))
@@ -276,7 +276,7 @@ END_FUNCTION_BLOCK
 
 @st.composite
 def block_programs(draw: st.DrawFn) -> BitProgram:
-    """Blocks whose bits lie at addresses that VAR_CONFIG gives: the task copies each in or out."""
+    """Blocks whose bits are at addresses that VAR_CONFIG gives: the task copies each in or out."""
     bools = st.lists(st.booleans(), min_size=8 * AREA_BYTES, max_size=8 * AREA_BYTES)
     order = draw(st.permutations(range(8 * AREA_BYTES)))
     first, written, inverted = draw(bools), draw(bools), draw(bools)

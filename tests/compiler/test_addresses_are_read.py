@@ -1,4 +1,4 @@
-"""What lies at an address such as %MW1 is read and written without a name."""
+"""What is at an address such as %MW1 is read and written without a name."""
 
 from __future__ import annotations
 

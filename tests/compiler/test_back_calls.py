@@ -99,7 +99,7 @@ def test_scalars_go_by_value_and_come_back() -> None:
     assert (run["x"], run["y"]) == (10, 15)
 
 
-def test_locals_start_anew_at_every_call() -> None:
+def test_locals_start_again_at_every_call() -> None:
     r, n = local("F", INT), local("n", INT, ScalarInit(7))
     f = function("F", r, [], assign(n, add(load(n), const(1))), assign(r, load(n)), locals_=[n])
     p = ProgramBuilder()

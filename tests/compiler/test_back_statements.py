@@ -233,7 +233,7 @@ def test_while_and_repeat_with_continue() -> None:
     assert (run["w"], run["r"], run["n"]) == (5, 3, 0)
 
 
-def test_code_behind_return_is_not_run() -> None:
+def test_code_after_return_is_not_run() -> None:
     p = ProgramBuilder()
     n = p.variable("n", INT)
     run = p.run(increment(n), If([(const(1, BOOL), [Return(POS), increment(n, 10)])], [], POS), increment(n, 100))

@@ -1,4 +1,4 @@
-"""How the lowering cuts a program into functions: what is inlined, what is handed over in registers, what is cut."""
+"""How the lowering cuts a program into functions: what is inlined, what is passed in registers, what is cut."""
 
 from __future__ import annotations
 

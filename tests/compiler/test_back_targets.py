@@ -200,7 +200,7 @@ def test_absolute_addresses_are_refused() -> None:
         link([emit_object(text, target, 2)], target, ["entry"], 0)
 
 
-def test_sections_nobody_reaches_are_left_out() -> None:
+def test_unreachable_sections_are_left_out() -> None:
     target = find_target("x86_64-linux")
     text = ir('define void @entry() {\n ret void\n}\ndefine void @far() section ".text.far" {\n ret void\n}\n', target)
     linked = link([emit_object(text, target, 2)], target, ["entry"], 0)

@@ -97,7 +97,7 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
 @pytest.mark.parametrize("level", LEVELS)
 @settings(max_examples=25, deadline=None)
 @given(units=UNITS)
-def test_each_call_is_told(tmp_path_factory, level: Level, units: list[Unit]) -> None:
+def test_each_call_is_reported(tmp_path_factory, level: Level, units: list[Unit]) -> None:
     program = Program(units)
     path = tmp_path_factory.mktemp("calls") / "calls.st"
     path.write_text(program.text)
@@ -107,7 +107,7 @@ def test_each_call_is_told(tmp_path_factory, level: Level, units: list[Unit]) ->
         assert places(plc, built.symbols) == program.places
 
 
-def test_a_function_of_the_runtime_and_the_jump_to_it_are_told_by_their_caller(tmp_path) -> None:
+def test_a_function_of_the_runtime_and_the_jump_to_it_are_reported_by_their_caller(tmp_path) -> None:
     path = tmp_path / "product.st"
     path.write_text("PROGRAM Main\nVAR a, b : REAL; END_VAR\na := a * b;\nb := a + 1.0;\nEND_PROGRAM\n")
     built = compile_sources([path], target="cortex-m3")
@@ -118,7 +118,7 @@ def test_a_function_of_the_runtime_and_the_jump_to_it_are_told_by_their_caller(t
         assert (place.pou, place.line) == ("Main", 3)
 
 
-def test_a_function_that_never_returns_is_told_once(tmp_path) -> None:
+def test_a_function_that_never_returns_is_reported_once(tmp_path) -> None:
     """It has no need to save where it would return to."""
     path = tmp_path / "loop.st"
     path.write_text("PROGRAM Main\nVAR x : REAL; END_VAR\nWHILE TRUE DO\nx := x * 1.5;\nEND_WHILE\nEND_PROGRAM\n")

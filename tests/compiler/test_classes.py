@@ -71,7 +71,7 @@ def test_call_of_a_declared_instance_is_direct() -> None:
     assert "@class." not in text
 
 
-def test_class_number_exists_only_where_classes_have_to_be_told_apart() -> None:
+def test_class_number_exists_only_where_classes_have_to_be_distinguished() -> None:
     program = checked(FAMILY + "FUNCTION_BLOCK Alone METHOD M END_METHOD END_FUNCTION_BLOCK "
                       "PROGRAM Main VAR a : Alone; d : Derived; END_VAR a.M(); d.Value(); END_PROGRAM")  # fmt: skip
     sizes = {v.name: v.type.size for v in program.globals}

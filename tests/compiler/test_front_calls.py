@@ -179,7 +179,7 @@ def test_result_that_is_not_used_is_fine_for_a_call_with_effects() -> None:
             "29: a single bit has no address, so it cannot be given to the VAR_IN_OUT count",
         ),
         ("i := Add3(1.5, 1);", "11: 1.5 does not fit INT; write REAL_TO_INT(1.5)"),
-        ("i := Add3(r, 1);", "11: REAL does not fit INT by itself; write REAL_TO_INT(...)"),
+        ("i := Add3(r, 1);", "11: REAL does not fit INT; write REAL_TO_INT(...)"),
         ("i := Add4(1);", "6: unknown function Add4; did you mean Add3?"),
         ("i := i(1);", "6: i is not a function"),
         ("i := Main(1);", "6: a call of the program Main is a statement and has no value"),
@@ -342,7 +342,7 @@ def test_function_block_takes_positional_arguments() -> None:
     assert [v.name for v, _ in c.inputs] == ["UP", "LIMIT"]
 
 
-def test_output_of_another_type_is_converted_behind_the_call() -> None:
+def test_output_of_another_type_is_converted_after_the_call() -> None:
     block, assign = statements("c(TOTAL := d, N => d);")
     assert isinstance(block, FbCall)
     assert block.outputs == []
@@ -364,9 +364,9 @@ def test_instances_in_arrays_are_called_by_index() -> None:
     [
         ("c(UP := b);", "1: the VAR_IN_OUT TOTAL of COUNTER is missing"),
         ("c(UPP := b, TOTAL := d);", "3: COUNTER has no parameter UPP; did you mean UP?"),
-        ("c(UP := i, TOTAL := d);", "9: INT does not fit BOOL by itself; write INT_TO_BOOL(...)"),
+        ("c(UP := i, TOTAL := d);", "9: INT does not fit BOOL; write INT_TO_BOOL(...)"),
         ("c(TOTAL := d, Q := b);", "15: Q is given with =>"),
-        ("c(TOTAL := d, N => b);", "15: INT does not fit BOOL by itself; write INT_TO_BOOL(...)"),
+        ("c(TOTAL := d, N => b);", "15: INT does not fit BOOL; write INT_TO_BOOL(...)"),
         ("c(TOTAL := d, N => 5);", "20: the output N needs a variable"),
         ("b := c(TOTAL := d);", "6: a call of the function block COUNTER is a statement and has no value"),
         ("c.Q := b;", "1: Q is an output of COUNTER and cannot be assigned to"),
@@ -389,7 +389,7 @@ def test_variable_of_an_instance_is_not_written_from_outside() -> None:
 
 def test_function_block_in_a_function_lives_for_one_call() -> None:
     text = "FUNCTION F : INT VAR t : TON; END_VAR t(); F := 1; END_FUNCTION"
-    (message,) = [m for m in messages(text, "warning") if "anew" in m]
+    (message,) = [m for m in messages(text, "warning") if "initialised" in m]
     assert "FUNCTION_BLOCK" in message
     assert messages(text) == []
 

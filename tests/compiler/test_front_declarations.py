@@ -1,4 +1,4 @@
-"""Types, variables, initial values and where things lie in memory."""
+"""Types, variables, initial values and where things are in memory."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_declarations_may_come_in_any_order() -> None:
         (main("v : ARRAY[5..1] OF INT;"), "3:11", "above"),
         (main("x : INT; v : ARRAY[1..x] OF INT;"), "3:23", "constant"),
         (main("v : INT(5..1);"), "3:9", "not a range"),
-        (main("v : REAL(1..5);"), "3:5", "integer type"),
+        (main("v : REAL(1..5);"), "3:5", "integer base type"),
         (main("v : STRING[0];"), "3:12", "1..65535"),
         (main("v : INT[5];"), "3:5", "only a STRING has a length"),
         (main("v : Main;"), "3:5", "not a type"),

@@ -178,7 +178,7 @@ def test_constant_takes_the_type_that_is_needed(target: str, literal: str, expec
         ("b := 2;", 6, "BOOL"),
         ("r := 1e39;", 6, "too large for REAL"),
         ("sub := 11;", 8, "outside"),
-        ("e := 7;", 6, "7 is no value of Color; it has Red (0)"),
+        ("e := 7;", 6, "7 is not a value of Color; it has Red (0)"),
         ("e := Color#Pink;", 6, "has no value Pink"),
         ("e := Color.Gren;", 12, "did you mean Green"),
         ("t := 5;", 6, "T#5ms"),

@@ -51,15 +51,15 @@ def in_declaration(line: str) -> list[str]:
         ("t := 1.5s;", ["1: a duration is written T#1.5s, not 1.5s"]),
         ("t := 500ms;", ["1: a duration is written T#500ms, not 500ms"]),
         ("t := T5s;", ["1: unknown name T5s; a duration is written T#5s"]),
-        ("s := 'a' + 'b';", ["1: texts are joined by CONCAT(a, b), not by +"]),
-        ("s := s + 'b' + s;", ["1: texts are joined by CONCAT(a, b), not by +"]),
-        ("s := s + a;", ["1: texts are joined by CONCAT(a, b), not by +"]),
+        ("s := 'a' + 'b';", ["1: strings are joined by CONCAT(a, b), not by +"]),
+        ("s := s + 'b' + s;", ["1: strings are joined by CONCAT(a, b), not by +"]),
+        ("s := s + a;", ["1: strings are joined by CONCAT(a, b), not by +"]),
         ("a := arr(1);", ["1: arr is an array; an element is written arr[1]"]),
         ("x := %IX;\na := unknown1;", [
             "1: %IX is not an address such as %IX0.3 or %QW2", "2: unknown name unknown1"
         ]),
         ("a := Nothing(1);", ["1: Nothing gives no result; call it as a statement, or declare FUNCTION Nothing : INT"]),
-        ("s := 'it''s';", ["1: a quote within a text is written $'"]),
+        ("s := 'it''s';", ["1: a quote within a string is written $'"]),
         ("FOR (a = 0; a < 10; a++) b := 1;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
         ("FOR a IN arr DO b := 1; END_FOR;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
         ("CASE a OF\n1: b := 1; BREAK;\nEND_CASE;", [
@@ -80,7 +80,7 @@ def in_declaration(line: str) -> list[str]:
         ("x := v.q();", ["1: q is a variable of Valve, not a method; leave out ()"]),
         ("s[0] := 'a';", ["1: a character of a STRING is a number here: write 16#61 for 'a'"]),
         ("a := s.length;", ["1: STRING[80] has no members; its length is LEN(...)"]),
-        ("IF strcmp(s, 'a') = 0 THEN a := 1; END_IF;", ["1: unknown function strcmp; texts are compared with ="]),
+        ("IF strcmp(s, 'a') = 0 THEN a := 1; END_IF;", ["1: unknown function strcmp; strings are compared with ="]),
         ("a := strlen(s);", ["1: unknown function strlen; write LEN"]),
         ("a := 1; # first", ["1: # has no place in a program; a comment is written // or (* *)"]),
         ("a := 1; -- first\nb := 2;", ["1: a comment is written // or (* *)"]),
@@ -99,7 +99,7 @@ def test_a_mistake_in_a_body(body: str, said: list[str]) -> None:
         ("c : ARRAY[0..2] OF INT := {1,2,3};", "the values of an array are written in brackets: [1, 2, 3]"),
         ("c : REFERENCE_TO INT;", "REFERENCE_TO is written REFERENCE TO"),
         ("c : POINTER_TO INT;", "POINTER_TO is written POINTER TO"),
-        ("c : BOOL AT %QX1.4;", "AT stands behind the name: c AT %QX1.4 : BOOL;"),
+        ("c : BOOL AT %QX1.4;", "AT comes after the name: c AT %QX1.4 : BOOL;"),
         ("c : FLOAT;", "unknown type FLOAT; write REAL"),
         ("c : DOUBLE := 1.0;", "unknown type DOUBLE; write LREAL"),
         ("c : uint8_t;", "unknown type uint8_t; write USINT"),
@@ -117,11 +117,11 @@ def test_a_mistake_in_a_declaration(line: str, said: str) -> None:
     [
         (
             "FUNCTION_BLOCK G\nPUBLIC METHOD m : INT\nm := 1;\nEND_METHOD\nEND_FUNCTION_BLOCK\n",
-            ["2:1: PUBLIC stands behind METHOD: METHOD PUBLIC m"],
+            ["2:1: PUBLIC comes after METHOD: METHOD PUBLIC m"],
         ),
         (
             "ABSTRACT FUNCTION_BLOCK G\nEND_FUNCTION_BLOCK\n",
-            ["1:1: ABSTRACT stands behind FUNCTION_BLOCK: FUNCTION_BLOCK ABSTRACT G"],
+            ["1:1: ABSTRACT comes after FUNCTION_BLOCK: FUNCTION_BLOCK ABSTRACT G"],
         ),
         (
             "PROGRAM Main\nVAR a : INT; END_VAR\nBEGIN\na := 1;\nEND_PROGRAM\n",

@@ -48,7 +48,7 @@ def test_case_branch_goes_on_to_the_next_label() -> None:
     assert [len(body) for _, body in s.branches] == [3, 0]
 
 
-def test_for_counts_by_one_unless_told_otherwise() -> None:
+def test_for_counts_by_one_by_default() -> None:
     s = statement("FOR u := 1 TO 10 DO i := u; END_FOR;")
     assert isinstance(s, For)
     assert isinstance(s.step, Const)
@@ -84,8 +84,8 @@ def test_return_ends_a_unit() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("IF i THEN ; END_IF;", "4: INT does not fit BOOL by itself; write INT_TO_BOOL(...)"),
-        ("WHILE r DO ; END_WHILE;", "7: REAL does not fit BOOL by itself; write REAL_TO_BOOL(...)"),
+        ("IF i THEN ; END_IF;", "4: INT does not fit BOOL; write INT_TO_BOOL(...)"),
+        ("WHILE r DO ; END_WHILE;", "7: REAL does not fit BOOL; write REAL_TO_BOOL(...)"),
         ("CASE r OF 1: ; END_CASE;", "6: CASE needs an integer or an enumeration, not REAL"),
         ("CASE i OF 1..5: ; 3: ; END_CASE;", "19: 3 is a label in line 7 already"),
         ("CASE i OF 3: ; 1..5: ; END_CASE;", "16: 3 is a label in line 7 already"),
@@ -105,7 +105,7 @@ def test_return_ends_a_unit() -> None:
         ("ABS(i) := 6;", "1: the left side of := needs a variable"),
         ("MAX(i, j).1 := b;", "1: the left side of := needs a variable"),
         ("i S= b;", "1: S= needs a BOOL variable, not INT"),
-        ("b S= i;", "6: INT does not fit BOOL by itself; write INT_TO_BOOL(...)"),
+        ("b S= i;", "6: INT does not fit BOOL; write INT_TO_BOOL(...)"),
         ("i X= b;", "3: X has no place here; an assignment is written :=, S= or R="),
         ("i REF= j;", "1: the left side of REF= is a REFERENCE TO, not INT"),
         ("nothing := 1;", "1: unknown name nothing"),
@@ -125,7 +125,7 @@ def test_wrong_statement_is_explained(text: str, message: str) -> None:
         ("ABS(i);", "1: the result of this call is not used"),
         (
             "s := '1234567890123456789012345678901234567890123456789012345678901234567890123456789012345';",
-            "6: this text has 85 characters, STRING[80] holds 80",
+            "6: this string has 85 characters, STRING[80] holds 80",
         ),
     ],
 )

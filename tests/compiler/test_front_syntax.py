@@ -188,7 +188,7 @@ def test_errors_stop_at_the_limit() -> None:
     assert len(statement("".join(f"x := 1 + ;\ny := {i};\n" for i in range(100)))) == MAX_ERRORS
 
 
-def test_diagnosis_is_shown_with_its_line_and_a_caret() -> None:
+def test_diagnostic_is_shown_with_its_line_and_a_caret() -> None:
     source = Source("dir/f.st", "PROGRAM Main\nVAR x : INT; END_VAR\n\tx := ;\nEND_PROGRAM")
     (diagnostic,) = check_sources([source]).diagnostics
     assert render(diagnostic, [source]) == "dir/f.st:3:7: error: expected a value before ;\n\tx := ;\n\t     ^"
@@ -224,7 +224,7 @@ def test_tables_are_the_same_from_the_cache_and_from_the_grammar() -> None:
     assert len(load_tables().rules) == len(fresh.rules)
 
 
-def test_broken_cache_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_broken_cache_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     load_tables.cache_clear()
     load_tables()

@@ -68,7 +68,7 @@ def test_constant_condition_is_named_as_the_reason() -> None:
         "15: this statement is never reached: the condition is always FALSE"
     ]
     assert in_main("IF TRUE THEN ; ELSE i := 1; END_IF;", "unreachable") == [
-        "21: this statement is never reached: a condition before is always TRUE"
+        "21: this statement is never reached: a previous condition is always TRUE"
     ]
 
 

@@ -140,11 +140,11 @@ def test_paths_are_resolved(path: str, area: int, offset: int, t: Type, bit: int
         ("Main.text[11]", "has the characters 0 to 9"),
         ("Main.p.x", "write Main.p^.x"),
         ("Main.p[1]", "write Main.p^[1]"),
-        ("Main.n^", "no pointer"),
-        ("Main.ref^", "no pointer"),
-        ("Main.p^^", "no pointer"),
+        ("Main.n^", "not a pointer"),
+        ("Main.ref^", "not a pointer"),
+        ("Main.p^^", "not a pointer"),
         ("Main.itf.speed", "the class of its instance"),
-        ("Main.itf^", "no pointer"),
+        ("Main.itf^", "not a pointer"),
         ("Main.open[1]", "whose bounds change with each call"),
         ("Main.open", "whose bounds change with each call"),
         ("Main.tmp", "lives only while Main runs"),
@@ -181,7 +181,7 @@ def test_pointers_and_references_are_part_of_the_place(
     assert (symbol.place, symbol.type) == (place, t)
 
 
-def test_bits_behind_pointers_are_read() -> None:
+def test_bits_through_pointers_are_read() -> None:
     symbol = table().resolve("Main.raw^.9")
     assert (symbol.place, symbol.bit) == ((0, 160, (0,)), 9)
     assert symbol.decode(b"\0\2") is True

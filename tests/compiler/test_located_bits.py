@@ -1,4 +1,4 @@
-"""Writing a bit writes that bit and nothing else, wherever it lies and whatever writes it."""
+"""Writing a bit writes that bit and nothing else, wherever it is and whatever writes it."""
 
 from __future__ import annotations
 

@@ -132,7 +132,7 @@ def test_what_is_kept_lies_in_retain_memory(kind: str, section: str, word: str) 
         ),
         ("VAR_TEMP RETAIN", "a VAR_TEMP cannot be RETAIN: it lives for one call; VAR RETAIN keeps a value"),
         ("VAR_OUTPUT CONSTANT", "a VAR_OUTPUT cannot be CONSTANT: it is there to be written"),
-        ("VAR_INPUT PRIVATE", "PRIVATE is for VAR; a VAR_INPUT is there for all who call; leave it out"),
+        ("VAR_INPUT PRIVATE", "PRIVATE is for VAR; a VAR_INPUT is visible to all callers; leave it out"),
         ("VAR FINAL", "FINAL is for blocks and methods, not for variables; leave it out"),
         ("VAR_INST", "a FUNCTION_BLOCK has no VAR_INST; VAR keeps its value from call to call"),
     ],
@@ -150,7 +150,7 @@ def test_the_error_says_what_to_write(text: str, said: str) -> None:
         ),
         (
             "PROGRAM F\nVAR PRIVATE\nx : INT;\nEND_VAR\nEND_PROGRAM\n",
-            "2:1: PRIVATE has no effect in a PROGRAM: other units see its variables all the same; leave it out",
+            "2:1: PRIVATE has no effect in a PROGRAM: other POUs see its variables all the same; leave it out",
         ),
         (
             "FUNCTION_BLOCK F\nVAR_IN_OUT\nx : INT := 5;\nEND_VAR\nEND_FUNCTION_BLOCK\n",

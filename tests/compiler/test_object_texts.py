@@ -1,4 +1,4 @@
-"""The texts of CODESYS 3 objects, which do not end with END_PROGRAM and such."""
+"""The text of CODESYS 3 objects, which do not end with END_PROGRAM and such."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_an_error_in_a_member_is_in_its_own_file(tmp_path: Path) -> None:
 
 def test_a_member_whose_unit_is_no_unit_is_an_error(tmp_path: Path) -> None:
     files = {"Types.st": "TYPE T : INT; END_TYPE", "Types.Start.st": "METHOD Start : BOOL\nStart := TRUE;"}
-    message = "the METHOD Start has no FUNCTION_BLOCK or PROGRAM in front of it"
+    message = "the METHOD Start has no FUNCTION_BLOCK or PROGRAM before it"
     assert errors(written(tmp_path, files)) == [f"1:8: {message}"]
 
 

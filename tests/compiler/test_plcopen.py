@@ -200,10 +200,10 @@ def test_a_diagram_that_is_not_read_is_named_and_the_rest_is_checked(tmp_path: P
     ("text", "line", "message"),
     [
         ('<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY x "y">]>\n<project/>', 2, "document type"),
-        ("<project>\n<types>\n</project>", 3, "not whole XML: mismatched tag"),
-        ("", 1, "not whole XML: no element found"),
+        ("<project>\n<types>\n</project>", 3, "not well-formed XML: mismatched tag"),
+        ("", 1, "not well-formed XML: no element found"),
         ("<a>" * 1000, 1, "more than 200 elements stand in each other"),
-        ("<ExportFile/>", 1, "<ExportFile> is no PLCopen XML"),
+        ("<ExportFile/>", 1, "<ExportFile> is not PLCopen XML"),
         (project(pou("X", "", kind="macro")), 7, "X is a macro"),
     ],
 )

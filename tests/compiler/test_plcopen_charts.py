@@ -171,7 +171,7 @@ def test_an_action_may_have_a_qualifier_with_a_time(tmp_path: Path) -> None:
     ("extra", "why"),
     [
         ('<macroStep localId="9" name="m"/>', "it has a macro step"),
-        (transition(9, "77", "TRUE"), "a transition has no step before or behind it"),
+        (transition(9, "77", "TRUE"), "a transition has no step before or after it"),
         ('<transition localId="9">' + into("1") + "</transition>", "a transition has no condition"),
         (
             step(9, "CS", "5", more=f"<addData>{data('sfc/element', '<attribute>Count</attribute>')}</addData>"),

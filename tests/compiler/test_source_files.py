@@ -278,7 +278,7 @@ def test_a_file_without_text_says_what_to_export(tmp_path: Path, name: str, mess
     assert {d.code for d in found} == {"unknown", "file"}
     assert message in next(d.message for d in found if d.code == "file")
     (tmp_path / "main.st").unlink()
-    with pytest.raises(UsageError, match=f"There is no source file .*{name} is no text: .*"):
+    with pytest.raises(UsageError, match=f"There is no source file .*{name} is not text: .*"):
         load_sources([tmp_path])
 
 
@@ -290,7 +290,7 @@ def test_a_binary_file_is_one_error_whatever_it_is_called(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("suffix", [".ST", ".iecst", ".scl"])
-def test_other_suffixes_of_program_texts_are_taken_from_folders(tmp_path: Path, suffix: str) -> None:
+def test_other_suffixes_of_sources_are_taken_from_folders(tmp_path: Path, suffix: str) -> None:
     (tmp_path / f"main{suffix}").write_text(PROGRAM, "utf-8")
     with started(tmp_path) as plc:
         plc.run_cycles(1)
@@ -349,7 +349,7 @@ def test_the_blocks_in_c_in_front_of_an_openplc_program_are_left_out(tmp_path: P
         assert plc.read("Main.n") == 2
 
 
-def test_a_program_that_uses_a_block_in_c_is_told_so(tmp_path: Path) -> None:
+def test_a_program_that_uses_a_block_in_c_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "plc.st"
     path.write_text(GENERATED.replace("n : INT;", "n : INT; log : LOGGER;"))
     found = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]

@@ -184,19 +184,19 @@ def real_texts(draw: st.DrawFn) -> tuple[str, list[float]]:
 
 @PROGRAM
 @given(batch(any_integer_text))
-def test_integers_and_their_texts_convert_both_ways(program: tuple[list[Term], str]) -> None:
+def test_integers_and_their_strings_convert_both_ways(program: tuple[list[Term], str]) -> None:
     check(*program)
 
 
 @PROGRAM
 @given(batch(any_duration_text))
-def test_durations_and_their_texts_convert_both_ways(program: tuple[list[Term], str]) -> None:
+def test_durations_and_their_strings_convert_both_ways(program: tuple[list[Term], str]) -> None:
     check(*program)
 
 
 @PROGRAM
 @given(real_texts())
-def test_real_texts_are_as_short_as_possible_and_read_back(case: tuple[str, list[float]]) -> None:
+def test_real_strings_are_as_short_as_possible_and_read_back(case: tuple[str, list[float]]) -> None:
     name, values = case
     known = Declarations([])
     variables = [known.variable(name, f"{name}#{v:.17E}", v) for v in values]
@@ -216,7 +216,7 @@ DECIMAL = st.from_regex(r"-?[0-9]{1,10}(\.[0-9]{1,9})?(E[+-]?[0-9]{1,3})?", full
 
 @PROGRAM
 @given(st.lists(DECIMAL, min_size=EXPRESSIONS, max_size=EXPRESSIONS))
-def test_decimal_texts_read_as_the_nearest_real(texts: list[str]) -> None:
+def test_decimal_strings_read_as_the_nearest_real(texts: list[str]) -> None:
     check([Term(f"STRING_TO_LREAL('{t}')", "LREAL", float(t)) for t in texts])
 
 
@@ -412,7 +412,7 @@ def test_dates_convert_into_each_other(program: tuple[list[Term], str]) -> None:
 
 @PROGRAM
 @given(batch(any_date_text))
-def test_dates_and_their_texts_convert_both_ways(program: tuple[list[Term], str]) -> None:
+def test_dates_and_their_strings_convert_both_ways(program: tuple[list[Term], str]) -> None:
     check(*program)
 
 

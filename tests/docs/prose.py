@@ -1,15 +1,28 @@
-"""The words of a source that people read: comments, docstrings, messages, and the text of Markdown, with their lines.
+"""The files of the project, and the words in them that people read: comments, docstrings, messages, text of Markdown.
 
 Code is left out: names in it follow other rules than English.
 """
 
 import io
 import re
+import subprocess
 import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
 Line = tuple[int, str]
+
+ROOT = Path(__file__).parents[2]
+
+
+def project_files() -> list[str]:
+    """Paths from ROOT: what git knows; in a copy without git all but hidden files and what was built."""
+    if (ROOT / ".git").exists():
+        listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+        return [name for name in listed.splitlines() if (ROOT / name).is_file()]
+    found = (path.relative_to(ROOT) for path in ROOT.rglob("*") if path.is_file())
+    return sorted(str(path) for path in found if not re.match(r"\.|build|.*(/\.|__pycache__)", str(path)))
+
 
 # In C and Structured Text: a comment, or a string (of which only the content is read).
 _C = re.compile(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', re.DOTALL)

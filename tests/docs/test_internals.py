@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-import subprocess
 from functools import cache
 from pathlib import Path
 
-import prose
 import pytest
+from prose import ROOT, outside_code, project_files
 
-ROOT = Path(__file__).parents[2]
 INTERNALS = ROOT / "docs" / "internals.md"
 FILE = re.compile(r"[\w./-]+\.(?:c|h|S|py|st|sh|md|build|ini|lark)|(?:[\w.-]+/)+[\w.-]+/?")
 FUNCTION = re.compile(r"((?:\w+\.)*)(\w+)\(\)")
@@ -23,18 +21,13 @@ ELSEWHERE = ("/", "link/NAME.py", "app.", "build", "$")
 @cache
 def files() -> dict[str, str]:
     """Each file of the repository and its text; "" for one that is not a source."""
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     sources = (".c", ".h", ".py")
-    return {
-        name: (ROOT / name).read_text() if name.endswith(sources) else ""
-        for name in listed.splitlines()
-        if (ROOT / name).is_file()
-    }
+    return {name: (ROOT / name).read_text() if name.endswith(sources) else "" for name in project_files()}
 
 
 def words() -> list[str]:
     """What stands between backticks, outside of blocks."""
-    text = "\n".join(line for _, line in prose.outside_code(INTERNALS.read_text()))
+    text = "\n".join(line for _, line in outside_code(INTERNALS.read_text()))
     return sorted(set(re.findall(r"`([^`\n]+)`", text)))
 
 

@@ -13,7 +13,7 @@ HEAD = struct.Struct("<4sIIII")  # magic, sequence, tag, size, CRC
 
 
 def commit_log(flash: Path) -> int:
-    """Where the commit log lies: it is the first of the logs of records."""
+    """Where the commit log is: it is the first of the logs of records."""
     data = flash.read_bytes()
     return next(at for at in range(0, len(data), SECTOR) if data.startswith(RECORD, at))
 

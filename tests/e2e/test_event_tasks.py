@@ -55,7 +55,7 @@ def answered(plc, task: int) -> int:
     return info.cycles + info.overruns
 
 
-def test_every_rise_that_a_cycle_leaves_behind_is_a_run(tool, plc, eventually):
+def test_every_rise_at_the_end_of_a_cycle_is_a_run(tool, plc, eventually):
     plc.flash(tool.build("edges", PROGRAM.replace("{edges}", str(EDGES))))
     plc.write({"go": True})
     eventually(lambda: plc.read("edges") == EDGES)

@@ -176,7 +176,7 @@ with plctool.connect("serial:" + sys.argv[1]) as plc:
 # ---- downloads -------------------------------------------------------------------------------------------------------
 
 
-def test_the_second_of_two_flashes_is_told_of_the_first(tool, plcrt, counter, large, start, slow, eventually):
+def test_the_second_of_two_flashes_learns_of_the_first(tool, plcrt, counter, large, start, slow, eventually):
     first = start("flash", "--port", slow.path, str(large))
     eventually(lambda: slow.to_device.carried > 2000)
     slow.to_device.damage = NOTHING_ARRIVES  # the first one lasts until we have seen the second

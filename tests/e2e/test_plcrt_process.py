@@ -102,7 +102,7 @@ def test_a_file_that_is_no_flash_is_not_touched(tmp_path):
     assert film.read_bytes().strip(b"x") == b"" and film.stat().st_size == 5 * 1024 * 1024
 
 
-def test_a_small_file_of_somebody_else_is_not_touched(tmp_path):
+def test_a_small_file_of_another_program_is_not_touched(tmp_path):
     notes = tmp_path / "notes"
     notes.write_text("milk, bread")
     done = run_plcrt("--flash", str(notes))
@@ -165,7 +165,7 @@ def test_garbage_on_the_line_does_no_harm(plcrt):
     assert device_name(plcrt.port) == "plcrt"
 
 
-def test_replies_that_nobody_reads_do_not_block_it(plcrt, eventually):
+def test_replies_that_are_not_read_do_not_block_it(plcrt, eventually):
     """Name requests without end from a client that never reads: the terminal fills up."""
     transport = SerialTransport(plcrt.port)
     connection = Connection(transport)
@@ -210,7 +210,7 @@ def test_it_does_not_stop_when_its_terminal_closes(plcrt):
     assert plcrt.stop() == 0
 
 
-def test_it_goes_on_when_nobody_reads_its_output(tmp_path):
+def test_it_goes_on_when_its_output_is_not_read(tmp_path):
     """Standard output is a pipe whose other end is closed already."""
     reader, writer = os.pipe()
     os.close(reader)

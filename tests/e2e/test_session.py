@@ -152,7 +152,7 @@ def random_program(seed: int) -> tuple[str, int]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_programs_nobody_knows_beforehand_compute_the_right_value(tool, plcrt, eventually, seed):
+def test_random_programs_compute_the_right_value(tool, plcrt, eventually, seed):
     text, expected = random_program(random.randrange(1 << 30) + seed)
     image = tool.build("unknown", text)
     tool.ok("flash", "--port", plcrt.port, str(image))

@@ -201,7 +201,7 @@ def test_a_serial_device_is_opened_again_by_the_next_worker(tmp_path, eventually
         worker = eventually(lambda: plcrt.worker)
         opened = lambda pid: os.ttyname(theirs) in [os.readlink(f) for f in Path(f"/proc/{pid}/fd").iterdir()]  # noqa: E731
         eventually(lambda: opened(worker))
-        assert not opened(process.pid)  # a device that goes away is not held by anybody
+        assert not opened(process.pid)  # a device that goes away is not held by the supervisor
         os.kill(worker, OUTSIDE)
         eventually(lambda: plcrt.worker not in (None, worker))
         eventually(lambda: opened(plcrt.worker))

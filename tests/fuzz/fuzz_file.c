@@ -68,7 +68,7 @@ static void append(RTS_UI32 file, RTS_UI32 number)
     model[file].begin = position;
 }
 
-/* From the beginning of the first sector that `from` lies in, what was there is worth nothing. */
+/* From the beginning of the first sector that `from` is in, what was there is worth nothing. */
 static void forget(RTS_UI32 file, RTS_UI32 from, RTS_UI32 to)
 {
     for (; from < to; from++) {

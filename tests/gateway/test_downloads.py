@@ -53,7 +53,7 @@ def block(image: bytes, offset: int, session: int) -> bytes:
     return l7.encode(message)
 
 
-def test_another_tool_is_told_who_downloads(served: Served, flashing: Flashing) -> None:
+def test_another_tool_learns_who_downloads(served: Served, flashing: Flashing) -> None:
     other = served.connect()
     flashing.begin()
     with pytest.raises(LinkError, match=r"plctool flash big.cdl \(pid \d+\) is downloading a program; try again") as e:

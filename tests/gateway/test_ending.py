@@ -38,7 +38,7 @@ def test_one_that_only_asks_does_not_keep_it_alive(impatient: Served, eventually
     eventually(lambda: impatient.has_ended)
 
 
-def test_a_line_that_is_lost_is_told_to_every_tool(served: Served, eventually: Eventually) -> None:
+def test_a_line_that_is_lost_is_reported_to_every_tool(served: Served, eventually: Eventually) -> None:
     first, second = served.connect(), served.connect()
     first.read("Main.count"), second.read("Main.count")
     served.line.gone = True
@@ -50,7 +50,7 @@ def test_a_line_that_is_lost_is_told_to_every_tool(served: Served, eventually: E
         second.read("Main.count")
 
 
-def test_tools_are_told_that_it_was_ended_by_command(served: Served, eventually: Eventually) -> None:
+def test_tools_learn_that_it_was_ended_by_command(served: Served, eventually: Eventually) -> None:
     tool, asking = served.connect(), served.guest(asks_only=True, tool="plctool gateway")
     tool.read("Main.count")
     asking.send(document_frame(Kind.CALL, 2, {"op": "stop"}), PATIENCE)
@@ -78,7 +78,7 @@ def test_one_that_wants_the_line_alone_gets_it_from_an_idle_gateway_only(
     eventually(lambda: served.has_ended)
 
 
-def test_the_device_is_told_that_the_channel_closes(served: Served, eventually: Eventually) -> None:
+def test_the_device_learns_that_the_channel_closes(served: Served, eventually: Eventually) -> None:
     served.connect().read("Main.count")
     assert served.device._id
     served.gateway.stop("over", "over")

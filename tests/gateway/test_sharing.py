@@ -185,7 +185,7 @@ def test_scan_beside_other_tools_finds_the_device_and_keeps_the_channel(served: 
     assert logins(served) == 1
 
 
-def test_tools_are_told_of_each_other(served: Served) -> None:
+def test_tools_learn_of_each_other(served: Served) -> None:
     watching, flashing = served.connect("plctool watch Main.x"), served.connect("plctool flash")
     assert [other.tool for other in flashing.others()] == ["plctool watch Main.x"]
     assert str(watching.others()[0]).startswith("plctool flash (pid ")

@@ -1,4 +1,4 @@
-"""An application made by hand, with symbols, for tests of what lies above the services."""
+"""An application made by hand, with symbols, for tests of what is above the services."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def test_arrays_and_elements_are_read(running: Controller) -> None:
     assert running.plc.read_all(["Main.list", "Main.list[2]"]) == {"Main.list": [1, 2, 3], "Main.list[2]": 2}
 
 
-def test_values_are_written_as_python_values_or_texts(running: Controller) -> None:
+def test_values_are_written_as_python_values_or_strings(running: Controller) -> None:
     running.plc.write({"Main.count": 7, "Main.pause": "T#1s", "Main.name": "abc", "Main.level": 1.5})
     values = running.plc.read_all(["Main.count", "Main.pause", "Main.name", "Main.level"])
     assert values == {"Main.count": 7, "Main.pause": "T#1s", "Main.name": "abc", "Main.level": 1.5}
@@ -185,7 +185,7 @@ def test_a_symbol_file_that_is_named_is_used(running: Controller) -> None:
     assert plc.read("Main.count") == 0
 
 
-def test_an_image_that_changed_behind_our_back_is_never_read_with_old_symbols(running: Controller) -> None:
+def test_an_image_that_changed_meanwhile_is_never_read_with_old_symbols(running: Controller) -> None:
     running.plc.read("Main.count")
     running.fake.image = make_application("2")[0]
     with pytest.raises(DeviceError, match="Another application"):

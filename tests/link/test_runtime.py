@@ -139,7 +139,7 @@ def test_a_session_survives_a_restart_of_the_runtime(session: Session) -> None:
     assert services.echo(session, b"after") == b"after"
 
 
-def test_a_second_client_is_told_that_the_device_is_busy() -> None:
+def test_a_second_client_learns_that_the_device_is_busy() -> None:
     first, second = Session(Connection(SimTransport())), Session(Connection(SimSerial()))
     services.echo(first, b"mine")
     with pytest.raises(LinkError, match="busy"):

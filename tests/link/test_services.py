@@ -252,7 +252,7 @@ def test_pointers_are_followed_by_the_device() -> None:
     assert bench.plc.requests.count((lib.SG_MONITORING2, lib.SRV_MON2_READ)) == 1
 
 
-def test_what_is_behind_a_pointer_to_nothing_is_none_and_the_rest_is_read() -> None:
+def test_the_target_of_a_pointer_to_nothing_is_none_and_the_rest_is_read() -> None:
     bench = Bench()
     bench.plc.memory[0][8:16] = pointer(0, 69_999)
     contents = monitoring.read_memory(
@@ -261,7 +261,7 @@ def test_what_is_behind_a_pointer_to_nothing_is_none_and_the_rest_is_read() -> N
     assert contents.values == [None, None, b"\x6f"]
 
 
-def test_long_values_behind_pointers_are_read_in_pieces() -> None:
+def test_long_values_through_pointers_are_read_in_pieces() -> None:
     bench = Bench(buffer_size=512)
     bench.plc.memory[0][0:8] = pointer(1, 100)
     bench.plc.memory[1][:3000] = bytes(n % 251 for n in range(3000))
@@ -269,7 +269,7 @@ def test_long_values_behind_pointers_are_read_in_pieces() -> None:
     assert contents.values == [bytes(bench.plc.memory[1][104:2104])]
 
 
-def test_values_are_written_behind_pointers() -> None:
+def test_values_are_written_through_pointers() -> None:
     bench = Bench()
     bench.plc.memory[0][0:8] = pointer(1, 100)
     monitoring.write_memory(bench.session, bench.crc, [Write(AreaRange(0, 0, 2, (4,)), b"\xaa\xbb")])
@@ -376,7 +376,7 @@ def test_a_write_whose_answer_is_lost_is_not_repeated() -> None:
 # ---- download --------------------------------------------------------------------------------------------------------
 
 
-def test_an_image_arrives_and_progress_is_told() -> None:
+def test_an_image_arrives_and_progress_is_reported() -> None:
     bench, image, seen = Bench(buffer_size=2048), make_image(20_000, 5), list[int]()
     services.download(bench.session, image, progress=seen.append)
     assert bench.plc.image == image

@@ -75,11 +75,11 @@ KEPT = [
 ]  # fmt: skip
 """Variables that are what the qualifier says."""
 LOST = ["Main.part.other", "Main.parts[1].other", "Second.lost"]
-"""Variables that are VAR, wherever they lie."""
+"""Variables that are VAR, wherever they are."""
 
 
 def program(qualifier: str, *, changed: bool = False) -> str:
-    """The source; `changed`: the variables lie elsewhere."""
+    """The source; `changed`: the variables are elsewhere."""
     new, new_too = ("added : LREAL := 1.5;", "added_too : LREAL := 2.5;") if changed else ("", "")
     text = PROGRAM if qualifier else PROGRAM.replace("PROGRAM {one_qualifier} ", "PROGRAM ")
     one = "PERSISTENT" if "PERSISTENT" in qualifier else qualifier

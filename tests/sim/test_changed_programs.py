@@ -1,5 +1,5 @@
 """A download looks at PERSISTENT values one by one: what has the same name and type in the new program is kept,
-whatever lies around it, and only that."""
+whatever is around it, and only that."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def build(tmp_path_factory):
 
 @settings(max_examples=60, deadline=None)
 @given(old=programs, new=programs, cut=st.booleans())
-def test_only_what_changed_begins_anew(build, old, new, cut) -> None:
+def test_only_what_changed_begins_again(build, old, new, cut) -> None:
     before, after = build(source(old)), build(source(new))
     if before.crc == after.crc:
         return
@@ -164,7 +164,7 @@ def test_the_host_names_what_the_device_keeps(build, old, new) -> None:
     assert not set(changes.kept) & set(changes.lost)
 
 
-def test_the_reason_of_a_loss_is_told(build) -> None:
+def test_the_reason_of_a_loss_is_reported(build) -> None:
     before = build("PROGRAM Main VAR PERSISTENT a, b, c, d : INT; s : STRING; END_VAR END_PROGRAM").symbols.kept
     persistent = "VAR PERSISTENT a, e : INT; b : DINT; s : STRING[9]; END_VAR"
     text = f"PROGRAM Main {persistent} VAR RETAIN c : INT; END_VAR END_PROGRAM"

@@ -41,7 +41,7 @@ NAMES = ["Main.n", "Main.kept", "Main.block.fresh"]
     ("event", "kept", "fresh"),
     [("download", 8, True), ("warm", 8, False), ("cold", 7, True), ("power", 9, False)],
 )
-def test_retain_variables_and_what_fb_init_is_told(tmp_path: Path, event: str, kept: int, fresh: bool) -> None:
+def test_retain_variables_and_what_fb_init_gets(tmp_path: Path, event: str, kept: int, fresh: bool) -> None:
     with simulator(tmp_path, "RETAIN") as plc:
         bring_about(plc, event)
         n = 5 if event in ("warm", "cold") else 6  # stopped after a reset
@@ -49,7 +49,7 @@ def test_retain_variables_and_what_fb_init_is_told(tmp_path: Path, event: str, k
 
 
 @pytest.mark.parametrize(("event", "fresh"), [("download", True), ("warm", False), ("cold", True), ("power", True)])
-def test_without_retain_variables_fb_init_is_told_that_none_were_kept(tmp_path: Path, event: str, fresh: bool) -> None:
+def test_without_retain_variables_fb_init_learns_that_none_were_kept(tmp_path: Path, event: str, fresh: bool) -> None:
     with simulator(tmp_path, "") as plc:
         bring_about(plc, event)
         assert plc.read("Main.block.fresh") is fresh

@@ -169,7 +169,7 @@ END_PROGRAM
 """
 
 
-def test_kept_instances_are_of_their_class_in_a_program_that_numbers_it_anew(build) -> None:
+def test_kept_instances_are_of_their_class_in_a_program_that_numbers_it_again(build) -> None:
     other = "FUNCTION_BLOCK Aaa EXTENDS Base METHOD Step : DINT Step := 100; END_METHOD END_FUNCTION_BLOCK"
     built = build(CLASSES.format(other="", instance=""))
     with Simulator(built.image, built.symbols) as plc:

@@ -181,7 +181,7 @@ def test_what_pointers_lead_to_is_written(plc: Simulator, name: str, value: obje
     assert plc.read(seen_as) == value
 
 
-def test_a_bit_behind_a_pointer_is_written(plc: Simulator) -> None:
+def test_a_bit_through_a_pointer_is_written(plc: Simulator) -> None:
     plc.write({"Main.raw^.2": True})
     assert plc.read("Main.list[1]") == 14
 
@@ -199,7 +199,7 @@ def test_a_bit_behind_a_pointer_is_written(plc: Simulator) -> None:
         ("Main.head", "NULL", None),
     ],
 )
-def test_texts_are_written_as_they_are_shown(plc: Simulator, name: str, text: str, seen: object) -> None:
+def test_strings_are_written_as_they_are_shown(plc: Simulator, name: str, text: str, seen: object) -> None:
     plc.write({name: plc.symbols().resolve(name).parse(text)})
     assert plc.read(name) == seen
 

@@ -56,7 +56,7 @@ def test_a_day_of_a_10_ms_task_has_8640000_cycles(plc):
     assert plc.now_ns == 86_400 * 10**9
 
 
-def test_time_passes_only_when_it_is_told_to(plc):
+def test_time_passes_only_on_request(plc):
     assert plc.read("Main.n") == 0
     plc.run_for(ms=30)
     assert plc.read("Main.n") == 3

@@ -191,7 +191,7 @@ class Board:
         self._qmp("system_reset")
 
     def address_of(self, symbol: str) -> int:
-        """Where something of the firmware lies."""
+        """Where something of the firmware is."""
         with self.firmware.open("rb") as file:
             return int(ELFFile(file).get_section_by_name(".symtab").get_symbol_by_name(symbol)[0]["st_value"])
 

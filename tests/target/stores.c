@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Arguments base=, size= (of the flash, in the guest), memory= (the file it lies in), out=. Each store appends the
+ * Arguments base=, size= (of the flash, in the guest), memory= (the file it is in), out=. Each store appends the
  * offset of its aligned block of 8 bytes (u32) and what that block holds afterwards to `out`, at once: the flash after
  * n stores is the flash before, with the first n of these written over it. Debian has no header for plugins; these are
  * the few prototypes needed.

@@ -1,4 +1,4 @@
-"""The calls that led to an exception: a checked error, a fault, and a loop that is broken, with and without an FPU."""
+"""The calls that led to an exception: a checked error, a fault, and a loop that is aborted, with and without an FPU."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ FAULTS = {1: "DIVIDEBYZERO", 2: "ACCESS_VIOLATION", 3: "WATCHDOG", 4: "WATCHDOG"
 
 
 @pytest.mark.parametrize("level", [0, 2])
-def test_each_call_is_told(plc: Plc, tmp_path: Path, level: Level) -> None:
+def test_each_call_is_reported(plc: Plc, tmp_path: Path, level: Level) -> None:
     plc.flash(compile_text(TEXT, TARGET, tmp_path, checks="div", level=level).path)
     for how, name in FAULTS.items():
         plc.write({"Main.how": how})

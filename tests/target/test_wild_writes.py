@@ -57,7 +57,7 @@ LINE = TEXT.split("\n").index(STATEMENT) + 1
 STACK_SIZE = 2048  # of a task, in the full configuration
 PERIPHERAL, REGISTER = 0x4000_0000, 0xE000_ED08  # a timer or the watchdog, VTOR
 
-# What it must not write: where that lies.
+# What it must not write: where that is.
 TARGETS: dict[str, Callable[[Board], int]] = {
     "variables": lambda board: board.address_of("tasks"),
     "initialised variables": lambda board: board.address_of("data_start"),

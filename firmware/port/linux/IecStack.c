@@ -61,7 +61,7 @@ bool IecStackIsOverflow(const IEC_STACK *stack, uintptr_t address)
     return stack->bottom - address - 1 < GUARD_SIZE;
 }
 
-/* ---- the address sanitizer has to be told which stack is in use: nothing may be left in the middle of that ---- */
+/* ---- the address sanitizer must know which stack is in use: nothing may be left in the middle of that ---- */
 
 #if defined(__SANITIZE_ADDRESS__)
 
@@ -99,7 +99,7 @@ bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
     return !left;
 }
 
-/* The frames that are given up have poisoned what lies between their variables: here, and where handlers run. */
+/* The frames that are given up have poisoned what is between their variables: here, and where handlers run. */
 NOT_CHECKED void IecStackLeave(IEC_STACK *stack)
 {
     __asan_handle_no_return();

@@ -1,10 +1,10 @@
 /*
- * IecStack.h - stacks of their own for IEC code: nothing of the runtime lies on them, and guards lie around them.
+ * IecStack.h - stacks of their own for IEC code: nothing of the runtime is on them, and guards are around them.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
  * Shared by the linux and the sim port. A program that writes beyond a local array destroys what IEC code left there,
- * or meets a guard; what the thread goes on with afterwards lies on the stack it came from. Only the stack record, which
+ * or meets a guard; what the thread goes on with afterwards is on the stack it came from. Only the stack record, which
  * is found through a thread-local variable, leads back there.
  */
 #ifndef IECSTACK_H
@@ -15,7 +15,7 @@
 /* The layout of the first three is known to IecStackSwitch.S. */
 typedef struct {
     uintptr_t back;   /* stack pointer of the thread, saved while IEC code runs */
-    uintptr_t top;    /* behind the highest address of the IEC stack */
+    uintptr_t top;    /* past the highest address of the IEC stack */
     RTS_UI32 running; /* IEC code runs; atomic */
     uintptr_t bottom; /* lowest address */
     struct {
@@ -29,7 +29,7 @@ bool IecStackReserve(IEC_STACK *stack);
 /* The memory for the signal handlers of the thread that runs on it. */
 void *IecStackSignalMemory(const IEC_STACK *stack, size_t *size);
 
-/* Whether the address lies in the guard below the stack, where it grows into. */
+/* Whether the address is in the guard below the stack, where it grows into. */
 bool IecStackIsOverflow(const IEC_STACK *stack, uintptr_t address);
 
 /* Runs fn(arg) on the IEC stack: true when it returned, false when IecStackLeave was called. */

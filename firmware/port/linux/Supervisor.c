@@ -181,7 +181,7 @@ static RTS_UI32 describe_signal(int number)
     return RTSEXCPT_NOEXCEPTION;
 }
 
-/* SIGKILL comes from outside (a user, the system when memory is short): it is told, and does not count. */
+/* SIGKILL comes from outside (a user, the system when memory is short): it is reported, and does not count. */
 static void note_death(int status)
 {
     int number = WIFSIGNALED(status) ? WTERMSIG(status) : state.life->number; /* a sanitizer exits */
@@ -320,7 +320,7 @@ int PortSupervise(int (*work)(void))
     sigaddset(&set, SIGTERM);
     sigaddset(&set, SIGINT);
     sigprocmask(SIG_BLOCK, &set, NULL);
-    (void)signal(SIGCHLD, SIG_DFL); /* when it is ignored, nobody learns how a child ended */
+    (void)signal(SIGCHLD, SIG_DFL); /* if it is ignored, the exit status of a child is lost */
     do {
         if (!start_worker()) {
             return EXIT_FAILURE;

@@ -79,7 +79,7 @@ static bool make_raw(int line)
     return cfgetospeed(&taken) == state.speed;
 }
 
-/* TIOCEXCL keeps everybody out but root, the lock keeps other plcrt and plctool out. */
+/* TIOCEXCL keeps all out but root, the lock keeps other plcrt and plctool out. */
 static bool make_exclusive(int line)
 {
     (void)ioctl(line, TIOCEXCL);

@@ -35,7 +35,7 @@ static struct {
 
 /* ---- before the runtime starts ---- */
 
-/* Opened for writing too: so it never ends, whoever comes and goes at the other end. */
+/* Opened for writing too: so it never ends, whatever happens at the other end. */
 static int open_pipe(const char *path, PORT_REASON *reason)
 {
     struct stat status;

@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Shared by the linux and the sim port, so it depends on no other file of a port. It also lives in processes that are
- * not ours (Python): signal handlers are taken at first use, faults outside SysExceptTry go to whoever had them
+ * not ours (Python): signal handlers are taken at first use, faults outside SysExceptTry go to those who had them
  * before, and SysExceptShutdown gives everything back.
  *
  * IEC code runs on a stack of its own (IecStack.h), so that what it destroys there is its own. Leaving it from a handler
@@ -109,7 +109,7 @@ static PLACE place_of(const void *ucontext)
 /* The stack is read as it is, whatever a sanitizer thinks of the gaps between its variables. */
 #define READS_STACK __attribute__((no_sanitize("address")))
 
-/* What a stack that overflowed tells: below what the running calls have left lies what earlier ones have, so only as
+/* What a stack that overflowed shows: below what the running calls have left is what earlier ones have, so only as
  * many words as are kept. */
 READS_STACK static const uintptr_t *highest_calls(const IEC_STACK *stack)
 {
@@ -189,7 +189,7 @@ static void chain(const SIGNAL *signal, siginfo_t *info, void *ucontext)
     } else if (previous->sa_handler == SIG_DFL) {
         sigaction(signal->number, previous, NULL);
         if (info->si_code <= 0) {
-            raise(signal->number); /* somebody sent it; a real fault comes again by itself */
+            raise(signal->number); /* another process sent it; a real fault occurs again */
         }
     } else if (previous->sa_handler != SIG_IGN) {
         previous->sa_handler(signal->number);
@@ -244,7 +244,7 @@ static void give_back(SIGNAL *signal)
     struct sigaction ignore = {.sa_handler = SIG_IGN};
     sigaction(signal->number, NULL, &now);
     if ((now.sa_flags & SA_SIGINFO) == 0 || (now.sa_sigaction != on_fault && now.sa_sigaction != on_break)) {
-        return; /* somebody came after us and may still call us: stay */
+        return; /* another handler was installed later and may still call this one: stay */
     }
     if (is_break(signal)) {
         sigaction(signal->number, &ignore, NULL); /* drops a break on its way, which would now end the process */

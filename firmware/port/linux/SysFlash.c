@@ -47,7 +47,7 @@ static bool read_all(int file, RTS_UI8 *data, size_t size, off_t offset)
     while (size > 0) {
         ssize_t done = pread(file, data, size, offset);
         if (done == 0) {
-            errno = EIO; /* somebody made the file shorter */
+            errno = EIO; /* another process made the file shorter */
         }
         if (done == 0 || (done < 0 && errno != EINTR)) {
             return false;
@@ -120,7 +120,7 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
 {
     RTS_UI8 sector[PORT_FLASH_SECTOR_SIZE];
     if (!inside(offset, PORT_FLASH_SECTOR_SIZE) || offset % PORT_FLASH_SECTOR_SIZE != 0) {
-        return fault("erase of no sector", offset);
+        return fault("erase inside a sector", offset);
     }
     memset(sector, ERASED, sizeof(sector));
     return write_all(state.file, sector, sizeof(sector), offset) ? ERR_OK : fault("erase failed", offset);
@@ -221,7 +221,7 @@ static bool lock_file(int file, const char *path, PORT_REASON *reason)
     return false;
 }
 
-/* A flash file, or the beginning of one: what lies there besides belongs to somebody else. */
+/* A flash file, or the beginning of one: other files are not overwritten. */
 static bool is_flash_file(int file, off_t size)
 {
     return size == PORT_FLASH_SIZE || (size < PORT_FLASH_SIZE && is_erased(file, 0, size));

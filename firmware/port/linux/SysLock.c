@@ -1,5 +1,5 @@
 /*
- * SysLock.c - the lock of the Linux port: a mutex that lends its holder the priority of who waits.
+ * SysLock.c - the lock of the Linux port: a mutex that lends its holder the priority of the one that waits.
  *
  * SPDX-License-Identifier: Apache-2.0
  *

@@ -1,5 +1,5 @@
 /*
- * SysTarget.c - who this device is: architecture, host name, a serial number from the machine id.
+ * SysTarget.c - the identity of this device: architecture, host name, a serial number from the machine id.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

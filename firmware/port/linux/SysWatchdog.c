@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Main is below all tasks, so tasks that take all processors (endless loops that their watchdog allows) leave it none,
- * and then nobody could stop them. When it starves, it gets a priority above them for a while.
+ * and then they could not be stopped. When it starves, it gets a priority above them for a while.
  */
 #define _GNU_SOURCE
 #include "CmpScheduleTimer.h"

@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * SIGTERM and SIGINT end it in order, a second one at once. SIGHUP is ignored: a controller does not stop because
- * somebody closes the terminal it was started from. The controller itself is a child process (Supervisor.c), which ends
+ * a user closes the terminal it was started from. The controller itself is a child process (Supervisor.c), which ends
  * on SIGTERM only: SIGINT from a terminal reaches both.
  */
 #define _GNU_SOURCE
@@ -225,7 +225,7 @@ static OPTIONS parse_options(int argc, char **argv)
 
 /* ---- life ---- */
 
-/* Whoever started us may have closed them: what is opened next would take their place, and be written to by printf. */
+/* The parent process may have closed them: what is opened next would take their place, and be written to by printf. */
 static void hold_standard_streams(void)
 {
     int file;
@@ -258,7 +258,7 @@ static void take_end_signals(int flags)
     sigemptyset(&end.sa_mask);
     sigaction(SIGTERM, &end, NULL);
     sigaction(SIGINT, &end, NULL);
-    sigemptyset(&ends); /* they may have been blocked by whoever started us */
+    sigemptyset(&ends); /* the parent process may have blocked them */
     sigaddset(&ends, SIGTERM);
     sigaddset(&ends, SIGINT);
     sigprocmask(SIG_UNBLOCK, &ends, NULL);

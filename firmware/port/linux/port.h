@@ -1,5 +1,5 @@
 /*
- * port.h - what main.c tells the Sys components of the Linux port, and they offer it beyond their Sys headers.
+ * port.h - what main.c passes to the Sys components of the Linux port, and they offer it beyond their Sys headers.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -21,7 +21,7 @@ void PortReason(PORT_REASON *reason, const char *format, ...) __attribute__((for
 /* ---- the wait of main ---- */
 
 /*
- * Something that main waits for between two passes of CH_COMM_CYCLE: a serial line, a socket, an edge of an input. Whoever
+ * Something that main waits for between two passes of CH_COMM_CYCLE: a serial line, a socket, an edge of an input. What
  * opened it keeps the record, may change it at any time, and looks in CH_COMM_CYCLE whether there is something to do.
  * So its latency is that of a pass, not PORT_IDLE_MS, which is how often main looks at time. All from main.
  */
@@ -76,7 +76,7 @@ bool PortComKnowsBaud(RTS_UI32 baud);
 /* Opens the one serial line: a device, or with path "pty" a new pseudo terminal. Before CMInit. */
 bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason);
 void PortComClose(void);
-/* For a process whose child has the line now: closes a device, which the child opens anew when it is lost. A pseudo
+/* For a process whose child has the line now: closes a device, which the child opens again when it is lost. A pseudo
  * terminal stays open, so that it outlives the child. */
 void PortComHandOver(void);
 /* Name of the pseudo terminal, NULL when the line is none. */

@@ -22,7 +22,7 @@
 #define LOG_MAX_ENTRIES 256
 #define CHECKSUM_TABLE_ENTRIES 256
 
-/* Less than the patience of plctool with a device that does not answer, and of whoever ends plcrt [us]. */
+/* Less than the patience of plctool with a device that does not answer, and of what ends plcrt [us]. */
 #define APP_DEFAULT_WATCHDOG_US 5000000
 
 /* A reset answers within a second, also that of a program whose initialisation does not end [us]. */

@@ -209,7 +209,7 @@ RTS_I64 SimNow(void)
 
 /* ---- lock ---- */
 
-/* Nobody else is there; while a cycle is measured it costs what it costs on Linux. */
+/* There is no other thread; while a cycle is measured it costs what it costs on Linux. */
 RTS_UI32 SysLockEnter(void)
 {
     if (sim.real_clock)
@@ -406,7 +406,7 @@ static RTS_RESULT advance(void *arg)
     return ERR_OK;
 }
 
-/* `beyond_ns`: how far behind the end what is due still runs. */
+/* `beyond_ns`: how far past the end what is due still runs. */
 static RTS_RESULT pass(RTS_I64 ns, RTS_I64 beyond_ns)
 {
     PASSAGE passage;
@@ -585,7 +585,7 @@ RTS_RESULT SimBench(RTS_UI32 task, RTS_UI32 cycles, double *code_ns, double *cyc
         return ERR_INVALIDID;
     if (info.interval_us != 0)
         bench.interval_ns = (RTS_I64)info.interval_us * NS_PER_US;
-    *cycle_ns = best_of(cycle_batch, &bench); /* first, because an endless loop is broken out of here */
+    *cycle_ns = best_of(cycle_batch, &bench); /* first, because an endless loop is aborted here */
     *code_ns = best_of(code_batch, &bench);
     shift_timers(sim.now_ns - start_ns);
     return bench.failed ? ERR_EXCEPTION : ERR_OK;

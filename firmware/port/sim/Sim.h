@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Time passes only in SimAdvance and SimRunCycles. Everything but one supervising thread runs in the caller's thread:
- * call from one thread only. What lies in flash survives SimStart; all else is lost, as it is when power comes back.
+ * call from one thread only. What is in flash survives SimStart; all else is lost, as it is when power comes back.
  *
  * A function that runs the runtime returns SIM_POWER_CUT when a planned power cut hit it, and does nothing but return
  * that until SimStart.
@@ -54,7 +54,7 @@ RTS_RESULT SimCommCycle(void);
 /* Virtual time since SimStart [ns]. */
 RTS_I64 SimNow(void);
 
-/* Cycles that take longer than this in real time [ms] are broken out of as endless; the default is
+/* Cycles that take longer than this in real time [ms] are aborted as endless; the default is
  * SIM_CYCLE_LIMIT_MS. */
 void SimSetCycleLimit(RTS_UI32 ms);
 
@@ -90,7 +90,7 @@ RTS_RESULT SimBench(RTS_UI32 task, RTS_UI32 cycles, double *code_ns, double *cyc
 /* When power is cut, relative to a flash operation (program or erase): it did not happen; it did; half of its bytes
  * did. */
 enum { SIM_CUT_BEFORE = 0, SIM_CUT_AFTER = 1, SIM_CUT_TORN = 2, SIM_FAULT = 3 };
-/* SIM_FAULT is no cut: half of the bytes are done, the operation returns ERR_DEVICE, power stays. */
+/* SIM_FAULT is not a cut: half of the bytes are done, the operation returns ERR_DEVICE, power stays. */
 
 /* A new, erased flash. From power off. ERR_PARAMETER for a geometry that SysFlash.h does not allow, ERR_NOMEMORY. */
 RTS_RESULT SimFlashConfigure(RTS_UI32 size, RTS_UI32 sector_size, RTS_UI32 program_size, RTS_UI8 erased);
@@ -103,7 +103,7 @@ RTS_UI8 *SimFlashData(void);
 RTS_UI32 SimFlashSize(void);
 
 /* Sets the whole content, e.g. of a flash file; what is not erased counts as programmed. From power off.
- * ERR_PARAMETER for another size than SimFlashConfigure was told. */
+ * ERR_PARAMETER for another size than SimFlashConfigure got. */
 RTS_RESULT SimFlashLoad(const RTS_UI8 *data, RTS_UI32 size);
 
 /* Keeps the content, and brings back what was kept (nothing, when the geometry changed since). From power off. */

@@ -1,5 +1,5 @@
 /*
- * SimSupervise.c - breaks endless loops; what else takes threads.
+ * SimSupervise.c - aborts endless loops; what else takes threads.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -27,7 +27,7 @@ typedef struct {
 } SEEN;
 
 static struct {
-    pid_t process; /* whose thread it is: a fork leaves it behind */
+    pid_t process; /* whose thread it is: a fork does not have it */
     RTS_UI32 limit_ms;
 } supervisor = {0, SIM_CYCLE_LIMIT_MS};
 

@@ -24,7 +24,7 @@
 #define SCHED_EVENTS_IN_TIMERS 1
 #define SCHED_FREEWHEELING_IN_TIMERS 1
 
-/* All tasks run in the thread that lets time pass, one after the other; whoever writes a variable does it between two
+/* All tasks run in the thread that lets time pass, one after the other; what writes a variable does it between two
  * cycles. */
 #define APP_IMAGE_ALWAYS 0
 
@@ -38,7 +38,7 @@
 /* Bytes the simulated serial line holds in each direction. */
 #define SIM_COM_SIZE (64 * 1024)
 
-/* A cycle that takes longer than this in real time is broken out of [ms]: virtual time stands still in an endless
+/* A cycle that takes longer than this in real time is aborted [ms]: virtual time stands still in an endless
  * loop. */
 #define SIM_CYCLE_LIMIT_MS 2000
 

@@ -16,7 +16,7 @@ void SimPowerCut(void);
 RTS_RESULT SimFlashPowerOn(void);
 void SimComPowerOn(void);
 
-/* Starts the thread that breaks endless loops, once per process. */
+/* Starts the thread that aborts endless loops, once per process. */
 void SimSuperviseStart(void);
 
 /* A mutex as on Linux, for what it costs. */

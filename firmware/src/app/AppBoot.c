@@ -1,9 +1,9 @@
 /*
- * AppBoot.c - what runs after a start-up: the boot project, or the application before it when that died.
+ * AppBoot.c - what runs after a start-up: the boot project, or the previous application if that failed.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Only its own death counts against an application, and is noted in flash before anything else is done. When it cannot
+ * Only its own failure counts against an application, and is noted in flash before anything else is done. When it cannot
  * be loaded for another reason (a fault of the flash, a function that this firmware lacks), nothing is written and
  * nothing runs: the next start finds all as it was.
  */
@@ -67,7 +67,7 @@ bool AppRollBack(RTS_UI32 failed)
     return true;
 }
 
-/* The application is in the exception that ended the run before this start. */
+/* The application is in the exception that ended the previous run. */
 static void take_exception(const SYS_START *start)
 {
     APP_EXCEPTION exception = {start->exception, start->code_offset, start->task};
@@ -80,7 +80,7 @@ static void take_exception(const SYS_START *start)
 /* Whether the active application was what ended the run before this start. */
 static bool has_died(RTS_UI32 cause)
 {
-    static const RTS_UI8 unfinished[] = {0xFF, 1, 2}; /* [SYS_START_*]: initialisations that are a death */
+    static const RTS_UI8 unfinished[] = {0xFF, 1, 2}; /* [SYS_START_*]: initialisations that count as a failure */
     const COMMIT *commit = AppCommitGet();
 
     return commit->begun >= unfinished[cause] ||
@@ -116,7 +116,7 @@ static void take_death(void)
         AppCommitSetDead(start->text);
 }
 
-/* A boot project starts by itself, unless it died. */
+/* A boot project starts automatically, unless it failed. */
 static void run_boot_project(void)
 {
     take_death();

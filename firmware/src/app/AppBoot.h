@@ -1,5 +1,5 @@
 /*
- * AppBoot.h - what runs after a start-up, and instead of an application that died.
+ * AppBoot.h - what runs after a start-up, and instead of an application that failed.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -11,10 +11,10 @@
 #include "CmpErrors.h"
 #include "CmpStd.h"
 
-/* Loads what is in flash, and starts it unless it died before. */
+/* Loads what is in flash, and starts it unless it failed before. */
 void AppBoot(void);
 
-/* Starts what was loaded and not started, because a user asks for it: also what died before, when there is none to go
+/* Starts what was loaded and not started, because a user asks for it: also what failed before, when there is none to go
  * back to. */
 RTS_RESULT AppBootByHand(void);
 

@@ -1,5 +1,5 @@
 /*
- * AppChecks.c - reads an image segment by segment for those who check it.
+ * AppChecks.c - reads an image segment by segment for its checks.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -32,7 +32,7 @@ typedef struct {
     RTS_UI32 offset;  /* of its next entry */
     RTS_UI32 end;
     RTS_UI32 areas_seen;   /* a bit for each */
-    RTS_RESULT unresolved; /* what was wrong with the first import that was */
+    RTS_RESULT unresolved; /* the error of the first bad import */
 } LOADER;
 
 /* Returns ERR_OK, or refuses. */
@@ -54,7 +54,7 @@ RTS_RESULT LoaderReadNext(LOADER *l, void *data, RTS_UI32 size);
 /* Has every entry of a segment checked by `check_entry`, which reads it. */
 RTS_RESULT LoaderCheckEntries(LOADER *l, RTS_UI32 segment, CHECK check_entry);
 
-/* Whether all segments lie within the image. */
+/* Whether all segments are within the image. */
 RTS_RESULT LoaderCheckSegments(LOADER *l);
 
 /* Whether a reference leads into the code segment. */

@@ -20,7 +20,7 @@ RTS_STATIC_ASSERT(sizeof(COMMIT) == 32, commit_is_32_bytes);
 
 enum { COMMIT_TAG = 0x324D4D43, BEGUN_MAX = 0xFE };
 
-/* What the log holds: the commit, and with it why the application is dead, which nobody would read without a log. */
+/* What the log holds: the commit, and with it why the application failed, which is of no use without a log. */
 typedef struct {
     COMMIT commit;
     APP_EXCEPTION exception;        /* that the active application is in */

@@ -5,8 +5,8 @@
  *
  * A slot says itself that its image is a program of the device: after the image follows a seal, one unit that is
  * programmed when all else is in flash and checked. Seals are numbered, so that the newest program is found even when
- * nothing else is left. What happened to the programs since is in a log of commit records, each the whole truth about
- * both slots: the newest valid one counts, unless a slot has a newer seal. From main only.
+ * nothing else is left. What happened to the programs since is in a log of commit records, each with the complete state
+ * of both slots: the newest valid one counts, unless a slot has a newer seal. From main only.
  */
 #ifndef APPCOMMIT_H
 #define APPCOMMIT_H
@@ -20,8 +20,8 @@ enum {
     SLOT_TRIAL = 1,   /* downloaded; stopped in good order since it was last started */
     SLOT_STARTED = 2, /* started, and has not proven itself yet */
     SLOT_PROVEN = 3,  /* ran for APP_PROVE_US without exception */
-    SLOT_FAILED = 4,  /* died before it was proven: not run without being asked to */
-    SLOT_HALTED = 5,  /* proven, but died in its initialisation: not run without being asked to */
+    SLOT_FAILED = 4,  /* failed before it was proven: run on request only */
+    SLOT_HALTED = 5,  /* proven, but failed in its initialisation: run on request only */
 };
 
 enum { SLOT_COUNT = 2, SLOT_NONE = 0xFF };
@@ -40,7 +40,7 @@ typedef struct {
     COMMIT_SLOT slot[SLOT_COUNT];
 } COMMIT;
 
-/* Finds out what is in flash. When the application died, it is in that exception again. */
+/* Finds out what is in flash. If the application failed, it is in that exception again. */
 void AppCommitOpen(void);
 
 /* ERR_OK, or ERR_DEVICE: the flash could not be read, nothing is known, and nothing is written. */
@@ -52,18 +52,18 @@ const COMMIT *AppCommitGet(void);
 /* Whether the application in `slot` has proven itself. */
 bool AppCommitIsProven(RTS_UI32 slot);
 
-/* Whether the active application died, and is not to be run without being asked to. */
+/* Whether the active application failed, and is run on request only. */
 bool AppCommitIsDead(void);
 
 /* The slot that is not `slot`; of SLOT_NONE the first. */
 RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
 
 /* Seals the image in `slot`, whose file ends with it: from now on it is what boots, a trial. On ERR_DEVICE what was
- * before still is, and the image is given up. */
+ * before still is, and the image is deleted. */
 RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after);
 
 /*
- * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the one before
+ * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the previous one
  * stays, or it is this one but may be lost when power is.
  */
 
@@ -77,7 +77,7 @@ RTS_RESULT AppCommitRollBack(RTS_UI32 failed, RTS_UI32 retain_after);
  * its state already. */
 RTS_RESULT AppCommitSetState(RTS_UI32 slot, RTS_UI8 state);
 
-/* The active one died, of the exception it is in: SLOT_FAILED, or SLOT_HALTED when it has proven itself. */
+/* The active one failed by the exception it is in: SLOT_FAILED, or SLOT_HALTED when it has proven itself. */
 void AppCommitSetDead(const char *text);
 
 /* The initialisation of the active one begins, and has ended. */

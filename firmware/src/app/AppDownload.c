@@ -1,5 +1,5 @@
 /*
- * AppDownload.c - the way of a new application into the device.
+ * AppDownload.c - downloading a new application.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -25,7 +25,7 @@ static struct {
     RTS_UI32 crc;
 } download;
 
-/* Which slot is kept. An application that failed gives way to the one before it now, or that one would be overwritten
+/* Which slot is kept. An application that failed gives way to the previous one now, or that one would be overwritten
  * though it is the newest that runs; it is kept also when it cannot be read now. */
 static RTS_UI32 slot_to_keep(void)
 {

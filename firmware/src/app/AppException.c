@@ -32,7 +32,7 @@ const char *AppExceptionName(RTS_UI32 code)
         {RTSEXCPT_ILLEGAL_INSTRUCTION, "illegal instruction"},
         {RTSEXCPT_PRIV_INSTRUCTION, "privileged instruction"},
 #if !RTS_ONE_CORE
-        {RTSEXCPT_STOP_TIMEOUT, "did not end in time for a stop, broken off"},
+        {RTSEXCPT_STOP_TIMEOUT, "did not end in time for a stop, aborted"},
 #endif
         {RTSEXCPT_STACK_OVERFLOW, "stack overflow"},
         {RTSEXCPT_MISALIGNMENT, "misaligned access"},

@@ -33,7 +33,7 @@ RTS_RESULT LoaderCheckFunctions(LOADER *l)
         if (i >= CDL_FUNCTION_RELOC)
             return refuse(l, ERR_NOT_SUPPORTED, "Function %u is not supported.", U(i));
         if (!LoaderIsCode(l, table[i].area, table[i].offset))
-            return refuse(l, ERR_INVALID_REFERENCE, "Function %u lies outside the code.", U(i));
+            return refuse(l, ERR_INVALID_REFERENCE, "Function %u is outside the code.", U(i));
         l->image->entry[i] = table[i].offset;
     }
     return ERR_OK;
@@ -80,7 +80,7 @@ static const char *problem_text(RTS_RESULT result)
                                                   : "other version";
 }
 
-/* Adds an import that cannot be resolved to the refusal, which is to name all of them. */
+/* Adds an import that cannot be resolved to the refusal, which names all of them. */
 static void add_unresolved(LOADER *l, const char *name, RTS_RESULT result)
 {
     APP_REFUSAL *refusal = l->refusal;
@@ -135,11 +135,11 @@ static RTS_RESULT check_iec_function(LOADER *l)
     if (!read_name(l->image->file, &l->offset, l->end, name))
         return refuse(l, ERR_PARAMETER, "Name in the IEC function table is bad.");
     if (!LoaderIsCode(l, info.area, info.offset))
-        return refuse(l, ERR_INVALID_REFERENCE, "IEC function %s lies outside the code.", name);
+        return refuse(l, ERR_INVALID_REFERENCE, "IEC function %s is outside the code.", name);
     return ERR_OK;
 }
 
-/* Names for tools that ask about the application; nobody calls what they stand for. */
+/* Names for tools that ask about the application; what they stand for is not called. */
 RTS_RESULT LoaderCheckIecFunctions(LOADER *l)
 {
     return SRV_INFORMATION ? LoaderCheckEntries(l, SEGMENT_IEC_FUNCTIONS, check_iec_function) : (RTS_RESULT)ERR_OK;

@@ -4,9 +4,9 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Manual 8.9, 8.10. A task gets a copy of what it shares with others at the start of its cycle and works on that. After
- * its code, the bits that it changed (its copy against the copy as it was) go to the shared outputs. So inputs hold
- * still for a cycle, tasks that write bits of one byte do not undo each other, and a cycle that fails leaves no half of
- * its outputs behind. What a task alone uses it works on directly, which costs nothing.
+ * its code, the bits that it changed (its copy against the copy as it was) go to the shared outputs. So inputs do
+ * not change in a cycle, tasks that write bits of one byte do not undo each other, and a cycle that fails leaves no half of
+ * its outputs after. What a task alone uses it works on directly, which costs nothing.
  *
  * The image says which part of each area a task uses (CDL_BLOB_IMAGES); without that all tasks work on the shared areas.
  */
@@ -38,7 +38,7 @@ typedef struct {
     IMAGE_PART part[IMAGE_AREAS];
 } TASK_IMAGE;
 
-/* Gives a part its place behind the `used` units of copies before it; returns how many are used then. */
+/* Gives a part its place after the `used` units of previous copies; returns how many are used then. */
 RTS_UI32 AppImagePlace(IMAGE_PART *part, const CDL_IMAGE *image, RTS_UI32 used);
 
 /* `used` when something is wrong: more than any device has. */

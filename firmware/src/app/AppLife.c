@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * An application that is new has to prove itself by running for a while. Until it has, dying makes the next start-up go
- * back to the one before (AppBoot.c). Losing power is no way to die.
+ * An application that is new has to prove itself by running for a while. Until it has, a failure makes the next start-up go
+ * back to the previous one (AppBoot.c). A loss of power is not a failure.
  */
 #include "AppLife.h"
 
@@ -185,8 +185,8 @@ static void unload(void)
     memset(&app.image, 0, sizeof app.image);
 }
 
-/* Initial values, what is kept, and fresh tasks. What the flash says meanwhile is that it was begun: nothing else tells
- * of a program that ends the runtime here. */
+/* Initial values, what is kept, and fresh tasks. What the flash says meanwhile is that it was begun: nothing else shows
+ * that a program ended the runtime here. */
 static RTS_RESULT initialise(bool init_retains)
 {
     RTS_RESULT result;

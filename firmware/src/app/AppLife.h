@@ -16,7 +16,7 @@
 RTS_UI32 AppGetSlot(void);
 bool AppHasException(void);
 
-/* Whether its last cycle was broken off for a stop. That says nothing against the program, but it starts from a reset
+/* Whether its last cycle was aborted for a stop. That says nothing against the program, but it starts from a reset
  * only. */
 bool AppWasBrokenOff(void);
 

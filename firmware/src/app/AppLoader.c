@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A row of checks, each may rely on the ones before it. Every refusal is a sentence of its own.
+ * A row of checks, each may rely on the previous ones. Every refusal is a sentence of its own.
  */
 #include "AppLoader.h"
 

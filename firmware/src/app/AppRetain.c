@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The application before is in the other slot, with its table of kept variables; its records are those that are newer
+ * The previous application is in the other slot, with its table of kept variables; its records are those that are newer
  * than its `retain_after`, up to the `retain_after` of the new one. All of that stays until the new application has a
  * record of its own, so a power cut at any time only means that its first start is done again. After a rollback the
  * other slot has the newer numbers, so nothing is taken from there.

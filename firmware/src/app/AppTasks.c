@@ -23,10 +23,10 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
     if (task->kind == KIND_CYCLIC && task->interval_us == 0)
         return refuse(l, ERR_PARAMETER, "Cyclic task %s has no interval.", name);
     if (task->entry_offset >= l->image->code.size)
-        return refuse(l, ERR_INVALID_REFERENCE, "Task %s lies outside the code.", name);
+        return refuse(l, ERR_INVALID_REFERENCE, "Task %s is outside the code.", name);
     if (task->kind == KIND_EVENT &&
         (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
-        return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s lies outside its area.", name);
+        return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s is outside its area.", name);
     if (task->kind == KIND_EXTERNAL && !SchedHasExternalEvent(task->event_offset))
         return refuse(l, ERR_NO_OBJECT, "Task %s waits for an event that is not here.", name);
     return ERR_OK;
@@ -54,7 +54,7 @@ static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)
     return result;
 }
 
-/* Of two tables the last one counts. Values of variables that are out of order are not found, which harms nobody. */
+/* Of two tables the last one counts. Values of variables that are out of order are not found, which does no harm. */
 static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
 {
     RETAIN_TABLE table;
@@ -72,7 +72,7 @@ static RTS_RESULT check_kept(LOADER *l, RTS_UI32 size)
 }
 
 #if APP_IMAGE_SIZE > 0
-/* Behind the list of tasks: what each of them uses of inputs and outputs. */
+/* After the list of tasks: what each of them uses of inputs and outputs. */
 static RTS_RESULT check_images(LOADER *l, RTS_UI32 size)
 {
     IMAGE_PART *part = l->image->task_image[0].part;

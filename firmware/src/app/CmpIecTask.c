@@ -11,7 +11,7 @@
 
 /* ---- the external function for checks in compiled code ---- */
 
-/* The call lies before the return address; that of Thumb code has its mode bit set. */
+/* The call is before the return address; that of Thumb code has its mode bit set. */
 static void iecraise(RTS_UI32 code)
 {
     uintptr_t address = (uintptr_t)__builtin_return_address(0) & ~(uintptr_t)APP_ENTRY_MODE_BIT;

@@ -15,7 +15,7 @@ static float real_power(float base, float exponent)
     return (float)pow((double)base, (double)exponent);
 }
 
-/* The signatures are those of the interface texts in CmpMath.h. */
+/* The signatures are those in CmpMath.h. */
 /* clang-format off */
 static const CMP_EXT_FUNCTION functions[] = {
     {"sin", 0xB90BD8A4, VERSION, (RTS_PFN)sin},

@@ -137,7 +137,7 @@ static int compare(const KEPT *a, const KEPT *b)
     return memcmp(a->variable.hash, b->variable.hash, CDL_KEPT_HASH_SIZE);
 }
 
-/* Whether a value that the same variable had goes into `to`. A string that is shorter now begins anew. */
+/* Whether a value that the same variable had goes into `to`. A string that is shorter now is initialised. */
 static bool is_taken(const KEPT *to, const KEPT *from)
 {
     return compare(to, from) == 0 && to->run.size >= from->run.size && (is_persistent(to) || !kept.persistent_only);
@@ -244,7 +244,7 @@ RTS_RESULT RetainSave(bool always)
     copy();
     if (kept.saved_valid && !always)
         return ERR_OK;
-    retain.failed = false; /* a stop that loses them is said, also after saves in between that failed */
+    retain.failed = false; /* a stop that loses them is logged, also after saves in between that failed */
     return save_copy();
 }
 
@@ -296,7 +296,7 @@ static void save_when_due(void)
         (void)save_copy();
 }
 
-/* A device whose retain flash is broken still runs, with initial values. */
+/* A device whose retain flash fails still runs, with initial values. */
 static void open_log(void)
 {
     RTS_RESULT result = FlashLogOpen(&retain.log, FILE_RETAIN);

@@ -4,7 +4,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Needs no SysTimer. A task waits for those that run and for communication: what it is late is its jitter.
+ * Needs no SysTimer. A task waits for those that run and for communication: its delay is its jitter.
  */
 #include "CmpScheduleTimer.h"
 

@@ -194,7 +194,7 @@ void SchedRequestEnd(void)
     SysAtomicStore(&stop.end_asked, 1);
 }
 
-/* Looks whether somebody waits for tasks, and since when. */
+/* Looks whether a stop waits for tasks, and since when. */
 static void look_for_stop(RTS_I64 now_ns)
 {
     RTS_UI32 asked = SysAtomicLoad(&stop.asked);
@@ -218,7 +218,7 @@ static bool holds_up_stop(const IEC_GUARD *guard, RTS_I64 now_ns)
 
 enum { NOTHING_RUNS = -1 };
 
-/* Of the cycles that run; on one core the one that started last is the only one that gets on. */
+/* Of the cycles that run; on one core the one that started last is the only one that makes progress. */
 static RTS_I64 find_latest_start(void)
 {
     RTS_I64 latest_ns = NOTHING_RUNS;
@@ -233,7 +233,7 @@ static RTS_I64 find_latest_start(void)
 }
 
 /* Time stands still for a cycle as long as one that started later, and may have interrupted it, goes on from one check
- * to the next. Of several tasks that take too long the one that holds up the others is broken first, and they
+ * to the next. Of several tasks that take too long the blocking one is aborted first, so that the others can
  * finish. */
 static void check_time(RTS_I64 now_ns)
 {

@@ -19,7 +19,7 @@
 #include "SysTime.h"
 #include "rts_config.h"
 
-/* IEC code that may be running. `phase` is odd while it does, and the other fields hold still then. */
+/* IEC code that may be running. `phase` is odd while it does, and the other fields do not change then. */
 typedef struct {
     RTS_UI32 phase;
     RTS_I64 start_ns;
@@ -65,7 +65,7 @@ static GUARD_INLINE void guard_begin(GUARD *guard, RTS_I64 now_ns)
 {
     guard->start_ns = now_ns;
     SysAtomicStore(&guard->phase, guard->phase + 1);
-    SysAtomicFence(); /* whoever sees a write of the cycle sees that it runs */
+    SysAtomicFence(); /* what sees a write of the cycle sees that it runs */
 }
 
 static GUARD_INLINE void guard_end(GUARD *guard)
@@ -146,7 +146,7 @@ static RTS_UI32 divide(RTS_UI64 dividend, RTS_UI32 divisor, RTS_UI32 *rest)
     return quotient;
 }
 
-/* Sets the time of the cycle. Milliseconds are counted on, since dividing 64 bits is slow on small cores. */
+/* Sets the time of the cycle. Milliseconds are accumulated, since dividing 64 bits is slow on small cores. */
 static void set_time(TASK *task, RTS_I64 time_ns)
 {
     IEC_CONTEXT *context = &task->context;
@@ -188,7 +188,7 @@ static void account(TASK *task, RTS_I64 late_ns, RTS_I64 elapsed_ns)
     SysAtomicStore(&task->cycles, task->cycles + 1);
 }
 
-/* What SysTimeGetNs does not tell: how long this context had the processor. It costs more. */
+/* What SysTimeGetNs does not give: how long this context had the processor. It costs more. */
 static RTS_I64 used_ns(const TASK *task)
 {
     return SCHED_PROCESSOR_TIME && task->watchdog_ns != 0 ? SysTimeGetUsedNs() : 0;
@@ -207,8 +207,8 @@ static bool watchdog_expired(TASK *task, RTS_I64 elapsed_ns)
     return task->exceeded >= task->sensitivity || elapsed_ns > task->guard.limit_ns;
 }
 
-/* No other cycle starts, which is settled before the guard says that this one is over. The rest of stopping the
- * application is main's. */
+/* No other cycle starts, which is settled before the guard says that this one is over. Main completes the stop of the
+ * application. */
 static bool end_with_exception(TASK *task, RTS_UI32 code, uintptr_t address)
 {
     SysAtomicStore(&tasks.running, 0);
@@ -237,7 +237,7 @@ static void run_phases_after(TASK *task)
     }
 }
 
-/* Not inlined, because the compiler then works out the place of the task in the list anew for each field. */
+/* Not inlined, because the compiler then computes the place of the task in the list again for each field. */
 static __attribute__((noinline)) bool run_cycle(TASK *task, RTS_I64 due_ns)
 {
     RTS_I64 start_ns = SysTimeGetNs();

@@ -3,10 +3,10 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Events are counted where they happen and answered where the task runs, each by one cycle. The count is a single
- * number: how often the variable was found changed, which is odd while it is TRUE. Whoever looks at the variable looks
+ * Events are counted where they happen and handled where the task runs, each by one cycle. The count is a single
+ * number: how often the variable was found changed, which is odd while it is TRUE. What looks at the variable looks
  * again when another context has counted meanwhile, so that looks of several tasks come in an order, and no edge that a
- * task left behind at the end of its cycle is counted twice or not at all.
+ * task has set at the end of its cycle is counted twice or not at all.
  */
 #include "TaskTrigger.h"
 

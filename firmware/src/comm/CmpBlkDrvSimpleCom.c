@@ -304,7 +304,7 @@ RTS_RESULT CmpBlkDrvSimpleCom_Hook(CMP_HOOK hook)
         open_lines();
     else if (hook == CH_COMM_CYCLE)
         cycle();
-    else if (hook == CH_EXIT3) /* not CH_EXIT_COMM: there the channel server takes leave */
+    else if (hook == CH_EXIT3) /* not CH_EXIT_COMM: the channel server still sends its close there */
         close_lines();
     return ERR_OK;
 }

@@ -403,7 +403,7 @@ static RTS_RESULT handle_message(COMM_CLIENT *client)
     return ERR_OK;
 }
 
-/* A new request, whatever has become of the one before. */
+/* A new request, whatever has become of the previous one. */
 static RTS_RESULT start_message(CHANNEL *channel, const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 length = size < COMM_PREFIX_SIZE ? 0 : BytesGet32(((const CHANNEL_MESSAGE *)data)->size);
@@ -478,7 +478,7 @@ static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 
 
 /* ---- packages ---- */
 
-/* Tells a peer that its channel does not exist (any more), so that it need not wait for a time-out. */
+/* Informs a peer that its channel does not exist (any more), so that it need not wait for a time-out. */
 static void complain(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
 {
     COMM_COUNT(counters.foreign);

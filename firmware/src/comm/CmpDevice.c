@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * There is no user management: a login is a statement of intent, it keeps programs that only look from changing
- * anything.
+ * There is no user management: a login only prevents changes by programs that did not mean to make
+ * any.
  */
 #include "CmpDevice.h"
 

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Requests carry programs of a stack machine. This is no interpreter: it recognises the programs clients send (address
+ * Requests carry programs of a stack machine. This is not an interpreter: it recognises the programs clients send (address
  * of a variable, perhaps by way of pointers; copy to that address) and refuses everything else, so no request can
  * compute, jump, call or reach memory outside the areas. What a pointer holds is never used as an address: it is looked
  * up in the areas, and from there on an area and an offset as any other.
@@ -47,7 +47,7 @@ static bool goes_on_with(const PROGRAM *program, const RTS_UI8 *bytes, RTS_UI32 
     return program->size >= size && memcmp(program->code, bytes, size) == 0;
 }
 
-/* Takes a number of `size` bytes. What is missing takes the rest with it and is no operator. */
+/* Takes a number of `size` bytes. A number that is cut off ends the program. */
 static RTS_UI32 take(PROGRAM *program, RTS_UI32 size)
 {
     RTS_UI32 value = 0;
@@ -155,7 +155,7 @@ static void copy(void *to, const void *from, RTS_UI32 size)
         memcpy(to, from, size);
 }
 
-/* Copies between the application's memory and a message, where numbers lie anywhere. */
+/* Copies between the application's memory and a message, where numbers are anywhere. */
 static void load(RTS_UI8 *value, const RTS_UI8 *memory, RTS_UI32 size)
 {
     RTS_UI64 number;

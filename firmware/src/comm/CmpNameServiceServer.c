@@ -1,5 +1,5 @@
 /*
- * CmpNameServiceServer.c - answers who this node is (network scan).
+ * CmpNameServiceServer.c - replies with the identity of this node (network scan).
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Writers may be main, tasks and interrupts at once: each takes a number of its own and with it a place, and nobody
+ * Writers may be main, tasks and interrupts at once: each takes a number of its own and with it a place, and none
  * waits. An entry is valid while its place holds its number; a reader looks before and after the copy.
  */
 #include "CmpLog.h"

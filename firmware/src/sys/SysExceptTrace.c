@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Only words that may be return addresses are kept. Which of them are, says the debugging information on the host,
- * which knows how much stack each function holds at each instruction: it costs the running program nothing.
+ * Only words that may be return addresses are kept. The debugging information on the host says which of them are:
+ * it has how much stack each function holds at each instruction: it costs the running program nothing.
  */
 #include "SysExcept.h"
 

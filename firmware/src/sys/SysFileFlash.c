@@ -21,7 +21,7 @@ typedef struct {
 
 static FLASH_FILE files[FILE_COUNT];
 
-/* ---- where the files lie ---- */
+/* ---- where the files are ---- */
 
 #ifdef FILE_MAP
 
@@ -30,7 +30,7 @@ static bool overlap(const FILE_AREA *a, const FILE_AREA *b)
     return a->offset < b->offset + b->size && b->offset < a->offset + a->size;
 }
 
-/* Whether file `i` lies in the flash, on borders of its sectors, apart from the files before it. */
+/* Whether file `i` is in the flash, on borders of its sectors, apart from the files before it. */
 static bool is_valid(RTS_UI32 i)
 {
     const SYS_FLASH *flash = SysFlashGet();
@@ -49,7 +49,7 @@ static bool is_valid(RTS_UI32 i)
     return true;
 }
 
-/* False when the flash has no room for the files, or they lie badly. */
+/* False when the flash has no room for the files, or the layout is invalid. */
 static bool map_files(void)
 {
     static const FILE_AREA map[FILE_COUNT] = {FILE_MAP};
@@ -66,8 +66,8 @@ static bool map_files(void)
 #else
 
 /*
- * Both logs lie behind the slots, which share what is left. A half of the retain log is a sixteenth of the flash and
- * a sector. Nothing else has a say, so that firmware of other sizes finds what this one has written. False when
+ * Both logs are after the slots, which share what is left. A half of the retain log is a sixteenth of the flash and
+ * a sector. Nothing else counts, so that firmware of other sizes finds what this one has written. False when
  * nothing is left for the slots.
  */
 static bool map_files(void)

@@ -46,7 +46,7 @@ static RTS_UI32 head_crc(const FLASH_LOG_HEAD *head)
     return CRC32Update(0, head, offsetof(FLASH_LOG_HEAD, crc));
 }
 
-/* ERR_OK: the record is valid. ERR_CRC_FAILED: it is not. ERR_DEVICE: who knows. */
+/* ERR_OK: the record is valid. ERR_CRC_FAILED: it is not. ERR_DEVICE: unknown. */
 static RTS_RESULT check_data(RTS_UI32 file, RTS_UI32 position, const FLASH_LOG_HEAD *head)
 {
     RTS_UI32 crc = head_crc(head);
@@ -250,7 +250,7 @@ RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI
     result = write_record(log->file, position, &head, data);
     checked = check_data(log->file, position, &head);
     if (checked == ERR_OK)
-        log->newest = position; /* also when it may not survive a power cut */
+        log->newest = position; /* the record is readable, so it counts even if sync failed */
     return result != ERR_OK || checked == ERR_OK ? result : (RTS_RESULT)ERR_DEVICE;
 }
 
@@ -260,7 +260,7 @@ RTS_RESULT FlashLogMark(FLASH_LOG *log)
         return ERR_DISK_FULL;
     SysFileAppend(log->file, log->start + log->used);
     log->used += FILE_ALIGN;
-    return SysFileWrite(log->file, log, FILE_ALIGN); /* whatever is not erased and starts no record */
+    return SysFileWrite(log->file, log, FILE_ALIGN); /* anything that is not erased and does not start a record */
 }
 
 bool FlashLogIsMarked(const FLASH_LOG *log, RTS_UI32 size)

@@ -41,7 +41,7 @@ def parser() -> argparse.ArgumentParser:
 
     _add_file_commands(command)
     _add_device_commands(command)
-    command("demo", "show the whole story on this machine")
+    command("demo", "run a demonstration of all of it on this machine")
     return root
 
 
@@ -59,7 +59,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         metavar="all|none|LIST",
         help="run-time checks: div, bounds, subrange, null; default: all",
     )
-    build.add_argument("--debug", action="store_true", help="keep the code close to its source")
+    build.add_argument("--debug", action="store_true", help="optimise less, so that the code is close to its source")
     _add_warnings(build)
 
     check = command("check", "print every diagnostic of a program")
@@ -109,10 +109,10 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 
 
 def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
-    flash = command("flash", "bring an image onto a device and start it")
+    flash = command("flash", "send an image to a device and start it")
     _add_image(flash)
-    flash.add_argument("--no-start", action="store_true", help="leave it stopped until it is started or power returns")
-    flash.add_argument("--force", action="store_true", help="also when the device has this image already")
+    flash.add_argument("--no-start", action="store_true", help="do not start it; it starts at the next power-up")
+    flash.add_argument("--force", action="store_true", help="send it even if the device has it already")
     _add_link(flash)
 
     _add_link(command("scan", "list the devices that answer"))
@@ -143,7 +143,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     write = command("write", "set variables")
     write.add_argument("values", nargs="+", metavar="NAME=VALUE", help="value as 'read' shows it: Main.pause=T#2s")
     _add_link(write, symbols=True)
-    watch = command("watch", "print values of variables again and again")
+    watch = command("watch", "print values of variables periodically")
     _add_names(watch)
     watch.add_argument("--interval", type=_seconds, default=DEFAULT_INTERVAL, metavar="S", help="seconds; default: 0.5")
     watch.add_argument("--count", type=_count, metavar="N", help="readings; default: until Ctrl-C")
@@ -151,7 +151,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
 
     gateway = command("gateway", "show or end the processes that share a serial line among tools")
     gateway.add_argument(
-        "what", choices=["status", "stop"], help="status: who uses which line; stop: end it and tell its tools"
+        "what", choices=["status", "stop"], help="status: tools of each line; stop: end it, its tools get an error"
     )
     gateway.add_argument("--port", metavar="PORT", help="only the gateway of this port; default: all of this user")
 
@@ -184,11 +184,10 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
     for kind in TRANSPORTS.values():
         if kind.flag:
             link.add_argument(f"--{kind.flag}", metavar=kind.shape, help=kind.help)
-        for name, option in kind.options.items():
-            link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
-    link.add_argument(
-        "--no-gateway", action="store_true", help="do not share the port; default: with PLCTOOL_GATEWAY=off"
-    )
+    options = {name: option for kind in TRANSPORTS.values() for name, option in kind.options.items()}
+    for name, option in options.items():
+        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
+    link.add_argument("--no-gateway", action="store_true", help="do not share the port, as with PLCTOOL_GATEWAY=off")
     for scheme, place in LATER.items():
         link.add_argument(f"--{scheme}", metavar=place, help="not in this version")
     link.add_argument("--node", type=int, metavar="N", help="not in this version")

@@ -118,7 +118,8 @@ def _link(args: argparse.Namespace) -> Link:
         flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
         raise UsageError(f"Name one link only, {flags}.", "no-link")
     kind = TRANSPORTS[given[0]]
-    options = {name: value for name in kind.options if (value := getattr(args, name)) is not None}
+    names = {name for every in TRANSPORTS.values() for name in every.options}
+    options = {name: value for name in sorted(names) if (value := getattr(args, name)) is not None}
     return make_link(given[0], getattr(args, kind.flag), **options)
 
 

@@ -26,7 +26,7 @@ Level = int | Literal["s"]
 
 
 class CompileError(UsageError):
-    """The program has errors. The message holds all diagnoses as people read them; `diagnostics` is for machines."""
+    """The program has errors. The message has all diagnostics as users read them; `diagnostics` is for programs."""
 
     def __init__(self, diagnostics: Sequence[Diagnostic], sources: Sequence[Source]) -> None:
         from plctool.compiler.diagnostics import render_all
@@ -46,7 +46,7 @@ def load_sources(paths: Sequence[Path | str]) -> list[Source]:
 
 
 def check_sources(paths: Sequence[Path | str]) -> CheckResult:
-    """Every diagnosis of a program and its unit tests, without building it."""
+    """Every diagnostic of a program and its unit tests, without building it."""
     return check_with_tests(load_sources(paths))
 
 

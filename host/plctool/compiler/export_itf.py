@@ -1,7 +1,7 @@
-"""Writes the C side of a library: a header for its functions that are implemented in C, and a frame to fill in.
+"""Writes the C side of a library: a header for its functions that are implemented in C, and a C file to fill in.
 
-The header holds the types, the prototypes and the entries of the function table; it is written anew whenever the
-library changes. The frame is a component for the runtime's list (docs/porting.md); it is the user's once it is written.
+The header holds the types, the prototypes and the entries of the function table; it is written again whenever the
+library changes. The C file is a component for the runtime's list (docs/porting.md); once written, it is the user's.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -177,7 +177,7 @@ def _value(t: Type) -> str:
 
 
 def _target(t: Type) -> str:
-    """What an address of a value points to, with a space behind it."""
+    """What an address of a value points to, with a space after it."""
     while isinstance(t, ArrayType):
         t = t.element
     if isinstance(t, StringType):
@@ -193,7 +193,7 @@ def _is_named(t: EnumType | StructType) -> bool:
 
 
 def _named_types(functions: list[Pou]) -> list[EnumType | StructType]:
-    """The enums and structs the functions need, each behind what it consists of."""
+    """The enums and structs the functions need, each after what it consists of."""
     found: dict[EnumType | StructType, None] = {}
 
     def add(t: Type) -> None:

@@ -1,4 +1,4 @@
-"""The front end of the compiler: from source texts to a typed program, or to diagnoses.
+"""The front end of the compiler: from sources to a typed program, or to diagnostics.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -62,9 +62,9 @@ def check_sources(
 ) -> CheckResult:
     """Checks the files of a program together.
 
-    `library`: whether the standard library is there; `library_sources`: other library texts in place of it. `tests`:
+    `library`: whether the standard library is there; `library_sources`: other library sources in place of it. `tests`:
     takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
-    `warnings`: which of them are wanted. Whatever the texts hold, the answer is a program or diagnoses, never an
+    `warnings`: which of them are wanted. Whatever the sources contain, the result is a program or diagnostics, never an
     exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())

@@ -1,7 +1,7 @@
 """What is kept over a power cut, variable by variable: the table that the image carries (CDL_KEPT).
 
 A changed program finds a value again by the full name and the type of the variable, member or element. So an entry is
-about a scalar or a string, or about all elements of one array, told apart by their indices. Of an array of structs
+about a scalar or a string, or about all elements of one array, distinguished by their indices. Of an array of structs
 there is an entry for each member. What is an address is never kept.
 """
 
@@ -72,14 +72,16 @@ def is_kept(t: Type, keep: Keep) -> bool:
 
 
 def kept_variables(parts: Iterable[KeptPart]) -> list[KeptVariable]:
-    """The entries of the table. Raises UsageError when two variables cannot be told apart, or one is too large."""
+    """The entries of the table. Raises UsageError when two variables look the same, or one is too large."""
     found: dict[bytes, KeptPart] = {}
     for part in parts:
         if part.size > _WIDEST:
             raise UsageError(f"{part.name} has {part.size} bytes, but what is kept has at most {_WIDEST}.", "kept-size")
         other = found.setdefault(_hash(part), part)
         if other is not part:
-            raise UsageError(f"{part.name} and {other.name} look alike to the device; rename one of them.", "kept-name")
+            raise UsageError(
+                f"{part.name} and {other.name} look the same to the device; rename one of them.", "kept-name"
+            )
     return [
         KeptVariable(
             key, p.offset, p.size, p.persistent, p.stride or p.size, p.count, p.first, _is_run(p)
@@ -97,7 +99,7 @@ def _hash(part: KeptPart) -> bytes:
 
 
 def _parts(t: Type, keep: Keep) -> Iterator[KeptPart]:
-    """Of a variable of the type; names begin behind its own."""
+    """Of a variable of the type; names begin after its own."""
     if isinstance(t, ArrayType):
         yield from _elements(t, keep)
     elif isinstance(t, StructType) and not t.union:

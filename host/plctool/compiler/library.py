@@ -29,7 +29,7 @@ _DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
 
 
 def without_library(key: str) -> str:
-    """A name without the library of other systems in front of it: there is one library here."""
+    """A name without the library of other systems before it: there is one library here."""
     return _QUALIFIED.sub("", key, count=1) if "." in key else key
 
 

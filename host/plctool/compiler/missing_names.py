@@ -78,7 +78,7 @@ class Missing:
 
 
 def missing_names(uses: Iterable[Use]) -> list[Missing]:
-    """The names, each once, those of one library behind each other, the most used ones first."""
+    """The names, each once, those of one library together, the most used ones first."""
     found: dict[str, Missing] = {}
     for use in uses:
         entry = found.setdefault(use.name.casefold(), Missing(use.name, use, 0, library_of(use.name)))

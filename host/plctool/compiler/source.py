@@ -1,6 +1,6 @@
-"""Source texts and places in them.
+"""Sources and locations in them.
 
-Inside the front end a place is a character offset into one text; lines and columns are worked out when somebody asks.
+Inside the front end a location is a character offset into one text; lines and columns are computed when needed.
 A text that was made from a file of another kind (XML, an export of a whole project) knows where in that file each of
 its parts stands, so that diagnostics, breakpoints and warnings that are turned off have the lines of the file.
 

@@ -103,7 +103,7 @@ def _files(path: Path) -> list[Path]:
     if suffix == ".tsproj":
         projects = twincat.projects_of_solution(path, decode(path.read_bytes()))
         if not projects:
-            raise UsageError(f"{path} names no PLC project (.plcproj) that is there.", "no-source")
+            raise UsageError(f"{path} does not name a PLC project (.plcproj) that exists.", "no-source")
         return [file for project in projects for file in _files(project)]
     return [path]
 
@@ -133,7 +133,7 @@ def find_sources(folder: Path) -> list[Path]:
 def _other_files(folder: Path) -> str:
     """What to do with the files that hold programs but no text."""
     others = (path for path in sorted(folder.rglob("*")) if path.suffix.lower() in unreadable.WHAT_TO_DO)
-    return next((f"; {path.name} is no text: {unreadable.WHAT_TO_DO[path.suffix.lower()]}" for path in others), "")
+    return next((f"; {path.name} is not text: {unreadable.WHAT_TO_DO[path.suffix.lower()]}" for path in others), "")
 
 
 def _is_source(path: Path) -> bool:

@@ -221,7 +221,7 @@ def _bits(place: Place) -> tuple[int, int]:
 
 
 def _element(place: IndexPlace) -> int | None:
-    """The bytes in front of an element of an array whose indices are constants."""
+    """The bytes before an element of an array whose indices are constants."""
     if not isinstance(place.base.type, ArrayType) or place.limits is not None:
         return None
     number = 0

@@ -468,7 +468,7 @@ class Parameter:
     A STRING passed by reference travels as (pointer, u32 capacity), so that STRING_SIZE and cutting work for any
     length.
 
-    Behind the parameters that the program declares stand the bounds of those that are an ARRAY[*] (Variable.bounds).
+    After the parameters that the program declares come the bounds of those that are an ARRAY[*] (Variable.bounds).
     """
 
     variable: Variable
@@ -527,7 +527,7 @@ class TaskPart:
 
 @dataclass
 class TaskEvent:
-    """The BOOL a task waits for: in `variable`, `offset` bytes behind its start. `bit` of that byte; None for all."""
+    """The BOOL a task waits for: in `variable`, `offset` bytes after its start. `bit` of that byte; None for all."""
 
     variable: Variable
     offset: int = 0
@@ -566,5 +566,5 @@ class TypedProgram:
     accesses: list[Variable] = field(default_factory=list)  # VAR_ACCESS: other names of parts of globals
     constants: dict[str, Const] = field(default_factory=dict)  # that have no memory, by full name
     startup: Pou | None = None  # (init_retains : BOOL): what is called when the variables have their initial values
-    shutdown: Pou | None = None  # what is called when the application ends, or its variables start anew
+    shutdown: Pou | None = None  # what is called when the application ends, or its variables are initialised
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not

@@ -21,12 +21,12 @@ WARNINGS = {
     "configuration": "a task has no time, no event or no program, or a program no task",
     "endless": "a loop never ends as it is written",
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration or is compared with one",
-    "for-bound": "a FOR changes its end or step in its body, but both are worked out once, at its start",
+    "for-bound": "a FOR changes its end or step in its body, but both are computed once, at its start",
     "integer-division": "an integer division drops its fraction before the result becomes a REAL",
     "kept": "a variable is RETAIN or PERSISTENT, but what it holds is an address, which is not kept",
     "layout": "a type takes more memory than it does in other systems",
     "left-out": "a part of an export, such as a visualisation, has no meaning here",
-    "lifetime": "an instance of a function block lives for one call only, and starts anew in the next one",
+    "lifetime": "an instance of a function block lives for one call only, and is initialised in the next one",
     "narrowing": "an integer or an LREAL goes where not all of its values fit",
     "no-effect": "an attribute, pragma or qualifier changes nothing here, though it does in other systems",
     "no-program": "there is no PROGRAM, so nothing would run",
@@ -38,14 +38,14 @@ WARNINGS = {
     "result": "a function or method never assigns its result",
     "shared": "several tasks write one variable, or variables in one byte of %M",
     "shared-output": "two tasks write the same bit of an output",
-    "task": "a program is called that another task, or its own, runs as well",
-    "truncated": "a text is longer than the STRING it goes to",
+    "task": "a program is called that a task runs as well",
+    "truncated": "a string is longer than the STRING it goes to",
     "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG",
     "unreachable": "a statement is never reached",
     "unused": "a variable or program is never used, or the result of a call",
     "widening": "a product is computed in a type that is narrower than where it goes",
 }
-"""What each warning is about; its name is the `code` of the diagnosis."""
+"""What each warning is about; its name is the `code` of the diagnostic."""
 
 _SWITCH = re.compile(r"\{\s*warning\s+(disable|restore)\s+([\w-]+)\s*\}", re.IGNORECASE)
 

@@ -35,7 +35,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class _Frame:
-    """At an instruction: bytes of stack that the function holds, and where below their end the return address lies
+    """At an instruction: bytes of stack that the function holds, and where below their end the return address is
     (None: in the link register)."""
 
     size: int

@@ -40,7 +40,7 @@ class ClassType(EnumType):
 
 @dataclass(frozen=True)
 class Change:
-    """`data` goes to where a variable lies, `offset` bytes on. Of a single byte only the bits in `mask`: the others are
+    """`data` goes to where a variable is, `offset` bytes on. Of a single byte only the bits in `mask`: the others are
     other variables, and not ours to write."""
 
     offset: int

@@ -334,7 +334,7 @@ def _segment(data: bytes, header: Any, name: str) -> bytes:
     if not segment.size:
         return b""
     if segment.offset < header.header_size or segment.offset + segment.size > len(data):
-        raise _refuse(f"its {name.replace('_', ' ')} lies outside of it")
+        raise _refuse(f"its {name.replace('_', ' ')} is outside of it")
     return data[segment.offset : segment.offset + segment.size]
 
 
@@ -354,7 +354,7 @@ def _parse_functions(data: bytes, code_size: int) -> dict[int, int]:
         if entry.area == NO_AREA:
             continue
         if entry.area != lib.APP_AREA_CODE or entry.offset >= code_size:
-            raise _refuse(f"entry {number} of its function table lies outside the code")
+            raise _refuse(f"entry {number} of its function table is outside the code")
         functions[number] = int(entry.offset)
     return functions
 
@@ -396,7 +396,7 @@ def _parse_tasks(blobs: dict[int, bytes], code_size: int) -> list[ImageTask]:
     for number, task in enumerate(_entries("CDL_TASK", blobs.get(int(lib.CDL_BLOB_TASKS), b""), "task list")):
         name = bytes(ffi.buffer(task.name)).split(b"\0")[0].decode("ascii", "replace")
         if task.entry_offset >= code_size:
-            raise _refuse(f"the entry of task {name} lies outside the code")
+            raise _refuse(f"the entry of task {name} is outside the code")
         event = None if task.event_area == NO_AREA else (int(task.event_area), int(task.event_offset))
         external = events.get(int(task.event_offset), "") if task.kind == lib.KIND_EXTERNAL else ""
         inputs, outputs = (*parts[2 * number : 2 * number + 2], *NO_PARTS)[:2]

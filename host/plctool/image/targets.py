@@ -48,7 +48,7 @@ class Target:
 
     @property
     def compact(self) -> bool:
-        """Whether programs lie in a small flash."""
+        """Whether programs are in a small flash."""
         return self.pointer_size == 4
 
 

@@ -6,7 +6,7 @@ gives, and calls again when a package arrives or `deadline` is reached. Times ar
 The device takes blocks in order only and asks once for the first one it misses; the reply acknowledges the request.
 So the client sends all it has and goes back when asked. When nothing is heard, and now and then on a bad line, it
 polls: an empty block with a number that the device has already makes it say what it has, and send a lost reply again.
-Blocks are handed out at the rate of the line, so that little is thrown away after a loss, and their size follows the
+Blocks are given out at the rate of the line, so that little is thrown away after a loss, and their size follows the
 error rate, because on a bad line most long blocks arrive damaged. Up to two requests may be under way, so that the line
 does not idle while the device works.
 """
@@ -39,7 +39,7 @@ _LONGEST_RETRY = 1.0
 _NO_PROGRESS = 2  # times the patience: how long a device may be heard without anything getting on
 _SHORTEST_TIMEOUT = 0.1
 _FIRST_TIMEOUT = 0.4  # until a round trip has been measured
-_AHEAD, _AHEAD_BAD = 0.05, 0.005  # how far ahead of the line blocks are handed to it, on a good and a bad line [s]
+_AHEAD, _AHEAD_BAD = 0.05, 0.005  # how far ahead of the line blocks are given to it, on a good and a bad line [s]
 _POLL_EVERY = 4  # blocks, on a bad line
 _WINDOW = 2 * _POLL_EVERY  # most blocks under way on a bad line
 _MAX_LOSSES = 40  # of one block

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from plctool.core import lib
 from plctool.errors import UsageError
 from plctool.link.transport import DEFAULT_BAUD, BlockTransport
 
@@ -106,15 +105,14 @@ TRANSPORTS: dict[str, Transport] = {
         flag="tcp",
         shape="HOST[:PORT]",
         example="192.168.1.5",
-        help=f"controller on the network, over TCP; port {lib.TCP_PORT} if none is given",
+        help="controller on the network, over TCP",
     ),
     "udp": Transport(
         _open_udp,
         flag="udp",
         shape="HOST[:PORT]",
         example="192.168.1.5",
-        help=f"the same over UDP, ports {lib.UDP_PORT}..{lib.UDP_PORT + lib.UDP_PORTS - 1} if none is given; "
-        "for scan also the broadcast address of a network",
+        help="the same over UDP; for scan also the broadcast address of a network",
     ),
     "sim": Transport(_open_sim),  # the simulator of this process, which has to be on
 }

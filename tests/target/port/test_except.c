@@ -179,7 +179,7 @@ static void leave_near_the_end_of_the_stack(void *arg)
                      "i"(IEC_STACK_GUARD + 16));
 }
 
-/* A large frame that ends at the bottom of the guard. What the fault pushes lies below, on a stack that is idle. */
+/* A large frame that ends at the bottom of the guard. What the fault pushes is below, on a stack that is idle. */
 static void use_a_frame_that_ends_in_the_guard(void *arg)
 {
     RTS_UNUSED(arg);

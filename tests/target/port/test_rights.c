@@ -444,7 +444,7 @@ static void call_what_fails(void *arg)
     *(volatile RTS_I32 *)arg = imported_fail_with_all_rights();
 }
 
-static void failure_behind_a_gate_takes_the_rights_back(void)
+static void failure_with_a_gate_takes_the_rights_back(void)
 {
     RTS_EXCEPTION exception;
     CHECK_EQUAL(SysExceptTry(call_what_fails, &areas, &exception), false);
@@ -467,7 +467,7 @@ static void call_what_takes_long(void *arg)
     (void)imported_work_for_long();
 }
 
-static void function_behind_a_gate_keeps_its_rights_when_it_is_interrupted(void)
+static void function_with_a_gate_keeps_its_rights_when_it_is_interrupted(void)
 {
     RTS_HANDLE high = start(&fast, write_the_stack_of_the_task_below, 300, 3);
     RTS_HANDLE low = start(&slow, call_what_takes_long, 50000, 10);
@@ -499,7 +499,7 @@ static void break_it(RTS_I64 now)
         SysExceptBreak(&slow, RTSEXCPT_WATCHDOG);
 }
 
-static void endless_loop_behind_a_gate_is_broken(void)
+static void endless_loop_with_a_gate_is_aborted(void)
 {
     ClockSetCallback(break_it);
     RTS_HANDLE timer = start(&slow, call_what_never_ends, 2000, 0);
@@ -531,8 +531,8 @@ int main(void)
     TEST_RUN(after_the_call_it_has_not);
     TEST_RUN(function_with_a_gate_may_call_another_by_its_gate);
     TEST_RUN(svc_elsewhere_gives_no_rights);
-    TEST_RUN(failure_behind_a_gate_takes_the_rights_back);
-    TEST_RUN(function_behind_a_gate_keeps_its_rights_when_it_is_interrupted);
-    TEST_RUN(endless_loop_behind_a_gate_is_broken);
+    TEST_RUN(failure_with_a_gate_takes_the_rights_back);
+    TEST_RUN(function_with_a_gate_keeps_its_rights_when_it_is_interrupted);
+    TEST_RUN(endless_loop_with_a_gate_is_aborted);
     TEST_END();
 }

@@ -11,7 +11,7 @@ RTS_UI32 SysComGetCount(void)
     return 0;
 }
 
-/* Write here: baud rate and pins, empty both ring buffers and the FIFOs of the hardware (bytes that came while nobody
+/* Write here: baud rate and pins, empty both ring buffers and the FIFOs of the hardware (bytes that came while no one
  * listened may hold back the interrupt of the next one), switch the receive interrupt on. That interrupt has to be
  * above all tasks, else a long cycle loses bytes. */
 RTS_RESULT SysComOpen(RTS_UI32 index)

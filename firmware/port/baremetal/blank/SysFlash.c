@@ -6,7 +6,7 @@
 #include "SysFlash.h"
 
 /* Write here: the real geometry. At least one sector for each slot and two for each of the two record logs; programs
- * lie and run in the slots, so `mapped` is where the processor sees them. */
+ * are and run in the slots, so `mapped` is where the processor sees them. */
 enum { FLASH_SIZE = 64 * 1024, SECTOR_SIZE = 4096, PROGRAM_SIZE = 8, ERASED = 0xFF };
 
 /* Write here: copy from flash; with `mapped` this is a memcpy. */
@@ -19,7 +19,7 @@ static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 }
 
 /* Write here: program whole units, check what was programmed. Interrupts go on: tasks must not wait for this, so code
- * that runs meanwhile lies in another bank or in RAM when the chip cannot read while it programs. */
+ * that runs meanwhile is in another bank or in RAM when the chip cannot read while it programs. */
 static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size)
 {
     RTS_UNUSED(offset);

@@ -1,5 +1,5 @@
 /*
- * SysTarget.c - who this device is. Contract: SysTarget.h.
+ * SysTarget.c - the identity of this device. Contract: SysTarget.h.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -16,14 +16,14 @@ const SYS_TARGET *SysTargetGet(void)
         .id = TARGET_ID_CORTEX_M3,
         .version = 0x01000000,
         .device_name = "Blank",
-        .vendor_name = "Nobody",
+        .vendor_name = "Vendor",
         .node_name = "blank",
         .serial_number = "0",
     };
     return &target;
 }
 
-/* Write here: when start-up paints the stack of main with a pattern, how much of it is left. Not told: as it is. */
+/* Write here: when start-up paints the stack of main with a pattern, how much of it is left. Not known: as it is. */
 SYS_STACK SysTargetGetStack(void)
 {
     return (SYS_STACK){0, 0};

@@ -22,7 +22,7 @@ RTS_UI32 SysTimeGetMs(void)
     return 0;
 }
 
-/* Write here: give other tasks some 20 us, if your tasks are threads. With RTS_ONE_CORE 1 nobody calls it. */
+/* Write here: give other tasks some 20 us, if your tasks are threads. With RTS_ONE_CORE 1 it is never called. */
 void SysTimePause(void)
 {
 }

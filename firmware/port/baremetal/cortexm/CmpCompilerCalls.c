@@ -278,7 +278,7 @@ static RTS_I32 lreal_exponent(LREAL_BITS x)
     return (RTS_I32)(x.bits >> MANTISSA_BITS & EXPONENTS);
 }
 
-/* With GUARD_BITS zeros behind it. */
+/* With GUARD_BITS zeros after it. */
 static RTS_UI64 lreal_mantissa(LREAL_BITS x)
 {
     RTS_UI64 one = (RTS_UI64)1 << MANTISSA_BITS;

@@ -1,5 +1,5 @@
 /*
- * CodeInPlace.c - application code runs where it lies in flash: no RAM, no copy. The usual choice; the other is
+ * CodeInPlace.c - application code runs where it is in flash: no RAM, no copy. The usual choice; the other is
  * CodeInRam.c.
  *
  * SPDX-License-Identifier: Apache-2.0

@@ -6,8 +6,8 @@
  * SysExceptTry is called in handler mode (a timer's interrupt) or in main, both on the main stack. It enters the
  * function by SVC in *thread mode on the process stack*, at the priority of the interrupt it came from
  * (CCR.NONBASETHRDENA), and leaves it by another SVC. So whatever goes wrong in it, the frames of faults and interrupts
- * that need to be trusted lie on the main stack, and leaving is the same exception return for a normal end, a checked
- * error, a fault, and a broken loop:
+ * that need to be trusted are on the main stack, and leaving is the same exception return for a normal end, a checked
+ * error, a fault, and an aborted loop:
  *
  *   main stack:    ... interrupt | SysExceptTry | frame of the SVC that entered      <- leaving returns to it
  *   process stack: slot of this nesting depth
@@ -19,7 +19,7 @@
  *   vectors, where NULL points                      nothing, as to all else
  *   areas of the application (AppAreas.c)           read, write
  *   stack slot of the depth that runs               read, write
- * and nothing of the rest: peripherals, the processor's own registers. So a wild store ends in an exception that names
+ * and nothing else: peripherals, the processor's own registers. So a wild store ends in an exception that names
  * it, and has changed nothing but the program's own data. Entering and leaving a Try move one region, that of the
  * stack, and set CONTROL.nPRIV, which says how thread mode goes on; handlers are privileged whatever it says.
  *
@@ -82,7 +82,7 @@ enum { IEC_STACK_ALIGN = STACK_GUARD, IEC_STACK_GUARD = STACK_GUARD };
 __attribute__((section(".bss.iec_stack"), aligned(IEC_STACK_ALIGN))) static IEC_STACK stacks[APP_MAX_TASKS];
 
 static struct {
-    TRY *top; /* behind the innermost that runs */
+    TRY *top; /* past the innermost that runs */
     TRY tries[APP_MAX_TASKS];
 } state;
 
@@ -190,7 +190,7 @@ static void drop_fpu_context(void)
 #endif
 }
 
-/* The slot of the depth below lies above; of main, which has all rights, none does, but nobody runs that it matters to. */
+/* The slot of the depth below is above; of main, which has all rights, none does, but no task runs then. */
 static void give_back_rights(const TRY *try)
 {
     drop_fpu_context();
@@ -325,7 +325,7 @@ __attribute__((used)) static void open_gate(FRAME *frame)
     set_control(0);
 }
 
-/* Goes to 1 unless the SVC was that of a gate. Most code lies behind the gates. */
+/* Goes to 1 unless the SVC was that of a gate. Most code is past the gates. */
 #define LOOK_FOR_A_GATE                                                                                          \
     "mrs r0, psp\n\tldr r2, [r0, #24]\n\tmovw r3, #:lower16:gates_end\n\tmovt r3, #:upper16:gates_end\n\t"       \
     "cmp r2, r3\n\tbhs 1f\n\tmovw r3, #:lower16:gates_start\n\tmovt r3, #:upper16:gates_start\n\tcmp r2, r3\n\t" \
@@ -372,7 +372,7 @@ static uintptr_t find_caller(const TRY *try)
     return 0;
 }
 
-/* The frame could not be pushed, was pushed below the end, or what lies there was hit by the last push that had no
+/* The frame could not be pushed, was pushed below the end, or what is there was hit by the last push that had no
  * room: of 16 registers of an FPU, say. */
 static int is_overflow(RTS_UI32 cfsr, const FRAME *frame, uintptr_t end)
 {
@@ -472,7 +472,7 @@ void SysExceptShutdown(void)
 {
 }
 
-/* Where a function that is broken goes on: it leaves the running Try. By then the processor has taken its frame back,
+/* Where a function that is aborted goes on: it leaves the running Try. By then the processor has taken its frame back,
  * so that the stack pointer is as it was. */
 __attribute__((naked, noreturn)) static void try_break(RTS_UI32 code, uintptr_t address, RTS_UI32 unused,
                                                        uintptr_t link)
@@ -503,7 +503,7 @@ static void redirect(FRAME *frame, RTS_UI32 code)
     frame->xpsr = (frame->xpsr & XPSR_ALIGNED) | XPSR_THUMB;
 }
 
-/* We run above the Try, so it is interrupted, and where it is to go on lies on its process stack. */
+/* We run above the Try, so it is interrupted, and where it is to go on is on its process stack. */
 void SysExceptBreak(const void *arg, RTS_UI32 code)
 {
     FRAME *frame = process_stack();
@@ -514,7 +514,7 @@ void SysExceptBreak(const void *arg, RTS_UI32 code)
     }
 }
 
-/* When a large frame leaves no room for that of the fault, its place is lost: then find_caller finds the entry, behind
+/* When a large frame leaves no room for that of the fault, its place is lost: then find_caller finds the entry, after
  * the instructions that make its frame and have no line. */
 #if RTS_IEC_UNPRIVILEGED
 #define PUSH_ENTRY "add r3, r2, #10\n\tpush {r3, r9}\n\tpush {r9, lr}\n\t"

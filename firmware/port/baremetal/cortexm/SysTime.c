@@ -1,5 +1,5 @@
 /*
- * SysTime.c - the clock: SysTick counts the milliseconds, its counter what lies between.
+ * SysTime.c - the clock: SysTick counts the milliseconds, its counter what is between.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -31,7 +31,7 @@ typedef struct {
 
 static struct {
     TIMER timer[SYSTIMER_COUNT];
-    TIMER *end; /* behind the last one in use */
+    TIMER *end; /* past the last one in use */
 } state;
 
 void SysTimerInit(void)

@@ -1,5 +1,5 @@
 /*
- * reset.c - why the controller started: kept in RAM that survives a reset and that nobody clears.
+ * reset.c - why the controller started: kept in RAM that survives a reset and is not cleared.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -43,8 +43,8 @@ void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
         CpuBarrier();
 }
 
-/* Which reset it was, and where, main has put into the log. What nobody announced may have been the reset pin, or the
- * watchdog of a chip that does not tell. */
+/* Which reset it was, and where, main has put into the log. An unannounced one may have been the reset pin, or the
+ * watchdog of a chip that does not report it. */
 const SYS_START *SysStartGet(void)
 {
     static const SYS_START starts[] = {

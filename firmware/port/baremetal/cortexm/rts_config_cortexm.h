@@ -26,7 +26,7 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #endif
 
 /* No program of a small controller takes this long for a cycle [us]: an endless loop is an exception soon. Its own
- * watchdog does not make it longer: tasks interrupt main, so nobody can talk to the device meanwhile, stop it or send
+ * watchdog does not make it longer: tasks interrupt main, so no tool can talk to the device meanwhile, stop it or send
  * another program, and plctool waits 5 s for an answer. */
 #ifndef APP_MAX_CYCLE_US
 #define APP_MAX_CYCLE_US 2000000

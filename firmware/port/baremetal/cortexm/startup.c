@@ -38,7 +38,7 @@ void TimerIrq(void);
 
 #define TIMER_VECTOR(n) [IRQ_VECTOR(BOARD_TASK_IRQ + (n))] = {TimerIrq}
 
-/* An interrupt nobody expects finds no handler, which is a fault of the runtime. */
+/* An unexpected interrupt has no handler, which is a fault of the runtime. */
 __attribute__((section(".vectors"), used)) static const VECTOR vectors[VECTOR_IRQ + BOARD_IRQ_COUNT] = {
     [0] = {.stack = stack_top},
     [1] = {ResetHandler},

@@ -152,7 +152,7 @@ class Function:
         return self.value(f"{'tail ' if tail else ''}call {result} @{symbol}({', '.join(arguments)})")
 
     def prologue(self, text: str) -> Value:
-        """Writes an instruction that gives a value, in front of all others of the function."""
+        """Writes an instruction that gives a value, before all others of the function."""
         self._count += 1
         name = f"%v{self._count}"
         self._prologue.append(f"  {name} = {text}{self.debug}")
@@ -197,7 +197,7 @@ class Function:
         self.terminate(f"br i1 {condition}, label %{then}, label %{otherwise}")
 
     def begin_detached(self, label: str) -> None:
-        """Starts a block behind a terminator, reached only by branches written earlier."""
+        """Starts a block after a terminator, reached only by branches written earlier."""
         assert self._dead, "the block before is open"
         self.begin(label)
 

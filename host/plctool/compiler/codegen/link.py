@@ -1,6 +1,6 @@
 """The linker: one ELF object becomes one block of position independent code and constants without relocations.
 
-Sections that are reached from the entries are laid out one behind the other, PC-relative relocations between them are
+Sections that are reached from the entries are laid out one after the other, PC-relative relocations between them are
 applied, everything else (writable data, absolute addresses, undefined symbols) is refused with an error that names it.
 """
 

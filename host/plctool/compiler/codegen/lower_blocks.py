@@ -54,7 +54,7 @@ def fb_call(frame: Frame, s: FbCall) -> None:
 
 def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:
     """Stores the inputs in the instance. Returns the values of those that the block stores itself; they must be
-    stored here as well in front of an expression that could see it."""
+    stored here as well before an expression that could see it."""
     handed = frame.unit.handed.get(s.block, [])
     values: dict[Variable, Value] = {}
     arguments = [argument for _, argument in s.inputs + s.in_outs]
@@ -92,7 +92,7 @@ def _is_plain_node(frame: Frame, node: object, block: Pou) -> bool:
 
 
 def take_inputs(frame: Frame, block: Pou) -> None:
-    """Stores the inputs that the block was handed."""
+    """Stores the inputs that the block was passed."""
     for number, variable in enumerate(frame.unit.handed.get(block, [])):
         frame.store(frame.ref(VarPlace(variable, variable.type, block.pos)), parameter_value(number))
 

@@ -75,7 +75,7 @@ def _operands(
 ) -> list[Value]:
     """The operands that carry one argument."""
     t = parameter.variable.type
-    if argument is None:  # an output nobody wants
+    if argument is None:  # an output that is not used
         ref = frame.temporary(t)
     elif not isinstance(argument, Place):
         if is_scalar(t) and not parameter.by_reference:

@@ -34,7 +34,7 @@ class Ref:
 
     `tag`: alias tag or "". `direct`: reached by name only, not through a pointer. `capacity`: of a STRING
     [characters], an i32. `bit`: the bit of an integer that a BOOL lives in, -1 for none; `type` is then that
-    integer's. `loose`: a character that may never have been written (behind the NUL).
+    integer's. `loose`: a character that may never have been written (after the NUL).
     """
 
     pointer: Value
@@ -95,7 +95,7 @@ class Frame:
         return self._written(REFS, place)
 
     def aggregate(self, e: Expr) -> Ref:
-        """Where the value of a string, array or struct expression lies; valid until the end of the statement."""
+        """Where the value of a string, array or struct expression is; valid until the end of the statement."""
         return self._written(AGGREGATES, e)
 
     def _written(self, table: dict[type, Callable[[Frame, Any], Written]], node: Expr | Place) -> Written:

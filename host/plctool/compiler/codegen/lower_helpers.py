@@ -1,8 +1,8 @@
 """Functions in LLVM IR that images need: the loops all string functions are made of, and what LLVM calls by name.
 
-Templates. Strings are walked in chunks of CHUNK bytes (a vector, or an integer) as long as a whole chunk lies within
+Templates. Strings are walked in chunks of CHUNK bytes (a vector, or an integer) as long as a whole chunk is within
 the capacity, then byte by byte. PTR stands for the integer type of an address, START for the index at which the byte
-loop takes over (0 when the target has no chunks). Bytes behind a NUL are frozen, as they may never have been written.
+loop takes over (0 when the target has no chunks). Bytes after a NUL are frozen, as they may never have been written.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ test:
 next:
 """
 
-# SPAN__ of stdlib/strings.st: the index at most COUNT characters behind START where the string ends.
+# SPAN__ of stdlib/strings.st: the index at most COUNT characters after START where the string ends.
 _SPAN = _Walk(
     head="""define internal i32 @str.span(ptr %ctx, ptr %s, i32 %cap, i32 %start, i32 %want) ATTRIBUTES {
 entry:

@@ -23,7 +23,7 @@ _CONSTANT_FROM = 4  # different scalars that are worth a constant
 
 
 def encode_scalar(value: int | float | str, t: Type) -> bytes:
-    """A scalar or string constant as it lies in memory."""
+    """A scalar or string constant as it is in memory."""
     if isinstance(t, StringType):
         text = encode_text(str(value)[: t.length], t)
         return text + bytes(t.size - len(text))

@@ -27,7 +27,7 @@ def while_loop(frame: Body, s: While) -> None:
 
 @rule(STATEMENTS, Repeat)
 def repeat_loop(frame: Body, s: Repeat) -> None:
-    """The test comes behind each round."""
+    """The condition is tested after each iteration."""
     fn = frame.fn
     again, test, end = fn.label("repeat"), fn.label("until"), fn.label("endrepeat")
     fn.begin(again)
@@ -47,7 +47,7 @@ def _loop_body(frame: Body, body: list[Statement], on_continue: str, on_exit: st
 
 @rule(STATEMENTS, For)
 def for_loop(frame: Body, s: For) -> None:
-    """The test in front of the increment keeps the variable from wrapping; it ends at the first value behind
+    """The test before the increment keeps the variable from wrapping; it ends at the first value past
     `stop`, or at the limit of its type."""
     fn = frame.fn
     start, stop, step = frame.value(s.start), frame.value(s.stop), frame.value(s.step)

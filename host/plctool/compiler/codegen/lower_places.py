@@ -114,7 +114,7 @@ def own_instance(frame: Frame, place: SelfPlace) -> Ref:
 
 @rule(REFS, ValuePlace)
 def temporary(frame: Frame, place: ValuePlace) -> Ref:
-    """Where a value lies that is no variable."""
+    """Where a value is that is no variable."""
     return materialised(frame, place.value)
 
 
@@ -147,7 +147,7 @@ def indexed(frame: Frame, place: IndexPlace) -> Ref:
 
 
 def _open_index(frame: Frame, place: IndexPlace, limits: list[tuple[Expr, Expr]]) -> Value:
-    """The number of an element of an ARRAY[*] as a pointer-sized integer. It is worked out in 64 bits, where
+    """The number of an element of an ARRAY[*] as a pointer-sized integer. It is computed in 64 bits, where
     nothing wraps."""
     fn = frame.fn
     total: Value | None = None

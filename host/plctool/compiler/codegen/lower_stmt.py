@@ -44,7 +44,7 @@ def assign(frame: Body, s: Assign) -> None:
 
 
 def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
-    """Whether the callee may build its result in the target: it fits, and nobody sees it half done."""
+    """Whether the callee may build its result in the target: it fits, and no other code sees it half done."""
     pou = call.function
     if pou.external or not _fits(call, target) or not frame.effects.is_local(pou):
         return False
@@ -61,7 +61,7 @@ def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
 
 @rule(STATEMENTS, CallStatement)
 def call_statement(frame: Body, s: CallStatement) -> None:
-    """A call whose result, if any, nobody wants."""
+    """A call whose result, if any, is not used."""
     call = s.call
     call_function(frame, call, frame.temporary(call.type) if result_in_memory(call.function) else None)
 
@@ -103,7 +103,7 @@ def return_statement(frame: Body, s: Return) -> None:
 
 @rule(STATEMENTS, Case)
 def case_statement(frame: Body, s: Case) -> None:
-    """A switch; wide ranges are compared in front of it."""
+    """A switch; wide ranges are compared before it."""
     fn, t = frame.fn, s.selector.type
     text = value_type(t)
     selector = frame.value(s.selector)

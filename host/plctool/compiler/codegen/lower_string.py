@@ -1,7 +1,7 @@
 """Strings: copying with cutting, comparing.
 
 A STRING is a run of bytes up to a NUL or the capacity, whichever comes first: no memory content makes these functions
-read or write outside of it. Bytes behind the NUL have no meaning and may be overwritten.
+read or write outside of it. Bytes after the NUL have no meaning and may be overwritten.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def equals_literal(frame: Frame, ref: Ref, text: str) -> Value | None:
 
 
 def encode_text(text: str, t: StringType) -> bytes:
-    """The characters as they lie in memory."""
+    """The characters as they are in memory."""
     return text.encode("utf-16-le", "surrogatepass") if t.wide else text.encode("latin-1")
 
 

@@ -136,7 +136,7 @@ class Unit:
         return self._program if pou.checks else self.plain
 
     def inlining(self, pou: Pou) -> str:
-        """What LLVM is told about inlining a POU: the standard library is made for it, if there is room."""
+        """The attributes for LLVM about inlining a POU: the standard library is made for it, if there is room."""
         if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self._sections:
             return "noinline"
         if sum(variable.type.size for variable in pou.locals) > _LARGE_FRAME:

@@ -1,4 +1,4 @@
-"""From the functions of a module to the texts LLVM compiles: where inlining ends, and into which parts a large module
+"""From the functions of a module to the sources LLVM compiles: where inlining ends, and into which parts a large module
 is cut, to be compiled side by side.
 
 LLVM inlines what is small, and what is called once. It never looks at how large the caller becomes, and its passes take

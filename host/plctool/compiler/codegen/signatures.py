@@ -1,7 +1,7 @@
 """Parameters of compiled functions: the context, the instance, room for a result in memory, then what the program
 declares.
 
-A function block finds its inputs in its instance. Those that every call of the block gives, it is handed as parameters,
+A function block finds its inputs in its instance. Those that every call of the block gives, it is passed as parameters,
 as far as there are registers for them, and stores them itself: that is smaller and faster than to store them before
 each call and to load them in the block.
 """
@@ -100,7 +100,7 @@ def parameter_list(pou: Pou, handed: HandedInputs) -> str:
 
 
 def handed_inputs(program: TypedProgram, target: Target) -> HandedInputs:
-    """The inputs of each function block that it is handed as parameters."""
+    """The inputs of each function block that it is passed as parameters."""
     extra = (pou for pou in (program.startup, program.shutdown) if pou is not None)
     reached = dict.fromkeys([*program.pous, *program.programs.values(), *extra])  # and perhaps some that never run
     given: HandedInputs = {}

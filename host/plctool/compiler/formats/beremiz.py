@@ -1,4 +1,4 @@
-"""build/plc.st of OpenPLC Editor and Beremiz: the blocks in C that they put in front of every program.
+"""build/plc.st of OpenPLC Editor and Beremiz: the blocks in C that they put before every program.
 
 SPDX-License-Identifier: Apache-2.0
 """

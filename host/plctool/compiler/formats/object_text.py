@@ -42,7 +42,7 @@ def is_member(sources: Sequence[Source]) -> bool:
 
 
 def with_members(unit: Source, members: Sequence[Source]) -> list[Source]:
-    """A unit with its members behind it. Their own files stay as sources without text, so that lines can be shown."""
+    """A POU with its members after it. Their own files stay as sources without text, so that lines can be shown."""
     text = Text()
     shown = []
     for source in (unit, *members):

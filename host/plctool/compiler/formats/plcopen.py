@@ -42,7 +42,7 @@ def read_project(path: str, text: str) -> list[Source]:
         findings.add(error.at, "xml", str(error))
         return [Text().source(path, text, findings=findings.all)]
     if root.tag != "project":
-        message = f"<{root.tag}> is no PLCopen XML; in CODESYS and TwinCAT, export with Project, Export PLCopenXML"
+        message = f"<{root.tag}> is not PLCopen XML; in CODESYS and TwinCAT, export with Project, Export PLCopenXML"
         findings.add(root.at, "xml", message)
         return [Text().source(path, text, findings=findings.all)]
     project = _Project(findings)

@@ -90,7 +90,7 @@ class Chart:
         sources = list(dict.fromkeys(self._steps_before(transition)))
         targets = list(dict.fromkeys(self._steps_behind(transition)))
         if not sources or not targets:
-            raise NotTranslatedError(transition.at, "a transition has no step before or behind it")
+            raise NotTranslatedError(transition.at, "a transition has no step before or after it")
         priority = transition.get("priority")
         order = f" (PRIORITY := {priority})" if priority.isdecimal() and priority != "0" else ""
         head = f"TRANSITION{order} FROM {_listed(sources)} TO {_listed(targets)} := "

@@ -123,7 +123,7 @@ class Network:
     def _value(self, connection: Element, ref: str, formal: str) -> str:
         element = self._elements.get(ref)
         if element is None:
-            raise NotTranslatedError(connection.at, f"a line comes from element {ref}, which is not there")
+            raise NotTranslatedError(connection.at, f"a line comes from element {ref}, which does not exist")
         if element.tag == "leftPowerRail":
             return "TRUE"
         if element.tag in ("inVariable", "inOutVariable"):
@@ -140,7 +140,7 @@ class Network:
             self._busy.discard(ref)
 
     def _passed(self, element: Element) -> str:
-        """The value behind what only passes it on."""
+        """The value that what only passes it on gets."""
         if element.tag == "contact":
             return self._contact(element)
         if element.tag == "coil":

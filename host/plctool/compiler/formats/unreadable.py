@@ -36,7 +36,7 @@ def refusal(path: Path, data: bytes) -> str:
     """What to say of a file that is no text; "" for a text."""
     known = WHAT_TO_DO.get(path.suffix.lower())
     if known is not None:
-        return f"this is no text that can be compiled; {known}"
+        return f"this is not source text; {known}"
     if b"\0" in data[:_SEEN] and not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "this is a binary file, no program text; export the program as text or PLCopen XML"
     return ""

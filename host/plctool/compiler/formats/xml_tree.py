@@ -1,4 +1,4 @@
-"""XML files as trees whose texts know their lines and columns.
+"""XML files as trees whose text has lines and columns.
 
 Read with expat. A document type is refused, so there are no entities that grow and none that reach outside the file; no
 more than `MAX_DEPTH` elements may stand in each other.
@@ -93,7 +93,7 @@ class _Reader:
             self._parser.Parse(_LONE_RETURN.sub(" ", text).encode("utf-8", "replace"), True)
         except expat.ExpatError as error:
             what = expat.errors.messages.get(error.code, str(error.code))
-            raise XmlError(Place(error.lineno, error.offset + 1), f"the file is not whole XML: {what}") from None
+            raise XmlError(Place(error.lineno, error.offset + 1), f"the file is not well-formed XML: {what}") from None
         return self._root.children[0]
 
     @property

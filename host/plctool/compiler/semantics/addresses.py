@@ -1,4 +1,4 @@
-"""The variables that lie at addresses such as %IX0.3 (AT), and those that statements use without a declaration.
+"""The variables that are at addresses such as %IX0.3 (AT), and those that statements use without a declaration.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -23,7 +23,7 @@ def is_open(location: ast.DirectAddress | None) -> bool:
 
 
 def _read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
-    """What `%IW2` means; None after a diagnosis."""
+    """What `%IW2` means; None after an error."""
     address = parse_address(node.text)
     if address is None:
         scope.error(node.pos, "location", f"{node.text} is not an address such as %IX0.3 or %QW2")
@@ -33,7 +33,7 @@ def _read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
 def located(
     name: str, t: Type, init: Initial | None, location: ast.DirectAddress, scope: Scope, offset: int
 ) -> Variable | None:
-    """A variable with AT, declared at `offset`; None after a diagnosis."""
+    """A variable with AT, declared at `offset`; None after an error."""
     address = _read_address(location, scope)
     if address is None:
         return None
@@ -55,14 +55,14 @@ def located(
 
 
 class DirectVariables:
-    """The variables behind addresses that statements use."""
+    """The variables at addresses that statements use."""
 
     def __init__(self, allocation: Allocation) -> None:
         self._allocation = allocation
         self._known: dict[str, VarSymbol] = {}
 
     def find(self, node: ast.DirectAddress, scope: Scope) -> VarSymbol | None:
-        """The variable at an address; None after a diagnosis."""
+        """The variable at an address; None after an error."""
         key = node.text.upper()
         symbol = self._known.get(key)
         if symbol is not None:

@@ -1,4 +1,4 @@
-"""Where variables lie.
+"""Where variables are.
 
 SPDX-License-Identifier: Apache-2.0
 """

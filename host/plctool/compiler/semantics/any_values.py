@@ -1,7 +1,7 @@
 """ANY in the way of CODESYS: a parameter that tells address, size and kind of its argument, whatever that is.
 
 Methods have it so, and functions whose statements name `x.pValue`, `x.diSize` or `x.TypeClass`; all others with
-ANY are generic. Such an argument is handed over as its address; size and kind follow behind the parameters, as
+ANY are generic. Such an argument is passed as its address; size and kind follow after the parameters, as
 inputs that have no name in the program. The body begins by putting them together.
 
 SPDX-License-Identifier: Apache-2.0
@@ -85,7 +85,7 @@ def is_any(spec: ast.TypeSpec) -> bool:
 
 
 def parameter(name: str, value: Variable) -> tuple[Parameter, list[Parameter], list[Statement]]:
-    """The parameter that is handed over for `value`, an AnyType; those behind all others; what the body begins with."""
+    """The parameter that is passed for `value`, an AnyType; those after all others; what the body begins with."""
     pos, t = value.pos, value.type
     assert isinstance(t, StructType)
     address, kind, size = (
@@ -109,7 +109,7 @@ def part(place: Place, name: str, seen_as: Type | None = None) -> Place:
 
 
 def handed(place: Place, t: Type, size: Expr) -> tuple[Expr, list[Expr]]:
-    """What a call hands over for `place`, and behind the arguments. An AnyType is passed on."""
+    """What a call passes for `place`, and after the arguments. An AnyType is passed on."""
     pos: Pos = place.pos
     if isinstance(place.type, StructType) and place.type.name == NAME:
         address, kind, bytes_ = (

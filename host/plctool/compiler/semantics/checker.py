@@ -1,7 +1,7 @@
 """What every check of an expression or statement gets: where it stands, whom to ask, how to report.
 
 The rules themselves are functions, one for each kind of node of the syntax tree (package `rules`). They register here
-for the kind they check; so a rule has its parts checked by `expr` and `statement` without knowing who does it.
+for the kind they check; so a rule has its parts checked by `expr` and `statement` without knowing which one does it.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -54,7 +54,7 @@ class Checker:
         return e
 
     def statement(self, node: ast.Stmt) -> list[Statement]:
-        """What a statement becomes; nothing after a diagnosis."""
+        """What a statement becomes; nothing after an error."""
         self._statements += 1
         if self._statements > MAX_DEPTH:
             raise NestingError(self.pos(node.pos))

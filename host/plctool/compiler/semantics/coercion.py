@@ -50,7 +50,7 @@ _FORMS = {"DATE": "2024-02-29", "TOD": "12:30:15", "DT": "2024-02-29-12:30:15"}
 
 
 class Coercion:
-    """Implicit conversions with their diagnoses."""
+    """Implicit conversions with their diagnostics."""
 
     def __init__(self, diagnostics: Diagnostics, text_of: Callable[[Expr], Expr]) -> None:
         """`text_of` makes a text of a CHAR or WCHAR."""
@@ -115,7 +115,7 @@ class Coercion:
         return self._mismatch(e, target)
 
     def _needs(self, e: Expr, source: str, target: str) -> Expr:
-        message = f"{e.type} does not fit {target} by itself; write {source}_TO_{target}(...)"
+        message = f"{e.type} does not fit {target}; write {source}_TO_{target}(...)"
         return self._error(e.pos, "type", message)
 
     # ---- by kind ----
@@ -182,7 +182,7 @@ class Coercion:
         if isinstance(e, Const):
             assert isinstance(e.value, int)
             if e.value not in target.values.values():
-                return self._error(e.pos, "range", f"{e.value} is no value of {target}; it has {target.choices}")
+                return self._error(e.pos, "range", f"{e.value} is not a value of {target}; it has {target.choices}")
             name = constants.describe(e.value, target)
             self._warn(e.pos, "enum", f"the number {e.value} stands for a value of {target}; write {target}#{name}")
             return Const(e.value, target, e.pos)
@@ -204,7 +204,7 @@ class Coercion:
             hint = hint if isinstance(e, Const) else f"; write {e.type.keyword}_TO_{target.keyword}(...)"
             return self._error(e.pos, "type", f"{e.type} does not fit {target}{hint}")
         if isinstance(e, Const) and isinstance(e.value, str) and len(e.value) > target.length:
-            self._warn(e.pos, "truncated", f"this text has {len(e.value)} characters, {target} holds {target.length}")
+            self._warn(e.pos, "truncated", f"this string has {len(e.value)} characters, {target} holds {target.length}")
             return Const(e.value[: target.length], target, e.pos)
         return e
 

@@ -165,7 +165,7 @@ class _Builder:
                 return
 
     def _connect(self, instance: ast.ProgramInstance, program: ProgramInfo, task: Task, scope: Scope) -> None:
-        """`PROGRAM p WITH t : Type(input := x, output => y)`: small programs before and behind do the assignments."""
+        """`PROGRAM p WITH t : Type(input := x, output => y)`: small programs before and after do the assignments."""
         handed = program_arguments(Checker(self._world, scope), instance.args, program, instance.pos)
         if handed is None:
             return

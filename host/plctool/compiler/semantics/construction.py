@@ -187,7 +187,7 @@ class _Construction:
         return any(path_members(self._world, part) for part in instances_in(t))
 
     def _is_fresh(self, place: Place, keep: Keep | None) -> Expr | None:
-        """Whether nothing was put back into a place, so that it begins anew; None when nothing in it is ever kept."""
+        """Whether nothing was put back into a place, so that it is initialised; None if nothing in it is kept."""
         if keep is None or not is_kept(place.type, keep):
             return None
         pos = place.pos

@@ -58,7 +58,7 @@ NUMBERS = (Kind.INT, Kind.BIT)
 
 
 def elementary(t: Type) -> Elementary | None:
-    """The scalar behind a type (of an enum or subrange: its base); None for strings, arrays, structs and pointers."""
+    """The scalar of a type (of an enum or subrange: its base); None for strings, arrays, structs and pointers."""
     base = base_of(t)
     return base if isinstance(base, Elementary) else None
 
@@ -80,7 +80,7 @@ def same_type(a: Type, b: Type) -> bool:
 
 
 def takes_array(t: Type, actual: Type) -> bool:
-    """Whether `t` is an ARRAY[*] and an array of type `actual` can be handed over for it."""
+    """Whether `t` is an ARRAY[*] and an array of type `actual` can be passed for it."""
     if not isinstance(t, OpenArrayType) or not isinstance(actual, ArrayType):
         return False
     return len(t.bounds) == len(actual.bounds) and same_type(t.element, actual.element)

@@ -29,7 +29,7 @@ class Declared:
     """Who declares what. Each of them says what is wrong the first time, and does nothing the second time."""
 
     type_of: Callable[[TypeSymbol], Type]
-    type_named: Callable[[int, str, Scope], Type]  # ERROR after a diagnosis
+    type_named: Callable[[int, str, Scope], Type]  # ERROR after an error
     variable: Callable[[GlobalSymbol], VarSymbol]
     function: Callable[[PouSymbol, dict[str, Type]], FunctionInfo | None]  # None while it is being declared
     member: Callable[[Member], FunctionInfo]

@@ -36,7 +36,7 @@ class Dispatches:
             self._own_calls.append((caller, dispatch, pos))
 
     def note_other_call(self, caller: Pou | None, function: Pou, dispatch: Dispatch | None, pos: Pos) -> None:
-        """A call on an instance behind a pointer, which may be the own one or not."""
+        """A call on an instance through a pointer, which may be the own one or not."""
         if caller is not None:
             self._other_calls.append((caller, function, dispatch, pos))
 

@@ -1,7 +1,7 @@
 """Inputs with R_EDGE and F_EDGE: where the program reads one, it gets whether the input has just risen or fallen.
 
-Beside such an input lie two more variables: what it was at the call before, and the edge. The body begins by working
-the edge out, and sees it under the name of the input; everybody else sees the input itself.
+Beside such an input are two more variables: its value at the previous call, and the edge. The body begins by computing
+the edge, and sees it under the name of the input; all others see the input itself.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -19,7 +19,7 @@ RISING = "R_EDGE"
 
 
 def edge_variables(raw: Variable) -> tuple[Variable, Variable]:
-    """What an input was at the call before, and its edge; they have no name in the program."""
+    """What an input was at the previous call, and its edge; they have no name in the program."""
     owner, dot, name = raw.name.rpartition(".")
     last, edge = (Variable(f"{owner}{dot}%{name}.{e}", BOOL, raw.storage, raw.pos) for e in ("before", "edge"))
     return last, edge

@@ -118,7 +118,7 @@ def _only_reads(call: Call) -> bool:
 
 
 def _is_own(variable: Variable, pou: Pou) -> bool:
-    """Whether it belongs to the unit, so that nobody changes it from outside while the unit runs."""
+    """Whether it belongs to the POU, so that no other code changes it while the POU runs."""
     if variable.storage is Storage.AREA:
         owner = variable.name.rpartition(".")[0]
         inside = owner == pou.name or pou.name.startswith(f"{owner}.")
@@ -141,7 +141,7 @@ def _may_change(loop: While | Repeat, variable: Variable, pou: Pou, effects: Eff
 
 
 def _may_reach(node: object, effects: Effects) -> bool:
-    """Whether a call may write more than what it is handed."""
+    """Whether a call may write more than what it is passed."""
     if isinstance(node, Call):
         return node.dispatch is not None or not effects.is_local(node.function)
     return isinstance(node, FbCall)

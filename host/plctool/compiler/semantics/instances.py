@@ -13,7 +13,7 @@ from plctool.compiler.semantics.world import World
 from plctool.iec.types import ArrayType, StructType, Type
 
 INITIALISERS = ("fb_init", "fb_reinit", "fb_exit")  # each class may have its own parameters
-INIT_RETAINS, COPY_CODE = "binitretains", "bincopycode"  # what every FB_Init is told
+INIT_RETAINS, COPY_CODE = "binitretains", "bincopycode"  # the inputs of every FB_Init
 
 
 def instances_in(t: Type) -> Iterator[StructType]:

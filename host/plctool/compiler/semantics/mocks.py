@@ -1,4 +1,4 @@
-"""Mocks of unit tests: what MOCK and MOCK_FUNCTION name gets a switch in front of its body.
+"""Mocks of unit tests: what MOCK and MOCK_FUNCTION name gets a switch before its body.
 
 All of it happens in the syntax tree, before anything is checked, and only for the program that runs the tests:
 

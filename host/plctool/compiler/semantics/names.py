@@ -1,4 +1,4 @@
-"""The names of a program, in front of those of the library: which declaration each stands for.
+"""The names of a program, before those of the library: which declaration each stands for.
 
 Nothing is declared here; a declaration of the library is parsed when its name is first asked for.
 
@@ -34,7 +34,7 @@ def _is_in_namespace(decl: ast.GlobalBlock) -> bool:
 
 
 def enclosing(full_name: str) -> list[str]:
-    """The namespaces a dotted name lies in: `a.b` and `a` for `a.b.c`."""
+    """The namespaces a dotted name is in: `a.b` and `a` for `a.b.c`."""
     parts = full_name.split(".")
     return [".".join(parts[:n]) for n in range(len(parts) - 1, 0, -1)]
 
@@ -263,7 +263,7 @@ class Names:
 
     @cached_property
     def planned(self) -> dict[str, PlannedInstance]:
-        """Every instance by its name; the sources are known before anybody asks."""
+        """Every instance by its name; the sources are known before the first use."""
         planned: dict[str, PlannedInstance] = {}
         for instance in (i for decl in self.configurations for i in decl.programs):
             symbol = self.lookup_program(instance.type_name)

@@ -1,4 +1,4 @@
-"""ARRAY[*]: a parameter that takes arrays of any size. The array is handed over by its address, the bounds of its
+"""ARRAY[*]: a parameter that takes arrays of any size. The array is passed by its address, the bounds of its
 dimensions beside it, as inputs that have no name in the program: lower and upper one, DINT.
 
 SPDX-License-Identifier: Apache-2.0
@@ -40,7 +40,7 @@ def give_bounds(variable: Variable, storage: Storage) -> list[Variable]:
 
 
 def bound_parameters(parameters: Sequence[Parameter]) -> list[Parameter]:
-    """The inputs behind the parameters of a function that hold the bounds of those that are an ARRAY[*]."""
+    """The inputs after the parameters of a function that hold the bounds of those that are an ARRAY[*]."""
     variables = [v for p in parameters for v in give_bounds(p.variable, Storage.LOCAL)]
     return [Parameter(v, Direction.INPUT) for v in variables]
 
@@ -67,7 +67,7 @@ def total_size(place: Place) -> Expr:
 
 
 def handed_bounds(parameter: Variable, argument: Expr | Place | None, pos: Pos) -> list[tuple[Variable, Expr]]:
-    """What the variables behind an ARRAY[*] get when `argument` is handed over: an array, or nothing for an output
+    """What the variables of an ARRAY[*] get when `argument` is passed: an array, or nothing for an output
     that is not wanted."""
     t = parameter.type
     if not isinstance(t, OpenArrayType):

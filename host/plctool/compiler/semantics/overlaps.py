@@ -13,7 +13,7 @@ from plctool.iec.areas import Area
 
 
 def report_overlaps(variables: Iterable[Variable], diagnostics: Diagnostics) -> None:
-    """Warns of variables that lie over others, at the one that is declared later, unless that is meant."""
+    """Warns of variables that are over others, at the one that is declared later, unless that is meant."""
     located = [v for v in variables if v.area in (Area.INPUT, Area.OUTPUT, Area.MEMORY) and not v.name.startswith("%")]
     numbers = {variable: number for number, variable in enumerate(located)}
     reaching: list[Variable] = []
@@ -40,7 +40,7 @@ def _is_meant(one: Variable, other: Variable) -> bool:
 
 
 def _bits(variable: Variable) -> tuple[int, int]:
-    """The first bit, and the first one behind the variable."""
+    """The first bit, and the one past the end of the variable."""
     first = variable.offset * 8
     if variable.bit is not None:
         return first + variable.bit, first + variable.bit + 1

@@ -60,7 +60,7 @@ MODIFIERS: dict[str, frozenset[Modifier]] = {
     "TYPE": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
     "NAMESPACE": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
 }
-"""For each kind of unit the words that may stand in front of its name."""
+"""For each kind of unit the words that may stand before its name."""
 
 _INSTEAD_OF_SECTION = {
     ("FUNCTION", "VAR_INST"): "VAR_STAT keeps a value from call to call",
@@ -172,9 +172,7 @@ class _Check:
         if keeps and Modifier.CONSTANT in given:
             self._warning(block.pos, f"{keeps[0]} has no effect here: a constant never changes; leave it out")
         if kind == "PROGRAM" and access and access != [Modifier.PUBLIC]:
-            message = (
-                f"{access[0]} has no effect in a PROGRAM: other units see its variables all the same; leave it out"
-            )
+            message = f"{access[0]} has no effect in a PROGRAM: other POUs see its variables all the same; leave it out"
             self._warning(block.pos, message)
 
     def _line(self, block: ast.VarBlock, line: ast.VarDecl) -> None:
@@ -192,7 +190,7 @@ class _Check:
 
 
 def _given(decl: ast.PouDecl) -> int:
-    """How many sections in front nobody wrote: that of the value of a SET."""
+    """How many sections at the start are not in the source: that of the value of a SET."""
     return int(decl.keyword == "SET")
 
 
@@ -236,7 +234,7 @@ def _wrong_qualifier(kind: str, keyword: str, word: str) -> str:
 
 def _wrong_access(kind: str, keyword: str, word: str) -> str:
     if keyword in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT"):
-        return f"{word} is for VAR; a {keyword} is there for all who call; leave it out"
+        return f"{word} is for VAR; a {keyword} is visible to all callers; leave it out"
     if keyword == "VAR_GLOBAL":
         return f"a VAR_GLOBAL may be PUBLIC or INTERNAL, not {word}"
     return (
@@ -250,6 +248,6 @@ def _why_not_kept(kind: str, keyword: str) -> str:
     if keyword == "VAR_EXTERNAL":
         return "it only repeats a VAR_GLOBAL; write it there"
     if kind in ("TEST", "SETUP", "TEARDOWN"):
-        return "a test starts anew each time; leave it out"
+        return "a test is initialised each time; leave it out"
     lasting = "VAR" if kind in ("PROGRAM", "FUNCTION_BLOCK", "CLASS") else "VAR_STAT"
     return f"it lives for one call; {lasting} RETAIN keeps a value"

@@ -1,4 +1,4 @@
-"""__QUERYINTERFACE and __QUERYPOINTER: what else an instance behind an interface is.
+"""__QUERYINTERFACE and __QUERYPOINTER: what else the instance of an interface is.
 
 Each pair of types gets a small function `(source, target by reference) : BOOL`. It asks the instance, through a
 dispatch over the class numbers like any method, whether it conforms: two methods that all classes share give the
@@ -46,7 +46,7 @@ class Queries:
         self._functions: dict[tuple[ClassInfo, PointerType], _Query] = {}
 
     def function(self, source: ClassInfo, t: PointerType, target: PointerType, pos: Pos) -> Pou:
-        """The function that asks instances behind a pointer or interface `t`, of the class `source` or of one that
+        """The function that asks instances of a pointer or interface `t`, of the class `source` or of one that
         conforms, whether they are what `target` may point to."""
         known = self._functions.get((source, target))
         if known is None:

@@ -26,7 +26,7 @@ from plctool.iec.types import Type
 
 
 def _internal_to(symbol: Symbol) -> str | None:
-    """The namespace that alone may use a unit or global; None when everybody may."""
+    """The namespace that alone may use a unit or global; None if all may."""
     if isinstance(symbol, GlobalSymbol):
         space, marked = symbol.namespace, ast.Modifier.INTERNAL in symbol.qualifiers
     elif isinstance(symbol, TypeSymbol | PouSymbol):
@@ -78,7 +78,7 @@ class Scope:
         self.use(namespace.using)
 
     def use(self, names: list[tuple[int, str]]) -> None:
-        """USING: makes what is in namespaces known by bare names, behind what is nearer."""
+        """USING: makes what is in namespaces known by bare names, after what is nearer."""
         self.path += tuple(found for offset, name in names if (found := self._namespace(offset, name)) is not None)
 
     def _namespace(self, offset: int, name: str) -> str | None:
@@ -106,7 +106,7 @@ class Scope:
         return False
 
     def declare(self, symbol: VarSymbol, offset: int) -> bool:
-        """Makes a local name known; False after a diagnosis when it is taken."""
+        """Makes a local name known; False after an error when it is taken."""
         key = symbol.name.casefold()
         other = self.names.get(key)
         if not isinstance(other, VarSymbol):

@@ -4,7 +4,7 @@
 - In a chart without simultaneous branches one step is active at a time: its transitions are a branch of a CASE over a
   hidden number, and while it stays, so are the calls of its actions. Else the transitions are evaluated first, into
   temporaries, and then fire together.
-- An action that has only the qualifier N is called while one of its steps is active, and once more behind that. With
+- An action that has only the qualifier N is called while one of its steps is active, and once more after that. With
   any other qualifier an instance of the library's ACTION_CONTROL decides.
 
 What is hidden has a name that starts with %, which no identifier does, and holds that of the unit, because a unit that
@@ -34,7 +34,7 @@ FIRES = "%fires"  # whether a transition does, in this cycle
 
 @dataclass
 class Action:
-    """An ACTION or a BOOL variable, and the steps that have it. `asked`: somebody reads its A."""
+    """An ACTION or a BOOL variable, and the steps that have it. `asked`: its A is read."""
 
     name: str
     hidden: str  # the variable that belongs to it: an ACTION_CONTROL, or whether the action is active

@@ -1,6 +1,6 @@
 """Variables that several tasks write: one may undo what the other wrote.
 
-What a unit writes is worked out once, for whatever calls it. What is written through a pointer is not known.
+What a unit writes is computed once, for whatever calls it. What is written through a pointer is not known.
 
 SPDX-License-Identifier: Apache-2.0
 """

@@ -93,7 +93,7 @@ class VarSymbol:
 
 @dataclass(slots=True, eq=False)
 class GlobalSymbol:
-    """A global variable before anybody asked for it; `symbol` once it is declared."""
+    """A global variable before its first use; `symbol` once it is declared."""
 
     name: str
     full_name: str
@@ -190,7 +190,7 @@ class BlockInfo:
 
 @dataclass(slots=True, eq=False)
 class Member:
-    """A method, action, or the GET or SET of a property. `info` once somebody needed its signature."""
+    """A method, action, or the GET or SET of a property. `info` once its signature was needed."""
 
     decl: ast.PouDecl
     owner: ClassInfo
@@ -215,7 +215,7 @@ class Member:
 @dataclass(slots=True, eq=False)
 class ClassInfo:
     """What a FUNCTION_BLOCK, INTERFACE or PROGRAM has besides variables. `members` are its own; `names` what they see
-    of the unit around them. `number` identifies the class in its instances; 0 when none has to be told from others."""
+    of the unit around them. `number` identifies the class in its instances; 0 if that is not needed."""
 
     symbol: PouSymbol
     name: str

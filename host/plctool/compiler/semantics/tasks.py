@@ -76,7 +76,7 @@ class _Reader:
             self.task.interval_us = interval
 
     def _run_by(self, name: str, kind: TaskKind, node: ast.Expr) -> bool:
-        """A task runs by one thing; False after a diagnosis."""
+        """A task runs by one thing; False after an error."""
         if self._runs_by:
             message = f"a TASK runs by {self._runs_by} or by {name}, not by both: write another task"
             self._checker.error(node.pos, "configuration", message)
@@ -88,7 +88,7 @@ class _Reader:
         self.task.watchdog_us = self._duration(node, "WATCHDOG")
 
     def _duration(self, node: ast.Expr, name: str) -> int:
-        """In microseconds; 0 for none, and after a diagnosis."""
+        """In microseconds; 0 for none, and after an error."""
         e = self._checker.constant(node)
         if e is None:
             return 0
@@ -97,7 +97,7 @@ class _Reader:
             return 0
         duration = e.value * 1000 if e.type is TIME else e.value // 1000
         if not 0 <= duration <= MAX_DURATION_US:
-            self._checker.error(node.pos, "range", f"{name} has to lie between 0 and 35 minutes")
+            self._checker.error(node.pos, "range", f"{name} must be between 0 and 35 minutes")
             return 0
         return duration
 

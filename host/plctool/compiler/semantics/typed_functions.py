@@ -1,4 +1,4 @@
-"""Standard functions with a type behind their names: `ADD_INT(a, b)` is ADD for arguments that are INT.
+"""Standard functions with a type after their names: `ADD_INT(a, b)` is ADD for arguments that are INT.
 
 SPDX-License-Identifier: Apache-2.0
 """

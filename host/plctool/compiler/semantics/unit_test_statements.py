@@ -142,7 +142,7 @@ class TestBody:
             report_unused(self._c.scope)
 
     def _nodes(self, call: ast.Call, count: int, *, message: bool = True) -> list[ast.Expr] | None:
-        """The arguments, perhaps with a message behind them; None after a diagnosis."""
+        """The arguments, perhaps with a message after them; None after an error."""
         assert isinstance(call.callee, ast.Name)
         name = call.callee.name.upper()
         nodes = [a.value for a in call.args if a.name is None and a.value is not None]
@@ -304,7 +304,7 @@ class TestBody:
         if method is not None:
             return method
         if isinstance(nodes[0], ast.Member) and bound_member(self._c, nodes[0]) is not None:
-            message = "this is no instance; for a method write MOCK_FUNCTION instance.m RETURNS ..."
+            message = "this is not an instance; for a method write MOCK_FUNCTION instance.m RETURNS ..."
             self._c.error(nodes[0].pos, "mock", message)
             return None
         instance = self._c.expr(nodes[0])

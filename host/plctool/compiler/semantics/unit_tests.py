@@ -7,7 +7,7 @@ out:
 - The variables of a test live on the stack, those of SETUP in the data area, so all are fresh at every start. A PROGRAM
   is instantiated as a function block; a variable with an address (AT) is a plain member of it then.
 - An assert that does not hold stores its number and both values in hidden variables and returns. TEARDOWN follows in
-  any case; behind a run-time exception, which ends the program, the host runs it by a number of its own.
+  any case; after a run-time exception, which ends the program, the host runs it by a number of its own.
 - TIME() reads a hidden variable instead of the time of the cycle, and ADVANCE_TIME adds to it: so time goes on within
   one call, and optimisation knows of it.
 
@@ -78,7 +78,7 @@ class TestSuite:
         self.teardowns: dict[str, int] = {}  # by file
 
     def teardown_of(self, case: TestCase) -> int | None:
-        """The number that runs just the TEARDOWN behind a test."""
+        """The number that runs just the TEARDOWN after a test."""
         return self.teardowns.get(case.pos.file)
 
     def begin(self, program: Program) -> TestProgram:

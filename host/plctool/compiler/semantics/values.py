@@ -40,7 +40,7 @@ def whole(variable: Variable, pos: Pos) -> Place:
 
 
 def is_temporary(place: Place) -> bool:
-    """Whether a place is (part of) a value that nobody else sees."""
+    """Whether a place is (part of) a value that no other code sees."""
     while not isinstance(place, VarPlace | DerefPlace | ValuePlace | SelfPlace):
         place = place.base
     return isinstance(place, ValuePlace)

@@ -1,4 +1,4 @@
-"""Everything the check of one program shares: its names, what is declared so far, diagnoses.
+"""Everything the check of one program shares: its names, what is declared so far, diagnostics.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -63,7 +63,7 @@ class World:
         return scope
 
     def class_of(self, t: Type) -> ClassInfo | None:
-        """The class of instances of a function block type or behind an interface."""
+        """The class of instances of a function block type or of an interface."""
         if not isinstance(t, StructType):
             return None
         block = self.blocks.get(t)

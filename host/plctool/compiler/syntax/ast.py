@@ -30,7 +30,7 @@ class Literal:
 
 @dataclass(slots=True, eq=False)
 class Name:
-    """`x`, or `.x` for the global variable behind a local one of that name."""
+    """`x`, or `.x` for the global variable that a local one of that name hides."""
 
     pos: int
     name: str
@@ -158,7 +158,7 @@ class ArrayInit:
 
 @dataclass(slots=True, eq=False)
 class StructInit:
-    """`(member := value, ...)`. `arguments`: it stands behind the name of a type, `Pump(limit := 5)`, where the inputs
+    """`(member := value, ...)`. `arguments`: it follows the name of a type, `Pump(limit := 5)`, where the inputs
     of FB_Init come before members of the same name; a value without a name ("") is always one of them."""
 
     pos: int
@@ -287,7 +287,7 @@ class VarBlock:
 
 @dataclass(slots=True, eq=False)
 class TypeDecl:
-    """A type with what stands in front of it or of its TYPE."""
+    """A type with what stands before it or of its TYPE."""
 
     pos: int
     name: str
@@ -307,7 +307,7 @@ class TypeDecl:
 @dataclass(slots=True, eq=False)
 class Namespace:
     """Where a declaration stands: the dotted name of its NAMESPACE, "" for none, and what it is USING. `internal`: of
-    an INTERNAL one, the namespace around it, which may use it; "" when that is none and it has to do with itself."""
+    an INTERNAL one, the namespace around it, which may use it; "" if there is none."""
 
     name: str = ""
     using: list[tuple[int, str]] = field(default_factory=list)
@@ -387,7 +387,7 @@ class Transition:
 @dataclass(slots=True, eq=False)
 class Chart:
     """A body that is a Sequential Function Chart; its ACTIONs are members of the unit. `valid`: it has no errors.
-    `asked`: the actions, case-folded, whose A somebody reads."""
+    `asked`: the actions, case-folded, whose A is read."""
 
     steps: list[Step]
     transitions: list[Transition]
@@ -473,7 +473,7 @@ class ConfigurationDecl:
 
 @dataclass(slots=True, eq=False)
 class TestDecl:
-    """A TEST, or what its file has to do before and behind each TEST. `keyword`: TEST, SETUP or TEARDOWN. The calls in
+    """A TEST, or what its file has to do before and after each TEST. `keyword`: TEST, SETUP or TEARDOWN. The calls in
     the body may be those of unit_tests.py: ASSERT_EQ, MOCK ..."""
 
     pos: int

@@ -14,7 +14,7 @@ from difflib import get_close_matches
 from typing import Protocol
 
 Attributes = dict[int, dict[str, str]]
-"""Attributes by the offset of what they stand in front of; name in lower case -> text."""
+"""Attributes by the offset of what they stand before; name in lower case -> text."""
 
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
@@ -26,7 +26,7 @@ HEEDED: dict[str, frozenset[str]] = {
     "version": frozenset(("FUNCTION",)),
     "shared_output": frozenset(("variable",)),
 }
-"""What does something, and in front of what."""
+"""What does something, and before what."""
 
 OF_THE_LIBRARY = frozenset((
     "no_checks", "no_init", "by_reference", "cuts_result", "in_place", "alias", "extensible",
@@ -40,13 +40,13 @@ REFUSED = {
 }
 """What leaves a unit without its code where it is not heeded."""
 
-_LAYOUT = "members lie at multiples of their size, or of 8 bytes"
+_LAYOUT = "members are at multiples of their size, or of 8 bytes"
 _CALL_IT = "call it in the first cycle, or do its work in FB_Init"
 UNHEEDED = {
     "call_after_global_init_slot": _CALL_IT,
     "call_before_global_exit_slot": "write FB_Exit",
     "global_init_slot": "variables get their initial values in the order of their declarations",
-    "init_namespace": "give the text itself as the initial value",
+    "init_namespace": "give the string itself as the initial value",
     "initialize_on_call": "assign the inputs in the call",
     "is_connected": "add a BOOL input that the caller sets",
     "no-exit": "FB_Exit is called for every instance",
@@ -61,7 +61,7 @@ UNHEEDED = {
     "relative_offset": _LAYOUT,
     "subsequent": "write a STRUCT, whose members follow each other",
     "tccallafteroutputupdate": "inputs are read before the programs and outputs are written after them",
-    "tcinitonreset": "every variable but RETAIN and PERSISTENT starts anew at a reset",
+    "tcinitonreset": "every variable but RETAIN and PERSISTENT is initialised at a reset",
     "tcinitsymbol": "give the initial value in the declaration",
     "tclinkto": "write AT %I* or %Q*, and the address in VAR_CONFIG",
     "tcnodeid": "write AT %I* or %Q*, and the address in VAR_CONFIG",
@@ -128,7 +128,7 @@ def _check(name: str, place: str, offset: int, given: Mapping[str, str], reports
         where = f", not a {place}" if name in HEEDED and place else ""
         reports.error(offset, "attribute", f"{REFUSED[name]}{where}")
     elif name in HEEDED:
-        reports.warning(offset, "no-effect", _no_effect(name, f"it stands in front of {_listed(name)}"))
+        reports.warning(offset, "no-effect", _no_effect(name, f"it is written before {_listed(name)}"))
     elif name in UNHEEDED and not (name in _NO_INIT and "instance-path" in given):
         reports.warning(offset, "no-effect", _no_effect(name, UNHEEDED[name]))
     elif name in OF_THE_LIBRARY:

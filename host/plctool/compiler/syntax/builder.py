@@ -67,7 +67,7 @@ class Builder:
         self.units = Arrangement(lambda pos, code, message: self.report(pos, code, message), self.pou)
 
     def _attributes_at(self, pos: int, what: str) -> dict[str, str]:
-        """The attributes in front of a declaration."""
+        """The attributes before a declaration."""
         found = self.attributes.get(pos)
         if found is None:
             return {}
@@ -191,7 +191,7 @@ class Builder:
         return ast.Repeat(count.pos, self.number(count), _listed(values))
 
     def struct_init(self, *items: Any) -> ast.StructInit:
-        """Values without a name are further elements of the array in front of them: `(start := 3, 4, end := 5)`."""
+        """Values without a name are further elements of the array before them: `(start := 3, 4, end := 5)`."""
         members: list[tuple[int, str, ast.Init]] = []
         listed: ast.ArrayInit | None = None
         for item in _listed(items):

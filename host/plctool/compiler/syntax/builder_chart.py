@@ -14,7 +14,7 @@ QUALIFIERS = TIMED | {"N", "R", "S", "P", "P0", "P1"}
 
 
 def read_action(node: ast.Expr, report: Report) -> ast.StepAction | None:
-    """`name(qualifier, time, indicators)`, of which all but the name may be left out; None after a diagnosis."""
+    """`name(qualifier, time, indicators)`, of which all but the name may be left out; None after an error."""
     args: list[ast.Expr] = []
     target = node
     if isinstance(node, ast.Call):

@@ -12,7 +12,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.lexer import Report, Token
 
 MEMBERS = frozenset(("METHOD", "ACTION", "GET", "SET"))
-"""Keywords of PouDecls that stand in another unit, or behind it."""
+"""Keywords of PouDecls that stand in another POU, or after it."""
 
 _OWNERS = frozenset(("FUNCTION_BLOCK", "PROGRAM", "INTERFACE"))
 
@@ -35,7 +35,7 @@ class Arrangement:
         self._pou = pou
 
     def arrange(self, units: Iterable[Any]) -> list[Any]:
-        """The units of a file or namespace. A METHOD or ACTION between units belongs to the one in front of it."""
+        """The units of a file or namespace. A METHOD or ACTION between units belongs to the previous one."""
         found: list[Any] = []
         using: list[tuple[int, str]] = []
         for unit in _flat(units):
@@ -55,7 +55,7 @@ class Arrangement:
         if isinstance(owner, ast.PouDecl) and owner.keyword in _OWNERS:
             owner.members.append(member)
             return
-        message = f"the {member.keyword} {member.name} has no FUNCTION_BLOCK or PROGRAM in front of it"
+        message = f"the {member.keyword} {member.name} has no FUNCTION_BLOCK or PROGRAM before it"
         self._report(member.pos, "syntax", message)
 
     def complete(self, decl: ast.PouDecl, bases: Any, interfaces: Any, parts: Sequence[Any]) -> None:

@@ -27,7 +27,7 @@ _VARIABLE = re.compile(r"([A-Za-z_]\w*)\s*(?:AT\s*%[\w.*]+\s*)?:(?!=)")
 
 
 def names_asked_for(texts: Sequence[str], library: Callable[[], Iterable[str]]) -> frozenset[str]:
-    """What `defined(pou: NAME)` finds in the texts of a program and in the library, in capitals; nothing when nobody
+    """What `defined(pou: NAME)` finds in the sources of a program and in the library, in capitals; nothing when nothing
     asks. Branches that are left out count as well."""
     if not any(map(_ASKS.search, texts)):
         return frozenset()
@@ -76,7 +76,7 @@ class Conditions:
             holds = self.active and self._holds(rest, pos)
             self._open.append(_Branches(pos, holds, holds))
         elif not self._open or (self._open[-1].last and word != "END_IF"):
-            self._report(pos, "pragma", f"{{{word}}} without an {{IF}} in front of it")
+            self._report(pos, "pragma", f"{{{word}}} without an {{IF}} before it")
         elif word == "END_IF":
             self._open.pop()
         else:

@@ -55,7 +55,7 @@ def _typed(message: str) -> Callable[[re.Match[str]], str]:
 
 
 def _located(match: re.Match[str]) -> str:
-    return f"AT stands behind the name: {match['name']} AT {match['place']} : {match['type'].strip()};"
+    return f"AT comes after the name: {match['name']} AT {match['place']} : {match['type'].strip()};"
 
 
 _HINTS = (
@@ -64,7 +64,7 @@ _HINTS = (
     _hint(r"\bARRAY\s*\[\s*(?P<count>\d+)\s*\]", _count),
     _hint(r":=\s*(?P<here>\{(?P<values>[^{};']*)\}\s*)", _list, "here"),
     _hint(r"\b(?:IF|ELSIF|WHILE|UNTIL)\b[^;]*?(?P<here>:=)", "a comparison is written =; := assigns", "here"),
-    _hint(r"[^'\s(,=](?P<here>'(?='))", "a quote within a text is written $'", "here"),
+    _hint(r"[^'\s(,=](?P<here>'(?='))", "a quote within a string is written $'", "here"),
     _hint(r"\bFOR\s*\(.*", _LOOP),
     _hint(r"\bFOR\s+(?:EACH\s+)?\w+\s+IN\b", _LOOP),
     _hint(r"\bSWITCH\b[^;]*", _CHOICE),

@@ -85,7 +85,7 @@ OPENING = frozenset((
     "MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING", "INITIAL_STEP", "STEP",
     "TRANSITION", "PROPERTY_GET", "PROPERTY_SET", "_AT",
 ))  # fmt: skip
-"""Terminals that are names where no name (behind AT, no address) follows."""
+"""Terminals that are names where no name (after AT, no address) follows."""
 
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'\s*(?::=\s*'([^']*)'\s*)?\}", re.IGNORECASE)
 _DURATION = re.compile(r"\d+(?:ms|us|ns|s|m|h|d)", re.IGNORECASE)
@@ -116,7 +116,7 @@ class Token:
 
     @property
     def end(self) -> int:
-        """The offset behind the last character."""
+        """The offset past the last character."""
         return self.pos + len(self.text)
 
 
@@ -266,7 +266,7 @@ class Lexer:
 
 def is_followed_by_name(token: Token, text: str) -> bool:
     """Whether MOCK, METHOD ... start something, as in `MOCK pump.valve;`: another name follows, as it never does
-    behind a
+    after a
     variable of that name."""
     if token.type == "TRANSITION" and _PRIORITY.match(text, token.end):
         return True
@@ -286,7 +286,7 @@ def meant(token: Token, text: str) -> str:
 
 
 def modified(token: Token, text: str) -> tuple[str, str] | None:
-    """Keyword and name of a unit whose modifier stands in front of it, as in `PUBLIC METHOD m`."""
+    """Keyword and name of a unit whose modifier stands before it, as in `PUBLIC METHOD m`."""
     match = _MODIFIED.match(text, token.end)
     return None if match is None else (match[1].upper(), match[2])
 

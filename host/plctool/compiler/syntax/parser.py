@@ -118,7 +118,7 @@ _NAMES_ELSEWHERE = frozenset(("NULL", "CONFIGURATION"))  # variables of existing
 
 
 def _is_name_after_all(token: Token, parser: Parser, text: str) -> bool:
-    """Makes a keyword that does not fit a name, behind a point and where such a variable is declared or used."""
+    """Makes a keyword that does not fit a name, after a point and where such a variable is declared or used."""
     last = parser.values[-1] if parser.values else None
     behind_point = isinstance(last, Token) and last.type == "_DOT" and KEYWORDS.get(token.text.upper()) == token.type
     if not behind_point and (token.type not in _NAMES_ELSEWHERE or is_followed_by_name(token, text)):
@@ -129,7 +129,7 @@ def _is_name_after_all(token: Token, parser: Parser, text: str) -> bool:
 
 @dataclass
 class Parsed:
-    """A text: its declarations, the attributes in it and what is declared behind them, its other pragmas."""
+    """A text: its declarations, the attributes in it and what is declared after them, its other pragmas."""
 
     declarations: list[ast.Declaration]
     attributes: Attributes

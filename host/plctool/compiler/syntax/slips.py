@@ -44,11 +44,11 @@ NAMES = {
 """Names of other languages."""
 
 FUNCTIONS = {
-    **dict.fromkeys(("STRCMP", "EQUALS"), "texts are compared with ="),
-    "STRLEN": "write LEN", "STRCAT": "write CONCAT", "STRCPY": "texts are assigned with :=", "STRSTR": "write FIND",
+    **dict.fromkeys(("STRCMP", "EQUALS"), "strings are compared with ="),
+    "STRLEN": "write LEN", "STRCAT": "write CONCAT", "STRCPY": "strings are assigned with :=", "STRSTR": "write FIND",
     "SUBSTR": "write MID", "ATOI": "write STRING_TO_INT", "ATOF": "write STRING_TO_REAL", "POW": "write a ** b",
     "ROUND": "write REAL_TO_INT, which rounds", "MALLOC": "nothing is allocated while a program runs",
-    **dict.fromkeys(("PRINTF", "PRINT"), "a program prints nothing; write the text into a STRING and watch it"),
+    **dict.fromkeys(("PRINTF", "PRINT"), "a program prints nothing; write it into a STRING and watch it"),
     **dict.fromkeys(("SLEEP", "DELAY", "WAIT"), "a program never waits; call a TON in each cycle"),
 }  # fmt: skip
 """Functions of other languages."""
@@ -82,7 +82,7 @@ REFUSED_CALLS = {
     "__NEW": _NO_MEMORY,
     "__DELETE": _NO_MEMORY,
     "BITADR": "a bit has no address of its own here; use the variable itself, or ADR and a bit number",
-    "INDEXOF": "a unit has no number here; call it by its name",
+    "INDEXOF": "a POU has no number here; call it by its name",
     "INI": "an instance gets its initial values when the program starts; assign them one by one",
 }
 """Functions of other systems that this one has not, and why."""

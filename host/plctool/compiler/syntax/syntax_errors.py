@@ -62,7 +62,7 @@ _PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",)}
 _RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
 _BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
 _ELSE_IF = re.compile(r"\bELSE\s+IF\b", re.IGNORECASE)
-_APART = 3  # an error closer than so many tokens to the one before is a consequence of it
+_APART = 3  # an error closer than so many tokens to the previous one is a consequence of it
 
 Stack = list[int]
 
@@ -100,7 +100,7 @@ class Recovery:
         self._skip(token)
 
     def report_token(self, offset: int, code: str, message: str) -> None:
-        """Reports a fault of the text; what does not fit right behind it is a consequence."""
+        """Reports a fault of the text; what does not fit right after it is a consequence."""
         self._report(offset, code, message)
         self._accepted = 0
 
@@ -111,9 +111,9 @@ class Recovery:
         token.type, token.text = kind, right.split()[0]
 
     def report_in_front(self, token: Token, keyword: str, name: str) -> None:
-        """Reports a modifier that stands in front of the keyword of a unit, and leaves it out."""
+        """Reports a modifier that stands before the keyword of a unit, and leaves it out."""
         word = token.text.upper()
-        self._report(token.pos, "syntax", f"{word} stands behind {keyword}: {keyword} {word} {name}")
+        self._report(token.pos, "syntax", f"{word} comes after {keyword}: {keyword} {word} {name}")
         token.type = "LEFT_OUT"
 
     def refuse(self, token: Token) -> None:
@@ -144,7 +144,7 @@ class Recovery:
     # ---- repairs ----
 
     def _insert(self, token: Token) -> bool:
-        """Puts in one missing token before `token`, or before the name in front of it."""
+        """Puts in one missing token before `token`, or before the name before it."""
         stack, values = self._parser.states, self._parser.values
         if token.type == "EQ" and self._shift(stack, "_ASSIGN"):
             what = "an assignment" if self._item(stack) == "stmt" else "an initial value"
@@ -251,7 +251,7 @@ class Recovery:
             self._quiet = True
 
     def _leave_out(self, token: Token, message: str, end: str) -> None:
-        """Reports `token`, and goes on behind the word or sign `end`."""
+        """Reports `token`, and goes on after the word or sign `end`."""
         self._say(token.pos, message)
         self.skipping, self._skip_to = True, end
 
@@ -259,7 +259,7 @@ class Recovery:
         """Variables declared between statements."""
         if token.type != "VAR" or self._item(self._parser.states) != "stmt":
             return False
-        self._leave_out(token, f"{token.text} stands in front of the first statement", "END_VAR")
+        self._leave_out(token, f"{token.text} stands before the first statement", "END_VAR")
         return True
 
     def _stray_end(self, token: Token) -> bool:

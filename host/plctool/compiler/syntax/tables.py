@@ -1,7 +1,7 @@
 """The LALR(1) tables of grammar.lark. lark makes them once; after that they come from the user's cache folder.
 
 Making them takes longer than checking a small program, hence the cache. It is only a file of numbers and names:
-whatever is wrong with it, the tables are made anew.
+whatever is wrong with it, the tables are made again.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -52,7 +52,7 @@ class Tables:
 
     def after(self, stack: list[int], *kinds: str) -> list[int] | None:
         """The states after tokens of these kinds, None when one does not fit. More than a look into `actions`: that
-        may hold reductions for tokens that fit nowhere behind them."""
+        may hold reductions for tokens that fit nowhere after them."""
         stack = list(stack)
         for kind in kinds:
             while True:

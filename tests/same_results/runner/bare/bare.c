@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * There are no interrupts and no supervisor: an endless loop is broken by the time limit of the test. A fault that is
+ * There are no interrupts and no supervisor: an endless loop is aborted by the time limit of the test. A fault that is
  * not a checked error is one of the test: it ends the runner.
  */
 #include <setjmp.h>

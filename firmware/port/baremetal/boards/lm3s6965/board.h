@@ -11,7 +11,7 @@
 #define BOARD_CLOCK_HZ 50000000u
 #define BOARD_IRQ_COUNT 44u
 #define BOARD_PRIORITY_BITS 3
-#define BOARD_TASK_IRQ 9u /* PWM and quadrature encoder, which nobody uses here */
+#define BOARD_TASK_IRQ 9u /* PWM and quadrature encoder, which are not used here */
 
 enum { IRQ_UART0 = 5, IRQ_WATCHDOG = 18, IRQ_TIMER0A = 19 };
 

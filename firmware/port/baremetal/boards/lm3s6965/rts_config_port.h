@@ -1,5 +1,5 @@
 /*
- * rts_config_port.h - the LM3S6965 board: who it is. Its sizes are those of the configuration.
+ * rts_config_port.h - the LM3S6965 board: its identity. Its sizes are those of the configuration.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

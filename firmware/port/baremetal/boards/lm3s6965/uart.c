@@ -33,7 +33,7 @@ static struct {
 RTS_STATIC_ASSERT((BOARD_UART_RX_SIZE & (BOARD_UART_RX_SIZE - 1)) == 0, rx_size_is_a_power_of_two);
 RTS_STATIC_ASSERT((BOARD_UART_TX_SIZE & (BOARD_UART_TX_SIZE - 1)) == 0, tx_size_is_a_power_of_two);
 
-/* A byte that finds no room is lost; the frame's check sum tells. */
+/* A byte that finds no room is lost; the frame's check sum shows it. */
 static void receive(void)
 {
     while ((UART_FR & FR_RX_EMPTY) == 0) {

@@ -17,7 +17,7 @@
 #define WATCHDOG_INTCLR REG32(WATCHDOG + 0xC)
 #define WATCHDOG_LOCK REG32(WATCHDOG + 0xC00)
 
-/* What lies below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
+/* What is below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
 enum { MPU_BELOW_RAM = MPU_BOARD + 1, BELOW_RAM_LOG2 = 16 };
 #define RAM_BASE 0x20000000u
 RTS_STATIC_ASSERT(MPU_BELOW_RAM < 8, the_mpu_has_a_region_left);
@@ -66,7 +66,7 @@ void BoardWatchdogKick(void)
 enum { SERIAL_NUMBER_SIZE = 16 };
 static char serial_number[SERIAL_NUMBER_SIZE];
 
-/* The number the factory left behind the file area, or a default when nobody did. */
+/* The number the factory wrote after the file area, or a default when there is none. */
 static const char *read_serial_number(void)
 {
     extern const char factory_data[];

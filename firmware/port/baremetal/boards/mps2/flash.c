@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Stricter than the memory: a unit is programmed once after an erase, nothing is written past the area, and the MPU
- * keeps everybody else from writing at all, as a flash controller would.
+ * keeps all others from writing at all, as a flash controller would.
  */
 #include <string.h>
 

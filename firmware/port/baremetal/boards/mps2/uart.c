@@ -46,7 +46,7 @@ static void receive(RTS_UI32 index)
     RTS_UI8 byte = (RTS_UI8)uarts[index]->data;
     work = 1;
     if (used(&line->rx) == BOARD_UART_RX_SIZE)
-        return; /* lost; the frame's check sum tells */
+        return; /* lost; the frame's check sum shows it */
     line->rx_data[line->rx.head % BOARD_UART_RX_SIZE] = byte;
     line->rx.head++;
 }

@@ -1,5 +1,5 @@
 /*
- * rts_config_port.h - the MPS2 AN385 board (Cortex-M3): who it is. Its sizes are those of the configuration.
+ * rts_config_port.h - the MPS2 AN385 board (Cortex-M3): its identity. Its sizes are those of the configuration.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -15,7 +15,7 @@
 #define CYCLE_MAX_PHASES 0
 #define SCHED_MAX_EXTERNAL_EVENTS 0
 #define SCHED_EVENTS_IN_TIMERS 0   /* the super loop has no timers */
-#define NETSERVER_MESSAGE_SIZE 232 /* who it is, with names of 19 characters and a serial number of 24 */
+#define NETSERVER_MESSAGE_SIZE 232 /* the identity, with names of 19 characters and a serial number of 24 */
 #define COM_QUEUE_SIZE 324
 #define LOG_MAX_ENTRIES 0
 #define EXCEPT_MAX_CALLS 0

@@ -1,6 +1,6 @@
 /*
  * rts_config_size.h - sizes of the standard configuration: three tasks, retain variables, monitoring, log. No events
- * for components in C: who has some raises the two numbers.
+ * for components in C: with some, raise the two numbers.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -40,7 +40,7 @@ def _check_exit(world: World, member: Member) -> None:
     """The runtime calls it, and tells nothing but whether the instance moves."""
     parameters = [(symbol.name.casefold(), symbol.type) for symbol, _ in world.declared.member(member).parameters]
     if parameters not in ([], [("bincopycode", BOOL)]):
-        _error(world, member, f"{member.name} has bInCopyCode : BOOL as its only input, or none")
+        _error(world, member, f"{member.name} may only have the input bInCopyCode : BOOL")
 
 
 def _check_accessors(world: World, member: Member, key: str) -> None:

@@ -1,4 +1,4 @@
-"""Parts of variables that lie at a fixed address: `Main.fb.values[3]`.
+"""Parts of variables that are at a fixed address: `Main.fb.values[3]`.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -38,7 +38,7 @@ class FixedPlace:
 
 
 def fixed_place(place: Place) -> FixedPlace | None:
-    """Where a place lies; None when that is only known when it runs."""
+    """Where a place is; None when that is only known when it runs."""
     if isinstance(place, VarPlace):
         return FixedPlace(place.var) if place.var.storage is Storage.AREA else None
     if not isinstance(place, MemberPlace | IndexPlace | BitPlace):

@@ -107,7 +107,7 @@ class Functions:
     def _any_parameters(
         self, block: ast.VarBlock, line: ast.VarDecl, info: FunctionInfo, scope: Scope
     ) -> list[Parameter]:
-        """Inputs that describe their arguments; what is handed over behind all other parameters."""
+        """Inputs that describe their arguments; what is passed after all other parameters."""
         assert isinstance(line.type, ast.NamedType)
         if block.keyword != ast.Section.VAR_INPUT or line.init is not None:
             scope.error(line.pos, "type", f"{line.type.name} is for inputs here, without an initial value")

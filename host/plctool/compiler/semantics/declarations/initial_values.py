@@ -29,7 +29,7 @@ class InitialValues:
         self._world = world
 
     def initial(self, node: ast.Init, t: Type, scope: Scope) -> Initial | None:
-        """An initial value, calculated at the start when it is not constant; None after a diagnosis."""
+        """An initial value, calculated at the start when it is not constant; None after an error."""
         if isinstance(node, ast.ArrayInit):
             return self._array_initial(node, t, scope)
         if isinstance(node, ast.StructInit):
@@ -42,7 +42,7 @@ class InitialValues:
         if isinstance(e, Const):
             return ScalarInit(e.value)
         if isinstance(t, StructType) and t in self._world.blocks:
-            scope.error(node.pos, "type", f"an instance of {t} is no value; write (name := value) for its variables")
+            scope.error(node.pos, "type", f"an instance of {t} is not a value; write (name := value) for its variables")
             return None
         if isinstance(e, Load) and isinstance(e.place, VarPlace) and e.place.var.constant:
             return e.place.var.initial or (ArrayInit([]) if isinstance(t, ArrayType) else StructInit({}))

@@ -1,8 +1,8 @@
 """VAR_CONFIG and VAR_ACCESS: what is said from outside about variables of programs and of the instances in them.
 
-A variable of a program, or a global one, with `AT %I*` lies at the address that VAR_CONFIG gives. One of a function
-block lies in the instance like any other; the task copies it from its address before the programs, or to its address
-behind them. Without an entry it is plain memory.
+A variable of a program, or a global one, with `AT %I*` is at the address that VAR_CONFIG gives. One of a function
+block is in the instance like any other; the task copies it from its address before the programs, or to its address
+after them. Without an entry it is plain memory.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -60,7 +60,7 @@ class Entry:
 
 @dataclass
 class _Copy:
-    """`place`, part of an instance in the variable `root`, and what lies at its address."""
+    """`place`, part of an instance in the variable `root`, and what is at its address."""
 
     root: Variable
     place: Place
@@ -72,7 +72,7 @@ class _Copy:
         return None if self.area is Area.OUTPUT else Assign(self.place, load(self.outside), self.place.pos)
 
     def outwards(self) -> Assign | None:
-        """What is done behind them."""
+        """What is done after them."""
         return None if self.area is Area.INPUT else Assign(self.outside, load(self.place), self.place.pos)
 
 
@@ -111,7 +111,7 @@ class InstanceConfig:
 
     @cached_property
     def _places(self) -> set[str]:
-        """The names in front of a path that lead to no variable."""
+        """The names before a path that lead to no variable."""
         names = self._world.names
         prefixes = {name.casefold() for decl in names.configurations for name in (decl.name, *decl.resources)}
         return prefixes - names.planned.keys()
@@ -269,7 +269,7 @@ class InstanceConfig:
     # ---- both ----
 
     def _find(self, path: ast.Expr, spec: ast.TypeSpec, scope: Scope, use: str) -> tuple[Place, FixedPlace] | None:
-        """The variable of a path, which has to be of the type given; None after a diagnosis."""
+        """The variable of a path, which has to be of the type given; None after an error."""
         wanted, _ = self._types.type_of(spec, scope)
         place = named_place(Checker(self._world, scope), path, use)
         if place is None or wanted is ERROR:

@@ -1,6 +1,6 @@
 """Instances of PROGRAMs: those that a CONFIGURATION names, and one by its own name of every other PROGRAM.
 
-The instance is declared when a task or a name needs it first, as everything else is. A PROGRAM that nobody needs is
+The instance is declared when a task or a name needs it first, as everything else is. A PROGRAM that is not needed is
 checked with variables that go nowhere.
 
 SPDX-License-Identifier: Apache-2.0
@@ -75,7 +75,7 @@ class Programs:
         return {space.name: space.program.pou for space in self._declared.values() if space.program is not None}
 
     def declare_others(self) -> bool:
-        """Queues the PROGRAMs nobody needs for checking; whether there are any."""
+        """Queues the PROGRAMs that are not needed for checking; whether there are any."""
         others = [s for s in self._world.names.program_symbols() if s not in self._checked]
         for symbol in others:
             self._declare(PlannedInstance(symbol.decl.full_name, symbol), Allocation())
@@ -83,7 +83,7 @@ class Programs:
         return bool(others)
 
     def report_unused(self) -> None:
-        """Warns of the programs that nobody runs."""
+        """Warns of programs that are never run."""
         names = self._world.names
         for symbol in names.program_symbols():
             if not any(name.casefold() in self._declared for name in names.instances_of(symbol)):

@@ -76,7 +76,7 @@ class TypeDeclarations:
         self, decl: ast.VarDecl, scope: Scope, may: May = May.BE_PLAIN, *, overrides: bool = False
     ) -> tuple[Type, Initial | None]:
         """Type and initial value of a declaration line; None for all zero, unless it says 0 where memory may hold
-        something else: it lies at an address, or `overrides` another initial value."""
+        something else: it is at an address, or `overrides` another initial value."""
         try:
             return self._declared_type(decl, scope, may, overrides=overrides)
         except Exception as error:
@@ -104,7 +104,7 @@ class TypeDeclarations:
         return t, overlay(given, default)
 
     def _with_arguments(self, decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
-        """Type and initial value with what stands in brackets behind the type of an array: `F[(1), (2)]`."""
+        """Type and initial value with what is written in brackets after the type of an array: `F[(1), (2)]`."""
         spec, init = decl.type, decl.init
         given: ast.Init | None = None
         if isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
@@ -161,7 +161,7 @@ class TypeDeclarations:
         return self._struct(spec, scope, name)
 
     def named_type(self, offset: int, name: str, scope: Scope) -> Type:
-        """The type of that name; ERROR after a diagnosis when there is none."""
+        """The type of that name; ERROR after an error, if there is none."""
         return self._named(ast.NamedType(offset, name), scope)[0]
 
     def _named(self, spec: ast.NamedType, scope: Scope) -> tuple[Type, Initial | None]:
@@ -334,7 +334,7 @@ class TypeDeclarations:
         elif isinstance(base, Elementary) and base.kind in (Kind.INT, Kind.BIT):
             limits, number = constants.limits(base), base
         if limits is None:
-            scope.error(spec.pos, "type", f"a subrange is one of an integer type, not of {base}")
+            scope.error(spec.pos, "type", f"a subrange needs an integer base type, not {base}")
             return ERROR, None
         if not limits[0] <= low <= high <= limits[1]:
             scope.error(spec.low.pos, "range", f"{low}..{high} is not a range of {base}")
@@ -421,7 +421,7 @@ class TypeDeclarations:
 
 
 def _of_instance(item: ast.Init | ast.Repeat) -> ast.Init | ast.Repeat:
-    """`(1)` behind the type of an array of instances: the input of one FB_Init."""
+    """`(1)` after the type of an array of instances: the input of one FB_Init."""
     if isinstance(item, ast.StructInit):
         return replace(item, arguments=True)
     if isinstance(item, ast.ArrayInit | ast.Repeat):

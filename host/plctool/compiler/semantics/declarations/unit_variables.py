@@ -46,7 +46,7 @@ def _holds_constants(block: ast.VarBlock) -> bool:
 
 
 def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.VarDecl, Role]]:
-    """Declarations of constants, each behind those that it uses. What uses itself stays where it is."""
+    """Declarations of constants, each after those that it uses. What uses itself stays where it is."""
     ordered: list[tuple[ast.VarDecl, Role]] = []
     pending = list(lines)
     while pending:
@@ -178,7 +178,7 @@ class UnitVariables:
                 symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword])
                 if is_instance(self._world, t):
                     require_instances(self._world, t, scope, offset)
-                    message = f"the instance {name} starts anew at every call; {_KEEPING[pou.kind]} would keep it"
+                    message = f"the instance {name} is initialised at every call; {_KEEPING[pou.kind]} would keep it"
                     scope.warning(offset, "lifetime", message)
                 if t is not ERROR:
                     symbol.variable = Variable(name, t, Storage.LOCAL, symbol.pos, initial=init)

@@ -54,7 +54,7 @@ class Variables:
         self._world = world
         self._types = types
         self._config = config
-        self._calculated: set[Variable] = set()  # constants whose value is worked out when the application starts
+        self._calculated: set[Variable] = set()  # constants whose value is computed when the application starts
 
     def _is_calculated(self, e: Expr) -> bool:
         """Whether a value is made of constants by functions of the library alone, as LOG(2.0) is."""
@@ -143,7 +143,7 @@ class Variables:
         return result
 
     def address(self, location: ast.DirectAddress | None, t: Type, pos: Pos, *names: str) -> ast.DirectAddress | None:
-        """Where a variable with these names lies: for `AT %I*` VAR_CONFIG says it. None: it has no address."""
+        """Where a variable with these names is: for `AT %I*` VAR_CONFIG says it. None: it has no address."""
         if location is None or not is_open(location):
             return location
         return self._config.location(location.text[1], t, pos, *names)

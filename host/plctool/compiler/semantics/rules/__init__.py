@@ -1,7 +1,7 @@
 """The rules of expressions and statements: one function for each kind of node, and what they share.
 
 A rule has the parts of its node checked by the `Checker` it gets, so the modules import each other in one direction
-only. All of them are imported here, so that whoever needs one of them has all.
+only. All of them are imported here, so that a user of one of them has all.
 
 SPDX-License-Identifier: Apache-2.0
 """

@@ -94,7 +94,7 @@ def named_function(c: Checker, callee: ast.Expr) -> PouSymbol | None:
 
 
 def plain_arguments(c: Checker, node: ast.Call, declared: Container[str] = ()) -> list[ast.Argument] | None:
-    """The arguments of a call that is part of an expression; None after a diagnosis. `EN := TRUE` says nothing."""
+    """The arguments of a call that is part of an expression; None after an error. `EN := TRUE` says nothing."""
     args, enable = split_enable(node, declared)
     if enable.eno is None and (enable.en is None or _is_true(enable.en)):
         return args
@@ -109,7 +109,7 @@ def _is_true(node: ast.Expr) -> bool:
 def bind(
     c: Checker, args: list[ast.Argument], names: list[tuple[str, Direction]], what: str, offset: int
 ) -> dict[int, ast.Argument] | None:
-    """Arguments by index of their parameter, without the empty ones (`PT := `); None after a diagnosis."""
+    """Arguments by index of their parameter, without the empty ones (`PT := `); None after an error."""
     if c.scope.is_incomplete(what):
         return None
     if not args:
@@ -196,7 +196,7 @@ def typed_call(
 
 
 def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tuple[Expr, list[Expr]] | None:
-    """What is handed over for a parameter of type ANY_...: a variable, or a value for the time of the call."""
+    """What is passed for a parameter of type ANY_...: a variable, or a value for the time of the call."""
     if isinstance(actual, ast.Argument):
         offset = actual.pos
         e = None if actual.value is None else settle(c.expr(actual.value))
@@ -234,7 +234,7 @@ def _default_value(c: Checker, symbol: VarSymbol, parameter: Parameter, offset: 
 def _actual_argument(
     c: Checker, actual: Actual, symbol: VarSymbol, direction: Direction, parameter: Parameter
 ) -> Expr | Place | None:
-    """One argument as its parameter needs it; None after a diagnosis."""
+    """One argument as its parameter needs it; None after an error."""
     t = symbol.type
     if isinstance(actual, ast.Argument):
         if actual.value is None:
@@ -280,7 +280,7 @@ def refer(place: Place, t: ReferenceType) -> Expr:
 def referenced_place(
     c: Checker, node: ast.Expr, t: Type, name: str, *, output: bool, constant: bool = False
 ) -> Place | None:
-    """A variable handed over by reference; a value will do when it is `constant`. Strings may have any length."""
+    """A variable passed by reference; a value will do when it is `constant`. Strings may have any length."""
     what = "the output" if output else "the VAR_IN_OUT"
     if constant:
         e = c.expr(node, t)

@@ -40,7 +40,7 @@ from plctool.iec.types import BOOL, StringType, StructType
 
 @dataclass
 class _Arguments:
-    """What a call of a function block hands over."""
+    """What a call of a function block passes."""
 
     inputs: list[tuple[Variable, Expr]] = field(default_factory=list)
     in_outs: list[tuple[Variable, Place]] = field(default_factory=list)
@@ -49,7 +49,7 @@ class _Arguments:
 
 
 def program_call(c: Checker, call: ast.Call, program: ProgramInfo) -> list[Statement]:
-    """`Prog(in := e, out => p)`: the inputs are assigned before, the outputs behind."""
+    """`Prog(in := e, out => p)`: the inputs are assigned before, the outputs after."""
     pos = c.pos(call.pos)
     handed = program_arguments(c, call.args, program, call.pos)
     if handed is None:
@@ -62,7 +62,7 @@ def program_call(c: Checker, call: ast.Call, program: ProgramInfo) -> list[State
 def program_arguments(
     c: Checker, args: list[ast.Argument], program: ProgramInfo, offset: int
 ) -> tuple[list[Statement], list[Statement]] | None:
-    """The assignments before and behind a call; None after a diagnosis."""
+    """The assignments before and after a call; None after an error."""
     names = [(symbol.name, direction) for symbol, direction in program.parameters]
     bound = bind(c, args, names, program.name, offset)
     if bound is None:

@@ -1,4 +1,4 @@
-"""Bodies: statements behind each other, and which of them are never reached.
+"""Bodies: statements in sequence, and which of them are never reached.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -46,7 +46,7 @@ def report_unreachable(c: Checker, offset: int, why: str = "") -> None:
 
 
 def report_unused(scope: Scope) -> None:
-    """Warns of variables nobody uses, and of results nobody assigns."""
+    """Warns of variables that are not used, and of results that are not assigned."""
     for symbol in scope.names.values():
         if not isinstance(symbol, VarSymbol) or symbol.used or symbol.name.startswith("%"):
             continue
@@ -58,7 +58,7 @@ def report_unused(scope: Scope) -> None:
 
 
 def _ends(statements: list[Statement]) -> bool:
-    """Whether what stands behind some statements is never reached."""
+    """Whether what follows some statements is never reached."""
     if not statements:
         return False
     last = statements[-1]

@@ -19,7 +19,7 @@ from plctool.iec.types import StructType
 
 def action_flag(c: Checker, node: ast.Member) -> Expr | None:
     """`action.Q` and `action.A` of a Sequential Function Chart, also from outside: whether the action is active,
-    and whether it runs, which it does once more behind that."""
+    and whether it runs, which it does once more after that."""
     if node.name.upper() not in ("Q", "A"):
         return None
     bound = bound_member(c, node.base)

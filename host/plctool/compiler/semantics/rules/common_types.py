@@ -60,7 +60,7 @@ def _literal_for(c: Checker, e: Expr, other: Type, expected: Type | None) -> Exp
 
 
 def common_of(c: Checker, values: list[Expr], name: str, offset: int, expected: Type | None) -> Type:
-    """The type all arguments of `name` are brought to; ERROR after a diagnosis."""
+    """The type all arguments of `name` are brought to; ERROR after an error."""
     characters = [v.type for v in values if v.type in (CHAR, WCHAR)]
     if characters:  # beside them, a text constant of one character is one
         values = [character(v, characters[0]) or v for v in values]

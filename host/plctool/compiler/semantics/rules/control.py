@@ -80,7 +80,7 @@ def if_statement(c: Checker, node: ast.If) -> list[Statement]:
             report_unreachable(c, body[0].pos, ": the condition is always FALSE")
         elif always:
             for skipped in filter(None, bodies[number + 1 :]):
-                report_unreachable(c, skipped[0].pos, ": a condition before is always TRUE")
+                report_unreachable(c, skipped[0].pos, ": a previous condition is always TRUE")
             break
     return [If(branches, check_body(c, node.otherwise), c.pos(node.pos))]
 
@@ -161,7 +161,7 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
         c.error(node.var.pos, "type", f"a FOR loop counts with an integer, not with {place.type}")
         place = None
     elif place is not None and isinstance(place.type, EnumType):
-        c.warning(node.var.pos, "enum", f"the loop takes {place.type} for a number, beyond its last value")
+        c.warning(node.var.pos, "enum", f"the loop counts {place.type} as a number, past its last value")
     target = t if place is not None and t is not None else ERROR
     pos = c.pos(node.pos)
     start, stop = c.value(node.start, target), c.value(node.stop, target)
@@ -177,15 +177,15 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
 
 
 def _report_changes(c: Checker, node: ast.For, limits: Expr | list[Expr], body: list[Statement]) -> None:
-    """Warns of a body that changes what end or step were worked out from: other systems look at it in each turn."""
+    """Warns of a body that changes what end or step were computed from: other systems look at it in each turn."""
     read = {place.var for place in walk(limits) if isinstance(place, VarPlace) and is_scalar(place.type)}
     written = {root_of(place) for part in walk(body) for place in written_places(part)} if read else set()
     changed = sorted(variable.name for variable in read & written if variable is not None)
     if changed:
         message = (
-            f"{changed[0].rpartition('.')[2]} changes in this loop, but end and step are worked out once, at its start"
+            f"{changed[0].rpartition('.')[2]} changes in this loop, but end and step are computed once, at its start"
         )
-        c.warning(node.pos, "for-bound", f"{message}; write WHILE if the new value shall count")
+        c.warning(node.pos, "for-bound", f"{message}; write WHILE to use the new value")
 
 
 def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:

@@ -58,7 +58,7 @@ def conversion(c: Checker, name: str, node: ast.Call, expected: Type | None) -> 
 
 
 def _operand(c: Checker, name: str, node: ast.Call, wanted: Type | None = None) -> Expr:
-    """The one argument, IN, as a value of `wanted`; the error value after a diagnosis."""
+    """The one argument, IN, as a value of `wanted`; the error value after an error."""
     if len(node.args) != 1:
         return c.error(node.pos, "arguments", f"{name} takes 1 argument, not {len(node.args)}")
     argument = node.args[0]

@@ -1,4 +1,4 @@
-"""The names of enumeration values as texts: what TO_STRING gives of an enumeration with {attribute 'to_string'}.
+"""The names of enumeration values as strings: what TO_STRING gives of an enumeration with {attribute 'to_string'}.
 
 SPDX-License-Identifier: Apache-2.0
 """

@@ -16,7 +16,7 @@ from plctool.iec.types import BOOL, InterfaceType, PointerType, ReferenceType, S
 
 _INTERFACE, _POINTER = "an interface", "a pointer to a function block"
 QUERIES = {"__QUERYINTERFACE": _INTERFACE, "__QUERYPOINTER": _POINTER}
-"""The functions, and what each needs to be told."""
+"""The functions, and what each needs to know."""
 
 
 def query(c: Checker, node: ast.Call) -> Expr:
@@ -35,7 +35,7 @@ def query(c: Checker, node: ast.Call) -> Expr:
 
 
 def attempt(c: Checker, node: ast.Assign) -> list[Statement]:
-    """`target ?= source`: the target holds the instance behind the source if it may, and else NULL."""
+    """`target ?= source`: the target holds the instance of the source if it may, and else NULL."""
     pos = c.pos(node.pos)
     target = changeable_place(c, node.targets[0], "the left side of ?=", "take an address")
     reference = target.pointer if isinstance(target, DerefPlace) else None

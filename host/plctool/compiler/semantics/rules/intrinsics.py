@@ -100,7 +100,7 @@ def _mux_index(key: str) -> int | None:
 
 
 def _choose(c: Checker, intrinsic: Intrinsic, selector: Expr, f: Applied) -> Expr:
-    """One of the arguments behind the selector."""
+    """One of the arguments after the selector."""
     values = f.args[1:]
     t = common_of(c, values, f.name, f.node.pos, f.expected)
     if t is ERROR or selector.type is ERROR:

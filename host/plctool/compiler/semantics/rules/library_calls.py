@@ -1,4 +1,4 @@
-"""Calls of library functions: of those for texts, of generic ones, of overloaded ones.
+"""Calls of library functions: of those for strings, of generic ones, of overloaded ones.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -119,7 +119,7 @@ def call_text_function(c: Checker, symbol: PouSymbol, node: ast.Call) -> Expr:
 
 
 def _argument_values(c: Checker, node: ast.Call, expected: Type | None) -> list[Expr] | None:
-    """The arguments as values, in the order they are written in; None after a diagnosis."""
+    """The arguments as values, in the order they are written in; None after an error."""
     values: list[Expr] = []
     for argument in node.args:
         if argument.value is None:
@@ -215,7 +215,7 @@ def _instantiate(
 def _group_type(
     c: Checker, members: list[Expr], group: str, name: str, offset: int, expected: Type | None
 ) -> Type | None:
-    """The common type of arguments, which has to belong to the group; None after a diagnosis."""
+    """The common type of arguments, which has to belong to the group; None after an error."""
     wanted = expected if expected is not None and accepts(group, expected) else None
     result = common_of(c, members, name, offset, wanted)
     if result is ERROR:

@@ -121,7 +121,7 @@ def _dotted_type(c: Checker, node: ast.Member) -> bool:
 
 
 def usable(c: Checker, bound: Bound, member: Member | None, offset: int) -> Member | None:
-    """The member of those that `bound` may be, if it exists and may be used here; None after a diagnosis."""
+    """The member of those that `bound` may be, if it exists and may be used here; None after an error."""
     if member is not None:
         return member if accessible(c, member, offset) else None
     if c.scope.inherits_unknown(bound.cls):

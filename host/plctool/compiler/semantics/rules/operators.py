@@ -124,7 +124,7 @@ def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expe
         if t is not None and op is BinaryOp.MOD and t.kind is Kind.REAL:
             t = None
     if t is None and op is BinaryOp.ADD and (isinstance(left.type, StringType) or isinstance(right.type, StringType)):
-        return c.error(offset, "type", "texts are joined by CONCAT(a, b), not by +")
+        return c.error(offset, "type", "strings are joined by CONCAT(a, b), not by +")
     if t is None:
         return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
     if t in _UNTYPED:

@@ -119,7 +119,7 @@ def _bit_number(c: Checker, node: ast.Member, t: Elementary) -> ast.BitAccess | 
         symbol = c.world.declared.variable(symbol)
     constant = symbol.value if isinstance(symbol, VarSymbol) else None
     if constant is None or not isinstance(constant.value, int):
-        c.error(node.name_pos, "type", f"{t} has no members, and {node.name} is no constant that counts its bits")
+        c.error(node.name_pos, "type", f"{t} has no members, and {node.name} is not a constant bit number")
         return None
     c.expr(ast.Name(node.name_pos, node.name))  # it is used
     return ast.BitAccess(node.pos, node.base, "X", constant.value, node.name_pos)
@@ -155,7 +155,7 @@ def _part(c: Checker, base: Expr, t: Elementary, node: ast.BitAccess) -> Expr:
 
 @checks(ast.Index)
 def indexed(c: Checker, node: ast.Index, expected: Type | None) -> Expr:
-    """`base[i, j]`: an element of an array, a character of a text, what lies behind a pointer."""
+    """`base[i, j]`: an element of an array, a character of a string, what a pointer leads to."""
     base = c.expr(node.base)
     indices = node.indices
     while indices and base.type is not ERROR:
@@ -192,7 +192,7 @@ def _element(c: Checker, base: Expr, t: ArrayType, nodes: list[ast.Expr], offset
 
 
 def _pointed(c: Checker, pointer: Expr, node: ast.Expr) -> Expr:
-    """`pointer[n]`: the n-th value behind the one it points to."""
+    """`pointer[n]`: the n-th value after the one it points to."""
     index = _subscript(c, node)
     if index.type is ERROR:
         return index

@@ -21,7 +21,7 @@ from plctool.compiler.semantics.values import load, whole
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Pos, VarPlace
 
-_LONGEST = 16  # parts of a name behind its first; more are members of members
+_LONGEST = 16  # parts of a name after its first; more are members of members
 
 
 def variable_value(symbol: VarSymbol, pos: Pos) -> Expr:

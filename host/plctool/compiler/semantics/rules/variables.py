@@ -107,7 +107,7 @@ def _own_name(c: Checker, node: ast.Name, symbol: object) -> Expr | None:
 
 
 def _own_instance(c: Checker, node: ast.Name) -> SelfPlace | None:
-    """The instance THIS or SUPER stands for; None after a diagnosis."""
+    """The instance THIS or SUPER stands for; None after an error."""
     cls, name = c.scope.cls, node.name.upper()
     if cls is None or cls.type is None:
         c.error(node.pos, "name", f"{name} stands for the instance, which only a function block has")
