@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from plctool.compiler.codegen.lower_frame import STATEMENTS
-from plctool.compiler.semantics.checker import STATEMENT_RULES
+from plctool.compiler.codegen.lower_frame import STATEMENTS, VALUES
+from plctool.compiler.semantics.checker import EXPRESSION_RULES, STATEMENT_RULES
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Assign
+from plctool.compiler.typed import Assign, Binary
 
 PROGRAM = """PROGRAM Main
 VAR
@@ -74,6 +74,37 @@ def test_bug_in_the_lowering_names_the_place_in_the_program(tool: Any, monkeypat
     monkeypatch.setitem(STATEMENTS, Assign, broken)
     done = tool("build", "main.st")
     assert (done.status, done.out) == (1, "")
+    assert done.err.startswith("plctool: Internal error at main.st:6 (AssertionError); please report")
+
+
+def fails(*args: object, **named: object) -> object:
+    raise AssertionError
+
+
+@pytest.mark.parametrize(
+    ("command", "broken", "line"),
+    [
+        ("check", "plctool.compiler.semantics.declarations.type_declarations.TypeDeclarations.type_of", 3),
+        ("check", "plctool.compiler.semantics.program.statements_of", 1),
+        ("build", "plctool.compiler.codegen.lower.write_body", 1),
+    ],
+)
+def test_bug_outside_of_statements_names_the_place_too(
+    tool: Any, monkeypatch: pytest.MonkeyPatch, command: str, broken: str, line: int
+) -> None:
+    monkeypatch.setattr(broken, fails)
+    done = tool(command, "main.st")
+    assert (done.status, done.out) == (1, "")
+    assert done.err.startswith(f"plctool: Internal error at main.st:{line} (AssertionError); please report")
+
+
+@pytest.mark.parametrize("command", ["check", "build"])
+def test_bug_in_an_expression_names_its_own_line(tool: Any, monkeypatch: pytest.MonkeyPatch, command: str) -> None:
+    rules = EXPRESSION_RULES if command == "check" else VALUES
+    kind = ast.Binary if command == "check" else Binary
+    monkeypatch.setitem(rules, kind, fails)  # type: ignore[arg-type]
+    Path("main.st").write_text("PROGRAM Main\nVAR\n  a : INT;\nEND_VAR\na := 1\n  + a\n;\nEND_PROGRAM\n")
+    done = tool(command, "main.st")
     assert done.err.startswith("plctool: Internal error at main.st:6 (AssertionError); please report")
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import ClassVar
 
 from plctool.iec.areas import Area
 from plctool.iec.types import Keep, StructType, Type
@@ -103,18 +104,28 @@ def overlay(given: Initial, default: Initial | None) -> Initial:
     return given
 
 
+# ---- nodes of a body ------------------------------------------------------------------------------------------------
+
+
+class Node:
+    """A place, an expression or a statement. `children`: the fields that hold nodes, or lists and tuples with nodes."""
+
+    children: ClassVar[tuple[str, ...]] = ()
+
+
 # ---- places: what can stand left of := ----------------------------------------------------------------------------
 
 
 @dataclass
-class VarPlace:
+class VarPlace(Node):
     var: Variable
     type: Type
     pos: Pos
 
 
 @dataclass
-class MemberPlace:
+class MemberPlace(Node):
+    children: ClassVar = ("base",)
     base: Place
     offset: int
     type: Type
@@ -122,10 +133,11 @@ class MemberPlace:
 
 
 @dataclass
-class IndexPlace:
+class IndexPlace(Node):
     """`base` is an array; one index per dimension, each any integer type. Or a STRING with one 0-based index (type
     BYTE, of a WSTRING WORD). `limits`: of an ARRAY[*], the bounds of each dimension (DINT)."""
 
+    children: ClassVar = ("base", "indices", "limits")
     base: Place
     indices: list[Expr]
     type: Type
@@ -134,18 +146,20 @@ class IndexPlace:
 
 
 @dataclass
-class DerefPlace:
+class DerefPlace(Node):
     """`pointer^`; NULL raises ACCESS_VIOLATION when checks are on."""
 
+    children: ClassVar = ("pointer",)
     pointer: Expr
     type: Type
     pos: Pos
 
 
 @dataclass
-class BitPlace:
+class BitPlace(Node):
     """`base.bit` of a bit string or integer; type BOOL."""
 
+    children: ClassVar = ("base",)
     base: Place
     bit: int
     type: Type
@@ -153,16 +167,17 @@ class BitPlace:
 
 
 @dataclass
-class ValuePlace:
+class ValuePlace(Node):
     """A value that has to be passed by reference (a literal or a result): materialised in a temporary on the stack."""
 
+    children: ClassVar = ("value",)
     value: Expr
     type: Type
     pos: Pos
 
 
 @dataclass
-class SelfPlace:
+class SelfPlace(Node):
     """The instance a method or function block body runs on: THIS^. `exact`: SUPER^, which calls what its own type
     declares."""
 
@@ -178,7 +193,7 @@ Place = VarPlace | MemberPlace | IndexPlace | DerefPlace | BitPlace | ValuePlace
 
 
 @dataclass
-class Const:
+class Const(Node):
     """int for integers, bits, TIME, enums; bool as 0/1; float for reals; str for STRING (latin-1 characters)."""
 
     value: int | float | str
@@ -187,7 +202,8 @@ class Const:
 
 
 @dataclass
-class Load:
+class Load(Node):
+    children: ClassVar = ("place",)
     place: Place
     type: Type
     pos: Pos
@@ -199,7 +215,8 @@ class UnaryOp(Enum):
 
 
 @dataclass
-class Unary:
+class Unary(Node):
+    children: ClassVar = ("operand",)
     op: UnaryOp
     operand: Expr
     type: Type
@@ -226,13 +243,14 @@ class BinaryOp(Enum):
 
 
 @dataclass
-class Binary:
+class Binary(Node):
     """Both operands have the same base type; for comparisons `type` is BOOL. Strings may only be compared.
 
     Integers wrap. DIV and MOD by zero raise DIVIDEBYZERO for integers; MIN / -1 wraps, MIN MOD -1 is 0. MOD takes the
     sign of the dividend.
     """
 
+    children: ClassVar = ("left", "right")
     op: BinaryOp
     left: Expr
     right: Expr
@@ -241,7 +259,7 @@ class Binary:
 
 
 @dataclass
-class Convert:
+class Convert(Node):
     """A value conversion between scalars.
 
     integer/bit/time/enum -> integer/bit/time/enum: sign- or zero-extend by the source, truncate to the target; anything
@@ -249,6 +267,7 @@ class Convert:
     real: nearest. `check` carries the subrange limits to test first.
     """
 
+    children: ClassVar = ("operand",)
     operand: Expr
     type: Type
     pos: Pos
@@ -276,7 +295,8 @@ class Intrinsic(Enum):
 
 
 @dataclass
-class IntrinsicCall:
+class IntrinsicCall(Node):
+    children: ClassVar = ("args",)
     intrinsic: Intrinsic
     args: list[Expr]
     type: Type
@@ -284,9 +304,10 @@ class IntrinsicCall:
 
 
 @dataclass
-class AddressOf:
+class AddressOf(Node):
     """ADR(x) / REF(x)."""
 
+    children: ClassVar = ("place",)
     place: Place
     type: Type
     pos: Pos
@@ -302,13 +323,14 @@ class Dispatch:
 
 
 @dataclass
-class Call:
+class Call(Node):
     """A call of a FUNCTION (or an EXTERNAL one), or of a method of `instance`. `args` in order of
     `function.parameters`: an expression for VAR_INPUT,
     a place for VAR_IN_OUT, a place or None for VAR_OUTPUT. The result is `type`; strings and structs come back in a
     temporary.
     """
 
+    children: ClassVar = ("args", "instance")
     function: Pou
     args: list[Expr | Place | None]
     type: Type
@@ -324,25 +346,28 @@ Expr = Const | Load | Unary | Binary | Convert | IntrinsicCall | AddressOf | Cal
 
 
 @dataclass
-class Assign:
+class Assign(Node):
     """Same type on both sides, except strings, which are cut to the target's length. Arrays and structs are copied."""
 
+    children: ClassVar = ("target", "value")
     target: Place
     value: Expr
     pos: Pos
 
 
 @dataclass
-class CallStatement:
+class CallStatement(Node):
+    children: ClassVar = ("call",)
     call: Call
     pos: Pos
 
 
 @dataclass
-class FbCall:
+class FbCall(Node):
     """`instance(in := e, out => p)`: inputs are assigned, VAR_IN_OUT pointers stored, the body called, outputs
     copied."""
 
+    children: ClassVar = ("instance", "inputs", "in_outs", "outputs")
     block: Pou
     instance: Place
     inputs: list[tuple[Variable, Expr]]
@@ -353,16 +378,18 @@ class FbCall:
 
 
 @dataclass
-class If:
+class If(Node):
+    children: ClassVar = ("branches", "otherwise")
     branches: list[tuple[Expr, list[Statement]]]
     otherwise: list[Statement]
     pos: Pos
 
 
 @dataclass
-class Case:
+class Case(Node):
     """Labels are inclusive ranges (low, high) in the selector's type; they do not overlap."""
 
+    children: ClassVar = ("selector", "branches", "otherwise")
     selector: Expr
     branches: list[tuple[list[tuple[int, int]], list[Statement]]]
     otherwise: list[Statement]
@@ -370,11 +397,12 @@ class Case:
 
 
 @dataclass
-class For:
+class For(Node):
     """`stop` and `step` are evaluated once. The loop ends without wrapping, also at the limits of the type; `FOR i := 5
     TO 5` runs once. A step of 0 raises DIVIDEBYZERO when it is not a constant (a constant 0 is a compile error).
     `step` is signed when it leads downwards, whatever the type of `var`."""
 
+    children: ClassVar = ("var", "start", "stop", "step", "body")
     var: Place
     start: Expr
     stop: Expr
@@ -384,31 +412,33 @@ class For:
 
 
 @dataclass
-class While:
+class While(Node):
+    children: ClassVar = ("condition", "body")
     condition: Expr
     body: list[Statement]
     pos: Pos
 
 
 @dataclass
-class Repeat:
+class Repeat(Node):
+    children: ClassVar = ("body", "until")
     body: list[Statement]
     until: Expr
     pos: Pos
 
 
 @dataclass
-class Exit:
+class Exit(Node):
     pos: Pos
 
 
 @dataclass
-class Continue:
+class Continue(Node):
     pos: Pos
 
 
 @dataclass
-class Return:
+class Return(Node):
     pos: Pos
 
 

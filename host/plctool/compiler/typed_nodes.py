@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import fields
-from typing import get_args
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import TypeVar
 
 from plctool.compiler.typed import (
     AddressOf,
@@ -15,36 +15,53 @@ from plctool.compiler.typed import (
     DerefPlace,
     Direction,
     Exit,
-    Expr,
     FbCall,
     For,
+    Node,
     Place,
     Pou,
     SelfPlace,
-    Statement,
     Storage,
     ValuePlace,
     Variable,
     VarPlace,
 )
 
-_NODES = set(get_args(Place) + get_args(Expr) + get_args(Statement)) - {Const, Exit, Continue}  # without the smallest
-_LEAVES = frozenset(("type", "pos", "op", "offset", "bit", "intrinsic", "truncate", "check", "dispatch", "function"))
-_PARTS = {node: tuple(f.name for f in fields(node) if f.name not in _LEAVES) for node in _NODES}  # what may hold nodes
+T = TypeVar("T")
+_WALKED = frozenset(Node.__subclasses__()) - {Const, Exit, Continue}  # without those no question is about
 
 
-def walk(root: object) -> Iterator[object]:
-    """Every node of statements or expressions below `root` (a node, or lists and tuples of them)."""
+def walk(root: object) -> Iterator[Node]:
+    """Every node of statements or expressions below `root` (a node, or lists and tuples of them), but constants, EXIT
+    and CONTINUE."""
     stack = [root]
     while stack:
         node = stack.pop()
         kind = type(node)
         if kind is list or kind is tuple:
             stack.extend(node)  # type: ignore[arg-type]
-        elif kind in _PARTS:
+        elif kind in _WALKED:
+            assert isinstance(node, Node)
             yield node
-            for name in _PARTS[kind]:
+            for name in node.children:
                 stack.append(getattr(node, name))
+
+
+def rewrite(root: T, change: Callable[[Node], Node | None]) -> T:
+    """A copy of `root` (a node, or lists and tuples of them) in which `change` says what stands in place of each node;
+    where it gives None, that node stays, with its own parts rewritten."""
+    return _rewritten(root, change)  # type: ignore[return-value]
+
+
+def _rewritten(root: object, change: Callable[[Node], Node | None]) -> object:
+    if isinstance(root, list | tuple):
+        return type(root)(_rewritten(part, change) for part in root)
+    if not isinstance(root, Node):
+        return root
+    changed = change(root)
+    if changed is not None:
+        return changed
+    return replace(root, **{name: _rewritten(getattr(root, name), change) for name in root.children})  # type: ignore[type-var]
 
 
 def root_of(place: Place) -> Variable | None:

@@ -6,12 +6,25 @@ nothing reaches, so the lowering never has to ask whether code is dead; LLVM rem
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-_CALLED = re.compile(r"call [^@\n]*@([\w.]+)\(")
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """An operand: `text` is what stands in the IR. `constant`: the integer it is, when it is one. `fixed`: a pointer
+    that holds in the whole function to memory that is known to be there, so that sums with it stay inside."""
+
+    text: str
+    constant: int | None = None
+    fixed: bool = False
+
+    def __str__(self) -> str:
+        return self.text
+
+
+TRUE, FALSE, NULL = Value("true"), Value("false"), Value("null")
 
 
 class Module:
@@ -50,17 +63,17 @@ class Module:
         """Reference to an attribute group, e.g. '#3'."""
         return f"#{self._attributes.setdefault(text, len(self._attributes))}"
 
-    def constant(self, data: bytes, align: int = 1) -> str:
-        """A read-only constant in the image; equal byte strings of alignment 1 exist once. Returns '@name'."""
+    def constant(self, data: bytes, align: int = 1) -> Value:
+        """The address of a read-only constant in the image; equal byte strings of alignment 1 exist once."""
         if align == 1 and data in self._literals:
-            return self._literals[data]
+            return Value(self._literals[data])
         name = f"@const.{len(self._globals)}"
         if align == 1:
             self._literals[data] = name
         self._globals.append(
             f"{name} = internal unnamed_addr constant [{len(data)} x i8] {bytes_literal(data)}, align {align}"
         )
-        return name
+        return Value(name)
 
     def keep(self, name: str) -> None:
         """Protects an internal symbol from removal by the optimiser."""
@@ -105,6 +118,7 @@ class Function:
         self._prologue: list[str] = []
         self._lines: list[str] = []
         self._count = 0
+        self.callees: list[str] = []  # the symbol of the function of every call
         self._dead = False
         self.block = "entry"
         self.scope = -1  # its DISubprogram
@@ -112,14 +126,14 @@ class Function:
 
     # ---- instructions ----
 
-    def value(self, text: str) -> str:
-        """Writes an instruction that gives a value; returns its name."""
+    def value(self, text: str) -> Value:
+        """Writes an instruction that gives a value."""
         if self._dead:
             self.begin(self.label("dead"))
         self._count += 1
         name = f"%v{self._count}"
         self._lines.append(f"  {name} = {text}{self.debug}")
-        return name
+        return Value(name)
 
     def do(self, text: str) -> None:
         """Writes an instruction without a value."""
@@ -127,26 +141,36 @@ class Function:
             self.begin(self.label("dead"))
         self._lines.append(f"  {text}{self.debug}")
 
-    def prologue(self, text: str) -> str:
-        """Writes an instruction before all others of the function; returns its name."""
+    def call(self, symbol: str, arguments: Iterable[str], attributes: str = "", *, tail: bool = False) -> None:
+        """Calls a function of the program for its effect. `arguments` with their types."""
+        self.callees.append(symbol)
+        self.do(f"{'tail ' if tail else ''}call void @{symbol}({', '.join(arguments)}){attributes}")
+
+    def call_value(self, result: str, symbol: str, arguments: Iterable[str], *, tail: bool = False) -> Value:
+        """Calls a function of the program for its result, of the LLVM type `result`."""
+        self.callees.append(symbol)
+        return self.value(f"{'tail ' if tail else ''}call {result} @{symbol}({', '.join(arguments)})")
+
+    def prologue(self, text: str) -> Value:
+        """Writes an instruction that gives a value, before all others of the function."""
         self._count += 1
         name = f"%v{self._count}"
         self._prologue.append(f"  {name} = {text}{self.debug}")
-        return name
+        return Value(name)
 
-    def alloca(self, size: int, align: int) -> str:
+    def alloca(self, size: int, align: int) -> Value:
         """Memory on the stack for the whole call, contents undefined. Returns the pointer."""
         self._count += 1
         name = f"%m{self._count}"
         self._allocas.append(f"  {name} = alloca [{size} x i8], align {align}")
-        return name
+        return Value(name, fixed=True)
 
-    def slot(self, llvm_type: str) -> str:
+    def slot(self, llvm_type: str) -> Value:
         """A scalar on the stack, which LLVM turns into registers. Returns the pointer."""
         self._count += 1
         name = f"%s{self._count}"
         self._allocas.append(f"  {name} = alloca {llvm_type}")
-        return name
+        return Value(name, fixed=True)
 
     # ---- blocks ----
 
@@ -169,7 +193,7 @@ class Function:
     def branch(self, label: str) -> None:
         self.terminate(f"br label %{label}")
 
-    def branch_if(self, condition: str, then: str, otherwise: str) -> None:
+    def branch_if(self, condition: Value, then: str, otherwise: str) -> None:
         self.terminate(f"br i1 {condition}, label %{then}, label %{otherwise}")
 
     def begin_detached(self, label: str) -> None:
@@ -183,10 +207,6 @@ class Function:
     def size(self) -> int:
         """Instructions, about."""
         return len(self._prologue) + len(self._lines)
-
-    def callees(self) -> list[str]:
-        """The name of the callee of every call."""
-        return _CALLED.findall("\n".join(self._lines))
 
     def definition(self, linkage: str) -> str:
         scope = f"!dbg !{self.scope}" if self.scope >= 0 else ""
@@ -205,6 +225,11 @@ class Definition:
     linkage: str
 
 
+def number(value: int) -> Value:
+    """An integer."""
+    return Value(str(value), value)
+
+
 def bytes_literal(data: bytes) -> str:
     """An LLVM c"..." literal."""
     if not any(data):
@@ -217,11 +242,11 @@ def escape(data: bytes) -> str:
     return "".join(chr(b) if 32 <= b < 127 and b not in b'"\\' else f"\\{b:02X}" for b in data)
 
 
-def float_literal(value: float, bits: int) -> str:
+def float_literal(value: float, bits: int) -> Value:
     """A REAL (32) or LREAL (64) constant, exact; values that a REAL cannot hold are rounded to the nearest."""
     if bits == 32:
         value = round_to_single(value)
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+    return Value(f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}")
 
 
 def round_to_single(value: float) -> float:

@@ -16,14 +16,14 @@ from elftools.elf.elffile import ELFFile
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.line_table import Line, in_order, read_line_table
 from plctool.compiler.codegen.relocations import (
-    AARCH64_ADRP,
     AARCH64_LOW12,
     ABSOLUTE,
     APPLY,
-    RISCV_HIGH,
     RISCV_LOW,
+    AArch64,
     OutOfReach,
     Relocation,
+    RiscV,
     stub,
     thumb_addend,
 )
@@ -35,7 +35,6 @@ from plctool.image.targets import Machine, Target
 _WRITABLE, _ALLOCATED, _EXECUTABLE = 1, 2, 4
 _DROPPED = (".ARM.exidx", ".ARM.extab", ".eh_frame")
 _FUNCTION = 2  # STT_FUNC
-_RELAX_HINT = 51  # R_RISCV_RELAX: nothing to do
 _THUMBS = (Machine.THUMB, Machine.THUMB_V6M)
 
 
@@ -185,11 +184,11 @@ class _Linker:
         high = {
             section.offset + offset: self._address(symbol) + addend
             for offset, kind, symbol, addend in section.relocations
-            if kind == RISCV_HIGH and self._target.machine is Machine.RISCV32
+            if kind == RiscV.R_RISCV_PCREL_HI20 and self._target.machine is Machine.RISCV32
         }
         self._check_pages(section)
         for offset, kind, symbol, addend in section.relocations:
-            if self._target.machine is Machine.RISCV32 and kind == _RELAX_HINT:
+            if self._target.machine is Machine.RISCV32 and kind == RiscV.R_RISCV_RELAX:
                 continue
             symbol = self._resolved(symbol)
             target = self._address(symbol)
@@ -214,7 +213,7 @@ class _Linker:
         """AArch64: every low part must have the ADRP of exactly its target, which becomes an ADR."""
         if self._target.machine is not Machine.AARCH64:
             return
-        pages = {(r[2], r[3]) for r in section.relocations if r[1] == AARCH64_ADRP}
+        pages = {(r[2], r[3]) for r in section.relocations if r[1] == AArch64.R_AARCH64_ADR_PREL_PG_HI21}
         for _, kind, symbol, addend in section.relocations:
             if kind in AARCH64_LOW12 and (symbol, addend) not in pages:
                 raise UsageError(

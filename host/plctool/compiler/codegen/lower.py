@@ -14,7 +14,8 @@ from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
 from plctool.compiler.codegen.partition import texts
 from plctool.compiler.codegen.sections import sections
-from plctool.compiler.codegen.signatures import handed_inputs, parameter_list
+from plctool.compiler.codegen.signatures import CONTEXT, SELF, handed_inputs, parameter_list
+from plctool.compiler.internal import note_position
 from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
 from plctool.iec.areas import Area
@@ -55,7 +56,12 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     done = chosen = 0
     while done < len(unit.pous) or chosen < len(unit.dispatchers):
         if done < len(unit.pous):
-            _pou(unit, list(unit.pous)[done], effects)
+            pou = list(unit.pous)[done]
+            try:
+                _pou(unit, pou, effects)
+            except Exception as error:
+                note_position(error, pou.pos)
+                raise
             done += 1
         else:
             dispatch, name = list(unit.dispatchers.items())[chosen]
@@ -76,7 +82,7 @@ def _task_entry(unit: Unit, number: int, task: Task) -> str:
     name = f"task.{number}"
     fn = Function(f"void @{name}(ptr noalias nonnull readonly %ctx)", unit.plain)
     for pou in task.programs:
-        fn.do(f"call void @{unit.symbol(pou)}(ptr %ctx)")
+        fn.call(unit.symbol(pou), [CONTEXT])
     fn.terminate("ret void")
     unit.module.add(name, fn, linkage="")
     return name
@@ -118,14 +124,14 @@ def _global_init(unit: Unit, startup: Pou) -> None:
     flag, text = fn.value("icmp ne i32 %init_retains, 0"), value_type(BOOL)
     operand = flag if text == "i1" else fn.value(f"zext i1 {flag} to {text}")
     # Not inlined, because it has lines and this has none.
-    fn.do(f"call void @{unit.symbol(startup)}(ptr %ctx, {text} {operand}) noinline")
+    fn.call(unit.symbol(startup), [CONTEXT, f"{text} {operand}"], " noinline")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_INIT, fn, linkage="")
 
 
 def _global_exit(unit: Unit, shutdown: Pou) -> None:
     fn = Function(f"void @{GLOBAL_EXIT}(ptr noalias nonnull readonly %ctx)", unit.plain)
-    fn.do(f"call void @{unit.symbol(shutdown)}(ptr %ctx) noinline")
+    fn.call(unit.symbol(shutdown), [CONTEXT], " noinline")
     fn.terminate("ret void")
     unit.module.add(GLOBAL_EXIT, fn, linkage="")
 
@@ -148,9 +154,9 @@ def _struct_initialisers(unit: Unit) -> None:
     done = 0
     while done < len(unit.structs):
         name, struct = list(unit.structs.items())[done]
-        fn = Function(f"void @{name}(ptr nonnull %self)", unit.plain)
+        fn = Function(f"void @{name}(ptr nonnull {SELF})", unit.plain)
         frame = Frame(unit, fn, None)
-        initialise_members(frame, Ref("%self", 0, struct, direct=True), struct, None)
+        initialise_members(frame, Ref(SELF, 0, struct, direct=True), struct, None)
         fn.terminate("ret void")
         unit.module.add(name, fn)
         done += 1

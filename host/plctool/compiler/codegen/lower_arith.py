@@ -5,7 +5,7 @@ Integers wrap, nothing here has undefined behaviour for any operand, and no conv
 
 from __future__ import annotations
 
-from plctool.compiler.codegen.ir import float_literal
+from plctool.compiler.codegen.ir import NULL, Value, float_literal, number
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, Frame, zero
 from plctool.compiler.codegen.lower_unit import Check, value_type
 from plctool.compiler.typed import BinaryOp, Const, Intrinsic, Pos, UnaryOp
@@ -45,17 +45,17 @@ def bits_of(t: Type) -> int:
     return base.bits if isinstance(base, Elementary) else 64
 
 
-def constant(value: int | float | str, t: Type) -> str:
+def constant(value: int | float | str, t: Type) -> Value:
     """A scalar constant as an LLVM operand."""
     text = value_type(t)
     if text in ("float", "double"):
         return float_literal(float(value), bits_of(t))
     if text == "ptr":
-        return f"inttoptr (i64 {int(value)} to ptr)" if int(value) else "null"
-    return str(int(value))
+        return Value(f"inttoptr (i64 {int(value)} to ptr)") if int(value) else NULL
+    return number(int(value))
 
 
-def compare(frame: Frame, op: BinaryOp, left: str, right: str, t: Type) -> str:
+def compare(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type) -> Value:
     """The i1 of a comparison of two values of `t`."""
     integer, real = _COMPARE[op]
     text = value_type(t)
@@ -68,14 +68,14 @@ def compare(frame: Frame, op: BinaryOp, left: str, right: str, t: Type) -> str:
     return frame.fn.value(f"icmp {integer} {text} {left}, {right}")
 
 
-def binary(frame: Frame, op: BinaryOp, left: str, right: str, t: Type) -> str:
+def binary(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type) -> Value:
     """An operator that cannot fail. `t`: type of both operands and of the result."""
     text = value_type(t)
     table = _REAL if text in ("float", "double") else _INTEGER
     return frame.fn.value(f"{table[op]} {text} {left}, {right}")
 
 
-def divide(frame: Frame, op: BinaryOp, left: str, right: str, t: Type, pos: Pos, divisor: int | None) -> str:
+def divide(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type, pos: Pos, divisor: int | None) -> Value:
     """DIV or MOD of integers. `divisor`: its value when it is constant."""
     checked = Check.DIV in frame.checks and (divisor is None or divisor == 0)
     if checked:
@@ -88,14 +88,14 @@ def divide(frame: Frame, op: BinaryOp, left: str, right: str, t: Type, pos: Pos,
     return _divide_signed(frame, op, left, right, t, checked, divisor)
 
 
-def _divide_unsigned(frame: Frame, op: BinaryOp, left: str, right: str, t: Type, *, safe: bool) -> str:
+def _divide_unsigned(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type, *, safe: bool) -> Value:
     text = value_type(t)
     if not safe:
         right = frame.fn.value(f"call {text} @llvm.umax.{text}({text} {right}, {text} 1)")
     return frame.fn.value(f"{'udiv' if op is BinaryOp.DIV else 'urem'} {text} {left}, {right}")
 
 
-def _divide_narrow(frame: Frame, op: BinaryOp, left: str, right: str, t: Type, *, safe: bool) -> str:
+def _divide_narrow(frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type, *, safe: bool) -> Value:
     """In 32 bits, where MIN / -1 does not overflow."""
     fn, text = frame.fn, value_type(t)
     wide_left = fn.value(f"sext {text} {left} to i32")
@@ -108,8 +108,8 @@ def _divide_narrow(frame: Frame, op: BinaryOp, left: str, right: str, t: Type, *
 
 
 def _divide_signed(
-    frame: Frame, op: BinaryOp, left: str, right: str, t: Type, checked: bool, divisor: int | None
-) -> str:
+    frame: Frame, op: BinaryOp, left: Value, right: Value, t: Type, checked: bool, divisor: int | None
+) -> Value:
     """32 and 64 bits: divisors that LLVM does not define (-1 with MIN, 0 unchecked) are replaced by 1."""
     fn, text = frame.fn, value_type(t)
     word = "sdiv" if op is BinaryOp.DIV else "srem"
@@ -127,7 +127,7 @@ def _divide_signed(
     return fn.value(f"select i1 {minus_one}, {text} {negated}, {text} {result}")
 
 
-def unary(frame: Frame, op: UnaryOp, operand: str, t: Type) -> str:
+def unary(frame: Frame, op: UnaryOp, operand: Value, t: Type) -> Value:
     text = value_type(t)
     if op is UnaryOp.NOT:
         return frame.fn.value(f"xor {text} {operand}, {1 if is_bool(t) else -1}")
@@ -136,7 +136,7 @@ def unary(frame: Frame, op: UnaryOp, operand: str, t: Type) -> str:
     return frame.fn.value(f"sub {text} 0, {operand}")
 
 
-def convert(frame: Frame, value: str, source: Type, target: Type, *, truncate: bool = False) -> str:
+def convert(frame: Frame, value: Value, source: Type, target: Type, *, truncate: bool = False) -> Value:
     """A scalar conversion as typed.Convert defines it."""
     old, new = value_type(source), value_type(target)
     fn = frame.fn
@@ -161,18 +161,18 @@ def convert(frame: Frame, value: str, source: Type, target: Type, *, truncate: b
     return fn.value(f"{word} {old} {value} to {new}")
 
 
-def lowest_bit(frame: Frame, value: str) -> str:
+def lowest_bit(frame: Frame, value: Value) -> Value:
     """A BOOL as 0 or 1."""
-    return value if value in ("0", "1") else frame.fn.value(f"and i8 {value}, 1")
+    return value if value.constant in (0, 1) else frame.fn.value(f"and i8 {value}, 1")
 
 
-def is_not_zero(frame: Frame, value: str, t: Type) -> str:
+def is_not_zero(frame: Frame, value: Value, t: Type) -> Value:
     """The i1 of a conversion to BOOL."""
     text = value_type(t)
     return frame.fn.value(f"{'fcmp une' if is_real(t) else 'icmp ne'} {text} {value}, {zero(t)}")
 
 
-def _to_integer(frame: Frame, value: str, source: Type, target: Type, truncate: bool) -> str:
+def _to_integer(frame: Frame, value: Value, source: Type, target: Type, truncate: bool) -> Value:
     text, integer = value_type(source), value_type(target)
     if not truncate:
         value = _round_to_even(frame, value, text)
@@ -181,7 +181,7 @@ def _to_integer(frame: Frame, value: str, source: Type, target: Type, truncate: 
     return frame.fn.value(f"call {integer} @llvm.{word}.sat.{integer}.{suffix}({text} {value})")
 
 
-def _round_to_even(frame: Frame, value: str, text: str) -> str:
+def _round_to_even(frame: Frame, value: Value, text: str) -> Value:
     """Adding and taking away 2^23 (2^52) with the sign of the value leaves no room for a fraction; larger values
     have none. LLVM's own rounding would be a library call on most targets."""
     fn = frame.fn
@@ -194,35 +194,37 @@ def _round_to_even(frame: Frame, value: str, text: str) -> str:
     return fn.value(f"select i1 {small}, {text} {rounded}, {text} {value}")
 
 
-def shift(frame: Frame, op: Intrinsic, value: str, t: Type, count: str, count_type: Type, known: int | None) -> str:
+def shift(
+    frame: Frame, op: Intrinsic, value: Value, t: Type, count: Value, count_type: Type, known: int | None
+) -> Value:
     """SHL, SHR. `known`: the count when it is constant."""
     fn, text, width = frame.fn, value_type(t), bits_of(t)
     word = "shl" if op is Intrinsic.SHL else "ashr" if is_signed(t) else "lshr"
     if known is not None:
-        return fn.value(f"{word} {text} {value}, {known}") if 0 <= known < width else "0"
+        return fn.value(f"{word} {text} {value}, {known}") if 0 <= known < width else number(0)
     count_text = value_type(count_type)
     fits = fn.value(f"icmp ult {count_text} {count}, {width}")
     shifted = fn.value(f"{word} {text} {value}, {resize(frame, count, count_type, width)}")
     return fn.value(f"select i1 {fits}, {text} {shifted}, {text} 0")
 
 
-def rotate(frame: Frame, op: Intrinsic, value: str, t: Type, count: str, count_type: Type) -> str:
+def rotate(frame: Frame, op: Intrinsic, value: Value, t: Type, count: Value, count_type: Type) -> Value:
     text = value_type(t)
     word = "fshl" if op is Intrinsic.ROL else "fshr"
     amount = resize(frame, count, count_type, bits_of(t))
     return frame.fn.value(f"call {text} @llvm.{word}.{text}({text} {value}, {text} {value}, {text} {amount})")
 
 
-def resize(frame: Frame, value: str, t: Type, width: int) -> str:
+def resize(frame: Frame, value: Value, t: Type, width: int) -> Value:
     """An integer in `width` bits, extended by its own sign."""
     bits = bits_of(t)
-    if bits == width or value.lstrip("-").isdigit():
+    if bits == width or value.constant is not None:
         return value
     word = "trunc" if bits > width else "sext" if is_signed(t) else "zext"
     return frame.fn.value(f"{word} i{bits} {value} to i{width}")
 
 
-def absolute(frame: Frame, value: str, t: Type) -> str:
+def absolute(frame: Frame, value: Value, t: Type) -> Value:
     text = value_type(t)
     if is_real(t):
         return frame.fn.value(f"call {text} @llvm.fabs.f{bits_of(t)}({text} {value})")
@@ -231,17 +233,17 @@ def absolute(frame: Frame, value: str, t: Type) -> str:
     return frame.fn.value(f"call {text} @llvm.abs.{text}({text} {value}, i1 false)")
 
 
-def square_root(frame: Frame, value: str, t: Type) -> str:
+def square_root(frame: Frame, value: Value, t: Type) -> Value:
     text = value_type(t)
     return frame.fn.value(f"call {text} @llvm.sqrt.f{bits_of(t)}({text} {value})")
 
 
-def select(frame: Frame, condition: str, then: str, otherwise: str, t: Type) -> str:
+def select(frame: Frame, condition: Value, then: Value, otherwise: Value, t: Type) -> Value:
     text = value_type(t)
     return frame.fn.value(f"select i1 {condition}, {text} {then}, {text} {otherwise}")
 
 
-def extreme(frame: Frame, op: Intrinsic, left: str, right: str, t: Type) -> str:
+def extreme(frame: Frame, op: Intrinsic, left: Value, right: Value, t: Type) -> Value:
     """MIN, MAX of two scalars."""
     text = value_type(t)
     if is_bool(t):
@@ -253,7 +255,7 @@ def extreme(frame: Frame, op: Intrinsic, left: str, right: str, t: Type) -> str:
     return frame.fn.value(f"call {text} @llvm.{word}.{text}({text} {left}, {text} {right})")
 
 
-def bitcast(frame: Frame, value: str, source: Type, target: Type) -> str:
+def bitcast(frame: Frame, value: Value, source: Type, target: Type) -> Value:
     old, new = value_type(source), value_type(target)
     if old == new:
         return value

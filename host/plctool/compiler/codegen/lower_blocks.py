@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower_arith import convert, is_real
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Frame, Ref, rule
 from plctool.compiler.codegen.lower_string import copy_literal, copy_string
 from plctool.compiler.codegen.lower_unit import value_type
+from plctool.compiler.codegen.signatures import CONTEXT, SELF, parameter_value
 from plctool.compiler.typed import (
     Binary,
     BinaryOp,
@@ -45,8 +47,7 @@ def fb_call(frame: Frame, s: FbCall) -> None:
         target = frame.import_function(frame.unit.import_slot(s.block.external))
         frame.fn.do(f"call void {target}(ptr {base}) {frame.unit.external_call}")
     else:
-        words = ["ptr %ctx", f"ptr {base}", *arguments]
-        frame.fn.do(f"call void @{frame.unit.target_of(s.block, s.dispatch)}({', '.join(words)})")
+        frame.fn.call(frame.unit.target_of(s.block, s.dispatch), [CONTEXT, f"ptr {base}", *arguments])
     for variable, place in s.outputs:
         _copy_out(frame, _member(frame, s.block, instance, variable), frame.ref(place))
 
@@ -55,7 +56,7 @@ def _inputs(frame: Frame, s: FbCall, instance: Ref) -> list[str]:
     """Stores the inputs in the instance. Returns the values of those that the block stores itself; they must be
     stored here as well before an expression that could see it."""
     handed = frame.unit.handed.get(s.block, [])
-    values: dict[Variable, str] = {}
+    values: dict[Variable, Value] = {}
     arguments = [argument for _, argument in s.inputs + s.in_outs]
     last = max((n for n, argument in enumerate(arguments) if not _is_plain(frame, argument, s.block)), default=0)
     for number, (variable, value) in enumerate(s.inputs):
@@ -93,12 +94,12 @@ def _is_plain_node(frame: Frame, node: object, block: Pou) -> bool:
 def take_inputs(frame: Frame, block: Pou) -> None:
     """Stores the inputs that the block was passed."""
     for number, variable in enumerate(frame.unit.handed.get(block, [])):
-        frame.store(frame.ref(VarPlace(variable, variable.type, block.pos)), f"%p{number}")
+        frame.store(frame.ref(VarPlace(variable, variable.type, block.pos)), parameter_value(number))
 
 
 def _member(frame: Frame, block: Pou, instance: Ref, variable: Variable) -> Ref:
     tag = ""
-    if instance.direct and (instance.tag or instance.pointer == "%self"):
+    if instance.direct and (instance.tag or instance.pointer == SELF):
         assert block.instance is not None
         tag = frame.unit.tag((block.instance.root.name, variable.offset))
     return instance.member(variable.offset, variable.type, tag)

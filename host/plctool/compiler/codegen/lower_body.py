@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from plctool.compiler.codegen import lower_expr, lower_loops, lower_places, lower_stmt  # noqa: F401  their rules
 from plctool.compiler.codegen.lower_blocks import take_inputs
-from plctool.compiler.codegen.lower_frame import Body, Ref, string_capacity
+from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
 from plctool.compiler.codegen.lower_string import copy_string
 from plctool.compiler.codegen.lower_unit import value_type
-from plctool.compiler.codegen.signatures import result_in_memory
+from plctool.compiler.codegen.signatures import (
+    CONTEXT,
+    RESULT,
+    RESULT_CAPACITY,
+    SELF,
+    parameter_capacity,
+    parameter_value,
+    result_in_memory,
+)
 from plctool.compiler.typed import Pou, PouKind, Variable
 from plctool.iec.types import StringType, is_scalar
 
@@ -21,8 +29,8 @@ def write_body(frame: Body) -> None:
         _take_parameters(frame, pou)
     take_inputs(frame, pou)
     if pou.result is not None and result_in_memory(pou):
-        capacity = "%result.capacity" if pou.cuts_result else string_capacity(pou.result.type)
-        frame.locals[pou.result] = Ref("%result", 0, pou.result.type, direct=True, capacity=capacity)
+        capacity = RESULT_CAPACITY if pou.cuts_result else string_capacity(pou.result.type)
+        frame.locals[pou.result] = Ref(RESULT, 0, pou.result.type, direct=True, capacity=capacity)
     for var in pou.locals:
         if var not in frame.locals:
             frame.locals[var] = _stack_memory(frame, var)
@@ -42,9 +50,9 @@ def write_calls(frame: Body, parts: list[str]) -> None:
     """Writes calls of the parts that the body was cut into."""
     assert frame.pou is not None
     take_inputs(frame, frame.pou)
-    instance = ", ptr %self" if frame.pou.kind is PouKind.FUNCTION_BLOCK else ""
+    instance = [f"ptr {SELF}"] if frame.pou.kind is PouKind.FUNCTION_BLOCK else []
     for symbol in parts:
-        frame.fn.do(f"call void @{symbol}(ptr %ctx{instance})")
+        frame.fn.call(symbol, [CONTEXT, *instance])
     frame.fn.terminate("ret void")
 
 
@@ -57,16 +65,16 @@ def _stack_memory(frame: Body, var: Variable) -> Ref:
 
 def _take_parameters(frame: Body, pou: Pou) -> None:
     for number, parameter in enumerate(pou.parameters):
-        var, name = parameter.variable, f"%p{number}"
+        var, given, room = parameter.variable, parameter_value(number), parameter_capacity(number)
         if parameter.by_reference:
-            capacity = f"{name}.capacity" if isinstance(var.type, StringType) else ""
-            frame.locals[var] = Ref(name, 0, var.type, capacity=capacity)
+            capacity = room if isinstance(var.type, StringType) else NO_CAPACITY
+            frame.locals[var] = Ref(given, 0, var.type, capacity=capacity)
             continue
         ref = _stack_memory(frame, var)
         frame.locals[var] = ref
         if is_scalar(var.type):
-            frame.store(ref, name)
+            frame.store(ref, given)
         elif isinstance(var.type, StringType):
-            copy_string(frame, ref, Ref(name, 0, var.type, capacity=f"{name}.capacity"))
+            copy_string(frame, ref, Ref(given, 0, var.type, capacity=room))
         else:
-            frame.copy(ref, Ref(name, 0, var.type), var.type.size)
+            frame.copy(ref, Ref(given, 0, var.type), var.type.size)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from plctool.compiler.codegen.ir import Value, number
 from plctool.compiler.codegen.lower_arith import convert, is_bool, lowest_bit
-from plctool.compiler.codegen.lower_frame import Frame, Ref, string_capacity
+from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.codegen.lower_places import materialised
 from plctool.compiler.codegen.lower_unit import value_type
-from plctool.compiler.codegen.signatures import extended, parameter_types
+from plctool.compiler.codegen.signatures import CONTEXT, extension, parameter_types
 from plctool.compiler.typed import (
     Call,
     Direction,
@@ -19,11 +20,11 @@ from plctool.compiler.typed import (
 from plctool.iec.types import StringType, is_scalar
 
 
-def call_function(frame: Frame, e: Call, result: Ref | None) -> str:
+def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
     """Calls a function. `result`: where a string, array or struct goes; scalars are returned."""
     pou = e.function
     write_back: list[tuple[Ref, Ref]] = []
-    arguments = [] if pou.external else ["ptr %ctx"]
+    arguments = [] if pou.external else [CONTEXT]
     if e.instance is not None:
         arguments.append(f"ptr {frame.address(frame.ref(e.instance))}")
     if result is not None:
@@ -40,41 +41,38 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> str:
     return value
 
 
-def _result_capacity(frame: Frame, pou: Pou, result: Ref) -> str:
+def _result_capacity(frame: Frame, pou: Pou, result: Ref) -> Value:
     """How much of a string result there is room for: at most what the function declares."""
     assert pou.result is not None
-    declared = string_capacity(pou.result.type)
-    if result.capacity.isdigit():
-        return str(min(int(declared), int(result.capacity)))
+    assert isinstance(pou.result.type, StringType)
+    declared = pou.result.type.length
+    if result.capacity.constant is not None:
+        return number(min(declared, result.capacity.constant))
     return frame.fn.value(f"call i32 @llvm.umin.i32(i32 {declared}, i32 {result.capacity})")
 
 
-def _call_instruction(frame: Frame, pou: Pou, dispatch: Dispatch | None, arguments: list[str]) -> str:
+def _call_instruction(frame: Frame, pou: Pou, dispatch: Dispatch | None, arguments: list[str]) -> Value | None:
     unit, fn = frame.unit, frame.fn
-    returns = pou.result is not None and is_scalar(pou.result.type)
-    text, attributes = "void", ""
+    result = pou.result.type if pou.result is not None and is_scalar(pou.result.type) else None
     if pou.external:
         target = frame.import_function(unit.import_slot(pou.external))
-        attributes = f" {unit.external_call}"
         convention = f"{unit.target.external_convention} " if unit.target.external_convention else ""
-    else:
-        target, convention = f"@{unit.target_of(pou, dispatch)}", ""
-    if not returns:
-        fn.do(f"call {convention}void {target}({', '.join(arguments)}){attributes}")
-        return ""
-    assert pou.result is not None
-    t = pou.result.type
-    text = value_type(t)
-    if pou.external:
-        words = extended(t).split()
-        text = " ".join(reversed(words))
-        return fn.value(f"call {convention}{text} {target}({', '.join(arguments)}){attributes}")
-    return fn.value(f"call {text} {target}({', '.join(arguments)})")
+        returned = "void" if result is None else f"{extension(result)} {value_type(result)}".lstrip()
+        text = f"call {convention}{returned} {target}({', '.join(arguments)}) {unit.external_call}"
+        if result is not None:
+            return fn.value(text)
+        fn.do(text)
+        return None
+    symbol = unit.target_of(pou, dispatch)
+    if result is not None:
+        return fn.call_value(value_type(result), symbol, arguments)
+    fn.call(symbol, arguments)
+    return None
 
 
 def _operands(
     frame: Frame, pou: Pou, parameter: Parameter, argument: Expr | Place | None, write_back: list[tuple[Ref, Ref]]
-) -> list[str]:
+) -> list[Value]:
     """The operands that carry one argument."""
     t = parameter.variable.type
     if argument is None:  # an output that is not used

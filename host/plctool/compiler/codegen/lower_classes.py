@@ -4,10 +4,10 @@ goes on to the right method. Only direct calls result: LLVM can inline them, and
 
 from __future__ import annotations
 
-from plctool.compiler.codegen.ir import Function
+from plctool.compiler.codegen.ir import FALSE, Function
 from plctool.compiler.codegen.lower_frame import ACCESS_VIOLATION, Frame
 from plctool.compiler.codegen.lower_unit import Unit, value_type
-from plctool.compiler.codegen.signatures import parameter_list
+from plctool.compiler.codegen.signatures import SELF, formals, parameter_list
 from plctool.compiler.typed import Dispatch
 from plctool.iec.types import CLASS_NUMBER, is_scalar
 
@@ -17,15 +17,14 @@ def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
     wrong pointer."""
     pou = dispatch.function
     result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
-    parameters = parameter_list(pou, unit.handed)
-    fn = Function(f"{result} @{name}({parameters})", unit.plain)
+    fn = Function(f"{result} @{name}({parameter_list(pou, unit.handed)})", unit.plain)
     frame = Frame(unit, fn, None)
     frame.open_scope(pou.name, pou.pos)
-    arguments = _arguments(parameters)
+    arguments = [formal.argument for formal in formals(pou, unit.handed)]
     by_symbol: dict[str, list[int]] = {}
     for number, target in dispatch.targets.items():
         by_symbol.setdefault(unit.symbol(target), []).append(number)
-    loaded = fn.value(f"load i32, ptr %self, align 4{unit.tag(CLASS_NUMBER)}")
+    loaded = fn.value(f"load i32, ptr {SELF}, align 4{unit.tag(CLASS_NUMBER)}")
     labels = {symbol: fn.label("class") for symbol in by_symbol}
     unknown = fn.label("unknown")
     cases = " ".join(f"i32 {n}, label %{labels[s]}" for s, numbers in by_symbol.items() for n in numbers)
@@ -33,18 +32,12 @@ def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
     for symbol, label in labels.items():
         fn.begin_detached(label)
         if result == "void":
-            fn.do(f"tail call void @{symbol}({arguments})")
+            fn.call(symbol, arguments, tail=True)
             fn.terminate("ret void")
         else:
-            fn.terminate(f"ret {result} {fn.value(f'tail call {result} @{symbol}({arguments})')}")
+            fn.terminate(f"ret {result} {fn.call_value(result, symbol, arguments, tail=True)}")
     fn.begin_detached(unknown)
-    frame.require("false", ACCESS_VIOLATION, pou.pos)
+    frame.require(FALSE, ACCESS_VIOLATION, pou.pos)
     fn.terminate("unreachable")
     frame.write_raises()
     unit.module.add(name, fn)
-
-
-def _arguments(parameters: str) -> str:
-    """The arguments that hand all parameters on: types and names without attributes."""
-    words = (p.split() for p in parameters.split(", "))
-    return ", ".join(f"{w[0]} {w[-1]}" for w in words)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from plctool.compiler.codegen.ir import FALSE, TRUE, Value
 from plctool.compiler.codegen.lower_arith import (
     COMPARISONS,
     LOGIC,
@@ -57,31 +58,33 @@ _SHORT_CIRCUIT = (BinaryOp.AND_THEN, BinaryOp.OR_ELSE)
 
 
 @rule(VALUES, Const)
-def constant_value(frame: Frame, e: Const) -> str:
+def constant_value(frame: Frame, e: Const) -> Value:
     """A number."""
     return constant(e.value, e.type)
 
 
 @rule(VALUES, Unary)
-def unary_value(frame: Frame, e: Unary) -> str:
+def unary_value(frame: Frame, e: Unary) -> Value:
     """NOT and the sign."""
     return unary(frame, e.op, frame.value(e.operand), e.type)
 
 
 @rule(VALUES, Call)
-def call_value(frame: Frame, e: Call) -> str:
+def call_value(frame: Frame, e: Call) -> Value:
     """A scalar that a function returns."""
-    return call_function(frame, e, None)
+    value = call_function(frame, e, None)
+    assert value is not None, "a function without a scalar result is called by a statement"
+    return value
 
 
 @rule(VALUES, AddressOf)
-def address_value(frame: Frame, e: AddressOf) -> str:
+def address_value(frame: Frame, e: AddressOf) -> Value:
     """The address of a variable."""
     return frame.address(frame.ref(e.place))
 
 
 @rule(VALUES, Load)
-def loaded(frame: Frame, e: Load) -> str:
+def loaded(frame: Frame, e: Load) -> Value:
     """The scalar in a variable; of a FOR variable what its register holds."""
     if isinstance(e.place, VarPlace):
         shadow = frame.shadows.get(e.place.var)
@@ -90,7 +93,7 @@ def loaded(frame: Frame, e: Load) -> str:
     return frame.load(frame.ref(e.place))
 
 
-def truth(frame: Frame, e: Expr) -> str:
+def truth(frame: Frame, e: Expr) -> Value:
     """The i1 that holds the value of a BOOL expression."""
     if isinstance(e, Binary):
         if e.op in _SHORT_CIRCUIT:
@@ -109,7 +112,7 @@ def truth(frame: Frame, e: Expr) -> str:
 
 
 @rule(VALUES, Binary)
-def binary_value(frame: Frame, e: Binary) -> str:
+def binary_value(frame: Frame, e: Binary) -> Value:
     """A comparison is an i1 first; anything else is calculated."""
     if e.op in COMPARISONS or e.op in _SHORT_CIRCUIT:
         return frame.fn.value(f"zext i1 {truth(frame, e)} to i8")
@@ -119,7 +122,7 @@ def binary_value(frame: Frame, e: Binary) -> str:
     return binary(frame, e.op, left, right, e.type)
 
 
-def _short_circuit(frame: Frame, e: Binary) -> str:
+def _short_circuit(frame: Frame, e: Binary) -> Value:
     fn = frame.fn
     left = truth(frame, e.left)
     more, end, first = fn.label("more"), fn.label("end"), fn.block
@@ -131,11 +134,11 @@ def _short_circuit(frame: Frame, e: Binary) -> str:
     right = truth(frame, e.right)
     last = fn.block
     fn.begin(end)
-    skipped = "false" if e.op is BinaryOp.AND_THEN else "true"
+    skipped = FALSE if e.op is BinaryOp.AND_THEN else TRUE
     return fn.value(f"phi i1 [ {skipped}, %{first} ], [ {right}, %{last} ]")
 
 
-def _compared_strings(frame: Frame, e: Binary) -> str:
+def _compared_strings(frame: Frame, e: Binary) -> Value:
     if e.op in (BinaryOp.EQ, BinaryOp.NE):
         for literal, other in ((e.right, e.left), (e.left, e.right)):
             if isinstance(literal, Const) and not isinstance(other, Const):
@@ -149,7 +152,7 @@ def _compared_strings(frame: Frame, e: Binary) -> str:
 
 
 @rule(VALUES, Convert)
-def converted(frame: Frame, e: Convert) -> str:
+def converted(frame: Frame, e: Convert) -> Value:
     """A conversion, with the check of a subrange."""
     source = e.operand.type
     value = frame.value(e.operand)
@@ -164,7 +167,7 @@ def converted(frame: Frame, e: Convert) -> str:
 
 
 def _check_limits(
-    frame: Frame, value: str, t: Type, known: tuple[int, int] | None, limits: tuple[int, int], pos: Pos
+    frame: Frame, value: Value, t: Type, known: tuple[int, int] | None, limits: tuple[int, int], pos: Pos
 ) -> None:
     assert known is not None
     low, high = max(limits[0], known[0]), min(limits[1], known[1])
@@ -172,14 +175,14 @@ def _check_limits(
         return
     text = value_type(t)
     if low > high:
-        frame.require("false", ARRAY_BOUNDS, pos)
+        frame.require(FALSE, ARRAY_BOUNDS, pos)
         return
     relative = frame.fn.value(f"sub {text} {value}, {low}") if low else value
     frame.require(frame.fn.value(f"icmp ule {text} {relative}, {high - low}"), ARRAY_BOUNDS, pos)
 
 
 @rule(VALUES, IntrinsicCall)
-def intrinsic(frame: Frame, e: IntrinsicCall) -> str:
+def intrinsic(frame: Frame, e: IntrinsicCall) -> Value:
     """The scalar that an intrinsic function gives."""
     op, t = e.intrinsic, e.type
     if op is Intrinsic.TIME:
@@ -209,7 +212,7 @@ def intrinsic(frame: Frame, e: IntrinsicCall) -> str:
     return bitcast(frame, values[0], first, t)
 
 
-def _choose(frame: Frame, selector: str, selector_type: Type, values: list[str], text: str) -> str:
+def _choose(frame: Frame, selector: Value, selector_type: Type, values: list[Value], text: str) -> Value:
     """MUX: the last value for every selector that is not the index of another one."""
     result = values[-1]
     for index in reversed(range(len(values) - 1)):
@@ -258,7 +261,7 @@ def selected(frame: Frame, e: IntrinsicCall) -> Ref:
     return Ref(pointer, 0, e.type, capacity=capacity)
 
 
-def _pick(frame: Frame, e: IntrinsicCall, choice: str, values: list[str], text: str) -> str:
+def _pick(frame: Frame, e: IntrinsicCall, choice: Value, values: list[Value], text: str) -> Value:
     if e.intrinsic is Intrinsic.SELECT:
         return frame.fn.value(f"select i1 {choice}, {text} {values[1]}, {text} {values[0]}")
     return _choose(frame, choice, e.args[0].type, values, text)

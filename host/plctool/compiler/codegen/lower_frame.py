@@ -11,18 +11,21 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from plctool.compiler.analysis import Effects
-from plctool.compiler.codegen.ir import Function
+from plctool.compiler.codegen.ir import NULL, Function, Value, number
 from plctool.compiler.codegen.lower_unit import RAISE, Check, Unit, value_type
+from plctool.compiler.internal import note_position
 from plctool.compiler.typed import Expr, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
 from plctool.iec.areas import Area
 from plctool.iec.types import Elementary, StringType, Type, base_of, is_scalar
 
-_FUNCTION_WIDE = ("%self", "%result", "%p", "%m", "%s")  # parameters and stack memory, by the names `ir` and we give
 TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)
 FrameType = TypeVar("FrameType", bound="Frame")
 Node = TypeVar("Node")
 Written = TypeVar("Written")
+
+
+NO_CAPACITY = Value("")  # of what is not a string
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,16 +33,16 @@ class Ref:
     """An address in the generated code: `pointer` plus `offset` bytes, holding a `type`.
 
     `tag`: alias tag or "". `direct`: reached by name only, not through a pointer. `capacity`: of a STRING
-    [characters], as an i32 operand. `bit`: the bit of an integer that a BOOL lives in, -1 for none; `type` is then that
+    [characters], an i32. `bit`: the bit of an integer that a BOOL lives in, -1 for none; `type` is then that
     integer's. `loose`: a character that may never have been written (after the NUL).
     """
 
-    pointer: str
+    pointer: Value
     offset: int
     type: Type
     tag: str = ""
     direct: bool = False
-    capacity: str = ""
+    capacity: Value = NO_CAPACITY
     bit: int = -1
     loose: bool = False
 
@@ -48,8 +51,8 @@ class Ref:
         return Ref(self.pointer, self.offset + offset, t, tag, self.direct, string_capacity(t))
 
 
-def string_capacity(t: Type) -> str:
-    return str(t.length) if isinstance(t, StringType) else ""
+def string_capacity(t: Type) -> Value:
+    return number(t.length) if isinstance(t, StringType) else NO_CAPACITY
 
 
 class Frame:
@@ -62,14 +65,13 @@ class Frame:
         self.pou = pou
         self.checks = unit.options.checks if pou is None or pou.checks else frozenset[Check]()
         self.locals: dict[Variable, Ref] = {}
-        self.shadows: dict[Variable, str] = {}  # FOR variables that live in a register inside their loop
+        self.shadows: dict[Variable, Value] = {}  # FOR variables that live in a register inside their loop
         self.ranges: dict[Variable, tuple[int, int]] = {}
-        self._bases: dict[Area, str] = {}
-        self._addresses: dict[tuple[str, str, int], str] = {}  # by block, so that none lives longer than it must
-        self._fixed: set[str] = set()  # area bases: pointers that hold in the whole function
+        self._bases: dict[Area, Value] = {}
+        self._addresses: dict[tuple[str, Value, int], Value] = {}  # by block, so that none lives longer than it must
         self._raises: dict[tuple[int, str], str] = {}
-        self._free: dict[tuple[int, int], list[str]] = {}
-        self._busy: list[tuple[tuple[int, int], str]] = []
+        self._free: dict[tuple[int, int], list[Value]] = {}
+        self._busy: list[tuple[tuple[int, int], Value]] = []
         self.pointer_int = f"i{8 * unit.target.pointer_size}"
 
     def open_scope(self, name: str, pos: Pos) -> None:
@@ -84,38 +86,44 @@ class Frame:
 
     # ---- what is written for each kind of node ----
 
-    def value(self, e: Expr) -> str:
+    def value(self, e: Expr) -> Value:
         """The operand that holds the value of a scalar expression."""
-        return VALUES[type(e)](self, e)
+        return self._written(VALUES, e)
 
     def ref(self, place: Place) -> Ref:
         """The address of a place; writes the instructions and checks that it takes."""
-        return REFS[type(place)](self, place)
+        return self._written(REFS, place)
 
     def aggregate(self, e: Expr) -> Ref:
         """Where the value of a string, array or struct expression is; valid until the end of the statement."""
-        return AGGREGATES[type(e)](self, e)
+        return self._written(AGGREGATES, e)
+
+    def _written(self, table: dict[type, Callable[[Frame, Any], Written]], node: Expr | Place) -> Written:
+        try:
+            return table[type(node)](self, node)
+        except Exception as error:
+            note_position(error, node.pos)
+            raise
 
     # ---- context ----
 
-    def context_load(self, offset: int, llvm_type: str, extra: str = "") -> str:
+    def context_load(self, offset: int, llvm_type: str, extra: str = "") -> Value:
         """A load from the context at the start of the function."""
         address = self.fn.prologue(f"getelementptr inbounds i8, ptr %ctx, i64 {offset}")
         return self.fn.prologue(f"load {llvm_type}, ptr {address}{extra}, !invariant.load !{self.unit.empty}")
 
-    def area_base(self, area: Area) -> str:
+    def area_base(self, area: Area) -> Value:
         base = self._bases.get(area)
         if base is None:
             metadata = self.unit.module.metadata
             size = metadata(f"!{{i64 {max(self.unit.area_sizes.get(area, 0), 1)}}}")
             facts = f", !nonnull !{self.unit.empty}, !align !{metadata('!{i64 8}')}, !dereferenceable !{size}"
             offset = self.unit.area_offset + area.value * self.unit.target.pointer_size
-            base = self.context_load(offset, "ptr", facts)
+            base = replace(self.context_load(offset, "ptr", facts), fixed=True)
             self._bases[area] = base
-            self._fixed.add(base)
         return base
 
-    def import_function(self, slot: int) -> str:
+    def import_function(self, slot: int) -> Value:
         """The address of import `slot`, loaded here."""
         fn, size = self.fn, self.unit.target.pointer_size
         invariant = f"!invariant.load !{self.unit.empty}"
@@ -126,7 +134,7 @@ class Frame:
 
     # ---- checks ----
 
-    def require(self, condition: str, code: int, pos: Pos) -> None:
+    def require(self, condition: Value, code: int, pos: Pos) -> None:
         """Raises RTSEXCPT_* `code` unless the i1 `condition` holds."""
         keep = self.fn.debug
         self.at(pos)
@@ -152,20 +160,19 @@ class Frame:
 
     # ---- memory ----
 
-    def address(self, ref: Ref) -> str:
+    def address(self, ref: Ref) -> Value:
         """The pointer to `ref`."""
         if ref.offset == 0:
             return ref.pointer
         key = (self.fn.block, ref.pointer, ref.offset)
         known = self._addresses.get(key)
         if known is None:
-            sure = ref.pointer in self._fixed or ref.pointer.startswith(_FUNCTION_WIDE)
-            flag = "inbounds " if sure else ""
+            flag = "inbounds " if ref.pointer.fixed else ""
             known = self.fn.value(f"getelementptr {flag}i8, ptr {ref.pointer}, {self.pointer_int} {ref.offset}")
             self._addresses[key] = known
         return known
 
-    def element(self, ref: Ref, index: str, t: Type, *, counted: bool) -> Ref:
+    def element(self, ref: Ref, index: Value, t: Type, *, counted: bool) -> Ref:
         """Element `index` (pointer-sized integer) of the array of `t` at `ref`. `counted`: it is known to be within."""
         flags = "inbounds nuw " if counted and ref.offset >= 0 else ""
         pointer = self.fn.value(
@@ -173,7 +180,7 @@ class Frame:
         )
         return replace(ref, pointer=pointer, offset=0, type=t, capacity=string_capacity(t))
 
-    def load(self, ref: Ref) -> str:
+    def load(self, ref: Ref) -> Value:
         """The scalar at `ref`."""
         fn = self.fn
         text = value_type(ref.type)
@@ -186,7 +193,7 @@ class Frame:
             return fn.value(f"and i8 {bit}, 1")
         return value
 
-    def store(self, ref: Ref, value: str) -> None:
+    def store(self, ref: Ref, value: Value) -> None:
         """Stores a scalar."""
         fn = self.fn
         text = value_type(ref.type)
@@ -198,16 +205,16 @@ class Frame:
             upper = self.address(replace(ref, offset=ref.offset + 4))
             fn.do(f"store i32 0, ptr {upper}, align 4{ref.tag}")
 
-    def _with_bit(self, ref: Ref, text: str, value: str) -> str:
+    def _with_bit(self, ref: Ref, text: str, value: Value) -> Value:
         fn = self.fn
         base = base_of(ref.type)
         assert isinstance(base, Elementary)
         mask = 1 << ref.bit
         old = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.type.align}{ref.tag}")
-        if value == "1":
+        if value.constant == 1:
             return fn.value(f"or {text} {old}, {mask}")
         cleared = fn.value(f"and {text} {old}, {~mask}")
-        if value == "0":
+        if value.constant == 0:
             return cleared
         wide = fn.value(f"and i8 {value}, 1")
         if text != "i8":
@@ -268,10 +275,14 @@ class Body(Frame):
         for statement in body:
             self.release_temporaries()
             self.at(statement.pos)
-            STATEMENTS[type(statement)](self, statement)
+            try:
+                STATEMENTS[type(statement)](self, statement)
+            except Exception as error:
+                note_position(error, statement.pos)
+                raise
 
 
-VALUES: dict[type, Callable[[Frame, Any], str]] = {}
+VALUES: dict[type, Callable[[Frame, Any], Value]] = {}
 REFS: dict[type, Callable[[Frame, Any], Ref]] = {}
 AGGREGATES: dict[type, Callable[[Frame, Any], Ref]] = {}
 STATEMENTS: dict[type, Callable[[Body, Any], None]] = {}
@@ -289,12 +300,12 @@ def rule(
     return register
 
 
-def zero(t: Type) -> str:
+def zero(t: Type) -> Value:
     """The zero of a scalar type as an LLVM constant."""
     text = value_type(t)
     if text == "ptr":
-        return "null"
-    return "0.0" if text in ("float", "double") else "0"
+        return NULL
+    return Value("0.0") if text in ("float", "double") else number(0)
 
 
 DIVIDE_BY_ZERO = int(lib.RTSEXCPT_DIVIDEBYZERO)

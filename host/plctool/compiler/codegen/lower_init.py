@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
-from plctool.compiler.codegen.ir import round_to_single
+from plctool.compiler.codegen.ir import Value, round_to_single
 from plctool.compiler.codegen.lower_arith import constant
 from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.codegen.lower_string import copy_literal, encode_text
@@ -90,7 +90,7 @@ def _initialise_scalar(frame: Frame, ref: Ref, initial: ScalarInit) -> None:
 def _initialise_struct(frame: Frame, ref: Ref, t: StructType, initial: Initial | None) -> None:
     if initial is None:
         if any(image_of(frame.unit, t, None)):
-            frame.fn.do(f"call void @{frame.unit.initialiser(t)}(ptr {frame.address(ref)})")
+            frame.fn.call(frame.unit.initialiser(t), [f"ptr {frame.address(ref)}"])
         return
     initialise_members(frame, ref, t, initial)
 
@@ -134,7 +134,7 @@ def _initialise_scalars(frame: Frame, ref: Ref, t: ArrayType, initial: Initial |
             frame.store(element, _constant_at(data, i * size, t.element))
 
 
-def _constant_at(data: bytes, offset: int, t: Type) -> str:
+def _constant_at(data: bytes, offset: int, t: Type) -> Value:
     raw = data[offset : offset + t.size]
     base = base_of(t)
     if isinstance(base, Elementary) and base.kind is Kind.REAL:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from plctool.compiler.codegen.ir import TRUE, Value, number
 from plctool.compiler.codegen.lower_arith import compare, is_signed, known_integer
 from plctool.compiler.codegen.lower_expr import truth
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, STATEMENTS, Body, rule
@@ -74,7 +75,7 @@ def for_loop(frame: Body, s: For) -> None:
     fn.begin_detached(last)
     word = "sadd" if is_signed(s.var.type) else "uadd"
     if known_step is not None and known_step < 0 and word == "uadd":
-        word, step = "usub", str(-known_step)
+        word, step = "usub", number(-known_step)
     loop.set(fn.value(f"call {loop.text} @llvm.{word}.sat.{loop.text}({loop.text} {current}, {loop.text} {step})"))
     fn.begin(end)
     if var is not None:
@@ -85,35 +86,37 @@ def for_loop(frame: Body, s: For) -> None:
 class _Loop:
     """The control variable of a FOR loop. When only the loop writes it, its value is kept in a register as well."""
 
-    def __init__(self, body: Body, s: For, stop: str, step: str, known_step: int | None, var: Variable | None) -> None:
+    def __init__(
+        self, body: Body, s: For, stop: Value, step: Value, known_step: int | None, var: Variable | None
+    ) -> None:
         self._body, self._s, self._stop, self._step, self._known_step = body, s, stop, step, known_step
         self.text = value_type(s.var.type)
-        self._shadow = body.fn.slot(self.text) if var is not None else ""
-        if var is not None:
+        self._shadow = body.fn.slot(self.text) if var is not None else None
+        if var is not None and self._shadow is not None:
             body.shadows[var] = self._shadow
 
-    def set(self, value: str) -> None:
+    def set(self, value: Value) -> None:
         body = self._body
         body.store(body.ref(self._s.var), value)
-        if self._shadow:
+        if self._shadow is not None:
             body.fn.do(f"store {self.text} {value}, ptr {self._shadow}")
 
-    def current(self) -> str:
+    def current(self) -> Value:
         body = self._body
-        if self._shadow:
+        if self._shadow is not None:
             return body.fn.value(f"load {self.text}, ptr {self._shadow}")
         return body.load(body.ref(self._s.var))
 
-    def enters(self, start: str) -> str:
+    def enters(self, start: Value) -> Value:
         return self._reaches(start)
 
-    def goes_on(self, current: str) -> str:
+    def goes_on(self, current: Value) -> Value:
         """Whether another round follows: `current` + step neither passes `stop` nor wraps."""
         body, fn, t = self._body, self._body.fn, self._s.var.type
         if self._known_step in (1, -1):
             op = BinaryOp.LT if self._known_step == 1 else BinaryOp.GT
             return compare(body, op, current, self._stop, t)
-        if self._shadow and self._next_fits():
+        if self._shadow is not None and self._next_fits():
             return self._reaches(fn.value(f"add {self.text} {current}, {self._step}"))
         room = self._by_direction(
             fn.value(f"sub {self.text} {self._stop}, {current}"), fn.value(f"sub {self.text} {current}, {self._stop}")
@@ -137,7 +140,7 @@ class _Loop:
             return False
         return whole[0] <= stop[0] + self._known_step and stop[1] + self._known_step <= whole[1]
 
-    def _reaches(self, value: str) -> str:
+    def _reaches(self, value: Value) -> Value:
         """Whether `value` is not beyond `stop`."""
         body, t = self._body, self._s.var.type
         if self._known_step is not None:
@@ -146,12 +149,12 @@ class _Loop:
         up, down = (compare(body, op, value, self._stop, t) for op in (BinaryOp.LE, BinaryOp.GE))
         return body.fn.value(f"select i1 {self._upwards()}, i1 {up}, i1 {down}")
 
-    def _by_direction(self, up: str, down: str) -> str:
+    def _by_direction(self, up: Value, down: Value) -> Value:
         if self._known_step is not None:
             return up if self._known_step > 0 else down
         return self._body.fn.value(f"select i1 {self._upwards()}, {self.text} {up}, {self.text} {down}")
 
-    def _upwards(self) -> str:
+    def _upwards(self) -> Value:
         if not is_signed(self._s.step.type):
-            return "true"
+            return TRUE
         return self._body.fn.value(f"icmp sgt {self.text} {self._step}, 0")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from plctool.compiler.codegen.ir import FALSE, Value
 from plctool.compiler.codegen.lower_arith import bits_of, is_signed, known_integer, resize
 from plctool.compiler.codegen.lower_frame import (
     ACCESS_VIOLATION,
@@ -16,6 +17,7 @@ from plctool.compiler.codegen.lower_frame import (
     string_capacity,
 )
 from plctool.compiler.codegen.lower_unit import Check
+from plctool.compiler.codegen.signatures import SELF
 from plctool.compiler.ranges import value_range
 from plctool.compiler.typed import (
     BitPlace,
@@ -47,7 +49,7 @@ def variable(frame: Frame, place: VarPlace) -> Ref:
     if var.storage is Storage.SELF:
         assert frame.pou is not None and frame.pou.instance is not None
         tag = frame.unit.tag((frame.pou.instance.root.name, var.offset))
-        return Ref("%self", var.offset, t, tag, True, string_capacity(t))
+        return Ref(SELF, var.offset, t, tag, True, string_capacity(t))
     if var.storage is Storage.REFERENCE and var not in frame.locals:
         if frame.pou is not None and frame.pou.kind is PouKind.METHOD:
             return _unsure_reference(frame, var, place.pos)
@@ -59,7 +61,7 @@ def _stored_reference(frame: Frame, var: Variable) -> Ref:
     """A VAR_IN_OUT of a function block: the pointer its caller stored in the instance, loaded once."""
     assert frame.pou is not None and frame.pou.instance is not None
     tag = frame.unit.tag((frame.pou.instance.root.name, var.offset))
-    slot = frame.fn.prologue(f"getelementptr inbounds i8, ptr %self, {frame.pointer_int} {var.offset}")
+    slot = frame.fn.prologue(f"getelementptr inbounds i8, ptr {SELF}, {frame.pointer_int} {var.offset}")
     pointer = frame.fn.prologue(f"load ptr, ptr {slot}{tag}")
     return Ref(pointer, 0, var.type, capacity=string_capacity(var.type))
 
@@ -68,7 +70,7 @@ def _unsure_reference(frame: Frame, var: Variable, pos: Pos) -> Ref:
     """A VAR_IN_OUT of the block in a method, which may run before the block was called for the first time."""
     assert frame.pou is not None and frame.pou.instance is not None
     tag = frame.unit.tag((frame.pou.instance.root.name, var.offset))
-    pointer = frame.load(Ref("%self", var.offset, PointerType(var.type), tag))
+    pointer = frame.load(Ref(SELF, var.offset, PointerType(var.type), tag))
     return _behind(frame, pointer, var.type, pos)
 
 
@@ -79,7 +81,7 @@ def member(frame: Frame, place: MemberPlace) -> Ref:
     tag = ""
     if isinstance(base.type, StructType) and base.type.union:  # its members overlap, and so do their parts
         return replace(base.member(place.offset, place.type), direct=False)
-    if base.direct and isinstance(base.type, StructType) and (base.tag or base.pointer == "%self"):
+    if base.direct and isinstance(base.type, StructType) and (base.tag or base.pointer == SELF):
         tag = frame.unit.tag((base.type.root.name, place.offset))
     return base.member(place.offset, place.type, tag)
 
@@ -91,7 +93,7 @@ def dereferenced(frame: Frame, place: DerefPlace) -> Ref:
     return _behind(frame, pointer, place.type, place.pos)
 
 
-def _behind(frame: Frame, pointer: str, t: Type, pos: Pos) -> Ref:
+def _behind(frame: Frame, pointer: Value, t: Type, pos: Pos) -> Ref:
     """What a pointer that may be NULL points to."""
     if Check.NULL in frame.checks:
         frame.require(frame.fn.value(f"icmp ne ptr {pointer}, null"), ACCESS_VIOLATION, pos)
@@ -107,7 +109,7 @@ def bit(frame: Frame, place: BitPlace) -> Ref:
 @rule(REFS, SelfPlace)
 def own_instance(frame: Frame, place: SelfPlace) -> Ref:
     """The instance that a body or method is about."""
-    return Ref("%self", 0, place.type, direct=True)
+    return Ref(SELF, 0, place.type, direct=True)
 
 
 @rule(REFS, ValuePlace)
@@ -126,11 +128,12 @@ def indexed(frame: Frame, place: IndexPlace) -> Ref:
     element = base.type.element
     if place.limits is not None:
         return frame.element(base, _open_index(frame, place, place.limits), element, counted=False)
-    constant_part, dynamic, counted = 0, "", True
+    constant_part, counted = 0, True
+    dynamic: Value | None = None
     for expr, (low, high) in zip(place.indices, base.type.bounds, strict=True):
         count = high - low + 1
         constant_part *= count
-        if dynamic:
+        if dynamic is not None:
             dynamic = frame.fn.value(f"mul {frame.pointer_int} {dynamic}, {count}")
         known = known_integer(expr)
         if known is not None and low <= known <= high:
@@ -138,28 +141,32 @@ def indexed(frame: Frame, place: IndexPlace) -> Ref:
             continue
         part, within = _subscript(frame, expr, low, high, place.pos)
         counted = counted and within
-        dynamic = part if not dynamic else frame.fn.value(f"add {frame.pointer_int} {dynamic}, {part}")
+        dynamic = part if dynamic is None else frame.fn.value(f"add {frame.pointer_int} {dynamic}, {part}")
     base = base.member(constant_part * element.size, element, base.tag)
-    return frame.element(base, dynamic, element, counted=counted) if dynamic else base
+    return frame.element(base, dynamic, element, counted=counted) if dynamic is not None else base
 
 
-def _open_index(frame: Frame, place: IndexPlace, limits: list[tuple[Expr, Expr]]) -> str:
+def _open_index(frame: Frame, place: IndexPlace, limits: list[tuple[Expr, Expr]]) -> Value:
     """The number of an element of an ARRAY[*] as a pointer-sized integer. It is computed in 64 bits, where
     nothing wraps."""
-    fn, number = frame.fn, "0"
+    fn = frame.fn
+    total: Value | None = None
     for expr, (low_bound, high_bound) in zip(place.indices, limits, strict=True):
         low, high = (resize(frame, frame.value(e), DINT, 64) for e in (low_bound, high_bound))
         relative = fn.value(f"sub i64 {resize(frame, frame.value(expr), expr.type, 64)}, {low}")
         last = fn.value(f"sub i64 {high}, {low}")
         if Check.BOUNDS in frame.checks:
             frame.require(fn.value(f"icmp ule i64 {relative}, {last}"), ARRAY_BOUNDS, place.pos)
-        if number != "0":
-            number = fn.value(f"mul i64 {number}, {fn.value(f'add i64 {last}, 1')}")
-        number = relative if number == "0" else fn.value(f"add i64 {number}, {relative}")
-    return number if frame.pointer_int == "i64" else fn.value(f"trunc i64 {number} to {frame.pointer_int}")
+        if total is None:
+            total = relative
+        else:
+            total = fn.value(f"mul i64 {total}, {fn.value(f'add i64 {last}, 1')}")
+            total = fn.value(f"add i64 {total}, {relative}")
+    assert total is not None, "an array has a dimension"
+    return total if frame.pointer_int == "i64" else fn.value(f"trunc i64 {total} to {frame.pointer_int}")
 
 
-def _subscript(frame: Frame, expr: Expr, low: int, high: int, pos: Pos) -> tuple[str, bool]:
+def _subscript(frame: Frame, expr: Expr, low: int, high: int, pos: Pos) -> tuple[Value, bool]:
     """An index counted from 0 as a pointer-sized integer, and whether it is known to be within the bounds."""
     index = frame.value(expr)
     limits = value_range(expr, frame.ranges)
@@ -174,7 +181,7 @@ def _subscript(frame: Frame, expr: Expr, low: int, high: int, pos: Pos) -> tuple
     tested, last = relative, high - low
     if low < 0 and not is_signed(expr.type):  # what is below `low` when read as signed is far above `high`
         tested, last = wide, high
-    ok = frame.fn.value(f"icmp ule i{work} {tested}, {last}") if last >= 0 else "false"
+    ok = frame.fn.value(f"icmp ule i{work} {tested}, {last}") if last >= 0 else FALSE
     frame.require(ok, ARRAY_BOUNDS, pos)
     return _widen(frame, relative, work), True
 
@@ -184,7 +191,8 @@ def _character(frame: Frame, base: Ref, place: IndexPlace) -> Ref:
     expr = place.indices[0]
     index = frame.value(expr)
     limits = value_range(expr, frame.ranges)
-    inside = base.capacity.isdigit() and limits is not None and limits[0] >= 0 and limits[1] <= int(base.capacity)
+    last = base.capacity.constant
+    inside = last is not None and limits is not None and limits[0] >= 0 and limits[1] <= last
     if not inside and Check.BOUNDS in frame.checks:
         work = max(32, bits_of(expr.type))
         index = resize(frame, index, expr.type, work)
@@ -197,7 +205,7 @@ def _character(frame: Frame, base: Ref, place: IndexPlace) -> Ref:
     return replace(frame.element(base, index, place.type, counted=inside), loose=not trusted)
 
 
-def _widen(frame: Frame, value: str, bits: int) -> str:
+def _widen(frame: Frame, value: Value, bits: int) -> Value:
     """A non-negative integer as a pointer-sized one."""
     width = 8 * frame.unit.target.pointer_size
     if bits == width:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from plctool.compiler.codegen.ir import FALSE, Value, number
 from plctool.compiler.codegen.lower_arith import compare
 from plctool.compiler.codegen.lower_frame import Frame, Ref
 from plctool.compiler.typed import BinaryOp
@@ -21,28 +22,26 @@ _INLINE_COMPARE = 16
 
 def copy_string(frame: Frame, target: Ref, source: Ref) -> None:
     """target := source, cut to the target's capacity."""
-    if target.capacity.isdigit() and source.capacity.isdigit():
-        length = min(int(target.capacity), int(source.capacity))
+    if target.capacity.constant is not None and source.capacity.constant is not None:
+        length = min(target.capacity.constant, source.capacity.constant)
         target_machine = frame.unit.target
         inline = _INLINE_COPY if target_machine.vectors else _SHORT_COPY if target_machine.unaligned else _TINY_COPY
         if length * _unit(target) <= inline:
             frame.copy(target, source, length * _unit(target))
             _terminate(frame, target, length)
             return
-    name, capacity = frame.unit.helper(_helper("copy", target)), source.capacity
-    frame.fn.value(
-        f"call i32 @{name}(ptr null, ptr {frame.address(target)}, i32 {target.capacity}, i32 0, "
-        f"ptr {frame.address(source)}, i32 {capacity}, i32 0, i32 {capacity})"
-    )
+    name, room = frame.unit.helper(_helper("copy", target)), f"i32 {source.capacity}"
+    to = ["ptr null", f"ptr {frame.address(target)}", f"i32 {target.capacity}", "i32 0"]
+    frame.fn.call_value("i32", name, [*to, f"ptr {frame.address(source)}", room, "i32 0", room])
 
 
 def copy_literal(frame: Frame, target: Ref, text: str) -> None:
     """target := constant, cut to the target's capacity."""
     wide = _unit(target) == 2
-    if not target.capacity.isdigit():
+    if target.capacity.constant is None:
         copy_string(frame, target, literal_text(frame, text, wide=wide))
         return
-    text = text[: int(target.capacity)]
+    text = text[: target.capacity.constant]
     if text:
         source = replace(literal_text(frame, text, wide=wide), direct=target.direct)
         frame.copy(target, source, len(text) * _unit(target))
@@ -53,7 +52,7 @@ def literal_text(frame: Frame, text: str, *, wide: bool) -> Ref:
     """A constant string in the image."""
     t = StringType(len(text), wide)
     pointer = frame.unit.module.constant(encode_text(text + "\0", t), t.align)
-    return Ref(pointer, 0, t, direct=True, capacity=str(len(text)))
+    return Ref(pointer, 0, t, direct=True, capacity=number(len(text)))
 
 
 def _terminate(frame: Frame, target: Ref, length: int) -> None:
@@ -62,24 +61,22 @@ def _terminate(frame: Frame, target: Ref, length: int) -> None:
     frame.fn.do(f"store i{8 * unit} 0, ptr {end}, align {unit}")
 
 
-def compare_strings(frame: Frame, op: BinaryOp, left: Ref, right: Ref) -> str:
+def compare_strings(frame: Frame, op: BinaryOp, left: Ref, right: Ref) -> Value:
     """The i1 of a comparison, byte by byte, unsigned."""
-    order = frame.fn.value(
-        f"call i32 @{frame.unit.helper(_helper('compare', left))}(ptr {frame.address(left)}, i32 {left.capacity}, "
-        f"ptr {frame.address(right)}, i32 {right.capacity})"
-    )
-    return compare(frame, op, order, "0", DINT)
+    arguments = [text for ref in (left, right) for text in (f"ptr {frame.address(ref)}", f"i32 {ref.capacity}")]
+    order = frame.fn.call_value("i32", frame.unit.helper(_helper("compare", left)), arguments)
+    return compare(frame, op, order, number(0), DINT)
 
 
-def equals_literal(frame: Frame, ref: Ref, text: str) -> str | None:
+def equals_literal(frame: Frame, ref: Ref, text: str) -> Value | None:
     """The i1 of a comparison with a short constant, without a loop; None when that is not possible."""
     assert isinstance(ref.type, StringType)
     data, at = encode_text(text + "\0", ref.type), 0
     size = len(data)
-    if not ref.capacity.isdigit() or size > _INLINE_COMPARE:
+    if ref.capacity.constant is None or size > _INLINE_COMPARE:
         return None
-    if int(ref.capacity) < len(text):
-        return "false"
+    if ref.capacity.constant < len(text):
+        return FALSE
     fn, parts = frame.fn, []
     while at < size:
         width = max(w for w in (1, 2, 4, 8) if w <= min(size - at, frame.unit.target.pointer_size))

@@ -20,7 +20,7 @@ def texts(module: Module) -> list[str]:
     """The parts of a module, an even number of them when there are several. A part has copies of functions of others
     that may be inlined."""
     functions = module.functions
-    calls = {name: Counter(c for c in d.function.callees() if c in functions) for name, d in functions.items()}
+    calls = {name: Counter(c for c in d.function.callees if c in functions) for name, d in functions.items()}
     _limit_growth(functions, calls)
     total = sum(d.function.size for d in functions.values())
     if total <= _WHOLE:

@@ -9,8 +9,53 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import IntEnum
 
 from plctool.image.targets import Machine
+
+
+class X86(IntEnum):
+    """Kinds of relocations by the names of the ELF supplement of each processor."""
+
+    R_X86_64_64 = 1
+    R_X86_64_PC32 = 2
+    R_X86_64_PLT32 = 4
+    R_X86_64_32 = 10
+
+
+class Arm(IntEnum):
+    R_ARM_ABS32 = 2
+    R_ARM_REL32 = 3
+    R_ARM_THM_CALL = 10
+    R_ARM_THM_JUMP24 = 30
+    R_ARM_THM_JUMP11 = 102
+
+
+class AArch64(IntEnum):
+    R_AARCH64_ABS64 = 257
+    R_AARCH64_ABS32 = 258
+    R_AARCH64_PREL32 = 261
+    R_AARCH64_ADR_PREL_PG_HI21 = 275
+    R_AARCH64_ADD_ABS_LO12_NC = 277
+    R_AARCH64_LDST8_ABS_LO12_NC = 278
+    R_AARCH64_JUMP26 = 282
+    R_AARCH64_CALL26 = 283
+    R_AARCH64_LDST16_ABS_LO12_NC = 284
+    R_AARCH64_LDST32_ABS_LO12_NC = 285
+    R_AARCH64_LDST64_ABS_LO12_NC = 286
+    R_AARCH64_LDST128_ABS_LO12_NC = 299
+
+
+class RiscV(IntEnum):
+    R_RISCV_32 = 1
+    R_RISCV_CALL_PLT = 19
+    R_RISCV_PCREL_HI20 = 23
+    R_RISCV_PCREL_LO12_I = 24
+    R_RISCV_PCREL_LO12_S = 25
+    R_RISCV_ADD32 = 35
+    R_RISCV_SUB32 = 39
+    R_RISCV_RELAX = 51  # a hint to the linker
+    R_RISCV_32_PCREL = 57
 
 
 @dataclass(frozen=True)
@@ -82,9 +127,9 @@ def _thumb_short_branch(code: bytearray, r: Relocation) -> None:
 
 def thumb_addend(code: bytes, place: int, kind: int) -> int:
     """The addend that REL sections keep in place."""
-    if kind in (2, 3):
+    if kind in (Arm.R_ARM_ABS32, Arm.R_ARM_REL32):
         return int.from_bytes(code[place : place + 4], "little", signed=True)
-    if kind == 102:
+    if kind == Arm.R_ARM_THM_JUMP11:
         value: int = (struct.unpack_from("<H", code, place)[0] & 0x7FF) << 1
         return value - 0x1000 if value & 0x800 else value
     first, second = struct.unpack_from("<HH", code, place)
@@ -147,52 +192,54 @@ def _riscv_subtract(code: bytearray, r: Relocation) -> None:
     _put_word(code, r.place, _word(code, r.place) - r.target - r.addend)
 
 
+AARCH64_LOW12 = frozenset(
+    (
+        AArch64.R_AARCH64_ADD_ABS_LO12_NC,
+        AArch64.R_AARCH64_LDST8_ABS_LO12_NC,
+        AArch64.R_AARCH64_LDST16_ABS_LO12_NC,
+        AArch64.R_AARCH64_LDST32_ABS_LO12_NC,
+        AArch64.R_AARCH64_LDST64_ABS_LO12_NC,
+        AArch64.R_AARCH64_LDST128_ABS_LO12_NC,
+    )
+)
+RISCV_LOW = frozenset((RiscV.R_RISCV_PCREL_LO12_I, RiscV.R_RISCV_PCREL_LO12_S))
+
 _THUMB: dict[int, Apply] = {
-    3: _thumb_relative32,
-    10: _thumb_branch,
-    30: _thumb_branch,
-    102: _thumb_short_branch,
+    Arm.R_ARM_REL32: _thumb_relative32,
+    Arm.R_ARM_THM_CALL: _thumb_branch,
+    Arm.R_ARM_THM_JUMP24: _thumb_branch,
+    Arm.R_ARM_THM_JUMP11: _thumb_short_branch,
 }
 
 APPLY: dict[Machine, dict[int, Apply]] = {
-    Machine.X86_64: {2: _relative32, 4: _relative32},
+    Machine.X86_64: {X86.R_X86_64_PC32: _relative32, X86.R_X86_64_PLT32: _relative32},
     Machine.THUMB: _THUMB,
     Machine.THUMB_V6M: _THUMB,
     Machine.AARCH64: {
-        261: _relative32,
-        275: _adrp,
-        277: _low12,
-        278: _low12,
-        282: _aarch64_branch,
-        283: _aarch64_branch,
-        284: _low12,
-        285: _low12,
-        286: _low12,
-        299: _low12,
+        AArch64.R_AARCH64_PREL32: _relative32,
+        AArch64.R_AARCH64_ADR_PREL_PG_HI21: _adrp,
+        AArch64.R_AARCH64_JUMP26: _aarch64_branch,
+        AArch64.R_AARCH64_CALL26: _aarch64_branch,
+        **dict.fromkeys(AARCH64_LOW12, _low12),
     },
     Machine.RISCV32: {
-        19: _riscv_call,
-        23: _riscv_high,
-        24: _riscv_low,
-        25: _riscv_low_store,
-        35: _riscv_add,
-        39: _riscv_subtract,
-        57: _relative32,
+        RiscV.R_RISCV_CALL_PLT: _riscv_call,
+        RiscV.R_RISCV_PCREL_HI20: _riscv_high,
+        RiscV.R_RISCV_PCREL_LO12_I: _riscv_low,
+        RiscV.R_RISCV_PCREL_LO12_S: _riscv_low_store,
+        RiscV.R_RISCV_ADD32: _riscv_add,
+        RiscV.R_RISCV_SUB32: _riscv_subtract,
+        RiscV.R_RISCV_32_PCREL: _relative32,
     },
 }
 
-AARCH64_ADRP = 275
-AARCH64_LOW12 = frozenset((277, 278, 284, 285, 286, 299))
-RISCV_HIGH = 23
-RISCV_LOW = frozenset((24, 25))
-
 # Relocations of debugging information: kinds of absolute addresses, and their bytes.
-ABSOLUTE = {
-    Machine.X86_64: {1: 8, 10: 4},
-    Machine.THUMB: {2: 4},
-    Machine.THUMB_V6M: {2: 4},
-    Machine.AARCH64: {257: 8, 258: 4},
-    Machine.RISCV32: {1: 4},
+ABSOLUTE: dict[Machine, dict[int, int]] = {
+    Machine.X86_64: {X86.R_X86_64_64: 8, X86.R_X86_64_32: 4},
+    Machine.THUMB: {Arm.R_ARM_ABS32: 4},
+    Machine.THUMB_V6M: {Arm.R_ARM_ABS32: 4},
+    Machine.AARCH64: {AArch64.R_AARCH64_ABS64: 8, AArch64.R_AARCH64_ABS32: 4},
+    Machine.RISCV32: {RiscV.R_RISCV_32: 4},
 }
 
 

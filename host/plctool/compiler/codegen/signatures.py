@@ -8,6 +8,9 @@ each call and to load them in the block.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower_arith import is_real, is_signed
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
@@ -15,7 +18,22 @@ from plctool.compiler.typed_nodes import walk
 from plctool.iec.types import StringType, Type, is_scalar
 from plctool.image.targets import Target
 
+CONTEXT = "ptr %ctx"  # the argument that hands the context on
+SELF = Value("%self", fixed=True)  # the instance
+RESULT = Value("%result", fixed=True)  # where a result goes that comes back in memory
+RESULT_CAPACITY = Value("%result.capacity")
+
 HandedInputs = dict[Pou, list[Variable]]
+
+
+def parameter_value(number: int) -> Value:
+    """Parameter `number` of those that the program declares."""
+    return Value(f"%p{number}", fixed=True)
+
+
+def parameter_capacity(number: int) -> Value:
+    """The capacity that comes with it when it is a string."""
+    return Value(f"%p{number}.capacity")
 
 
 def parameter_types(pou: Pou, parameter: Parameter) -> list[str]:
@@ -25,15 +43,14 @@ def parameter_types(pou: Pou, parameter: Parameter) -> list[str]:
         return ["ptr", "i32"]
     if parameter.by_reference or not is_scalar(t):
         return ["ptr"]
-    return [extended(t)] if pou.external else [value_type(t)]
+    return [f"{value_type(t)} {extension(t)}".rstrip() if pou.external else value_type(t)]
 
 
-def extended(t: Type) -> str:
-    """A scalar parameter or result of a C function."""
-    text = value_type(t)
-    if text in ("i8", "i16"):
-        return f"{text} {'signext' if is_signed(t) else 'zeroext'}"
-    return text
+def extension(t: Type) -> str:
+    """How a scalar parameter or result of a C function fills its register, as an attribute; "" for none."""
+    if value_type(t) in ("i8", "i16"):
+        return "signext" if is_signed(t) else "zeroext"
+    return ""
 
 
 def result_in_memory(pou: Pou) -> bool:
@@ -41,20 +58,45 @@ def result_in_memory(pou: Pou) -> bool:
     return pou.result is not None and not is_scalar(pou.result.type)
 
 
-def parameter_list(pou: Pou, handed: HandedInputs) -> str:
-    """The parameters of the define line."""
-    words = ["ptr noalias nonnull readonly %ctx"]
+@dataclass(frozen=True)
+class Formal:
+    """A parameter of a compiled function: its LLVM type, what is promised of it, and the value it has inside."""
+
+    type: str
+    value: Value
+    attributes: str = ""
+
+    @property
+    def definition(self) -> str:
+        """As it stands in the define line."""
+        return " ".join(filter(None, (self.type, self.attributes, str(self.value))))
+
+    @property
+    def argument(self) -> str:
+        """As an argument that hands it on."""
+        return f"{self.type} {self.value}"
+
+
+def formals(pou: Pou, handed: HandedInputs) -> list[Formal]:
+    """The parameters of the function of a unit."""
+    found = [Formal("ptr", Value("%ctx"), "noalias nonnull readonly")]
     if pou.kind in (PouKind.FUNCTION_BLOCK, PouKind.METHOD):
-        words.append("ptr nonnull %self")
+        found.append(Formal("ptr", SELF, "nonnull"))
     if result_in_memory(pou):
-        words.append(f"ptr {'' if pou.in_place else 'noalias '}nonnull %result")
-        words += ["i32 %result.capacity"] if pou.cuts_result else []
+        found.append(Formal("ptr", RESULT, "nonnull" if pou.in_place else "noalias nonnull"))
+        found += [Formal("i32", RESULT_CAPACITY)] if pou.cuts_result else []
     if pou.kind in (PouKind.FUNCTION, PouKind.METHOD):
         for number, parameter in enumerate(pou.parameters):
-            names = (f"%p{number}", f"%p{number}.capacity")
-            words += [f"{text} {name}" for text, name in zip(parameter_types(pou, parameter), names, strict=False)]
-    words += [f"{value_type(variable.type)} %p{n}" for n, variable in enumerate(handed.get(pou, ()))]
-    return ", ".join(words)
+            values = (parameter_value(number), parameter_capacity(number))
+            types = parameter_types(pou, parameter)
+            found += [Formal(text, value) for text, value in zip(types, values, strict=False)]
+    found += [Formal(value_type(v.type), parameter_value(n)) for n, v in enumerate(handed.get(pou, ()))]
+    return found
+
+
+def parameter_list(pou: Pou, handed: HandedInputs) -> str:
+    """The parameters of the define line."""
+    return ", ".join(formal.definition for formal in formals(pou, handed))
 
 
 def handed_inputs(program: TypedProgram, target: Target) -> HandedInputs:

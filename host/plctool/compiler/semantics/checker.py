@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
+from plctool.compiler.internal import note_position
 from plctool.compiler.nesting import MAX_DEPTH, NestingError
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, settle
 from plctool.compiler.semantics.scope import Scope
@@ -44,7 +45,11 @@ class Checker:
         self._expressions += 1
         if self._expressions > MAX_DEPTH:
             raise NestingError(self.pos(node.pos))
-        e = EXPRESSION_RULES[type(node)](self, node, expected)
+        try:
+            e = EXPRESSION_RULES[type(node)](self, node, expected)
+        except Exception as error:
+            note_position(error, self.pos(node.pos))
+            raise
         self._expressions -= 1
         return e
 
@@ -53,7 +58,11 @@ class Checker:
         self._statements += 1
         if self._statements > MAX_DEPTH:
             raise NestingError(self.pos(node.pos))
-        statements = STATEMENT_RULES[type(node)](self, node)
+        try:
+            statements = STATEMENT_RULES[type(node)](self, node)
+        except Exception as error:
+            note_position(error, self.pos(node.pos))
+            raise
         self._statements -= 1
         return statements
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
 
 from plctool.compiler.kept import is_kept
 from plctool.compiler.semantics.instances import (
@@ -41,6 +39,7 @@ from plctool.compiler.typed import (
     Initial,
     Load,
     MemberPlace,
+    Node,
     Parameter,
     Place,
     Pos,
@@ -57,6 +56,7 @@ from plctool.compiler.typed import (
     VarPlace,
     overlay,
 )
+from plctool.compiler.typed_nodes import rewrite
 from plctool.iec.areas import Area
 from plctool.iec.types import (
     BOOL,
@@ -324,14 +324,12 @@ def _moved_initial(initial: Initial | None, instance: Place) -> Initial | None:
     return ComputedInit(_moved(initial.value, instance)) if isinstance(initial, ComputedInit) else initial
 
 
-def _moved(node: Any, instance: Place) -> Any:
-    if isinstance(node, SelfPlace):
-        return instance
-    if isinstance(node, VarPlace):
-        own = node.var.storage is Storage.SELF
-        return MemberPlace(instance, node.var.offset, node.type, node.pos) if own else node
-    if isinstance(node, list):
-        return [_moved(part, instance) for part in node]
-    if isinstance(node, Expr | Place):
-        return replace(node, **{name: _moved(part, instance) for name, part in vars(node).items()})
-    return node
+def _moved(e: Expr, instance: Place) -> Expr:
+    def moved(node: Node) -> Node | None:
+        if isinstance(node, SelfPlace):
+            return instance
+        if isinstance(node, VarPlace) and node.var.storage is Storage.SELF:
+            return MemberPlace(instance, node.var.offset, node.type, node.pos)
+        return None
+
+    return rewrite(e, moved)

@@ -48,7 +48,7 @@ def _plain(name: str) -> str:
 def raising() -> ast.PouDecl:
     """The function that raises an exception by its number."""
     code = ast.VarDecl(0, [(0, "code")], None, ast.NamedType(0, "UDINT"), None)
-    block = ast.VarBlock(0, "VAR_INPUT", set(), [code])
+    block = ast.VarBlock(0, ast.Section.VAR_INPUT, set(), [code])
     return ast.PouDecl(0, "FUNCTION", _RAISE, None, [block], [], {"external": "iecraise"}, Source("", ""))
 
 
@@ -97,9 +97,9 @@ class Mocks:
                 if member.result is not None:
                     lines.append(ast.VarDecl(pos, [(pos, value_of(name))], None, member.result, None))
             members.append(_member(member, name, chosen=chosen and member.keyword in ("METHOD", "GET")))
-        blocks = [*decl.blocks, ast.VarBlock(pos, "VAR", set(), lines)] if lines else decl.blocks
+        blocks = [*decl.blocks, ast.VarBlock(pos, ast.Section.VAR, set(), lines)] if lines else decl.blocks
         skip = ast.If(pos, [(ast.Name(pos, MOCKED), [_counted(pos, CALLS), ast.Return(pos)])], [])
-        body = decl.body if "CLASS" in decl.modifiers else [skip, *decl.body]
+        body = decl.body if ast.Modifier.CLASS in decl.modifiers else [skip, *decl.body]
         return replace(decl, blocks=blocks, body=body, members=members)
 
     # ---- functions ----
@@ -121,13 +121,13 @@ class Mocks:
         lines = [_variable(pos, switch_of(decl.name), "BOOL"), value]
         give: list[ast.Stmt] = [_assign(pos, decl.name, ast.Name(pos, value_of(decl.name))), ast.Return(pos)]
         body = [ast.If(pos, [(ast.Name(pos, switch_of(decl.name)), give)], []), *body]
-        block = ast.GlobalBlock(ast.VarBlock(pos, "VAR_GLOBAL", set(), lines), decl.source)
+        block = ast.GlobalBlock(ast.VarBlock(pos, ast.Section.VAR_GLOBAL, set(), lines), decl.source)
         return [block, replace(decl, body=body, attributes=attributes)]
 
 
 def _member(decl: ast.PouDecl, name: str, *, chosen: bool) -> ast.PouDecl:
     """A method, action or property. `chosen`: it has members of its own."""
-    if "ABSTRACT" in decl.modifiers or decl.name.casefold() in INITIALISERS:
+    if ast.Modifier.ABSTRACT in decl.modifiers or decl.name.casefold() in INITIALISERS:
         return decl
     pos = decl.pos
     condition: ast.Expr = ast.Name(pos, MOCKED)

@@ -45,7 +45,7 @@ class PlannedInstance:
 
     name: str
     symbol: PouSymbol
-    qualifiers: frozenset[str] = frozenset()
+    qualifiers: frozenset[ast.Modifier] = frozenset()
 
 
 class Names:
@@ -311,7 +311,7 @@ class Names:
         """What a name is in the PROGRAMs that have a variable of it, with the instance in front."""
         found = []
         for instance in self.planned.values():
-            blocks = (b for b in instance.symbol.decl.blocks if b.keyword != "VAR_TEMP")
+            blocks = (b for b in instance.symbol.decl.blocks if b.keyword != ast.Section.VAR_TEMP)
             written = [n for b in blocks for line in b.decls for _, n in line.names if n.casefold() == name.casefold()]
             found += [f"{instance.name}.{n}" for n in written]
         return found

@@ -13,11 +13,12 @@ from collections.abc import Iterable
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.ast import Modifier, Section
 
-KEEPING = frozenset(("RETAIN", "NON_RETAIN", "PERSISTENT"))
-ACCESS = frozenset(("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"))
-_CONSTANT = frozenset(("CONSTANT",))
-_NONE = frozenset[str]()
+KEEPING = frozenset((Modifier.RETAIN, Modifier.NON_RETAIN, Modifier.PERSISTENT))
+ACCESS = frozenset((Modifier.PUBLIC, Modifier.PRIVATE, Modifier.PROTECTED, Modifier.INTERNAL))
+_CONSTANT = frozenset((Modifier.CONSTANT,))
+_NONE = frozenset[Modifier]()
 
 _CALL = {  # what lives for one call, and what does not
     "VAR": _CONSTANT, "VAR_TEMP": _CONSTANT, "VAR_STAT": _CONSTANT | KEEPING, "VAR_EXTERNAL": _CONSTANT,
@@ -26,7 +27,7 @@ _PARAMETERS = {"VAR_INPUT": _CONSTANT, "VAR_OUTPUT": _NONE, "VAR_IN_OUT": _CONST
 _LASTING = {**_CALL, "VAR_INPUT": _CONSTANT | KEEPING, "VAR_OUTPUT": KEEPING, "VAR_IN_OUT": _CONSTANT}
 _TEST = {"VAR": _CONSTANT, "VAR_TEMP": _CONSTANT, "VAR_EXTERNAL": _CONSTANT}
 
-SECTIONS: dict[str, dict[str, frozenset[str]]] = {
+SECTIONS: dict[str, dict[str, frozenset[Modifier]]] = {
     "FUNCTION": {**_CALL, **_PARAMETERS},
     "FUNCTION_BLOCK": {**_LASTING, "VAR": _CONSTANT | KEEPING | ACCESS},
     "CLASS": {**_CALL, "VAR": _CONSTANT | KEEPING | ACCESS},
@@ -37,27 +38,27 @@ SECTIONS: dict[str, dict[str, frozenset[str]]] = {
     "property of an INTERFACE": {},
     "ACTION": {},
     "CONFIGURATION": {"VAR_GLOBAL": _CONSTANT | KEEPING},
-    "file": {"VAR_GLOBAL": _CONSTANT | KEEPING | {"PUBLIC", "INTERNAL"}},
+    "file": {"VAR_GLOBAL": _CONSTANT | KEEPING | {Modifier.PUBLIC, Modifier.INTERNAL}},
     "TEST": _TEST,
     "SETUP": _TEST,
     "TEARDOWN": _TEST,
 }
 """For each kind of unit its sections, and for each of those the qualifiers that do something there."""
 
-_OBJECTS = ACCESS | {"FINAL", "ABSTRACT", "OVERRIDE"}
-MODIFIERS: dict[str, frozenset[str]] = {
-    "FUNCTION": frozenset(("PUBLIC", "INTERNAL")),
-    "FUNCTION_BLOCK": frozenset(("PUBLIC", "INTERNAL", "ABSTRACT", "FINAL")),
-    "CLASS": frozenset(("PUBLIC", "INTERNAL", "ABSTRACT", "FINAL")),
-    "PROGRAM": frozenset(("PUBLIC", "INTERNAL")),
-    "INTERFACE": frozenset(("PUBLIC", "INTERNAL")),
+_OBJECTS = ACCESS | {Modifier.FINAL, Modifier.ABSTRACT, Modifier.OVERRIDE}
+MODIFIERS: dict[str, frozenset[Modifier]] = {
+    "FUNCTION": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
+    "FUNCTION_BLOCK": frozenset((Modifier.PUBLIC, Modifier.INTERNAL, Modifier.ABSTRACT, Modifier.FINAL)),
+    "CLASS": frozenset((Modifier.PUBLIC, Modifier.INTERNAL, Modifier.ABSTRACT, Modifier.FINAL)),
+    "PROGRAM": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
+    "INTERFACE": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
     "METHOD": _OBJECTS,
     "PROPERTY": _OBJECTS,
-    "method of an INTERFACE": frozenset(("PUBLIC", "ABSTRACT")),
-    "property of an INTERFACE": frozenset(("PUBLIC", "ABSTRACT")),
+    "method of an INTERFACE": frozenset((Modifier.PUBLIC, Modifier.ABSTRACT)),
+    "property of an INTERFACE": frozenset((Modifier.PUBLIC, Modifier.ABSTRACT)),
     "ACTION": _NONE,
-    "TYPE": frozenset(("PUBLIC", "INTERNAL")),
-    "NAMESPACE": frozenset(("PUBLIC", "INTERNAL")),
+    "TYPE": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
+    "NAMESPACE": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
 }
 """For each kind of unit the words that may stand before its name."""
 
@@ -135,13 +136,13 @@ class _Check:
                 self._error(block.pos, message)
 
     def _modifiers(self, decl: ast.PouDecl, kind: str) -> None:
-        given = decl.modifiers - {"CLASS"}
+        given = decl.modifiers - {Modifier.CLASS}
         for word in sorted(given - MODIFIERS[kind]):
             self._error(decl.pos, _wrong_modifier(kind, word))
         access = sorted(given & ACCESS)
         if len(access) > 1:
             self._error(decl.pos, f"{decl.name} cannot be {' and '.join(access)}; choose one")
-        for one, other in (("ABSTRACT", "FINAL"), ("ABSTRACT", "PRIVATE")):
+        for one, other in ((Modifier.ABSTRACT, Modifier.FINAL), (Modifier.ABSTRACT, Modifier.PRIVATE)):
             if {one, other} <= given:
                 message = f"{decl.name} cannot be {one} and {other}: derived blocks complete what is {one}"
                 self._error(decl.pos, message)
@@ -162,28 +163,28 @@ class _Check:
 
     def _combination(self, kind: str, block: ast.VarBlock) -> None:
         given = block.qualifiers
-        keeps = sorted(given & {"RETAIN", "PERSISTENT"})
-        if keeps and "NON_RETAIN" in given:
+        keeps = sorted(given & {Modifier.RETAIN, Modifier.PERSISTENT})
+        if keeps and Modifier.NON_RETAIN in given:
             self._error(block.pos, f"a variable cannot be {keeps[0]} and NON_RETAIN; choose one")
         access = sorted(given & ACCESS)
         if len(access) > 1:
             self._error(block.pos, f"a variable cannot be {' and '.join(access)}; choose one")
-        if keeps and "CONSTANT" in given:
+        if keeps and Modifier.CONSTANT in given:
             self._warning(block.pos, f"{keeps[0]} has no effect here: a constant never changes; leave it out")
-        if kind == "PROGRAM" and access and access != ["PUBLIC"]:
+        if kind == "PROGRAM" and access and access != [Modifier.PUBLIC]:
             message = f"{access[0]} has no effect in a PROGRAM: other POUs see its variables all the same; leave it out"
             self._warning(block.pos, message)
 
     def _line(self, block: ast.VarBlock, line: ast.VarDecl) -> None:
         name = line.names[0][1]
-        if line.location is not None and "CONSTANT" in block.qualifiers and block.keyword == "VAR_GLOBAL":
+        if line.location is not None and Modifier.CONSTANT in block.qualifiers and block.keyword == Section.VAR_GLOBAL:
             self._error(line.location.pos, f"the constant {name} has no address; leave out CONSTANT or AT")
         if line.init is None:
             return
-        if block.keyword == "VAR_EXTERNAL":
+        if block.keyword == Section.VAR_EXTERNAL:
             message = f"this initial value has no effect: {name} gets the one of its VAR_GLOBAL; write it there"
             self._warning(line.pos, message)
-        elif block.keyword == "VAR_IN_OUT":
+        elif block.keyword == Section.VAR_IN_OUT:
             message = f"this initial value has no effect: each call gives {name} a variable; leave it out"
             self._warning(line.pos, message)
 
@@ -194,9 +195,9 @@ def _given(decl: ast.PouDecl) -> int:
 
 
 def _kind(decl: ast.PouDecl) -> str:
-    if "CLASS" in decl.modifiers:
+    if Modifier.CLASS in decl.modifiers:
         return "CLASS"
-    return "PROPERTY" if decl.keyword in ("GET", "SET") else decl.keyword
+    return "PROPERTY" if decl.is_property else decl.keyword
 
 
 def _with_article(kind: str) -> str:
@@ -221,12 +222,12 @@ def _wrong_modifier(kind: str, word: str) -> str:
 
 
 def _wrong_qualifier(kind: str, keyword: str, word: str) -> str:
-    if word in ("FINAL", "ABSTRACT", "OVERRIDE"):
+    if word in (Modifier.FINAL, Modifier.ABSTRACT, Modifier.OVERRIDE):
         return f"{word} is for blocks and methods, not for variables; leave it out"
     if word in ACCESS:
         return _wrong_access(kind, keyword, word)
-    if word == "CONSTANT":
-        reason = "it is there to be written" if keyword == "VAR_OUTPUT" else "a constant is written VAR CONSTANT"
+    if word == Modifier.CONSTANT:
+        reason = "it is there to be written" if keyword == Section.VAR_OUTPUT else "a constant is written VAR CONSTANT"
         return f"a {keyword} cannot be CONSTANT: {reason}"
     return f"a {keyword} cannot be {word}: {_why_not_kept(kind, keyword)}"
 

@@ -5,6 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from plctool.compiler.internal import note_position
 from plctool.compiler.library import Library
 from plctool.compiler.semantics.any_values import describes_any
 from plctool.compiler.semantics.checker import Checker
@@ -98,7 +99,11 @@ class Program:
         self._classes.declare_members()
         while bodies:
             scope, decl = bodies.next()
-            write_body(Checker(world, scope), statements_of(world, decl, scope))
+            try:
+                write_body(Checker(world, scope), statements_of(world, decl, scope))
+            except Exception as error:
+                note_position(error, scope.pos(decl.pos))
+                raise
             if not scope.library:
                 checked.append(scope)
             if bodies.only_library:

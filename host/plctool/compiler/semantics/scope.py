@@ -28,10 +28,10 @@ from plctool.iec.types import Type
 def _internal_to(symbol: Symbol) -> str | None:
     """The namespace that alone may use a unit or global; None if all may."""
     if isinstance(symbol, GlobalSymbol):
-        space, marked = symbol.namespace, "INTERNAL" in symbol.qualifiers
+        space, marked = symbol.namespace, ast.Modifier.INTERNAL in symbol.qualifiers
     elif isinstance(symbol, TypeSymbol | PouSymbol):
         decl = symbol.decl
-        space, marked = decl.namespace, "INTERNAL" in decl.modifiers
+        space, marked = decl.namespace, ast.Modifier.INTERNAL in decl.modifiers
     else:
         return None
     if space is None or not space.name or not (marked or space.internal is not None):

@@ -91,7 +91,7 @@ def _declare(decl: ast.PouDecl, owner: ast.PouDecl, diagnostics: Diagnostics) ->
         if node.name.upper() == "A" and isinstance(node.base, ast.Name)
     }
     _Structure(decl, owner, diagnostics).check()
-    steps = ast.VarBlock(decl.pos, "STEP", set(), [_step_variable(step) for step in decl.chart.steps])
+    steps = ast.VarBlock(decl.pos, ast.Section.STEP, set(), [_step_variable(step) for step in decl.chart.steps])
     steps.decls += _hidden(decl, decl.chart)
     temporary = [_variable(decl.pos, hidden_name(decl, BEFORE), "UINT")]
     if not is_sequential(decl.chart):
@@ -99,7 +99,7 @@ def _declare(decl: ast.PouDecl, owner: ast.PouDecl, diagnostics: Diagnostics) ->
         temporary = [_variable(t.pos, name, "BOOL") for t, name in zip(decl.chart.transitions, fires, strict=True)]
     decl.blocks = [*decl.blocks, steps]
     if decl.chart.valid:
-        decl.blocks.append(ast.VarBlock(decl.pos, "VAR_TEMP", set(), temporary))
+        decl.blocks.append(ast.VarBlock(decl.pos, ast.Section.VAR_TEMP, set(), temporary))
 
 
 def _variable(pos: int, name: str, type_name: str, init: ast.Init | None = None) -> ast.VarDecl:

@@ -10,6 +10,7 @@ from enum import Enum
 
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.ast import Section
 from plctool.compiler.typed import Const, Direction, Initial, Pos, Pou, Variable
 from plctool.iec.types import Elementary, Keep, Kind, PointerType, StructType, Type
 
@@ -44,7 +45,11 @@ UNTYPED_REAL = Elementary("real constant", Kind.REAL, 64, True, -1)
 NULL_TYPE = PointerType(ERROR)
 
 
-DIRECTIONS = {"VAR_INPUT": Direction.INPUT, "VAR_OUTPUT": Direction.OUTPUT, "VAR_IN_OUT": Direction.IN_OUT}
+DIRECTIONS = {
+    Section.VAR_INPUT: Direction.INPUT,
+    Section.VAR_OUTPUT: Direction.OUTPUT,
+    Section.VAR_IN_OUT: Direction.IN_OUT,
+}
 """Of parameters, by the keyword of their section."""
 
 
@@ -79,7 +84,7 @@ class VarSymbol:
     given: bool = False  # has an initial value of its own
     by_reference: bool = False
     used: bool = False
-    access: str = ""  # PUBLIC, PRIVATE, PROTECTED or INTERNAL, where it is written
+    access: ast.Modifier | None = None  # PUBLIC, PRIVATE, PROTECTED or INTERNAL, where it is written
     keep: Keep = Keep.UNSAID  # what the section of a member says
     is_path: bool = False  # starts with the path of its instance
     group: str = ""  # ANY_... of a parameter that describes its argument (any_values.py)
@@ -94,7 +99,7 @@ class GlobalSymbol:
     full_name: str
     pos: int
     decl: ast.VarDecl
-    qualifiers: set[str]
+    qualifiers: set[ast.Modifier]
     source: Source
     symbol: VarSymbol | None = None
     busy: bool = False
@@ -199,12 +204,12 @@ class Member:
     @property
     def is_property(self) -> bool:
         """Whether it reads or writes a property."""
-        return self.decl.keyword in ("GET", "SET")
+        return self.decl.is_property
 
     @property
     def abstract(self) -> bool:
         """Whether it has no body."""
-        return "ABSTRACT" in self.decl.modifiers or self.owner.is_interface
+        return ast.Modifier.ABSTRACT in self.decl.modifiers or self.owner.is_interface
 
 
 @dataclass(slots=True, eq=False)
@@ -231,7 +236,7 @@ class ClassInfo:
     @property
     def abstract(self) -> bool:
         """Whether only derived blocks have instances."""
-        return "ABSTRACT" in self.symbol.decl.modifiers or self.is_interface
+        return ast.Modifier.ABSTRACT in self.symbol.decl.modifiers or self.is_interface
 
     def all_interfaces(self) -> list[ClassInfo]:
         """Those named, those that they extend, those of the base."""

@@ -195,13 +195,14 @@ class TestProgram:
         for name in {name.casefold() for b in decl.blocks for line in b.decls for _, name in line.names}:
             if isinstance(scope.names.get(name), VarSymbol):
                 del scope.names[name]  # hides one of SETUP
-        blocks = sorted(decl.blocks, key=lambda b: "CONSTANT" not in b.qualifiers)  # bounds may need constants
+        # Bounds may need constants.
+        blocks = sorted(decl.blocks, key=lambda b: ast.Modifier.CONSTANT not in b.qualifiers)
         for block in blocks:
-            if block.keyword not in ("VAR", "VAR_TEMP", "VAR_EXTERNAL"):
+            if block.keyword not in (ast.Section.VAR, ast.Section.VAR_TEMP, ast.Section.VAR_EXTERNAL):
                 scope.error(block.pos, "unsupported", f"a {decl.keyword} has VAR, not {block.keyword}")
-            elif block.keyword != "VAR_EXTERNAL":  # globals are known anyway
+            elif block.keyword != ast.Section.VAR_EXTERNAL:  # globals are known anyway
                 for line in block.decls:
-                    if "CONSTANT" in block.qualifiers:
+                    if ast.Modifier.CONSTANT in block.qualifiers:
                         self._constant(line, scope, pou.name)
                     else:
                         self._line(line, scope, shared)

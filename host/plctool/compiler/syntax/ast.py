@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import TypeVar
 
 from plctool.compiler.source import Source
@@ -229,6 +230,38 @@ TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | Struc
 # ---- declarations --------------------------------------------------------------------------------------------------
 
 
+class Modifier(StrEnum):
+    """A word in front of the name of a unit or type, or after the keyword of a section (a qualifier)."""
+
+    PUBLIC = "PUBLIC"
+    PRIVATE = "PRIVATE"
+    PROTECTED = "PROTECTED"
+    INTERNAL = "INTERNAL"
+    FINAL = "FINAL"
+    ABSTRACT = "ABSTRACT"
+    OVERRIDE = "OVERRIDE"
+    CLASS = "CLASS"  # of a FUNCTION_BLOCK that is one
+    CONSTANT = "CONSTANT"
+    RETAIN = "RETAIN"
+    NON_RETAIN = "NON_RETAIN"
+    PERSISTENT = "PERSISTENT"
+
+
+class Section(StrEnum):
+    """A section of declarations, by its keyword."""
+
+    VAR = "VAR"
+    VAR_INPUT = "VAR_INPUT"
+    VAR_OUTPUT = "VAR_OUTPUT"
+    VAR_IN_OUT = "VAR_IN_OUT"
+    VAR_TEMP = "VAR_TEMP"
+    VAR_STAT = "VAR_STAT"
+    VAR_INST = "VAR_INST"
+    VAR_EXTERNAL = "VAR_EXTERNAL"
+    VAR_GLOBAL = "VAR_GLOBAL"
+    STEP = "STEP"  # the steps of a chart, which the compiler declares
+
+
 @dataclass(slots=True, eq=False)
 class VarDecl:
     """One declaration line: `names AT location : type edge := init`; `edge` is R_EDGE, F_EDGE or ""."""
@@ -244,11 +277,11 @@ class VarDecl:
 
 @dataclass(slots=True, eq=False)
 class VarBlock:
-    """`VAR_INPUT RETAIN ... END_VAR`; `keyword` and `qualifiers` in capitals."""
+    """`VAR_INPUT RETAIN ... END_VAR`"""
 
     pos: int
-    keyword: str
-    qualifiers: set[str]
+    keyword: Section
+    qualifiers: set[Modifier]
     decls: list[VarDecl]
 
 
@@ -263,7 +296,7 @@ class TypeDecl:
     source: Source
     namespace: Namespace | None = None
     attributes: dict[str, str] = field(default_factory=dict)
-    modifiers: set[str] = field(default_factory=set)  # PUBLIC, INTERNAL
+    modifiers: set[Modifier] = field(default_factory=set)  # PUBLIC, INTERNAL
 
     @property
     def qualified(self) -> bool:
@@ -295,7 +328,7 @@ class PouDecl:
     body: list[Stmt]
     attributes: dict[str, str]
     source: Source
-    modifiers: set[str] = field(default_factory=set)  # PUBLIC, FINAL ... in capitals
+    modifiers: set[Modifier] = field(default_factory=set)  # PUBLIC, FINAL ...
     bases: list[tuple[int, str]] = field(default_factory=list)  # EXTENDS
     interfaces: list[tuple[int, str]] = field(default_factory=list)  # IMPLEMENTS
     members: list[PouDecl] = field(default_factory=list)
@@ -306,6 +339,17 @@ class PouDecl:
     def full_name(self) -> str:
         """With the namespace in front."""
         return f"{self.namespace.name}.{self.name}" if self.namespace and self.namespace.name else self.name
+
+    @property
+    def is_property(self) -> bool:
+        """Whether it reads or writes a property of the unit it is in."""
+        return self.keyword in ("GET", "SET")
+
+    @property
+    def member_key(self) -> str:
+        """Under which it is found among the members of a unit; a property has two."""
+        name = self.name.casefold()
+        return f"{name}.{self.keyword.lower()}" if self.is_property else name
 
 
 @dataclass(slots=True, eq=False)
@@ -380,7 +424,7 @@ class ProgramInstance:
     type_pos: int
     type_name: str
     args: list[Argument]
-    qualifiers: set[str]
+    qualifiers: set[Modifier]
 
 
 @dataclass(slots=True, eq=False)

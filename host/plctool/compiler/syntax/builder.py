@@ -94,7 +94,7 @@ class Builder:
         elif base is not None:
             self.report(base[0], "syntax", "only a STRUCT or UNION can extend another one")
         decl = ast.TypeDecl(name.pos, name.text, spec, init, self.source)
-        decl.modifiers = {token.text.upper() for token in modifiers}
+        decl.modifiers = {ast.Modifier(token.text.upper()) for token in modifiers}
         return decl
 
     def named_type(self, name: tuple[int, str]) -> ast.NamedType:
@@ -153,9 +153,9 @@ class Builder:
     # ---- variables ----
 
     def var_block(self, keyword: Token, *items: Any) -> ast.VarBlock:
-        qualifiers = {t.text.upper() for t in items if isinstance(t, Token)}
+        qualifiers = {ast.Modifier(t.text.upper()) for t in items if isinstance(t, Token)}
         decls = [d for d in items if isinstance(d, ast.VarDecl)]
-        return ast.VarBlock(keyword.pos, keyword.text.upper(), qualifiers, decls)
+        return ast.VarBlock(keyword.pos, ast.Section(keyword.text.upper()), qualifiers, decls)
 
     def var_decl(
         self,
@@ -229,7 +229,7 @@ class Builder:
         *modifiers, name = head
         attributes = self._attributes_at(keyword.pos, keyword.text.upper())
         decl = ast.PouDecl(name.pos, keyword.text.upper(), name.text, result, [], body or [], attributes, self.source)
-        decl.modifiers = {t.text.upper() for t in modifiers if t is not None}
+        decl.modifiers = {ast.Modifier(t.text.upper()) for t in modifiers if t is not None}
         self.units.complete(decl, None, None, blocks or [])
         return decl
 
@@ -265,7 +265,7 @@ class Builder:
         *head, bases, interfaces, parts = rest
         decl = self.pou(keyword, head, None, [], [])
         decl.keyword = "FUNCTION_BLOCK"
-        decl.modifiers.add("CLASS")
+        decl.modifiers.add(ast.Modifier.CLASS)
         self.units.complete(decl, bases, interfaces, parts or [])
         return decl
 
@@ -345,7 +345,7 @@ class Builder:
     def instance(
         self, _keyword: Token, qualifier: Token | None, name: Token, task: Token | None, type_name: Token, args: Any
     ) -> ast.ProgramInstance:
-        qualifiers = {qualifier.text.upper()} if qualifier else set[str]()
+        qualifiers = {ast.Modifier(qualifier.text.upper())} if qualifier else set[ast.Modifier]()
         return ast.ProgramInstance(
             name.pos,
             name.text,

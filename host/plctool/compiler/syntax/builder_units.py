@@ -111,7 +111,7 @@ class Arrangement:
             decl.result = spec
         else:
             line = ast.VarDecl(name.pos, [(name.pos, name.text)], None, spec, None)
-            decl.blocks.insert(0, ast.VarBlock(name.pos, "VAR_INPUT", set(), [line]))
+            decl.blocks.insert(0, ast.VarBlock(name.pos, ast.Section.VAR_INPUT, set(), [line]))
         return decl
 
     def namespace(self, rest: Sequence[Any]) -> list[Any]:

@@ -38,7 +38,7 @@ from plctool.iec.types import (
     StructType,
 )  # fmt: skip
 
-_ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
+_ACCESS = {ast.Modifier.PUBLIC, ast.Modifier.PRIVATE, ast.Modifier.PROTECTED, ast.Modifier.INTERNAL}
 _MEMBER_MAY = {
     Role.INPUT: May.BE_EDGE | May.HAVE_OPEN_ADDRESS, Role.OUTPUT: May.HAVE_OPEN_ADDRESS,
     Role.IN_OUT: May.BE_OPEN_ARRAY, Role.LOCAL: May.HAVE_OPEN_ADDRESS, Role.STEP: May.BE_PLAIN,
@@ -122,9 +122,9 @@ class Blocks:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
                 symbol.given, symbol.used = line.init is not None, direction is not None
-                symbol.access = next(iter(block.qualifiers & _ACCESS), "")
+                symbol.access = next(iter(block.qualifiers & _ACCESS), None)
                 symbol.open_area = line.location.text[1] if line.location is not None else ""
-                symbol.constant = "CONSTANT" in block.qualifiers
+                symbol.constant = ast.Modifier.CONSTANT in block.qualifiers
                 symbol.is_path = "instance-path" in line.attributes
                 symbol.used = symbol.used or symbol.is_path
                 if symbol.is_path and not isinstance(t, StringType):

@@ -10,6 +10,7 @@ from plctool.compiler.semantics.conversions import same_type
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.symbols import ERROR, ClassInfo, Member
 from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
 from plctool.iec.types import BOOL
 
 
@@ -19,7 +20,7 @@ def check_class(world: World, cls: ClassInfo) -> None:
         inherited = cls.base.find(key) if cls.base is not None else None
         if inherited is not None and key not in INITIALISERS:
             _check_override(world, member, inherited)
-        elif "OVERRIDE" in member.decl.modifiers and not any(key in i.members for i in cls.all_interfaces()):
+        elif ast.Modifier.OVERRIDE in member.decl.modifiers and not any(key in i.members for i in cls.all_interfaces()):
             names = cls.base.member_names() if cls.base is not None else []
             hint = did_you_mean(member.decl.name, names)
             _error(world, member, f"{member.name} overrides nothing{hint}")
@@ -54,9 +55,9 @@ def _check_accessors(world: World, member: Member, key: str) -> None:
 
 
 def _check_override(world: World, member: Member, inherited: Member) -> None:
-    if "FINAL" in inherited.decl.modifiers:
+    if ast.Modifier.FINAL in inherited.decl.modifiers:
         _error(world, member, f"{inherited.name} is FINAL and cannot be overridden")
-    elif "PRIVATE" in inherited.decl.modifiers:
+    elif ast.Modifier.PRIVATE in inherited.decl.modifiers:
         _error(world, member, f"{inherited.name} is PRIVATE and cannot be overridden; choose another name")
     else:
         _check_signature(world, member, inherited)
@@ -102,7 +103,7 @@ def _check_interfaces(world: World, cls: ClassInfo) -> None:
 
 
 def _check_implementation(world: World, member: Member, wanted: Member) -> None:
-    hidden = member.decl.modifiers & {"PRIVATE", "PROTECTED"}
+    hidden = member.decl.modifiers & {ast.Modifier.PRIVATE, ast.Modifier.PROTECTED}
     if hidden:
         _error(world, member, f"{member.name} implements {wanted.name}, so it cannot be {hidden.pop()}")
     _check_signature(world, member, wanted)

@@ -33,13 +33,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Initial, Pou, PouKind, ScalarInit, Storage, Variable
 from plctool.iec.types import CLASS_NUMBER, UDINT, EnumType, Field, InterfaceType, Keep, StructType
 
-_LASTING = {"VAR_INST": Role.LOCAL, "STEP": Role.STEP}  # keywords of blocks in members
-
-
-def _member_key(decl: ast.PouDecl) -> str:
-    """Under which a member is found; a property has two."""
-    name = decl.name.casefold()
-    return f"{name}.{decl.keyword.lower()}" if decl.keyword in ("GET", "SET") else name
+_LASTING = {ast.Section.VAR_INST: Role.LOCAL, ast.Section.STEP: Role.STEP}  # keywords of blocks in members
 
 
 def _named(interfaces: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
@@ -105,7 +99,7 @@ class Classes:
             info = self._world.declared.block(base)
             if info is None:
                 scope.error(offset, "recursion", f"{symbol.decl.name} extends itself: {self._hierarchy.circle(symbol)}")
-            elif "FINAL" in base.decl.modifiers:
+            elif ast.Modifier.FINAL in base.decl.modifiers:
                 scope.error(offset, "inheritance", f"{name} is FINAL and cannot be extended")
             return info
         if isinstance(base, PouSymbol) and base.keyword == "INTERFACE":
@@ -135,12 +129,14 @@ class Classes:
         if inherited is not None:
             defaults.update(inherited.members)
         assert info.cls is not None and base.cls is not None
-        private = {k for k, s in base.cls.names.items() if isinstance(s, VarSymbol) and s.access == "PRIVATE"}
+        private = {
+            k for k, s in base.cls.names.items() if isinstance(s, VarSymbol) and s.access is ast.Modifier.PRIVATE
+        }
         info.cls.names.update((k, s) for k, s in base.cls.names.items() if k not in private)
 
     def _add_members(self, cls: ClassInfo) -> None:
         for decl in cls.symbol.decl.members:
-            key = _member_key(decl)
+            key = decl.member_key
             if key in cls.members:
                 pos = decl.source.pos(decl.pos)
                 self._world.diagnostics.error(pos, "duplicate", f"{cls.name} has a {decl.keyword} {decl.name} already")
@@ -181,7 +177,7 @@ class Classes:
         inherited = cls.base.block.members if cls.base is not None and cls.base.block is not None else {}
         own = {member.decl.name.casefold() for member in cls.members.values()}
         for key, symbol in info.members.items():
-            known = inherited.get(key) is symbol and (symbol.access == "PRIVATE" or key not in own)
+            known = inherited.get(key) is symbol and (symbol.access is ast.Modifier.PRIVATE or key not in own)
             if "." not in key and not known:
                 self._see(cls, key, symbol)
         cls.names.update(scope.edges)
@@ -265,7 +261,7 @@ class Classes:
         scope.pou, scope.cls, scope.outer = pou, cls, cls.names
         if decl.namespace is not None:
             scope.use(decl.namespace.using)
-        scope.names.update(cls.instance_variables.get(_member_key(decl), {}))
+        scope.names.update(cls.instance_variables.get(decl.member_key, {}))
         self._functions.signature(info, decl, scope)
         if not member.abstract:
             self._world.bodies.add(scope, decl)

@@ -100,7 +100,7 @@ class Functions:
                         behind += self._any_parameters(block, line, info, scope)
                     else:
                         self._parameters(replace(block, decls=[line]), info, scope)
-            elif block.keyword not in ("VAR_INST", "STEP"):
+            elif block.keyword not in (ast.Section.VAR_INST, ast.Section.STEP):
                 self._units.declare_stack_variables(block, info.pou, scope)
         info.pou.parameters += [*bound_parameters(info.pou.parameters), *behind]
 
@@ -109,7 +109,7 @@ class Functions:
     ) -> list[Parameter]:
         """Inputs that describe their arguments; what is passed after all other parameters."""
         assert isinstance(line.type, ast.NamedType)
-        if block.keyword != "VAR_INPUT" or line.init is not None:
+        if block.keyword != ast.Section.VAR_INPUT or line.init is not None:
             scope.error(line.pos, "type", f"{line.type.name} is for inputs here, without an initial value")
             return []
         t, behind = self._world.declared.type_named(line.pos, f"__SYSTEM.{NAME}", scope), list[Parameter]()
@@ -156,7 +156,7 @@ class Functions:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=default)
                 symbol.given, symbol.by_reference, symbol.used = line.init is not None, by_reference, True
-                symbol.constant = "CONSTANT" in block.qualifiers
+                symbol.constant = ast.Modifier.CONSTANT in block.qualifiers
                 if not scope.declare(symbol, offset):
                     continue
                 storage = Storage.REFERENCE if by_reference else Storage.LOCAL

@@ -130,7 +130,7 @@ class Programs:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, ROLES[block.keyword], default=init)
                 symbol.used = direction is not None or line.location is not None
-                symbol.constant = direction is not None and "CONSTANT" in block.qualifiers
+                symbol.constant = direction is not None and ast.Modifier.CONSTANT in block.qualifiers
                 if not scope.declare(symbol, offset) or t is ERROR:
                     continue
                 self._variables.check_kept(name, t, own, scope, offset)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from enum import Flag, auto
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.internal import note_position
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.addresses import is_open
@@ -76,6 +77,15 @@ class TypeDeclarations:
     ) -> tuple[Type, Initial | None]:
         """Type and initial value of a declaration line; None for all zero, unless it says 0 where memory may hold
         something else: it is at an address, or `overrides` another initial value."""
+        try:
+            return self._declared_type(decl, scope, may, overrides=overrides)
+        except Exception as error:
+            note_position(error, scope.pos(decl.pos))
+            raise
+
+    def _declared_type(
+        self, decl: ast.VarDecl, scope: Scope, may: May, *, overrides: bool
+    ) -> tuple[Type, Initial | None]:
         overrides = overrides or decl.location is not None
         self._check_extras(decl, may, scope)
         spec, init = self._with_arguments(decl, scope)

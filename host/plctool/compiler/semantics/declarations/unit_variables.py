@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
 from plctool.compiler.semantics.declarations.variables import Variables
@@ -15,14 +15,20 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, GlobalSymbol, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
+from plctool.compiler.syntax.ast import Section
 from plctool.compiler.typed import Assign, Load, Pou, PouKind, Storage, Variable, VarPlace
 from plctool.iec.types import Keep
 
 ROLES = {
-    "VAR_INPUT": Role.INPUT, "VAR_OUTPUT": Role.OUTPUT, "VAR_IN_OUT": Role.IN_OUT, "VAR": Role.LOCAL,
-    "VAR_TEMP": Role.TEMP,
-    "VAR_STAT": Role.LOCAL, "VAR_INST": Role.LOCAL, "STEP": Role.STEP,
-}  # fmt: skip
+    Section.VAR_INPUT: Role.INPUT,
+    Section.VAR_OUTPUT: Role.OUTPUT,
+    Section.VAR_IN_OUT: Role.IN_OUT,
+    Section.VAR: Role.LOCAL,
+    Section.VAR_TEMP: Role.TEMP,
+    Section.VAR_STAT: Role.LOCAL,
+    Section.VAR_INST: Role.LOCAL,
+    Section.STEP: Role.STEP,
+}
 _KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
 _KEEPING = {
     PouKind.FUNCTION: "a FUNCTION_BLOCK", PouKind.METHOD: "VAR_INST", PouKind.FUNCTION_BLOCK: "VAR",
@@ -32,7 +38,11 @@ _KEEPING = {
 
 def _holds_constants(block: ast.VarBlock) -> bool:
     """Whether what a block declares has one value for ever. CONSTANT parameters are only read-only."""
-    return "CONSTANT" in block.qualifiers and block.keyword not in (*DIRECTIONS, "VAR_EXTERNAL", "VAR_INST")
+    return ast.Modifier.CONSTANT in block.qualifiers and block.keyword not in (
+        *DIRECTIONS,
+        Section.VAR_EXTERNAL,
+        Section.VAR_INST,
+    )
 
 
 def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.VarDecl, Role]]:
@@ -47,15 +57,9 @@ def _in_order_of_use(lines: list[tuple[ast.VarDecl, Role]]) -> list[tuple[ast.Va
     return ordered
 
 
-def _names_used(node: object) -> set[str]:
+def _names_used(line: ast.VarDecl) -> set[str]:
     """The names, case-folded, in the type and the initial value of a declaration."""
-    if isinstance(node, ast.Name):
-        return {node.name.casefold()}
-    if isinstance(node, list | tuple):
-        return set().union(*map(_names_used, node))
-    if is_dataclass(node):
-        return set().union(*(_names_used(getattr(node, f.name)) for f in fields(node)))
-    return set()
+    return {name.name.casefold() for name in ast.every(ast.Name, line)}
 
 
 def _seen_by_actions(block: ast.VarBlock, decl: ast.PouDecl) -> bool:
@@ -90,14 +94,14 @@ class UnitVariables:
         for block in decl.blocks:
             if _holds_constants(block):
                 continue
-            if block.keyword == "VAR_EXTERNAL":
+            if block.keyword == Section.VAR_EXTERNAL:
                 self._declare_externals(block, scope)
-            elif block.keyword == "VAR_STAT":
+            elif block.keyword == Section.VAR_STAT:
                 self._declare_statics(block, decl, scope)
-            elif block.keyword == "VAR_TEMP" and not _seen_by_actions(block, decl):
+            elif block.keyword == Section.VAR_TEMP and not _seen_by_actions(block, decl):
                 self.declare_stack_variables(block, pou, scope)
-            elif block.keyword == "VAR_TEMP":
-                yield replace(block, keyword="VAR")
+            elif block.keyword == Section.VAR_TEMP:
+                yield replace(block, keyword=Section.VAR)
                 self._start_anew(block, scope)
             else:
                 yield block
@@ -138,7 +142,7 @@ class UnitVariables:
                 symbol = self._world.declared.variable(found)
                 if ERROR not in (t, symbol.type) and t != symbol.type:
                     scope.error(offset, "type", f"the VAR_GLOBAL {name} is of type {symbol.type}, not {t}")
-                if "CONSTANT" in block.qualifiers:
+                if ast.Modifier.CONSTANT in block.qualifiers:
                     symbol = replace(symbol, constant=True)
                 scope.names[name.casefold()] = symbol
 
@@ -158,8 +162,11 @@ class UnitVariables:
 
     def keep_of(self, block: ast.VarBlock, pou: Pou) -> Keep:
         """Whether the variables of a section keep their values; where none can, `permitted` has said so."""
-        short = pou.kind in (PouKind.FUNCTION, PouKind.METHOD) and block.keyword not in ("VAR_STAT", "VAR_INST")
-        if short or block.keyword in ("VAR_TEMP", "VAR_IN_OUT"):
+        short = pou.kind in (PouKind.FUNCTION, PouKind.METHOD) and block.keyword not in (
+            Section.VAR_STAT,
+            Section.VAR_INST,
+        )
+        if short or block.keyword in (Section.VAR_TEMP, Section.VAR_IN_OUT):
             return Keep.UNSAID
         return Keep.of(block.qualifiers)
 

@@ -126,7 +126,7 @@ class Variables:
         t, init = self._types.declared_type(symbol.decl, scope, May.HAVE_ADDRESS)
         require_instances(self._world, t, scope, symbol.pos)
         owner = symbol.full_name.rpartition(".")[0]
-        if "CONSTANT" in symbol.qualifiers:
+        if ast.Modifier.CONSTANT in symbol.qualifiers:
             result = self.constant_symbol(symbol.pos, symbol.name, t, init, scope, owner, Role.GLOBAL)
         else:
             result = VarSymbol(symbol.name, scope.pos(symbol.pos), t, Role.GLOBAL, default=init)

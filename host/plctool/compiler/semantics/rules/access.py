@@ -23,7 +23,11 @@ def may_see(c: Checker, symbol: VarSymbol, t: Type, node: ast.Member) -> bool:
     if plain and cls is not None and (here is None or not here.derives(cls)):
         message = f"{symbol.name} is a VAR of {cls.name} for its own use; make it VAR_OUTPUT to read it outside"
         c.warning(node.name_pos, "access", message)
-    return cls is None or plain or _permitted(c, {symbol.access}, cls, f"{cls.name}.{symbol.name}", node.name_pos)
+    return (
+        cls is None
+        or symbol.access is None
+        or _permitted(c, {symbol.access}, cls, f"{cls.name}.{symbol.name}", node.name_pos)
+    )
 
 
 def declaring_class(symbol: VarSymbol, cls: ClassInfo) -> ClassInfo:
@@ -46,17 +50,17 @@ def accessible(c: Checker, member: Member, offset: int) -> bool:
     return _permitted(c, member.decl.modifiers, member.owner, member.name, offset)
 
 
-def _permitted(c: Checker, modifiers: set[str], owner: ClassInfo, name: str, offset: int) -> bool:
+def _permitted(c: Checker, modifiers: set[ast.Modifier], owner: ClassInfo, name: str, offset: int) -> bool:
     here = c.scope.cls
-    if "PRIVATE" in modifiers and here is not owner:
+    if ast.Modifier.PRIVATE in modifiers and here is not owner:
         c.error(offset, "access", f"{name} is PRIVATE: only {owner.name} itself may use it")
         return False
-    if "PROTECTED" in modifiers and (here is None or not here.derives(owner)):
+    if ast.Modifier.PROTECTED in modifiers and (here is None or not here.derives(owner)):
         message = f"{name} is PROTECTED: only {owner.name} and what extends it may use it"
         c.error(offset, "access", message)
         return False
     space = owner.symbol.decl.namespace
-    if "INTERNAL" in modifiers and space is not None and not c.scope.is_within(space.name):
+    if ast.Modifier.INTERNAL in modifiers and space is not None and not c.scope.is_within(space.name):
         c.error(offset, "access", f"{name} is INTERNAL: only the namespace {space.name} may use it")
         return False
     return True

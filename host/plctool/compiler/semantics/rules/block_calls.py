@@ -119,7 +119,7 @@ def block_call(c: Checker, call: ast.Call, instance: Expr) -> list[Statement]:
                 c.expr(argument.value)
         return []
     block = c.world.blocks[instance.type]
-    if block.cls is not None and "CLASS" in block.cls.symbol.decl.modifiers:
+    if block.cls is not None and ast.Modifier.CLASS in block.cls.symbol.decl.modifiers:
         c.error(call.pos, "call", f"{block.type} is a CLASS and has no body; call one of its methods")
         return []
     names = [(p.variable.name, p.direction) for p in block.pou.parameters]

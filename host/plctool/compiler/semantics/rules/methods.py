@@ -55,7 +55,7 @@ def _member_call(
     if isinstance(place, SelfPlace) and place.exact and member.abstract:
         return c.error(name_offset, "inheritance", f"{member.name} is ABSTRACT and has no body to call")
     info = c.world.declared.member(member)
-    dispatch = _dispatch_of(c, bound.cls, _member_key(member), place, info.pou)
+    dispatch = _dispatch_of(c, bound.cls, member.decl.member_key, place, info.pou)
     bound_args = bind(c, args, [(s.name, d) for s, d in info.parameters], info.pou.name, offset)
     if bound_args is None:
         return error_value(c.pos(offset))
@@ -68,11 +68,6 @@ def _member_call(
         elif elsewhere:
             c.world.dispatches.note_other_call(c.scope.pou, info.pou, dispatch, e.pos)
     return e
-
-
-def _member_key(member: Member) -> str:
-    suffix = f".{member.decl.keyword.lower()}" if member.is_property else ""
-    return member.decl.name.casefold() + suffix
 
 
 def _dispatch_of(c: Checker, cls: ClassInfo, key: str, place: Place | None, function: Pou) -> Dispatch | None:
