@@ -151,13 +151,27 @@ def test_flash_says_who_is_watching(tool, plcrt, program, start):
     assert others == [{"tool": "plctool watch Main.step", "pid": pid}]
 
 
+OTHER = "PROGRAM Main VAR step : INT; END_VAR step := 3; END_PROGRAM"
+
+
 def test_watch_ends_with_a_sentence_when_another_program_was_flashed(tool, plcrt, program, start):
+    """One whose symbols this machine has not."""
     watch = start("watch", "--port", plcrt.port, "Main.step", "--interval", "0.05")
     watch.line()
-    other = tool.build("other", "PROGRAM Main VAR step : INT; END_VAR step := 3; END_PROGRAM")
+    other = tool.build("other", OTHER)
+    other.with_suffix(".sym").unlink()
+    shutil.rmtree(tool.folder / "cache")
     tool.ok("flash", "--port", plcrt.port, str(other))
     status, _, err = watch.end()
     assert status == 1 and "Another application was loaded" in err
+
+
+def test_watch_goes_on_with_another_program_whose_symbols_are_found(tool, plcrt, program, start):
+    watch = start("watch", "--port", plcrt.port, "Main.step", "--interval", "0.05")
+    watch.line()
+    tool.ok("flash", "--port", plcrt.port, str(tool.build("other", OTHER)))
+    while "Main.step = 3\n" not in watch.line():
+        assert watch.process.poll() is None
 
 
 def test_two_programs_of_python_share_a_line(plcrt, program, tmp_path):
