@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import compiling
+import latency
 import overheads
 import targets
 
@@ -207,6 +208,7 @@ def main() -> None:
     bench_day()
     bench_serial()
     bench_network()
+    latency.main()
 
 
 if __name__ == "__main__":
