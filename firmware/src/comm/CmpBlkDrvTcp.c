@@ -17,6 +17,8 @@
 #include "SysTime.h"
 #include "rts_config.h"
 
+#if COMM_ENDPOINTS /* a port without network may compile all of firmware/src */
+
 enum {
     FRAME_MIN = sizeof(TCP_HEADER) + 8, /* the shortest packet there is: two words of address, no payload */
     FRAME_MAX = sizeof(TCP_HEADER) + BLK_MAX_SIZE,
@@ -377,3 +379,5 @@ RTS_RESULT CmpBlkDrvTcp_Hook(CMP_HOOK hook)
         close_all();
     return ERR_OK;
 }
+
+#endif

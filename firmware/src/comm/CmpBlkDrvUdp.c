@@ -14,13 +14,13 @@
 #include "SysSocket.h"
 #include "rts_config.h"
 
+#if COMM_ENDPOINTS /* a port without network may compile all of firmware/src */
+
 enum {
     READ_MAX = 64, /* datagrams per cycle, so that a flood does not stop the rest of the runtime */
     PORT_BITS = 16,
     IP_BITS = 32,
 };
-
-RTS_STATIC_ASSERT(COMM_ENDPOINTS, udp_needs_endpoints);
 
 typedef struct {
     RTS_HANDLE socket;
@@ -177,3 +177,5 @@ RTS_RESULT CmpBlkDrvUdp_Hook(CMP_HOOK hook)
         close_all();
     return ERR_OK;
 }
+
+#endif
