@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -27,9 +28,9 @@ def run(meson: str, build: Path) -> tuple[int, Counter[str]]:
     reports = build / "pytest-reports"
     for old in reports.glob("*.xml"):
         old.unlink()
-    status = subprocess.run(
-        [meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild"], check=False
-    ).returncode
+    processes = (os.cpu_count() or 1) + 1  # some tests wait more than they work
+    command = [meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild", "--num-processes", str(processes)]
+    status = subprocess.run(command, check=False).returncode
     counts: Counter[str] = Counter()
     for line in (build / "meson-logs" / "testlog.json").read_text().splitlines():
         test = json.loads(line)
