@@ -28,7 +28,7 @@ def run(meson: str, build: Path) -> tuple[int, Counter[str]]:
     reports = build / "pytest-reports"
     for old in reports.glob("*.xml"):
         old.unlink()
-    processes = (os.cpu_count() or 1) + 1  # some tests wait more than they work
+    processes = os.cpu_count() or 1
     command = [meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild", "--num-processes", str(processes)]
     status = subprocess.run(command, check=False).returncode
     counts: Counter[str] = Counter()
