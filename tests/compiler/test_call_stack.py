@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from plctool.compiler import Level, compile_sources
@@ -84,7 +84,8 @@ class Program:
         if units[callee].twice:
             self.lines += [call.format(callee, "1000")]
         self.places.append((name, len(self.lines) + 1))
-        self.lines += [call.format(callee, argument), "x := x + 1;"]  # a call at the end may become a jump
+        # A call at the end may become a jump; what follows it is not known before, or it would not be done there.
+        self.lines += [call.format(callee, argument), "x := x + cycle;" if name == "Main" else "x := x + n;"]
 
 
 def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
@@ -95,10 +96,16 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
 
 
 @pytest.mark.parametrize("level", LEVELS)
-# Not random: at level s two short methods, each called twice, above two function blocks of 3 elements (the first one
-# called twice) lose the methods' calls, which is not mended yet.
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None)
 @given(units=UNITS)
+@example(
+    units=[
+        Unit("METHOD", 0, True),
+        Unit("METHOD", 0, True),
+        Unit("FUNCTION_BLOCK", 2, True),
+        Unit("FUNCTION_BLOCK", 2, False),
+    ]
+)
 def test_each_call_is_reported(tmp_path_factory, level: Level, units: list[Unit]) -> None:
     program = Program(units)
     path = tmp_path_factory.mktemp("calls") / "calls.st"
