@@ -19,7 +19,6 @@
 #define COMM_MAX_CLIENTS 4
 #define COMM_ENDPOINTS 1
 #define TCP_BUFFER_SIZE 16384
-#define EXCEPT_MAX_CALLS 32 /* stale words of earlier calls count, too */
 #define LOG_MAX_ENTRIES 256
 #define CHECKSUM_TABLE_ENTRIES 256
 

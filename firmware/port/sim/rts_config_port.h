@@ -15,7 +15,6 @@
 #define APP_MEMORY_SIZE (64 * 1024)
 #define APP_AREAS_FROM_PORT 1
 #define NETSERVER_MESSAGE_SIZE 16384
-#define EXCEPT_MAX_CALLS 32 /* stale words of earlier calls count, too */
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160
 #define CM_MAX_EXT_TABLES 8
