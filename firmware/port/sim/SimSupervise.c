@@ -20,16 +20,20 @@
 
 enum { LOOK_EVERY_MS = 20 };
 
-/* A cycle that was seen running. */
+/* A cycle that was seen running. Serials begin again in each runtime, and when tasks are created; virtual time begins
+ * again in each runtime. */
 typedef struct {
+    RTS_UI32 runtime;
     RTS_UI32 serial;
+    RTS_I64 start_ns;
     RTS_I64 since_ms;
 } SEEN;
 
 static struct {
-    pid_t process; /* whose thread it is: a fork does not have it */
+    pid_t process;     /* whose thread it is: a fork does not have it */
+    RTS_UI32 runtimes; /* started in this process */
     RTS_UI32 limit_ms;
-} supervisor = {0, SIM_CYCLE_LIMIT_MS};
+} supervisor = {0, 0, SIM_CYCLE_LIMIT_MS};
 
 static RTS_I64 real_ms(void)
 {
@@ -41,11 +45,12 @@ static RTS_I64 real_ms(void)
 
 static void look(RTS_UI32 index, SEEN *seen)
 {
-    IEC_GUARD guard;
+    RTS_UI32 runtime = SysAtomicLoad(&supervisor.runtimes);
+    IEC_GUARD guard = {0};
 
-    if (!IecTaskReadGuard(index, &guard) || guard.serial != seen->serial) {
-        seen->serial = guard.serial;
-        seen->since_ms = real_ms();
+    if (!IecTaskReadGuard(index, &guard) || runtime != seen->runtime || guard.serial != seen->serial ||
+        guard.start_ns != seen->start_ns) {
+        *seen = (SEEN){runtime, guard.serial, guard.start_ns, real_ms()};
     } else if (real_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms)) {
         SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
     }
@@ -53,7 +58,7 @@ static void look(RTS_UI32 index, SEEN *seen)
 
 static void *supervise(void *unused)
 {
-    SEEN seen[APP_MAX_TASKS + 1] = {{0, 0}};
+    SEEN seen[APP_MAX_TASKS + 1] = {{0, 0, 0, 0}};
     const struct timespec pause = {0, LOOK_EVERY_MS * 1000000L};
 
     RTS_UNUSED(unused);
@@ -84,6 +89,7 @@ void SimSuperviseStart(void)
 {
     pthread_t thread;
 
+    (void)SysAtomicAdd(&supervisor.runtimes, 1);
     if (supervisor.process == getpid())
         return;
     make_mutex();
