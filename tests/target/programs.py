@@ -75,3 +75,39 @@ CONFIGURATION Config
     END_RESOURCE
 END_CONFIGURATION
 """
+
+# A fast task that interrupts a slow one: when `trip` is set it does `fault` in the middle of a cycle of the slow one.
+FAST_AND_SLOW = """
+VAR_GLOBAL
+    begun, finished : DINT; (* cycles of the slow task *)
+END_VAR
+PROGRAM Main
+VAR
+    n, x : DINT;
+    trip : BOOL;
+    {variables}
+END_VAR
+n := n + 1;
+IF trip AND begun <> finished THEN
+{fault}
+END_IF
+END_PROGRAM
+PROGRAM Long
+VAR
+    i, x : DINT;
+END_VAR
+begun := begun + 1;
+FOR i := 1 TO 50_000 DO
+    x := x XOR (x * 5 + i);
+END_FOR
+finished := finished + 1;
+END_PROGRAM
+CONFIGURATION Config
+    RESOURCE Res ON PLC
+        TASK Fast(INTERVAL := T#1ms, PRIORITY := 1);
+        TASK Slow(INTERVAL := T#10ms, PRIORITY := 5);
+        PROGRAM Main WITH Fast : Main;
+        PROGRAM Long WITH Slow : Long;
+    END_RESOURCE
+END_CONFIGURATION
+"""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from environment import IEC_STACK_SIZE, TARGET, eventually
-from programs import Built, compile_text
+from programs import FAST_AND_SLOW, Built, compile_text
 
 from plctool.core import lib
 from plctool.debug.symbols import symbol_path
@@ -36,41 +36,6 @@ Large := f[i + 1] + f[i];
 END_FUNCTION
 """
 
-TASKS = """
-VAR_GLOBAL
-    begun, finished : DINT; (* cycles of the slow task *)
-END_VAR
-PROGRAM Main
-VAR
-    n, x : DINT;
-    trip : BOOL;
-    {variables}
-END_VAR
-n := n + 1;
-IF trip AND begun <> finished THEN
-{fault}
-END_IF
-END_PROGRAM
-PROGRAM Long
-VAR
-    i, x : DINT;
-END_VAR
-begun := begun + 1;
-FOR i := 1 TO 50_000 DO
-    x := x XOR (x * 5 + i);
-END_FOR
-finished := finished + 1;
-END_PROGRAM
-CONFIGURATION Config
-    RESOURCE Res ON PLC
-        TASK Fast(INTERVAL := T#1ms, PRIORITY := 1);
-        TASK Slow(INTERVAL := T#10ms, PRIORITY := 5);
-        PROGRAM Main WITH Fast : Main;
-        PROGRAM Long WITH Slow : Long;
-    END_RESOURCE
-END_CONFIGURATION
-"""
-
 
 @dataclass(frozen=True)
 class Fault:
@@ -85,7 +50,7 @@ class Fault:
 
     @property
     def text(self) -> str:
-        return self.before + TASKS.format(variables=self.variables, fault=self.statement)
+        return self.before + FAST_AND_SLOW.format(variables=self.variables, fault=self.statement)
 
     @property
     def line(self) -> int:
@@ -207,7 +172,7 @@ END_CONFIGURATION
 
 def test_endless_loops_in_two_tasks_are_both_broken(make_board, build) -> None:
     loop = "WHILE trip DO x := x + 1; END_WHILE"
-    text = TASKS.format(variables="", fault=loop).replace("END_FOR", f"END_FOR\n{loop}", 1)
+    text = FAST_AND_SLOW.format(variables="", fault=loop).replace("END_FOR", f"END_FOR\n{loop}", 1)
     text = text.replace("    i, x : DINT;", "    i, x : DINT;\n    trip : BOOL;")
     board = make_board()
     board.power_on("slow")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 from environment import MACHINE, eventually
-from programs import Built, program
+from programs import FAST_AND_SLOW, Built, program
 from qemu import Board
 
 from plctool.core import lib
@@ -17,42 +17,10 @@ from plctool.link.connection import Connection
 from plctool.link.services import AppState
 
 STATEMENT = "p^ := 16#5A5A_A5A5;"
-TEXT = f"""
-VAR_GLOBAL
-    begun, finished : DINT; (* cycles of the slow task *)
-END_VAR
-PROGRAM Main
-VAR
-    home : DINT;
-    p : POINTER TO DINT;
-    distance : DINT; (* from home *)
-    trip : BOOL;
-END_VAR
-IF trip AND begun <> finished THEN
-    trip := FALSE;
-    p := ADR(home) + distance;
-{STATEMENT}
-END_IF
-END_PROGRAM
-PROGRAM Long
-VAR
-    i, x : DINT;
-END_VAR
-begun := begun + 1;
-FOR i := 1 TO 50_000 DO
-    x := x XOR (x * 5 + i);
-END_FOR
-finished := finished + 1;
-END_PROGRAM
-CONFIGURATION Config
-    RESOURCE Res ON PLC
-        TASK Fast(INTERVAL := T#1ms, PRIORITY := 1);
-        TASK Slow(INTERVAL := T#10ms, PRIORITY := 5);
-        PROGRAM Main WITH Fast : Main;
-        PROGRAM Long WITH Slow : Long;
-    END_RESOURCE
-END_CONFIGURATION
-"""
+TEXT = FAST_AND_SLOW.format(
+    variables="home, distance : DINT; p : POINTER TO DINT;",
+    fault=f"trip := FALSE;\np := ADR(home) + distance; (* from home *)\n{STATEMENT}",
+)
 LINE = TEXT.split("\n").index(STATEMENT) + 1
 STACK_SIZE = 2048  # of a task, in the full configuration
 PERIPHERAL, REGISTER = 0x4000_0000, 0xE000_ED08  # a timer or the watchdog, VTOR
