@@ -1,5 +1,5 @@
 /*
- * Sim.c - the simulator: power, virtual clock, timers, device identity, measurements.
+ * Sim.c - the simulator: power, virtual clock, timers, measurements.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -16,7 +16,6 @@
 #include "SimLink.h"
 #include "SysExcept.h"
 #include "SysLock.h"
-#include "SysTarget.h"
 #include "SysTime.h"
 #include "SysTimer.h"
 #include "rts_config.h"
@@ -591,55 +590,6 @@ RTS_RESULT SimBench(RTS_UI32 task, RTS_UI32 cycles, double *code_ns, double *cyc
     return bench.failed ? ERR_EXCEPTION : ERR_OK;
 }
 
-/* ---- the device ---- */
-
-enum { NODE_NAME_SIZE = 32 };
-
-#if defined(__aarch64__)
-#define SIM_TARGET_ID TARGET_ID_AARCH64_LINUX
-#else
-#define SIM_TARGET_ID TARGET_ID_X86_64_LINUX
-#endif
-
-static char node_name[NODE_NAME_SIZE] = "simulator";
-
-static SYS_TARGET target = {
-    TARGET_TYPE_PROGRAMMABLE, SIM_TARGET_ID, 0x01000000, "plctool simulator", "plctool", node_name, "0",
-};
-
-const SYS_TARGET *SysTargetGet(void)
-{
-    return &target;
-}
-
-SYS_STACK SysTargetGetStack(void)
-{
-    return (SYS_STACK){0, 0};
-}
-
-/* A xorshift generator: what it gives is the same in every process, so that tests repeat. */
-RTS_UI32 SysTargetRandom(void)
-{
-    static RTS_UI32 state = 0x2545F491;
-
-    state ^= state << 13;
-    state ^= state >> 17;
-    state ^= state << 5;
-    return state;
-}
-
-void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version)
-{
-    target.type = type;
-    target.id = id;
-    target.version = version;
-}
-
-void SimSetNodeName(const char *name)
-{
-    strncpy(node_name, name, NODE_NAME_SIZE - 1);
-}
-
 /* ---- what IEC code can call ---- */
 
 /* Lets virtual time pass within a cycle: what a long cycle is on a real device. */
@@ -657,72 +607,17 @@ bool SimHasExternal(const char *name)
     return sim.on && CMFindExternal(name) != NULL;
 }
 
-/* ---- external events ---- */
-
-/* The hardware's, so they survive a loss of power. */
-static struct {
-    RTS_UI32 count;
-    struct {
-        char name[SIM_EVENT_NAME_SIZE];
-        RTS_HANDLE event;
-    } list[SCHED_MAX_EXTERNAL_EVENTS];
-} events;
-
-static RTS_RESULT register_event(RTS_UI32 index)
+bool SimIsOn(void)
 {
-    RTS_RESULT result;
-
-    events.list[index].event = SchedRegisterExternalEvent(events.list[index].name, &result);
-    return result;
-}
-
-static RTS_UI32 find_event(const char *name)
-{
-    RTS_UI32 i = 0;
-
-    while (i < events.count && strcmp(events.list[i].name, name) != 0)
-        i++;
-    return i;
-}
-
-RTS_RESULT SimAddEvent(const char *name)
-{
-    RTS_SIZE size = strlen(name) + 1;
-
-    if (find_event(name) < events.count)
-        return ERR_OK;
-    if (size < 2 || size > SIM_EVENT_NAME_SIZE)
-        return ERR_PARAMETER;
-    if (events.count == SCHED_MAX_EXTERNAL_EVENTS)
-        return ERR_NOMEMORY;
-    memcpy(events.list[events.count].name, name, size);
-    events.count++;
-    return sim.on ? register_event(events.count - 1) : ERR_OK;
-}
-
-RTS_RESULT SimPostEvent(const char *name)
-{
-    RTS_UI32 index = find_event(name);
-
-    return index < events.count ? SchedPostExternalEvent(events.list[index].event) : (RTS_RESULT)ERR_NO_OBJECT;
-}
-
-void SimForgetEvents(void)
-{
-    for (; events.count > 0; events.count--) {
-        if (sim.on)
-            (void)SchedUnregisterExternalEvent(events.list[events.count - 1].event);
-    }
+    return sim.on;
 }
 
 RTS_RESULT SysSim_Hook(CMP_HOOK hook)
 {
-    RTS_RESULT result = ERR_OK;
-    RTS_UI32 i;
+    RTS_RESULT result;
 
     if (hook != CH_INIT3)
         return ERR_OK;
-    for (i = 0; i < events.count && result == ERR_OK; i++)
-        result = register_event(i);
+    result = SimEventRegisterAll();
     return result == ERR_OK ? CMRegisterExternal(externals, RTS_COUNT(externals)) : result;
 }

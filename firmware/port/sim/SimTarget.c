@@ -1,0 +1,57 @@
+/*
+ * SimTarget.c - what the simulated device says it is.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include <string.h>
+
+#include "CompactDownload.h"
+#include "Sim.h"
+#include "SysTarget.h"
+
+enum { NODE_NAME_SIZE = 32 };
+
+#if defined(__aarch64__)
+#define SIM_TARGET_ID TARGET_ID_AARCH64_LINUX
+#else
+#define SIM_TARGET_ID TARGET_ID_X86_64_LINUX
+#endif
+
+static char node_name[NODE_NAME_SIZE] = "simulator";
+
+static SYS_TARGET target = {
+    TARGET_TYPE_PROGRAMMABLE, SIM_TARGET_ID, 0x01000000, "plctool simulator", "plctool", node_name, "0",
+};
+
+const SYS_TARGET *SysTargetGet(void)
+{
+    return &target;
+}
+
+SYS_STACK SysTargetGetStack(void)
+{
+    return (SYS_STACK){0, 0};
+}
+
+/* A xorshift generator: what it gives is the same in every process, so that tests repeat. */
+RTS_UI32 SysTargetRandom(void)
+{
+    static RTS_UI32 state = 0x2545F491;
+
+    state ^= state << 13;
+    state ^= state >> 17;
+    state ^= state << 5;
+    return state;
+}
+
+void SimSetTarget(RTS_UI32 type, RTS_UI32 id, RTS_UI32 version)
+{
+    target.type = type;
+    target.id = id;
+    target.version = version;
+}
+
+void SimSetNodeName(const char *name)
+{
+    strncpy(node_name, name, NODE_NAME_SIZE - 1);
+}
