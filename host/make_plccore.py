@@ -15,6 +15,7 @@ import cffi
 SHARED = [
     "CmpErrors.h",
     "CompactDownload.h",
+    "IoConfig.h",
     "CmpIecAbi.h",
     "SysExcept.h",
     "SysStart.h",

@@ -141,6 +141,16 @@ enum {
     CDL_BLOB_IMAGES = 16, /* CDL_IMAGE for inputs and outputs of each task; those it lacks work on the shared areas */
 };
 
+/* A runtime that does not know a blob from CDL_BLOB_REQUIRED on refuses the image: the application would not do without
+ * it. CDL_BLOB_IO: the I/O configuration, an IO_CONFIG_PLACE (IoConfig.h). */
+#ifdef RTS_CFFI
+static const RTS_UI32 CDL_BLOB_REQUIRED;
+static const RTS_UI32 CDL_BLOB_IO;
+#else
+#define CDL_BLOB_REQUIRED 0x80000000u
+#define CDL_BLOB_IO 0x80000001u
+#endif
+
 /* What a task uses of the inputs or of the outputs, in units of CDL_IMAGE_UNIT bytes, so that parts that do not overlap
  * have no word in common. count 0: nothing, or the task has to work on the shared area, because the program keeps
  * addresses in it. */
