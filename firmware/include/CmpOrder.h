@@ -41,6 +41,9 @@ X(CmpAppSrv)
 #if HAS_CmpLogSrv
 X(CmpLogSrv)
 #endif
+#if HAS_CmpPlcShell
+X(CmpPlcShell)
+#endif
 #if HAS_CmpMonitor2
 X(CmpMonitor2)
 #endif

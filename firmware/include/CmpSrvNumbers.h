@@ -94,8 +94,8 @@ enum {
     CHANNEL_TIMEOUT_MS = 30000,
     CHANNEL_IDLE_MS = 5000,
     CHANNEL_COMPLAINT_MS = 100,
-    CHANNEL_LOGIN_MS = 5000, /* on a network or bus: a channel ends when it has had no login for so long */
-    CHANNEL_SETTLE_MS = 1000, /* and is not given to another peer before, once it has been used */
+    CHANNEL_LOGIN_MS = 5000,   /* on a network or bus: a channel ends when it has had no login for so long */
+    CHANNEL_SETTLE_MS = 1000,  /* and is not given to another peer before, once it has been used */
     CHANNEL_MIN_MESSAGE = 128, /* an open request for a smaller buffer is ignored */
 };
 
@@ -118,6 +118,7 @@ enum {
     SG_APPLICATION = 2,
     SG_LOG = 5,
     SG_IOMGR = 0x0B,
+    SG_PLCSHELL = 0x11,
     SG_MONITORING2 = 0x1B,
 };
 
@@ -262,6 +263,20 @@ enum {
     TAG_LOG_ENTRY = 0x03,
     TAG_LOG_TEXT = 0x04,
     TAG_LOG_COMPONENT_NAME = 0x05,
+};
+
+/* PLC shell (4.15). */
+enum {
+    SRV_SHELL_EXECUTE = 1,
+    SRV_SHELL_CANCEL = 2,
+    TAG_SHELL_COMMAND = 0x10,
+    TAG_SHELL_SESSION = 0x11,
+    TAG_SHELL_ARGUMENTS = 0x12,
+    TAG_SHELL_BLOCK = 0x13,
+    TAG_SHELL_PART = 0x81, /* more follow */
+    TAG_SHELL_LAST = 0x82,
+    TAG_SHELL_TEXT = 0x20,
+    SHELL_MAX_COMMAND = 33, /* bytes, with NUL */
 };
 
 #endif

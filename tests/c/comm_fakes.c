@@ -17,6 +17,7 @@
 #include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
 #include "CmpLogSrv.h"
+#include "CmpPlcShell.h"
 #include "CmpMonitor2.h"
 #include "CmpNameServiceServer.h"
 #include "CmpRouterEmbedded.h"
@@ -314,6 +315,7 @@ void fakes_hook(CMP_HOOK hook)
         CmpAppSrv_Hook,
         CmpMonitor2_Hook,
         CmpLogSrv_Hook,
+        CmpPlcShell_Hook,
         CmpChannelServerEmbedded_Hook,
         CmpNameServiceServer_Hook,
         CmpRouterEmbedded_Hook,

@@ -127,6 +127,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(reset)
     _add_link(command("tasks", "show the times of the tasks"))
     _add_link(command("log", "print the log of a device"))
+    shell = command("shell", "send a command to the PLC shell of a device; ? lists them")
+    _add_link(shell)
+    shell.add_argument("words", nargs="+", metavar="COMMAND", help="for example ?, rtsinfo, tasklist, plcload")
 
     port = command("port-check", "check a port: run programs on a board and compare the results with what is expected")
     port.add_argument("--yes", action="store_true", help="replace the program that is on the board")

@@ -327,6 +327,11 @@ def write(plc: Controller, texts: Mapping[str, str]) -> tuple[Document, Texts]:
     return {"values": reading.values}, reading.texts
 
 
+def shell(plc: Plc, command: str) -> Document:
+    """What the device's PLC shell answers."""
+    return {"command": command, "answer": plc.shell(command)}
+
+
 def log(plc: Controller) -> Document:
     """The log; the exception that holds the program at present comes with its source line."""
     from plctool.core import lib

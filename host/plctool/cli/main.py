@@ -217,6 +217,10 @@ def _log(args: argparse.Namespace) -> int:
     return _on_device(args, documents.log, output.log_text)
 
 
+def _shell(args: argparse.Namespace) -> int:
+    return _on_device(args, lambda plc: documents.shell(plc, " ".join(args.words)), lambda d: str(d["answer"]))
+
+
 def _port_check(args: argparse.Namespace) -> int:
     from plctool.port_check import outcome_text, summary_text
 
@@ -305,8 +309,8 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": _build, "check": _check, "info": _info, "symbols": _symbols, "run": _run, "test": _test,
     "export-itf": _export_itf, "bench": _bench, "demo": _demo,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
-    "tasks": _tasks, "log": _log, "port-check": _port_check, "read": _read, "write": _write, "watch": _watch,
-    "gateway": _gateway,
+    "tasks": _tasks, "log": _log, "shell": _shell, "port-check": _port_check,
+    "read": _read, "write": _write, "watch": _watch, "gateway": _gateway,
 }  # fmt: skip
 
 
