@@ -92,9 +92,9 @@ def _bench(args: argparse.Namespace) -> int:
 
 
 def _completion(args: argparse.Namespace) -> int:
-    import argcomplete
+    from argcomplete.shell_integration import shellcode
 
-    script = argcomplete.shellcode(["plctool"], shell=args.shell)  # type: ignore[no-untyped-call]
+    script = shellcode(["plctool"], shell=args.shell)
     return _show(args, {"script": script}, lambda d: script)
 
 
