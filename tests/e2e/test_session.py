@@ -1,5 +1,6 @@
 """The life of a program on a controller, through the real tool and the real runtime: build, flash, use, stop, reset."""
 
+import json
 import random
 
 import pytest
@@ -67,8 +68,8 @@ def test_flash_of_the_same_image_is_skipped(tool, plcrt, counter):
 
 def test_watch_prints_the_samples_asked_for(tool, plcrt, counter):
     tool.ok("flash", "--port", plcrt.port, str(counter))
-    samples = tool.ok("watch", "--port", plcrt.port, "Main.count", "--count", "3", "--interval", "0.1")["samples"]
-    counts = [sample["values"]["Main.count"] for sample in samples]
+    done = tool("watch", "--port", plcrt.port, "Main.count", "--count", "3", "--interval", "0.1", "--json")
+    counts = [json.loads(line)["values"]["Main.count"] for line in done.out.splitlines()]
     assert len(counts) == 3 and counts == sorted(counts)
 
 
