@@ -76,6 +76,7 @@ enum {
     CMPID_SysEvent = 0x001C,
     CMPID_CmpBlkDrvTcp = 0x001D,
     CMPID_CmpBlkDrvUdp = 0x001E,
+    CMPID_CmpBlkDrvCan = 0x001F,
 };
 
 /* Name of a component, "" when unknown. */
