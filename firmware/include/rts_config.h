@@ -288,6 +288,19 @@
 #define CAN_SEPARATION_MS 0
 #endif
 
+/* The number of the device on CAN if the settings have no {"CmpBlkDrvCan", "Node"}, 1..127; and its bit rate [bit/s]. */
+#ifndef CAN_NODE
+#define CAN_NODE 1
+#endif
+#ifndef CAN_BIT_RATE
+#define CAN_BIT_RATE 500000
+#endif
+
+/* The serial line that carries CAN frames, where there is no controller (SysCanSlcan.c). */
+#ifndef CAN_SLCAN_LINE
+#define CAN_SLCAN_LINE 1
+#endif
+
 /* How long after bus off the device tries again [ms]. */
 #ifndef CAN_RESTART_MS
 #define CAN_RESTART_MS 500
