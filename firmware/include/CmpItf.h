@@ -77,6 +77,8 @@ enum {
     CMPID_CmpBlkDrvTcp = 0x001D,
     CMPID_CmpBlkDrvUdp = 0x001E,
     CMPID_CmpPlcShell = 0x002F,
+    CMPID_CmpBlkDrvCan = 0x001F,
+    CMPID_SysCan = 0x0020,
 };
 
 /* Name of a component, "" when unknown. */

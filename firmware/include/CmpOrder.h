@@ -53,6 +53,9 @@ X(CmpChannelServerEmbedded)
 #if HAS_CmpBlkDrvSimpleCom
 X(CmpBlkDrvSimpleCom)
 #endif
+#if HAS_CmpBlkDrvCan
+X(CmpBlkDrvCan)
+#endif
 #if HAS_CmpBlkDrvTcp
 X(CmpBlkDrvTcp)
 #endif

@@ -31,6 +31,23 @@ typedef struct {
     RTS_UI8 ip[4];
 } TCP_ADDRESS;
 
+/* ---- layer 2: CAN (own) ---- */
+
+/* A name request that fits into a frame. */
+typedef struct {
+    RTS_UI8 type;   /* CAN_FRAME_SCAN */
+    RTS_UI8 window; /* replies come after a random time of up to so many CAN_SCAN_UNIT_MS */
+    WIRE_UI16 version;
+    WIRE_UI32 request_id; /* both as in NS_REQUEST */
+} CAN_SCAN;
+
+/* A tool takes an address (the source in the identifier), or has it already. */
+typedef struct {
+    RTS_UI8 type; /* CAN_FRAME_CLAIM, CAN_FRAME_TAKEN */
+    RTS_UI8 unused[3];
+    WIRE_UI32 number; /* random; of the tool that sends the frame */
+} CAN_CLAIM;
+
 /* ---- layer 3: router [2.1] ---- */
 
 /* Then the receiver's address, the sender's, and zeros up to a multiple of 4. */

@@ -23,6 +23,7 @@ enum {
     BLK_DRV_TYPE_TCP = 1,
     BLK_DRV_TYPE_COM = 2,
     BLK_DRV_TYPE_UDP = 5,
+    BLK_DRV_TYPE_CAN = 7,
     BLK_DRV_TYPE_DIRECT = 8,
 };
 
@@ -34,6 +35,21 @@ enum {
     UDP_PORTS = 4,
     UDP_INDEX_BITS = 2,     /* of a network address, above those of the host */
     ROUTER_MAX_NETWORK = 3, /* words of a network address */
+};
+
+/* ---- layer 2: CAN (own; docs/can.md) ---- */
+enum {
+    CAN_ID_BASE = 0x1F400000, /* of 29-bit identifiers: base | target << 8 | source; base has zeros there */
+    CAN_TARGET_SHIFT = 8,
+    CAN_ADDRESS_MASK = 0xFF,
+    CAN_NODE_MAX = 127, /* devices are 1..127, as in CANopen */
+    CAN_TOOL_MIN = 128,
+    CAN_TOOL_MAX = 254,
+    CAN_TO_ALL = 255,
+    CAN_FRAME_SCAN = 0x40, /* first byte of the frames that are not ISO-TP's */
+    CAN_FRAME_CLAIM = 0x41,
+    CAN_FRAME_TAKEN = 0x42,
+    CAN_SCAN_UNIT_MS = 10, /* of CAN_SCAN.window */
 };
 
 /* ---- layer 3: router (2) ---- */

@@ -11,6 +11,7 @@
 
 #include "../../firmware/src/app/AppLife.h"
 #include "CmpAppSrv.h"
+#include "CmpBlkDrvCan.h"
 #include "CmpBlkDrvSimpleCom.h"
 #include "CmpBlkDrvTcp.h"
 #include "CmpBlkDrvUdp.h"
@@ -320,7 +321,9 @@ void fakes_hook(CMP_HOOK hook)
         CmpNameServiceServer_Hook,
         CmpRouterEmbedded_Hook,
         CmpBlkDrvSimpleCom_Hook,
-#if COMM_ENDPOINTS
+#if COMM_CAN_TESTED
+        CmpBlkDrvCan_Hook,
+#elif COMM_ENDPOINTS
         CmpBlkDrvTcp_Hook,
         CmpBlkDrvUdp_Hook,
 #endif

@@ -96,7 +96,7 @@ static void the_state_has_its_exception(void)
     CHECK(strcmp(ask("getprgstat"), "run\r\n") == 0);
     fakes.status.state = AS_STOP;
     fakes.status.exception.code = 0x101;
-    CHECK(strcmp(ask("getprgstat"), "stop\r\nexception 0x101\r\n") == 0);
+    CHECK(strcmp(ask("getprgstat"), "stop\r\nexception 0x00000101\r\n") == 0);
 }
 
 static void commands_that_change_something_do_it_once(void)
