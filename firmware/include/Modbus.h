@@ -58,9 +58,14 @@ enum {
     MODBUS_INPUT_REGISTERS = 0x08,
 };
 
+/*
+ * The order of bytes. On the wire a register has its high byte first; the devices of most vendors have the high register
+ * of a longer number first, some the low one. Memory has the bytes of the wire, those of each group of `reverse` in
+ * reverse order: 1: as on the wire; 2: each register with its low byte first, so that numbers whose low register
+ * comes first have all their bytes so; 4 and 8: numbers of two and four registers, whose high register comes first.
+ */
 enum {
     MODBUS_RANGE_WRITABLE = 0x01, /* from the network */
-    MODBUS_RANGE_LOW_FIRST = 0x02, /* the memory has the low byte of a register first */
 };
 
 /* Memory of a server: it is in one table, or in several at a time: a coil and a bit of a register are the same memory
@@ -70,14 +75,17 @@ typedef struct {
     RTS_UI8 flags;           /* MODBUS_RANGE_* */
     RTS_UI16 first_register; /* as on the wire, from 0 */
     RTS_UI16 first_bit;
-    RTS_UI16 reserved;
-    RTS_UI32 bits; /* size; a multiple of 16 if it has registers */
+    RTS_UI16 reverse; /* 1, 2, 4 or 8; 2 for a range without registers */
+    RTS_UI32 bits;    /* size; with registers a multiple of 16 and of 8 * reverse */
 } MODBUS_RANGE;
 
 enum {
     MODBUS_JOB_ON_CHANGE = 0x01, /* writes when the value is another one, besides every interval */
     MODBUS_JOB_VERIFY = 0x02,    /* reads back what it wrote */
-    MODBUS_JOB_LOW_FIRST = 0x04, /* the memory has the low byte of a register first */
+    MODBUS_JOB_REVERSE_2 = 0x10, /* `reverse` of its registers, in both directions; none: 1 */
+    MODBUS_JOB_REVERSE_4 = 0x20,
+    MODBUS_JOB_REVERSE_8 = 0x40,
+    MODBUS_JOB_REVERSE_SHIFT = 3, /* flags >> 3 & 14: reverse, but 0 for 1 */
 };
 
 /* What a client asks a device for, again and again. */

@@ -14,7 +14,8 @@
 #include "ModbusLink.h"
 #include "ModbusPdu.h"
 
-/* A job and its data. Registers have the high byte first, unless MODBUS_JOB_LOW_FIRST; bits are in ascending order. */
+/* A job and its data. Registers are in the order of MODBUS_JOB_REVERSE_2 .., of whose groups there are whole ones; bits
+ * from the lowest of the first byte on. */
 typedef struct {
     const MODBUS_JOB *job;
     RTS_UI8 *in;          /* what was read last */

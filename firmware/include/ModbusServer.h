@@ -11,8 +11,8 @@
 
 #include "ModbusLink.h"
 
-/* A range and its memory: (bits + 7) / 8 bytes, registers with the high byte first unless MODBUS_RANGE_LOW_FIRST, bits
- * of a range without registers from the lowest bit of its first byte on (it has MODBUS_RANGE_LOW_FIRST). */
+/* A range and its memory: (bits + 7) / 8 bytes; bits of a range without registers from the lowest bit of its first byte
+ * on. */
 typedef struct {
     const MODBUS_RANGE *range;
     RTS_UI8 *data;

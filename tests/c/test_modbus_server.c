@@ -18,19 +18,21 @@ static RTS_UI8 discrete[250];
 static RTS_UI8 last[16];
 static RTS_UI8 swapped[8];
 static RTS_UI8 many[250];
+static RTS_UI8 reals[8];
 
 static const MODBUS_RANGE ranges[] = {
-    {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE, 0, 0, 0, 160},
-    {MODBUS_HOLDING_REGISTERS, 0, 10, 0, 0, 32},
-    {MODBUS_INPUT_REGISTERS, 0, 0, 0, 0, 2000},
-    {MODBUS_DISCRETE_INPUTS, MODBUS_RANGE_LOW_FIRST, 0, 100, 0, 2000},
-    {MODBUS_HOLDING_REGISTERS, MODBUS_RANGE_WRITABLE, 65528, 0, 0, 128},
-    {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE | MODBUS_RANGE_LOW_FIRST, 500, 500, 0, 64},
-    {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE, 1000, 1000, 0, 2000},
+    {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE, 0, 0, 1, 160},
+    {MODBUS_HOLDING_REGISTERS, 0, 10, 0, 1, 32},
+    {MODBUS_INPUT_REGISTERS, 0, 0, 0, 1, 2000},
+    {MODBUS_DISCRETE_INPUTS, 0, 0, 100, 2, 2000},
+    {MODBUS_HOLDING_REGISTERS, MODBUS_RANGE_WRITABLE, 65528, 0, 1, 128},
+    {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE, 500, 500, 2, 64},
+    {MODBUS_HOLDING_REGISTERS | MODBUS_COILS, MODBUS_RANGE_WRITABLE, 1000, 1000, 1, 2000},
+    {MODBUS_HOLDING_REGISTERS, MODBUS_RANGE_WRITABLE, 2000, 0, 4, 64},
 };
 static const MODBUS_MEMORY memory[] = {{&ranges[0], writable}, {&ranges[1], readable}, {&ranges[2], inputs},
                                        {&ranges[3], discrete}, {&ranges[4], last},     {&ranges[5], swapped},
-                                       {&ranges[6], many}};
+                                       {&ranges[6], many},     {&ranges[7], reals}};
 
 static MODBUS_SERVER server;
 static RTS_UI8 pdu[MODBUS_MAX_PDU + 8];
@@ -132,6 +134,16 @@ static void memory_with_the_low_byte_first_looks_the_same_from_outside(void)
     CHECK_REPLY(ASK(1, 2, 4, 0, 16), 1, 2, 0x34, 0x12);
     CHECK_REPLY(ASK(5, 2, 4, 0xFF, 0), 5, 2, 4, 0xFF, 0);
     CHECK_EQUAL(swapped[2], 0x35);
+}
+
+static void numbers_of_two_registers_may_have_the_high_one_first(void)
+{
+    static const RTS_UI8 in_memory[] = {0xDD, 0xCC, 0xBB, 0xAA, 4, 3, 2, 1};
+
+    begin();
+    CHECK_REPLY(ASK(16, 0x07, 0xD0, 0, 4, 8, 0xAA, 0xBB, 0xCC, 0xDD, 1, 2, 3, 4), 16, 0x07, 0xD0, 0, 4);
+    CHECK(memcmp(reals, in_memory, sizeof(reals)) == 0);
+    CHECK_REPLY(ASK(3, 0x07, 0xD1, 0, 2), 3, 4, 0xCC, 0xDD, 1, 2);
 }
 
 static void bits_are_packed_from_the_lowest(void)
@@ -358,6 +370,7 @@ int main(void)
     RUN(a_read_goes_on_in_the_next_range);
     RUN(coils_and_registers_are_one_memory);
     RUN(memory_with_the_low_byte_first_looks_the_same_from_outside);
+    RUN(numbers_of_two_registers_may_have_the_high_one_first);
     RUN(bits_are_packed_from_the_lowest);
     RUN(a_register_is_masked);
     RUN(a_write_comes_before_the_read_of_the_same_request);

@@ -98,18 +98,25 @@ static void choose(MODBUS_CLIENT *client, RTS_I64 now_ns)
 
 /* ---- requests ---- */
 
-static void swap(RTS_UI8 *data, RTS_UI32 size)
+/* Bytes of a group that are in reverse order; 0: none are. */
+static RTS_UI32 reverse_of(const MODBUS_JOB_STATE *state, const MODBUS_FUNCTION *function)
 {
-    for (RTS_UI32 i = 0; i + 1 < size; i += 2) {
-        RTS_UI8 high = data[i];
-        data[i] = data[i + 1];
-        data[i + 1] = high;
-    }
+    return function->count_of_bits == 1 ? 0 : state->job->flags >> MODBUS_JOB_REVERSE_SHIFT & 14;
 }
 
-static bool is_swapped(const MODBUS_JOB_STATE *state, const MODBUS_FUNCTION *function)
+/* From the order of the wire to that of memory, or back. */
+static void reorder(const MODBUS_JOB_STATE *state, const MODBUS_FUNCTION *function, RTS_UI8 *data, RTS_UI32 size)
 {
-    return (state->job->flags & MODBUS_JOB_LOW_FIRST) != 0 && function->count_of_bits > 1;
+    RTS_UI32 reverse = reverse_of(state, function);
+
+    for (RTS_UI32 i = 0; reverse != 0 && i < size; i++) {
+        RTS_UI32 other = i ^ (reverse - 1);
+        RTS_UI8 byte = data[i];
+        if (other > i) {
+            data[i] = data[other];
+            data[other] = byte;
+        }
+    }
 }
 
 static void put_mask(const MODBUS_JOB_STATE *state, RTS_UI8 *data)
@@ -132,8 +139,7 @@ static void put_data(MODBUS_CLIENT *client)
     memcpy(state->written, state->out, size);
     SysLockLeave(lock);
     memcpy(data, state->written, size);
-    if (is_swapped(state, function))
-        swap(data, size);
+    reorder(state, function, data, size);
     if (function->function == MODBUS_WRITE_COIL)
         ModbusPut16(data, (data[0] & 1) != 0 ? 0xFF00 : 0);
     else if (function->function == MODBUS_MASK_WRITE_REGISTER)
@@ -276,22 +282,27 @@ static void end(MODBUS_CLIENT *client, bool good, RTS_I64 now_ns)
     client->device = NULL;
 }
 
-/* Whether the device has what was written to it. */
+/* The bits of byte `i` on the wire that were written. */
+static RTS_UI8 written_bits(const MODBUS_JOB *job, RTS_UI32 i, RTS_UI32 size)
+{
+    if (job->function == MODBUS_MASK_WRITE_REGISTER)
+        return (RTS_UI8)(i == 0 ? job->mask >> 8 : job->mask);
+    if (ModbusFindFunction(job->function)->count_of_bits == 1 && i + 1 == size && job->write_count % 8 != 0)
+        return (RTS_UI8)((1u << job->write_count % 8) - 1);
+    return 0xFF;
+}
+
+/* Whether the device has what was written to it: compared in the order of memory. */
 static bool is_verified(const MODBUS_CLIENT *client, RTS_UI8 *data)
 {
     const MODBUS_JOB_STATE *state = client->job;
+    RTS_UI32 reverse = reverse_of(state, client->request.function);
     RTS_UI32 size = write_size(state);
     RTS_UI32 wrong = 0;
 
-    if (is_swapped(state, client->request.function))
-        swap(data, size);
     for (RTS_UI32 i = 0; i < size; i++) {
-        RTS_UI32 differs = (RTS_UI32)(data[i] ^ state->written[i]);
-        if (state->job->function == MODBUS_MASK_WRITE_REGISTER)
-            differs &= state->job->mask >> (((i == 0) != is_swapped(state, client->request.function)) ? 8 : 0);
-        if (client->request.function->count_of_bits == 1 && i == size - 1 && state->job->write_count % 8 != 0)
-            differs &= (1u << state->job->write_count % 8) - 1;
-        wrong |= differs & 0xFF;
+        RTS_UI8 wanted = state->written[reverse != 0 ? i ^ (reverse - 1) : i];
+        wrong |= (data[i] ^ wanted) & written_bits(state->job, i, size);
     }
     return wrong == 0;
 }
@@ -302,8 +313,7 @@ static void take_data(const MODBUS_CLIENT *client, RTS_UI8 *data)
     RTS_UI32 size = ModbusDataSize(client->request.function, client->request.read_count);
     RTS_UI32 lock;
 
-    if (is_swapped(state, client->request.function))
-        swap(data, size);
+    reorder(state, client->request.function, data, size);
     lock = SysLockEnter();
     memcpy(state->in, data, size);
     SysLockLeave(lock);

@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A reply is made in the buffer of its request. Registers and bits are moved by one function, which counts bits: the
- * high byte of a register is first where a `flip` is 1, and bits are in ascending order of bytes where it is 0.
+ * A reply is made in the buffer of its request. Registers and bits are moved by one function, which counts bits from the
+ * lowest of the first register on: byte n of them is at n ^ flip.
  */
 #include "ModbusServer.h"
 
@@ -76,7 +76,7 @@ static RTS_UI32 find_in(const MODBUS_MEMORY *memory, RTS_UI8 table, RTS_UI32 add
         return 0;
     found->data = memory->data;
     found->at = (address - first) * unit_of(table);
-    found->flip = (range->flags & MODBUS_RANGE_LOW_FIRST) == 0;
+    found->flip = 1u ^ (range->reverse - 1u);
     return count - (address - first);
 }
 
