@@ -325,6 +325,58 @@
 #define COMM_COUNTERS 1
 #endif
 
+/* Modbus (IoDrvModbus): what an application may have. 0 clients or servers: none, and no flash for them. */
+#ifndef MODBUS_MAX_CLIENTS /* serial lines, or TCP connections, with devices; about 400 bytes each */
+#define MODBUS_MAX_CLIENTS 1
+#endif
+#ifndef MODBUS_MAX_DEVICES /* on all of them; about 60 bytes each */
+#define MODBUS_MAX_DEVICES 8
+#endif
+#ifndef MODBUS_MAX_JOBS /* reads and writes of all devices; about 40 bytes each */
+#define MODBUS_MAX_JOBS 16
+#endif
+#ifndef MODBUS_MAX_SERVERS /* serial lines and TCP ports on which this device is a server; about 350 bytes each */
+#define MODBUS_MAX_SERVERS 1
+#endif
+#ifndef MODBUS_MAX_RANGES /* of all servers; 8 bytes each */
+#define MODBUS_MAX_RANGES 8
+#endif
+#ifndef MODBUS_DATA_SIZE /* bytes: what clients read, twice what they write, and the memory of servers */
+#define MODBUS_DATA_SIZE 512
+#endif
+
+/* Connections at a time of a Modbus TCP server, about 320 bytes each; one more, and the idlest is closed. 0: no TCP, for
+ * ports without sockets. */
+#ifndef MODBUS_MAX_CONNECTIONS
+#define MODBUS_MAX_CONNECTIONS 0
+#endif
+
+/* Sockets of field buses at a time. */
+#ifndef SYSSOCK_MAX_FIELD_BUS
+#define SYSSOCK_MAX_FIELD_BUS (MODBUS_MAX_CONNECTIONS + 1 + MODBUS_MAX_SERVERS + MODBUS_MAX_CLIENTS)
+#endif
+
+/* A Modbus device that does not reply is asked once more. Then it is lost, and asked again after this time, so that
+ * others on its line wait for it less than once in a minute; the first time after a short one, because most losses are
+ * short. If there are no others, after MODBUS_RETRY_ALONE_MS each time [ms]. */
+#ifndef MODBUS_RETRY_MS
+#define MODBUS_RETRY_MS 61000
+#endif
+#ifndef MODBUS_RETRY_SOON_MS
+#define MODBUS_RETRY_SOON_MS 4000
+#endif
+#ifndef MODBUS_RETRY_ALONE_MS
+#define MODBUS_RETRY_ALONE_MS 1000
+#endif
+
+/* How long a connection to a Modbus device may take, and how often it is tried [ms]. */
+#ifndef MODBUS_CONNECT_MS
+#define MODBUS_CONNECT_MS 5000
+#endif
+#ifndef MODBUS_RECONNECT_MS
+#define MODBUS_RECONNECT_MS 1000
+#endif
+
 /* Service groups of layer 7; three words each. */
 #ifndef SRV_MAX_GROUPS
 #define SRV_MAX_GROUPS 8
