@@ -35,7 +35,8 @@ typedef struct {
  * ERR_DEVICE: it cannot be opened. Only a firmware with a field bus needs it, and SysComGetByteNs. */
 RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index);
 
-/* When the last byte came that SysComRead has returned (SysTimeGetNs): to within 0.2 ms, but not earlier than that. */
+/* When the last byte came that SysComRead has returned, or a later one, or when it was read, if the port cannot know better
+ * (SysTimeGetNs). SYSCOM_BYTE_TIMES 1. */
 RTS_I64 SysComGetByteNs(RTS_UI32 index);
 
 /* Reads what has been received, at most `size` bytes; returns the number, 0 when there is nothing. */

@@ -344,6 +344,11 @@
 #define COMM_COUNTERS 1
 #endif
 
+/* 1: the port notes when a byte comes on a serial line (SysComGetByteNs), for a field bus. */
+#ifndef SYSCOM_BYTE_TIMES
+#define SYSCOM_BYTE_TIMES 0
+#endif
+
 /* Modbus (IoDrvModbus): what an application may have. 0 clients or servers: none, and no flash for them. */
 #ifndef MODBUS_MAX_CLIENTS /* serial lines, or TCP connections, with devices; about 400 bytes each */
 #define MODBUS_MAX_CLIENTS 1
