@@ -233,6 +233,15 @@ static void without_flow_control_a_packet_is_given_up_after_a_second(void)
     CHECK(pair.failed && took >= ISOTP_TIMEOUT_MS && took <= ISOTP_TIMEOUT_MS + 2);
 }
 
+static void a_clock_that_was_read_earlier_ends_nothing(void)
+{
+    start_pair(100, CLASSIC, 0, 0);
+    CHECK(!IsoTpSendExpired(&pair.tx, pair.now_ms - 1));
+    RTS_UI8 frame[ISOTP_MAX_FRAME];
+    arrive(frame, IsoTpNext(&pair.tx, frame, pair.now_ms));
+    CHECK(IsoTpIsReceiving(&pair.rx) && !IsoTpReceiveExpired(&pair.rx, pair.now_ms - 1));
+}
+
 /* Flow control that is not one, and frames that belong to no packet. */
 static void what_is_out_of_place_changes_nothing(void)
 {
@@ -332,6 +341,7 @@ int main(void)
     RUN(a_packet_longer_than_the_buffer_is_refused_at_once);
     RUN(a_receiver_that_says_wait_is_waited_for_but_not_for_ever);
     RUN(without_flow_control_a_packet_is_given_up_after_a_second);
+    RUN(a_clock_that_was_read_earlier_ends_nothing);
     RUN(what_is_out_of_place_changes_nothing);
     RUN(a_new_packet_takes_the_place_of_one_that_did_not_end);
     RUN(frames_filled_up_to_their_size_are_taken);

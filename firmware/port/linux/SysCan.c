@@ -104,7 +104,6 @@ static RTS_UI32 read_line(RTS_UI8 *data, RTS_UI32 size)
     return moved(read(can.line.file, data, size));
 }
 
-/* What nobody reads from a pseudo terminal is lost, as it is on a bus without another node. */
 static RTS_UI32 write_line(const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 taken = moved(write(can.line.file, data, size));

@@ -377,6 +377,7 @@ static void cycle(void)
     if (!can.open)
         return;
     receive(now_ms);
+    now_ms = SysTimeGetMs(); /* a service may have taken its time */
     expire(now_ms);
     answer_scans(now_ms);
     transmit(now_ms);

@@ -17,6 +17,14 @@ enum {
     OVERFLOW = 2,
 };
 
+/* A caller may look at the clock at the start of its cycle, and again later: then `since_ms` is after `now_ms`. */
+static bool has_passed(RTS_UI32 since_ms, RTS_UI32 now_ms, RTS_UI32 ms)
+{
+    RTS_UI32 passed = now_ms - since_ms;
+
+    return passed >= ms && passed <= INT32_MAX;
+}
+
 ISOTP_KIND IsoTpKind(const RTS_UI8 *data, RTS_UI32 size)
 {
     RTS_UI32 kind = size == 0 ? ISOTP_OTHER : data[0] >> 4;
@@ -149,7 +157,7 @@ void IsoTpFlowSent(ISOTP_RX *rx)
 
 bool IsoTpReceiveExpired(ISOTP_RX *rx, RTS_UI32 now_ms)
 {
-    return rx->size != 0 && now_ms - rx->heard_ms >= ISOTP_TIMEOUT_MS && forget(rx);
+    return rx->size != 0 && has_passed(rx->heard_ms, now_ms, ISOTP_TIMEOUT_MS) && forget(rx);
 }
 
 /* ---- sending ---- */
@@ -208,7 +216,7 @@ static RTS_UI32 put_start(const ISOTP_TX *tx, RTS_UI8 *frame)
 /* Time is whole milliseconds, of which the first one may be almost over. */
 static bool may_send(const ISOTP_TX *tx, RTS_UI32 now_ms)
 {
-    return tx->separation_ms == 0 || now_ms - tx->since_ms > tx->separation_ms;
+    return tx->separation_ms == 0 || has_passed(tx->since_ms, now_ms, tx->separation_ms + 1u);
 }
 
 RTS_UI32 IsoTpNext(const ISOTP_TX *tx, RTS_UI8 frame[ISOTP_MAX_FRAME], RTS_UI32 now_ms)
@@ -276,6 +284,6 @@ ISOTP_TX_RESULT IsoTpTakeFlow(ISOTP_TX *tx, const RTS_UI8 *data, RTS_UI32 size, 
 
 bool IsoTpSendExpired(ISOTP_TX *tx, RTS_UI32 now_ms)
 {
-    return IsoTpIsSending(tx) && now_ms - tx->since_ms >= ISOTP_TIMEOUT_MS + (RTS_UI32)tx->separation_ms &&
+    return IsoTpIsSending(tx) && has_passed(tx->since_ms, now_ms, ISOTP_TIMEOUT_MS + (RTS_UI32)tx->separation_ms) &&
            fail(tx) == ISOTP_TX_FAILED;
 }
