@@ -73,9 +73,9 @@ static void print_device(SHELL_OUTPUT *out)
     print(out, "Vendor: %s", target->vendor_name);
     print(out, "Node: %s", target->node_name);
     print(out, "Serial number: %s", target->serial_number);
-    print(out, "Target: type 0x%x, id 0x%x, version 0x%x", (unsigned)target->type, (unsigned)target->id,
+    print(out, "Target: type 0x%X, id 0x%X, version 0x%X", (unsigned)target->type, (unsigned)target->id,
           (unsigned)target->version);
-    print(out, "Runtime: 0x%x", (unsigned)RTS_VERSION);
+    print(out, "Runtime: 0x%X", (unsigned)RTS_VERSION);
 }
 
 static bool is_loaded(SHELL_OUTPUT *out, APP_STATUS *status)
@@ -102,7 +102,7 @@ static void print_state(SHELL_OUTPUT *out)
         return;
     print(out, "%s", status.state == AS_RUN ? "run" : "stop");
     if (status.exception.code != RTSEXCPT_NOEXCEPTION)
-        print(out, "exception 0x%x", (unsigned)status.exception.code);
+        print(out, "exception 0x%X", (unsigned)status.exception.code);
 }
 
 static void print_tasks(SHELL_OUTPUT *out)
@@ -185,7 +185,7 @@ static void run(const SHELL_COMMAND *command, const COMM_CLIENT *client, bool fi
         if (result == ERR_OK)
             print(out, "%s: done", command->name);
         else
-            print(out, "%s: error 0x%x", command->name, (unsigned)result);
+            print(out, "%s: error 0x%X", command->name, (unsigned)result);
     }
 }
 
