@@ -26,6 +26,7 @@
 static struct {
     char path[256]; /* of the device, "" for a pseudo terminal */
     char pty_name[64];
+    char link[256]; /* to the pseudo terminal, "" for none */
     speed_t speed;
     PORT_SOURCE line; /* what is read and written; no file while the device is away */
     int slave;        /* of a pseudo terminal */
@@ -116,9 +117,55 @@ static bool open_pty(void)
     return state.slave >= 0 && make_raw(state.slave);
 }
 
+/* Whether the link is one to a pseudo terminal: ours, or left by a plcrt that was killed. */
+static bool link_leads_to(const char *place)
+{
+    char found[sizeof(state.pty_name)];
+    ssize_t length = readlink(state.link, found, sizeof(found) - 1);
+    found[length > 0 ? length : 0] = '\0';
+    return length > 0 && strncmp(found, place, strlen(place)) == 0;
+}
+
+/* Never replaces what is no such link. */
+static bool make_link(PORT_REASON *reason)
+{
+    if (link_leads_to("/dev/pts/")) {
+        (void)unlink(state.link);
+    }
+    if (symlink(state.pty_name, state.link) == 0) {
+        return true;
+    }
+    PortReason(reason, "cannot make the link %s to the pseudo terminal: %s%s", state.link, strerror(errno),
+               errno == EEXIST ? "; name another path, or remove it" : "");
+    state.link[0] = '\0';
+    return false;
+}
+
+static void remove_link(void)
+{
+    if (state.link[0] != '\0' && link_leads_to(state.pty_name)) {
+        (void)unlink(state.link);
+    }
+    state.link[0] = '\0';
+}
+
+/* ---- what main opens ---- */
+
+static const char pty_prefix[] = "pty:";
+
+/* The path of the link in "pty:PATH", "" for "pty", NULL if it is a device. */
+static const char *pty_link(const char *path)
+{
+    size_t length = sizeof(pty_prefix) - 1;
+    if (strncmp(path, pty_prefix, length) == 0) {
+        return path + length;
+    }
+    return strcmp(path, "pty") == 0 ? "" : NULL;
+}
+
 bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
 {
-    bool pty = strcmp(path, "pty") == 0;
+    const char *link = pty_link(path);
     const speed_t *speed = find_speed(baud);
     if (speed == NULL || strlen(path) >= sizeof(state.path)) {
         PortReason(reason, "cannot use %s at %u baud", path, (unsigned)baud);
@@ -128,11 +175,15 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
     state.line = (PORT_SOURCE){.file = -1, .events = POLLIN};
     state.slave = -1;
     state.speed = *speed;
-    memcpy(state.path, pty ? "" : path, pty ? 1 : strlen(path) + 1);
-    if (pty ? !open_pty() : !open_device()) {
+    strcpy(link != NULL ? state.link : state.path, link != NULL ? link : path);
+    if (link != NULL ? !open_pty() : !open_device()) {
         int error = errno;
         PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)baud, strerror(error));
         reason->busy = error == EBUSY;
+        PortComClose();
+        return false;
+    }
+    if (state.link[0] != '\0' && !make_link(reason)) {
         PortComClose();
         return false;
     }
@@ -147,6 +198,7 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
 
 void PortComClose(void)
 {
+    remove_link();
     PortWaitRemove(&state.line);
     if (state.line.file >= 0) {
         close(state.line.file);
@@ -169,7 +221,10 @@ void PortComHandOver(void)
 
 const char *PortComPtyName(void)
 {
-    return state.configured && state.pty_name[0] != '\0' ? state.pty_name : NULL;
+    if (!state.configured || state.pty_name[0] == '\0') {
+        return NULL;
+    }
+    return state.link[0] != '\0' ? state.link : state.pty_name;
 }
 
 /* ---- a device that goes away ---- */

@@ -42,12 +42,14 @@ typedef struct {
 } OPTIONS;
 
 static const char usage[] =
-    "usage: plcrt --flash FILE [--serial PATH|pty] [--baud N] [--tcp [ADDRESS:]PORT] [--udp ADDRESS[:INDEX]]\n"
-    "             [--event NAME=PIPE]...\n"
+    "usage: plcrt --flash FILE [--serial PATH|pty[:LINK]] [--baud N] [--tcp [ADDRESS:]PORT]\n"
+    "             [--udp ADDRESS[:INDEX]] [--event NAME=PIPE]...\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
     "  --serial pty    opens a pseudo terminal and prints its name as \"serial: /dev/pts/N\"\n"
+    "  --serial pty:LINK\n"
+    "                  opens one that has the name LINK, a symbolic link, while plcrt runs\n"
     "  --baud N        speed of the serial device, 115200 if not given\n"
     "  --tcp PLACE     serves TCP at [ADDRESS:]PORT, 127.0.0.1:11740 if no place is given, and prints where as\n"
     "                  \"tcp: ADDRESS:PORT\"; port 0 is one that is free, the address 0.0.0.0 all of this machine\n"
@@ -122,6 +124,14 @@ static const struct option long_options[] = {
     {NULL, 0, NULL, 0},
 };
 
+static const char *take_serial(const char *text)
+{
+    if (strcmp(text, "pty:") == 0) {
+        refuse("--serial pty: lacks the name of the link: write for example pty:/tmp/plc");
+    }
+    return text;
+}
+
 static const char *take_tcp(const char *text)
 {
     SOCKADDRESS place;
@@ -156,7 +166,7 @@ static void take_option(OPTIONS *options, int option)
         options->flash = optarg;
         break;
     case OPTION_SERIAL:
-        options->serial = optarg;
+        options->serial = take_serial(optarg);
         break;
     case OPTION_BAUD:
         options->baud = parse_baud(optarg);

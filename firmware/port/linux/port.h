@@ -73,13 +73,14 @@ void PortFlashClose(void);
 /* ---- SysCom ---- */
 
 bool PortComKnowsBaud(RTS_UI32 baud);
-/* Opens the one serial line: a device, or with path "pty" a new pseudo terminal. Before CMInit. */
+/* Opens the one serial line: a device, with path "pty" a new pseudo terminal, with "pty:LINK" one that the symbolic link
+ * LINK leads to until PortComClose. A link to a pseudo terminal is replaced, another file is an error. Before CMInit. */
 bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason);
 void PortComClose(void);
 /* For a process whose child has the line now: closes a device, which the child opens again when it is lost. A pseudo
  * terminal stays open, so that it outlives the child. */
 void PortComHandOver(void);
-/* Name of the pseudo terminal, NULL when the line is none. */
+/* Name of the pseudo terminal, which is its link if it has one; NULL when the line is none. */
 const char *PortComPtyName(void);
 
 /* ---- SysSocket ---- */
