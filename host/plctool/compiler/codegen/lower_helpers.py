@@ -237,6 +237,7 @@ _STRINGS = {"str.span": _SPAN, "str.copy": _COPY, "str.compare": _COMPARE}
 # Functions of stdlib/strings.st that have a faster body here, with the same meaning.
 LIBRARY_FUNCTIONS = {"SPAN__": "str.span", "COPY__": "str.copy", "WSPAN__": "str.wspan", "WCOPY__": "str.wcopy"}
 
+
 def string_helper(name: str, target: Target, attributes: str) -> str:
     """The definition of one of the str.* functions for a target."""
     wide = name.startswith("str.w")
