@@ -284,11 +284,11 @@ typedef struct {
 /* TAG_IO_STATE (own). Indices are those of the configuration (IoConfig.h). */
 typedef struct {
     WIRE_UI16 index;
-    WIRE_UI16 parent; /* IO_CONFIG_NONE: none */
-    WIRE_UI16 type;   /* CT_* */
-    WIRE_UI16 flags;  /* CF_* */
-    WIRE_UI32 errors; /* since the application was loaded */
-    WIRE_UI32 age_ms; /* since its last good data; 0xFFFFFFFF: none yet, or longer */
+    WIRE_UI16 parent;  /* IO_CONFIG_NONE: none */
+    WIRE_UI16 type;    /* CT_* */
+    WIRE_UI16 flags;   /* CF_* */
+    WIRE_UI32 errors;  /* since the application was loaded */
+    WIRE_UI32 age_ms;  /* since its last good data; 0xFFFFFFFF: none yet, or longer */
     WIRE_UI32 skipped; /* how often a task found its driver busy, since the start of the runtime */
 } IO_STATE;
 

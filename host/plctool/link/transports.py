@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Value = int | str
 _LAST_NODE = 127  # CAN_NODE_MAX; the command line starts without the core
 
+
 @dataclass(frozen=True)
 class Option:
     """An option of a link, described by `help`. `parse` raises ValueError for what is not a value
