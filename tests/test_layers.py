@@ -22,7 +22,7 @@ ROOT = Path(plctool.__file__).parent
 FLOORS = (
     ("errors", "core", "version"),
     ("files", "iec"),
-    ("image",),
+    ("image", "io"),
     ("debug",),
     ("link",),
     ("gateway",),

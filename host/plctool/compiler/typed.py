@@ -12,17 +12,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import ClassVar
 
+from plctool.files import Pos as Pos
 from plctool.iec.areas import Area
 from plctool.iec.types import Keep, StructType, Type
-
-
-@dataclass(frozen=True)
-class Pos:
-    """A place in a source file; `line` and `column` count from 1."""
-
-    file: str
-    line: int
-    column: int
 
 
 class Storage(Enum):
