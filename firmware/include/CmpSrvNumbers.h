@@ -115,6 +115,7 @@ enum {
     SG_DEVICE = 1,
     SG_APPLICATION = 2,
     SG_LOG = 5,
+    SG_IOMGR = 0x0B,
     SG_MONITORING2 = 0x1B,
 };
 
@@ -226,6 +227,25 @@ enum {
     MON2_OP_DER = 0x09, /* the value, of as many bytes as the next byte says, at an address */
     MON2_OP_ADD = 0x0E,
     MON2_OP_MASK = 0x40, /* own: of the byte at an address only the bits that are 1 in the next byte are written */
+};
+
+/* Inputs and outputs; what is in them is our own. */
+enum {
+    SRV_IO_SCAN = 1,
+    SRV_IO_IDENTIFY = 2,
+    SRV_IO_LIST = 0x70,            /* own */
+    SRV_IO_READ_PARAMETER = 0x71,  /* own */
+    SRV_IO_WRITE_PARAMETER = 0x72, /* own */
+    TAG_IO_CONNECTOR = 0x02,
+    TAG_IO_PARAMETER = 0x03,
+    TAG_IO_START = 0x04,
+    TAG_IO_RESULT = 0x05,
+    TAG_IO_DATA = 0x06,
+    TAG_IO_ENTRY = 0x82,
+    TAG_IO_STATE = 0x07,
+    TAG_IO_NAME = 0x08,
+    TAG_IO_DRIVER = 0x09,
+    TAG_IO_MODULE = 0x0A,
 };
 
 /* Log (4.10). */
