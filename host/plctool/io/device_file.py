@@ -36,7 +36,7 @@ from plctool.io.names import MAX_NAME, is_name
 from plctool.io.positions import TomlText
 from plctool.io.tables import Entry, Table, each
 
-MAX_LINE = 0xFFF
+MAX_LINE = 63  # characters
 MAX_ID = 0x7FFF_FFFF
 LIMITS = {"inputs": 1 << 16, "outputs": 1 << 16, "connectors": 0xFFFE, "channels": 0xFFFE}
 """What a vendor may limit, and the largest value of each; inputs and outputs in bytes."""
@@ -44,10 +44,10 @@ LIMITS = {"inputs": 1 << 16, "outputs": 1 << 16, "connectors": 0xFFFE, "channels
 
 @dataclass(frozen=True)
 class Line:
-    """A line of IoDrvGpio. `text`: where it is on the board."""
+    """A line of IoDrvGpio. `line`: what the port calls it; `text`: where it is on the board."""
 
     name: str
-    number: int
+    line: str
     output: bool
     text: str
     pos: Pos
@@ -133,36 +133,33 @@ def read_device_file(text: TomlText, mistakes: Mistakes) -> DeviceFile:
 def _entries(table: Table) -> Iterator[tuple[Entry, bool]]:
     """The channels in `in` and `out`, and whether each is an output."""
     seen: set[str] = set()
-    for key, output in (("in", False), ("out", True)):
-        names = table.table(key)
-        for entry in names.items() if names is not None else ():
-            if entry.key in seen:
-                table.mistakes.error(entry.key_pos, f"{entry.key} is there already; names are unique")
-            elif not is_name(entry.key):
-                message = f"'{entry.key}' cannot be a name in C; use at most {MAX_NAME} letters, digits and _"
-                table.mistakes.error(entry.key_pos, message)
-            else:
-                seen.add(entry.key)
-                yield entry, output
+    for entry, output in table.channels():
+        if entry.key in seen:
+            table.mistakes.error(entry.key_pos, f"{entry.key} is there already; names are unique")
+        elif not is_name(entry.key):
+            message = f"'{entry.key}' cannot be a name in C; use at most {MAX_NAME} letters, digits and _"
+            table.mistakes.error(entry.key_pos, message)
+        else:
+            seen.add(entry.key)
+            yield entry, output
 
 
 def _lines(table: Table) -> Iterator[Line]:
-    used: dict[int, str] = {}
+    used: dict[str, str] = {}
     for entry, output in _entries(table):
-        text, number = "", entry.value
-        if isinstance(number, Table):
-            inner = number
-            number, text = inner.number("line", 0, MAX_LINE, required=True), inner.text("text", "") or ""
+        text, line = "", entry.value
+        if isinstance(line, Table):
+            inner = line
+            line, text = inner.text("line", entry.key), inner.text("text", "") or ""
             inner.close()
-            if number is None:
-                continue
-        if type(number) is not int or not 0 <= number <= MAX_LINE:
-            table.mistakes.error(entry.pos, f"{entry.key} needs the number of its line, 0 to {MAX_LINE}")
-        elif number in used:
-            table.mistakes.error(entry.pos, f"{entry.key} is line {number}, as {used[number]} is")
+        if not isinstance(line, str) or not 0 < len(line) <= MAX_LINE or not line.isascii():
+            example = f'{entry.key} = "PA5"'
+            table.mistakes.error(entry.pos, f"{entry.key} needs the name that the port gives its line: {example}")
+        elif line in used:
+            table.mistakes.error(entry.pos, f"{entry.key} is the line {line}, as {used[line]} is")
         else:
-            used[number] = entry.key
-            yield Line(entry.key, number, output, text, entry.key_pos)
+            used[line] = entry.key
+            yield Line(entry.key, line, output, text, entry.key_pos)
 
 
 def _module(table: Table) -> Module | None:

@@ -37,10 +37,8 @@ def read_local(table: Table, context: Context) -> list[Connector]:
 
 def _connector(table: Table, module: Module) -> Connector:
     connector = read_connector(Connector, table, module.driver, default_name=module.name)
-    for key, output in (("in", False), ("out", True)):
-        names = table.table(key)
-        for entry in names.items() if names is not None else ():
-            _add_channel(connector, entry, module, output, table.mistakes)
+    for entry, output in table.channels():
+        _add_channel(connector, entry, module, output, table.mistakes)
     for parameter in sorted(module.parameters.values(), key=lambda p: p.id):
         value = table.raw(parameter.name)
         if value is None:

@@ -10,11 +10,9 @@ A channel has any type; its parameter is its number in the device, from 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from plctool.io.channels import channel_of
 from plctool.io.common import read_connector
-from plctool.io.model import Channel, Connector, Context
+from plctool.io.model import Connector, Context
 from plctool.io.tables import Table
 
 DRIVER = "IoDrvSim"
@@ -23,16 +21,8 @@ DRIVER = "IoDrvSim"
 def read_sim(table: Table, context: Context) -> list[Connector]:
     """The device of a table."""
     connector = read_connector(Connector, table, DRIVER, default_name="sim")
-    for number, channel in enumerate(_channels(table), 1):
-        channel.parameter = number
-        connector.channels.append(channel)
+    for number, (entry, output) in enumerate(table.channels(), 1):
+        channel = channel_of(entry, table.mistakes, output=output, parameter=number)
+        if channel is not None:
+            connector.channels.append(channel)
     return [connector]
-
-
-def _channels(table: Table) -> Iterator[Channel]:
-    for key, output in (("in", False), ("out", True)):
-        names = table.table(key)
-        for entry in names.items() if names else ():
-            channel = channel_of(entry, table.mistakes, output=output)
-            if channel is not None:
-                yield channel

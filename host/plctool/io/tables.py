@@ -173,6 +173,13 @@ class Table:
             path = (*self._path, key)
             yield Entry(key, self._text.key_pos(path), inner, self._text.value_pos(path))
 
+    def channels(self) -> Iterator[tuple[Entry, bool]]:
+        """The entries of the tables `in` and `out`, and whether each is an output."""
+        for key in ("in", "out"):
+            names = self.table(key)
+            for entry in names.items() if names is not None else ():
+                yield entry, key == "out"
+
     def _inner(self, path: Path, values: dict[str, Any]) -> Table:
         return Table(self._text, (*self._path, *path), values, self.mistakes)
 
