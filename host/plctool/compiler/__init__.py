@@ -66,6 +66,16 @@ def load_io(paths: Sequence[Path | str], files: IoFiles = IoFiles()) -> Descript
     return None if found is None else load_description(found, files.device)
 
 
+def _target(wanted: str | None, io: Description | None) -> str:
+    """The processor to compile for. Raises UsageError if the board has another one."""
+    board = io.device if io is not None else None
+    if board is None or not board.target:
+        return wanted or DEFAULT_TARGET
+    if wanted is not None and wanted != board.target:
+        raise UsageError(f"{board.title} has the target {board.target}, not {wanted}; leave out --target.", "target")
+    return board.target
+
+
 def io_sources(io: Description | None) -> list[Source]:
     """What messages about a description quote."""
     from plctool.compiler.source import Source
@@ -104,7 +114,7 @@ def check_with_tests(
 def compile_sources(
     paths: Sequence[Path | str],
     *,
-    target: str = DEFAULT_TARGET,
+    target: str | None = None,
     level: Level = 2,
     checks: str = "all",
     debug: bool = False,
@@ -112,7 +122,8 @@ def compile_sources(
     io: IoFiles = IoFiles(),
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
-    said otherwise; `io`: its inputs and outputs.
+    said otherwise; `target`: that of the board (`device.toml`) unless
+    said otherwise, else x86_64-linux; `io`: its inputs and outputs.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense, InternalError when
     the compiler has a bug.
@@ -127,8 +138,8 @@ def compile_sources(
     from plctool.image.targets import find_target
 
     number, size = (2, True) if level == "s" else (level, False)
-    options = Options(find_target(target), number, parse_checks(checks), debug, size)
     description = load_io(paths, io)
+    options = Options(find_target(_target(target, description)), number, parse_checks(checks), debug, size)
     sources = load_sources(paths)
     shown = [*sources, *io_sources(description)]
     with bugs_reported():

@@ -12,7 +12,7 @@ from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
-from plctool.compiler.io_configuration import assign_tasks, channel_rows, configuration_of
+from plctool.compiler.io_configuration import assign_tasks, configuration_of, io_document
 from plctool.compiler.kept import kept_parts, kept_variables
 from plctool.compiler.nesting import room_for_nesting
 from plctool.compiler.typed import Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
@@ -72,7 +72,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
         code += bytes(-len(code) % _CODE_ALIGN)
         io = (len(code), len(configuration))
         code += configuration
-        symbols.io = [vars(row) for row in channel_rows(program, program.io)]
+        symbols.io = io_document(program, program.io)
     symbols.kept = [KeptName(part.name, part.type, part.persistent, part.size) for part in kept]
     image = Image(
         device_id=int(getattr(lib, target.device_id)),

@@ -121,6 +121,8 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
         world.names.register_globals(declarations, source)
     _declare_devices(world)
     world.io.begin(world.names, world.diagnostics)
+    if not world.io.readable:
+        return None
     program.declare_all()
     if tests is None:
         application = configure(world, program.config)
@@ -128,7 +130,7 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
         application = tests.configure()
         tests.add()
     program.check_bodies()
-    world.io.finish(world.allocation, world.diagnostics)
+    world.io.finish(world.allocation, application.tasks if tests is None else None, world.diagnostics)
     if tests is None and application.tasks:
         program.programs.report_unused()
     world.calls.report_shared(application.tasks)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import groupby
+from typing import Any
 
 from plctool.compiler.task_images import task_ranges
 from plctool.compiler.typed import Task, TaskKind, TypedProgram
@@ -122,37 +122,38 @@ def substitute_value(t: Type | None, value: object) -> int:
     return int.from_bytes(encode(t, value), "little")
 
 
-@dataclass(frozen=True)
-class ChannelRow:
-    """What users see of a channel. `address`: of the variable; `age_us`: see `worst_age_us`."""
+def io_document(program: TypedProgram, description: Description) -> dict[str, Any]:
+    """What the symbol file says of inputs and outputs. `age_us`: see `worst_age_us`; `address`: of the variable."""
+    devices = [
+        {
+            "name": connector.name,
+            "driver": connector.driver,
+            "parameters": [{"name": p.name, "id": p.id, "type": _type_name(p)} for p in connector.parameters if p.name],
+        }
+        for connector in description.connectors
+    ]
+    channels = [
+        {
+            "device": connector.name,
+            "channel": c.name,
+            "output": c.output,
+            "variable": c.variable or c.target,
+            "type": str(c.variable_type),
+            "address": _address(c),
+            "tasks": [program.tasks[i].name for i in c.tasks],
+            "age_us": worst_age_us(c, program.tasks),
+            "parameter": c.parameter,
+            "parameter_bit": c.parameter_bit,
+            "bits": c.size_bits,
+            "big_endian": c.big_endian,
+        }
+        for connector, c in description.channels
+    ]
+    return {"devices": devices, "channels": channels}
 
-    device: str
-    channel: str
-    output: bool
-    variable: str
-    address: str
-    type: str
-    tasks: list[str]
-    age_us: int | None
-    connector: int
-    parameter: int
-    parameter_bit: int
-    bits: int
 
-
-def channel_rows(program: TypedProgram, description: Description) -> list[ChannelRow]:
-    """All channels in order."""
-    rows = []
-    for index, connector in enumerate(description.connectors):
-        for c in connector.channels:
-            tasks = [program.tasks[i].name for i in c.tasks]
-            rows.append(
-                ChannelRow(
-                    connector.name, c.name, c.output, c.variable or c.target, _address(c), str(c.variable_type), tasks,
-                    worst_age_us(c, program.tasks), index, c.parameter, c.parameter_bit, c.size_bits,
-                )
-            )  # fmt: skip
-    return rows
+def _type_name(p: Parameter) -> str:
+    return f"ARRAY[0..{len(p.value) - 1}] OF BYTE" if isinstance(p.value, bytes) else p.type.name
 
 
 def _address(c: Channel) -> str:
@@ -163,9 +164,3 @@ def _address(c: Channel) -> str:
     width = {1: "B", 2: "W", 4: "D", 8: "L"}.get(size, "B")
     unit = {"W": 2, "D": 4, "L": 8}.get(width, 1)
     return f"%{letter}{width}{offset // unit}" if offset % unit == 0 else f"%{letter}B{offset}"
-
-
-def worst_input(rows: Iterable[ChannelRow]) -> ChannelRow | None:
-    """The input whose data may be oldest."""
-    inputs = [r for r in rows if not r.output and r.age_us is not None]
-    return max(inputs, key=lambda r: r.age_us or 0, default=None)

@@ -70,7 +70,7 @@ class SymbolTable:
     """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry goes up to
     the next one. `aliases`: other names of variables. `classes`: the numbers by which instances show their class.
     `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
-    lose. `io`: the channels of inputs and outputs, as `compiler/io_configuration.py` has them."""
+    lose. `io`: devices and channels of inputs and outputs (`compiler/io_configuration.py`), empty for none."""
 
     image_crc: int
     target: str
@@ -85,7 +85,7 @@ class SymbolTable:
     constants: dict[str, Symbol] = field(default_factory=dict)
     debug: list[bytes] = field(default_factory=list)
     kept: list[KeptName] = field(default_factory=list)
-    io: list[dict[str, Any]] = field(default_factory=list)
+    io: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -237,7 +237,7 @@ class SymbolTable:
                 {n: _read_constant(n, c, types) for n, c in document["constants"].items()},
                 [zlib.decompress(base64.b64decode(text)) for text in document["debug"]],
                 [KeptName(*entry) for entry in document.get("kept", [])],
-                document.get("io", []),
+                document.get("io", {}),
             )
         except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None

@@ -50,7 +50,8 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
     try:
         toml = TomlText(path, text)
     except BadToml as error:
-        mistakes.error(error.pos, f"this is not TOML: {error.message[:1].lower()}{error.message[1:]}")
+        mistakes.error(error.pos, _not_toml(error))
+        made.readable = False
         return made
     root = Table(toml, (), toml.values, mistakes)
     named = root.text("device")
@@ -61,6 +62,8 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
             device = None
     if device is not None:
         made.device = _device_file(device, made)
+        if not made.readable:
+            return made
     context = Context(mistakes, made.device)
     for name, read in KINDS.items():
         for table in root.tables(name):
@@ -72,12 +75,25 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
 
 
 def _device_file(path: Path, made: Description) -> DeviceFile | None:
-    text = made.texts[str(path)] = _read(path)
+    device, mistakes, text = load_device(path)
+    made.texts[str(path)] = text
+    made.mistakes.found += mistakes.found
+    made.readable = device is not None
+    return device
+
+
+def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
+    """A device file with what is wrong with it, and its text. Raises UsageError if it cannot be read."""
+    mistakes, text = Mistakes(), _read(path)
     try:
-        return read_device_file(TomlText(str(path), text), made.mistakes)
+        return read_device_file(TomlText(str(path), text), mistakes), mistakes, text
     except BadToml as error:
-        made.mistakes.error(error.pos, f"this is not TOML: {error.message[:1].lower()}{error.message[1:]}")
-        return None
+        mistakes.error(error.pos, _not_toml(error))
+        return None, mistakes, text
+
+
+def _not_toml(error: BadToml) -> str:
+    return f"this is not TOML: {error.message[:1].lower()}{error.message[1:]}"
 
 
 def _check_names(connectors: Sequence[Connector], mistakes: Mistakes) -> None:

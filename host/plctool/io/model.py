@@ -121,13 +121,14 @@ class Context:
 @dataclass
 class Description:
     """A description that was read. A parent comes before its children. `texts`: the files with their contents, for
-    messages."""
+    messages. `readable`: the files are TOML."""
 
     path: str
     connectors: list[Connector]
     mistakes: Mistakes
     texts: dict[str, str]
     device: DeviceFile | None = None
+    readable: bool = True
 
     @property
     def channels(self) -> list[tuple[Connector, Channel]]:

@@ -12,21 +12,23 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.diagnostics import Diagnostics, did_you_mean
 from plctool.compiler.semantics.allocation import Allocation
 from plctool.compiler.semantics.names import Names
 from plctool.compiler.semantics.symbols import GlobalSymbol
 from plctool.compiler.source import Piece, Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Pos, Pou, Storage, Variable
+from plctool.compiler.typed import Pos, Pou, Storage, Task, Variable
 from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.errors import UsageError
 from plctool.iec.addresses import parse_address
 from plctool.iec.areas import Area
 from plctool.iec.literals import LiteralKind
 from plctool.iec.types import Elementary, Kind, Type, base_of
+from plctool.iec.values import encode
 from plctool.io.layout import lay_out
 from plctool.io.mistakes import CODE, Mistakes
-from plctool.io.model import Channel, Connector, Description, bits_of, holds_bools
+from plctool.io.model import VALUE, Channel, Connector, Description, bits_of, holds_bools
 
 DEVICE_TYPE = "IO_DEVICE"
 _LIST = "Devices"  # the list of globals in which the variables of devices are
@@ -40,7 +42,7 @@ def report(mistakes: Mistakes, diagnostics: Diagnostics) -> None:
         if mistake.severity == "error":
             diagnostics.error(mistake.pos, CODE, mistake.message)
         else:
-            diagnostics.warning(mistake.pos, CODE, mistake.message)
+            diagnostics.warning(mistake.pos, "io", mistake.message)
 
 
 def device_variables(description: Description, declared: Iterable[str]) -> Source | None:
@@ -64,6 +66,11 @@ class IoChannels:
         self.description = description
         self._channels: dict[str, Channel] = {}  # by the full name of what they lead to, case-folded
         self.variables: dict[str, Variable] = {}  # that have become inputs or outputs, by full name case-folded
+
+    @property
+    def readable(self) -> bool:
+        """Whether anything can be said of inputs and outputs."""
+        return self.description is None or self.description.readable
 
     # ---- while variables are declared ----
 
@@ -90,14 +97,14 @@ class IoChannels:
         channel = self._channels.get(name.casefold())
         return None if channel is None else _area(channel)
 
-    def claims(self, letter: str, pos: Pos, names: Sequence[str], diagnostics: Diagnostics) -> bool:
-        """Whether a channel leads to a variable AT %I* or the like (`letter`), declared at `pos` under these names."""
+    def claims(self, letter: str, names: Sequence[str], diagnostics: Diagnostics) -> bool:
+        """Whether a channel leads to a variable that is declared AT %I* or the like (`letter`) under these names."""
         channel = next((c for n in names if (c := self._channels.get(n.casefold())) is not None), None)
         if channel is None:
             return False
         if letter != _letter(channel):
             message = f"{names[0]} is declared AT %{letter}*, but the channel {channel.name} is an {_kind(channel)}"
-            diagnostics.error(pos, CODE, message)
+            diagnostics.error(channel.pos, CODE, message)
         return True
 
     # ---- parts of variables ----
@@ -138,10 +145,13 @@ class IoChannels:
 
     # ---- when all is known ----
 
-    def finish(self, allocation: Allocation, diagnostics: Diagnostics) -> None:
-        """Gives the variables their addresses, and the channels type and place."""
+    def finish(self, allocation: Allocation, tasks: Sequence[Task] | None, diagnostics: Diagnostics) -> None:
+        """Gives the variables their addresses, and the channels type and place. `tasks`: None for unit tests, which
+        have none of the program's."""
         if self.description is None or diagnostics.errors:
             return
+        if tasks is not None:
+            _check_tasks(self.description, [task.name for task in tasks], diagnostics)
         for _, channel in self.description.channels:
             if channel.target.startswith("%"):
                 self._reserve(channel, allocation)
@@ -178,7 +188,7 @@ class IoChannels:
                 return
             channel.variable_type = variable.type
             channel.area_bit = variable.offset * 8 + (variable.bit or 0)
-        problem = _misfit(connector, channel)
+        problem = _misfit(connector, channel) or _bad_substitute(channel)
         if problem:
             diagnostics.error(channel.pos, CODE, problem)
 
@@ -281,6 +291,22 @@ def _misfit(connector: Connector, channel: Channel) -> str:
     return ""
 
 
+def _bad_substitute(channel: Channel) -> str:
+    """What is wrong with `on_stop` or `on_error`; "" for nothing."""
+    given = channel.substitute
+    if given.what != VALUE:
+        return ""
+    assert channel.variable_type is not None
+    key = "on_stop" if channel.output else "on_error"
+    try:
+        data = encode(channel.variable_type, given.value)
+    except UsageError as error:
+        return f"{key}: {error.message}"
+    if any(data[4:]):
+        return f'{key} can be "hold", "zero" or a value of at most 32 bits, not {given.value}'
+    return ""
+
+
 def _fitting(channel: Channel) -> str:
     if channel.type is not None:
         return f": declare it as {channel.type}" if not channel.target.startswith("%") else ""
@@ -309,6 +335,14 @@ def _report_double_use(description: Description, diagnostics: Diagnostics) -> No
                 diagnostics.error(other.pos, CODE, message)
             if last is None or start + channel.size_bits > last.area_bit + last.size_bits:
                 last = channel
+
+
+def _check_tasks(description: Description, tasks: Sequence[str], diagnostics: Diagnostics) -> None:
+    known = {name.casefold() for name in tasks}
+    for connector in description.connectors:
+        if connector.task is not None and connector.task.casefold() not in known:
+            hint = did_you_mean(connector.task, tasks) or f"; the program has {', '.join(tasks)}"
+            diagnostics.error(connector.task_pos or connector.pos, CODE, f"there is no task {connector.task}{hint}")
 
 
 def _check_limits(description: Description, allocation: Allocation, diagnostics: Diagnostics) -> None:
