@@ -26,7 +26,7 @@ FLOORS = (
     ("debug",),
     ("link",),
     ("gateway",),
-    ("controller", "compiler"),
+    ("controller", "compiler", "sim_io"),
     ("device", "sim"),
     ("",),
     ("port_check", "st_tests", "testing"),

@@ -88,6 +88,13 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--get", action="append", default=[], metavar="NAME", help="print after the last cycle; may be repeated"
     )
 
+    run.add_argument(
+        "--plant",
+        type=Path,
+        metavar="FILE.py",
+        help="Python with 'def step(plc)', which is called each EVERY_MS (1) ms",
+    )
+
     test = command("test", "run the unit tests of a program in this process, on a virtual clock")
     _add_sources(test)
     test.add_argument(

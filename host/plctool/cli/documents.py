@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from plctool.link.transports import Link
     from plctool.port_check import Outcome
     from plctool.port_check import Report as PortReport
+    from plctool.sim import Simulator
     from plctool.st_tests import Report as TestReport
 
 Document = dict[str, Any]
@@ -270,10 +271,15 @@ def test(
 
 
 def run(
-    path: Path, cycles: int | None, time_ms: int | None, sets: Mapping[str, str], gets: Sequence[str]
+    path: Path,
+    cycles: int | None,
+    time_ms: int | None,
+    sets: Mapping[str, str],
+    gets: Sequence[str],
+    plant: Path | None = None,
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
-    values as users read them.
+    values as users read them. `plant`: a file in Python that is what the inputs and outputs are connected to.
 
     Raises DeviceError when the program stops with an exception.
     """
@@ -284,6 +290,8 @@ def run(
         for name in gets:
             table.resolve(name)  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
+        if plant is not None:
+            _attach(plc, plant)
         if time_ms is None:
             plc.run_cycles(1 if cycles is None else cycles)
         else:
@@ -296,6 +304,20 @@ def run(
             "time_ms": plc.now_ns / 1e6,
         }
         return document, reading.texts
+
+
+def _attach(plc: Simulator, path: Path) -> None:
+    """Runs a file in Python, and attaches the plant that it defines."""
+    import runpy
+
+    try:
+        names = runpy.run_path(str(path))
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-plant") from None
+    step = names.get("step")
+    if not callable(step):
+        raise UsageError(f"{path} has no function step; write: def step(plc): ...", "no-plant")
+    plc.attach(step, float(names.get("EVERY_MS", 1)))
 
 
 def _raise_exception(plc: Controller) -> None:

@@ -76,7 +76,7 @@ def _symbols(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get)
+    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get, args.plant)
     return _show(args, document, lambda d: output.run_text(d, texts))
 
 

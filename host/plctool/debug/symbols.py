@@ -98,20 +98,27 @@ class SymbolTable:
     # ---- variables ----
 
     def resolve(self, path: str) -> Symbol:
-        """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5', or what is at an
-        address such as %MW0. Upper and lower case are the same. Raises UsageError with a suggestion."""
+        """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5', what is at an
+        address such as %MW0, or at a channel such as gpio.DI0. Upper and lower case are the same. Raises UsageError with a suggestion."""
         text = path.strip()
         at = len(text)
+        channel = self._channels.get(text.casefold()) if text.casefold() not in self._by_key else None
+        if channel is not None:
+            return self.resolve(channel)
         while at > 0:
             symbol = self._by_key.get(text[:at].casefold())
             if symbol is not None:
                 return walk(symbol, text, at, self._units)
             at = max(text.rfind(".", 0, at), text.rfind("[", 0, at), text.rfind("^", 0, at))
-        address = parse_address(text)
-        if address is not None:
-            bit, t = (None, address.type) if address.width else (address.bit, ELEMENTARY["BYTE"])
-            return Symbol(text.upper(), address.area.value, address.offset, t, bit)
+        symbol = _at_address(text)
+        if symbol is not None:
+            return symbol
         raise self._unknown(text)
+
+    @cached_property
+    def _channels(self) -> dict[str, str]:
+        """What channels of inputs and outputs lead to, by their names with that of the device, in small letters."""
+        return {f"{c['device']}.{c['channel']}".casefold(): c["variable"] for c in self.io.get("channels", [])}
 
     def _unknown(self, text: str) -> UsageError:
         prefix = text.casefold() + "."
@@ -252,6 +259,15 @@ class SymbolTable:
             write_atomically(copy, text.encode())
         except (OSError, UsageError):
             return  # the cache only saves naming the file
+
+
+def _at_address(text: str) -> Symbol | None:
+    """What is at an address such as %MW0; None if the text is none."""
+    address = parse_address(text)
+    if address is None:
+        return None
+    bit, t = (None, address.type) if address.width else (address.bit, ELEMENTARY["BYTE"])
+    return Symbol(text.upper(), address.area.value, address.offset, t, bit)
 
 
 def _variable(symbol: Symbol, types: dict[str, Any]) -> dict[str, Any]:
