@@ -99,7 +99,8 @@ class SymbolTable:
 
     def resolve(self, path: str) -> Symbol:
         """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5', what is at an
-        address such as %MW0, or at a channel such as gpio.DI0. Upper and lower case are the same. Raises UsageError with a suggestion."""
+        address such as %MW0, or at a channel such as gpio.DI0. Upper and lower case are the same. Raises UsageError
+        with a suggestion."""
         text = path.strip()
         at = len(text)
         channel = self._channels.get(text.casefold()) if text.casefold() not in self._by_key else None
