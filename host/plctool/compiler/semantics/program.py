@@ -12,7 +12,7 @@ from plctool.compiler.semantics.construction import construct
 from plctool.compiler.semantics.declarations.classes import Classes
 from plctool.compiler.semantics.declarations.functions import Functions
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
-from plctool.compiler.semantics.declarations.instances import Blocks, Programs
+from plctool.compiler.semantics.declarations.instance_layouts import Blocks, Programs
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
 from plctool.compiler.semantics.declarations.unit_variables import UnitVariables
 from plctool.compiler.semantics.declarations.variables import Variables

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from plctool.compiler.semantics.assertions import NUMBER, Assertion, Bench
 from plctool.compiler.semantics.configuration import Application, configure, default_programs
 from plctool.compiler.semantics.conversions import load, whole
 from plctool.compiler.semantics.declarations.type_declarations import May
@@ -27,7 +28,7 @@ from plctool.compiler.semantics.mocks import Mocks, raising
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
-from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestBody
+from plctool.compiler.semantics.unit_test_statements import TestBody
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
