@@ -82,7 +82,7 @@ class TestBody:
     def write(self, decl: ast.TestDecl) -> None:
         """Checks the statements into the unit of the scope."""
         write_body(self._c, decl.body)
-        if decl.keyword != "SETUP":
+        if decl.keyword is not ast.TestUnit.SETUP:
             report_unused(self._c.scope)
 
     def _nodes(self, call: ast.Call, count: int, *, message: bool = True) -> list[ast.Expr] | None:

@@ -177,12 +177,12 @@ class TypeDeclarations:
                 scope.error(spec.pos, "recursion", f"the type {symbol.decl.name} contains itself")
                 return ERROR, None
             return self.type_of_symbol(symbol), symbol.default
-        if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK:
             info = self._world.declared.block(symbol)
             if info is None:
                 scope.error(spec.pos, "recursion", f"the function block {spec.name} contains itself")
             return (ERROR, None) if info is None else (info.type, self.struct_default(info.type))
-        if isinstance(symbol, PouSymbol) and symbol.keyword == "INTERFACE":
+        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.INTERFACE:
             return self._world.declared.interface(symbol), None
         if is_group(spec.name):
             scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
@@ -277,7 +277,7 @@ class TypeDeclarations:
 
     def _pointer(self, spec: ast.PointerSpec, scope: Scope) -> Type:
         symbol = scope.unit(spec.target.name) if isinstance(spec.target, ast.NamedType) else None
-        if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK:
             target: Type = self._world.declared.layout(symbol) or ERROR  # the block itself may hold the pointer
         elif isinstance(symbol, TypeSymbol) and symbol.busy and symbol.decl.name in self._structs:
             target = self._structs[symbol.decl.name]  # and so may a struct
@@ -285,10 +285,10 @@ class TypeDeclarations:
             target, _ = self.type_of(spec.target, scope)
         if target is ERROR:
             return ERROR
-        if spec.keyword == "REFERENCE" and isinstance(target, ReferenceType):
+        if spec.keyword is ast.Pointing.REFERENCE and isinstance(target, ReferenceType):
             scope.error(spec.pos, "type", f"there is no REFERENCE to a REFERENCE; write {target}")
             return ERROR
-        kinds = {"REFERENCE": ReferenceType, "POINTER": RawPointerType}
+        kinds = {ast.Pointing.REFERENCE: ReferenceType, ast.Pointing.POINTER: RawPointerType}
         return kinds.get(spec.keyword, PointerType)(target)
 
     def _struct(self, spec: ast.StructSpec, scope: Scope, name: str) -> tuple[Type, Initial | None]:
