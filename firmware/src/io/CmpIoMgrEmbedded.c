@@ -598,8 +598,10 @@ static void diagnose(void)
 
     for (i = 0; i < IoTablesCountConnectors(); i++) {
         IO_DRIVER *driver = IoDeviceGetDriver(i);
-        if (driver != NULL && driver->functions->IoDrvGetModuleDiagnosis != NULL)
-            (void)driver->functions->IoDrvGetModuleDiagnosis(IoMgrConfigGetConnector(i));
+        if (driver == NULL || driver->functions->IoDrvGetModuleDiagnosis == NULL || !enter(driver))
+            continue;
+        (void)driver->functions->IoDrvGetModuleDiagnosis(IoMgrConfigGetConnector(i));
+        leave(driver);
     }
 }
 
