@@ -76,6 +76,10 @@ enum {
     CMPID_SysEvent = 0x001C,
     CMPID_CmpBlkDrvTcp = 0x001D,
     CMPID_CmpBlkDrvUdp = 0x001E,
+    CMPID_CmpIoMgrEmbedded = 0x001F,
+    CMPID_CmpIoMgrSrv = 0x0020,
+    CMPID_IoDrvSim = 0x0021,
+    CMPID_IoDrvGpio = 0x0022,
 };
 
 /* Name of a component, "" when unknown. */

@@ -30,6 +30,15 @@ X(CmpRetain)
 #if HAS_CmpMath
 X(CmpMath)
 #endif
+#if HAS_CmpIoMgrEmbedded
+X(CmpIoMgrEmbedded)
+#endif
+#if HAS_IoDrvSim
+X(IoDrvSim)
+#endif
+#if HAS_IoDrvGpio
+X(IoDrvGpio)
+#endif
 #ifdef PORT_COMPONENTS
 PORT_COMPONENTS(X)
 #endif
@@ -43,6 +52,9 @@ X(CmpLogSrv)
 #endif
 #if HAS_CmpMonitor2
 X(CmpMonitor2)
+#endif
+#if HAS_CmpIoMgrSrv
+X(CmpIoMgrSrv)
 #endif
 X(CmpRouterEmbedded)
 X(CmpNameServiceServer)

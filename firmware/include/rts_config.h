@@ -56,6 +56,25 @@
 #define APP_AREAS_FROM_PORT 0
 #endif
 
+/* Devices, modules and buses of an application, which the I/O manager drives; 16 bytes of RAM each. 0: no inputs and
+ * outputs but those that tasks use as memory; an application that has others is refused. */
+#ifndef IO_MAX_CONNECTORS
+#define IO_MAX_CONNECTORS 0
+#endif
+
+/* Simulated devices (IoDrvSim): bytes of all together, twice, and parameters that channels name. */
+#ifndef IO_SIM_MEMORY
+#define IO_SIM_MEMORY 16384
+#endif
+#ifndef IO_SIM_MAX_BLOCKS
+#define IO_SIM_MAX_BLOCKS 1024
+#endif
+
+/* 1: IoDrvSim takes the connectors of drivers that are not there, which are then never missing. For the simulator. */
+#ifndef IO_SIM_TAKES_ALL
+#define IO_SIM_TAKES_ALL 0
+#endif
+
 /* How a port wants the areas aligned, and their `size` rounded up, and where they are, to let programs write nothing but
  * them. */
 #ifndef APP_AREAS_ALIGNED
