@@ -80,6 +80,7 @@ enum {
     CMPID_CmpIoMgrSrv = 0x0020,
     CMPID_IoDrvSim = 0x0021,
     CMPID_IoDrvGpio = 0x0022,
+    CMPID_IoDrvModbus = 0x0024,
 };
 
 /* Name of a component, "" when unknown. */
