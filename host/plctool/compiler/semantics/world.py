@@ -16,6 +16,7 @@ from plctool.compiler.semantics.coercion import Coercion
 from plctool.compiler.semantics.declared import Declared
 from plctool.compiler.semantics.dispatches import Dispatches
 from plctool.compiler.semantics.endless import Loop
+from plctool.compiler.semantics.io_channels import IoChannels
 from plctool.compiler.semantics.names import Names
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, PouSymbol, VarSymbol
@@ -38,6 +39,7 @@ class World:
         self.dispatches = Dispatches()
         self.allocation = Allocation()
         self.direct = DirectVariables(self.allocation)
+        self.io = IoChannels()
         self.bodies = BodyQueue()
         self.blocks: dict[StructType, BlockInfo] = {}
         self.open_members: dict[StructType, dict[str, VarSymbol]] = {}  # of structures: AT %I*, %Q*, %M*
