@@ -134,6 +134,7 @@ enum {
     SG_APPLICATION = 2,
     SG_LOG = 5,
     SG_IOMGR = 0x0B,
+    SG_PLCSHELL = 0x11,
     SG_MONITORING2 = 0x1B,
 };
 
@@ -278,6 +279,20 @@ enum {
     TAG_LOG_ENTRY = 0x03,
     TAG_LOG_TEXT = 0x04,
     TAG_LOG_COMPONENT_NAME = 0x05,
+};
+
+/* PLC shell (4.15). */
+enum {
+    SRV_SHELL_EXECUTE = 1,
+    SRV_SHELL_CANCEL = 2,
+    TAG_SHELL_COMMAND = 0x10,
+    TAG_SHELL_SESSION = 0x11,
+    TAG_SHELL_ARGUMENTS = 0x12,
+    TAG_SHELL_BLOCK = 0x13,
+    TAG_SHELL_PART = 0x81, /* more follow */
+    TAG_SHELL_LAST = 0x82,
+    TAG_SHELL_TEXT = 0x20,
+    SHELL_MAX_COMMAND = 33, /* bytes, with NUL */
 };
 
 #endif

@@ -133,6 +133,10 @@ class Plc(Controller):
     def log(self, after: int = 0) -> list[LogEntry]:
         return services.read_log(self._session, after)
 
+    def shell(self, command: str) -> str:
+        """The answer of the controller's PLC shell, in lines; `?` lists its commands."""
+        return services.run_shell(self._session, command)
+
     # ---- the application ----
 
     def start(self) -> None:

@@ -18,6 +18,7 @@
 #include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
 #include "CmpLogSrv.h"
+#include "CmpPlcShell.h"
 #include "CmpMonitor2.h"
 #include "CmpNameServiceServer.h"
 #include "CmpRouterEmbedded.h"
@@ -315,6 +316,7 @@ void fakes_hook(CMP_HOOK hook)
         CmpAppSrv_Hook,
         CmpMonitor2_Hook,
         CmpLogSrv_Hook,
+        CmpPlcShell_Hook,
         CmpChannelServerEmbedded_Hook,
         CmpNameServiceServer_Hook,
         CmpRouterEmbedded_Hook,
