@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from datetime import timedelta
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from plctool.controller import Controller
 from plctool.core import error_name, ffi, lib
@@ -18,10 +19,14 @@ from plctool.debug.variables import Change, Symbol, unreachable
 from plctool.errors import DeviceError, UsageError
 from plctool.files import read_image
 from plctool.image.file import image_crc, parse_image
+from plctool.image.targets import host_target
 from plctool.link import l7
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
+
+if TYPE_CHECKING:
+    from plctool.compiler import Level
 
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _SECTOR = 4096
@@ -62,6 +67,15 @@ class Simulator(Controller):
         file = Path(path)
         image = read_image(file)
         return cls(image, find_symbols(parse_image(image).crc, file), start=start)
+
+    @classmethod
+    def from_sources(cls, *paths: Path | str, level: Level = 2, checks: str = "all", start: bool = True) -> Simulator:
+        """The program in source files and folders, compiled for this. `level` and `checks` as in `compile_sources`,
+        which says what is raised."""
+        from plctool.compiler import compile_sources  # only here: what runs images needs no compiler
+
+        built = compile_sources(paths, target=host_target(), level=level, checks=checks)
+        return cls(built.image, built.symbols, start=start)
 
     def close(self) -> None:
         """Shuts the runtime down; another Simulator may be made then."""
@@ -162,8 +176,9 @@ class Simulator(Controller):
         """Virtual time since power on [ns]."""
         return int(lib.SimNow())
 
-    def run_cycles(self, count: int) -> None:
-        """Runs until the first task has made `count` more cycles, or the program stopped with an exception."""
+    def run_cycles(self, count: int, *, check: bool = True) -> None:
+        """Runs until the first task has made `count` more cycles. Raises ProgramStopped when the program stopped with
+        an exception; without `check`, `status()` has it."""
         if count > 0:
             result = lib.SimRunCycles(count)
             if result == lib.ERR_TIMEOUT:
@@ -171,14 +186,19 @@ class Simulator(Controller):
                 raise DeviceError(message, "waits", result)
             if result not in (lib.ERR_OK, lib.ERR_EXCEPTION):
                 _check(result, "The program does not run")
+        if check:
+            self.check_running()
 
-    def run_for(self, ms: float = 0, *, seconds: float = 0) -> None:
+    def run_for(self, ms: float | timedelta = 0, *, seconds: float = 0, check: bool = True) -> None:
         """Lets virtual time pass: ten times 10 ms are ten cycles of a 10 ms task. Raises UsageError for a time that is
-        negative or longer than 146 years."""
-        ns = round(ms * 1e6 + seconds * 1e9)
+        negative or longer than 146 years, and ProgramStopped as `run_cycles` does."""
+        passed = ms / timedelta(milliseconds=1) if isinstance(ms, timedelta) else ms
+        ns = round(passed * 1e6 + seconds * 1e9)
         if not 0 <= ns < MAX_NS:
             raise UsageError(f"Time passes forwards, and for at most {MAX_NS // 10**9} s.", "time")
         _check(lib.SimRunFor(ns), "Time does not advance")
+        if check:
+            self.check_running()
 
     def bench(self, task: int, cycles: int) -> tuple[float, float]:
         """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""
