@@ -44,12 +44,13 @@ def check(wheel: Path, python: str, folder: Path) -> None:
     run(python, "-m", "venv", "env", folder=folder)
     bin = folder / "env" / "bin"
     run(bin / "pip", "install", "--quiet", "--only-binary", ":all:", wheel, "pytest", "mypy", folder=folder)
-    (folder / "main.st").write_text(PROGRAM)
-    run(bin / "plctool", "build", "main.st", folder=folder)
+    (folder / "project").mkdir()
+    (folder / "project" / "main.st").write_text(PROGRAM)
+    run(bin / "plctool", "build", "project", folder=folder)
     values = run(bin / "plctool", "run", "app.cdl", "--cycles", "5", "--get", "Main.n", folder=folder)
     assert "Main.n = 5" in values, values
     assert run(bin / "plcrt", "--version", folder=folder).startswith("plcrt ")
-    assert "1 passed" in run(bin / "python", "-m", "pytest", "main.st", folder=folder)
+    assert "1 passed" in run(bin / "python", "-m", "pytest", "project", folder=folder)
     (folder / "typed.py").write_text(TYPED)
     mypy = subprocess.run([bin / "mypy", "typed.py"], cwd=folder, capture_output=True, text=True, check=False)
     assert "typed.py:3" in mypy.stdout and "missing library stubs" not in mypy.stdout, mypy.stdout
