@@ -16,6 +16,8 @@ SHARED = [
     "CmpErrors.h",
     "CompactDownload.h",
     "IoConfig.h",
+    "IoDrvGpio.h",
+    "IoDrvSim.h",
     "CmpIecAbi.h",
     "SysExcept.h",
     "SysStart.h",

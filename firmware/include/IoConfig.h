@@ -6,7 +6,8 @@
  * Structures and names of manual 8.2.2, 8.5 and 8.8.1. The configuration is part of the code segment, so that execution
  * in place spends no RAM on it: it is read only, and has indices and offsets where the manual has pointers. The head is
  * followed by the tables, in the order of its counts, then by the data: names and values, each where an entry says.
- * Entries start at multiples of 4. All little-endian.
+ * Entries start at multiples of 4. All little-endian. What an entry has of the next table begins where that of the entry
+ * before it ended, so that each entry is checked once.
  */
 #ifndef IOCONFIG_H
 #define IOCONFIG_H

@@ -148,6 +148,11 @@ def test_tasks_of_an_empty_device_are_none(tool: Any, plc: FakePlc) -> None:
     assert tool("tasks", *PORT).status == 0
 
 
+def test_the_shell_takes_its_command_as_words(tool: Any, running: FakePlc) -> None:
+    assert tool("shell", *PORT, "say", "it").out.splitlines()[0] == "You said say it"
+    assert tool("shell", *PORT, "?", "--json").json == {"command": "?", "answer": "You said ?\nand now\nall is said."}
+
+
 def test_log_entries_come_with_class_component_and_place(tool: Any, running: FakePlc) -> None:
     running.log = [
         (1, 1_500_000_000, lib.LOG_INFO, "CmpApp", "started"),

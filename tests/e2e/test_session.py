@@ -80,6 +80,15 @@ def test_tasks_show_cycles_and_times(tool, plcrt, counter, eventually):
     assert tasks[0]["min_us"] <= tasks[0]["avg_us"] <= tasks[0]["max_us"]
 
 
+def test_the_shell_stops_and_starts_the_program(tool, plcrt, counter):
+    tool.ok("flash", "--port", plcrt.port, str(counter))
+    answers = [
+        tool.ok("shell", "--port", plcrt.port, command)["answer"]
+        for command in ("applist", "stopprg", "getprgstat", "startprg", "getprgstat")
+    ]
+    assert answers == ["Application", "stopprg: done", "stop", "startprg: done", "run"]
+
+
 def test_scan_finds_the_device(tool, plcrt):
     found = tool.ok("scan", "--port", plcrt.port)
     assert len(found["devices"]) == 1

@@ -13,7 +13,7 @@ from plctool.link import services
 from plctool.link.connection import Connection
 from plctool.link.session import Session
 from plctool.link.transport import DEFAULT_BAUD
-from plctool.link.transports import LATER, TRANSPORTS, Link, make_link, open_transport, parse_link
+from plctool.link.transports import TRANSPORTS, Link, make_link, open_transport, parse_link
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,6 @@ def test_a_link_is_its_kind_its_place_and_its_options(text: str, place: str, bau
         ("serial:/dev/ttyS0?baud=fast", "'fast' is not a number above 0"),
         ("serial:/dev/ttyS0?baud=", "'' is not a number above 0"),
         ("sim:?baud=1", "it has none"),
-        *((f"{scheme}:x", "is not in this version; use a serial line") for scheme in LATER),
     ],
 )
 def test_what_is_no_link_is_refused_with_what_to_write(text: str, said: str) -> None:
@@ -65,12 +64,6 @@ def test_what_is_no_link_is_refused_with_what_to_write(text: str, said: str) -> 
 def test_a_network_link_has_a_place_and_needs_no_gateway(text: str) -> None:
     link = parse_link(text)
     assert (str(link), link.options, link.is_shared) == (text, {}, False)
-
-
-def test_no_kind_of_link_is_there_and_to_come() -> None:
-    assert not TRANSPORTS.keys() & LATER.keys()
-    flags = [kind.flag for kind in TRANSPORTS.values() if kind.flag]
-    assert len({*flags, *LATER}) == len(flags) + len(LATER)
 
 
 def test_the_simulator_of_this_process_is_a_link() -> None:

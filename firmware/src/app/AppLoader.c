@@ -14,6 +14,7 @@
 #include "AppTasks.h"
 #include "CmpChecksum.h"
 #include "CmpRetain.h"
+#include "IoConfigCheck.h"
 #include "SysFileFlash.h"
 #include "SysTarget.h"
 
@@ -130,6 +131,9 @@ RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE 
         LoaderCheckSegments,  check_code,         check_areas,
         LoaderCheckFunctions, LoaderCheckImports, LoaderCheckIecFunctions,
         LoaderCheckInfo,      LoaderCheckBlobs,
+#if IO_MAX_CONNECTORS > 0
+        LoaderCheckIo,
+#endif
     };
     LOADER l;
     RTS_RESULT result = ERR_OK;

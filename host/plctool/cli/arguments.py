@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
-from plctool.link.transports import LATER, TRANSPORTS
+from plctool.link.transports import TRANSPORTS
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -140,6 +140,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(reset)
     _add_link(command("tasks", "show the times of the tasks"))
     _add_link(command("log", "print the log of a device"))
+    shell = command("shell", "send a command to the PLC shell of a device; ? lists them")
+    _add_link(shell)
+    shell.add_argument("words", nargs="+", metavar="COMMAND", help="for example ?, rtsinfo, tasklist, plcload")
 
     port = command("port-check", "check a port: run programs on a board and compare the results with what is expected")
     port.add_argument("--yes", action="store_true", help="replace the program that is on the board")
@@ -199,11 +202,9 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
             link.add_argument(f"--{kind.flag}", metavar=kind.shape, help=kind.help)
     options = {name: option for kind in TRANSPORTS.values() for name, option in kind.options.items()}
     for name, option in options.items():
-        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
+        default = f"; default: {option.default}" if option.default else ""
+        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}{default}")
     link.add_argument("--no-gateway", action="store_true", help="do not share the port, as with PLCTOOL_GATEWAY=off")
-    for scheme, place in LATER.items():
-        link.add_argument(f"--{scheme}", metavar=place, help="not in this version")
-    link.add_argument("--node", type=int, metavar="N", help="not in this version")
     if symbols:
         parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="if they are not found automatically")
 

@@ -311,6 +311,34 @@ def interrupted_flash(connect: Callable[[], Controller], image: Path) -> Interru
     return Interrupted(f"Interrupted. {now}", "interrupted")
 
 
+def flash_several(
+    plcs: Mapping[str, Plc],
+    image: Path,
+    *,
+    start: bool = True,
+    force: bool = False,
+    progress: Callable[[str, int, int], None] = lambda node, done, total: None,
+) -> tuple[Document, list[PlcError]]:
+    """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    def one(node: str, plc: Plc) -> Document:
+        show = lambda done, total: progress(node, done, total)  # noqa: E731
+        return {"node": node, **flash(plc, image, start=start, force=force, progress=show)}
+
+    devices: list[Document] = []
+    errors: list[PlcError] = []
+    with ThreadPoolExecutor(len(plcs)) as threads:
+        results = [(node, threads.submit(one, node, plc)) for node, plc in plcs.items()]
+        for node, result in results:
+            try:
+                devices.append(result.result())
+            except PlcError as error:
+                errors.append(error)
+                devices.append({"node": node, "error": {"code": error.code, "message": error.message}})
+    return {"devices": devices}, errors
+
+
 def start(plc: Controller) -> Document:
     """Starts the program; the state that it leads to."""
     plc.start()
@@ -366,6 +394,11 @@ def write(plc: Controller, texts: Mapping[str, str]) -> tuple[Document, Texts]:
     plc.write({name: table.resolve(name).parse(text) for name, text in texts.items()})
     reading = plc.sample(list(texts))
     return {"values": reading.values}, reading.texts
+
+
+def shell(plc: Plc, command: str) -> Document:
+    """What the device's PLC shell answers."""
+    return {"command": command, "answer": plc.shell(command)}
 
 
 def log(plc: Controller) -> Document:

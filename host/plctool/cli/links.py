@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 
 from plctool.errors import LinkError, UsageError
-from plctool.link.transports import LATER, TRANSPORTS, Link, Value, make_link, not_yet, parse_link
+from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link
 
 VARIABLE = "PLC_LINK"
 PROJECT_FILE = "plc.toml"
@@ -16,7 +16,6 @@ PROJECT_FILE = "plc.toml"
 
 def link_of(args: argparse.Namespace) -> Link:
     """The link of a command; options such as --baud also hold for one that the arguments do not name."""
-    _refuse_what_is_to_come(args)
     given = _given(args)
     if len(given) > 1:
         flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
@@ -35,7 +34,6 @@ def link_of(args: argparse.Namespace) -> Link:
 
 def names_no_link(args: argparse.Namespace) -> bool:
     """Whether neither the arguments nor the environment name a link."""
-    _refuse_what_is_to_come(args)
     return not _given(args) and _default_link() is None
 
 
@@ -49,12 +47,6 @@ def all_serial_ports(args: argparse.Namespace) -> list[Link]:
     return links
 
 
-def _refuse_what_is_to_come(args: argparse.Namespace) -> None:
-    for name in (*LATER, "node"):
-        if getattr(args, name) is not None:
-            raise not_yet(f"--{name}")
-
-
 def _given(args: argparse.Namespace) -> list[str]:
     """The kinds of link that the arguments name."""
     return [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and getattr(args, kind.flag)]
@@ -62,7 +54,7 @@ def _given(args: argparse.Namespace) -> list[str]:
 
 def _options(args: argparse.Namespace) -> dict[str, Value]:
     names = {name for kind in TRANSPORTS.values() for name in kind.options}
-    return {name: value for name in sorted(names) if (value := getattr(args, name)) is not None}
+    return {name: value for name in sorted(names) if (value := getattr(args, name.replace("-", "_"))) is not None}
 
 
 def _default_link() -> Link | None:

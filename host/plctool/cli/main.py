@@ -16,6 +16,7 @@ from plctool.cli.arguments import pairs, parser
 from plctool.cli.documents import Document
 from plctool.cli.links import all_serial_ports, link_of, names_no_link
 from plctool.errors import InternalError, PlcError, UsageError
+from plctool.link.transports import Link
 from plctool.version import plctool_version
 
 if TYPE_CHECKING:
@@ -143,7 +144,25 @@ def _on_device(args: argparse.Namespace, operation: Callable[[Plc], Document], t
     return _show(args, document, text)
 
 
+def _flash_several(args: argparse.Namespace, link: Link) -> int:
+    from plctool.device import connect_several
+
+    with connect_several(link) as plcs, _Progress(not args.json) as progress:
+        document, errors = documents.flash_several(
+            plcs,
+            args.image,
+            start=not args.no_start,
+            force=args.force,
+            progress=lambda node, done, total: progress.show(done, total, node),
+        )
+    _show(args, document, output.flash_several_text)
+    return max((error.exit_code for error in errors), default=EXIT_OK)
+
+
 def _flash(args: argparse.Namespace) -> int:
+    if len((link := link_of(args)).nodes or ()) > 1:
+        return _flash_several(args, link)
+
     def announce(others: Sequence[OtherTool]) -> None:
         if others and not args.json:
             users = "1 other tool uses" if len(others) == 1 else f"{len(others)} other tools use"
@@ -162,18 +181,25 @@ def _flash(args: argparse.Namespace) -> int:
 
 
 class _Progress:
-    """A progress bar on a terminal, silence elsewhere. It begins with the first bytes."""
+    """A progress bar for each download on a terminal, silence elsewhere. It begins with the first bytes."""
 
     def __init__(self, wanted: bool) -> None:
         self._bar: Any = None
-        self._task: Any = None
+        self._tasks: dict[str, Any] = {}
         if wanted and sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, DownloadColumn, Progress, TimeRemainingColumn, TransferSpeedColumn
+            from rich.progress import (
+                BarColumn,
+                DownloadColumn,
+                Progress,
+                TextColumn,
+                TimeRemainingColumn,
+                TransferSpeedColumn,
+            )
 
-            columns = (BarColumn(), DownloadColumn(), TransferSpeedColumn(), TimeRemainingColumn())
+            label = TextColumn("{task.description}")
+            columns = (label, BarColumn(), DownloadColumn(), TransferSpeedColumn(), TimeRemainingColumn())
             self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            self._task = self._bar.add_task("flash", total=None)
 
     def __enter__(self) -> _Progress:
         return self
@@ -182,10 +208,13 @@ class _Progress:
         if self._bar:
             self._bar.stop()
 
-    def show(self, done: int, total: int) -> None:
-        if self._bar:
-            self._bar.start()  # harmless when repeated
-            self._bar.update(self._task, completed=done, total=total)
+    def show(self, done: int, total: int, device: str = "") -> None:
+        if not self._bar:
+            return
+        self._bar.start()  # harmless when repeated
+        if device not in self._tasks:
+            self._tasks[device] = self._bar.add_task(device, total=total)
+        self._bar.update(self._tasks[device], completed=done, total=total)
 
 
 def _scan(args: argparse.Namespace) -> int:
@@ -218,6 +247,10 @@ def _tasks(args: argparse.Namespace) -> int:
 
 def _log(args: argparse.Namespace) -> int:
     return _on_device(args, documents.log, output.log_text)
+
+
+def _shell(args: argparse.Namespace) -> int:
+    return _on_device(args, lambda plc: documents.shell(plc, " ".join(args.words)), lambda d: str(d["answer"]))
 
 
 def _port_check(args: argparse.Namespace) -> int:
@@ -307,8 +340,8 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": _build, "check": _check, "info": _info, "symbols": _symbols, "run": _run, "test": _test,
     "export-itf": _export_itf, "bench": _bench, "demo": _demo,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
-    "tasks": _tasks, "log": _log, "port-check": _port_check, "read": _read, "write": _write, "watch": _watch,
-    "gateway": _gateway, "completion": _completion, "man": _man,
+    "tasks": _tasks, "log": _log, "shell": _shell, "port-check": _port_check,
+    "read": _read, "write": _write, "watch": _watch, "gateway": _gateway, "completion": _completion, "man": _man,
 }  # fmt: skip
 
 

@@ -95,6 +95,14 @@ def flash_text(document: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def flash_several_text(document: dict[str, Any]) -> str:
+    """What a download did on each device."""
+    return "\n".join(
+        f"{device['node']}: {device['error']['message'] if 'error' in device else flash_text(device)}"
+        for device in document["devices"]
+    )
+
+
 def tasks_text(document: dict[str, Any]) -> str:
     """A line for each task."""
     columns = ("name", "cycles", "last_us", "avg_us", "min_us", "max_us", "jitter_us", "overruns")

@@ -1,0 +1,62 @@
+/*
+ * CmpIoMgrEmbedded.h - the I/O manager: what drivers ask of it, and what others see of devices.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Manual 8.4, 8.5, 8.12.2. It calls the drivers (IoDrv.h) that the configuration of the loaded application names
+ * (IoConfig.h): when it is loaded, in each cycle, in the safe state, and for requests from the PC.
+ *
+ * While the application is stopped or has an exception inputs are still read, from main, and devices kept up. Outputs are
+ * safe then: each channel holds what the device got last, is zero, or has a value, as the configuration says.
+ */
+#ifndef CMPIOMGREMBEDDED_H
+#define CMPIOMGREMBEDDED_H
+
+#include "CmpErrors.h"
+#include "CmpItf.h"
+#include "CmpStd.h"
+#include "IoConfig.h"
+#include "IoDrv.h"
+#include "IoMgrConfig.h"
+#include "IoMgrDevices.h"
+
+/* ---- drivers (8.4) ---- */
+
+/* In CH_INIT2 and CH_EXIT2, from main. ERR_DUPLICATE: a driver of that name is there. */
+RTS_RESULT IoMgrRegisterInstance(IO_DRIVER *driver);
+RTS_RESULT IoMgrUnregisterInstance(IO_DRIVER *driver);
+
+/* ---- configuring ---- */
+
+/* Whether the configuration gives an enabled connector to a driver. */
+bool IoMgrConfigIsMine(const IoConfigConnector *connector, const IO_DRIVER *driver);
+
+/*
+ * Why a driver refuses its configuration, in IoDrvUpdateConfiguration and IoDrvUpdateMapping: a sentence without the name
+ * of the connector, which is put before it. The application is refused with it, and the driver returns what this
+ * returns. ERR_OK: the connector is optional; the sentence is in the log, and the driver goes on without it.
+ */
+RTS_RESULT IoMgrConfigRefuse(const IoConfigConnector *connector, RTS_RESULT result, const char *format, ...);
+
+/* ---- requests (8.2.3). From main; an error of the driver, ERR_NOT_SUPPORTED: it has no such function,
+ * ERR_INVALIDID: there is no such connector, ERR_NO_OBJECT: it has no driver, or no such parameter. ---- */
+
+RTS_RESULT IoMgrReadParameter(RTS_UI32 connector, RTS_UI32 id, void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
+RTS_RESULT IoMgrWriteParameter(RTS_UI32 connector, RTS_UI32 id, const void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
+RTS_RESULT IoMgrIdentify(RTS_UI32 connector);
+RTS_RESULT IoMgrScanModules(RTS_UI32 connector, RTS_UI32 index, IoDrvModule *module);
+
+/* How often a task found the driver of a connector busy, since the start of the runtime. */
+RTS_UI32 IoMgrGetSkipped(RTS_UI32 connector);
+
+/* Events of the component; manual's numbers. */
+enum {
+    EVT_PrepareUpdateConfiguration = 0x10001,
+    EVT_DoneUpdateConfiguration = 0x10002,
+    EVT_PrepareUpdateMapping = 0x10005,
+    EVT_DoneUpdateMapping = 0x10006,
+};
+
+RTS_RESULT CmpIoMgrEmbedded_Hook(CMP_HOOK hook);
+
+#endif
