@@ -196,9 +196,7 @@ def test_a_folder_is_no_image_and_the_error_says_how_to_make_one(tool: Any, scra
     (scratch / "src").mkdir()
     done = tool(command, "src")
     assert done.status == 2
-    assert done.err == (
-        "plctool: src is a folder; make an image of its sources first: plctool build src -o app.cdl.\n"
-    )
+    assert done.err == ("plctool: src is a folder; make an image of its sources first: plctool build src -o app.cdl.\n")
 
 
 def test_an_image_for_another_target_names_both_targets(tool: Any, scratch: Path) -> None:
