@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler import CompileError, load_sources
+from plctool.compiler import CompileError, IoFiles, io_sources, load_io, load_sources
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
@@ -44,15 +44,20 @@ _EXCEPTIONS = {
 
 
 def run_tests(
-    paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0, warnings: WarningOptions = ALL_WARNINGS
+    paths: Sequence[Path | str],
+    *,
+    pattern: str = "*",
+    level: int = 0,
+    warnings: WarningOptions = ALL_WARNINGS,
+    io: IoFiles = IoFiles(),  # noqa: B008
 ) -> Report:
     """Runs the tests in sources whose name matches `pattern` (with * and ?) or contains it; case does not matter.
 
-    `level`: optimisation; the lowest compiles fastest, and the results are the same. Raises CompileError when the
-    program has errors, UsageError when there are no tests.
+    `level`: optimisation; the lowest compiles fastest, and the results are the same. `io`: inputs and outputs. Raises
+    CompileError when the program has errors, UsageError when there are no tests.
     """
     begin = time.perf_counter()
-    program = TestProgram(paths, level=level, warnings=warnings)
+    program = TestProgram(paths, level=level, warnings=warnings, io=io)
     chosen = [i for i, case in enumerate(program.cases) if _fits(case.name.casefold(), pattern.casefold())]
     if not chosen:
         what = f"no test matches '{pattern}'" if program.cases else "there are no tests: write TEST 'name' ... END_TEST"
@@ -63,16 +68,26 @@ def run_tests(
 
 class TestProgram:
     """A program with its tests, compiled when the first one runs. `cases`: the tests, in the order of the sources;
-    `diagnostics`: warnings of the compiler. Raises CompileError when the program has errors."""
+    `diagnostics`: warnings of the compiler; `io`: inputs and outputs. Raises CompileError when the program has
+    errors."""
 
     __test__ = False  # nothing for pytest to collect
 
-    def __init__(self, paths: Sequence[Path | str], *, level: int = 0, warnings: WarningOptions = ALL_WARNINGS) -> None:
+    def __init__(
+        self,
+        paths: Sequence[Path | str],
+        *,
+        level: int = 0,
+        warnings: WarningOptions = ALL_WARNINGS,
+        io: IoFiles = IoFiles(),  # noqa: B008
+    ) -> None:
+        description = load_io(paths, io)
         self.sources = load_sources(paths)
         self._suite = TestSuite()
         self._level = level
         with _power(), bugs_reported():
-            checked = check_sources(self.sources, tests=self._suite, warnings=warnings)
+            checked = check_sources(self.sources, tests=self._suite, warnings=warnings, io=description)
+        self.sources += io_sources(description)
         if checked.program is None:
             raise CompileError([d for d in checked.diagnostics if d.severity == "error"], self.sources)
         self._program = checked.program
