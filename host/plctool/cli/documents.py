@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from plctool.cli import io_documents
-from plctool.errors import DeviceError, LinkError, PlcError, UsageError
+from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
 if TYPE_CHECKING:
@@ -33,14 +33,6 @@ class Interrupted(PlcError):
     """The user ended an operation by Ctrl-C; the message says what it has left."""
 
     exit_code = 130
-
-
-class ProgramStopped(DeviceError):
-    """The program ended with an exception. `exception` is for machines, as in `plctool status --json`."""
-
-    def __init__(self, exception: ExceptionInfo) -> None:
-        super().__init__(f"The program stopped: {exception}.", "exception")
-        self.exception = _exception_document(exception)
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -250,7 +242,6 @@ def run(
             plc.run_cycles(1 if cycles is None else cycles)
         else:
             plc.run_for(time_ms)
-        _raise_exception(plc)
         tasks, reading = plc.tasks(), plc.sample(gets)
         document = {
             "values": reading.values,
@@ -259,6 +250,15 @@ def run(
             **({"trace": str(trace.path)} if trace else {}),
         }
         return document, reading.texts
+
+
+def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: TraceFile) -> None:
+    """As `run`, in steps."""
+    from plctool.trace_file import trace_csv
+
+    lines = trace_csv(plc, trace.names, cycles, time_ms)
+    write_atomically(trace.path, "".join(lines).encode())
+    plc.check_running()
 
 
 def _attach(plc: Simulator, path: Path) -> None:
@@ -273,19 +273,6 @@ def _attach(plc: Simulator, path: Path) -> None:
     if not callable(step):
         raise UsageError(f"{path} has no function step; write: def step(plc): ...", "no-plant")
     plc.attach(step, float(names.get("EVERY_MS", 1)))
-
-
-def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: TraceFile) -> None:
-    """As `run`, in steps."""
-    from plctool.trace_file import trace_csv
-
-    lines = trace_csv(plc, trace.names, cycles, time_ms)
-    write_atomically(trace.path, "".join(lines).encode())
-
-
-def _raise_exception(plc: Controller) -> None:
-    if exception := plc.status().exception:
-        raise ProgramStopped(exception)
 
 
 def bench(path: Path, cycles: int) -> Document:
@@ -360,6 +347,7 @@ def flash_several(
     progress: Callable[[str, int, int], None] = lambda node, done, total: None,
 ) -> tuple[Document, list[PlcError]]:
     """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
+
     def one(node: str, plc: Plc) -> Document:
         show = lambda done, total: progress(node, done, total)  # noqa: E731
         return {"node": node, **flash(plc, image, start=start, force=force, progress=show)}
@@ -406,11 +394,12 @@ def status_document(status: PlcStatus) -> Document:
     return {
         "state": str(status.state),
         "image_crc": None if status.state is AppState.NONE else f"{status.image_crc:08X}",
-        "exception": None if status.exception is None else _exception_document(status.exception),
+        "exception": None if status.exception is None else exception_document(status.exception),
     }
 
 
-def _exception_document(exception: ExceptionInfo) -> Document:
+def exception_document(exception: ExceptionInfo) -> Document:
+    """For machines."""
     return {**vars(exception), "calls": [vars(call) for call in exception.calls]}
 
 
@@ -458,7 +447,7 @@ def log(plc: Controller) -> Document:
     exception = plc.status().exception
     last = next((e for e in reversed(entries) if e["class"] == "exception"), None)
     if exception and exception.file and last:
-        known = _exception_document(exception)
+        known = exception_document(exception)
         last |= {name: known[name] for name in ("pou", "file", "line", "calls")}
     return {"entries": entries}
 
