@@ -31,7 +31,7 @@ RTS_STATIC_ASSERT((BOARD_UART_TX_SIZE & (BOARD_UART_TX_SIZE - 1)) == 0, tx_size_
 
 static UART *const uarts[] = {(UART *)0x40004000u, (UART *)0x40005000u};
 static LINE lines[BOARD_UART_COUNT];
-static volatile RTS_UI8 work;
+static volatile bool work;
 
 static RTS_UI16 used(const RING *ring)
 {
@@ -44,7 +44,7 @@ static void receive(RTS_UI32 index)
     LINE *line = &lines[index];
     uarts[index]->intclear = INT_RX;
     RTS_UI8 byte = (RTS_UI8)uarts[index]->data;
-    work = 1;
+    work = true;
     if (used(&line->rx) == BOARD_UART_RX_SIZE)
         return; /* lost; the frame's check sum shows it */
     line->rx_data[line->rx.head % BOARD_UART_RX_SIZE] = byte;
@@ -59,7 +59,7 @@ static void transmit(RTS_UI32 index)
         return;
     uarts[index]->data = line->tx_data[line->tx.tail % BOARD_UART_TX_SIZE];
     line->tx.tail++;
-    work = 1;
+    work = true;
 }
 
 void Uart0RxIrq(void)
@@ -92,10 +92,10 @@ void UartInit(void)
     }
 }
 
-int BoardHasWork(void)
+bool BoardHasWork(void)
 {
-    int was = work;
-    work = 0;
+    bool was = work;
+    work = false;
     return was;
 }
 
