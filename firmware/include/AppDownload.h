@@ -15,8 +15,8 @@
 /*
  * Download. Begin opens the idle slot (erases lazily, sector by sector), Write appends, End checks everything
  * and, only when all is well, commits the slot, stops the old application and loads the new one (state AS_STOP).
- * On any error the old application goes on, untouched; except that when the tasks of the new one cannot be created, it
- * is loaded again, with its retain variables, and started if it ran.
+ * On any error the old application goes on, untouched; except that when a driver refuses the I/O configuration of the new
+ * one, or its tasks cannot be created, it is loaded again, with its retain variables, and started if it ran.
  *
  * Begin: ERR_NOMEMORY too large for the slot. Write: ERR_INVALID_SEQUENCE not begun or `offset` is not what
  * AppDownloadOffset says; ERR_DEVICE flash fault, which ends the download. End: the reason as ERR_* and in *refusal

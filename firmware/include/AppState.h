@@ -6,6 +6,8 @@
 #ifndef APPSTATE_H
 #define APPSTATE_H
 
+#include "CmpStd.h"
+
 /* Application states (codesys-v3-protocol 4.6). An exception is AS_STOP with OS_EXCEPTION set in the operating
  * state. */
 enum { AS_NONE = 0, AS_RUN = 1, AS_STOP = 2, AS_HALT_ON_BP = 3, AS_SINGLE_CYCLE = 5 };
@@ -22,5 +24,8 @@ enum {
     EVT_DownloadDone = 0x1000A,
     EVT_CmpApp_Exception = 0x8001C,
 };
+
+/* AS_*. From any context. */
+RTS_UI32 AppGetState(void);
 
 #endif

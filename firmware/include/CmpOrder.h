@@ -30,6 +30,15 @@ X(CmpRetain)
 #if HAS_CmpMath
 X(CmpMath)
 #endif
+#if HAS_CmpIoMgrEmbedded
+X(CmpIoMgrEmbedded)
+#endif
+#if HAS_IoDrvSim
+X(IoDrvSim)
+#endif
+#if HAS_IoDrvGpio
+X(IoDrvGpio)
+#endif
 #ifdef PORT_COMPONENTS
 PORT_COMPONENTS(X)
 #endif
@@ -41,14 +50,23 @@ X(CmpAppSrv)
 #if HAS_CmpLogSrv
 X(CmpLogSrv)
 #endif
+#if HAS_CmpPlcShell
+X(CmpPlcShell)
+#endif
 #if HAS_CmpMonitor2
 X(CmpMonitor2)
+#endif
+#if HAS_CmpIoMgrSrv
+X(CmpIoMgrSrv)
 #endif
 X(CmpRouterEmbedded)
 X(CmpNameServiceServer)
 X(CmpChannelServerEmbedded)
 #if HAS_CmpBlkDrvSimpleCom
 X(CmpBlkDrvSimpleCom)
+#endif
+#if HAS_CmpBlkDrvCan
+X(CmpBlkDrvCan)
 #endif
 #if HAS_CmpBlkDrvTcp
 X(CmpBlkDrvTcp)

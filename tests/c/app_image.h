@@ -15,6 +15,7 @@
 #include "CmpChecksum.h"
 #include "CmpIecTask.h"
 #include "CompactDownload.h"
+#include "IoConfig.h"
 #include "Sim.h"
 #include "rts_config.h"
 
@@ -40,7 +41,7 @@ typedef struct {
 enum { SPEC_MAX_KEPT = 8 };
 
 typedef struct {
-    RTS_UI8 code[1024];
+    RTS_UI8 code[4096];
     RTS_UI32 code_size;
     RTS_UI32 areas[APP_AREA_CODE]; /* bytes */
     RTS_I32 function[CDL_FUNCTION_COUNT];
@@ -52,6 +53,7 @@ typedef struct {
     RTS_UI32 kept_count;                 /* 0: no blob */
     CDL_IMAGE images[2 * APP_MAX_TASKS]; /* what the tasks use of inputs and outputs */
     RTS_UI32 image_count;                /* 0: no blob */
+    IO_CONFIG_PLACE io;                  /* size 0: no blob */
     const char *info[5];
 } APP_SPEC;
 
@@ -119,6 +121,17 @@ static inline void emit_set(APP_SPEC *spec, RTS_UI32 area, RTS_UI32 offset, RTS_
     emit(spec, "\xC7\x80", 2);
     emit_u32(spec, offset);
     emit_u32(spec, value);
+}
+
+/* area[offset] := area[offset], as DINT */
+static inline void emit_copy(APP_SPEC *spec, RTS_UI32 to_area, RTS_UI32 to, RTS_UI32 from_area, RTS_UI32 from)
+{
+    emit_load_area(spec, from_area);
+    emit(spec, "\x8B\x88", 2); /* mov ecx, [rax + from] */
+    emit_u32(spec, from);
+    emit_load_area(spec, to_area);
+    emit(spec, "\x89\x88", 2); /* mov [rax + to], ecx */
+    emit_u32(spec, to);
 }
 
 /* area[offset] := low word of the context's time_ms */
@@ -360,6 +373,8 @@ static inline void build_image(APP_BYTES *image, const APP_SPEC *spec)
     append_kept(image, spec);
     if (spec->image_count != 0)
         append_blob(image, CDL_BLOB_IMAGES, spec->images, spec->image_count * (RTS_UI32)sizeof(CDL_IMAGE));
+    if (spec->io.size != 0)
+        append_blob(image, CDL_BLOB_IO, &spec->io, sizeof spec->io);
     h.blob = end_segment(image, h.blob.offset);
     pad(image, APP_CODE_ALIGN);
     h.code.offset = image->size;

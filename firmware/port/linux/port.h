@@ -35,7 +35,8 @@ bool PortWaitAdd(const PORT_SOURCE *source);
 void PortWaitRemove(const PORT_SOURCE *source);
 /* In this pass something was done after which there may be more to do: the next PortWait does not wait. */
 void PortWaitNotNow(void);
-/* Waits until one of them is ready, or a signal comes, `timeout_ms` at most. Returns whether there may be something to
+/* Waits until one of them is ready, or a signal comes, `timeout_ms` at most, or less if a component wants it
+ * (SysTimeWantPass). Returns whether there may be something to
  * do. */
 bool PortWait(int timeout_ms);
 
@@ -82,6 +83,29 @@ void PortComClose(void);
 void PortComHandOver(void);
 /* Name of the pseudo terminal, which is its link if it has one; NULL when the line is none. */
 const char *PortComPtyName(void);
+
+/* ---- SysCan ---- */
+
+typedef struct {
+    RTS_UI32 node;          /* 1..127 */
+    RTS_UI32 base;          /* of the identifiers */
+    RTS_UI32 bit_rate;      /* of an adapter; interfaces of the kernel have their own */
+    RTS_UI32 data_bit_rate; /* not 0: FD frames are sent */
+} PORT_CAN_OPTIONS;
+
+/* Opens the one CAN controller: an interface of the kernel, "slcan:PATH" for an adapter on a serial line, "slcan:pty" for
+ * a new pseudo terminal. Before CMInit. */
+bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON *reason);
+void PortCanClose(void);
+/* As PortComHandOver. */
+void PortCanHandOver(void);
+/* Name of the pseudo terminal, NULL when there is none. */
+const char *PortCanPtyName(void);
+
+/* ---- SysTarget ---- */
+
+/* The name of the device in a scan; the text stays. Before CMInit. */
+void PortTargetSetName(const char *name);
 
 /* ---- SysSocket ---- */
 

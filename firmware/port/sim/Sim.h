@@ -14,6 +14,7 @@
 
 #include "CmpErrors.h"
 #include "CmpStd.h"
+#include "IoConfig.h"
 #include "SysStart.h"
 
 enum { SIM_POWER_CUT = 0x8001 };
@@ -140,6 +141,23 @@ RTS_UI32 SimFlashOps(void);
  * one). */
 RTS_UI32 SimFlashViolations(void);
 const char *SimFlashViolation(void);
+
+/* ---- inputs and outputs ---- */
+
+/*
+ * The devices of the loaded application are simulated (IoDrvSim.h), whatever drivers their description names; each is
+ * known by the name of its connector. Write sets `bits` of a parameter, from bit `bit` on, to what stands in `data` from
+ * bit 0 on: what an input measures from now on. Read gives what outputs have now. ERR_NO_OBJECT: no such connector or
+ * parameter; ERR_OUT_OF_LIMITS: the parameter is not as long.
+ */
+RTS_RESULT SimIoWrite(const char *connector, RTS_UI32 parameter, RTS_UI32 bit, RTS_UI32 bits, const RTS_UI8 *data);
+RTS_RESULT SimIoRead(const char *connector, RTS_UI32 parameter, RTS_UI32 bit, RTS_UI32 bits, RTS_UI8 *data);
+
+/* Sets a fault, IO_SIM_* of IoDrvSim.h, until it is set to 0 or another application is loaded. ERR_NO_OBJECT. */
+RTS_RESULT SimIoFault(const char *connector, RTS_UI32 fault, RTS_UI32 value);
+
+/* How the runtime sees the device. ERR_NO_OBJECT. */
+RTS_RESULT SimIoGetState(const char *connector, IO_DEVICE_STATE *state);
 
 /* ---- serial line 0 ---- */
 

@@ -7,8 +7,12 @@
 #define HAS_CmpEventMgrEmbedded 1
 #define HAS_CmpRetain 1
 #define HAS_CmpMath 1
+#define HAS_CmpIoMgrEmbedded 1
+#define HAS_IoDrvSim 1
+#define HAS_CmpIoMgrSrv 1
 #define HAS_COMMUNICATION 1
 #define HAS_CmpLogSrv 1
+#define HAS_CmpPlcShell 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
 #define PORT_COMPONENTS(X) X(SysSim)

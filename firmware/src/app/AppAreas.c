@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "AppIo.h"
 #include "CmpErrors.h"
 #include "SysLock.h"
 #include "SysMem.h"
@@ -46,13 +47,37 @@ void AppAreasClear(void)
     memset(&areas, 0, sizeof areas);
 }
 
-/* A task that copies its outputs back meanwhile is before or after. */
+#if IO_MAX_CONNECTORS > 0
+/* Part by part, so that the mask is small. Without lock, since the manager looks at all channels for each. */
+static void clear_what_is_not_held(void)
+{
+    RTS_UI8 *outputs = (RTS_UI8 *)areas.all.output;
+    RTS_UI8 held[32];
+    RTS_UI32 at;
+    RTS_UI32 i;
+
+    for (at = 0; at < APP_OUTPUT_SIZE; at += i) {
+        RTS_UI32 size = APP_OUTPUT_SIZE - at < sizeof held ? APP_OUTPUT_SIZE - at : sizeof held;
+        memset(held, 0, sizeof held);
+        AppIoGet()->get_held(at, held, size);
+        for (i = 0; i < size; i++)
+            outputs[at + i] &= held[i];
+    }
+}
+#else
+#define clear_what_is_not_held() ((void)0)
+#endif
+
+/* A task that copies its outputs back meanwhile is before or after; none does when no cycle may start any more. */
 void AppAreasClearOutputs(void)
 {
     RTS_UI32 lock = SysLockEnter();
 
-    memset(areas.all.output, 0, sizeof areas.all.output);
+    if (AppIoGet() == NULL)
+        memset(areas.all.output, 0, sizeof areas.all.output);
     SysLockLeave(lock);
+    if (AppIoGet() != NULL)
+        clear_what_is_not_held();
 }
 
 RTS_UI8 *AppAreasGet(RTS_UI32 area)

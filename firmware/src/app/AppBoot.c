@@ -33,11 +33,8 @@ static RTS_RESULT load_from_slot(RTS_UI32 slot, RTS_UI32 retain_until)
         if (code == NULL)
             result = APP_REFUSE(&refusal, ERR_NOMEMORY, "There is no executable memory for the code.");
     }
-    if (result == ERR_OK) {
-        result = AppLoad(&image, code, retain_until);
-        if (result != ERR_OK)
-            result = APP_REFUSE(&refusal, result, "The flash cannot be read.");
-    }
+    if (result == ERR_OK)
+        result = AppLoad(&image, code, retain_until, &refusal);
     if (result != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Boot project refused: %s", refusal.text);
     return result;

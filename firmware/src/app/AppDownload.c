@@ -117,15 +117,16 @@ static RTS_RESULT take_over(const APP_IMAGE *image, APP_REFUSAL *refusal)
     AppPostEvent(EVT_PrepareDownload);
     ran = AppStopTasks();
     AppUnload();
-    result = AppLoad(image, code, retain_after);
-    if (result == ERR_OK)
+    result = AppLoad(image, code, retain_after, refusal);
+    if (result == ERR_OK) {
         result = AppInitialise();
+        if (result != ERR_OK)
+            result = APP_REFUSE(refusal, result, "There are not enough timers for the tasks.");
+    }
     if (result != ERR_OK)
         put_back(image->file, ran);
     AppPostEvent(EVT_DownloadDone);
-    if (result == ERR_NOMEMORY)
-        return APP_REFUSE(refusal, result, "There are not enough timers for the tasks.");
-    return result == ERR_OK ? ERR_OK : APP_REFUSE(refusal, result, "The flash cannot be read.");
+    return result;
 }
 
 static RTS_RESULT finish_download(APP_REFUSAL *refusal)
@@ -152,7 +153,7 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
     AppHandlePendingException();
     result = finish_download(refusal);
     if (result == ERR_OK)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application loaded, CRC 0x%x", (unsigned)download.crc);
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application loaded, CRC %X", (unsigned)download.crc);
     else
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Download refused: %s", refusal->text);
     return result;

@@ -14,6 +14,7 @@
 #include "AppCommit.h"
 #include "AppException.h"
 #include "AppFunctions.h"
+#include "AppIo.h"
 #include "AppRetain.h"
 #include "AppState.h"
 #include "CmpEventMgr.h"
@@ -175,6 +176,8 @@ static void set_context(void)
 static void unload(void)
 {
     (void)IecTaskCreateAll(NULL, 0, &app.context);
+    if (AppIoGet() != NULL)
+        AppIoGet()->unload();
     RetainDetach();
     SysFlashReleaseCode(app.image.file);
     AppExceptionClear();
@@ -243,14 +246,28 @@ const RTS_UI8 *AppMapCode(const APP_IMAGE *image)
     return SysFlashMapCode(image->file, SysFileGetArea(image->file)->offset + image->code.offset, image->code.size);
 }
 
-RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until)
+/* Gives the drivers the configuration of the application. */
+#if IO_MAX_CONNECTORS > 0
+static RTS_RESULT load_io(APP_REFUSAL *refusal)
+{
+    const IO_CONFIG *config = (const IO_CONFIG *)(const void *)(app.code + app.image.io.offset);
+
+    if (app.image.io.size == 0)
+        return ERR_OK;
+    return AppIoGet()->load(config, app.tables.tasks, app.image.task_count, &app.context, refusal);
+}
+#else
+#define load_io(refusal) ((RTS_RESULT)ERR_OK)
+#endif
+
+RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until, APP_REFUSAL *refusal)
 {
     RTS_RESULT restored;
     RTS_RESULT result = AppLoaderRead(image, &app.tables);
 
     if (result != ERR_OK) {
         SysFlashReleaseCode(image->file);
-        return result;
+        return APP_REFUSE(refusal, result, "The flash cannot be read.");
     }
     app.image = *image;
     app.code = code;
@@ -258,6 +275,11 @@ RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_
     SysExceptCodeRange(code, image->code.size);
     set_context();
     AppAreasClear();
+    result = load_io(refusal);
+    if (result != ERR_OK) {
+        unload();
+        return result;
+    }
     restored = AppRetainLoad(&app.image, app.context.area[APP_AREA_RETAIN], retain_until);
     app.pending = restored == ERR_OK ? INIT_WARM : INIT_COLD;
     return ERR_OK;

@@ -10,6 +10,8 @@
 #define APPLIFE_H
 
 #include "AppLoaded.h"
+#include "AppRefusal.h"
+#include "AppState.h"
 #include "CmpErrors.h"
 
 /* Slot of the loaded application, SLOT_NONE without one. */
@@ -19,9 +21,6 @@ bool AppHasException(void);
 /* Whether its last cycle was aborted for a stop. That says nothing against the program, but it starts from a reset
  * only. */
 bool AppWasBrokenOff(void);
-
-/* AS_* of AppState.h. */
-RTS_UI32 AppGetState(void);
 
 /* False while it waits for its initial values. */
 bool AppIsInitialised(void);
@@ -34,8 +33,9 @@ const IEC_CONTEXT *AppGetContext(void);
 const RTS_UI8 *AppMapCode(const APP_IMAGE *image);
 
 /* Takes over a checked image with its code mapped at `code`, when nothing is loaded. Retain variables come from a
- * record up to number `retain_until`. The application is in AS_STOP then, and nothing of it was called. */
-RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until);
+ * record up to number `retain_until`. The application is in AS_STOP then, and nothing of it was called. An error comes
+ * with its sentence: the flash cannot be read, or a driver refuses the I/O configuration. */
+RTS_RESULT AppLoad(const APP_IMAGE *image, const RTS_UI8 *code, RTS_UI32 retain_until, APP_REFUSAL *refusal);
 void AppUnload(void);
 
 /* Gives the loaded application its initial values and its tasks; it is in AS_STOP then, perhaps with an exception. It

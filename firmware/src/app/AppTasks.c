@@ -7,6 +7,8 @@
 
 #include <string.h>
 
+#include "AppIo.h"
+#include "IoConfigCheck.h"
 #include "RetainTable.h"
 #include "SchedEvents.h"
 
@@ -123,6 +125,10 @@ static RTS_RESULT check_blob(LOADER *l)
         result = check_kept(l, blob.size);
     else if (blob.id == CDL_BLOB_IMAGES)
         result = check_images(l, blob.size);
+    else if (blob.id == CDL_BLOB_IO && AppIoGet() != NULL)
+        result = LoaderFindIo(l, blob.size);
+    else if (blob.id >= CDL_BLOB_REQUIRED)
+        return refuse(l, ERR_NOT_SUPPORTED, "The application needs what this firmware lacks (0x%X).", U(blob.id));
     /* Others are of a newer tool, and not needed to run. */
     l->offset = next;
     return result;

@@ -28,8 +28,12 @@ class Allocation:
         self.variables: list[Variable] = []
 
     def add(self, variable: Variable) -> None:
-        """Places a variable at the end of its area, or notes one that has an address."""
+        """Places a variable at the end of its area, or notes one that has an address. Inputs and outputs without one
+        get it in the end (`io_channels.py`)."""
         t, area = variable.type, variable.area
+        if variable.offset < 0 and area in (Area.INPUT, Area.OUTPUT):
+            self.variables.append(variable)
+            return
         if variable.offset < 0:
             variable.offset = align_up(self.sizes[area], t.align)
         self.sizes[area] = max(self.sizes[area], variable.offset + t.size)

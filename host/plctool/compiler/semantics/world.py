@@ -19,6 +19,7 @@ from plctool.compiler.semantics.allocation import Allocation, DirectVariables
 from plctool.compiler.semantics.call_graph import CallGraph
 from plctool.compiler.semantics.coercion import Coercion
 from plctool.compiler.semantics.dynamic_types import Dispatches
+from plctool.compiler.semantics.io_channels import IoChannels
 from plctool.compiler.semantics.names import Names
 from plctool.compiler.semantics.pitfalls import Loop
 from plctool.compiler.semantics.scope import Scope
@@ -100,6 +101,7 @@ class World:
         self.dispatches = Dispatches()
         self.allocation = Allocation()
         self.direct = DirectVariables(self.allocation)
+        self.io = IoChannels()
         self.bodies = BodyQueue()
         self.blocks: dict[StructType, BlockInfo] = {}
         self.open_members: dict[StructType, dict[str, VarSymbol]] = {}  # of structures: AT %I*, %Q*, %M*

@@ -1,0 +1,257 @@
+/*
+ * IoMgrConfig.c - the I/O configuration of the loaded application, and copies of its channels.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "IoMgrConfig.h"
+
+#include <string.h>
+
+#include "IoTables.h"
+
+static const IO_CONFIG no_config;
+
+static struct {
+    const IO_CONFIG *head;
+    const IoConfigConnector *connectors;
+    const IoConfigConnectorMap *connector_maps;
+    const IoConfigChannelMap *channel_maps;
+    const RTS_UI8 *data;
+    RTS_UI8 *const *areas; /* by APP_AREA_* */
+} tables;
+
+/* ---- for the manager ---- */
+
+static const IoConfigParameter *get_parameters(void)
+{
+    return (const IoConfigParameter *)(tables.connectors + tables.head->connectors);
+}
+
+const IoConfigTaskMap *IoTablesGetTaskMaps(void)
+{
+    return (const IoConfigTaskMap *)(get_parameters() + tables.head->parameters);
+}
+
+void IoTablesSet(const IO_CONFIG *config, const IEC_CONTEXT *context)
+{
+    tables.head = config != NULL ? config : &no_config;
+    tables.connectors = (const IoConfigConnector *)(tables.head + 1);
+    tables.connector_maps = (const IoConfigConnectorMap *)(IoTablesGetTaskMaps() + tables.head->task_maps);
+    tables.channel_maps = (const IoConfigChannelMap *)(tables.connector_maps + tables.head->connector_maps);
+    tables.data = (const RTS_UI8 *)(tables.channel_maps + tables.head->channel_maps);
+    tables.areas = context != NULL ? context->area : NULL;
+}
+
+RTS_UI32 IoTablesCountConnectors(void)
+{
+    return tables.head->connectors;
+}
+
+RTS_UI32 IoTablesCountTaskMaps(void)
+{
+    return tables.head->task_maps;
+}
+
+static const char *get_text(RTS_UI32 offset)
+{
+    return (const char *)tables.data + offset;
+}
+
+IO_DEVICE_STATE *IoTablesGetState(RTS_UI32 offset)
+{
+    return (IO_DEVICE_STATE *)(void *)(tables.areas[APP_AREA_DATA] + offset);
+}
+
+/* ---- connectors ---- */
+
+/* Moves to the first connector from `connector` on, of *count, that has the type, or with `by_parent` the parent. */
+static const IoConfigConnector *find(const IoConfigConnector *connector, int *count, bool by_parent, RTS_UI32 wanted)
+{
+    for (; *count > 0; connector++, --*count) {
+        if ((by_parent ? connector->parent : connector->type) == wanted)
+            return connector;
+    }
+    return NULL;
+}
+
+const IoConfigConnector *IoMgrConfigGetFirstConnector(const IoConfigConnector *connectors, int *count, RTS_UI16 type)
+{
+    return find(connectors, count, false, type);
+}
+
+const IoConfigConnector *IoMgrConfigGetNextConnector(const IoConfigConnector *connector, int *count, RTS_UI16 type)
+{
+    --*count;
+    return find(connector + 1, count, false, type);
+}
+
+const IoConfigConnector *IoMgrConfigGetFirstChild(const IoConfigConnector *connectors, int *count,
+                                                  const IoConfigConnector *parent)
+{
+    return find(connectors, count, true, IoMgrConfigGetIndex(parent));
+}
+
+const IoConfigConnector *IoMgrConfigGetNextChild(const IoConfigConnector *connector, int *count,
+                                                 const IoConfigConnector *parent)
+{
+    --*count;
+    return find(connector + 1, count, true, IoMgrConfigGetIndex(parent));
+}
+
+RTS_UI32 IoMgrConfigGetIndex(const IoConfigConnector *connector)
+{
+    return (RTS_UI32)(connector - tables.connectors);
+}
+
+const IoConfigConnector *IoMgrConfigGetConnector(RTS_UI32 index)
+{
+    return index < IoTablesCountConnectors() ? &tables.connectors[index] : NULL;
+}
+
+const char *IoMgrConfigGetName(const IoConfigConnector *connector)
+{
+    return get_text(connector->name);
+}
+
+const char *IoMgrConfigGetDriverName(const IoConfigConnector *connector)
+{
+    return get_text(connector->driver);
+}
+
+/* ---- parameters ---- */
+
+const IoConfigParameter *IoMgrConfigGetParameter(const IoConfigConnector *connector, RTS_UI32 id)
+{
+    const IoConfigParameter *parameter = get_parameters() + connector->first_parameter;
+    const IoConfigParameter *end = parameter + connector->parameter_count;
+
+    while (parameter < end && parameter->id < id)
+        parameter++;
+    return parameter < end && parameter->id == id ? parameter : NULL;
+}
+
+static RTS_UI32 get_value(const IoConfigParameter *parameter, RTS_UI32 bits, RTS_RESULT *result)
+{
+    bool known = parameter != NULL && (parameter->flags & PVF_POINTER) == 0 && parameter->bits <= bits;
+
+    if (result != NULL)
+        *result = known ? ERR_OK : ERR_PARAMETER;
+    return known ? parameter->value : 0;
+}
+
+RTS_UI32 IoMgrConfigGetParameterValueDword(const IoConfigParameter *parameter, RTS_RESULT *result)
+{
+    return get_value(parameter, 32, result);
+}
+
+RTS_UI16 IoMgrConfigGetParameterValueWord(const IoConfigParameter *parameter, RTS_RESULT *result)
+{
+    return (RTS_UI16)get_value(parameter, 16, result);
+}
+
+RTS_UI8 IoMgrConfigGetParameterValueByte(const IoConfigParameter *parameter, RTS_RESULT *result)
+{
+    return (RTS_UI8)get_value(parameter, 8, result);
+}
+
+const void *IoMgrConfigGetParameterValuePointer(const IoConfigParameter *parameter, RTS_RESULT *result)
+{
+    bool known = parameter != NULL && (parameter->flags & PVF_POINTER) != 0;
+
+    if (result != NULL)
+        *result = known ? ERR_OK : ERR_PARAMETER;
+    return known ? get_text(parameter->value) : NULL;
+}
+
+const char *IoMgrConfigGetParameterValueText(const IoConfigParameter *parameter)
+{
+    const char *text = IoMgrConfigGetParameterValuePointer(parameter, NULL);
+    RTS_UI32 size = parameter != NULL ? parameter->bits / 8 : 0;
+
+    return text != NULL && size > 0 && text[size - 1] == '\0' ? text : NULL;
+}
+
+/* ---- maps ---- */
+
+const IoConfigConnectorMap *IoMgrConfigGetConnectorMaps(const IoConfigTaskMap *map)
+{
+    return tables.connector_maps + map->first_connector_map;
+}
+
+const IoConfigChannelMap *IoMgrConfigGetChannelMaps(const IoConfigConnectorMap *map)
+{
+    return tables.channel_maps + map->first_channel_map;
+}
+
+/* ---- copies ---- */
+
+static void copy_bytes(RTS_UI8 *to, const RTS_UI8 *from, RTS_UI32 size, bool swapped)
+{
+    if (!swapped) {
+        memcpy(to, from, size);
+    } else {
+        while (size > 0)
+            *to++ = from[--size];
+    }
+}
+
+/* Whole bytes, or bits that are within one byte on both sides. */
+static void copy(RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from, RTS_UI32 from_bit, RTS_UI32 bits, bool swapped)
+{
+    to += to_bit >> 3;
+    from += from_bit >> 3;
+    if (((to_bit | from_bit | bits) & 7) == 0) {
+        copy_bytes(to, from, bits >> 3, swapped);
+    } else {
+        RTS_UI32 mask = ((1u << bits) - 1) << (to_bit & 7);
+        RTS_UI32 value = (RTS_UI32)*from >> (from_bit & 7) << (to_bit & 7);
+        *to = (RTS_UI8)((*to & ~mask) | (value & mask));
+    }
+}
+
+static void copy_input(const IoConfigChannelMap *channel, const void *memory, RTS_UI32 turned)
+{
+    copy(tables.areas[APP_AREA_INPUT], channel->area_bit, memory, channel->parameter_bit, channel->bits,
+         (channel->flags & IO_CHANNEL_BIG_ENDIAN) != turned);
+}
+
+static void copy_output(const IoConfigChannelMap *channel, void *memory, RTS_UI32 turned)
+{
+    copy(memory, channel->parameter_bit, tables.areas[APP_AREA_OUTPUT], channel->area_bit, channel->bits,
+         (channel->flags & IO_CHANNEL_BIG_ENDIAN) != turned);
+}
+
+void IoMgrCopyInputLE(const IoConfigChannelMap *channel, const void *memory)
+{
+    copy_input(channel, memory, 0);
+}
+
+void IoMgrCopyInputBE(const IoConfigChannelMap *channel, const void *memory)
+{
+    copy_input(channel, memory, IO_CHANNEL_BIG_ENDIAN);
+}
+
+void IoMgrCopyOutputLE(const IoConfigChannelMap *channel, void *memory)
+{
+    copy_output(channel, memory, 0);
+}
+
+void IoMgrCopyOutputBE(const IoConfigChannelMap *channel, void *memory)
+{
+    copy_output(channel, memory, IO_CHANNEL_BIG_ENDIAN);
+}
+
+void IoTablesSetChannel(RTS_UI32 type, const IoConfigChannelMap *channel, RTS_UI32 value)
+{
+    RTS_UI8 *area = tables.areas[APP_AREA_INPUT + type];
+    RTS_UI32 at = channel->area_bit;
+    RTS_UI32 bits;
+
+    if (((at | channel->bits) & 7) != 0) {
+        RTS_UI8 byte = (RTS_UI8)value;
+        copy(area, at, &byte, 0, channel->bits, false);
+        return;
+    }
+    for (bits = channel->bits; bits > 0; bits -= 8, at += 8, value >>= 8)
+        area[at >> 3] = (RTS_UI8)value;
+}

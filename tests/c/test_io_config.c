@@ -1,0 +1,5 @@
+#include "io_driver.h"
+int main(void)
+{
+    return test_result();
+}
