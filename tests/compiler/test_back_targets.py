@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import struct
 
 import pytest
 from back_support import POS, ProgramBuilder, Running, binary, build, const, load, place
+from elftools.dwarf.callframe import FDE
+from elftools.elf.elffile import ELFFile
 
 from plctool.compiler import Level, compile_sources
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.emit import emit_object
 from plctool.compiler.codegen.link import link
+from plctool.compiler.codegen.memory_functions import MEMORY_FUNCTIONS, memory_object
 from plctool.compiler.codegen.relocations import OutOfReach, stub
 from plctool.compiler.typed import (
     Assign,
@@ -198,6 +202,14 @@ def test_absolute_addresses_are_refused() -> None:
     )
     with pytest.raises(UsageError, match=r"position independent|writable"):
         link([emit_object(text, target, 2)], target, ["entry"], 0)
+
+
+@pytest.mark.parametrize("target", ALL, ids=lambda t: t.name)
+def test_frames_of_memory_functions_are_known(target: Target) -> None:
+    """The call stack of an exception in one of them leads on to its caller."""
+    dwarf = ELFFile(io.BytesIO(memory_object(target))).get_dwarf_info(relocate_dwarf_sections=False)
+    frames = [entry for entry in dwarf.CFI_entries() if isinstance(entry, FDE)]
+    assert len(frames) == len(MEMORY_FUNCTIONS)
 
 
 def test_unreachable_sections_are_left_out() -> None:

@@ -3,7 +3,7 @@ syntax tree."""
 
 from __future__ import annotations
 
-from plctool.compiler.syntax.ast import Modifier, Section
+from plctool.compiler.syntax.ast import Edge, Modifier, Operator, Section
 from plctool.compiler.syntax.lexer import KEYWORDS
 
 
@@ -17,3 +17,8 @@ def test_every_modifier_and_qualifier_of_the_grammar_is_known() -> None:
 
 def test_every_section_of_the_grammar_is_known() -> None:
     assert words("VAR", "GLOBAL") == {word.value for word in Section} - {Section.STEP}
+
+
+def test_every_operator_and_edge_of_the_grammar_is_known() -> None:
+    assert words("EDGE") == {word.value for word in Edge}
+    assert words("OP", "NOT") == {word.value for word in Operator if word.value.isidentifier()}

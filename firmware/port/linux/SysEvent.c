@@ -91,7 +91,7 @@ static void *run(void *param)
     return NULL;
 }
 
-static int create_thread(EVENT *event, int realtime)
+static int create_thread(EVENT *event, bool realtime)
 {
     pthread_attr_t attributes;
     struct sched_param parameters = {.sched_priority = PORT_PRIORITY_EVENTS};
@@ -119,7 +119,7 @@ static RTS_RESULT start(EVENT *event)
         LogAdd(CMPID_SysTimer, LOG_ERROR, result, "--event %s is there twice", event->name);
         return result;
     }
-    event->started = create_thread(event, 1) == 0 || create_thread(event, 0) == 0;
+    event->started = create_thread(event, true) == 0 || create_thread(event, false) == 0;
     return event->started ? ERR_OK : ERR_NOMEMORY;
 }
 

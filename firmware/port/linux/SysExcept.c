@@ -218,7 +218,7 @@ static void on_break(int number, siginfo_t *info, void *ucontext)
 
 /* ---- taking and giving back ---- */
 
-static int is_break(const SIGNAL *signal)
+static bool is_break(const SIGNAL *signal)
 {
     return signal == &state.signal[RTS_COUNT(state.signal) - 1];
 }

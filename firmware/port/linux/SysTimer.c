@@ -48,7 +48,7 @@ typedef struct {
 static struct {
     TIMER timer[MAX_TIMERS];
     char *stacks;
-    int realtime; /* 0 after the system has refused SCHED_FIFO */
+    bool realtime; /* false after the system has refused SCHED_FIFO */
 } state;
 
 /* ---- in the thread ---- */
@@ -65,14 +65,14 @@ static void sleep_towards(TIMER *timer)
     pthread_cond_timedwait(&timer->changed, &timer->lock, &until);
 }
 
-/* Sleeps until the next call is due; 0 when the timer was stopped instead. */
-static int wait_until_due(TIMER *timer, RTS_I64 *due_ns)
+/* Sleeps until the next call is due; false when the timer was stopped instead. */
+static bool wait_until_due(TIMER *timer, RTS_I64 *due_ns)
 {
     pthread_mutex_lock(&timer->lock);
     while (!timer->stop && timer->due_ns > SysTimeGetNs()) {
         sleep_towards(timer);
     }
-    int go_on = !timer->stop;
+    bool go_on = !timer->stop;
     *due_ns = timer->due_ns;
     if (timer->interval_ns == 0) {
         timer->due_ns = NEVER;
@@ -124,7 +124,7 @@ static TIMER *get_timer(RTS_HANDLE handle)
 }
 
 /* The thread leaves SIGTERM and the like to main; what SysExcept needs it unblocks itself. */
-static int create_thread(TIMER *timer, int realtime)
+static int create_thread(TIMER *timer, bool realtime)
 {
     pthread_attr_t attributes;
     struct sched_param parameters = {.sched_priority = timer->priority};
@@ -160,10 +160,10 @@ RTS_RESULT SysTimerStart(RTS_HANDLE handle)
     pthread_mutex_unlock(&timer->lock);
     int error = create_thread(timer, state.realtime);
     if (error == EPERM && state.realtime) {
-        state.realtime = 0;
+        state.realtime = false;
         LogAdd(CMPID_SysTimer, LOG_WARNING, ERR_NO_ACCESS_RIGHTS,
                "No CAP_SYS_NICE: tasks run without real-time priority");
-        error = create_thread(timer, 0);
+        error = create_thread(timer, false);
     }
     timer->started = error == 0;
     if (error != 0) {
@@ -274,7 +274,7 @@ static void init_timer(TIMER *timer)
 static RTS_RESULT init(void)
 {
     memset(&state, 0, sizeof(state));
-    state.realtime = 1;
+    state.realtime = true;
     char *stacks =
         mmap(NULL, (size_t)MAX_TIMERS * STACK_STEP, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (stacks == MAP_FAILED) {

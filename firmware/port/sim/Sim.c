@@ -421,7 +421,9 @@ static RTS_RESULT pass(RTS_I64 ns, RTS_I64 beyond_ns)
     passage.limit_ns = passage.end_ns + beyond_ns;
     if (sim.power_lost)
         return SIM_POWER_CUT;
-    return sim.on ? with_landing(advance, &passage) : (RTS_RESULT)ERR_NOTINITIALIZED;
+    if (!sim.on)
+        return ERR_NOTINITIALIZED;
+    return with_landing(advance, &passage);
 }
 
 RTS_RESULT SimAdvance(RTS_I64 ns)
@@ -478,7 +480,9 @@ RTS_RESULT SimRunCycles(RTS_UI32 cycles)
 {
     if (sim.power_lost)
         return SIM_POWER_CUT;
-    return sim.on ? with_landing(run_cycles, &cycles) : (RTS_RESULT)ERR_NOTINITIALIZED;
+    if (!sim.on)
+        return ERR_NOTINITIALIZED;
+    return with_landing(run_cycles, &cycles);
 }
 
 static RTS_RESULT comm_cycle(void *unused)
@@ -492,7 +496,9 @@ RTS_RESULT SimCommCycle(void)
 {
     if (sim.power_lost)
         return SIM_POWER_CUT;
-    return sim.on ? with_landing(comm_cycle, NULL) : (RTS_RESULT)ERR_NOTINITIALIZED;
+    if (!sim.on)
+        return ERR_NOTINITIALIZED;
+    return with_landing(comm_cycle, NULL);
 }
 
 /* ---- measurements ---- */
@@ -581,8 +587,11 @@ RTS_RESULT SimBench(RTS_UI32 task, RTS_UI32 cycles, double *code_ns, double *cyc
     BENCH bench = {task, cycles / BENCH_BATCHES + 1, NS_PER_MS, NULL, NULL, false};
     RTS_I64 start_ns = sim.now_ns;
     IEC_TASK_INFO info;
-    RTS_RESULT result = sim.on ? AppStartApplication() : (RTS_RESULT)ERR_NOTINITIALIZED;
+    RTS_RESULT result;
 
+    if (!sim.on)
+        return ERR_NOTINITIALIZED;
+    result = AppStartApplication();
     if (result != ERR_OK)
         return result;
     if (IecTaskGetInfo(task, &info) != ERR_OK || IecTaskGetEntry(task, &bench.entry, &bench.context) != ERR_OK)

@@ -55,7 +55,9 @@ RTS_RESULT SimPostEvent(const char *name)
 {
     RTS_UI32 index = find_event(name);
 
-    return index < events.count ? SchedPostExternalEvent(events.list[index].event) : (RTS_RESULT)ERR_NO_OBJECT;
+    if (index >= events.count)
+        return ERR_NO_OBJECT;
+    return SchedPostExternalEvent(events.list[index].event);
 }
 
 void SimForgetEvents(void)

@@ -93,7 +93,9 @@ static RTS_RESULT load_boot_project(bool may_go_back)
     if (may_go_back && AppCommitGet()->state[active] == SLOT_FAILED && AppRollBack(active))
         return ERR_OK;
     result = load_from_slot(active, RetainGetSequence());
-    return result == ERR_CRC_FAILED && may_go_back && AppRollBack(active) ? (RTS_RESULT)ERR_OK : result;
+    if (result == ERR_CRC_FAILED && may_go_back && AppRollBack(active))
+        return ERR_OK;
+    return result;
 }
 
 static bool stays_stopped(void)

@@ -142,7 +142,9 @@ static RTS_RESULT check_iec_function(LOADER *l)
 /* Names for tools that ask about the application; what they stand for is not called. */
 RTS_RESULT LoaderCheckIecFunctions(LOADER *l)
 {
-    return SRV_INFORMATION ? LoaderCheckEntries(l, SEGMENT_IEC_FUNCTIONS, check_iec_function) : (RTS_RESULT)ERR_OK;
+    if (!SRV_INFORMATION)
+        return ERR_OK;
+    return LoaderCheckEntries(l, SEGMENT_IEC_FUNCTIONS, check_iec_function);
 }
 
 /* ---- application info ---- */

@@ -121,7 +121,12 @@ static RTS_RESULT check_images(LOADER *l, RTS_UI32 size)
     return ERR_OK;
 }
 #else
-#define check_images(l, size) ((void)(size), (RTS_RESULT)ERR_OK)
+static RTS_RESULT check_images(const LOADER *l, RTS_UI32 size)
+{
+    RTS_UNUSED(l);
+    RTS_UNUSED(size);
+    return ERR_OK;
+}
 #endif
 
 static RTS_RESULT check_blob(LOADER *l)

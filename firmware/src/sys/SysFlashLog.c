@@ -52,7 +52,9 @@ static RTS_RESULT check_data(RTS_UI32 file, RTS_UI32 position, const FLASH_LOG_H
     RTS_UI32 crc = head_crc(head);
     RTS_RESULT result = SysFileCRC32(file, position + FLASH_LOG_HEAD_SIZE, head->size, &crc);
 
-    return result == ERR_OK && crc != head->crc ? (RTS_RESULT)ERR_CRC_FAILED : result;
+    if (result == ERR_OK && crc != head->crc)
+        return ERR_CRC_FAILED;
+    return result;
 }
 
 static bool is_wanted(const WANTED *wanted, const FLASH_LOG_HEAD *head)
@@ -251,7 +253,9 @@ RTS_RESULT FlashLogAppend(FLASH_LOG *log, RTS_UI32 tag, const void *data, RTS_UI
     checked = check_data(log->file, position, &head);
     if (checked == ERR_OK)
         log->newest = position; /* the record is readable, so it counts even if sync failed */
-    return result != ERR_OK || checked == ERR_OK ? result : (RTS_RESULT)ERR_DEVICE;
+    if (result == ERR_OK && checked != ERR_OK)
+        return ERR_DEVICE;
+    return result;
 }
 
 RTS_RESULT FlashLogMark(FLASH_LOG *log)

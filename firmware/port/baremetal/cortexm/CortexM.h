@@ -135,7 +135,7 @@ void SysExceptInit(void);
 void SysTimerAlarm(void);
 
 /* Whether no timer's call is overdue by more than a second, asked by main, which all of them interrupt. */
-int SysTimersWork(void);
+bool SysTimersWork(void);
 
 /* At the end of each stack, protected by the MPU. */
 enum { STACK_GUARD_LOG2 = 5, STACK_GUARD = 1 << STACK_GUARD_LOG2 };
@@ -175,7 +175,7 @@ void BoardAlarmSet(RTS_UI32 ns);
 void BoardWatchdogStart(RTS_UI32 ms);
 void BoardWatchdogKick(void);
 
-/* 1 when there is something for the main loop to do since the last call (received bytes), so that it does not sleep. */
-int BoardHasWork(void);
+/* Whether there is something for the main loop to do since the last call (received bytes), so that it does not sleep. */
+bool BoardHasWork(void);
 
 #endif

@@ -13,9 +13,9 @@ void SysTimerAlarm(void)
 {
 }
 
-int SysTimersWork(void)
+bool SysTimersWork(void)
 {
-    return 1;
+    return true;
 }
 
 /* No line of a task is ever enabled. */

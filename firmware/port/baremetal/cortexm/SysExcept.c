@@ -281,7 +281,7 @@ __attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
 }
 
 /* Whether the stack can be read from there on: it may be in the guard, below it, or not known. */
-static int is_readable(const TRY *try, uintptr_t stack)
+static bool is_readable(const TRY *try, uintptr_t stack)
 {
     return stack - stack_end(try) < RTS_IEC_STACK_SIZE - IEC_STACK_GUARD;
 }
@@ -374,7 +374,7 @@ static uintptr_t find_caller(const TRY *try)
 
 /* The frame could not be pushed, was pushed below the end, or what is there was hit by the last push that had no
  * room: of 16 registers of an FPU, say. */
-static int is_overflow(RTS_UI32 cfsr, const FRAME *frame, uintptr_t end)
+static bool is_overflow(RTS_UI32 cfsr, const FRAME *frame, uintptr_t end)
 {
     enum { PUSH_MAX = IEC_STACK_GUARD != 0 ? IEC_STACK_GUARD : 64 };
     return (cfsr & CFSR_STACKING) || (uintptr_t)frame < end ||
@@ -454,7 +454,7 @@ bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
     return exception->code == RTSEXCPT_NOEXCEPTION;
 }
 
-static int in_try(void)
+static bool in_try(void)
 {
     RTS_UI32 control;
     __asm__ volatile("mrs %0, control" : "=r"(control));
@@ -485,7 +485,7 @@ __attribute__((naked, noreturn)) static void try_break(RTS_UI32 code, uintptr_t 
 }
 
 /* Whether it is about to raise an exception: then where it was must not be forgotten. */
-static int is_raising(const FRAME *frame)
+static bool is_raising(const FRAME *frame)
 {
     enum { BREAK_SIZE = 4 };
     return frame->pc == ((RTS_UI32)(uintptr_t)try_raise & ~1u) ||

@@ -86,18 +86,18 @@ static RTS_I64 due_since(const TIMER *timer)
     return timer->state == TIMER_FIRED ? timer->due_ns : timer->next_ns;
 }
 
-int SysTimersWork(void)
+bool SysTimersWork(void)
 {
     RTS_UI32 mask = CpuMask();
     RTS_I64 overdue = SysTimeGetNs() - OVERDUE_NS;
-    int work = 1;
+    bool work = true;
     for (const TIMER *timer = state.timer; timer < state.end; timer++)
-        work &= timer->state < TIMER_WAITING || due_since(timer) > overdue;
+        work = work && (timer->state < TIMER_WAITING || due_since(timer) > overdue);
     CpuRestore(mask);
     return work;
 }
 
-static int outranks(RTS_UI32 one, RTS_UI32 other)
+static bool outranks(RTS_UI32 one, RTS_UI32 other)
 {
     RTS_UI8 a = state.timer[one].priority, b = state.timer[other].priority;
     return a < b || (a == b && one < other);

@@ -120,6 +120,7 @@ class Function:
         self._lines: list[str] = []
         self._count = 0
         self.callees: list[str] = []  # the symbol of the function of every call
+        self._phis: dict[str, int] = {}  # the index of the line, by name
         self._dead = False
         self.block = "entry"
         self.scope = -1  # its DISubprogram
@@ -141,6 +142,19 @@ class Function:
         if self._dead:
             self.begin(self.label("dead"))
         self._lines.append(f"  {text}{self.debug}")
+
+    def phi(self, llvm_type: str, *incoming: tuple[Value, str]) -> Value:
+        """At the beginning of a block, the value that belongs to the block before: pairs of both. `add_incoming` adds
+        those that are not known yet."""
+        assert not self.debug, "a phi has no line"
+        result = self.value(f"phi {llvm_type} ")
+        self._phis[result.text] = len(self._lines) - 1
+        self._lines[-1] += ", ".join(f"[ {value}, %{block} ]" for value, block in incoming)
+        return result
+
+    def add_incoming(self, phi: Value, value: Value, block: str) -> None:
+        """What a phi is after `block`."""
+        self._lines[self._phis[phi.text]] += f", [ {value}, %{block} ]"
 
     def call(self, symbol: str, arguments: Iterable[str], attributes: str = "", *, tail: bool = False) -> None:
         """Calls a function of the program for its effect. `arguments` with their types."""

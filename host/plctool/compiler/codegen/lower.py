@@ -9,12 +9,12 @@ from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_body import write_body, write_calls
 from plctool.compiler.codegen.lower_classes import write_dispatcher
 from plctool.compiler.codegen.lower_frame import TAGGED_AREAS, Body, Frame, Ref, string_capacity
-from plctool.compiler.codegen.lower_helpers import string_helper
 from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
 from plctool.compiler.codegen.partition import texts
 from plctool.compiler.codegen.sections import sections
 from plctool.compiler.codegen.signatures import CONTEXT, SELF, handed_inputs, parameter_list
+from plctool.compiler.codegen.string_functions import string_function
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
@@ -69,7 +69,7 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
             chosen += 1
     _struct_initialisers(unit)
     for name in sorted(unit.helpers):
-        unit.module.add_helper(string_helper(name, unit.target, unit.strings))
+        unit.module.add_helper(string_function(name, unit.target, unit.strings))
     pous = {name: pou for pou, name in unit.pous.items()}
     return Lowered(texts(unit.module), tasks, functions, pous, unit.imports)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from plctool.compiler.codegen.ir import Module, escape
-from plctool.compiler.codegen.lower_helpers import LIBRARY_FUNCTIONS
+from plctool.compiler.codegen.string_functions import LIBRARY_FUNCTIONS
 from plctool.compiler.typed import Dispatch, External, Pos, Pou, PouKind, StructInit, Variable
 from plctool.core import ffi, lib
 from plctool.errors import UsageError
@@ -206,7 +206,7 @@ class Unit:
         return slot
 
     def helper(self, name: str) -> str:
-        """The symbol of a function of `lower_helpers`, which is then put in the module."""
+        """The symbol of a function of `string_functions`, which is then put in the module."""
         self.helpers.add(name)
         return name
 

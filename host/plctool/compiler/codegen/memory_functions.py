@@ -9,102 +9,11 @@ from __future__ import annotations
 from functools import cache
 
 from plctool.compiler.codegen.emit import emit_object
-from plctool.compiler.codegen.ir import Module
+from plctool.compiler.codegen.ir import Function, Module, Value, number
 from plctool.compiler.codegen.lower_unit import function_attributes
 from plctool.image.targets import Target
 
-MEMORY_FUNCTIONS = frozenset(("memcpy", "memset", "memmove"))
-
-_MEMORY = """define hidden ptr @memcpy(ptr %d, ptr %s, PTR %n) #0 section ".text.memcpy" {
-entry:
-  br label %wide
-wide:
-  %w = phi PTR [ 0, %entry ], [ %w.next, %wide.body ]
-  %w.next = add PTR %w, WORD
-  %fits = icmp ule PTR %w.next, %n
-  br i1 %fits, label %wide.body, label %loop
-wide.body:
-  %ws = getelementptr i8, ptr %s, PTR %w
-  %wd = getelementptr i8, ptr %d, PTR %w
-  %wv = load VECTOR, ptr %ws, align 1
-  store VECTOR %wv, ptr %wd, align 1
-  br label %wide
-loop:
-  %i = phi PTR [ %w, %wide ], [ %i.next, %body ]
-  %more = icmp ult PTR %i, %n
-  br i1 %more, label %body, label %done
-body:
-  %ps = getelementptr i8, ptr %s, PTR %i
-  %pd = getelementptr i8, ptr %d, PTR %i
-  %v = load i8, ptr %ps, align 1
-  store i8 %v, ptr %pd, align 1
-  %i.next = add PTR %i, 1
-  br label %loop
-done:
-  ret ptr %d
-}
-
-define hidden ptr @memset(ptr %d, i32 %c, PTR %n) #0 section ".text.memset" {
-entry:
-  %b = trunc i32 %c to i8
-  %lane = insertelement <WORD x i8> poison, i8 %b, i32 0
-  %lanes = shufflevector <WORD x i8> %lane, <WORD x i8> poison, <WORD x i32> zeroinitializer
-  br label %wide
-wide:
-  %w = phi PTR [ 0, %entry ], [ %w.next, %wide.body ]
-  %w.next = add PTR %w, WORD
-  %fits = icmp ule PTR %w.next, %n
-  br i1 %fits, label %wide.body, label %loop
-wide.body:
-  %wd = getelementptr i8, ptr %d, PTR %w
-  store <WORD x i8> %lanes, ptr %wd, align 1
-  br label %wide
-loop:
-  %i = phi PTR [ %w, %wide ], [ %i.next, %body ]
-  %more = icmp ult PTR %i, %n
-  br i1 %more, label %body, label %done
-body:
-  %pd = getelementptr i8, ptr %d, PTR %i
-  store i8 %b, ptr %pd, align 1
-  %i.next = add PTR %i, 1
-  br label %loop
-done:
-  ret ptr %d
-}
-
-define hidden ptr @memmove(ptr %d, ptr %s, PTR %n) #0 section ".text.memmove" {
-entry:
-  %da = ptrtoint ptr %d to PTR
-  %sa = ptrtoint ptr %s to PTR
-  %gap = sub PTR %da, %sa
-  %forward = icmp uge PTR %gap, %n
-  br i1 %forward, label %up, label %down
-up:
-  %i = phi PTR [ 0, %entry ], [ %i.next, %up.body ]
-  %up.more = icmp ult PTR %i, %n
-  br i1 %up.more, label %up.body, label %done
-up.body:
-  %us = getelementptr i8, ptr %s, PTR %i
-  %ud = getelementptr i8, ptr %d, PTR %i
-  %uv = load i8, ptr %us, align 1
-  store i8 %uv, ptr %ud, align 1
-  %i.next = add PTR %i, 1
-  br label %up
-down:
-  %k = phi PTR [ %n, %entry ], [ %k.next, %down.body ]
-  %down.more = icmp ne PTR %k, 0
-  br i1 %down.more, label %down.body, label %done
-down.body:
-  %k.next = sub PTR %k, 1
-  %ds = getelementptr i8, ptr %s, PTR %k.next
-  %dd = getelementptr i8, ptr %d, PTR %k.next
-  %dv = load i8, ptr %ds, align 1
-  store i8 %dv, ptr %dd, align 1
-  br label %down
-done:
-  ret ptr %d
-}
-"""
+_ZERO = number(0)
 
 
 @cache
@@ -112,9 +21,110 @@ def memory_object(target: Target) -> bytes:
     """The ELF object with the three functions, each in a section of its own so that the linker takes only what is
     called. It says how their frames look (.debug_frame), for the call stack of an exception in one of them."""
     module = Module(target.triple)
-    module.attributes(f"minsize optsize {function_attributes(target)}")
+    attributes = module.attributes(f"minsize optsize {function_attributes(target)}")
     module.add_compile_unit(module.metadata('!DIFile(filename: "memory", directory: "")'))
-    word = 16 if target.vectors else target.pointer_size if target.unaligned else 1
-    definitions = _MEMORY.replace("VECTOR", f"<{word} x i8>").replace("WORD", str(word))
-    module.add_helper(definitions.replace("PTR", f"i{8 * target.pointer_size}"))
-    return emit_object(module.text([]), target, 2)
+    memory = _Memory(target)
+    bodies = {
+        f"memcpy(ptr %d, ptr %s, {memory.size} %n)": memory.copy,
+        f"memset(ptr %d, i32 %c, {memory.size} %n)": memory.fill,
+        f"memmove(ptr %d, ptr %s, {memory.size} %n)": memory.move,
+    }
+    definitions = []
+    for signature, write in bodies.items():
+        name = signature.partition("(")[0]
+        fn = Function(f"ptr @{signature}", f'{attributes} section ".text.{name}"')
+        write(fn)
+        definitions.append(fn.definition("hidden"))
+    return emit_object(module.text(definitions), target, 2)
+
+
+MEMORY_FUNCTIONS = frozenset(("memcpy", "memset", "memmove"))
+
+
+class _Memory:
+    """Writes the bodies for a target: whole words, or vectors, first, then bytes."""
+
+    def __init__(self, target: Target) -> None:
+        self.size = f"i{8 * target.pointer_size}"
+        self._word = 16 if target.vectors else target.pointer_size if target.unaligned else 1
+        self._vector = f"<{self._word} x i8>"
+
+    def copy(self, fn: Function) -> None:
+        words = self._words(fn)
+        value = fn.value(f"load {self._vector}, ptr {self._at(fn, '%s', words)}, align 1")
+        fn.do(f"store {self._vector} {value}, ptr {self._at(fn, '%d', words)}, align 1")
+        fn.branch("wide")
+        i = self._bytes(fn, words)
+        value = fn.value(f"load i8, ptr {self._at(fn, '%s', i)}, align 1")
+        fn.do(f"store i8 {value}, ptr {self._at(fn, '%d', i)}, align 1")
+        self._end(fn, i)
+
+    def fill(self, fn: Function) -> None:
+        byte = fn.value("trunc i32 %c to i8")
+        lane = fn.value(f"insertelement {self._vector} poison, i8 {byte}, i32 0")
+        lanes = fn.value(
+            f"shufflevector {self._vector} {lane}, {self._vector} poison, <{self._word} x i32> zeroinitializer"
+        )
+        words = self._words(fn)
+        fn.do(f"store {self._vector} {lanes}, ptr {self._at(fn, '%d', words)}, align 1")
+        fn.branch("wide")
+        i = self._bytes(fn, words)
+        fn.do(f"store i8 {byte}, ptr {self._at(fn, '%d', i)}, align 1")
+        self._end(fn, i)
+
+    def move(self, fn: Function) -> None:
+        """Byte by byte: upwards, unless the target begins within the source."""
+        target, source = (fn.value(f"ptrtoint ptr {name} to {self.size}") for name in ("%d", "%s"))
+        gap = fn.value(f"sub {self.size} {target}, {source}")
+        fn.branch_if(fn.value(f"icmp uge {self.size} {gap}, %n"), "up", "down")
+        fn.begin_detached("up")
+        i = fn.phi(self.size, (_ZERO, "entry"))
+        fn.branch_if(fn.value(f"icmp ult {self.size} {i}, %n"), "up.body", "done")
+        fn.begin_detached("up.body")
+        self._move_byte(fn, i)
+        fn.add_incoming(i, fn.value(f"add {self.size} {i}, 1"), "up.body")
+        fn.branch("up")
+        fn.begin_detached("down")
+        left = fn.phi(self.size, (Value("%n"), "entry"))
+        fn.branch_if(fn.value(f"icmp ne {self.size} {left}, 0"), "down.body", "done")
+        fn.begin_detached("down.body")
+        last = fn.value(f"sub {self.size} {left}, 1")
+        self._move_byte(fn, last)
+        fn.add_incoming(left, last, "down.body")
+        fn.branch("down")
+        self._return(fn)
+
+    def _move_byte(self, fn: Function, i: Value) -> None:
+        source, target = self._at(fn, "%s", i), self._at(fn, "%d", i)
+        fn.do(f"store i8 {fn.value(f'load i8, ptr {source}, align 1')}, ptr {target}, align 1")
+
+    def _at(self, fn: Function, base: str, index: Value) -> Value:
+        return fn.value(f"getelementptr i8, ptr {base}, {self.size} {index}")
+
+    def _words(self, fn: Function) -> Value:
+        """The loop `wide` over whole words, of which the body follows; the index of a word."""
+        fn.begin("wide")
+        at = fn.phi(self.size, (_ZERO, "entry"))
+        after = fn.value(f"add {self.size} {at}, {self._word}")
+        fn.add_incoming(at, after, "wide.body")
+        fn.branch_if(fn.value(f"icmp ule {self.size} {after}, %n"), "wide.body", "loop")
+        fn.begin_detached("wide.body")
+        return at
+
+    def _bytes(self, fn: Function, words: Value) -> Value:
+        """The loop over what is left, of which the body follows; the index of a byte."""
+        fn.begin_detached("loop")
+        i = fn.phi(self.size, (words, "wide"))
+        fn.branch_if(fn.value(f"icmp ult {self.size} {i}, %n"), "body", "done")
+        fn.begin_detached("body")
+        return i
+
+    def _end(self, fn: Function, i: Value) -> None:
+        fn.add_incoming(i, fn.value(f"add {self.size} {i}, 1"), "body")
+        fn.branch("loop")
+        self._return(fn)
+
+    @staticmethod
+    def _return(fn: Function) -> None:
+        fn.begin_detached("done")
+        fn.terminate("ret ptr %d")

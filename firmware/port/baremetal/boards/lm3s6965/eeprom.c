@@ -26,7 +26,7 @@ enum { CHIP_WRITE = 0x50 << 1, CHIP_READ = CHIP_WRITE | 1, PAGE_SIZE = 128 };
 enum { SECTOR_SIZE = 1024, PROGRAM_SIZE = 4, ERASED = 0xFF };
 enum { BUSY_TRIES = 1000 }; /* a page takes 5 ms, a refused address 25 us */
 
-static int step(RTS_UI32 what)
+static bool step(RTS_UI32 what)
 {
     I2C_MCS = what;
     while ((I2C_MCS & BUSY) != 0)
@@ -35,7 +35,7 @@ static int step(RTS_UI32 what)
 }
 
 /* Sends the address of a byte. While it writes a page the chip answers to nothing. */
-static int select_byte(RTS_UI32 offset, RTS_UI32 then)
+static bool select_byte(RTS_UI32 offset, RTS_UI32 then)
 {
     I2C_MSA = CHIP_WRITE;
     for (RTS_UI32 i = 0; i < BUSY_TRIES; i++) {
@@ -46,10 +46,10 @@ static int select_byte(RTS_UI32 offset, RTS_UI32 then)
         }
         (void)step(STOP);
     }
-    return 0;
+    return false;
 }
 
-static int is_inside(RTS_UI32 offset, RTS_UI32 size)
+static bool is_inside(RTS_UI32 offset, RTS_UI32 size)
 {
     return offset <= BOARD_FLASH_SIZE && size <= BOARD_FLASH_SIZE - offset;
 }
@@ -88,17 +88,17 @@ static RTS_RESULT write(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
     return ERR_OK;
 }
 
-static int is_erased(RTS_UI32 offset, RTS_UI32 size)
+static bool is_erased(RTS_UI32 offset, RTS_UI32 size)
 {
     RTS_UI8 unit[PROGRAM_SIZE];
     for (RTS_UI32 end = offset + size; offset < end; offset += PROGRAM_SIZE) {
         if (flash_read(offset, unit, PROGRAM_SIZE) != ERR_OK)
-            return 0;
+            return false;
         for (RTS_UI32 i = 0; i < PROGRAM_SIZE; i++)
             if (unit[i] != ERASED)
-                return 0;
+                return false;
     }
-    return 1;
+    return true;
 }
 
 static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size)

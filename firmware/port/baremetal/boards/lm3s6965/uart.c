@@ -30,7 +30,7 @@ enum { INT_RX = 1 << 4, INT_TX = 1 << 5, INT_RX_TIMEOUT = 1 << 6 };
 /* Empty when head == tail; positions run freely and are masked on use. */
 static struct {
     volatile RTS_UI16 rx_head, rx_tail, tx_head, tx_tail;
-    volatile RTS_UI8 work;
+    volatile bool work;
     RTS_UI8 rx[BOARD_UART_RX_SIZE];
     RTS_UI8 tx[BOARD_UART_TX_SIZE];
 } line;
@@ -49,7 +49,7 @@ static void receive(void)
         RTS_UI8 byte = (RTS_UI8)UART_DR;
         if ((RTS_UI16)(line.rx_head - line.rx_tail) < BOARD_UART_RX_SIZE)
             line.rx[line.rx_head++ % BOARD_UART_RX_SIZE] = byte;
-        line.work = 1;
+        line.work = true;
     }
 }
 
@@ -57,7 +57,7 @@ static void transmit(void)
 {
     while (line.tx_head != line.tx_tail && (UART_FR & FR_TX_FULL) == 0) {
         UART_DR = line.tx[line.tx_tail++ % BOARD_UART_TX_SIZE];
-        line.work = 1;
+        line.work = true;
     }
 }
 
@@ -75,10 +75,10 @@ void UartInit(void)
     IrqEnable(IRQ_UART0, LEVEL_DEVICE);
 }
 
-int BoardHasWork(void)
+bool BoardHasWork(void)
 {
-    int was = line.work;
-    line.work = 0;
+    bool was = line.work;
+    line.work = false;
     return was;
 }
 

@@ -29,7 +29,7 @@ static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
     return ERR_OK;
 }
 
-static int is_erased(const RTS_UI8 *data, RTS_UI32 size)
+static bool is_erased(const RTS_UI8 *data, RTS_UI32 size)
 {
     while (size && *data == ERASED)
         data++, size--;

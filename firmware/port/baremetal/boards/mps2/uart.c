@@ -35,7 +35,7 @@ RTS_STATIC_ASSERT((BOARD_UART_TX_SIZE & (BOARD_UART_TX_SIZE - 1)) == 0, tx_size_
 
 static UART *const uarts[] = {(UART *)0x40004000u, (UART *)0x40005000u};
 static LINE lines[BOARD_UART_COUNT];
-static volatile RTS_UI8 work;
+static volatile bool work;
 static RTS_I64 byte_ns[BOARD_UART_COUNT]; /* SYSCOM_BYTE_TIMES */
 
 static RTS_UI16 used(const RING *ring)
@@ -49,7 +49,7 @@ static void receive(RTS_UI32 index)
     LINE *line = &lines[index];
     uarts[index]->intclear = INT_RX;
     RTS_UI8 byte = (RTS_UI8)uarts[index]->data;
-    work = 1;
+    work = true;
     if (SYSCOM_BYTE_TIMES)
         byte_ns[index] = SysTimeGetNs();
     if (used(&line->rx) == BOARD_UART_RX_SIZE)
@@ -66,7 +66,7 @@ static void transmit(RTS_UI32 index)
         return;
     uarts[index]->data = line->tx_data[line->tx.tail % BOARD_UART_TX_SIZE];
     line->tx.tail++;
-    work = 1;
+    work = true;
 }
 
 void Uart0RxIrq(void)
@@ -99,10 +99,10 @@ void UartInit(void)
     }
 }
 
-int BoardHasWork(void)
+bool BoardHasWork(void)
 {
-    int was = work;
-    work = 0;
+    bool was = work;
+    work = false;
     return was;
 }
 

@@ -1,0 +1,305 @@
+"""The loops that all functions of strings are made of, in LLVM IR.
+
+Strings are walked in chunks (a vector, or an integer) as long as a whole chunk is within the capacity, then character
+by character. What is after a NUL is frozen, as it may never have been written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from plctool.compiler.codegen.ir import Function, Value, number
+from plctool.image.targets import Target
+
+# Functions of stdlib/strings.st that have a faster body here, with the same meaning.
+LIBRARY_FUNCTIONS = {"SPAN__": "str.span", "COPY__": "str.copy", "WSPAN__": "str.wspan", "WCOPY__": "str.wcopy"}
+
+_ZERO = number(0)
+
+
+def string_function(name: str, target: Target, attributes: str) -> str:
+    """The definition of one of the str.* functions for a target; those of WSTRING begin with str.w."""
+    strings = _Strings(target, name.startswith("str.w"))
+    kind = name.replace("str.w", "str.")
+    fn = Function(f"i32 @{name}({_PARAMETERS[kind]})", attributes)
+    _BODIES[kind](fn, strings)
+    return fn.definition("internal")
+
+
+@dataclass(frozen=True)
+class _Strings:
+    """How strings are read on a target."""
+
+    target: Target
+    wide: bool
+
+    @property
+    def character(self) -> str:
+        return "i16" if self.wide else "i8"
+
+    @property
+    def align(self) -> int:
+        return 2 if self.wide else 1
+
+    @property
+    def chunk(self) -> int:
+        """How many characters are looked at together; 0 for one by one."""
+        if self.wide:
+            return 0
+        if self.target.vectors:
+            return 16
+        return self.target.pointer_size if self.target.unaligned else 0
+
+    @property
+    def _integer(self) -> str:
+        return f"i{8 * self.chunk}"
+
+    @property
+    def _chunk_type(self) -> str:
+        return f"<{self.chunk} x i8>" if self.target.vectors else self._integer
+
+    @property
+    def _marks_type(self) -> str:
+        return f"i{self.chunk}" if self.target.vectors else self._integer
+
+    # ---- addresses ----
+
+    def index(self, fn: Function, value: str | Value) -> Value:
+        """A number of characters, as wide as an address."""
+        if self.target.pointer_size == 4:
+            return Value(str(value))
+        return fn.value(f"zext i32 {value} to i{8 * self.target.pointer_size}")
+
+    def at(self, fn: Function, base: str | Value, index: Value) -> Value:
+        """The address of a character."""
+        return fn.value(f"getelementptr {self.character}, ptr {base}, i{8 * self.target.pointer_size} {index}")
+
+    # ---- characters ----
+
+    def load(self, fn: Function, address: Value) -> Value:
+        character = fn.value(f"load {self.character}, ptr {address}, align {self.align}")
+        return fn.value(f"freeze {self.character} {character}")
+
+    def store(self, fn: Function, character: Value, address: Value) -> None:
+        fn.do(f"store {self.character} {character}, ptr {address}, align {self.align}")
+
+    # ---- chunks ----
+
+    def load_chunk(self, fn: Function, address: Value) -> Value:
+        chunk = fn.value(f"load {self._chunk_type}, ptr {address}, align 1")
+        return fn.value(f"freeze {self._chunk_type} {chunk}")
+
+    def store_chunk(self, fn: Function, chunk: Value, address: Value) -> None:
+        fn.do(f"store {self._chunk_type} {chunk}, ptr {address}, align 1")
+
+    def marks(self, fn: Function, chunk: Value) -> Value:
+        """Which characters of a chunk are NUL."""
+        if self.target.vectors:
+            found = fn.value(f"icmp eq {self._chunk_type} {chunk}, zeroinitializer")
+            return fn.value(f"bitcast <{self.chunk} x i1> {found} to i{self.chunk}")
+        ones, highs = (int.from_bytes(bytes([byte]) * self.chunk, "little") for byte in (0x01, 0x80))
+        less = fn.value(f"sub {self._integer} {chunk}, {ones}")
+        inverted = fn.value(f"xor {self._integer} {chunk}, -1")
+        under = fn.value(f"and {self._integer} {less}, {inverted}")
+        return fn.value(f"and {self._integer} {under}, {highs}")
+
+    def has_nul(self, fn: Function, marks: Value) -> Value:
+        return fn.value(f"icmp ne {self._marks_type} {marks}, 0")
+
+    def first(self, fn: Function, marks: Value) -> Value:
+        """The index of the first NUL, which is there."""
+        if self.target.vectors:
+            wide = fn.value(f"zext i{self.chunk} {marks} to i32")
+            return fn.value(f"call i32 @llvm.cttz.i32(i32 {wide}, i1 true)")
+        bit = fn.value(f"call {self._integer} @llvm.cttz.{self._integer}({self._integer} {marks}, i1 true)")
+        byte = fn.value(f"lshr {self._integer} {bit}, 3")
+        return byte if self.chunk == 4 else fn.value(f"trunc {self._integer} {byte} to i32")
+
+    def unlike(self, fn: Function, one: Value, other: Value) -> Value:
+        """Whether two chunks differ."""
+        differ = fn.value(f"icmp ne {self._chunk_type} {one}, {other}")
+        if not self.target.vectors:
+            return differ
+        marks = fn.value(f"bitcast <{self.chunk} x i1> {differ} to i{self.chunk}")
+        return fn.value(f"icmp ne i{self.chunk} {marks}, 0")
+
+
+def _least(fn: Function, one: str | Value, other: str | Value) -> Value:
+    return fn.value(f"call i32 @llvm.umin.i32(i32 {one}, i32 {other})")
+
+
+# ---- walking up to a NUL or a number of characters ----
+
+
+def _walk_chunks(
+    fn: Function, strings: _Strings, room: Value, count: Value, visit: Callable[[Value], Value]
+) -> tuple[Value, Value]:
+    """From the entry on, over the chunks within `room` characters. `visit` gets the index of a chunk and loads it.
+
+    Leads to the block `loop` from `short`, with the first result as the index to go on at; or on, in the block `full`,
+    with the second one as the number of characters, at most `count`.
+    """
+    inner = fn.value(f"call i32 @llvm.usub.sat.i32(i32 {room}, i32 {strings.chunk - 1})")
+    bound = _least(fn, inner, count)
+    fn.branch_if(fn.value(f"icmp eq i32 {bound}, 0"), "loop", "chunk")
+    fn.begin_detached("chunk")
+    at = fn.phi("i32", (_ZERO, "entry"))
+    after = fn.value(f"add i32 {at}, {strings.chunk}")
+    marks = strings.marks(fn, visit(strings.index(fn, at)))
+    fn.branch_if(strings.has_nul(fn, marks), "found", "clear")
+    fn.begin_detached("clear")
+    fn.add_incoming(at, after, "clear")
+    fn.branch_if(fn.value(f"icmp ult i32 {after}, {bound}"), "chunk", "short")
+    fn.begin_detached("short")
+    fn.branch_if(fn.value(f"icmp uge i32 {after}, {count}"), "full", "loop")
+    fn.begin_detached("found")
+    end = fn.value(f"add i32 {at}, {strings.first(fn, marks)}")
+    fn.begin("full")
+    length = fn.phi("i32", (after, "short"), (end, "found"))
+    return after, _least(fn, length, count)
+
+
+def _walk_characters(
+    fn: Function, strings: _Strings, base: Value, count: Value, start: Value | None
+) -> tuple[Value, Value, Value]:
+    """The block `loop`: character by character, from the entry, and from `short` with the index `start`.
+
+    Leads to `done` from `loop` and `test`, or on, in the block `next`. Results: the index, also as wide as an address,
+    and the character.
+    """
+    fn.begin_detached("loop")
+    i = fn.phi("i32", (_ZERO, "entry"), *([] if start is None else [(start, "short")]))
+    fn.branch_if(fn.value(f"icmp ult i32 {i}, {count}"), "test", "done")
+    fn.begin_detached("test")
+    index = strings.index(fn, i)
+    character = strings.load(fn, strings.at(fn, base, index))
+    fn.branch_if(fn.value(f"icmp eq {strings.character} {character}, 0"), "done", "next")
+    fn.begin_detached("next")
+    return i, index, character
+
+
+def _next_character(fn: Function, i: Value) -> None:
+    """Back from `next` to `loop`."""
+    fn.add_incoming(i, fn.value(f"add i32 {i}, 1"), "next")
+    fn.branch("loop")
+
+
+def _span(fn: Function, strings: _Strings) -> None:
+    """SPAN__ of stdlib/strings.st: the index at most `want` characters after `start` where the string ends."""
+    left = fn.value("sub i32 %cap, %start")
+    count = _least(fn, "%want", left)
+    room = fn.value(f"add i32 {left}, 1")
+    base = strings.at(fn, "%s", strings.index(fn, "%start"))
+    start = None
+    if strings.chunk:
+        start, length = _walk_chunks(
+            fn, strings, room, count, lambda index: strings.load_chunk(fn, strings.at(fn, base, index))
+        )
+        fn.terminate(f"ret i32 {fn.value(f'add i32 %start, {length}')}")
+    else:
+        fn.branch("loop")
+    i, _, _ = _walk_characters(fn, strings, base, count, start)
+    _next_character(fn, i)
+    fn.begin_detached("done")
+    fn.terminate(f"ret i32 {fn.value(f'add i32 %start, {i}')}")
+
+
+def _copy(fn: Function, strings: _Strings) -> None:
+    """COPY__ of stdlib/strings.st: copies at most `want` characters of a string from `start` on to another one at
+    `pos`, ends that there and returns its new length. With `pos` and `start` 0 it is the assignment of strings. Both
+    may be the same string when `pos` is not above `start`."""
+    target_left, source_left = fn.value("sub i32 %dcap, %pos"), fn.value("sub i32 %scap, %start")
+    left = _least(fn, target_left, source_left)
+    count = _least(fn, "%want", left)
+    room = fn.value(f"add i32 {left}, 1")
+    target = strings.at(fn, "%d", strings.index(fn, "%pos"))
+    source = strings.at(fn, "%s", strings.index(fn, "%start"))
+
+    def visit(index: Value) -> Value:
+        chunk = strings.load_chunk(fn, strings.at(fn, source, index))
+        strings.store_chunk(fn, chunk, strings.at(fn, target, index))
+        return chunk
+
+    start, whole = None, list[tuple[Value, str]]()
+    if strings.chunk:
+        start, length = _walk_chunks(fn, strings, room, count, visit)
+        whole = [(length, "full")]
+        fn.branch("done")
+    else:
+        fn.branch("loop")
+    i, index, character = _walk_characters(fn, strings, source, count, start)
+    strings.store(fn, character, strings.at(fn, target, index))
+    _next_character(fn, i)
+    fn.begin_detached("done")
+    copied = fn.phi("i32", *whole, (i, "loop"), (i, "test"))
+    strings.store(fn, _ZERO, strings.at(fn, target, strings.index(fn, copied)))
+    fn.terminate(f"ret i32 {fn.value(f'add i32 %pos, {copied}')}")
+
+
+# ---- comparing ----
+
+
+def _compare_chunks(fn: Function, strings: _Strings, room: Value) -> Value:
+    """From the entry on, over the chunks within `room` characters that are the same and have no NUL.
+
+    Leads to the block `loop` from `wide` and `chunk`, with the result as the index to go on at.
+    """
+    chunks = fn.value(f"and i32 {room}, -{strings.chunk}")
+    fn.begin("wide")
+    at = fn.phi("i32", (_ZERO, "entry"))
+    fn.add_incoming(at, fn.value(f"add i32 {at}, {strings.chunk}"), "skip")
+    fn.branch_if(fn.value(f"icmp eq i32 {at}, {chunks}"), "loop", "chunk")
+    fn.begin_detached("skip")
+    fn.branch("wide")
+    fn.begin_detached("chunk")
+    index = strings.index(fn, at)
+    one, other = (strings.load_chunk(fn, strings.at(fn, base, index)) for base in ("%a", "%b"))
+    marks = strings.marks(fn, one)
+    unlike = strings.unlike(fn, one, other)
+    ends = strings.has_nul(fn, marks)
+    fn.branch_if(fn.value(f"or i1 {ends}, {unlike}"), "loop", "skip")
+    return at
+
+
+def _character_or_end(fn: Function, strings: _Strings, base: str, i: Value, index: Value, before: str) -> Value:
+    """A character of `base` (%a or %b), 0 past its capacity. `before`: the block that this goes on in."""
+    name = base.removeprefix("%")
+    fn.branch_if(fn.value(f"icmp ult i32 {i}, {base}cap"), f"{name}.load", f"{name}.done")
+    fn.begin_detached(f"{name}.load")
+    character = strings.load(fn, strings.at(fn, base, index))
+    fn.begin(f"{name}.done")
+    return fn.phi(strings.character, (_ZERO, before), (character, f"{name}.load"))
+
+
+def _compare(fn: Function, strings: _Strings) -> None:
+    """Less than, equal to or greater than 0 as the first string is less than, equal to or greater than the second."""
+    limit = _least(fn, "%acap", "%bcap")
+    room = fn.value(f"add i32 {limit}, 1")
+    if strings.chunk:
+        at = _compare_chunks(fn, strings, room)
+        starts = [(at, "wide"), (at, "chunk")]
+    else:
+        fn.branch("loop")
+        starts = [(_ZERO, "entry")]
+    fn.begin_detached("loop")
+    i = fn.phi("i32", *starts)
+    index = strings.index(fn, i)
+    one = _character_or_end(fn, strings, "%a", i, index, "loop")
+    other = _character_or_end(fn, strings, "%b", i, index, "a.done")
+    same = fn.value(f"icmp eq {strings.character} {one}, {other}")
+    live = fn.value(f"icmp ne {strings.character} {one}, 0")
+    fn.branch_if(fn.value(f"and i1 {same}, {live}"), "next", "done")
+    fn.begin_detached("next")
+    _next_character(fn, i)
+    fn.begin_detached("done")
+    left, right = (fn.value(f"zext {strings.character} {c} to i32") for c in (one, other))
+    fn.terminate(f"ret i32 {fn.value(f'sub i32 {left}, {right}')}")
+
+
+_BODIES = {"str.span": _span, "str.copy": _copy, "str.compare": _compare}
+_PARAMETERS = {
+    "str.span": "ptr %ctx, ptr %s, i32 %cap, i32 %start, i32 %want",
+    "str.copy": "ptr %ctx, ptr %d, i32 %dcap, i32 %pos, ptr %s, i32 %scap, i32 %start, i32 %want",
+    "str.compare": "ptr %a, i32 %acap, ptr %b, i32 %bcap",
+}
