@@ -55,6 +55,7 @@ typedef struct {
     RTS_UI32 room;       /* bytes of a message, with its prefix, in one block */
     RTS_UI32 last_received;
     RTS_UI32 last_sent;
+    RTS_UI32 anonymous_since; /* without a login; with COMM_ENDPOINTS only */
     CHANNEL_RECEIVER rx;
     CHANNEL_SENDER tx;
     ROUTER_PEER peer;

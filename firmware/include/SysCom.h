@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Called by CmpBlkDrvSimpleCom from main. Nothing blocks: a port buffers received bytes (interrupt driven) and bytes
- * to send.
+ * Called by CmpBlkDrvSimpleCom and IoDrvModbus from main. Nothing blocks: a port buffers received bytes (interrupt
+ * driven) and bytes to send. A line is used by one component at a time.
  */
 #ifndef SYSCOM_H
 #define SYSCOM_H
@@ -19,6 +19,25 @@ RTS_UI32 SysComGetCount(void);
  * before is forgotten. ERR_DEVICE when it cannot. */
 RTS_RESULT SysComOpen(RTS_UI32 index);
 void SysComClose(RTS_UI32 index);
+
+enum { SYSCOM_PARITY_NONE, SYSCOM_PARITY_EVEN, SYSCOM_PARITY_ODD };
+
+/* How a line is to run; always 8 data bits, no flow control. */
+typedef struct {
+    RTS_UI32 baud;
+    RTS_UI8 parity;    /* SYSCOM_PARITY_* */
+    RTS_UI8 stop_bits; /* 1 or 2 */
+    bool rs485;        /* the port drives the bus while it sends, and only then */
+} SYSCOM_SETTINGS;
+
+/* Opens a line of a field bus, by the name that the port gives its lines ("/dev/ttyS1", "COM2"), and returns its index.
+ * ERR_NO_OBJECT: the port has no such line; ERR_DUPLICATE: it is in use; ERR_NOT_SUPPORTED: it cannot run like that;
+ * ERR_DEVICE: it cannot be opened. Only a firmware with a field bus needs it, and SysComGetByteNs. */
+RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index);
+
+/* When the last byte came that SysComRead has returned, or a later one, or when it was read, if the port cannot know better
+ * (SysTimeGetNs). SYSCOM_BYTE_TIMES 1. */
+RTS_I64 SysComGetByteNs(RTS_UI32 index);
 
 /* Reads what has been received, at most `size` bytes; returns the number, 0 when there is nothing. */
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size);

@@ -1,12 +1,13 @@
 /*
- * SysSocket.h - IPv4 sockets of the block drivers of networks.
+ * SysSocket.h - IPv4 sockets of the block drivers of networks, and of field buses.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Called by CmpBlkDrvTcp and CmpBlkDrvUdp from main. No function blocks; each takes no longer than copying its data. The
- * port decides at which addresses the device listens, as it decides on baud rates: SysSockOpen returns sockets that are
- * bound. Addresses and port numbers are in the byte order of the CPU: 127.0.0.1 is 0x7F000001. No memory is allocated
- * after start; a port has room for its own sockets and TCP_MAX_CONNECTIONS + 1 accepted ones.
+ * Called by CmpBlkDrvTcp, CmpBlkDrvUdp and IoDrvModbus from main. No function blocks; each takes no longer than copying
+ * its data. The port decides at which addresses the device can be programmed, as it decides on baud rates: SysSockOpen
+ * returns sockets that are bound. Where a field bus listens and connects to, the application says. Addresses and port
+ * numbers are in the byte order of the CPU: 127.0.0.1 is 0x7F000001. No memory is allocated after start; a port has
+ * room for its own sockets, TCP_MAX_CONNECTIONS + 1 accepted ones, and SYSSOCK_MAX_FIELD_BUS.
  */
 #ifndef SYSSOCKET_H
 #define SYSSOCKET_H
@@ -27,6 +28,15 @@ typedef enum {
 
 /* The socket for this purpose; RTS_INVALID_HANDLE when the port has none. */
 RTS_HANDLE SysSockOpen(SYSSOCK_PURPOSE purpose);
+
+/* A socket that listens for TCP connections at an address (0: all of the device). ERR_DUPLICATE: another one does;
+ * ERR_NO_ACCESS_RIGHTS: the port number is for others; ERR_NOBUFFER: no room; ERR_DEVICE: not an address of this device. */
+RTS_RESULT SysSockListen(const SOCKADDRESS *own, RTS_HANDLE *listener);
+
+/* Begins a connection, which sends without delay; RTS_INVALID_HANDLE: no room, or no way there. */
+RTS_HANDLE SysSockConnect(const SOCKADDRESS *peer);
+/* ERR_OK: it is there; ERR_PENDING: not yet; ERR_NET_NOTCONNECTED: refused, or no way there. */
+RTS_RESULT SysSockGetConnected(RTS_HANDLE socket);
 
 /* The local address of a socket, and the length of its network prefix in bits (0..32). ERR_INVALID_HANDLE. */
 RTS_RESULT SysSockGetOwn(RTS_HANDLE socket, SOCKADDRESS *own, RTS_UI32 *prefix);

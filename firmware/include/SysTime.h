@@ -17,6 +17,10 @@ RTS_I64 SysTimeGetUsedNs(void);
 /* Milliseconds of the same clock; wraps after 49 days, so compare differences only. */
 RTS_UI32 SysTimeGetMs(void);
 
+/* Main makes its next pass of CH_COMM_CYCLE after this many ms at most, although nothing comes that it waits for. From main,
+ * in each pass again. Empty where main sleeps no longer than 1 ms; only a firmware with a field bus needs it. */
+void SysTimeWantPass(RTS_UI32 ms);
+
 /* Lets others run for some 20 us. By a task that waits for another one; only where several run at a time
  * (RTS_ONE_CORE 0). */
 void SysTimePause(void);

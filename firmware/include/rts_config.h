@@ -286,6 +286,50 @@
 #define TCP_FRAME_MS 3000
 #endif
 
+/* 1: CAN FD can be used. Each queued frame takes 56 bytes more. 0: classic frames only. */
+#ifndef CAN_FD
+#define CAN_FD 0
+#endif
+
+/* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of 512 bytes and 30. */
+#ifndef CAN_RX_SESSIONS
+#define CAN_RX_SESSIONS (COMM_MAX_CLIENTS + 1)
+#endif
+
+/* Packets that may be on their way to tools over CAN; each costs the same. One whose tool has gone takes its place for a
+ * second. */
+#ifndef CAN_TX_SESSIONS
+#define CAN_TX_SESSIONS (COMM_MAX_CLIENTS + 1)
+#endif
+
+/* What the device asks of senders: so many frames at most before it asks for more (0: no limit), and at least so many
+ * milliseconds between two. As many as the port can buffer while main does something else: frames that are lost cost a
+ * repetition of the packet. */
+#ifndef CAN_BLOCK_SIZE
+#define CAN_BLOCK_SIZE 16
+#endif
+#ifndef CAN_SEPARATION_MS
+#define CAN_SEPARATION_MS 0
+#endif
+
+/* The number of the device on CAN if the settings have no {"CmpBlkDrvCan", "Node"}, 1..127; and its bit rate [bit/s]. */
+#ifndef CAN_NODE
+#define CAN_NODE 1
+#endif
+#ifndef CAN_BIT_RATE
+#define CAN_BIT_RATE 500000
+#endif
+
+/* The serial line that carries CAN frames, where there is no controller (CanOnSerial.c). */
+#ifndef CAN_SLCAN_LINE
+#define CAN_SLCAN_LINE 1
+#endif
+
+/* How long after bus off the device tries again [ms]. */
+#ifndef CAN_RESTART_MS
+#define CAN_RESTART_MS 500
+#endif
+
 /* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is
  * below 424), COM_QUEUE_SIZE and about 150 bytes. */
 #ifndef COM_MAX_LINES
@@ -303,6 +347,63 @@
  * look with the debugger at a bad line. 300 bytes of flash, 80 of RAM. */
 #ifndef COMM_COUNTERS
 #define COMM_COUNTERS 1
+#endif
+
+/* 1: the port notes when a byte comes on a serial line (SysComGetByteNs), for a field bus. */
+#ifndef SYSCOM_BYTE_TIMES
+#define SYSCOM_BYTE_TIMES 0
+#endif
+
+/* Modbus (IoDrvModbus): what an application may have. 0 clients or servers: none, and no flash for them. */
+#ifndef MODBUS_MAX_CLIENTS /* serial lines, or TCP connections, with devices; about 400 bytes each */
+#define MODBUS_MAX_CLIENTS 1
+#endif
+#ifndef MODBUS_MAX_DEVICES /* on all of them; about 60 bytes each */
+#define MODBUS_MAX_DEVICES 8
+#endif
+#ifndef MODBUS_MAX_JOBS /* reads and writes of all devices; about 40 bytes each */
+#define MODBUS_MAX_JOBS 16
+#endif
+#ifndef MODBUS_MAX_SERVERS /* serial lines and TCP ports on which this device is a server; about 350 bytes each */
+#define MODBUS_MAX_SERVERS 1
+#endif
+#ifndef MODBUS_MAX_RANGES /* of all servers; 8 bytes each */
+#define MODBUS_MAX_RANGES 8
+#endif
+#ifndef MODBUS_DATA_SIZE /* bytes: what clients read, twice what they write, and the memory of servers */
+#define MODBUS_DATA_SIZE 512
+#endif
+
+/* Connections at a time of a Modbus TCP server, about 320 bytes each; one more, and the idlest is closed. 0: no TCP, for
+ * ports without sockets. */
+#ifndef MODBUS_MAX_CONNECTIONS
+#define MODBUS_MAX_CONNECTIONS 0
+#endif
+
+/* Sockets of field buses at a time. */
+#ifndef SYSSOCK_MAX_FIELD_BUS
+#define SYSSOCK_MAX_FIELD_BUS (MODBUS_MAX_CONNECTIONS + 1 + MODBUS_MAX_SERVERS + MODBUS_MAX_CLIENTS)
+#endif
+
+/* A Modbus device that does not reply is asked once more. Then it is lost, and asked again after this time, so that
+ * others on its line wait for it less than once in a minute; the first time after a short one, because most losses are
+ * short. If there are no others, after MODBUS_RETRY_ALONE_MS each time [ms]. */
+#ifndef MODBUS_RETRY_MS
+#define MODBUS_RETRY_MS 61000
+#endif
+#ifndef MODBUS_RETRY_SOON_MS
+#define MODBUS_RETRY_SOON_MS 4000
+#endif
+#ifndef MODBUS_RETRY_ALONE_MS
+#define MODBUS_RETRY_ALONE_MS 1000
+#endif
+
+/* How long a connection to a Modbus device may take, and how often it is tried [ms]. */
+#ifndef MODBUS_CONNECT_MS
+#define MODBUS_CONNECT_MS 5000
+#endif
+#ifndef MODBUS_RECONNECT_MS
+#define MODBUS_RECONNECT_MS 1000
 #endif
 
 /* Service groups of layer 7; three words each. */

@@ -251,6 +251,68 @@ static void a_line_that_does_not_exist_gives_nothing(void)
     CHECK_EQUAL(SysComRead(0, &byte, 1), 0);
 }
 
+/* A pseudo terminal with a link that only this process uses. */
+static const char *link_path(void)
+{
+    static char path[128];
+    const char *folder = getenv("TMPDIR");
+    snprintf(path, sizeof(path), "pty:%s/test-linux-com-%d", folder != NULL ? folder : "/tmp", (int)getpid());
+    return path;
+}
+
+static bool leads_to_a_pty(const char *link)
+{
+    char found[64] = "";
+    return readlink(link, found, sizeof(found) - 1) > 0 && strncmp(found, "/dev/pts/", 9) == 0;
+}
+
+static void a_pty_has_the_name_of_its_link_while_it_is_open(void)
+{
+    const char *link = link_path() + strlen("pty:");
+    open_com(link_path());
+    CHECK(strcmp(PortComPtyName(), link) == 0);
+    CHECK(leads_to_a_pty(link));
+    int client = open_client(link);
+    check_round_trip(client);
+    close(client);
+    close_com();
+    CHECK_EQUAL(access(link, F_OK), -1);
+}
+
+static void a_link_left_by_a_killed_process_is_replaced(void)
+{
+    const char *link = link_path() + strlen("pty:");
+    CHECK_EQUAL(symlink("/dev/pts/99999", link), 0);
+    open_com(link_path());
+    int client = open_client(link);
+    close(client);
+    close_com();
+}
+
+static void a_link_that_another_one_has_taken_is_left_to_it(void)
+{
+    const char *link = link_path() + strlen("pty:");
+    open_com(link_path());
+    CHECK_EQUAL(unlink(link), 0);
+    CHECK_EQUAL(symlink("/dev/pts/99999", link), 0);
+    close_com();
+    CHECK(leads_to_a_pty(link));
+    CHECK_EQUAL(unlink(link), 0);
+}
+
+static void no_other_file_is_replaced_by_a_link(void)
+{
+    PORT_REASON reason = {"", false};
+    const char *path = link_path() + strlen("pty:");
+    CHECK_EQUAL(symlink("/dev/null", path), 0);
+    CHECK(!PortComOpen(link_path(), 9600, &reason));
+    CHECK(strstr(reason.text, path) != NULL && strstr(reason.text, "name another path") != NULL);
+    CHECK_EQUAL(SysComGetCount(), 0);
+    CHECK_EQUAL(unlink(path), 0); /* still there */
+    CHECK(!PortComOpen("pty:/does-not-exist/link", 9600, &reason));
+    CHECK(strstr(reason.text, "/does-not-exist/link") != NULL);
+}
+
 int main(void)
 {
     for (int i = 0; i < 256; i++) {
@@ -261,6 +323,10 @@ int main(void)
     RUN(clients_of_a_pty_come_and_go);
     RUN(a_line_without_listener_never_blocks);
     RUN(after_a_moved_byte_main_does_not_wait);
+    RUN(a_pty_has_the_name_of_its_link_while_it_is_open);
+    RUN(a_link_left_by_a_killed_process_is_replaced);
+    RUN(a_link_that_another_one_has_taken_is_left_to_it);
+    RUN(no_other_file_is_replaced_by_a_link);
     RUN(a_device_that_goes_away_is_taken_up_again);
     RUN(what_cannot_be_opened_is_said);
     RUN(a_device_that_keeps_another_speed_is_refused);

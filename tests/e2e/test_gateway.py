@@ -293,12 +293,17 @@ def test_it_survives_the_tool_that_started_it(tool, plcrt, program, start):
         assert "Main.step = 1" in second.line()
 
 
+def line_of(plcrt) -> str:
+    """The terminal itself, which its link leads to."""
+    return os.path.realpath(plcrt.port)
+
+
 def test_a_link_to_a_port_meets_the_same_gateway(tool, plcrt, tmp_path):
     link = tmp_path / "my-plc"
     link.symlink_to(plcrt.port)
     tool.ok("status", "--port", plcrt.port)
     tool.ok("status", "--port", str(link))
-    assert only_gateway()["line"] == plcrt.port
+    assert only_gateway()["line"] == line_of(plcrt)
 
 
 def test_it_ends_when_it_is_idle_and_lets_go_of_the_port(tool, plcrt, monkeypatch, eventually):
@@ -332,8 +337,9 @@ def test_a_gateway_that_does_not_answer_can_be_stopped(tool, plcrt, eventually):
     tool.ok("status", "--port", plcrt.port)
     pid = only_gateway()["pid"]
     os.kill(pid, signal.SIGSTOP)
-    assert tool.ok("gateway", "status")["gateways"] == [{"line": plcrt.port, "pid": pid, "stuck": True, "tools": []}]
-    assert tool.ok("gateway", "stop", "--port", plcrt.port)["stopped"] == [{"line": plcrt.port, "pid": pid}]
+    line = line_of(plcrt)
+    assert tool.ok("gateway", "status")["gateways"] == [{"line": line, "pid": pid, "stuck": True, "tools": []}]
+    assert tool.ok("gateway", "stop", "--port", plcrt.port)["stopped"] == [{"line": line, "pid": pid}]
     assert tool.ok("status", "--port", plcrt.port)["state"] == "none"
 
 
@@ -341,10 +347,10 @@ def test_gateway_status_and_stop(tool, plcrt, program, start):
     watch = start("watch", "--port", plcrt.port, "Main.step")
     watch.line()
     (found,) = tool.ok("gateway", "status")["gateways"]
-    assert (found["line"], found["baud"], found["stuck"], found["claim"]) == (plcrt.port, 115200, False, None)
+    assert (found["line"], found["baud"], found["stuck"], found["claim"]) == (line_of(plcrt), 115200, False, None)
     assert found["tools"] == [{"tool": "plctool watch Main.step", "pid": watch.process.pid}]
     assert f"plctool watch Main.step (pid {watch.process.pid})" in tool("gateway", "status").out
-    assert tool.ok("gateway", "stop")["stopped"] == [{"line": plcrt.port, "pid": found["pid"]}]
+    assert tool.ok("gateway", "stop")["stopped"] == [{"line": line_of(plcrt), "pid": found["pid"]}]
     assert "No gateway runs." in tool("gateway", "status").out
     status, _, err = watch.end()
     assert status == 3 and "was ended by plctool gateway" in err

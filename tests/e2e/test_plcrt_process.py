@@ -25,7 +25,7 @@ from plctool.link.serial import SerialTransport
 from plctool.link.services import read_identity, read_status
 from plctool.link.session import Session
 from plctool.link.transport import NO_PLACES
-from plctool.testing.plcrt import Plcrt, find_plcrt
+from plctool.testing.plcrt import Plcrt, find_plcrt, find_worker
 
 IDLE_SHARE = 0.05  # of one processor; 0.005 is usual, but machines under load count otherwise
 
@@ -59,6 +59,7 @@ def processor_ns(pid: int) -> int:
         (["--flash", "f", "-xy"], "-x is not an option"),
         (["--flash", "f", "--baud", "115201"], "115200"),
         (["--flash", "f", "--baud", "fast"], "--baud fast"),
+        (["--flash", "f", "--serial", "pty:"], "pty:/tmp/plc"),
         (["--flash", "f", "--can", "can0"], "--serial"),
         (["--flash", "f", "--udp", "127.0.0.1:4"], "--udp 127.0.0.1:4 is not a valid"),
         (["--flash", "f", "--udp=1740"], "192.168.1.5:1"),
@@ -137,10 +138,11 @@ def test_a_limit_of_file_sizes_is_an_error_and_not_a_signal(tmp_path):
     assert done.returncode == 1 and "too large" in done.stderr
 
 
-def test_a_closed_standard_output_is_not_replaced_by_the_flash_file(tmp_path):
+def test_a_closed_standard_output_is_not_replaced_by_the_flash_file(tmp_path, eventually):
     flash = tmp_path / "flash"
     command = [find_plcrt(), "--flash", str(flash), "--serial", "pty"]
     with subprocess.Popen(command, preexec_fn=lambda: os.close(1)) as process:
+        eventually(lambda: find_worker(process.pid))
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
         process.terminate()
@@ -149,8 +151,34 @@ def test_a_closed_standard_output_is_not_replaced_by_the_flash_file(tmp_path):
 
 
 def test_the_device_answers_on_the_terminal_it_names(plcrt):
-    assert plcrt.port.startswith("/dev/pts/")
+    assert os.readlink(plcrt.port).startswith("/dev/pts/")
     assert device_name(plcrt.port) == "plcrt"
+
+
+def test_without_a_link_it_names_the_terminal_itself(tmp_path):
+    command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        port = process.stdout.readline().removeprefix("serial: ").strip()
+        assert port.startswith("/dev/pts/") and device_name(port) == "plcrt"
+        process.terminate()
+
+
+def test_its_terminal_has_the_same_name_after_a_restart_and_none_when_it_has_ended(plcrt):
+    port = plcrt.port
+    plcrt.stop(signal.SIGKILL)
+    plcrt.start()
+    assert plcrt.port == port and device_name(port) == "plcrt"
+    plcrt.stop()
+    assert not os.path.lexists(port)
+
+
+def test_a_file_in_place_of_its_link_is_not_touched(tmp_path):
+    notes = tmp_path / "notes"
+    notes.write_text("milk, bread")
+    done = run_plcrt("--flash", str(tmp_path / "flash"), "--serial", f"pty:{notes}")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert str(notes) in done.stderr and "name another path" in done.stderr
+    assert notes.read_text() == "milk, bread"
 
 
 def test_clients_come_and_go(plcrt):
@@ -210,13 +238,14 @@ def test_it_does_not_stop_when_its_terminal_closes(plcrt):
     assert plcrt.stop() == 0
 
 
-def test_it_goes_on_when_its_output_is_not_read(tmp_path):
+def test_it_goes_on_when_its_output_is_not_read(tmp_path, eventually):
     """Standard output is a pipe whose other end is closed already."""
     reader, writer = os.pipe()
     os.close(reader)
     command = [find_plcrt(), "--flash", str(tmp_path / "flash"), "--serial", "pty"]
     with subprocess.Popen(command, stdout=writer) as process:
         os.close(writer)
+        eventually(lambda: find_worker(process.pid))
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
         process.terminate()
@@ -301,9 +330,10 @@ def test_no_function_is_looked_up_by_the_linker_while_it_runs():
         assert any(tag.entry.d_val & ENUM_DT_FLAGS["DF_BIND_NOW"] for tag in tags)
 
 
-def test_it_runs_without_any_line(tmp_path):
+def test_it_runs_without_any_line(tmp_path, eventually):
     command = [find_plcrt(), "--flash", str(tmp_path / "flash")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        eventually(lambda: find_worker(process.pid))
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
         process.terminate()

@@ -16,7 +16,7 @@ import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 SOURCE = FIRMWARE / "src"
-FLOORS = ["core", "sys", "app", "io", "comm"]
+FLOORS = ["core", "sys", "modbus", "app", "io", "comm"]
 
 # Two sources with the same functions, of which a firmware has one.
 INSTEAD_OF = {"CmpScheduleEmbedded": "CmpScheduleTimer"}

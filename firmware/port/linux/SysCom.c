@@ -1,5 +1,6 @@
 /*
- * SysCom.c - the serial line of the Linux port: a device, or a pseudo terminal for tests and local tools.
+ * SysCom.c - the serial lines of the Linux port: one to be reached by, a device or a pseudo terminal for tests and local
+ * tools, and those of field buses.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -12,27 +13,43 @@
 #include "CmpLog.h"
 #include "SysTime.h"
 #include "port.h"
+#include "rts_config.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/serial.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
-static struct {
+enum { LINES = 1 + PORT_MAX_BUS_LINES };
+
+typedef struct {
     char path[256]; /* of the device, "" for a pseudo terminal */
-    char pty_name[64];
-    speed_t speed;
-    PORT_SOURCE line; /* what is read and written; no file while the device is away */
-    int slave;        /* of a pseudo terminal */
-    bool configured;
+    SYSCOM_SETTINGS settings;
+    PORT_SOURCE source; /* what is read and written; no file while the device is away */
     bool open;
     RTS_UI32 tried_ms;
-} state = {.line = {.file = -1}, .slave = -1};
+    RTS_I64 byte_ns; /* when bytes were read last */
+} LINE;
+
+/* The first one is to be reached by. */
+static LINE lines[LINES] = {{.source = {.file = -1}}};
+
+static struct {
+    char pty_name[64];
+    char link[256]; /* to the pseudo terminal, "" for none */
+    int slave;      /* of a pseudo terminal */
+    bool configured;
+} state = {.slave = -1};
+
+static LINE *const own = &lines[0];
 
 /* ---- opening ---- */
 
@@ -40,6 +57,7 @@ static const struct {
     RTS_UI32 baud;
     speed_t speed;
 } speeds[] = {
+    {1200, B1200},       {2400, B2400},       {4800, B4800},
     {9600, B9600},       {19200, B19200},     {38400, B38400},     {57600, B57600},     {115200, B115200},
     {230400, B230400},   {460800, B460800},   {500000, B500000},   {921600, B921600},   {1000000, B1000000},
     {1500000, B1500000}, {2000000, B2000000}, {3000000, B3000000}, {4000000, B4000000},
@@ -60,23 +78,49 @@ bool PortComKnowsBaud(RTS_UI32 baud)
     return find_speed(baud) != NULL;
 }
 
-/* 8N1, raw, no modem lines. A device that cannot run at the speed keeps its own without saying so. */
-static bool make_raw(int line)
+/* Raw, no modem lines. */
+static void describe(struct termios *settings, const SYSCOM_SETTINGS *wanted)
 {
+    cfmakeraw(settings);
+    settings->c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS | PARENB | PARODD);
+    settings->c_cflag |= CLOCAL | CREAD;
+    settings->c_cflag |= wanted->stop_bits == 2 ? CSTOPB : 0;
+    settings->c_cflag |= wanted->parity != SYSCOM_PARITY_NONE ? PARENB : 0;
+    settings->c_cflag |= wanted->parity == SYSCOM_PARITY_ODD ? PARODD : 0;
+    cfsetspeed(settings, *find_speed(wanted->baud));
+}
+
+/* Pseudo terminals have no bits that a parity could be of. */
+static bool is_pty(int file)
+{
+    enum { FIRST_MAJOR = 136, LAST_MAJOR = 143 };
+    struct stat found;
+    return fstat(file, &found) == 0 && major(found.st_rdev) >= FIRST_MAJOR && major(found.st_rdev) <= LAST_MAJOR;
+}
+
+/* A device that cannot run like that keeps its own settings without saying so. */
+static bool make_raw(int file, const SYSCOM_SETTINGS *wanted)
+{
+    const tcflag_t frame = CSTOPB | PARENB | PARODD;
     struct termios settings;
     struct termios taken;
-    if (tcgetattr(line, &settings) != 0) {
+    if (tcgetattr(file, &settings) != 0) {
         return false;
     }
-    cfmakeraw(&settings);
-    settings.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS);
-    settings.c_cflag |= CLOCAL | CREAD;
-    cfsetspeed(&settings, state.speed);
-    if (tcsetattr(line, TCSANOW, &settings) != 0 || tcgetattr(line, &taken) != 0) {
+    describe(&settings, wanted);
+    if (tcsetattr(file, TCSANOW, &settings) != 0 || tcgetattr(file, &taken) != 0) {
         return false;
     }
     errno = EINVAL;
-    return cfgetospeed(&taken) == state.speed;
+    return cfgetospeed(&taken) == *find_speed(wanted->baud) &&
+           (is_pty(file) || (taken.c_cflag & frame) == (settings.c_cflag & frame));
+}
+
+/* The driver of the device switches RTS, which drives the bus; adapters that do it by themselves need none of it. */
+static bool drive_bus(int file, const SYSCOM_SETTINGS *wanted)
+{
+    struct serial_rs485 rs485 = {.flags = SER_RS485_ENABLED | SER_RS485_RTS_ON_SEND};
+    return !wanted->rs485 || ioctl(file, TIOCSRS485, &rs485) == 0;
 }
 
 /* TIOCEXCL keeps all out but root, the lock keeps other plcrt and plctool out. */
@@ -88,55 +132,111 @@ static bool make_exclusive(int line)
     return locked;
 }
 
-static bool open_device(void)
+static bool open_device(LINE *line)
 {
-    state.line.file = open(state.path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (state.line.file < 0) {
+    int file = open(line->path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (file < 0) {
         return false;
     }
-    if (!make_exclusive(state.line.file) || !make_raw(state.line.file)) {
+    if (!make_exclusive(file) || !make_raw(file, &line->settings) || !drive_bus(file, &line->settings)) {
         int error = errno;
-        close(state.line.file);
-        state.line.file = -1;
+        close(file);
         errno = error;
         return false;
     }
-    (void)tcflush(state.line.file, TCIOFLUSH);
+    (void)tcflush(file, TCIOFLUSH);
+    line->source.file = file;
     return true;
 }
 
 static bool open_pty(void)
 {
-    state.line.file = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (state.line.file < 0 || grantpt(state.line.file) != 0 || unlockpt(state.line.file) != 0 ||
-        ptsname_r(state.line.file, state.pty_name, sizeof(state.pty_name)) != 0) {
+    int file = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    own->source.file = file;
+    if (file < 0 || grantpt(file) != 0 || unlockpt(file) != 0 ||
+        ptsname_r(file, state.pty_name, sizeof(state.pty_name)) != 0) {
         return false;
     }
     state.slave = open(state.pty_name, O_RDWR | O_NOCTTY | O_CLOEXEC);
-    return state.slave >= 0 && make_raw(state.slave);
+    return state.slave >= 0 && make_raw(state.slave, &own->settings);
+}
+
+/* Whether the link is one to a pseudo terminal: ours, or left by a plcrt that was killed. */
+static bool link_leads_to(const char *place)
+{
+    char found[sizeof(state.pty_name)];
+    ssize_t length = readlink(state.link, found, sizeof(found) - 1);
+    found[length > 0 ? length : 0] = '\0';
+    return length > 0 && strncmp(found, place, strlen(place)) == 0;
+}
+
+/* Never replaces what is no such link. */
+static bool make_link(PORT_REASON *reason)
+{
+    if (link_leads_to("/dev/pts/")) {
+        (void)unlink(state.link);
+    }
+    if (symlink(state.pty_name, state.link) == 0) {
+        return true;
+    }
+    PortReason(reason, "cannot make the link %s to the pseudo terminal: %s%s", state.link, strerror(errno),
+               errno == EEXIST ? "; name another path, or remove it" : "");
+    state.link[0] = '\0';
+    return false;
+}
+
+static void remove_link(void)
+{
+    if (state.link[0] != '\0' && link_leads_to(state.pty_name)) {
+        (void)unlink(state.link);
+    }
+    state.link[0] = '\0';
+}
+
+/* ---- what main opens ---- */
+
+static const char pty_prefix[] = "pty:";
+
+/* The path of the link in "pty:PATH", "" for "pty", NULL if it is a device. */
+static const char *pty_link(const char *path)
+{
+    size_t length = sizeof(pty_prefix) - 1;
+    if (strncmp(path, pty_prefix, length) == 0) {
+        return path + length;
+    }
+    return strcmp(path, "pty") == 0 ? "" : NULL;
+}
+
+static void forget(LINE *line)
+{
+    memset(line, 0, sizeof(*line));
+    line->source = (PORT_SOURCE){.file = -1, .events = POLLIN};
 }
 
 bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
 {
-    bool pty = strcmp(path, "pty") == 0;
-    const speed_t *speed = find_speed(baud);
-    if (speed == NULL || strlen(path) >= sizeof(state.path)) {
+    const char *link = pty_link(path);
+    if (!PortComKnowsBaud(baud) || strlen(path) >= sizeof(own->path)) {
         PortReason(reason, "cannot use %s at %u baud", path, (unsigned)baud);
         return false;
     }
     memset(&state, 0, sizeof(state));
-    state.line = (PORT_SOURCE){.file = -1, .events = POLLIN};
     state.slave = -1;
-    state.speed = *speed;
-    memcpy(state.path, pty ? "" : path, pty ? 1 : strlen(path) + 1);
-    if (pty ? !open_pty() : !open_device()) {
+    forget(own);
+    own->settings = (SYSCOM_SETTINGS){.baud = baud, .parity = SYSCOM_PARITY_NONE, .stop_bits = 1};
+    strcpy(link != NULL ? state.link : own->path, link != NULL ? link : path);
+    if (link != NULL ? !open_pty() : !open_device(own)) {
         int error = errno;
         PortReason(reason, "cannot open serial line %s at %u baud: %s", path, (unsigned)baud, strerror(error));
         reason->busy = error == EBUSY;
         PortComClose();
         return false;
     }
-    if (!PortWaitAdd(&state.line)) {
+    if (state.link[0] != '\0' && !make_link(reason)) {
+        PortComClose();
+        return false;
+    }
+    if (!PortWaitAdd(&own->source)) {
         PortReason(reason, "cannot wait for %s: PORT_MAX_SOURCES are in use", path);
         PortComClose();
         return false;
@@ -145,78 +245,88 @@ bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason)
     return true;
 }
 
+static void release(LINE *line)
+{
+    PortWaitRemove(&line->source);
+    if (line->source.file >= 0) {
+        close(line->source.file);
+    }
+    line->source.file = -1;
+}
+
 void PortComClose(void)
 {
-    PortWaitRemove(&state.line);
-    if (state.line.file >= 0) {
-        close(state.line.file);
-    }
+    remove_link();
+    release(own);
     if (state.slave >= 0) {
         close(state.slave);
     }
-    state.line.file = -1;
     state.slave = -1;
     state.configured = false;
 }
 
 void PortComHandOver(void)
 {
-    if (state.line.file >= 0 && state.slave < 0) {
-        close(state.line.file);
-        state.line.file = -1;
+    if (own->source.file >= 0 && state.slave < 0) {
+        close(own->source.file);
+        own->source.file = -1;
     }
 }
 
 const char *PortComPtyName(void)
 {
-    return state.configured && state.pty_name[0] != '\0' ? state.pty_name : NULL;
+    if (!state.configured || state.pty_name[0] == '\0') {
+        return NULL;
+    }
+    return state.link[0] != '\0' ? state.link : state.pty_name;
 }
 
 /* ---- a device that goes away ---- */
 
-static void lose_device(void)
+static void lose_device(LINE *line)
 {
-    LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is gone", state.path);
-    close(state.line.file);
-    state.line.file = -1;
-    state.line.events = POLLIN;
-    state.tried_ms = SysTimeGetMs();
+    LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is gone", line->path);
+    close(line->source.file);
+    line->source.file = -1;
+    line->source.events = POLLIN;
+    line->tried_ms = SysTimeGetMs();
 }
 
-static void look_for_device(void)
+static void look_for_device(LINE *line)
 {
-    if (SysTimeGetMs() - state.tried_ms < PORT_REOPEN_MS) {
+    if (SysTimeGetMs() - line->tried_ms < PORT_REOPEN_MS) {
         return;
     }
-    state.tried_ms = SysTimeGetMs();
-    if (open_device()) {
-        LogAdd(CMPID_SysCom, LOG_INFO, ERR_OK, "Serial device %s is back", state.path);
+    line->tried_ms = SysTimeGetMs();
+    if (open_device(line)) {
+        LogAdd(CMPID_SysCom, LOG_INFO, ERR_OK, "Serial device %s is back", line->path);
     }
 }
 
-/* Whether line `index` can be used now. */
-static bool ready(RTS_UI32 index)
+/* The line if it can be used now, or NULL. */
+static LINE *ready(RTS_UI32 index)
 {
-    if (index != 0 || !state.open) {
-        return false;
+    LINE *line = &lines[index];
+    if (index >= LINES || !line->open) {
+        return NULL;
     }
-    if (state.line.file < 0) {
-        look_for_device();
+    if (line->source.file < 0) {
+        look_for_device(line);
     }
-    return state.line.file >= 0;
+    return line->source.file >= 0 ? line : NULL;
 }
 
 /* The bytes a read or write moved. Nothing to read and no room are not errors; all else means that the device is
  * gone. */
-static RTS_UI32 moved(ssize_t count)
+static RTS_UI32 moved(LINE *line, ssize_t count)
 {
     if (count > 0) {
         PortWaitNotNow();
         return (RTS_UI32)count;
     }
     bool later = count < 0 && (errno == EAGAIN || errno == EINTR);
-    if (!later && state.slave < 0) {
-        lose_device();
+    if (!later && line->path[0] != '\0') {
+        lose_device(line);
     }
     return 0;
 }
@@ -228,36 +338,101 @@ RTS_UI32 SysComGetCount(void)
     return state.configured ? 1 : 0;
 }
 
+/* A device that is away is looked for. */
+static void open_or_wait(LINE *line)
+{
+    line->open = true;
+    line->tried_ms = SysTimeGetMs();
+    if (line->source.file < 0 && !open_device(line)) {
+        LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is away: %s", line->path, strerror(errno));
+    }
+}
+
 RTS_RESULT SysComOpen(RTS_UI32 index)
 {
     if (index >= SysComGetCount()) {
         return ERR_DEVICE;
     }
-    state.open = true;
-    if (state.line.file < 0 && !open_device()) {
-        LogAdd(CMPID_SysCom, LOG_WARNING, ERR_DEVICE, "Serial device %s is away: %s", state.path, strerror(errno));
+    open_or_wait(own);
+    return ERR_OK;
+}
+
+/* A line of this path that is in use, or a free one; NULL: there are too many. */
+static LINE *find_line(const char *path)
+{
+    LINE *found = NULL;
+    if (state.configured && strcmp(own->path, path) == 0) {
+        return own;
     }
+    for (LINE *line = lines + 1; line < lines + LINES; line++) {
+        if (line->open && strcmp(line->path, path) == 0) {
+            return line;
+        }
+        found = line->open ? found : line;
+    }
+    return found;
+}
+
+RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
+{
+    LINE *line = find_line(name);
+    if (strlen(name) >= sizeof(line->path) || name[0] == '\0') {
+        return ERR_NO_OBJECT;
+    }
+    if (!PortComKnowsBaud(settings->baud)) {
+        return ERR_NOT_SUPPORTED;
+    }
+    if (line == NULL || line == own || line->open) {
+        return line == NULL ? ERR_NO_OBJECT : ERR_DUPLICATE;
+    }
+    forget(line);
+    line->settings = *settings;
+    strcpy(line->path, name);
+    if (!PortWaitAdd(&line->source)) {
+        return ERR_NO_OBJECT;
+    }
+    *index = (RTS_UI32)(line - lines);
+    open_or_wait(line);
     return ERR_OK;
 }
 
 void SysComClose(RTS_UI32 index)
 {
-    if (index == 0) {
-        state.open = false;
+    LINE *line = &lines[index];
+    if (index >= LINES || !line->open) {
+        return;
+    }
+    line->open = false;
+    if (line != own) {
+        release(line);
     }
 }
 
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
 {
-    return size > 0 && ready(index) ? moved(read(state.line.file, data, size)) : 0;
+    LINE *line = size > 0 ? ready(index) : NULL;
+    if (line == NULL) {
+        return 0;
+    }
+    RTS_UI32 count = moved(line, read(line->source.file, data, size));
+    if (count > 0) {
+        line->byte_ns = SysTimeGetNs();
+    }
+    return count;
 }
 
 RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
 {
-    if (size == 0 || !ready(index)) {
+    LINE *line = size > 0 ? ready(index) : NULL;
+    if (line == NULL) {
         return 0;
     }
-    RTS_UI32 taken = moved(write(state.line.file, data, size));
-    state.line.events = taken < size ? POLLIN | POLLOUT : POLLIN;
+    RTS_UI32 taken = moved(line, write(line->source.file, data, size));
+    line->source.events = taken < size ? POLLIN | POLLOUT : POLLIN;
     return taken;
+}
+
+RTS_I64 SysComGetByteNs(RTS_UI32 index)
+{
+    return index < LINES ? lines[index].byte_ns : 0;
 }

@@ -27,7 +27,7 @@
 
 enum {
     PURPOSES = SYSSOCK_UDP_BROADCAST + 1,
-    SOCKETS = PURPOSES + TCP_MAX_CONNECTIONS + 1, /* one waits for a place */
+    SOCKETS = PURPOSES + TCP_MAX_CONNECTIONS + 1 + SYSSOCK_MAX_FIELD_BUS, /* one waits for a place */
     BACKLOG = 16,
     IP_BITS = 32,
 };
@@ -301,28 +301,98 @@ static RTS_HANDLE find_free(void)
     return handle;
 }
 
+/* A socket that is waited for; what there is no room for is closed. */
+static RTS_HANDLE take(int file, short events)
+{
+    RTS_HANDLE handle = find_free();
+    if (handle == SOCKETS) {
+        close(file);
+        return RTS_INVALID_HANDLE;
+    }
+    sockets.source[handle] = (PORT_SOURCE){.file = file, .events = events};
+    if (!PortWaitAdd(&sockets.source[handle])) {
+        SysSockClose(handle);
+        return RTS_INVALID_HANDLE;
+    }
+    return handle;
+}
+
+static void send_without_delay(int file)
+{
+    int on = 1;
+    (void)setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+}
+
+static RTS_RESULT why_not_bound(void)
+{
+    switch (errno) {
+    case EADDRINUSE:
+        return ERR_DUPLICATE;
+    case EACCES:
+        return ERR_NO_ACCESS_RIGHTS;
+    default:
+        return ERR_DEVICE;
+    }
+}
+
+RTS_RESULT SysSockListen(const SOCKADDRESS *own, RTS_HANDLE *listener)
+{
+    int file = bind_socket(SOCK_STREAM, *own, true);
+    if (file < 0) {
+        return why_not_bound();
+    }
+    make_ready();
+    *listener = take(file, POLLIN);
+    return *listener != RTS_INVALID_HANDLE ? ERR_OK : ERR_NOBUFFER;
+}
+
+RTS_HANDLE SysSockConnect(const SOCKADDRESS *peer)
+{
+    struct sockaddr_in there = make_address(peer->ip, peer->port);
+    int file = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (file < 0) {
+        return RTS_INVALID_HANDLE;
+    }
+    send_without_delay(file);
+    if (connect(file, (struct sockaddr *)&there, sizeof(there)) != 0 && errno != EINPROGRESS) {
+        close(file);
+        return RTS_INVALID_HANDLE;
+    }
+    make_ready();
+    return take(file, POLLOUT);
+}
+
+RTS_RESULT SysSockGetConnected(RTS_HANDLE socket)
+{
+    struct pollfd polled = {.fd = file_of(socket), .events = POLLOUT};
+    int error = 0;
+    socklen_t size = sizeof(error);
+    if (polled.fd < 0) {
+        return ERR_NET_NOTCONNECTED;
+    }
+    if (poll(&polled, 1, 0) == 0) {
+        return ERR_PENDING;
+    }
+    find(socket)->events = POLLIN;
+    bool good = getsockopt(polled.fd, SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error == 0;
+    return good ? ERR_OK : ERR_NET_NOTCONNECTED;
+}
+
 RTS_HANDLE SysSockAccept(RTS_HANDLE listener, SOCKADDRESS *peer)
 {
     struct sockaddr_in from = {.sin_family = AF_INET};
     socklen_t size = sizeof(from);
-    int on = 1;
-    RTS_HANDLE handle = find_free();
-    if (handle == SOCKETS) {
+    if (find_free() == SOCKETS) {
         return RTS_INVALID_HANDLE;
     }
     int file = accept4(file_of(listener), (struct sockaddr *)&from, &size, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (file < 0) {
         return RTS_INVALID_HANDLE;
     }
-    (void)setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-    sockets.source[handle] = (PORT_SOURCE){.file = file, .events = POLLIN};
-    if (!PortWaitAdd(&sockets.source[handle])) {
-        SysSockClose(handle);
-        return RTS_INVALID_HANDLE;
-    }
+    send_without_delay(file);
     PortWaitNotNow();
     *peer = read_address(&from);
-    return handle;
+    return take(file, POLLIN);
 }
 
 static bool is_later(void)

@@ -35,7 +35,8 @@ bool PortWaitAdd(const PORT_SOURCE *source);
 void PortWaitRemove(const PORT_SOURCE *source);
 /* In this pass something was done after which there may be more to do: the next PortWait does not wait. */
 void PortWaitNotNow(void);
-/* Waits until one of them is ready, or a signal comes, `timeout_ms` at most. Returns whether there may be something to
+/* Waits until one of them is ready, or a signal comes, `timeout_ms` at most, or less if a component wants it
+ * (SysTimeWantPass). Returns whether there may be something to
  * do. */
 bool PortWait(int timeout_ms);
 
@@ -73,14 +74,38 @@ void PortFlashClose(void);
 /* ---- SysCom ---- */
 
 bool PortComKnowsBaud(RTS_UI32 baud);
-/* Opens the one serial line: a device, or with path "pty" a new pseudo terminal. Before CMInit. */
+/* Opens the one serial line: a device, with path "pty" a new pseudo terminal, with "pty:LINK" one that the symbolic link
+ * LINK leads to until PortComClose. A link to a pseudo terminal is replaced, another file is an error. Before CMInit. */
 bool PortComOpen(const char *path, RTS_UI32 baud, PORT_REASON *reason);
 void PortComClose(void);
 /* For a process whose child has the line now: closes a device, which the child opens again when it is lost. A pseudo
  * terminal stays open, so that it outlives the child. */
 void PortComHandOver(void);
-/* Name of the pseudo terminal, NULL when the line is none. */
+/* Name of the pseudo terminal, which is its link if it has one; NULL when the line is none. */
 const char *PortComPtyName(void);
+
+/* ---- SysCan ---- */
+
+typedef struct {
+    RTS_UI32 node;          /* 1..127 */
+    RTS_UI32 base;          /* of the identifiers */
+    RTS_UI32 bit_rate;      /* of an adapter; interfaces of the kernel have their own */
+    RTS_UI32 data_bit_rate; /* not 0: FD frames are sent */
+} PORT_CAN_OPTIONS;
+
+/* Opens the one CAN controller: an interface of the kernel, "slcan:PATH" for an adapter on a serial line, "slcan:pty" for
+ * a new pseudo terminal. Before CMInit. */
+bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON *reason);
+void PortCanClose(void);
+/* As PortComHandOver. */
+void PortCanHandOver(void);
+/* Name of the pseudo terminal, NULL when there is none. */
+const char *PortCanPtyName(void);
+
+/* ---- SysTarget ---- */
+
+/* The name of the device in a scan; the text stays. Before CMInit. */
+void PortTargetSetName(const char *name);
 
 /* ---- SysSocket ---- */
 

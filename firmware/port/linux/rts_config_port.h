@@ -21,6 +21,8 @@
 #define COMM_MAX_CLIENTS 4
 #define COMM_ENDPOINTS 1
 #define TCP_BUFFER_SIZE 16384
+#define CAN_FD 1
+#define CAN_BLOCK_SIZE 0 /* the kernel has room */
 #define LOG_MAX_ENTRIES 256
 #define CHECKSUM_TABLE_ENTRIES 256
 
@@ -73,8 +75,20 @@
  * found at its end.) */
 #define PORT_WATCHDOG_US 5000
 
+/* Serial lines of field buses, besides the one of --serial. */
+#define PORT_MAX_BUS_LINES 8
+
+/* Modbus: as many connections as the field has; the others as many as a large machine has. */
+#define MODBUS_MAX_CONNECTIONS 32
+#define MODBUS_MAX_CLIENTS 16
+#define MODBUS_MAX_DEVICES 128
+#define MODBUS_MAX_JOBS 512
+#define MODBUS_MAX_SERVERS 4
+#define MODBUS_MAX_RANGES 512
+#define MODBUS_DATA_SIZE 65536
+
 /* What main may wait for at a time: lines, sockets, inputs. */
-#define PORT_MAX_SOURCES 16
+#define PORT_MAX_SOURCES 96
 
 /* Longest sleep of the main loop with nothing to do [ms]. */
 #define PORT_IDLE_MS 10

@@ -1,5 +1,5 @@
 /*
- * SimCom.c - serial line 0: two queues of bytes.
+ * SimCom.c - serial line 0: two queues of bytes. There are no lines of field buses.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -85,4 +85,18 @@ RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
 RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
 {
     return index == 0 && line.open ? put(&line.from_device, data, size) : 0;
+}
+
+RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
+{
+    RTS_UNUSED(name);
+    RTS_UNUSED(settings);
+    RTS_UNUSED(index);
+    return ERR_NO_OBJECT;
+}
+
+RTS_I64 SysComGetByteNs(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+    return 0;
 }

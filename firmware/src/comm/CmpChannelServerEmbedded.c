@@ -27,6 +27,7 @@ static COMM_CLIENT clients[COMM_MAX_CLIENTS];
 /* What outlives a channel. */
 static struct {
     RTS_UI32 complained_at;
+    RTS_UI32 guessed_at; /* the last time a package had an id that is not its sender's; with COMM_ENDPOINTS only */
     RTS_UI16 last_id;
 } server;
 
@@ -213,11 +214,20 @@ static bool is_taken(const COMM_CLIENT *client, RTS_UI32 now_ms)
            now_ms - client->channel.last_received < CHANNEL_IDLE_MS;
 }
 
-/* Whether `a` is the better one to give to a new peer: it is free, or has been silent longer. */
+/* The channel is in use by a client that may be about to log in: another one that only opens does not end it. */
+static bool is_settling(const CHANNEL *channel, RTS_UI32 now_ms)
+{
+    return COMM_ENDPOINTS && channel->id != 0 && !channel->fresh && !is_gone(&channel->peer) &&
+           now_ms - channel->anonymous_since < CHANNEL_SETTLE_MS;
+}
+
+/* Whether `a` is the better one to give to a new peer: it is free, or was never used, or has been silent longer. */
 static bool is_better(const CHANNEL *a, const CHANNEL *b, RTS_UI32 now_ms)
 {
     if (a->id == 0 || b->id == 0)
         return b->id != 0;
+    if (COMM_ENDPOINTS && a->fresh != b->fresh)
+        return a->fresh;
     return now_ms - a->last_received > now_ms - b->last_received;
 }
 
@@ -229,7 +239,8 @@ static COMM_CLIENT *claim_client(const ROUTER_PEER *peer, RTS_UI32 now_ms)
     FOR_EACH_CLIENT (client) {
         if (client->channel.id != 0 && RouterIsSamePeer(peer, &client->channel.peer))
             return client;
-        if (!is_taken(client, now_ms) && (found == NULL || is_better(&client->channel, &found->channel, now_ms)))
+        if (!is_taken(client, now_ms) && !is_settling(&client->channel, now_ms) &&
+            (found == NULL || is_better(&client->channel, &found->channel, now_ms)))
             found = client;
     }
     return found;
@@ -242,7 +253,7 @@ static bool is_repetition(const CHANNEL *channel, const ROUTER_PEER *peer, const
            RouterIsSamePeer(peer, &channel->peer);
 }
 
-static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPEN_REQUEST *request)
+static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPEN_REQUEST *request, RTS_UI32 now_ms)
 {
     CHANNEL *channel = &client->channel;
 
@@ -257,6 +268,8 @@ static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPE
     channel->address_words = request->address_words;
     channel->id = new_id();
     channel->fresh = true;
+    if (COMM_ENDPOINTS)
+        channel->anonymous_since = now_ms;
     COMM_COUNT(counters.opened);
 }
 
@@ -275,7 +288,7 @@ static void handle_open(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 s
         return;
     }
     if (!is_repetition(&client->channel, peer, &request))
-        open_channel(client, peer, &request);
+        open_channel(client, peer, &request, now_ms);
     client->channel.last_received = now_ms;
     client->channel.open_due = true;
 }
@@ -436,6 +449,21 @@ static RTS_RESULT accept_block(COMM_CLIENT *client, bool is_first, const RTS_UI8
     return rx->left == 0 ? handle_message(client) : ERR_OK;
 }
 
+/* A package had an id that is not its sender's. */
+static void note_guess(RTS_UI32 now_ms)
+{
+    COMM_COUNT(counters.foreign);
+    if (COMM_ENDPOINTS)
+        server.guessed_at = now_ms;
+}
+
+/* On a network a sender may pretend to be another one, and try all ids. So while wrong ids arrive, no package ends a
+ * channel: a client that is honest then ends it by silence. */
+static bool is_guessing(RTS_UI32 now_ms)
+{
+    return COMM_ENDPOINTS && now_ms - server.guessed_at < CHANNEL_COMPLAINT_MS;
+}
+
 /* A block received before: its acknowledgement was lost, and perhaps the reply too. */
 static void handle_duplicate(CHANNEL *channel, RTS_UI32 now_ms)
 {
@@ -472,7 +500,7 @@ static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 
         handle_duplicate(channel, now_ms);
     else
         handle_gap(channel, ahead);
-    if (result != ERR_OK)
+    if (result != ERR_OK && !is_guessing(now_ms))
         close_channel(client, result);
 }
 
@@ -481,7 +509,7 @@ static void handle_data(COMM_CLIENT *client, const CHANNEL_DATA *data, RTS_UI32 
 /* Informs a peer that its channel does not exist (any more), so that it need not wait for a time-out. */
 static void complain(const ROUTER_PEER *peer, RTS_UI16 id, RTS_UI32 now_ms)
 {
-    COMM_COUNT(counters.foreign);
+    note_guess(now_ms);
     if (now_ms - server.complained_at < CHANNEL_COMPLAINT_MS)
         return;
     server.complained_at = now_ms;
@@ -520,17 +548,17 @@ static void handle_channel_package(const ROUTER_PEER *peer, const RTS_UI8 *data,
         COMM_COUNT(counters.malformed);
 }
 
-static void handle_close(const ROUTER_PEER *peer, const CHANNEL_CLOSE *close, RTS_UI32 size)
+static void handle_close(const ROUTER_PEER *peer, const CHANNEL_CLOSE *close, RTS_UI32 size, RTS_UI32 now_ms)
 {
     if (size < sizeof(*close)) {
         COMM_COUNT(counters.malformed);
         return;
     }
     COMM_CLIENT *client = find_owner(peer, BytesGet16(close->id));
-    if (client != NULL)
+    if (client != NULL && !is_guessing(now_ms))
         forget_channel(client);
     else
-        COMM_COUNT(counters.foreign);
+        note_guess(now_ms);
 }
 
 static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
@@ -545,7 +573,7 @@ static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RT
     if (meta->type == CHANNEL_PKG_OPEN_REQ)
         handle_open(peer, data, size, now_ms);
     else if (meta->type == CHANNEL_PKG_CLOSE_REQ)
-        handle_close(peer, (const CHANNEL_CLOSE *)data, size);
+        handle_close(peer, (const CHANNEL_CLOSE *)data, size, now_ms);
     else if (meta->type == CHANNEL_PKG_RTSINFO_REQ)
         send_rts_info(peer);
 }
@@ -581,6 +609,11 @@ static void repeat_when_overdue(CHANNEL_SENDER *tx, RTS_UI32 now_ms)
     repeat_reply(tx);
 }
 
+static bool is_anonymous_too_long(const CHANNEL *channel, RTS_UI32 now_ms)
+{
+    return COMM_ENDPOINTS && now_ms - channel->anonymous_since >= CHANNEL_LOGIN_MS;
+}
+
 static void cycle_client(COMM_CLIENT *client, RTS_UI32 now_ms)
 {
     if (client->channel.id == 0)
@@ -589,7 +622,10 @@ static void cycle_client(COMM_CLIENT *client, RTS_UI32 now_ms)
         forget_channel(client);
         return;
     }
-    if (now_ms - client->channel.last_received >= CHANNEL_TIMEOUT_MS) {
+    if (COMM_ENDPOINTS && SrvIsLoggedIn(client))
+        client->channel.anonymous_since = now_ms;
+    if (now_ms - client->channel.last_received >= CHANNEL_TIMEOUT_MS ||
+        is_anonymous_too_long(&client->channel, now_ms)) {
         close_channel(client, ERR_CHS_TIMEOUT);
         return;
     }

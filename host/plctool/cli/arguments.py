@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from plctool.errors import UsageError
-from plctool.image.targets import DEFAULT_TARGET
-from plctool.link.transports import LATER, TRANSPORTS
+from plctool.image.targets import DEFAULT_TARGET, TARGETS
+from plctool.link.transports import TRANSPORTS
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -41,7 +41,11 @@ def parser() -> argparse.ArgumentParser:
 
     _add_file_commands(command)
     _add_device_commands(command)
+    _add_io_commands(command)
     command("demo", "run a demonstration of all of it on this machine")
+    completion = command("completion", "print the script that makes a shell complete this command")
+    completion.add_argument("shell", choices=["bash", "zsh", "fish"], help="your shell")
+    command("man", "print the manual page, for 'man -l -'")
     return root
 
 
@@ -49,7 +53,10 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build = command("build", "compile a program to an image")
     _add_sources(build)
     build.add_argument("-o", "--output", type=Path, default=Path("app.cdl"), metavar="IMAGE", help="default: app.cdl")
-    build.add_argument("--target", default=DEFAULT_TARGET, metavar="NAME", help=f"processor; default: {DEFAULT_TARGET}")
+    target = build.add_argument(
+        "--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}"
+    )
+    target.completer = lambda **words: TARGETS  # type: ignore[attr-defined]  # for argcomplete
     build.add_argument(
         "-O", dest="level", type=_level, metavar="0..3|s", default=2, help="optimisation, s for small code; default: 2"
     )
@@ -61,10 +68,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     )
     build.add_argument("--debug", action="store_true", help="optimise less, so that the code is close to its source")
     _add_warnings(build)
+    _add_io_files(build)
 
     check = command("check", "print every diagnostic of a program")
     _add_sources(check)
     _add_warnings(check)
+    _add_io_files(check)
 
     info = command("info", "describe an image")
     _add_image(info)
@@ -85,6 +94,19 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--get", action="append", default=[], metavar="NAME", help="print after the last cycle; may be repeated"
     )
 
+    run.add_argument(
+        "--trace", nargs="+", default=[], metavar="NAME", help="write the values after each cycle to a CSV file"
+    )
+    run.add_argument(
+        "-o", "--output", type=Path, default=Path("trace.csv"), metavar="FILE", help="of --trace; default: trace.csv"
+    )
+    run.add_argument(
+        "--plant",
+        type=Path,
+        metavar="FILE.py",
+        help="Python with 'def step(plc)', which is called each EVERY_MS (1) ms",
+    )
+
     test = command("test", "run the unit tests of a program in this process, on a virtual clock")
     _add_sources(test)
     test.add_argument(
@@ -97,11 +119,13 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     test.add_argument("--junit", type=Path, metavar="FILE", help="write a report in JUnit's format as well")
     test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
     _add_warnings(test)
+    _add_io_files(test)
 
     export = command("export-itf", "write a C header, and a C file to fill in, for functions implemented in C")
-    _add_sources(export)
+    export.add_argument("sources", nargs="*", type=Path, metavar="FILE.st|DIR", help="for a folder, all sources in it")
     export.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: the current folder")
     export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
+    export.add_argument("--device", type=Path, metavar="FILE.toml", help="write the C header of this board instead")
 
     bench = command("bench", "measure the time of a cycle on this machine")
     _add_image(bench)
@@ -115,7 +139,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     flash.add_argument("--force", action="store_true", help="send it even if the device has it already")
     _add_link(flash)
 
-    _add_link(command("scan", "list the devices that answer"))
+    _add_link(command("scan", "list the devices that answer; without a link, on all serial ports"))
     _add_link(command("status", "show the state of the program"))
     _add_link(command("start", "start the program"))
     _add_link(command("stop", "stop the program"))
@@ -127,6 +151,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(reset)
     _add_link(command("tasks", "show the times of the tasks"))
     _add_link(command("log", "print the log of a device"))
+    shell = command("shell", "send a command to the PLC shell of a device; ? lists them")
+    _add_link(shell)
+    shell.add_argument("words", nargs="+", metavar="COMMAND", help="for example ?, rtsinfo, tasklist, plcload")
 
     port = command("port-check", "check a port: run programs on a board and compare the results with what is expected")
     port.add_argument("--yes", action="store_true", help="replace the program that is on the board")
@@ -156,6 +183,35 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     gateway.add_argument("--port", metavar="PORT", help="only the gateway of this port; default: all of this user")
 
 
+def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
+    io = command("io", "show and check what is connected to the inputs and outputs")
+    actions = io.add_subparsers(title="what", metavar="WHAT", dest="what", required=True, parser_class=_Parser)
+
+    def action(name: str, text: str) -> argparse.ArgumentParser:
+        sub = actions.add_parser(name, help=text, description=text[:1].upper() + text[1:] + ".")
+        sub.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+        return sub
+
+    io_map = action("map", "list the channels of an image with their variables and tasks")
+    _add_image(io_map)
+    init = action("init", "write a description with comments, to begin with")
+    init.add_argument("file", type=Path, nargs="?", default=Path("main.io.toml"), metavar="FILE.io.toml")
+    init.add_argument("--device", type=Path, metavar="FILE.toml", help="what the vendor says of the board")
+    _add_link(action("status", "show how the devices of the running program are"))
+    scan = action("scan", "list what is on a bus")
+    scan.add_argument("io_device", metavar="BUS", help="its name in 'plctool io status'")
+    _add_link(scan)
+    identify = action("identify", "let a device show itself")
+    identify.add_argument("io_device", metavar="DEVICE", help="its name in 'plctool io status'")
+    _add_link(identify)
+    param = action("param", "read or set a parameter of a device, until the program is loaded again")
+    param.add_argument("verb", choices=["get", "set"])
+    param.add_argument("io_device", metavar="DEVICE", help="its name in 'plctool io status'")
+    param.add_argument("parameter", metavar="NAME|ID[=VALUE]", help="set: with its value")
+    param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
+    _add_link(param, symbols=True)
+
+
 def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("sources", nargs="+", type=Path, metavar="FILE.st|DIR", help="for a folder, all sources in it")
 
@@ -165,7 +221,7 @@ def _add_image(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_names(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("names", nargs="+", metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.level")
+    parser.add_argument("names", nargs="+", metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.*")
 
 
 def _add_warnings(parser: argparse.ArgumentParser) -> None:
@@ -179,6 +235,13 @@ def _add_warnings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--werror", action="store_true", help="treat warnings as errors")
 
 
+def _add_io_files(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--io", type=Path, metavar="FILE.io.toml", help="inputs and outputs; default: what is beside the sources"
+    )
+    parser.add_argument("--device", type=Path, metavar="FILE.toml", help="what the vendor says of the board")
+
+
 def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
     link = parser.add_argument_group("link")
     for kind in TRANSPORTS.values():
@@ -186,11 +249,9 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
             link.add_argument(f"--{kind.flag}", metavar=kind.shape, help=kind.help)
     options = {name: option for kind in TRANSPORTS.values() for name, option in kind.options.items()}
     for name, option in options.items():
-        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
+        default = f"; default: {option.default}" if option.default else ""
+        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}{default}")
     link.add_argument("--no-gateway", action="store_true", help="do not share the port, as with PLCTOOL_GATEWAY=off")
-    for scheme, place in LATER.items():
-        link.add_argument(f"--{scheme}", metavar=place, help="not in this version")
-    link.add_argument("--node", type=int, metavar="N", help="not in this version")
     if symbols:
         parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="if they are not found automatically")
 

@@ -3,15 +3,36 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, TextIO
 
 _LOG_COLUMN = 27  # where the text of a log entry begins
+_DIAGNOSTIC = re.compile(r"^(.+?:\d+:\d+:) (error|warning):(?= )|^(\s*\^)$", re.MULTILINE)
+_BOLD, _RED, _MAGENTA, _GREEN, _PLAIN = "\33[1m", "\33[1;31m", "\33[1;35m", "\33[1;32m", "\33[0m"
 
 
 def as_json(document: Any) -> str:
     """One line of JSON."""
     return json.dumps(document, allow_nan=False)
+
+
+def wants_colour(stream: TextIO) -> bool:
+    """Whether text for a stream may have colours: on a terminal, unless NO_COLOR is set (no-color.org)."""
+    return stream.isatty() and not os.environ.get("NO_COLOR")
+
+
+def coloured(text: str, stream: TextIO) -> str:
+    """Diagnostics with location, kind and caret in colours, if the stream wants them."""
+    return _DIAGNOSTIC.sub(_colour, text) if wants_colour(stream) else text
+
+
+def _colour(match: re.Match[str]) -> str:
+    location, kind, caret = match.groups()
+    if caret:
+        return f"{_GREEN}{caret}{_PLAIN}"
+    return f"{_BOLD}{location}{_PLAIN} {_RED if kind == 'error' else _MAGENTA}{kind}:{_PLAIN}"
 
 
 def values_text(texts: dict[str, str], separator: str = "\n") -> str:
@@ -56,6 +77,48 @@ def run_text(document: dict[str, Any], texts: dict[str, str]) -> str:
     return f"{values_text(texts)}\n{document['cycles']} cycles, {document['time_ms']:.10g} ms".lstrip()
 
 
+def build_text(document: dict[str, Any]) -> str:
+    """What was built, and how old inputs may be."""
+    lines = [f"{document['image']}: {document['size']} bytes, CRC {document['crc']}"]
+    if io := document.get("io"):
+        lines.append(f"{io['channels']} channels of inputs and outputs")
+        if oldest := io["oldest_input"]:
+            lines[-1] += f"; oldest input: {oldest['channel']}, up to {age_text(oldest['age_us'])}"
+    return "\n".join(lines)
+
+
+def age_text(age_us: int | None) -> str:
+    """A time as users read it; - for one that has no limit."""
+    return "-" if age_us is None else f"{age_us / 1000:g} ms"
+
+
+def io_map_text(document: dict[str, Any]) -> str:
+    """A line for each channel."""
+    rows = [
+        {**c, "tasks": ", ".join(c["tasks"]), "direction": "out" if c["output"] else "in", "age": age_text(c["age_us"])}
+        for c in document["channels"]
+    ]
+    columns = ("device", "channel", "direction", "variable", "type", "address", "tasks", "age")
+    return table(rows, columns) if rows else "This image has no inputs and outputs but memory; see docs/io.md."
+
+
+def io_status_text(document: dict[str, Any]) -> str:
+    """A line for each device."""
+    rows = [
+        {**d, "age": "-" if d["age_ms"] is None else f"{d['age_ms']} ms", "device": d["name"]}
+        for d in document["devices"]
+    ]
+    columns = ("device", "driver", "state", "age", "errors", "skipped")
+    return table(rows, columns) if rows else "The program has no devices."
+
+
+def io_scan_text(document: dict[str, Any]) -> str:
+    """A line for each device on a bus."""
+    rows = [{**d, **{k: f"0x{d[k]:X}" for k in ("vendor", "product", "revision")}} for d in document["devices"]]
+    columns = ("slot", "name", "vendor", "product", "revision")
+    return table(rows, columns) if rows else f"Nothing answers on {document['bus']}."
+
+
 def interface_text(document: dict[str, Any]) -> str:
     """The functions of a C interface, and the files."""
     kept = "" if document["source_written"] else " (kept as it is; --force replaces it)"
@@ -72,6 +135,14 @@ def flash_text(document: dict[str, Any]) -> str:
         lines += [f"PERSISTENT value lost: {name} {why}" for name, why in document["persistent"]["lost"].items()]
         lines += [f"PERSISTENT value new: {name}" for name in document["persistent"]["new"]]
     return "\n".join(lines)
+
+
+def flash_several_text(document: dict[str, Any]) -> str:
+    """What a download did on each device."""
+    return "\n".join(
+        f"{device['node']}: {device['error']['message'] if 'error' in device else flash_text(device)}"
+        for device in document["devices"]
+    )
 
 
 def tasks_text(document: dict[str, Any]) -> str:

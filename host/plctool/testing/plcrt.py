@@ -32,26 +32,36 @@ def _is_child(pid: int, parent: int) -> bool:
     return int(ppid) == parent and state not in "ZX"
 
 
+def find_worker(supervisor: int) -> int | None:
+    """Process id of the child of plcrt that runs the controller; None while it is being started. With a worker plcrt
+    takes the signals that end it."""
+    pids = map(int, filter(str.isdigit, os.listdir("/proc")))
+    return next((pid for pid in pids if _is_child(pid, supervisor)), None)
+
+
 class Plcrt:
-    """Context manager around one process; `port` is the pseudo terminal it serves, `tcp` and `udp` are its places on
-    the network if `options` ask for some (`--tcp 0`)."""
+    """Context manager around one process; `port` is the pseudo terminal it serves, by a link beside the flash file that
+    stays the same over restarts, `tcp`, `udp` and `can` are its other places if `options` ask for some (`--tcp 0`,
+    `--can slcan:pty`)."""
 
     def __init__(self, flash: Path | str, *options: str) -> None:
         self.flash = Path(flash)
         self.options = options
         self.process: subprocess.Popen[str] | None = None
-        self.port = self.tcp = self.udp = ""
+        self.port = f"{self.flash}.tty"
+        self.tcp = self.udp = self.can = ""
 
     def start(self) -> None:
         """Starts the process and waits for the lines that say where it is."""
-        command = [find_plcrt(), "--flash", str(self.flash), "--serial", "pty", *self.options]
+        command = [find_plcrt(), "--flash", str(self.flash), "--serial", f"pty:{self.port}", *self.options]
         self.process = subprocess.Popen(
             ends_with_us(command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         assert self.process.stdout and self.process.stderr
-        self.port = self._place("serial")
+        self._place("serial")
         self.tcp = self._place("tcp") if "--tcp" in self.options else ""
         self.udp = self._place("udp") if "--udp" in self.options else ""
+        self.can = self._place("can") if "slcan:pty" in self.options else ""
 
     def _place(self, kind: str) -> str:
         """What the process says next: where it serves one kind of link."""
@@ -66,8 +76,7 @@ class Plcrt:
     def worker(self) -> int | None:
         """Process id of the child that runs the controller; None while it is being started again."""
         assert self.process
-        pids = map(int, filter(str.isdigit, os.listdir("/proc")))
-        return next((pid for pid in pids if _is_child(pid, self.process.pid)), None)
+        return find_worker(self.process.pid)
 
     def stop(self, how: signal.Signals = signal.SIGTERM) -> int:
         """Ends the process; SIGKILL stands for a power cut. Returns the exit status."""
@@ -75,6 +84,7 @@ class Plcrt:
             return 0
         self.process.send_signal(how)
         status = self.process.wait(timeout=10)
+        Path(self.port).unlink(missing_ok=True)  # left if it was killed; its terminal may become that of another one
         for stream in (self.process.stdout, self.process.stderr):
             if stream:
                 stream.close()

@@ -43,3 +43,21 @@ RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
     RTS_UNUSED(size);
     return 0;
 }
+
+/* Write here, for a field bus: find the line of this name, and do what SysComOpen does with these settings. With rs485 the
+ * port drives the bus from the first start bit to the last stop bit: take it back in the interrupt that comes when
+ * the shift register is empty, not when the data register is. */
+RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
+{
+    RTS_UNUSED(name);
+    RTS_UNUSED(settings);
+    RTS_UNUSED(index);
+    return ERR_NO_OBJECT;
+}
+
+/* Write here, for a field bus: what the receive interrupt noted of SysTimeGetNs. */
+RTS_I64 SysComGetByteNs(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+    return 0;
+}

@@ -78,3 +78,9 @@ RTS_UI32 SysTimeGetMs(void)
     CpuRestore(mask);
     return ms;
 }
+
+/* The tick wakes main every millisecond. */
+void SysTimeWantPass(RTS_UI32 ms)
+{
+    RTS_UNUSED(ms);
+}

@@ -5,6 +5,10 @@
  */
 #include "CortexM.h"
 #include "SysCom.h"
+#include "SysTime.h"
+#include "rts_config.h"
+
+#include <string.h>
 
 enum { UART_BAUD = 115200 };
 enum { STATE_TX_FULL = 1 };
@@ -32,6 +36,7 @@ RTS_STATIC_ASSERT((BOARD_UART_TX_SIZE & (BOARD_UART_TX_SIZE - 1)) == 0, tx_size_
 static UART *const uarts[] = {(UART *)0x40004000u, (UART *)0x40005000u};
 static LINE lines[BOARD_UART_COUNT];
 static volatile RTS_UI8 work;
+static RTS_I64 byte_ns[BOARD_UART_COUNT]; /* SYSCOM_BYTE_TIMES */
 
 static RTS_UI16 used(const RING *ring)
 {
@@ -45,6 +50,8 @@ static void receive(RTS_UI32 index)
     uarts[index]->intclear = INT_RX;
     RTS_UI8 byte = (RTS_UI8)uarts[index]->data;
     work = 1;
+    if (SYSCOM_BYTE_TIMES)
+        byte_ns[index] = SysTimeGetNs();
     if (used(&line->rx) == BOARD_UART_RX_SIZE)
         return; /* lost; the frame's check sum shows it */
     line->rx_data[line->rx.head % BOARD_UART_RX_SIZE] = byte;
@@ -104,14 +111,36 @@ RTS_UI32 SysComGetCount(void)
     return BOARD_UART_COUNT;
 }
 
+static void open_line(RTS_UI32 index, RTS_UI32 divider)
+{
+    lines[index].rx = (RING){0, 0};
+    lines[index].tx = (RING){0, 0};
+    uarts[index]->bauddiv = divider;
+    uarts[index]->ctrl = CTRL_ALL;
+}
+
 RTS_RESULT SysComOpen(RTS_UI32 index)
 {
     if (index >= BOARD_UART_COUNT)
         return ERR_DEVICE;
-    lines[index].rx = (RING){0, 0};
-    lines[index].tx = (RING){0, 0};
-    uarts[index]->bauddiv = BOARD_CLOCK_HZ / UART_BAUD;
-    uarts[index]->ctrl = CTRL_ALL;
+    open_line(index, BOARD_CLOCK_HZ / UART_BAUD);
+    return ERR_OK;
+}
+
+/* "COM1" and "COM2". These UARTs have no parity, one stop bit, no pin for the direction, and divide by 16 or more. */
+RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
+{
+    enum { NUMBER = 3, LEAST_DIVIDER = 16, MOST_DIVIDER = 0xFFFFF };
+    RTS_UI32 divider = settings->baud != 0 ? BOARD_CLOCK_HZ / settings->baud : 0;
+    *index = memcmp(name, "COM", NUMBER) == 0 ? (RTS_UI32)(name[NUMBER] - '1') : BOARD_UART_COUNT;
+    if (*index >= BOARD_UART_COUNT || name[NUMBER + 1] != '\0')
+        return ERR_NO_OBJECT;
+    if (uarts[*index]->ctrl != 0)
+        return ERR_DUPLICATE;
+    if (divider < LEAST_DIVIDER || divider > MOST_DIVIDER || settings->parity != SYSCOM_PARITY_NONE ||
+        settings->stop_bits != 1 || settings->rs485)
+        return ERR_NOT_SUPPORTED;
+    open_line(*index, divider);
     return ERR_OK;
 }
 
@@ -119,6 +148,14 @@ void SysComClose(RTS_UI32 index)
 {
     if (index < BOARD_UART_COUNT)
         uarts[index]->ctrl = 0;
+}
+
+RTS_I64 SysComGetByteNs(RTS_UI32 index)
+{
+    RTS_UI32 mask = CpuMask();
+    RTS_I64 last_ns = index < BOARD_UART_COUNT ? byte_ns[index] : 0;
+    CpuRestore(mask);
+    return last_ns;
 }
 
 RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)

@@ -1,0 +1,62 @@
+/*
+ * ModbusLink.h - a serial line or a connection on which Modbus frames come and go: one buffer, one direction at a time.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A frame is received into the buffer of its link, the reply is made there, and sent from there: nothing more is
+ * received before it has left, so a flood of requests waits at its sender, or is lost on the line.
+ */
+#ifndef MODBUSLINK_H
+#define MODBUSLINK_H
+
+#include "CmpErrors.h"
+#include "Modbus.h"
+#include "SysSocket.h"
+
+/* Places in the buffer: the header of TCP, of which RTU has only the unit, the PDU, and the CRC of RTU. */
+enum {
+    MODBUS_AT_TRANSACTION = 0,
+    MODBUS_AT_PROTOCOL = 2,
+    MODBUS_AT_LENGTH = 4,
+    MODBUS_AT_UNIT = 6,
+    MODBUS_AT_PDU = 7,
+    MODBUS_CRC_SIZE = 2,
+    MODBUS_FRAME_SIZE = MODBUS_AT_PDU + MODBUS_MAX_PDU + MODBUS_CRC_SIZE + 1, /* one more: it is too long */
+};
+
+typedef struct MODBUS_LINK MODBUS_LINK;
+
+/* The functions of ModbusRtu.h and ModbusTcp.h. None of them blocks; `now_ns`: SysTimeGetNs, or the clock of a test. */
+typedef struct {
+    /* Whether a request may be sent now: the line is quiet, the connection is there. Opens what is not open. */
+    bool (*ready)(MODBUS_LINK *link, RTS_I64 now_ns);
+    /* Goes on with what is on its way. Size of the PDU of a frame that has come, 0: none. It stays in the buffer until
+     * something is sent, or dropped. */
+    RTS_UI32 (*receive)(MODBUS_LINK *link, RTS_I64 now_ns);
+    /* Begins to send a PDU of this size that is in the buffer, to or from the unit there. */
+    void (*send)(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
+} MODBUS_LINK_TYPE;
+
+struct MODBUS_LINK {
+    const MODBUS_LINK_TYPE *type;
+    RTS_HANDLE handle; /* line of SysCom, or socket; RTS_INVALID_HANDLE: not open */
+    bool sending;
+    bool connecting;
+    RTS_UI16 fill;       /* bytes received, or to be sent */
+    RTS_UI16 sent;       /* of them */
+    RTS_I64 began_ns;    /* TCP: when the connection began, or was tried */
+    RTS_I64 moved_ns;    /* RTU: when the last byte that is sent leaves; TCP: when a byte moved last, or it began */
+    RTS_I64 silence_ns;  /* RTU: the shortest pause between frames */
+    RTS_I64 char_ns;     /* RTU: how long a character takes */
+    SOCKADDRESS peer;    /* TCP: the server that a client connects to */
+    RTS_UI32 bad_frames; /* of a wrong CRC or length */
+    RTS_UI8 frame[MODBUS_FRAME_SIZE];
+};
+
+/* What was received is not needed, the next frame may come. */
+static inline void ModbusLinkDrop(MODBUS_LINK *link)
+{
+    link->fill = 0;
+}
+
+#endif

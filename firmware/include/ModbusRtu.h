@@ -1,0 +1,25 @@
+/*
+ * ModbusRtu.h - frames of Modbus on a serial line: unit, PDU, CRC, and silence around them.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Modbus over serial line V1.02, 2.5.1: a frame ends when no byte has come for 3.5 characters, above 19200 baud for
+ * 1.75 ms. All from main.
+ */
+#ifndef MODBUSRTU_H
+#define MODBUSRTU_H
+
+#include "ModbusLink.h"
+#include "SysCom.h"
+
+/* CRC-16 of Modbus, polynomial 0xA001 reflected: "123456789" gives 0x4B37. From any context. */
+RTS_UI16 ModbusCrc(const RTS_UI8 *data, RTS_UI32 size);
+
+/* A link on a line that SysComOpenPort has opened with these settings. */
+void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *settings);
+
+bool ModbusRtuReady(MODBUS_LINK *link, RTS_I64 now_ns);
+RTS_UI32 ModbusRtuReceive(MODBUS_LINK *link, RTS_I64 now_ns);
+void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
+
+#endif

@@ -1,0 +1,25 @@
+/*
+ * ModbusTcp.h - frames of Modbus on a TCP connection: transaction, protocol, length, unit, PDU.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Frames are found by their length, however they arrive. A connection on which something else comes is closed: then its
+ * handle is RTS_INVALID_HANDLE. All from main.
+ */
+#ifndef MODBUSTCP_H
+#define MODBUSTCP_H
+
+#include "ModbusLink.h"
+
+/* A link on an accepted connection. */
+void ModbusTcpBegin(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns);
+/* A link that connects to a server when it is asked whether it is ready, and again when it has lost the connection,
+ * MODBUS_RECONNECT_MS after it began to connect last. */
+void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer);
+void ModbusTcpClose(MODBUS_LINK *link);
+
+bool ModbusTcpReady(MODBUS_LINK *link, RTS_I64 now_ns);
+RTS_UI32 ModbusTcpReceive(MODBUS_LINK *link, RTS_I64 now_ns);
+void ModbusTcpSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
+
+#endif

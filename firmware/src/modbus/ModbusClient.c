@@ -1,0 +1,445 @@
+/*
+ * ModbusClient.c - this device as a Modbus client: asks the devices of one line for their data.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "ModbusClient.h"
+
+#include <string.h>
+
+#include "SysLock.h"
+#include "rts_config.h"
+
+#define NS_PER_MS ((RTS_I64)1000000)
+#define NEVER INT64_MAX
+
+enum { REFUSED_MS = 1000 /* what a device refuses is not tried more often */ };
+
+bool ModbusDeviceIsLost(const MODBUS_DEVICE *device)
+{
+    return device->failures >= MODBUS_TRIES;
+}
+
+bool ModbusDeviceIsGood(const MODBUS_DEVICE *device)
+{
+    bool good = device->good_ns != 0 && !ModbusDeviceIsLost(device);
+
+    for (RTS_UI32 i = 0; good && i < device->job_count; i++)
+        good = device->jobs[i].good || device->jobs[i].done_ns == 0;
+    return good;
+}
+
+void ModbusClientBegin(MODBUS_CLIENT *client, MODBUS_DEVICE *devices, RTS_UI32 count)
+{
+    client->devices = devices;
+    client->device_count = count;
+    client->device = NULL;
+    client->transaction = 0;
+}
+
+/* ---- which job is next ---- */
+
+static RTS_UI32 write_size(const MODBUS_JOB_STATE *state)
+{
+    return ModbusDataSize(ModbusFindFunction(state->job->function), state->job->write_count);
+}
+
+/* A task may be writing it: then it is another value now or in the next pass. */
+static bool has_changed(const MODBUS_JOB_STATE *state)
+{
+    return !state->is_written || memcmp(state->out, state->written, write_size(state)) != 0;
+}
+
+/* When the job is due. One that has changed comes after those that are due since before it was done last. */
+static RTS_I64 due_ns(const MODBUS_JOB_STATE *state)
+{
+    const MODBUS_JOB *job = state->job;
+
+    if (job->write_count != 0 && !state->has_out)
+        return NEVER;
+    if ((job->flags & MODBUS_JOB_ON_CHANGE) == 0 || (!state->good && state->done_ns != 0))
+        return state->due_ns;
+    if (has_changed(state))
+        return state->done_ns;
+    return job->interval_ms != 0 ? state->due_ns : NEVER;
+}
+
+static MODBUS_JOB_STATE *find_due(const MODBUS_DEVICE *device, RTS_I64 *earliest_ns)
+{
+    MODBUS_JOB_STATE *found = NULL;
+
+    for (RTS_UI32 i = 0; i < device->job_count; i++) {
+        RTS_I64 due = due_ns(&device->jobs[i]);
+        if (due <= *earliest_ns) {
+            *earliest_ns = due;
+            found = &device->jobs[i];
+        }
+    }
+    return found;
+}
+
+/* The job that is due, and longest. */
+static void choose(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    RTS_I64 earliest_ns = now_ns;
+
+    for (RTS_UI32 i = 0; i < client->device_count; i++) {
+        MODBUS_DEVICE *device = &client->devices[i];
+        MODBUS_JOB_STATE *job;
+        if (ModbusDeviceIsLost(device) && now_ns < device->retry_ns)
+            continue;
+        job = find_due(device, &earliest_ns);
+        if (job != NULL) {
+            client->device = device;
+            client->job = job;
+        }
+    }
+}
+
+/* ---- requests ---- */
+
+/* Bytes of a group that are in reverse order; 0: none are. */
+static RTS_UI32 reverse_of(const MODBUS_JOB_STATE *state, const MODBUS_FUNCTION *function)
+{
+    return function->count_of_bits == 1 ? 0 : state->job->flags >> MODBUS_JOB_REVERSE_SHIFT & 14;
+}
+
+/* From the order of the wire to that of memory, or back. */
+static void reorder(const MODBUS_JOB_STATE *state, const MODBUS_FUNCTION *function, RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_UI32 reverse = reverse_of(state, function);
+
+    for (RTS_UI32 i = 0; reverse != 0 && i < size; i++) {
+        RTS_UI32 other = i ^ (reverse - 1);
+        RTS_UI8 byte = data[i];
+        if (other > i) {
+            data[i] = data[other];
+            data[other] = byte;
+        }
+    }
+}
+
+static void put_mask(const MODBUS_JOB_STATE *state, RTS_UI8 *data)
+{
+    RTS_UI16 mask = state->job->mask;
+
+    ModbusPut16(data + 2, ModbusGet16(data) & mask);
+    ModbusPut16(data, (RTS_UI16)~mask);
+}
+
+/* What is to be written, as it is now. */
+static void put_data(MODBUS_CLIENT *client)
+{
+    MODBUS_JOB_STATE *state = client->job;
+    const MODBUS_FUNCTION *function = client->request.function;
+    RTS_UI32 size = write_size(state);
+    RTS_UI8 *data = client->request.data;
+    RTS_UI32 lock = SysLockEnter();
+
+    memcpy(state->written, state->out, size);
+    SysLockLeave(lock);
+    memcpy(data, state->written, size);
+    reorder(state, function, data, size);
+    if (function->function == MODBUS_WRITE_COIL)
+        ModbusPut16(data, (data[0] & 1) != 0 ? 0xFF00 : 0);
+    else if (function->function == MODBUS_MASK_WRITE_REGISTER)
+        put_mask(state, data);
+}
+
+static RTS_UI8 function_to_verify(const MODBUS_FUNCTION *function)
+{
+    return function->table == MODBUS_COILS ? MODBUS_READ_COILS : MODBUS_READ_HOLDING_REGISTERS;
+}
+
+static void describe(MODBUS_CLIENT *client)
+{
+    const MODBUS_JOB *job = client->job->job;
+    MODBUS_REQUEST *request = &client->request;
+
+    request->function = ModbusFindFunction(job->function);
+    request->read_address = job->read_address;
+    request->read_count = job->read_count;
+    request->write_address = job->write_address;
+    request->write_count = job->write_count;
+    if (!client->verifies)
+        return;
+    request->function = ModbusFindFunction(function_to_verify(request->function));
+    request->read_address = job->write_address;
+    request->read_count = job->write_count;
+    request->write_count = 0;
+}
+
+static void send(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    MODBUS_LINK *link = &client->link;
+    RTS_UI8 *pdu = link->frame + MODBUS_AT_PDU;
+    RTS_UI32 size;
+
+    describe(client);
+    size = ModbusBeginRequest(&client->request, pdu);
+    if (client->request.write_count != 0)
+        put_data(client);
+    memcpy(client->head, pdu, MODBUS_HEAD_SIZE);
+    link->frame[MODBUS_AT_UNIT] = client->device->unit;
+    ModbusPut16(link->frame + MODBUS_AT_TRANSACTION, ++client->transaction);
+    client->device->counters.requests++;
+    client->device->asked = true;
+    client->sent = true;
+    client->waits = false;
+    link->type->send(link, size, now_ns);
+}
+
+/* ---- results ---- */
+
+static void next_due(MODBUS_JOB_STATE *state, RTS_I64 interval_ns, RTS_I64 now_ns)
+{
+    state->done_ns = now_ns;
+    state->due_ns += interval_ns;
+    if (state->due_ns <= now_ns - interval_ns) /* more than one was missed: they are not made up for */
+        state->due_ns = now_ns;
+}
+
+static bool others_reply(const MODBUS_CLIENT *client)
+{
+    for (RTS_UI32 i = 0; i < client->device_count; i++) {
+        const MODBUS_DEVICE *device = &client->devices[i];
+        if (device != client->device && device->asked && !ModbusDeviceIsLost(device))
+            return true;
+    }
+    return false;
+}
+
+/* What a device may have forgotten while it was away is written again. */
+static void write_all_again(const MODBUS_DEVICE *device, const MODBUS_JOB_STATE *but)
+{
+    for (RTS_UI32 i = 0; i < device->job_count; i++) {
+        if (&device->jobs[i] != but)
+            device->jobs[i].is_written = false;
+    }
+}
+
+/* The whole line was away: the others need not wait until it is their turn. */
+static void ask_all(const MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    for (RTS_UI32 i = 0; i < client->device_count; i++) {
+        if (client->devices[i].retry_ns > now_ns)
+            client->devices[i].retry_ns = now_ns;
+    }
+}
+
+static void note_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    MODBUS_DEVICE *device = client->device;
+
+    if (ModbusDeviceIsLost(device)) {
+        write_all_again(device, client->job);
+        if (!others_reply(client))
+            ask_all(client, now_ns);
+    }
+    device->failures = 0;
+    device->good_ns = now_ns;
+}
+
+static RTS_I64 pause_of(const MODBUS_CLIENT *client)
+{
+    if (!others_reply(client))
+        return MODBUS_RETRY_ALONE_MS * NS_PER_MS;
+    return (client->device->failures == MODBUS_TRIES ? MODBUS_RETRY_SOON_MS : MODBUS_RETRY_MS) * NS_PER_MS;
+}
+
+/* No reply: once more, or the device is lost. */
+static void fail(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    MODBUS_DEVICE *device = client->device;
+
+    device->counters.timeouts++;
+    if (device->failures < UINT8_MAX)
+        device->failures++;
+    client->job->good = false;
+    client->job->is_written = false;
+    client->job->done_ns = now_ns;
+    if (ModbusDeviceIsLost(device))
+        device->retry_ns = now_ns + pause_of(client);
+    else
+        client->job->due_ns = now_ns;
+    client->verifies = false;
+    client->device = NULL;
+}
+
+static void end(MODBUS_CLIENT *client, bool good, RTS_I64 now_ns)
+{
+    MODBUS_JOB_STATE *job = client->job;
+    RTS_I64 interval_ns = job->job->interval_ms * NS_PER_MS;
+
+    if (!good && interval_ns < REFUSED_MS * NS_PER_MS && job->job->write_count != 0)
+        job->due_ns = now_ns + REFUSED_MS * NS_PER_MS;
+    else
+        next_due(job, interval_ns, now_ns);
+    job->done_ns = now_ns;
+    job->good = good;
+    job->is_written = good && job->job->write_count != 0;
+    client->verifies = false;
+    client->device = NULL;
+}
+
+/* The bits of byte `i` on the wire that were written. */
+static RTS_UI8 written_bits(const MODBUS_JOB *job, RTS_UI32 i, RTS_UI32 size)
+{
+    if (job->function == MODBUS_MASK_WRITE_REGISTER)
+        return (RTS_UI8)(i == 0 ? job->mask >> 8 : job->mask);
+    if (ModbusFindFunction(job->function)->count_of_bits == 1 && i + 1 == size && job->write_count % 8 != 0)
+        return (RTS_UI8)((1u << job->write_count % 8) - 1);
+    return 0xFF;
+}
+
+/* Whether the device has what was written to it: compared in the order of memory. */
+static bool is_verified(const MODBUS_CLIENT *client, RTS_UI8 *data)
+{
+    const MODBUS_JOB_STATE *state = client->job;
+    RTS_UI32 reverse = reverse_of(state, client->request.function);
+    RTS_UI32 size = write_size(state);
+    RTS_UI32 wrong = 0;
+
+    for (RTS_UI32 i = 0; i < size; i++) {
+        RTS_UI8 wanted = state->written[reverse != 0 ? i ^ (reverse - 1) : i];
+        wrong |= (data[i] ^ wanted) & written_bits(state->job, i, size);
+    }
+    return wrong == 0;
+}
+
+static void take_data(const MODBUS_CLIENT *client, RTS_UI8 *data)
+{
+    MODBUS_JOB_STATE *state = client->job;
+    RTS_UI32 size = ModbusDataSize(client->request.function, client->request.read_count);
+    RTS_UI32 lock;
+
+    reorder(state, client->request.function, data, size);
+    lock = SysLockEnter();
+    memcpy(state->in, data, size);
+    SysLockLeave(lock);
+}
+
+static void take_good(MODBUS_CLIENT *client, RTS_UI8 *data, RTS_I64 now_ns)
+{
+    bool good = true;
+
+    note_reply(client, now_ns);
+    if (client->verifies) {
+        good = is_verified(client, data);
+        client->device->counters.unverified += !good;
+    } else if (client->request.read_count != 0) {
+        take_data(client, data);
+    }
+    if (!client->verifies && (client->job->job->flags & MODBUS_JOB_VERIFY) != 0) {
+        client->verifies = true;
+        client->sent = false;
+        client->since_ns = now_ns;
+        return;
+    }
+    end(client, good, now_ns);
+}
+
+/* A gateway replies for a device that is silent. */
+static void take_exception(MODBUS_CLIENT *client, RTS_UI8 code, RTS_I64 now_ns)
+{
+    client->device->counters.last_exception = code;
+    if (code == MODBUS_NO_PATH || code == MODBUS_NO_TARGET) {
+        fail(client, now_ns);
+        return;
+    }
+    client->device->counters.exceptions++;
+    note_reply(client, now_ns);
+    end(client, false, now_ns);
+}
+
+/* ---- the reply ---- */
+
+/* The transaction is where RTU has none: there it is that of the request. */
+static MODBUS_REPLY check(const MODBUS_CLIENT *client, RTS_UI32 size)
+{
+    const RTS_UI8 *frame = client->link.frame;
+
+    if (frame[MODBUS_AT_UNIT] != client->device->unit ||
+        ModbusGet16(frame + MODBUS_AT_TRANSACTION) != client->transaction)
+        return MODBUS_REPLY_OTHER;
+    return ModbusCheckReply(&client->request, client->head, frame + MODBUS_AT_PDU, size);
+}
+
+static void take_frame(MODBUS_CLIENT *client, RTS_UI32 size, RTS_I64 now_ns)
+{
+    RTS_UI8 *pdu = client->link.frame + MODBUS_AT_PDU;
+    MODBUS_REPLY reply = check(client, size);
+
+    if (reply == MODBUS_REPLY_GOOD)
+        take_good(client, pdu + 2, now_ns);
+    else if (reply == MODBUS_REPLY_EXCEPTION)
+        take_exception(client, pdu[1], now_ns);
+    else
+        client->device->counters.others++;
+    ModbusLinkDrop(&client->link);
+}
+
+static bool is_too_late(const MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    return now_ns - client->since_ns >= client->device->timeout_ms * NS_PER_MS;
+}
+
+static void wait_for_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    MODBUS_LINK *link = &client->link;
+    RTS_UI32 size = link->type->receive(link, now_ns);
+
+    if (link->handle == RTS_INVALID_HANDLE) {
+        fail(client, now_ns);
+        return;
+    }
+    if (!client->waits && !link->sending) {
+        client->waits = true;
+        client->since_ns = link->moved_ns > now_ns ? link->moved_ns : now_ns;
+    }
+    if (size != 0)
+        take_frame(client, size, now_ns);
+    else if (client->waits && is_too_late(client, now_ns)) {
+        if (client->device->unit == MODBUS_BROADCAST)
+            end(client, true, now_ns);
+        else
+            fail(client, now_ns);
+    }
+}
+
+/* ---- passes ---- */
+
+static void begin(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    choose(client, now_ns);
+    client->sent = false;
+    client->since_ns = now_ns;
+}
+
+/* Frames that come while nothing was asked belong to nothing. */
+static void drop_frames(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    if (client->link.handle != RTS_INVALID_HANDLE && client->link.type->receive(&client->link, now_ns) != 0)
+        ModbusLinkDrop(&client->link);
+}
+
+static void try_to_send(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    if (client->link.type->ready(&client->link, now_ns))
+        send(client, now_ns);
+    else if (is_too_late(client, now_ns))
+        fail(client, now_ns);
+}
+
+void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    if (client->device != NULL && client->sent) {
+        wait_for_reply(client, now_ns);
+        return;
+    }
+    drop_frames(client, now_ns);
+    if (client->device == NULL)
+        begin(client, now_ns);
+    if (client->device != NULL)
+        try_to_send(client, now_ns);
+}

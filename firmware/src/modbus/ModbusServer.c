@@ -1,0 +1,329 @@
+/*
+ * ModbusServer.c - this device as a Modbus server: memory that others read and write.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A reply is made in the buffer of its request. Registers and bits are moved by one function, which counts bits from the
+ * lowest of the first register on: byte n of them is at n ^ flip.
+ */
+#include "ModbusServer.h"
+
+#include <string.h>
+
+#include "CMUtils.h"
+#include "ModbusPdu.h"
+#include "SysLock.h"
+
+enum { TEXT_MAX = 100, REGISTER_SIZE = 2, ANY_UNIT = 255 };
+
+/* ---- memory ---- */
+
+/* Bits in memory, or in a PDU. */
+typedef struct {
+    RTS_UI8 *data;
+    RTS_UI32 at; /* bit */
+    RTS_UI32 flip;
+} BITS;
+
+/* Up to 8 bits within one byte. */
+static RTS_UI8 *byte_of(const BITS *bits)
+{
+    return bits->data + (bits->at / 8 ^ bits->flip);
+}
+
+static RTS_UI32 left_in_byte(const BITS *bits)
+{
+    return 8 - bits->at % 8;
+}
+
+static RTS_UI32 least(RTS_UI32 a, RTS_UI32 b)
+{
+    return a < b ? a : b;
+}
+
+static void move(BITS *to, BITS *from, RTS_UI32 count)
+{
+    while (count != 0) {
+        RTS_UI32 step = least(count, least(left_in_byte(to), left_in_byte(from)));
+        RTS_UI32 mask = (1u << step) - 1;
+        RTS_UI32 value = *byte_of(from) >> from->at % 8 & mask;
+        RTS_UI8 *byte = byte_of(to);
+        *byte = (RTS_UI8)((*byte & ~(mask << to->at % 8)) | value << to->at % 8);
+        to->at += step;
+        from->at += step;
+        count -= step;
+    }
+}
+
+static bool is_of_registers(RTS_UI8 table)
+{
+    return (table & (MODBUS_HOLDING_REGISTERS | MODBUS_INPUT_REGISTERS)) != 0;
+}
+
+static RTS_UI32 unit_of(RTS_UI8 table)
+{
+    return is_of_registers(table) ? MODBUS_REGISTER_BITS : 1;
+}
+
+/* Where the address is in a range; how many there are from it on is returned, 0: it is not there. */
+static RTS_UI32 find_in(const MODBUS_MEMORY *memory, RTS_UI8 table, RTS_UI32 address, BITS *found)
+{
+    const MODBUS_RANGE *range = memory->range;
+    RTS_UI32 first = is_of_registers(table) ? range->first_register : range->first_bit;
+    RTS_UI32 count = range->bits / unit_of(table);
+
+    if ((range->tables & table) == 0 || address < first || address - first >= count)
+        return 0;
+    found->data = memory->data;
+    found->at = (address - first) * unit_of(table);
+    found->flip = 1u ^ (range->reverse - 1u);
+    return count - (address - first);
+}
+
+static RTS_UI32 find(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, bool to_write, BITS *found)
+{
+    for (RTS_UI32 i = 0; i < server->range_count; i++) {
+        const MODBUS_MEMORY *memory = &server->memory[i];
+        RTS_UI32 there = find_in(memory, table, address, found);
+        if (there != 0)
+            return to_write && (memory->range->flags & MODBUS_RANGE_WRITABLE) == 0 ? 0 : there;
+    }
+    return 0;
+}
+
+/* Whether all of them are there. */
+static bool has_all(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, RTS_UI32 count, bool to_write)
+{
+    BITS found;
+
+    while (count != 0) {
+        RTS_UI32 there = least(count, find(server, table, address, to_write, &found));
+        if (there == 0)
+            return false;
+        address += there;
+        count -= there;
+    }
+    return true;
+}
+
+/* Moves them between memory and a PDU; `has_all`, and locked. */
+static void exchange(const MODBUS_SERVER *server, RTS_UI8 table, RTS_UI32 address, RTS_UI32 count, RTS_UI8 *data,
+                     bool to_write)
+{
+    BITS pdu = {data, 0, is_of_registers(table)};
+    BITS found = {NULL, 0, 0};
+
+    while (count != 0) {
+        RTS_UI32 there = least(count, find(server, table, address, to_write, &found));
+        if (to_write)
+            move(&found, &pdu, there * unit_of(table));
+        else
+            move(&pdu, &found, there * unit_of(table));
+        address += there;
+        count -= there;
+    }
+}
+
+/* ---- reading and writing ---- */
+
+static void mask_register(const MODBUS_SERVER *server, const MODBUS_REQUEST *request)
+{
+    RTS_UI8 value[REGISTER_SIZE];
+
+    exchange(server, request->function->table, request->write_address, 1, value, false);
+    for (RTS_UI32 i = 0; i < REGISTER_SIZE; i++) {
+        RTS_UI8 and_mask = request->data[i];
+        RTS_UI8 or_mask = request->data[REGISTER_SIZE + i];
+        value[i] = (RTS_UI8)((value[i] & and_mask) | (or_mask & ~and_mask));
+    }
+    exchange(server, request->function->table, request->write_address, 1, value, true);
+}
+
+static RTS_UI8 access(MODBUS_SERVER *server, const MODBUS_REQUEST *request, RTS_UI8 *pdu)
+{
+    RTS_UI8 table = request->function->table;
+    RTS_UI32 lock;
+
+    if (!has_all(server, table, request->read_address, request->read_count, false) ||
+        !has_all(server, table, request->write_address, request->write_count, true))
+        return MODBUS_ILLEGAL_ADDRESS;
+    lock = SysLockEnter();
+    if (request->function->function == MODBUS_MASK_WRITE_REGISTER)
+        mask_register(server, request);
+    else
+        exchange(server, table, request->write_address, request->write_count, request->data, true);
+    exchange(server, table, request->read_address, request->read_count, pdu + 2, false);
+    SysLockLeave(lock);
+    if (request->write_count != 0)
+        server->written++;
+    return 0;
+}
+
+/* Size of the reply after `access`: the data, or the beginning of the request. */
+static RTS_UI32 end_reply(const MODBUS_REQUEST *request, RTS_UI8 *pdu)
+{
+    RTS_UI32 bytes = ModbusDataSize(request->function, request->read_count);
+
+    if (request->function->most_read == 0)
+        return request->function->function == MODBUS_MASK_WRITE_REGISTER ? MODBUS_HEAD_SIZE : 5;
+    pdu[1] = (RTS_UI8)bytes;
+    return 2 + bytes;
+}
+
+/* The last byte of bits may have some that nobody asked for. */
+static void clear_last(const MODBUS_REQUEST *request, RTS_UI8 *pdu)
+{
+    pdu[1 + ModbusDataSize(request->function, request->read_count)] = 0;
+}
+
+static RTS_UI32 reply_access(MODBUS_SERVER *server, MODBUS_REQUEST *request, RTS_UI8 *pdu, RTS_UI8 *exception)
+{
+    if (request->function->most_read != 0 && request->function->most_written == 0)
+        clear_last(request, pdu);
+    *exception = access(server, request, pdu);
+    return end_reply(request, pdu);
+}
+
+/* ---- what the device is ---- */
+
+static RTS_UI32 put_text(const MODBUS_SERVER *server, RTS_UI32 object, RTS_UI8 *place)
+{
+    const char *text = server->object[object];
+    RTS_UI32 length = text != NULL ? CMUtlStrNLen(text, TEXT_MAX) : 0;
+
+    memcpy(place, text != NULL ? text : "", length);
+    return length;
+}
+
+static RTS_UI32 reply_server_id(const MODBUS_SERVER *server, RTS_UI8 *pdu)
+{
+    RTS_UI32 length = put_text(server, MODBUS_PRODUCT_NAME, pdu + 4);
+
+    pdu[1] = (RTS_UI8)(2 + length);
+    pdu[2] = server->unit;
+    pdu[3] = server->running ? 0xFF : 0;
+    return 4 + length;
+}
+
+enum { ID_BASIC = 1, ID_REGULAR = 2, ID_EXTENDED = 3, ID_INDIVIDUAL = 4, ID_CONFORMITY = 0x82, ID_HEAD = 7 };
+
+static bool has_object(const MODBUS_SERVER *server, RTS_UI32 object)
+{
+    return object < MODBUS_BASIC_OBJECTS || (server->object[object] != NULL && server->object[object][0] != '\0');
+}
+
+/* Appends objects from `object` to before `end`, as many as there is room for. Returns the size of the reply. */
+static RTS_UI32 put_objects(const MODBUS_SERVER *server, RTS_UI32 object, RTS_UI32 end, RTS_UI8 *pdu)
+{
+    RTS_UI32 size = ID_HEAD;
+
+    for (; object < end; object++) {
+        if (!has_object(server, object))
+            continue;
+        if (size + 2 + TEXT_MAX > MODBUS_MAX_PDU) {
+            pdu[4] = 0xFF; /* more follows, */
+            pdu[5] = (RTS_UI8)object;
+            return size;
+        }
+        RTS_UI32 length = put_text(server, object, pdu + size + 2);
+        pdu[size] = (RTS_UI8)object;
+        pdu[size + 1] = (RTS_UI8)length;
+        pdu[6]++;
+        size += 2 + length;
+    }
+    return size;
+}
+
+/* A stream begins with the first object if the one it is to begin with is none. */
+static RTS_UI32 reply_identification(const MODBUS_SERVER *server, RTS_UI8 *pdu, RTS_UI8 *exception)
+{
+    RTS_UI8 code = pdu[2];
+    RTS_UI32 object = pdu[3];
+    RTS_UI32 end = code == ID_BASIC ? MODBUS_BASIC_OBJECTS : MODBUS_OBJECTS;
+
+    if (pdu[1] != MODBUS_DEVICE_IDENTIFICATION)
+        *exception = MODBUS_ILLEGAL_FUNCTION;
+    else if (code < ID_BASIC || code > ID_INDIVIDUAL)
+        *exception = MODBUS_ILLEGAL_VALUE;
+    else if (code == ID_INDIVIDUAL && (object >= MODBUS_OBJECTS || !has_object(server, object)))
+        *exception = MODBUS_ILLEGAL_ADDRESS;
+    if (*exception != 0)
+        return 0;
+    if (code == ID_INDIVIDUAL)
+        end = object + 1;
+    else if (object >= end)
+        object = 0;
+    pdu[3] = ID_CONFORMITY;
+    memset(pdu + 4, 0, 3);
+    return put_objects(server, object, end, pdu);
+}
+
+/* ---- requests ---- */
+
+static RTS_UI32 reply(MODBUS_SERVER *server, MODBUS_REQUEST *request, RTS_UI8 *pdu, RTS_UI8 *exception)
+{
+    switch (request->function->function) {
+    case MODBUS_REPORT_SERVER_ID:
+        return reply_server_id(server, pdu);
+    case MODBUS_ENCAPSULATED:
+        return reply_identification(server, pdu, exception);
+    default:
+        return reply_access(server, request, pdu, exception);
+    }
+}
+
+RTS_UI32 ModbusServerReply(MODBUS_SERVER *server, RTS_UI8 *pdu, RTS_UI32 size)
+{
+    MODBUS_REQUEST request;
+    RTS_UI8 function = pdu[0];
+    RTS_UI8 exception = ModbusReadRequest(pdu, size, &request);
+
+    server->requests++;
+    size = exception == 0 ? reply(server, &request, pdu, &exception) : 0;
+    if (exception == 0)
+        return size;
+    server->errors++;
+    pdu[0] = function | MODBUS_EXCEPTION;
+    pdu[1] = exception;
+    return 2;
+}
+
+static bool is_for(const MODBUS_SERVER *server, RTS_UI8 unit)
+{
+    if (!server->tcp)
+        return unit == server->unit || unit == MODBUS_BROADCAST;
+    return server->unit == 0 || unit == server->unit || unit == 0 || unit == ANY_UNIT;
+}
+
+/* On TCP 0 is not all devices, but the one that is connected. */
+static bool wants_reply(const MODBUS_SERVER *server, RTS_UI8 unit)
+{
+    return server->tcp || unit != MODBUS_BROADCAST;
+}
+
+/* A client of TCP need not wait until it gives up: there is no such device here. */
+static RTS_UI32 reply_no_target(RTS_UI8 *pdu)
+{
+    pdu[0] |= MODBUS_EXCEPTION;
+    pdu[1] = MODBUS_NO_TARGET;
+    return 2;
+}
+
+bool ModbusServerPoll(MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    RTS_UI32 size = link->type->receive(link, now_ns);
+    RTS_UI8 unit = link->frame[MODBUS_AT_UNIT];
+    RTS_UI8 *pdu = link->frame + MODBUS_AT_PDU;
+
+    if (size == 0)
+        return false;
+    if (is_for(server, unit))
+        size = ModbusServerReply(server, pdu, size);
+    else
+        size = server->tcp ? reply_no_target(pdu) : 0;
+    if (size != 0 && wants_reply(server, unit))
+        link->type->send(link, size, now_ns);
+    else
+        ModbusLinkDrop(link);
+    return true;
+}

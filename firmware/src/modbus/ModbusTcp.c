@@ -1,0 +1,150 @@
+/*
+ * ModbusTcp.c - frames of Modbus on a TCP connection.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "ModbusTcp.h"
+
+#include "ModbusPdu.h"
+#include "rts_config.h"
+
+enum { NS_PER_MS = 1000000, LENGTH_MIN = 2, LENGTH_MAX = 1 + MODBUS_MAX_PDU };
+
+static const MODBUS_LINK_TYPE tcp = {ModbusTcpReady, ModbusTcpReceive, ModbusTcpSend};
+
+static bool is_open(const MODBUS_LINK *link)
+{
+    return link->handle != RTS_INVALID_HANDLE;
+}
+
+/* ---- connections ---- */
+
+void ModbusTcpBegin(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns)
+{
+    link->type = &tcp;
+    link->handle = socket;
+    link->sending = false;
+    link->connecting = false;
+    link->fill = 0;
+    link->began_ns = link->moved_ns = now_ns;
+}
+
+void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
+{
+    ModbusTcpBegin(link, RTS_INVALID_HANDLE, -(RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS);
+    link->peer = *peer;
+}
+
+void ModbusTcpClose(MODBUS_LINK *link)
+{
+    if (is_open(link))
+        SysSockClose(link->handle);
+    link->handle = RTS_INVALID_HANDLE;
+    link->sending = false;
+    link->connecting = false;
+    link->fill = 0;
+}
+
+static void connect_again(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    if (now_ns - link->began_ns < (RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS)
+        return;
+    ModbusTcpBegin(link, SysSockConnect(&link->peer), now_ns);
+    link->connecting = is_open(link);
+}
+
+static void look_at_connecting(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    RTS_RESULT result = SysSockGetConnected(link->handle);
+
+    if (result == ERR_OK)
+        link->connecting = false;
+    else if (result != ERR_PENDING || now_ns - link->began_ns >= (RTS_I64)MODBUS_CONNECT_MS * NS_PER_MS)
+        ModbusTcpClose(link);
+}
+
+bool ModbusTcpReady(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    if (!is_open(link))
+        connect_again(link, now_ns);
+    if (link->connecting)
+        look_at_connecting(link, now_ns);
+    return is_open(link) && !link->connecting && !link->sending;
+}
+
+/* ---- sending ---- */
+
+static void transmit(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    RTS_UI32 taken;
+
+    if (SysSockSend(link->handle, link->frame + link->sent, (RTS_UI32)link->fill - link->sent, &taken) != ERR_OK) {
+        ModbusTcpClose(link);
+        return;
+    }
+    if (taken != 0)
+        link->moved_ns = now_ns;
+    link->sent = (RTS_UI16)(link->sent + taken);
+    if (link->sent < link->fill)
+        return;
+    link->sending = false;
+    link->fill = 0;
+}
+
+void ModbusTcpSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
+{
+    ModbusPut16(link->frame + MODBUS_AT_PROTOCOL, 0);
+    ModbusPut16(link->frame + MODBUS_AT_LENGTH, 1 + pdu_size);
+    link->fill = (RTS_UI16)(MODBUS_AT_PDU + pdu_size);
+    link->sent = 0;
+    link->sending = true;
+    transmit(link, now_ns);
+}
+
+/* ---- receiving ---- */
+
+static RTS_UI32 length_of(const MODBUS_LINK *link)
+{
+    return ModbusGet16(link->frame + MODBUS_AT_LENGTH);
+}
+
+/* Reads up to `end` bytes of the frame; true when they are all there. */
+static bool has_read(MODBUS_LINK *link, RTS_UI32 end, RTS_I64 now_ns)
+{
+    RTS_UI32 size;
+
+    if (link->fill >= end)
+        return true;
+    if (SysSockRecv(link->handle, link->frame + link->fill, end - link->fill, &size) != ERR_OK) {
+        ModbusTcpClose(link);
+        return false;
+    }
+    if (size != 0)
+        link->moved_ns = now_ns;
+    link->fill = (RTS_UI16)(link->fill + size);
+    return link->fill == end;
+}
+
+static bool is_header_good(MODBUS_LINK *link)
+{
+    if (ModbusGet16(link->frame + MODBUS_AT_PROTOCOL) == 0 && length_of(link) >= LENGTH_MIN &&
+        length_of(link) <= LENGTH_MAX)
+        return true;
+    link->bad_frames++;
+    ModbusTcpClose(link);
+    return false;
+}
+
+RTS_UI32 ModbusTcpReceive(MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    if (!is_open(link) || link->connecting)
+        return 0;
+    if (link->sending) {
+        transmit(link, now_ns);
+        return 0;
+    }
+    if (!has_read(link, MODBUS_AT_PDU, now_ns) || !is_header_good(link) ||
+        !has_read(link, MODBUS_AT_UNIT + length_of(link), now_ns))
+        return 0;
+    return length_of(link) - 1;
+}

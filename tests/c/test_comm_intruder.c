@@ -1,0 +1,236 @@
+/*
+ * test_comm_intruder.c - on a network: peers that open channels for nothing, guess ids, or pretend to be another one.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "channel_fixture.h"
+
+RTS_STATIC_ASSERT(COMM_ENDPOINTS, built_for_a_network);
+RTS_STATIC_ASSERT(COMM_MAX_CLIENTS == 4, built_for_four_clients);
+
+enum { ADDRESS = 0x0102, INTRUDER = 0x0666 };
+
+static REPLY answer;
+
+static bool is_served(CLIENT *who)
+{
+    return client_request(who, SG_APPLICATION, SRV_APP_READ_APPLICATION_LIST, NULL, 0, &answer) &&
+           reply_error(&answer) == ERR_OK;
+}
+
+/* Time passes, and what the device says meanwhile is ignored. */
+static void pass(RTS_UI32 ms)
+{
+    fakes_cycle(ms);
+    while (SimLinkReceive(package, sizeof(package)) != 0) {
+    }
+}
+
+/* Opens a channel, whatever the device says to others because of it. */
+static bool comes_in(CLIENT *who)
+{
+    int result = -1;
+
+    client_send_open(who, 7, NETSERVER_MESSAGE_SIZE);
+    for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS && result == -1; i++)
+        result = client_take_open(who);
+    return result == CHANNEL_OPEN_OK;
+}
+
+/* A client that is logged in. */
+static void start(void)
+{
+    fakes_start();
+    client_init(&client, ADDRESS);
+    CHECK(client_connect(&client) && is_served(&client));
+    pass(CHANNEL_COMPLAINT_MS);
+}
+
+/* All ids as quickly as the line has them, from `address`, in packages of this type. */
+static void guess_all_ids(RTS_UI16 address, RTS_UI8 type)
+{
+    CLIENT guess = {.address = address};
+
+    for (RTS_UI32 id = 1; id <= CHANNEL_ID_MAX; id++) {
+        guess.channel = (RTS_UI16)id;
+        if (type == CHANNEL_PKG_CLOSE_REQ)
+            client_send_close(&guess);
+        else
+            client_send_block(&guess, client.sent + 1, NEXT, message, 8, 0, 8);
+        pass(id % 1000 == 0);
+    }
+}
+
+static void guessing_all_ids_from_elsewhere_closes_nothing(void)
+{
+    start();
+    guess_all_ids(INTRUDER, CHANNEL_PKG_CLOSE_REQ);
+    guess_all_ids(INTRUDER, CHANNEL_PKG_DATA);
+    CHECK(is_served(&client));
+}
+
+static void guessing_all_ids_in_the_name_of_the_client_closes_nothing(void)
+{
+    start();
+    guess_all_ids(ADDRESS, CHANNEL_PKG_CLOSE_REQ);
+    CHECK(is_served(&client));
+}
+
+static void a_close_request_works_again_when_the_guessing_has_ended(void)
+{
+    start();
+    guess_all_ids(ADDRESS, CHANNEL_PKG_CLOSE_REQ);
+    client_send_close(&client);
+    CHECK(is_served(&client));
+    pass(CHANNEL_COMPLAINT_MS);
+    client_send_close(&client);
+    CHECK(!is_served(&client));
+}
+
+static void blocks_in_the_name_of_the_client_close_nothing(void)
+{
+    start();
+    guess_all_ids(ADDRESS, CHANNEL_PKG_DATA);
+    CHECK_EQUAL(counters()->failed, 0);
+    CHECK(ChannelIsOpen(ChannelGetClient(0)));
+}
+
+static void a_channel_without_login_ends(void)
+{
+    CLIENT idle;
+
+    start();
+    client_init(&idle, INTRUDER);
+    CHECK(client_open(&idle));
+    for (RTS_UI32 ms = 0; ms < CHANNEL_LOGIN_MS; ms += CHANNEL_KEEPALIVE_MS) {
+        CHECK(works(&idle)); /* what it says without a login does not help */
+        pass(CHANNEL_KEEPALIVE_MS);
+    }
+    CHECK(!works(&idle));
+    CHECK(is_served(&client));
+}
+
+static void a_channel_with_login_stays(void)
+{
+    start();
+    for (RTS_UI32 ms = 0; ms < 3 * CHANNEL_LOGIN_MS; ms += CHANNEL_KEEPALIVE_MS) {
+        pass(CHANNEL_KEEPALIVE_MS);
+        CHECK(is_served(&client));
+    }
+}
+
+static void after_a_logout_there_is_time_for_another_login(void)
+{
+    start();
+    pass(CHANNEL_LOGIN_MS - 1);
+    CHECK(is_served(&client));
+    pass(1);
+    SrvEndSession(ChannelGetClient(0));
+    pass(CHANNEL_LOGIN_MS - 1);
+    CHECK(client_login(&client) && client_login_app(&client) && is_served(&client));
+}
+
+static void a_storm_of_open_requests_does_not_end_a_login(void)
+{
+    CLIENT crowd[2 * COMM_MAX_CLIENTS];
+    CLIENT newcomer;
+
+    fakes_start();
+    for (RTS_UI16 i = 0; i < RTS_COUNT(crowd); i++)
+        client_init(&crowd[i], (RTS_UI16)(INTRUDER + i));
+    client_init(&newcomer, ADDRESS);
+    for (RTS_UI32 i = 0; i < COMM_MAX_CLIENTS; i++)
+        client_send_open(&crowd[i], 1, NETSERVER_MESSAGE_SIZE);
+    pass(0);
+    CHECK(comes_in(&newcomer) && works(&newcomer));
+    for (RTS_UI32 i = 0; i < RTS_COUNT(crowd); i++)
+        client_send_open(&crowd[i], 2, NETSERVER_MESSAGE_SIZE);
+    pass(0);
+    CHECK(client_login(&newcomer) && client_login_app(&newcomer) && is_served(&newcomer));
+}
+
+static void those_who_hold_channels_without_login_give_way_after_a_while(void)
+{
+    CLIENT crowd[COMM_MAX_CLIENTS];
+    CLIENT newcomer;
+
+    fakes_start();
+    for (RTS_UI16 i = 0; i < RTS_COUNT(crowd); i++) {
+        client_init(&crowd[i], (RTS_UI16)(INTRUDER + i));
+        CHECK(client_open(&crowd[i]) && works(&crowd[i]));
+    }
+    client_init(&newcomer, ADDRESS);
+    CHECK(!comes_in(&newcomer));
+    pass(CHANNEL_SETTLE_MS);
+    CHECK(comes_in(&newcomer) && client_login(&newcomer));
+}
+
+/* Reads memory, files and traces in other runtimes: groups 0x0F, 8 and their neighbours. */
+static void there_are_no_services_but_those_of_the_documentation(void)
+{
+    start();
+    for (RTS_UI16 group = 0; group < L7_REPLY; group++) {
+        bool known = group == SG_DEVICE || group == SG_APPLICATION || group == SG_LOG || group == SG_PLCSHELL ||
+                     group == SG_MONITORING2;
+        CHECK(client_request(&client, group, 0xFE, NULL, 0, &answer));
+        CHECK_EQUAL(reply_error(&answer), known ? ERR_L7_UNKNOWNCMD : ERR_L7_UNKNOWNCMDGROUP);
+    }
+}
+
+static const RTS_UI16 groups[] = {SG_DEVICE, SG_APPLICATION, SG_LOG, SG_PLCSHELL, SG_MONITORING2};
+enum { LAST_TAG = 0x90, LONG_CONTENT = 1000 };
+
+/* One element after another in a container, or none of them: of this tag, and of `size` bytes. */
+static void send_tag(RTS_UI32 group, RTS_UI32 service, RTS_UI32 container, RTS_UI32 tag, RTS_UI32 size)
+{
+    static RTS_UI8 content[LONG_CONTENT + 32];
+    BTAG_WRITER writer;
+
+    BTagWriterInit(&writer, content, sizeof(content));
+    if (container != 0)
+        BTagOpen(&writer, container, BTAG_ALIGN_0);
+    BTagOpen(&writer, tag, BTAG_ALIGN_0);
+    memset(BTagReserve(&writer, size), 0xFF, size);
+    BTagClose(&writer);
+    if (container != 0)
+        BTagClose(&writer);
+    CHECK(client_request(&client, (RTS_UI16)group, (RTS_UI16)service, content, writer.size, &answer));
+}
+
+static void every_service_survives_every_tag_of_every_size(void)
+{
+    static const RTS_UI32 containers[] = {0, 0x81, 0x82, 0x83};
+    static const RTS_UI32 sizes[] = {0, 1, 2, 3, 4, 7, 8, 12, 16, 61, 255, LONG_CONTENT};
+
+    start();
+    for (RTS_UI32 g = 0; g < RTS_COUNT(groups); g++)
+        for (RTS_UI32 service = 1; service < L7_REPLY; service++)
+            for (RTS_UI32 c = 0; c < RTS_COUNT(containers); c++) {
+                send_tag(groups[g], service, containers[c], 0, 0);
+                if (reply_error(&answer) == ERR_L7_UNKNOWNCMD)
+                    break;
+                for (RTS_UI32 tag = 0; tag <= LAST_TAG; tag++)
+                    for (RTS_UI32 s = 0; s < RTS_COUNT(sizes); s++) {
+                        if (!SrvIsLoggedIn(ChannelGetClient(0)))
+                            CHECK(client_login(&client) && client_login_app(&client));
+                        send_tag(groups[g], service, containers[c], tag, sizes[s]);
+                    }
+            }
+    CHECK(client_login(&client) && client_login_app(&client) && is_served(&client));
+}
+
+int main(void)
+{
+    RUN(guessing_all_ids_from_elsewhere_closes_nothing);
+    RUN(guessing_all_ids_in_the_name_of_the_client_closes_nothing);
+    RUN(a_close_request_works_again_when_the_guessing_has_ended);
+    RUN(blocks_in_the_name_of_the_client_close_nothing);
+    RUN(a_channel_without_login_ends);
+    RUN(a_channel_with_login_stays);
+    RUN(after_a_logout_there_is_time_for_another_login);
+    RUN(a_storm_of_open_requests_does_not_end_a_login);
+    RUN(those_who_hold_channels_without_login_give_way_after_a_while);
+    RUN(there_are_no_services_but_those_of_the_documentation);
+    RUN(every_service_survives_every_tag_of_every_size);
+    return test_result();
+}
