@@ -8,6 +8,7 @@ import pytest
 from environment import MACHINE, TARGET, eventually, firmware
 from programs import program
 from qemu import Board
+from test_headroom import HEADROOM
 
 from plctool.compiler import IoFiles, compile_sources
 from plctool.debug.symbols import symbol_path
@@ -51,7 +52,7 @@ def test_outputs_are_the_leds_of_the_board(tmp_path: Path) -> None:
         plc.flash(image)
         eventually(lambda: leds() == 3)
         assert plc.read("Main.pressed") is False
-        assert plc.io_devices()[0].ok
+        assert plc.io_devices()[0].state == "ok"
         plc.stop()
         assert leds() == 1
         plc.start()
@@ -60,3 +61,4 @@ def test_outputs_are_the_leds_of_the_board(tmp_path: Path) -> None:
         with pytest.raises(DeviceError, match=r"gpio \(IoDrvGpio\): this device has no line LED7"):
             plc.flash(build(tmp_path / "bad", LINES.replace("LED1", "LED7")))
         eventually(lambda: leds() == 3)  # what ran before runs again
+        assert plc.stack().unused >= HEADROOM  # the deepest that there is
