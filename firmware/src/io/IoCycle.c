@@ -105,12 +105,10 @@ static const IoConfigTaskMap *get_map(RTS_UI32 task, RTS_UI32 type)
 
 typedef IO_DRIVER *(*PF_DRIVER_OF)(RTS_UI32 connector);
 
-/* The connectors of a map from `map` on that go to one driver, or to none. */
+/* The end of those connectors from `map` on that go to one driver, or to none. */
 static const IoConfigConnectorMap *end_of_run(const IoConfigConnectorMap *map, const IoConfigConnectorMap *end,
-                                              PF_DRIVER_OF driver_of)
+                                              PF_DRIVER_OF driver_of, const IO_DRIVER *driver)
 {
-    IO_DRIVER *driver = driver_of(map->connector);
-
     while (++map < end && driver_of(map->connector) == driver) {
     }
     return map;
@@ -143,7 +141,7 @@ static void read_inputs(const IoConfigTaskMap *task_map)
 
     for (; map < end; map = next) {
         IO_DRIVER *driver = IoDeviceGetWell(map->connector);
-        next = end_of_run(map, end, IoDeviceGetWell);
+        next = end_of_run(map, end, IoDeviceGetWell, driver);
         if (driver == NULL) {
             substitute(map, next);
         } else if (driver->functions->IoDrvReadInputs != NULL && enter_driver(driver)) {
@@ -193,8 +191,9 @@ static void write_to(IO_DRIVER *driver, const IoConfigTaskMap *task_map, PF_WRIT
     const IoConfigConnectorMap *next;
 
     for (; map < end; map = next) {
-        next = end_of_run(map, end, IoDeviceGetDriver);
-        if (IoDeviceGetDriver(map->connector) == driver)
+        IO_DRIVER *other = IoDeviceGetDriver(map->connector);
+        next = end_of_run(map, end, IoDeviceGetDriver, other);
+        if (other == driver)
             write(driver, map, (int)(next - map));
     }
 }
@@ -207,7 +206,7 @@ static void write_outputs(RTS_UI32 task, const IoConfigTaskMap *task_map)
 
     for (; map < end; map = next) {
         IO_DRIVER *driver = IoDeviceGetDriver(map->connector);
-        next = end_of_run(map, end, IoDeviceGetDriver);
+        next = end_of_run(map, end, IoDeviceGetDriver, driver);
         if (driver == NULL || driver->functions->IoDrvWriteOutputs == NULL || !enter_or_note(driver, 1u << task))
             continue;
         write_all(driver, map, (int)(next - map));
