@@ -19,6 +19,7 @@
 #include "IoDrv.h"
 #include "IoMgrConfig.h"
 #include "IoMgrDevices.h"
+#include "IoMgrRequests.h"
 
 /* ---- drivers (8.4) ---- */
 
@@ -38,23 +39,10 @@ bool IoMgrConfigIsMine(const IoConfigConnector *connector, const IO_DRIVER *driv
  */
 RTS_RESULT IoMgrConfigRefuse(const IoConfigConnector *connector, RTS_RESULT result, const char *format, ...);
 
-/* ---- requests (8.2.3). From main; an error of the driver, ERR_NOT_SUPPORTED: it has no such function,
- * ERR_INVALIDID: there is no such connector, ERR_NO_OBJECT: it has no driver, or no such parameter. ---- */
-
-RTS_RESULT IoMgrReadParameter(RTS_UI32 connector, RTS_UI32 id, void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
-RTS_RESULT IoMgrWriteParameter(RTS_UI32 connector, RTS_UI32 id, const void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
-RTS_RESULT IoMgrIdentify(RTS_UI32 connector);
-RTS_RESULT IoMgrScanModules(RTS_UI32 connector, RTS_UI32 index, IoDrvModule *module);
-
-/* How often a task found the driver of a connector busy, since the start of the runtime. */
-RTS_UI32 IoMgrGetSkipped(RTS_UI32 connector);
-
 /* Events of the component; manual's numbers. */
 enum {
     EVT_PrepareUpdateConfiguration = 0x10001,
     EVT_DoneUpdateConfiguration = 0x10002,
-    EVT_PrepareUpdateMapping = 0x10005,
-    EVT_DoneUpdateMapping = 0x10006,
 };
 
 RTS_RESULT CmpIoMgrEmbedded_Hook(CMP_HOOK hook);

@@ -23,6 +23,9 @@ void IoMgrConfigResetDiagnosis(const IoConfigConnector *connector, RTS_UI32 flag
 /* Good data came from the device now, or went to it: it is found, configured, active and without error, and the age
  * of its data is 0. */
 void IoMgrConfigNoteData(const IoConfigConnector *connector);
+/* The same for a device that is always at hand, such as lines of the board: its data is of the moment it is read, until
+ * an error is set. */
+void IoMgrConfigNoteAlive(const IoConfigConnector *connector);
 /* Something failed, and the device is not lost for that. */
 void IoMgrConfigNoteError(const IoConfigConnector *connector);
 

@@ -21,6 +21,7 @@ enum { PLACES = CYCLE_MAX_PHASES > 0 ? CYCLE_MAX_PHASES : 1 };
 /* In the order of registration. */
 static struct {
     RTS_UI32 count;
+    RTS_UI32 used; /* a bit for each phase that has one */
     ENTRY row[PLACES];
 } phases;
 
@@ -31,6 +32,7 @@ RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run)
     phases.row[phases.count].when = when;
     phases.row[phases.count].run = run;
     phases.count++;
+    phases.used |= 1u << when;
     return ERR_OK;
 }
 
@@ -43,7 +45,9 @@ void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task, const IEC_CONTEXT *context)
 {
     RTS_UI32 i;
 
-    for (i = 0; CyclePhasesExist() && i < phases.count; i++) {
+    if (CYCLE_MAX_PHASES == 0 || (phases.used >> when & 1) == 0)
+        return;
+    for (i = 0; i < phases.count; i++) {
         if (phases.row[i].when == when)
             phases.row[i].run(task, context);
     }

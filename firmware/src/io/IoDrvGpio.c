@@ -152,7 +152,7 @@ static RTS_RESULT open_group(GROUP *group, const IoConfigConnector *connector, c
     if (result == ERR_OK)
         result = SysGpioOpen((RTS_UI32)(group - groups), BytesGet32(group->out));
     if (result == ERR_OK)
-        IoMgrConfigNoteData(connector);
+        IoMgrConfigNoteAlive(connector);
     else
         close_group(group);
     return result;
@@ -168,7 +168,7 @@ static RTS_RESULT use_group(GROUP *group, const IoConfigConnector *connector)
                                  (unsigned)IO_GPIO_GROUPS);
     if (group->lines == crc_of_lines(connector)) {
         group->connector = connector;
-        IoMgrConfigNoteData(connector);
+        IoMgrConfigNoteAlive(connector);
         return ERR_OK;
     }
     close_group(group);
@@ -251,14 +251,6 @@ static GROUP *find_group(const IoConfigConnectorMap *map)
     return group;
 }
 
-static void note_result(const GROUP *group, RTS_RESULT result)
-{
-    if (result == ERR_OK)
-        IoMgrConfigNoteData(group->connector);
-    else
-        IoMgrConfigSetDiagnosis(group->connector, CF_CONNECTOR_ERROR);
-}
-
 static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
 {
     for (; count > 0; count--, maps++) {
@@ -269,9 +261,10 @@ static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
         RTS_UI32 lock;
         RTS_RESULT result = SysGpioRead((RTS_UI32)(group - groups), &values);
 
-        note_result(group, result);
-        if (result != ERR_OK)
+        if (result != ERR_OK) {
+            IoMgrConfigSetDiagnosis(group->connector, CF_CONNECTOR_ERROR);
             continue;
+        }
         BytesPut32(group->in, values);
         lock = SysLockEnter();
         for (; channels > 0; channels--)
@@ -296,7 +289,7 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
         result = group->lines != 0 ? SysGpioWrite((RTS_UI32)(group - groups), group->outputs, BytesGet32(group->out))
                                    : (RTS_RESULT)ERR_DEVICE;
         if (result != ERR_OK)
-            note_result(group, result);
+            IoMgrConfigSetDiagnosis(group->connector, CF_CONNECTOR_ERROR);
     }
     return ERR_OK;
 }

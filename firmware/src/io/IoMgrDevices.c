@@ -19,6 +19,7 @@ enum {
     HAD_DATA = 0x00010000,  /* good_ms counts */
     BUS_CYCLE = 0x00020000, /* has one of its own */
     BUS_WAITS = 0x00040000, /* was left to who is in the driver */
+    ALIVE = 0x00080000,     /* its data is of now */
     TOLD_SHIFT = 20,        /* what the log knows, HEALTH_*: two bits */
     BUS_TASK_SHIFT = 24,    /* to the top */
 };
@@ -62,8 +63,13 @@ void IoMgrConfigSetDiagnosis(const IoConfigConnector *connector, RTS_UI32 flags)
 
     if (device == NULL)
         return;
-    if ((flags & CF_ERRORS) != 0)
+    if ((flags & CF_ERRORS) != 0) {
         (void)SysAtomicAdd(&device->errors, 1);
+        if ((SysAtomicLoad(&device->flags) & ALIVE) != 0)
+            SysAtomicStore(&device->good_ms, SysTimeGetMs());
+        change(&device->flags, ALIVE, flags);
+        return;
+    }
     change(&device->flags, 0, flags);
 }
 
@@ -85,6 +91,15 @@ void IoMgrConfigNoteData(const IoConfigConnector *connector)
     SysAtomicStore(&device->good_ms, SysTimeGetMs());
     if ((SysAtomicLoad(&device->flags) & (good | CF_ERRORS)) != good)
         change(&device->flags, CF_ERRORS, good);
+}
+
+void IoMgrConfigNoteAlive(const IoConfigConnector *connector)
+{
+    DEVICE *device = device_of(connector);
+
+    IoMgrConfigNoteData(connector);
+    if (device != NULL)
+        change(&device->flags, 0, ALIVE);
 }
 
 void IoMgrConfigNoteError(const IoConfigConnector *connector)
@@ -186,12 +201,15 @@ void IoDeviceSetDriver(RTS_UI32 index, IO_DRIVER *driver)
 /* ---- what others see ---- */
 
 /* Ages that a clock of 32 bits cannot tell from short ones any more are none. */
-static RTS_UI32 age_of(DEVICE *device, RTS_UI32 now_ms)
+static RTS_UI32 age_of(DEVICE *device, RTS_UI32 flags)
 {
-    RTS_UI32 age = now_ms - SysAtomicLoad(&device->good_ms);
+    RTS_UI32 age;
 
-    if ((SysAtomicLoad(&device->flags) & HAD_DATA) == 0)
+    if ((flags & ALIVE) != 0)
+        return 0;
+    if ((flags & HAD_DATA) == 0)
         return 0xFFFFFFFFu;
+    age = SysTimeGetMs() - SysAtomicLoad(&device->good_ms);
     if (age < 0xF0000000u)
         return age;
     if (age > 0xFFFFFF00u)
@@ -204,7 +222,7 @@ static void get_state(DEVICE *device, IO_DEVICE_STATE *state)
 {
     RTS_UI32 flags = SysAtomicLoad(&device->flags);
 
-    state->age_ms = age_of(device, SysTimeGetMs());
+    state->age_ms = age_of(device, flags);
     state->errors = SysAtomicLoad(&device->errors);
     state->flags = flags & 0xFFFF;
     state->ok = health_of(flags) == HEALTH_GOOD;

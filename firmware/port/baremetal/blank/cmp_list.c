@@ -3,6 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#include "IoDrvBlank.h"
+
 #define HAS_CmpLog 1
 #define HAS_CmpEventMgrEmbedded 1
 #define HAS_CmpRetain 1
@@ -14,4 +16,5 @@
 #define HAS_CmpPlcShell 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
+#define PORT_COMPONENTS(X) X(IoDrvBlank)
 #include "CmpList.h"

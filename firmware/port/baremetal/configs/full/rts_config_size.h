@@ -13,6 +13,7 @@
 #define APP_RETAIN_SIZE 2048
 #define APP_MEMORY_SIZE 1024
 #define IO_MAX_CONNECTORS 8
+#define RTS_MAIN_STACK_SIZE 3584 /* a driver refuses its configuration, and what ran before is loaded again */
 #define RTS_IEC_STACK_SIZE 2048
 #define NETSERVER_MESSAGE_SIZE 2048
 #ifndef COMM_MAX_CLIENTS
