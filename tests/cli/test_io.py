@@ -48,7 +48,7 @@ def test_build_prints_how_old_inputs_may_be(tool, program: Path) -> None:  # typ
     done = tool("build", "main.st")
     assert done.out.splitlines()[1] == "3 channels of inputs and outputs; oldest input: Bench.button, up to 10 ms"
     oldest = {"channel": "Bench.button", "age_us": 10000}
-    assert tool("build", "main.st", "--json").json["io"] == {"channels": 3, "oldest_input": oldest}
+    assert tool("build", "main.st", "--json").json["io"] == {"channels": 3, "oldest_input": oldest, "lines": []}
 
 
 def test_map_lists_channels(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
@@ -109,6 +109,14 @@ def test_plant_in_a_file_is_attached(tool, program: Path) -> None:  # type: igno
     )
     tool("build", "main.st")
     found = tool("run", "app.cdl", "--time", "T#95ms", "--plant", "plant.py", "--get", "Bench.level", "--json").json
+    assert found["values"]["Bench.level"] == 9
+
+
+def test_plant_in_st_is_compiled_and_attached(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
+    (program / "plant").mkdir()
+    (program / "plant" / "p.st").write_text("PROGRAM P\nVAR level : INT; END_VAR\nlevel := level + 1;\nEND_PROGRAM\n")
+    tool("build", "main.st")
+    found = tool("run", "app.cdl", "--time", "T#95ms", "--plant", "plant/p.st", "--get", "Bench.level", "--json").json
     assert found["values"]["Bench.level"] == 9
 
 
