@@ -320,7 +320,7 @@
 #define CAN_BIT_RATE 500000
 #endif
 
-/* The serial line that carries CAN frames, where there is no controller (SysCanSlcan.c). */
+/* The serial line that carries CAN frames, where there is no controller (CanOnSerial.c). */
 #ifndef CAN_SLCAN_LINE
 #define CAN_SLCAN_LINE 1
 #endif

@@ -127,7 +127,10 @@ static void a_tool_that_stops_in_the_middle_blocks_no_other(void)
     CHECK(can_connect(&client, tool));
     CHECK(echo(&client));
     for (int i = 0; i < 2 * CAN_RX_SESSIONS; i++)
-        can_frame(mute, DEVICE_NODE, "\x11\x90" "abcdef", 8);
+        can_frame(mute, DEVICE_NODE,
+                  "\x11\x90"
+                  "abcdef",
+                  8);
     CHECK(echo(&client));
     can_drain(tool);
     CHECK(BlkDrvCanGetCounters()->unsent != 0);
@@ -221,7 +224,7 @@ static void frames_of_others_are_left_alone(void)
         {CAN_ID_BASE | 5 << 8 | 200, CAN_FLAG_EXTENDED | CAN_FLAG_REMOTE},
         {CAN_ID_BASE | 5 << 8 | 255, CAN_FLAG_EXTENDED},
         {CAN_ID_BASE | 5 << 8 | 0, CAN_FLAG_EXTENDED},
-        {CAN_ID_BASE | 5 << 8 | 7, CAN_FLAG_EXTENDED},   /* another device */
+        {CAN_ID_BASE | 5 << 8 | 7, CAN_FLAG_EXTENDED},     /* another device */
         {CAN_ID_BASE | 255 << 8 | 200, CAN_FLAG_EXTENDED}, /* ISO-TP to all */
     };
 

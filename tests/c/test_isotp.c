@@ -159,18 +159,30 @@ static void the_frames_are_those_of_the_standard(void)
     ISOTP_TX tx = {.state = ISOTP_TX_IDLE};
 
     (void)IsoTpStart(&tx, (const RTS_UI8 *)"abc", 3, CLASSIC, 0);
-    CHECK(IsoTpNext(&tx, frame, 0) == 4 && memcmp(frame, "\x03" "abc", 4) == 0);
+    CHECK(IsoTpNext(&tx, frame, 0) == 4 && memcmp(frame,
+                                                  "\x03"
+                                                  "abc",
+                                                  4) == 0);
     IsoTpSent(&tx, 0);
     CHECK(!IsoTpIsSending(&tx));
     (void)IsoTpStart(&tx, (const RTS_UI8 *)"abcdefghij", 10, CLASSIC, 0);
-    CHECK(IsoTpNext(&tx, frame, 0) == 8 && memcmp(frame, "\x10\x0A" "abcdef", 8) == 0);
+    CHECK(IsoTpNext(&tx, frame, 0) == 8 && memcmp(frame,
+                                                  "\x10\x0A"
+                                                  "abcdef",
+                                                  8) == 0);
     IsoTpSent(&tx, 0);
     CHECK_EQUAL(IsoTpNext(&tx, frame, 0), 0);
     (void)IsoTpTakeFlow(&tx, (const RTS_UI8 *)"\x30\0\0", 3, 0);
-    CHECK(IsoTpNext(&tx, frame, 0) == 5 && memcmp(frame, "\x21" "ghij", 5) == 0);
+    CHECK(IsoTpNext(&tx, frame, 0) == 5 && memcmp(frame,
+                                                  "\x21"
+                                                  "ghij",
+                                                  5) == 0);
     IsoTpSent(&tx, 0);
     (void)IsoTpStart(&tx, (const RTS_UI8 *)"abcdefghij", 10, ISOTP_MAX_FRAME, 0); /* FD */
-    CHECK(IsoTpNext(&tx, frame, 0) == 12 && memcmp(frame, "\0\x0A" "abcdefghij", 12) == 0);
+    CHECK(IsoTpNext(&tx, frame, 0) == 12 && memcmp(frame,
+                                                   "\0\x0A"
+                                                   "abcdefghij",
+                                                   12) == 0);
 }
 
 static void flow_control_comes_after_the_first_frame_and_each_block(void)
@@ -248,9 +260,25 @@ static void what_is_out_of_place_changes_nothing(void)
     static const struct {
         const char *data;
         RTS_UI32 size;
-    } frames[] = {{"", 0},           {"\x21zzzzzzz", 8}, {"\x30", 1},         {"\x30\0", 2},     {"\x00", 1},
-                  {"\x08" "1234567", 8}, {"\x40" "1234567", 8}, {"\xF0", 1},  {"\x10\x05" "abcdef", 8}, {"\x10", 1},
-                  {"\x10\x64" "abc", 5}};
+    } frames[] = {{"", 0},
+                  {"\x21zzzzzzz", 8},
+                  {"\x30", 1},
+                  {"\x30\0", 2},
+                  {"\x00", 1},
+                  {"\x08"
+                   "1234567",
+                   8},
+                  {"\x40"
+                   "1234567",
+                   8},
+                  {"\xF0", 1},
+                  {"\x10\x05"
+                   "abcdef",
+                   8},
+                  {"\x10", 1},
+                  {"\x10\x64"
+                   "abc",
+                   5}};
     ISOTP_RX rx = {.buffer = pair.in, .capacity = sizeof(pair.in)};
     RTS_UI8 flow[ISOTP_FLOW_SIZE];
     RTS_UI32 size;
@@ -269,11 +297,26 @@ static void a_new_packet_takes_the_place_of_one_that_did_not_end(void)
     RTS_UI32 size;
     ISOTP_RX rx = {.buffer = pair.in, .capacity = sizeof(pair.in)};
 
-    CHECK_EQUAL(IsoTpReceive(&rx, (const RTS_UI8 *)"\x10\x64" "abcdef", 8, 0, &size), ISOTP_RX_NOTHING);
-    CHECK_EQUAL(IsoTpReceive(&rx, (const RTS_UI8 *)"\x10\x0A" "ABCDEF", 8, 0, &size), ISOTP_RX_ABORTED);
-    CHECK_EQUAL(IsoTpReceive(&rx, (const RTS_UI8 *)"\x21" "GHIJ", 5, 0, &size), ISOTP_RX_DONE);
+    CHECK_EQUAL(IsoTpReceive(&rx,
+                             (const RTS_UI8 *)"\x10\x64"
+                                              "abcdef",
+                             8, 0, &size),
+                ISOTP_RX_NOTHING);
+    CHECK_EQUAL(IsoTpReceive(&rx,
+                             (const RTS_UI8 *)"\x10\x0A"
+                                              "ABCDEF",
+                             8, 0, &size),
+                ISOTP_RX_ABORTED);
+    CHECK_EQUAL(IsoTpReceive(&rx,
+                             (const RTS_UI8 *)"\x21"
+                                              "GHIJ",
+                             5, 0, &size),
+                ISOTP_RX_DONE);
     CHECK(size == 10 && memcmp(pair.in, "ABCDEFGHIJ", 10) == 0);
-    (void)IsoTpReceive(&rx, (const RTS_UI8 *)"\x10\x64" "abcdef", 8, 0, &size);
+    (void)IsoTpReceive(&rx,
+                       (const RTS_UI8 *)"\x10\x64"
+                                        "abcdef",
+                       8, 0, &size);
     CHECK_EQUAL(IsoTpReceive(&rx, (const RTS_UI8 *)"\x03xyz", 4, 0, &size), ISOTP_RX_DONE);
     CHECK(!IsoTpIsReceiving(&rx));
 }
@@ -285,8 +328,15 @@ static void frames_filled_up_to_their_size_are_taken(void)
 
     CHECK_EQUAL(IsoTpReceive(&rx, (const RTS_UI8 *)"\x03xyz\xCC\xCC\xCC\xCC", 8, 0, &size), ISOTP_RX_DONE);
     CHECK_EQUAL(size, 3);
-    (void)IsoTpReceive(&rx, (const RTS_UI8 *)"\x10\x0A" "ABCDEF", 8, 0, &size);
-    CHECK_EQUAL(IsoTpReceive(&rx, (const RTS_UI8 *)"\x21" "GHIJ\xCC\xCC\xCC", 8, 0, &size), ISOTP_RX_DONE);
+    (void)IsoTpReceive(&rx,
+                       (const RTS_UI8 *)"\x10\x0A"
+                                        "ABCDEF",
+                       8, 0, &size);
+    CHECK_EQUAL(IsoTpReceive(&rx,
+                             (const RTS_UI8 *)"\x21"
+                                              "GHIJ\xCC\xCC\xCC",
+                             8, 0, &size),
+                ISOTP_RX_DONE);
     CHECK_EQUAL(size, 10);
 }
 

@@ -119,8 +119,12 @@ static void filters_let_pass_what_they_say(void)
         RTS_UI32 id;
         RTS_UI8 flags;
         bool passes;
-    } frames[] = {{0x1F4005AA, CAN_FLAG_EXTENDED, true}, {0x1F4006AA, CAN_FLAG_EXTENDED, false},
-                  {0x123, 0, true},  {0x123, CAN_FLAG_EXTENDED, false}, {0x122, 0, false}, {0x500, 0, false}};
+    } frames[] = {{0x1F4005AA, CAN_FLAG_EXTENDED, true},
+                  {0x1F4006AA, CAN_FLAG_EXTENDED, false},
+                  {0x123, 0, true},
+                  {0x123, CAN_FLAG_EXTENDED, false},
+                  {0x122, 0, false},
+                  {0x500, 0, false}};
 
     start();
     CHECK_EQUAL(SimCanSetFilters(B, filters, RTS_COUNT(filters)), ERR_OK);
@@ -135,8 +139,13 @@ static void filters_let_pass_what_they_say(void)
 static void what_cannot_be_a_frame_is_refused(void)
 {
     static const CAN_FRAME frames[] = {
-        {.id = 0x800}, {.id = 0x20000000, .flags = CAN_FLAG_EXTENDED}, {.size = 9}, {.size = 12},
-        {.size = 9, .flags = CAN_FLAG_FD}, {.size = 65, .flags = CAN_FLAG_FD}, {.flags = CAN_FLAG_FAST},
+        {.id = 0x800},
+        {.id = 0x20000000, .flags = CAN_FLAG_EXTENDED},
+        {.size = 9},
+        {.size = 12},
+        {.size = 9, .flags = CAN_FLAG_FD},
+        {.size = 65, .flags = CAN_FLAG_FD},
+        {.flags = CAN_FLAG_FAST},
         {.flags = CAN_FLAG_FD | CAN_FLAG_REMOTE},
     };
 

@@ -342,13 +342,6 @@ def test_what_is_no_serial_port_is_reported(tool: Any, port: str) -> None:
     assert "it is not a serial port" in done.err
 
 
-@pytest.mark.parametrize("link", [("--can", "socketcan:can0"), ("--node", "0")])
-def test_links_of_later_versions_exit_2(tool: Any, link: tuple[str, str]) -> None:
-    done = tool("status", *link, "--json")
-    assert done.status == 2
-    assert f"{link[0]} is not in this version" in done.json["error"]["message"]
-
-
 def test_a_silent_device_exits_3(tool: Any, serial_opened_by: Any) -> None:
     from fake_device import FakeDevice, FakeLine
 

@@ -87,7 +87,9 @@ def test_several_devices_are_flashed_at_once(hub: CanHub, tool: Any, counter: Pa
 
 def test_one_tool_flashes_while_another_one_watches(hub: CanHub, tool: Any, counter: Path) -> None:
     """And a third one talks to a third device: three conversations on one bus."""
-    big = tool.build("big", "PROGRAM Main VAR a : ARRAY[0..2999] OF DINT := [3000(7)]; END_VAR a[0] := a[0] + 1; END_PROGRAM")
+    big = tool.build(
+        "big", "PROGRAM Main VAR a : ARRAY[0..2999] OF DINT := [3000(7)]; END_VAR a[0] := a[0] + 1; END_PROGRAM"
+    )
     watching, flashed = threading.Event(), threading.Event()
     errors: list[PlcError] = []
     readings: list[int] = []
@@ -104,7 +106,7 @@ def test_one_tool_flashes_while_another_one_watches(hub: CanHub, tool: Any, coun
             errors.append(error)
 
     def talk() -> None:
-        session = Session(Connection(CanTransport("hub", PythonCanBus(open_bus(f"slcan:{hub.paths[2]}", 500000, 0)), 77)))
+        session = Session(Connection(transport_of(hub, 2, 77)))
         data = random.Random(1).randbytes(3000)
         while not flashed.is_set():
             if services.echo(session, data) != data:
@@ -140,9 +142,15 @@ class _Fixed(random.Random):
         return super().randint(a, b) if first is None else first
 
 
+def transport_of(hub: CanHub, tool: int, node: int, first: int | None = None) -> CanTransport:
+    """A transport of a tool to a device. `first`: the address it tries first."""
+    bus = PythonCanBus(open_bus(f"slcan:{hub.paths[tool]}", 500000, 0))
+    return CanTransport("hub", bus, node, random_source=None if first is None else _Fixed(first))
+
+
 def test_two_tools_never_have_one_address(hub: CanHub) -> None:
     """The second one finds the address taken and takes another one; the first one goes on."""
-    first = CanTransport("hub", PythonCanBus(open_bus(f"slcan:{hub.paths[0]}", 500000, 0)), 1, random_source=_Fixed(200))
+    first = transport_of(hub, 0, 1, first=200)
     session = Session(Connection(first, Choice("1")))
     assert services.echo(session, b"hello") == b"hello"
     done = threading.Event()
@@ -153,7 +161,7 @@ def test_two_tools_never_have_one_address(hub: CanHub) -> None:
 
     thread = threading.Thread(target=go_on)
     thread.start()
-    second = CanTransport("hub", PythonCanBus(open_bus(f"slcan:{hub.paths[1]}", 500000, 0)), 1, random_source=_Fixed(200))
+    second = transport_of(hub, 1, 1, first=200)
     done.set()
     thread.join()
     assert first.local_address == b"\x00\xc8"
@@ -163,14 +171,12 @@ def test_two_tools_never_have_one_address(hub: CanHub) -> None:
 
 
 def test_a_collision_that_was_missed_is_noticed_and_mended(hub: CanHub) -> None:
-    first = CanTransport("hub", PythonCanBus(open_bus(f"slcan:{hub.paths[0]}", 500000, 0)), 1, random_source=_Fixed(201))
+    first = transport_of(hub, 0, 1, first=201)
     session = Session(Connection(first, Choice("1")))
     assert services.echo(session, b"hello") == b"hello"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("plctool.link.canbus._CLAIM_TIME", 0.0)  # it does not listen before it begins
-        second = CanTransport(
-            "hub", PythonCanBus(open_bus(f"slcan:{hub.paths[1]}", 500000, 0)), 2, random_source=_Fixed(201)
-        )
+        second = transport_of(hub, 1, 2, first=201)
     other = Session(Connection(second, Choice("2")))
     assert other.recover(lambda: services.echo(other, b"hello")) == b"hello"
     assert session.recover(lambda: services.echo(session, b"hello")) == b"hello"

@@ -53,7 +53,8 @@ def link_of(plcrt: Plcrt, kind: str) -> str:
 
 def option_of(plcrt: Plcrt, kind: str) -> list[str]:
     scheme, _, place = link_of(plcrt, kind).partition(":")
-    return [f"--{'port' if scheme == 'serial' else scheme}", place]
+    node = ["--node", "1"] if kind == "can" else []
+    return [f"--{'port' if scheme == 'serial' else scheme}", place, *node]
 
 
 def open_session(link: str) -> Session:

@@ -203,7 +203,8 @@ bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON 
     if ((pty && can.slave < 0) || !open_line()) {
         int error = errno;
         PortReason(reason, "cannot open CAN %s: %s%s", text, strerror(error),
-                   error == ENETDOWN ? "; set it up, for example with: ip link set can0 up type can bitrate 500000" : "");
+                   error == ENETDOWN ? "; set it up, for example with: ip link set can0 up type can bitrate 500000"
+                                     : "");
         reason->busy = error == EBUSY;
         PortCanClose();
         return false;

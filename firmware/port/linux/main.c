@@ -60,7 +60,8 @@ static const char usage[] =
     "  --udp PLACE     serves UDP at ADDRESS[:INDEX], 127.0.0.1 if no place is given, on port 1740 + INDEX (0..3), "
     "the\n"
     "                  first one that is free if there is no INDEX, and prints where as \"udp: ADDRESS:PORT\"\n"
-    "  --can PLACE     serves CAN: an interface of the system (can0), an adapter (slcan:/dev/ttyACM0), or with slcan:pty a\n"
+    "  --can PLACE     serves CAN: an interface of the system (can0), an adapter (slcan:/dev/ttyACM0), or with "
+    "slcan:pty a\n"
     "                  pseudo terminal, whose name it prints as \"can: /dev/pts/N\"\n"
     "  --node N        number of the device on CAN, 1..127; 1 if not given\n"
     "  --bitrate N[/M] bits per second of an adapter, 500000 if not given; with M CAN FD, with M for the data\n"
@@ -200,7 +201,8 @@ static RTS_UI32 parse_can_base(const char *text)
     char *end = "";
     RTS_UI32 base = parse_number(text, 0x1FFFFFFF, &end);
     if (base == UINT32_MAX || (base & 0xFFFF) != 0 || *end != '\0') {
-        refuse("--can-base %s is not a base of identifiers: give 29 bits of which the last 16 are 0, as 0x1F400000", text);
+        refuse("--can-base %s is not a base of identifiers: give 29 bits of which the last 16 are 0, as 0x1F400000",
+               text);
     }
     return base;
 }
@@ -286,8 +288,8 @@ static void take_place(int argc, char **argv, int option)
 
 static OPTIONS parse_options(int argc, char **argv)
 {
-    OPTIONS options = {
-        .baud = DEFAULT_BAUD, .can_options = {.node = CAN_NODE, .base = CAN_ID_BASE, .bit_rate = CAN_BIT_RATE}};
+    OPTIONS options = {.baud = DEFAULT_BAUD,
+                       .can_options = {.node = CAN_NODE, .base = CAN_ID_BASE, .bit_rate = CAN_BIT_RATE}};
     int option;
     opterr = 0;
     while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1) {

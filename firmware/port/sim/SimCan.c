@@ -457,8 +457,8 @@ void SimCanGetState(RTS_UI32 node, CAN_STATE *state)
 {
     const NODE *asked = &bus.node[node];
 
-    *state = (CAN_STATE){state_of(asked),   bus.bit_rate,     bus.data_bit_rate,
-                         asked->tx_errors, asked->rx_errors, asked->lost};
+    *state =
+        (CAN_STATE){state_of(asked), bus.bit_rate, bus.data_bit_rate, asked->tx_errors, asked->rx_errors, asked->lost};
 }
 
 void SimCanRestart(RTS_UI32 node)

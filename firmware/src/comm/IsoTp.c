@@ -8,9 +8,9 @@
 #include <string.h>
 
 enum {
-    CLASSIC = 8,      /* bytes of a classic frame */
-    FIRST_HEAD = 2,   /* bytes before the data */
-    LONG_SINGLE = 2,  /* the same of a single frame on FD with more than 7 bytes */
+    CLASSIC = 8,     /* bytes of a classic frame */
+    FIRST_HEAD = 2,  /* bytes before the data */
+    LONG_SINGLE = 2, /* the same of a single frame on FD with more than 7 bytes */
     SEQUENCE_MASK = 0x0F,
     GO_ON = 0,
     WAIT = 1,

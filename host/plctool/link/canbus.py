@@ -7,12 +7,13 @@ that no other tool has it: the device knows a tool by it.
 from __future__ import annotations
 
 import errno
+import logging
 import math
 import queue
 import random
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from types import MappingProxyType
 from typing import Protocol
@@ -22,9 +23,12 @@ import isotp
 
 from plctool.core import lib
 from plctool.errors import LinkError, UsageError
-from plctool.link import names, router
+from plctool.link import router
 from plctool.link.channel import ChannelLost
 from plctool.link.wire import Layout
+
+for _name in ("can", "isotp"):
+    logging.getLogger(_name).addHandler(logging.NullHandler())  # what matters is in our errors
 
 _SCAN = Layout("CAN_SCAN")
 _CLAIM = Layout("CAN_CLAIM")
@@ -191,7 +195,7 @@ class CanTransport:
         self.point_to_point = False
         self.node = node
         self._places: dict[bytes, str] = {}
-        self.places = MappingProxyType(self._places)
+        self.places: Mapping[bytes, str] = MappingProxyType(self._places)
         self._bus, self._base, self._fd = bus, base, fd
         self._random = random_source or random.SystemRandom()
         self._number = self._random.getrandbits(32)
@@ -199,15 +203,12 @@ class CanTransport:
         self._nodes: dict[int, _Node] = {}
         self._collided = self._settled = False
         self._address = 0
+        self.local_address = bytes(2)
         try:
             self._take_address()
         except LinkError:
             self.close()
             raise
-
-    @property
-    def local_address(self) -> bytes:
-        return bytes([0, self._address])
 
     def now(self) -> float:
         return self._bus.now()
@@ -332,6 +333,7 @@ class CanTransport:
         """Takes an address that no other tool has. Raises LinkError when there is none."""
         for _ in range(_CLAIMS):
             self._address = self._random.randint(_FIRST_TOOL, _LAST_TOOL)
+            self.local_address = bytes([0, self._address])
             self._collided = self._settled = False
             self._claim(lib.CAN_FRAME_CLAIM)
             end = self.now() + _CLAIM_TIME

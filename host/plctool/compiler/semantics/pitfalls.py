@@ -1,4 +1,5 @@
-"""Loops that cannot end as they are written.
+"""What the language allows and is hardly ever meant, for warnings: loops without an end, comparisons that always give
+the same, fractions that are lost, pointers to another type.
 
 A loop is looked at when all bodies are checked, as what it calls may change its condition.
 
@@ -11,12 +12,19 @@ from collections.abc import Iterable
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.ranges import Range, type_range
+from plctool.compiler.semantics import constants
+from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary
+from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.typed import (
     AddressOf,
     Assign,
+    Binary,
+    BinaryOp,
     Call,
     Case,
     Const,
+    Convert,
     DerefPlace,
     Direction,
     Exit,
@@ -32,12 +40,28 @@ from plctool.compiler.typed import (
     SelfPlace,
     Statement,
     Storage,
+    Unary,
     Variable,
     VarPlace,
     While,
 )
 from plctool.compiler.typed_nodes import root_of, walk, written_places
 from plctool.iec.areas import Area
+from plctool.iec.types import (
+    BOOL,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Kind,
+    PointerType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+    base_of,
+)
+
+# ---- loops that cannot end as they are written ----
 
 Loop = While | Repeat | For
 _CLOCKS = (Intrinsic.TIME, Intrinsic.LTIME)
@@ -149,3 +173,115 @@ def _may_reach(node: object, effects: Effects) -> bool:
 
 def _name(variable: Variable) -> str:
     return variable.name.rpartition(".")[2]
+
+
+# ---- integer divisions whose result becomes a REAL: the fraction is lost before ----
+
+
+def lost_fraction(e: Expr, target: Elementary, *, explicit: bool = False) -> str:
+    """What to say when the integer `e` becomes `target`; "" when it is no division. `explicit`: by INT_TO_REAL and the
+    like; then whole days, seconds ... of a date or duration are meant as they are, and so are bits."""
+    division = _division(e)
+    if division is None or (explicit and _is_of_time(division.left)):
+        return ""
+    source = elementary(division.type)
+    if source is None or (explicit and source.kind is not Kind.INT):
+        return ""
+    drops = f"this division of {source} drops its fraction and only then becomes {target}"
+    return f"{drops}; convert an operand: {source}_TO_{target}(...) / ..."
+
+
+def _division(e: Expr) -> Binary | None:
+    """The integer division that an expression is, or that is added to something in it."""
+    if isinstance(e, Unary):
+        return _division(e.operand)
+    if isinstance(e, Convert):
+        source = elementary(e.operand.type)
+        return _division(e.operand) if source is not None and source.kind in NUMBERS else None
+    if not isinstance(e, Binary):
+        return None
+    if e.op in (BinaryOp.ADD, BinaryOp.SUB):
+        return _division(e.left) or _division(e.right)
+    return e if e.op is BinaryOp.DIV else None
+
+
+def _is_of_time(e: Expr) -> bool:
+    """Whether a number is a duration or date that was converted."""
+    while isinstance(e, Convert):
+        e = e.operand
+        source = elementary(e.type)
+        if source is not None and source.kind in (Kind.TIME, Kind.DATE):
+            return True
+    return False
+
+
+# ---- whether a pointer may look at a variable of another type without surprise ----
+
+_BITS = (Kind.BIT, Kind.CHAR)
+
+
+def overlays(found: Type, wanted: Type) -> bool:
+    """Whether `found` is a `wanted`, begins with one or is what one begins with, or either is seen as plain bits."""
+    a, b = _plain(found), _plain(wanted)
+    if isinstance(a, PointerType) or isinstance(b, PointerType):
+        return True
+    if ERROR in (a, b) or a == b or _is_bits(a) or _is_bits(b):
+        return True
+    if isinstance(a, StringType) and isinstance(b, StringType):
+        return a.wide is b.wide
+    if isinstance(a, StructType) and isinstance(b, StructType) and (a.conforms(b) or b.conforms(a)):
+        return True
+    first = isinstance(a, StructType) and any(overlays(t, b) for t in _first(a))
+    return first or (isinstance(b, StructType) and any(overlays(a, t) for t in _first(b)))
+
+
+def _plain(t: Type) -> Type:
+    """The type of the elements of an array, and of those; of an enumeration or subrange its base."""
+    while isinstance(t, ArrayType):
+        t = t.element
+    return base_of(t)
+
+
+def _is_bits(t: Type) -> bool:
+    return isinstance(t, Elementary) and t.kind in _BITS
+
+
+def _first(t: StructType) -> list[Type]:
+    return [f.type for f in t.fields if f.offset <= 0 and not f.hidden]
+
+
+# ---- comparisons with a number beyond what the other side can be ----
+
+_SWAPPED = {BinaryOp.LT: BinaryOp.GT, BinaryOp.GT: BinaryOp.LT, BinaryOp.LE: BinaryOp.GE, BinaryOp.GE: BinaryOp.LE}
+
+
+def always(op: BinaryOp, value: Expr, number: int, *, swapped: bool) -> str:
+    """What to say of `value op number` (`swapped`: of `number op value`) when the type of the value decides it; ""
+    when it does not."""
+    limits = _limits(value.type)
+    if limits is None or isinstance(value, Const):
+        return ""
+    op = _SWAPPED.get(op, op) if swapped else op
+    least, most = (constants.binary(op, limit, number, BOOL) for limit in limits)
+    within = limits[0] <= number <= limits[1]
+    decided = least == most if op in _SWAPPED else not within
+    return f"this is always {'TRUE' if least else 'FALSE'}: {_why(value.type, limits, number)}" if decided else ""
+
+
+def _limits(t: Type) -> Range | None:
+    if isinstance(t, SubrangeType):
+        return t.low, t.high
+    base = elementary(t)
+    return type_range(t) if base is not None and base.kind in NUMBERS and not isinstance(t, EnumType) else None
+
+
+def _why(t: Type, limits: Range, number: int) -> str:
+    low, high = limits
+    what = f"{'an' if t.name[0] in 'AEIOU' and not t.name.startswith('U') else 'a'} {t}"
+    if number > low:
+        return f"{what} is at most {high}; use a larger type or another number"
+    base = elementary(t)
+    if low == 0 and base is not None and not isinstance(t, SubrangeType):
+        signed = SIGNED[min(64, 2 * base.bits)]
+        return f"{what} is never negative; use a signed type such as {signed}, or leave the comparison out"
+    return f"{what} is at least {low}; use another type or another number"

@@ -1,5 +1,5 @@
 /*
- * SysCanSlcan.c - a CAN controller behind a serial line (Slcan.h), for boards that have no other.
+ * CanOnSerial.c - SysCan.h on a serial line (Slcan.h), for boards without a CAN controller.
  *
  * SPDX-License-Identifier: Apache-2.0
  *

@@ -1,14 +1,32 @@
-"""Dates and times of day: how they convert into each other and into durations, and the functions that compute with
-them.
+"""Arithmetic with dates, times of day and pointers: what the operators make of them.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
-from plctool.compiler.semantics.conversions import NS_PER_MS, convert, scaled
-from plctool.compiler.typed import BinaryOp, Expr
-from plctool.iec.types import DATE, DT, LDATE, LDT, LTIME, LTOD, TIME, TOD, Elementary, Type
+from plctool.compiler.semantics.conversions import NS_PER_MS, NUMBERS, convert, elementary, scaled, settle
+from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Pos
+from plctool.iec.types import (
+    DATE,
+    DT,
+    LDATE,
+    LDT,
+    LINT,
+    LTIME,
+    LTOD,
+    LWORD,
+    TIME,
+    TOD,
+    Elementary,
+    InterfaceType,
+    PointerType,
+    RawPointerType,
+    ReferenceType,
+    Type,
+)
+
+# ---- dates, times of day and durations ----
 
 _DAY_NS = 86_400_000_000_000
 _SECOND = 1_000_000_000
@@ -65,3 +83,38 @@ def convert_date(e: Expr, target: Elementary) -> Expr:
         elif same_meaning(target, DATE):
             e = scaled(scaled(e, BinaryOp.DIV, day(e.type)), BinaryOp.MUL, day(e.type))
     return rescale(e, target)
+
+
+# ---- pointers: POINTER TO counts in bytes; REF_TO, the one of the standard, is only followed ----
+
+
+def is_address(e: Expr) -> bool:
+    """Whether this is a POINTER TO."""
+    return isinstance(e.type, RawPointerType)
+
+
+def as_number(e: Expr) -> Expr:
+    """An address as LWORD; any other value as it is."""
+    is_pointer = isinstance(e.type, PointerType) and not isinstance(e.type, InterfaceType | ReferenceType)
+    return convert(e, LWORD) if is_pointer else e
+
+
+def moved(op: BinaryOp, left: Expr, right: Expr, pos: Pos) -> Expr | None:
+    """`pointer + n`, `n + pointer`, `pointer - n`: another pointer. None when it is something else."""
+    if op is BinaryOp.ADD and is_address(right):
+        left, right = right, left
+    if op not in (BinaryOp.ADD, BinaryOp.SUB) or not is_address(left) or isinstance(right.type, PointerType):
+        return None
+    right = settle(right)
+    number = elementary(right.type)
+    if number is None or number.kind not in NUMBERS:
+        return None
+    return convert(Binary(op, convert(left, LINT), convert(right, LINT), LINT, pos), left.type)
+
+
+def element(pointer: Expr, index: Expr, pos: Pos) -> Expr:
+    """The address of `pointer[index]`, counted in elements."""
+    assert isinstance(pointer.type, PointerType)
+    size = Const(pointer.type.target.size, LINT, pos)
+    offset = Binary(BinaryOp.MUL, convert(index, LINT), size, LINT, pos)
+    return convert(Binary(BinaryOp.ADD, convert(pointer, LINT), offset, LINT, pos), pointer.type)
