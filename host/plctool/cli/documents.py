@@ -93,7 +93,7 @@ def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
         raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
 
 
-def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles) -> tuple[Document, list[str]]:
+def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles | None = None) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
     from plctool.compiler import check_with_tests, io_sources, load_io, load_sources
     from plctool.compiler.diagnostics import render_all

@@ -60,6 +60,7 @@ def load_io(paths: Sequence[Path | str], files: IoFiles = IoFiles()) -> Descript
     UsageError for a file that cannot be read, and when it is not clear which one is meant."""
     from plctool.io.description import find_description, load_description
 
+    files = files or IoFiles()
     found = files.description or find_description(list(map(Path, paths)))
     if found is None and files.device is not None:
         raise UsageError(f"There is no description (NAME.io.toml) that uses {files.device}; name it with --io.", "io")
