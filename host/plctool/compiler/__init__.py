@@ -55,7 +55,7 @@ class IoFiles:
     device: Path | None = None
 
 
-def load_io(paths: Sequence[Path | str], files: IoFiles = IoFiles()) -> Description | None:
+def load_io(paths: Sequence[Path | str], files: IoFiles | None = None) -> Description | None:
     """The description of the inputs and outputs of a program; None if it has none. It serves one check. Raises
     UsageError for a file that cannot be read, and when it is not clear which one is meant."""
     from plctool.io.description import find_description, load_description
