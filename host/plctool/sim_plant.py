@@ -60,7 +60,8 @@ class PlantProgram:
             self._names = self._connections(plc)
         given = {variable: plc.output(c) for c, (output, variable) in self._names.items() if output}
         wanted = {c: variable for c, (output, variable) in self._names.items() if not output}
-        passed, self._now_ns = plc.now_ns - self._now_ns, plc.now_ns
+        began = self._now_ns if self._now_ns <= plc.now_ns else 0  # after a restart its clock begins again
+        passed, self._now_ns = plc.now_ns - began, plc.now_ns
         values = self._ask({"set": given, "ns": passed, "get": list(wanted.values())})["values"]
         for channel, variable in wanted.items():
             plc.set_input(channel, values[variable])

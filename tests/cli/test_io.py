@@ -85,9 +85,10 @@ def test_mistake_is_quoted_with_a_caret(tool, program: Path) -> None:  # type: i
 
 def test_several_descriptions_are_an_error_that_names_them(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
     (program / "other.io.toml").write_text("[sim]\nin = { a = 'Main.start' }\n")
-    done = tool("build", "main.st")
+    done = tool("build", ".")
     assert done.status == 2
     assert "choose one with --io: main.io.toml, other.io.toml" in done.err
+    assert tool("build", "main.st", "--json").json["io"]["channels"] == 3  # that with its name
     assert tool("build", "main.st", "--io", "other.io.toml", "--json").json["io"]["channels"] == 1
 
 
