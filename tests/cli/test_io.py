@@ -187,8 +187,8 @@ def test_header_of_a_board_compiles(tool, program: Path) -> None:  # type: ignor
             "device.toml:4:21: error: type cannot be 'INTT'; did you mean",
         ),
         (
-            "[[module]]\nname = 'A'\ndriver = 'D'\n[module.parameter]\np = { id = 1, type = 'BYTE', choices = { a = -1 } }",
-            "device.toml:5:40: error: the choice a of p is -1; it can be 0 to 255",
+            "[[module]]\nname = 'A'\ndriver = 'D'\n[module.parameter]\np = { id = 1, type = 'BYTE', choices.a = -1 }",
+            "device.toml:5:42: error: the choice a of p is -1; it can be 0 to 255",
         ),
         (
             "[[module]]\nname = 'A'\ndriver = 'D'\n[module.parameter]\np = { id = 1, type = 'USINT', default = 256 }",
