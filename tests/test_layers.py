@@ -28,7 +28,7 @@ FLOORS = (
     ("gateway",),
     ("controller", "compiler", "sim_io"),
     ("device", "sim"),
-    ("",),
+    ("", "sim_plant"),
     ("port_check", "st_tests", "testing", "trace_file"),
     ("cli", "pytest_plugin"),
     ("__main__",),

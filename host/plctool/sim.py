@@ -127,6 +127,8 @@ class Simulator(Controller):
         """Power off and on again: what is in flash survives."""
         lib.SimStop()
         _check(lib.SimStart(), "The simulator does not start")
+        for plant in self._plants:  # the clock begins at 0 again
+            plant.due_ns = self.now_ns + plant.every_ns
 
     def raw_status(self) -> Status:
         c = ffi.new("APP_STATUS *")

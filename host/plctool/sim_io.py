@@ -68,9 +68,9 @@ class SimIo:
     """The channels of the program with these symbols."""
 
     def __init__(self, symbols: SymbolTable) -> None:
-        self._channels = [_channel(entry, symbols) for entry in symbols.io.get("channels", [])]
+        self.channels = [_channel(entry, symbols) for entry in symbols.io.get("channels", [])]
         self._names: dict[str, list[SimChannel]] = {}
-        for c in self._channels:
+        for c in self.channels:
             for name in {c.title.casefold(), c.name.casefold(), c.symbol.name.casefold()}:
                 self._names.setdefault(name, []).append(c)
 
@@ -82,7 +82,7 @@ class SimIo:
         if found:
             titles = " or ".join(c.title for c in found)
             raise UsageError(f"There are several channels {name}; write {titles}.", "ambiguous")
-        hint = did_you_mean(name, [c.title for c in self._channels]) or "; 'plctool io map' lists them"
+        hint = did_you_mean(name, [c.title for c in self.channels]) or "; 'plctool io map' lists them"
         raise UsageError(f"There is no channel {name}{hint}.", "unknown-channel")
 
     def set_input(self, name: str, value: Any) -> None:
@@ -100,7 +100,7 @@ class SimIo:
     def follow(self, first_bit: int, end_bit: int, memory: Callable[[int, int], bytes]) -> None:
         """Bits of the inputs were written: the devices measure that from now on. `memory` gives bytes of the inputs, by
         offset and size."""
-        for c in self._channels:
+        for c in self.channels:
             if not c.output and c.area_bit < end_bit and first_bit < c.area_bit + c.bits:
                 data = memory(c.area_bit // 8, -(-c.bits // 8))
                 shift = c.area_bit % 8

@@ -48,7 +48,7 @@ def test_build_prints_how_old_inputs_may_be(tool, program: Path) -> None:  # typ
     done = tool("build", "main.st")
     assert done.out.splitlines()[1] == "3 channels of inputs and outputs; oldest input: Bench.button, up to 10 ms"
     oldest = {"channel": "Bench.button", "age_us": 10000}
-    assert tool("build", "main.st", "--json").json["io"] == {"channels": 3, "oldest_input": oldest}
+    assert tool("build", "main.st", "--json").json["io"] == {"channels": 3, "oldest_input": oldest, "lines": []}
 
 
 def test_map_lists_channels(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
@@ -85,9 +85,10 @@ def test_mistake_is_quoted_with_a_caret(tool, program: Path) -> None:  # type: i
 
 def test_several_descriptions_are_an_error_that_names_them(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
     (program / "other.io.toml").write_text("[sim]\nin = { a = 'Main.start' }\n")
-    done = tool("build", "main.st")
+    done = tool("build", ".")
     assert done.status == 2
     assert "choose one with --io: main.io.toml, other.io.toml" in done.err
+    assert tool("build", "main.st", "--json").json["io"]["channels"] == 3  # that with its name
     assert tool("build", "main.st", "--io", "other.io.toml", "--json").json["io"]["channels"] == 1
 
 
@@ -109,6 +110,14 @@ def test_plant_in_a_file_is_attached(tool, program: Path) -> None:  # type: igno
     )
     tool("build", "main.st")
     found = tool("run", "app.cdl", "--time", "T#95ms", "--plant", "plant.py", "--get", "Bench.level", "--json").json
+    assert found["values"]["Bench.level"] == 9
+
+
+def test_plant_in_st_is_compiled_and_attached(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
+    (program / "plant").mkdir()
+    (program / "plant" / "p.st").write_text("PROGRAM P\nVAR level : INT; END_VAR\nlevel := level + 1;\nEND_PROGRAM\n")
+    tool("build", "main.st")
+    found = tool("run", "app.cdl", "--time", "T#95ms", "--plant", "plant/p.st", "--get", "Bench.level", "--json").json
     assert found["values"]["Bench.level"] == 9
 
 
@@ -176,6 +185,10 @@ def test_header_of_a_board_compiles(tool, program: Path) -> None:  # type: ignor
         (
             "[[module]]\nname = 'A'\ndriver = 'D'\nin = { X = { type = 'INTT', parameter = 1 } }",
             "device.toml:4:21: error: type cannot be 'INTT'; did you mean",
+        ),
+        (
+            "[[module]]\nname = 'A'\ndriver = 'D'\n[module.parameter]\np = { id = 1, type = 'BYTE', choices.a = -1 }",
+            "device.toml:5:42: error: the choice a of p is -1; it can be 0 to 255",
         ),
         (
             "[[module]]\nname = 'A'\ndriver = 'D'\n[module.parameter]\np = { id = 1, type = 'USINT', default = 256 }",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from conftest import Tool
 
+from plctool.core import lib
 from plctool.testing.plcrt import Plcrt
 
 PROGRAM = """\
@@ -56,7 +57,22 @@ def test_devices_of_a_running_program(tool: Tool, plcrt: Plcrt, eventually) -> N
     missing = tool("io", "param", "get", "Bench", "77", *link)
     assert (missing.status, "no such parameter" in missing.err) == (1, True)
 
+    lost_and_found(tool, link, eventually)
     refused(tool, plcrt)
+
+
+def lost_and_found(tool: Tool, link: tuple[str, ...], eventually) -> None:  # type: ignore[no-untyped-def]
+    """A device that does not answer is shown, and the program knows; both end when it answers again."""
+
+    def state() -> str:
+        return str(tool.ok("io", "status", *link)["devices"][0]["state"])
+
+    absent = str(int(lib.IO_SIM_ABSENT))
+    tool.ok("io", "param", "set", "Bench", f"{absent}=1", *link)
+    assert eventually(lambda: state() == "not found")
+    assert eventually(lambda: not tool.ok("read", *link, "Bench.ok")["values"]["Bench.ok"])
+    tool.ok("io", "param", "set", "Bench", f"{absent}=0", *link)
+    assert eventually(lambda: state() == "ok")
 
 
 def refused(tool: Tool, plcrt: Plcrt) -> None:

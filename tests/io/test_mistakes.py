@@ -44,7 +44,7 @@ MISTAKES = [
     # tables and keys
     ("[gpoi]", 1, "there is no 'gpoi' here; did you mean gpio?"),
     ("[sim]\nnane = 'x'", 2, "there is no 'nane' here; did you mean name?"),
-    ("[sim]\nzzz = 1", 2, "there is no 'zzz' here; [sim] has name, optional, task, in or out"),
+    ("[sim]\nzzz = 1", 2, "there is no 'zzz' here; [sim] has name, optional, enabled, task, in or out"),
     ("[sim]\nname = 3", 2, "name is a number; it has to be a text in quotes"),
     ("[sim]\nname = 'a b'", 2, "'a b' cannot be a variable; the name of a device is one of a variable"),
     ("[sim]\noptional = 1", 2, "optional is a number; it has to be true or false"),

@@ -125,6 +125,15 @@ def test_unknown_channel_is_an_error_with_a_hint(plc: Simulator) -> None:
         plc.fault("Bench", "broken")
 
 
+def test_plant_goes_on_after_a_restart(plc: Simulator) -> None:
+    steps: list[int] = []
+    plc.attach(lambda plant: steps.append(plant.now_ns // 1_000_000), every_ms=10)
+    plc.run_for(25)
+    plc.restart()
+    plc.run_for(25)
+    assert steps == [10, 20, 10, 20]
+
+
 def test_image_survives_a_restart(plc: Simulator) -> None:
     plc.set_input("DI0", True)
     plc.restart()

@@ -28,6 +28,27 @@ def test_variable_with_an_open_address_gets_one(tmp_path: Path) -> None:
     assert messages(tmp_path, program, "[sim]\nin = { x = 'Main.a' }\nout = { y = 'Main.b' }") == []
 
 
+def test_address_of_var_config_is_that_of_the_channel(tmp_path: Path) -> None:
+    program = MAIN.format("a AT %I* : BOOL; b : BOOL;", "b := a;")
+    program += "CONFIGURATION C\nTASK t(INTERVAL := T#10ms);\nPROGRAM Main WITH t : Main;\n"
+    program += "VAR_CONFIG Main.a AT %IX7.2 : BOOL; END_VAR\nEND_CONFIGURATION\n"
+    built = build(tmp_path, program, "[sim]\nin = { x = 'Main.a' }\nout = { y = 'Main.b' }")
+    assert built.warnings == []
+    assert addresses(built)["Main.a"] == "%IX7.2"
+
+
+def test_open_address_in_a_block_is_located_by_its_channel(tmp_path: Path) -> None:
+    program = MAIN.format("f : Block;", "f();")
+    program += "FUNCTION_BLOCK Block\nVAR a AT %I* : BOOL; b : BOOL; END_VAR\nb := a;\nEND_FUNCTION_BLOCK\n"
+    assert messages(tmp_path, program, "[sim]\nin = { x = 'Main.f.a' }\nout = { y = 'Main.f.b' }") == []
+
+
+def test_device_that_is_not_enabled_is_in_the_image(tmp_path: Path) -> None:
+    text = "[sim]\nenabled = false\noptional = true\nin = { x = 'Main.a' }"
+    found = configuration(build(tmp_path, MAIN.format("a, b : BOOL;", "b := a;"), text))
+    assert [c.flags for c in found.connectors] == [2]
+
+
 def test_global_is_found_by_both_names(tmp_path: Path) -> None:
     (tmp_path / "GVL.st").write_text("VAR_GLOBAL a, b : BOOL; END_VAR\n")
     (tmp_path / "main.st").write_text(MAIN.format("", "b := a;"))

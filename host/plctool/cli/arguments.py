@@ -97,8 +97,8 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     run.add_argument(
         "--plant",
         type=Path,
-        metavar="FILE.py",
-        help="Python with 'def step(plc)', which is called each EVERY_MS (1) ms",
+        metavar="FILE.py|.st|.cdl",
+        help="what the inputs and outputs are connected to: Python with 'def step(plc)', or a program (docs/io.md)",
     )
     run.add_argument(
         "--trace", nargs="+", default=[], metavar="NAME", help="write the values after each cycle to a CSV file"

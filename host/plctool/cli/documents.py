@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from plctool.port_check import Outcome
     from plctool.port_check import Report as PortReport
     from plctool.sim import Simulator
+    from plctool.sim_plant import PlantProgram
     from plctool.st_tests import Report as TestReport
 
 Document = dict[str, Any]
@@ -69,7 +71,7 @@ def build(
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
     if channels:
-        document["io"] = {"channels": len(channels), "oldest_input": io_documents.oldest_input(channels)}
+        document["io"] = io_documents.summary(result.symbols.io)
     return document, result.rendered_warnings
 
 
@@ -83,7 +85,7 @@ def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
         raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
 
 
-def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles) -> tuple[Document, list[str]]:
+def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles | None = None) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
     from plctool.compiler import check_with_tests, io_sources, load_io, load_sources
     from plctool.compiler.diagnostics import render_all
@@ -222,7 +224,7 @@ def run(
     trace: TraceFile | None = None,
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
-    values as users read them. `plant`: a file in Python that is what the inputs and outputs are connected to.
+    values as users read them. `plant`: what the inputs and outputs are connected to.
 
     Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
@@ -234,14 +236,13 @@ def run(
         table = plc.symbols()
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
-        if plant is not None:
-            _attach(plc, plant)
-        if trace:
-            _run_traced(plc, cycles, time_ms, trace)
-        elif time_ms is None:
-            plc.run_cycles(1 if cycles is None else cycles)
-        else:
-            plc.run_for(time_ms)
+        with _attached(plc, plant) if plant is not None else nullcontext():
+            if trace:
+                _run_traced(plc, cycles, time_ms, trace)
+            elif time_ms is None:
+                plc.run_cycles(1 if cycles is None else cycles)
+            else:
+                plc.run_for(time_ms)
         tasks, reading = plc.tasks(), plc.sample(gets)
         document = {
             "values": reading.values,
@@ -261,8 +262,29 @@ def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: 
     plc.check_running()
 
 
-def _attach(plc: Simulator, path: Path) -> None:
-    """Runs a file in Python, and attaches the plant that it defines."""
+@contextmanager
+def _attached(plc: Simulator, path: Path) -> Iterator[None]:
+    """The plant in a file is connected to a simulator: Python with a function `step`, or a program in ST."""
+    if path.suffix == ".py":
+        _attach_python(plc, path)
+        yield
+        return
+    from plctool.sim_plant import PlantProgram
+
+    with PlantProgram.from_file(path) if path.suffix == ".cdl" else _compiled_plant(path) as plant:
+        plc.attach(plant, plant.every_ms)
+        yield
+
+
+def _compiled_plant(path: Path) -> PlantProgram:
+    from plctool.compiler import compile_sources
+    from plctool.sim_plant import PlantProgram
+
+    built = compile_sources([path])
+    return PlantProgram(built.image, built.symbols)
+
+
+def _attach_python(plc: Simulator, path: Path) -> None:
     import runpy
 
     try:

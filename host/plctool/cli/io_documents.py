@@ -32,6 +32,13 @@ def channels_of(path: Path) -> Document:
     return {"channels": symbols.io.get("channels", [])}
 
 
+def summary(io: Document) -> Document:
+    """What `build` prints of the inputs and outputs in a symbol file. `lines`: the share of its time that each line is
+    used, of those that are shared by requests."""
+    lines = [{"name": d["name"], "load": d["load"]} for d in io["devices"] if d.get("load") is not None]
+    return {"channels": len(io["channels"]), "oldest_input": oldest_input(io["channels"]), "lines": lines}
+
+
 def oldest_input(channels: Sequence[Document]) -> Document | None:
     """The input whose data may be the oldest when it is used."""
     inputs = [c for c in channels if not c["output"] and c["age_us"] is not None]

@@ -55,11 +55,12 @@ class IoFiles:
     device: Path | None = None
 
 
-def load_io(paths: Sequence[Path | str], files: IoFiles = IoFiles()) -> Description | None:
+def load_io(paths: Sequence[Path | str], files: IoFiles | None = None) -> Description | None:
     """The description of the inputs and outputs of a program; None if it has none. It serves one check. Raises
     UsageError for a file that cannot be read, and when it is not clear which one is meant."""
     from plctool.io.description import find_description, load_description
 
+    files = files or IoFiles()
     found = files.description or find_description(list(map(Path, paths)))
     if found is None and files.device is not None:
         raise UsageError(f"There is no description (NAME.io.toml) that uses {files.device}; name it with --io.", "io")

@@ -1,4 +1,4 @@
-"""What the tables of all kinds have in common: name, task, optional."""
+"""What the tables of all kinds have in common: name, task, optional, enabled."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def read_connector(
     parent: Connector | None = None,
     kind: int | None = None,
 ) -> C:
-    """A connector of the class `made` with the keys `name`, `task` and `optional` of a table.
+    """A connector of the class `made` with the keys `name`, `task`, `optional` and `enabled` of a table.
 
     With `name` it has a variable of that name in the program; without `default_name` the name is required. `kind`:
     CT_*, for other than master and slave."""
@@ -36,6 +36,7 @@ def read_connector(
     connector.type = kind if kind is not None else int(lib.CT_SLAVE if parent is not None else lib.CT_MASTER)
     connector.variable = name is not None
     connector.optional = table.flag("optional")
+    connector.enabled = table.flag("enabled", True)
     connector.task = table.text("task")
     connector.task_pos = table.value_pos("task")
     return connector

@@ -18,10 +18,13 @@ SUFFIX = ".io.toml"
 
 
 def find_description(sources: Sequence[Path]) -> Path | None:
-    """The description beside the sources, or in a folder of them; None if there is none. Raises UsageError if there
-    are several."""
+    """The description beside the sources, or in a folder of them; None if there is none. Of several, that with the name
+    of a source. Raises UsageError if it is not clear which one is meant."""
     folders = dict.fromkeys(path if path.is_dir() else path.parent for path in sources)
     found = sorted(file for folder in folders for file in folder.glob(f"*{SUFFIX}") if file.is_file())
+    if len(found) > 1:
+        own = {f"{source.stem}{SUFFIX}" for source in sources}
+        found = [file for file in found if file.name in own] or found
     if len(found) > 1:
         names = ", ".join(str(file) for file in found)
         raise UsageError(f"There are several descriptions of inputs and outputs; choose one with --io: {names}.", "io")

@@ -26,7 +26,7 @@ filter = { id = 101, type = "UINT", low = 0, high = 1000, default = 10, text = "
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from plctool.files import Pos
@@ -224,6 +224,11 @@ def _parameter(entry: Entry, mistakes: Mistakes) -> ModuleParameter | None:
         inner.close()
         return None
     made = ModuleParameter(entry.key, number, t, low, high, default, choices, text)
+    plain = replace(made, choices={})
+    for word, value in choices.items():
+        problem = parameter_problem(plain, value)
+        if problem:
+            inner.error(f"the choice {word} of {entry.key} {problem}", "choices")
     if default is not None:
         problem = parameter_problem(made, default)
         if problem:

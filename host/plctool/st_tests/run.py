@@ -49,7 +49,7 @@ def run_tests(
     pattern: str = "*",
     level: int = 0,
     warnings: WarningOptions = ALL_WARNINGS,
-    io: IoFiles = IoFiles(),  # noqa: B008
+    io: IoFiles | None = None,
 ) -> Report:
     """Runs the tests in sources whose name matches `pattern` (with * and ?) or contains it; case does not matter.
 

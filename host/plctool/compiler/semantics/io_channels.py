@@ -89,6 +89,11 @@ class IoChannels:
                 where = _where(first.pos, channel.pos)
                 message = f"{channel.target} belongs to the channel {first.name} {where} already"
                 diagnostics.error(channel.pos, CODE, message)
+        for connector in self.description.connectors:
+            key = connector.name.casefold()
+            if connector.variable and (key in names.planned or names.own_unit(key) is not None):
+                message = f"the program has a {connector.name} already; give the device another name"
+                diagnostics.error(connector.pos, CODE, message)
         for key in {name.partition(".")[0] for name in self._channels} & names.planned.keys():
             names.instance(key)
 

@@ -109,6 +109,11 @@ class InstanceConfig:
         entry.placed = True
         return entry.line.location if self._has_area(entry, letter) else None
 
+    def gives_address(self, *names: str) -> bool:
+        """Whether VAR_CONFIG has an address for a variable with one of these names."""
+        found = (self.entries.get(n.casefold()) for n in names)
+        return any(entry is not None and entry.line.location is not None for entry in found)
+
     @cached_property
     def _places(self) -> set[str]:
         """The names before a path that lead to no variable."""

@@ -147,7 +147,8 @@ class Variables:
         """Where a variable with these names is: for `AT %I*` VAR_CONFIG says it. None: it has no address."""
         if location is None or not is_open(location):
             return location
-        if self._world.io.claims(location.text[1], names, self._world.diagnostics):
+        claimed = self._world.io.claims(location.text[1], names, self._world.diagnostics)
+        if claimed and not self._config.gives_address(*names):
             return None
         return self._config.location(location.text[1], t, pos, *names)
 

@@ -1,0 +1,65 @@
+"""A plant that is a program in ST, beside the controller on the same virtual time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from io_support import build
+
+from plctool.compiler import compile_sources
+from plctool.errors import DeviceError, UsageError
+from plctool.sim import Simulator
+from plctool.sim_plant import PlantProgram
+
+PROGRAM = """\
+PROGRAM Main
+VAR level : REAL; pump : BOOL; END_VAR
+IF level < 30.0 THEN pump := TRUE; ELSIF level > 60.0 THEN pump := FALSE; END_IF;
+END_PROGRAM
+"""
+DESCRIPTION = "[[sim]]\nname = 'Tank'\nin = { level = 'Main.level' }\nout = { pump = 'Main.pump' }\n"
+PLANT = """\
+PROGRAM Plant
+VAR Tank_pump : BOOL; level : REAL := 20.0; END_VAR
+level := level + SEL(Tank_pump, -0.1, 0.2);
+END_PROGRAM
+"""
+
+
+def plant(folder: Path, text: str) -> PlantProgram:
+    (folder / "plant").mkdir()
+    (folder / "plant" / "plant.st").write_text(text)
+    built = compile_sources([folder / "plant"])
+    return PlantProgram(built.image, built.symbols)
+
+
+def test_controller_keeps_the_level_of_the_plant(tmp_path: Path) -> None:
+    built = build(tmp_path, PROGRAM, DESCRIPTION)
+    levels = []
+    with plant(tmp_path, PLANT) as tank, Simulator(built.image, built.symbols) as plc:
+        assert tank.every_ms == 10
+        plc.attach(tank, tank.every_ms)
+        for _ in range(60):
+            plc.run_for(200)
+            levels.append(plc.read("Main.level"))
+    assert max(levels[10:]) == pytest.approx(60, abs=3)
+    assert min(levels[10:]) == pytest.approx(30, abs=3)
+
+
+def test_exception_of_the_plant_is_named(tmp_path: Path) -> None:
+    built = build(tmp_path, PROGRAM, DESCRIPTION)
+    text = "PROGRAM Plant\nVAR level : REAL; n, m : INT; END_VAR\nn := 1 / m;\nEND_PROGRAM\n"
+    with plant(tmp_path, text) as tank, Simulator(built.image, built.symbols) as plc:
+        plc.attach(tank, tank.every_ms)
+        with pytest.raises(DeviceError, match=r"The plant failed: DIVIDEBYZERO in task Main.*plant\.st:3"):
+            plc.run_for(100)
+
+
+def test_plant_without_any_of_the_channels_is_an_error(tmp_path: Path) -> None:
+    built = build(tmp_path, PROGRAM, DESCRIPTION)
+    text = "PROGRAM Plant\nVAR n : INT; END_VAR\nn := n + 1;\nEND_PROGRAM\n"
+    with plant(tmp_path, text) as tank, Simulator(built.image, built.symbols) as plc:
+        plc.attach(tank, tank.every_ms)
+        with pytest.raises(UsageError, match="none of the variables level, pump"):
+            plc.run_for(100)
