@@ -22,9 +22,9 @@ typedef struct {
 } FAKE_BYTES;
 
 typedef struct {
-    bool open;       /* the device's end */
+    bool open; /* the device's end */
     bool connected;
-    bool peer_gone;  /* the other end has closed */
+    bool peer_gone; /* the other end has closed */
     SOCKADDRESS peer;
     RTS_UI8 in[FAKE_SOCKET_ROOM]; /* to the device */
     RTS_UI32 in_size;
@@ -44,9 +44,9 @@ typedef struct {
     bool locked;
 
     FAKE_SOCKET sockets[FAKE_SOCKETS];
-    RTS_UI32 pending;     /* sockets that wait to be accepted, from `accepted` on */
+    RTS_UI32 pending; /* sockets that wait to be accepted, from `accepted` on */
     RTS_UI32 accepted;
-    RTS_UI32 used;        /* sockets that there were */
+    RTS_UI32 used; /* sockets that there were */
     RTS_RESULT listen_result;
     RTS_UI32 listeners;
     RTS_RESULT connect_result; /* ERR_OK, ERR_PENDING, ERR_NET_NOTCONNECTED */
