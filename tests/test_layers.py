@@ -29,7 +29,7 @@ FLOORS = (
     ("controller", "compiler", "sim_io"),
     ("device", "sim"),
     ("",),
-    ("port_check", "st_tests", "testing"),
+    ("port_check", "st_tests", "testing", "trace_file"),
     ("cli",),
     ("__main__",),
 )

@@ -11,8 +11,8 @@
 #include "CmpStd.h"
 
 /*
- * Formats into `out`, always NUL-terminated and cut to `size` bytes (at least 1). Understands %s, %d (int), %u and %x
- * (unsigned), %%. Returns the length of the result. From any context.
+ * Formats into `out`, always NUL-terminated and cut to `size` bytes (at least 1). Understands %s, %d (int), %u and %X
+ * (unsigned, the latter always with eight digits), %%. Returns the length of the result. From any context.
  */
 RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list arguments);
 RTS_SIZE CMUtlsnprintf(char *out, RTS_SIZE size, const char *format, ...);

@@ -76,11 +76,14 @@ enum {
     CMPID_SysEvent = 0x001C,
     CMPID_CmpBlkDrvTcp = 0x001D,
     CMPID_CmpBlkDrvUdp = 0x001E,
-    CMPID_CmpIoMgrEmbedded = 0x001F,
-    CMPID_CmpIoMgrSrv = 0x0020,
-    CMPID_IoDrvSim = 0x0021,
-    CMPID_IoDrvGpio = 0x0022,
-    CMPID_IoDrvModbus = 0x0024,
+    CMPID_CmpBlkDrvCan = 0x001F,
+    CMPID_SysCan = 0x0020,
+    CMPID_CmpPlcShell = 0x0021,
+    CMPID_CmpIoMgrEmbedded = 0x0022,
+    CMPID_CmpIoMgrSrv = 0x0023,
+    CMPID_IoDrvSim = 0x0024,
+    CMPID_IoDrvGpio = 0x0025,
+    CMPID_IoDrvModbus = 0x0026,
 };
 
 /* Name of a component, "" when unknown. */

@@ -53,6 +53,9 @@ X(CmpAppSrv)
 #if HAS_CmpLogSrv
 X(CmpLogSrv)
 #endif
+#if HAS_CmpPlcShell
+X(CmpPlcShell)
+#endif
 #if HAS_CmpMonitor2
 X(CmpMonitor2)
 #endif
@@ -64,6 +67,9 @@ X(CmpNameServiceServer)
 X(CmpChannelServerEmbedded)
 #if HAS_CmpBlkDrvSimpleCom
 X(CmpBlkDrvSimpleCom)
+#endif
+#if HAS_CmpBlkDrvCan
+X(CmpBlkDrvCan)
 #endif
 #if HAS_CmpBlkDrvTcp
 X(CmpBlkDrvTcp)

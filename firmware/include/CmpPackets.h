@@ -31,6 +31,23 @@ typedef struct {
     RTS_UI8 ip[4];
 } TCP_ADDRESS;
 
+/* ---- layer 2: CAN (own) ---- */
+
+/* A name request that fits into a frame. */
+typedef struct {
+    RTS_UI8 type;   /* CAN_FRAME_SCAN */
+    RTS_UI8 window; /* replies come after a random time of up to so many CAN_SCAN_UNIT_MS */
+    WIRE_UI16 version;
+    WIRE_UI32 request_id; /* both as in NS_REQUEST */
+} CAN_SCAN;
+
+/* A tool takes an address (the source in the identifier), or has it already. */
+typedef struct {
+    RTS_UI8 type; /* CAN_FRAME_CLAIM, CAN_FRAME_TAKEN */
+    RTS_UI8 unused[3];
+    WIRE_UI32 number; /* random; of the tool that sends the frame */
+} CAN_CLAIM;
+
 /* ---- layer 3: router [2.1] ---- */
 
 /* Then the receiver's address, the sender's, and zeros up to a multiple of 4. */
@@ -267,11 +284,11 @@ typedef struct {
 /* TAG_IO_STATE (own). Indices are those of the configuration (IoConfig.h). */
 typedef struct {
     WIRE_UI16 index;
-    WIRE_UI16 parent; /* IO_CONFIG_NONE: none */
-    WIRE_UI16 type;   /* CT_* */
-    WIRE_UI16 flags;  /* CF_* */
-    WIRE_UI32 errors; /* since the application was loaded */
-    WIRE_UI32 age_ms; /* since its last good data; 0xFFFFFFFF: none yet, or longer */
+    WIRE_UI16 parent;  /* IO_CONFIG_NONE: none */
+    WIRE_UI16 type;    /* CT_* */
+    WIRE_UI16 flags;   /* CF_* */
+    WIRE_UI32 errors;  /* since the application was loaded */
+    WIRE_UI32 age_ms;  /* since its last good data; 0xFFFFFFFF: none yet, or longer */
     WIRE_UI32 skipped; /* how often a task found its driver busy, since the start of the runtime */
 } IO_STATE;
 

@@ -23,6 +23,7 @@ enum {
     BLK_DRV_TYPE_TCP = 1,
     BLK_DRV_TYPE_COM = 2,
     BLK_DRV_TYPE_UDP = 5,
+    BLK_DRV_TYPE_CAN = 7,
     BLK_DRV_TYPE_DIRECT = 8,
 };
 
@@ -34,6 +35,21 @@ enum {
     UDP_PORTS = 4,
     UDP_INDEX_BITS = 2,     /* of a network address, above those of the host */
     ROUTER_MAX_NETWORK = 3, /* words of a network address */
+};
+
+/* ---- layer 2: CAN (own; docs/can.md) ---- */
+enum {
+    CAN_ID_BASE = 0x1F400000, /* of 29-bit identifiers: base | target << 8 | source; base has zeros there */
+    CAN_TARGET_SHIFT = 8,
+    CAN_ADDRESS_MASK = 0xFF,
+    CAN_NODE_MAX = 127, /* devices are 1..127, as in CANopen */
+    CAN_TOOL_MIN = 128,
+    CAN_TOOL_MAX = 254,
+    CAN_TO_ALL = 255,
+    CAN_FRAME_SCAN = 0x40, /* first byte of the frames that are not ISO-TP's */
+    CAN_FRAME_CLAIM = 0x41,
+    CAN_FRAME_TAKEN = 0x42,
+    CAN_SCAN_UNIT_MS = 10, /* of CAN_SCAN.window */
 };
 
 /* ---- layer 3: router (2) ---- */
@@ -94,8 +110,8 @@ enum {
     CHANNEL_TIMEOUT_MS = 30000,
     CHANNEL_IDLE_MS = 5000,
     CHANNEL_COMPLAINT_MS = 100,
-    CHANNEL_LOGIN_MS = 5000, /* on a network or bus: a channel ends when it has had no login for so long */
-    CHANNEL_SETTLE_MS = 1000, /* and is not given to another peer before, once it has been used */
+    CHANNEL_LOGIN_MS = 5000,   /* on a network or bus: a channel ends when it has had no login for so long */
+    CHANNEL_SETTLE_MS = 1000,  /* and is not given to another peer before, once it has been used */
     CHANNEL_MIN_MESSAGE = 128, /* an open request for a smaller buffer is ignored */
 };
 
@@ -118,6 +134,7 @@ enum {
     SG_APPLICATION = 2,
     SG_LOG = 5,
     SG_IOMGR = 0x0B,
+    SG_PLCSHELL = 0x11,
     SG_MONITORING2 = 0x1B,
 };
 
@@ -262,6 +279,20 @@ enum {
     TAG_LOG_ENTRY = 0x03,
     TAG_LOG_TEXT = 0x04,
     TAG_LOG_COMPONENT_NAME = 0x05,
+};
+
+/* PLC shell (4.15). */
+enum {
+    SRV_SHELL_EXECUTE = 1,
+    SRV_SHELL_CANCEL = 2,
+    TAG_SHELL_COMMAND = 0x10,
+    TAG_SHELL_SESSION = 0x11,
+    TAG_SHELL_ARGUMENTS = 0x12,
+    TAG_SHELL_BLOCK = 0x13,
+    TAG_SHELL_PART = 0x81, /* more follow */
+    TAG_SHELL_LAST = 0x82,
+    TAG_SHELL_TEXT = 0x20,
+    SHELL_MAX_COMMAND = 33, /* bytes, with NUL */
 };
 
 #endif

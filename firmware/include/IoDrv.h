@@ -110,9 +110,9 @@ typedef struct {
      * from bit `bit_offset` on; bit 0 is the lowest of byte 0. `data` has room for them. ERR_NO_OBJECT: no such
      * parameter (a read then gives what the configuration says); ERR_PENDING: call again. Below 1 ms.
      */
-    RTS_RESULT (*IoDrvReadParameter)
+    RTS_RESULT(*IoDrvReadParameter)
     (const IoConfigConnector *connector, RTS_UI32 id, void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
-    RTS_RESULT (*IoDrvWriteParameter)
+    RTS_RESULT(*IoDrvWriteParameter)
     (const IoConfigConnector *connector, RTS_UI32 id, const void *data, RTS_UI32 bits, RTS_UI32 bit_offset);
 } ICmpIoDrv;
 

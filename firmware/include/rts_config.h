@@ -281,6 +281,50 @@
 #define TCP_FRAME_MS 3000
 #endif
 
+/* 1: CAN FD can be used. Each queued frame takes 56 bytes more. 0: classic frames only. */
+#ifndef CAN_FD
+#define CAN_FD 0
+#endif
+
+/* Packets that may arrive over CAN at a time, from as many tools; each costs a packet of 512 bytes and 30. */
+#ifndef CAN_RX_SESSIONS
+#define CAN_RX_SESSIONS (COMM_MAX_CLIENTS + 1)
+#endif
+
+/* Packets that may be on their way to tools over CAN; each costs the same. One whose tool has gone takes its place for a
+ * second. */
+#ifndef CAN_TX_SESSIONS
+#define CAN_TX_SESSIONS (COMM_MAX_CLIENTS + 1)
+#endif
+
+/* What the device asks of senders: so many frames at most before it asks for more (0: no limit), and at least so many
+ * milliseconds between two. As many as the port can buffer while main does something else: frames that are lost cost a
+ * repetition of the packet. */
+#ifndef CAN_BLOCK_SIZE
+#define CAN_BLOCK_SIZE 16
+#endif
+#ifndef CAN_SEPARATION_MS
+#define CAN_SEPARATION_MS 0
+#endif
+
+/* The number of the device on CAN if the settings have no {"CmpBlkDrvCan", "Node"}, 1..127; and its bit rate [bit/s]. */
+#ifndef CAN_NODE
+#define CAN_NODE 1
+#endif
+#ifndef CAN_BIT_RATE
+#define CAN_BIT_RATE 500000
+#endif
+
+/* The serial line that carries CAN frames, where there is no controller (CanOnSerial.c). */
+#ifndef CAN_SLCAN_LINE
+#define CAN_SLCAN_LINE 1
+#endif
+
+/* How long after bus off the device tries again [ms]. */
+#ifndef CAN_RESTART_MS
+#define CAN_RESTART_MS 500
+#endif
+
 /* Serial lines the block driver serves; each costs one receive packet (514 bytes, less when NETSERVER_MESSAGE_SIZE is
  * below 424), COM_QUEUE_SIZE and about 150 bytes. */
 #ifndef COM_MAX_LINES

@@ -16,7 +16,15 @@ from typing import Any, Self, overload
 
 from plctool.core import lib
 from plctool.debug.kept_changes import KeptChanges, kept_changes
-from plctool.debug.symbols import SourceLine, SymbolTable, cache_path, find_symbols, load_symbols, symbol_path
+from plctool.debug.symbols import (
+    SourceLine,
+    SymbolTable,
+    cache_path,
+    find_symbols,
+    is_pattern,
+    load_symbols,
+    symbol_path,
+)
 from plctool.debug.variables import Change, Reading, Symbol
 from plctool.errors import DeviceError, UsageError
 from plctool.files import read_image
@@ -228,16 +236,18 @@ class Controller(ABC):
     @overload
     def read(self, name: str, other: str, /, *more: str) -> dict[str, Any]: ...
     def read(self, *names: str) -> Any:
-        """The value of one variable, or the values of several by the names given."""
+        """The value of one variable, or the values of several by the names given; also of those that match a pattern
+        such as `Main.*`."""
         values = self.read_all(names)
-        return values if len(names) > 1 else values[names[0]]
+        return values if len(names) > 1 or is_pattern(names[0]) else values[names[0]]
 
     def read_all(self, names: Sequence[str]) -> dict[str, Any]:
         """Values by name. Structs and arrays come as dicts and lists, TIME as a string."""
         return self.sample(names).values
 
     def sample(self, names: Sequence[str]) -> Reading:
-        """The variables with these names as they are now; of one moment between two cycles if the reading says so.
+        """The variables with these names, or that match these patterns, as they are now; of one moment between two
+        cycles if the reading says so.
 
         Raises UsageError for a name that is unknown, DeviceError when a pointer leads to no variable.
         """
@@ -247,7 +257,7 @@ class Controller(ABC):
         return reading
 
     def _sample(self, table: SymbolTable, names: Sequence[str]) -> Reading:
-        symbols = {name: table.resolve(name) for name in names}
+        symbols = table.select(names)
         contents = self._read(table, list(symbols.values()))
         return Reading(symbols, dict(zip(symbols, contents.values, strict=True)), contents.consistent)
 

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,13 @@ from plctool.gateway.place import NoGateway
 from plctool.iec.types import Type
 from plctool.iec.values import decode, encode
 from plctool.link import io_services, services
-from plctool.link.connection import SCAN_SECONDS, Connection, MessageLink, no_answer
+from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLink, no_answer
 from plctool.link.io_services import IoDevice, IoModule
 from plctool.link.monitoring import APP_CHANGED, AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
 from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
 from plctool.link.session import Session
-from plctool.link.transports import Link, open_transport, parse_link
+from plctool.link.transports import Link, can_transport, open_transport, parse_link, share_bus
 
 _BUSY_POLL = 0.2  # shortest time between two looks at a device that another tool keeps to itself [s]
 
@@ -75,7 +75,32 @@ def _open_link(text: str | Link, gateway: bool | None, tool: str | None) -> Mess
                 return connect_gateway(link, tool or Path(sys.argv[0]).name or "Python")
         else:
             dismiss_idle(link.place)
-    return Connection(open_transport(link))
+    return Connection(open_transport(link), _choice(link))
+
+
+@contextmanager
+def connect_several(link: Link, symbols: Path | None = None) -> Iterator[dict[str, Plc]]:
+    """The controllers that the nodes of a link on a bus name, each for a thread of its own. Raises LinkError."""
+    bus = share_bus(link)
+    opened: dict[str, Plc] = {}
+    try:
+        for node in link.nodes or []:
+            one = link.of_node(node)
+            opened[node] = Plc(Connection(can_transport(one, bus.part()), _choice(one)), symbols)
+        yield opened
+    finally:
+        for plc in opened.values():
+            plc.close()
+        bus.close()
+
+
+def _choice(link: Link) -> Choice | None:
+    nodes = link.nodes
+    if nodes is None:
+        return None
+    if len(nodes) > 1:
+        raise UsageError(f"Only 'flash' takes several devices; name one of {', '.join(nodes)}.", "no-such-link")
+    return Choice(nodes[0] if nodes else "")
 
 
 class Plc(Controller):
@@ -111,6 +136,10 @@ class Plc(Controller):
 
     def log(self, after: int = 0) -> list[LogEntry]:
         return services.read_log(self._session, after)
+
+    def shell(self, command: str) -> str:
+        """The answer of the controller's PLC shell, in lines; `?` lists its commands."""
+        return services.run_shell(self._session, command)
 
     # ---- inputs and outputs ----
 

@@ -11,12 +11,14 @@
 
 #include "../../firmware/src/app/AppLife.h"
 #include "CmpAppSrv.h"
+#include "CmpBlkDrvCan.h"
 #include "CmpBlkDrvSimpleCom.h"
 #include "CmpBlkDrvTcp.h"
 #include "CmpBlkDrvUdp.h"
 #include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
 #include "CmpLogSrv.h"
+#include "CmpPlcShell.h"
 #include "CmpMonitor2.h"
 #include "CmpNameServiceServer.h"
 #include "CmpRouterEmbedded.h"
@@ -314,11 +316,14 @@ void fakes_hook(CMP_HOOK hook)
         CmpAppSrv_Hook,
         CmpMonitor2_Hook,
         CmpLogSrv_Hook,
+        CmpPlcShell_Hook,
         CmpChannelServerEmbedded_Hook,
         CmpNameServiceServer_Hook,
         CmpRouterEmbedded_Hook,
         CmpBlkDrvSimpleCom_Hook,
-#if COMM_ENDPOINTS
+#if COMM_CAN_TESTED
+        CmpBlkDrvCan_Hook,
+#elif COMM_ENDPOINTS
         CmpBlkDrvTcp_Hook,
         CmpBlkDrvUdp_Hook,
 #endif

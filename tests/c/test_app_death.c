@@ -78,7 +78,7 @@ static void one_crash_of_an_unproven_application_rolls_it_back(void)
     start_unproven_after_proven();
     CHECK_EQUAL(restart(SYS_START_CRASH, RUN_AT_ONCE), ERR_OK);
     CHECK_EQUAL(running_step(), 1);
-    CHECK(log_has("signal SIGSEGV: access violation at code offset 0x12"));
+    CHECK(log_has("signal SIGSEGV: access violation at code offset 0x00000012"));
     CHECK(log_has("Back to the application before"));
     CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK_EQUAL(running_step(), 1);
@@ -156,8 +156,8 @@ static void what_stays_stopped_is_not_called(void)
     CHECK_EQUAL(AppStopApplication(), ERR_OK);
     SimStop(); /* nor at the end */
     CHECK_EQUAL(SimStart(), ERR_OK);
-    CHECK_EQUAL(running_step(), 1);                                         /* and the next start decides */
-    CHECK(log_has("signal SIGSEGV: access violation at code offset 0x12")); /* which knows why */
+    CHECK_EQUAL(running_step(), 1);                                               /* and the next start decides */
+    CHECK(log_has("signal SIGSEGV: access violation at code offset 0x00000012")); /* which knows why */
     CHECK(log_has("Back to the application before"));
 }
 

@@ -65,7 +65,7 @@ static void division_by_zero_stops_the_application(void)
     emit_divide_by_zero(&spec);
     run_bad_task();
     check_exception(RTSEXCPT_DIVIDEBYZERO, at, 1);
-    snprintf(text, sizeof text, "Bad: division by zero at code offset 0x%x", (unsigned)at);
+    snprintf(text, sizeof text, "Bad: division by zero at code offset 0x%08X", (unsigned)at);
     CHECK(last_log_is(text));
 }
 

@@ -80,7 +80,7 @@ static void something_else_than_an_image(void)
 {
     begin_image();
     header.header_tag = 0x464C457F;
-    check_header_refused(ERR_TYPE_MISMATCH, "Not a compact download image: it starts with 0x464c457f");
+    check_header_refused(ERR_TYPE_MISMATCH, "Not a compact download image: it starts with 0x464C457F");
 }
 
 static void another_header_version(void)
@@ -122,14 +122,14 @@ static void another_device_type(void)
 {
     begin_image();
     header.device_type = 0x1001;
-    check_header_refused(ERR_TYPE_MISMATCH, "for device type 0x1001, this device is 0x1000");
+    check_header_refused(ERR_TYPE_MISMATCH, "for device type 0x00001001, this device is 0x00001000");
 }
 
 static void another_device_id(void)
 {
     begin_image();
     header.device_id = TARGET_ID_CORTEX_M3;
-    check_header_refused(ERR_ID_MISMATCH, "for device id 0x9004, this device is 0x9001");
+    check_header_refused(ERR_ID_MISMATCH, "for device id 0x00009004, this device is 0x00009001");
 }
 
 static void another_major_version(void)

@@ -5,7 +5,8 @@
  */
 #include "channel_fixture.h"
 
-RTS_STATIC_ASSERT(COMM_ENDPOINTS && COMM_MAX_CLIENTS == 4, built_for_a_network);
+RTS_STATIC_ASSERT(COMM_ENDPOINTS, built_for_a_network);
+RTS_STATIC_ASSERT(COMM_MAX_CLIENTS == 4, built_for_four_clients);
 
 enum { ADDRESS = 0x0102, INTRUDER = 0x0666 };
 
@@ -164,18 +165,19 @@ static void those_who_hold_channels_without_login_give_way_after_a_while(void)
     CHECK(comes_in(&newcomer) && client_login(&newcomer));
 }
 
-/* Reads memory, files and traces in other runtimes: groups 0x0F, 0x11, 8 and their neighbours. */
+/* Reads memory, files and traces in other runtimes: groups 0x0F, 8 and their neighbours. */
 static void there_are_no_services_but_those_of_the_documentation(void)
 {
     start();
     for (RTS_UI16 group = 0; group < L7_REPLY; group++) {
-        bool known = group == SG_DEVICE || group == SG_APPLICATION || group == SG_LOG || group == SG_MONITORING2;
+        bool known = group == SG_DEVICE || group == SG_APPLICATION || group == SG_LOG || group == SG_PLCSHELL ||
+                     group == SG_MONITORING2;
         CHECK(client_request(&client, group, 0xFE, NULL, 0, &answer));
         CHECK_EQUAL(reply_error(&answer), known ? ERR_L7_UNKNOWNCMD : ERR_L7_UNKNOWNCMDGROUP);
     }
 }
 
-static const RTS_UI16 groups[] = {SG_DEVICE, SG_APPLICATION, SG_LOG, SG_MONITORING2};
+static const RTS_UI16 groups[] = {SG_DEVICE, SG_APPLICATION, SG_LOG, SG_PLCSHELL, SG_MONITORING2};
 enum { LAST_TAG = 0x90, LONG_CONTENT = 1000 };
 
 /* One element after another in a container, or none of them: of this tag, and of `size` bytes. */

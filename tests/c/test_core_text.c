@@ -24,7 +24,7 @@ static void every_conversion_works(void)
     CHECK(FORMATS("0 1 4294967295", "%u %u %u", 0u, 1u, UINT_MAX));
     CHECK(FORMATS("0 7 -7 2147483647", "%d %d %d %d", 0, 7, -7, INT_MAX));
     CHECK(FORMATS("-2147483648", "%d", INT_MIN));
-    CHECK(FORMATS("0 a 1f ffffffff", "%x %x %x %x", 0u, 10u, 31u, UINT_MAX));
+    CHECK(FORMATS("00000000 0000000A 0000001F FFFFFFFF", "%X %X %X %X", 0u, 10u, 31u, UINT_MAX));
     CHECK(FORMATS("100%", "%u%%", 100u));
 }
 

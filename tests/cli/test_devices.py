@@ -7,10 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_device import FakePlc
+from fake_device import FakeDevice, FakeLine, FakePlc
+from serial.tools.list_ports_common import ListPortInfo
+from small_app import make_application
 
 from plctool.cli import main as cli
 from plctool.core import lib
+from plctool.errors import LinkError
+from plctool.link.transport import BlockTransport
+from plctool.link.transports import Link
 
 PORT = ("--port", "/dev/fake")
 
@@ -45,6 +50,34 @@ def test_flash_says_what_it_did_to_people(tool: Any, plc: FakePlc, image: Path) 
     assert f"{image.stat().st_size} bytes" in done.out
     assert "state: run" in done.out
     assert "already" in tool("flash", *PORT, str(image)).out
+
+
+@pytest.mark.parametrize(("at", "words"), [(1, "has no program."), (0, "has the new program (CRC ")])
+def test_ctrl_c_during_flash_says_what_is_on_the_device_now(
+    tool: Any, plc: FakePlc, image: Path, monkeypatch: pytest.MonkeyPatch, at: int, words: str
+) -> None:
+    if at:
+        monkeypatch.setattr("plctool.link.services.download", interrupt)
+    else:
+        monkeypatch.setattr("plctool.link.services.start", interrupt)
+    done = tool("flash", *PORT, str(image))
+    assert (done.status, done.out) == (130, "")
+    assert done.err.startswith("plctool: Interrupted. The device ") and words in done.err
+
+
+def test_ctrl_c_during_the_flash_of_another_program_leaves_the_previous_one(
+    tool: Any, running: FakePlc, image: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("plctool.link.services.download", interrupt)
+    before = f"{running.crc:08X}"
+    (image.parent / "other.cdl").write_bytes(make_application("2")[0])
+    done = tool("flash", *PORT, "other.cdl")
+    assert done.status == 130
+    assert done.err == f"plctool: Interrupted. The device has still the previous program (CRC {before}), state: run.\n"
+
+
+def interrupt(*arguments: Any) -> None:
+    raise KeyboardInterrupt
 
 
 def test_a_refused_image_exits_1_with_the_reason(tool: Any, plc: FakePlc, image: Path) -> None:
@@ -115,6 +148,11 @@ def test_tasks_of_an_empty_device_are_none(tool: Any, plc: FakePlc) -> None:
     assert tool("tasks", *PORT).status == 0
 
 
+def test_the_shell_takes_its_command_as_words(tool: Any, running: FakePlc) -> None:
+    assert tool("shell", *PORT, "say", "it").out.splitlines()[0] == "You said say it"
+    assert tool("shell", *PORT, "?", "--json").json == {"command": "?", "answer": "You said ?\nand now\nall is said."}
+
+
 def test_log_entries_come_with_class_component_and_place(tool: Any, running: FakePlc) -> None:
     running.log = [
         (1, 1_500_000_000, lib.LOG_INFO, "CmpApp", "started"),
@@ -167,6 +205,26 @@ def test_lists_are_written_as_a_whole(tool: Any, running: FakePlc) -> None:
     assert bytes(running.memory[0][28:34]) == bytes([1, 0, 5, 0, 5, 0])
 
 
+def test_read_takes_patterns(tool: Any, running: FakePlc) -> None:
+    running.memory[lib.APP_AREA_CODE] = bytearray(4)  # of a constant
+    values = tool("read", *PORT, "Main.*", "--json").json["values"]
+    assert {"Main.count", "Main.ok", "Main.name", "Main.list"} <= set(values)
+    assert list(tool("read", *PORT, "main.C*", "Main.list[?]", "--json").json["values"]) == [
+        "Main.count", "Main.list[1]", "Main.list[2]", "Main.list[3]",
+    ]  # fmt: skip
+
+
+def test_a_pattern_that_nothing_matches_exits_2(tool: Any, running: FakePlc) -> None:
+    done = tool("read", *PORT, "Pump.*")
+    assert done.status == 2
+    assert done.err == "plctool: No variable matches Pump.*; 'plctool symbols' lists them.\n"
+
+
+def test_watch_takes_patterns(tool: Any, running: FakePlc) -> None:
+    line = tool("watch", *PORT, "Main.c*", "--count", "1", "--json").out
+    assert json.loads(line)["values"] == {"Main.count": 0}
+
+
 def test_read_of_an_unknown_name_exits_2_with_a_suggestion(tool: Any, running: FakePlc) -> None:
     done = tool("read", *PORT, "Main.coutn", "--json")
     assert done.status == 2
@@ -215,8 +273,8 @@ def watched(running: FakePlc) -> tuple[str, ...]:
     return ("watch", *PORT, "Main.count", "--interval", "0")
 
 
-def test_watch_collects_samples(tool: Any, watched: tuple[str, ...]) -> None:
-    samples = tool(*watched, "--count", "3", "--json").json["samples"]
+def test_watch_as_json_gives_a_document_a_line(tool: Any, watched: tuple[str, ...]) -> None:
+    samples = [json.loads(line) for line in tool(*watched, "--count", "3", "--json").out.splitlines()]
     assert [sample["values"] for sample in samples] == [{"Main.count": 0}] * 3
     assert all(sample["time_s"] >= 0 for sample in samples)
 
@@ -227,7 +285,7 @@ def test_watch_prints_a_line_a_reading_where_there_is_no_terminal(tool: Any, wat
     assert all(line.endswith("Main.count = 0") for line in lines)
 
 
-def test_watch_as_json_gives_its_document_at_ctrl_c(
+def test_watch_as_json_prints_each_reading_at_once_and_ends_well_at_ctrl_c(
     tool: Any, watched: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     naps = iter([None, None])
@@ -239,7 +297,7 @@ def test_watch_as_json_gives_its_document_at_ctrl_c(
     monkeypatch.setattr("plctool.device.time.sleep", sleep)
     done = tool(*watched, "--json")
     assert done.status == 0
-    assert len(done.json["samples"]) == 2
+    assert len(done.out.splitlines()) == 2
 
 
 def test_ctrl_c_exits_130_without_a_word(tool: Any, watched: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -259,7 +317,7 @@ DEVICE_COMMANDS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("command", DEVICE_COMMANDS, ids=lambda c: c[0])
+@pytest.mark.parametrize("command", [c for c in DEVICE_COMMANDS if c != ("scan",)], ids=lambda c: c[0])
 def test_every_device_command_without_a_link_exits_2(tool: Any, image: Path, command: tuple[str, ...]) -> None:
     done = tool(*command, "--json")
     assert done.status == 2
@@ -284,13 +342,6 @@ def test_what_is_no_serial_port_is_reported(tool: Any, port: str) -> None:
     assert "it is not a serial port" in done.err
 
 
-@pytest.mark.parametrize("link", [("--can", "socketcan:can0"), ("--node", "0")])
-def test_links_of_later_versions_exit_2(tool: Any, link: tuple[str, str]) -> None:
-    done = tool("status", *link, "--json")
-    assert done.status == 2
-    assert f"{link[0]} is not in this version" in done.json["error"]["message"]
-
-
 def test_a_silent_device_exits_3(tool: Any, serial_opened_by: Any) -> None:
     from fake_device import FakeDevice, FakeLine
 
@@ -307,12 +358,106 @@ def test_an_option_of_another_kind_of_link_exits_2(tool: Any) -> None:
     assert (done.status, done.err) == (2, "plctool: A tcp link has no option 'baud'; it has none.\n")
 
 
+@pytest.fixture
+def opened(plc: FakePlc, serial_opened_by: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The serial links that are opened."""
+    links: list[str] = []
+
+    def open_line(link: Link) -> BlockTransport:
+        links.append(str(link))
+        return FakeLine(FakeDevice(plc.handle))
+
+    serial_opened_by(open_line)
+    return links
+
+
+def test_the_environment_names_the_link_of_commands_without_one(
+    tool: Any, opened: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PLC_LINK", "serial:/dev/mine?baud=9600")
+    assert tool("status").status == 0
+    assert tool("status", "--baud", "19200").status == 0
+    assert tool("status", *PORT).status == 0
+    assert tool("scan").status == 0
+    mine, fake = "serial:/dev/mine?baud", "serial:/dev/fake?baud"
+    assert opened == [f"{mine}=9600", f"{mine}=19200", f"{fake}=115200", f"{mine}=9600"]
+
+
+def test_the_project_names_the_link_where_the_environment_does_not(
+    tool: Any, opened: list[str], scratch: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (scratch / "plc.toml").write_text('link = "serial:/dev/project"\n[other]\nlink = "x"\n')
+    (scratch / "sources").mkdir()
+    monkeypatch.chdir(scratch / "sources")
+    assert tool("status").status == 0
+    monkeypatch.setenv("PLC_LINK", "serial:/dev/mine")
+    assert tool("status").status == 0
+    assert opened == ["serial:/dev/project?baud=115200", "serial:/dev/mine?baud=115200"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("link = 5", 'write for example link = "serial:/dev/ttyS0"'),
+        ("link = ", "is not TOML"),
+        ('link = "/dev/ttyS0"', "'/dev/ttyS0' is not a link; write for example serial:/dev/ttyS0"),
+    ],
+)
+def test_a_wrong_link_of_the_project_exits_2_and_names_the_file(
+    tool: Any, scratch: Path, text: str, words: str
+) -> None:
+    (scratch / "plc.toml").write_text(text)
+    done = tool("status")
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "plc.toml" in done.err and words in done.err
+
+
+def test_a_wrong_link_of_the_environment_exits_2_and_names_it(tool: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PLC_LINK", "ttyS0")
+    done = tool("status")
+    assert done.status == 2 and "PLC_LINK" in done.err
+
+
+@pytest.fixture
+def ports(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The serial ports of the machine."""
+    names: list[str] = []
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [ListPortInfo(name) for name in names])
+    return names
+
+
+def test_scan_without_a_link_looks_at_all_serial_ports(
+    tool: Any, plc: FakePlc, serial_opened_by: Any, ports: list[str]
+) -> None:
+    def open_line(link: Link) -> BlockTransport:
+        if link.place == "/dev/ttyS1":
+            raise LinkError("Cannot open /dev/ttyS1: it is busy.", "open")
+        line = FakeLine(FakeDevice(plc.handle))
+        line.cut = link.place == "/dev/ttyS0"
+        return line
+
+    serial_opened_by(open_line)
+    ports += ["/dev/ttyS0", "/dev/ttyS1", "/dev/ttyUSB3"]
+    (found,) = tool("scan", "--json").json["devices"]
+    assert (found["link"], found["node_name"]) == ("serial:/dev/ttyUSB3", "press-3")
+    ports.pop()
+    done = tool("scan")
+    assert done.status == 3
+    assert "No device answers on" in done.err and "Cannot open /dev/ttyS1: it is busy." in done.err
+
+
+def test_scan_without_a_link_on_a_machine_without_serial_ports_exits_3(tool: Any, ports: list[str]) -> None:
+    done = tool("scan")
+    assert (done.status, done.err.count("\n")) == (3, 1)
+    assert "no serial ports" in done.err
+
+
 # ---- bugs ------------------------------------------------------------------------------------------------------------
 
 
 def test_a_bug_is_one_sentence_with_a_hint(tool: Any, plc: FakePlc, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("PLCTOOL_DEBUG", raising=False)
-    monkeypatch.setattr(cli, "_link", lambda args: 1 / 0)
+    monkeypatch.setattr(cli, "link_of", lambda args: 1 / 0)
     done = tool("status", *PORT)
     assert (done.status, done.out) == (1, "")
     assert "Internal error" in done.err
@@ -323,5 +468,5 @@ def test_a_bug_is_one_sentence_with_a_hint(tool: Any, plc: FakePlc, monkeypatch:
 
 def test_a_bug_shows_its_traceback_on_demand(tool: Any, plc: FakePlc, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PLCTOOL_DEBUG", "1")
-    monkeypatch.setattr(cli, "_link", lambda args: 1 / 0)
+    monkeypatch.setattr(cli, "link_of", lambda args: 1 / 0)
     assert "ZeroDivisionError" in tool("status", *PORT).err

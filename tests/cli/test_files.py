@@ -205,6 +205,63 @@ def test_run_takes_virtual_time(tool: Any, counter: Path) -> None:
     assert document["values"]["Main.n"] == document["cycles"] > 100
 
 
+def test_run_writes_a_line_of_a_trace_after_each_cycle(tool: Any, counter: Path, scratch: Path) -> None:
+    words = ("--trace", "Main.n", "Main.pause", "Main.list", "-o", "n.csv")
+    assert tool("run", str(counter), "--cycles", "3", *words, "--json").json["trace"] == "n.csv"
+    assert (scratch / "n.csv").read_text().splitlines() == [
+        "time_ms,Main.n,Main.pause,Main.list[1],Main.list[2],Main.list[3]",
+        "0,1,T#20ms,1,2,3",
+        "10,2,T#40ms,1,2,3",
+        "20,3,T#60ms,1,2,3",
+    ]
+
+
+def test_run_traces_for_a_time_and_takes_patterns(tool: Any, counter: Path, scratch: Path) -> None:
+    document = tool("run", str(counter), "--time", "T#1s", "--trace", "Main.s*", "Main.n", "--json").json
+    head, *rows = (scratch / "trace.csv").read_text().splitlines()
+    assert head == "time_ms,Main.step,Main.n"
+    assert rows[-1] == f"990,1,{document['cycles']}"
+    assert (len(rows), document["time_ms"]) == (100, 1000)
+
+
+def test_a_trace_of_a_program_that_waits_has_a_line_every_ten_milliseconds(tool: Any, scratch: Path) -> None:
+    text = """PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM
+CONFIGURATION c RESOURCE r ON PLC TASK t(EVENT := 'door', PRIORITY := 1); PROGRAM Main WITH t : Main;
+END_RESOURCE END_CONFIGURATION"""
+    (scratch / "waits.st").write_text(text)
+    assert tool("build", "waits.st").status == 0
+    assert tool("run", "app.cdl", "--time", "T#25ms", "--trace", "Main.n").status == 0
+    assert (scratch / "trace.csv").read_text().splitlines() == ["time_ms,Main.n", "10,0", "20,0", "25,0"]
+
+
+def test_a_trace_ends_where_the_program_stops_with_an_exception(tool: Any, scratch: Path) -> None:
+    text = "PROGRAM Main VAR n : INT; on : BOOL; END_VAR\nn := n + 1; on := 12 / (3 - n) > 0;\nEND_PROGRAM"
+    (scratch / "ends.st").write_text(text)
+    tool("build", "ends.st")
+    done = tool("run", "app.cdl", "--cycles", "9", "--trace", "Main.*")
+    assert done.status == 1 and "DIVIDEBYZERO" in done.err
+    rows = (scratch / "trace.csv").read_text().splitlines()
+    assert [row.partition(",")[2] for row in rows] == ["Main.n,Main.on", "1,1", "2,1", "3,1"]
+
+
+def test_a_trace_replaces_neither_the_image_nor_its_symbols(tool: Any, counter: Path) -> None:
+    for name in (str(counter), "counter.sym"):
+        done = tool("run", str(counter), "--trace", "Main.n", "-o", name)
+        assert done.status == 2 and "write for example -o trace.csv" in done.err
+
+
+def test_run_takes_patterns_of_what_to_print(tool: Any, scratch: Path) -> None:
+    text = """TYPE P : STRUCT x : INT; y : REAL; END_STRUCT END_TYPE
+INTERFACE I END_INTERFACE
+PROGRAM Main VAR n : INT; p : P; t : TON; r : REFERENCE TO INT; i : I; a : POINTER TO INT; END_VAR
+t(IN := TRUE, PT := T#1s); END_PROGRAM"""
+    (scratch / "all.st").write_text(text)
+    tool("build", "all.st")
+    values = tool("run", "app.cdl", "--get", "Main.*", "--json").json["values"]
+    assert values.items() >= {"Main.n": 0, "Main.p.x": 0, "Main.p.y": 0.0, "Main.t.IN": True, "Main.t.Q": False}.items()
+    assert "Main.p" not in values and "Main.t" not in values
+
+
 def test_run_sets_variables_first(tool: Any, counter: Path) -> None:
     words = ("--set", "Main.step=7", "--set", "Main.pause=T#1s", "--set", "Main.text=a b")
     gets = ("--get", "Main.n", "--get", "Main.pause", "--get", "Main.text", "--get", "Main.list")

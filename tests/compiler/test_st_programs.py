@@ -6,17 +6,22 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-from plctool.compiler import check_sources, compile_sources
+from plctool.compiler import check_sources
+from plctool.compiler.build import build_program
+from plctool.compiler.codegen.lower_unit import Options, parse_checks
 from plctool.compiler.diagnostics import Diagnostic
+from plctool.compiler.front import CheckResult
 from plctool.debug.symbols import SymbolTable
 from plctool.iec.literals import string, typed, unsigned
 from plctool.iec.types import ELEMENTARY, REAL
 from plctool.iec.value_texts import format_date, parse_date
 from plctool.iec.values import decode, encode
+from plctool.image.targets import DEFAULT_TARGET, find_target
 from plctool.sim import Simulator
 
 FOLDER = Path(__file__).parents[1] / "st"
@@ -138,12 +143,21 @@ def exception_of(plc: Simulator, symbols: SymbolTable) -> tuple[str, int] | None
     return exception.name, place.line if place else 0
 
 
+@cache
+def checked(path: Path) -> CheckResult:
+    """A program with its unit tests as the front end sees it, for all that is built of it."""
+    return check_sources([path])
+
+
 def run_program(path: Path, script: Script, level: int = 2) -> list[str]:
     """Runs the program; what is not as expected."""
     per_cycle = {name: values for name, values in script.expected if len(values) > 1}
     at_end = {name: values[0] for name, values in script.expected if len(values) == 1}
     wrong = []
-    result = compile_sources([path], level=level, checks=script.options.get("checks", "all"))
+    typed_program = checked(path).program
+    assert typed_program is not None, "it does not compile"
+    checks = parse_checks(script.options.get("checks", "all"))
+    result = build_program(typed_program, Options(find_target(DEFAULT_TARGET), level, checks))
     with Simulator(result.image, result.symbols) as plc:
         if script.time_ms:
             plc.run_for(script.time_ms)
@@ -181,7 +195,7 @@ def runs(script: Script) -> bool:
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda p: p.stem)
 def test_program(path: Path) -> None:
     script = read_script(path)
-    wrong = check_diagnostics(check_sources([path]).diagnostics, script)
+    wrong = check_diagnostics(checked(path).diagnostics, script)
     if runs(script):
         wrong += run_program(path, script)
     assert not wrong, "\n".join(wrong)

@@ -25,7 +25,7 @@ from plctool.link.session import Session
 from plctool.link.transports import open_transport, parse_link
 from plctool.testing.plcrt import Plcrt
 
-KINDS = ["serial", "tcp", "udp"]
+KINDS = ["serial", "tcp", "udp", "can"]
 PATIENCE = 30.0  # for what is bound to happen [s]
 CLIENTS = 4  # tools that may be logged in at a time on Linux: COMM_MAX_CLIENTS
 
@@ -42,16 +42,19 @@ def _own_loopback() -> str:
 
 @pytest.fixture
 def plcrt(tmp_path: Path) -> Iterator[Plcrt]:
-    with Plcrt(tmp_path / "plc.flash", "--tcp", "0", "--udp", _own_loopback()) as running:
+    with Plcrt(tmp_path / "plc.flash", "--tcp", "0", "--udp", _own_loopback(), "--can", "slcan:pty") as running:
         yield running
 
 
 def link_of(plcrt: Plcrt, kind: str) -> str:
-    return {"serial": f"serial:{plcrt.port}", "tcp": f"tcp:{plcrt.tcp}", "udp": f"udp:{plcrt.udp}"}[kind]
+    place = {"serial": plcrt.port, "tcp": plcrt.tcp, "udp": plcrt.udp, "can": f"slcan:{plcrt.can}"}[kind]
+    return f"{kind}:{place}"
 
 
 def option_of(plcrt: Plcrt, kind: str) -> list[str]:
-    return {"serial": ["--port", plcrt.port], "tcp": ["--tcp", plcrt.tcp], "udp": ["--udp", plcrt.udp]}[kind]
+    scheme, _, place = link_of(plcrt, kind).partition(":")
+    node = ["--node", "1"] if kind == "can" else []
+    return [f"--{'port' if scheme == 'serial' else scheme}", place, *node]
 
 
 def open_session(link: str) -> Session:
@@ -65,7 +68,7 @@ class TestEveryLink:
     def test_the_device_is_found_and_names_itself(self, plcrt: Plcrt, kind: str) -> None:
         (node,) = plctool.scan(link_of(plcrt, kind), 0.5)
         assert node.device_name == "plcrt"
-        assert node.place == (plcrt.udp if kind == "udp" else "")
+        assert node.place == {"udp": plcrt.udp, "can": "node 1"}.get(kind, "")
 
     @pytest.mark.parametrize("size", [1, 440, 441, 442, 1000, 16000])
     def test_echoes_of_all_sizes_come_back(self, plcrt: Plcrt, kind: str, size: int) -> None:

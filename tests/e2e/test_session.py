@@ -1,5 +1,6 @@
 """The life of a program on a controller, through the real tool and the real runtime: build, flash, use, stop, reset."""
 
+import json
 import random
 
 import pytest
@@ -67,8 +68,8 @@ def test_flash_of_the_same_image_is_skipped(tool, plcrt, counter):
 
 def test_watch_prints_the_samples_asked_for(tool, plcrt, counter):
     tool.ok("flash", "--port", plcrt.port, str(counter))
-    samples = tool.ok("watch", "--port", plcrt.port, "Main.count", "--count", "3", "--interval", "0.1")["samples"]
-    counts = [sample["values"]["Main.count"] for sample in samples]
+    done = tool("watch", "--port", plcrt.port, "Main.count", "--count", "3", "--interval", "0.1", "--json")
+    counts = [json.loads(line)["values"]["Main.count"] for line in done.out.splitlines()]
     assert len(counts) == 3 and counts == sorted(counts)
 
 
@@ -77,6 +78,15 @@ def test_tasks_show_cycles_and_times(tool, plcrt, counter, eventually):
     tasks = eventually(lambda: [t for t in tool.ok("tasks", "--port", plcrt.port)["tasks"] if t["cycles"] > 5])
     assert len(tasks) == 1
     assert tasks[0]["min_us"] <= tasks[0]["avg_us"] <= tasks[0]["max_us"]
+
+
+def test_the_shell_stops_and_starts_the_program(tool, plcrt, counter):
+    tool.ok("flash", "--port", plcrt.port, str(counter))
+    answers = [
+        tool.ok("shell", "--port", plcrt.port, command)["answer"]
+        for command in ("applist", "stopprg", "getprgstat", "startprg", "getprgstat")
+    ]
+    assert answers == ["Application", "stopprg: done", "stop", "startprg: done", "run"]
 
 
 def test_scan_finds_the_device(tool, plcrt):

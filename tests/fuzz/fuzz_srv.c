@@ -79,6 +79,8 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
     case 18:
         return SEED(0x1B, 1, APP "\x81\x01\x1B" "\x82\x01\x18\x02\x01\x04\x05\x13\x02\x10\x00\x06\x00"
                                  "\x09\x08\x02\x20\x00\x0E\x09\x08\x03\x04\x00\x00\x00\x0E");
+    case 20:
+        return SEED(0x11, 1, "\x13\x04\x01\0\0\0\x10\x02" "?\0");
     case 19:
         return SEED(0x1B, 2, APP "\x03\x14" "\0\0\x01\0\0\0\x55\x0B\x00\x02\x10\x00\x06\x00\x09\x08\x02\x04\x00\x0E");
     default:

@@ -361,6 +361,7 @@ class FakePlc:
             (lib.SG_MONITORING2, lib.SRV_MON2_READ): self._read,
             (lib.SG_MONITORING2, lib.SRV_MON2_WRITE): self._write,
             (lib.SG_LOG, lib.SRV_LOG_GET_ENTRIES): self._log,
+            (lib.SG_PLCSHELL, lib.SRV_SHELL_EXECUTE): self._shell,
         }
 
     def _login(self, tags: bintag.Tags) -> list[bintag.Tag]:
@@ -514,6 +515,12 @@ class FakePlc:
     def _load(code: bytes) -> tuple[int, bytes]:
         size = 2 if code[0] == lib.MON2_OP_LD16 else 4
         return int.from_bytes(code[1 : 1 + size], "little"), code[1 + size :]
+
+    def _shell(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        lines = [f"You said {tags.text(lib.TAG_SHELL_COMMAND)}\r\n", "and now\r\n", "all is said.\r\n"]
+        block = tags.u32(lib.TAG_SHELL_BLOCK)
+        head = lib.TAG_SHELL_PART if block + 1 < len(lines) else lib.TAG_SHELL_LAST
+        return [bintag.container(head, bintag.text(lib.TAG_SHELL_TEXT, lines[block]))]
 
     def _log(self, tags: bintag.Tags) -> list[bintag.Tag]:
         start = tags.u32(lib.TAG_LOG_START_HANDLE)

@@ -13,7 +13,7 @@ from plctool.link import services
 from plctool.link.connection import Connection
 from plctool.link.session import Session
 from plctool.link.transport import DEFAULT_BAUD
-from plctool.link.transports import LATER, TRANSPORTS, Link, make_link, open_transport, parse_link
+from plctool.link.transports import TRANSPORTS, Link, make_link, open_transport, parse_link
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,13 @@ def test_a_link_is_its_kind_its_place_and_its_options(text: str, place: str, bau
         ("serial:/dev/ttyS0?baud=fast", "'fast' is not a number above 0"),
         ("serial:/dev/ttyS0?baud=", "'' is not a number above 0"),
         ("sim:?baud=1", "it has none"),
-        *((f"{scheme}:x", "is not in this version; use a serial line") for scheme in LATER),
+        ("can:", "'can:' is not a link"),
+        ("can:socketcan:can0?node=0", "'0' is not the number of a device, 1 to 127"),
+        ("can:socketcan:can0?node=1,128", "'128' is not the number of a device"),
+        ("can:socketcan:can0?bitrate=fast", "'fast' is not a bit rate"),
+        ("can:socketcan:can0?bitrate=1/2/3", "'1/2/3' is not a bit rate"),
+        ("can:socketcan:can0?can-base=0x123", "'0x123' is not a base"),
+        ("can:socketcan:can0?can-base=0x20000000", "is not a base"),
     ],
 )
 def test_what_is_no_link_is_refused_with_what_to_write(text: str, said: str) -> None:
@@ -67,10 +73,32 @@ def test_a_network_link_has_a_place_and_needs_no_gateway(text: str) -> None:
     assert (str(link), link.options, link.is_shared) == (text, {}, False)
 
 
-def test_no_kind_of_link_is_there_and_to_come() -> None:
-    assert not TRANSPORTS.keys() & LATER.keys()
+def test_no_option_means_two_things() -> None:
     flags = [kind.flag for kind in TRANSPORTS.values() if kind.flag]
-    assert len({*flags, *LATER}) == len(flags) + len(LATER)
+    options = [name for kind in TRANSPORTS.values() for name in kind.options]
+    assert len({*flags, *options}) == len(flags) + len(options)
+
+
+@pytest.mark.parametrize(
+    ("text", "nodes"),
+    [
+        ("can:socketcan:can0", []),
+        ("can:slcan:/dev/ttyACM0?node=5", ["5"]),
+        ("can:virtual:x?node=press", ["press"]),
+        ("can:socketcan:can0?node=1,2,mixer", ["1", "2", "mixer"]),
+    ],
+)
+def test_a_link_to_a_bus_names_its_devices(text: str, nodes: list[str]) -> None:
+    link = parse_link(text)
+    assert link.nodes == nodes
+    assert parse_link(str(link)) == link
+    assert link.of_node("7").nodes == ["7"]
+    assert link.options["can-base"] == "0x1F400000"
+
+
+@pytest.mark.parametrize("text", ["serial:/dev/ttyS0", "tcp:192.168.1.5", "udp:192.168.1.5", "sim:"])
+def test_other_links_lead_to_one_device(text: str) -> None:
+    assert parse_link(text).nodes is None
 
 
 def test_the_simulator_of_this_process_is_a_link() -> None:

@@ -190,6 +190,10 @@ def test_the_log_is_read_to_its_end_in_several_requests() -> None:
     assert [e.handle for e in services.read_log(bench.session, after=6)] == [7, 8]
 
 
+def test_a_long_answer_of_the_shell_comes_in_parts() -> None:
+    assert services.run_shell(Bench().session, "rtsinfo") == "You said rtsinfo\nand now\nall is said."
+
+
 # ---- monitoring ------------------------------------------------------------------------------------------------------
 
 

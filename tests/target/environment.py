@@ -20,7 +20,7 @@ TARGETS = {
 }
 TARGET = TARGETS.get(MACHINE, "")
 CONFIG = os.environ.get("FIRMWARE_CONFIG", "standard")
-IEC_STACK_SIZE = {"standard": 1024, "full": 2048}[CONFIG]  # of a task [bytes]
+IEC_STACK_SIZE = {"standard": 1024, "full": 2048, "can": 1024}[CONFIG]  # of a task [bytes]
 PATIENCE = 60.0  # [s]; machines under load are slow
 
 

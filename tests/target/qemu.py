@@ -130,7 +130,7 @@ class Board:
         self.machine, self.firmware, self.folder = machine, firmware, folder
         self.flash_file = folder / "flash.bin"
         self._process: subprocess.Popen[bytes] | None = None
-        self._port = 0
+        self._port = self._second_port = 0
         if not self.flash_file.exists():
             self.flash_file.touch()
             size = EEPROM_SIZE if machine == "lm3s6965evb" else FLASH_SIZE
@@ -155,7 +155,8 @@ class Board:
         command = [
             "qemu-system-arm", *_machine_options(self.machine, self.flash_file),
             "-display", "none", "-monitor", "none", "-kernel", str(self.firmware),
-            "-serial", f"tcp:{LOCALHOST}:0,server=on,wait=off,nodelay=on", "-qmp", "unix:qmp,server,nowait",
+            *(2 * ["-serial", f"tcp:{LOCALHOST}:0,server=on,wait=off,nodelay=on"]),
+            "-qmp", "unix:qmp,server,nowait",
             *(["-icount", icount] if icount else []),
             *(["-plugin", plugin] if plugin else []),
         ]  # fmt: skip
@@ -166,11 +167,11 @@ class Board:
             if self._process.poll() is not None or time.monotonic() > end:
                 raise RuntimeError(f"QEMU did not start: {(self.folder / 'qemu.log').read_text()}")
             time.sleep(0.005)
-        self._port = self._find_port()
+        self._port, self._second_port = self._find_port(0), self._find_port(1)
 
-    def _find_port(self) -> int:
-        """The TCP port that QEMU has chosen for the serial line."""
-        names = [device["filename"] for device in self._qmp("query-chardev") if device["label"] == "serial0"]
+    def _find_port(self, line: int) -> int:
+        """The TCP port that QEMU has chosen for a serial line."""
+        names = [device["filename"] for device in self._qmp("query-chardev") if device["label"] == f"serial{line}"]
         return int(names[0].removeprefix("disconnected:").split(",")[0].rsplit(":", 1)[1])
 
     def power_off(self) -> None:
@@ -218,6 +219,11 @@ class Board:
     def port(self) -> str:
         """The serial line, for `plctool --port`."""
         return f"socket://{LOCALHOST}:{self._port}"
+
+    @property
+    def can(self) -> str:
+        """The second serial line, which carries CAN frames, for `plctool --can`."""
+        return f"slcan:socket://{LOCALHOST}:{self._second_port}"
 
     def line(self) -> SocketSerial:
         """The serial line, from the client's end."""

@@ -163,6 +163,7 @@ static bool start_worker(void)
         fprintf(stderr, "plcrt: cannot start a process: %s\n", strerror(errno));
     }
     PortComHandOver();
+    PortCanHandOver();
     state.started_ms = now_ms();
     return state.worker > 0;
 }

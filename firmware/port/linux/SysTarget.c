@@ -40,6 +40,13 @@ static const SYS_TARGET target = {
     .serial_number = state.serial_number,
 };
 
+static const char *given_name; /* by the user; NULL: none */
+
+void PortTargetSetName(const char *name)
+{
+    given_name = name;
+}
+
 const SYS_TARGET *SysTargetGet(void)
 {
     return &target;
@@ -96,10 +103,10 @@ static void read_machine_id(char *text, int size)
     }
 }
 
-/* As the settings of a product say, or that of the machine. */
+/* As the user or the settings of a product say, or that of the machine. */
 static void name_node(void)
 {
-    const char *name = SettgGetStringValue("SysTarget", "NodeName", NULL);
+    const char *name = given_name != NULL ? given_name : SettgGetStringValue("SysTarget", "NodeName", NULL);
     if (name != NULL) {
         snprintf(state.node_name, sizeof(state.node_name), "%s", name);
     } else {

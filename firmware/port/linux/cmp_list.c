@@ -15,8 +15,10 @@
 #define HAS_CmpIoMgrSrv 1
 #define HAS_COMMUNICATION 1
 #define HAS_CmpLogSrv 1
+#define HAS_CmpPlcShell 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
+#define HAS_CmpBlkDrvCan 1
 #define HAS_CmpBlkDrvTcp 1
 #define HAS_CmpBlkDrvUdp 1
 #define PORT_SYSTEM(X) X(SysTarget) X(SysLock) X(SysTimer)

@@ -10,6 +10,7 @@
 #define _GNU_SOURCE
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
+#include "CmpSrvNumbers.h"
 #include "Supervisor.h"
 #include "SysExcept.h"
 #include "port.h"
@@ -36,6 +37,8 @@ typedef struct {
     RTS_UI32 baud;
     const char *tcp;
     const char *udp;
+    const char *can;
+    PORT_CAN_OPTIONS can_options;
     char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
     RTS_UI32 event_count;
     bool alone;
@@ -43,7 +46,8 @@ typedef struct {
 
 static const char usage[] =
     "usage: plcrt --flash FILE [--serial PATH|pty[:LINK]] [--baud N] [--tcp [ADDRESS:]PORT]\n"
-    "             [--udp ADDRESS[:INDEX]] [--event NAME=PIPE]...\n"
+    "             [--udp ADDRESS[:INDEX]] [--can INTERFACE|slcan:PATH|slcan:pty] [--node N] [--name NAME]\n"
+    "             [--event NAME=PIPE]...\n"
     "\n"
     "  --flash FILE    file that stands for the flash memory; created when it does not exist\n"
     "  --serial PATH   serial device to be reached by\n"
@@ -56,6 +60,13 @@ static const char usage[] =
     "  --udp PLACE     serves UDP at ADDRESS[:INDEX], 127.0.0.1 if no place is given, on port 1740 + INDEX (0..3), "
     "the\n"
     "                  first one that is free if there is no INDEX, and prints where as \"udp: ADDRESS:PORT\"\n"
+    "  --can PLACE     serves CAN: an interface of the system (can0), an adapter (slcan:/dev/ttyACM0), or with "
+    "slcan:pty a\n"
+    "                  pseudo terminal, whose name it prints as \"can: /dev/pts/N\"\n"
+    "  --node N        number of the device on CAN, 1..127; 1 if not given\n"
+    "  --bitrate N[/M] bits per second of an adapter, 500000 if not given; with M CAN FD, with M for the data\n"
+    "  --can-base ID   of the 29-bit identifiers, 0x1F400000 if not given: docs/can.md\n"
+    "  --name NAME     of the device in a scan; the name of this machine if not given\n"
     "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
     "  --version       prints the version\n"
@@ -106,6 +117,10 @@ enum {
     OPTION_VERSION,
     OPTION_HELP,
     OPTION_CAN,
+    OPTION_NODE,
+    OPTION_BIT_RATE,
+    OPTION_CAN_BASE,
+    OPTION_NAME,
     OPTION_UDP,
     OPTION_TCP,
 };
@@ -119,6 +134,10 @@ static const struct option long_options[] = {
     {"version", no_argument, NULL, OPTION_VERSION},
     {"help", no_argument, NULL, OPTION_HELP},
     {"can", required_argument, NULL, OPTION_CAN},
+    {"node", required_argument, NULL, OPTION_NODE},
+    {"bitrate", required_argument, NULL, OPTION_BIT_RATE},
+    {"can-base", required_argument, NULL, OPTION_CAN_BASE},
+    {"name", required_argument, NULL, OPTION_NAME},
     {"udp", optional_argument, NULL, OPTION_UDP},
     {"tcp", optional_argument, NULL, OPTION_TCP},
     {NULL, 0, NULL, 0},
@@ -159,6 +178,61 @@ static void take_event(OPTIONS *options, char *text)
     options->event[options->event_count++] = text;
 }
 
+/* A number from `text` up to `most`; *end is what follows it. */
+static RTS_UI32 parse_number(const char *text, unsigned long most, char **end)
+{
+    errno = 0;
+    unsigned long number = text[0] >= '0' && text[0] <= '9' ? strtoul(text, end, 0) : ULONG_MAX;
+    return errno != 0 || number > most ? UINT32_MAX : (RTS_UI32)number;
+}
+
+static RTS_UI32 parse_node(const char *text)
+{
+    char *end = "";
+    RTS_UI32 node = parse_number(text, CAN_NODE_MAX, &end);
+    if (node == UINT32_MAX || node == 0 || *end != '\0') {
+        refuse("--node %s is not the number of a device: give 1 to 127", text);
+    }
+    return node;
+}
+
+static RTS_UI32 parse_can_base(const char *text)
+{
+    char *end = "";
+    RTS_UI32 base = parse_number(text, 0x1FFFFFFF, &end);
+    if (base == UINT32_MAX || (base & 0xFFFF) != 0 || *end != '\0') {
+        refuse("--can-base %s is not a base of identifiers: give 29 bits of which the last 16 are 0, as 0x1F400000",
+               text);
+    }
+    return base;
+}
+
+static void parse_bit_rate(const char *text, PORT_CAN_OPTIONS *options)
+{
+    char *end = "?";
+    options->bit_rate = parse_number(text, 1000000, &end);
+    options->data_bit_rate = *end == '/' ? parse_number(end + 1, 8000000, &end) : 0;
+    if (options->bit_rate == UINT32_MAX || options->data_bit_rate == UINT32_MAX || *end != '\0' ||
+        options->bit_rate == 0) {
+        refuse("--bitrate %s is not one of CAN: give for example 500000, or 500000/2000000 for CAN FD", text);
+    }
+}
+
+static void take_can_option(OPTIONS *options, int option)
+{
+    if (option == OPTION_CAN) {
+        options->can = optarg;
+    } else if (option == OPTION_NODE) {
+        options->can_options.node = parse_node(optarg);
+    } else if (option == OPTION_BIT_RATE) {
+        parse_bit_rate(optarg, &options->can_options);
+    } else if (option == OPTION_CAN_BASE) {
+        options->can_options.base = parse_can_base(optarg);
+    } else if (option == OPTION_NAME) {
+        PortTargetSetName(optarg);
+    }
+}
+
 static void take_option(OPTIONS *options, int option)
 {
     switch (option) {
@@ -189,8 +263,8 @@ static void take_option(OPTIONS *options, int option)
     case OPTION_UDP:
         options->udp = take_udp(optarg != NULL ? optarg : "127.0.0.1");
         break;
-    case OPTION_CAN:
-        refuse("CAN is not in this version: use --serial, --tcp or --udp");
+    default:
+        take_can_option(options, option);
     }
 }
 
@@ -214,7 +288,8 @@ static void take_place(int argc, char **argv, int option)
 
 static OPTIONS parse_options(int argc, char **argv)
 {
-    OPTIONS options = {.baud = DEFAULT_BAUD};
+    OPTIONS options = {.baud = DEFAULT_BAUD,
+                       .can_options = {.node = CAN_NODE, .base = CAN_ID_BASE, .bit_rate = CAN_BIT_RATE}};
     int option;
     opterr = 0;
     while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
@@ -367,6 +442,9 @@ static void print_lines(void)
     }
     print_socket("tcp", SYSSOCK_TCP);
     print_socket("udp", SYSSOCK_UDP);
+    if (PortCanPtyName() != NULL) {
+        printf("can: %s\n", PortCanPtyName());
+    }
     (void)fflush(stdout);
 }
 
@@ -402,11 +480,13 @@ static bool open_lines(const OPTIONS *options, PORT_REASON *reason)
 {
     return (options->serial == NULL || PortComOpen(options->serial, options->baud, reason)) &&
            (options->tcp == NULL || PortTcpOpen(options->tcp, reason)) &&
-           (options->udp == NULL || PortUdpOpen(options->udp, reason));
+           (options->udp == NULL || PortUdpOpen(options->udp, reason)) &&
+           (options->can == NULL || PortCanOpen(options->can, &options->can_options, reason));
 }
 
 static void close_all(void)
 {
+    PortCanClose();
     PortSockClose();
     PortComClose();
     PortFlashClose();

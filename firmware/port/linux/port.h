@@ -84,6 +84,29 @@ void PortComHandOver(void);
 /* Name of the pseudo terminal, which is its link if it has one; NULL when the line is none. */
 const char *PortComPtyName(void);
 
+/* ---- SysCan ---- */
+
+typedef struct {
+    RTS_UI32 node;          /* 1..127 */
+    RTS_UI32 base;          /* of the identifiers */
+    RTS_UI32 bit_rate;      /* of an adapter; interfaces of the kernel have their own */
+    RTS_UI32 data_bit_rate; /* not 0: FD frames are sent */
+} PORT_CAN_OPTIONS;
+
+/* Opens the one CAN controller: an interface of the kernel, "slcan:PATH" for an adapter on a serial line, "slcan:pty" for
+ * a new pseudo terminal. Before CMInit. */
+bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON *reason);
+void PortCanClose(void);
+/* As PortComHandOver. */
+void PortCanHandOver(void);
+/* Name of the pseudo terminal, NULL when there is none. */
+const char *PortCanPtyName(void);
+
+/* ---- SysTarget ---- */
+
+/* The name of the device in a scan; the text stays. Before CMInit. */
+void PortTargetSetName(const char *name);
+
 /* ---- SysSocket ---- */
 
 /* For TCP "[ADDRESS:]PORT" or "ADDRESS", for UDP "ADDRESS[:INDEX]" (port UDP_PORT + INDEX). Without an address it is

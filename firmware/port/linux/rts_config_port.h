@@ -20,6 +20,8 @@
 #define COMM_MAX_CLIENTS 4
 #define COMM_ENDPOINTS 1
 #define TCP_BUFFER_SIZE 16384
+#define CAN_FD 1
+#define CAN_BLOCK_SIZE 0 /* the kernel has room */
 #define LOG_MAX_ENTRIES 256
 #define CHECKSUM_TABLE_ENTRIES 256
 

@@ -153,7 +153,7 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
     AppHandlePendingException();
     result = finish_download(refusal);
     if (result == ERR_OK)
-        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application loaded, CRC 0x%x", (unsigned)download.crc);
+        LogAdd(CMPID_CmpAppEmbedded, LOG_INFO, ERR_OK, "Application loaded, CRC %X", (unsigned)download.crc);
     else
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Download refused: %s", refusal->text);
     return result;

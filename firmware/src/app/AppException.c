@@ -78,7 +78,7 @@ void AppExceptionSet(const APP_EXCEPTION *exception, const char *where)
     if (exception->code_offset == APP_NO_CODE_OFFSET)
         LogAdd(CMPID_CmpAppEmbedded, LOG_EXCEPTION, exception->code, "%s: %s", where, name);
     else
-        LogAdd(CMPID_CmpAppEmbedded, LOG_EXCEPTION, exception->code, "%s: %s at code offset 0x%x", where, name,
+        LogAdd(CMPID_CmpAppEmbedded, LOG_EXCEPTION, exception->code, "%s: %s at code offset 0x%X", where, name,
                (unsigned)exception->code_offset);
 }
 

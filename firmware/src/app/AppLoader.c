@@ -31,7 +31,7 @@ static RTS_RESULT check_header(LOADER *l)
     if (result != ERR_OK)
         return result;
     if (header->header_tag != CDL_HEADER_TAG)
-        return refuse(l, ERR_TYPE_MISMATCH, "Not a compact download image: it starts with 0x%x.",
+        return refuse(l, ERR_TYPE_MISMATCH, "Not a compact download image: it starts with 0x%X.",
                       U(header->header_tag));
     if (header->header_version != CDL_HEADER_VERSION || header->header_size != CDL_HEADER_SIZE)
         return refuse(l, ERR_VERSION_MISMATCH, "Header version %u of %u bytes is unknown here.",
@@ -54,9 +54,9 @@ static RTS_RESULT check_crc(LOADER *l)
     if (result != ERR_OK)
         return refuse(l, result, "Flash cannot be read.");
     if (crc != expected)
-        return refuse(l, ERR_CRC_FAILED, "The image is damaged: CRC 0x%x, not 0x%x.", U(crc), U(expected));
+        return refuse(l, ERR_CRC_FAILED, "The image is damaged: CRC %X, not %X.", U(crc), U(expected));
     if (crc != l->image->crc)
-        return refuse(l, ERR_CRC_FAILED, "CRC 0x%x is not the announced one, 0x%x.", U(crc), U(l->image->crc));
+        return refuse(l, ERR_CRC_FAILED, "CRC %X is not the announced one, %X.", U(crc), U(l->image->crc));
     return ERR_OK;
 }
 
@@ -65,11 +65,11 @@ static RTS_RESULT check_target(LOADER *l)
     const SYS_TARGET *target = SysTargetGet();
 
     if (l->header.device_type != target->type)
-        return refuse(l, ERR_TYPE_MISMATCH, "The image is for device type 0x%x, this device is 0x%x.",
+        return refuse(l, ERR_TYPE_MISMATCH, "The image is for device type 0x%X, this device is 0x%X.",
                       U(l->header.device_type), U(target->type));
     if (l->header.device_id != target->id)
         return refuse(l, ERR_ID_MISMATCH,
-                      "The image is for device id 0x%x, this device is 0x%x: build it for this target.",
+                      "The image is for device id 0x%X, this device is 0x%X: build it for this target.",
                       U(l->header.device_id), U(target->id));
     if (l->header.device_version >> 24 != target->version >> 24)
         return refuse(l, ERR_VERSION_MISMATCH, "The image is for device version %u.x, this device has %u.x.",

@@ -123,7 +123,7 @@ static RTS_RESULT check_blob(LOADER *l)
     else if (blob.id == CDL_BLOB_IO && AppIoGet() != NULL)
         result = LoaderFindIo(l, blob.size);
     else if (blob.id >= CDL_BLOB_REQUIRED)
-        return refuse(l, ERR_NOT_SUPPORTED, "The application needs what this firmware lacks (0x%x).", U(blob.id));
+        return refuse(l, ERR_NOT_SUPPORTED, "The application needs what this firmware lacks (0x%X).", U(blob.id));
     /* Others are of a newer tool, and not needed to run. */
     l->offset = next;
     return result;

@@ -624,7 +624,8 @@ static void cycle_client(COMM_CLIENT *client, RTS_UI32 now_ms)
     }
     if (COMM_ENDPOINTS && SrvIsLoggedIn(client))
         client->channel.anonymous_since = now_ms;
-    if (now_ms - client->channel.last_received >= CHANNEL_TIMEOUT_MS || is_anonymous_too_long(&client->channel, now_ms)) {
+    if (now_ms - client->channel.last_received >= CHANNEL_TIMEOUT_MS ||
+        is_anonymous_too_long(&client->channel, now_ms)) {
         close_channel(client, ERR_CHS_TIMEOUT);
         return;
     }

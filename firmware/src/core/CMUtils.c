@@ -25,15 +25,18 @@ static void put_string(OUTPUT *out, const char *s)
         put_char(out, *s++);
 }
 
+enum { HEX_DIGITS = 8 };
+
+/* Hexadecimal numbers are CRCs, places and numbers of devices: they are as long everywhere. */
 static void put_number(OUTPUT *out, unsigned value, unsigned base)
 {
     char digits[3 * sizeof value];
     RTS_SIZE count = 0;
 
     do {
-        digits[count++] = "0123456789abcdef"[value % base];
+        digits[count++] = "0123456789ABCDEF"[value % base];
         value /= base;
-    } while (value != 0);
+    } while (value != 0 || (base == 16 && count < HEX_DIGITS));
     while (count > 0)
         put_char(out, digits[--count]);
 }
@@ -66,7 +69,7 @@ RTS_SIZE CMUtlvsnprintf(char *out, RTS_SIZE size, const char *format, va_list ar
         case 'u':
             put_number(&output, va_arg(arguments, unsigned), 10);
             break;
-        case 'x':
+        case 'X':
             put_number(&output, va_arg(arguments, unsigned), 16);
             break;
         case '\0':

@@ -501,7 +501,7 @@ static RTS_RESULT configure(IO_DRIVER *driver)
     if (result == ERR_OK && functions->IoDrvUpdateMapping != NULL)
         result = functions->IoDrvUpdateMapping(IoTablesGetTaskMaps(), (int)IoTablesCountTaskMaps());
     if (result != ERR_OK && manager.refused == ERR_OK)
-        result = APP_REFUSE(manager.refusal, result, "The driver %s refuses its configuration (error 0x%x).",
+        result = APP_REFUSE(manager.refusal, result, "The driver %s refuses its configuration (error 0x%X).",
                             functions->IoDrvGetInfo()->szDriverName, (unsigned)result);
     return result;
 }

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from plctool.errors import UsageError
-from plctool.image.targets import DEFAULT_TARGET
-from plctool.link.transports import LATER, TRANSPORTS
+from plctool.image.targets import DEFAULT_TARGET, TARGETS
+from plctool.link.transports import TRANSPORTS
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -43,6 +43,9 @@ def parser() -> argparse.ArgumentParser:
     _add_device_commands(command)
     _add_io_commands(command)
     command("demo", "run a demonstration of all of it on this machine")
+    completion = command("completion", "print the script that makes a shell complete this command")
+    completion.add_argument("shell", choices=["bash", "zsh", "fish"], help="your shell")
+    command("man", "print the manual page, for 'man -l -'")
     return root
 
 
@@ -50,7 +53,10 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build = command("build", "compile a program to an image")
     _add_sources(build)
     build.add_argument("-o", "--output", type=Path, default=Path("app.cdl"), metavar="IMAGE", help="default: app.cdl")
-    build.add_argument("--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}")
+    target = build.add_argument(
+        "--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}"
+    )
+    target.completer = lambda **words: TARGETS  # type: ignore[attr-defined]  # for argcomplete
     build.add_argument(
         "-O", dest="level", type=_level, metavar="0..3|s", default=2, help="optimisation, s for small code; default: 2"
     )
@@ -88,6 +94,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--get", action="append", default=[], metavar="NAME", help="print after the last cycle; may be repeated"
     )
 
+    run.add_argument(
+        "--trace", nargs="+", default=[], metavar="NAME", help="write the values after each cycle to a CSV file"
+    )
+    run.add_argument(
+        "-o", "--output", type=Path, default=Path("trace.csv"), metavar="FILE", help="of --trace; default: trace.csv"
+    )
     run.add_argument(
         "--plant",
         type=Path,
@@ -127,7 +139,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     flash.add_argument("--force", action="store_true", help="send it even if the device has it already")
     _add_link(flash)
 
-    _add_link(command("scan", "list the devices that answer"))
+    _add_link(command("scan", "list the devices that answer; without a link, on all serial ports"))
     _add_link(command("status", "show the state of the program"))
     _add_link(command("start", "start the program"))
     _add_link(command("stop", "stop the program"))
@@ -139,6 +151,9 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(reset)
     _add_link(command("tasks", "show the times of the tasks"))
     _add_link(command("log", "print the log of a device"))
+    shell = command("shell", "send a command to the PLC shell of a device; ? lists them")
+    _add_link(shell)
+    shell.add_argument("words", nargs="+", metavar="COMMAND", help="for example ?, rtsinfo, tasklist, plcload")
 
     port = command("port-check", "check a port: run programs on a board and compare the results with what is expected")
     port.add_argument("--yes", action="store_true", help="replace the program that is on the board")
@@ -206,7 +221,7 @@ def _add_image(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_names(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("names", nargs="+", metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.level")
+    parser.add_argument("names", nargs="+", metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.*")
 
 
 def _add_warnings(parser: argparse.ArgumentParser) -> None:
@@ -234,11 +249,9 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
             link.add_argument(f"--{kind.flag}", metavar=kind.shape, help=kind.help)
     options = {name: option for kind in TRANSPORTS.values() for name, option in kind.options.items()}
     for name, option in options.items():
-        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}; default: {option.default}")
+        default = f"; default: {option.default}" if option.default else ""
+        link.add_argument(f"--{name}", metavar="N", help=f"{option.help}{default}")
     link.add_argument("--no-gateway", action="store_true", help="do not share the port, as with PLCTOOL_GATEWAY=off")
-    for scheme, place in LATER.items():
-        link.add_argument(f"--{scheme}", metavar=place, help="not in this version")
-    link.add_argument("--node", type=int, metavar="N", help="not in this version")
     if symbols:
         parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="if they are not found automatically")
 

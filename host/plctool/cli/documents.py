@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from plctool.errors import DeviceError, UsageError
+from plctool.errors import DeviceError, LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
 if TYPE_CHECKING:
@@ -27,6 +29,12 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 Texts = dict[str, str]
 """Values of variables by name, as ST writes them."""
+
+
+class Interrupted(PlcError):
+    """The user ended an operation by Ctrl-C; the message says what it has left."""
+
+    exit_code = 130
 
 
 class ProgramStopped(DeviceError):
@@ -270,29 +278,41 @@ def test(
 # ---- in this process -------------------------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class TraceFile:
+    """Variables whose values after each cycle of the first task go to a file, as CSV."""
+
+    names: Sequence[str]
+    path: Path
+
+
 def run(
     path: Path,
     cycles: int | None,
     time_ms: int | None,
     sets: Mapping[str, str],
     gets: Sequence[str],
+    trace: TraceFile | None = None,
     plant: Path | None = None,
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
     values as users read them. `plant`: a file in Python that is what the inputs and outputs are connected to.
 
-    Raises DeviceError when the program stops with an exception.
+    Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
     from plctool.sim import Simulator
 
+    if trace:
+        check_output(trace.path, [path], "-o trace.csv")
     with Simulator.from_file(path) as plc:
         table = plc.symbols()
-        for name in gets:
-            table.resolve(name)  # a wrong name is reported before the run
+        table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
         if plant is not None:
             _attach(plc, plant)
-        if time_ms is None:
+        if trace:
+            _run_traced(plc, cycles, time_ms, trace)
+        elif time_ms is None:
             plc.run_cycles(1 if cycles is None else cycles)
         else:
             plc.run_for(time_ms)
@@ -302,8 +322,17 @@ def run(
             "values": reading.values,
             "cycles": tasks[0].cycles if tasks else 0,
             "time_ms": plc.now_ns / 1e6,
+            **({"trace": str(trace.path)} if trace else {}),
         }
         return document, reading.texts
+
+
+def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: TraceFile) -> None:
+    """As `run`, in steps."""
+    from plctool.trace_file import trace_csv
+
+    lines = trace_csv(plc, trace.names, cycles, time_ms)
+    write_atomically(trace.path, "".join(lines).encode())
 
 
 def _attach(plc: Simulator, path: Path) -> None:
@@ -369,6 +398,53 @@ def flash(
     }
 
 
+def interrupted_flash(connect: Callable[[], Controller], image: Path) -> Interrupted:
+    """After a download that was given up: what is on the controller now, asked on a link of its own."""
+    from plctool.image.file import image_crc
+    from plctool.link.services import AppState
+
+    try:
+        with connect() as plc:
+            status = plc.raw_status()
+    except PlcError as error:
+        now = f"What is on the device could not be read, see 'plctool status': {error.message}"
+    else:
+        if status.state is AppState.NONE:
+            now = "The device has no program."
+        else:
+            which = "the new" if status.image_crc == image_crc(read_image(image)) else "still the previous"
+            now = f"The device has {which} program (CRC {status.image_crc:08X}), state: {status.state}."
+    return Interrupted(f"Interrupted. {now}", "interrupted")
+
+
+def flash_several(
+    plcs: Mapping[str, Plc],
+    image: Path,
+    *,
+    start: bool = True,
+    force: bool = False,
+    progress: Callable[[str, int, int], None] = lambda node, done, total: None,
+) -> tuple[Document, list[PlcError]]:
+    """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    def one(node: str, plc: Plc) -> Document:
+        show = lambda done, total: progress(node, done, total)  # noqa: E731
+        return {"node": node, **flash(plc, image, start=start, force=force, progress=show)}
+
+    devices: list[Document] = []
+    errors: list[PlcError] = []
+    with ThreadPoolExecutor(len(plcs)) as threads:
+        results = [(node, threads.submit(one, node, plc)) for node, plc in plcs.items()]
+        for node, result in results:
+            try:
+                devices.append(result.result())
+            except PlcError as error:
+                errors.append(error)
+                devices.append({"node": node, "error": {"code": error.code, "message": error.message}})
+    return {"devices": devices}, errors
+
+
 def start(plc: Controller) -> Document:
     """Starts the program; the state that it leads to."""
     plc.start()
@@ -423,6 +499,11 @@ def write(plc: Controller, texts: Mapping[str, str]) -> tuple[Document, Texts]:
     plc.write({name: table.resolve(name).parse(text) for name, text in texts.items()})
     reading = plc.sample(list(texts))
     return {"values": reading.values}, reading.texts
+
+
+def shell(plc: Plc, command: str) -> Document:
+    """What the device's PLC shell answers."""
+    return {"command": command, "answer": plc.shell(command)}
 
 
 def log(plc: Controller) -> Document:
@@ -505,24 +586,45 @@ def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> 
 
 def scan(link: Link, gateway: bool | None, tool: str) -> Document:
     """The controllers that answer on a link. Raises LinkError when there are none."""
+    return {"devices": _scan(link, gateway, tool)}
+
+
+def scan_all(links: Sequence[Link], gateway: bool | None, tool: str) -> Document:
+    """The controllers that answer on any of the links, which are asked at the same time, each with its link. Raises
+    LinkError when there are none, with the reason of each link."""
+
+    def ask(link: Link) -> list[Document] | LinkError:
+        try:
+            return [{"link": f"{link.scheme}:{link.place}", **found} for found in _scan(link, gateway, tool)]
+        except LinkError as error:
+            return error
+
+    with ThreadPoolExecutor(max_workers=len(links)) as pool:
+        answers = list(pool.map(ask, links))
+    devices = [device for answer in answers if not isinstance(answer, LinkError) for device in answer]
+    if not devices:
+        reasons = " ".join(answer.message for answer in answers if isinstance(answer, LinkError))
+        raise LinkError(f"No device answers on the serial ports of this machine. {reasons}", "no-answer")
+    return {"devices": devices}
+
+
+def _scan(link: Link, gateway: bool | None, tool: str) -> list[Document]:
     from plctool.device import scan as nodes_on
     from plctool.image.file import target_name
 
-    return {
-        "devices": [
-            {
-                "address": node.address_text,
-                "node_name": node.node_name,
-                "device_name": node.device_name,
-                "vendor_name": node.vendor_name,
-                "target": target_name(node.target_id),
-                "version": node.version,
-                "serial_number": node.serial_number,
-                **({"place": node.place} if node.place else {}),
-            }
-            for node in nodes_on(link, gateway=gateway, tool=tool)
-        ]
-    }
+    return [
+        {
+            "address": node.address_text,
+            "node_name": node.node_name,
+            "device_name": node.device_name,
+            "vendor_name": node.vendor_name,
+            "target": target_name(node.target_id),
+            "version": node.version,
+            "serial_number": node.serial_number,
+            **({"place": node.place} if node.place else {}),
+        }
+        for node in nodes_on(link, gateway=gateway, tool=tool)
+    ]
 
 
 def watch(

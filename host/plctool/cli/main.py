@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 from plctool.cli import documents, output
 from plctool.cli.arguments import pairs, parser
 from plctool.cli.documents import Document
+from plctool.cli.links import all_serial_ports, link_of, names_no_link
 from plctool.errors import InternalError, PlcError, UsageError
-from plctool.link.transports import LATER, TRANSPORTS, Link, make_link, not_yet
+from plctool.link.transports import Link
 from plctool.version import plctool_version
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def _warnings(args: argparse.Namespace) -> WarningOptions:
 def _print_warnings(args: argparse.Namespace, warnings: Sequence[str]) -> None:
     if not args.json:
         for warning in warnings:
-            print(warning, file=sys.stderr)
+            print(output.coloured(warning, sys.stderr), file=sys.stderr)
 
 
 def _build(args: argparse.Namespace) -> int:
@@ -63,7 +64,7 @@ def _io_files(args: argparse.Namespace) -> IoFiles:
 
 def _check(args: argparse.Namespace) -> int:
     document, texts = documents.check(args.sources, _warnings(args), _io_files(args))
-    _show(args, document, lambda d: "\n".join(texts))
+    _show(args, document, lambda d: output.coloured("\n".join(texts), sys.stdout))
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
 
 
@@ -76,7 +77,8 @@ def _symbols(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get, args.plant)
+    trace = documents.TraceFile(args.trace, args.output) if args.trace else None
+    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get, trace, args.plant)
     return _show(args, document, lambda d: output.run_text(d, texts))
 
 
@@ -87,8 +89,7 @@ def _test(args: argparse.Namespace) -> int:
         args.sources, args.filter, args.level, args.junit, _warnings(args), _io_files(args)
     )
     _print_warnings(args, report.warning_texts())
-    colour = sys.stdout.isatty() and "NO_COLOR" not in os.environ
-    _show(args, document, lambda d: report_text(report, colour=colour))
+    _show(args, document, lambda d: report_text(report, colour=output.wants_colour(sys.stdout)))
     return EXIT_FAILED if report.failed else EXIT_OK
 
 
@@ -100,6 +101,20 @@ def _export_itf(args: argparse.Namespace) -> int:
 
 def _bench(args: argparse.Namespace) -> int:
     return _show(args, documents.bench(args.image, args.cycles), lambda d: output.table(d["tasks"], d["tasks"][0]))
+
+
+def _completion(args: argparse.Namespace) -> int:
+    from argcomplete.shell_integration import shellcode
+
+    script = shellcode(["plctool"], shell=args.shell)
+    return _show(args, {"script": script}, lambda d: script)
+
+
+def _man(args: argparse.Namespace) -> int:
+    from plctool.cli.manual import manual_page
+
+    page = manual_page(parser())
+    return _show(args, {"page": page}, lambda d: page)
 
 
 def _demo(args: argparse.Namespace) -> int:
@@ -117,27 +132,10 @@ def _demo(args: argparse.Namespace) -> int:
 # ---- commands on devices ---------------------------------------------------------------------------------------------
 
 
-def _link(args: argparse.Namespace) -> Link:
-    """The link the arguments name."""
-    for name in (*LATER, "node"):
-        if getattr(args, name) is not None:
-            raise not_yet(f"--{name}")
-    given = [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and getattr(args, kind.flag)]
-    if not given:
-        raise UsageError("Say where the device is: --port /dev/ttyS0, for example.", "no-link")
-    if len(given) > 1:
-        flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
-        raise UsageError(f"Name one link only, {flags}.", "no-link")
-    kind = TRANSPORTS[given[0]]
-    names = {name for every in TRANSPORTS.values() for name in every.options}
-    options = {name: value for name in sorted(names) if (value := getattr(args, name)) is not None}
-    return make_link(given[0], getattr(args, kind.flag), **options)
-
-
 def _connect(args: argparse.Namespace) -> Plc:
     from plctool.device import connect
 
-    return connect(_link(args), getattr(args, "symbols", None), gateway=_gateway_wanted(args), tool=_me(args))
+    return connect(link_of(args), getattr(args, "symbols", None), gateway=_gateway_wanted(args), tool=_me(args))
 
 
 def _gateway_wanted(args: argparse.Namespace) -> bool | None:
@@ -157,7 +155,25 @@ def _on_device(args: argparse.Namespace, operation: Callable[[Plc], Document], t
     return _show(args, document, text)
 
 
+def _flash_several(args: argparse.Namespace, link: Link) -> int:
+    from plctool.device import connect_several
+
+    with connect_several(link) as plcs, _Progress(not args.json) as progress:
+        document, errors = documents.flash_several(
+            plcs,
+            args.image,
+            start=not args.no_start,
+            force=args.force,
+            progress=lambda node, done, total: progress.show(done, total, node),
+        )
+    _show(args, document, output.flash_several_text)
+    return max((error.exit_code for error in errors), default=EXIT_OK)
+
+
 def _flash(args: argparse.Namespace) -> int:
+    if len((link := link_of(args)).nodes or ()) > 1:
+        return _flash_several(args, link)
+
     def announce(others: Sequence[OtherTool]) -> None:
         if others and not args.json:
             users = "1 other tool uses" if len(others) == 1 else f"{len(others)} other tools use"
@@ -169,22 +185,32 @@ def _flash(args: argparse.Namespace) -> int:
                 plc, args.image, start=not args.no_start, force=args.force, progress=progress.show, announce=announce
             )
 
-    return _on_device(args, flash, output.flash_text)
+    try:
+        return _on_device(args, flash, output.flash_text)
+    except KeyboardInterrupt:
+        raise documents.interrupted_flash(lambda: _connect(args), args.image) from None
 
 
 class _Progress:
-    """A progress bar on a terminal, silence elsewhere. It begins with the first bytes."""
+    """A progress bar for each download on a terminal, silence elsewhere. It begins with the first bytes."""
 
     def __init__(self, wanted: bool) -> None:
         self._bar: Any = None
-        self._task: Any = None
+        self._tasks: dict[str, Any] = {}
         if wanted and sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, DownloadColumn, Progress, TimeRemainingColumn, TransferSpeedColumn
+            from rich.progress import (
+                BarColumn,
+                DownloadColumn,
+                Progress,
+                TextColumn,
+                TimeRemainingColumn,
+                TransferSpeedColumn,
+            )
 
-            columns = (BarColumn(), DownloadColumn(), TransferSpeedColumn(), TimeRemainingColumn())
+            label = TextColumn("{task.description}")
+            columns = (label, BarColumn(), DownloadColumn(), TransferSpeedColumn(), TimeRemainingColumn())
             self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            self._task = self._bar.add_task("flash", total=None)
 
     def __enter__(self) -> _Progress:
         return self
@@ -193,14 +219,20 @@ class _Progress:
         if self._bar:
             self._bar.stop()
 
-    def show(self, done: int, total: int) -> None:
-        if self._bar:
-            self._bar.start()  # harmless when repeated
-            self._bar.update(self._task, completed=done, total=total)
+    def show(self, done: int, total: int, device: str = "") -> None:
+        if not self._bar:
+            return
+        self._bar.start()  # harmless when repeated
+        if device not in self._tasks:
+            self._tasks[device] = self._bar.add_task(device, total=total)
+        self._bar.update(self._tasks[device], completed=done, total=total)
 
 
 def _scan(args: argparse.Namespace) -> int:
-    document = documents.scan(_link(args), _gateway_wanted(args), _me(args))
+    if names_no_link(args):
+        document = documents.scan_all(all_serial_ports(args), _gateway_wanted(args), _me(args))
+    else:
+        document = documents.scan(link_of(args), _gateway_wanted(args), _me(args))
     return _show(args, document, lambda d: output.table(d["devices"], d["devices"][0]))
 
 
@@ -228,6 +260,10 @@ def _log(args: argparse.Namespace) -> int:
     return _on_device(args, documents.log, output.log_text)
 
 
+def _shell(args: argparse.Namespace) -> int:
+    return _on_device(args, lambda plc: documents.shell(plc, " ".join(args.words)), lambda d: str(d["answer"]))
+
+
 def _port_check(args: argparse.Namespace) -> int:
     from plctool.port_check import outcome_text, summary_text
 
@@ -237,7 +273,7 @@ def _port_check(args: argparse.Namespace) -> int:
 
     document, report = documents.port_check(
         lambda: _connect(args),
-        link=_link(args),
+        link=link_of(args),
         replace=args.yes,
         max_drift=args.max_drift,
         power_cycle=power_cycle if args.power_cycle else None,
@@ -283,12 +319,11 @@ def _say_waiting(reason: str) -> None:
 
 
 def _watch_json(args: argparse.Namespace) -> int:
-    """All samples as one document, when the count is reached or at Ctrl-C."""
-    samples: list[Document] = []
+    """A document a line, each at once, until the count is reached or Ctrl-C."""
     with _connect(args) as plc, suppress(KeyboardInterrupt):
         for sample, _ in _samples(args, plc, _say_waiting):
-            samples.append(sample)
-    return _show(args, {"samples": samples}, lambda d: "")
+            print(output.as_json(sample), flush=True)
+    return EXIT_OK
 
 
 def _watch_live(args: argparse.Namespace) -> int:
@@ -356,8 +391,8 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": _build, "check": _check, "info": _info, "symbols": _symbols, "run": _run, "test": _test,
     "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
-    "tasks": _tasks, "log": _log, "port-check": _port_check, "read": _read, "write": _write, "watch": _watch,
-    "gateway": _gateway,
+    "tasks": _tasks, "log": _log, "shell": _shell, "port-check": _port_check,
+    "read": _read, "write": _write, "watch": _watch, "gateway": _gateway, "completion": _completion, "man": _man,
 }  # fmt: skip
 
 
@@ -395,8 +430,9 @@ def _report(error: PlcError, as_json: bool) -> int:
             document["exception"] = exception
         print(output.as_json(document))
     else:
-        prefix = "" if hasattr(error, "diagnostics") else "plctool: "  # diagnostics begin with their location
-        print(f"{prefix}{error.message}", file=sys.stderr)
+        is_compilers = hasattr(error, "diagnostics")  # these begin with their location
+        text = output.coloured(error.message, sys.stderr) if is_compilers else f"plctool: {error.message}"
+        print(text, file=sys.stderr)
     return error.exit_code
 
 
@@ -412,8 +448,17 @@ def _show_every_character() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
+def _complete() -> None:
+    """The shell asks what may come next on the command line; ends the process."""
+    import argcomplete
+
+    argcomplete.autocomplete(parser())
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status of the process."""
+    if "_ARGCOMPLETE" in os.environ:
+        _complete()
     words = list(sys.argv[1:] if arguments is None else arguments)
     as_json = "--json" in words
     _show_every_character()

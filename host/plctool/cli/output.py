@@ -3,15 +3,36 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, TextIO
 
 _LOG_COLUMN = 27  # where the text of a log entry begins
+_DIAGNOSTIC = re.compile(r"^(.+?:\d+:\d+:) (error|warning):(?= )|^(\s*\^)$", re.MULTILINE)
+_BOLD, _RED, _MAGENTA, _GREEN, _PLAIN = "\33[1m", "\33[1;31m", "\33[1;35m", "\33[1;32m", "\33[0m"
 
 
 def as_json(document: Any) -> str:
     """One line of JSON."""
     return json.dumps(document, allow_nan=False)
+
+
+def wants_colour(stream: TextIO) -> bool:
+    """Whether text for a stream may have colours: on a terminal, unless NO_COLOR is set (no-color.org)."""
+    return stream.isatty() and not os.environ.get("NO_COLOR")
+
+
+def coloured(text: str, stream: TextIO) -> str:
+    """Diagnostics with location, kind and caret in colours, if the stream wants them."""
+    return _DIAGNOSTIC.sub(_colour, text) if wants_colour(stream) else text
+
+
+def _colour(match: re.Match[str]) -> str:
+    location, kind, caret = match.groups()
+    if caret:
+        return f"{_GREEN}{caret}{_PLAIN}"
+    return f"{_BOLD}{location}{_PLAIN} {_RED if kind == 'error' else _MAGENTA}{kind}:{_PLAIN}"
 
 
 def values_text(texts: dict[str, str], separator: str = "\n") -> str:
@@ -114,6 +135,14 @@ def flash_text(document: dict[str, Any]) -> str:
         lines += [f"PERSISTENT value lost: {name} {why}" for name, why in document["persistent"]["lost"].items()]
         lines += [f"PERSISTENT value new: {name}" for name in document["persistent"]["new"]]
     return "\n".join(lines)
+
+
+def flash_several_text(document: dict[str, Any]) -> str:
+    """What a download did on each device."""
+    return "\n".join(
+        f"{device['node']}: {device['error']['message'] if 'error' in device else flash_text(device)}"
+        for device in document["devices"]
+    )
 
 
 def tasks_text(document: dict[str, Any]) -> str:

@@ -15,12 +15,12 @@ from plctool.compiler.garbage import no_collection
 from plctool.compiler.library import Library, standard_library
 from plctool.compiler.missing_names import declared_names
 from plctool.compiler.nesting import NestingError, room_for_nesting
+from plctool.compiler.semantics.allocation import report_overlaps
+from plctool.compiler.semantics.call_graph import report_shared_writes
 from plctool.compiler.semantics.configuration import configure
 from plctool.compiler.semantics.io_channels import IoChannels, device_variables
-from plctool.compiler.semantics.overlaps import report_overlaps
 from plctool.compiler.semantics.permitted import check_declarations
 from plctool.compiler.semantics.program import Program
-from plctool.compiler.semantics.shared_writes import report_shared_writes
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.ast import Declaration

@@ -24,7 +24,7 @@ from plctool.errors import UsageError
 from plctool.files import write_atomically
 from plctool.iec.addresses import parse_address
 from plctool.iec.type_descriptions import DescribedTypes, describe
-from plctool.iec.types import ELEMENTARY, ArrayType
+from plctool.iec.types import ELEMENTARY, ArrayType, OpenArrayType, StructType
 
 if TYPE_CHECKING:
     from plctool.debug.call_frames import DebugInfo
@@ -147,6 +147,24 @@ class SymbolTable:
                 yield symbol
             if elements or not isinstance(symbol.type, ArrayType):
                 todo += list(symbol.parts())[::-1]
+
+    def select(self, names: Sequence[str]) -> dict[str, Symbol]:
+        """The variables of these names, as `resolve` finds them, and for a pattern with * or ? all values whose names
+        match it: `Main.*` is all of Main, arrays as a whole. Raises UsageError for what is not in the program."""
+        found: dict[str, Symbol] = {}
+        for name in names:
+            if is_pattern(name):
+                found |= self._matching(name)
+            else:
+                found[name] = self.resolve(name)
+        return found
+
+    def _matching(self, pattern: str) -> dict[str, Symbol]:
+        kinds_without_value = StructType | OpenArrayType
+        found = {s.name: s for s in self.find([pattern]) if not isinstance(s.type, kinds_without_value)}
+        if not found:
+            raise UsageError(f"No variable matches {pattern}; 'plctool symbols' lists them.", "unknown-variable")
+        return found
 
     # ---- code ----
 
@@ -294,6 +312,11 @@ def _constant(symbol: Symbol, types: dict[str, Any]) -> dict[str, Any]:
 
 def _read_constant(name: str, entry: dict[str, Any], types: DescribedTypes) -> Symbol:
     return constant_symbol(name, types.get(entry["type"]), bytes.fromhex(entry["content"]))
+
+
+def is_pattern(name: str) -> bool:
+    """Whether a name stands for all variables that match it."""
+    return "*" in name or "?" in name
 
 
 def _pattern(text: str) -> str:

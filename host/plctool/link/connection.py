@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Protocol
 
@@ -20,6 +20,7 @@ _OPEN_PATIENCE = 5.0
 _AT_ONCE = 16  # packages sent before the next look at the input
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
 SCAN_SECONDS = 1.5
+_ALL_REPLIED = 0.6  # time after which all devices on a bus have replied [s]
 
 
 def no_answer(name: str) -> ChannelLost:
@@ -27,6 +28,42 @@ def no_answer(name: str) -> ChannelLost:
     return ChannelLost(
         f"No device answers on {name}; check that it is on, the cable, and the baud rate or address.", "no-answer"
     )
+
+
+def _node_texts(nodes: Iterable[names.Node]) -> str:
+    """What users choose from: `1 (press), 2 (mixer)`."""
+    found = sorted(nodes, key=lambda node: node.address)
+    return ", ".join(f"{int.from_bytes(node.address, 'big')} ({node.node_name})" for node in found)
+
+
+def _several(name: str, choice: Choice, nodes: Iterable[names.Node]) -> LinkError:
+    return LinkError(
+        f"Several devices answer on {name}: {_node_texts(nodes)}; say which one with {choice.option}.", "several"
+    )
+
+
+def _no_such_node(name: str, choice: Choice, nodes: Iterable[names.Node]) -> LinkError:
+    return LinkError(
+        f"No device on {name} has the name {choice.wanted}; these answer: {_node_texts(nodes)}.", "no-answer"
+    )
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which device is meant on a link where several may reply: its number or name, "" for the only one. `option`: how a
+    user says it."""
+
+    wanted: str
+    option: str = "--node"
+
+    @property
+    def number(self) -> int | None:
+        return int(self.wanted) if self.wanted.isdecimal() else None
+
+    def fits(self, node: names.Node) -> bool:
+        if self.number is not None:
+            return node.address == self.number.to_bytes(2, "big")
+        return self.wanted in ("", node.node_name)
 
 
 class MessageLink(Protocol):
@@ -60,8 +97,9 @@ class MessageLink(Protocol):
 class Connection:
     """The way to one device. `open` finds it and opens a channel, `exchange` sends a request and returns the reply."""
 
-    def __init__(self, transport: BlockTransport) -> None:
+    def __init__(self, transport: BlockTransport, choice: Choice | None = None) -> None:
         self.transport = transport
+        self._choice = choice
         self._peer: bytes | None = None
         self._channel: Channel | None = None
 
@@ -93,10 +131,7 @@ class Connection:
     def open(self) -> None:
         """Opens a new channel, after a name request on the first time. Raises LinkError if no device answers."""
         if self._peer is None:
-            found = self.scan(_OPEN_PATIENCE, enough=1)
-            if not found:
-                raise no_answer(self.name)
-            self._peer = found[0].address
+            self._peer = self._find(self._choice).address
         header = router.header_size(self._peer, self.transport.local_address)
         line = Line(
             self.transport.max_packet - header, header + self.transport.packet_overhead, self.transport.byte_rate
@@ -110,6 +145,19 @@ class Connection:
             self._peer = None  # there may be another device by now
             raise
         self._channel = channel
+
+    def _find(self, choice: Choice | None) -> names.Node:
+        """The device that is meant. Raises LinkError when it does not reply, or there are several."""
+        if choice is None or choice.number is not None:
+            found = self.scan(_OPEN_PATIENCE, enough=1)
+        else:
+            found = self.scan(_ALL_REPLIED) or self.scan(_OPEN_PATIENCE - _ALL_REPLIED, enough=1)
+        fitting = [node for node in found if choice is None or choice.fits(node)]
+        if not found or (choice and not fitting):
+            raise no_answer(self.name) if not found or not choice else _no_such_node(self.name, choice, found)
+        if choice and len(fitting) > 1:
+            raise _several(self.name, choice, fitting)
+        return fitting[0]
 
     def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
         """Sends a request and returns the reply. `patience`: seconds of silence that are borne.

@@ -314,6 +314,26 @@ class _Transfer:
         self._progress(self.arrived)
 
 
+# ---- PLC shell -------------------------------------------------------------------------------------------------------
+
+
+def run_shell(session: Session, command: str) -> str:
+    """The answer of a device to a command of its PLC shell. Raises DeviceError when it has none."""
+    answer, block = "", 0
+    while True:
+        content = [
+            bintag.u32(lib.TAG_SHELL_SESSION, session.ensure()),
+            bintag.u32(lib.TAG_SHELL_BLOCK, block),
+            bintag.text(lib.TAG_SHELL_COMMAND, command),
+        ]
+        tags = session.call(lib.SG_PLCSHELL, lib.SRV_SHELL_EXECUTE, content)
+        parts = tags.containers(lib.TAG_SHELL_PART)
+        text = "".join(part.text(lib.TAG_SHELL_TEXT) for part in parts or tags.containers(lib.TAG_SHELL_LAST))
+        answer, block = answer + text, block + 1
+        if not parts or not text:
+            return answer.replace("\r\n", "\n").rstrip("\n")
+
+
 # ---- log -------------------------------------------------------------------------------------------------------------
 
 

@@ -7,14 +7,17 @@ it is needed, so that the command line starts quickly.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from plctool.errors import UsageError
 from plctool.link.transport import DEFAULT_BAUD, BlockTransport
 
+if TYPE_CHECKING:
+    from plctool.link.canbus import Bus, SharedBus
+
 Value = int | str
-LATER = {"can": "INTERFACE:CHANNEL"}
-"""Kinds of links that are still to come, and what a place looks like."""
+_LAST_NODE = 127  # CAN_NODE_MAX; the command line starts without the core
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,18 @@ class Link:
         """Whether one process at a time can have it, so that the tools of this machine need a gateway to share it."""
         return TRANSPORTS[self.scheme].is_shared
 
+    @property
+    def nodes(self) -> list[str] | None:
+        """The devices that are meant, by number or name, on a link where several may reply; [] if the user names none.
+        None: it is a link to one device."""
+        if not TRANSPORTS[self.scheme].is_bus:
+            return None
+        return [name for name in str(self.options["node"]).split(",") if name]
+
+    def of_node(self, node: str) -> Link:
+        """The same link, to one of the devices."""
+        return replace(self, options={**self.options, "node": node})
+
 
 @dataclass(frozen=True)
 class Transport:
@@ -58,12 +73,71 @@ class Transport:
     help: str = ""
     options: Mapping[str, Option] = field(default_factory=dict)
     is_shared: bool = False
+    is_bus: bool = False  # several devices may reply; its option `node` says which one is meant
 
 
 def _above_zero(text: str) -> int:
     if not text.isdecimal() or int(text) == 0:
         raise ValueError(f"'{text}' is not a number above 0")
     return int(text)
+
+
+def _nodes(text: str) -> str:
+    for node in text.split(","):
+        if node.isdecimal() and not 1 <= int(node) <= _LAST_NODE:
+            raise ValueError(f"'{node}' is not the number of a device, 1 to {_LAST_NODE}")
+    return text
+
+
+def _bit_rate(text: str) -> str:
+    rates = text.split("/")
+    if len(rates) > 2 or not all(rate.isdecimal() and int(rate) for rate in rates):
+        raise ValueError(f"'{text}' is not a bit rate; write 500000, or 500000/2000000 for CAN FD")
+    return text
+
+
+def _can_base(text: str) -> str:
+    try:
+        base = int(text, 0)
+    except ValueError:
+        base = -1
+    if not 0 <= base <= 0x1FFFFFFF or base & 0xFFFF:
+        raise ValueError(f"'{text}' is not a base of identifiers, of 29 bits with the last 16 zero")
+    return f"0x{base:08X}"
+
+
+def _open_can(link: Link) -> BlockTransport:
+    from plctool.link import canbus
+
+    return can_transport(link, canbus.PythonCanBus(canbus.open_bus(link.place, *_bit_rates(link))))
+
+
+def share_bus(link: Link) -> SharedBus:
+    """Opens the bus of a link for several transports of this process. Raises LinkError."""
+    from plctool.link import canbus
+
+    rates = _bit_rates(link)
+    return canbus.SharedBus(canbus.open_bus(link.place, *rates))
+
+
+def _bit_rates(link: Link) -> tuple[int, int]:
+    """Of arbitration and of data; 0: no CAN FD."""
+    first, _, second = str(link.options["bitrate"]).partition("/")
+    return int(first), int(second or 0)
+
+
+def can_transport(link: Link, bus: Bus) -> BlockTransport:
+    """The transport of a link on a bus that is open."""
+    from plctool.link.canbus import CanTransport
+
+    node = str(link.options["node"])
+    return CanTransport(
+        link.place,
+        bus,
+        int(node) if node.isdecimal() else None,
+        base=int(str(link.options["can-base"]), 16),
+        fd=_bit_rates(link)[1] != 0,
+    )
 
 
 def _open_serial(link: Link) -> BlockTransport:
@@ -114,6 +188,19 @@ TRANSPORTS: dict[str, Transport] = {
         example="192.168.1.5",
         help="the same over UDP; for scan also the broadcast address of a network",
     ),
+    "can": Transport(
+        _open_can,
+        flag="can",
+        shape="INTERFACE:CHANNEL",
+        example="socketcan:can0",
+        help="controller on a CAN bus, by an interface of python-can",
+        options={
+            "node": Option("", _nodes, "which device on the bus, by number or name; flash takes several: 1,2,3"),
+            "bitrate": Option("500000", _bit_rate, "bits per second; CAN FD with two numbers: 500000/2000000"),
+            "can-base": Option("0x1F400000", _can_base, "of the identifiers"),
+        },
+        is_bus=True,
+    ),
     "sim": Transport(_open_sim),  # the simulator of this process, which has to be on
 }
 
@@ -125,10 +212,8 @@ def parse_link(text: str) -> Link:
     them.
     """
     scheme, colon, rest = text.partition(":")
-    if not colon or scheme not in (*TRANSPORTS, *LATER):
+    if not colon or scheme not in TRANSPORTS:
         raise _no_link(text)
-    if scheme in LATER:
-        raise not_yet(f"A {scheme} link")
     place, mark, options = rest.rpartition("?")
     named = dict(pair.partition("=")[::2] for pair in options.split("&"))
     if not mark or ("://" in rest and not named.keys() <= TRANSPORTS[scheme].options.keys()):
@@ -156,13 +241,6 @@ def make_link(scheme: str, place: str, **options: Value) -> Link:
 def open_transport(link: Link) -> BlockTransport:
     """Opens a link for this process alone. Raises LinkError."""
     return TRANSPORTS[link.scheme].open(link)
-
-
-def not_yet(what: str) -> UsageError:
-    """The error about a kind of link, or an option for one, that is still to come."""
-    return UsageError(
-        f"{what} is not in this version; use a serial line (--port) or the network (--tcp, --udp).", "no-such-link"
-    )
 
 
 def _no_link(text: str) -> UsageError:

@@ -41,15 +41,15 @@ def find_worker(supervisor: int) -> int | None:
 
 class Plcrt:
     """Context manager around one process; `port` is the pseudo terminal it serves, by a link beside the flash file that
-    stays the same over restarts, `tcp` and `udp` are its places on the network if `options` ask for some
-    (`--tcp 0`)."""
+    stays the same over restarts, `tcp`, `udp` and `can` are its other places if `options` ask for some (`--tcp 0`,
+    `--can slcan:pty`)."""
 
     def __init__(self, flash: Path | str, *options: str) -> None:
         self.flash = Path(flash)
         self.options = options
         self.process: subprocess.Popen[str] | None = None
         self.port = f"{self.flash}.tty"
-        self.tcp = self.udp = ""
+        self.tcp = self.udp = self.can = ""
 
     def start(self) -> None:
         """Starts the process and waits for the lines that say where it is."""
@@ -61,6 +61,7 @@ class Plcrt:
         self._place("serial")
         self.tcp = self._place("tcp") if "--tcp" in self.options else ""
         self.udp = self._place("udp") if "--udp" in self.options else ""
+        self.can = self._place("can") if "slcan:pty" in self.options else ""
 
     def _place(self, kind: str) -> str:
         """What the process says next: where it serves one kind of link."""

@@ -8,6 +8,7 @@
 #define HAS_CmpRetain 1
 #define HAS_COMMUNICATION 1
 #define HAS_CmpLogSrv 1
+#define HAS_CmpPlcShell 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
 #include "CmpList.h"

@@ -20,7 +20,7 @@ static void log_reset_cause(void)
     if (record->cause < RESET_FATAL)
         LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);
     else
-        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%x, CFSR 0x%x", names[record->cause],
+        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%X, CFSR 0x%X", names[record->cause],
                (unsigned)record->pc, (unsigned)record->status);
 }
 

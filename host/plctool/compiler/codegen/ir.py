@@ -40,7 +40,6 @@ class Module:
         self._metadata_ids: dict[str, int] = {}
         self._named_metadata: list[str] = []
         self._literals: dict[bytes, str] = {}
-        self._kept: list[str] = []
 
     def metadata(self, text: str) -> int:
         """The number of the metadata node `text`, e.g. '!{i64 8}'; equal nodes exist once."""
@@ -59,6 +58,17 @@ class Module:
     def named_metadata(self, name: str, nodes: list[int]) -> None:
         self._named_metadata.append(f"!{name} = !{{{', '.join(f'!{n}' for n in nodes)}}}")
 
+    def add_compile_unit(self, file: int) -> int:
+        """The node that makes LLVM write debugging information, of which only lines are wanted. `file`: a DIFile."""
+        unit = self.distinct_metadata(
+            f'!DICompileUnit(language: DW_LANG_C99, file: !{file}, producer: "plctool", isOptimized: true, '
+            "runtimeVersion: 0, emissionKind: LineTablesOnly)"
+        )
+        self.named_metadata("llvm.dbg.cu", [unit])
+        flags = ('!{i32 7, !"Dwarf Version", i32 4}', '!{i32 2, !"Debug Info Version", i32 3}')
+        self.named_metadata("llvm.module.flags", [self.metadata(flag) for flag in flags])
+        return unit
+
     def attributes(self, text: str) -> str:
         """Reference to an attribute group, e.g. '#3'."""
         return f"#{self._attributes.setdefault(text, len(self._attributes))}"
@@ -75,10 +85,6 @@ class Module:
         )
         return Value(name)
 
-    def keep(self, name: str) -> None:
-        """Protects an internal symbol from removal by the optimiser."""
-        self._kept.append(name)
-
     def add(self, name: str, function: Function, linkage: str = "internal") -> None:
         """A function that exists once in the program. `linkage`: "" when it is called from outside."""
         self.functions[name] = Definition(function, linkage)
@@ -91,11 +97,6 @@ class Module:
         """The module in LLVM's assembly language, with these functions in it."""
         parts = [f'target triple = "{self._triple}"']
         parts += self._globals
-        if self._kept:
-            kept = ", ".join(f"ptr @{name}" for name in self._kept)
-            parts.append(
-                f'@llvm.compiler.used = appending global [{len(self._kept)} x ptr] [{kept}], section "llvm.metadata"'
-            )
         parts += functions
         parts += self._helpers
         parts += [f"attributes #{number} = {{ {text} }}" for text, number in self._attributes.items()]

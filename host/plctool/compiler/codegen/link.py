@@ -15,6 +15,7 @@ from elftools.elf.elffile import ELFFile
 
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.line_table import Line, in_order, read_line_table
+from plctool.compiler.codegen.memory_functions import MEMORY_FUNCTIONS, memory_object
 from plctool.compiler.codegen.relocations import (
     AARCH64_LOW12,
     ABSOLUTE,
@@ -101,12 +102,17 @@ class _Linker:
         self._symbols: list[_ElfSymbol] = []
         self._objects: list[tuple[list[_Section], bytes]] = []
         for data in objects:
-            sections, symbols = _read_elf(data, target, len(self._sections))
-            self._objects.append((sections, data))
-            self._sections += sections
-            self._symbols += symbols
+            self._read(data)
+        if any(not s.section and s.name in MEMORY_FUNCTIONS for s in self._symbols):
+            self._read(memory_object(target))
         self._defined = {s.name: s for s in self._symbols if s.section and s.is_global}
         self._stubs: dict[str, int] = {}  # offset in the block, by name, in the order of slots
+
+    def _read(self, data: bytes) -> None:
+        sections, symbols = _read_elf(data, self._target, len(self._sections))
+        self._objects.append((sections, data))
+        self._sections += sections
+        self._symbols += symbols
 
     def run(self, roots: Sequence[str]) -> Linked:
         used = self._reach({self._defined[name].section for name in roots})

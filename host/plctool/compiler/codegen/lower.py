@@ -9,7 +9,7 @@ from plctool.compiler.codegen.ir import Function
 from plctool.compiler.codegen.lower_body import write_body, write_calls
 from plctool.compiler.codegen.lower_classes import write_dispatcher
 from plctool.compiler.codegen.lower_frame import TAGGED_AREAS, Body, Frame, Ref, string_capacity
-from plctool.compiler.codegen.lower_helpers import MEMORY_FUNCTIONS, memory_functions, string_helper
+from plctool.compiler.codegen.lower_helpers import string_helper
 from plctool.compiler.codegen.lower_init import initialise, initialise_members
 from plctool.compiler.codegen.lower_unit import Options, Unit, value_type
 from plctool.compiler.codegen.partition import texts
@@ -70,9 +70,6 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     _struct_initialisers(unit)
     for name in sorted(unit.helpers):
         unit.module.add_helper(string_helper(name, unit.target, unit.strings))
-    unit.module.add_helper(memory_functions(unit.target, unit.smallest))
-    for name in MEMORY_FUNCTIONS:
-        unit.module.keep(name)
     pous = {name: pou for pou, name in unit.pous.items()}
     return Lowered(texts(unit.module), tasks, functions, pous, unit.imports)
 

@@ -1,4 +1,4 @@
-"""Functions in LLVM IR that images need: the loops all string functions are made of, and what LLVM calls by name.
+"""Functions in LLVM IR: the loops all string functions are made of.
 
 Templates. Strings are walked in chunks of CHUNK bytes (a vector, or an integer) as long as a whole chunk is within
 the capacity, then byte by byte. PTR stands for the integer type of an address, START for the index at which the byte
@@ -237,99 +237,6 @@ _STRINGS = {"str.span": _SPAN, "str.copy": _COPY, "str.compare": _COMPARE}
 # Functions of stdlib/strings.st that have a faster body here, with the same meaning.
 LIBRARY_FUNCTIONS = {"SPAN__": "str.span", "COPY__": "str.copy", "WSPAN__": "str.wspan", "WCOPY__": "str.wcopy"}
 
-_MEMORY = """define internal ptr @memcpy(ptr %d, ptr %s, PTR %n) ATTRIBUTES section ".text.memcpy" {
-entry:
-  br label %wide
-wide:
-  %w = phi PTR [ 0, %entry ], [ %w.next, %wide.body ]
-  %w.next = add PTR %w, WORD
-  %fits = icmp ule PTR %w.next, %n
-  br i1 %fits, label %wide.body, label %loop
-wide.body:
-  %ws = getelementptr i8, ptr %s, PTR %w
-  %wd = getelementptr i8, ptr %d, PTR %w
-  %wv = load VECTOR, ptr %ws, align 1
-  store VECTOR %wv, ptr %wd, align 1
-  br label %wide
-loop:
-  %i = phi PTR [ %w, %wide ], [ %i.next, %body ]
-  %more = icmp ult PTR %i, %n
-  br i1 %more, label %body, label %done
-body:
-  %ps = getelementptr i8, ptr %s, PTR %i
-  %pd = getelementptr i8, ptr %d, PTR %i
-  %v = load i8, ptr %ps, align 1
-  store i8 %v, ptr %pd, align 1
-  %i.next = add PTR %i, 1
-  br label %loop
-done:
-  ret ptr %d
-}
-
-define internal ptr @memset(ptr %d, i32 %c, PTR %n) ATTRIBUTES section ".text.memset" {
-entry:
-  %b = trunc i32 %c to i8
-  %lane = insertelement <WORD x i8> poison, i8 %b, i32 0
-  %lanes = shufflevector <WORD x i8> %lane, <WORD x i8> poison, <WORD x i32> zeroinitializer
-  br label %wide
-wide:
-  %w = phi PTR [ 0, %entry ], [ %w.next, %wide.body ]
-  %w.next = add PTR %w, WORD
-  %fits = icmp ule PTR %w.next, %n
-  br i1 %fits, label %wide.body, label %loop
-wide.body:
-  %wd = getelementptr i8, ptr %d, PTR %w
-  store <WORD x i8> %lanes, ptr %wd, align 1
-  br label %wide
-loop:
-  %i = phi PTR [ %w, %wide ], [ %i.next, %body ]
-  %more = icmp ult PTR %i, %n
-  br i1 %more, label %body, label %done
-body:
-  %pd = getelementptr i8, ptr %d, PTR %i
-  store i8 %b, ptr %pd, align 1
-  %i.next = add PTR %i, 1
-  br label %loop
-done:
-  ret ptr %d
-}
-
-define internal ptr @memmove(ptr %d, ptr %s, PTR %n) ATTRIBUTES section ".text.memmove" {
-entry:
-  %da = ptrtoint ptr %d to PTR
-  %sa = ptrtoint ptr %s to PTR
-  %gap = sub PTR %da, %sa
-  %forward = icmp uge PTR %gap, %n
-  br i1 %forward, label %up, label %down
-up:
-  %i = phi PTR [ 0, %entry ], [ %i.next, %up.body ]
-  %up.more = icmp ult PTR %i, %n
-  br i1 %up.more, label %up.body, label %done
-up.body:
-  %us = getelementptr i8, ptr %s, PTR %i
-  %ud = getelementptr i8, ptr %d, PTR %i
-  %uv = load i8, ptr %us, align 1
-  store i8 %uv, ptr %ud, align 1
-  %i.next = add PTR %i, 1
-  br label %up
-down:
-  %k = phi PTR [ %n, %entry ], [ %k.next, %down.body ]
-  %down.more = icmp ne PTR %k, 0
-  br i1 %down.more, label %down.body, label %done
-down.body:
-  %k.next = sub PTR %k, 1
-  %ds = getelementptr i8, ptr %s, PTR %k.next
-  %dd = getelementptr i8, ptr %d, PTR %k.next
-  %dv = load i8, ptr %ds, align 1
-  store i8 %dv, ptr %dd, align 1
-  br label %down
-done:
-  ret ptr %d
-}
-"""
-
-MEMORY_FUNCTIONS = ("memcpy", "memset", "memmove")
-
 
 def string_helper(name: str, target: Target, attributes: str) -> str:
     """The definition of one of the str.* functions for a target."""
@@ -366,12 +273,6 @@ def _chunk(target: Target) -> int:
     if target.vectors:
         return 16
     return target.pointer_size if target.unaligned else 0
-
-
-def memory_functions(target: Target, attributes: str) -> str:
-    """memcpy, memset and memmove, each in a section of its own so that the linker takes only what is called."""
-    word = 16 if target.vectors else target.pointer_size if target.unaligned else 1
-    return _finish(_MEMORY.replace("VECTOR", f"<{word} x i8>").replace("WORD", str(word)), target, attributes)
 
 
 def _finish(body: str, target: Target, attributes: str) -> str:

@@ -86,6 +86,11 @@ def value_type(t: Type) -> str:
     return f"i{base.bits}"
 
 
+def function_attributes(target: Target) -> str:
+    """The attributes that every function has."""
+    return _ALWAYS + (_PROBES if target.probes else "")
+
+
 class Unit:
     """One compilation."""
 
@@ -116,9 +121,8 @@ class Unit:
         self._tag_root = module.metadata(f'!{{!"any", !{tree}, i64 0}}')
         self._tags: dict[object, str] = {}
         # An access through NULL that is not checked is left to the processor, which faults.
-        base = _ALWAYS + (_PROBES if self.target.probes else "")
+        base = function_attributes(self.target)
         always = base if Check.NULL in options.checks else f"{base} null_pointer_is_valid"
-        self.smallest = module.attributes(f"minsize optsize {base}")
         self.plain = module.attributes(f"{'optsize ' if options.compact else ''}{always}")
         self.strings = module.attributes(f"{'optsize ' if options.size else ''}{base}")
         self._program = self.plain
@@ -245,13 +249,7 @@ class Unit:
         file = self.file(pos.file)
         if self._compile_unit < 0:
             self._subroutine_type = module.metadata(f"!DISubroutineType(types: !{self.empty})")
-            self._compile_unit = module.distinct_metadata(
-                f'!DICompileUnit(language: DW_LANG_C99, file: !{file}, producer: "plctool", isOptimized: true, '
-                "runtimeVersion: 0, emissionKind: LineTablesOnly)"
-            )
-            module.named_metadata("llvm.dbg.cu", [self._compile_unit])
-            flags = ('!{i32 7, !"Dwarf Version", i32 4}', '!{i32 2, !"Debug Info Version", i32 3}')
-            module.named_metadata("llvm.module.flags", [module.metadata(flag) for flag in flags])
+            self._compile_unit = module.add_compile_unit(file)
         scope = module.distinct_metadata(
             f'!DISubprogram(name: "{name}", scope: !{file}, file: !{file}, line: {pos.line}, scopeLine: {pos.line}, '
             f"type: !{self._subroutine_type}, spFlags: DISPFlagDefinition, unit: !{self._compile_unit})"

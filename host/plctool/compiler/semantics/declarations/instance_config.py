@@ -14,16 +14,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-from plctool.compiler.semantics.addresses import located
+from plctool.compiler.semantics.allocation import located
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import same_type
+from plctool.compiler.semantics.conversions import load, same_type, whole
 from plctool.compiler.semantics.declarations.fixed_places import FixedPlace, fixed_place, with_part
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
 from plctool.compiler.semantics.instances import instances_in
 from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, VarSymbol
-from plctool.compiler.semantics.values import load, whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (

@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.kept import is_kept
-from plctool.compiler.semantics.addresses import is_open, located
+from plctool.compiler.semantics.allocation import is_open, located
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
 from plctool.compiler.semantics.instances import instances_in, require_instances

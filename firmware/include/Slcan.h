@@ -1,0 +1,67 @@
+/*
+ * Slcan.h - SLCAN: CAN frames as lines of text on a serial line, as adapters of many makers have it (LAWICEL).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * For a CAN adapter, and for a line between two machines that stands for a bus. No hardware in here: the line is two
+ * functions. All from main.
+ *
+ *   tIIIL<data>\r TIIIIIIIIL<data>\r    frame with 11 or 29 bits, L bytes; r and R: remote
+ *   dIIIL<data>\r DIIIIIIIIL<data>\r    FD, L is the length code 0..F; b and B: with the second bit rate
+ *   C\r S6\r Y2\r O\r                   to an adapter: close, bit rate, second bit rate, open
+ *
+ * What is no frame (an answer of the adapter, noise) is passed over; four digits of a time stamp may follow a frame.
+ */
+#ifndef SLCAN_H
+#define SLCAN_H
+
+#include "SysCan.h"
+
+enum {
+    SLCAN_STAMP_SIZE = 4,
+    SLCAN_TEXT_SIZE = 1 + 8 + 1 + 2 * CAN_DATA_SIZE + SLCAN_STAMP_SIZE + 1, /* the longest line */
+    SLCAN_COMMANDS_SIZE = 16,
+    SLCAN_CHUNK = 32,
+    SLCAN_FILTERS = 4,
+};
+
+/* Writes the line of a frame with its end, SLCAN_TEXT_SIZE at most; returns its length. */
+RTS_UI32 SlcanEncode(const CAN_FRAME *frame, char *text);
+
+/* Reads a line without its end. False if it is no frame; time_us is set to 0. */
+bool SlcanDecode(const char *text, RTS_UI32 size, CAN_FRAME *frame);
+
+/* The serial line; both return how many bytes were moved, as SysComRead and SysComWrite do. */
+typedef struct {
+    RTS_UI32 (*read)(RTS_UI8 *data, RTS_UI32 size);
+    RTS_UI32 (*write)(const RTS_UI8 *data, RTS_UI32 size);
+} SLCAN_LINE;
+
+/* A controller on such a line. The fields are those of Slcan.c. */
+typedef struct {
+    SLCAN_LINE line;
+    RTS_UI32 bit_rate;
+    RTS_UI32 data_bit_rate;
+    RTS_UI32 lost; /* lines that were damaged */
+    CAN_FILTER filter[SLCAN_FILTERS];
+    RTS_UI32 filters;
+    RTS_UI32 fill;
+    bool too_long;
+    RTS_UI8 chunk[SLCAN_CHUNK];
+    RTS_UI32 chunk_size;
+    RTS_UI32 chunk_read;
+    RTS_UI32 out_size;
+    RTS_UI32 out_sent;
+    char in[SLCAN_TEXT_SIZE];
+    char out[SLCAN_TEXT_SIZE + SLCAN_COMMANDS_SIZE];
+} SLCAN;
+
+/* Sends the commands that open an adapter; what is none ignores them. ERR_NOT_SUPPORTED: adapters have no such bit rate. */
+RTS_RESULT SlcanOpen(SLCAN *slcan, SLCAN_LINE line, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate);
+
+/* As the functions of SysCan.h; a frame that the line has not taken yet goes on with each call of these. */
+RTS_RESULT SlcanSetFilters(SLCAN *slcan, const CAN_FILTER *filters, RTS_UI32 count);
+RTS_RESULT SlcanSend(SLCAN *slcan, const CAN_FRAME *frame);
+RTS_RESULT SlcanReceive(SLCAN *slcan, CAN_FRAME *frame);
+
+#endif

@@ -1,0 +1,236 @@
+/*
+ * CmpPlcShell.c - the PLC shell (group 0x11): commands and answers in words.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * An answer may need several messages. The client asks for one after another by number, and the command is run again for
+ * each: what has been sent already is left out. So nothing is kept from one to the next. A command that changes
+ * something does so for the first message only.
+ */
+#include "CmpPlcShell.h"
+
+#include <string.h>
+
+#include "CMUtils.h"
+#include "CmpAppEmbedded.h"
+#include "CmpDevice.h"
+#include "CmpIecTask.h"
+#include "CmpSrv.h"
+#include "SysExcept.h"
+#include "SysTarget.h"
+#include "rts_config.h"
+
+/* Where the lines of an answer go: into one message, after those that went into the messages before. */
+typedef struct {
+    BTAG_WRITER *reply;
+    RTS_UI32 skip; /* characters still to be left out */
+    RTS_UI32 room; /* characters that still fit */
+    bool more;     /* some do not fit */
+} SHELL_OUTPUT;
+
+typedef struct {
+    const char *name;
+    const char *help;
+    RTS_UI32 right; /* RIGHT_* */
+    RTS_RESULT (*change)(void);
+    void (*print)(SHELL_OUTPUT *out);
+} SHELL_COMMAND;
+
+/* ---- output ---- */
+
+static void put(SHELL_OUTPUT *out, const char *text, RTS_UI32 size)
+{
+    RTS_UI32 skipped = size < out->skip ? size : out->skip;
+
+    out->skip -= skipped;
+    size -= skipped;
+    RTS_UI32 fits = size < out->room ? size : out->room;
+    BTagAppend(out->reply, text + skipped, fits);
+    out->room -= fits;
+    out->more = out->more || fits < size;
+}
+
+static void print(SHELL_OUTPUT *out, const char *format, ...)
+{
+    enum { LINE_SIZE = 160 };
+    char line[LINE_SIZE];
+    va_list arguments;
+
+    va_start(arguments, format);
+    RTS_SIZE size = CMUtlvsnprintf(line, sizeof(line), format, arguments);
+    va_end(arguments);
+    put(out, line, (RTS_UI32)size);
+    put(out, "\r\n", 2);
+}
+
+/* ---- commands ---- */
+
+static void print_device(SHELL_OUTPUT *out)
+{
+    const SYS_TARGET *target = SysTargetGet();
+
+    print(out, "Device: %s", target->device_name);
+    print(out, "Vendor: %s", target->vendor_name);
+    print(out, "Node: %s", target->node_name);
+    print(out, "Serial number: %s", target->serial_number);
+    print(out, "Target: type 0x%X, id 0x%X, version 0x%X", (unsigned)target->type, (unsigned)target->id,
+          (unsigned)target->version);
+    print(out, "Runtime: 0x%X", (unsigned)RTS_VERSION);
+}
+
+static bool is_loaded(SHELL_OUTPUT *out, APP_STATUS *status)
+{
+    AppGetStatus(status);
+    if (status->state == AS_NONE)
+        print(out, "No Application loaded");
+    return status->state != AS_NONE;
+}
+
+static void print_applications(SHELL_OUTPUT *out)
+{
+    APP_STATUS status;
+
+    if (is_loaded(out, &status))
+        print(out, "Application");
+}
+
+static void print_state(SHELL_OUTPUT *out)
+{
+    APP_STATUS status;
+
+    if (!is_loaded(out, &status))
+        return;
+    print(out, "%s", status.state == AS_RUN ? "run" : "stop");
+    if (status.exception.code != RTSEXCPT_NOEXCEPTION)
+        print(out, "exception 0x%X", (unsigned)status.exception.code);
+}
+
+static void print_tasks(SHELL_OUTPUT *out)
+{
+    IEC_TASK_INFO info;
+
+    for (RTS_UI32 i = 0; i < IecTaskGetCount(); i++)
+        if (IecTaskGetInfo(i, &info) == ERR_OK)
+            print(out, "%s: priority %u, interval %u us, cycles %u, last %u us, max %u us, jitter %u us", info.name,
+                  (unsigned)info.priority, (unsigned)info.interval_us, (unsigned)info.cycles, (unsigned)info.last_us,
+                  (unsigned)info.max_us, (unsigned)info.jitter_us);
+}
+
+/* The share of the time that cyclic tasks take. */
+static void print_load(SHELL_OUTPUT *out)
+{
+    IEC_TASK_INFO info;
+    RTS_UI32 percent = 0;
+
+    for (RTS_UI32 i = 0; i < IecTaskGetCount(); i++)
+        if (IecTaskGetInfo(i, &info) == ERR_OK && info.kind == KIND_CYCLIC && info.interval_us != 0)
+            percent += (RTS_UI32)((RTS_UI64)info.avg_us * 100 / info.interval_us);
+    print(out, "PLC load: %u%%", (unsigned)percent);
+}
+
+static RTS_RESULT reset_warm(void)
+{
+    return AppReset(RESET_OPTION_WARM);
+}
+
+static RTS_RESULT reset_cold(void)
+{
+    return AppReset(RESET_OPTION_COLD);
+}
+
+static void print_help(SHELL_OUTPUT *out);
+
+static const SHELL_COMMAND commands[] = {
+    {"?", "this list", RIGHT_VIEW, NULL, print_help},
+    {"rtsinfo", "device and runtime", RIGHT_VIEW, NULL, print_device},
+    {"applist", "applications", RIGHT_VIEW, NULL, print_applications},
+    {"getprgstat", "state of the application", RIGHT_VIEW, NULL, print_state},
+    {"startprg", "start the application", RIGHT_CONTROL, AppStartApplication, NULL},
+    {"stopprg", "stop the application", RIGHT_CONTROL, AppStopApplication, NULL},
+    {"resetprg", "warm reset of the application", RIGHT_CONTROL, reset_warm, NULL},
+    {"resetprgcold", "cold reset of the application", RIGHT_CONTROL, reset_cold, NULL},
+    {"tasklist", "tasks and their times", RIGHT_VIEW, NULL, print_tasks},
+    {"plcload", "share of the time that cyclic tasks take", RIGHT_VIEW, NULL, print_load},
+};
+
+static void print_help(SHELL_OUTPUT *out)
+{
+    for (RTS_UI32 i = 0; i < RTS_COUNT(commands); i++)
+        print(out, "%s: %s", commands[i].name, commands[i].help);
+}
+
+/* ---- service ---- */
+
+/* `name` need not have a NUL. */
+static const SHELL_COMMAND *find_command(const BTAG *name)
+{
+    RTS_UI32 length = CMUtlStrNLen((const char *)name->data, name->size);
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(commands); i++)
+        if (strlen(commands[i].name) == length && memcmp(commands[i].name, name->data, length) == 0)
+            return &commands[i];
+    return NULL;
+}
+
+static void run(const SHELL_COMMAND *command, const COMM_CLIENT *client, bool first, SHELL_OUTPUT *out)
+{
+    if (command == NULL) {
+        print(out, "There is no such command; ? lists them.");
+    } else if ((client->session.rights & command->right) == 0) {
+        print(out, "You may not do this.");
+    } else if (command->print != NULL) {
+        command->print(out);
+    } else if (first) {
+        RTS_RESULT result = command->change();
+        if (result == ERR_OK)
+            print(out, "%s: done", command->name);
+        else
+            print(out, "%s: error 0x%X", command->name, (unsigned)result);
+    }
+}
+
+static RTS_RESULT execute(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    enum { OVERHEAD = 24 }; /* heads of the two elements, NUL, padding */
+    BTAG name;
+    BTAG_WRITER start = *reply;
+    RTS_UI32 block = 0;
+    RTS_RESULT result = BTagFind(&request->tags, TAG_SHELL_COMMAND, 1, SHELL_MAX_COMMAND, &name);
+
+    if (result == ERR_OK)
+        result = BTagFindOptional(&request->tags, TAG_SHELL_BLOCK, &block);
+    if (result != ERR_OK)
+        return result;
+    if (BTagGetRoom(reply) <= OVERHEAD)
+        return ERR_BUFFERSIZE;
+    RTS_UI32 room = BTagGetRoom(reply) - OVERHEAD;
+    SHELL_OUTPUT out = {reply, block < UINT32_MAX / room ? block * room : UINT32_MAX, room, false};
+    BTagOpen(reply, TAG_SHELL_LAST, BTAG_ALIGN_0);
+    BTagOpen(reply, TAG_SHELL_TEXT, BTAG_ALIGN_0);
+    run(find_command(&name), request->client, block == 0, &out);
+    BTagAppendZeros(reply, 1);
+    BTagPad(reply);
+    BTagClose(reply);
+    BTagClose(reply);
+    if (out.more) /* the same, said to be a part */
+        start.data[start.size] = TAG_SHELL_PART;
+    return ERR_OK;
+}
+
+/* There is never one that runs on. */
+static RTS_RESULT cancel(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UNUSED(request);
+    BTagWrite16(reply, TAG_SERVICE_RESULT, ERR_OK);
+    return ERR_OK;
+}
+
+static const SRV_SERVICE services[] = {
+    {SRV_SHELL_EXECUTE, RIGHT_VIEW, execute},
+    {SRV_SHELL_CANCEL, RIGHT_VIEW, cancel},
+};
+
+RTS_RESULT CmpPlcShell_Hook(CMP_HOOK hook)
+{
+    return hook == CH_INIT3 ? SrvRegisterGroup(SG_PLCSHELL, services, RTS_COUNT(services)) : ERR_OK;
+}

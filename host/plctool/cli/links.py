@@ -1,0 +1,87 @@
+"""Which link a command uses: the one of its options, else the environment's PLC_LINK, else `link` in plc.toml."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tomllib
+from pathlib import Path
+
+from plctool.errors import LinkError, UsageError
+from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link
+
+VARIABLE = "PLC_LINK"
+PROJECT_FILE = "plc.toml"
+
+
+def link_of(args: argparse.Namespace) -> Link:
+    """The link of a command; options such as --baud also hold for one that the arguments do not name."""
+    given = _given(args)
+    if len(given) > 1:
+        flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
+        raise UsageError(f"Name one link only, {flags}.", "no-link")
+    if given:
+        return make_link(given[0], getattr(args, TRANSPORTS[given[0]].flag), **_options(args))
+    link = _default_link()
+    if link is None:
+        raise UsageError(
+            f"Say where the device is: --port /dev/ttyS0, for example, or once and for all in the environment: "
+            f"{VARIABLE}=serial:/dev/ttyS0.",
+            "no-link",
+        )
+    return make_link(link.scheme, link.place, **{**link.options, **_options(args)})
+
+
+def names_no_link(args: argparse.Namespace) -> bool:
+    """Whether neither the arguments nor the environment name a link."""
+    return not _given(args) and _default_link() is None
+
+
+def all_serial_ports(args: argparse.Namespace) -> list[Link]:
+    """The serial ports of this machine. Raises LinkError if it has none."""
+    from serial.tools.list_ports import comports
+
+    links = [make_link("serial", port.device, **_options(args)) for port in sorted(comports())]
+    if not links:
+        raise LinkError("This machine has no serial ports; say where to look, for example --udp 192.168.1.255.", "open")
+    return links
+
+
+def _given(args: argparse.Namespace) -> list[str]:
+    """The kinds of link that the arguments name."""
+    return [scheme for scheme, kind in TRANSPORTS.items() if kind.flag and getattr(args, kind.flag)]
+
+
+def _options(args: argparse.Namespace) -> dict[str, Value]:
+    names = {name for kind in TRANSPORTS.values() for name in kind.options}
+    return {name: value for name in sorted(names) if (value := getattr(args, name.replace("-", "_"))) is not None}
+
+
+def _default_link() -> Link | None:
+    if text := os.environ.get(VARIABLE):
+        return _parse(text, f"the environment's {VARIABLE}")
+    for folder in (Path.cwd(), *Path.cwd().parents):
+        file = folder / PROJECT_FILE
+        if file.is_file():
+            return _link_in(file)
+    return None
+
+
+def _link_in(file: Path) -> Link | None:
+    """What a project says. Raises UsageError for a file that cannot be understood."""
+    try:
+        text = tomllib.loads(file.read_text()).get("link")
+    except OSError as error:
+        raise UsageError(f"{file} cannot be read: {error.strerror}.", "bad-project") from None
+    except ValueError as error:  # of TOML or UTF-8
+        raise UsageError(f"{file} is not TOML: {error}.", "bad-project") from None
+    if text is not None and not isinstance(text, str):
+        raise UsageError(f'{file}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project")
+    return _parse(text, str(file)) if text else None
+
+
+def _parse(text: str, where: str) -> Link:
+    try:
+        return parse_link(text)
+    except UsageError as error:
+        raise UsageError(f"In {where}: {error.message}", error.code) from None

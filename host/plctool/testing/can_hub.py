@@ -1,0 +1,90 @@
+"""A CAN bus made of pseudo terminals: each is an SLCAN adapter, and a frame from one goes to all others."""
+
+from __future__ import annotations
+
+import os
+import selectors
+import threading
+import tty
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+_LARGEST_BACKLOG = 1 << 20  # bytes for an adapter that nobody reads, before frames to it are dropped
+_READ = 4096
+_FRAMES = b"tTrRdDbB"  # first letters of lines that are frames; all others are commands to the adapter
+
+
+@dataclass
+class _Adapter:
+    master: int
+    slave: int
+    path: str
+    received: bytearray = field(default_factory=bytearray)
+    backlog: bytearray = field(default_factory=bytearray)
+
+
+class CanHub:
+    """Context manager; `paths` are the adapters. `frames` counts what was carried."""
+
+    def __init__(self, adapters: int) -> None:
+        self._adapters = [_open() for _ in range(adapters)]
+        self.paths = [adapter.path for adapter in self._adapters]
+        self.frames = 0
+        self._selector = selectors.DefaultSelector()
+        self._wake, self._end = os.pipe()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> CanHub:
+        for adapter in self._adapters:
+            self._selector.register(adapter.master, selectors.EVENT_READ, adapter)
+        self._selector.register(self._wake, selectors.EVENT_READ)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        os.close(self._end)
+        self._thread.join()
+        self._selector.close()
+        os.close(self._wake)
+        for adapter in self._adapters:
+            os.close(adapter.master)
+            os.close(adapter.slave)
+
+    def _run(self) -> None:
+        while True:
+            for key, events in self._selector.select():
+                adapter = key.data
+                if adapter is None:
+                    return
+                if events & selectors.EVENT_WRITE:
+                    self._give(adapter, b"")
+                if events & selectors.EVENT_READ:
+                    self._take(adapter)
+
+    def _take(self, adapter: _Adapter) -> None:
+        """Carries the frames an adapter was given to all others."""
+        with suppress(BlockingIOError):
+            adapter.received += os.read(adapter.master, _READ)
+        *lines, rest = adapter.received.split(b"\r")
+        frames = [line + b"\r" for line in lines if line[:1] and line[:1] in _FRAMES]
+        adapter.received = rest
+        self.frames += len(frames)
+        for other in self._adapters:
+            if other is not adapter and frames:
+                self._give(other, b"".join(frames))
+
+    def _give(self, adapter: _Adapter, data: bytes) -> None:
+        if len(adapter.backlog) < _LARGEST_BACKLOG:
+            adapter.backlog += data
+        with suppress(BlockingIOError):
+            while adapter.backlog:
+                del adapter.backlog[: os.write(adapter.master, adapter.backlog)]
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if adapter.backlog else 0)
+        self._selector.modify(adapter.master, events, adapter)
+
+
+def _open() -> _Adapter:
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    return _Adapter(master, slave, os.ttyname(slave))

@@ -1,0 +1,191 @@
+/*
+ * test_comm_shell.c - CmpPlcShell: commands in words, answers of any length.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include <stdio.h>
+#include <string.h>
+
+#include "CmpBytes.h"
+#include "CmpSrv.h"
+#include "comm_client.h"
+#include "comm_fakes.h"
+#include "test.h"
+
+static CLIENT client;
+static REPLY reply;
+static char text[8192];
+static RTS_UI32 parts;
+
+static void setup(void)
+{
+    fakes_start();
+    client_init(&client, 0x0102);
+    CHECK(client_open(&client) && client_login(&client));
+}
+
+/* Part `block` of the answer, appended to `text`; the tag it came in. */
+static RTS_UI32 ask_part(const char *command, RTS_UI32 block)
+{
+    RTS_UI8 content[128];
+    BTAG_WRITER writer;
+    BTAG_READER part;
+    BTAG head;
+    BTAG tag;
+
+    BTagWriterInit(&writer, content, sizeof(content));
+    BTagWrite32(&writer, TAG_SHELL_SESSION, client.session);
+    BTagWrite32(&writer, TAG_SHELL_BLOCK, block);
+    BTagOpen(&writer, TAG_SHELL_COMMAND, BTAG_ALIGN_2);
+    BTagAppendText(&writer, command, sizeof(content));
+    BTagClose(&writer);
+    CHECK(client_call(&client, SG_PLCSHELL, SRV_SHELL_EXECUTE, &writer, &reply));
+    if (reply_error(&reply) != ERR_OK)
+        return 0;
+    CHECK_EQUAL(BTagReadNext(&reply.tags, &head), ERR_OK);
+    CHECK_EQUAL(BTagReadContainer(&reply.tags, &head, &part), ERR_OK);
+    CHECK_EQUAL(BTagFind(&part, TAG_SHELL_TEXT, 1, sizeof(reply.message), &tag), ERR_OK);
+    strncat(text, (const char *)tag.data, tag.size);
+    return head.id;
+}
+
+/* The whole answer. */
+static const char *ask(const char *command)
+{
+    text[0] = '\0';
+    for (parts = 1; ask_part(command, parts - 1) == TAG_SHELL_PART && parts < 100; parts++) {
+    }
+    return text;
+}
+
+static void help_names_every_command(void)
+{
+    static const char *const names[] = {"?",       "rtsinfo",  "applist",      "getprgstat", "startprg",
+                                        "stopprg", "resetprg", "resetprgcold", "tasklist",   "plcload"};
+    char line[64];
+
+    setup();
+    ask("?");
+    for (RTS_UI32 i = 0; i < RTS_COUNT(names); i++) {
+        snprintf(line, sizeof(line), "%s: ", names[i]);
+        CHECK(strstr(text, line) != NULL);
+    }
+}
+
+static void an_unknown_command_says_where_the_list_is(void)
+{
+    setup();
+    CHECK(strcmp(ask("mem"), "There is no such command; ? lists them.\r\n") == 0);
+    CHECK(strcmp(ask("startprgx"), text) == 0);
+    CHECK_EQUAL(fakes.starts, 0);
+}
+
+static void without_application_it_says_so(void)
+{
+    setup();
+    CHECK(strcmp(ask("applist"), "Application\r\n") == 0);
+    fakes.status.state = AS_NONE;
+    CHECK(strcmp(ask("applist"), "No Application loaded\r\n") == 0);
+    CHECK(strcmp(ask("getprgstat"), "No Application loaded\r\n") == 0);
+}
+
+static void the_state_has_its_exception(void)
+{
+    setup();
+    fakes.status.state = AS_RUN;
+    CHECK(strcmp(ask("getprgstat"), "run\r\n") == 0);
+    fakes.status.state = AS_STOP;
+    fakes.status.exception.code = 0x101;
+    CHECK(strcmp(ask("getprgstat"), "stop\r\nexception 0x00000101\r\n") == 0);
+}
+
+static void commands_that_change_something_do_it_once(void)
+{
+    setup();
+    CHECK(strcmp(ask("startprg"), "startprg: done\r\n") == 0);
+    CHECK(strcmp(ask("stopprg"), "stopprg: done\r\n") == 0);
+    ask("resetprg");
+    CHECK_EQUAL(fakes.reset_option, RESET_OPTION_WARM);
+    ask("resetprgcold");
+    CHECK_EQUAL(fakes.reset_option, RESET_OPTION_COLD);
+    CHECK(fakes.starts == 1 && fakes.stops == 1 && fakes.resets == 2);
+    CHECK_EQUAL(ask_part("startprg", 1), TAG_SHELL_LAST);
+    CHECK_EQUAL(fakes.starts, 1);
+}
+
+static void an_error_is_said(void)
+{
+    setup();
+    fakes.control_result = ERR_INVALID_STATE;
+    ask("startprg");
+    CHECK(strncmp(text, "startprg: error 0x", 18) == 0);
+}
+
+static void it_needs_a_login(void)
+{
+    setup();
+    client.session = 0;
+    CHECK_EQUAL(ask_part("?", 0), 0);
+    CHECK_EQUAL(reply_error(&reply), ERR_INVALID_SESSION_ID);
+}
+
+static void a_long_answer_comes_in_parts(void)
+{
+    setup();
+    ask("tasklist");
+    fakes.task_count = FAKE_TASKS;
+    for (RTS_UI32 i = 0; i < FAKE_TASKS; i++)
+        snprintf(fakes.tasks[i].name, sizeof(fakes.tasks[i].name), "Task%u", (unsigned)i);
+    ask("tasklist");
+    CHECK_EQUAL(parts, 1);
+    char whole[sizeof(text)];
+    memcpy(whole, text, sizeof(text));
+    client_send_open(&client, 8, CHANNEL_MIN_MESSAGE);
+    CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
+    CHECK(client_login(&client));
+    ask("tasklist");
+    CHECK(parts > 2);
+    CHECK(strcmp(text, whole) == 0);
+}
+
+static void the_load_is_that_of_cyclic_tasks(void)
+{
+    setup();
+    fakes.task_count = 3;
+    fakes.tasks[0] = (IEC_TASK_INFO){.kind = KIND_CYCLIC, .interval_us = 1000, .avg_us = 250};
+    fakes.tasks[1] = (IEC_TASK_INFO){.kind = KIND_CYCLIC, .interval_us = 10000, .avg_us = 1000};
+    fakes.tasks[2] = (IEC_TASK_INFO){.kind = KIND_FREEWHEELING, .avg_us = 5000};
+    CHECK(strcmp(ask("plcload"), "PLC load: 35%\r\n") == 0);
+}
+
+static void a_command_need_not_have_a_nul_and_is_bounded(void)
+{
+    static const RTS_UI8 bare[] = {TAG_SHELL_COMMAND, 7, 'a', 'p', 'p', 'l', 'i', 's', 't'};
+    RTS_UI8 longer[2 + SHELL_MAX_COMMAND + 1] = {TAG_SHELL_COMMAND, SHELL_MAX_COMMAND + 1};
+
+    setup();
+    CHECK(client_request(&client, SG_PLCSHELL, SRV_SHELL_EXECUTE, bare, sizeof(bare), &reply));
+    CHECK_EQUAL(reply_error(&reply), ERR_OK);
+    memset(longer + 2, 'x', sizeof(longer) - 2);
+    CHECK(client_request(&client, SG_PLCSHELL, SRV_SHELL_EXECUTE, longer, sizeof(longer), &reply));
+    CHECK_EQUAL(reply_error(&reply), ERR_SIZE_MISMATCH);
+    CHECK(client_request(&client, SG_PLCSHELL, SRV_SHELL_EXECUTE, NULL, 0, &reply));
+    CHECK_EQUAL(reply_error(&reply), ERR_L7_TAG_MISSING);
+    CHECK(client_request(&client, SG_PLCSHELL, SRV_SHELL_CANCEL, NULL, 0, &reply));
+    CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_OK);
+}
+
+int main(void)
+{
+    RUN(help_names_every_command);
+    RUN(an_unknown_command_says_where_the_list_is);
+    RUN(without_application_it_says_so);
+    RUN(the_state_has_its_exception);
+    RUN(commands_that_change_something_do_it_once);
+    RUN(an_error_is_said);
+    RUN(it_needs_a_login);
+    RUN(a_long_answer_comes_in_parts);
+    RUN(the_load_is_that_of_cyclic_tasks);
+    RUN(a_command_need_not_have_a_nul_and_is_bounded);
+    return test_result();
+}

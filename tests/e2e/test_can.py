@@ -1,0 +1,213 @@
+"""Three plcrt and several tools on one CAN bus, which is a hub of pseudo terminals."""
+
+from __future__ import annotations
+
+import json
+import random
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import plctool
+from plctool.errors import LinkError, PlcError
+from plctool.link import services
+from plctool.link.canbus import CanTransport, PythonCanBus, open_bus
+from plctool.link.connection import Choice, Connection
+from plctool.link.session import Session
+from plctool.testing.can_hub import CanHub
+from plctool.testing.plcrt import Plcrt
+
+NODES = {1: "press", 2: "mixer", 77: "oven"}
+TOOLS = 3
+PATIENCE = 60.0  # for what is bound to happen [s]
+
+
+@pytest.fixture(scope="module")
+def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CanHub]:
+    folder = tmp_path_factory.mktemp("can")
+    with CanHub(len(NODES) + TOOLS) as hub, ExitStack() as stack:
+        for (number, name), path in zip(NODES.items(), hub.paths[TOOLS:], strict=True):
+            options = ("--can", f"slcan:{path}", "--node", str(number), "--name", name)
+            stack.enter_context(Plcrt(folder / f"{name}.flash", *options))
+        yield hub
+
+
+def link_of(hub: CanHub, tool: int, node: int | str | None = None) -> str:
+    return f"can:slcan:{hub.paths[tool]}" + (f"?node={node}" if node is not None else "")
+
+
+def options_of(hub: CanHub, tool: int, node: int | str | None = None) -> list[str]:
+    return ["--can", f"slcan:{hub.paths[tool]}", *(["--node", str(node)] if node is not None else [])]
+
+
+def test_a_scan_lists_all_devices(hub: CanHub, tool: Any) -> None:
+    devices = tool.ok("scan", *options_of(hub, 0))["devices"]
+    assert {(d["address"], d["node_name"], d["place"]) for d in devices} == {
+        (f"{number:04X}", name, f"node {number}") for number, name in NODES.items()
+    }
+
+
+def test_a_device_is_chosen_by_number_or_name(hub: CanHub) -> None:
+    for number, name in NODES.items():
+        for node in (number, name):
+            with plctool.connect(link_of(hub, 0, node)) as plc:
+                assert plc.identity().node_name == name
+
+
+def test_without_a_choice_they_are_listed(hub: CanHub, tool: Any) -> None:
+    done = tool("status", *options_of(hub, 0))
+    assert done.status == 3
+    assert "1 (press), 2 (mixer), 77 (oven); say which one with --node" in done.err
+    done = tool("status", *options_of(hub, 0, "kettle"))
+    assert (done.status, "has the name kettle" in done.err) == (3, True)
+    done = tool("status", *options_of(hub, 0, 99))
+    assert (done.status, "No device answers" in done.err) == (3, True)
+    done = tool("status", *options_of(hub, 0, "1,2"))
+    assert (done.status, "Only 'flash' takes several devices" in done.err) == (2, True)
+
+
+def test_several_devices_are_flashed_at_once(hub: CanHub, tool: Any, counter: Path) -> None:
+    document = tool.ok("flash", *options_of(hub, 0, "1,mixer,77"), str(counter))
+    assert [(d["node"], d["state"], d["skipped"]) for d in document["devices"]] == [
+        ("1", "run", False),
+        ("mixer", "run", False),
+        ("77", "run", False),
+    ]
+    for node in NODES:
+        assert tool.ok("status", *options_of(hub, 1, node))["state"] == "run"
+    done = tool("flash", *options_of(hub, 0, "1,99"), str(counter), "--json")
+    assert done.status == 3
+    good, bad = json.loads(done.out)["devices"]
+    assert (good["skipped"], bad["node"], bad["error"]["code"]) == (True, "99", "no-answer")
+
+
+def test_one_tool_flashes_while_another_one_watches(hub: CanHub, tool: Any, counter: Path) -> None:
+    """And a third one talks to a third device: three conversations on one bus."""
+    big = tool.build(
+        "big", "PROGRAM Main VAR a : ARRAY[0..2999] OF DINT := [3000(7)]; END_VAR a[0] := a[0] + 1; END_PROGRAM"
+    )
+    watching, flashed = threading.Event(), threading.Event()
+    errors: list[PlcError] = []
+    readings: list[int] = []
+
+    def watch() -> None:
+        try:
+            with plctool.connect(link_of(hub, 1, "mixer")) as plc:
+                for _, reading in plc.watch(["Main.count"], interval=0.0):
+                    readings.append(reading.values["Main.count"])
+                    watching.set()
+                    if flashed.is_set():
+                        return
+        except PlcError as error:
+            errors.append(error)
+
+    def talk() -> None:
+        session = Session(Connection(transport_of(hub, 2, 77)))
+        data = random.Random(1).randbytes(3000)
+        while not flashed.is_set():
+            if services.echo(session, data) != data:
+                errors.append(PlcError("the echo is another one", "echo"))
+        session.connection.close()
+
+    with plctool.connect(link_of(hub, 0, "mixer")) as plc:
+        plc.flash(counter)
+    threads = [threading.Thread(target=watch, daemon=True), threading.Thread(target=talk, daemon=True)]
+    for thread in threads:
+        thread.start()
+    assert watching.wait(PATIENCE)
+    with plctool.connect(link_of(hub, 0, "press")) as plc:
+        plc.flash(big)
+        assert plc.read("Main.a[2999]") == 7
+    flashed.set()
+    for thread in threads:
+        thread.join(PATIENCE)
+    assert errors == []
+    assert readings == sorted(readings)
+    assert len(set(readings)) > 1
+
+
+class _Fixed(random.Random):
+    """Chooses the same address first, then others."""
+
+    def __init__(self, first: int) -> None:
+        super().__init__()
+        self.first: int | None = first
+
+    def randint(self, a: int, b: int) -> int:
+        first, self.first = self.first, None
+        return super().randint(a, b) if first is None else first
+
+
+def transport_of(hub: CanHub, tool: int, node: int, first: int | None = None) -> CanTransport:
+    """A transport of a tool to a device. `first`: the address it tries first."""
+    bus = PythonCanBus(open_bus(f"slcan:{hub.paths[tool]}", 500000, 0))
+    return CanTransport("hub", bus, node, random_source=None if first is None else _Fixed(first))
+
+
+def test_two_tools_never_have_one_address(hub: CanHub) -> None:
+    """The second one finds the address taken and takes another one; the first one goes on."""
+    first = transport_of(hub, 0, 1, first=200)
+    session = Session(Connection(first, Choice("1")))
+    assert services.echo(session, b"hello") == b"hello"
+    done = threading.Event()
+
+    def go_on() -> None:
+        while not done.is_set():
+            assert services.echo(session, b"hello") == b"hello"
+
+    thread = threading.Thread(target=go_on)
+    thread.start()
+    second = transport_of(hub, 1, 1, first=200)
+    done.set()
+    thread.join()
+    assert first.local_address == b"\x00\xc8"
+    assert second.local_address != b"\x00\xc8"
+    first.close()
+    second.close()
+
+
+def test_a_collision_that_was_missed_is_noticed_and_mended(hub: CanHub) -> None:
+    first = transport_of(hub, 0, 1, first=201)
+    session = Session(Connection(first, Choice("1")))
+    assert services.echo(session, b"hello") == b"hello"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("plctool.link.canbus._CLAIM_TIME", 0.0)  # it does not listen before it begins
+        second = transport_of(hub, 1, 2, first=201)
+    other = Session(Connection(second, Choice("2")))
+    assert other.recover(lambda: services.echo(other, b"hello")) == b"hello"
+    assert session.recover(lambda: services.echo(session, b"hello")) == b"hello"
+    assert first.local_address != second.local_address
+    first.close()
+    second.close()
+
+
+def test_what_is_no_interface_is_told(tool: Any) -> None:
+    for place, status, said in (
+        ("can0", 2, "is not a CAN interface"),
+        ("teapot:can0", 2, "is not a CAN interface"),
+        ("slcan:/dev/no-such-line", 3, "Cannot open CAN slcan:/dev/no-such-line"),
+    ):
+        done = tool("status", "--can", place)
+        assert (done.status, said in done.err, done.err.count("\n")) == (status, True, 1), done.err
+
+
+def test_wrong_options_of_plcrt_are_refused(tmp_path: Path) -> None:
+    for options, said in (
+        (("--node", "0"), "give 1 to 127"),
+        (("--node", "128"), "give 1 to 127"),
+        (("--bitrate", "fast"), "is not one of CAN"),
+        (("--can-base", "0x123"), "is not a base"),
+        (("--can", "slcan:/dev/no-such-line"), "cannot open CAN"),
+        (("--can", "no-such-interface"), "cannot open CAN"),
+    ):
+        with pytest.raises(PlcError, match=said):
+            Plcrt(tmp_path / "other.flash", *options).start()
+
+
+def test_a_device_that_is_gone_is_told(hub: CanHub) -> None:
+    with pytest.raises(LinkError, match="No device answers"), plctool.connect(link_of(hub, 0, 55)) as plc:
+        plc.identity()
