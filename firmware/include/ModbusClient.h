@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A line is a serial line or a TCP connection, behind which may be a gateway with several devices. One request at a time
+ * A line is a serial line or a TCP connection, which may lead to a gateway with several devices. One request at a time
  * is on its way; of those that are due the one that has been due longest comes next, so that all get their turn on a
  * line that is too slow. All from main. Data are exchanged with the lock of the process image (SysLock.h): those of one
  * job are of one moment.

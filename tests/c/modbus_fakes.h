@@ -66,7 +66,7 @@ void line_send_frame(const RTS_UI8 *data, RTS_UI32 size);
 /* Bytes that have come from the device; forgets them. */
 RTS_UI32 line_take(RTS_UI8 *data, RTS_UI32 capacity);
 
-/* Somebody connects to the device's listener; the socket is accepted when it asks. */
+/* A connection to the device's listener, which is accepted when the device asks. */
 FAKE_SOCKET *net_dial(void);
 void net_put(FAKE_SOCKET *socket, const RTS_UI8 *data, RTS_UI32 size);
 /* An ADU with this PDU. */
