@@ -158,19 +158,20 @@ static bool open_pty(void)
     return state.slave >= 0 && make_raw(state.slave, &own->settings);
 }
 
-/* Whether the link is one to a pseudo terminal: ours, or left by a plcrt that was killed. */
-static bool link_leads_to(const char *place)
+/* Where the link leads to, "" if it is none. */
+static const char *read_link(char *found, size_t size)
 {
-    char found[sizeof(state.pty_name)];
-    ssize_t length = readlink(state.link, found, sizeof(found) - 1);
+    ssize_t length = readlink(state.link, found, size - 1);
     found[length > 0 ? length : 0] = '\0';
-    return length > 0 && strncmp(found, place, strlen(place)) == 0;
+    return found;
 }
 
 /* Never replaces what is no such link. */
 static bool make_link(PORT_REASON *reason)
 {
-    if (link_leads_to("/dev/pts/")) {
+    static const char ptys[] = "/dev/pts/"; /* one left by a plcrt that was killed */
+    char found[sizeof(state.pty_name)];
+    if (strncmp(read_link(found, sizeof(found)), ptys, sizeof(ptys) - 1) == 0) {
         (void)unlink(state.link);
     }
     if (symlink(state.pty_name, state.link) == 0) {
@@ -184,7 +185,8 @@ static bool make_link(PORT_REASON *reason)
 
 static void remove_link(void)
 {
-    if (state.link[0] != '\0' && link_leads_to(state.pty_name)) {
+    char found[sizeof(state.pty_name)];
+    if (state.link[0] != '\0' && strcmp(read_link(found, sizeof(found)), state.pty_name) == 0) {
         (void)unlink(state.link);
     }
     state.link[0] = '\0';
