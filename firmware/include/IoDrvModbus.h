@@ -26,10 +26,11 @@ enum {
     MODBUS_PARAM_PARITY = 4,    /* SYSCOM_PARITY_*: 0 none, 1 even, 2 odd; even if missing */
     MODBUS_PARAM_STOP_BITS = 5, /* 1 if missing */
     MODBUS_PARAM_RS485 = 6,     /* 1: the port drives the bus while it sends */
-    MODBUS_PARAM_ADDRESS = 7,   /* TCP: IPv4, 127.0.0.1 is 0x7F000001; of a client its server, of a server its own, 0: all */
-    MODBUS_PARAM_PORT = 8,      /* TCP: MODBUS_PORT if missing */
-    MODBUS_PARAM_UNIT = 9,      /* of a device, or a server; 1 if missing, of a TCP server 0: every unit */
-    MODBUS_PARAM_TIMEOUT = 10,  /* of a device [ms], from the last byte of the request; 1000 if missing */
+    MODBUS_PARAM_ADDRESS =
+        7,                 /* TCP: IPv4, 127.0.0.1 is 0x7F000001; of a client its server, of a server its own, 0: all */
+    MODBUS_PARAM_PORT = 8, /* TCP: MODBUS_PORT if missing */
+    MODBUS_PARAM_UNIT = 9, /* of a device, or a server; 1 if missing, of a TCP server 0: every unit */
+    MODBUS_PARAM_TIMEOUT = 10,   /* of a device [ms], from the last byte of the request; 1000 if missing */
     MODBUS_PARAM_OBJECT = 0x100, /* + n: object n of the identification of a server, a text */
     MODBUS_PARAM_JOB = 0x1000,   /* + n: a MODBUS_JOB */
     MODBUS_PARAM_RANGE = 0x2000, /* + n: a MODBUS_RANGE */

@@ -32,8 +32,8 @@ enum {
     MODBUS_DEVICE_FAILURE = 4,
     MODBUS_ACKNOWLEDGE = 5,
     MODBUS_DEVICE_BUSY = 6,
-    MODBUS_NO_PATH = 10,       /* of a gateway: it does not know the device */
-    MODBUS_NO_TARGET = 11,     /* of a gateway: the device does not reply */
+    MODBUS_NO_PATH = 10,   /* of a gateway: it does not know the device */
+    MODBUS_NO_TARGET = 11, /* of a gateway: the device does not reply */
 };
 
 /* Limits of one request. */

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A line is a serial line or a TCP connection, behind which may be a gateway with several devices. One request at a time
+ * A line is a serial line or a TCP connection, which may lead to a gateway with several devices. One request at a time
  * is on its way; of those that are due the one that has been due longest comes next, so that all get their turn on a
  * line that is too slow. All from main. Data are exchanged with the lock of the process image (SysLock.h): those of one
  * job are of one moment.
@@ -18,14 +18,14 @@
  * from the lowest of the first byte on. */
 typedef struct {
     const MODBUS_JOB *job;
-    RTS_UI8 *in;          /* what was read last */
-    RTS_UI8 *out;         /* what is to be written */
-    RTS_UI8 *written;     /* what the device has of it; as much room as `out` */
-    bool has_out;         /* `out` was filled, nothing is written before */
-    bool is_written;      /* `written` is valid */
-    bool good;            /* its last try was */
-    RTS_I64 due_ns;       /* when it is to be done next */
-    RTS_I64 done_ns;      /* when it was tried last */
+    RTS_UI8 *in;      /* what was read last */
+    RTS_UI8 *out;     /* what is to be written */
+    RTS_UI8 *written; /* what the device has of it; as much room as `out` */
+    bool has_out;     /* `out` was filled, nothing is written before */
+    bool is_written;  /* `written` is valid */
+    bool good;        /* its last try was */
+    RTS_I64 due_ns;   /* when it is to be done next */
+    RTS_I64 done_ns;  /* when it was tried last */
 } MODBUS_JOB_STATE;
 
 typedef struct {
@@ -42,10 +42,10 @@ typedef struct {
     RTS_UI32 timeout_ms;
     RTS_UI32 job_count;
     MODBUS_JOB_STATE *jobs;
-    bool asked;          /* it was tried at all */
-    RTS_UI8 failures;    /* tries in a row that it was silent for; from MODBUS_TRIES on it is lost */
-    RTS_I64 retry_ns;    /* when a lost device is asked again */
-    RTS_I64 good_ns;     /* when it replied last; 0: never */
+    bool asked;       /* it was tried at all */
+    RTS_UI8 failures; /* tries in a row that it was silent for; from MODBUS_TRIES on it is lost */
+    RTS_I64 retry_ns; /* when a lost device is asked again */
+    RTS_I64 good_ns;  /* when it replied last; 0: never */
     MODBUS_DEVICE_COUNTERS counters;
 } MODBUS_DEVICE;
 
@@ -59,10 +59,10 @@ typedef struct {
     MODBUS_DEVICE *device; /* NULL: nothing */
     MODBUS_JOB_STATE *job;
     MODBUS_REQUEST request;
-    bool sent;          /* else it waits for the link */
-    bool waits;         /* the last byte has left, the time-out runs */
+    bool sent;  /* else it waits for the link */
+    bool waits; /* the last byte has left, the time-out runs */
     bool verifies;
-    RTS_I64 since_ns;   /* since when it waits for the link, or for the reply */
+    RTS_I64 since_ns; /* since when it waits for the link, or for the reply */
     RTS_UI16 transaction;
     RTS_UI8 head[MODBUS_HEAD_SIZE];
 } MODBUS_CLIENT;

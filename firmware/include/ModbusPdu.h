@@ -13,8 +13,8 @@
 /* What a function code is. */
 typedef struct {
     RTS_UI8 function;
-    RTS_UI8 table; /* MODBUS_COILS, ...; 0: it is about none */
-    RTS_UI8 size;  /* of its request, without the bytes that a count in it announces */
+    RTS_UI8 table;         /* MODBUS_COILS, ...; 0: it is about none */
+    RTS_UI8 size;          /* of its request, without the bytes that a count in it announces */
     RTS_UI8 count_of_bits; /* 1: of one, 16: of registers */
     RTS_UI16 most_read;    /* bits or registers; 0: it reads none */
     RTS_UI16 most_written;

@@ -22,9 +22,9 @@ typedef struct {
 } FAKE_BYTES;
 
 typedef struct {
-    bool open;       /* the device's end */
+    bool open; /* the device's end */
     bool connected;
-    bool peer_gone;  /* the other end has closed */
+    bool peer_gone; /* the other end has closed */
     SOCKADDRESS peer;
     RTS_UI8 in[FAKE_SOCKET_ROOM]; /* to the device */
     RTS_UI32 in_size;
@@ -44,9 +44,9 @@ typedef struct {
     bool locked;
 
     FAKE_SOCKET sockets[FAKE_SOCKETS];
-    RTS_UI32 pending;     /* sockets that wait to be accepted, from `accepted` on */
+    RTS_UI32 pending; /* sockets that wait to be accepted, from `accepted` on */
     RTS_UI32 accepted;
-    RTS_UI32 used;        /* sockets that there were */
+    RTS_UI32 used; /* sockets that there were */
     RTS_RESULT listen_result;
     RTS_UI32 listeners;
     RTS_RESULT connect_result; /* ERR_OK, ERR_PENDING, ERR_NET_NOTCONNECTED */
@@ -66,7 +66,7 @@ void line_send_frame(const RTS_UI8 *data, RTS_UI32 size);
 /* Bytes that have come from the device; forgets them. */
 RTS_UI32 line_take(RTS_UI8 *data, RTS_UI32 capacity);
 
-/* Somebody connects to the device's listener; the socket is accepted when it asks. */
+/* A connection to the device's listener, which is accepted when the device asks. */
 FAKE_SOCKET *net_dial(void);
 void net_put(FAKE_SOCKET *socket, const RTS_UI8 *data, RTS_UI32 size);
 /* An ADU with this PDU. */

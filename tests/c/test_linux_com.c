@@ -193,6 +193,95 @@ static void a_device_that_goes_away_is_taken_up_again(void)
     rmdir(folder);
 }
 
+static const SYSCOM_SETTINGS slow = {.baud = 1200, .parity = SYSCOM_PARITY_EVEN, .stop_bits = 2};
+
+static const char *name_of_bus(void)
+{
+    static char name[64];
+    snprintf(name, sizeof(name), "/tmp/test_linux_com.%d", (int)getpid());
+    return name;
+}
+
+/* The settings of the slave of a pseudo terminal, through its other end. */
+static struct termios settings_of(int end)
+{
+    struct termios found;
+    CHECK_EQUAL(tcgetattr(end, &found), 0);
+    return found;
+}
+
+static void a_line_of_a_field_bus_is_opened_by_name(void)
+{
+    const char *name = name_of_bus();
+    RTS_UI8 data[4] = {0};
+    RTS_UI32 line = 0;
+    RTS_I64 before_ns;
+    int end = plug_in(name);
+    open_com("pty");
+    CHECK_EQUAL(SysComOpenPort(name, &slow, &line), ERR_OK);
+    CHECK(line >= SysComGetCount());
+    struct termios found = settings_of(end);
+    CHECK_EQUAL(cfgetospeed(&found), B1200);
+    CHECK_EQUAL(SysComWrite(line, (const RTS_UI8 *)"ab", 2), 2);
+    CHECK(read_client(end, data, 2) == 2 && memcmp(data, "ab", 2) == 0);
+    before_ns = SysTimeGetNs();
+    CHECK_EQUAL(write(end, "c", 1), 1);
+    while (SysComRead(line, data, 1) == 0 && SysTimeGetNs() - before_ns < 10000000000) {
+        (void)PortWait(1);
+    }
+    CHECK(SysComGetByteNs(line) >= before_ns && SysComGetByteNs(line) <= SysTimeGetNs());
+    SysComClose(line);
+    CHECK_EQUAL(SysComWrite(line, (const RTS_UI8 *)"d", 1), 0);
+    close(end);
+    close_com();
+    unlink(name);
+}
+
+static void a_line_belongs_to_one_component(void)
+{
+    const char *name = name_of_bus();
+    RTS_UI32 line = 0;
+    RTS_UI32 other = 0;
+    int end = plug_in(name);
+    open_com(name);
+    CHECK_EQUAL(SysComOpenPort(name, &slow, &line), ERR_DUPLICATE);
+    close_com();
+    CHECK_EQUAL(SysComOpenPort(name, &slow, &line), ERR_OK);
+    CHECK_EQUAL(SysComOpenPort(name, &slow, &other), ERR_DUPLICATE);
+    SysComClose(line);
+    CHECK_EQUAL(SysComOpenPort(name, &slow, &line), ERR_OK);
+    SysComClose(line);
+    close(end);
+    unlink(name);
+}
+
+static void a_line_that_is_not_plugged_in_is_waited_for(void)
+{
+    const char *name = name_of_bus();
+    RTS_UI8 byte;
+    RTS_UI32 line = 0;
+    unlink(name);
+    CHECK_EQUAL(SysComOpenPort(name, &slow, &line), ERR_OK);
+    CHECK_EQUAL(SysComRead(line, &byte, 1), 0);
+    int end = plug_in(name);
+    RTS_I64 deadline = SysTimeGetNs() + 10000000000;
+    while (SysComWrite(line, (const RTS_UI8 *)"!", 1) == 0 && SysTimeGetNs() < deadline) {
+        sleep_1ms();
+    }
+    CHECK(read_client(end, &byte, 1) == 1 && byte == '!');
+    SysComClose(line);
+    close(end);
+    unlink(name);
+}
+
+static void a_line_that_cannot_run_like_that_is_refused(void)
+{
+    const SYSCOM_SETTINGS odd = {.baud = 12345, .parity = SYSCOM_PARITY_NONE, .stop_bits = 1};
+    RTS_UI32 line = 0;
+    CHECK_EQUAL(SysComOpenPort("/dev/ttyS0", &odd, &line), ERR_NOT_SUPPORTED);
+    CHECK_EQUAL(SysComOpenPort("", &slow, &line), ERR_NO_OBJECT);
+}
+
 static void what_cannot_be_opened_is_said(void)
 {
     PORT_REASON reason = {"", false};
@@ -328,6 +417,10 @@ int main(void)
     RUN(a_link_that_another_one_has_taken_is_left_to_it);
     RUN(no_other_file_is_replaced_by_a_link);
     RUN(a_device_that_goes_away_is_taken_up_again);
+    RUN(a_line_of_a_field_bus_is_opened_by_name);
+    RUN(a_line_belongs_to_one_component);
+    RUN(a_line_that_is_not_plugged_in_is_waited_for);
+    RUN(a_line_that_cannot_run_like_that_is_refused);
     RUN(what_cannot_be_opened_is_said);
     RUN(a_device_that_keeps_another_speed_is_refused);
     RUN(a_device_that_another_program_uses_is_refused);

@@ -28,9 +28,13 @@ typedef struct {
     RTS_UI8 function; /* of the last request */
 } REMOTE;
 
-static const MODBUS_RANGE range = {
-    MODBUS_HOLDING_REGISTERS | MODBUS_COILS | MODBUS_INPUT_REGISTERS | MODBUS_DISCRETE_INPUTS, MODBUS_RANGE_WRITABLE, 0, 0,
-    1, REGISTERS * 16};
+static const MODBUS_RANGE range = {MODBUS_HOLDING_REGISTERS | MODBUS_COILS | MODBUS_INPUT_REGISTERS |
+                                       MODBUS_DISCRETE_INPUTS,
+                                   MODBUS_RANGE_WRITABLE,
+                                   0,
+                                   0,
+                                   1,
+                                   REGISTERS * 16};
 
 static REMOTE remotes[DEVICES];
 static MODBUS_CLIENT client;

@@ -92,9 +92,9 @@ static void silence_is_shorter_at_higher_speeds_down_to_a_limit(void)
         RTS_UI8 stop_bits;
         RTS_I64 silence_us;
     } rows[] = {
-        {1200, SYSCOM_PARITY_EVEN, 1, 32083}, {9600, SYSCOM_PARITY_NONE, 2, 4010},
-        {9600, SYSCOM_PARITY_NONE, 1, 3645},   {19200, SYSCOM_PARITY_ODD, 1, 2005},
-        {38400, SYSCOM_PARITY_EVEN, 1, 1750},  {115200, SYSCOM_PARITY_EVEN, 1, 1750},
+        {1200, SYSCOM_PARITY_EVEN, 1, 32083},   {9600, SYSCOM_PARITY_NONE, 2, 4010},
+        {9600, SYSCOM_PARITY_NONE, 1, 3645},    {19200, SYSCOM_PARITY_ODD, 1, 2005},
+        {38400, SYSCOM_PARITY_EVEN, 1, 1750},   {115200, SYSCOM_PARITY_EVEN, 1, 1750},
         {4000000, SYSCOM_PARITY_NONE, 1, 1750},
     };
 

@@ -69,19 +69,19 @@ static RTS_UI32 ask(const RTS_UI8 *request, RTS_UI32 size)
 }
 
 #define ASK(...) ask((const RTS_UI8[]){__VA_ARGS__}, sizeof((const RTS_UI8[]){__VA_ARGS__}))
-#define CHECK_REPLY(size, ...)                                           \
-    do {                                                                 \
-        static const RTS_UI8 expected[] = {__VA_ARGS__};                 \
-        RTS_UI32 replied = (size);                                       \
-        CHECK_EQUAL(replied, sizeof(expected));                          \
-        CHECK(memcmp(pdu, expected, sizeof(expected)) == 0);             \
+#define CHECK_REPLY(size, ...)                               \
+    do {                                                     \
+        static const RTS_UI8 expected[] = {__VA_ARGS__};     \
+        RTS_UI32 replied = (size);                           \
+        CHECK_EQUAL(replied, sizeof(expected));              \
+        CHECK(memcmp(pdu, expected, sizeof(expected)) == 0); \
     } while (0)
-#define CHECK_EXCEPTION(code, ...)                                                    \
-    do {                                                                              \
-        static const RTS_UI8 request[] = {__VA_ARGS__};                               \
-        CHECK_EQUAL(ask(request, sizeof(request)), 2);                                \
-        CHECK_EQUAL(pdu[0], request[0] | MODBUS_EXCEPTION);                           \
-        CHECK_EQUAL(pdu[1], (code));                                                  \
+#define CHECK_EXCEPTION(code, ...)                          \
+    do {                                                    \
+        static const RTS_UI8 request[] = {__VA_ARGS__};     \
+        CHECK_EQUAL(ask(request, sizeof(request)), 2);      \
+        CHECK_EQUAL(pdu[0], request[0] | MODBUS_EXCEPTION); \
+        CHECK_EQUAL(pdu[1], (code));                        \
     } while (0)
 
 static void registers_are_written_and_read(void)
@@ -319,8 +319,8 @@ static void identification_is_a_stream_or_one_object(void)
                 '0');
     CHECK_REPLY(ASK(43, 14, 2, 3), 43, 14, 2, 0x82, 0, 0, 1, 4, 3, 'B', 'o', 'x');
     CHECK_REPLY(ASK(43, 14, 4, 1), 43, 14, 4, 0x82, 0, 0, 1, 1, 2, 'P', '1');
-    CHECK_REPLY(ASK(43, 14, 1, 200), 43, 14, 1, 0x82, 0, 0, 3, 0, 4, 'A', 'c', 'm', 'e', 1, 2, 'P', '1', 2, 3, '1',
-                '.', '0'); /* from the beginning */
+    CHECK_REPLY(ASK(43, 14, 1, 200), 43, 14, 1, 0x82, 0, 0, 3, 0, 4, 'A', 'c', 'm', 'e', 1, 2, 'P', '1', 2, 3, '1', '.',
+                '0'); /* from the beginning */
     CHECK_EXCEPTION(MODBUS_ILLEGAL_ADDRESS, 43, 14, 4, 7);
     CHECK_EXCEPTION(MODBUS_ILLEGAL_ADDRESS, 43, 14, 4, 3); /* it has no URL */
     CHECK_EXCEPTION(MODBUS_ILLEGAL_VALUE, 43, 14, 0, 0);

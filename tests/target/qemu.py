@@ -225,6 +225,11 @@ class Board:
         """The second serial line, which carries CAN frames, for `plctool --can`."""
         return f"slcan:socket://{LOCALHOST}:{self._second_port}"
 
+    @property
+    def field_bus(self) -> tuple[str, int]:
+        """Where the second serial line can be reached that a field bus has."""
+        return LOCALHOST, self._second_port
+
     def line(self) -> SocketSerial:
         """The serial line, from the client's end."""
         return SocketSerial(self._port)

@@ -57,10 +57,10 @@ static const struct {
     RTS_UI32 baud;
     speed_t speed;
 } speeds[] = {
-    {1200, B1200},       {2400, B2400},       {4800, B4800},
-    {9600, B9600},       {19200, B19200},     {38400, B38400},     {57600, B57600},     {115200, B115200},
-    {230400, B230400},   {460800, B460800},   {500000, B500000},   {921600, B921600},   {1000000, B1000000},
-    {1500000, B1500000}, {2000000, B2000000}, {3000000, B3000000}, {4000000, B4000000},
+    {1200, B1200},       {2400, B2400},       {4800, B4800},       {9600, B9600},       {19200, B19200},
+    {38400, B38400},     {57600, B57600},     {115200, B115200},   {230400, B230400},   {460800, B460800},
+    {500000, B500000},   {921600, B921600},   {1000000, B1000000}, {1500000, B1500000}, {2000000, B2000000},
+    {3000000, B3000000}, {4000000, B4000000},
 };
 
 static const speed_t *find_speed(RTS_UI32 baud)
@@ -158,19 +158,20 @@ static bool open_pty(void)
     return state.slave >= 0 && make_raw(state.slave, &own->settings);
 }
 
-/* Whether the link is one to a pseudo terminal: ours, or left by a plcrt that was killed. */
-static bool link_leads_to(const char *place)
+/* Where the link leads to, "" if it is none. */
+static const char *read_link(char *found, size_t size)
 {
-    char found[sizeof(state.pty_name)];
-    ssize_t length = readlink(state.link, found, sizeof(found) - 1);
+    ssize_t length = readlink(state.link, found, size - 1);
     found[length > 0 ? length : 0] = '\0';
-    return length > 0 && strncmp(found, place, strlen(place)) == 0;
+    return found;
 }
 
 /* Never replaces what is no such link. */
 static bool make_link(PORT_REASON *reason)
 {
-    if (link_leads_to("/dev/pts/")) {
+    static const char ptys[] = "/dev/pts/"; /* one left by a plcrt that was killed */
+    char found[sizeof(state.pty_name)];
+    if (strncmp(read_link(found, sizeof(found)), ptys, sizeof(ptys) - 1) == 0) {
         (void)unlink(state.link);
     }
     if (symlink(state.pty_name, state.link) == 0) {
@@ -184,7 +185,8 @@ static bool make_link(PORT_REASON *reason)
 
 static void remove_link(void)
 {
-    if (state.link[0] != '\0' && link_leads_to(state.pty_name)) {
+    char found[sizeof(state.pty_name)];
+    if (state.link[0] != '\0' && strcmp(read_link(found, sizeof(found)), state.pty_name) == 0) {
         (void)unlink(state.link);
     }
     state.link[0] = '\0';

@@ -14,8 +14,8 @@
 static struct {
     const PORT_SOURCE *source[PORT_MAX_SOURCES];
     RTS_UI32 count;
-    bool more;   /* work was done in this pass */
-    bool hurry;  /* a component wants the next pass before the time-out of its wait */
+    bool more;  /* work was done in this pass */
+    bool hurry; /* a component wants the next pass before the time-out of its wait */
     int hurry_ms;
 } waiting;
 

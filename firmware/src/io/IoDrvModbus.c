@@ -117,7 +117,7 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
     return ERR_OK;
 }
 
-/* ---- what the manager is told ---- */
+/* ---- what the manager sees ---- */
 
 static void note_error(MODBUS_NOTED *noted, RTS_UI32 errors, RTS_UI32 flag)
 {

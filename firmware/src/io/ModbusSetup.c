@@ -35,7 +35,8 @@ static const void *structure(const IoConfigConnector *connector, RTS_UI32 id, RT
 {
     const IoConfigParameter *parameter = IoMgrConfigGetParameter(connector, id);
 
-    return parameter != NULL && parameter->bits == 8 * size ? IoMgrConfigGetParameterValuePointer(parameter, NULL) : NULL;
+    return parameter != NULL && parameter->bits == 8 * size ? IoMgrConfigGetParameterValuePointer(parameter, NULL)
+                                                            : NULL;
 }
 
 static RTS_RESULT refuse_number(const IoConfigConnector *connector, const char *what, RTS_UI32 most)
@@ -260,8 +261,9 @@ static bool is_range_good(const MODBUS_RANGE *range)
     const RTS_UI32 bits = MODBUS_COILS | MODBUS_DISCRETE_INPUTS;
     const RTS_UI32 addresses = 0x10000;
 
-    if (range->bits == 0 || range->bits > addresses * MODBUS_REGISTER_BITS || (range->tables & (registers | bits)) == 0 ||
-        range->reverse == 0 || range->reverse > 8 || (range->reverse & (range->reverse - 1)) != 0)
+    if (range->bits == 0 || range->bits > addresses * MODBUS_REGISTER_BITS ||
+        (range->tables & (registers | bits)) == 0 || range->reverse == 0 || range->reverse > 8 ||
+        (range->reverse & (range->reverse - 1)) != 0)
         return false;
     if ((range->tables & bits) != 0 && range->first_bit + range->bits > addresses)
         return false;
@@ -308,7 +310,8 @@ static void describe(MODBUS_SERVER *server, const IoConfigConnector *connector)
                                                    target->device_name};
 
     for (RTS_UI32 i = 0; i < MODBUS_OBJECTS; i++) {
-        const char *text = IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, MODBUS_PARAM_OBJECT + i));
+        const char *text =
+            IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, MODBUS_PARAM_OBJECT + i));
         server->object[i] = text != NULL ? text : otherwise[i];
     }
 }

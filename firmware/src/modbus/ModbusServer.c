@@ -170,7 +170,7 @@ static RTS_UI32 end_reply(const MODBUS_REQUEST *request, RTS_UI8 *pdu)
     return 2 + bytes;
 }
 
-/* The last byte of bits may have some that nobody asked for. */
+/* The last byte of bits may have some that the request does not ask for. */
 static void clear_last(const MODBUS_REQUEST *request, RTS_UI8 *pdu)
 {
     pdu[1 + ModbusDataSize(request->function, request->read_count)] = 0;

@@ -128,7 +128,7 @@ _FUNCTIONS = {
 
 def element_size(t: Type) -> int:
     """The bytes of one number of a type: 2, 4 or 8; 1 for BOOL and numbers of a byte, which have a register of their
-    own; 0 for texts and arrays of bytes, whose bytes follow each other, and -1 for what registers cannot have."""
+    own; 0 for strings and arrays of bytes, whose bytes follow each other, and -1 for what registers cannot have."""
     t = base_of(t)
     if isinstance(t, ArrayType):
         inner = element_size(t.element)

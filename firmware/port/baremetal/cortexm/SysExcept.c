@@ -261,7 +261,7 @@ __attribute__((naked, noinline)) static RTS_UI64 try_enter(void (*fn)(void *arg)
                      "pop {r3-r11, pc}");
 }
 
-__attribute__((used)) static RTS_UI32 enter(FRAME *caller, RTS_UI32 exc_return)
+__attribute__((used)) static RTS_UI32 enter_try(FRAME *caller, RTS_UI32 exc_return)
 {
     TRY *try = state.top;
     if (try == state.tries + APP_MAX_TASKS)
@@ -288,7 +288,7 @@ static bool is_readable(const TRY *try, uintptr_t stack)
 
 /* Drops what is on the process stack. An FPU context that waits there for being saved is given up by the return,
  * because try_enter used the FPU, so that the frame returned to has one too. */
-__attribute__((used)) static RTS_UI32 leave(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link)
+__attribute__((used)) static RTS_UI32 leave_try(RTS_UI32 code, RTS_UI32 address, uintptr_t stack, uintptr_t link)
 {
     TRY *try = --state.top;
     if (code != RTSEXCPT_NOEXCEPTION && is_readable(try, stack))
@@ -341,13 +341,16 @@ __attribute__((used)) static void open_gate(FRAME *frame)
     __asm__ volatile("tst lr, #4\n\tite eq\n\tmrseq r0, msp\n\tmrsne r0, psp\n\tmov r1, lr\n\t" \
                      "bl " #function "\n\tbx r0")
 
+/* Functions that are called here have names that no other source has: the program is optimised as a whole, which renames
+ * static functions of the same name. */
+
 /* From the main stack the call enters. From the process stack it leaves, with what is in r0 to r3 of its frame, unless
  * it is that of a gate. */
 __attribute__((naked)) void SvcHandler(void);
 void SvcHandler(void)
 {
-    __asm__ volatile("tst lr, #4\n\tbne 2f\n\tmrs r0, msp\n\tmov r1, lr\n\tbl enter\n\tbx r0\n"
-                     "2:\n\t" LOOK_FOR_A_GATE "1:\n\tmrs r12, psp\n\tldm r12, {r0-r3}\n\tbl leave\n\tbx r0");
+    __asm__ volatile("tst lr, #4\n\tbne 2f\n\tmrs r0, msp\n\tmov r1, lr\n\tbl enter_try\n\tbx r0\n"
+                     "2:\n\t" LOOK_FOR_A_GATE "1:\n\tmrs r12, psp\n\tldm r12, {r0-r3}\n\tbl leave_try\n\tbx r0");
 }
 
 /* The stack pointer before the exception pushed its frame, with or without the FPU's registers; for the trace alone. */
@@ -418,8 +421,8 @@ __attribute__((used)) static RTS_UI32 fault_dispatch(FRAME *frame, RTS_UI32 exc_
     SCB_SHCSR &= ~(RTS_UI32)SHCSR_PENDING;
     CpuRestore(0); /* the fault may have been in a place where interrupts are masked */
     if (cfsr & CFSR_STACKING)
-        return leave(code, address, 0, 0);
-    return leave(code, address, stack_before(frame, exc_return), frame->lr);
+        return leave_try(code, address, 0, 0);
+    return leave_try(code, address, stack_before(frame, exc_return), frame->lr);
 }
 
 /* A fault on the main stack is one of the runtime; that stack may be at its end, so it is given up. */

@@ -23,7 +23,14 @@
 #define PORT_A_DEN REG32(0x4000451Cu)
 
 enum { UART_BAUD = 115200, PINS = 3 };
-enum { FR_RX_EMPTY = 1 << 4, FR_TX_FULL = 1 << 5, LCRH_FIFOS_8N1 = 7 << 4, LCRH_PARITY = 1 << 1, LCRH_EVEN = 1 << 2, LCRH_STOP_2 = 1 << 3 };
+enum {
+    FR_RX_EMPTY = 1 << 4,
+    FR_TX_FULL = 1 << 5,
+    LCRH_FIFOS_8N1 = 7 << 4,
+    LCRH_PARITY = 1 << 1,
+    LCRH_EVEN = 1 << 2,
+    LCRH_STOP_2 = 1 << 3
+};
 enum { CTL_ON = 3 << 8 | 1 };
 enum { INT_RX = 1 << 4, INT_TX = 1 << 5, INT_RX_TIMEOUT = 1 << 6 };
 

@@ -1,0 +1,18 @@
+/*
+ * cmp_list.c - the components of the configuration with Modbus: those of the standard one, inputs and outputs, and Modbus.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "CmpCompilerCalls.h"
+
+#define HAS_CmpLog 1
+#define HAS_SysWatchdog 1
+#define HAS_CmpRetain 1
+#define HAS_COMMUNICATION 1
+#define HAS_CmpLogSrv 1
+#define HAS_CmpMonitor2 1
+#define HAS_CmpBlkDrvSimpleCom 1
+#define HAS_CmpIoMgrEmbedded 1
+#define HAS_IoDrvModbus 1
+#define PORT_COMPONENTS(X) X(CmpIntCalls) X(CmpRealCalls)
+#include "CmpList.h"

@@ -1,0 +1,194 @@
+/*
+ * test_modbus_client_tcp.c - a Modbus client on TCP: connections that are refused, slow, lost; gateways; late replies.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "ModbusClient.h"
+#include "ModbusPdu.h"
+#include "ModbusTcp.h"
+#include "modbus_fakes.h"
+#include "rts_config.h"
+#include "test.h"
+
+enum { MS = 1000000, TIMEOUT_MS = 100, INTERVAL_MS = 50, REQUEST_SIZE = 12 };
+
+static const MODBUS_JOB job = {MODBUS_READ_HOLDING_REGISTERS, 0, 0, 1, 0, 0, 0, INTERVAL_MS};
+static MODBUS_CLIENT client;
+static MODBUS_DEVICE devices[2];
+static MODBUS_JOB_STATE states[2];
+static RTS_UI8 in[2][2];
+static bool silent;
+static bool refuses; /* the gateway: for unit 2 */
+static RTS_UI16 transaction_offset;
+static RTS_UI32 asked;
+
+static void begin(RTS_UI32 count)
+{
+    const SOCKADDRESS peer = {0x0A000001, 502};
+
+    fakes_begin();
+    memset(&client, 0, sizeof(client));
+    memset(devices, 0, sizeof(devices));
+    memset(states, 0, sizeof(states));
+    memset(in, 0, sizeof(in));
+    silent = refuses = false;
+    transaction_offset = 0;
+    asked = 0;
+    for (RTS_UI32 i = 0; i < 2; i++) {
+        states[i] = (MODBUS_JOB_STATE){.job = &job, .in = in[i]};
+        devices[i] = (MODBUS_DEVICE){.unit = (RTS_UI8)(i + 1), .timeout_ms = TIMEOUT_MS, .job_count = 1};
+        devices[i].jobs = &states[i];
+    }
+    ModbusTcpBeginClient(&client.link, &peer);
+    ModbusClientBegin(&client, devices, count);
+}
+
+static FAKE_SOCKET *newest(void)
+{
+    return &fakes.sockets[fakes.used - 1];
+}
+
+/* The server at the other end of the newest connection: its register has the number of requests so far. */
+static void serve(void)
+{
+    FAKE_SOCKET *socket = newest();
+    RTS_UI8 unit = socket->out[6];
+
+    if (fakes.used == 0 || !socket->open || socket->out_size < REQUEST_SIZE)
+        return;
+    asked++;
+    if (!silent && refuses && unit == 2)
+        net_put_pdu(socket, ModbusGet16(socket->out), unit, (const RTS_UI8[]){0x83, MODBUS_NO_TARGET}, 2);
+    else if (!silent)
+        net_put_pdu(socket, (RTS_UI16)(ModbusGet16(socket->out) + transaction_offset), unit,
+                    (const RTS_UI8[]){3, 2, 0, (RTS_UI8)asked}, 4);
+    socket->out_size = 0;
+}
+
+static void run_ms(RTS_UI32 ms)
+{
+    for (RTS_UI32 i = 0; i < ms; i++, fakes.now_ns += MS) {
+        ModbusClientPoll(&client, fakes.now_ns);
+        if (fakes.used != 0)
+            serve();
+    }
+}
+
+static void one_connection_serves_all_devices_of_a_gateway(void)
+{
+    begin(2);
+    run_ms(1000);
+    CHECK_EQUAL(fakes.connects, 1);
+    CHECK_EQUAL(newest()->peer.ip, 0x0A000001);
+    CHECK(ModbusDeviceIsGood(&devices[0]) && ModbusDeviceIsGood(&devices[1]));
+    CHECK(asked >= 38 && asked <= 42);
+}
+
+static void a_refused_connection_is_tried_every_second(void)
+{
+    begin(1);
+    fakes.connect_result = ERR_NET_NOTCONNECTED;
+    run_ms(10000);
+    CHECK(ModbusDeviceIsLost(&devices[0]));
+    CHECK(fakes.connects >= 5 && fakes.connects <= 11);
+    fakes.connect_result = ERR_OK;
+    run_ms(2500);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+static void a_slow_connection_is_waited_for(void)
+{
+    begin(1);
+    fakes.connect_result = ERR_PENDING;
+    run_ms(2000);
+    CHECK_EQUAL(fakes.connects, 1);
+    fakes.connect_result = ERR_OK;
+    run_ms(1500);
+    CHECK_EQUAL(fakes.connects, 1);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+static void a_connection_that_never_comes_is_given_up(void)
+{
+    begin(1);
+    fakes.connect_result = ERR_PENDING;
+    run_ms(MODBUS_CONNECT_MS + 3000);
+    CHECK(fakes.connects >= 2);
+    CHECK(!fakes.sockets[0].open);
+}
+
+static void a_lost_connection_is_made_again(void)
+{
+    begin(1);
+    run_ms(3000);
+    newest()->peer_gone = true;
+    run_ms(300);
+    CHECK_EQUAL(fakes.connects, 2);
+    CHECK(!fakes.sockets[0].open);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+    CHECK_EQUAL(devices[0].counters.timeouts, 0); /* it was closed between two requests */
+}
+
+static void a_reply_of_another_transaction_is_passed_over(void)
+{
+    begin(1);
+    run_ms(200);
+    transaction_offset = 1;
+    run_ms(1000);
+    CHECK(ModbusDeviceIsLost(&devices[0]));
+    CHECK(devices[0].counters.others >= 2);
+    transaction_offset = 0;
+    run_ms(1500);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+static void a_device_that_the_gateway_does_not_reach_is_lost(void)
+{
+    begin(2);
+    refuses = true;
+    run_ms(2000);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+    CHECK(ModbusDeviceIsLost(&devices[1]));
+    CHECK_EQUAL(devices[1].counters.last_exception, MODBUS_NO_TARGET);
+    CHECK(devices[1].counters.requests <= 3);
+    refuses = false;
+    run_ms(MODBUS_RETRY_SOON_MS);
+    CHECK(ModbusDeviceIsGood(&devices[1]));
+}
+
+static void a_silent_device_does_not_end_the_connection(void)
+{
+    begin(1);
+    run_ms(200);
+    silent = true;
+    run_ms(1000);
+    CHECK(ModbusDeviceIsLost(&devices[0]));
+    CHECK_EQUAL(fakes.connects, 1);
+}
+
+static void what_is_no_frame_ends_the_connection(void)
+{
+    static const RTS_UI8 garbage[] = "HTTP/1.1 400 Bad Request";
+
+    begin(1);
+    run_ms(200);
+    net_put(newest(), garbage, sizeof(garbage));
+    run_ms(2500);
+    CHECK(!fakes.sockets[0].open);
+    CHECK_EQUAL(fakes.connects, 2);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+int main(void)
+{
+    RUN(one_connection_serves_all_devices_of_a_gateway);
+    RUN(a_refused_connection_is_tried_every_second);
+    RUN(a_slow_connection_is_waited_for);
+    RUN(a_connection_that_never_comes_is_given_up);
+    RUN(a_lost_connection_is_made_again);
+    RUN(a_reply_of_another_transaction_is_passed_over);
+    RUN(a_device_that_the_gateway_does_not_reach_is_lost);
+    RUN(a_silent_device_does_not_end_the_connection);
+    RUN(what_is_no_frame_ends_the_connection);
+    return test_result();
+}

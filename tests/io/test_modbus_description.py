@@ -1,0 +1,208 @@
+"""What [modbus] of a description becomes, and every mistake in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from io_support import build, configuration, messages
+
+from plctool.core import ffi, lib
+from plctool.io.configuration import ChannelEntry, ConnectorEntry
+from plctool.io.modbus import wire_address
+
+PROGRAM = """\
+PROGRAM Main
+VAR
+    on, off : BOOL; small : BYTE; word_1, word_2 : WORD; real_1, real_2 : REAL; long : LREAL; text : STRING(9);
+    words : ARRAY[0..9] OF INT; reals : ARRAY[0..3] OF REAL; bools : ARRAY[0..3] OF BOOL; pair : PAIR;
+END_VAR
+on := off;
+END_PROGRAM
+TYPE PAIR : STRUCT a : INT; b : REAL; END_STRUCT; END_TYPE
+"""
+
+DEVICE = """\
+[[modbus.rs485]]
+port = "/dev/ttyS1"
+baud = 9600
+[[modbus.rs485.device]]
+name = "Meter"
+unit = 3
+order = "{order}"
+[[modbus.rs485.device.read]]
+function = {function}
+address = {address}
+every = "T#100ms"
+vars = [{names}]
+"""
+
+
+def device(names: str, order: str = "ABCD", function: int = 3, address: int = 40001) -> str:
+    """A device with one read of some variables of Main."""
+    listed = ", ".join(f'"Main.{n}"' for n in names.split())
+    return DEVICE.format(names=listed, order=order, function=function, address=address)
+
+
+def structure(connector: ConnectorEntry, kind: str, number: int) -> object:
+    """The value of a parameter that is a structure."""
+    (value,) = (p.value for p in connector.parameters if p.id == number)
+    made = ffi.new(f"{kind} *")
+    ffi.buffer(made)[:] = value
+    return made
+
+
+def read_job(folder: Path, text: str) -> tuple[object, list[ChannelEntry]]:
+    """The one job of a description, and its channels in order."""
+    made = configuration(build(folder, PROGRAM, text))
+    channels = [c for t in made.task_maps for m in t.connectors for c in m.channels]
+    return structure(made.connectors[1], "MODBUS_JOB", int(lib.MODBUS_PARAM_JOB)), channels
+
+
+# How bytes ABCD.. of numbers lie in the driver's memory for each order, and which channels are turned round.
+ORDERS = [
+    ("word_1 words", "ABCD", 11, 2, [False, False]),
+    ("real_1 reals", "ABCD", 10, 4, [False, False]),
+    ("long", "ABCD", 4, 8, [False]),
+    ("word_1 real_1 long", "ABCD", 7, 1, [True, True, True]),
+    ("word_1 text", "ABCD", 6, 1, [True, False]),
+    ("text", "ABCD", 5, 1, [False]),
+    ("word_1 real_1 long reals", "CDAB", 15, 2, [False, False, False, False]),
+    ("word_1 real_1 reals text", "DCBA", 16, 1, [False, False, False, False]),
+    ("word_1 real_1", "BADC", 3, 2, [True, True]),
+    ("word_1 words", "BADC", 11, 1, [False, False]),
+]
+
+
+@pytest.mark.parametrize(("names", "order", "count", "reverse", "turned"), ORDERS)
+def test_order_of_bytes(tmp_path: Path, names: str, order: str, count: int, reverse: int, turned: list[bool]) -> None:
+    job, channels = read_job(tmp_path, device(names, order))
+    assert job.read_count == count
+    assert max(1, job.flags >> lib.MODBUS_JOB_REVERSE_SHIFT & 14) == reverse
+    assert [bool(c.flags & lib.IO_CHANNEL_BIG_ENDIAN) for c in channels] == turned
+
+
+WIRE = bytes([0x3F, 0xC0, 0x12, 0x34, 0x40, 0x49, 0x0F, 0xDB])
+
+
+@pytest.mark.parametrize("order", ["ABCD", "CDAB", "BADC", "DCBA"])
+def test_numbers_are_those_on_the_wire(tmp_path: Path, order: str) -> None:
+    """What the driver and the manager do to the bytes of a DWORD, step by step."""
+    permutation = {"ABCD": [0, 1, 2, 3], "CDAB": [2, 3, 0, 1], "BADC": [1, 0, 3, 2], "DCBA": [3, 2, 1, 0]}[order]
+    number = bytes([0xA, 0xB, 0xC, 0xD])
+    wire = bytes(number[permutation.index(i)] for i in range(4))
+    wire = bytes(number[i] for i in permutation)
+    for names in ("real_1", "word_1 real_1"):
+        job, channels = read_job(tmp_path, device(names, order))
+        reverse = max(1, job.flags >> lib.MODBUS_JOB_REVERSE_SHIFT & 14)
+        all_bytes = bytes(2 * job.read_count - 4) + wire
+        memory = bytes(all_bytes[i ^ (reverse - 1)] for i in range(len(all_bytes)))
+        at = channels[-1].parameter_bit // 8
+        found = memory[at : at + 4]
+        found = found[::-1] if channels[-1].flags & lib.IO_CHANNEL_BIG_ENDIAN else found
+        assert found == number[::-1]  # little-endian, as the CPU has it
+
+
+def test_bool_and_byte_take_a_register_each(tmp_path: Path) -> None:
+    job, channels = read_job(tmp_path, device("on small word_1 off"))
+    assert job.read_count == 4
+    assert [c.parameter_bit for c in channels] == [0, 16, 32, 48]
+
+
+def test_coils_are_bits_one_after_the_other(tmp_path: Path) -> None:
+    job, channels = read_job(tmp_path, device("word_1 small on off", function=1, address=17))
+    assert (job.read_address, job.read_count) == (16, 26)
+    assert [(c.parameter_bit, c.bits) for c in channels] == [(0, 16), (16, 8), (24, 1), (25, 1)]
+
+
+def test_write_has_the_bits_that_it_writes(tmp_path: Path) -> None:
+    text = device("word_2") + "[[modbus.rs485.device.write]]\nfunction = 22\naddress = 40005\non_change = true\n"
+    made = configuration(build(tmp_path, PROGRAM, text + 'verify = true\nvar = "Main.small"\n'))
+    job = structure(made.connectors[1], "MODBUS_JOB", int(lib.MODBUS_PARAM_JOB) + 1)
+    assert (job.function, job.write_address, job.write_count, job.mask, job.interval_ms) == (22, 4, 1, 0xFF, 0)
+    assert job.flags & 0xF == lib.MODBUS_JOB_ON_CHANGE | lib.MODBUS_JOB_VERIFY
+
+
+SERVER = """\
+[modbus.server.tcp]
+as_bits = {bits}
+holding = {{ {holding} }}
+input = {{ {input} }}
+coils = {{ {coils} }}
+"""
+
+
+def server(holding: str = "", input: str = "", coils: str = "", bits: str = "false") -> str:
+    """A server with some objects."""
+    return SERVER.format(holding=holding, input=input, coils=coils, bits=bits)
+
+
+def test_server_has_a_range_for_each_object(tmp_path: Path) -> None:
+    text = server('40001 = "Main.word_1", 40002 = "Main.reals"', '30001 = "Main.real_2"', '200 = "Main.on"', "true")
+    made = configuration(build(tmp_path, PROGRAM, text))
+    ranges = [structure(made.connectors[0], "MODBUS_RANGE", int(lib.MODBUS_PARAM_RANGE) + i) for i in range(3)]
+    found = [(r.tables, r.flags, r.first_register, r.first_bit, r.reverse, r.bits) for r in ranges]
+    registers, outputs = int(lib.MODBUS_HOLDING_REGISTERS), int(lib.MODBUS_INPUT_REGISTERS)
+    coils, discrete = int(lib.MODBUS_COILS), int(lib.MODBUS_DISCRETE_INPUTS)
+    assert found == [
+        (registers | coils, 1, 0, 0, 2, 16),
+        (registers | coils, 1, 1, 16, 4, 128),
+        (outputs | discrete, 0, 0, 0, 4, 32),
+    ]
+
+
+def test_bits_of_one_register_are_one_range(tmp_path: Path) -> None:
+    made = configuration(build(tmp_path, PROGRAM, server('"40001.0" = "Main.on", "40001.9" = "Main.off"')))
+    assert sum(p.id >= lib.MODBUS_PARAM_RANGE for p in made.connectors[0].parameters) == 1
+    channels = [c for t in made.task_maps for m in t.connectors for c in m.channels]
+    assert [(c.parameter, c.parameter_bit) for c in channels] == [(int(lib.MODBUS_PARAM_RANGE), b) for b in (0, 9)]
+
+
+def test_references_are_those_of_the_field() -> None:
+    coils, discrete = int(lib.MODBUS_COILS), int(lib.MODBUS_DISCRETE_INPUTS)
+    inputs, holding = int(lib.MODBUS_INPUT_REGISTERS), int(lib.MODBUS_HOLDING_REGISTERS)
+    assert [wire_address(n, coils) for n in (1, 9999, 65536, 0, 65537)] == [0, 9998, 65535, None, None]
+    assert [wire_address(n, discrete) for n in (10001, 100001, 1, 20001)] == [0, 0, None, None]
+    assert [wire_address(n, inputs) for n in (30001, 39999, 300001, 365536, 40001)] == [0, 9998, 0, 65535, None]
+    assert [wire_address(n, holding) for n in (40001, 49999, 400001, 465536, 50000)] == [0, 9998, 0, 65535, None]
+
+
+def test_load_of_a_line_is_known(tmp_path: Path) -> None:
+    built = build(tmp_path, PROGRAM, device("word_1"))
+    load = built.symbols.io["devices"][0]["load"]
+    # 8 and 7 characters of 11 bits, two silences of 3.5, and 5 ms for the device, every 100 ms
+    assert load == pytest.approx((15 + 7) * 11 / 9600 / 0.1 + 0.05, rel=0.01)
+
+
+def test_line_that_is_too_slow_is_warned_of(tmp_path: Path) -> None:
+    text = device("words").replace('"T#100ms"', '"T#20ms"')
+    assert any("too slow" in m for m in messages(tmp_path, PROGRAM, text))
+
+
+MISTAKES = [
+    (device("word_1", address=30001), "10: 30001 is not the address of holding registers: they are 40001 to 49999"),
+    (device("word_1", function=7), "9: function 7 cannot be here: to read there are 1, 2, 3, 4"),
+    (device("bools"), "Main.bools"),
+    (device("pair"), "Main.pair is PAIR, which registers cannot have"),
+    (device("word_1 real_1 reals"), "Main.reals is ARRAY[0..3] OF REAL: with this order of bytes it needs a table"),
+    (device("reals", "BADC"), "which cannot have this order of bytes: name its elements"),
+    (device("on word_1", function=1, address=1), "Main.word_1 would begin within a byte"),
+    (device("word_1", "ACDB"), "order cannot be 'ACDB'"),
+    (device("word_1").replace("9600", "9601"), "9601 is not a speed of serial lines"),
+    (device("word_1").replace("unit = 3", "unit = 300"), "unit is 300; it can be 0 to 247"),
+    (device("word_1").replace("unit = 3", "unit = 0"), "unit 0 is all devices of the line"),
+    (device("word_1").replace("address = 40001", "address = 40001\nwire = 0"), "write address or wire, not both"),
+    (server('40001 = "Main.real_1", 40002 = "Main.word_1"'), "are at the same addresses of the holding registers"),
+    (server('30001 = "Main.word_1"'), "30001 is not the address of holding registers"),
+    (server('"40001.3" = "Main.word_1"'), "a bit of a register is for a BOOL"),
+    (server('465536 = "Main.real_1"'), "goes beyond the last address"),
+    (server('40001 = "Main.word_1"', coils='5 = "Main.on"', bits="true"), "are at the same addresses of the coils"),
+    ('[modbus.server.tcp]\naddress = "plc"', "'plc' is not an address"),
+    ("[modbus.serve.tcp]\nport = 1", "there is no 'serve' here"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), MISTAKES)
+def test_mistake_is_reported(tmp_path: Path, text: str, message: str) -> None:
+    found = messages(tmp_path, PROGRAM, text)
+    assert any(message in m for m in found), found

@@ -1,0 +1,129 @@
+"""A board with Modbus on its second UART, as a server and as a client."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from environment import TARGET, eventually
+from programs import compile_text, program
+from pymodbus.client import ModbusTcpClient
+from pymodbus.framer import FramerType
+from qemu import Board
+
+from plctool.device import Plc
+from plctool.link.connection import Connection
+
+UNIT = 17
+
+SERVER = """
+[modbus.server.rs485]
+name = "Bus"
+port = "COM2"
+baud = 115200
+parity = "none"
+unit = 17
+as_bits = true
+holding = { 40001 = "Main.setpoint", 40002 = "Main.ratio" }
+input = { 30001 = "Main.half" }
+"""
+
+CLIENT = """
+[[modbus.rs485]]
+port = "COM2"
+baud = 115200
+parity = "none"
+[[modbus.rs485.device]]
+name = "Meter"
+unit = 17
+timeout = "T#500ms"
+[[modbus.rs485.device.read]]
+function = 3
+address = 40001
+every = "T#50ms"
+var = "Main.ratio"
+[[modbus.rs485.device.write]]
+function = 6
+address = 40010
+on_change = true
+var = "Main.half_int"
+"""
+
+VARIABLES = "VAR setpoint : INT; ratio, half : REAL; half_int : INT; ok : BOOL; END_VAR"
+
+
+def load(board: Board, folder: Path, description: str, body: str) -> Plc:
+    """The program with a description on the board, running."""
+    (folder / "bus.io.toml").write_text(description)
+    built = compile_text(program(VARIABLES, body, "T#10ms"), TARGET, folder)
+    plc = Plc(Connection(board.line()), built.path.with_suffix(".sym"))
+    plc.flash(built.image)
+    return plc
+
+
+def crc(data: bytes) -> bytes:
+    """What follows a frame."""
+    value = 0xFFFF
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (0xA001 if value & 1 else 0)
+    return value.to_bytes(2, "little")
+
+
+class Device:
+    """A device at the other end of the UART: `registers`, of which a client reads and writes some."""
+
+    def __init__(self, place: tuple[str, int]) -> None:
+        self.registers = bytearray(64)
+        self._socket = socket.create_connection(place)
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        with contextlib.suppress(ConnectionError):  # the board is switched off
+            self._serve()
+
+    def _serve(self) -> None:
+        while request := self._socket.recv(8, socket.MSG_WAITALL):
+            assert crc(request[:6]) == request[6:]
+            start = 2 * int.from_bytes(request[2:4])
+            if request[1] == 3:
+                size = 2 * int.from_bytes(request[4:6])
+                reply = bytes([UNIT, 3, size]) + self.registers[start : start + size]
+            else:
+                self.registers[start : start + 2] = request[4:6]
+                reply = request[:6]
+            self._socket.sendall(reply + crc(reply))
+
+
+def test_board_is_a_server(make_board: Callable[..., Any], tmp_path: Path) -> None:
+    board = make_board("modbus")
+    board.power_on("host")
+    with load(board, tmp_path, SERVER, "half := ratio / 2.0; ok := Bus.ok;") as plc:
+        host, port = board.field_bus
+        client = ModbusTcpClient(host, port=port, framer=FramerType.RTU, timeout=20, retries=0)
+        with client:
+            assert not client.write_registers(1, [0x4048, 0], device_id=UNIT).isError()  # 3.125
+            assert not client.write_register(0, 0x1234, device_id=UNIT).isError()
+            eventually(lambda: plc.read("Main.setpoint") == 0x1234 and plc.read("Main.half") == 1.5625)
+            assert client.read_input_registers(0, count=2, device_id=UNIT).registers == [0x3FC8, 0]
+            assert client.read_coils(0, count=16, device_id=UNIT).bits == [bool(0x1234 >> i & 1) for i in range(16)]
+            assert client.read_holding_registers(9, count=1, device_id=UNIT).exception_code == 2
+        assert plc.read("Main.ok")
+
+
+def test_board_is_a_client(make_board: Callable[..., Any], tmp_path: Path) -> None:
+    board = make_board("modbus")
+    board.power_on("host")
+    body = "half := ratio / 2.0; half_int := REAL_TO_INT(half); ok := Meter.ok;"
+    with load(board, tmp_path, CLIENT, body) as plc:
+        eventually(lambda: plc.read("Meter.errors") >= 2)
+        assert not plc.read("Main.ok")
+        device = Device(board.field_bus)
+        device.registers[0:4] = bytes([0x42, 0xC8, 0, 0])  # 100.0
+        eventually(lambda: plc.read("Main.ok") and plc.read("Main.ratio") == 100.0)
+        eventually(lambda: device.registers[18:20] == bytes([0, 50]))
