@@ -333,6 +333,7 @@ def flash_several(
     progress: Callable[[str, int, int], None] = lambda node, done, total: None,
 ) -> tuple[Document, list[PlcError]]:
     """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
+
     def one(node: str, plc: Plc) -> Document:
         show = lambda done, total: progress(node, done, total)  # noqa: E731
         return {"node": node, **flash(plc, image, start=start, force=force, progress=show)}
