@@ -22,11 +22,11 @@ ROOT = Path(plctool.__file__).parent
 FLOORS = (
     ("errors", "core", "version"),
     ("files", "iec"),
-    ("image",),
+    ("image", "io"),
     ("debug",),
     ("link",),
     ("gateway",),
-    ("controller", "compiler"),
+    ("controller", "compiler", "sim_io"),
     ("device", "sim"),
     ("",),
     ("port_check", "st_tests", "testing", "trace_file"),

@@ -8,17 +8,21 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from plctool.controller import Controller, OtherTool
 from plctool.debug.symbols import SymbolTable, load_symbols
 from plctool.debug.variables import Change, Reading, Symbol, unreachable
-from plctool.errors import DeviceError, LinkError, UsageError
+from plctool.errors import DeviceError, LinkError, UsageError, did_you_mean
 from plctool.gateway.client import GatewayConnection, GatewaySession, connect_gateway
 from plctool.gateway.control import dismiss_idle
 from plctool.gateway.frames import BUSY
 from plctool.gateway.place import NoGateway
-from plctool.link import services
+from plctool.iec.types import Type
+from plctool.iec.values import decode, encode
+from plctool.link import io_services, services
 from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLink, no_answer
+from plctool.link.io_services import IoDevice, IoModule
 from plctool.link.monitoring import APP_CHANGED, AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
 from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
@@ -136,6 +140,40 @@ class Plc(Controller):
     def shell(self, command: str) -> str:
         """The answer of the controller's PLC shell, in lines; `?` lists its commands."""
         return services.run_shell(self._session, command)
+
+    # ---- inputs and outputs ----
+
+    def io_devices(self) -> list[IoDevice]:
+        """The devices, modules and buses of the application. Raises DeviceError if the controller has no I/O
+        manager."""
+        return io_services.list_devices(self._session)
+
+    def io_device(self, name: str) -> IoDevice:
+        """The one of that name. Raises UsageError if there is none."""
+        devices = self.io_devices()
+        found = next((d for d in devices if d.name.casefold() == name.casefold()), None)
+        if found is None:
+            hint = did_you_mean(name, (d.name for d in devices)) or "; 'plctool io status' lists them"
+            raise UsageError(f"The program has no device {name}{hint}.", "unknown-device")
+        return found
+
+    def io_read_parameter(self, device: str, number: int, t: Type) -> Any:
+        """The value of a parameter of a device, by its name and the number of the parameter."""
+        bits = 8 * t.size
+        return decode(t, io_services.read_parameter(self._session, self.io_device(device).index, number, bits))
+
+    def io_write_parameter(self, device: str, number: int, t: Type, value: Any) -> None:
+        """Sets a parameter of a device, until the application is loaded again."""
+        data = encode(t, value)
+        io_services.write_parameter(self._session, self.io_device(device).index, number, 8 * len(data), data)
+
+    def io_identify(self, device: str) -> None:
+        """A device shows itself, by a light for example."""
+        io_services.identify(self._session, self.io_device(device).index)
+
+    def io_scan(self, bus: str) -> list[IoModule]:
+        """What is on a bus, whether the program uses it or not."""
+        return list(io_services.scan(self._session, self.io_device(bus).index))
 
     # ---- the application ----
 

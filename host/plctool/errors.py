@@ -3,6 +3,8 @@ shells."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class PlcError(Exception):
     """Base of all errors a user may see. `code` is a short slug; `exit_code` is the command's exit status."""
@@ -52,3 +54,12 @@ class LinkError(PlcError):
 
     def __init__(self, message: str, code: str = "link") -> None:
         super().__init__(message, code)
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """`; did you mean X?` for the candidate most like `name`, else nothing."""
+    from difflib import get_close_matches
+
+    by_key = {c.casefold(): c for c in candidates}
+    close = get_close_matches(name.casefold(), list(by_key), n=1, cutoff=0.7)
+    return f"; did you mean {by_key[close[0]]}?" if close else ""

@@ -1,12 +1,22 @@
-"""Reading and writing files, with errors that say what to do."""
+"""Reading and writing files, with errors that say what to do; locations in them."""
 
 from __future__ import annotations
 
 import os
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 from plctool.errors import UsageError
+
+
+@dataclass(frozen=True)
+class Pos:
+    """A place in a source file; `line` and `column` count from 1."""
+
+    file: str
+    line: int
+    column: int
 
 
 def write_atomically(path: Path, data: bytes) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from plctool.link import l7
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
+from plctool.sim_io import SimIo, is_input, set_fault
 
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _SECTOR = 4096
@@ -37,11 +39,13 @@ class Simulator(Controller):
     """
 
     _running: Simulator | None = None
+    _io: tuple[SymbolTable, SimIo] | None = None
 
     def __init__(self, image: bytes, symbols: SymbolTable | None = None, *, start: bool = True) -> None:
         if Simulator._running is not None:
             raise UsageError("There is a simulator already; close it first, one process has one controller.", "busy")
         super().__init__()
+        self._plants: list[_Plant] = []
         if symbols is not None:
             self.add_symbols(symbols)
         _check(lib.SimFlashConfigure(_FLASH_SIZE, _SECTOR, _PROGRAM_UNIT, 0xFF), "The simulated flash cannot be made")
@@ -152,6 +156,45 @@ class Simulator(Controller):
             )
         return entries
 
+    # ---- inputs and outputs ----
+
+    @property
+    def io(self) -> SimIo:
+        """The channels of the program. Raises UsageError if its symbols are not found."""
+        symbols = self.symbols()
+        if self._io is None or self._io[0] is not symbols:
+            self._io = (symbols, SimIo(symbols))
+        return self._io[1]
+
+    def set_input(self, name: str, value: Any) -> None:
+        """What a device measures from now on; `name`: of the channel (`Bench.button`) or its variable (`Main.start`).
+        The program sees it from its next cycle on."""
+        self.io.set_input(name, value)
+
+    def output(self, name: str) -> Any:
+        """What a device has now, by the name of the channel or of its variable; while the program is stopped, what the
+        description says of that."""
+        return self.io.value(name)
+
+    def fault(self, device: str, fault: str, value: int = 1) -> None:
+        """Makes a device fail: "absent", "late" (ms), "type", "answers" (how many are bad); 0 ends it."""
+        set_fault(device, fault, value)
+
+    def attach(self, step: Callable[[Simulator], None], every_ms: float = 1) -> None:
+        """A plant: `step(plc)` is called each `every_ms` of virtual time, from now on, while time passes. It reads
+        outputs and sets inputs. With `run_cycles` it is called after the cycles in which its time came."""
+        every = round(every_ms * 1e6)
+        if every <= 0:
+            raise UsageError("A plant needs a step of more than 0 ms.", "time")
+        self._plants.append(_Plant(step, every, self.now_ns + every))
+
+    def _step_plants(self) -> None:
+        """Calls the plants whose time has come."""
+        for plant in self._plants:
+            while plant.due_ns <= self.now_ns:
+                plant.due_ns += plant.every_ns
+                plant.step(self)
+
     # ---- time ----
 
     def _now(self) -> float:
@@ -164,13 +207,22 @@ class Simulator(Controller):
 
     def run_cycles(self, count: int) -> None:
         """Runs until the first task has made `count` more cycles, or the program stopped with an exception."""
-        if count > 0:
-            result = lib.SimRunCycles(count)
-            if result == lib.ERR_TIMEOUT:
-                message = "The first task waits for something that does not happen; give a time (--time) instead."
-                raise DeviceError(message, "waits", result)
-            if result not in (lib.ERR_OK, lib.ERR_EXCEPTION):
-                _check(result, "The program does not run")
+        if not self._plants:
+            self._run_cycles(count)
+            return
+        for _ in range(count):
+            self._run_cycles(1)
+            self._step_plants()
+            if self.raw_status().exception is not None:
+                return
+
+    def _run_cycles(self, count: int) -> None:
+        result = lib.SimRunCycles(count) if count > 0 else lib.ERR_OK
+        if result == lib.ERR_TIMEOUT:
+            message = "The first task waits for something that does not happen; give a time (--time) instead."
+            raise DeviceError(message, "waits", result)
+        if result not in (lib.ERR_OK, lib.ERR_EXCEPTION):
+            _check(result, "The program does not run")
 
     def run_for(self, ms: float = 0, *, seconds: float = 0) -> None:
         """Lets virtual time pass: ten times 10 ms are ten cycles of a 10 ms task. Raises UsageError for a time that is
@@ -178,7 +230,11 @@ class Simulator(Controller):
         ns = round(ms * 1e6 + seconds * 1e9)
         if not 0 <= ns < MAX_NS:
             raise UsageError(f"Time passes forwards, and for at most {MAX_NS // 10**9} s.", "time")
-        _check(lib.SimRunFor(ns), "Time does not advance")
+        end = self.now_ns + ns
+        while self._plants and (due := min(p.due_ns for p in self._plants)) <= end:
+            _check(lib.SimRunFor(max(0, due - self.now_ns)), "Time does not advance")
+            self._step_plants()
+        _check(lib.SimRunFor(max(0, end - self.now_ns)), "Time does not advance")
 
     def bench(self, task: int, cycles: int) -> tuple[float, float]:
         """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""
@@ -202,6 +258,10 @@ class Simulator(Controller):
             part = slice(change.offset, change.offset + len(change.data))
             both = zip(change.data, memory[part], strict=True)
             memory[part] = bytes(new & change.mask | old & ~change.mask for new, old in both)
+            if is_input(symbol) and table.io:
+                first = symbol.offset * 8 + (symbol.bit or 0)
+                bits = 1 if symbol.bit is not None else symbol.size * 8
+                self.io.follow(first, first + bits, _input_memory)
 
     def _content(self, symbol: Symbol) -> bytes | None:
         if symbol.fixed is not None:
@@ -230,6 +290,20 @@ class Simulator(Controller):
         if held is None or not lib.AppFindArea(int.from_bytes(held[:], "little"), area, offset):
             return None
         return area[0], offset[0] + symbol.offset
+
+
+@dataclass
+class _Plant:
+    """`due_ns`: when `step` is called next."""
+
+    step: Callable[[Simulator], None]
+    every_ns: int
+    due_ns: int
+
+
+def _input_memory(offset: int, size: int) -> bytes:
+    """Bytes of the inputs."""
+    return bytes(ffi.buffer(lib.AppGetAreaAddress(lib.APP_AREA_INPUT, offset, size), size))
 
 
 def _check(result: int, what: str) -> None:

@@ -41,6 +41,7 @@ def parser() -> argparse.ArgumentParser:
 
     _add_file_commands(command)
     _add_device_commands(command)
+    _add_io_commands(command)
     command("demo", "run a demonstration of all of it on this machine")
     completion = command("completion", "print the script that makes a shell complete this command")
     completion.add_argument("shell", choices=["bash", "zsh", "fish"], help="your shell")
@@ -53,7 +54,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_sources(build)
     build.add_argument("-o", "--output", type=Path, default=Path("app.cdl"), metavar="IMAGE", help="default: app.cdl")
     target = build.add_argument(
-        "--target", default=DEFAULT_TARGET, metavar="NAME", help=f"processor; default: {DEFAULT_TARGET}"
+        "--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}"
     )
     target.completer = lambda **words: TARGETS  # type: ignore[attr-defined]  # for argcomplete
     build.add_argument(
@@ -67,10 +68,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     )
     build.add_argument("--debug", action="store_true", help="optimise less, so that the code is close to its source")
     _add_warnings(build)
+    _add_io_files(build)
 
     check = command("check", "print every diagnostic of a program")
     _add_sources(check)
     _add_warnings(check)
+    _add_io_files(check)
 
     info = command("info", "describe an image")
     _add_image(info)
@@ -97,6 +100,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     run.add_argument(
         "-o", "--output", type=Path, default=Path("trace.csv"), metavar="FILE", help="of --trace; default: trace.csv"
     )
+    run.add_argument(
+        "--plant",
+        type=Path,
+        metavar="FILE.py",
+        help="Python with 'def step(plc)', which is called each EVERY_MS (1) ms",
+    )
 
     test = command("test", "run the unit tests of a program in this process, on a virtual clock")
     _add_sources(test)
@@ -110,11 +119,13 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     test.add_argument("--junit", type=Path, metavar="FILE", help="write a report in JUnit's format as well")
     test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
     _add_warnings(test)
+    _add_io_files(test)
 
     export = command("export-itf", "write a C header, and a C file to fill in, for functions implemented in C")
-    _add_sources(export)
+    export.add_argument("sources", nargs="*", type=Path, metavar="FILE.st|DIR", help="for a folder, all sources in it")
     export.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: the current folder")
     export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
+    export.add_argument("--device", type=Path, metavar="FILE.toml", help="write the C header of this board instead")
 
     bench = command("bench", "measure the time of a cycle on this machine")
     _add_image(bench)
@@ -172,6 +183,35 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     gateway.add_argument("--port", metavar="PORT", help="only the gateway of this port; default: all of this user")
 
 
+def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
+    io = command("io", "show and check what is connected to the inputs and outputs")
+    actions = io.add_subparsers(title="what", metavar="WHAT", dest="what", required=True, parser_class=_Parser)
+
+    def action(name: str, text: str) -> argparse.ArgumentParser:
+        sub = actions.add_parser(name, help=text, description=text[:1].upper() + text[1:] + ".")
+        sub.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+        return sub
+
+    io_map = action("map", "list the channels of an image with their variables and tasks")
+    _add_image(io_map)
+    init = action("init", "write a description with comments, to begin with")
+    init.add_argument("file", type=Path, nargs="?", default=Path("main.io.toml"), metavar="FILE.io.toml")
+    init.add_argument("--device", type=Path, metavar="FILE.toml", help="what the vendor says of the board")
+    _add_link(action("status", "show how the devices of the running program are"))
+    scan = action("scan", "list what is on a bus")
+    scan.add_argument("io_device", metavar="BUS", help="its name in 'plctool io status'")
+    _add_link(scan)
+    identify = action("identify", "let a device show itself")
+    identify.add_argument("io_device", metavar="DEVICE", help="its name in 'plctool io status'")
+    _add_link(identify)
+    param = action("param", "read or set a parameter of a device, until the program is loaded again")
+    param.add_argument("verb", choices=["get", "set"])
+    param.add_argument("io_device", metavar="DEVICE", help="its name in 'plctool io status'")
+    param.add_argument("parameter", metavar="NAME|ID[=VALUE]", help="set: with its value")
+    param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
+    _add_link(param, symbols=True)
+
+
 def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("sources", nargs="+", type=Path, metavar="FILE.st|DIR", help="for a folder, all sources in it")
 
@@ -193,6 +233,13 @@ def _add_warnings(parser: argparse.ArgumentParser) -> None:
         help="do not report these warnings; may be repeated",
     )
     parser.add_argument("--werror", action="store_true", help="treat warnings as errors")
+
+
+def _add_io_files(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--io", type=Path, metavar="FILE.io.toml", help="inputs and outputs; default: what is beside the sources"
+    )
+    parser.add_argument("--device", type=Path, metavar="FILE.toml", help="what the vendor says of the board")
 
 
 def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:

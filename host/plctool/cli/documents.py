@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,11 +13,13 @@ from plctool.errors import DeviceError, LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
 if TYPE_CHECKING:
-    from plctool.compiler import Level
+    from plctool.compiler import IoFiles, Level
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.warnings import WarningOptions
     from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
     from plctool.device import Plc
+    from plctool.iec.types import Type
+    from plctool.io.device_file import DeviceFile
     from plctool.link.transports import Link
     from plctool.port_check import Outcome
     from plctool.port_check import Report as PortReport
@@ -48,11 +51,12 @@ class ProgramStopped(DeviceError):
 def build(
     paths: Sequence[Path],
     output: Path,
-    target: str,
+    target: str | None,
     level: Level,
     checks: str,
     debug: bool,
     warnings: WarningOptions,
+    io: IoFiles,
 ) -> tuple[Document, list[str]]:
     """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as users read them.
 
@@ -63,16 +67,19 @@ def build(
     from plctool.debug.symbols import symbol_path
 
     check_output(output, paths, f"-o {output.stem}.cdl")
-    result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug, warnings=warnings)
+    result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug, warnings=warnings, io=io)
     result.write(output)
+    channels = result.symbols.io.get("channels", [])
     document = {
         "image": str(output),
         "symbols": str(symbol_path(output)),
         "crc": f"{result.crc:08X}",
         "size": len(result.image),
-        "target": target,
+        "target": result.symbols.target,
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
+    if channels:
+        document["io"] = {"channels": len(channels), "oldest_input": oldest_input(channels)}
     return document, result.rendered_warnings
 
 
@@ -86,14 +93,15 @@ def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
         raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
 
 
-def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, list[str]]:
+def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
-    from plctool.compiler import check_with_tests, load_sources
+    from plctool.compiler import check_with_tests, io_sources, load_io, load_sources
     from plctool.compiler.diagnostics import render_all
     from plctool.compiler.missing_names import Use, missing_names
 
     sources = load_sources(paths)
-    result = check_with_tests(sources, warnings)
+    result = check_with_tests(sources, warnings, lambda: load_io(paths, io))
+    shown = [*sources, *io_sources(load_io(paths, io))]
     uses = [Use(d.missing, d.file, d.line) for d in result.diagnostics if d.missing]
     document: Document = {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}
     if uses:
@@ -101,7 +109,55 @@ def check(paths: Sequence[Path], warnings: WarningOptions) -> tuple[Document, li
             {"name": m.name, "library": m.library, "count": m.count, "file": m.first.file, "line": m.first.line}
             for m in missing_names(uses)
         ]
-    return document, render_all(result.diagnostics, sources)
+    return document, render_all(result.diagnostics, shown)
+
+
+def export_board(device: Path, folder: Path) -> Document:
+    """Writes the C header of a board from what its vendor says of it (`device.toml`)."""
+    from plctool.files import make_folder
+    from plctool.io.board_header import board_header
+
+    name, text = board_header(_board(device))
+    make_folder(folder)
+    write_atomically(folder / name, text.encode("ascii", "replace"))
+    return {"header": str(folder / name)}
+
+
+def _board(path: Path) -> DeviceFile:
+    """A device file without mistakes. Raises CompileError with all of them."""
+    from plctool.compiler import CompileError
+    from plctool.compiler.diagnostics import Diagnostic
+    from plctool.compiler.source import Source
+    from plctool.io.description import load_device
+    from plctool.io.mistakes import CODE
+
+    device, mistakes, text = load_device(path)
+    found = [Diagnostic(m.pos.file, m.pos.line, m.pos.column, m.severity, CODE, m.message) for m in mistakes.found]
+    if device is None or found:
+        raise CompileError(found, [Source(str(path), text)])
+    return device
+
+
+def io_init(path: Path, device: Path | None) -> Document:
+    """Writes a description to begin with. Raises UsageError if there is one already."""
+    from plctool.io.beginning import beginning
+
+    if path.exists():
+        raise UsageError(f"{path} is there already; write another one, or remove it first.", "exists")
+    if not path.name.endswith(".io.toml"):
+        raise UsageError(f"A description is called NAME.io.toml; write {path.stem}.io.toml.", "bad-output")
+    board = None if device is None else _board(device)
+    write_atomically(
+        path, beginning(board, None if device is None else _beside(device, path)).encode("ascii", "replace")
+    )
+    return {"description": str(path)}
+
+
+def _beside(device: Path, path: Path) -> str:
+    """How a description at `path` names a device file."""
+    import os
+
+    return Path(os.path.relpath(device.resolve(), path.resolve().parent)).as_posix()
 
 
 def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:
@@ -115,6 +171,8 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
     from plctool.compiler.internal import bugs_reported
     from plctool.files import make_folder
 
+    if not paths:
+        raise UsageError("Name the sources, or a board by --device.", "usage")
     sources = load_sources(paths)
     with bugs_reported():
         program = check_sources(sources)
@@ -145,6 +203,24 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
 
 def diagnostic_document(diagnostic: Diagnostic) -> Document:
     return {name: value for name, value in vars(diagnostic).items() if name != "missing"}
+
+
+def io_map(path: Path) -> Document:
+    """The channels of an image."""
+    from plctool.debug.symbols import find_symbols
+    from plctool.image.file import describe_image
+
+    symbols = find_symbols(int(describe_image(read_image(path))["crc"], 16), path)
+    return {"channels": symbols.io.get("channels", [])}
+
+
+def oldest_input(channels: Sequence[Document]) -> Document | None:
+    """The input whose data may be the oldest when it is used."""
+    inputs = [c for c in channels if not c["output"] and c["age_us"] is not None]
+    oldest = max(inputs, key=lambda c: int(c["age_us"]), default=None)
+    if oldest is None:
+        return None
+    return {"channel": f"{oldest['device']}.{oldest['channel']}", "age_us": oldest["age_us"]}
 
 
 def info(path: Path) -> Document:
@@ -186,14 +262,14 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
 
 
 def test(
-    paths: Sequence[Path], pattern: str, level: int, junit: Path | None, warnings: WarningOptions
+    paths: Sequence[Path], pattern: str, level: int, junit: Path | None, warnings: WarningOptions, io: IoFiles
 ) -> tuple[Document, TestReport]:
     """Runs the unit tests of a program, and writes their report to `junit` as well."""
     from plctool import st_tests
 
     if junit:
         check_output(junit, paths, "--junit report.xml")
-    report = st_tests.run_tests(paths, pattern=pattern, level=level, warnings=warnings)
+    report = st_tests.run_tests(paths, pattern=pattern, level=level, warnings=warnings, io=io)
     if junit:
         write_atomically(junit, st_tests.junit_xml(report))
     return report.document(), report
@@ -217,9 +293,10 @@ def run(
     sets: Mapping[str, str],
     gets: Sequence[str],
     trace: TraceFile | None = None,
+    plant: Path | None = None,
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
-    values as users read them.
+    values as users read them. `plant`: a file in Python that is what the inputs and outputs are connected to.
 
     Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
@@ -231,6 +308,8 @@ def run(
         table = plc.symbols()
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
+        if plant is not None:
+            _attach(plc, plant)
         if trace:
             _run_traced(plc, cycles, time_ms, trace)
         elif time_ms is None:
@@ -254,6 +333,20 @@ def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: 
 
     lines = trace_csv(plc, trace.names, cycles, time_ms)
     write_atomically(trace.path, "".join(lines).encode())
+
+
+def _attach(plc: Simulator, path: Path) -> None:
+    """Runs a file in Python, and attaches the plant that it defines."""
+    import runpy
+
+    try:
+        names = runpy.run_path(str(path))
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-plant") from None
+    step = names.get("step")
+    if not callable(step):
+        raise UsageError(f"{path} has no function step; write: def step(plc): ...", "no-plant")
+    plc.attach(step, float(names.get("EVERY_MS", 1)))
 
 
 def _raise_exception(plc: Controller) -> None:
@@ -438,6 +531,56 @@ def log(plc: Controller) -> Document:
 
 
 # ---- on a link -------------------------------------------------------------------------------------------------------
+
+
+def io_status(plc: Plc) -> Document:
+    """How the devices of the program are."""
+    return {"devices": [{**vars(device), "state": device.state} for device in plc.io_devices()]}
+
+
+def io_scan(plc: Plc, bus: str) -> Document:
+    """What is on a bus."""
+    return {"bus": bus, "devices": [vars(module) for module in plc.io_scan(bus)]}
+
+
+def io_identify(plc: Plc, device: str) -> Document:
+    """A device shows itself."""
+    plc.io_identify(device)
+    return {"device": device, "identified": True}
+
+
+def io_parameter(plc: Plc, device: str, parameter: str, type_name: str | None, text: str | None = None) -> Document:
+    """Reads a parameter, or sets it to what `text` says. `parameter`: a number, or a name of the description;
+    `type_name`: of one that the description does not have."""
+    from plctool.iec.value_texts import literal, parse_value
+
+    number, t = _parameter(plc, device, parameter, type_name)
+    if text is not None:
+        plc.io_write_parameter(device, number, t, parse_value(t, text))
+    value = plc.io_read_parameter(device, number, t)
+    return {"device": device, "parameter": parameter, "id": number, "value": value, "text": literal(t, value)}
+
+
+def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> tuple[int, Type]:
+    """Number and type of a parameter."""
+    from plctool.errors import did_you_mean
+    from plctool.iec.types import ELEMENTARY, StringType
+
+    known: list[Document] = []
+    with suppress(UsageError):  # without symbols numbers will do
+        devices = plc.symbols().io.get("devices", [])
+        known = next((d["parameters"] for d in devices if d["name"].casefold() == device.casefold()), [])
+    found = next((p for p in known if parameter.casefold() in (p["name"].casefold(), str(p["id"]))), None)
+    number = int(parameter, 0) if parameter[:1].isdigit() else None
+    if found is None and number is None:
+        hint = did_you_mean(parameter, (p["name"] for p in known)) or "; give its number, and its type by --type"
+        raise UsageError(f"{device} has no parameter {parameter}{hint}.", "unknown-parameter")
+    name = (type_name or (found["type"] if found else "UDINT")).upper()
+    length = name.removeprefix("STRING[").removesuffix("]")
+    t: Type | None = StringType(int(length)) if length.isdigit() else ELEMENTARY.get(name)
+    if t is None:
+        raise UsageError(f"A parameter cannot be {name}; use for example UINT, REAL or STRING[20].", "bad-type")
+    return found["id"] if found else number or 0, t
 
 
 def scan(link: Link, gateway: bool | None, tool: str) -> Document:

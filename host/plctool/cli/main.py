@@ -20,6 +20,7 @@ from plctool.link.transports import Link
 from plctool.version import plctool_version
 
 if TYPE_CHECKING:
+    from plctool.compiler import IoFiles
     from plctool.compiler.warnings import WarningOptions
     from plctool.controller import OtherTool
     from plctool.device import Plc
@@ -49,14 +50,20 @@ def _print_warnings(args: argparse.Namespace, warnings: Sequence[str]) -> None:
 
 def _build(args: argparse.Namespace) -> int:
     document, warnings = documents.build(
-        args.sources, args.output, args.target, args.level, args.checks, args.debug, _warnings(args)
+        args.sources, args.output, args.target, args.level, args.checks, args.debug, _warnings(args), _io_files(args)
     )
     _print_warnings(args, warnings)
-    return _show(args, document, lambda d: f"{d['image']}: {d['size']} bytes, CRC {d['crc']}")
+    return _show(args, document, output.build_text)
+
+
+def _io_files(args: argparse.Namespace) -> IoFiles:
+    from plctool.compiler import IoFiles
+
+    return IoFiles(args.io, args.device)
 
 
 def _check(args: argparse.Namespace) -> int:
-    document, texts = documents.check(args.sources, _warnings(args))
+    document, texts = documents.check(args.sources, _warnings(args), _io_files(args))
     _show(args, document, lambda d: output.coloured("\n".join(texts), sys.stdout))
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
 
@@ -71,20 +78,24 @@ def _symbols(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     trace = documents.TraceFile(args.trace, args.output) if args.trace else None
-    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get, trace)
+    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get, trace, args.plant)
     return _show(args, document, lambda d: output.run_text(d, texts))
 
 
 def _test(args: argparse.Namespace) -> int:
     from plctool.st_tests import report_text
 
-    document, report = documents.test(args.sources, args.filter, args.level, args.junit, _warnings(args))
+    document, report = documents.test(
+        args.sources, args.filter, args.level, args.junit, _warnings(args), _io_files(args)
+    )
     _print_warnings(args, report.warning_texts())
     _show(args, document, lambda d: report_text(report, colour=output.wants_colour(sys.stdout)))
     return EXIT_FAILED if report.failed else EXIT_OK
 
 
 def _export_itf(args: argparse.Namespace) -> int:
+    if args.device is not None:
+        return _show(args, documents.export_board(args.device, args.output), lambda d: str(d["header"]))
     return _show(args, documents.export_interface(args.sources, args.output, args.force), output.interface_text)
 
 
@@ -330,15 +341,55 @@ def _watch_live(args: argparse.Namespace) -> int:
     return EXIT_OK
 
 
+def _io(args: argparse.Namespace) -> int:
+    return IO_ACTIONS[args.what](args)
+
+
+def _io_map(args: argparse.Namespace) -> int:
+    return _show(args, documents.io_map(args.image), output.io_map_text)
+
+
+def _io_init(args: argparse.Namespace) -> int:
+    return _show(args, documents.io_init(args.file, args.device), lambda d: f"{d['description']} written")
+
+
+def _io_status(args: argparse.Namespace) -> int:
+    return _on_device(args, documents.io_status, output.io_status_text)
+
+
+def _io_scan(args: argparse.Namespace) -> int:
+    return _on_device(args, lambda plc: documents.io_scan(plc, args.io_device), output.io_scan_text)
+
+
+def _io_identify(args: argparse.Namespace) -> int:
+    operation = lambda plc: documents.io_identify(plc, args.io_device)  # noqa: E731
+    return _on_device(args, operation, lambda d: f"{d['device']} shows itself")
+
+
+def _io_param(args: argparse.Namespace) -> int:
+    name, equals, text = args.parameter.partition("=")
+    if (args.verb == "set") != bool(equals):
+        example = f"set {args.io_device} {name}=1" if args.verb == "set" else f"get {args.io_device} {name}"
+        raise UsageError(f"Write for example: plctool io param {example}.", "usage")
+    value = text if args.verb == "set" else None
+    operation = lambda plc: documents.io_parameter(plc, args.io_device, name, args.type, value)  # noqa: E731
+    return _on_device(args, operation, lambda d: f"{d['device']} {d['parameter']} = {d['text']}")
+
+
 def _gateway(args: argparse.Namespace) -> int:
     if args.what == "status":
         return _show(args, documents.gateways(args.port), output.gateways_text)
     return _show(args, documents.stop_gateways(args.port), output.stopped_text)
 
 
+IO_ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "map": _io_map, "init": _io_init, "status": _io_status, "scan": _io_scan, "identify": _io_identify,
+    "param": _io_param,
+}  # fmt: skip
+
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": _build, "check": _check, "info": _info, "symbols": _symbols, "run": _run, "test": _test,
-    "export-itf": _export_itf, "bench": _bench, "demo": _demo,
+    "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
     "tasks": _tasks, "log": _log, "shell": _shell, "port-check": _port_check,
     "read": _read, "write": _write, "watch": _watch, "gateway": _gateway, "completion": _completion, "man": _man,

@@ -77,6 +77,48 @@ def run_text(document: dict[str, Any], texts: dict[str, str]) -> str:
     return f"{values_text(texts)}\n{document['cycles']} cycles, {document['time_ms']:.10g} ms".lstrip()
 
 
+def build_text(document: dict[str, Any]) -> str:
+    """What was built, and how old inputs may be."""
+    lines = [f"{document['image']}: {document['size']} bytes, CRC {document['crc']}"]
+    if io := document.get("io"):
+        lines.append(f"{io['channels']} channels of inputs and outputs")
+        if oldest := io["oldest_input"]:
+            lines[-1] += f"; oldest input: {oldest['channel']}, up to {age_text(oldest['age_us'])}"
+    return "\n".join(lines)
+
+
+def age_text(age_us: int | None) -> str:
+    """A time as users read it; - for one that has no limit."""
+    return "-" if age_us is None else f"{age_us / 1000:g} ms"
+
+
+def io_map_text(document: dict[str, Any]) -> str:
+    """A line for each channel."""
+    rows = [
+        {**c, "tasks": ", ".join(c["tasks"]), "direction": "out" if c["output"] else "in", "age": age_text(c["age_us"])}
+        for c in document["channels"]
+    ]
+    columns = ("device", "channel", "direction", "variable", "type", "address", "tasks", "age")
+    return table(rows, columns) if rows else "This image has no inputs and outputs but memory; see docs/io.md."
+
+
+def io_status_text(document: dict[str, Any]) -> str:
+    """A line for each device."""
+    rows = [
+        {**d, "age": "-" if d["age_ms"] is None else f"{d['age_ms']} ms", "device": d["name"]}
+        for d in document["devices"]
+    ]
+    columns = ("device", "driver", "state", "age", "errors", "skipped")
+    return table(rows, columns) if rows else "The program has no devices."
+
+
+def io_scan_text(document: dict[str, Any]) -> str:
+    """A line for each device on a bus."""
+    rows = [{**d, **{k: f"0x{d[k]:X}" for k in ("vendor", "product", "revision")}} for d in document["devices"]]
+    columns = ("slot", "name", "vendor", "product", "revision")
+    return table(rows, columns) if rows else f"Nothing answers on {document['bus']}."
+
+
 def interface_text(document: dict[str, Any]) -> str:
     """The functions of a C interface, and the files."""
     kept = "" if document["source_written"] else " (kept as it is; --force replaces it)"

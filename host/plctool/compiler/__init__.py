@@ -6,8 +6,8 @@ The parts are imported when they are first needed: `plctool.iec.types` alone mus
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from plctool.compiler.front import CheckResult
     from plctool.compiler.source import Source
     from plctool.compiler.warnings import WarningOptions
+    from plctool.io.model import Description
 
 Level = int | Literal["s"]
 """How much is optimised: 0 .. 3, or "s" for small code."""
@@ -45,24 +46,66 @@ def load_sources(paths: Sequence[Path | str]) -> list[Source]:
         raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
 
 
+@dataclass(frozen=True)
+class IoFiles:
+    """Where the inputs and outputs are described: `description` (by default what is beside the sources), and the
+    vendor's `device` (by default what the description names)."""
+
+    description: Path | None = None
+    device: Path | None = None
+
+
+def load_io(paths: Sequence[Path | str], files: IoFiles = IoFiles()) -> Description | None:
+    """The description of the inputs and outputs of a program; None if it has none. It serves one check. Raises
+    UsageError for a file that cannot be read, and when it is not clear which one is meant."""
+    from plctool.io.description import find_description, load_description
+
+    found = files.description or find_description(list(map(Path, paths)))
+    if found is None and files.device is not None:
+        raise UsageError(f"There is no description (NAME.io.toml) that uses {files.device}; name it with --io.", "io")
+    return None if found is None else load_description(found, files.device)
+
+
+def _target(wanted: str | None, io: Description | None) -> str:
+    """The processor to compile for. Raises UsageError if the board has another one."""
+    board = io.device if io is not None else None
+    if board is None or not board.target:
+        return wanted or DEFAULT_TARGET
+    if wanted is not None and wanted != board.target:
+        raise UsageError(f"{board.title} has the target {board.target}, not {wanted}; leave out --target.", "target")
+    return board.target
+
+
+def io_sources(io: Description | None) -> list[Source]:
+    """What messages about a description quote."""
+    from plctool.compiler.source import Source
+
+    return [] if io is None else [Source(path, text) for path, text in io.texts.items()]
+
+
 def check_sources(paths: Sequence[Path | str]) -> CheckResult:
     """Every diagnostic of a program and its unit tests, without building it."""
-    return check_with_tests(load_sources(paths))
+    return check_with_tests(load_sources(paths), load=lambda: load_io(paths))
 
 
-def check_with_tests(sources: Sequence[Source], warnings: WarningOptions | None = None) -> CheckResult:
-    """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all."""
+def check_with_tests(
+    sources: Sequence[Source],
+    warnings: WarningOptions | None = None,
+    load: Callable[[], Description | None] = lambda: None,
+) -> CheckResult:
+    """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
+    `load` gets the inputs and outputs for each of both."""
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
 
     with bugs_reported():
-        result = check_sources(sources, warnings=warnings or ALL_WARNINGS)
+        result = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=load())
         if not result.has_tests:
             return result
         from plctool.compiler.semantics.unit_tests import TestSuite
 
-        tests = check_sources(sources, tests=TestSuite(), warnings=warnings or ALL_WARNINGS)
+        tests = check_sources(sources, tests=TestSuite(), warnings=warnings or ALL_WARNINGS, io=load())
     found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
     found_sorted = sorted(found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
     return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)
@@ -71,14 +114,16 @@ def check_with_tests(sources: Sequence[Source], warnings: WarningOptions | None 
 def compile_sources(
     paths: Sequence[Path | str],
     *,
-    target: str = DEFAULT_TARGET,
+    target: str | None = None,
     level: Level = 2,
     checks: str = "all",
     debug: bool = False,
     warnings: WarningOptions | None = None,
+    io: IoFiles = IoFiles(),
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
-    said otherwise.
+    said otherwise; `target`: that of the board (`device.toml`) unless
+    said otherwise, else x86_64-linux; `io`: its inputs and outputs.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense, InternalError when
     the compiler has a bug.
@@ -93,15 +138,17 @@ def compile_sources(
     from plctool.image.targets import find_target
 
     number, size = (2, True) if level == "s" else (level, False)
-    options = Options(find_target(target), number, parse_checks(checks), debug, size)
+    description = load_io(paths, io)
+    options = Options(find_target(_target(target, description)), number, parse_checks(checks), debug, size)
     sources = load_sources(paths)
+    shown = [*sources, *io_sources(description)]
     with bugs_reported():
-        checked = check_sources(sources, warnings=warnings or ALL_WARNINGS)
+        checked = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=description)
     if checked.program is None:
-        raise CompileError(checked.diagnostics, sources)
+        raise CompileError(checked.diagnostics, shown)
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.
     info = ApplicationInfo(project=Path(paths[0]).stem, date=int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
     with bugs_reported():
         built = build_program(checked.program, options, info)
     found = checked.diagnostics
-    return replace(built, warnings=found, rendered_warnings=[render(d, sources) for d in found])
+    return replace(built, warnings=found, rendered_warnings=[render(d, shown) for d in found])

@@ -12,6 +12,7 @@ from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
+from plctool.compiler.io_configuration import assign_tasks, configuration_of, io_document
 from plctool.compiler.kept import kept_parts, kept_variables
 from plctool.compiler.nesting import room_for_nesting
 from plctool.compiler.typed import Pou, PouKind, ScalarInit, Task, TaskPart, TypedProgram
@@ -24,8 +25,10 @@ from plctool.iec.types import CLASS_NUMBER, base_of
 from plctool.iec.values import encode
 from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image, image_crc
 from plctool.image.targets import Machine, Target
+from plctool.io.configuration import pack_configuration
 
 _UNIT = int(lib.CDL_IMAGE_UNIT)
+_CODE_ALIGN = int(lib.APP_CODE_ALIGN)
 
 
 @dataclass(frozen=True)
@@ -62,10 +65,18 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     linked = link(objects, target, [*lowered.tasks, *lowered.functions.values()], len(lowered.imports))
     symbols = _symbols(program, lowered, linked, target, info.project)
     kept = kept_parts(v for v in program.globals if v.area is Area.RETAIN)
+    code, io = linked.code, None
+    if program.io is not None:
+        assign_tasks(program, program.io)
+        configuration = pack_configuration(configuration_of(program, program.io))
+        code += bytes(-len(code) % _CODE_ALIGN)
+        io = (len(code), len(configuration))
+        code += configuration
+        symbols.io = io_document(program, program.io)
     symbols.kept = [KeptName(part.name, part.type, part.persistent, part.size) for part in kept]
     image = Image(
         device_id=int(getattr(lib, target.device_id)),
-        code=linked.code,
+        code=code,
         areas={area.value: size for area, size in program.area_sizes.items() if area is not Area.CODE},
         functions={number: _entry(linked, name, target) for number, name in lowered.functions.items()},
         externals=[
@@ -77,6 +88,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
         ],
         info=info,
         kept=kept_variables(kept),
+        io=io,
     )
     built = build_image(image)
     symbols.image_crc = image_crc(built)

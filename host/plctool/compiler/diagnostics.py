@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Literal
 
 from plctool.compiler.missing_names import Use, table
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Pos
 from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
+from plctool.errors import did_you_mean as did_you_mean
 
 Severity = Literal["error", "warning"]
 
@@ -163,10 +163,3 @@ def _part_of(line: str, column: int) -> tuple[str, int]:
     begin = max(0, min(column - MAX_LINE // 2, len(line) - MAX_LINE))
     before, behind = "..." * (begin > 0), "..." * (begin + MAX_LINE < len(line))
     return before + line[begin : begin + MAX_LINE] + behind, column - begin + len(before)
-
-
-def did_you_mean(name: str, candidates: Iterable[str]) -> str:
-    """`; did you mean X?` for the candidate most like `name`, else nothing."""
-    by_key = {c.casefold(): c for c in candidates}
-    close = get_close_matches(name.casefold(), list(by_key), n=1, cutoff=0.7)
-    return f"; did you mean {by_key[close[0]]}?" if close else ""

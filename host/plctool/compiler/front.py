@@ -15,11 +15,12 @@ from plctool.compiler.garbage import no_collection
 from plctool.compiler.library import Library, standard_library
 from plctool.compiler.missing_names import declared_names
 from plctool.compiler.nesting import NestingError, room_for_nesting
+from plctool.compiler.semantics.allocation import report_overlaps
+from plctool.compiler.semantics.call_graph import report_shared_writes
 from plctool.compiler.semantics.configuration import configure
-from plctool.compiler.semantics.overlaps import report_overlaps
+from plctool.compiler.semantics.io_channels import IoChannels, device_variables
 from plctool.compiler.semantics.permitted import check_declarations
 from plctool.compiler.semantics.program import Program
-from plctool.compiler.semantics.shared_writes import report_shared_writes
 from plctool.compiler.semantics.world import World
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.ast import Declaration
@@ -34,6 +35,7 @@ from plctool.iec.types import MAX_SIZE
 
 if TYPE_CHECKING:
     from plctool.compiler.semantics.unit_tests import TestSuite
+    from plctool.io.model import Description
 
 __all__ = ["CheckResult", "Diagnostic", "Source", "check_sources", "render"]
 
@@ -59,18 +61,20 @@ def check_sources(
     library_sources: Sequence[Source] = (),
     tests: TestSuite | None = None,
     warnings: WarningOptions = ALL_WARNINGS,
+    io: Description | None = None,
 ) -> CheckResult:
     """Checks the files of a program together.
 
     `library`: whether the standard library is there; `library_sources`: other library sources in place of it. `tests`:
     takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
-    `warnings`: which of them are wanted. Whatever the sources contain, the result is a program or diagnostics, never an
-    exception.
+    `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check. Whatever the
+    sources contain, the result is a program or diagnostics, never an exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     program = Program(chosen)
     diagnostics = program.world.diagnostics
     diagnostics.options = warnings
+    program.world.io = IoChannels(io)
     with no_collection(), room_for_nesting():
         typed = _guarded(program, sources, tests)
     has_tests = bool(program.world.names.tests)
@@ -115,6 +119,10 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     for source, declarations in parsed:
         world.names.register(declarations)
         world.names.register_globals(declarations, source)
+    _declare_devices(world)
+    world.io.begin(world.names, world.diagnostics)
+    if not world.io.readable:
+        return None
     program.declare_all()
     if tests is None:
         application = configure(world, program.config)
@@ -122,11 +130,13 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
         application = tests.configure()
         tests.add()
     program.check_bodies()
+    world.io.finish(world.allocation, application.tasks if tests is None else None, world.diagnostics)
     if tests is None and application.tasks:
         program.programs.report_unused()
     world.calls.report_shared(application.tasks)
     if tests is None and not world.diagnostics.errors:
         report_shared_writes(application.tasks, world.diagnostics)
+        world.io.report_written_inputs(world.pous, world.diagnostics)
     allocation = world.allocation
     _check_sizes(world, sources)
     report_overlaps(allocation.variables, world.diagnostics)
@@ -142,13 +152,25 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
         startup=program.startup,
         shutdown=program.shutdown,
         aliases=world.names.aliases(),
-        accesses=program.config.accesses,
+        accesses=program.config.accesses(),
         constants=world.constants,
         externals=program.external_functions(),
+        io=world.io.description,
     )
     if not world.diagnostics.errors:
         plan_images(typed, world.diagnostics)
     return typed
+
+
+def _declare_devices(world: World) -> None:
+    """The variables of the devices that the description names."""
+    if world.io.description is None:
+        return
+    source = device_variables(world.io.description, {g.name.casefold() for g in world.names.globals()})
+    if source is not None:
+        declarations = parse_all(source, world.diagnostics.at(source).error).declarations
+        world.names.register(declarations)
+        world.names.register_globals(declarations, source)
 
 
 def _name_what_is_missing(program: Program, sources: Sequence[Source], broken: Sequence[Source]) -> None:

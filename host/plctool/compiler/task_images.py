@@ -87,6 +87,18 @@ def plan_images(program: TypedProgram, diagnostics: Diagnostics) -> None:
     _report_shared_outputs(program.tasks, uses, diagnostics)
 
 
+def task_ranges(program: TypedProgram) -> list[dict[Area, set[tuple[int, int]]]]:
+    """The bytes of inputs and outputs that each task names, from the first up to the one past the end; all of an area
+    of which it takes an address."""
+    units = _Units()
+    found = []
+    for task in program.tasks:
+        use = units.use(task.programs)
+        whole = {area: {(0, program.area_sizes[area])} for area in use.addressed}
+        found.append({**use.bytes, **whole})
+    return found
+
+
 class _Units:
     """What units use, each looked at once."""
 

@@ -10,19 +10,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
+from plctool.files import Pos as Pos
 from plctool.iec.areas import Area
 from plctool.iec.types import Keep, StructType, Type
 
-
-@dataclass(frozen=True)
-class Pos:
-    """A place in a source file; `line` and `column` count from 1."""
-
-    file: str
-    line: int
-    column: int
+if TYPE_CHECKING:
+    from plctool.io.model import Description
 
 
 class Storage(Enum):
@@ -568,3 +563,4 @@ class TypedProgram:
     startup: Pou | None = None  # (init_retains : BOOL): what is called when the variables have their initial values
     shutdown: Pou | None = None  # what is called when the application ends, or its variables are initialised
     externals: list[Pou] = field(default_factory=list)  # functions in C that the sources declare, called or not
+    io: Description | None = None  # the inputs and outputs, each with its address

@@ -23,6 +23,7 @@ WARNINGS = {
     "enum": "a number, or a value of another enumeration, becomes a value of an enumeration or is compared with one",
     "for-bound": "a FOR changes its end or step in its body, but both are computed once, at its start",
     "integer-division": "an integer division drops its fraction before the result becomes a REAL",
+    "io": "something in a description of inputs and outputs is probably not meant",
     "kept": "a variable is RETAIN or PERSISTENT, but what it holds is an address, which is not kept",
     "layout": "a type takes more memory than it does in other systems",
     "left-out": "a part of an export, such as a visualisation, has no meaning here",
@@ -44,6 +45,7 @@ WARNINGS = {
     "unreachable": "a statement is never reached",
     "unused": "a variable or program is never used, or the result of a call",
     "widening": "a product is computed in a type that is narrower than where it goes",
+    "written-input": "a program writes an input, which the next cycle overwrites",
 }
 """What each warning is about; its name is the `code` of the diagnostic."""
 

@@ -70,7 +70,7 @@ class SymbolTable:
     """Everything in a symbol file. `lines`: (code offset, index into `files` or -1, line), sorted; an entry goes up to
     the next one. `aliases`: other names of variables. `classes`: the numbers by which instances show their class.
     `constants`: those that are not in memory. `debug`: see `DebugInfo`. `kept`: what a power cut does not
-    lose."""
+    lose. `io`: devices and channels of inputs and outputs (`compiler/io_configuration.py`), empty for none."""
 
     image_crc: int
     target: str
@@ -85,6 +85,7 @@ class SymbolTable:
     constants: dict[str, Symbol] = field(default_factory=dict)
     debug: list[bytes] = field(default_factory=list)
     kept: list[KeptName] = field(default_factory=list)
+    io: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._all = self.variables | self.constants
@@ -97,20 +98,28 @@ class SymbolTable:
     # ---- variables ----
 
     def resolve(self, path: str) -> Symbol:
-        """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5', or what is at an
-        address such as %MW0. Upper and lower case are the same. Raises UsageError with a suggestion."""
+        """The variable, member, element or bit `path` names, e.g. 'Main.fb.arr[3].x' or 'Main.word.5', what is at an
+        address such as %MW0, or at a channel such as gpio.DI0. Upper and lower case are the same. Raises UsageError
+        with a suggestion."""
         text = path.strip()
         at = len(text)
+        channel = self._channels.get(text.casefold()) if text.casefold() not in self._by_key else None
+        if channel is not None:
+            return self.resolve(channel)
         while at > 0:
             symbol = self._by_key.get(text[:at].casefold())
             if symbol is not None:
                 return walk(symbol, text, at, self._units)
             at = max(text.rfind(".", 0, at), text.rfind("[", 0, at), text.rfind("^", 0, at))
-        address = parse_address(text)
-        if address is not None:
-            bit, t = (None, address.type) if address.width else (address.bit, ELEMENTARY["BYTE"])
-            return Symbol(text.upper(), address.area.value, address.offset, t, bit)
+        symbol = _at_address(text)
+        if symbol is not None:
+            return symbol
         raise self._unknown(text)
+
+    @cached_property
+    def _channels(self) -> dict[str, str]:
+        """What channels of inputs and outputs lead to, by their names with that of the device, in small letters."""
+        return {f"{c['device']}.{c['channel']}".casefold(): c["variable"] for c in self.io.get("channels", [])}
 
     def _unknown(self, text: str) -> UsageError:
         prefix = text.casefold() + "."
@@ -224,6 +233,7 @@ class SymbolTable:
             "lines": self.lines,
             "files": self.files,
             "kept": [[k.name, k.type, k.persistent, k.size] for k in self.kept],
+            "io": self.io,
             "debug": [base64.b64encode(zlib.compress(data)).decode() for data in self.debug],
         }
         return json.dumps(document, separators=(",", ":"))
@@ -253,6 +263,7 @@ class SymbolTable:
                 {n: _read_constant(n, c, types) for n, c in document["constants"].items()},
                 [zlib.decompress(base64.b64decode(text)) for text in document["debug"]],
                 [KeptName(*entry) for entry in document.get("kept", [])],
+                document.get("io", {}),
             )
         except (zlib.error, ValueError, KeyError, TypeError, AttributeError):
             raise UsageError(f"{name} cannot be read; build again.", "bad-symbols") from None
@@ -267,6 +278,15 @@ class SymbolTable:
             write_atomically(copy, text.encode())
         except (OSError, UsageError):
             return  # the cache only saves naming the file
+
+
+def _at_address(text: str) -> Symbol | None:
+    """What is at an address such as %MW0; None if the text is none."""
+    address = parse_address(text)
+    if address is None:
+        return None
+    bit, t = (None, address.type) if address.width else (address.bit, ELEMENTARY["BYTE"])
+    return Symbol(text.upper(), address.area.value, address.offset, t, bit)
 
 
 def _variable(symbol: Symbol, types: dict[str, Any]) -> dict[str, Any]:

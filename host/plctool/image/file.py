@@ -31,6 +31,7 @@ _SEGMENTS = (
     "application_info", "area_table", "function_table", "external_function_table", "iec_function_table", "blob", "code",
 )  # fmt: skip
 _MAX_NAME = 255
+_BLOB_IO = int(lib.CDL_BLOB_IO)
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class KeptVariable:
 @dataclass(frozen=True)
 class Image:
     """An application. `areas`: bytes of RAM by area index. `functions`: CDL_FUNCTION_* -> code offset to call. `kept`:
-    in ascending order of their hashes."""
+    in ascending order of their hashes. `io`: offset and size of the I/O configuration in the code."""
 
     device_id: int
     code: bytes
@@ -121,6 +122,7 @@ class Image:
     compiler_version: int = COMPILER_VERSION
     flags: int = 0
     kept: list[KeptVariable] = field(default_factory=list)
+    io: tuple[int, int] | None = None
     crc: int = 0  # set by `parse_image`
 
 
@@ -221,6 +223,9 @@ def _blobs(image: Image) -> Iterator[bytes]:
         yield _blob(lib.CDL_BLOB_EVENTS, events)
     if image.kept:
         yield _blob(lib.CDL_BLOB_RETAIN, b"".join(map(_kept_entry, image.kept)))
+    if image.io is not None:
+        offset, size = image.io
+        yield _blob(_BLOB_IO, _pack("IO_CONFIG_PLACE", {"offset": offset, "size": size}))
     if any(task.parts != NO_PARTS for task in image.tasks):
         yield _blob(lib.CDL_BLOB_IMAGES, b"".join(_part_entry(part) for task in image.tasks for part in task.parts))
 
@@ -302,6 +307,7 @@ def parse_image(data: bytes) -> Image:
         compiler_version=int(header.compiler_version),
         flags=int(header.flags),
         kept=list(_parse_kept(blobs.get(int(lib.CDL_BLOB_RETAIN), b""))),
+        io=_parse_io(blobs.get(_BLOB_IO, b""), len(code)),
         crc=int(header.crc),
     )
 
@@ -435,6 +441,15 @@ def _parse_kept(payload: bytes) -> Iterator[KeptVariable]:
         yield KeptVariable(
             bytes(ffi.buffer(entry.hash)), offset, length, persistent, stride, count, first, is_run
         )  # fmt: skip
+
+
+def _parse_io(payload: bytes, code_size: int) -> tuple[int, int] | None:
+    if not payload:
+        return None
+    (place,) = _entries("IO_CONFIG_PLACE", payload[: ffi.sizeof("IO_CONFIG_PLACE")], "place of its I/O configuration")
+    if place.offset + place.size > code_size:
+        raise _refuse("its I/O configuration is outside the code")
+    return int(place.offset), int(place.size)
 
 
 def _parse_info(data: bytes) -> ApplicationInfo:

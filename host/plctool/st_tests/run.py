@@ -11,7 +11,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler import CompileError, load_sources
+from plctool.compiler import CompileError, IoFiles, io_sources, load_io, load_sources
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
@@ -44,18 +44,25 @@ _EXCEPTIONS = {
 
 
 def run_tests(
-    paths: Sequence[Path | str], *, pattern: str = "*", level: int = 0, warnings: WarningOptions = ALL_WARNINGS
+    paths: Sequence[Path | str],
+    *,
+    pattern: str = "*",
+    level: int = 0,
+    warnings: WarningOptions = ALL_WARNINGS,
+    io: IoFiles = IoFiles(),  # noqa: B008
 ) -> Report:
     """Runs the tests in sources whose name matches `pattern` (with * and ?) or contains it; case does not matter.
 
-    `level`: optimisation; the lowest compiles fastest, and the results are the same. Raises CompileError when the
-    program has errors, UsageError when there are no tests.
+    `level`: optimisation; the lowest compiles fastest, and the results are the same. `io`: inputs and outputs. Raises
+    CompileError when the program has errors, UsageError when there are no tests.
     """
     begin = time.perf_counter()
+    description = load_io(paths, io)
     sources = load_sources(paths)
     suite = TestSuite()
     with _power(), bugs_reported():
-        checked = check_sources(sources, tests=suite, warnings=warnings)
+        checked = check_sources(sources, tests=suite, warnings=warnings, io=description)
+    sources += io_sources(description)
     if checked.program is None:
         raise CompileError([d for d in checked.diagnostics if d.severity == "error"], sources)
     chosen = [i for i, case in enumerate(suite.cases) if _fits(case.name.casefold(), pattern.casefold())]

@@ -1,4 +1,4 @@
-"""memcpy, memset and memmove, which LLVM calls by name: an object of their own, linked when a program needs one of them.
+"""memcpy, memset and memmove, which LLVM calls by name: an object of its own, linked when a program needs one of them.
 
 They are the same in every program, and LLVM takes longer for their loops than for a small program, so they are compiled
 once in a process.

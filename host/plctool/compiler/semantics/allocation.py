@@ -1,13 +1,23 @@
-"""Where variables are.
+"""Where variables are: the areas, addresses such as %IX0.3 in declarations and statements, variables that share memory.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
-from plctool.compiler.typed import Variable
+from collections.abc import Iterable
+
+from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.semantics.conversions import elementary
+from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.symbols import Role, VarSymbol
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Initial, Storage, Variable
+from plctool.iec.addresses import Address, parse_address
 from plctool.iec.areas import Area
-from plctool.iec.types import align_up
+from plctool.iec.types import BOOL, Type, align_up, base_of
+
+# ---- the areas ----
 
 
 class Allocation:
@@ -18,9 +28,115 @@ class Allocation:
         self.variables: list[Variable] = []
 
     def add(self, variable: Variable) -> None:
-        """Places a variable at the end of its area, or notes one that has an address."""
+        """Places a variable at the end of its area, or notes one that has an address. Inputs and outputs without one
+        get it in the end (`io_channels.py`)."""
         t, area = variable.type, variable.area
+        if variable.offset < 0 and area in (Area.INPUT, Area.OUTPUT):
+            self.variables.append(variable)
+            return
         if variable.offset < 0:
             variable.offset = align_up(self.sizes[area], t.align)
         self.sizes[area] = max(self.sizes[area], variable.offset + t.size)
         self.variables.append(variable)
+
+
+# ---- addresses ----
+
+MAX_ADDRESS = 0xFFFF  # the last byte an address such as %IB65535 reaches
+
+
+def is_open(location: ast.DirectAddress | None) -> bool:
+    """Whether it is `%I*` and the like: VAR_CONFIG says where."""
+    return location is not None and location.text.endswith("*")
+
+
+def _read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
+    """What `%IW2` means; None after an error."""
+    address = parse_address(node.text)
+    if address is None:
+        scope.error(node.pos, "location", f"{node.text} is not an address such as %IX0.3 or %QW2")
+    return address
+
+
+def located(
+    name: str, t: Type, init: Initial | None, location: ast.DirectAddress, scope: Scope, offset: int
+) -> Variable | None:
+    """A variable with AT, declared at `offset`; None after an error."""
+    address = _read_address(location, scope)
+    if address is None:
+        return None
+    base = elementary(t)
+    problem = ""
+    if address.width == 0 and base_of(t) is not BOOL:
+        problem = f"{location.text} is a bit, {t} is not"
+    elif address.width and base is not None and base.bits != address.width:
+        problem = f"{t} has {base.bits} bits, {location.text} {address.width}"
+    elif address.offset % t.align:
+        problem = f"{t} needs an address that is a multiple of {t.align} bytes"
+    elif address.offset + t.size > MAX_ADDRESS + 1:
+        problem = f"{location.text} is too far; addresses end at byte {MAX_ADDRESS}"
+    if problem:
+        scope.error(location.pos, "location", problem)
+        return None
+    bit = address.bit if address.width == 0 else None
+    return Variable(name, t, Storage.AREA, scope.pos(offset), address.area, address.offset, init, bit=bit)
+
+
+class DirectVariables:
+    """The variables at addresses that statements use."""
+
+    def __init__(self, allocation: Allocation) -> None:
+        self._allocation = allocation
+        self._known: dict[str, VarSymbol] = {}
+
+    def find(self, node: ast.DirectAddress, scope: Scope) -> VarSymbol | None:
+        """The variable at an address; None after an error."""
+        key = node.text.upper()
+        symbol = self._known.get(key)
+        if symbol is not None:
+            return symbol
+        address = _read_address(node, scope)
+        variable = None if address is None else located(key, address.type, None, node, scope, node.pos)
+        if address is None or variable is None:
+            return None
+        self._allocation.add(variable)
+        symbol = self._known[key] = VarSymbol(key, variable.pos, address.type, Role.GLOBAL, variable)
+        return symbol
+
+
+# ---- variables that share memory ----
+
+
+def report_overlaps(variables: Iterable[Variable], diagnostics: Diagnostics) -> None:
+    """Warns of variables that are over others, at the one that is declared later, unless that is meant."""
+    located = [v for v in variables if v.area in (Area.INPUT, Area.OUTPUT, Area.MEMORY) and not v.name.startswith("%")]
+    numbers = {variable: number for number, variable in enumerate(located)}
+    reaching: list[Variable] = []
+    for variable in sorted(located, key=lambda v: (v.area.value, *_bits(v))):
+        start, _ = _bits(variable)
+        reaching = [v for v in reaching if v.area is variable.area and _bits(v)[1] > start]
+        for other in reaching:
+            if _is_meant(variable, other):
+                continue
+            later, earlier = sorted((variable, other), key=lambda v: numbers[v], reverse=True)
+            where = f"in line {earlier.pos.line}" if earlier.pos.file == later.pos.file else f"in {earlier.pos.file}"
+            message = f"{later.name} shares its memory with {earlier.name} {where}"
+            diagnostics.warning(later.pos, "overlap", message)
+        reaching.append(variable)
+
+
+def _is_meant(one: Variable, other: Variable) -> bool:
+    """A bit of something larger, in the memory area any part of something larger; the instances of one PROGRAM."""
+    if one.pos == other.pos or (one.bit is None) != (other.bit is None):
+        return True
+    (start, end), (other_start, other_end) = _bits(one), _bits(other)
+    within = (start >= other_start and end <= other_end) or (other_start >= start and other_end <= end)
+    return one.area is Area.MEMORY and within and one.type.size != other.type.size
+
+
+def _bits(variable: Variable) -> tuple[int, int]:
+    """The first bit, and the one past the end of the variable."""
+    first = variable.offset * 8
+    if variable.bit is not None:
+        return first + variable.bit, first + variable.bit + 1
+    return first, first + variable.type.size * 8

@@ -1,14 +1,42 @@
-"""Who calls whom: recursion, and programs that several tasks reach.
+"""Who calls whom: recursion, programs that several tasks reach, and variables that several tasks write.
+
+What a unit writes is computed once, for whatever calls it. What is written through a pointer is not known.
 
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.typed import Pos, Pou, PouKind, Task
+from plctool.compiler.semantics.generics import bounds_of
+from plctool.compiler.typed import (
+    Assign,
+    BitPlace,
+    Call,
+    Const,
+    Direction,
+    FbCall,
+    For,
+    IndexPlace,
+    MemberPlace,
+    Place,
+    Pos,
+    Pou,
+    PouKind,
+    SelfPlace,
+    Storage,
+    Task,
+    Variable,
+    VarPlace,
+)
+from plctool.compiler.typed_nodes import callees, walk
+from plctool.iec.areas import Area
+from plctool.iec.types import ArrayType
+
+# ---- recursion, and programs that several tasks reach ----
 
 
 class CallGraph:
@@ -29,8 +57,8 @@ class CallGraph:
         for task in tasks:
             for pou in self._reached(task.programs):
                 runs.setdefault(pou, []).append(task)
-        for caller, callees in self._calls.items():
-            for callee, pos in callees.items():
+        for caller, called in self._calls.items():
+            for callee, pos in called.items():
                 if callee.kind is not PouKind.PROGRAM or caller not in runs:
                     continue
                 names = [task.name for task in runs[callee]]
@@ -78,3 +106,180 @@ class CallGraph:
         self._diagnostics.error(
             pos, "recursion", f"{message}, which the stack of a controller does not allow; use a loop"
         )
+
+
+# ---- variables that several tasks write: one may undo what the other wrote ----
+
+_SHARED = (Area.DATA, Area.RETAIN, Area.MEMORY)  # of the outputs, each task has an image of its own
+
+
+@dataclass(frozen=True)
+class _Write:
+    """Bits `start` to `end` (not included) of an area are written at `pos`, as part of `variable`."""
+
+    variable: Variable
+    start: int
+    end: int
+    pos: Pos
+
+
+@dataclass
+class _Unit:
+    """What a unit does itself. `own`: it writes its instance; `parameters`: what it writes of its VAR_IN_OUT and
+    outputs."""
+
+    writes: list[_Write] = field(default_factory=list)
+    parameters: set[Variable] = field(default_factory=set)
+    own: bool = False
+    callees: list[Pou] = field(default_factory=list)
+
+
+def report_shared_writes(tasks: Sequence[Task], diagnostics: Diagnostics) -> None:
+    """Warns at the write of the later task, once for each variable."""
+    if len(tasks) < 2:
+        return
+    units = _Units()
+    by_task = [units.reached(_programs(task)) for task in tasks]
+    told: set[Variable] = set()
+    for later in range(1, len(tasks)):
+        for earlier in range(later):
+            common = {pou.name for pou in by_task[later] & by_task[earlier]}
+            mine, other = units.writes(by_task[later]), units.writes(by_task[earlier])
+            for write, theirs in _overlaps(mine, other):
+                shared = write.variable.name.rpartition(".")[0] in common  # `task` warns of the program
+                if shared or write.variable in told or theirs.variable in told:
+                    continue
+                told.add(write.variable)
+                message = _message(write, theirs, tasks[earlier].name, tasks[later].name)
+                diagnostics.warning(write.pos, "shared", message)
+
+
+def _message(write: _Write, theirs: _Write, earlier: str, later: str) -> str:
+    name, where = write.variable.name, "" if theirs.pos == write.pos else f" (line {theirs.pos.line})"
+    if theirs.pos.file != write.pos.file:
+        where = f" ({theirs.pos.file}, line {theirs.pos.line})"
+    if theirs.variable is write.variable:
+        both = f"{name} is written by the tasks {earlier}{where} and {later}, and each may undo what the other wrote"
+        return f"{both}; let one of them write it, or give each a variable of its own"
+    both = f"{later} writes {name} in the same byte as {theirs.variable.name}, which {earlier} writes{where}"
+    return f"{both}, and each may undo what the other wrote; put them into different bytes"
+
+
+def _programs(task: Task) -> list[Pou]:
+    """Without what VAR_CONFIG copies for the task."""
+    return [pou for pou in task.programs if pou.name not in (f"{task.name}.inputs", f"{task.name}.outputs")]
+
+
+def _overlaps(mine: list[_Write], other: list[_Write]) -> Iterator[tuple[_Write, _Write]]:
+    """The writes that meet, in the order of the places of the first."""
+    by_area: dict[Area, list[_Write]] = {}
+    for write in other:
+        by_area.setdefault(write.variable.area, []).append(write)
+    for writes in by_area.values():
+        writes.sort(key=lambda w: w.start)
+    for write in sorted(mine, key=lambda w: (w.pos.file, w.pos.line, w.pos.column)):
+        for theirs in by_area.get(write.variable.area, ()):
+            if theirs.start >= write.end:
+                break
+            if theirs.end > write.start:
+                yield write, theirs
+
+
+class _Units:
+    """What is known of the units so far."""
+
+    def __init__(self) -> None:
+        self._known: dict[Pou, _Unit] = {}
+
+    def reached(self, starts: Iterable[Pou]) -> set[Pou]:
+        """Everything that is called from `starts`."""
+        found, todo = set[Pou](), list(starts)
+        while todo:
+            pou = todo.pop()
+            if pou not in found:
+                found.add(pou)
+                todo += self.unit(pou).callees
+        return found
+
+    def writes(self, pous: Iterable[Pou]) -> list[_Write]:
+        """What units write, all together."""
+        return [write for pou in pous for write in self.unit(pou).writes]
+
+    def unit(self, pou: Pou) -> _Unit:
+        """What a unit does."""
+        known = self._known.get(pou)
+        if known is None:
+            known = self._known[pou] = _Unit()  # the answer within a recursion
+            for node in walk(pou.body):
+                self._note(node, known)
+        return known
+
+    def _note(self, node: object, unit: _Unit) -> None:
+        if isinstance(node, Assign):
+            self._write(node.target, unit)
+        elif isinstance(node, For):
+            self._write(node.var, unit)
+        elif isinstance(node, FbCall):
+            called = list(callees(node))
+            unit.callees += called
+            self._write(node.instance, unit)
+            for _, place in node.outputs:
+                self._write(place, unit)
+            for variable, place in node.in_outs:
+                if any(variable in self.unit(callee).parameters for callee in called):
+                    self._write(place, unit)
+        elif isinstance(node, Call):
+            self._call(node, unit)
+
+    def _call(self, node: Call, unit: _Unit) -> None:
+        called = list(callees(node))
+        unit.callees += called
+        if node.instance is not None and any(self.unit(callee).own for callee in called):
+            self._write(node.instance, unit)
+        for number, (parameter, argument) in enumerate(zip(node.function.parameters, node.args, strict=True)):
+            if argument is None or not isinstance(argument, Place) or parameter.direction is Direction.INPUT:
+                continue
+            variables = [callee.parameters[number].variable for callee in called]
+            writes = any(v in self.unit(c).parameters for c, v in zip(called, variables, strict=True))
+            if parameter.direction is Direction.OUTPUT or writes or node.function.external is not None:
+                self._write(argument, unit)
+
+    def _write(self, place: Place, unit: _Unit) -> None:
+        root, start, size = place, 0, 8 * place.type.size
+        while not isinstance(root, VarPlace):
+            if isinstance(root, MemberPlace):
+                start += 8 * root.offset
+            elif isinstance(root, BitPlace):
+                start, size = 0, 8 * root.base.type.size  # changing a bit writes the whole number
+            elif isinstance(root, IndexPlace):
+                start, size = _element(root, start, size)
+            else:
+                unit.own = unit.own or isinstance(root, SelfPlace)
+                return
+            root = root.base
+        variable = root.var
+        if variable.storage is Storage.SELF:
+            unit.own = True
+        elif variable.storage is Storage.REFERENCE:
+            unit.parameters.add(variable)
+        elif variable.storage is Storage.AREA and variable.area in _SHARED and not _is_hidden(variable):
+            start += 8 * variable.offset
+            unit.writes.append(_Write(variable, start, start + size, place.pos))
+
+
+def _element(place: IndexPlace, start: int, size: int) -> tuple[int, int]:
+    """The element with constant indices, else the whole array."""
+    t, number = place.base.type, 0
+    if not isinstance(t, ArrayType):
+        return 0, 8 * t.size
+    for index, (low, high) in zip(place.indices, bounds_of(place.base), strict=True):
+        known = [e.value for e in (index, low, high) if isinstance(e, Const) and isinstance(e.value, int)]
+        if len(known) < 3:
+            return 0, 8 * t.size
+        number = number * (known[2] - known[1] + 1) + known[0] - known[1]
+    return start + 8 * number * t.element.size, size
+
+
+def _is_hidden(variable: Variable) -> bool:
+    """Whether it has no name in the program."""
+    return "%" in variable.name[1:] or variable.name.startswith("__")

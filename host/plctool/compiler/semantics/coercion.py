@@ -22,8 +22,7 @@ from plctool.compiler.semantics.conversions import (
     scaled,
     time_to_ltime,
 )
-from plctool.compiler.semantics.divisions import lost_fraction
-from plctool.compiler.semantics.overlays import overlays
+from plctool.compiler.semantics.pitfalls import lost_fraction, overlays
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import AddressOf, Binary, BinaryOp, Call, Const, Convert, Expr, Load, Pos
 from plctool.iec.literals import BitPattern

@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Mapping
 
 from plctool.compiler.kept import is_kept
+from plctool.compiler.semantics.conversions import whole
 from plctool.compiler.semantics.instances import (
     COPY_CODE,
     INIT_RETAINS,
@@ -20,7 +21,6 @@ from plctool.compiler.semantics.instances import (
     starters,
 )
 from plctool.compiler.semantics.symbols import NOTHING, Member
-from plctool.compiler.semantics.values import whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.typed import (
     AddressOf,

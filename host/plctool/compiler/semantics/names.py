@@ -195,6 +195,10 @@ class Names:
         """What the program itself declares under that name."""
         return self._units.get(key)
 
+    def global_named(self, key: str) -> GlobalSymbol | None:
+        """The global variable of the program with that bare name, if it is the only one."""
+        return None if key in self._ambiguous else self._globals.get(key)
+
     def own_list(self, key: str) -> Namespace | None:
         """The list of globals of that name."""
         return self._lists.get(key)

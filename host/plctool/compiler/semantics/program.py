@@ -7,25 +7,22 @@ from __future__ import annotations
 
 from plctool.compiler.internal import note_position
 from plctool.compiler.library import Library
-from plctool.compiler.semantics.any_values import describes_any
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.construction import construct
-from plctool.compiler.semantics.declarations.blocks import Blocks
 from plctool.compiler.semantics.declarations.classes import Classes
 from plctool.compiler.semantics.declarations.functions import Functions
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
-from plctool.compiler.semantics.declarations.programs import Programs
+from plctool.compiler.semantics.declarations.instances import Blocks, Programs
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
 from plctool.compiler.semantics.declarations.unit_variables import UnitVariables
 from plctool.compiler.semantics.declarations.variables import Variables
-from plctool.compiler.semantics.declared import Declared
-from plctool.compiler.semantics.endless import report_endless
-from plctool.compiler.semantics.generics import is_generic
-from plctool.compiler.semantics.rules.bodies import report_unused, write_body
+from plctool.compiler.semantics.generics import describes_any, is_generic
+from plctool.compiler.semantics.pitfalls import report_endless
+from plctool.compiler.semantics.rules.control import report_unused, write_body
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc_statements import statements_of
 from plctool.compiler.semantics.symbols import TypeSymbol
-from plctool.compiler.semantics.world import World
+from plctool.compiler.semantics.world import Declared, World
 from plctool.compiler.typed import Pou
 
 

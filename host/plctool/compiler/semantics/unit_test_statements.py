@@ -10,17 +10,24 @@ from dataclasses import dataclass
 
 from plctool.compiler.semantics import mocks
 from plctool.compiler.semantics.checker import Checker, SpecialCalls
-from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, settle, time_to_ltime
-from plctool.compiler.semantics.rules.bodies import report_unused, write_body
-from plctool.compiler.semantics.rules.common_types import match_literals
+from plctool.compiler.semantics.conversions import (
+    NUMBERS,
+    convert,
+    elementary,
+    is_untyped,
+    load,
+    place_of,
+    settle,
+    time_to_ltime,
+)
+from plctool.compiler.semantics.rules.control import report_unused, write_body
 from plctool.compiler.semantics.rules.conversion_calls import convert_explicitly
-from plctool.compiler.semantics.rules.members import bound_member
+from plctool.compiler.semantics.rules.literals import match_literals
+from plctool.compiler.semantics.rules.members import bound_member, variable_value
 from plctool.compiler.semantics.rules.operators import operate
 from plctool.compiler.semantics.rules.parts import member_of
-from plctool.compiler.semantics.rules.qualified_names import variable_value
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol
-from plctool.compiler.semantics.values import is_untyped, load, place_of
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (

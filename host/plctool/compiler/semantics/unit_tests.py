@@ -21,13 +21,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from plctool.compiler.semantics.configuration import Application, configure, default_programs
+from plctool.compiler.semantics.conversions import load, whole
 from plctool.compiler.semantics.declarations.type_declarations import May
 from plctool.compiler.semantics.mocks import Mocks, raising
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestBody
-from plctool.compiler.semantics.values import load, whole
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (

@@ -1,27 +1,90 @@
 """Everything the check of one program shares: its names, what is declared so far, diagnostics.
 
+A statement needs a function, whose parameter is an array, whose bound is a constant expression, which names a global
+... So rules ask for what is declared, and what declares asks the rules. Here is what can be asked for.
+
 SPDX-License-Identifier: Apache-2.0
 """
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.library import Library
 from plctool.compiler.nesting import NestingError
-from plctool.compiler.semantics.addresses import DirectVariables
-from plctool.compiler.semantics.allocation import Allocation
-from plctool.compiler.semantics.body_queue import BodyQueue
+from plctool.compiler.semantics.allocation import Allocation, DirectVariables
 from plctool.compiler.semantics.call_graph import CallGraph
 from plctool.compiler.semantics.coercion import Coercion
-from plctool.compiler.semantics.declared import Declared
-from plctool.compiler.semantics.dispatches import Dispatches
-from plctool.compiler.semantics.endless import Loop
+from plctool.compiler.semantics.dynamic_types import Dispatches
+from plctool.compiler.semantics.io_channels import IoChannels
 from plctool.compiler.semantics.names import Names
+from plctool.compiler.semantics.pitfalls import Loop
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import BlockInfo, ClassInfo, PouSymbol, VarSymbol
+from plctool.compiler.semantics.symbols import (
+    BlockInfo,
+    ClassInfo,
+    FunctionInfo,
+    GlobalSymbol,
+    Member,
+    PouSymbol,
+    TypeSymbol,
+    VarSymbol,
+)
 from plctool.compiler.source import Source
+from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Call, Const, Expr, Pou, ScalarInit, Storage, StructInit, Variable
-from plctool.iec.types import WCHAR, EnumType, StructType, Type
+from plctool.iec.types import WCHAR, EnumType, InterfaceType, StructType, Type
+
+# ---- bodies that wait for their check ----
+
+
+class BodyQueue:
+    """Those still to be checked, each with the scope of its unit: of the program first, then of the library."""
+
+    def __init__(self) -> None:
+        self._own: deque[tuple[Scope, ast.PouDecl]] = deque()
+        self._library: deque[tuple[Scope, ast.PouDecl]] = deque()
+
+    def add(self, scope: Scope, decl: ast.PouDecl) -> None:
+        """Queues what is written in the unit of a scope."""
+        if scope.edges:
+            scope = replace(scope, names=scope.names | scope.edges)
+        (self._library if scope.library else self._own).append((scope, decl))
+
+    def __bool__(self) -> bool:
+        return bool(self._own or self._library)
+
+    @property
+    def only_library(self) -> bool:
+        """Whether all of the program itself is checked."""
+        return not self._own
+
+    def next(self) -> tuple[Scope, ast.PouDecl]:
+        """Takes one out."""
+        return (self._own or self._library).popleft()
+
+
+# ---- what is declared when something first needs it ----
+
+
+@dataclass(frozen=True)
+class Declared:
+    """Who declares what. Each of them says what is wrong the first time, and does nothing the second time."""
+
+    type_of: Callable[[TypeSymbol], Type]
+    type_named: Callable[[int, str, Scope], Type]  # ERROR after an error
+    variable: Callable[[GlobalSymbol], VarSymbol]
+    function: Callable[[PouSymbol, dict[str, Type]], FunctionInfo | None]  # None while it is being declared
+    member: Callable[[Member], FunctionInfo]
+    block: Callable[[PouSymbol], BlockInfo | None]  # None when it contains itself
+    layout: Callable[[PouSymbol], StructType | None]  # the type of a block, also while it is being declared
+    interface: Callable[[PouSymbol], InterfaceType]
+
+
+# ---- the check of one program ----
 
 
 class World:
@@ -38,6 +101,7 @@ class World:
         self.dispatches = Dispatches()
         self.allocation = Allocation()
         self.direct = DirectVariables(self.allocation)
+        self.io = IoChannels()
         self.bodies = BodyQueue()
         self.blocks: dict[StructType, BlockInfo] = {}
         self.open_members: dict[StructType, dict[str, VarSymbol]] = {}  # of structures: AT %I*, %Q*, %M*

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 
 from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.semantics.declarations.class_rules import check_class
 from plctool.compiler.semantics.declarations.functions import Functions
-from plctool.compiler.semantics.declarations.hierarchy import Hierarchy
+from plctool.compiler.semantics.declarations.inheritance import Hierarchy, check_class
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
 from plctool.compiler.semantics.instances import instances_in
 from plctool.compiler.semantics.scope import Scope

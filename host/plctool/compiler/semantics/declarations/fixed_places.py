@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from plctool.compiler.semantics.open_arrays import bounds_of
+from plctool.compiler.semantics.generics import bounds_of
 from plctool.compiler.typed import (
     ArrayInit,
     BitPlace,

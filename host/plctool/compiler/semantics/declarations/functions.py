@@ -9,11 +9,17 @@ import re
 import zlib
 from dataclasses import replace
 
-from plctool.compiler.semantics.any_values import NAME, describes_any, is_any, parameter
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
 from plctool.compiler.semantics.declarations.unit_variables import ROLES, UnitVariables, new_pou
-from plctool.compiler.semantics.generics import LIBRARY_STRING, WIDE_LIBRARY_STRING
-from plctool.compiler.semantics.open_arrays import bound_parameters
+from plctool.compiler.semantics.generics import (
+    LIBRARY_STRING,
+    NAME,
+    WIDE_LIBRARY_STRING,
+    bound_parameters,
+    describes_any,
+    is_any,
+    parameter,
+)
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import (
     DIRECTIONS,

@@ -11,7 +11,7 @@ from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.instances import COPY_CODE, INIT_RETAINS, initialisers
 from plctool.compiler.semantics.rules.arguments import input_value
-from plctool.compiler.semantics.rules.qualified_names import dotted_name
+from plctool.compiler.semantics.rules.members import dotted_name
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Namespace, Role, VarSymbol
 from plctool.compiler.semantics.world import World

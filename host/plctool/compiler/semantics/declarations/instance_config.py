@@ -14,15 +14,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-from plctool.compiler.semantics.addresses import located
+from plctool.compiler.semantics.allocation import located
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import same_type
+from plctool.compiler.semantics.conversions import load, same_type, whole
 from plctool.compiler.semantics.declarations.fixed_places import FixedPlace, fixed_place, with_part
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
+from plctool.compiler.semantics.instances import instances_in
 from plctool.compiler.semantics.rules.places import named_place
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, VarSymbol
-from plctool.compiler.semantics.values import load, whole
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -84,7 +84,7 @@ class InstanceConfig:
         self._types = types
         self._missing: dict[Pos, list[tuple[str, str, Type]]] = {}
         self._open_parts: dict[Type, list[tuple[str, VarSymbol]]] = {}
-        self.accesses: list[Variable] = []
+        self._accesses: list[tuple[Variable, Variable, int]] = []
 
     # ---- VAR_CONFIG ----
 
@@ -146,6 +146,7 @@ class InstanceConfig:
     def apply(self, tasks: Sequence[Task]) -> None:
         """Does what the entries say, when all variables are declared."""
         copies = [copy for entry in self.entries.values() if (copy := self._apply(entry)) is not None]
+        copies += self._channel_copies()
         for task in tasks:
             names = tuple(f"{pou.name}." for pou in task.programs)
             others = tuple(f"{pou.name}." for t in tasks if t is not task for pou in t.programs)
@@ -212,6 +213,33 @@ class InstanceConfig:
         block = self._world.blocks.get(t)
         return block.members if block is not None else self._world.open_members.get(t, {})
 
+    # ---- channels of inputs and outputs ----
+
+    def _channel_copies(self) -> list[_Copy]:
+        """What channels say of parts of variables and of instances."""
+        io, allocation = self._world.io, self._world.allocation
+        parts = io.parts(allocation.variables)
+        if not parts:
+            return []
+        source = io.source()
+        scope = self._world.scope(source)
+        scope.sees_inside = True
+        copies = []
+        for channel in parts:
+            path = io.path(channel, source)
+            place = named_place(Checker(self._world, scope), path, "a channel")
+            fixed = None if place is None else fixed_place(place)
+            if place is None:
+                continue
+            if fixed is None or fixed.bit is not None:
+                scope.error(path.pos, "place", "a channel names a variable by a path of names and constant indices")
+            elif any(part in self._world.blocks for part in instances_in(place.type)):
+                scope.error(path.pos, "place", f"{channel.target} is {place.type}; name a variable in it")
+            else:
+                outside = io.place(channel, place.type, allocation)
+                copies.append(_Copy(fixed.variable, place, whole(outside, outside.pos), outside.area))
+        return copies
+
     # ---- variables without an address ----
 
     def _report_missing(self) -> None:
@@ -219,7 +247,7 @@ class InstanceConfig:
             for part, symbol in self._open_members(variable.type):
                 name = variable.name + part
                 entry = self.entries.get(name.casefold())
-                if entry is None or entry.line.location is None:
+                if (entry is None or entry.line.location is None) and self._world.io.area(name) is None:
                     self._missing.setdefault(symbol.pos, []).append((name, symbol.open_area, symbol.type))
         for pos, missing in self._missing.items():
             name, letter, t = missing[0]
@@ -250,6 +278,12 @@ class InstanceConfig:
 
     # ---- VAR_ACCESS ----
 
+    def accesses(self) -> list[Variable]:
+        """The names of VAR_ACCESS, when all variables have their addresses."""
+        for alias, of, offset in self._accesses:
+            alias.offset = of.offset + offset
+        return [alias for alias, _, _ in self._accesses]
+
     def _access(self) -> None:
         seen: set[str] = set()
         for line, scope in self._lines():
@@ -262,9 +296,8 @@ class InstanceConfig:
             if found is not None:
                 (place, fixed), of = found, found[1].variable
                 alias = Variable(line.name, place.type, of.storage, scope.pos(line.pos), of.area, bit=fixed.bit)
-                alias.offset = of.offset + fixed.offset
                 alias.constant = not line.writable
-                self.accesses.append(alias)
+                self._accesses.append((alias, of, fixed.offset))
 
     # ---- both ----
 

@@ -12,7 +12,7 @@ from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.internal import note_position
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
-from plctool.compiler.semantics.addresses import is_open
+from plctool.compiler.semantics.allocation import is_open
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.declarations.initial_values import InitialValues
 from plctool.compiler.semantics.generics import is_group

@@ -1,5 +1,8 @@
 """What all program organisation units declare alike: constants, VAR_EXTERNAL, VAR_STAT, variables of a call.
 
+Beside such an input are two more variables: its value at the previous call, and the edge. The body begins by computing
+the edge, and sees it under the name of the input; all others see the input itself.
+
 SPDX-License-Identifier: Apache-2.0
 """
 
@@ -16,8 +19,45 @@ from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, GlobalSymbol, 
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.ast import Section
-from plctool.compiler.typed import Assign, Load, Pou, PouKind, Storage, Variable, VarPlace
-from plctool.iec.types import Keep
+from plctool.compiler.typed import (
+    Assign,
+    Binary,
+    BinaryOp,
+    Load,
+    Pou,
+    PouKind,
+    Storage,
+    Unary,
+    UnaryOp,
+    Variable,
+    VarPlace,
+)
+from plctool.iec.types import BOOL, Keep
+
+# ---- R_EDGE and F_EDGE ----
+
+RISING = "R_EDGE"
+
+
+def edge_variables(raw: Variable) -> tuple[Variable, Variable]:
+    """What an input was at the previous call, and its edge; they have no name in the program."""
+    owner, dot, name = raw.name.rpartition(".")
+    last, edge = (Variable(f"{owner}{dot}%{name}.{e}", BOOL, raw.storage, raw.pos) for e in ("before", "edge"))
+    return last, edge
+
+
+def see_edge(symbol: VarSymbol, kind: str, last: Variable, edge: Variable, scope: Scope) -> None:
+    """Lets the body in `scope` see the edge (`kind`: R_EDGE or F_EDGE) in place of the input."""
+    assert symbol.variable is not None
+    pos = symbol.pos
+    now, before = (Load(VarPlace(v, BOOL, pos), BOOL, pos) for v in (symbol.variable, last))
+    high, low = (now, before) if kind == RISING else (before, now)
+    found = Binary(BinaryOp.AND, high, Unary(UnaryOp.NOT, low, BOOL, pos), BOOL, pos)
+    scope.prologue += [Assign(VarPlace(edge, BOOL, pos), found, pos), Assign(VarPlace(last, BOOL, pos), now, pos)]
+    scope.edges[symbol.name.casefold()] = replace(symbol, variable=edge)
+
+
+# ---- constants, VAR_EXTERNAL, VAR_STAT, variables of a call ----
 
 ROLES = {
     Section.VAR_INPUT: Role.INPUT,

@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.kept import is_kept
-from plctool.compiler.semantics.addresses import is_open, located
+from plctool.compiler.semantics.allocation import is_open, located
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
 from plctool.compiler.semantics.instances import instances_in, require_instances
@@ -39,6 +39,7 @@ from plctool.iec.types import (
     Elementary,
     Keep,
     Kind,
+    PointerType,
     StringType,
     StructType,
     Type,
@@ -146,6 +147,8 @@ class Variables:
         """Where a variable with these names is: for `AT %I*` VAR_CONFIG says it. None: it has no address."""
         if location is None or not is_open(location):
             return location
+        if self._world.io.claims(location.text[1], names, self._world.diagnostics):
+            return None
         return self._config.location(location.text[1], t, pos, *names)
 
     def area_variable(
@@ -170,7 +173,10 @@ class Variables:
             return None
         if location is not None:
             return located(name, t, init, location, scope, offset)
-        return Variable(name, t, Storage.AREA, pos, self._area(t, keep), initial=init, keep=keep)
+        area = self._world.io.area(name)
+        if area is None or keep.kept or self._holds_instances(t) or isinstance(t, PointerType):
+            area = self._area(t, keep)
+        return Variable(name, t, Storage.AREA, pos, area, initial=init, keep=keep)
 
     def check_kept(self, name: str, t: Type, keep: Keep, scope: Scope, offset: int) -> None:
         """Warns of a variable of which nothing is kept though its section says so."""

@@ -9,15 +9,20 @@ from collections.abc import Container
 from dataclasses import dataclass, replace
 
 from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.semantics.any_values import handed
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, same_type, settle, takes_array
-from plctool.compiler.semantics.generics import accepts, group_name, is_group
-from plctool.compiler.semantics.open_arrays import handed_bounds, total_size
+from plctool.compiler.semantics.conversions import (
+    NUMBERS,
+    elementary,
+    error_value,
+    place_of,
+    same_type,
+    settle,
+    takes_array,
+)
+from plctool.compiler.semantics.generics import accepts, group_name, handed, handed_bounds, is_group, total_size
+from plctool.compiler.semantics.rules.members import dotted_name
 from plctool.compiler.semantics.rules.places import changeable_place, may_copy
-from plctool.compiler.semantics.rules.qualified_names import dotted_name
 from plctool.compiler.semantics.symbols import DIRECTIONS, ERROR, NOTHING, FunctionInfo, PouSymbol, VarSymbol
-from plctool.compiler.semantics.values import place_of
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     AddressOf,

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.rules.arguments import input_value, parameter_names
+from plctool.compiler.semantics.rules.builtin import attempt
 from plctool.compiler.semantics.rules.call_statements import enabled, has_enable
-from plctool.compiler.semantics.rules.instance_queries import attempt
-from plctool.compiler.semantics.rules.methods import assign_property, assigned_property
+from plctool.compiler.semantics.rules.calls import assign_property, assigned_property
 from plctool.compiler.semantics.rules.places import changeable_place, may_copy
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast

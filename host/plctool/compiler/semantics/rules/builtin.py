@@ -1,4 +1,4 @@
-"""Functions the compiler knows itself.
+"""Functions the compiler knows itself, among them those about variables: SIZEOF, ADR, REF, bounds, __QUERYINTERFACE.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -7,27 +7,239 @@ from __future__ import annotations
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import error_value
-from plctool.compiler.semantics.rules import intrinsics, operator_functions, variable_questions
-from plctool.compiler.semantics.rules.applied import Applied, BuiltIn
+from plctool.compiler.semantics.conversions import error_value, place_of, settle
+from plctool.compiler.semantics.generics import bounds_of, total_size
+from plctool.compiler.semantics.rules import intrinsics
 from plctool.compiler.semantics.rules.conversion_calls import conversion, conversion_hint
-from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.semantics.rules.intrinsics import Applied, BuiltIn, named
+from plctool.compiler.semantics.rules.members import space_of
+from plctool.compiler.semantics.rules.places import changeable_place, named_place
+from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, GlobalSymbol, PouSymbol, TypeSymbol, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Const, Expr
+from plctool.compiler.typed import (
+    AddressOf,
+    Binary,
+    BinaryOp,
+    BitPlace,
+    Call,
+    CallStatement,
+    Const,
+    DerefPlace,
+    Expr,
+    Intrinsic,
+    IntrinsicCall,
+    Load,
+    Place,
+    Pos,
+    Statement,
+    Storage,
+    Variable,
+    VarPlace,
+)
 from plctool.iec.types import (
     BOOL,
+    BYTE,
+    ELEMENTARY,
+    UDINT,
+    ArrayType,
+    InterfaceType,
+    OpenArrayType,
+    PointerType,
+    RawPointerType,
+    ReferenceType,
     StringType,
+    StructType,
     Type,
 )
 
+# ---- what is known of variables ----
+
+_OF_VARIABLES = ("SIZEOF", "XSIZEOF", "ADR", "REF", "__ISVALIDREF")
+"""Functions whose argument is a variable or a type, not a value."""
+
+
+def of_variable(c: Checker, name: str, node: ast.Call) -> Expr:
+    """The call of one of _OF_VARIABLES."""
+    if len(node.args) != 1 or node.args[0].value is None:
+        return c.error(node.pos, "arguments", f"{name} takes 1 argument, not {len(node.args)}")
+    argument = node.args[0].value
+    if name == "__ISVALIDREF":
+        return _is_valid(c, argument)
+    if name not in ("SIZEOF", "XSIZEOF"):
+        return _address_of(c, argument, RawPointerType if name == "ADR" else PointerType)
+    if isinstance(argument, ast.Name):
+        symbol = c.scope.lookup(argument.name)
+        is_block = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK"
+        if argument.name.upper() in ELEMENTARY or is_block or isinstance(symbol, TypeSymbol):
+            t = c.world.declared.type_named(argument.pos, argument.name, c.scope)
+            return error_value(c.pos(node.pos)) if t is ERROR else _size(c, t, node)
+    e = settle(c.expr(argument))
+    if isinstance(e.type, OpenArrayType):
+        return total_size(place_of(e))
+    return e if e.type is ERROR else _size(c, e.type, node)
+
+
+def _is_valid(c: Checker, node: ast.Expr) -> Expr:
+    """Whether a reference refers to something."""
+    e, pos = c.expr(node), c.pos(node.pos)
+    in_out = _in_out_given(c, e)
+    if in_out is not None:
+        return in_out
+    pointer = e.place.pointer if isinstance(e, Load) and isinstance(e.place, DerefPlace) else None
+    if pointer is None or not isinstance(pointer.type, ReferenceType):
+        return e if e.type is ERROR else c.error(node.pos, "type", f"{e.type} is not a REFERENCE TO")
+    return Binary(BinaryOp.NE, pointer, Const(0, pointer.type, pos), BOOL, pos)
+
+
+def _in_out_given(c: Checker, e: Expr) -> Expr | None:
+    """Whether a VAR_IN_OUT was given: that of a function always is, that of an instance from its first call on. None
+    when it is none."""
+    variable = e.place.var if isinstance(e, Load) and isinstance(e.place, VarPlace) else None
+    if variable is None or variable.storage is not Storage.REFERENCE:
+        return None
+    block = None if c.scope.cls is None else c.scope.cls.block
+    symbol = None if block is None else block.members.get(variable.name.casefold())
+    if block is None or symbol is None or symbol.variable is not variable:
+        return Const(1, BOOL, e.pos)
+    t = RawPointerType(BYTE)
+    slot = Load(VarPlace(Variable(variable.name, t, Storage.SELF, e.pos, offset=variable.offset), t, e.pos), t, e.pos)
+    return Binary(BinaryOp.NE, slot, Const(0, t, e.pos), BOOL, e.pos)
+
+
+def _size(c: Checker, t: Type, node: ast.Call) -> Expr:
+    return Const(t.size, UNTYPED_INT, c.pos(node.pos))
+
+
+def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
+    """ADR(x), REF(x); of a constant, the address of a variable that holds it."""
+    constant = _constant_text(c, node)
+    if constant is not None and isinstance(constant.type, StringType):
+        return AddressOf(
+            VarPlace(c.world.text(constant), constant.type, constant.pos), kind(constant.type), constant.pos
+        )
+    place = named_place(c, node, "an address")
+    if place is None:
+        return error_value(c.pos(node.pos))
+    if isinstance(place, BitPlace):
+        return c.error(node.pos, "type", "a single bit has no address")
+    t = place.type.element if isinstance(place.type, OpenArrayType) else place.type
+    return AddressOf(place, kind(t), c.pos(node.pos))
+
+
+def _constant_text(c: Checker, node: ast.Expr) -> Const | None:
+    """The value of a text, or of a constant that is one; None for anything else."""
+    symbol: object = None
+    if isinstance(node, ast.Name):
+        symbol = c.scope.lookup(node.name)
+    elif isinstance(node, ast.Member):
+        space = space_of(c, node.base)
+        symbol = None if space is None else space.members.get(node.name.casefold())
+    elif not isinstance(node, ast.Literal) or node.kind not in (ast.LiteralKind.STRING, ast.LiteralKind.WSTRING):
+        return None
+    if isinstance(symbol, GlobalSymbol):
+        symbol = c.world.declared.variable(symbol)
+    if not isinstance(node, ast.Literal) and not (isinstance(symbol, VarSymbol) and symbol.value is not None):
+        return None
+    e = c.expr(node)
+    return e if isinstance(e, Const) and isinstance(e.type, StringType) else None
+
+
+def _string_size(c: Checker, f: Applied) -> Expr:
+    """`STRING_SIZE(text)`: the bytes of its variable."""
+    text = f.args[0]
+    if not isinstance(text.type, StringType):
+        return c.error(f.node.pos, "type", f"{f.name} needs a STRING, not {text.type}")
+    loaded = Load(place_of(text), text.type, text.pos)
+    return IntrinsicCall(Intrinsic.STRING_SIZE, [loaded], UDINT, c.pos(f.node.pos))
+
+
+def _bound(c: Checker, f: Applied) -> Expr:
+    """`LOWER_BOUND(array, dimension)`"""
+    array, dimension = f.args
+    if not isinstance(array.type, ArrayType):
+        return c.error(f.node.pos, "type", f"{f.name} needs an array, not {array.type}")
+    count = len(array.type.bounds)
+    number = dimension.value if isinstance(dimension, Const) else None
+    if not isinstance(number, int) or not 1 <= number <= count:
+        which = "the constant 1" if count == 1 else f"a constant from 1 to {count}"
+        return c.error(f.node.args[1].pos, "range", f"the dimension of {array.type} is {which}")
+    return bounds_of(place_of(array))[number - 1][f.name == "UPPER_BOUND"]
+
+
+_ON_VARIABLES: dict[str, BuiltIn] = {
+    "STRING_SIZE": BuiltIn(_string_size, 1, 1),
+    "LOWER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
+    "UPPER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
+}
+
+
+# ---- __QUERYINTERFACE, __QUERYPOINTER and ?= ----
+
+_INTERFACE, _POINTER = "an interface", "a pointer to a function block"
+QUERIES = {"__QUERYINTERFACE": _INTERFACE, "__QUERYPOINTER": _POINTER}
+"""The functions, and what each needs to know."""
+
+
+def query(c: Checker, node: ast.Call) -> Expr:
+    """`__QUERYINTERFACE(source, target)`: whether the instance is what the target may hold, which is then there."""
+    assert isinstance(node.callee, ast.Name)
+    name = node.callee.name.upper()
+    wanted = QUERIES[name]
+    args = [a.value for a in node.args if a.value is not None and a.name is None]
+    if len(node.args) != 2 or len(args) != 2:
+        return c.error(node.pos, "arguments", f"{name} takes 2 arguments: what is asked, and {wanted}")
+    target = changeable_place(c, args[1], f"the second argument of {name}", "take an address")
+    t = None if target is None else target.type
+    if t is not None and not (_takes_instances(c, t) and isinstance(t, InterfaceType) is (wanted == _INTERFACE)):
+        return c.error(args[1].pos, "type", f"the second argument of {name} is {wanted}, not {t}")
+    return _ask(c, name, args[0], target, c.pos(node.pos))
+
+
+def attempt(c: Checker, node: ast.Assign) -> list[Statement]:
+    """`target ?= source`: the target holds the instance of the source if it may, and else NULL."""
+    pos = c.pos(node.pos)
+    target = changeable_place(c, node.targets[0], "the left side of ?=", "take an address")
+    reference = target.pointer if isinstance(target, DerefPlace) else None
+    if isinstance(reference, Load) and isinstance(reference.type, ReferenceType):
+        target = reference.place
+    if target is not None and not _takes_instances(c, target.type):
+        wanted = f"{_INTERFACE}, a reference or {_POINTER}"
+        c.error(node.targets[0].pos, "type", f"the left side of ?= is {wanted}, not {target.type}; write :=")
+        return []
+    asked = _ask(c, "?=", node.value, target, pos)
+    return [CallStatement(asked, pos)] if isinstance(asked, Call) else []
+
+
+def _takes_instances(c: Checker, t: Type) -> bool:
+    return isinstance(t, PointerType) and c.world.class_of(t.target) is not None
+
+
+def _ask(c: Checker, name: str, node: ast.Expr, target: Place | None, pos: Pos) -> Expr:
+    """Whether the instance that `node` gives is what the target may hold, which is then there."""
+    source = c.expr(node)
+    if source.type is ERROR or target is None:
+        return error_value(pos)
+    if isinstance(source.type, StructType):
+        source = AddressOf(place_of(source), PointerType(source.type), source.pos)
+    cls = c.world.class_of(source.type.target) if isinstance(source.type, PointerType) else None
+    if cls is None or not isinstance(source.type, PointerType):
+        message = f"{name} asks an instance, an interface or a pointer to a function block, not {source.type}"
+        return c.error(node.pos, "type", message)
+    assert isinstance(target.type, PointerType)
+    function = c.world.dispatches.queries.function(cls, source.type, target.type, pos)
+    return Call(function, [source, target], BOOL, pos)
+
+
+# ---- calls by name ----
+
 _PLACES = ("__POUNAME", "__POSITION")
-_FUNCTIONS = operator_functions.FUNCTIONS | intrinsics.FUNCTIONS | variable_questions.FUNCTIONS
+_FUNCTIONS = intrinsics.FUNCTIONS | _ON_VARIABLES
 
 
 def built_in_call(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
     """The call of a built-in function; None when there is none of that name."""
-    if name in variable_questions.OF_VARIABLES:
-        return variable_questions.of_variable(c, name, node)
+    if name in _OF_VARIABLES:
+        return of_variable(c, name, node)
     if name in _PLACES:
         return _place(c, name, node)
     function = _FUNCTIONS.get(name)
@@ -56,7 +268,7 @@ def function_hint(c: Checker, name: str) -> str:
     return (
         conversion_hint(c, name.upper())
         or did_you_mean(name, c.world.names.function_names())
-        or did_you_mean(name, [*_FUNCTIONS, *variable_questions.OF_VARIABLES])
+        or did_you_mean(name, [*_FUNCTIONS, *_OF_VARIABLES])
     )
 
 
@@ -70,7 +282,7 @@ def _checked_arguments(
         if at is None or at in found or argument.value is None:
             c.error(argument.pos, "arguments", f"{name} has no parameter {argument.name or i + 1}")
             return None
-        hint = None if name in operator_functions.COMPARING else expected
+        hint = None if name in intrinsics.COMPARING else expected
         found[at] = c.expr(argument.value, BOOL if name == "SEL" and at == 0 else hint)
     if sorted(found) != list(range(len(found))):
         c.error(node.pos, "arguments", f"an argument of {name} is missing")

@@ -1,4 +1,4 @@
-"""Calls as statements, with EN and ENO.
+"""Calls as statements: of function block instances and of programs, and with EN and ENO.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -6,18 +6,223 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Callable, Container
+from dataclasses import dataclass, field, replace
 
 from plctool.compiler.semantics.checker import Checker, checks_statement
-from plctool.compiler.semantics.rules.arguments import parameter_names, split_enable
-from plctool.compiler.semantics.rules.block_calls import block_call, called_instance, program_call
-from plctool.compiler.semantics.rules.calls import call
-from plctool.compiler.semantics.rules.members import is_called_by_name
+from plctool.compiler.semantics.conversions import load, place_of, same_type, whole
+from plctool.compiler.semantics.generics import handed_bounds
+from plctool.compiler.semantics.rules.arguments import (
+    bind,
+    input_value,
+    named_function,
+    parameter_names,
+    referenced_place,
+    split_enable,
+)
+from plctool.compiler.semantics.rules.calls import body_dispatch, call
+from plctool.compiler.semantics.rules.members import bound_member, called_program, is_called_by_name, variable_value
 from plctool.compiler.semantics.rules.places import changeable_place
-from plctool.compiler.semantics.rules.qualified_names import called_program
-from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.semantics.symbols import ERROR, NOTHING, BlockInfo, GlobalSymbol, ProgramInfo, Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Assign, Call, CallStatement, Const, If, Statement
-from plctool.iec.types import BOOL, StructType
+from plctool.compiler.typed import (
+    Assign,
+    BitPlace,
+    Call,
+    CallStatement,
+    Const,
+    DerefPlace,
+    Direction,
+    Expr,
+    FbCall,
+    If,
+    Load,
+    MemberPlace,
+    Place,
+    Statement,
+    Unary,
+    UnaryOp,
+    Variable,
+)
+from plctool.iec.types import BOOL, StringType, StructType
+
+# ---- instances and programs ----
+
+
+@dataclass
+class _Arguments:
+    """What a call of a function block passes."""
+
+    inputs: list[tuple[Variable, Expr]] = field(default_factory=list)
+    in_outs: list[tuple[Variable, Place]] = field(default_factory=list)
+    outputs: list[tuple[Variable, Place]] = field(default_factory=list)
+    after: list[Statement] = field(default_factory=list)  # outputs that need a conversion
+
+
+def program_call(c: Checker, call: ast.Call, program: ProgramInfo) -> list[Statement]:
+    """`Prog(in := e, out => p)`: the inputs are assigned before, the outputs after."""
+    pos = c.pos(call.pos)
+    handed = program_arguments(c, call.args, program, call.pos)
+    if handed is None:
+        return []
+    c.world.calls.add(c.scope.pou, program.pou, pos)
+    before, behind = handed
+    return [*before, CallStatement(Call(program.pou, [], NOTHING, pos), pos), *behind]
+
+
+def program_arguments(
+    c: Checker, args: list[ast.Argument], program: ProgramInfo, offset: int
+) -> tuple[list[Statement], list[Statement]] | None:
+    """The assignments before and after a call; None after an error."""
+    names = [(symbol.name, direction) for symbol, direction in program.parameters]
+    bound = bind(c, args, names, program.name, offset)
+    if bound is None:
+        return None
+    before, behind, ok = list[Statement](), list[Statement](), True
+    for i, (symbol, direction) in enumerate(program.parameters):
+        if direction is Direction.IN_OUT and i not in bound:
+            c.error(offset, "arguments", f"the VAR_IN_OUT {symbol.name} of {program.name} is missing")
+            ok = False
+    for i, argument in bound.items():
+        (symbol, direction), pos = program.parameters[i], c.pos(argument.pos)
+        if argument.value is None or symbol.variable is None:
+            continue
+        own = variable_value(symbol, pos)
+        if direction is Direction.INPUT:
+            e = input_value(c, argument.value, symbol.type, symbol.name)
+            ok = ok and e.type is not ERROR
+            before.append(Assign(place_of(own), e, pos))
+            continue
+        if direction is Direction.IN_OUT:
+            e = input_value(c, argument.value, symbol.type, symbol.name)
+            ok = ok and e.type is not ERROR
+            before.append(Assign(whole(symbol.variable, pos), e, pos))
+            continue
+        taken = _taken(c, symbol.name, own, argument)
+        ok = ok and taken is not None
+        if taken is not None:
+            behind.append(taken)
+    return (before, behind) if ok else None
+
+
+def called_instance(c: Checker, call: ast.Call) -> Expr | None:
+    """The instance a call statement is about; None when it calls a function."""
+    callee = call.callee
+    if bound_member(c, callee, called=True) is not None or named_function(c, callee) is not None:
+        return None
+    if isinstance(callee, ast.Name):
+        symbol = c.scope.lookup(callee.name)
+        if symbol is None and callee.name.upper() == "SUPER" and c.scope.cls is not None:
+            return c.expr(ast.Deref(callee.pos, callee))
+        if not isinstance(symbol, VarSymbol | GlobalSymbol):
+            return None
+        if isinstance(symbol, VarSymbol) and symbol.role is Role.RESULT:
+            return None
+    e = c.expr(callee)
+    return e if (isinstance(e.type, StructType) and e.type in c.world.blocks) or e.type is ERROR else None
+
+
+def block_call(c: Checker, call: ast.Call, instance: Expr) -> list[Statement]:
+    """`fb(in := e, out => p)`"""
+    if not isinstance(instance.type, StructType):
+        for argument in call.args:
+            if argument.value is not None:
+                c.expr(argument.value)
+        return []
+    block = c.world.blocks[instance.type]
+    if block.cls is not None and ast.Modifier.CLASS in block.cls.symbol.decl.modifiers:
+        c.error(call.pos, "call", f"{block.type} is a CLASS and has no body; call one of its methods")
+        return []
+    names = [(p.variable.name, p.direction) for p in block.pou.parameters]
+    bound = bind(c, [_by_own_name(a, block) for a in call.args], names, block.type.name, call.pos)
+    if bound is None:
+        return []
+    place, pos = place_of(instance), c.pos(call.pos)
+    handed = _block_arguments(c, block, bound, call, place)
+    if handed is None:
+        return []
+    if not isinstance(place, DerefPlace):
+        c.world.calls.add(c.scope.pou, block.pou, pos)
+    statement = FbCall(block.pou, place, handed.inputs, handed.in_outs, handed.outputs, pos)
+    statement.dispatch = body_dispatch(c, block, place)
+    return [statement, *handed.after]
+
+
+def _block_arguments(
+    c: Checker, block: BlockInfo, bound: dict[int, ast.Argument], call: ast.Call, instance: Place
+) -> _Arguments | None:
+    handed, ok = _Arguments(), True
+    for i, parameter in enumerate(block.pou.parameters):
+        variable, argument = parameter.variable, bound.get(i)
+        if parameter.direction is Direction.IN_OUT:
+            place = _block_in_out(c, variable, argument, block, call)
+            ok = ok and place is not None
+            if place is not None:
+                handed.in_outs.append((variable, place))
+                handed.inputs += handed_bounds(variable, place, place.pos)
+        elif argument is None or argument.value is None:
+            continue
+        elif parameter.direction is Direction.INPUT:
+            e = input_value(c, argument.value, variable.type, variable.name)
+            ok = ok and e.type is not ERROR
+            handed.inputs.append((variable, e))
+        else:
+            ok = _block_output(c, variable, argument, instance, handed) and ok
+    return handed if ok else None
+
+
+def _block_in_out(
+    c: Checker, variable: Variable, argument: ast.Argument | None, block: BlockInfo, call: ast.Call
+) -> Place | None:
+    if argument is None or argument.value is None:
+        c.error(call.pos, "arguments", f"the VAR_IN_OUT {variable.name} of {block.type} is missing")
+        return None
+    name, constant = variable.name, block.members[variable.name.casefold()].constant
+    if constant and not isinstance(c.expr(argument.value), Load):
+        c.error(argument.pos, "place", f"the instance keeps the address of {name}, so it needs a variable")
+        return None
+    place = referenced_place(c, argument.value, variable.type, name, output=False, constant=constant)
+    if place is None or not isinstance(place.type, StringType) or not isinstance(variable.type, StringType):
+        return place
+    if place.type.length < variable.type.length:
+        c.error(argument.pos, "type", f"the VAR_IN_OUT {name} is {variable.type}, {place.type} is too short")
+        return None
+    return place
+
+
+def _block_output(c: Checker, variable: Variable, argument: ast.Argument, instance: Place, handed: _Arguments) -> bool:
+    """`q => target`; with another type or NOT it is an assignment after the call."""
+    value = load(MemberPlace(instance, variable.offset, variable.type, c.pos(argument.pos)))
+    taken = _taken(c, variable.name, value, argument)
+    if taken is None:
+        return False
+    target = taken.target
+    if same_type(target.type, variable.type) and not argument.negated and not isinstance(target, BitPlace):
+        handed.outputs.append((variable, target))
+    else:
+        handed.after.append(taken)
+    return True
+
+
+def _taken(c: Checker, name: str, value: Expr, argument: ast.Argument) -> Assign | None:
+    """The assignment of an output to what is given for it."""
+    assert argument.value is not None
+    what, pos = f"the output {name}", c.pos(argument.pos)
+    target = changeable_place(c, argument.value, what, f"take {what}")
+    if target is None:
+        return None
+    if argument.negated:
+        value = Unary(UnaryOp.NOT, c.coerce(value, BOOL), BOOL, pos)
+    value = c.coerce(value, target.type)
+    return None if value.type is ERROR else Assign(target, value, pos)
+
+
+def _by_own_name(argument: ast.Argument, block: BlockInfo) -> ast.Argument:
+    """With the name its parameter is declared by, for one that has two: RESET is R of a counter."""
+    symbol = block.members.get((argument.name or "").casefold())
+    return argument if symbol is None else replace(argument, name=symbol.name)
+
+
+# ---- EN and ENO ----
 
 
 @checks_statement(ast.ExprStmt)

@@ -8,16 +8,25 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 
-from plctool.compiler.semantics import dates
+from plctool.compiler.semantics import arithmetic
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import BITS, NUMBERS, SIGNED, UNSIGNED, convert, elementary, settle
-from plctool.compiler.semantics.divisions import lost_fraction
-from plctool.compiler.semantics.rules.enumeration_texts import value_name
+from plctool.compiler.semantics.conversions import (
+    BITS,
+    NUMBERS,
+    SIGNED,
+    UNSIGNED,
+    convert,
+    elementary,
+    is_untyped,
+    settle,
+)
+from plctool.compiler.semantics.pitfalls import lost_fraction
 from plctool.compiler.semantics.rules.library_calls import call_by_name
-from plctool.compiler.semantics.symbols import ERROR, TypeSymbol
-from plctool.compiler.semantics.values import is_untyped
+from plctool.compiler.semantics.symbols import ERROR, PouSymbol, TypeSymbol
+from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Const, Expr, Intrinsic, IntrinsicCall
+from plctool.compiler.syntax.parser import parse
+from plctool.compiler.typed import Call, Const, Expr, Intrinsic, IntrinsicCall
 from plctool.iec.types import (
     BOOL,
     DINT,
@@ -35,6 +44,48 @@ from plctool.iec.types import (
     SubrangeType,
     Type,
 )
+
+# ---- TO_STRING of an enumeration with {attribute 'to_string'} ----
+
+
+def value_name(c: Checker, e: Expr, offset: int) -> Expr:
+    """The name of a value, by a function made for its enumeration; the number of one without a name."""
+    t = e.type
+    assert isinstance(t, EnumType)
+    made = c.world.enumeration_texts
+    symbol = made.get(t)
+    if symbol is None:
+        symbol = made[t] = _function(t, len(made) + 1)
+    info = c.world.declared.function(symbol, {})
+    assert info is not None and info.result is not None
+    return Call(info.pou, [convert(e, t.base)], info.result, c.pos(offset))
+
+
+def _function(t: EnumType, number: int) -> PouSymbol:
+    """`CASE value OF 1: NAME := 'Run'; ...`"""
+    name, wide = f"VALUE_NAME_{number}__", "LINT" if t.base.signed else "ULINT"
+    first: dict[int, str] = {}
+    for value_name_, value in t.values.items():
+        first.setdefault(value, value_name_)
+    branches = "\n".join(f"{value}: {name} := '{written}';" for value, written in first.items())
+    text = f"""FUNCTION {name} : STRING
+VAR_INPUT value : {t.base}; END_VAR
+CASE value OF
+{branches}
+ELSE {name} := {wide}_TO_STRING({t.base}_TO_{wide}(value));
+END_CASE
+END_FUNCTION
+"""
+    (decl,) = parse(Source("stdlib/enumerations.st", text), _no_error)
+    assert isinstance(decl, ast.PouDecl)
+    return PouSymbol(decl, library=True)
+
+
+def _no_error(offset: int, code: str, message: str) -> None:
+    raise AssertionError(message)
+
+
+# ---- conversions by name ----
 
 _CONVERSION = re.compile(r"(?:ANY_|(?P<source>\w+?)_)?(?P<how>TO|TRUNC)_(?P<target>\w+)")
 _BITCAST = re.compile(r"(?P<source>[A-Z]+)_AS_(?P<target>[A-Z]+)")
@@ -255,8 +306,8 @@ def _scalar(e: Expr, source: Elementary, to: Elementary) -> Expr:
         e = convert(e, source)
     if source is to:
         return e
-    if source in dates.UNIT_NS and to in dates.UNIT_NS:
-        return dates.convert_date(e, to)
+    if source in arithmetic.UNIT_NS and to in arithmetic.UNIT_NS:
+        return arithmetic.convert_date(e, to)
     if to is BOOL:
         return convert(e, BOOL)
     if source.kind is Kind.REAL:

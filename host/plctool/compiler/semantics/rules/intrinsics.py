@@ -1,4 +1,5 @@
-"""Functions that become an instruction or a few: ABS, SQRT, SHL, SEL, MUX, MIN, TIME and their kin.
+"""Functions that become an instruction or a few: ABS, SQRT, SHL, SEL, MUX, MIN and their kin; operators as functions,
+`ADD(a, b, c)`; both also with a type, `ADD_INT(a, b)`.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -6,29 +7,170 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
-from plctool.compiler.semantics import constants
+from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, error_value, settle
-from plctool.compiler.semantics.rules.applied import Applied, BuiltIn, named
-from plctool.compiler.semantics.rules.common_types import common_of, untyped_bits
+from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, error_value, is_untyped, load, settle
 from plctool.compiler.semantics.rules.library_calls import call_by_name
+from plctool.compiler.semantics.rules.literals import common_of, untyped_bits
+from plctool.compiler.semantics.rules.operators import fold_unary, operate
 from plctool.compiler.semantics.symbols import ERROR
-from plctool.compiler.semantics.values import is_untyped, load
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Const, Expr, Intrinsic, IntrinsicCall, VarPlace
-from plctool.iec.types import (
-    BOOL,
-    DINT,
-    ELEMENTARY,
-    LINT,
-    LREAL,
-    REAL,
-    Kind,
-    StringType,
-    Type,
-    is_scalar,
-)
+from plctool.compiler.typed import BinaryOp, Const, Expr, Intrinsic, IntrinsicCall, UnaryOp, VarPlace
+from plctool.iec.types import BOOL, DINT, ELEMENTARY, LINT, LREAL, REAL, Kind, StringType, Type, is_scalar
+
+# ---- what every function that is built in is ----
+
+
+@dataclass(frozen=True)
+class Applied:
+    """A function with its checked arguments, none of which is wrong."""
+
+    name: str
+    args: list[Expr]
+    node: ast.Call
+    expected: Type | None
+
+
+def _numbered(key: str) -> int | None:
+    """IN, or IN1, IN2 ..."""
+    if key == "IN":
+        return 0
+    return int(key[2:]) - 1 if re.fullmatch(r"IN[1-9]\d{0,2}", key) else None
+
+
+@dataclass(frozen=True)
+class BuiltIn:
+    """What a function becomes, how many arguments it takes (`most` is None when there is no limit), and which of them
+    a name in capitals stands for."""
+
+    rule: Callable[[Checker, Applied], Expr]
+    least: int
+    most: int | None = None
+    index_of: Callable[[str], int | None] = _numbered
+
+    def takes(self, count: int) -> bool:
+        """Whether the number of arguments is right."""
+        return self.least <= count and (self.most is None or count <= self.most)
+
+    @property
+    def needs(self) -> str:
+        """The number of arguments in words."""
+        if self.most is None:
+            return f"at least {self.least} arguments"
+        return "1 argument" if self.least == 1 else f"{self.least} arguments"
+
+
+def named(*names: str) -> Callable[[str], int | None]:
+    """The arguments have these names."""
+    return lambda key: names.index(key) if key in names else None
+
+
+# ---- `ADD_INT(a, b)` is ADD for arguments that are INT ----
+
+_OF_ONE_TYPE = (
+    "ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "ATAN2", "ADD", "SUB", "MUL", "DIV",
+    "MOD", "MOVE", "AND", "OR", "XOR", "NOT", "MIN", "MAX", "LIMIT", "GT", "GE", "EQ", "LE", "LT", "NE", "LEN",
+    "CONCAT", "FIND",
+)  # fmt: skip
+_OTHER_ARGUMENTS: dict[str, tuple[int | str, ...]] = {
+    **dict.fromkeys(_OF_ONE_TYPE, ()),
+    **dict.fromkeys(("SHL", "SHR", "ROL", "ROR"), (1, "N")),
+    "SEL": (0, "G"), "MUX": (0, "K"), "EXPT": (1, "IN2"),
+    "LEFT": (1, "L"), "RIGHT": (1, "L"), "MID": (1, 2, "L", "P"), "DELETE": (1, 2, "L", "P"), "INSERT": (2, "P"),
+    "REPLACE": (2, 3, "L", "P"),
+}  # fmt: skip
+"""The overloaded functions, and which of their arguments have a type of their own: by place and by name."""
+
+
+def overloaded_form(node: ast.Call) -> ast.Call | None:
+    """`ADD(INT_TO_INT(a), INT_TO_INT(b))` for `ADD_INT(a, b)`; None when the name is none of these."""
+    if not isinstance(node.callee, ast.Name):
+        return None
+    name, _, type_name = node.callee.name.upper().partition("_")
+    if name not in _OTHER_ARGUMENTS or type_name not in (*ELEMENTARY, "STRING", "WSTRING"):
+        return None
+    others = _OTHER_ARGUMENTS[name]
+    args = [
+        argument if i in others or (argument.name or "").upper() in others else _of_type(argument, type_name)
+        for i, argument in enumerate(node.args)
+    ]
+    return replace(node, callee=replace(node.callee, name=name), args=args)
+
+
+def _of_type(argument: ast.Argument, type_name: str) -> ast.Argument:
+    """The argument, converted as an assignment to a variable of the type would."""
+    value = argument.value
+    if value is None or argument.output:
+        return argument
+    conversion = ast.Name(value.pos, f"{type_name}_TO_{type_name}")
+    return replace(argument, value=ast.Call(value.pos, conversion, [ast.Argument(value.pos, None, value)]))
+
+
+# ---- operators as functions ----
+
+_FOLDED = {
+    "ADD": BinaryOp.ADD, "MUL": BinaryOp.MUL, "AND": BinaryOp.AND, "OR": BinaryOp.OR, "XOR": BinaryOp.XOR,
+}  # fmt: skip
+_PAIRS = {"SUB": BinaryOp.SUB, "DIV": BinaryOp.DIV, "MOD": BinaryOp.MOD, "NE": BinaryOp.NE}
+_CHAINS = {"GT": BinaryOp.GT, "GE": BinaryOp.GE, "EQ": BinaryOp.EQ, "LE": BinaryOp.LE, "LT": BinaryOp.LT}
+
+
+def _folded(c: Checker, f: Applied) -> Expr:
+    result = f.args[0]
+    for argument in f.args[1:]:
+        result = operate(c, _FOLDED[f.name], result, argument, f.node.pos, f.expected)
+    return result
+
+
+def _pair(c: Checker, f: Applied) -> Expr:
+    return operate(c, _PAIRS[f.name], f.args[0], f.args[1], f.node.pos, f.expected)
+
+
+def _chain(c: Checker, f: Applied) -> Expr:
+    """`GT(a, b, c)` is `a > b AND b > c`."""
+    result = operate(c, _CHAINS[f.name], f.args[0], f.args[1], f.node.pos)
+    for left, right in pairwise(f.args[1:]):
+        more = operate(c, _CHAINS[f.name], left, right, f.node.pos)
+        result = operate(c, BinaryOp.AND, result, more, f.node.pos)
+    return result
+
+
+def _not(c: Checker, f: Applied) -> Expr:
+    e = settle(f.args[0], f.expected)
+    base = elementary(e.type)
+    if base is None or not (base is BOOL or base.kind in NUMBERS):
+        return c.error(f.node.pos, "type", f"NOT needs a BOOL or a bit string, not {e.type}")
+    return fold_unary(c, UnaryOp.NOT, convert(e, base), f.node.pos)
+
+
+def _moved(c: Checker, f: Applied) -> Expr:
+    return f.args[0]
+
+
+def _dated(c: Checker, f: Applied) -> Expr:
+    """`ADD_DT_TIME(a, b)` and its kin."""
+    op, first, second = arithmetic.FUNCTIONS[f.name]
+    right = f.args[1] if second is None else c.coerce(f.args[1], second)
+    return operate(c, op, c.coerce(f.args[0], first), right, f.node.pos, f.expected)
+
+
+_OPERATORS: dict[str, BuiltIn] = {
+    **dict.fromkeys(_FOLDED, BuiltIn(_folded, 2)),
+    **dict.fromkeys(_PAIRS, BuiltIn(_pair, 2, 2)),
+    **dict.fromkeys(_CHAINS, BuiltIn(_chain, 2)),
+    **dict.fromkeys(arithmetic.FUNCTIONS, BuiltIn(_dated, 2, 2)),
+    "NOT": BuiltIn(_not, 1, 1),
+    "MOVE": BuiltIn(_moved, 1, 1),
+}
+COMPARING = frozenset((*_CHAINS, "NE"))
+"""Those whose result says nothing of the type of their arguments."""
+
+
+# ---- a few instructions ----
 
 _SHIFTS = {"SHL": Intrinsic.SHL, "SHR": Intrinsic.SHR, "ROL": Intrinsic.ROL, "ROR": Intrinsic.ROR}
 
@@ -133,6 +275,7 @@ def _time(c: Checker, f: Applied) -> Expr:
 
 
 FUNCTIONS: dict[str, BuiltIn] = {
+    **_OPERATORS,
     **dict.fromkeys(_SHIFTS, BuiltIn(_shift, 2, 2, named("IN", "N"))),
     "ABS": BuiltIn(_abs, 1, 1),
     "SQRT": BuiltIn(_sqrt, 1, 1),

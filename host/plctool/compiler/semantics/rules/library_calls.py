@@ -8,22 +8,21 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from plctool.compiler.semantics.any_values import describes_any
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import common_type, elementary, error_value, settle
+from plctool.compiler.semantics.conversions import common_type, elementary, error_value, is_untyped, settle
 from plctool.compiler.semantics.generics import (
     LIBRARY_STRING,
     WIDE_LIBRARY_STRING,
     accepts,
+    describes_any,
     first_of,
     group_name,
     is_generic,
     is_group,
 )
 from plctool.compiler.semantics.rules.arguments import Actual, arguments_text, bind, parameter_lines, typed_call
-from plctool.compiler.semantics.rules.common_types import common_of
+from plctool.compiler.semantics.rules.literals import common_of
 from plctool.compiler.semantics.symbols import ERROR, PouSymbol
-from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Direction, Expr
 from plctool.iec.types import LREAL, REAL, WCHAR, StringType, Type

@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.semantics import constants, dates, pointers
+from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import (
     BITS,
@@ -17,13 +17,13 @@ from plctool.compiler.semantics.conversions import (
     convert,
     elementary,
     error_value,
+    is_untyped,
     scaled,
 )
-from plctool.compiler.semantics.rules.common_types import match_literals, untyped_bits
+from plctool.compiler.semantics.pitfalls import always
 from plctool.compiler.semantics.rules.library_calls import call_by_name
+from plctool.compiler.semantics.rules.literals import match_literals, untyped_bits
 from plctool.compiler.semantics.symbols import ERROR, UNTYPED_INT, UNTYPED_REAL
-from plctool.compiler.semantics.type_limits import always
-from plctool.compiler.semantics.values import is_untyped
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Binary, BinaryOp, Const, Expr, Unary, UnaryOp
 from plctool.iec.types import (
@@ -102,11 +102,11 @@ def operate(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int, expe
     """`left op right` with implicit conversions, folded when both are constant."""
     if left.type is ERROR or right.type is ERROR:
         return error_value(c.pos(offset))
-    if pointers.is_address(left) or pointers.is_address(right):
-        moved = pointers.moved(op, left, right, c.pos(offset))
+    if arithmetic.is_address(left) or arithmetic.is_address(right):
+        moved = arithmetic.moved(op, left, right, c.pos(offset))
         if moved is not None:
             return moved
-        left, right = pointers.as_number(left), pointers.as_number(right)
+        left, right = arithmetic.as_number(left), arithmetic.as_number(right)
     if op in _COMPARISONS:
         return _compare(c, op, left, right, offset)
     if op in _LAZY:
@@ -179,27 +179,27 @@ def _date_arithmetic(
         return None
     if op is BinaryOp.ADD and x.kind is Kind.TIME:
         left, right, x, y = right, left, y, x
-    if op is BinaryOp.SUB and dates.same_meaning(x, y):
+    if op is BinaryOp.SUB and arithmetic.same_meaning(x, y):
         t = common_type(x, y)
         assert isinstance(t, Elementary)
         difference = _build(c, op, c.coerce(left, t), c.coerce(right, t), t, offset)
         result = LTIME if t.bits == 64 or expected is LTIME else TIME
         amount = convert(convert(difference, SIGNED[t.bits]), result)
-        factor = dates.UNIT_NS[t] // dates.UNIT_NS[result]
+        factor = arithmetic.UNIT_NS[t] // arithmetic.UNIT_NS[result]
         return amount if factor == 1 else scaled(amount, BinaryOp.MUL, factor)
     if y.kind is Kind.TIME and x.kind is Kind.DATE and op in (BinaryOp.ADD, BinaryOp.SUB):
-        if dates.same_meaning(x, TOD):
+        if arithmetic.same_meaning(x, TOD):
             return _move_clock(c, op, left, right, x, offset)
-        if dates.same_meaning(x, DT):
-            return _build(c, op, left, dates.rescale(right, x), x, offset)
+        if arithmetic.same_meaning(x, DT):
+            return _build(c, op, left, arithmetic.rescale(right, x), x, offset)
     return c.error(offset, "type", f"{op.value} cannot combine {left.type} and {right.type}")
 
 
 def _move_clock(c: Checker, op: BinaryOp, left: Expr, right: Expr, t: Elementary, offset: int) -> Expr:
     """A time of day plus or minus a duration: it stays within the day."""
-    number, day = SIGNED[t.bits], dates.day(t)
-    moved = scaled(right, BinaryOp.MOD, dates.day(right.type))
-    moved = convert(dates.rescale(moved, LTIME if t.bits == 64 else TIME), number)
+    number, day = SIGNED[t.bits], arithmetic.day(t)
+    moved = scaled(right, BinaryOp.MOD, arithmetic.day(right.type))
+    moved = convert(arithmetic.rescale(moved, LTIME if t.bits == 64 else TIME), number)
     total = _build(c, op, convert(left, number), moved, number, offset)
     return convert(scaled(scaled(total, BinaryOp.ADD, day), BinaryOp.MOD, day), t)
 

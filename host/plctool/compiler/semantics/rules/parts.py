@@ -6,15 +6,22 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.diagnostics import did_you_mean
-from plctool.compiler.semantics import constants, pointers
+from plctool.compiler.semantics import arithmetic, constants
 from plctool.compiler.semantics.checker import Checker, checks
-from plctool.compiler.semantics.conversions import NUMBERS, convert, elementary, error_value, literal_type
-from plctool.compiler.semantics.open_arrays import bounds_of
-from plctool.compiler.semantics.rules.access import may_see
-from plctool.compiler.semantics.rules.methods import property_of
-from plctool.compiler.semantics.rules.qualified_names import variable_value
+from plctool.compiler.semantics.conversions import (
+    NUMBERS,
+    convert,
+    elementary,
+    error_value,
+    is_untyped,
+    literal_type,
+    load,
+    place_of,
+)
+from plctool.compiler.semantics.generics import bounds_of
+from plctool.compiler.semantics.rules.calls import property_of
+from plctool.compiler.semantics.rules.members import may_see, variable_value
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, GlobalSymbol, Role, VarSymbol
-from plctool.compiler.semantics.values import is_untyped, load, place_of
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     AddressOf,
@@ -163,7 +170,7 @@ def indexed(c: Checker, node: ast.Index, expected: Type | None) -> Expr:
         if isinstance(t, StringType):
             base, indices = _character(c, base, indices), []
             continue
-        if pointers.is_address(base):
+        if arithmetic.is_address(base):
             base, indices = _pointed(c, base, indices[0]), indices[1:]
             continue
         if not isinstance(t, ArrayType):
@@ -196,7 +203,7 @@ def _pointed(c: Checker, pointer: Expr, node: ast.Expr) -> Expr:
     index = _subscript(c, node)
     if index.type is ERROR:
         return index
-    address = pointers.element(pointer, index, c.pos(node.pos))
+    address = arithmetic.element(pointer, index, c.pos(node.pos))
     assert isinstance(address.type, PointerType)
     return load(DerefPlace(address, address.type.target, c.pos(node.pos)))
 

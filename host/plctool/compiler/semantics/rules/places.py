@@ -6,11 +6,9 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.rules.access import is_inside
-from plctool.compiler.semantics.rules.members import Bound, bound_member
-from plctool.compiler.semantics.rules.qualified_names import space_of
+from plctool.compiler.semantics.conversions import is_exact, is_temporary, place_of
+from plctool.compiler.semantics.rules.members import Bound, bound_member, is_inside, space_of
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
-from plctool.compiler.semantics.values import is_exact, is_temporary, place_of
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import AddressOf, DerefPlace, Expr, Load, Place, SelfPlace
 from plctool.iec.types import StructType

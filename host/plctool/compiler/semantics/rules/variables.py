@@ -1,4 +1,4 @@
-"""Names as values: variables, constants, enumerations, THIS and SUPER.
+"""Names as values: variables, constants, enumerations, THIS and SUPER, the flags of actions in charts.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -8,22 +8,24 @@ from __future__ import annotations
 import re
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.semantics import sfc
 from plctool.compiler.semantics.checker import Checker, checks
-from plctool.compiler.semantics.conversions import error_value
-from plctool.compiler.semantics.rules.chart_flags import action_flag
-from plctool.compiler.semantics.rules.members import bound_member, own_member
-from plctool.compiler.semantics.rules.methods import property_value
-from plctool.compiler.semantics.rules.parts import member_of
-from plctool.compiler.semantics.rules.qualified_names import (
+from plctool.compiler.semantics.conversions import error_value, load
+from plctool.compiler.semantics.rules.calls import property_value
+from plctool.compiler.semantics.rules.members import (
+    bound_member,
     describe,
     is_namespace,
     namespace_member,
+    own_member,
     qualified,
     space_of,
     variable_value,
 )
+from plctool.compiler.semantics.rules.parts import member_of
 from plctool.compiler.semantics.symbols import (
     ERROR,
+    ClassInfo,
     GlobalSymbol,
     MemberSymbol,
     Namespace,
@@ -34,8 +36,49 @@ from plctool.compiler.semantics.symbols import (
 )
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import NAMES
-from plctool.compiler.typed import AddressOf, Const, Expr, SelfPlace
-from plctool.iec.types import EnumType, PointerType, Type
+from plctool.compiler.typed import AddressOf, Const, Expr, MemberPlace, Place, SelfPlace
+from plctool.iec.types import EnumType, PointerType, StructType, Type
+
+# ---- the flags of actions in charts: `action.Q` and `action.A` ----
+
+
+def action_flag(c: Checker, node: ast.Member) -> Expr | None:
+    """`action.Q` and `action.A` of a Sequential Function Chart, also from outside: whether the action is active,
+    and whether it runs, which it does once more after that."""
+    if node.name.upper() not in ("Q", "A"):
+        return None
+    bound = bound_member(c, node.base)
+    member = None if bound is None else bound.callable
+    if bound is None or member is None or member.decl.keyword != "ACTION":
+        return None
+    flag = _flag_symbol(bound.cls, bound.key)
+    if flag is None or flag.variable is None:
+        message = f"{member.name} has no {node.name}: no step of a chart has it as its action"
+        return c.error(node.name_pos, "unknown", message)
+    pos = c.pos(node.pos)
+    e = variable_value(flag, pos)
+    if isinstance(bound.place, Place) and not isinstance(node.base, ast.Name):
+        e = load(MemberPlace(bound.place, flag.variable.offset, flag.type, pos))
+    if isinstance(e.type, StructType):
+        return member_of(c, e, node)
+    if node.name.upper() == "A":
+        return c.error(node.name_pos, "unknown", f"from outside only {member.name}.Q is known, not its A")
+    return e
+
+
+def _flag_symbol(cls: ClassInfo | None, action: str) -> VarSymbol | None:
+    """The hidden variable of an action."""
+    while cls is not None:
+        for part in (p for p in (cls.symbol.decl, *cls.symbol.decl.members) if p.chart is not None):
+            own = cls.names if part is cls.symbol.decl else cls.instance_variables.get(part.name.casefold(), {})
+            symbol = own.get(sfc.hidden_name(part, action).casefold())
+            if isinstance(symbol, VarSymbol):
+                return symbol
+        cls = cls.base
+    return None
+
+
+# ---- variables, constants, enumerations, THIS and SUPER ----
 
 _OWN = ("THIS", "SUPER")
 _DURATION = re.compile(r"T_?(\d+(?:ms|us|ns|s|m|h|d))", re.IGNORECASE)

@@ -1,0 +1,362 @@
+"""The variables that channels of inputs and outputs lead to.
+
+A variable of a program, or a global one, that a channel names lives in the inputs or outputs, as if it had AT: where is
+decided when the whole program is known (`io/layout.py`). A part of a variable, or of an instance, that a channel names
+is copied by the task, as VAR_CONFIG does it.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from plctool.compiler.diagnostics import Diagnostics, did_you_mean
+from plctool.compiler.semantics.allocation import Allocation
+from plctool.compiler.semantics.names import Names
+from plctool.compiler.semantics.symbols import GlobalSymbol
+from plctool.compiler.source import Piece, Source
+from plctool.compiler.syntax import ast
+from plctool.compiler.typed import Pos, Pou, Storage, Task, Variable
+from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.errors import UsageError
+from plctool.iec.addresses import parse_address
+from plctool.iec.areas import Area
+from plctool.iec.literals import LiteralKind
+from plctool.iec.types import Elementary, Kind, Type, base_of
+from plctool.iec.values import encode
+from plctool.io.layout import lay_out
+from plctool.io.mistakes import CODE, Mistakes
+from plctool.io.model import VALUE, Channel, Connector, Description, bits_of, holds_bools
+
+DEVICE_TYPE = "IO_DEVICE"
+_LIST = "Devices"  # the list of globals in which the variables of devices are
+_PART = re.compile(r"[A-Za-z_]\w*|\[[^\]]*\]", re.ASCII)
+
+
+def report(mistakes: Mistakes, diagnostics: Diagnostics) -> None:
+    """Reports what was found since the last call."""
+    found, mistakes.found[:] = mistakes.found[:], []
+    for mistake in found:
+        if mistake.severity == "error":
+            diagnostics.error(mistake.pos, CODE, mistake.message)
+        else:
+            diagnostics.warning(mistake.pos, "io", mistake.message)
+
+
+def device_variables(description: Description, declared: Iterable[str]) -> Source | None:
+    """A list of globals with the IO_DEVICE of each device that has a name, but for those that the program has
+    `declared` itself (names in small letters)."""
+    devices = [c for c in description.connectors if c.variable and c.name.casefold() not in declared]
+    if not devices:
+        return None
+    text, pieces = "VAR_GLOBAL ", [Piece(0, devices[0].pos.line, devices[0].pos.column, copied=False)]
+    for connector in devices:
+        pieces.append(Piece(len(text), connector.pos.line, connector.pos.column, copied=False))
+        text += f"{connector.name} : {DEVICE_TYPE}; "
+    path = description.path
+    return Source(path, f"{text}END_VAR", _LIST, original=description.texts[path], pieces=tuple(pieces))
+
+
+class IoChannels:
+    """What a description says of the variables of a program; without one it says nothing."""
+
+    def __init__(self, description: Description | None = None) -> None:
+        self.description = description
+        self._channels: dict[str, Channel] = {}  # by the full name of what they lead to, case-folded
+        self.variables: dict[str, Variable] = {}  # that have become inputs or outputs, by full name case-folded
+
+    @property
+    def readable(self) -> bool:
+        """Whether anything can be said of inputs and outputs."""
+        return self.description is None or self.description.readable
+
+    # ---- while variables are declared ----
+
+    def begin(self, names: Names, diagnostics: Diagnostics) -> None:
+        """Finds out what the targets are called in full, when all names are known. Declares the programs they are
+        in."""
+        if self.description is None:
+            return
+        report(self.description.mistakes, diagnostics)
+        for _, channel in self.description.channels:
+            if channel.target.startswith("%"):
+                continue
+            channel.variable = _full_name(channel.target, names)
+            first = self._channels.setdefault(channel.variable.casefold(), channel)
+            if first is not channel:
+                where = _where(first.pos, channel.pos)
+                message = f"{channel.target} belongs to the channel {first.name} {where} already"
+                diagnostics.error(channel.pos, CODE, message)
+        for key in {name.partition(".")[0] for name in self._channels} & names.planned.keys():
+            names.instance(key)
+
+    def area(self, name: str) -> Area | None:
+        """Where the variable with this full name lives because a channel names it; None if none does."""
+        channel = self._channels.get(name.casefold())
+        return None if channel is None else _area(channel)
+
+    def claims(self, letter: str, names: Sequence[str], diagnostics: Diagnostics) -> bool:
+        """Whether a channel leads to a variable that is declared AT %I* or the like (`letter`) under these names."""
+        channel = next((c for n in names if (c := self._channels.get(n.casefold())) is not None), None)
+        if channel is None:
+            return False
+        if letter != _letter(channel):
+            message = f"{names[0]} is declared AT %{letter}*, but the channel {channel.name} is an {_kind(channel)}"
+            diagnostics.error(channel.pos, CODE, message)
+        return True
+
+    # ---- parts of variables ----
+
+    def parts(self, variables: Iterable[Variable]) -> list[Channel]:
+        """The channels that lead to no whole variable."""
+        self.variables = {v.name.casefold(): v for v in variables if v.storage is Storage.AREA}
+        return [c for key, c in self._channels.items() if key not in self.variables]
+
+    def source(self) -> Source:
+        """The description as a source, so that what is wrong with a name is reported where it stands."""
+        assert self.description is not None
+        return Source(self.description.path, self.description.texts[self.description.path])
+
+    def path(self, channel: Channel, source: Source) -> ast.Expr:
+        """The name of a channel's target as the program would write it."""
+        at = source.line_starts[channel.pos.line - 1] + channel.pos.column  # after the quote
+        path: ast.Expr | None = None
+        for match in _PART.finditer(channel.target):
+            text, offset = match.group(), at + match.start()
+            if path is None:
+                path = ast.Name(offset, text)
+            elif text.startswith("["):
+                indices: list[ast.Expr] = [_index(offset, i) for i in text[1:-1].split(",")]
+                path = ast.Index(at, path, indices)
+            else:
+                path = ast.Member(at, path, text, offset)
+        assert path is not None
+        return path
+
+    def place(self, channel: Channel, t: Type, allocation: Allocation) -> Variable:
+        """The input or output that is copied to or from what the channel names."""
+        variable = Variable(channel.target, t, Storage.AREA, channel.pos, _area(channel))
+        variable.shared_output = True  # a global instance is copied by every task
+        self.variables[channel.variable.casefold()] = variable
+        allocation.add(variable)
+        return variable
+
+    # ---- when all is known ----
+
+    def finish(self, allocation: Allocation, tasks: Sequence[Task] | None, diagnostics: Diagnostics) -> None:
+        """Gives the variables their addresses, and the channels type and place. `tasks`: None for unit tests, which
+        have none of the program's."""
+        if self.description is None or diagnostics.errors:
+            return
+        if tasks is not None:
+            _check_tasks(self.description, [task.name for task in tasks], diagnostics)
+        for _, channel in self.description.channels:
+            if channel.target.startswith("%"):
+                self._reserve(channel, allocation)
+        for area in (Area.INPUT, Area.OUTPUT):
+            open_ones = {v.name: v for v in allocation.variables if v.area is area and v.offset < 0}
+            if open_ones:
+                places = lay_out({name: v.type for name, v in open_ones.items()}, allocation.sizes[area])
+                for name, offset in places.items():
+                    open_ones[name].offset = offset
+                    allocation.sizes[area] = max(allocation.sizes[area], offset + open_ones[name].type.size)
+        for connector, channel in self.description.channels:
+            self._settle(connector, channel, diagnostics)
+        if not diagnostics.errors:
+            self._finish_devices(allocation, diagnostics)
+
+    @staticmethod
+    def _reserve(channel: Channel, allocation: Allocation) -> None:
+        """The area goes as far as a channel without a variable does."""
+        address = parse_address(channel.target)
+        assert address is not None
+        end = address.offset + max(1, (channel.bits or address.type.bits) // 8)
+        allocation.sizes[address.area] = max(allocation.sizes[address.area], end)
+
+    def _settle(self, connector: Connector, channel: Channel, diagnostics: Diagnostics) -> None:
+        if channel.target.startswith("%"):
+            address = parse_address(channel.target)
+            assert address is not None
+            channel.variable_type = address.type
+            channel.area_bit = address.offset * 8 + address.bit
+        else:
+            variable = self.variables[channel.variable.casefold()]
+            if variable.area is not _area(channel):
+                diagnostics.error(channel.pos, CODE, _misplaced(channel, variable))
+                return
+            channel.variable_type = variable.type
+            channel.area_bit = variable.offset * 8 + (variable.bit or 0)
+        problem = _misfit(connector, channel) or _bad_substitute(channel)
+        if problem:
+            diagnostics.error(channel.pos, CODE, problem)
+
+    def _finish_devices(self, allocation: Allocation, diagnostics: Diagnostics) -> None:
+        assert self.description is not None
+        devices = {v.name.rpartition(".")[2].casefold(): v for v in allocation.variables if v.type.name == DEVICE_TYPE}
+        for connector in self.description.connectors:
+            variable = devices.get(connector.name.casefold())
+            if connector.variable and variable is None:
+                message = f"the program has a variable {connector.name} already; declare it as {DEVICE_TYPE}"
+                diagnostics.error(connector.pos, CODE, f"{message}, or give the device another name")
+            elif connector.variable and variable is not None:
+                connector.state_offset = variable.offset
+            connector.complete(self.description.mistakes)
+        report(self.description.mistakes, diagnostics)
+        _report_double_use(self.description, diagnostics)
+        _check_limits(self.description, allocation, diagnostics)
+
+    def report_written_inputs(self, pous: Iterable[Pou], diagnostics: Diagnostics) -> None:
+        """Warns of inputs that the program writes: the next cycle overwrites them."""
+        if self.description is None:
+            return
+        inputs = sorted(
+            ((c.area_bit, c.area_bit + c.size_bits, c) for _, c in self.description.channels if not c.output),
+            key=lambda i: i[0],
+        )
+        reported = set[Variable]()
+        for place in (place for pou in pous for node in walk(pou.body) for place in written_places(node)):
+            root = root_of(place)
+            if root is None or root.storage is not Storage.AREA or root.area is not Area.INPUT or root in reported:
+                continue
+            first = root.offset * 8 + (root.bit or 0)
+            end = first + (1 if root.bit is not None else root.type.size * 8)
+            channel = next((c for start, stop, c in inputs if start < end and first < stop), None)
+            if channel is not None:
+                reported.add(root)
+                message = f"{root.name} is the input {channel.name}: the next cycle overwrites what is written here"
+                diagnostics.warning(place.pos, "written-input", message)
+
+
+# ---- questions -----------------------------------------------------------------------------------------------------
+
+
+def _area(channel: Channel) -> Area:
+    return Area.OUTPUT if channel.output else Area.INPUT
+
+
+def _letter(channel: Channel) -> str:
+    return "Q" if channel.output else "I"
+
+
+def _kind(channel: Channel) -> str:
+    return "output" if channel.output else "input"
+
+
+def _full_name(target: str, names: Names) -> str:
+    """`GVL.x` for `x`, if that is what the program calls it."""
+    first, dot, rest = target.partition(".")
+    if not dot:
+        symbol = names.global_named(first.casefold())
+        return target if symbol is None else symbol.full_name
+    members = names.own_list(first.casefold())
+    listed = members.members.get(rest.casefold()) if members is not None else None
+    return listed.full_name if isinstance(listed, GlobalSymbol) else target
+
+
+def _index(offset: int, text: str) -> ast.Expr:
+    number = int(text)
+    literal: ast.Expr = ast.Literal(offset, LiteralKind.INT, abs(number))
+    return literal if number >= 0 else ast.Unary(offset, "-", literal)
+
+
+def _where(first: Pos, pos: Pos) -> str:
+    return f"in line {first.line}" if first.file == pos.file else f"in {first.file}:{first.line}"
+
+
+def _misplaced(channel: Channel, variable: Variable) -> str:
+    """Why a variable is not where its channel needs it."""
+    name = channel.target
+    if variable.constant:
+        return f"{name} is a constant; name a variable"
+    if variable.keep.kept or variable.area is Area.RETAIN:
+        return f"{name} is kept over a restart, which an {_kind(channel)} is not; copy it in the program"
+    if variable.area is Area.DATA:
+        return f"{name} is {variable.type}, which cannot be an {_kind(channel)}; name a variable in it"
+    return f"{name} is at an address of the {variable.area.name.lower()}s, but {channel.name} is an {_kind(channel)}"
+
+
+def _misfit(connector: Connector, channel: Channel) -> str:
+    """Why a variable cannot be at a channel; "" if it can."""
+    t, wanted = channel.variable_type, channel.type
+    assert t is not None
+    name = f"{connector.name}.{channel.name}"
+    if channel.bits is not None and (bits_of(t) != channel.bits or holds_bools(t)):
+        has = f"{channel.bits} bits" if wanted is None else f"{wanted}"
+        return f"{channel.target} is {t}, but {name} is {has}{_fitting(channel)}"
+    base, other = base_of(t), base_of(wanted) if wanted is not None else None
+    if isinstance(base, Elementary) and isinstance(other, Elementary) and not _same_kind(base, other):
+        return f"{channel.target} is {t}, but {name} is {wanted}: declare it as {wanted}"
+    return ""
+
+
+def _bad_substitute(channel: Channel) -> str:
+    """What is wrong with `on_stop` or `on_error`; "" for nothing."""
+    given = channel.substitute
+    if given.what != VALUE:
+        return ""
+    assert channel.variable_type is not None
+    key = "on_stop" if channel.output else "on_error"
+    try:
+        data = encode(channel.variable_type, given.value)
+    except UsageError as error:
+        return f"{key}: {error.message}"
+    if any(data[4:]):
+        return f'{key} can be "hold", "zero" or a value of at most 32 bits, not {given.value}'
+    return ""
+
+
+def _fitting(channel: Channel) -> str:
+    if channel.type is not None:
+        return f": declare it as {channel.type}" if not channel.target.startswith("%") else ""
+    return ""
+
+
+def _same_kind(one: Elementary, other: Elementary) -> bool:
+    """Whether values mean the same: WORD goes with UINT and INT, INT not with UINT."""
+    if Kind.BIT in (one.kind, other.kind):
+        return {one.kind, other.kind} <= {Kind.BIT, Kind.INT}
+    return one.kind is other.kind and one.signed == other.signed
+
+
+def _report_double_use(description: Description, diagnostics: Diagnostics) -> None:
+    for output in (False, True):
+        channels = sorted(
+            ((c.area_bit, c) for _, c in description.channels if c.output is output), key=lambda pair: pair[0]
+        )
+        last: Channel | None = None
+        for start, channel in channels:
+            if last is not None and start < last.area_bit + last.size_bits:
+                one, other = sorted((last, channel), key=lambda c: (c.pos.file, c.pos.line, c.pos.column))
+                message = (
+                    f"{other.target} is where the channel {one.name} {_where(one.pos, other.pos)} leads to already"
+                )
+                diagnostics.error(other.pos, CODE, message)
+            if last is None or start + channel.size_bits > last.area_bit + last.size_bits:
+                last = channel
+
+
+def _check_tasks(description: Description, tasks: Sequence[str], diagnostics: Diagnostics) -> None:
+    known = {name.casefold() for name in tasks}
+    for connector in description.connectors:
+        if connector.task is not None and connector.task.casefold() not in known:
+            hint = did_you_mean(connector.task, tasks) or f"; the program has {', '.join(tasks)}"
+            diagnostics.error(connector.task_pos or connector.pos, CODE, f"there is no task {connector.task}{hint}")
+
+
+def _check_limits(description: Description, allocation: Allocation, diagnostics: Diagnostics) -> None:
+    device = description.device
+    if device is None:
+        return
+    used = {
+        "inputs": (allocation.sizes[Area.INPUT], "bytes of inputs"),
+        "outputs": (allocation.sizes[Area.OUTPUT], "bytes of outputs"),
+        "connectors": (len(description.connectors), "devices"),
+        "channels": (len(description.channels), "channels"),
+    }
+    for name, limit in device.limits.items():
+        count, what = used[name]
+        if count > limit:
+            where = description.channels[0][1].pos if description.channels else Pos(description.path, 1, 1)
+            diagnostics.error(where, CODE, f"there are {count} {what}; {device.title} has room for {limit}")

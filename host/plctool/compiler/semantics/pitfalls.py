@@ -1,0 +1,287 @@
+"""What the language allows and is hardly ever meant, for warnings: loops without an end, comparisons that always give
+the same, fractions that are lost, pointers to another type.
+
+A loop is looked at when all bodies are checked, as what it calls may change its condition.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from plctool.compiler.analysis import Effects
+from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.ranges import Range, type_range
+from plctool.compiler.semantics import constants
+from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary
+from plctool.compiler.semantics.symbols import ERROR
+from plctool.compiler.typed import (
+    AddressOf,
+    Assign,
+    Binary,
+    BinaryOp,
+    Call,
+    Case,
+    Const,
+    Convert,
+    DerefPlace,
+    Direction,
+    Exit,
+    Expr,
+    FbCall,
+    For,
+    If,
+    Intrinsic,
+    IntrinsicCall,
+    Pou,
+    Repeat,
+    Return,
+    SelfPlace,
+    Statement,
+    Storage,
+    Unary,
+    Variable,
+    VarPlace,
+    While,
+)
+from plctool.compiler.typed_nodes import root_of, walk, written_places
+from plctool.iec.areas import Area
+from plctool.iec.types import (
+    BOOL,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Kind,
+    PointerType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+    base_of,
+)
+
+# ---- loops that cannot end as they are written ----
+
+Loop = While | Repeat | For
+_CLOCKS = (Intrinsic.TIME, Intrinsic.LTIME)
+
+
+def report_endless(loops: Iterable[tuple[Pou, Loop]], diagnostics: Diagnostics) -> None:
+    """Warns of the loops that never end once they run. Each comes with the unit it stands in."""
+    effects = Effects()
+    for pou, loop in loops:
+        if has_exit(loop.body) or any(isinstance(node, Return) for node in walk(loop.body)):
+            continue
+        why = _never_passed(loop) if isinstance(loop, For) else _never_met(loop, pou, effects)
+        if why:
+            diagnostics.warning(loop.pos, "endless", f"this loop never ends: {why}")
+
+
+def has_exit(statements: list[Statement]) -> bool:
+    """Whether an EXIT leaves the loop whose body this is."""
+    for statement in statements:
+        bodies: list[list[Statement]] = []
+        if isinstance(statement, If | Case):
+            bodies = [*(body for _, body in statement.branches), statement.otherwise]
+        if isinstance(statement, Exit) or any(map(has_exit, bodies)):
+            return True
+    return False
+
+
+def _never_passed(loop: For) -> str:
+    """A FOR whose body sets its variable back."""
+    if not isinstance(loop.var, VarPlace) or not isinstance(loop.stop, Const) or not isinstance(loop.step, Const):
+        return ""
+    for statement in loop.body:
+        if not isinstance(statement, Assign) or not isinstance(statement.value, Const):
+            continue
+        if isinstance(statement.target, VarPlace) and statement.target.var is loop.var.var:
+            last, step, value = loop.stop.value, loop.step.value, statement.value.value
+            if isinstance(last, int) and isinstance(step, int) and isinstance(value, int):
+                goes_on = value + step <= last if step > 0 else value + step >= last
+                name = _name(loop.var.var)
+                return f"its body sets {name} to {value} each time; leave that to the FOR" if goes_on else ""
+    return ""
+
+
+def _never_met(loop: While | Repeat, pou: Pou, effects: Effects) -> str:
+    condition = loop.condition if isinstance(loop, While) else loop.until
+    if isinstance(condition, Const):
+        ends = bool(condition.value) is isinstance(loop, Repeat)
+        value = "FALSE" if isinstance(loop, Repeat) else "TRUE"
+        return "" if ends else f"its condition is always {value}; write what ends it, or EXIT in its body"
+    variables = _decided_by(condition, pou, effects)
+    if variables is None or any(_may_change(loop, variable, pou, effects) for variable in variables):
+        return ""
+    names = list(dict.fromkeys(_name(variable) for variable in variables))
+    if any(isinstance(node, IntrinsicCall) and node.intrinsic in _CLOCKS for node in walk(condition)):
+        names.append("TIME(), which is the time of the cycle")
+    listed = f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else names[0]
+    return f"nothing in it changes {listed}; change it in the body, or write IF to test once in each cycle"
+
+
+def _decided_by(condition: Expr, pou: Pou, effects: Effects) -> list[Variable] | None:
+    """The variables a condition depends on, all of this unit's own; None when it depends on something else as well."""
+    found: list[VarPlace] = []
+    for node in walk(condition):
+        if isinstance(node, DerefPlace | SelfPlace | AddressOf):
+            return None
+        if isinstance(node, Call) and not (_only_reads(node) and effects.is_local(node.function)):
+            return None
+        if isinstance(node, VarPlace):
+            if not _is_own(node.var, pou):
+                return None
+            found.append(node)
+    return [place.var for place in sorted(found, key=lambda place: (place.pos.line, place.pos.column))]
+
+
+def _only_reads(call: Call) -> bool:
+    inputs = all(p.direction is Direction.INPUT for p in call.function.parameters)
+    return inputs and call.instance is None and call.dispatch is None
+
+
+def _is_own(variable: Variable, pou: Pou) -> bool:
+    """Whether it belongs to the POU, so that no other code changes it while the POU runs."""
+    if variable.storage is Storage.AREA:
+        owner = variable.name.rpartition(".")[0]
+        inside = owner == pou.name or pou.name.startswith(f"{owner}.")
+        return bool(owner) and inside and variable.area in (Area.DATA, Area.RETAIN)
+    return variable.storage in (Storage.LOCAL, Storage.SELF)
+
+
+def _may_change(loop: While | Repeat, variable: Variable, pou: Pou, effects: Effects) -> bool:
+    if effects.has_address_taken(variable, pou):
+        return True
+    condition = loop.condition if isinstance(loop, While) else loop.until
+    for node in walk([loop.body, condition]):
+        for place in written_places(node):
+            root = root_of(place)
+            if root is variable or (root is None and variable.storage is not Storage.LOCAL):
+                return True
+        if variable.storage is not Storage.LOCAL and _may_reach(node, effects):
+            return True
+    return False
+
+
+def _may_reach(node: object, effects: Effects) -> bool:
+    """Whether a call may write more than what it is passed."""
+    if isinstance(node, Call):
+        return node.dispatch is not None or not effects.is_local(node.function)
+    return isinstance(node, FbCall)
+
+
+def _name(variable: Variable) -> str:
+    return variable.name.rpartition(".")[2]
+
+
+# ---- integer divisions whose result becomes a REAL: the fraction is lost before ----
+
+
+def lost_fraction(e: Expr, target: Elementary, *, explicit: bool = False) -> str:
+    """What to say when the integer `e` becomes `target`; "" when it is no division. `explicit`: by INT_TO_REAL and the
+    like; then whole days, seconds ... of a date or duration are meant as they are, and so are bits."""
+    division = _division(e)
+    if division is None or (explicit and _is_of_time(division.left)):
+        return ""
+    source = elementary(division.type)
+    if source is None or (explicit and source.kind is not Kind.INT):
+        return ""
+    drops = f"this division of {source} drops its fraction and only then becomes {target}"
+    return f"{drops}; convert an operand: {source}_TO_{target}(...) / ..."
+
+
+def _division(e: Expr) -> Binary | None:
+    """The integer division that an expression is, or that is added to something in it."""
+    if isinstance(e, Unary):
+        return _division(e.operand)
+    if isinstance(e, Convert):
+        source = elementary(e.operand.type)
+        return _division(e.operand) if source is not None and source.kind in NUMBERS else None
+    if not isinstance(e, Binary):
+        return None
+    if e.op in (BinaryOp.ADD, BinaryOp.SUB):
+        return _division(e.left) or _division(e.right)
+    return e if e.op is BinaryOp.DIV else None
+
+
+def _is_of_time(e: Expr) -> bool:
+    """Whether a number is a duration or date that was converted."""
+    while isinstance(e, Convert):
+        e = e.operand
+        source = elementary(e.type)
+        if source is not None and source.kind in (Kind.TIME, Kind.DATE):
+            return True
+    return False
+
+
+# ---- whether a pointer may look at a variable of another type without surprise ----
+
+_BITS = (Kind.BIT, Kind.CHAR)
+
+
+def overlays(found: Type, wanted: Type) -> bool:
+    """Whether `found` is a `wanted`, begins with one or is what one begins with, or either is seen as plain bits."""
+    a, b = _plain(found), _plain(wanted)
+    if isinstance(a, PointerType) or isinstance(b, PointerType):
+        return True
+    if ERROR in (a, b) or a == b or _is_bits(a) or _is_bits(b):
+        return True
+    if isinstance(a, StringType) and isinstance(b, StringType):
+        return a.wide is b.wide
+    if isinstance(a, StructType) and isinstance(b, StructType) and (a.conforms(b) or b.conforms(a)):
+        return True
+    first = isinstance(a, StructType) and any(overlays(t, b) for t in _first(a))
+    return first or (isinstance(b, StructType) and any(overlays(a, t) for t in _first(b)))
+
+
+def _plain(t: Type) -> Type:
+    """The type of the elements of an array, and of those; of an enumeration or subrange its base."""
+    while isinstance(t, ArrayType):
+        t = t.element
+    return base_of(t)
+
+
+def _is_bits(t: Type) -> bool:
+    return isinstance(t, Elementary) and t.kind in _BITS
+
+
+def _first(t: StructType) -> list[Type]:
+    return [f.type for f in t.fields if f.offset <= 0 and not f.hidden]
+
+
+# ---- comparisons with a number beyond what the other side can be ----
+
+_SWAPPED = {BinaryOp.LT: BinaryOp.GT, BinaryOp.GT: BinaryOp.LT, BinaryOp.LE: BinaryOp.GE, BinaryOp.GE: BinaryOp.LE}
+
+
+def always(op: BinaryOp, value: Expr, number: int, *, swapped: bool) -> str:
+    """What to say of `value op number` (`swapped`: of `number op value`) when the type of the value decides it; ""
+    when it does not."""
+    limits = _limits(value.type)
+    if limits is None or isinstance(value, Const):
+        return ""
+    op = _SWAPPED.get(op, op) if swapped else op
+    least, most = (constants.binary(op, limit, number, BOOL) for limit in limits)
+    within = limits[0] <= number <= limits[1]
+    decided = least == most if op in _SWAPPED else not within
+    return f"this is always {'TRUE' if least else 'FALSE'}: {_why(value.type, limits, number)}" if decided else ""
+
+
+def _limits(t: Type) -> Range | None:
+    if isinstance(t, SubrangeType):
+        return t.low, t.high
+    base = elementary(t)
+    return type_range(t) if base is not None and base.kind in NUMBERS and not isinstance(t, EnumType) else None
+
+
+def _why(t: Type, limits: Range, number: int) -> str:
+    low, high = limits
+    what = f"{'an' if t.name[0] in 'AEIOU' and not t.name.startswith('U') else 'a'} {t}"
+    if number > low:
+        return f"{what} is at most {high}; use a larger type or another number"
+    base = elementary(t)
+    if low == 0 and base is not None and not isinstance(t, SubrangeType):
+        signed = SIGNED[min(64, 2 * base.bits)]
+        return f"{what} is never negative; use a signed type such as {signed}, or leave the comparison out"
+    return f"{what} is at least {low}; use another type or another number"

@@ -1,0 +1,113 @@
+"""Finding and reading a description: `NAME.io.toml` beside the sources."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from plctool.errors import UsageError
+from plctool.files import Pos
+from plctool.io.device_file import DeviceFile, read_device_file
+from plctool.io.kinds import KINDS
+from plctool.io.mistakes import Mistakes
+from plctool.io.model import Connector, Context, Description
+from plctool.io.positions import BadToml, TomlText
+from plctool.io.tables import Table
+
+SUFFIX = ".io.toml"
+
+
+def find_description(sources: Sequence[Path]) -> Path | None:
+    """The description beside the sources, or in a folder of them; None if there is none. Raises UsageError if there
+    are several."""
+    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in sources)
+    found = sorted(file for folder in folders for file in folder.glob(f"*{SUFFIX}") if file.is_file())
+    if len(found) > 1:
+        names = ", ".join(str(file) for file in found)
+        raise UsageError(f"There are several descriptions of inputs and outputs; choose one with --io: {names}.", "io")
+    return found[0] if found else None
+
+
+def load_description(path: Path, device: Path | None = None) -> Description:
+    """Reads a description and the device file: `device`, else the one it names. What is wrong with them is in
+    `mistakes`. Raises UsageError for a file that cannot be read."""
+    return read_description(str(path), _read(path), device)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror}.", "io") from None
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path} is not UTF-8 at byte {error.start}; save it as UTF-8.", "io") from None
+
+
+def read_description(path: str, text: str, device: Path | None = None) -> Description:
+    """The same for a text."""
+    mistakes = Mistakes()
+    made = Description(path, [], mistakes, {path: text})
+    try:
+        toml = TomlText(path, text)
+    except BadToml as error:
+        mistakes.error(error.pos, _not_toml(error))
+        made.readable = False
+        return made
+    root = Table(toml, (), toml.values, mistakes)
+    named = root.text("device")
+    if device is None and named is not None:
+        device = Path(path).parent / named
+        if not device.is_file():
+            root.error(f"there is no file {device}", "device")
+            device = None
+    if device is not None:
+        made.device = _device_file(device, made)
+        if not made.readable:
+            return made
+    context = Context(mistakes, made.device)
+    for name, read in KINDS.items():
+        for table in root.tables(name):
+            made.connectors += read(table, context)
+            table.close()
+    root.close()
+    _check_names(made.connectors, mistakes)
+    return made
+
+
+def _device_file(path: Path, made: Description) -> DeviceFile | None:
+    device, mistakes, text = load_device(path)
+    made.texts[str(path)] = text
+    made.mistakes.found += mistakes.found
+    made.readable = device is not None
+    return device
+
+
+def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
+    """A device file with what is wrong with it, and its text. Raises UsageError if it cannot be read."""
+    mistakes, text = Mistakes(), _read(path)
+    try:
+        return read_device_file(TomlText(str(path), text), mistakes), mistakes, text
+    except BadToml as error:
+        mistakes.error(error.pos, _not_toml(error))
+        return None, mistakes, text
+
+
+def _not_toml(error: BadToml) -> str:
+    return f"this is not TOML: {error.message[:1].lower()}{error.message[1:]}"
+
+
+def _check_names(connectors: Sequence[Connector], mistakes: Mistakes) -> None:
+    """Names are unique: of devices all, of channels those of one device."""
+    seen: dict[str, Pos] = {}
+    for connector in connectors:
+        first = seen.setdefault(connector.name.casefold(), connector.pos)
+        if first is not connector.pos:
+            hint = "give it another name" if connector.variable else 'give it a name: name = "..."'
+            message = f"there is a device {connector.name} in line {first.line} already; {hint}"
+            mistakes.error(connector.pos, message)
+        channels: dict[str, Pos] = {}
+        for channel in connector.channels:
+            earlier = channels.setdefault(channel.name.casefold(), channel.pos)
+            if earlier is not channel.pos:
+                message = f"{connector.name} has a channel {channel.name} in line {earlier.line} already"
+                mistakes.error(channel.pos, message)

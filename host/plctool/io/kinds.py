@@ -1,0 +1,21 @@
+"""The kinds of tables in a description, by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from plctool.io.gpio import read_gpio
+from plctool.io.local import read_local
+from plctool.io.model import Connector, Context
+from plctool.io.sim import read_sim
+from plctool.io.tables import Table
+
+Kind = Callable[[Table, Context], list[Connector]]
+
+KINDS: dict[str, Kind] = {
+    "gpio": read_gpio,
+    "local": read_local,
+    "sim": read_sim,
+}
+"""What reads the table `[NAME]`, or each of `[[NAME]]`. A kind that has tables in its table, such as [[modbus.rs485]],
+opens them itself."""

@@ -1,0 +1,150 @@
+"""What a description becomes: connectors with parameters and channels. The interface of a kind of driver.
+
+A kind (`kinds.py` has one row for each) is a function that reads one table of a description and returns connectors:
+
+    def read_acme(table: Table, context: Context) -> list[Connector]
+
+It is called once for the top-level table with its name. It reads every key with the functions of `Table`, which report
+mistakes with their location, reads channels with `channels.read_channel()`, and calls `close()` of every table that it
+has opened but `table` itself. It raises nothing.
+
+A channel names a variable, whose type only the compiler knows. When all of them are known the compiler calls
+`Connector.complete()`, in which a kind's own class makes the parameters that depend on types: how many registers are
+read, for example. Then `configuration.py` writes the tables of IoConfig.h.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from plctool.core import lib
+from plctool.files import Pos
+from plctool.iec.types import BOOL, ArrayType, Type, base_of
+from plctool.io.mistakes import Mistakes
+
+if TYPE_CHECKING:
+    from plctool.io.device_file import DeviceFile
+
+HOLD, ZERO, VALUE = int(lib.IO_HOLD), int(lib.IO_ZERO), int(lib.IO_VALUE)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a connector. `id`: the driver's own. `value`: a number, BOOL or text that `iec.values.encode`
+    takes for the type; bytes for an ARRAY OF BYTE. `name`: what users call it, if they do."""
+
+    id: int
+    type: Type
+    value: Any
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Substitute:
+    """What an output becomes when the program stops, or an input when its device is lost: HOLD, ZERO, or VALUE with
+    `value` as the engineer wrote it, at `pos`."""
+
+    what: int
+    value: Any = None
+    pos: Pos | None = None
+
+
+@dataclass(eq=False)
+class Channel:
+    """An input or output. `parameter` and `parameter_bit`: where the driver has it.
+
+    `name`: within its connector, as the engineer or the vendor calls it. `target`: a variable (`Main.start`) or an
+    address (`%IX0.1`), written at `pos`. `bits`: its size, 1 for a BOOL; None: that of the variable. `type`: what the
+    device has, None if any type of that size will do. `age_us`: how old a value may be when the driver hands it over, 0
+    if it reads the line itself. The compiler sets what follows.
+    """
+
+    name: str
+    target: str
+    pos: Pos
+    output: bool
+    parameter: int = 0
+    parameter_bit: int = 0
+    bits: int | None = None
+    type: Type | None = None
+    big_endian: bool = False
+    substitute: Substitute = Substitute(HOLD)
+    age_us: int = 0
+
+    variable_type: Type | None = None
+    area_bit: int = -1
+    variable: str = ""  # its full name; "" for an address without one
+    tasks: list[int] = field(default_factory=list)  # that use it
+
+    @property
+    def size_bits(self) -> int:
+        """The bits that are copied, once the type of the variable is known."""
+        if self.bits is not None:
+            return self.bits
+        assert self.variable_type is not None
+        return bits_of(self.variable_type)
+
+
+@dataclass(eq=False)
+class Connector:
+    """A bus, device or module. `type`: CT_*. `name`: as in `plctool io map`, at most 31 ASCII characters, unique.
+    `driver`: szDriverName of the driver that takes it. `task`: in whose cycle the bus cycle is started, None for the
+    fastest. `variable`: it has an IO_DEVICE of its name in the program."""
+
+    name: str
+    driver: str
+    pos: Pos
+    type: int = int(lib.CT_MASTER)
+    parent: Connector | None = None
+    optional: bool = False
+    enabled: bool = True
+    task: str | None = None
+    task_pos: Pos | None = None
+    variable: bool = False
+    parameters: list[Parameter] = field(default_factory=list)
+    channels: list[Channel] = field(default_factory=list)
+    state_offset: int | None = None  # of its IO_DEVICE in the data area; set by the compiler
+
+    def complete(self, mistakes: Mistakes) -> None:
+        """The types of all channels are known: a kind's own class overrides it to make what depends on them."""
+
+
+@dataclass
+class Context:
+    """What kinds share. `device`: what the vendor says of the board, None if nothing."""
+
+    mistakes: Mistakes
+    device: DeviceFile | None = None
+
+
+@dataclass
+class Description:
+    """A description that was read. A parent comes before its children. `texts`: the files with their contents, for
+    messages. `readable`: the files are TOML."""
+
+    path: str
+    connectors: list[Connector]
+    mistakes: Mistakes
+    texts: dict[str, str]
+    device: DeviceFile | None = None
+    readable: bool = True
+
+    @property
+    def channels(self) -> list[tuple[Connector, Channel]]:
+        """All of them, in order."""
+        return [(connector, channel) for connector in self.connectors for channel in connector.channels]
+
+
+def bits_of(t: Type) -> int:
+    """The bits of a variable that a channel has: one of a BOOL, which takes a byte in memory."""
+    return 1 if base_of(t) is BOOL else t.size * 8
+
+
+def holds_bools(t: Type) -> bool:
+    """Whether a type is an array of BOOL, each in a byte of its own."""
+    while isinstance(t, ArrayType):
+        t = t.element
+        if base_of(t) is BOOL:
+            return True
+    return False

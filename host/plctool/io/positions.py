@@ -1,0 +1,191 @@
+"""Where the keys and values of a TOML text are.
+
+`tomllib` reads the values and refuses what is not TOML, but keeps no positions. A text that it has taken is valid, so
+its keys are found by looking at brackets, quotes and equals signs alone.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from plctool.files import Pos
+
+Path = tuple[str | int, ...]
+"""Keys, and indices of elements, that lead to a value."""
+
+_TOKEN = re.compile(
+    r"(?P<space>[ \t\r]+|\#[^\n]*)|(?P<line>\n)|(?P<sign>[\[\]{}=,.])|"
+    r"(?P<text>\"\"\"(?:[^\\]|\\.)*?\"{3,5}|'''.*?'{3,5}|\"(?:[^\"\\\n]|\\.)*\"|'[^'\n]*'|[^\s\[\]{}=,.\#\"']+)",
+    re.DOTALL,
+)
+_PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Offsets of a key and of its value; an element of an array has no key but itself."""
+
+    key: int
+    value: int
+
+
+class TomlText:
+    """A text with its values and where they are. Raises `BadToml` for what is not TOML."""
+
+    def __init__(self, path: str, text: str) -> None:
+        self.path = path
+        self.text = text
+        self._starts = [0, *(m.end() for m in re.finditer("\n", text))]
+        try:
+            self.values: dict[str, Any] = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise BadToml(*self._where(str(error))) from None
+        self._places = _Scanner(text).places
+
+    def _where(self, message: str) -> tuple[Pos, str]:
+        match = _PLACE.search(message)
+        if match is None or match[1] is None:
+            return self.pos(len(self.text.rstrip())), _PLACE.sub("", message)
+        return Pos(self.path, int(match[1]), int(match[2])), message[: match.start()]
+
+    def pos(self, offset: int) -> Pos:
+        """Line and column of a character."""
+        line = bisect_right(self._starts, offset)
+        return Pos(self.path, line, offset - self._starts[line - 1] + 1)
+
+    def key_pos(self, path: Path) -> Pos:
+        """Where the key of a value is, or the head of a table."""
+        return self.pos(self._places[path].key) if path in self._places else Pos(self.path, 1, 1)
+
+    def value_pos(self, path: Path) -> Pos:
+        """Where a value is."""
+        return self.pos(self._places[path].value) if path in self._places else Pos(self.path, 1, 1)
+
+
+class BadToml(Exception):
+    """A text is not TOML."""
+
+    def __init__(self, pos: Pos, message: str) -> None:
+        super().__init__(message)
+        self.pos = pos
+        self.message = message
+
+
+class _Scanner:
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._tokens: list[tuple[str, int, int]] = [
+            (m.group() if m.lastgroup == "sign" else str(m.lastgroup), m.start(), m.end())
+            for m in _TOKEN.finditer(text)
+            if m.lastgroup != "space"
+        ]
+        self._at = 0
+        self._counts: dict[Path, int] = {}  # of arrays of tables
+        self.places: dict[Path, Place] = {}
+        self._document()
+
+    # ---- tokens ----
+
+    @property
+    def _kind(self) -> str:
+        return self._tokens[self._at][0] if self._at < len(self._tokens) else "end"
+
+    @property
+    def _offset(self) -> int:
+        return self._tokens[self._at][1] if self._at < len(self._tokens) else len(self._text)
+
+    def _skip_lines(self) -> None:
+        while self._kind == "line":
+            self._at += 1
+
+    def _keys(self, end: str) -> Iterator[tuple[str, int]]:
+        """The parts of a dotted key, each with its offset, up to the sign after it."""
+        while self._kind not in (end, "end"):
+            if self._kind == "text":
+                _, start, stop = self._tokens[self._at]
+                (name,) = tomllib.loads(f"{self._text[start:stop]} = 0")
+                yield name, start
+            self._at += 1
+
+    # ---- the text ----
+
+    def _document(self) -> None:
+        table: Path = ()
+        while True:
+            self._skip_lines()
+            if self._kind == "end":
+                return
+            if self._kind == "[":
+                table = self._head()
+            else:
+                self._pair(table)
+
+    def _head(self) -> Path:
+        start = self._offset
+        self._at += 1
+        is_array = self._kind == "[" and self._offset == start + 1
+        self._at += is_array
+        names = list(self._keys("]"))
+        self._at += 1 + is_array
+        path: Path = ()
+        for number, (name, offset) in enumerate(names):
+            path = (*path, name)
+            last = number == len(names) - 1
+            self.places.setdefault(path, Place(offset, start if last else offset))
+            if last and is_array:
+                index = self._counts[path] = self._counts.get(path, -1) + 1
+                path = (*path, index)
+                self.places[path] = Place(offset, start)
+            elif path in self._counts:
+                path = (*path, self._counts[path])
+            elif last:
+                self.places[path] = Place(offset, start)
+        return path
+
+    def _pair(self, table: Path) -> None:
+        path = table
+        names = list(self._keys("="))
+        self._at += 1
+        for name, offset in names:
+            path = (*path, name)
+            self.places.setdefault(path, Place(offset, self._offset))
+        self._value(path)
+
+    def _value(self, path: Path) -> None:
+        kind = self._kind
+        if kind == "[":
+            self._array(path)
+        elif kind == "{":
+            self._inline_table(path)
+        else:
+            while self._kind not in (",", "]", "}", "line", "end"):
+                self._at += 1
+
+    def _array(self, path: Path) -> None:
+        self._at += 1
+        index = 0
+        while True:
+            self._skip_lines()
+            if self._kind in ("]", "end"):
+                break
+            if self._kind == ",":
+                self._at += 1
+                continue
+            self.places[*path, index] = Place(self._offset, self._offset)
+            self._value((*path, index))
+            index += 1
+        self._at += 1
+
+    def _inline_table(self, path: Path) -> None:
+        self._at += 1
+        while self._kind not in ("}", "end"):
+            if self._kind in (",", "line"):
+                self._at += 1
+            else:
+                self._pair(path)
+        self._at += 1

@@ -1,0 +1,137 @@
+"""Simulated inputs and outputs: the devices of a description in this process, made by IoDrvSim from the image.
+
+A channel is known by the name of its device and its own (`Bench.button`), by its own if no other has it (`button`), and
+by its variable (`Main.start`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from plctool.core import error_name, ffi, lib
+from plctool.debug.symbols import SymbolTable
+from plctool.debug.variables import Symbol
+from plctool.errors import DeviceError, UsageError, did_you_mean
+from plctool.iec.addresses import parse_address
+from plctool.iec.areas import Area
+from plctool.iec.types import BOOL, base_of
+from plctool.iec.values import decode, encode
+
+FAULTS = {
+    "absent": int(lib.IO_SIM_ABSENT),
+    "late": int(lib.IO_SIM_LATE),
+    "type": int(lib.IO_SIM_TYPE),
+    "answers": int(lib.IO_SIM_ANSWERS),
+}
+"""Faults of a device. absent: 1, it is not there; late: its data is as old as this [ms]; type: 1, it is another device
+than the description says; answers: so many next answers are bad."""
+
+
+@dataclass(frozen=True)
+class SimChannel:
+    """A channel of the symbol file. `bit`: the first of its `bits` in the parameter of the device; `area_bit`: in the
+    inputs or outputs."""
+
+    device: str
+    name: str
+    output: bool
+    symbol: Symbol
+    area_bit: int
+    parameter: int
+    bit: int
+    bits: int
+    big_endian: bool
+
+    @property
+    def title(self) -> str:
+        """Its name with that of the device."""
+        return f"{self.device}.{self.name}"
+
+    def read(self) -> bytes:
+        """What the device has now."""
+        data = ffi.new("RTS_UI8[]", -(-self.bits // 8))
+        _check(lib.SimIoRead(self.device.encode(), self.parameter, self.bit, self.bits, data), self.title)
+        return self._ordered(bytes(ffi.buffer(data)))
+
+    def write(self, data: bytes) -> None:
+        """What the device measures from now on."""
+        ordered = self._ordered(data)
+        _check(lib.SimIoWrite(self.device.encode(), self.parameter, self.bit, self.bits, ordered), self.title)
+
+    def _ordered(self, data: bytes) -> bytes:
+        return data[::-1] if self.big_endian else data
+
+
+class SimIo:
+    """The channels of the program with these symbols."""
+
+    def __init__(self, symbols: SymbolTable) -> None:
+        self._channels = [_channel(entry, symbols) for entry in symbols.io.get("channels", [])]
+        self._names: dict[str, list[SimChannel]] = {}
+        for c in self._channels:
+            for name in {c.title.casefold(), c.name.casefold(), c.symbol.name.casefold()}:
+                self._names.setdefault(name, []).append(c)
+
+    def find(self, name: str) -> SimChannel:
+        """The channel with a name. Raises UsageError if there is none, or there are several."""
+        found = self._names.get(name.casefold(), [])
+        if len(found) == 1:
+            return found[0]
+        if found:
+            titles = " or ".join(c.title for c in found)
+            raise UsageError(f"There are several channels {name}; write {titles}.", "ambiguous")
+        hint = did_you_mean(name, [c.title for c in self._channels]) or "; 'plctool io map' lists them"
+        raise UsageError(f"There is no channel {name}{hint}.", "unknown-channel")
+
+    def set_input(self, name: str, value: Any) -> None:
+        """What a device measures from now on. Raises UsageError for a value that does not fit."""
+        channel = self.find(name)
+        if channel.output:
+            raise UsageError(f"{channel.title} is an output: the program sets it.", "output")
+        channel.write(encode(channel.symbol.type, value))
+
+    def value(self, name: str) -> Any:
+        """What a device has now: an output as it left the program, or as it is while that is stopped."""
+        channel = self.find(name)
+        return decode(channel.symbol.type, channel.read())
+
+    def follow(self, first_bit: int, end_bit: int, memory: Callable[[int, int], bytes]) -> None:
+        """Bits of the inputs were written: the devices measure that from now on. `memory` gives bytes of the inputs, by
+        offset and size."""
+        for c in self._channels:
+            if not c.output and c.area_bit < end_bit and first_bit < c.area_bit + c.bits:
+                data = memory(c.area_bit // 8, -(-c.bits // 8))
+                shift = c.area_bit % 8
+                c.write(bytes([data[0] >> shift & (1 << c.bits) - 1]) if c.bits < 8 else data)
+
+
+def set_fault(device: str, fault: str, value: int) -> None:
+    """Makes a simulated device fail (FAULTS), or with 0 work again."""
+    if fault not in FAULTS:
+        raise UsageError(f"There is no fault '{fault}'; choose one of {', '.join(FAULTS)}.", "bad-fault")
+    _check(lib.SimIoFault(device.encode("ascii", "replace"), FAULTS[fault], value), device)
+
+
+def _channel(entry: dict[str, Any], symbols: SymbolTable) -> SimChannel:
+    address = parse_address(entry["address"])
+    assert address is not None
+    area_bit = address.offset * 8 + address.bit
+    symbol = symbols.resolve(entry["variable"])
+    if entry["bits"] == 1 and base_of(symbol.type) is not BOOL:  # an address of a bit
+        symbol = Symbol(symbol.name, symbol.area, symbol.offset, BOOL, symbol.bit)
+    return SimChannel(
+        entry["device"], entry["channel"], entry["output"], symbol, area_bit, entry["parameter"],
+        entry["parameter_bit"], entry["bits"], entry["big_endian"],
+    )  # fmt: skip
+
+
+def is_input(symbol: Symbol) -> bool:
+    """Whether a variable is where devices write."""
+    return symbol.pointer is None and symbol.area == Area.INPUT.value
+
+
+def _check(result: int, name: str) -> None:
+    if result != lib.ERR_OK:
+        raise DeviceError(f"The simulated device does not have {name} ({error_name(result)}).", "no-channel", result)

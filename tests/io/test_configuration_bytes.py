@@ -1,0 +1,75 @@
+"""What is packed into an image is what is read from it; bytes that are no configuration are refused."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from itertools import accumulate
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from plctool.errors import UsageError
+from plctool.io.configuration import (
+    ChannelEntry,
+    Configuration,
+    ConnectorEntry,
+    ConnectorMap,
+    ParameterEntry,
+    TaskMap,
+    pack_configuration,
+    parse_configuration,
+)
+
+U16, U32 = st.integers(0, 0xFFFE), st.integers(0, 0xFFFF_FFFE)
+NAMES = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=31)
+DIRECT = st.binary(min_size=1, max_size=4).map(lambda v: (8 * len(v), v, False))
+APART = st.binary(max_size=40).map(lambda v: (8 * len(v), v, True))
+PARAMETERS = st.builds(lambda i, t, v: ParameterEntry(i, t, *v), U32, U16, DIRECT | APART)
+CONNECTORS = st.builds(
+    ConnectorEntry, NAMES, NAMES, U16, U16, st.none() | U16, st.none() | U16, st.none() | U32,
+    st.lists(PARAMETERS, max_size=4).map(tuple),
+)  # fmt: skip
+CHANNELS = st.builds(ChannelEntry, U32, U32, U32, U16, U16, U32)
+MAPS = st.builds(ConnectorMap, U16, st.lists(CHANNELS, max_size=3).map(tuple))
+TASKS = st.builds(TaskMap, U16, st.sampled_from([0, 1]), st.lists(MAPS, max_size=3).map(tuple))
+CONFIGURATIONS = st.builds(
+    Configuration, st.lists(CONNECTORS, max_size=4).map(tuple), st.lists(TASKS, max_size=3).map(tuple)
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(CONFIGURATIONS)
+def test_what_is_read_is_what_was_written(configuration: Configuration) -> None:
+    packed = pack_configuration(configuration)
+    assert parse_configuration(packed) == configuration
+    assert len(packed) % 4 == 0
+
+
+@settings(max_examples=30, deadline=None)
+@given(CONFIGURATIONS, st.data())
+def test_what_is_cut_off_is_refused(configuration: Configuration, data: st.DataObject) -> None:
+    packed = pack_configuration(configuration)
+    with pytest.raises(UsageError, match="build it again"):
+        parse_configuration(packed[: data.draw(st.integers(0, len(packed) - 1))])
+
+
+@settings(max_examples=60, deadline=None)
+@given(CONFIGURATIONS, st.data())
+def test_changed_bytes_are_read_or_refused(configuration: Configuration, data: st.DataObject) -> None:
+    packed = bytearray(pack_configuration(configuration))
+    packed[data.draw(st.integers(0, len(packed) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    with suppress(UsageError):
+        parse_configuration(bytes(packed))
+
+
+def test_ranges_of_tables_follow_each_other() -> None:
+    """As the loader demands it (IoConfig.h)."""
+    sizes = [2, 0, 3]
+    connectors = [
+        ConnectorEntry(f"c{n}", "d", 1, 1, parameters=tuple(ParameterEntry(i, 0, 8, b"x") for i in range(size)))
+        for n, size in enumerate(sizes)
+    ]
+    packed = pack_configuration(Configuration(tuple(connectors), ()))
+    firsts = [int.from_bytes(packed[16 + 24 * n + 8 : 16 + 24 * n + 10], "little") for n in range(3)]
+    assert firsts == [0, *accumulate(sizes)][:3]
