@@ -41,7 +41,8 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("program")
     source = folder / "counter.st"
     source.write_text(
-        "PROGRAM Main VAR count : DINT; t : ARRAY[0..1999] OF DINT := [2000(3)]; END_VAR count := count + 1; END_PROGRAM"
+        "PROGRAM Main VAR count : DINT; t : ARRAY[0..1999] OF DINT := [2000(3)]; END_VAR "
+        "count := count + 1; END_PROGRAM"
     )
     compile_sources([source]).write(folder / "counter.cdl")
     return folder / "counter.cdl"
