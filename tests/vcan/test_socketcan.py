@@ -139,9 +139,9 @@ def test_an_interface_that_goes_down_comes_back(bus: str) -> None:
 def test_an_interface_that_is_down_is_told(tmp_path: Path) -> None:
     ip = [os.environ.get("BUSYBOX", "busybox"), "ip", "link"]
     subprocess.run([*ip, "add", "dev", "vcan9", "type", "vcan"], check=True)
-    with pytest.raises(PlcError, match="cannot open CAN vcan9: .*; set it up, for example with: ip link set"):
+    with pytest.raises(PlcError, match=r"cannot open CAN vcan9: .*; set it up, for example with: ip link set"):
         Plcrt(tmp_path / "x.flash", "--can", "vcan9").start()
     subprocess.run([*ip, "set", "vcan9", "mtu", "16"], check=True)
     subprocess.run([*ip, "set", "vcan9", "up"], check=True)
-    with pytest.raises(PlcError, match="cannot open CAN vcan9: .*mtu 72"):
+    with pytest.raises(PlcError, match=r"cannot open CAN vcan9: .*mtu 72"):
         Plcrt(tmp_path / "x.flash", "--can", "vcan9", "--bitrate", "500000/2000000").start()  # its mtu is 16
