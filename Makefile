@@ -17,7 +17,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
 BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
 
-.PHONY: demo test lint format bench size wheel attack fuzz all clean
+.PHONY: demo test test-vcan lint format bench size wheel attack fuzz all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -32,6 +32,11 @@ run-tests:
 
 all: $(BUILDS:%=%/build.ninja)
 	set -e; for build in $(BUILDS); do $(MESON) compile -C $$build; done
+
+# CAN of a real kernel, in a small Linux of its own; skipped with the reason where that cannot run.
+test-vcan: build/build.ninja
+	$(MESON) compile -C build
+	tests/vcan/run build $(BIN)/python || [ $$? -eq 77 ]
 
 C_FILES = find firmware tests bench examples -name '*.[ch]' -print0
 

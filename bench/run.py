@@ -100,6 +100,20 @@ def bench_network() -> None:
             line(f"{kind}, {len(result.image)} bytes", f"{len(result.image) / seconds / 1e6:.1f} MB/s")
 
 
+# ---- CAN -------------------------------------------------------------------------------------------------------------
+
+
+def bench_can() -> None:
+    print("\nA download over CAN on a simulated bus (share of what ISO-TP carries at best that is image bytes)")
+    done = subprocess.run([ROOT / "build/tests/c/can_share"], capture_output=True, text=True, check=True)
+    for name, size, seconds, share in (text.split("\t") for text in done.stdout.splitlines()):
+        line(
+            f"{name}, {size} bytes",
+            f"{float(seconds):.2f} s",
+            f"{float(share):.1%}; {int(size) / float(seconds) / 1e3:.1f} kB/s",
+        )
+
+
 # ---- cycles --------------------------------------------------------------------------------------------------------
 
 
@@ -208,6 +222,7 @@ def main() -> None:
     bench_day()
     bench_serial()
     bench_network()
+    bench_can()
     latency.main()
 
 

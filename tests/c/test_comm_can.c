@@ -16,6 +16,7 @@
 enum { KBIT = 1000, ECHO_SIZE = 1500 };
 
 static RTS_UI8 packet[BLK_MAX_SIZE];
+static const RTS_UI8 payload[400];
 
 static bool ask(CLIENT *client)
 {
@@ -85,7 +86,7 @@ static void packets_of_several_tools_arrive_at_the_same_time(void)
     for (int i = 0; i < 4; i++) {
         tool[i] = can_tool((RTS_UI8)(130 + i));
         can_client(&client[i], tool[i]);
-        RTS_UI32 size = client_packet(&client[i], 99, packet, 400, packet + 0);
+        RTS_UI32 size = client_packet(&client[i], 99, payload, sizeof(payload), packet);
         CHECK(can_put(tool[i], packet, size));
     }
     can_pass(300);
@@ -103,7 +104,7 @@ static void more_packets_than_there_is_room_for_are_sent_again(void)
     for (int i = 0; i < 6; i++) {
         tool[i] = can_tool((RTS_UI8)(130 + i));
         can_client(&client, tool[i]);
-        CHECK(can_put(tool[i], packet, client_packet(&client, 99, packet, 400, packet)));
+        CHECK(can_put(tool[i], packet, client_packet(&client, 99, payload, sizeof(payload), packet)));
     }
     can_pass(2000);
     CHECK_EQUAL(BlkDrvCanGetCounters()->packets, CAN_RX_SESSIONS);

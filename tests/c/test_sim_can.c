@@ -219,7 +219,7 @@ static void the_same_identifier_from_two_nodes_is_an_error(void)
     CHECK(state_of(A).tx_errors != 0 && state_of(B).tx_errors != 0);
     start();
     send(A, 5, 0x0F);
-    send(B, 5, 0x0F); /* nobody can tell */
+    send(B, 5, 0x0F); /* no node can tell */
     pass(1 * MS);
     CHECK(got(C) == 5 && got(C) == 0 && state_of(A).tx_errors == 0);
 }

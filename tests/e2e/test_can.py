@@ -185,6 +185,15 @@ def test_a_collision_that_was_missed_is_noticed_and_mended(hub: CanHub) -> None:
     second.close()
 
 
+def test_an_adapter_belongs_to_one_tool(hub: CanHub, tool: Any) -> None:
+    with plctool.connect(link_of(hub, 0, 1)) as plc:
+        assert plc.identity().node_name == "press"
+        done = tool("status", *options_of(hub, 0, 2))
+        assert (done.status, done.err.count("\n")) == (3, 1)
+        assert "another program uses it" in done.err
+        assert plc.identity().node_name == "press"
+
+
 def test_what_is_no_interface_is_told(tool: Any) -> None:
     for place, status, said in (
         ("can0", 2, "is not a CAN interface"),

@@ -186,6 +186,14 @@ static const char *slcan_path(const char *text)
     return strncmp(text, slcan_prefix, length) == 0 ? text + length : NULL;
 }
 
+static const char *advice(int error)
+{
+    if (error == ENETDOWN) {
+        return "; set it up, for example with: ip link set can0 up type can bitrate 500000";
+    }
+    return error == EPROTONOSUPPORT ? "; for CAN FD it needs mtu 72: ip link set can0 mtu 72" : "";
+}
+
 bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON *reason)
 {
     const char *path = slcan_path(text);
@@ -202,9 +210,7 @@ bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON 
     can.line = (PORT_SOURCE){.file = pty ? open_pty() : -1, .events = POLLIN};
     if ((pty && can.slave < 0) || !open_line()) {
         int error = errno;
-        PortReason(reason, "cannot open CAN %s: %s%s", text, strerror(error),
-                   error == ENETDOWN ? "; set it up, for example with: ip link set can0 up type can bitrate 500000"
-                                     : "");
+        PortReason(reason, "cannot open CAN %s: %s%s", text, strerror(error), advice(error));
         reason->busy = error == EBUSY;
         PortCanClose();
         return false;

@@ -397,7 +397,7 @@ void SimCanStart(RTS_UI32 node)
     bus.node[node].started = true;
 }
 
-/* A frame that is on the bus is not finished: nobody gets it. */
+/* A frame that is on the bus is not finished: no node gets it. */
 void SimCanStop(RTS_UI32 node)
 {
     NODE *stopped = &bus.node[node];

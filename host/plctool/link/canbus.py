@@ -189,13 +189,23 @@ def open_bus(place: str, bit_rate: int, data_bit_rate: int) -> can.BusABC:
         options |= {"fd": True, "data_bitrate": data_bit_rate}
     try:
         if interface == "slcan":
-            bus = SlcanBus(channel, bitrate=None if data_bit_rate else bit_rate, sleep_after_open=0)
-            if data_bit_rate:
-                bus.set_bitrate(bit_rate, data_bit_rate)
-            return bus
+            return _open_slcan(channel, bit_rate, data_bit_rate)
         return can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
     except (can.CanError, OSError, ValueError, ImportError) as error:
         raise LinkError(f"Cannot open CAN {place}: {_advice(error)}", "open") from error
+
+
+def _open_slcan(channel: str, bit_rate: int, data_bit_rate: int) -> SlcanBus:
+    bus = SlcanBus(channel, sleep_after_open=0)
+    try:
+        bus.serialPortOrig.exclusive = True  # two tools would take each other's frames
+    except OSError:
+        bus.serialPortOrig.close()  # first: the end of a bus closes the adapter of the tool that has it
+        with suppress(can.CanError, OSError):
+            bus.shutdown()
+        raise can.CanInitializationError("another program uses it; close that one first") from None
+    bus.set_bitrate(bit_rate, data_bit_rate or None)
+    return bus
 
 
 def _advice(error: Exception) -> str:

@@ -20,7 +20,7 @@ _OPEN_PATIENCE = 5.0
 _AT_ONCE = 16  # packages sent before the next look at the input
 _ASK_EVERY = 0.4  # a lost name request is repeated after [s]
 SCAN_SECONDS = 1.5
-_ALL_REPLIED = 0.6  # time after which all devices on a bus have replied [s]
+_ALL_REPLIED = 1.0  # time after which all devices on a bus have replied [s]
 
 
 def no_answer(name: str) -> ChannelLost:
@@ -150,14 +150,24 @@ class Connection:
         """The device that is meant. Raises LinkError when it does not reply, or there are several."""
         if choice is None or choice.number is not None:
             found = self.scan(_OPEN_PATIENCE, enough=1)
-        else:
-            found = self.scan(_ALL_REPLIED) or self.scan(_OPEN_PATIENCE - _ALL_REPLIED, enough=1)
-        fitting = [node for node in found if choice is None or choice.fits(node)]
-        if not found or (choice and not fitting):
-            raise no_answer(self.name) if not found or not choice else _no_such_node(self.name, choice, found)
-        if choice and len(fitting) > 1:
-            raise _several(self.name, choice, fitting)
-        return fitting[0]
+            if not found:
+                raise no_answer(self.name)
+            return found[0]
+        found = self._find_fitting(choice)
+        fitting = [node for node in found if choice.fits(node)]
+        if len(fitting) == 1:
+            return fitting[0]
+        if not found:
+            raise no_answer(self.name)
+        raise _several(self.name, choice, fitting) if fitting else _no_such_node(self.name, choice, found)
+
+    def _find_fitting(self, choice: Choice) -> list[names.Node]:
+        """The devices that reply within the time that all need, or longer until one of them is meant."""
+        found: dict[bytes, names.Node] = {}
+        end = self.now() + _OPEN_PATIENCE
+        while self.now() < end and not any(map(choice.fits, found.values())):
+            found |= {node.address: node for node in self.scan(_ALL_REPLIED)}
+        return list(found.values())
 
     def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
         """Sends a request and returns the reply. `patience`: seconds of silence that are borne.

@@ -79,7 +79,7 @@ class TestProgram:
         *,
         level: int = 0,
         warnings: WarningOptions = ALL_WARNINGS,
-        io: IoFiles = IoFiles(),  # noqa: B008
+        io: IoFiles | None = None,
     ) -> None:
         description = load_io(paths, io)
         self.sources = load_sources(paths)

@@ -9,7 +9,7 @@ import tty
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-_LARGEST_BACKLOG = 1 << 20  # bytes for an adapter that nobody reads, before frames to it are dropped
+_LARGEST_BACKLOG = 1 << 20  # bytes for an adapter that no tool reads, before frames to it are dropped
 _READ = 4096
 _FRAMES = b"tTrRdDbB"  # first letters of lines that are frames; all others are commands to the adapter
 

@@ -1,0 +1,226 @@
+"""CAN as the tool sees it: identifiers, the scan, addresses of tools, packets in frames, strangers, a lost bus."""
+
+from __future__ import annotations
+
+import random
+import secrets
+from collections.abc import Iterator
+
+import can
+import pytest
+
+from plctool.core import lib
+from plctool.errors import LinkError, UsageError
+from plctool.link import names, router
+from plctool.link.canbus import CanTransport, PythonCanBus, SharedBus, split_place
+from plctool.link.channel import ChannelLost
+
+BASE = 0x1F400000
+ALL = 255
+PATIENCE = 10.0  # for what is bound to come [s]
+
+
+class Wire:
+    """A bus of python-can in this process, and what is on it."""
+
+    def __init__(self) -> None:
+        self.name = secrets.token_hex(4)
+        self.end = self.bus()
+
+    def bus(self) -> can.BusABC:
+        return can.Bus(interface="virtual", channel=self.name)
+
+    def tool(self, node: int | None = None, first: int = 200, fd: bool = False) -> CanTransport:
+        return CanTransport("virtual", PythonCanBus(self.bus()), node, fd=fd, random_source=Fixed(first))
+
+    def say(self, source: int, target: int, data: bytes) -> None:
+        identifier = BASE | target << 8 | source
+        self.end.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=True, is_fd=len(data) > 8))
+
+    def heard(self) -> tuple[int, int, bytes]:
+        """Source, target and data of the next frame on the bus."""
+        message = self.end.recv(PATIENCE)
+        assert message
+        assert message.is_extended_id
+        assert message.arbitration_id >> 16 == BASE >> 16
+        return message.arbitration_id & 255, message.arbitration_id >> 8 & 255, bytes(message.data)
+
+
+class Fixed(random.Random):
+    """Chooses `first`, then `first` + 1 and so on."""
+
+    def __init__(self, first: int) -> None:
+        super().__init__(1)
+        self.next = first
+
+    def randint(self, a: int, b: int) -> int:
+        assert a <= self.next <= b
+        self.next += 1
+        return self.next - 1
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    made = Wire()
+    yield made
+    made.end.shutdown()
+
+
+def packet(sender: int, receiver: int, payload: bytes) -> bytes:
+    return router.encode(
+        router.Packet(lib.ROUTER_SVC_CHANNEL, receiver.to_bytes(2, "big"), sender.to_bytes(2, "big"), payload)
+    )
+
+
+def test_a_tool_says_its_address_and_has_it(wire: Wire) -> None:
+    tool = wire.tool()
+    source, target, data = wire.heard()
+    assert (source, target, data[0], len(data)) == (200, ALL, lib.CAN_FRAME_CLAIM, 8)
+    assert tool.local_address == b"\x00\xc8"
+    tool.close()
+
+
+def test_an_address_that_is_taken_or_claimed_is_left(wire: Wire) -> None:
+    wire.end.recv(0)
+    holder = wire.tool(first=200)
+    other = wire.bus()
+
+    class Defender(can.Listener):
+        def on_message_received(self, msg: can.Message) -> None:
+            if msg.arbitration_id == BASE | ALL << 8 | 201:  # claimed by another one at the same time
+                other.send(
+                    can.Message(arbitration_id=msg.arbitration_id, data=b"\x41\0\0\0\1\2\3\4", is_extended_id=True)
+                )
+            elif msg.arbitration_id == BASE | ALL << 8 | 202:
+                other.send(
+                    can.Message(arbitration_id=msg.arbitration_id, data=b"\x42\0\0\0\1\2\3\4", is_extended_id=True)
+                )
+
+    with can.Notifier(other, [Defender()]):
+        late = wire.tool(first=201)
+        assert late.local_address == b"\x00\xcb"
+        late.close()
+    holder.close()
+    other.shutdown()
+
+
+def test_the_holder_of_an_address_defends_it(wire: Wire) -> None:
+    holder = wire.tool()
+    wire.heard()
+    wire.say(200, ALL, b"\x41\0\0\0\1\2\3\4")
+    assert holder.receive(0.05) is None
+    source, target, data = wire.heard()
+    assert (source, target, data[0]) == (200, ALL, lib.CAN_FRAME_TAKEN)
+    holder.close()
+
+
+def test_anything_else_from_the_own_address_ends_the_connection(wire: Wire) -> None:
+    holder = wire.tool()
+    wire.say(200, 7, b"\x03abc")
+    with pytest.raises(ChannelLost, match="same address"):
+        holder.receive(PATIENCE)
+    assert holder.local_address == b"\x00\xc9"
+    holder.close()
+
+
+def test_a_scan_is_one_frame(wire: Wire) -> None:
+    for node, target in ((None, ALL), (5, 5)):
+        tool = wire.tool(node)
+        wire.heard()
+        request = names.encode_request(0x01020304)
+        tool.send(router.encode(router.Packet(lib.ROUTER_SVC_NAME_REQUEST, router.BROADCAST, b"\0\0", request)))
+        source, to, data = wire.heard()
+        assert (source, to) == (200, target)
+        assert data[0] == lib.CAN_FRAME_SCAN
+        assert (data[1] == 0) == (node is not None)
+        assert data[2:] == b"\x00\x04" + b"\x04\x03\x02\x01"
+        tool.close()
+
+
+def test_packets_go_in_frames_with_flow_control(wire: Wire) -> None:
+    tool = wire.tool(5)
+    wire.heard()
+    sent = packet(200, 5, b"0123456789")  # 22 bytes
+    tool.send(sent)
+    assert wire.heard() == (200, 5, b"\x10\x16" + sent[:6])
+    wire.say(5, 200, b"\x30\x01\x00")
+    assert tool.receive(0.05) is None
+    assert wire.heard() == (200, 5, b"\x21" + sent[6:13])
+    wire.say(5, 200, b"\x30\x00\x00")
+    assert tool.receive(0.05) is None
+    assert wire.heard() == (200, 5, b"\x22" + sent[13:20])
+    assert wire.heard() == (200, 5, b"\x23" + sent[20:])
+    tool.close()
+
+
+def test_a_packet_is_taken_from_its_sender_only(wire: Wire) -> None:
+    tool = wire.tool()
+    wire.heard()
+    for source, sender, taken in ((5, 6, False), (6, 6, True), (201, 201, False)):
+        data = packet(sender, 200, b"hello")
+        wire.say(source, 200, bytes([0x10, len(data)]) + data[:6])
+        wire.say(source, 200, b"\x21" + data[6:13])
+        wire.say(source, 200, b"\x22" + data[13:])
+        assert tool.receive(PATIENCE if taken else 0.05) == (data if taken else None)
+    assert tool.places[b"\x00\x06"] == "node 6"
+    tool.close()
+
+
+def test_with_fd_a_packet_may_be_one_frame(wire: Wire) -> None:
+    tool = wire.tool(5, fd=True)
+    wire.heard()
+    sent = packet(200, 5, bytes(30))  # 42 bytes
+    tool.send(sent)
+    source, target, data = wire.heard()
+    assert (source, target, len(data)) == (200, 5, 48)
+    assert data[:2] == b"\x00\x2a"
+    assert data[2:44] == sent
+    tool.close()
+
+
+def test_frames_of_others_change_nothing(wire: Wire) -> None:
+    tool = wire.tool()
+    strangers = [
+        can.Message(arbitration_id=0x605, data=bytes(8), is_extended_id=False),
+        can.Message(arbitration_id=0x18DAC805, data=b"\x03abc", is_extended_id=True),
+        can.Message(arbitration_id=BASE | 200 << 8 | 5, is_remote_frame=True, is_extended_id=True),
+        can.Message(arbitration_id=BASE | 200 << 8 | 5, data=b"", is_extended_id=True),
+        can.Message(arbitration_id=BASE | 201 << 8 | 5, data=b"\x03abc", is_extended_id=True),
+        can.Message(arbitration_id=BASE | 200 << 8 | 5, data=b"\x2f1234567", is_extended_id=True),
+        can.Message(arbitration_id=BASE | 200 << 8 | 5, data=b"\xf0", is_extended_id=True),
+        can.Message(arbitration_id=BASE | 200 << 8 | 5, data=b"\x10", is_extended_id=True),
+    ]
+    for message in strangers:
+        wire.end.send(message)
+    assert tool.receive(0.1) is None
+    tool.close()
+
+
+def test_a_bus_that_is_lost_is_told(wire: Wire) -> None:
+    bus = wire.bus()
+    tool = CanTransport("virtual", PythonCanBus(bus))
+    bus.shutdown()
+    for action in (lambda: tool.send(packet(200, 5, b"x")), lambda: tool.receive(0.1)):
+        with pytest.raises(LinkError, match="was lost") as caught:
+            action()
+        assert caught.value.code == "link-lost"
+
+
+def test_several_transports_share_a_bus(wire: Wire) -> None:
+    shared = SharedBus(wire.bus())
+    tools = [CanTransport("virtual", shared.part(), random_source=Fixed(first)) for first in (150, 160)]
+    for tool in tools:
+        address = tool.local_address[1]
+        data = packet(9, address, b"for you")
+        wire.say(9, address, bytes([0x10, len(data)]) + data[:6])
+        wire.say(9, address, b"\x21" + data[6:13])
+        wire.say(9, address, b"\x22" + data[13:])
+        assert tool.receive(PATIENCE) == data
+        tool.close()
+    shared.close()
+
+
+@pytest.mark.parametrize("place", ["", "can0", "socketcan:", "teapot:can0", ":can0"])
+def test_what_is_no_interface_is_wrong_use(place: str) -> None:
+    with pytest.raises(UsageError, match="is not a CAN interface"):
+        split_place(place)
