@@ -15,6 +15,7 @@ from plctool.compiler.syntax.builder_chart import read_action, read_priority
 from plctool.compiler.syntax.builder_units import Arrangement
 from plctool.compiler.syntax.lexer import Report, Token
 from plctool.iec import literals
+from plctool.iec.types import ELEMENTARY
 
 _Init = TypeVar("_Init", bound="ast.Init | None")
 
@@ -419,7 +420,10 @@ class Builder:
     def assign_with(self, target: ast.Expr, op: Token, _equals: Token, value: ast.Expr) -> ast.Assign | None:
         name = op.text.upper()
         if name not in ("S", "R", "REF"):
-            self.report(op.pos, "syntax", f"{op.text} has no place here; an assignment is written :=, S= or R=")
+            message = f"{op.text} has no place here; an assignment is written :=, S= or R="
+            if isinstance(target, ast.Name) and target.name.upper() in ELEMENTARY:
+                message = f"variables are declared in VAR ... END_VAR before the statements: {op.text} : {target.name};"
+            self.report(op.pos, "syntax", message)
             return None
         return ast.Assign(op.pos, [target], ast.Assigning(name + "="), value)
 
