@@ -197,7 +197,7 @@ static const char *advice(int error)
 bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON *reason)
 {
     const char *path = slcan_path(text);
-    bool pty = path != NULL && strcmp(path, "pty") == 0;
+    bool pty = strcmp(text, "slcan:pty") == 0;
     if (strlen(text) >= sizeof(can.name)) {
         PortReason(reason, "cannot open CAN %s: the name is too long", text);
         return false;

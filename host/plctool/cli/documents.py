@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from plctool.cli import io_documents
@@ -370,8 +371,14 @@ def flash_several(
 ) -> tuple[Document, list[PlcError]]:
     """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
 
+    ended = Event()  # by Ctrl-C
+
     def one(node: str, plc: Plc) -> Document:
-        show = lambda done, total: progress(node, done, total)  # noqa: E731
+        def show(done: int, total: int) -> None:
+            if ended.is_set():
+                raise Interrupted("Interrupted.", "interrupted")
+            progress(node, done, total)
+
         return {"node": node, **flash(plc, image, start=start, force=force, progress=show)}
 
     devices: list[Document] = []
@@ -384,6 +391,11 @@ def flash_several(
             except PlcError as error:
                 errors.append(error)
                 devices.append({"node": node, "error": {"code": error.code, "message": error.message}})
+            except KeyboardInterrupt:
+                ended.set()
+                raise Interrupted(
+                    "Interrupted. Some devices may have the new program; 'plctool status' shows which.", "interrupted"
+                ) from None
     return {"devices": devices}, errors
 
 
