@@ -240,6 +240,16 @@ static RTS_RESULT ask_kernel(REQUEST *request, int chip, RTS_UI32 outputs)
     return ERR_OK;
 }
 
+static bool has_edges(const REQUEST *request)
+{
+    for (RTS_UI32 i = 0; i < request->count; i++) {
+        if ((request->line[i].flags & (GPIO_V2_LINE_FLAG_EDGE_RISING | GPIO_V2_LINE_FLAG_EDGE_FALLING)) != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static RTS_RESULT open_request(REQUEST *request, RTS_UI32 outputs)
 {
     int chip = open_chip(request->chip);
@@ -248,8 +258,8 @@ static RTS_RESULT open_request(REQUEST *request, RTS_UI32 outputs)
     }
     RTS_RESULT result = ask_kernel(request, chip, outputs);
     (void)close(chip);
-    if (result == ERR_OK && !PortWaitAdd(&request->request)) {
-        return ERR_NOMEMORY; /* for edges; the caller closes */
+    if (result == ERR_OK && has_edges(request) && !PortWaitAdd(&request->request)) {
+        return ERR_NOMEMORY; /* the caller closes */
     }
     return result;
 }
@@ -301,16 +311,6 @@ static void post_edges(const REQUEST *request)
     if (size == (ssize_t)sizeof(edges)) {
         PortWaitNotNow();
     }
-}
-
-static bool has_edges(const REQUEST *request)
-{
-    for (RTS_UI32 i = 0; i < request->count; i++) {
-        if ((request->line[i].flags & (GPIO_V2_LINE_FLAG_EDGE_RISING | GPIO_V2_LINE_FLAG_EDGE_FALLING)) != 0) {
-            return true;
-        }
-    }
-    return false;
 }
 
 void SysGpioPoll(void)
