@@ -50,12 +50,11 @@ static void close_group(GROUP *group)
 
     if (group->lines != 0)
         SysGpioClose((RTS_UI32)(group - groups));
-    for (event = 0; event < SCHED_MAX_EXTERNAL_EVENTS; event++) {
-        if ((group->events >> event & 1) != 0)
+    for (event = 0; group->events != 0; event++, group->events >>= 1) {
+        if ((group->events & 1) != 0)
             (void)SchedUnregisterExternalEvent(event);
     }
     group->lines = 0;
-    group->events = 0;
     group->outputs = 0;
 }
 

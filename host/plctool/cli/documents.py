@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from plctool.cli import io_documents
-from plctool.errors import DeviceError, LinkError, PlcError, UsageError
+from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
 if TYPE_CHECKING:
@@ -35,14 +35,6 @@ class Interrupted(PlcError):
     """The user ended an operation by Ctrl-C; the message says what it has left."""
 
     exit_code = 130
-
-
-class ProgramStopped(DeviceError):
-    """The program ended with an exception. `exception` is for machines, as in `plctool status --json`."""
-
-    def __init__(self, exception: ExceptionInfo) -> None:
-        super().__init__(f"The program stopped: {exception}.", "exception")
-        self.exception = _exception_document(exception)
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -251,7 +243,6 @@ def run(
                 plc.run_cycles(1 if cycles is None else cycles)
             else:
                 plc.run_for(time_ms)
-        _raise_exception(plc)
         tasks, reading = plc.tasks(), plc.sample(gets)
         document = {
             "values": reading.values,
@@ -303,11 +294,7 @@ def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: 
 
     lines = trace_csv(plc, trace.names, cycles, time_ms)
     write_atomically(trace.path, "".join(lines).encode())
-
-
-def _raise_exception(plc: Controller) -> None:
-    if exception := plc.status().exception:
-        raise ProgramStopped(exception)
+    plc.check_running()
 
 
 def bench(path: Path, cycles: int) -> Document:
@@ -382,7 +369,6 @@ def flash_several(
     progress: Callable[[str, int, int], None] = lambda node, done, total: None,
 ) -> tuple[Document, list[PlcError]]:
     """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
-    from concurrent.futures import ThreadPoolExecutor
 
     def one(node: str, plc: Plc) -> Document:
         show = lambda done, total: progress(node, done, total)  # noqa: E731
@@ -430,11 +416,12 @@ def status_document(status: PlcStatus) -> Document:
     return {
         "state": str(status.state),
         "image_crc": None if status.state is AppState.NONE else f"{status.image_crc:08X}",
-        "exception": None if status.exception is None else _exception_document(status.exception),
+        "exception": None if status.exception is None else exception_document(status.exception),
     }
 
 
-def _exception_document(exception: ExceptionInfo) -> Document:
+def exception_document(exception: ExceptionInfo) -> Document:
+    """For machines."""
     return {**vars(exception), "calls": [vars(call) for call in exception.calls]}
 
 
@@ -482,7 +469,7 @@ def log(plc: Controller) -> Document:
     exception = plc.status().exception
     last = next((e for e in reversed(entries) if e["class"] == "exception"), None)
     if exception and exception.file and last:
-        known = _exception_document(exception)
+        known = exception_document(exception)
         last |= {name: known[name] for name in ("pou", "file", "line", "calls")}
     return {"entries": entries}
 

@@ -427,7 +427,7 @@ def _report(error: PlcError, as_json: bool) -> int:
         if diagnostics := getattr(error, "diagnostics", None):
             document["diagnostics"] = [vars(d) for d in diagnostics]
         if exception := getattr(error, "exception", None):
-            document["exception"] = exception
+            document["exception"] = documents.exception_document(exception)
         print(output.as_json(document))
     else:
         is_compilers = hasattr(error, "diagnostics")  # these begin with their location
