@@ -77,7 +77,7 @@ def io_sources(io: Description | None) -> list[Source]:
     """What messages about a description quote."""
     from plctool.compiler.source import Source
 
-    return [] if io is None else [Source(path, text) for path, text in io.texts.items()]
+    return [] if io is None else [Source(path, text) for path, text in io.contents.items()]
 
 
 def check_sources(paths: Sequence[Path | str]) -> CheckResult:
