@@ -201,3 +201,8 @@ def test_mistake_in_a_device_file_is_reported(tool, scratch: Path, device: str, 
     done = tool("export-itf", "--device", "device.toml")
     assert done.status == 2
     assert message in done.err
+
+
+def test_controller_without_io_manager_says_so(tool, plc) -> None:  # type: ignore[no-untyped-def]
+    done = tool("io", "status", "--port", "/dev/fake")
+    assert (done.status, "has no I/O manager" in done.err) == (1, True)
