@@ -1,4 +1,4 @@
-"""Channels lead to numbers, texts, arrays, structures, and to parts of them."""
+"""Channels lead to numbers, strings, arrays, structures, and to parts of them."""
 
 from __future__ import annotations
 

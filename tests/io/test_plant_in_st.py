@@ -52,7 +52,7 @@ def test_exception_of_the_plant_is_named(tmp_path: Path) -> None:
     text = "PROGRAM Plant\nVAR level : REAL; n, m : INT; END_VAR\nn := 1 / m;\nEND_PROGRAM\n"
     with plant(tmp_path, text) as tank, Simulator(built.image, built.symbols) as plc:
         plc.attach(tank, tank.every_ms)
-        with pytest.raises(DeviceError, match=r"The plant failed: DIVIDEBYZERO in task Main.*plant\.st:3"):
+        with pytest.raises(DeviceError, match=r"The plant failed: The program stopped: DIVIDEBYZERO.*plant\.st:3"):
             plc.run_for(100)
 
 

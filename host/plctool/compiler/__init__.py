@@ -68,20 +68,16 @@ def load_io(paths: Sequence[Path | str], files: IoFiles | None = None) -> Descri
 
 
 def _target(wanted: str | None, io: Description | None) -> str:
-    """The processor to compile for. Raises UsageError if the board has another one."""
-    board = io.device if io is not None else None
-    if board is None or not board.target:
-        return wanted or DEFAULT_TARGET
-    if wanted is not None and wanted != board.target:
-        raise UsageError(f"{board.title} has the target {board.target}, not {wanted}; leave out --target.", "target")
-    return board.target
+    """The processor to compile for."""
+    board = io.device.target if io is not None and io.device is not None else ""
+    return wanted or board or DEFAULT_TARGET
 
 
 def io_sources(io: Description | None) -> list[Source]:
     """What messages about a description quote."""
     from plctool.compiler.source import Source
 
-    return [] if io is None else [Source(path, text) for path, text in io.texts.items()]
+    return [] if io is None else [Source(path, text) for path, text in io.contents.items()]
 
 
 def check_sources(paths: Sequence[Path | str]) -> CheckResult:

@@ -180,7 +180,7 @@ def _struct(kind: str, **values: int) -> bytes:
 
 
 def parse_configuration(data: bytes) -> Configuration:
-    """The tables of an image. Raises UsageError for bytes that are none; nothing in them is trusted."""
+    """The tables of an image. Raises UsageError for bytes that are not one; nothing in them is trusted."""
     return _Reader(data).configuration()
 
 

@@ -79,7 +79,7 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
 
 def _device_file(path: Path, made: Description) -> DeviceFile | None:
     device, mistakes, text = load_device(path)
-    made.texts[str(path)] = text
+    made.contents[str(path)] = text
     made.mistakes.found += mistakes.found
     made.readable = device is not None
     return device

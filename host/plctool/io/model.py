@@ -121,13 +121,13 @@ class Context:
 
 @dataclass
 class Description:
-    """A description that was read. A parent comes before its children. `texts`: the files with their contents, for
+    """A description that was read. A parent comes before its children. `contents`: those of the files, by path, for
     messages. `readable`: the files are TOML."""
 
     path: str
     connectors: list[Connector]
     mistakes: Mistakes
-    texts: dict[str, str]
+    contents: dict[str, str]
     device: DeviceFile | None = None
     readable: bool = True
 

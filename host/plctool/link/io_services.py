@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 
 from plctool.core import error_name, lib
 from plctool.errors import DeviceError
@@ -66,13 +65,13 @@ class IoModule:
 def list_devices(session: Session) -> list[IoDevice]:
     """All connectors of the application, in the order of the description."""
     found: list[IoDevice] = []
-    while batch := session.recover(partial(_list_from, session, found[-1].index + 1 if found else 0)):
+    while batch := _list_from(session, found[-1].index + 1 if found else 0):
         found += batch
     return found
 
 
 def _list_from(session: Session, start: int) -> list[IoDevice]:
-    tags = session.call(lib.SG_IOMGR, lib.SRV_IO_LIST, [bintag.u32(lib.TAG_IO_START, start)])
+    tags = _call(session, lib.SRV_IO_LIST, bintag.u32(lib.TAG_IO_START, start))
     found = []
     for entry in tags.containers(lib.TAG_IO_ENTRY):
         state = _STATE.unpack(entry.bytes(lib.TAG_IO_STATE, _STATE.size))
@@ -128,7 +127,13 @@ def scan(session: Session, connector: int) -> Iterator[IoModule]:
 
 
 def _call(session: Session, service: int, *tags: bintag.Tag) -> bintag.Tags:
-    return session.recover(lambda: session.call(lib.SG_IOMGR, service, tags))
+    try:
+        return session.recover(lambda: session.call(lib.SG_IOMGR, service, tags))
+    except DeviceError as error:
+        if error.result not in (lib.ERR_L7_UNKNOWNCMDGROUP, lib.ERR_L7_UNKNOWNCMD):
+            raise
+        message = "This controller has no I/O manager; its firmware needs CmpIoMgrEmbedded (docs/porting.md)."
+        raise DeviceError(message, "no-io", error.result) from None
 
 
 def _contents(tags: bintag.Tags, wanted: int, size: int) -> list[bytes]:

@@ -56,7 +56,7 @@ def device_variables(description: Description, declared: Iterable[str]) -> Sourc
         pieces.append(Piece(len(text), connector.pos.line, connector.pos.column, copied=False))
         text += f"{connector.name} : {DEVICE_TYPE}; "
     path = description.path
-    return Source(path, f"{text}END_VAR", _LIST, original=description.texts[path], pieces=tuple(pieces))
+    return Source(path, f"{text}END_VAR", _LIST, original=description.contents[path], pieces=tuple(pieces))
 
 
 class IoChannels:
@@ -122,7 +122,7 @@ class IoChannels:
     def source(self) -> Source:
         """The description as a source, so that what is wrong with a name is reported where it stands."""
         assert self.description is not None
-        return Source(self.description.path, self.description.texts[self.description.path])
+        return Source(self.description.path, self.description.contents[self.description.path])
 
     def path(self, channel: Channel, source: Source) -> ast.Expr:
         """The name of a channel's target as the program would write it."""
