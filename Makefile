@@ -1,6 +1,7 @@
 # make demo   the whole story on this machine        make test   all tests
 # make lint   style, types, words                   make bench  figures, side by side
 # make format gives C and Python their one style
+# make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
 # make size   flash and RAM of the bare-metal runtime, per component
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each
@@ -16,7 +17,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
 BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
 
-.PHONY: demo test lint format bench size attack fuzz all clean
+.PHONY: demo test lint format bench size wheel attack fuzz all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -54,6 +55,14 @@ bench: $(BENCHED:%=%/build.ninja)
 
 size: build-cm3/build.ninja
 	$(MESON) compile -C build-cm3 size
+
+# The tag says which C library it needs at least: that of this machine's compiler.
+wheel: $(VENV)/dev
+	rm -rf dist
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist/local .
+	$(BIN)/auditwheel repair --wheel-dir dist dist/local/*.whl
+	rm -r dist/local
+	$(BIN)/python tests/wheel.py dist/*.whl $(PYTHON) python3.11 python3.12 python3.13
 
 ATTACKED := build$(if $(findstring --sanitized,$(ARGS)),-sanitized)
 

@@ -30,14 +30,14 @@ FLOORS = (
     ("device", "sim"),
     ("",),
     ("port_check", "st_tests", "testing", "trace_file"),
-    ("cli",),
+    ("cli", "pytest_plugin"),
     ("__main__",),
 )
 # What floors alone do not say: (package, what it does not know although that is below it).
 APART = (
     ("compiler", ("link", "gateway")),
     ("device", ("compiler",)),
-    ("sim", ("compiler", "gateway")),
+    ("sim", ("gateway",)),
     ("controller", ("gateway",)),
     ("testing", ("compiler", "device", "sim")),
 )

@@ -59,6 +59,14 @@ class ExceptionInfo:
         return f"{self.name}{task}{place}{calls}"
 
 
+class ProgramStopped(DeviceError):
+    """The program ended with an exception."""
+
+    def __init__(self, exception: ExceptionInfo) -> None:
+        super().__init__(f"The program stopped: {exception}.", "exception")
+        self.exception = exception
+
+
 @dataclass(frozen=True)
 class PlcStatus:
     """`state` is "run", "stop", "exception" or "none"; `image_crc` is 0 without application."""
@@ -188,6 +196,11 @@ class Controller(ABC):
         status = self.raw_status()
         exception = self._explain(status.image_crc, status.exception) if status.exception else None
         return PlcStatus(status.state, status.image_crc, status.image_size, exception)
+
+    def check_running(self) -> None:
+        """Raises ProgramStopped when the application stopped with an exception."""
+        if self.raw_status().exception is not None and (exception := self.status().exception):
+            raise ProgramStopped(exception)
 
     @abstractmethod
     def raw_status(self) -> Status:

@@ -39,6 +39,10 @@ def read_image(path: Path) -> bytes:
     """The bytes of an image file, whatever they are."""
     try:
         return path.read_bytes()
+    except IsADirectoryError:
+        raise UsageError(
+            f"{path} is a folder; make an image of its sources first: plctool build {path} -o app.cdl.", "no-image"
+        ) from None
     except OSError as error:
         raise UsageError(f"The image {path} cannot be read: {error.strerror}.", "no-image") from None
 

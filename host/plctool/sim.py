@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import timedelta
+from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from plctool.controller import Controller
 from plctool.core import error_name, ffi, lib
@@ -19,11 +21,15 @@ from plctool.debug.variables import Change, Symbol, unreachable
 from plctool.errors import DeviceError, UsageError
 from plctool.files import read_image
 from plctool.image.file import image_crc, parse_image
+from plctool.image.targets import host_target
 from plctool.link import l7
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
 from plctool.sim_io import SimIo, is_input, set_fault
+
+if TYPE_CHECKING:
+    from plctool.compiler import Level
 
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
 _SECTOR = 4096
@@ -66,6 +72,15 @@ class Simulator(Controller):
         file = Path(path)
         image = read_image(file)
         return cls(image, find_symbols(parse_image(image).crc, file), start=start)
+
+    @classmethod
+    def from_sources(cls, *paths: Path | str, level: Level = 2, checks: str = "all", start: bool = True) -> Simulator:
+        """The program in source files and folders, compiled for this. `level` and `checks` as in `compile_sources`,
+        which says what is raised."""
+        from plctool.compiler import compile_sources  # only here: what runs images needs no compiler
+
+        built = compile_sources(paths, target=host_target(), level=level, checks=checks)
+        return cls(built.image, built.symbols, start=start)
 
     def close(self) -> None:
         """Shuts the runtime down; another Simulator may be made then."""
@@ -205,16 +220,16 @@ class Simulator(Controller):
         """Virtual time since power on [ns]."""
         return int(lib.SimNow())
 
-    def run_cycles(self, count: int) -> None:
-        """Runs until the first task has made `count` more cycles, or the program stopped with an exception."""
-        if not self._plants:
-            self._run_cycles(count)
-            return
-        for _ in range(count):
-            self._run_cycles(1)
+    def run_cycles(self, count: int, *, check: bool = True) -> None:
+        """Runs until the first task has made `count` more cycles. Raises ProgramStopped when the program stopped with
+        an exception; without `check`, `status()` has it."""
+        for step in repeat(1, count) if self._plants else (count,):
+            self._run_cycles(step)
             self._step_plants()
             if self.raw_status().exception is not None:
-                return
+                break
+        if check:
+            self.check_running()
 
     def _run_cycles(self, count: int) -> None:
         result = lib.SimRunCycles(count) if count > 0 else lib.ERR_OK
@@ -224,10 +239,11 @@ class Simulator(Controller):
         if result not in (lib.ERR_OK, lib.ERR_EXCEPTION):
             _check(result, "The program does not run")
 
-    def run_for(self, ms: float = 0, *, seconds: float = 0) -> None:
+    def run_for(self, ms: float | timedelta = 0, *, seconds: float = 0, check: bool = True) -> None:
         """Lets virtual time pass: ten times 10 ms are ten cycles of a 10 ms task. Raises UsageError for a time that is
-        negative or longer than 146 years."""
-        ns = round(ms * 1e6 + seconds * 1e9)
+        negative or longer than 146 years, and ProgramStopped as `run_cycles` does."""
+        passed = ms / timedelta(milliseconds=1) if isinstance(ms, timedelta) else ms
+        ns = round(passed * 1e6 + seconds * 1e9)
         if not 0 <= ns < MAX_NS:
             raise UsageError(f"Time passes forwards, and for at most {MAX_NS // 10**9} s.", "time")
         end = self.now_ns + ns
@@ -235,6 +251,8 @@ class Simulator(Controller):
             _check(lib.SimRunFor(max(0, due - self.now_ns)), "Time does not advance")
             self._step_plants()
         _check(lib.SimRunFor(max(0, end - self.now_ns)), "Time does not advance")
+        if check:
+            self.check_running()
 
     def bench(self, task: int, cycles: int) -> tuple[float, float]:
         """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""

@@ -149,3 +149,88 @@ def test_a_mistake_in_a_declaration(line: str, said: str) -> None:
 )
 def test_a_mistake_in_a_unit(text: str, said: list[str]) -> None:
     assert messages(text) == said
+
+
+# Forty more, written before their messages were looked at.
+SELECT = "a choice between two values is written SEL(condition, value_if_false, value_if_true)"
+TESTED_AT_END = "a loop that tests at its end is written REPEAT ... UNTIL condition END_REPEAT"
+CONSTANT = "constants are declared in VAR CONSTANT ... END_VAR"
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("a =: 1;", ["1: an assignment is written :=, not ="]),
+        ("a <- 1;", ["1: an assignment is written :=, not <-"]),
+        ("a := x ? 1 : 2;", [f"1: ? has no place in a program; {SELECT}"]),
+        ("REM a remark", ["1: a comment is written // or (* *)"]),
+        ("# a remark", ["1: # has no place in a program; a comment is written // or (* *)"]),
+        ("x := a > 1 AND < 5;", ["1: AND joins two comparisons: ... AND a < 5"]),
+        ("a := b // 2;", ["1: // begins a comment; a division is written /"]),
+        ("x := ~y;", ["1: not is written NOT, not ~"]),
+        ("a := b << 2;", ["1: a shift is written SHL(b, 2)"]),
+        ("a := b >> 1;", ["1: a shift is written SHR(b, 1)"]),
+        ("a := LEN s;", ["1: a function is called with parentheses: LEN(s)"]),
+        ("a := ABS b;", ["1: a function is called with parentheses: ABS(b)"]),
+        ("CALL tm(IN := x);", ["1: there is no CALL; write tm(...)"]),
+        ("tm.Q();", ["1: Q is a variable of TON, not a method; leave out ()"]),
+        ("v(x := 1, q := y);", ["1: q is given with =>"]),
+        ("TON(IN := x, PT := T#5s);", [
+            "1: TON is a function block type; declare an instance of it and call that"
+        ]),
+        ("FOR a := 1 TO 9 STEP 2 DO b := a; END_FOR;", ["1: the step of a loop is written BY 2"]),
+        ("FOR a := 9 DOWNTO 1 DO b := a; END_FOR;", ["1: a loop that counts down is written TO 1 BY -1"]),
+        ("FOR a := 0, a < 9 DO b := a; END_FOR;", ["1: a loop is written FOR i := 0 TO 9 DO ... END_FOR"]),
+        ("FOR a := 0 TO 9; b := a; END_FOR;", ["1: expected DO before the body of the loop"]),
+        ("CASE a OF\n1: b := 1;\nELSE: b := 2;\nEND_CASE;", ["3: ELSE has no colon"]),
+        ("CASE a OF\n1: b := 1;\nDEFAULT: b := 2;\nEND_CASE;", [
+            "3: unknown name DEFAULT; the branch for all other values is ELSE"
+        ]),
+        ("CASE a OF\n>5: b := 1;\nEND_CASE;", [
+            "2: a branch has values or a range: 6..100: ...; for comparisons write IF ... ELSIF"
+        ]),
+        ("CASE a OF\n1 TO 5: b := 1;\nEND_CASE;", ["2: a range of values is written 1..5"]),
+        ("THEN a := 1;", ["1: THEN without an IF"]),
+        ("let c := 5;", [f"1: {DECLARE}"]),
+        ("int c = 5;", ["1: variables are declared in VAR ... END_VAR before the statements: c : int;"]),
+        ("a := self.b;", ["1: unknown name self; write THIS^"]),
+    ],
+)  # fmt: skip
+def test_more_mistakes_in_a_body_say_what_to_write(body: str, said: list[str]) -> None:
+    assert in_body(body) == said
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("a := b IF x ELSE 3;\na := 1;", f"1: {SELECT}"),
+        ("tm(IN := TRUE; PT := T#1s);", "1: inputs are separated by commas"),
+        ("DO a := 1; WHILE x;", f"1: {TESTED_AT_END}"),
+        ("REPEAT a := 1; WHILE x END_REPEAT;", f"1: {TESTED_AT_END}"),
+    ],
+)
+def test_mistakes_that_leave_a_sentence_open_are_said_first(body: str, said: str) -> None:
+    assert in_body(body)[0] == said
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("c := 5;", "a variable is declared with its type: c : INT := 5;"),
+        ("c[10] : INT;", "an array is declared c : ARRAY[0..9] OF INT;"),
+        ("c : ARRAY[0-9] OF INT;", "the bounds of an array are written 0..9"),
+        ("c : ARRAY(0..9) OF INT;", "the bounds of an array stand in brackets: ARRAY[0..9]"),
+        ("c : ARRAY OF INT;", "an array has its first and its last index in brackets: ARRAY[0..9] OF ..."),
+        ("c : INT, d : INT;", "a declaration ends with ;, not with a comma"),
+        ("c-d : INT;", "a name has no blank and no -: c_d"),
+        ("c d : INT;", "a name has no blank and no -: c_d"),
+        ("1c : INT;", "1c is not a number; a name begins with a letter"),
+        ("c : *INT;", "a pointer is declared POINTER TO INT"),
+        ("c : INT*;", "a pointer is declared POINTER TO INT"),
+        ("c : CONST INT := 5;", CONSTANT),
+        ("CONSTANT c : INT := 5;", CONSTANT),
+        ("c : TON(PT := 5s);", "a duration is written T#5s, not 5s"),
+    ],
+)
+def test_more_mistakes_in_a_declaration_say_what_to_write(line: str, said: str) -> None:
+    assert in_declaration(line) == [said]

@@ -125,7 +125,7 @@ def test_assignments_may_be_chained_from_the_right() -> None:
         ("REPEAT x := 1; END_REPEAT;", "5:16: UNTIL and a condition missing before END_REPEAT"),
         ("END_IF;", "5:1: END_IF without an IF"),
         ("ELSE x := 1;", "5:1: ELSE without an IF"),
-        ("THEN x := 1;", "5:1: expected a name or ;, found THEN"),
+        ("THEN x := 1;", "5:1: THEN without an IF"),
         ("x = 5;", "5:3: an assignment is written :=, not ="),
         ("x == 5;", "5:3: a comparison is written =, an assignment :=; there is no =="),
         ("CASE x OF 1: y := 1; 2 y := 3; END_CASE;", "5:23: expected :"),

@@ -39,7 +39,7 @@ def build(folder: Path, text: str, level: Level = 2, checks: str = "all") -> Bui
 
 
 def code_after(plc: Simulator, ms: int = 50) -> int:
-    plc.run_for(ms=ms)
+    plc.run_for(ms=ms, check=False)
     exception = plc.status().exception
     return exception.code if exception else lib.RTSEXCPT_NOEXCEPTION
 

@@ -121,7 +121,7 @@ def test_a_value_that_an_enumeration_has_not_is_refused(plc, value):
 
 def test_an_exception_stops_the_program_and_a_reset_lets_it_start_again(plc):
     plc.write({"Main.divisor": 0})
-    plc.run_cycles(3)
+    plc.run_cycles(3, check=False)
     assert plc.status().exception.name == "DIVIDEBYZERO"
     with pytest.raises(DeviceError, match="reset it first"):
         plc.start()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
+from datetime import timedelta
 from typing import Any
 
 from plctool.errors import UsageError
@@ -86,8 +87,8 @@ def _decode_real(base: Elementary, data: bytes) -> float | str:
 
 
 def encode(t: Type, value: Any) -> bytes:
-    """The bytes of a Python value; for all but STRINGs also of 'T#80ms' or '16#FF' (see `parse_value`).
-    Raises UsageError when it does not fit the type."""
+    """The bytes of a Python value; for all but STRINGs also of 'T#80ms' or '16#FF' (see `parse_value`),
+    for durations also of a timedelta. Raises UsageError when it does not fit the type."""
     if isinstance(t, ArrayType):
         return b"".join(encode(t.element, item) for item in _flat(t, value))
     if isinstance(t, StructType):
@@ -104,11 +105,18 @@ def encode(t: Type, value: Any) -> bytes:
         return bytes(t.size)
     base = base_of(t)
     assert isinstance(base, Elementary)
+    if base.kind is Kind.TIME and isinstance(value, timedelta):
+        value = _time_units(value, base)
     if base.kind is Kind.REAL:
         return _encode_real(base, value)
     if isinstance(value, float) and not value.is_integer():
         raise bad_value(value, t, "write a whole number")
     return _encode_integer(t, base, int(value))
+
+
+def _time_units(value: timedelta, base: Elementary) -> float:
+    """In the unit of the type: ns for LTIME, ms for TIME."""
+    return value // timedelta(microseconds=1) * 1000 if base.size == 8 else value / timedelta(milliseconds=1)
 
 
 def _flat(t: ArrayType, value: Any) -> list[Any]:

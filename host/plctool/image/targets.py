@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from dataclasses import dataclass
 from enum import Enum
 
@@ -89,6 +90,12 @@ TARGETS: dict[str, Target] = {
 }  # fmt: skip
 
 DEFAULT_TARGET = "x86_64-linux"
+
+
+def host_target() -> str:
+    """The target whose programs run in this process."""
+    here = f"{platform.machine()}-linux"
+    return here if here in TARGETS else DEFAULT_TARGET
 
 
 def find_target(name: str) -> Target:

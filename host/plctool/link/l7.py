@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from plctool.core import error_name, lib
 from plctool.errors import DeviceError, LinkError
+from plctool.image.file import target_name
 from plctool.link import bintag
 from plctool.link.wire import Layout
 
@@ -72,8 +74,17 @@ def check_result(result: int, action: str, reason: str = "") -> None:
 
 def why(result: int, reason: str = "") -> str:
     """The end of a sentence about an error, with its name. `reason`: the device's own words."""
-    known = reason.rstrip(".") or _ADVICE.get(result, "")
+    known = _WRONG_TARGET.sub(_named_targets, reason.rstrip(".")) or _ADVICE.get(result, "")
     return f"{known} ({error_name(result)})" if known else error_name(result)
+
+
+_WRONG_TARGET = re.compile(r"for device id 0x([0-9A-F]{1,8}), this device is 0x([0-9A-F]{1,8}): .*")
+
+
+def _named_targets(found: re.Match[str]) -> str:
+    """A device knows its targets by number, users by name."""
+    image, device = (target_name(int(number, 16)) for number in found.groups())
+    return f"for {image}, this device is {device}: build it with --target {device}"
 
 
 def monitoring_error_name(error: int) -> str:

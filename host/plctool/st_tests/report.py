@@ -105,6 +105,11 @@ def report_text(report: Report, *, colour: bool = False) -> str:
     return "\n".join(lines)
 
 
+def failure_text(failure: Failure, sources: Sequence[Source]) -> str:
+    """Where and why a test failed, with the source line and the calls that led there."""
+    return "\n".join(_failure_lines(failure, sources))
+
+
 def _failure_lines(failure: Failure, sources: Sequence[Source]) -> Iterator[str]:
     message = f" ({failure.message})" if failure.message else ""
     yield f"{failure.file}:{failure.line}: {failure.kind}: {failure.text}{message}"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import platform
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatch
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
 from plctool.compiler.internal import bugs_reported
-from plctool.compiler.semantics.unit_test_statements import FAILED, NUMBER, Assertion, Operand
+from plctool.compiler.semantics.assertions import FAILED, NUMBER, Assertion, Operand
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.controller import ExceptionInfo
@@ -27,7 +27,7 @@ from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.value_texts import literal
 from plctool.iec.values import decode
-from plctool.image.targets import DEFAULT_TARGET, TARGETS, find_target
+from plctool.image.targets import find_target, host_target
 from plctool.sim import Simulator
 from plctool.st_tests.report import TEST_NAME, Failure, Outcome, Report
 
@@ -57,26 +57,54 @@ def run_tests(
     CompileError when the program has errors, UsageError when there are no tests.
     """
     begin = time.perf_counter()
-    description = load_io(paths, io)
-    sources = load_sources(paths)
-    suite = TestSuite()
-    with _power(), bugs_reported():
-        checked = check_sources(sources, tests=suite, warnings=warnings, io=description)
-    sources += io_sources(description)
-    if checked.program is None:
-        raise CompileError([d for d in checked.diagnostics if d.severity == "error"], sources)
-    chosen = [i for i, case in enumerate(suite.cases) if _fits(case.name.casefold(), pattern.casefold())]
+    program = TestProgram(paths, level=level, warnings=warnings, io=io)
+    chosen = [i for i, case in enumerate(program.cases) if _fits(case.name.casefold(), pattern.casefold())]
     if not chosen:
-        what = f"no test matches '{pattern}'" if suite.cases else "there are no tests: write TEST 'name' ... END_TEST"
+        what = f"no test matches '{pattern}'" if program.cases else "there are no tests: write TEST 'name' ... END_TEST"
         raise UsageError(f"{what[:1].upper()}{what[1:]}.", "no-tests")
-    here = f"{platform.machine()}-linux"
-    target = find_target(here if here in TARGETS else DEFAULT_TARGET)
-    with bugs_reported():
-        built = build_program(checked.program, Options(target, level))
-    with Simulator(built.image, built.symbols, start=False) as plc:
-        bench = _Bench(plc, built, suite, checked.program.area_sizes)
-        outcomes = [bench.run(number) for number in chosen]
-    return Report(outcomes, time.perf_counter() - begin, sources, checked.diagnostics)
+    outcomes = list(program.run(chosen))
+    return Report(outcomes, time.perf_counter() - begin, program.sources, program.diagnostics)
+
+
+class TestProgram:
+    """A program with its tests, compiled when the first one runs. `cases`: the tests, in the order of the sources;
+    `diagnostics`: warnings of the compiler; `io`: inputs and outputs. Raises CompileError when the program has
+    errors."""
+
+    __test__ = False  # nothing for pytest to collect
+
+    def __init__(
+        self,
+        paths: Sequence[Path | str],
+        *,
+        level: int = 0,
+        warnings: WarningOptions = ALL_WARNINGS,
+        io: IoFiles = IoFiles(),  # noqa: B008
+    ) -> None:
+        description = load_io(paths, io)
+        self.sources = load_sources(paths)
+        self._suite = TestSuite()
+        self._level = level
+        with _power(), bugs_reported():
+            checked = check_sources(self.sources, tests=self._suite, warnings=warnings, io=description)
+        self.sources += io_sources(description)
+        if checked.program is None:
+            raise CompileError([d for d in checked.diagnostics if d.severity == "error"], self.sources)
+        self._program = checked.program
+        self.cases = self._suite.cases
+        self.diagnostics = checked.diagnostics
+
+    @cached_property
+    def _built(self) -> BuildResult:
+        with bugs_reported():
+            return build_program(self._program, Options(find_target(host_target()), self._level))
+
+    def run(self, numbers: Iterable[int]) -> Iterator[Outcome]:
+        """Runs the tests with these indices in `cases`, each from a cold start."""
+        with Simulator(self._built.image, self._built.symbols, start=False) as plc:
+            bench = _Bench(plc, self._built, self._suite, self._program.area_sizes)
+            for number in numbers:
+                yield bench.run(number)
 
 
 def _fits(name: str, pattern: str) -> bool:
@@ -118,7 +146,7 @@ class _Bench:
     def _cycle(self, number: int) -> None:
         self._plc.write({NUMBER: number})
         self._plc.start()
-        self._plc.run_cycles(1)
+        self._plc.run_cycles(1, check=False)
 
     def _continue(self, number: int) -> None:
         """Runs the test with this number on the variables as they are after an exception."""

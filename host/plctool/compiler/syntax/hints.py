@@ -22,6 +22,12 @@ _UNIT = r"\s*(?P<unit>ms|us|ns|s|m|h|d)\b"
 _IN_VARIABLES = "a variable is declared with its name first: {name} : {type};"
 _IN_BODY = "variables are declared in VAR ... END_VAR before the statements: {name} : {type};"
 _CHOICE = "a choice is written CASE a OF 1: ...; ELSE ...; END_CASE"
+_CONSTANT = "constants are declared in VAR CONSTANT ... END_VAR"
+_POINTER = "a pointer is declared POINTER TO {name}"
+_NAME = r"[A-Za-z_]\w*"
+_REPEAT = "a loop that tests at its end is written REPEAT ... UNTIL condition END_REPEAT"
+_LABEL = "a branch has values or a range: 6..100: ...; for comparisons write IF ... ELSIF"
+_RANGE = "a range of values is written {low}..{high}"
 _LOOP = "a loop is written FOR i := 0 TO 9 DO ... END_FOR"
 
 
@@ -44,6 +50,10 @@ def _count(match: re.Match[str]) -> str:
     return f"an array has its first and its last index in brackets: ARRAY[0..{int(match['count']) - 1}] OF ..."
 
 
+def _array(match: re.Match[str]) -> str:
+    return f"an array is declared {match['name']} : ARRAY[0..{int(match['count']) - 1}] OF {match['type']};"
+
+
 def _list(match: re.Match[str]) -> str:
     values = ", ".join(part.strip() for part in match["values"].split(","))
     return f"the values of an array are written in brackets: [{values}]"
@@ -59,6 +69,47 @@ def _located(match: re.Match[str]) -> str:
 
 
 _HINTS = (
+    _hint(r"(?P<here><-)", "an assignment is written :=, not <-", "here"),
+    _hint(r":=[^;]*?(?P<here>\bIF\b[^;]*\bELSE\b)", slips.CHOICE, "here", "body"),
+    _hint(r"(?:^|;)[ \t]*(?P<here>REM[ \t][^\n]*\n?\s*)", "a comment is written // or (* *)", "here"),
+    _hint(r"(?P<name>[\w.]+)\s*(?:<>|[<>]=?|=)\s*[\w.]+\s+(?P<word>AND|OR|XOR)\s+(?P<here>(?P<sign><>|[<>]=?|=)\s*"
+          r"(?P<value>[\w.]+))", "{word} joins two comparisons: ... {word} {name} {sign} {value}", "here", "body"),
+    _hint(rf"{_NAME}\(\s*\w+\s*:=[^();]+(?P<here>;\s*)\w+\s*:=[^();]*\)", "inputs are separated by commas", "here"),
+    _hint(rf"(?P<here>\bCALL\s+(?P<name>{_NAME}))", "there is no CALL; write {name}(...)", "here", "body"),
+    _hint(r"\bFOR\b[^;]*?:=[^;]*?(?P<here>,)", _LOOP, "here"),
+    _hint(r"(?P<here>\bSTEP\s+(?P<value>[-\w.]+))", "the step of a loop is written BY {value}", "here", "body"),
+    _hint(r"(?P<here>\bDOWNTO\s+(?P<value>[-\w.]+))", "a loop that counts down is written TO {value} BY -1", "here"),
+    _hint(r"(?:^|;)[ \t]*(?P<here>DO\b)", _REPEAT, "here"),
+    _hint(r"\bWHILE\b[^;]*?(?P<here>END_REPEAT)", _REPEAT, "here"),
+    _hint(r"\bELSE\s*(?P<here>:)(?!=)", "ELSE has no colon", "here", "body"),
+    _hint(r"^\s*(?P<here>(?:[<>]=?)\s*[-\w]+\s*):", _LABEL, "here", "body"),
+    _hint(r"^\s*(?P<low>[-\w]+)\s+(?P<here>TO)\s+(?P<high>[-\w]+)\s*:", _RANGE, "here", "body"),
+    _hint(rf"\b(?P<name>LEN|ABS|SQRT|SIN|COS|TAN|LN|LOG|EXP|TRUNC|ADR|SIZEOF)\s+(?P<here>(?P<value>{_NAME}))",
+          "a function is called with parentheses: {name}({value})", "here", "body"),
+    _hint(r"(?P<name>[\w.]+)\s*(?P<here><\s?<|>\s?>)\s*(?P<value>\w+)",
+          lambda m: f"a shift is written {'SHL' if '<' in m['here'] else 'SHR'}({m['name']}, {m['value']})", "here"),
+    _hint(r":=[^;/]*\w\s*(?P<here>//\s*[\w.]+\s*;[^\n]*\n\s*)",
+          "// begins a comment; a division is written /", "here", "body"),
+    _hint(r"(?:^|;)[ \t]*(?P<here>THEN\b)", "THEN without an IF", "here"),
+    _hint(rf"(?:^|;)[ \t]*(?P<here>(?:LET|CONST)\s+(?P<name>{_NAME})\s*)",
+          "variables are declared in VAR ... END_VAR before the statements: {name} : INT;", "here", "body"),
+    _hint(rf"^\s*(?P<here>(?P<name>{_NAME})\s*:=\s*(?P<value>[^;]*))",
+          "a variable is declared with its type: {name} : INT := {value};", "here", "declaration"),
+    _hint(r"\bARRAY\s*\[\s*(?P<here>(?P<low>\w+)\s*-\s*(?P<high>\w+)\s*\])",
+          "the bounds of an array are written {low}..{high}", "here"),
+    _hint(r"\bARRAY\s*(?P<here>\(\s*(?P<low>[-\w]+)\s*\.\.\s*(?P<high>[-\w]+)\s*\))",
+          "the bounds of an array stand in brackets: ARRAY[{low}..{high}]", "here"),
+    _hint(r"\bARRAY\s+(?P<here>OF)\b", "an array has its first and its last index in brackets: ARRAY[0..9] OF ...",
+          "here"),
+    _hint(rf"^\s*(?P<name>{_NAME})\s*(?P<here>\[(?P<count>\d+)\]\s*):\s*(?P<type>\w+)", _array, "here", "declaration"),
+    _hint(rf":\s*\w+\s*(?P<here>,)\s*{_NAME}\s*:", "a declaration ends with ;, not with a comma", "here",
+          "declaration"),
+    _hint(rf":\s*(?P<here>\*\s*(?P<name>{_NAME}))", _POINTER, "here", "declaration"),
+    _hint(rf":\s*(?P<name>{_NAME})\s*(?P<here>\*)", _POINTER, "here", "declaration"),
+    _hint(r":\s*(?P<here>CONST(?:ANT)?\s+\w+[^;]*)", _CONSTANT, "here", "declaration"),
+    _hint(r"^\s*(?P<here>CONST(?:ANT)?\s+\w+\s*)(?=:)", _CONSTANT, "here", "declaration"),
+    _hint(rf"^\s*(?!VAR)(?P<a>{_NAME})(?P<here>-|[ \t]+)(?P<b>{_NAME})\s*:(?!=)",
+          "a name has no blank and no -: {a}_{b}", "", "declaration"),
     _hint(r"(?P<name>\w+)\s+REF\s*=\s*(?P<value>[\w.\[\]]+)\s*[,)]",
           "an input that is a reference is given with :=, as others are: {name} := {value}", "", "body"),
     _hint(r"\bARRAY\s*\[\s*(?P<count>\d+)\s*\]", _count),
@@ -71,7 +122,6 @@ _HINTS = (
     _hint(r"\bCASE\s+\w+\s*:(?!=)", _CHOICE),
     _hint(r"\bBEGIN\s+\w+\s*", "there is no BEGIN; the statements follow END_VAR"),
     _hint(r"\bGOTO\s+\w+\s*", slips.REFUSED["JMP"].message),
-    _hint(r"\bCONST\s+\w+", "constants are declared in VAR CONSTANT ... END_VAR", "", "declaration"),
     _hint(r":\s*(?P<here>(?:unsigned|signed|long|short)\s+\w+)",
           "there is no unsigned; write UINT, UDINT ... for a type without negative numbers", "here", "declaration"),
     _hint(_TYPE_FIRST, _typed(_IN_VARIABLES), "here", "declaration"),

@@ -24,7 +24,7 @@ _TOKEN = re.compile(
   | (?P<PRAGMA>\{[^{}]*\})
   | (?P<FOREIGN>\{\{.*?\}\})
   | (?P<NESTED>\(\*|/\*)
-  | (?P<SLIP>==|&&|!=|\|\|?|!|%(?=[\s\d(])|\d\w+)
+  | (?P<SLIP>==|&&|!=|\|\|?|!|~|%(?=[\s\d(])|\d\w+)
   | (?P<BAD>\S)
   | (?P<END>\Z)
   )""",
@@ -97,6 +97,7 @@ _PART_FOLLOWS = re.compile(r"\s*[:.,^\[]")
 _NAME = re.compile(r"\s+[A-Za-z_]")
 _ADDRESS = re.compile(r"\s*%")
 _PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
+_DECLARED = re.compile(r"\s*(?:,|:(?!=))")
 _LABEL = re.compile(r"\s+[A-Za-z_]\w*\s*:(?!=)")
 _QUOTE = re.compile(r"\s*['\"]")
 _COMMENT_MARK = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
@@ -243,6 +244,8 @@ class Lexer:
         else:
             kind, meant = "NUMBER", text.lower().replace("0x", "16#", 1).replace("0b", "2#", 1)
             message = f"a number is written {meant}, not {text}" if "#" in meant else f"{text} is not a number"
+            if _DECLARED.match(self.text, pos + len(text)):
+                message += "; a name begins with a letter"
         self._report(pos, "syntax", message)
         return Token(kind, meant if "#" in meant or kind != "NUMBER" else "0", pos)
 
@@ -255,8 +258,8 @@ class Lexer:
             self._report(pos, "pragma", "this pragma is not closed")
             return True
         shown = character if character.isprintable() else f"character {ord(character)}"
-        hint = "; a comment is written // or (* *)" if character == "#" else ""
-        self._report(pos, "character", f"{shown} has no place in a program{hint}")
+        hint = slips.CHARACTERS.get(character, "")
+        self._report(pos, "character", f"{shown} has no place in a program{'; ' * bool(hint)}{hint}")
         return True
 
     def _end_of_line(self, pos: int) -> int:

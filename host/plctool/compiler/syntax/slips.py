@@ -14,9 +14,14 @@ SIGNS = {
     "||": ("OP", "OR", "or is written OR, not ||"),
     "|": ("OP", "OR", "or is written OR, not |"),
     "!": ("NOT", "NOT", "not is written NOT, not !"),
+    "~": ("NOT", "NOT", "not is written NOT, not ~"),
     "%": ("OP", "MOD", "a remainder is written MOD, not %"),
 }
 """Operators of other languages: the terminal and text they stand for, and what to say."""
+
+CHOICE = "a choice between two values is written SEL(condition, value_if_false, value_if_true)"
+CHARACTERS = {"#": "a comment is written // or (* *)", "?": CHOICE}
+"""Characters that begin nothing, and what may have been meant."""
 
 WORDS = {
     "ELSEIF": "ELSIF",
@@ -36,6 +41,8 @@ TYPES = {
 """Types of other languages."""
 
 NAMES = {
+    "DEFAULT": "the branch for all other values is ELSE",
+    "SELF": "write THIS^",
     "BREAK": "EXIT leaves a loop, and a branch of a CASE ends by itself",
     **dict.fromkeys(("NULLPTR", "NIL", "NONE"), "write NULL"),
     "PI": "write LREAL#3.141592653589793, or declare a constant",

@@ -61,6 +61,7 @@ _WORDS = {
 _PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",)}
 _RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
 _BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
+_AFTER_DECLARATIONS = re.compile(r"\b(?:END_\w+|VAR(?:_\w+)?|IF|FOR|WHILE|REPEAT|CASE)\b", re.IGNORECASE)
 _ELSE_IF = re.compile(r"\bELSE\s+IF\b", re.IGNORECASE)
 _APART = 3  # an error closer than so many tokens to the previous one is a consequence of it
 
@@ -182,6 +183,8 @@ class Recovery:
         for kind, text in (("_SEMI", ";"), ("_END_VAR", "END_VAR")):
             if token.type == "_SEMI" or self._shift(stack, kind, "IDENT", token.type) is None:
                 continue
+            if kind == "_END_VAR" and self._declarations_end_later(name):
+                continue
             self._parser.states.pop()
             self._parser.values.pop()
             if kind == "_SEMI":
@@ -195,6 +198,11 @@ class Recovery:
             self._parser.feed(name)
             return True
         return False
+
+    def _declarations_end_later(self, token: Token) -> bool:
+        """Whether their END_... follows before anything that cannot stand between declarations."""
+        following = _AFTER_DECLARATIONS.search(self._source.text, token.pos)
+        return following is not None and following[0].upper() in ("END_VAR", "END_STRUCT", "END_UNION")
 
     def _keyword_as_name(self, token: Token) -> bool:
         if token.text.upper() not in KEYWORDS or self._shift(self._parser.states, "IDENT") is None:
@@ -244,6 +252,8 @@ class Recovery:
             return
         item = self._item(self._parser.states)
         where = {"stmt": "body", "var_decl": "declaration"}.get(item or "", "")
+        if where == "declaration" and not self._declarations_end_later(token):
+            where = ""
         begin = self._last[0].pos if self._last else token.pos
         found = hint(self._source.text, begin, token.pos, where)
         if found is not None:

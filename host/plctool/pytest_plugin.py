@@ -1,0 +1,88 @@
+"""A plugin for pytest: the TEST blocks of `.st` files are tests like others, with their names, lines and failures.
+
+The program of a test is all sources of its folder, or those that `plc_sources` in the configuration of pytest names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from plctool.errors import PlcError
+
+if TYPE_CHECKING:
+    from plctool.st_tests import TestProgram
+    from plctool.st_tests.report import Failure
+
+_TEST = re.compile(rb"^\s*TEST\s+['\"]", re.IGNORECASE | re.MULTILINE)
+_PROGRAMS: pytest.StashKey[dict[tuple[Path, ...], TestProgram]] = pytest.StashKey()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addini("plc_sources", "sources of the program that TEST blocks test; default: their folder", type="paths")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """A file of Structured Text with a TEST in it; only this is looked for, so that other files cost nothing."""
+    if file_path.suffix.lower() == ".st" and _TEST.search(file_path.read_bytes()):
+        return StFile.from_parent(parent, path=file_path)
+    return None
+
+
+class StFile(pytest.File):
+    """The tests of one file."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        try:
+            program = self._program()
+        except PlcError as error:
+            raise self.CollectError(error.message) from None
+        for number, case in enumerate(program.cases):
+            if Path(case.pos.file).resolve() == self.path.resolve():
+                yield StItem.from_parent(self, name=case.name, program=program, number=number)
+
+    def _program(self) -> TestProgram:
+        """Each program is checked and compiled once."""
+        from plctool.st_tests import TestProgram
+
+        sources = tuple(self.config.getini("plc_sources")) or (self.path.parent,)
+        programs = self.config.stash.setdefault(_PROGRAMS, {})
+        if sources not in programs:
+            programs[sources] = TestProgram(sources)
+        return programs[sources]
+
+
+class StFailure(Exception):
+    """A TEST failed."""
+
+    def __init__(self, failure: Failure) -> None:
+        super().__init__(failure.text)
+        self.failure = failure
+
+
+class StItem(pytest.Item):
+    """A TEST block. It runs in a simulator of its own: Python tests between may use another."""
+
+    def __init__(self, *, program: TestProgram, number: int, **words: Any) -> None:
+        super().__init__(**words)
+        self._program = program
+        self._number = number
+
+    def runtest(self) -> None:
+        (outcome,) = self._program.run([self._number])
+        if outcome.failure:
+            raise StFailure(outcome.failure)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        from plctool.st_tests import failure_text
+
+        if isinstance(excinfo.value, StFailure):
+            return failure_text(excinfo.value.failure, self._program.sources)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        return self.path, self._program.cases[self._number].pos.line - 1, self.name

@@ -1,0 +1,73 @@
+"""TEST blocks as tests of pytest."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TESTS = """TEST 'counts by one'
+VAR c : Counter; END_VAR
+c();
+ASSERT_EQ(c.n, 1);
+END_TEST
+TEST 'counts by two'
+VAR c : Counter; END_VAR
+c();
+ASSERT_EQ(c.n, 2, 'so far');
+END_TEST
+"""
+COUNTER = "FUNCTION_BLOCK Counter VAR_OUTPUT n : INT; END_VAR n := n + 1; END_FUNCTION_BLOCK\n"
+PYTHON = """from plctool import Simulator
+def test_in_python():
+    with Simulator.from_sources("counter.st", "main.st") as plc:
+        plc.run_for(ms=10)
+        assert plc.read("Main.c.n") == 1
+"""
+
+
+def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pytest", "-p", "plctool.pytest_plugin", "-p", "no:cacheprovider", "-v"]
+    return subprocess.run([*command, *words], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.fixture
+def project(scratch: Path) -> Path:
+    (scratch / "counter.st").write_text(COUNTER)
+    (scratch / "main.st").write_text("PROGRAM Main VAR c : Counter; END_VAR c(); END_PROGRAM")
+    (scratch / "tests.st").write_text(TESTS)
+    return scratch
+
+
+def test_they_run_beside_tests_in_python_and_failures_show_their_line(project: Path) -> None:
+    (project / "test_counter.py").write_text(PYTHON)
+    done = run_pytest(project)
+    assert done.returncode == 1
+    assert "tests.st::counts by one PASSED" in done.stdout
+    assert "tests.st::counts by two FAILED" in done.stdout
+    assert "test_counter.py::test_in_python PASSED" in done.stdout
+    assert "tests.st:9: ASSERT_EQ: expected 2, got 1 (so far)\n    ASSERT_EQ(c.n, 2, 'so far');" in done.stdout
+    assert "1 failed, 2 passed" in done.stdout
+
+
+def test_they_are_chosen_like_other_tests(project: Path) -> None:
+    assert run_pytest(project, "-k", "one", "tests.st").returncode == 0
+    assert run_pytest(project, "tests.st::counts by one").returncode == 0
+
+
+def test_sources_of_other_folders_are_named_in_the_configuration(project: Path) -> None:
+    (project / "unit").mkdir()
+    (project / "tests.st").rename(project / "unit" / "tests.st")
+    assert "Counter" in run_pytest(project, "-k", "one").stdout  # not found
+    (project / "pytest.ini").write_text("[pytest]\nplc_sources =\n    counter.st\n    unit\n")
+    assert run_pytest(project, "-k", "one").returncode == 0
+
+
+def test_errors_of_the_compiler_are_errors_of_the_collection(project: Path) -> None:
+    (project / "counter.st").write_text(COUNTER.replace("n := n", "n := m"))
+    done = run_pytest(project)
+    assert done.returncode == 2
+    assert re.search(r"counter\.st:1:\d+: error: .*\bm\b", done.stdout) and "Traceback" not in done.stdout
