@@ -69,7 +69,12 @@ def build(
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
     if channels:
-        document["io"] = {"channels": len(channels), "oldest_input": io_documents.oldest_input(channels)}
+        lines = [d for d in result.symbols.io["devices"] if d.get("load") is not None]
+        document["io"] = {
+            "channels": len(channels),
+            "oldest_input": io_documents.oldest_input(channels),
+            "lines": [{"line": d["name"], "load": round(d["load"], 3)} for d in lines],
+        }
     return document, result.rendered_warnings
 
 
