@@ -69,12 +69,10 @@ def build(
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
     if channels:
-        lines = [d for d in result.symbols.io["devices"] if d.get("load") is not None]
-        document["io"] = {
-            "channels": len(channels),
-            "oldest_input": io_documents.oldest_input(channels),
-            "lines": [{"line": d["name"], "load": round(d["load"], 3)} for d in lines],
-        }
+        loads = {d["name"]: d["load"] for d in result.symbols.io["devices"] if d.get("load") is not None}
+        lines = {"lines": [{"line": name, "load": round(load, 3)} for name, load in loads.items()]} if loads else {}
+        oldest = io_documents.oldest_input(channels)
+        document["io"] = {"channels": len(channels), "oldest_input": oldest, **lines}
     return document, result.rendered_warnings
 
 
