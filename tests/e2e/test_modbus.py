@@ -10,6 +10,7 @@ import struct
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from modbus_support import Devices, Wire, eventually, free_port
@@ -19,6 +20,7 @@ from pymodbus.client.base import ModbusBaseSyncClient
 import plctool
 from plctool.compiler import compile_sources
 from plctool.device import Plc
+from plctool.errors import PlcError
 from plctool.testing.plcrt import Plcrt
 
 CONNECTIONS = 32  # MODBUS_MAX_CONNECTIONS of plcrt
@@ -29,7 +31,7 @@ PROGRAM Main
 VAR
     n : DINT; setpoint : INT; ratio : REAL; recipe : ARRAY[0..9] OF INT; enable, lamp : BOOL;
     echo : INT; half : REAL; sum : DINT; alive : BOOL;
-    rtu_set : INT; rtu_get : INT;
+    rtu_set : INT; rtu_get : INT; ghost_in, ghost_out : INT;
     power, energy : REAL; counter : UDINT; speed, reference : INT; pump : BOOL; level : INT;
 END_VAR
 VAR i : INT; END_VAR
@@ -97,6 +99,24 @@ address = 30001
 every = "T#50ms"
 var = "Main.level"
 
+[[modbus.rs485]]
+name = "Second"
+port = "{master_line}"
+optional = true
+[[modbus.rs485.device]]
+name = "Ghost"
+unit = 5
+[[modbus.rs485.device.read]]
+function = 3
+address = 40001
+every = "T#50ms"
+var = "Main.ghost_in"
+[[modbus.rs485.device.write]]
+function = 6
+address = 40001
+every = "T#50ms"
+var = "Main.ghost_out"
+
 [[modbus.tcp]]
 host = "127.0.0.1"
 port = {drive}
@@ -125,6 +145,7 @@ class Plant:
     """The PLC with its program, and all that is around it."""
 
     plc: Plc
+    folder: Path  # of its program
     server: int  # TCP port
     slave: Wire
     master: Wire
@@ -155,7 +176,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
         drives = Devices([1], tcp=drive)
         with meter, drives, Plcrt(folder / "flash") as plcrt, plctool.connect(f"serial:{plcrt.port}") as plc:
             plc.flash(image)
-            yield Plant(plc, server, slave, master, meter, drives)
+            yield Plant(plc, folder, server, slave, master, meter, drives)
 
 
 @pytest.fixture(params=["tcp", "rtu"])
@@ -372,3 +393,22 @@ def test_damaged_frames_are_not_taken(plant: Plant) -> None:
     assert plant.plc.read("Main.power") == before
     plant.master.flipped = False
     eventually(lambda: plant.plc.read("Main.power") == 99.0)
+
+
+# ---- what a controller cannot have ---------------------------------------------------------------------------------
+
+
+def test_optional_line_that_is_in_use_is_left_out(plant: Plant) -> None:
+    assert not ok(plant, "Ghost")
+    assert not ok(plant, "Second")
+    eventually(lambda: ok(plant, "Meter"))
+
+
+def test_line_that_two_want_refuses_the_image(plant: Plant, tmp_path: Path) -> None:
+    description = '[[modbus.rs485]]\nport = "{0}"\n[[modbus.rs485]]\nname = "Twice"\nport = "{0}"\n'
+    (tmp_path / "main.st").write_text(PROGRAM)
+    (tmp_path / "main.io.toml").write_text(description.format(plant.master.plc))
+    compile_sources([tmp_path / "main.st"]).write(tmp_path / "main.cdl")
+    with pytest.raises(PlcError, match=r"Twice \(IoDrvModbus\): the serial line \".*\" is in use"):
+        plant.plc.flash(tmp_path / "main.cdl")
+    eventually(lambda: ok(plant, "Meter"))  # the old program goes on, with its devices

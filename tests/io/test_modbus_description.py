@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from io_support import build, configuration, messages
 
+from plctool.cli.main import main
 from plctool.core import ffi, lib
 from plctool.io.configuration import ChannelEntry, ConnectorEntry
 from plctool.io.modbus import wire_address
@@ -206,3 +207,10 @@ MISTAKES = [
 def test_mistake_is_reported(tmp_path: Path, text: str, message: str) -> None:
     found = messages(tmp_path, PROGRAM, text)
     assert any(message in m for m in found), found
+
+
+def test_build_prints_the_load_of_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "main.st").write_text(PROGRAM)
+    (tmp_path / "main.io.toml").write_text(device("word_1"))
+    assert main(["build", str(tmp_path), "-o", str(tmp_path / "main.cdl")]) == 0
+    assert "modbus_ttyS1 is 30% in use" in capsys.readouterr().out

@@ -47,13 +47,16 @@ static bool is_channel_good(const MODBUS_PLACE *place, const IoConfigChannelMap 
            channel->bits <= bits - channel->parameter_bit;
 }
 
+/* A device of a line that is optional, and not used, has no data. */
 static RTS_RESULT check_map(const IoConfigConnectorMap *map, bool is_output)
 {
     const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
     const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
     MODBUS_PLACE place = ModbusFindPlace(&setup, connector);
 
-    for (RTS_UI32 i = 0; IoMgrConfigIsMine(connector, &driver) && i < map->channel_map_count; i++) {
+    if (!IoMgrConfigIsMine(connector, &driver) || (place.device == NULL && place.server == NULL))
+        return ERR_OK;
+    for (RTS_UI32 i = 0; i < map->channel_map_count; i++) {
         if (!is_channel_good(&place, &channel[i], is_output))
             return IoMgrConfigRefuse(connector, ERR_PARAMETER, "a channel is not in its data.");
     }
@@ -85,8 +88,11 @@ static void copy_all(const IoConfigConnectorMap *maps, int count, bool is_output
     for (; count > 0; count--, maps++) {
         const MODBUS_PLACE place = ModbusFindPlace(&setup, IoMgrConfigGetConnector(maps->connector));
         const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
-        for (RTS_UI32 i = 0; i < maps->channel_map_count; i++)
-            copy(&place, &channel[i], ModbusFindMemory(&place, channel[i].parameter, is_output, &bits));
+        for (RTS_UI32 i = 0; i < maps->channel_map_count; i++) {
+            RTS_UI8 *memory = ModbusFindMemory(&place, channel[i].parameter, is_output, &bits);
+            if (memory != NULL)
+                copy(&place, &channel[i], memory);
+        }
     }
     SysLockLeave(lock);
 }

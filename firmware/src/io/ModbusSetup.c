@@ -406,11 +406,12 @@ MODBUS_PLACE ModbusFindPlace(MODBUS_SETUP *setup, const IoConfigConnector *conne
 
 static RTS_UI8 *memory_of_job(const MODBUS_DEVICE *device, RTS_UI32 index, bool is_output, RTS_UI32 *bits)
 {
-    const MODBUS_JOB_STATE *state = &device->jobs[index];
+    const MODBUS_JOB_STATE *state;
     const MODBUS_FUNCTION *function;
 
     if (index >= device->job_count)
         return NULL;
+    state = &device->jobs[index];
     function = ModbusFindFunction(state->job->function);
     *bits = (is_output ? state->job->write_count : state->job->read_count) * (RTS_UI32)function->count_of_bits;
     return is_output ? state->out : state->in;
