@@ -18,6 +18,7 @@ SHARED = [
     "IoConfig.h",
     "IoDrvGpio.h",
     "IoDrvSim.h",
+    "IoDrvModbus.h",
     "CmpIecAbi.h",
     "SysExcept.h",
     "SysStart.h",

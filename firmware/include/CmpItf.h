@@ -83,6 +83,7 @@ enum {
     CMPID_CmpIoMgrSrv = 0x0023,
     CMPID_IoDrvSim = 0x0024,
     CMPID_IoDrvGpio = 0x0025,
+    CMPID_IoDrvModbus = 0x0026,
 };
 
 /* Name of a component, "" when unknown. */

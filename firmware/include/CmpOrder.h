@@ -39,6 +39,9 @@ X(IoDrvSim)
 #if HAS_IoDrvGpio
 X(IoDrvGpio)
 #endif
+#if HAS_IoDrvModbus
+X(IoDrvModbus)
+#endif
 #ifdef PORT_COMPONENTS
 PORT_COMPONENTS(X)
 #endif

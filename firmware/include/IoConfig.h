@@ -119,7 +119,8 @@ enum {
 };
 
 /* A channel: `bits` at `parameter_bit` of a parameter of the connector are those at `area_bit` of the inputs or outputs.
- * A channel that is no multiple of 8 bits, or does not start at one, is within one byte on both sides. */
+ * A channel that is no multiple of 8 bits, or does not start at one, is within one byte on both sides. `parameter_bit` is
+ * below 0x80000000, so that drivers can add to it. */
 typedef struct {
     RTS_UI32 parameter; /* id, the driver's own */
     RTS_UI32 parameter_bit;

@@ -88,7 +88,7 @@ typedef struct {
     RTS_RESULT (*IoDrvStartBusCycle)(const IoConfigConnector *connector);
 
     /* From main, about every 100 ms: brings the flags of a connector up to date (IoMgrConfigSetDiagnosis), for a driver
-     * that does not do so when things happen. Below 10 us. */
+     * that does not do so when things happen, and looks for lost ones. Below 10 us; 1 ms to get one back. */
     RTS_RESULT (*IoDrvGetModuleDiagnosis)(const IoConfigConnector *connector);
 
     /* After IoDrvStartBusCycle, in the same context, while the application runs: keeps a watchdog of the device from

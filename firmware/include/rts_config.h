@@ -62,6 +62,11 @@
 #define IO_MAX_CONNECTORS 0
 #endif
 
+/* Connectors of IoDrvGpio, with up to 32 lines each; 28 bytes of RAM each, and what the port takes. */
+#ifndef IO_GPIO_GROUPS
+#define IO_GPIO_GROUPS 1
+#endif
+
 /* Simulated devices (IoDrvSim): bytes of all together, twice, and parameters that channels name. */
 #ifndef IO_SIM_MEMORY
 #define IO_SIM_MEMORY 16384

@@ -19,6 +19,7 @@ static struct {
     RTS_UI8 in[DRIVER_MEMORY];
     RTS_UI8 out[DRIVER_MEMORY];
     char calls[64];       /* a letter each */
+    bool is_careless;     /* checks no channel */
     const char *refuses;  /* connector that it refuses */
     void (*within)(void); /* called once, within the next function of a cycle: what interrupts it */
     RTS_UI32 bus_cycles[IO_SPEC_CONNECTORS];
@@ -31,8 +32,10 @@ static void called(char letter)
 {
     RTS_SIZE length = strlen(plant.calls);
 
-    if (length + 1 < sizeof plant.calls)
+    if (length + 1 < sizeof plant.calls) {
         plant.calls[length] = letter;
+        plant.calls[length + 1] = '\0';
+    }
 }
 
 static void be_interrupted(void)
@@ -68,12 +71,32 @@ static RTS_RESULT test_configure(const IoConfigConnector *connectors, int count)
     return ERR_OK;
 }
 
+static RTS_RESULT check_channels(const IoConfigConnectorMap *map)
+{
+    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
+    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
+    RTS_UI32 i;
+
+    for (i = 0; i < map->channel_map_count && IoMgrConfigIsMine(connector, &test_driver); i++, channel++) {
+        if (channel->bits > 8 * DRIVER_MEMORY || channel->parameter_bit > 8u * DRIVER_MEMORY - channel->bits)
+            return IoMgrConfigRefuse(connector, ERR_OUT_OF_LIMITS, "it has no bit %u.",
+                                     (unsigned)channel->parameter_bit);
+    }
+    return ERR_OK;
+}
+
 static RTS_RESULT test_map(const IoConfigTaskMap *task_maps, int count)
 {
-    RTS_UNUSED(task_maps);
-    RTS_UNUSED(count);
+    RTS_RESULT result = ERR_OK;
+
     called('M');
-    return ERR_OK;
+    for (; count > 0; count--, task_maps++) {
+        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_maps);
+        RTS_UI32 i;
+        for (i = 0; i < task_maps->connector_map_count && result == ERR_OK && !plant.is_careless; i++)
+            result = check_channels(map + i);
+    }
+    return result;
 }
 
 static RTS_RESULT test_read(const IoConfigConnectorMap *maps, int count)

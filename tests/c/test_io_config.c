@@ -1,5 +1,132 @@
+/*
+ * test_io_config.c - how a driver reads its configuration, and that no damaged one reaches it.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
 #include "io_driver.h"
+
+/* Two buses with a device each and parameters of all kinds. */
+static void begin_tree(void)
+{
+    begin_io();
+    io_init(&io);
+    io_add_connector(&io, "BusA", "IoDrvTest");
+    io_add_parameter(&io, 3, 8, 0x12);
+    io_add_parameter(&io, 5, 16, 0x1234);
+    io_add_parameter(&io, 7, 32, 0x12345678);
+    io_add_text_parameter(&io, 9, "/dev/ttyS1");
+    io_add_connector(&io, "BusB", "IoDrvTest");
+    io_add_connector(&io, "DeviceA", "IoDrvTest")->parent = 0;
+    io.connectors[2].type = CT_SLAVE;
+    io_add_connector(&io, "DeviceB", "IoDrvTest")->parent = 1;
+    io.connectors[3].type = CT_SLAVE;
+    io.connectors[3].state = 32;
+    add_copying_task("Main", 10000, 0);
+    add_bytes(0, IO_MAP_INPUTS, 0, 4);
+    add_bytes(0, IO_MAP_OUTPUTS, 0, 4);
+}
+
+static void connectors_are_found_by_type_and_parent(void)
+{
+    const IoConfigConnector *all;
+    const IoConfigConnector *found;
+    int count = 4;
+
+    begin_tree();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    all = IoMgrConfigGetConnector(0);
+    found = IoMgrConfigGetFirstConnector(all, &count, CT_SLAVE);
+    CHECK(found == all + 2 && count == 2);
+    found = IoMgrConfigGetNextConnector(found, &count, CT_SLAVE);
+    CHECK(found == all + 3 && count == 1);
+    CHECK(IoMgrConfigGetNextConnector(found, &count, CT_SLAVE) == NULL);
+    count = 4;
+    found = IoMgrConfigGetFirstChild(all, &count, all + 1);
+    CHECK(found == all + 3);
+    CHECK(IoMgrConfigGetNextChild(found, &count, all + 1) == NULL);
+    CHECK(strcmp(IoMgrConfigGetName(found), "DeviceB") == 0);
+    CHECK_EQUAL(IoMgrConfigGetIndex(found), 3);
+    CHECK(IoMgrConfigGetConnector(4) == NULL);
+}
+
+static void parameters_are_found_by_id(void)
+{
+    const IoConfigConnector *bus;
+    RTS_RESULT result;
+
+    begin_tree();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    bus = IoMgrConfigGetConnector(0);
+    CHECK_EQUAL(IoMgrConfigGetParameterValueByte(IoMgrConfigGetParameter(bus, 3), &result), 0x12);
+    CHECK_EQUAL(result, ERR_OK);
+    CHECK_EQUAL(IoMgrConfigGetParameterValueWord(IoMgrConfigGetParameter(bus, 5), &result), 0x1234);
+    CHECK_EQUAL(IoMgrConfigGetParameterValueByte(IoMgrConfigGetParameter(bus, 5), &result), 0);
+    CHECK_EQUAL(result, ERR_PARAMETER);
+    CHECK_EQUAL(IoMgrConfigGetParameterValueDword(IoMgrConfigGetParameter(bus, 7), NULL), 0x12345678);
+    CHECK(strcmp(IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(bus, 9)), "/dev/ttyS1") == 0);
+    CHECK(IoMgrConfigGetParameterValuePointer(IoMgrConfigGetParameter(bus, 7), &result) == NULL);
+    CHECK_EQUAL(result, ERR_PARAMETER);
+    CHECK(IoMgrConfigGetParameter(bus, 4) == NULL);
+    CHECK(IoMgrConfigGetParameter(bus, 10) == NULL);
+    CHECK(IoMgrConfigGetParameter(bus + 1, 3) == NULL);
+}
+
+static void what_the_configuration_says_can_be_read_from_outside(void)
+{
+    RTS_UI32 value = 0;
+    char text[11];
+
+    begin_tree();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(IoMgrReadParameter(0, 7, &value, 8, 8), ERR_OK);
+    CHECK_EQUAL(value, 0x56);
+    CHECK_EQUAL(IoMgrReadParameter(0, 9, text, 88, 0), ERR_OK);
+    CHECK(strcmp(text, "/dev/ttyS1") == 0);
+    CHECK_EQUAL(IoMgrReadParameter(0, 9, text, 88, 8), ERR_OUT_OF_LIMITS);
+    CHECK_EQUAL(IoMgrReadParameter(0, 4, &value, 8, 0), ERR_NO_OBJECT);
+    CHECK_EQUAL(IoMgrReadParameter(4, 7, &value, 8, 0), ERR_INVALIDID);
+    CHECK_EQUAL(IoMgrWriteParameter(0, 7, &value, 8, 0), ERR_NOT_SUPPORTED);
+    CHECK_EQUAL(IoMgrIdentify(4), ERR_INVALIDID);
+}
+
+/* Each byte takes some values; what is accepted runs, and writes nothing but its areas. */
+static void each_byte_may_be_damaged(void)
+{
+    static const RTS_UI8 flips[] = {0x01, 0x04, 0x80, 0xFF};
+    RTS_UI32 refused = 0;
+    RTS_UI32 accepted = 0;
+    RTS_UI32 at;
+    RTS_UI32 i;
+
+    begin_tree();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    for (at = 0; at < spec.io.size; at++) {
+        for (i = 0; i < RTS_COUNT(flips); i++) {
+            RTS_UI32 place = image_header(&image).code.offset + spec.io.offset + at;
+            RTS_RESULT result;
+            image.bytes[place] ^= flips[i];
+            image_fix_crc(&image);
+            result = download(&image);
+            if (result == ERR_OK) {
+                accepted++;
+                CHECK_EQUAL(AppStartApplication(), ERR_OK);
+                CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+                CHECK_EQUAL(app_exception(), RTSEXCPT_NOEXCEPTION);
+            } else {
+                refused++;
+            }
+            image.bytes[place] ^= flips[i];
+        }
+    }
+    CHECK(refused > accepted / 2 && accepted > 0);
+}
+
 int main(void)
 {
+    NEEDS_X86_64;
+    RUN(connectors_are_found_by_type_and_parent);
+    RUN(parameters_are_found_by_id);
+    RUN(what_the_configuration_says_can_be_read_from_outside);
+    RUN(each_byte_may_be_damaged);
     return test_result();
 }

@@ -1,5 +1,142 @@
+/*
+ * test_io_refused.c - inputs and outputs that a device does not have refuse the application, by name.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "IoDrvSim.h"
 #include "io_driver.h"
+
+static APP_REFUSAL refusal;
+
+/* Application 1 runs on a device that has IoDrvTest only; a good application is there to be spoilt. */
+static void begin_with_old(void)
+{
+    APP_BYTES old;
+
+    begin_io();
+    CHECK_EQUAL(IoDrvSim_Hook(CH_EXIT2), ERR_OK); /* it would take all connectors */
+    build_counter(&old, 1);
+    CHECK_EQUAL(download(&old), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    add_copying_task("Main", 10000, 0);
+    add_bytes(0, IO_MAP_INPUTS, 0, 4);
+}
+
+static RTS_RESULT try_load(void)
+{
+    emit_io(&spec, &io);
+    build_image(&image, &spec);
+    return download_part(&image, image.size, &refusal);
+}
+
+static void check_refused(RTS_RESULT result, const char *text)
+{
+    CHECK_EQUAL(try_load(), result);
+    if (strstr(refusal.text, text) == NULL)
+        fprintf(stderr, "refused with: %s\n", refusal.text);
+    CHECK(strstr(refusal.text, text) != NULL);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, STEP_OFFSET), 1);
+}
+
+static void a_missing_driver(void)
+{
+    begin_with_old();
+    io_add_connector(&io, "Meter", "IoDrvModbus");
+    check_refused(ERR_NO_OBJECT, "Meter needs the driver IoDrvModbus, which this device does not have.");
+    CHECK(log_has("Download refused: Meter needs"));
+}
+
+static void an_optional_device_without_driver_is_left_out(void)
+{
+    begin_with_old();
+    io_add_connector(&io, "Meter", "IoDrvModbus")->flags |= CF_OPTIONAL;
+    CHECK_EQUAL(try_load(), ERR_OK);
+    CHECK(log_has("Meter is not used: there is no driver IoDrvModbus"));
+}
+
+static void a_device_that_is_not_enabled_needs_no_driver(void)
+{
+    begin_with_old();
+    io_add_connector(&io, "Meter", "IoDrvModbus")->flags = 0;
+    CHECK_EQUAL(try_load(), ERR_OK);
+    CHECK(!log_has("Meter"));
+}
+
+static void a_configuration_that_the_driver_refuses(void)
+{
+    begin_with_old();
+    plant.refuses = "Plant";
+    check_refused(ERR_NO_OBJECT, "Plant (IoDrvTest): there is no line DI9.");
+    CHECK(strchr(plant.calls, 'M') == NULL);
+    CHECK(plant.calls[strlen(plant.calls) - 1] == 'c');
+}
+
+static void what_ran_before_runs_with_its_own_inputs_again(void)
+{
+    begin_with_old();
+    add_bytes(0, IO_MAP_OUTPUTS, 0, 4);
+    CHECK_EQUAL(try_load(), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    io_add_connector(&io, "Spare", "IoDrvTest");
+    plant.refuses = "Spare";
+    CHECK_EQUAL(try_load(), ERR_NO_OBJECT);
+    CHECK_EQUAL(app_state(), AS_RUN);
+    plant.in[0] = 0x77;
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(output_at(0), 0x77);
+}
+
+static void an_optional_device_that_the_driver_refuses_is_left_out(void)
+{
+    begin_with_old();
+    io_add_connector(&io, "Spare", "IoDrvTest")->flags |= CF_OPTIONAL;
+    plant.refuses = "Spare";
+    CHECK_EQUAL(try_load(), ERR_OK);
+    CHECK(log_has("Not used: Spare (IoDrvTest): there is no line DI9."));
+}
+
+static void a_part_that_the_runtime_does_not_know(void)
+{
+    CDL_SEGMENT blob;
+    RTS_UI32 *id;
+
+    begin_with_old();
+    emit_io(&spec, &io);
+    build_image(&image, &spec);
+    blob = image_header(&image).blob;
+    id =
+        (RTS_UI32 *)(void *)(image.bytes + blob.offset + blob.size - sizeof(IO_CONFIG_PLACE) - 8); /* of the last one */
+    CHECK_EQUAL(*id, CDL_BLOB_IO);
+    *id = CDL_BLOB_REQUIRED + 99;
+    image_fix_crc(&image);
+    CHECK_EQUAL(download_part(&image, image.size, &refusal), ERR_NOT_SUPPORTED);
+    CHECK(strstr(refusal.text, "needs what this firmware lacks (0x80000063)") != NULL);
+    CHECK_EQUAL(app_state(), AS_RUN);
+}
+
+static void a_boot_project_is_refused_like_a_download(void)
+{
+    begin_with_old();
+    plant.is_careless = true;
+    io.channels[0].map.parameter_bit = 8u * 1024 * 1024; /* too far for IoDrvSim, which takes it after a restart */
+    CHECK_EQUAL(try_load(), ERR_OK);
+    SimStop();
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_NONE);
+    CHECK(log_has("Boot project refused: Plant (IoDrvTest): "));
+}
+
 int main(void)
 {
+    NEEDS_X86_64;
+    RUN(a_missing_driver);
+    RUN(an_optional_device_without_driver_is_left_out);
+    RUN(a_device_that_is_not_enabled_needs_no_driver);
+    RUN(a_configuration_that_the_driver_refuses);
+    RUN(what_ran_before_runs_with_its_own_inputs_again);
+    RUN(an_optional_device_that_the_driver_refuses_is_left_out);
+    RUN(a_part_that_the_runtime_does_not_know);
+    RUN(a_boot_project_is_refused_like_a_download);
     return test_result();
 }

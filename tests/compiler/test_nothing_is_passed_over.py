@@ -11,8 +11,8 @@ from front_support import check, findings, messages
 
 import plctool.compiler
 from plctool.compiler.front import Source, check_sources
+from plctool.compiler.semantics.configuration import _Reader
 from plctool.compiler.semantics.permitted import MODIFIERS, SECTIONS
-from plctool.compiler.semantics.tasks import _Reader
 from plctool.compiler.semantics.unit_tests import TestSuite as Suite
 from plctool.compiler.syntax import attributes
 from plctool.compiler.syntax.lexer import KEYWORDS

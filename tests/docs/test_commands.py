@@ -77,7 +77,7 @@ class Reader:
         )
         assert self.runtime.stdout
         kind, _, place = self.runtime.stdout.readline().strip().partition(": ")
-        if kind == "serial":
+        if kind in ("serial", "can"):
             self.port = place
 
     def stop_runtime(self) -> None:

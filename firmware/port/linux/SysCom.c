@@ -78,19 +78,14 @@ bool PortComKnowsBaud(RTS_UI32 baud)
     return find_speed(baud) != NULL;
 }
 
-/* Raw, no modem lines. */
-static void describe(struct termios *settings, const SYSCOM_SETTINGS *wanted)
+static tcflag_t frame_of(const SYSCOM_SETTINGS *wanted)
 {
-    cfmakeraw(settings);
-    settings->c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS | PARENB | PARODD);
-    settings->c_cflag |= CLOCAL | CREAD;
-    settings->c_cflag |= wanted->stop_bits == 2 ? CSTOPB : 0;
-    settings->c_cflag |= wanted->parity != SYSCOM_PARITY_NONE ? PARENB : 0;
-    settings->c_cflag |= wanted->parity == SYSCOM_PARITY_ODD ? PARODD : 0;
-    cfsetspeed(settings, *find_speed(wanted->baud));
+    tcflag_t frame = wanted->stop_bits == 2 ? CSTOPB : 0;
+    frame |= wanted->parity != SYSCOM_PARITY_NONE ? PARENB : 0;
+    return frame | (wanted->parity == SYSCOM_PARITY_ODD ? PARODD : 0);
 }
 
-/* Pseudo terminals have no bits that a parity could be of. */
+/* Pseudo terminals have no bits on a line, and refuse a parity. */
 static bool is_pty(int file)
 {
     enum { FIRST_MAJOR = 136, LAST_MAJOR = 143 };
@@ -98,7 +93,7 @@ static bool is_pty(int file)
     return fstat(file, &found) == 0 && major(found.st_rdev) >= FIRST_MAJOR && major(found.st_rdev) <= LAST_MAJOR;
 }
 
-/* A device that cannot run like that keeps its own settings without saying so. */
+/* No modem lines. A device that cannot run like that keeps its own settings without saying so. */
 static bool make_raw(int file, const SYSCOM_SETTINGS *wanted)
 {
     const tcflag_t frame = CSTOPB | PARENB | PARODD;
@@ -107,13 +102,15 @@ static bool make_raw(int file, const SYSCOM_SETTINGS *wanted)
     if (tcgetattr(file, &settings) != 0) {
         return false;
     }
-    describe(&settings, wanted);
+    cfmakeraw(&settings);
+    settings.c_cflag &= ~(CRTSCTS | frame);
+    settings.c_cflag |= CLOCAL | CREAD | (is_pty(file) ? 0 : frame_of(wanted));
+    cfsetspeed(&settings, *find_speed(wanted->baud));
     if (tcsetattr(file, TCSANOW, &settings) != 0 || tcgetattr(file, &taken) != 0) {
         return false;
     }
     errno = EINVAL;
-    return cfgetospeed(&taken) == *find_speed(wanted->baud) &&
-           (is_pty(file) || (taken.c_cflag & frame) == (settings.c_cflag & frame));
+    return cfgetospeed(&taken) == *find_speed(wanted->baud) && (taken.c_cflag & frame) == (settings.c_cflag & frame);
 }
 
 /* The driver of the device switches RTS, which drives the bus; adapters that do it by themselves need none of it. */

@@ -11,6 +11,8 @@
 #define HAS_CmpMath 1
 #define HAS_CmpIoMgrEmbedded 1
 #define HAS_IoDrvSim 1
+#define HAS_IoDrvGpio 1
+#define HAS_IoDrvModbus 1
 #define HAS_CmpIoMgrSrv 1
 #define HAS_COMMUNICATION 1
 #define HAS_CmpLogSrv 1

@@ -166,6 +166,13 @@ RTS_UI32 SimComPut(const RTS_UI8 *data, RTS_UI32 size);
 RTS_UI32 SimComGet(RTS_UI8 *data, RTS_UI32 size);
 
 #ifndef RTS_CFFI
+/* Lines of the board, DI0 .. DI7 and DO0 .. DO7, for tests of IoDrvGpio: sets what an input measures (its edges happen
+ * now), -1 or the level of a line, takes it away from us or gives it back, pulls the whole chip. ERR_NO_OBJECT. */
+RTS_RESULT SimGpioSet(const char *name, int high);
+int SimGpioGet(const char *name);
+RTS_RESULT SimGpioTake(const char *name, int taken);
+void SimGpioUnplug(int gone);
+
 /* Runs fn(arg) so that a power cut in it returns here: for tests that call the runtime directly. */
 RTS_RESULT SimCall(void (*fn)(void *arg), void *arg);
 #endif

@@ -17,6 +17,7 @@
 #include "AppIo.h"
 #include "AppRetain.h"
 #include "AppState.h"
+#include "AppTasks.h"
 #include "CmpEventMgr.h"
 #include "CmpIecTask.h"
 #include "CmpLog.h"
@@ -251,10 +252,15 @@ const RTS_UI8 *AppMapCode(const APP_IMAGE *image)
 static RTS_RESULT load_io(APP_REFUSAL *refusal)
 {
     const IO_CONFIG *config = (const IO_CONFIG *)(const void *)(app.code + app.image.io.offset);
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 i;
 
     if (app.image.io.size == 0)
         return ERR_OK;
-    return AppIoGet()->load(config, app.tables.tasks, app.image.task_count, &app.context, refusal);
+    result = AppIoGet()->load(config, app.tables.tasks, app.image.task_count, &app.context, refusal);
+    for (i = 0; i < app.image.task_count && result == ERR_OK; i++)
+        result = AppTasksCheckEvent(&app.tables.tasks[i], refusal);
+    return result;
 }
 #else
 #define load_io(refusal) ((RTS_RESULT)ERR_OK)

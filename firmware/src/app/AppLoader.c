@@ -132,7 +132,7 @@ RTS_RESULT AppLoaderCheck(RTS_UI32 file, RTS_UI32 size, RTS_UI32 crc, APP_IMAGE 
         LoaderCheckFunctions, LoaderCheckImports, LoaderCheckIecFunctions,
         LoaderCheckInfo,      LoaderCheckBlobs,
 #if IO_MAX_CONNECTORS > 0
-        LoaderCheckIo,
+        LoaderCheckIo,        LoaderCheckEvents,
 #endif
     };
     LOADER l;

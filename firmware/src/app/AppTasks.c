@@ -12,6 +12,30 @@
 #include "RetainTable.h"
 #include "SchedEvents.h"
 
+RTS_RESULT AppTasksCheckEvent(const CDL_TASK *task, APP_REFUSAL *refusal)
+{
+    if (task->kind != KIND_EXTERNAL || SchedHasExternalEvent(task->event_offset))
+        return ERR_OK;
+    return APP_REFUSE(refusal, ERR_NO_OBJECT, "Task %s waits for an event that is not here.", task->name);
+}
+
+#if IO_MAX_CONNECTORS > 0
+RTS_RESULT LoaderCheckEvents(LOADER *l)
+{
+    RTS_UI32 count = l->image->io.size == 0 && AppIoGet() != NULL ? l->image->task_count : 0;
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 i;
+
+    for (i = 0; i < count && result == ERR_OK; i++) {
+        CDL_TASK task;
+        result = LoaderRead(l, l->image->tasks + i * (RTS_UI32)sizeof task, &task, sizeof task);
+        if (result == ERR_OK)
+            result = AppTasksCheckEvent(&task, l->refusal);
+    }
+    return result;
+}
+#endif
+
 static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
 {
     const char *name = task->name;
@@ -29,9 +53,8 @@ static RTS_RESULT check_task(LOADER *l, const CDL_TASK *task)
     if (task->kind == KIND_EVENT &&
         (task->event_area >= APP_AREA_CODE || task->event_offset >= l->image->area_size[task->event_area]))
         return refuse(l, ERR_INVALID_REFERENCE, "Event of task %s is outside its area.", name);
-    if (task->kind == KIND_EXTERNAL && !SchedHasExternalEvent(task->event_offset))
-        return refuse(l, ERR_NO_OBJECT, "Task %s waits for an event that is not here.", name);
-    return ERR_OK;
+    /* A driver may post the event: it is known when the driver has its configuration. */
+    return AppIoGet() != NULL ? (RTS_RESULT)ERR_OK : AppTasksCheckEvent(task, l->refusal);
 }
 
 static RTS_RESULT check_tasks(LOADER *l, RTS_UI32 size)

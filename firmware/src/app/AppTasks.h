@@ -11,4 +11,10 @@
 /* A check of AppLoader.c. */
 RTS_RESULT LoaderCheckBlobs(LOADER *l);
 
+/* One more, after it: the events of tasks, unless drivers may have them. */
+RTS_RESULT LoaderCheckEvents(LOADER *l);
+
+/* Whether the external event is there that a task waits for. */
+RTS_RESULT AppTasksCheckEvent(const CDL_TASK *task, APP_REFUSAL *refusal);
+
 #endif

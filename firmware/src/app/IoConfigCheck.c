@@ -150,8 +150,8 @@ static bool is_channel(const IoConfigChannelMap *channel, RTS_UI32 area_size)
 
     return bits > 0 && (channel->flags & ~(IO_CHANNEL_ON_STOP | IO_CHANNEL_BIG_ENDIAN)) == 0 &&
            (channel->flags & IO_CHANNEL_ON_STOP) <= IO_VALUE &&
-           (in_bytes || ((at & 7) + bits <= 8 && (from & 7) + bits <= 8)) && from <= 0xFFFFFFFFu - bits &&
-           at / 8 < area_size && (bits + 7) / 8 <= area_size - at / 8;
+           (in_bytes || ((at & 7) + bits <= 8 && (from & 7) + bits <= 8)) && from >> 31 == 0 && at / 8 < area_size &&
+           (bits + 7) / 8 <= area_size - at / 8;
 }
 
 static RTS_RESULT check_channels(IO_CHECK *c, RTS_UI32 count, RTS_UI32 area_size)

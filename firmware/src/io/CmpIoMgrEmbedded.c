@@ -100,7 +100,7 @@ bool IoMgrConfigIsMine(const IoConfigConnector *connector, const IO_DRIVER *driv
 
 /* ---- one driver, one caller ---- */
 
-static bool enter(IO_DRIVER *driver)
+static bool enter_driver(IO_DRIVER *driver)
 {
     if (SysAtomicReplace(&driver->busy, 0, 1))
         return true;
@@ -135,7 +135,7 @@ static bool has_notes(IO_DRIVER *driver)
 
 static void do_notes(IO_DRIVER *driver, RTS_UI32 notes);
 
-static void leave(IO_DRIVER *driver)
+static void leave_driver(IO_DRIVER *driver)
 {
     SysAtomicStore(&driver->busy, 0);
     while (has_notes(driver) && SysAtomicReplace(&driver->busy, 0, 1)) {
@@ -147,11 +147,11 @@ static void leave(IO_DRIVER *driver)
 /* Enters, or leaves a note for who is in; false then. */
 static bool enter_or_note(IO_DRIVER *driver, RTS_UI32 what)
 {
-    if (enter(driver))
+    if (enter_driver(driver))
         return true;
     note(driver, what);
     if (SysAtomicReplace(&driver->busy, 0, 1)) /* it has just been left */
-        leave(driver);
+        leave_driver(driver);
     return false;
 }
 
@@ -207,9 +207,9 @@ static void read_inputs(const IoConfigTaskMap *task_map)
         next = end_of_run(map, end, IoDeviceGetWell);
         if (driver == NULL) {
             substitute(map, next);
-        } else if (driver->functions->IoDrvReadInputs != NULL && enter(driver)) {
+        } else if (driver->functions->IoDrvReadInputs != NULL && enter_driver(driver)) {
             (void)driver->functions->IoDrvReadInputs(map, (int)(next - map));
-            leave(driver);
+            leave_driver(driver);
         }
     }
 }
@@ -272,7 +272,7 @@ static void write_outputs(RTS_UI32 task, const IoConfigTaskMap *task_map)
         if (driver == NULL || driver->functions->IoDrvWriteOutputs == NULL || !enter_or_note(driver, 1u << task))
             continue;
         write_all(driver, map, (int)(next - map));
-        leave(driver);
+        leave_driver(driver);
     }
 }
 
@@ -301,7 +301,7 @@ static void start_bus_cycles(RTS_UI32 task)
         if (enter_or_note(driver, PENDING_BUS_CYCLE)) {
             if (IoDeviceTakeBusCycle(i))
                 run_bus_cycle(driver, i);
-            leave(driver);
+            leave_driver(driver);
         }
     }
 }
@@ -427,7 +427,7 @@ static void make_safe(void)
         if (driver->functions->IoDrvWriteOutputs == NULL || !enter_or_note(driver, PENDING_SAFE_STATE))
             continue;
         do_notes(driver, PENDING_SAFE_STATE);
-        leave(driver);
+        leave_driver(driver);
     }
 }
 
@@ -598,8 +598,10 @@ static void diagnose(void)
 
     for (i = 0; i < IoTablesCountConnectors(); i++) {
         IO_DRIVER *driver = IoDeviceGetDriver(i);
-        if (driver != NULL && driver->functions->IoDrvGetModuleDiagnosis != NULL)
-            (void)driver->functions->IoDrvGetModuleDiagnosis(IoMgrConfigGetConnector(i));
+        if (driver == NULL || driver->functions->IoDrvGetModuleDiagnosis == NULL || !enter_driver(driver))
+            continue;
+        (void)driver->functions->IoDrvGetModuleDiagnosis(IoMgrConfigGetConnector(i));
+        leave_driver(driver);
     }
 }
 

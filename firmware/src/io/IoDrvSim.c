@@ -36,7 +36,7 @@ typedef struct {
 static struct {
     BLOCK block[IO_SIM_MAX_BLOCKS];
     RTS_UI32 blocks;
-    DEVICE devices[IO_MAX_CONNECTORS];
+    DEVICE devices[IO_MAX_CONNECTORS > 0 ? IO_MAX_CONNECTORS : 1];
     RTS_UI8 device[IO_SIM_MEMORY];
     RTS_UI8 buffer[IO_SIM_MEMORY];
 } sim;

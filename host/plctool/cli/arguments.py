@@ -95,16 +95,16 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     )
 
     run.add_argument(
-        "--trace", nargs="+", default=[], metavar="NAME", help="write the values after each cycle to a CSV file"
-    )
-    run.add_argument(
-        "-o", "--output", type=Path, default=Path("trace.csv"), metavar="FILE", help="of --trace; default: trace.csv"
-    )
-    run.add_argument(
         "--plant",
         type=Path,
         metavar="FILE.py",
         help="Python with 'def step(plc)', which is called each EVERY_MS (1) ms",
+    )
+    run.add_argument(
+        "--trace", nargs="+", default=[], metavar="NAME", help="write the values after each cycle to a CSV file"
+    )
+    run.add_argument(
+        "-o", "--output", type=Path, default=Path("trace.csv"), metavar="FILE", help="of --trace; default: trace.csv"
     )
 
     test = command("test", "run the unit tests of a program in this process, on a virtual clock")

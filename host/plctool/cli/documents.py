@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from plctool.cli import io_documents
 from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from plctool.compiler.warnings import WarningOptions
     from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
     from plctool.device import Plc
-    from plctool.iec.types import Type
-    from plctool.io.device_file import DeviceFile
     from plctool.link.transports import Link
     from plctool.port_check import Outcome
     from plctool.port_check import Report as PortReport
@@ -71,7 +69,7 @@ def build(
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
     if channels:
-        document["io"] = {"channels": len(channels), "oldest_input": oldest_input(channels)}
+        document["io"] = {"channels": len(channels), "oldest_input": io_documents.oldest_input(channels)}
     return document, result.rendered_warnings
 
 
@@ -102,54 +100,6 @@ def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles) -> tuple
             for m in missing_names(uses)
         ]
     return document, render_all(result.diagnostics, shown)
-
-
-def export_board(device: Path, folder: Path) -> Document:
-    """Writes the C header of a board from what its vendor says of it (`device.toml`)."""
-    from plctool.files import make_folder
-    from plctool.io.board_header import board_header
-
-    name, text = board_header(_board(device))
-    make_folder(folder)
-    write_atomically(folder / name, text.encode("ascii", "replace"))
-    return {"header": str(folder / name)}
-
-
-def _board(path: Path) -> DeviceFile:
-    """A device file without mistakes. Raises CompileError with all of them."""
-    from plctool.compiler import CompileError
-    from plctool.compiler.diagnostics import Diagnostic
-    from plctool.compiler.source import Source
-    from plctool.io.description import load_device
-    from plctool.io.mistakes import CODE
-
-    device, mistakes, text = load_device(path)
-    found = [Diagnostic(m.pos.file, m.pos.line, m.pos.column, m.severity, CODE, m.message) for m in mistakes.found]
-    if device is None or found:
-        raise CompileError(found, [Source(str(path), text)])
-    return device
-
-
-def io_init(path: Path, device: Path | None) -> Document:
-    """Writes a description to begin with. Raises UsageError if there is one already."""
-    from plctool.io.beginning import beginning
-
-    if path.exists():
-        raise UsageError(f"{path} is there already; write another one, or remove it first.", "exists")
-    if not path.name.endswith(".io.toml"):
-        raise UsageError(f"A description is called NAME.io.toml; write {path.stem}.io.toml.", "bad-output")
-    board = None if device is None else _board(device)
-    write_atomically(
-        path, beginning(board, None if device is None else _beside(device, path)).encode("ascii", "replace")
-    )
-    return {"description": str(path)}
-
-
-def _beside(device: Path, path: Path) -> str:
-    """How a description at `path` names a device file."""
-    import os
-
-    return Path(os.path.relpath(device.resolve(), path.resolve().parent)).as_posix()
 
 
 def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:
@@ -197,24 +147,6 @@ def diagnostic_document(diagnostic: Diagnostic) -> Document:
     return {name: value for name, value in vars(diagnostic).items() if name != "missing"}
 
 
-def io_map(path: Path) -> Document:
-    """The channels of an image."""
-    from plctool.debug.symbols import find_symbols
-    from plctool.image.file import describe_image
-
-    symbols = find_symbols(int(describe_image(read_image(path))["crc"], 16), path)
-    return {"channels": symbols.io.get("channels", [])}
-
-
-def oldest_input(channels: Sequence[Document]) -> Document | None:
-    """The input whose data may be the oldest when it is used."""
-    inputs = [c for c in channels if not c["output"] and c["age_us"] is not None]
-    oldest = max(inputs, key=lambda c: int(c["age_us"]), default=None)
-    if oldest is None:
-        return None
-    return {"channel": f"{oldest['device']}.{oldest['channel']}", "age_us": oldest["age_us"]}
-
-
 def info(path: Path) -> Document:
     """Header, tables and POUs of an image; with its symbols also the bytes of code that each POU made."""
     from plctool.debug.symbols import find_symbols
@@ -222,6 +154,8 @@ def info(path: Path) -> Document:
 
     data = read_image(path)
     document = describe_image(data)
+    if devices := io_documents.devices_of(data):
+        document["devices"] = devices
     try:
         table = find_symbols(int(document["crc"], 16), path)
     except UsageError:
@@ -284,8 +218,8 @@ def run(
     time_ms: int | None,
     sets: Mapping[str, str],
     gets: Sequence[str],
-    trace: TraceFile | None = None,
     plant: Path | None = None,
+    trace: TraceFile | None = None,
 ) -> tuple[Document, Texts]:
     """Runs a program on a virtual clock for `cycles` of its first task or for `time_ms`. Returns the document, and the
     values as users read them. `plant`: a file in Python that is what the inputs and outputs are connected to.
@@ -413,7 +347,6 @@ def flash_several(
     progress: Callable[[str, int, int], None] = lambda node, done, total: None,
 ) -> tuple[Document, list[PlcError]]:
     """Brings an image onto several controllers at once. Returns also what went wrong; the document has it by node."""
-    from concurrent.futures import ThreadPoolExecutor
 
     def one(node: str, plc: Plc) -> Document:
         show = lambda done, total: progress(node, done, total)  # noqa: E731
@@ -520,56 +453,6 @@ def log(plc: Controller) -> Document:
 
 
 # ---- on a link -------------------------------------------------------------------------------------------------------
-
-
-def io_status(plc: Plc) -> Document:
-    """How the devices of the program are."""
-    return {"devices": [{**vars(device), "state": device.state} for device in plc.io_devices()]}
-
-
-def io_scan(plc: Plc, bus: str) -> Document:
-    """What is on a bus."""
-    return {"bus": bus, "devices": [vars(module) for module in plc.io_scan(bus)]}
-
-
-def io_identify(plc: Plc, device: str) -> Document:
-    """A device shows itself."""
-    plc.io_identify(device)
-    return {"device": device, "identified": True}
-
-
-def io_parameter(plc: Plc, device: str, parameter: str, type_name: str | None, text: str | None = None) -> Document:
-    """Reads a parameter, or sets it to what `text` says. `parameter`: a number, or a name of the description;
-    `type_name`: of one that the description does not have."""
-    from plctool.iec.value_texts import literal, parse_value
-
-    number, t = _parameter(plc, device, parameter, type_name)
-    if text is not None:
-        plc.io_write_parameter(device, number, t, parse_value(t, text))
-    value = plc.io_read_parameter(device, number, t)
-    return {"device": device, "parameter": parameter, "id": number, "value": value, "text": literal(t, value)}
-
-
-def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> tuple[int, Type]:
-    """Number and type of a parameter."""
-    from plctool.errors import did_you_mean
-    from plctool.iec.types import ELEMENTARY, StringType
-
-    known: list[Document] = []
-    with suppress(UsageError):  # without symbols numbers will do
-        devices = plc.symbols().io.get("devices", [])
-        known = next((d["parameters"] for d in devices if d["name"].casefold() == device.casefold()), [])
-    found = next((p for p in known if parameter.casefold() in (p["name"].casefold(), str(p["id"]))), None)
-    number = int(parameter, 0) if parameter[:1].isdigit() else None
-    if found is None and number is None:
-        hint = did_you_mean(parameter, (p["name"] for p in known)) or "; give its number, and its type by --type"
-        raise UsageError(f"{device} has no parameter {parameter}{hint}.", "unknown-parameter")
-    name = (type_name or (found["type"] if found else "UDINT")).upper()
-    length = name.removeprefix("STRING[").removesuffix("]")
-    t: Type | None = StringType(int(length)) if length.isdigit() else ELEMENTARY.get(name)
-    if t is None:
-        raise UsageError(f"A parameter cannot be {name}; use for example UINT, REAL or STRING[20].", "bad-type")
-    return found["id"] if found else number or 0, t
 
 
 def scan(link: Link, gateway: bool | None, tool: str) -> Document:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stdout, suppress
 from typing import TYPE_CHECKING, Any
 
-from plctool.cli import documents, output
+from plctool.cli import documents, io_documents, output
 from plctool.cli.arguments import pairs, parser
 from plctool.cli.documents import Document
 from plctool.cli.links import all_serial_ports, link_of, names_no_link
@@ -78,7 +78,7 @@ def _symbols(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     trace = documents.TraceFile(args.trace, args.output) if args.trace else None
-    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get, trace, args.plant)
+    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get, args.plant, trace)
     return _show(args, document, lambda d: output.run_text(d, texts))
 
 
@@ -95,7 +95,7 @@ def _test(args: argparse.Namespace) -> int:
 
 def _export_itf(args: argparse.Namespace) -> int:
     if args.device is not None:
-        return _show(args, documents.export_board(args.device, args.output), lambda d: str(d["header"]))
+        return _show(args, io_documents.export_board(args.device, args.output), lambda d: str(d["header"]))
     return _show(args, documents.export_interface(args.sources, args.output, args.force), output.interface_text)
 
 
@@ -346,23 +346,23 @@ def _io(args: argparse.Namespace) -> int:
 
 
 def _io_map(args: argparse.Namespace) -> int:
-    return _show(args, documents.io_map(args.image), output.io_map_text)
+    return _show(args, io_documents.channels_of(args.image), output.io_map_text)
 
 
 def _io_init(args: argparse.Namespace) -> int:
-    return _show(args, documents.io_init(args.file, args.device), lambda d: f"{d['description']} written")
+    return _show(args, io_documents.init(args.file, args.device), lambda d: f"{d['description']} written")
 
 
 def _io_status(args: argparse.Namespace) -> int:
-    return _on_device(args, documents.io_status, output.io_status_text)
+    return _on_device(args, io_documents.status, output.io_status_text)
 
 
 def _io_scan(args: argparse.Namespace) -> int:
-    return _on_device(args, lambda plc: documents.io_scan(plc, args.io_device), output.io_scan_text)
+    return _on_device(args, lambda plc: io_documents.scan(plc, args.io_device), output.io_scan_text)
 
 
 def _io_identify(args: argparse.Namespace) -> int:
-    operation = lambda plc: documents.io_identify(plc, args.io_device)  # noqa: E731
+    operation = lambda plc: io_documents.identify(plc, args.io_device)  # noqa: E731
     return _on_device(args, operation, lambda d: f"{d['device']} shows itself")
 
 
@@ -372,7 +372,7 @@ def _io_param(args: argparse.Namespace) -> int:
         example = f"set {args.io_device} {name}=1" if args.verb == "set" else f"get {args.io_device} {name}"
         raise UsageError(f"Write for example: plctool io param {example}.", "usage")
     value = text if args.verb == "set" else None
-    operation = lambda plc: documents.io_parameter(plc, args.io_device, name, args.type, value)  # noqa: E731
+    operation = lambda plc: io_documents.parameter(plc, args.io_device, name, args.type, value)  # noqa: E731
     return _on_device(args, operation, lambda d: f"{d['device']} {d['parameter']} = {d['text']}")
 
 

@@ -30,7 +30,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from plctool.files import Pos
-from plctool.iec.types import ELEMENTARY, Elementary, Kind, StringType, Type
+from plctool.iec.types import DEFAULT_STRING_LENGTH, ELEMENTARY, Elementary, Kind, StringType, Type
 from plctool.io.mistakes import Mistakes
 from plctool.io.names import MAX_NAME, is_name
 from plctool.io.positions import TomlText
@@ -197,10 +197,12 @@ def _type(table: Table) -> Type | None:
     name = table.text("type", required="INT")
     if name is None:
         return None
-    t = ELEMENTARY.get(name.upper())
-    if t is None:
-        table.choice("type", dict.fromkeys(t for t in ELEMENTARY if "X" not in t and "_" not in t))
-    return t
+    if name.upper() == "STRING":
+        return StringType(table.number("length", 1, 255, DEFAULT_STRING_LENGTH) or DEFAULT_STRING_LENGTH)
+    found = ELEMENTARY.get(name.upper())
+    if found is None:
+        table.choice("type", dict.fromkeys((*(t for t in ELEMENTARY if "X" not in t and "_" not in t), "STRING")))
+    return found
 
 
 def _parameter(entry: Entry, mistakes: Mistakes) -> ModuleParameter | None:
@@ -209,8 +211,7 @@ def _parameter(entry: Entry, mistakes: Mistakes) -> ModuleParameter | None:
         mistakes.error(entry.pos, f'{entry.key} needs a table: {entry.key} = {{ id = 1, type = "UINT" }}')
         return None
     number = inner.number("id", 0, MAX_ID, required=True)
-    length = inner.number("length", 1, 255)
-    t: Type | None = StringType(length) if length is not None else _type(inner)
+    t = _type(inner)
     low, high = inner.raw("low"), inner.raw("high")
     for key, value in (("low", low), ("high", high)):
         if value is not None and type(value) not in (int, float):

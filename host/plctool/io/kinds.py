@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from plctool.io.gpio import read_gpio
 from plctool.io.local import read_local
+from plctool.io.modbus import read_modbus
 from plctool.io.model import Connector, Context
 from plctool.io.sim import read_sim
 from plctool.io.tables import Table
@@ -15,6 +16,7 @@ Kind = Callable[[Table, Context], list[Connector]]
 KINDS: dict[str, Kind] = {
     "gpio": read_gpio,
     "local": read_local,
+    "modbus": read_modbus,
     "sim": read_sim,
 }
 """What reads the table `[NAME]`, or each of `[[NAME]]`. A kind that has tables in its table, such as [[modbus.rs485]],

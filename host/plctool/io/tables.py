@@ -46,7 +46,7 @@ class Table:
         self._asked: list[str] = []
         self.mistakes = mistakes
         self.name = ".".join(str(p) for p in path if isinstance(p, str))
-        self.pos = text.key_pos(path) if path else Pos(text.path, 1, 1)
+        self.pos = text.value_pos(path) if path else Pos(text.path, 1, 1)
 
     def __contains__(self, key: str) -> bool:
         return key in self._values

@@ -11,6 +11,7 @@ import logging
 import math
 import queue
 import random
+import re
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
@@ -20,6 +21,7 @@ from typing import Protocol
 
 import can
 import isotp
+from can.interfaces.slcan import slcanBus
 
 from plctool.core import lib
 from plctool.errors import LinkError, UsageError
@@ -36,6 +38,7 @@ _REQUEST = Layout("NS_REQUEST")
 
 _FIRST_TOOL, _LAST_TOOL, _ALL = int(lib.CAN_TOOL_MIN), int(lib.CAN_TOOL_MAX), int(lib.CAN_TO_ALL)
 _MASK, _SHIFT = int(lib.CAN_ADDRESS_MASK), int(lib.CAN_TARGET_SHIFT)
+_LINE_END = re.compile(rb"[\r\a]")
 _BASE_MASK = 0x1FFFFFFF & ~(_MASK << _SHIFT | _MASK)
 
 _CLAIM_TIME = 0.08  # for others to say that they have an address [s]
@@ -133,6 +136,36 @@ class _Part:
         self._notifier.remove_listener(self._queue.put)
 
 
+class SlcanBus(slcanBus):
+    """The one of python-can, which reads byte by byte: 27 calls for a frame."""
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        try:
+            return super()._recv_internal(timeout)
+        except (ValueError, IndexError):
+            return None, False  # a damaged line
+
+    def _read(self, timeout: float | None) -> str | None:
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        while (line := self._next_line()) is None:
+            try:
+                self._buffer += self.serialPortOrig.read(self.serialPortOrig.in_waiting or 1)
+            except OSError as error:
+                raise can.CanOperationError(f"Could not read from the serial line: {error}") from error
+            if time.monotonic() >= end:
+                return self._next_line()
+        return line
+
+    def _next_line(self) -> str | None:
+        """The oldest line in the buffer, with its end; None if there is none."""
+        found = _LINE_END.search(self._buffer)
+        if found is None:
+            return None
+        line = self._buffer[: found.end()].decode("ascii", "replace")
+        del self._buffer[: found.end()]
+        return line
+
+
 # ---- opening ---------------------------------------------------------------------------------------------------------
 
 
@@ -154,11 +187,12 @@ def open_bus(place: str, bit_rate: int, data_bit_rate: int) -> can.BusABC:
     options: dict[str, object] = {"bitrate": bit_rate}
     if data_bit_rate:
         options |= {"fd": True, "data_bitrate": data_bit_rate}
-    if interface == "slcan":
-        options["sleep_after_open"] = 0
-        if data_bit_rate:
-            raise UsageError("CAN FD is not possible over slcan; leave out the second bit rate.", "no-such-link")
     try:
+        if interface == "slcan":
+            bus = SlcanBus(channel, bitrate=None if data_bit_rate else bit_rate, sleep_after_open=0)
+            if data_bit_rate:
+                bus.set_bitrate(bit_rate, data_bit_rate)
+            return bus
         return can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
     except (can.CanError, OSError, ValueError, ImportError) as error:
         raise LinkError(f"Cannot open CAN {place}: {_advice(error)}", "open") from error

@@ -17,7 +17,7 @@ from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
 from plctool.compiler.internal import bugs_reported
-from plctool.compiler.semantics.unit_test_statements import FAILED, NUMBER, Assertion, Operand
+from plctool.compiler.semantics.assertions import FAILED, NUMBER, Assertion, Operand
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.controller import ExceptionInfo

@@ -10,4 +10,6 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
+#define IO_MAX_CONNECTORS 4
+
 #endif

@@ -163,7 +163,7 @@ def describes_any(decl: ast.PouDecl) -> bool:
     names = {n.casefold() for line in lines if is_any(line.type) for _, n in line.names}
     if not names:
         return False
-    return decl.keyword == "METHOD" or any(
+    return decl.keyword is ast.Unit.METHOD or any(
         isinstance(m.base, ast.Name) and m.base.name.casefold() in names and m.name.casefold() in _MEMBERS
         for m in ast.every(ast.Member, decl.body)
     )

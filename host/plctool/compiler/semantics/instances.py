@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import Member
 from plctool.compiler.semantics.world import World
+from plctool.compiler.syntax import ast
 from plctool.iec.types import ArrayType, StructType, Type
 
 INITIALISERS = ("fb_init", "fb_reinit", "fb_exit")  # each class may have its own parameters
@@ -59,7 +60,7 @@ def starters(world: World, t: StructType) -> list[Member]:
     found: dict[str, Member] = {}
     for cls in reversed(chain):
         for key, member in cls.members.items():
-            if "call_after_init" in member.decl.attributes and member.decl.keyword == "METHOD":
+            if "call_after_init" in member.decl.attributes and member.decl.keyword is ast.Unit.METHOD:
                 found.setdefault(key, member)
     return [chain[0].find(key) or member for key, member in found.items()]
 

@@ -258,7 +258,7 @@ def _full_name(target: str, names: Names) -> str:
 def _index(offset: int, text: str) -> ast.Expr:
     number = int(text)
     literal: ast.Expr = ast.Literal(offset, LiteralKind.INT, abs(number))
-    return literal if number >= 0 else ast.Unary(offset, "-", literal)
+    return literal if number >= 0 else ast.Unary(offset, ast.Operator.SUB, literal)
 
 
 def _where(first: Pos, pos: Pos) -> str:

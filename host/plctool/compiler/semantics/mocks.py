@@ -49,7 +49,7 @@ def raising() -> ast.PouDecl:
     """The function that raises an exception by its number."""
     code = ast.VarDecl(0, [(0, "code")], None, ast.NamedType(0, "UDINT"), None)
     block = ast.VarBlock(0, ast.Section.VAR_INPUT, set(), [code])
-    return ast.PouDecl(0, "FUNCTION", _RAISE, None, [block], [], {"external": "iecraise"}, Source("", ""))
+    return ast.PouDecl(0, ast.Unit.FUNCTION, _RAISE, None, [block], [], {"external": "iecraise"}, Source("", ""))
 
 
 class Mocks:
@@ -74,9 +74,9 @@ class Mocks:
         """The declarations with what the tests need to replace parts of them."""
         result: list[ast.Declaration] = []
         for decl in declarations:
-            if isinstance(decl, ast.PouDecl) and decl.keyword == "FUNCTION_BLOCK" and self._blocks:
+            if isinstance(decl, ast.PouDecl) and decl.keyword is ast.Unit.FUNCTION_BLOCK and self._blocks:
                 result.append(self._block(decl))
-            elif isinstance(decl, ast.PouDecl) and decl.keyword == "FUNCTION":
+            elif isinstance(decl, ast.PouDecl) and decl.keyword is ast.Unit.FUNCTION:
                 result += self._function(decl)
             else:
                 result.append(decl)
@@ -92,11 +92,11 @@ class Mocks:
         for member in decl.members:
             name = f"{decl.full_name}.{member.name}"
             chosen = member.name.casefold() in self._members
-            if chosen and member.keyword in ("METHOD", "GET"):
+            if chosen and member.keyword in (ast.Unit.METHOD, ast.Unit.GET):
                 lines += [_variable(pos, switch_of(name), "BOOL"), _variable(pos, calls_of(name), "UDINT")]
                 if member.result is not None:
                     lines.append(ast.VarDecl(pos, [(pos, value_of(name))], None, member.result, None))
-            members.append(_member(member, name, chosen=chosen and member.keyword in ("METHOD", "GET")))
+            members.append(_member(member, name, chosen=chosen and member.keyword in (ast.Unit.METHOD, ast.Unit.GET)))
         blocks = [*decl.blocks, ast.VarBlock(pos, ast.Section.VAR, set(), lines)] if lines else decl.blocks
         skip = ast.If(pos, [(ast.Name(pos, MOCKED), [_counted(pos, CALLS), ast.Return(pos)])], [])
         body = decl.body if ast.Modifier.CLASS in decl.modifiers else [skip, *decl.body]
@@ -133,7 +133,7 @@ def _member(decl: ast.PouDecl, name: str, *, chosen: bool) -> ast.PouDecl:
     condition: ast.Expr = ast.Name(pos, MOCKED)
     give: list[ast.Stmt] = []
     if chosen:
-        condition = ast.Binary(pos, "OR", condition, ast.Name(pos, switch_of(name)))
+        condition = ast.Binary(pos, ast.Operator.OR, condition, ast.Name(pos, switch_of(name)))
         give.append(_counted(pos, calls_of(name)))
         if decl.result is not None:
             give.append(_assign(pos, decl.name, ast.Name(pos, value_of(name))))
@@ -151,9 +151,11 @@ def _variable(pos: int, name: str, type_name: str) -> ast.VarDecl:
 
 
 def _assign(pos: int, name: str, value: ast.Expr) -> ast.Assign:
-    return ast.Assign(pos, [ast.Name(pos, name)], ":=", value)
+    return ast.Assign(pos, [ast.Name(pos, name)], ast.Assigning.VALUE, value)
 
 
 def _counted(pos: int, name: str) -> ast.Assign:
     """`name := name + 1`"""
-    return _assign(pos, name, ast.Binary(pos, "+", ast.Name(pos, name), ast.Literal(pos, ast.LiteralKind.INT, 1)))
+    return _assign(
+        pos, name, ast.Binary(pos, ast.Operator.ADD, ast.Name(pos, name), ast.Literal(pos, ast.LiteralKind.INT, 1))
+    )

@@ -76,7 +76,7 @@ class Names:
         """Makes the names of declarations known."""
         for decl in declarations:
             if isinstance(decl, ast.PouDecl):
-                self.has_members = self.has_members or bool(decl.members) or decl.keyword == "INTERFACE"
+                self.has_members = self.has_members or bool(decl.members) or decl.keyword is ast.Unit.INTERFACE
                 sfc.declare(decl, self.diagnostics)
                 self._add(PouSymbol(decl, library), library=library, full_name=decl.full_name)
             elif isinstance(decl, ast.TypeDecl):
@@ -234,11 +234,11 @@ class Names:
 
     def functions(self) -> list[PouSymbol]:
         """The FUNCTION declarations in order."""
-        return [s for s in self.pou_symbols() if s.keyword == "FUNCTION"]
+        return [s for s in self.pou_symbols() if s.keyword is ast.Unit.FUNCTION]
 
     def program_symbols(self) -> list[PouSymbol]:
         """The PROGRAM declarations in order."""
-        return [s for s in self.pou_symbols() if s.keyword == "PROGRAM"]
+        return [s for s in self.pou_symbols() if s.keyword is ast.Unit.PROGRAM]
 
     def globals(self) -> list[GlobalSymbol]:
         """All global variables the program itself declares; those with a name that others have too, twice."""
@@ -288,7 +288,7 @@ class Names:
     def instance(self, key: str, symbol: Unit | None = None) -> Namespace | None:
         """The instance of that name, or the only one of the PROGRAM `symbol`; None when there is none, or several."""
         if key not in self.planned:
-            if not isinstance(symbol, PouSymbol) or symbol.keyword != "PROGRAM":
+            if not isinstance(symbol, PouSymbol) or symbol.keyword is not ast.Unit.PROGRAM:
                 return None
             names = self.instances_of(symbol)
             if len(names) != 1:
@@ -315,7 +315,7 @@ class Names:
         """What a name is in the PROGRAMs that have a variable of it, with the instance in front."""
         found = []
         for instance in self.planned.values():
-            blocks = (b for b in instance.symbol.decl.blocks if b.keyword != ast.Section.VAR_TEMP)
+            blocks = (b for b in instance.symbol.decl.blocks if b.keyword is not ast.Section.VAR_TEMP)
             written = [n for b in blocks for line in b.decls for _, n in line.names if n.casefold() == name.casefold()]
             found += [f"{instance.name}.{n}" for n in written]
         return found

@@ -21,24 +21,27 @@ _CONSTANT = frozenset((Modifier.CONSTANT,))
 _NONE = frozenset[Modifier]()
 
 _CALL = {  # what lives for one call, and what does not
-    "VAR": _CONSTANT, "VAR_TEMP": _CONSTANT, "VAR_STAT": _CONSTANT | KEEPING, "VAR_EXTERNAL": _CONSTANT,
-}  # fmt: skip
-_PARAMETERS = {"VAR_INPUT": _CONSTANT, "VAR_OUTPUT": _NONE, "VAR_IN_OUT": _CONSTANT}
-_LASTING = {**_CALL, "VAR_INPUT": _CONSTANT | KEEPING, "VAR_OUTPUT": KEEPING, "VAR_IN_OUT": _CONSTANT}
-_TEST = {"VAR": _CONSTANT, "VAR_TEMP": _CONSTANT, "VAR_EXTERNAL": _CONSTANT}
+    Section.VAR: _CONSTANT,
+    Section.VAR_TEMP: _CONSTANT,
+    Section.VAR_STAT: _CONSTANT | KEEPING,
+    Section.VAR_EXTERNAL: _CONSTANT,
+}
+_PARAMETERS = {Section.VAR_INPUT: _CONSTANT, Section.VAR_OUTPUT: _NONE, Section.VAR_IN_OUT: _CONSTANT}
+_LASTING = {**_CALL, Section.VAR_INPUT: _CONSTANT | KEEPING, Section.VAR_OUTPUT: KEEPING, Section.VAR_IN_OUT: _CONSTANT}
+_TEST = {Section.VAR: _CONSTANT, Section.VAR_TEMP: _CONSTANT, Section.VAR_EXTERNAL: _CONSTANT}
 
-SECTIONS: dict[str, dict[str, frozenset[Modifier]]] = {
+SECTIONS: dict[str, dict[Section, frozenset[Modifier]]] = {
     "FUNCTION": {**_CALL, **_PARAMETERS},
-    "FUNCTION_BLOCK": {**_LASTING, "VAR": _CONSTANT | KEEPING | ACCESS},
-    "CLASS": {**_CALL, "VAR": _CONSTANT | KEEPING | ACCESS},
-    "PROGRAM": {**_LASTING, "VAR": _CONSTANT | KEEPING | ACCESS},
-    "METHOD": {**_CALL, **_PARAMETERS, "VAR_INST": KEEPING},
+    "FUNCTION_BLOCK": {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS},
+    "CLASS": {**_CALL, Section.VAR: _CONSTANT | KEEPING | ACCESS},
+    "PROGRAM": {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS},
+    "METHOD": {**_CALL, **_PARAMETERS, Section.VAR_INST: KEEPING},
     "method of an INTERFACE": _PARAMETERS,
-    "PROPERTY": {**_CALL, "VAR_INST": KEEPING},
+    "PROPERTY": {**_CALL, Section.VAR_INST: KEEPING},
     "property of an INTERFACE": {},
     "ACTION": {},
-    "CONFIGURATION": {"VAR_GLOBAL": _CONSTANT | KEEPING},
-    "file": {"VAR_GLOBAL": _CONSTANT | KEEPING | {Modifier.PUBLIC, Modifier.INTERNAL}},
+    "CONFIGURATION": {Section.VAR_GLOBAL: _CONSTANT | KEEPING},
+    "file": {Section.VAR_GLOBAL: _CONSTANT | KEEPING | {Modifier.PUBLIC, Modifier.INTERNAL}},
     "TEST": _TEST,
     "SETUP": _TEST,
     "TEARDOWN": _TEST,
@@ -63,13 +66,13 @@ MODIFIERS: dict[str, frozenset[Modifier]] = {
 """For each kind of unit the words that may stand before its name."""
 
 _INSTEAD_OF_SECTION = {
-    ("FUNCTION", "VAR_INST"): "VAR_STAT keeps a value from call to call",
-    ("FUNCTION_BLOCK", "VAR_INST"): "VAR keeps its value from call to call",
-    ("PROGRAM", "VAR_INST"): "VAR keeps its value from cycle to cycle",
-    ("CLASS", "VAR_INST"): "VAR keeps its value",
-    ("CLASS", "VAR_INPUT"): "nothing calls a CLASS itself; write VAR PUBLIC, or an input of a METHOD",
-    ("CLASS", "VAR_OUTPUT"): "nothing calls a CLASS itself; write VAR PUBLIC, or an output of a METHOD",
-    ("CLASS", "VAR_IN_OUT"): "nothing calls a CLASS itself; write it into a METHOD",
+    ("FUNCTION", Section.VAR_INST): "VAR_STAT keeps a value from call to call",
+    ("FUNCTION_BLOCK", Section.VAR_INST): "VAR keeps its value from call to call",
+    ("PROGRAM", Section.VAR_INST): "VAR keeps its value from cycle to cycle",
+    ("CLASS", Section.VAR_INST): "VAR keeps its value",
+    ("CLASS", Section.VAR_INPUT): "nothing calls a CLASS itself; write VAR PUBLIC, or an input of a METHOD",
+    ("CLASS", Section.VAR_OUTPUT): "nothing calls a CLASS itself; write VAR PUBLIC, or an output of a METHOD",
+    ("CLASS", Section.VAR_IN_OUT): "nothing calls a CLASS itself; write it into a METHOD",
 }
 
 
@@ -120,7 +123,7 @@ class _Check:
         self._modifiers(decl, kind)
         for block in decl.blocks[_given(decl) :]:
             self._section(kind, block)
-        if "external" in decl.attributes and decl.keyword == "FUNCTION":
+        if "external" in decl.attributes and decl.keyword is ast.Unit.FUNCTION:
             self._external(decl)
         for member in decl.members:
             inside = f"{_kind(member).lower()} of an INTERFACE" if kind == "INTERFACE" else _kind(member)
@@ -177,21 +180,21 @@ class _Check:
 
     def _line(self, block: ast.VarBlock, line: ast.VarDecl) -> None:
         name = line.names[0][1]
-        if line.location is not None and Modifier.CONSTANT in block.qualifiers and block.keyword == Section.VAR_GLOBAL:
+        if line.location is not None and Modifier.CONSTANT in block.qualifiers and block.keyword is Section.VAR_GLOBAL:
             self._error(line.location.pos, f"the constant {name} has no address; leave out CONSTANT or AT")
         if line.init is None:
             return
-        if block.keyword == Section.VAR_EXTERNAL:
+        if block.keyword is Section.VAR_EXTERNAL:
             message = f"this initial value has no effect: {name} gets the one of its VAR_GLOBAL; write it there"
             self._warning(line.pos, message)
-        elif block.keyword == Section.VAR_IN_OUT:
+        elif block.keyword is Section.VAR_IN_OUT:
             message = f"this initial value has no effect: each call gives {name} a variable; leave it out"
             self._warning(line.pos, message)
 
 
 def _given(decl: ast.PouDecl) -> int:
     """How many sections at the start are not in the source: that of the value of a SET."""
-    return int(decl.keyword == "SET")
+    return int(decl.keyword is ast.Unit.SET)
 
 
 def _kind(decl: ast.PouDecl) -> str:
@@ -204,7 +207,7 @@ def _with_article(kind: str) -> str:
     return f"{'an' if kind[0] in 'AI' else 'a'} {kind}"
 
 
-def _wrong_section(kind: str, keyword: str) -> str:
+def _wrong_section(kind: str, keyword: Section) -> str:
     advice = _INSTEAD_OF_SECTION.get((kind, keyword)) or f"it has {_listed(SECTIONS[kind])}"
     return f"{_with_article(kind)} has no {keyword}; {advice}"
 
@@ -221,33 +224,33 @@ def _wrong_modifier(kind: str, word: str) -> str:
     return f"{_with_article(kind)} cannot be {word}; it may be {_listed(allowed, 'or')}"
 
 
-def _wrong_qualifier(kind: str, keyword: str, word: str) -> str:
+def _wrong_qualifier(kind: str, keyword: Section, word: str) -> str:
     if word in (Modifier.FINAL, Modifier.ABSTRACT, Modifier.OVERRIDE):
         return f"{word} is for blocks and methods, not for variables; leave it out"
     if word in ACCESS:
         return _wrong_access(kind, keyword, word)
     if word == Modifier.CONSTANT:
-        reason = "it is there to be written" if keyword == Section.VAR_OUTPUT else "a constant is written VAR CONSTANT"
+        reason = "it is there to be written" if keyword is Section.VAR_OUTPUT else "a constant is written VAR CONSTANT"
         return f"a {keyword} cannot be CONSTANT: {reason}"
     return f"a {keyword} cannot be {word}: {_why_not_kept(kind, keyword)}"
 
 
-def _wrong_access(kind: str, keyword: str, word: str) -> str:
-    if keyword in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT"):
+def _wrong_access(kind: str, keyword: Section, word: str) -> str:
+    if keyword in (Section.VAR_INPUT, Section.VAR_OUTPUT, Section.VAR_IN_OUT):
         return f"{word} is for VAR; a {keyword} is visible to all callers; leave it out"
-    if keyword == "VAR_GLOBAL":
+    if keyword is Section.VAR_GLOBAL:
         return f"a VAR_GLOBAL may be PUBLIC or INTERNAL, not {word}"
     return (
         f"{word} is for the VAR of a FUNCTION_BLOCK or CLASS; only {_with_article(kind)} itself sees this; leave it out"
     )
 
 
-def _why_not_kept(kind: str, keyword: str) -> str:
-    if keyword == "VAR_IN_OUT":
+def _why_not_kept(kind: str, keyword: Section) -> str:
+    if keyword is Section.VAR_IN_OUT:
         return "it is a variable of the caller; write it where that is declared"
-    if keyword == "VAR_EXTERNAL":
+    if keyword is Section.VAR_EXTERNAL:
         return "it only repeats a VAR_GLOBAL; write it there"
     if kind in ("TEST", "SETUP", "TEARDOWN"):
         return "a test is initialised each time; leave it out"
-    lasting = "VAR" if kind in ("PROGRAM", "FUNCTION_BLOCK", "CLASS") else "VAR_STAT"
+    lasting = Section.VAR if kind in ("PROGRAM", "FUNCTION_BLOCK", "CLASS") else Section.VAR_STAT
     return f"it lives for one call; {lasting} RETAIN keeps a value"

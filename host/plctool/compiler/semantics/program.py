@@ -12,7 +12,7 @@ from plctool.compiler.semantics.construction import construct
 from plctool.compiler.semantics.declarations.classes import Classes
 from plctool.compiler.semantics.declarations.functions import Functions
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
-from plctool.compiler.semantics.declarations.instances import Blocks, Programs
+from plctool.compiler.semantics.declarations.instance_layouts import Blocks, Programs
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
 from plctool.compiler.semantics.declarations.unit_variables import UnitVariables
 from plctool.compiler.semantics.declarations.variables import Variables
@@ -23,6 +23,7 @@ from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc_statements import statements_of
 from plctool.compiler.semantics.symbols import TypeSymbol
 from plctool.compiler.semantics.world import Declared, World
+from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Pou
 
 
@@ -58,9 +59,9 @@ class Program:
         for symbol in self.world.names.units():
             if isinstance(symbol, TypeSymbol):
                 self.types.type_of_symbol(symbol)
-            elif symbol.keyword == "FUNCTION_BLOCK":
+            elif symbol.keyword is ast.Unit.FUNCTION_BLOCK:
                 self._blocks.block(symbol)
-            elif symbol.keyword == "FUNCTION" and (not is_generic(symbol.decl) or describes_any(symbol.decl)):
+            elif symbol.keyword is ast.Unit.FUNCTION and (not is_generic(symbol.decl) or describes_any(symbol.decl)):
                 self._functions.function(symbol, {})
         for variable in self.world.names.globals():
             self.variables.global_variable(variable)

@@ -75,7 +75,7 @@ def is_sequential(chart: ast.Chart) -> bool:
 def declare(decl: ast.PouDecl, diagnostics: Diagnostics) -> None:
     """Checks the charts of a unit and of its actions, and adds the variables that belong to them."""
     for part in [part for part in (decl, *decl.members) if part.chart is not None]:
-        if part.keyword not in ("METHOD", "GET", "SET"):
+        if part.keyword not in (ast.Unit.METHOD, ast.Unit.GET, ast.Unit.SET):
             _declare(part, decl, diagnostics)
             continue
         message = f"{part.name} keeps nothing between its calls, so it cannot be a chart; use an ACTION"

@@ -45,7 +45,7 @@ def _part(pos: int, step: ast.Step, member: str) -> ast.Expr:
 
 
 def _assign(pos: int, target: ast.Expr, value: ast.Expr) -> ast.Stmt:
-    return ast.Assign(pos, [target], ":=", value)
+    return ast.Assign(pos, [target], ast.Assigning.VALUE, value)
 
 
 def _bool(pos: int, value: bool) -> ast.Expr:
@@ -61,7 +61,7 @@ def _time(pos: int) -> ast.Expr:
     return ast.Call(pos, _name(pos, "TIME"), [])
 
 
-def _joined(op: str, operands: list[ast.Expr]) -> ast.Expr:
+def _joined(op: ast.Operator, operands: list[ast.Expr]) -> ast.Expr:
     first, *rest = operands
     for operand in rest:
         first = ast.Binary(operand.pos, op, first, operand)
@@ -74,7 +74,7 @@ def _started(pos: int, step: ast.Step) -> ast.Stmt:
 
 def _measured(pos: int, step: ast.Step) -> ast.Stmt:
     """The time the step has been active."""
-    elapsed = ast.Binary(pos, "-", _time(pos), _part(pos, step, "START"))
+    elapsed = ast.Binary(pos, ast.Operator.SUB, _time(pos), _part(pos, step, "START"))
     return _assign(pos, _part(pos, step, "T"), elapsed)
 
 
@@ -157,9 +157,11 @@ class _Evolution:
         pos, sources = transition.pos, keys(transition.sources)
         enabled = [_part(pos, step, "X") for step in self._ends(transition.sources)]
         rivals = [other for other in before if sources & keys(other.sources)]
-        enabled += [ast.Unary(pos, "NOT", _name(pos, fires[other])) for other in rivals]
+        enabled += [ast.Unary(pos, ast.Operator.NOT, _name(pos, fires[other])) for other in rivals]
         note = _assign(pos, _name(pos, fires[transition]), _bool(pos, True))
-        return ast.If(pos, [(_joined("AND", enabled), [ast.If(pos, [(transition.condition, [note])], [])])], [])
+        return ast.If(
+            pos, [(_joined(ast.Operator.AND, enabled), [ast.If(pos, [(transition.condition, [note])], [])])], []
+        )
 
 
 def _label(pos: int, value: int) -> ast.CaseLabel:
@@ -206,7 +208,7 @@ class _Execution:
             branches.append(([_label(step.pos, number)], own))
         pos = calls[0].target.pos
         state = _name(pos, hidden_name(self._decl, STATE))
-        same = ast.Binary(pos, "=", state, _name(pos, hidden_name(self._decl, BEFORE)))
+        same = ast.Binary(pos, ast.Operator.EQ, state, _name(pos, hidden_name(self._decl, BEFORE)))
         return ast.If(pos, [(same, [ast.Case(pos, state, branches, [])])], otherwise)
 
     def _unknown(self, action: Action) -> None:
@@ -226,14 +228,14 @@ class _Execution:
         pos = action.target.pos
         if not action.plain:
             return [*_controlled(action), ast.If(pos, [(_output(action, "A"), [_run(action)])], [])]
-        condition = ast.Binary(pos, "OR", _active(action, "N"), _name(pos, action.hidden))
+        condition = ast.Binary(pos, ast.Operator.OR, _active(action, "N"), _name(pos, action.hidden))
         note = _assign(pos, _name(pos, action.hidden), _active(action, "N"))
         return [ast.If(pos, [(condition, [note, _run(action)])], [])]
 
 
 def _active(action: Action, qualifier: str) -> ast.Expr:
     """Whether a step is active that has the action with this qualifier."""
-    return _joined("OR", [_part(u.pos, step, "X") for step, u in action.uses if u.qualifier == qualifier])
+    return _joined(ast.Operator.OR, [_part(u.pos, step, "X") for step, u in action.uses if u.qualifier == qualifier])
 
 
 def _run(action: Action) -> ast.Stmt:

@@ -131,7 +131,7 @@ class PouSymbol:
     library: bool
 
     @property
-    def keyword(self) -> str:
+    def keyword(self) -> ast.Unit:
         """FUNCTION, FUNCTION_BLOCK, INTERFACE or PROGRAM."""
         return self.decl.keyword
 
@@ -231,7 +231,7 @@ class ClassInfo:
     @property
     def is_interface(self) -> bool:
         """Whether there are no instances of it, only of what implements it."""
-        return self.symbol.keyword == "INTERFACE"
+        return self.symbol.keyword is ast.Unit.INTERFACE
 
     @property
     def abstract(self) -> bool:

@@ -6,9 +6,9 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from plctool.compiler.semantics import mocks
+from plctool.compiler.semantics.assertions import FAILED, LTIME_NOW, TIME_NOW, Assertion, Bench, Operand
 from plctool.compiler.semantics.checker import Checker, SpecialCalls
 from plctool.compiler.semantics.conversions import (
     NUMBERS,
@@ -38,7 +38,6 @@ from plctool.compiler.typed import (
     Expr,
     If,
     Load,
-    Pos,
     Return,
     Statement,
     Storage,
@@ -49,69 +48,7 @@ from plctool.compiler.typed import (
 )  # fmt: skip
 from plctool.iec.types import BOOL, DINT, LREAL, LTIME, TIME, UDINT, ArrayType, Kind, StringType, StructType, Type
 
-NUMBER, FAILED = "__test", "__failed"
-"""Hidden variables: the test to run (from 0); afterwards the assert that failed (from 1)."""
-
-_TIME, _LTIME = "__time", "__ltime"
 _MESSAGE = StringType(255)
-_NOWHERE = Pos("", 0, 0)
-
-
-@dataclass(frozen=True)
-class Operand:
-    """A value an assert is about: a constant, or what the hidden variable holds after the failure."""
-
-    type: Type
-    value: int | float | str = 0
-    variable: str = ""
-
-
-@dataclass(frozen=True)
-class Assertion:
-    """An assert: where it stands, what it is called, what it compares."""
-
-    pos: Pos
-    name: str
-    actual: Operand
-    expected: Operand
-    tolerance: Operand | None = None
-    message: Operand | None = None
-
-
-class Bench:
-    """What all tests of a program share: its asserts, numbered from 1, and the hidden variables."""
-
-    def __init__(self, world: World, asserts: list[Assertion]) -> None:
-        self.asserts = asserts
-        self._world = world
-        self._operands: dict[tuple[str, Type], Variable] = {}
-        hidden = ((NUMBER, DINT), (FAILED, DINT), (_TIME, TIME), (_LTIME, LTIME))
-        self._hidden = {name: self._variable(name, t) for name, t in hidden}
-        world.clock = {"TIME": self._hidden[_TIME], "LTIME": self._hidden[_LTIME]}
-
-    def _variable(self, name: str, t: Type) -> Variable:
-        made = Variable(name, t, Storage.AREA, _NOWHERE)
-        self._world.allocation.add(made)
-        return made
-
-    def operand(self, role: str, t: Type) -> Variable:
-        """The hidden variable for one side of an assert."""
-        found = self._operands.get((role, t))
-        if found is None:
-            found = self._variable(f"__{role}{len(self._operands)}", t)
-            self._operands[role, t] = found
-        return found
-
-    def place(self, name: str, pos: Pos) -> VarPlace:
-        """One of the hidden variables that every program of tests has."""
-        variable = self._hidden[name]
-        return VarPlace(variable, variable.type, pos)
-
-    def passed(self, pos: Pos) -> Expr:
-        """Whether no assert has failed so far."""
-        return Binary(BinaryOp.EQ, load(self.place(FAILED, pos)), Const(0, DINT, pos), BOOL, pos)
-
-
 _OPERATORS = {
     "ASSERT_EQ": BinaryOp.EQ, "ASSERT_NEQ": BinaryOp.NE, "ASSERT_GT": BinaryOp.GT, "ASSERT_GE": BinaryOp.GE,
     "ASSERT_LT": BinaryOp.LT, "ASSERT_LE": BinaryOp.LE,
@@ -145,7 +82,7 @@ class TestBody:
     def write(self, decl: ast.TestDecl) -> None:
         """Checks the statements into the unit of the scope."""
         write_body(self._c, decl.body)
-        if decl.keyword != "SETUP":
+        if decl.keyword is not ast.TestUnit.SETUP:
             report_unused(self._c.scope)
 
     def _nodes(self, call: ast.Call, count: int, *, message: bool = True) -> list[ast.Expr] | None:
@@ -288,7 +225,7 @@ class TestBody:
             self._c.error(call.pos, "range", "time does not go back")
             return []
         pos = self._c.pos(call.pos)
-        long, short = self._bench.place(_LTIME, pos), self._bench.place(_TIME, pos)
+        long, short = self._bench.place(LTIME_NOW, pos), self._bench.place(TIME_NOW, pos)
         step = time_to_ltime(e) if e.type is TIME else e
         total = Binary(BinaryOp.ADD, Load(long, LTIME, pos), step, LTIME, pos)
         milliseconds = convert_explicitly(self._c, Load(long, LTIME, pos), TIME)

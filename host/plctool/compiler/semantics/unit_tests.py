@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from plctool.compiler.semantics.assertions import NUMBER, Assertion, Bench
 from plctool.compiler.semantics.configuration import Application, configure, default_programs
 from plctool.compiler.semantics.conversions import load, whole
 from plctool.compiler.semantics.declarations.type_declarations import May
@@ -27,7 +28,7 @@ from plctool.compiler.semantics.mocks import Mocks, raising
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
-from plctool.compiler.semantics.unit_test_statements import NUMBER, Assertion, Bench, TestBody
+from plctool.compiler.semantics.unit_test_statements import TestBody
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -129,11 +130,11 @@ class TestProgram:
         for symbol in self._blocks.values():
             self._world.declared.block(symbol)
         files: dict[str, _File] = {}
-        for decl in (t for t in self._world.names.tests if t.keyword == "SETUP"):
+        for decl in (t for t in self._world.names.tests if t.keyword is ast.TestUnit.SETUP):
             self._setup(decl, files.setdefault(decl.source.path, _File()))
-        for decl in (t for t in self._world.names.tests if t.keyword == "TEARDOWN"):
+        for decl in (t for t in self._world.names.tests if t.keyword is ast.TestUnit.TEARDOWN):
             self._teardown(decl, files.setdefault(decl.source.path, _File()))
-        for decl in (t for t in self._world.names.tests if t.keyword == "TEST"):
+        for decl in (t for t in self._world.names.tests if t.keyword is ast.TestUnit.TEST):
             self._test(decl, files.get(decl.source.path, _File()))
         for path, file in files.items():
             if file.teardown is not None:
@@ -200,7 +201,7 @@ class TestProgram:
         for block in blocks:
             if block.keyword not in (ast.Section.VAR, ast.Section.VAR_TEMP, ast.Section.VAR_EXTERNAL):
                 scope.error(block.pos, "unsupported", f"a {decl.keyword} has VAR, not {block.keyword}")
-            elif block.keyword != ast.Section.VAR_EXTERNAL:  # globals are known anyway
+            elif block.keyword is not ast.Section.VAR_EXTERNAL:  # globals are known anyway
                 for line in block.decls:
                     if ast.Modifier.CONSTANT in block.qualifiers:
                         self._constant(line, scope, pou.name)
@@ -249,7 +250,7 @@ def _as_block(program: PouSymbol) -> PouSymbol:
     """A PROGRAM as a type with instances. Addresses are dropped: each instance has its own inputs and outputs."""
     decl = program.decl
     blocks = [replace(b, decls=[replace(line, location=None) for line in b.decls]) for b in decl.blocks]
-    return PouSymbol(replace(decl, keyword="FUNCTION_BLOCK", blocks=blocks), library=False)
+    return PouSymbol(replace(decl, keyword=ast.Unit.FUNCTION_BLOCK, blocks=blocks), library=False)
 
 
 def _call(pou: Pou) -> Statement:

@@ -115,21 +115,47 @@ class Call:
         return self.had_enable or any(argument.name is not None for argument in self.args)
 
 
+class Operator(StrEnum):
+    """A sign or word between or before operands. `&` is AND."""
+
+    ADD = "+"
+    SUB = "-"
+    MUL = "*"
+    DIV = "/"
+    MOD = "MOD"
+    POWER = "**"
+    EQ = "="
+    NE = "<>"
+    LT = "<"
+    LE = "<="
+    GT = ">"
+    GE = ">="
+    AND = "AND"
+    AND_THEN = "AND_THEN"
+    OR = "OR"
+    OR_ELSE = "OR_ELSE"
+    XOR = "XOR"
+    NOT = "NOT"
+
+
+COMPARISONS = frozenset((Operator.EQ, Operator.NE, Operator.LT, Operator.LE, Operator.GT, Operator.GE))
+
+
 @dataclass(slots=True, eq=False)
 class Unary:
     """`op` is NOT, - or +."""
 
     pos: int
-    op: str
+    op: Operator
     operand: Expr
 
 
 @dataclass(slots=True, eq=False)
 class Binary:
-    """`op` in capitals; `&` is AND. `pos` is that of the operator."""
+    """`pos` is that of the operator."""
 
     pos: int
-    op: str
+    op: Operator
     left: Expr
     right: Expr
 
@@ -208,12 +234,18 @@ class ArraySpec:
     element: TypeSpec
 
 
+class Pointing(StrEnum):
+    """A type that holds an address, by its keyword."""
+
+    POINTER = "POINTER"
+    REFERENCE = "REFERENCE"
+    REF_TO = "REF_TO"
+
+
 @dataclass(slots=True, eq=False)
 class PointerSpec:
-    """`keyword` is POINTER, REFERENCE or REF_TO."""
-
     pos: int
-    keyword: str
+    keyword: Pointing
     target: TypeSpec
 
 
@@ -262,9 +294,37 @@ class Section(StrEnum):
     STEP = "STEP"  # the steps of a chart, which the compiler declares
 
 
+class Unit(StrEnum):
+    """A program organisation unit, or what one holds, by its keyword. GET and SET are those of a PROPERTY."""
+
+    PROGRAM = "PROGRAM"
+    FUNCTION = "FUNCTION"
+    FUNCTION_BLOCK = "FUNCTION_BLOCK"
+    INTERFACE = "INTERFACE"
+    METHOD = "METHOD"
+    ACTION = "ACTION"
+    GET = "GET"
+    SET = "SET"
+
+
+class TestUnit(StrEnum):
+    """A unit of tests, by its keyword."""
+
+    TEST = "TEST"
+    SETUP = "SETUP"
+    TEARDOWN = "TEARDOWN"
+
+
+class Edge(StrEnum):
+    """What an input says of the last call: that it was FALSE, or that it was TRUE."""
+
+    RISING = "R_EDGE"
+    FALLING = "F_EDGE"
+
+
 @dataclass(slots=True, eq=False)
 class VarDecl:
-    """One declaration line: `names AT location : type edge := init`; `edge` is R_EDGE, F_EDGE or ""."""
+    """One declaration line: `names AT location : type edge := init`."""
 
     pos: int
     names: list[tuple[int, str]]
@@ -272,7 +332,7 @@ class VarDecl:
     type: TypeSpec
     init: Init | None
     attributes: dict[str, str] = field(default_factory=dict)
-    edge: str = ""
+    edge: Edge | None = None
 
 
 @dataclass(slots=True, eq=False)
@@ -316,12 +376,11 @@ class Namespace:
 
 @dataclass(slots=True, eq=False)
 class PouDecl:
-    """PROGRAM, FUNCTION, FUNCTION_BLOCK or INTERFACE (`keyword`), and what such a unit holds: METHOD, ACTION, the
-    GET and
-    SET of a PROPERTY. A CLASS is a FUNCTION_BLOCK with that among its `modifiers`. `attributes` by lower-case name."""
+    """A unit, or what it holds (`members`). A CLASS is a FUNCTION_BLOCK with that among its `modifiers`. `attributes`
+    by lower-case name."""
 
     pos: int
-    keyword: str
+    keyword: Unit
     name: str
     result: TypeSpec | None
     blocks: list[VarBlock]
@@ -343,7 +402,7 @@ class PouDecl:
     @property
     def is_property(self) -> bool:
         """Whether it reads or writes a property of the unit it is in."""
-        return self.keyword in ("GET", "SET")
+        return self.keyword in (Unit.GET, Unit.SET)
 
     @property
     def member_key(self) -> str:
@@ -473,11 +532,11 @@ class ConfigurationDecl:
 
 @dataclass(slots=True, eq=False)
 class TestDecl:
-    """A TEST, or what its file has to do before and after each TEST. `keyword`: TEST, SETUP or TEARDOWN. The calls in
-    the body may be those of unit_tests.py: ASSERT_EQ, MOCK ..."""
+    """A TEST, or what its file has to do before and after each TEST. The calls in the body may be those of
+    unit_tests.py: ASSERT_EQ, MOCK ..."""
 
     pos: int
-    keyword: str
+    keyword: TestUnit
     name: str
     blocks: list[VarBlock]
     body: list[Stmt]
@@ -490,13 +549,23 @@ Declaration = TypeDecl | PouDecl | GlobalBlock | InstanceBlock | ConfigurationDe
 # ---- statements ----------------------------------------------------------------------------------------------------
 
 
+class Assigning(StrEnum):
+    """The sign of an assignment."""
+
+    VALUE = ":="
+    SET = "S="
+    RESET = "R="
+    REFERENCE = "REF="
+    INTERFACE = "?="  # when the instance has it
+
+
 @dataclass(slots=True, eq=False)
 class Assign:
-    """`targets[0] := targets[1] := ... := value`; `op` is :=, S=, R=, REF= or ?=. `pos` is that of the operator."""
+    """`targets[0] := targets[1] := ... := value`. `pos` is that of the operator."""
 
     pos: int
     targets: list[Expr]
-    op: str
+    op: Assigning
     value: Expr
 
 

@@ -20,14 +20,31 @@ from plctool.iec.types import ELEMENTARY
 _Init = TypeVar("_Init", bound="ast.Init | None")
 
 _PRECEDENCE = {
-    "**": 7, "*": 6, "/": 6, "MOD": 6, "+": 5, "-": 5, "<": 4, ">": 4, "<=": 4, ">=": 4, "=": 3, "<>": 3,
-    "AND": 2, "&": 2, "AND_THEN": 2, "XOR": 1, "OR": 0, "OR_ELSE": 0,
-}  # fmt: skip
+    operator: precedence
+    for precedence, operators in enumerate(
+        (
+            (ast.Operator.OR, ast.Operator.OR_ELSE),
+            (ast.Operator.XOR,),
+            (ast.Operator.AND, ast.Operator.AND_THEN),
+            (ast.Operator.EQ, ast.Operator.NE),
+            (ast.Operator.LT, ast.Operator.GT, ast.Operator.LE, ast.Operator.GE),
+            (ast.Operator.ADD, ast.Operator.SUB),
+            (ast.Operator.MUL, ast.Operator.DIV, ast.Operator.MOD),
+            (ast.Operator.POWER,),
+        )
+    )
+    for operator in operators
+}
+
+
+def _operator(token: Token) -> ast.Operator:
+    text = token.text.upper()
+    return ast.Operator.AND if text == "&" else ast.Operator(text)
 
 
 def _chain(operands: Sequence[ast.Expr], operators: Sequence[Token]) -> ast.Expr:
     """Sorts out `a op b op c` by precedence, left-associative."""
-    values, pending = [operands[0]], list[tuple[int, str, int]]()
+    values, pending = [operands[0]], list[tuple[int, ast.Operator, int]]()
 
     def reduce() -> None:
         _, op, pos = pending.pop()
@@ -35,11 +52,11 @@ def _chain(operands: Sequence[ast.Expr], operators: Sequence[Token]) -> ast.Expr
         values[-1] = ast.Binary(pos, op, values[-1], right)
 
     for token, operand in zip(operators, operands[1:], strict=True):
-        op = token.text.upper()
+        op = _operator(token)
         precedence = _PRECEDENCE[op]
         while pending and pending[-1][0] >= precedence:
             reduce()
-        pending.append((precedence, "AND" if op == "&" else op, token.pos))
+        pending.append((precedence, op, token.pos))
         values.append(operand)
     while pending:
         reduce()
@@ -141,7 +158,7 @@ class Builder:
         return low, high
 
     def pointer(self, keyword: Token, target: ast.TypeSpec) -> ast.PointerSpec:
-        return ast.PointerSpec(keyword.pos, keyword.text.upper(), target)
+        return ast.PointerSpec(keyword.pos, ast.Pointing(keyword.text.upper()), target)
 
     def struct(self, keyword: Token, overlap: Token | None, *fields: ast.VarDecl | None) -> ast.StructSpec:
         if overlap is not None and keyword.type == "STRUCT":
@@ -171,7 +188,7 @@ class Builder:
         attributes = self._attributes_at(pos, "variable")
         init = _placed(init, pos)
         written = [(t.pos, t.text) for t in names]
-        return ast.VarDecl(pos, written, address, spec, init, attributes, edge.text.upper() if edge else "")
+        return ast.VarDecl(pos, written, address, spec, init, attributes, ast.Edge(edge.text.upper()) if edge else None)
 
     def nameless_decl(self, location: Token, spec: ast.TypeSpec, init: ast.Init | None) -> ast.VarDecl:
         """`AT %MW1 : INT;`: the address is its name."""
@@ -225,11 +242,14 @@ class Builder:
     def var_blocks(self, *blocks: Any) -> list[Any]:
         return [b for b in blocks if b is not None]
 
-    def pou(self, keyword: Token, head: list[Any], result: Any, blocks: Any, body: Any) -> ast.PouDecl:
-        """`head`: modifiers and name."""
+    def pou(
+        self, keyword: Token, head: list[Any], result: Any, blocks: Any, body: Any, unit: ast.Unit | None = None
+    ) -> ast.PouDecl:
+        """`head`: modifiers and name; `unit`: what it is when the keyword alone does not say it."""
         *modifiers, name = head
         attributes = self._attributes_at(keyword.pos, keyword.text.upper())
-        decl = ast.PouDecl(name.pos, keyword.text.upper(), name.text, result, [], body or [], attributes, self.source)
+        unit = unit or ast.Unit(keyword.text.upper())
+        decl = ast.PouDecl(name.pos, unit, name.text, result, [], body or [], attributes, self.source)
         decl.modifiers = {ast.Modifier(t.text.upper()) for t in modifiers if t is not None}
         self.units.complete(decl, None, None, blocks or [])
         return decl
@@ -264,8 +284,7 @@ class Builder:
 
     def class_block(self, keyword: Token, *rest: Any) -> Any:
         *head, bases, interfaces, parts = rest
-        decl = self.pou(keyword, head, None, [], [])
-        decl.keyword = "FUNCTION_BLOCK"
+        decl = self.pou(keyword, head, None, [], [], ast.Unit.FUNCTION_BLOCK)
         decl.modifiers.add(ast.Modifier.CLASS)
         self.units.complete(decl, bases, interfaces, parts or [])
         return decl
@@ -361,10 +380,10 @@ class Builder:
 
     def test(self, keyword: Token, name: Token, blocks: Any, body: Any) -> ast.TestDecl:
         text = self.string(name)
-        return ast.TestDecl(keyword.pos, "TEST", str(text.value), blocks, body, self.source)
+        return ast.TestDecl(keyword.pos, ast.TestUnit.TEST, str(text.value), blocks, body, self.source)
 
     def setup(self, keyword: Token, blocks: Any, body: Any) -> ast.TestDecl:
-        return ast.TestDecl(keyword.pos, keyword.type, keyword.text, blocks, body, self.source)
+        return ast.TestDecl(keyword.pos, ast.TestUnit(keyword.type), keyword.text, blocks, body, self.source)
 
     def mock(self, keyword: Token, instance: ast.Expr) -> ast.ExprStmt:
         return self._statement_call(keyword, ast.Argument(instance.pos, None, instance))
@@ -390,8 +409,8 @@ class Builder:
 
     def assign(self, target: ast.Expr, value: Any) -> ast.Assign:
         if type(value) is tuple:
-            return ast.Assign(target.pos, [target, *value[0]], ":=", value[1])
-        return ast.Assign(target.pos, [target], ":=", value)
+            return ast.Assign(target.pos, [target, *value[0]], ast.Assigning.VALUE, value[1])
+        return ast.Assign(target.pos, [target], ast.Assigning.VALUE, value)
 
     def chained(self, target: ast.Expr, value: Any) -> tuple[list[ast.Expr], ast.Expr]:
         if type(value) is tuple:
@@ -406,10 +425,10 @@ class Builder:
                 message = f"variables are declared in VAR ... END_VAR before the statements: {op.text} : {target.name};"
             self.report(op.pos, "syntax", message)
             return None
-        return ast.Assign(op.pos, [target], name + "=", value)
+        return ast.Assign(op.pos, [target], ast.Assigning(name + "="), value)
 
     def attempt(self, target: ast.Expr, op: Token, value: ast.Expr) -> ast.Assign:
-        return ast.Assign(op.pos, [target], op.text, value)
+        return ast.Assign(op.pos, [target], ast.Assigning(op.text), value)
 
     def expr_stmt(self, value: ast.Expr) -> ast.ExprStmt:
         return ast.ExprStmt(value.pos, value)
@@ -462,12 +481,11 @@ class Builder:
 
     def binary(self, *children: Any) -> ast.Expr:
         if len(children) == 3:
-            op = children[1].text.upper()
-            return ast.Binary(children[1].pos, "AND" if op == "&" else op, children[0], children[2])
+            return ast.Binary(children[1].pos, _operator(children[1]), children[0], children[2])
         return _chain(children[::2], children[1::2])
 
     def unary(self, op: Token, operand: ast.Expr) -> ast.Expr:
-        return ast.Unary(op.pos, op.text.upper(), operand)
+        return ast.Unary(op.pos, ast.Operator(op.text.upper()), operand)
 
     def parenthesised(self, value: ast.Expr) -> ast.Expr:
         return value

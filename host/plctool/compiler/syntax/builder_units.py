@@ -11,10 +11,10 @@ from typing import Any
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.lexer import Report, Token
 
-MEMBERS = frozenset(("METHOD", "ACTION", "GET", "SET"))
+MEMBERS = frozenset((ast.Unit.METHOD, ast.Unit.ACTION, ast.Unit.GET, ast.Unit.SET))
 """Keywords of PouDecls that stand in another POU, or after it."""
 
-_OWNERS = frozenset(("FUNCTION_BLOCK", "PROGRAM", "INTERFACE"))
+_OWNERS = frozenset((ast.Unit.FUNCTION_BLOCK, ast.Unit.PROGRAM, ast.Unit.INTERFACE))
 
 
 def _flat(units: Iterable[Any]) -> list[Any]:
@@ -93,8 +93,8 @@ class Arrangement:
                 continue
             token, more, own_blocks, body = accessor
             all_blocks = [*(blocks or []), *(own_blocks or [])]
-            decl = self._pou(keyword, [*modifiers, *more, name], None, all_blocks, body)
-            found.append(self._accessor(decl, token.type, spec, name))
+            decl = self._pou(keyword, [*modifiers, *more, name], None, all_blocks, body, ast.Unit(token.type))
+            found.append(self._accessor(decl, spec, name))
         if not found:
             self._report(name.pos, "syntax", f"the property {name.text} needs a GET or a SET")
         return found
@@ -102,12 +102,11 @@ class Arrangement:
     def single_accessor(self, keyword: Token, rest: Sequence[Any]) -> ast.PouDecl:
         """PROPERTY_GET and PROPERTY_SET of the fourth edition."""
         *head, spec, blocks, body = rest
-        decl = self._pou(keyword, head, None, blocks, body)
-        return self._accessor(decl, keyword.type.removeprefix("PROPERTY_"), spec, head[-1])
+        decl = self._pou(keyword, head, None, blocks, body, ast.Unit(keyword.type.removeprefix("PROPERTY_")))
+        return self._accessor(decl, spec, head[-1])
 
-    def _accessor(self, decl: ast.PouDecl, kind: str, spec: ast.TypeSpec, name: Token) -> ast.PouDecl:
-        decl.keyword = kind
-        if kind == "GET":
+    def _accessor(self, decl: ast.PouDecl, spec: ast.TypeSpec, name: Token) -> ast.PouDecl:
+        if decl.keyword is ast.Unit.GET:
             decl.result = spec
         else:
             line = ast.VarDecl(name.pos, [(name.pos, name.text)], None, spec, None)

@@ -10,6 +10,9 @@
 #define HAS_SysWatchdog 1
 #define HAS_CmpRetain 1
 #define HAS_CmpMath 1
+#define HAS_CmpIoMgrEmbedded 1
+#define HAS_IoDrvGpio 1
+#define HAS_CmpIoMgrSrv 1
 #define HAS_COMMUNICATION 1
 #define HAS_CmpLogSrv 1
 #define HAS_CmpPlcShell 1

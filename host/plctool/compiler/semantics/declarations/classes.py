@@ -94,14 +94,14 @@ class Classes:
         base = scope.unit(name)
         if base is not None and not scope.may_use(base, name, offset):
             return None
-        if isinstance(base, PouSymbol) and base.keyword == "FUNCTION_BLOCK":
+        if isinstance(base, PouSymbol) and base.keyword is ast.Unit.FUNCTION_BLOCK:
             info = self._world.declared.block(base)
             if info is None:
                 scope.error(offset, "recursion", f"{symbol.decl.name} extends itself: {self._hierarchy.circle(symbol)}")
             elif ast.Modifier.FINAL in base.decl.modifiers:
                 scope.error(offset, "inheritance", f"{name} is FINAL and cannot be extended")
             return info
-        if isinstance(base, PouSymbol) and base.keyword == "INTERFACE":
+        if isinstance(base, PouSymbol) and base.keyword is ast.Unit.INTERFACE:
             scope.error(offset, "inheritance", f"{name} is an interface; write IMPLEMENTS {name}")
         else:
             scope.lacks(symbol.decl.full_name, base=True)
@@ -241,7 +241,7 @@ class Classes:
         symbol = scope.unit(name)
         if symbol is not None and not scope.may_use(symbol, name, offset):
             return None
-        if isinstance(symbol, PouSymbol) and symbol.keyword == "INTERFACE":
+        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.INTERFACE:
             return self._world.interfaces[self.interface(symbol).target]  # type: ignore[index]
         self._no_such(offset, name, scope, "interface", symbol is None)
         return None
@@ -272,7 +272,7 @@ class Classes:
     def declare_members(self) -> None:
         """Declares the members of everything known so far, used or not, so that all of it is checked."""
         for symbol in self._world.names.pou_symbols():
-            if symbol.keyword == "INTERFACE":
+            if symbol.keyword is ast.Unit.INTERFACE:
                 self.interface(symbol)
         classes = [*self._world.interfaces.values(), *self._blocks.values(), *self._programs]
         new = [cls for cls in classes if cls not in self._complete]

@@ -115,7 +115,7 @@ class Functions:
     ) -> list[Parameter]:
         """Inputs that describe their arguments; what is passed after all other parameters."""
         assert isinstance(line.type, ast.NamedType)
-        if block.keyword != ast.Section.VAR_INPUT or line.init is not None:
+        if block.keyword is not ast.Section.VAR_INPUT or line.init is not None:
             scope.error(line.pos, "type", f"{line.type.name} is for inputs here, without an initial value")
             return []
         t, behind = self._world.declared.type_named(line.pos, f"__SYSTEM.{NAME}", scope), list[Parameter]()

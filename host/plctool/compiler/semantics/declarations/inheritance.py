@@ -28,7 +28,7 @@ class Hierarchy:
     def _derived(self) -> dict[PouSymbol, list[PouSymbol]]:
         """The blocks derived directly from a block; roots are among the keys."""
         derived: dict[PouSymbol, list[PouSymbol]] = {}
-        todo = [s for s in self._world.names.pou_symbols() if s.keyword == "FUNCTION_BLOCK"]
+        todo = [s for s in self._world.names.pou_symbols() if s.keyword is ast.Unit.FUNCTION_BLOCK]
         seen = set(todo)
         while todo:
             symbol = todo.pop(0)
@@ -46,7 +46,7 @@ class Hierarchy:
         """The block it is derived from directly."""
         for _, name in symbol.decl.bases[:1]:
             base = self._world.scope_of(symbol).unit(name)
-            if isinstance(base, PouSymbol) and base.keyword == "FUNCTION_BLOCK":
+            if isinstance(base, PouSymbol) and base.keyword is ast.Unit.FUNCTION_BLOCK:
                 return base
         return None
 

@@ -6,6 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
@@ -181,3 +182,26 @@ class InitialValues:
                     arguments[name.casefold()] = input_value(Checker(self._world, scope), node, symbol.type, name)
                     return True
         return False
+
+
+def with_arguments(decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
+    """Type and initial value with what is written in brackets after the type of an array: `F[(1), (2)]`."""
+    spec, init = decl.type, decl.init
+    given: ast.Init | None = None
+    if isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
+        element = spec.element
+        if element.inits is not None:
+            given = ast.ArrayInit(element.inits.pos, [_of_instance(item) for item in element.inits.items])
+            spec = ast.ArraySpec(spec.pos, spec.bounds, ast.NamedType(element.pos, element.name))
+    if given is not None and init is not None:
+        scope.error(init.pos, "duplicate", "there are two initial values; write the second one into the first")
+    return spec, given or init
+
+
+def _of_instance(item: ast.Init | ast.Repeat) -> ast.Init | ast.Repeat:
+    """`(1)` after the type of an array of instances: the input of one FB_Init."""
+    if isinstance(item, ast.StructInit):
+        return replace(item, arguments=True)
+    if isinstance(item, ast.ArrayInit | ast.Repeat):
+        return item
+    return ast.StructInit(item.pos, [(item.pos, "", item)], arguments=True)

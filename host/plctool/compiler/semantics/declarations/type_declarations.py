@@ -5,7 +5,6 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from dataclasses import replace
 from enum import Flag, auto
 
 from plctool.compiler.diagnostics import did_you_mean
@@ -14,7 +13,8 @@ from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.allocation import is_open
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.declarations.initial_values import InitialValues
+from plctool.compiler.semantics.declarations.initial_values import InitialValues, with_arguments
+from plctool.compiler.semantics.declarations.number_types import enumeration, subrange, values_of
 from plctool.compiler.semantics.generics import is_group
 from plctool.compiler.semantics.instances import require_instances
 from plctool.compiler.semantics.scope import Scope
@@ -22,7 +22,7 @@ from plctool.compiler.semantics.symbols import ERROR, PouSymbol, Role, TypeSymbo
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.slips import TYPES
-from plctool.compiler.typed import ArrayInit, Const, Initial, Pos, ScalarInit, Storage, StructInit, Variable, overlay
+from plctool.compiler.typed import ArrayInit, Initial, ScalarInit, Storage, StructInit, Variable, overlay
 from plctool.iec.types import (
     BOOL,
     BYTE,
@@ -31,17 +31,14 @@ from plctool.iec.types import (
     INT,
     MAX_SIZE,
     ArrayType,
-    Elementary,
     EnumType,
     Field,
-    Kind,
     OpenArrayType,
     PointerType,
     RawPointerType,
     ReferenceType,
     StringType,
     StructType,
-    SubrangeType,
     Type,
 )  # fmt: skip
 
@@ -88,7 +85,7 @@ class TypeDeclarations:
     ) -> tuple[Type, Initial | None]:
         overrides = overrides or decl.location is not None
         self._check_extras(decl, may, scope)
-        spec, init = self._with_arguments(decl, scope)
+        spec, init = with_arguments(decl, scope)
         if isinstance(spec, ast.ArraySpec) and None in spec.bounds and May.BE_OPEN_ARRAY in may:
             return self._open_array(spec, scope), None
         t, default = self.type_of(spec, scope)
@@ -102,19 +99,6 @@ class TypeDeclarations:
         if default is None and not overrides and given == ScalarInit(0) and str(given.value) != "-0.0":
             return t, None
         return t, overlay(given, default)
-
-    def _with_arguments(self, decl: ast.VarDecl, scope: Scope) -> tuple[ast.TypeSpec, ast.Init | None]:
-        """Type and initial value with what is written in brackets after the type of an array: `F[(1), (2)]`."""
-        spec, init = decl.type, decl.init
-        given: ast.Init | None = None
-        if isinstance(spec, ast.ArraySpec) and isinstance(spec.element, ast.NamedType):
-            element = spec.element
-            if element.inits is not None:
-                given = ast.ArrayInit(element.inits.pos, [_of_instance(item) for item in element.inits.items])
-                spec = ast.ArraySpec(spec.pos, spec.bounds, ast.NamedType(element.pos, element.name))
-        if given is not None and init is not None:
-            scope.error(init.pos, "duplicate", "there are two initial values; write the second one into the first")
-        return spec, given or init
 
     def _check_extras(self, decl: ast.VarDecl, may: May, scope: Scope) -> None:
         location = decl.location
@@ -150,9 +134,11 @@ class TypeDeclarations:
         if isinstance(spec, ast.EnumSpec):
             if name is None and isinstance(scope.unit(spec.base or ""), PouSymbol | TypeSymbol):
                 return self._instance(spec, scope)
-            return self._enum(spec, scope, name)
+            base = INT if spec.base is None else self.named_type(spec.pos, spec.base, scope)
+            return enumeration(self._world, spec, base, scope, name)
         if isinstance(spec, ast.SubrangeSpec):
-            return self._subrange(spec, scope, name)
+            base = self.named_type(spec.pos, spec.base, scope)
+            return subrange(self._world, spec, base, scope, name)
         if isinstance(spec, ast.PointerSpec):
             return self._pointer(spec, scope), None
         if name is None:
@@ -191,12 +177,12 @@ class TypeDeclarations:
                 scope.error(spec.pos, "recursion", f"the type {symbol.decl.name} contains itself")
                 return ERROR, None
             return self.type_of_symbol(symbol), symbol.default
-        if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK:
             info = self._world.declared.block(symbol)
             if info is None:
                 scope.error(spec.pos, "recursion", f"the function block {spec.name} contains itself")
             return (ERROR, None) if info is None else (info.type, self.struct_default(info.type))
-        if isinstance(symbol, PouSymbol) and symbol.keyword == "INTERFACE":
+        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.INTERFACE:
             return self._world.declared.interface(symbol), None
         if is_group(spec.name):
             scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
@@ -231,7 +217,7 @@ class TypeDeclarations:
             symbol.type, symbol.default = t, default
         if decl.init is not None and t is not ERROR:  # it may name a value of this very enumeration
             if isinstance(t, EnumType) and isinstance(decl.spec, ast.EnumSpec):
-                scope.names.update(_values_of(t, scope.pos(decl.pos)))
+                scope.names.update(values_of(t, scope.pos(decl.pos)))
             given = self._initials.initial(decl.init, t, scope)
             symbol.default = default if given is None else overlay(given, default)
         symbol.busy = False
@@ -280,39 +266,6 @@ class TypeDeclarations:
             return ERROR
         return ERROR if element is ERROR else OpenArrayType(element, ((0, -1),) * len(spec.bounds))
 
-    def _enum(self, spec: ast.EnumSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
-        base: Type = INT
-        if spec.base is not None:
-            base = self.named_type(spec.pos, spec.base, scope)
-            if base is ERROR:
-                return ERROR, None
-        if not isinstance(base, Elementary) or base.kind not in (Kind.INT, Kind.BIT):
-            scope.error(spec.pos, "type", f"an enumeration is based on an integer type, not on {base}")
-            return ERROR, None
-        t = EnumType(name or "(" + ", ".join(n for _, n, _ in spec.values) + ")", base, {})
-        inner = Scope(scope.globals, scope.source, scope.library, dict(scope.names), scope.bindings)
-        checker, value, seen = Checker(self._world, inner), -1, set[str]()
-        for offset, value_name, node in spec.values:
-            key = value_name.casefold()
-            if key in seen:
-                scope.error(offset, "duplicate", f"{value_name} is in this enumeration already")
-                continue
-            if not value_name:
-                scope.error(offset, "syntax", f"the values of an enumeration have names; {base} has no arguments")
-                return ERROR, None
-            seen.add(key)
-            given = None if node is None or isinstance(node, ast.ArrayInit | ast.StructInit) else checker.integer(node)
-            value = value + 1 if given is None else given
-            if not constants.fits(value, base):
-                scope.error(offset, "range", f"{value} does not fit {base}")
-                value = 0
-            t.values[value_name] = value
-            inner.names[key] = _value_symbol(t, value_name, scope.pos(offset))
-            if name is None:
-                scope.names.setdefault(key, inner.names[key])
-        first = next(iter(t.values.values()), 0)
-        return t, ScalarInit(first) if first else None
-
     def _instance(self, spec: ast.EnumSpec, scope: Scope) -> tuple[Type, Initial | None]:
         """`TON(PT := T#1s)`, `Pump(valve, 3)`: a type with initial values and inputs of FB_Init."""
         members = [(o, name, v) if v is not None else (o, "", ast.Name(o, name)) for o, name, v in spec.values]
@@ -322,29 +275,9 @@ class TypeDeclarations:
         given = self._initials.initial(ast.StructInit(spec.pos, members, arguments=True), t, scope)
         return t, default if given is None else overlay(given, default)
 
-    def _subrange(self, spec: ast.SubrangeSpec, scope: Scope, name: str | None) -> tuple[Type, Initial | None]:
-        base = self.named_type(spec.pos, spec.base, scope)
-        checker = Checker(self._world, scope)
-        low, high = checker.integer(spec.low), checker.integer(spec.high)
-        if base is ERROR or low is None or high is None:
-            return ERROR, None
-        limits: tuple[int, int] | None = None
-        if isinstance(base, SubrangeType):
-            limits, number = (base.low, base.high), base.base
-        elif isinstance(base, Elementary) and base.kind in (Kind.INT, Kind.BIT):
-            limits, number = constants.limits(base), base
-        if limits is None:
-            scope.error(spec.pos, "type", f"a subrange needs an integer base type, not {base}")
-            return ERROR, None
-        if not limits[0] <= low <= high <= limits[1]:
-            scope.error(spec.low.pos, "range", f"{low}..{high} is not a range of {base}")
-            return ERROR, None
-        t = SubrangeType(name or f"{base}({low}..{high})", number, low, high)
-        return t, ScalarInit(low) if low else None
-
     def _pointer(self, spec: ast.PointerSpec, scope: Scope) -> Type:
         symbol = scope.unit(spec.target.name) if isinstance(spec.target, ast.NamedType) else None
-        if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK:
             target: Type = self._world.declared.layout(symbol) or ERROR  # the block itself may hold the pointer
         elif isinstance(symbol, TypeSymbol) and symbol.busy and symbol.decl.name in self._structs:
             target = self._structs[symbol.decl.name]  # and so may a struct
@@ -352,10 +285,10 @@ class TypeDeclarations:
             target, _ = self.type_of(spec.target, scope)
         if target is ERROR:
             return ERROR
-        if spec.keyword == "REFERENCE" and isinstance(target, ReferenceType):
+        if spec.keyword is ast.Pointing.REFERENCE and isinstance(target, ReferenceType):
             scope.error(spec.pos, "type", f"there is no REFERENCE to a REFERENCE; write {target}")
             return ERROR
-        kinds = {"REFERENCE": ReferenceType, "POINTER": RawPointerType}
+        kinds = {ast.Pointing.REFERENCE: ReferenceType, ast.Pointing.POINTER: RawPointerType}
         return kinds.get(spec.keyword, PointerType)(target)
 
     def _struct(self, spec: ast.StructSpec, scope: Scope, name: str) -> tuple[Type, Initial | None]:
@@ -418,22 +351,3 @@ class TypeDeclarations:
     def struct_default(self, t: StructType) -> Initial | None:
         """What a struct or instance starts with: None for all zero."""
         return StructInit({}) if t.name in self._world.defaults else None
-
-
-def _of_instance(item: ast.Init | ast.Repeat) -> ast.Init | ast.Repeat:
-    """`(1)` after the type of an array of instances: the input of one FB_Init."""
-    if isinstance(item, ast.StructInit):
-        return replace(item, arguments=True)
-    if isinstance(item, ast.ArrayInit | ast.Repeat):
-        return item
-    return ast.StructInit(item.pos, [(item.pos, "", item)], arguments=True)
-
-
-def _value_symbol(t: EnumType, name: str, pos: Pos) -> VarSymbol:
-    constant = Const(t.values[name], t, pos)
-    return VarSymbol(name, pos, t, Role.LOCAL, value=constant, constant=True, used=True)
-
-
-def _values_of(t: EnumType, pos: Pos) -> dict[str, VarSymbol]:
-    """The values of an enumeration as names, case-folded."""
-    return {name.casefold(): _value_symbol(t, name, pos) for name in t.values}

@@ -36,8 +36,6 @@ from plctool.iec.types import BOOL, Keep
 
 # ---- R_EDGE and F_EDGE ----
 
-RISING = "R_EDGE"
-
 
 def edge_variables(raw: Variable) -> tuple[Variable, Variable]:
     """What an input was at the previous call, and its edge; they have no name in the program."""
@@ -46,12 +44,12 @@ def edge_variables(raw: Variable) -> tuple[Variable, Variable]:
     return last, edge
 
 
-def see_edge(symbol: VarSymbol, kind: str, last: Variable, edge: Variable, scope: Scope) -> None:
-    """Lets the body in `scope` see the edge (`kind`: R_EDGE or F_EDGE) in place of the input."""
+def see_edge(symbol: VarSymbol, kind: ast.Edge, last: Variable, edge: Variable, scope: Scope) -> None:
+    """Lets the body in `scope` see the edge in place of the input."""
     assert symbol.variable is not None
     pos = symbol.pos
     now, before = (Load(VarPlace(v, BOOL, pos), BOOL, pos) for v in (symbol.variable, last))
-    high, low = (now, before) if kind == RISING else (before, now)
+    high, low = (now, before) if kind is ast.Edge.RISING else (before, now)
     found = Binary(BinaryOp.AND, high, Unary(UnaryOp.NOT, low, BOOL, pos), BOOL, pos)
     scope.prologue += [Assign(VarPlace(edge, BOOL, pos), found, pos), Assign(VarPlace(last, BOOL, pos), now, pos)]
     scope.edges[symbol.name.casefold()] = replace(symbol, variable=edge)
@@ -69,7 +67,11 @@ ROLES = {
     Section.VAR_INST: Role.LOCAL,
     Section.STEP: Role.STEP,
 }
-_KINDS = {"FUNCTION": PouKind.FUNCTION, "FUNCTION_BLOCK": PouKind.FUNCTION_BLOCK, "PROGRAM": PouKind.PROGRAM}
+_KINDS = {
+    ast.Unit.FUNCTION: PouKind.FUNCTION,
+    ast.Unit.FUNCTION_BLOCK: PouKind.FUNCTION_BLOCK,
+    ast.Unit.PROGRAM: PouKind.PROGRAM,
+}
 _KEEPING = {
     PouKind.FUNCTION: "a FUNCTION_BLOCK", PouKind.METHOD: "VAR_INST", PouKind.FUNCTION_BLOCK: "VAR",
     PouKind.PROGRAM: "VAR",
@@ -105,7 +107,7 @@ def _names_used(line: ast.VarDecl) -> set[str]:
 def _seen_by_actions(block: ast.VarBlock, decl: ast.PouDecl) -> bool:
     """Whether an ACTION of the unit uses a name that the block declares."""
     names = {name.casefold() for line in block.decls for _, name in line.names}
-    actions = [member.body for member in decl.members if member.keyword == "ACTION"]
+    actions = [member.body for member in decl.members if member.keyword is ast.Unit.ACTION]
     return any(name.name.casefold() in names for name in ast.every(ast.Name, actions))
 
 
@@ -134,13 +136,13 @@ class UnitVariables:
         for block in decl.blocks:
             if _holds_constants(block):
                 continue
-            if block.keyword == Section.VAR_EXTERNAL:
+            if block.keyword is Section.VAR_EXTERNAL:
                 self._declare_externals(block, scope)
-            elif block.keyword == Section.VAR_STAT:
+            elif block.keyword is Section.VAR_STAT:
                 self._declare_statics(block, decl, scope)
-            elif block.keyword == Section.VAR_TEMP and not _seen_by_actions(block, decl):
+            elif block.keyword is Section.VAR_TEMP and not _seen_by_actions(block, decl):
                 self.declare_stack_variables(block, pou, scope)
-            elif block.keyword == Section.VAR_TEMP:
+            elif block.keyword is Section.VAR_TEMP:
                 yield replace(block, keyword=Section.VAR)
                 self._start_anew(block, scope)
             else:
@@ -193,7 +195,7 @@ class UnitVariables:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, Role.LOCAL)
                 if t is not ERROR:
-                    owner = scope.pou.name if scope.pou is not None and decl.keyword == "METHOD" else decl.name
+                    owner = scope.pou.name if scope.pou is not None and decl.keyword is ast.Unit.METHOD else decl.name
                     full_name = f"{owner}.{name}"
                     keep = Keep.of(block.qualifiers)
                     self._variables.check_kept(name, t, keep, scope, offset)

@@ -95,7 +95,7 @@ def named_function(c: Checker, callee: ast.Expr) -> PouSymbol | None:
     """The FUNCTION that a name with a namespace or library in front stands for."""
     dotted = dotted_name(c, callee)
     symbol = None if dotted is None else c.scope.unit(dotted)
-    return symbol if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION" else None
+    return symbol if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION else None
 
 
 def plain_arguments(c: Checker, node: ast.Call, declared: Container[str] = ()) -> list[ast.Argument] | None:
@@ -270,7 +270,12 @@ def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
 
 def _is_slip(node: ast.Expr, t: Type, name: str) -> bool:
     """`f(x = 1)` for an input x that is no BOOL."""
-    if not isinstance(node, ast.Binary) or node.op != "=" or not isinstance(node.left, ast.Name) or base_of(t) is BOOL:
+    if (
+        not isinstance(node, ast.Binary)
+        or node.op is not ast.Operator.EQ
+        or not isinstance(node.left, ast.Name)
+        or base_of(t) is BOOL
+    ):
         return False
     return node.left.name.casefold() == name.casefold()
 

@@ -24,11 +24,11 @@ _NOTHING = (ast.LiteralKind.NULL, ast.LiteralKind.INT)
 @checks_statement(ast.Assign)
 def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
     """`a := b := e`, `a S= e`, `a R= e`, `r REF= x`, `i ?= x`"""
-    if node.op == "REF=":
+    if node.op is ast.Assigning.REFERENCE:
         return _assign_reference(c, node)
-    if node.op == "?=":
+    if node.op is ast.Assigning.INTERFACE:
         return attempt(c, node)
-    if node.op != ":=":
+    if node.op is not ast.Assigning.VALUE:
         return _set_or_reset(c, node)
     if isinstance(node.value, ast.Call):
         declared = parameter_names(c, node.value.callee)
@@ -92,5 +92,5 @@ def _set_or_reset(c: Checker, node: ast.Assign) -> list[Statement]:
         c.error(node.targets[0].pos, "type", f"{node.op} needs a BOOL variable, not {place.type}")
         return []
     pos = c.pos(node.pos)
-    change = Assign(place, Const(int(node.op == "S="), BOOL, pos), pos)
+    change = Assign(place, Const(int(node.op is ast.Assigning.SET), BOOL, pos), pos)
     return [If([(condition, [change])], [], pos)]

@@ -69,7 +69,7 @@ def of_variable(c: Checker, name: str, node: ast.Call) -> Expr:
         return _address_of(c, argument, RawPointerType if name == "ADR" else PointerType)
     if isinstance(argument, ast.Name):
         symbol = c.scope.lookup(argument.name)
-        is_block = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK"
+        is_block = isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK
         if argument.name.upper() in ELEMENTARY or is_block or isinstance(symbol, TypeSymbol):
             t = c.world.declared.type_named(argument.pos, argument.name, c.scope)
             return error_value(c.pos(node.pos)) if t is ERROR else _size(c, t, node)

@@ -180,7 +180,7 @@ def call(c: Checker, node: ast.Call, expected: Type | None) -> Expr:
     if dotted is not None and (bare := _of_library(c, dotted)) is not None:
         return _call_by_bare_name(c, replace(node, callee=ast.Name(callee.pos, bare)), expected)
     symbol = c.scope.unit(dotted) if dotted is not None else None
-    if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION":
+    if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION:
         return _call_function(c, symbol, node, expected)
     if isinstance(symbol, PouSymbol):
         return c.error(node.pos, "call", _not_callable(c, symbol, symbol.decl.full_name))
@@ -208,7 +208,7 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
         if symbol.type in c.world.blocks or symbol.type is ERROR:
             return _call_of_place(c, node)
         shadow, symbol = symbol, c.world.names.unit(name.casefold(), library=c.scope.library)
-    is_function = isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION"
+    is_function = isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION
     if isinstance(symbol, PouSymbol) and is_function and (not symbol.library or c.scope.library):
         return _call_function(c, symbol, node, expected)
     args = plain_arguments(c, node)
@@ -252,11 +252,11 @@ def _written(node: ast.Call) -> str:
 
 
 def _not_callable(c: Checker, symbol: object, name: str) -> str:
-    if isinstance(symbol, PouSymbol) and symbol.keyword == "FUNCTION_BLOCK":
+    if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK:
         return f"{name} is a function block type; declare an instance of it and call that"
     if isinstance(symbol, Namespace) and symbol.program is not None:
         return f"a call of the program {name} is a statement and has no value"
-    if isinstance(symbol, PouSymbol) and symbol.keyword == "PROGRAM":
+    if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.PROGRAM:
         listed = " or ".join(f"{instance}()" for instance in c.world.names.instances_of(symbol))
         return f"the program {name} has several instances; call {listed}"
     if isinstance(symbol, VarSymbol) and isinstance(symbol.type, ArrayType):

@@ -117,7 +117,11 @@ def dotted_name(c: Checker, node: ast.Expr) -> str | None:
 def describe(symbol: object) -> str:
     """What a name that is not a variable stands for."""
     if isinstance(symbol, PouSymbol):
-        article = {"FUNCTION": "a function", "FUNCTION_BLOCK": "a function block type", "INTERFACE": "an interface"}
+        article = {
+            ast.Unit.FUNCTION: "a function",
+            ast.Unit.FUNCTION_BLOCK: "a function block type",
+            ast.Unit.INTERFACE: "an interface",
+        }
         return article.get(symbol.keyword, "a program")
     if isinstance(symbol, MemberSymbol):
         return "a method"
@@ -297,4 +301,4 @@ def is_called_by_name(c: Checker, node: ast.Expr) -> bool:
         return True
     bound = bound_member(c, node)
     member = None if bound is None else bound.callable
-    return member is not None and member.decl.keyword == "ACTION"
+    return member is not None and member.decl.keyword is ast.Unit.ACTION

@@ -45,7 +45,20 @@ from plctool.iec.types import (
     base_of,
 )
 
-_OPERATORS = {op.value: op for op in BinaryOp}
+_OPERATORS = {operator: BinaryOp[operator.name] for operator in ast.Operator if operator.name in BinaryOp.__members__}
+_OF_EXPECTED_TYPE = frozenset(
+    (
+        ast.Operator.ADD,
+        ast.Operator.SUB,
+        ast.Operator.MUL,
+        ast.Operator.DIV,
+        ast.Operator.MOD,
+        ast.Operator.AND,
+        ast.Operator.OR,
+        ast.Operator.XOR,
+    )
+)
+"""Those whose operands have the type of the result."""
 _COMPARISONS = {BinaryOp.EQ, BinaryOp.NE, BinaryOp.LT, BinaryOp.LE, BinaryOp.GT, BinaryOp.GE}
 _LOGIC = {BinaryOp.AND, BinaryOp.OR, BinaryOp.XOR}
 _LAZY = {BinaryOp.AND_THEN, BinaryOp.OR_ELSE}
@@ -59,14 +72,14 @@ def unary_operator(c: Checker, node: ast.Unary, expected: Type | None) -> Expr:
     base = elementary(e.type)
     if e.type is ERROR:
         return e
-    if node.op == "NOT":
+    if node.op is ast.Operator.NOT:
         if base is None or not (base is BOOL or base.kind in NUMBERS):
             return c.error(node.pos, "type", f"NOT needs a BOOL or a bit string, not {e.type}")
         e = untyped_bits(c, e, expected) if is_untyped(e) else convert(e, base)
         return fold_unary(c, UnaryOp.NOT, e, node.pos)
     if base is None or base.kind not in (Kind.INT, Kind.BIT, Kind.REAL, Kind.TIME):
         return c.error(node.pos, "type", f"{node.op} needs a number, not {e.type}")
-    if node.op == "+":
+    if node.op is ast.Operator.ADD:
         return e
     if not base.signed and base.bits < 64 and not isinstance(e, Const):
         base = SIGNED[base.bits * 2]
@@ -87,13 +100,12 @@ def fold_unary(c: Checker, op: UnaryOp, e: Expr, offset: int) -> Expr:
 @checks(ast.Binary)
 def binary_operator(c: Checker, node: ast.Binary, expected: Type | None) -> Expr:
     """`a op b`"""
-    arithmetic = node.op in ("+", "-", "*", "/", "MOD", "AND", "OR", "XOR")
-    wanted = expected if arithmetic else None
+    wanted = expected if node.op in _OF_EXPECTED_TYPE else None
     left = c.expr(node.left, wanted)
-    if node.op in ("=", "<>", "<", ">", "<=", ">=") and isinstance(left.type, EnumType):
+    if node.op in ast.COMPARISONS and isinstance(left.type, EnumType):
         wanted = left.type  # its values may be written without its name
     right = c.expr(node.right, wanted)
-    if node.op == "**":
+    if node.op is ast.Operator.POWER:
         return _power(c, left, right, node.pos, expected)
     return operate(c, _OPERATORS[node.op], left, right, node.pos, expected)
 

@@ -49,7 +49,7 @@ def action_flag(c: Checker, node: ast.Member) -> Expr | None:
         return None
     bound = bound_member(c, node.base)
     member = None if bound is None else bound.callable
-    if bound is None or member is None or member.decl.keyword != "ACTION":
+    if bound is None or member is None or member.decl.keyword is not ast.Unit.ACTION:
         return None
     flag = _flag_symbol(bound.cls, bound.key)
     if flag is None or flag.variable is None:
@@ -193,7 +193,7 @@ def _written(c: Checker, key: str) -> str:
 
 def constant_of_block(c: Checker, symbol: object, name: str) -> VarSymbol | None:
     """`Block.LIMIT`: a constant, which is the same in all instances."""
-    if not isinstance(symbol, PouSymbol) or symbol.keyword != "FUNCTION_BLOCK":
+    if not isinstance(symbol, PouSymbol) or symbol.keyword is not ast.Unit.FUNCTION_BLOCK:
         return None
     block = c.world.declared.block(symbol)
     member = block.members.get(name.casefold()) if block is not None else None

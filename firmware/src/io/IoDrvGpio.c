@@ -1,0 +1,348 @@
+/*
+ * IoDrvGpio.c - driver of the board's own digital inputs and outputs.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * A connector is a group of lines (SysGpio.h). A group whose lines stay the same over a download stays open, so that
+ * outputs that hold their value do so.
+ */
+#include "IoDrvGpio.h"
+
+#include <string.h>
+
+#include "CmpBytes.h"
+#include "CmpChecksum.h"
+#include "CmpIoMgrEmbedded.h"
+#include "SchedEvents.h"
+#include "SysGpio.h"
+#include "SysLock.h"
+#include "rts_config.h"
+
+RTS_STATIC_ASSERT((int)IO_GPIO_LINES == 32, a_value_has_a_bit_for_each_line);
+RTS_STATIC_ASSERT(SCHED_MAX_EXTERNAL_EVENTS <= 32, events_have_a_bit_each);
+
+typedef struct {
+    const IoConfigConnector *connector; /* NULL: nobody uses the group now */
+    RTS_UI32 outputs;                   /* lines that are some */
+    RTS_UI8 in[4];                      /* as they were read */
+    RTS_UI8 out[4];                     /* to be written */
+    RTS_UI32 lines;                     /* CRC of what they are; 0: closed */
+    RTS_UI32 events;                    /* handles of those that are registered for it, a bit each */
+} GROUP;
+
+static GROUP groups[IO_GPIO_GROUPS];
+
+static const ICmpIoDrv functions;
+static IO_DRIVER gpio_driver = {.functions = &functions};
+
+static const IoDrvInfo *get_info(void)
+{
+    static const IoDrvInfo info = {"IoDrvGpio", "Lines of the board", "Open PLC runtime", 0x00010000};
+
+    return &info;
+}
+
+/* ---- configuration ---- */
+
+static void close_group(GROUP *group)
+{
+    RTS_HANDLE event;
+
+    if (group->lines != 0)
+        SysGpioClose((RTS_UI32)(group - groups));
+    for (event = 0; group->events != 0; event++, group->events >>= 1) {
+        if ((group->events & 1) != 0)
+            (void)SchedUnregisterExternalEvent(event);
+    }
+    group->lines = 0;
+    group->outputs = 0;
+}
+
+static const char *get_text(const IoConfigConnector *connector, RTS_UI32 id)
+{
+    return IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, id));
+}
+
+static RTS_UI32 get_options(const IoConfigConnector *connector, RTS_UI32 number)
+{
+    return IoMgrConfigGetParameterValueDword(IoMgrConfigGetParameter(connector, GPIO_OPTIONS + number), NULL);
+}
+
+static RTS_UI32 crc_of_text(RTS_UI32 crc, const char *text)
+{
+    return text != NULL ? CRC32Update(crc, text, (RTS_UI32)strlen(text) + 1) : crc + 1;
+}
+
+/* What tells one set of lines from another. */
+static RTS_UI32 crc_of_lines(const IoConfigConnector *connector)
+{
+    RTS_UI32 crc = 1;
+    RTS_UI32 n;
+
+    for (n = 0; n < IO_GPIO_LINES; n++) {
+        RTS_UI32 options = get_options(connector, n);
+        crc = crc_of_text(crc, get_text(connector, GPIO_LINE + n));
+        crc = crc_of_text(crc, get_text(connector, GPIO_EVENT + n));
+        crc = CRC32Update(crc, &options, sizeof options);
+    }
+    return crc | 1;
+}
+
+static RTS_RESULT register_event(GROUP *group, const char *name, RTS_HANDLE *event)
+{
+    RTS_RESULT result = ERR_OK;
+
+    *event = RTS_INVALID_HANDLE;
+    if (name == NULL)
+        return ERR_OK;
+    *event = SchedRegisterExternalEvent(name, &result);
+    if (result == ERR_OK)
+        group->events |= 1u << *event;
+    return result;
+}
+
+/* Why a line is refused; %s is the line, or its event. */
+static const char *reason_of(RTS_RESULT result)
+{
+    switch (result) {
+    case ERR_NO_OBJECT:
+        return "this device has no line %s.";
+    case ERR_OPERATION_DENIED:
+        return "line %s is in use by something else.";
+    case ERR_NOT_SUPPORTED:
+        return "line %s cannot do what its options ask for.";
+    case ERR_DUPLICATE:
+        return "there is an event %s already.";
+    default:
+        return "line %s cannot be opened.";
+    }
+}
+
+/* *bad: the line or event that is refused. */
+static RTS_RESULT add_line(GROUP *group, RTS_UI32 number, const char **bad)
+{
+    const char *event = get_text(group->connector, GPIO_EVENT + number);
+    SYS_GPIO_LINE line = {get_text(group->connector, GPIO_LINE + number), get_options(group->connector, number), 0};
+    RTS_RESULT result;
+
+    if (line.name == NULL)
+        return ERR_OK;
+    *bad = event;
+    result = register_event(group, event, &line.event);
+    if (result != ERR_OK)
+        return result;
+    *bad = line.name;
+    if (line.event == RTS_INVALID_HANDLE)
+        line.options &= ~(RTS_UI32)(GPIO_OPTION_RISING | GPIO_OPTION_FALLING);
+    if ((line.options & GPIO_OPTION_OUT) != 0)
+        group->outputs |= 1u << number;
+    return SysGpioAdd((RTS_UI32)(group - groups), number, &line);
+}
+
+/* Opens the lines of a connector. */
+static RTS_RESULT open_group(GROUP *group, const IoConfigConnector *connector, const char **bad)
+{
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 n;
+
+    group->connector = connector;
+    group->lines = crc_of_lines(connector);
+    for (n = 0; n < IO_GPIO_LINES && result == ERR_OK; n++)
+        result = add_line(group, n, bad);
+    if (result == ERR_OK)
+        result = SysGpioOpen((RTS_UI32)(group - groups), BytesGet32(group->out));
+    if (result == ERR_OK)
+        IoMgrConfigNoteData(connector);
+    else
+        close_group(group);
+    return result;
+}
+
+static RTS_RESULT use_group(GROUP *group, const IoConfigConnector *connector)
+{
+    const char *bad = "";
+    RTS_RESULT result;
+
+    if (group == groups + IO_GPIO_GROUPS)
+        return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "this device can have %u groups of lines.",
+                                 (unsigned)IO_GPIO_GROUPS);
+    if (group->lines == crc_of_lines(connector)) {
+        group->connector = connector;
+        IoMgrConfigNoteData(connector);
+        return ERR_OK;
+    }
+    close_group(group);
+    memset(group->out, 0, sizeof group->out);
+    result = open_group(group, connector, &bad);
+    return result == ERR_OK ? ERR_OK : IoMgrConfigRefuse(connector, result, reason_of(result), bad);
+}
+
+static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
+{
+    GROUP *group = groups;
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 i;
+
+    for (i = 0; i < IO_GPIO_GROUPS; i++)
+        groups[i].connector = NULL;
+    for (; count > 0 && result == ERR_OK; count--, connectors++) {
+        if (IoMgrConfigIsMine(connectors, &gpio_driver)) {
+            result = use_group(group, connectors);
+            group += group < groups + IO_GPIO_GROUPS;
+        }
+    }
+    return result;
+}
+
+/* What nobody has taken over from the application before. */
+static void close_unused(void)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < IO_GPIO_GROUPS; i++) {
+        if (groups[i].connector == NULL)
+            close_group(&groups[i]);
+    }
+}
+
+static bool is_channel(const IoConfigChannelMap *channel, RTS_UI32 type)
+{
+    return channel->parameter == (type == IO_MAP_INPUTS ? GPIO_INPUTS : GPIO_OUTPUTS) &&
+           channel->bits <= IO_GPIO_LINES && channel->parameter_bit <= (RTS_UI32)IO_GPIO_LINES - channel->bits;
+}
+
+static RTS_RESULT check_map(const IoConfigConnectorMap *map, RTS_UI32 type)
+{
+    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
+    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
+    RTS_UI32 count = map->channel_map_count;
+
+    for (; count > 0 && IoMgrConfigIsMine(connector, &gpio_driver); count--, channel++) {
+        if (!is_channel(channel, type))
+            return IoMgrConfigRefuse(connector, ERR_OUT_OF_LIMITS, "it has no channel %u.%u.",
+                                     (unsigned)channel->parameter, (unsigned)channel->parameter_bit);
+    }
+    return ERR_OK;
+}
+
+static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_RESULT result = ERR_OK;
+
+    for (; count > 0; count--, task_maps++) {
+        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_maps);
+        RTS_UI32 maps = task_maps->connector_map_count;
+        for (; maps > 0 && result == ERR_OK; maps--)
+            result = check_map(map++, task_maps->type);
+    }
+    return result;
+}
+
+/* ---- cycles ---- */
+
+/* A connector that has lines has a group, open or not. */
+static GROUP *find_group(const IoConfigConnectorMap *map)
+{
+    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
+    GROUP *group = groups;
+
+    while (group->connector != connector)
+        group++;
+    return group;
+}
+
+static void note_result(const GROUP *group, RTS_RESULT result)
+{
+    if (result == ERR_OK)
+        IoMgrConfigNoteData(group->connector);
+    else
+        IoMgrConfigSetDiagnosis(group->connector, CF_CONNECTOR_ERROR);
+}
+
+static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
+{
+    for (; count > 0; count--, maps++) {
+        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
+        RTS_UI32 channels = maps->channel_map_count;
+        GROUP *group = find_group(maps);
+        RTS_UI32 values;
+        RTS_UI32 lock;
+        RTS_RESULT result = SysGpioRead((RTS_UI32)(group - groups), &values);
+
+        note_result(group, result);
+        if (result != ERR_OK)
+            continue;
+        BytesPut32(group->in, values);
+        lock = SysLockEnter();
+        for (; channels > 0; channels--)
+            IoMgrCopyInputLE(channel++, group->in);
+        SysLockLeave(lock);
+    }
+    return ERR_OK;
+}
+
+static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
+{
+    for (; count > 0; count--, maps++) {
+        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
+        RTS_UI32 channels = maps->channel_map_count;
+        GROUP *group = find_group(maps);
+        RTS_UI32 lock = SysLockEnter();
+        RTS_RESULT result;
+
+        for (; channels > 0; channels--)
+            IoMgrCopyOutputLE(channel++, group->out);
+        SysLockLeave(lock);
+        result = group->lines != 0 ? SysGpioWrite((RTS_UI32)(group - groups), group->outputs, BytesGet32(group->out))
+                                   : (RTS_RESULT)ERR_DEVICE;
+        if (result != ERR_OK)
+            note_result(group, result);
+    }
+    return ERR_OK;
+}
+
+/* A chip that has gone (USB) is opened again when it is back, outputs with what they should be. */
+static RTS_RESULT diagnose(const IoConfigConnector *connector)
+{
+    IO_DEVICE_STATE state;
+    const char *bad;
+    GROUP *group = groups;
+
+    (void)IoMgrGetState(IoMgrConfigGetIndex(connector), &state);
+    while (group < groups + IO_GPIO_GROUPS && group->connector != connector)
+        group++;
+    if (state.ok || group == groups + IO_GPIO_GROUPS)
+        return ERR_OK;
+    close_group(group);
+    return open_group(group, connector, &bad);
+}
+
+static const ICmpIoDrv functions = {
+    .IoDrvGetInfo = get_info,
+    .IoDrvUpdateConfiguration = update_configuration,
+    .IoDrvUpdateMapping = update_mapping,
+    .IoDrvReadInputs = read_inputs,
+    .IoDrvWriteOutputs = write_outputs,
+    .IoDrvGetModuleDiagnosis = diagnose,
+};
+
+RTS_RESULT IoDrvGpio_Hook(CMP_HOOK hook)
+{
+    RTS_UI32 i;
+
+    switch (hook) {
+    case CH_INIT2:
+        return IoMgrRegisterInstance(&gpio_driver);
+    case CH_COMM_CYCLE:
+        SysGpioPoll();
+        close_unused();
+        break;
+    case CH_EXIT2:
+        for (i = 0; i < IO_GPIO_GROUPS; i++)
+            close_group(&groups[i]);
+        return IoMgrUnregisterInstance(&gpio_driver);
+    default:
+        break;
+    }
+    return ERR_OK;
+}

@@ -1,0 +1,354 @@
+/*
+ * IoDrvModbus.c - driver of Modbus devices, and of this device as a Modbus server.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * The engine (src/modbus) runs in CH_COMM_CYCLE; tasks and it meet in the data of ModbusSetup.h, under SysLock.
+ */
+#include "IoDrvModbus.h"
+
+#include <string.h>
+
+#include "AppState.h"
+#include "CmpIoMgrEmbedded.h"
+#include "ModbusServerTcp.h"
+#include "ModbusSetup.h"
+#include "SysLock.h"
+#include "SysTime.h"
+
+static MODBUS_SETUP setup;
+
+/* Between IoDrvUpdateMapping and the next configuration. */
+static bool is_running;
+
+static const ICmpIoDrv functions;
+static IO_DRIVER driver = {.functions = &functions};
+
+static const IoDrvInfo *get_info(void)
+{
+    static const IoDrvInfo info = {"IoDrvModbus", "Modbus", "Open PLC runtime", 0x00010000};
+
+    return &info;
+}
+
+/* ---- configuration ---- */
+
+static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
+{
+    is_running = false;
+    return ModbusSetUp(&setup, &driver, connectors, count);
+}
+
+static bool is_channel_good(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, bool is_output)
+{
+    RTS_UI32 bits = 0;
+
+    return ModbusFindMemory(place, channel->parameter, is_output, &bits) != NULL && channel->parameter_bit <= bits &&
+           channel->bits <= bits - channel->parameter_bit;
+}
+
+static RTS_RESULT check_map(const IoConfigConnectorMap *map, bool is_output)
+{
+    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
+    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
+    MODBUS_PLACE place = ModbusFindPlace(&setup, connector);
+
+    for (RTS_UI32 i = 0; IoMgrConfigIsMine(connector, &driver) && i < map->channel_map_count; i++) {
+        if (!is_channel_good(&place, &channel[i], is_output))
+            return IoMgrConfigRefuse(connector, ERR_PARAMETER, "a channel is not in its data.");
+    }
+    return ERR_OK;
+}
+
+static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_RESULT result = ERR_OK;
+
+    for (int i = 0; i < count; i++) {
+        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(&task_maps[i]);
+        for (RTS_UI32 k = 0; result == ERR_OK && k < task_maps[i].connector_map_count; k++)
+            result = check_map(&map[k], task_maps[i].type == IO_MAP_OUTPUTS);
+    }
+    is_running = result == ERR_OK;
+    return result;
+}
+
+/* ---- tasks ---- */
+
+typedef void (*PF_COPY)(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory);
+
+static void copy_all(const IoConfigConnectorMap *maps, int count, bool is_output, PF_COPY copy)
+{
+    RTS_UI32 lock = SysLockEnter();
+    RTS_UI32 bits;
+
+    for (; count > 0; count--, maps++) {
+        const MODBUS_PLACE place = ModbusFindPlace(&setup, IoMgrConfigGetConnector(maps->connector));
+        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
+        for (RTS_UI32 i = 0; i < maps->channel_map_count; i++)
+            copy(&place, &channel[i], ModbusFindMemory(&place, channel[i].parameter, is_output, &bits));
+    }
+    SysLockLeave(lock);
+}
+
+static void copy_input(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory)
+{
+    RTS_UNUSED(place);
+    IoMgrCopyInputLE(channel, memory);
+}
+
+/* From now on the job may be done: it has values of the program, or of the safe state. */
+static void copy_output(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory)
+{
+    IoMgrCopyOutputLE(channel, memory);
+    if (place->device != NULL)
+        place->device->jobs[channel->parameter - MODBUS_PARAM_JOB].has_out = true;
+}
+
+static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
+{
+    copy_all(maps, count, false, copy_input);
+    return ERR_OK;
+}
+
+static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
+{
+    copy_all(maps, count, true, copy_output);
+    return ERR_OK;
+}
+
+/* ---- what the manager is told ---- */
+
+static void note_error(MODBUS_NOTED *noted, RTS_UI32 errors, RTS_UI32 flag)
+{
+    if (errors == noted->noted_errors)
+        return;
+    noted->noted_errors = errors;
+    if (flag != 0)
+        IoMgrConfigSetDiagnosis(noted->connector, flag);
+    else
+        IoMgrConfigNoteError(noted->connector);
+}
+
+static RTS_UI32 errors_of(const MODBUS_DEVICE *device)
+{
+    return device->counters.timeouts + device->counters.exceptions + device->counters.unverified;
+}
+
+static void note_device(MODBUS_NOTED *noted, const MODBUS_DEVICE *device)
+{
+    bool lost = ModbusDeviceIsLost(device);
+    bool good = ModbusDeviceIsGood(device);
+
+    if (device->good_ns != noted->noted_ns && good)
+        IoMgrConfigNoteData(noted->connector);
+    noted->noted_ns = device->good_ns;
+    if (lost)
+        note_error(noted, errors_of(device), CF_CONNECTOR_BUS_ERROR);
+    else
+        note_error(noted, errors_of(device), good || device->failures != 0 ? 0 : CF_CONNECTOR_ERROR);
+}
+
+/* Of a client a line is as well as one of its devices. */
+static void note_client(MODBUS_CLIENT_LINE *line)
+{
+    const MODBUS_CLIENT *client = &line->client;
+    RTS_UI32 first = (RTS_UI32)(client->devices - setup.devices);
+    bool replies = client->device_count == 0;
+
+    for (RTS_UI32 i = 0; i < client->device_count; i++) {
+        note_device(&setup.noted[first + i], &client->devices[i]);
+        replies = replies || (client->devices[i].good_ns != 0 && !ModbusDeviceIsLost(&client->devices[i]));
+    }
+    if (replies)
+        IoMgrConfigNoteData(line->noted.connector);
+    else if (!line->noted.noted_lost && client->devices[0].failures != 0)
+        IoMgrConfigSetDiagnosis(line->noted.connector, CF_CONNECTOR_BUS_ERROR);
+    line->noted.noted_lost = !replies && client->devices[0].failures != 0;
+    note_error(&line->noted, client->link.bad_frames, 0);
+}
+
+/* The age of a server is that of what was written to it last. */
+static void note_server(MODBUS_SERVER_LINE *line, RTS_RESULT state)
+{
+    bool lost = state != ERR_OK;
+    bool begins = line->noted.noted_ns == 0;
+
+    if (!lost && (begins || line->noted.noted_lost || line->server.written != (RTS_UI32)line->noted.noted_ns - 1)) {
+        IoMgrConfigNoteData(line->noted.connector);
+        line->noted.noted_ns = (RTS_I64)line->server.written + 1;
+    }
+    if (lost && state != ERR_PENDING && !line->noted.noted_lost)
+        IoMgrConfigSetDiagnosis(line->noted.connector, CF_CONNECTOR_BUS_ERROR);
+    line->noted.noted_lost = lost;
+    note_error(&line->noted, line->server.errors + line->link.bad_frames, 0);
+}
+
+/* ---- the engine ---- */
+
+#if MODBUS_MAX_CONNECTIONS > 0
+static void poll_tcp_servers(RTS_I64 now_ns)
+{
+    ModbusServerTcpPoll(now_ns);
+}
+
+static RTS_RESULT state_of(const MODBUS_SERVER_LINE *line)
+{
+    return line->server.tcp ? ModbusServerTcpGetState(&line->server) : ERR_OK;
+}
+
+static RTS_UI32 tcp_counter(RTS_UI32 id)
+{
+    const MODBUS_TCP_COUNTERS *counters = ModbusServerTcpGetCounters();
+
+    return id == MODBUS_PARAM_ACCEPTED ? counters->accepted : counters->displaced;
+}
+#else
+static void poll_tcp_servers(RTS_I64 now_ns)
+{
+    RTS_UNUSED(now_ns);
+}
+
+static RTS_RESULT state_of(const MODBUS_SERVER_LINE *line)
+{
+    RTS_UNUSED(line);
+    return ERR_OK;
+}
+
+static RTS_UI32 tcp_counter(RTS_UI32 id)
+{
+    RTS_UNUSED(id);
+    return 0;
+}
+#endif
+
+/* Silence, and the next request of a client, are shorter than the sleep of main may be. */
+static void cycle(void)
+{
+    RTS_I64 now_ns = SysTimeGetNs();
+    bool hurry = setup.client_count != 0;
+
+    for (RTS_UI32 i = 0; i < setup.client_count; i++) {
+        ModbusClientPoll(&setup.clients[i].client, now_ns);
+        note_client(&setup.clients[i]);
+    }
+    for (RTS_UI32 i = 0; i < setup.server_count; i++) {
+        MODBUS_SERVER_LINE *line = &setup.servers[i];
+        line->server.running = AppGetState() == AS_RUN;
+        if (!line->server.tcp)
+            (void)ModbusServerPoll(&line->server, &line->link, now_ns);
+        hurry = hurry || line->link.fill != 0;
+        note_server(line, state_of(line));
+    }
+    poll_tcp_servers(now_ns);
+    if (hurry)
+        SysTimeWantPass(1);
+}
+
+/* ---- requests from the PC ---- */
+
+static RTS_RESULT device_counter(const MODBUS_DEVICE *device, RTS_UI32 id, RTS_UI32 *value)
+{
+    const MODBUS_DEVICE_COUNTERS *counters = &device->counters;
+
+    switch (id) {
+    case MODBUS_PARAM_REQUESTS:
+        *value = counters->requests;
+        return ERR_OK;
+    case MODBUS_PARAM_TIMEOUTS:
+        *value = counters->timeouts;
+        return ERR_OK;
+    case MODBUS_PARAM_EXCEPTIONS:
+        *value = counters->exceptions;
+        return ERR_OK;
+    case MODBUS_PARAM_OTHERS:
+        *value = counters->others;
+        return ERR_OK;
+    case MODBUS_PARAM_UNVERIFIED:
+        *value = counters->unverified;
+        return ERR_OK;
+    case MODBUS_PARAM_LAST_EXCEPTION:
+        *value = counters->last_exception;
+        return ERR_OK;
+    default:
+        return ERR_NO_OBJECT;
+    }
+}
+
+static RTS_RESULT server_counter(const MODBUS_SERVER_LINE *line, RTS_UI32 id, RTS_UI32 *value)
+{
+    switch (id) {
+    case MODBUS_PARAM_REQUESTS:
+        *value = line->server.requests;
+        return ERR_OK;
+    case MODBUS_PARAM_EXCEPTIONS:
+        *value = line->server.errors;
+        return ERR_OK;
+    case MODBUS_PARAM_WRITTEN:
+        *value = line->server.written;
+        return ERR_OK;
+    case MODBUS_PARAM_BAD_FRAMES:
+        *value = line->link.bad_frames;
+        return ERR_OK;
+    case MODBUS_PARAM_ACCEPTED:
+    case MODBUS_PARAM_DISPLACED:
+        *value = tcp_counter(id);
+        return ERR_OK;
+    default:
+        return ERR_NO_OBJECT;
+    }
+}
+
+static RTS_RESULT client_counter(const IoConfigConnector *connector, RTS_UI32 id, RTS_UI32 *value)
+{
+    for (RTS_UI32 i = 0; i < setup.client_count && id == MODBUS_PARAM_BAD_FRAMES; i++) {
+        if (setup.clients[i].noted.connector != connector)
+            continue;
+        *value = setup.clients[i].client.link.bad_frames;
+        return ERR_OK;
+    }
+    return ERR_NO_OBJECT;
+}
+
+static RTS_RESULT read_parameter(const IoConfigConnector *connector, RTS_UI32 id, void *data, RTS_UI32 bits,
+                                 RTS_UI32 bit_offset)
+{
+    const MODBUS_PLACE place = ModbusFindPlace(&setup, connector);
+    RTS_UI32 value = 0;
+    RTS_RESULT result;
+
+    if (place.device != NULL)
+        result = device_counter(place.device, id, &value);
+    else if (place.server != NULL)
+        result = server_counter(place.server, id, &value);
+    else
+        result = client_counter(connector, id, &value);
+    if (result != ERR_OK || bit_offset != 0 || bits != 8 * sizeof(value))
+        return result != ERR_OK ? result : ERR_PARAMETER;
+    memcpy(data, &value, sizeof(value));
+    return ERR_OK;
+}
+
+/* ---- life ---- */
+
+static const ICmpIoDrv functions = {
+    .IoDrvGetInfo = get_info,
+    .IoDrvUpdateConfiguration = update_configuration,
+    .IoDrvUpdateMapping = update_mapping,
+    .IoDrvReadInputs = read_inputs,
+    .IoDrvWriteOutputs = write_outputs,
+    .IoDrvReadParameter = read_parameter,
+};
+
+RTS_RESULT IoDrvModbus_Hook(CMP_HOOK hook)
+{
+    if (hook == CH_INIT2)
+        return IoMgrRegisterInstance(&driver);
+    if (hook == CH_COMM_CYCLE && is_running)
+        cycle();
+    else if (hook == CH_EXIT3)
+        (void)update_configuration(NULL, 0);
+    else if (hook == CH_EXIT2)
+        (void)IoMgrUnregisterInstance(&driver);
+    return ERR_OK;
+}

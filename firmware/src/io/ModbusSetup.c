@@ -1,0 +1,429 @@
+/*
+ * ModbusSetup.c - the lines, devices, jobs and ranges of Modbus that the configuration asks for.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "ModbusSetup.h"
+
+#include <string.h>
+
+#include "CmpIoMgrEmbedded.h"
+#include "IoDrvModbus.h"
+#include "ModbusRtu.h"
+#include "ModbusServerTcp.h"
+#include "ModbusTcp.h"
+#include "SysCom.h"
+#include "SysTarget.h"
+
+enum { DEFAULT_BAUD = 19200, DEFAULT_TIMEOUT_MS = 1000, LEAST_BAUD = 300 };
+
+static const bool HAS_TCP = MODBUS_MAX_CONNECTIONS > 0;
+
+/* ---- parameters ---- */
+
+static RTS_UI32 number(const IoConfigConnector *connector, RTS_UI32 id, RTS_UI32 otherwise)
+{
+    RTS_RESULT result;
+    const IoConfigParameter *parameter = IoMgrConfigGetParameter(connector, id);
+    RTS_UI32 value = IoMgrConfigGetParameterValueDword(parameter, &result);
+
+    return result == ERR_OK ? value : otherwise;
+}
+
+/* The value of a parameter that is a structure of `size` bytes, NULL otherwise. */
+static const void *structure(const IoConfigConnector *connector, RTS_UI32 id, RTS_UI32 size)
+{
+    const IoConfigParameter *parameter = IoMgrConfigGetParameter(connector, id);
+
+    return parameter != NULL && parameter->bits == 8 * size ? IoMgrConfigGetParameterValuePointer(parameter, NULL) : NULL;
+}
+
+static RTS_RESULT refuse_number(const IoConfigConnector *connector, const char *what, RTS_UI32 most)
+{
+    return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "this device has room for %u %s.", (unsigned)most, what);
+}
+
+/* Bytes of the data, zero; NULL: no room. */
+static RTS_UI8 *take_data(MODBUS_SETUP *setup, RTS_UI32 size)
+{
+    RTS_UI8 *data = setup->data + setup->data_size;
+
+    if (size > MODBUS_DATA_SIZE - setup->data_size)
+        return NULL;
+    setup->data_size += size;
+    return data;
+}
+
+/* ---- serial lines ---- */
+
+static RTS_RESULT refuse_line(const IoConfigConnector *connector, RTS_RESULT result, const char *name)
+{
+    switch (result) {
+    case ERR_NO_OBJECT:
+        return IoMgrConfigRefuse(connector, result, "this device has no serial line \"%s\".", name);
+    case ERR_DUPLICATE:
+        return IoMgrConfigRefuse(connector, result, "the serial line \"%s\" is in use.", name);
+    default:
+        return IoMgrConfigRefuse(connector, result, "the serial line \"%s\" cannot run with these settings.", name);
+    }
+}
+
+static RTS_RESULT open_line(MODBUS_LINK *link, const IoConfigConnector *connector)
+{
+    const char *name = IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, MODBUS_PARAM_LINE));
+    RTS_UI32 line;
+    RTS_RESULT result;
+    const SYSCOM_SETTINGS settings = {
+        number(connector, MODBUS_PARAM_BAUD, DEFAULT_BAUD),
+        (RTS_UI8)number(connector, MODBUS_PARAM_PARITY, SYSCOM_PARITY_EVEN),
+        (RTS_UI8)number(connector, MODBUS_PARAM_STOP_BITS, 1),
+        number(connector, MODBUS_PARAM_RS485, 0) != 0,
+    };
+
+    link->handle = RTS_INVALID_HANDLE;
+    if (name == NULL)
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "the name of its serial line is missing.");
+    if (settings.baud < LEAST_BAUD || settings.parity > SYSCOM_PARITY_ODD || settings.stop_bits < 1 ||
+        settings.stop_bits > 2)
+        return refuse_line(connector, ERR_NOT_SUPPORTED, name);
+    result = SysComOpenPort(name, &settings, &line);
+    if (result != ERR_OK)
+        return refuse_line(connector, result, name);
+    ModbusRtuBegin(link, line, &settings);
+    return ERR_OK;
+}
+
+static void close_line(MODBUS_LINK *link)
+{
+    if (link->type != NULL && link->handle != RTS_INVALID_HANDLE)
+        SysComClose(link->handle);
+}
+
+/* ---- TCP ---- */
+
+static RTS_RESULT refuse_tcp(const IoConfigConnector *connector)
+{
+    return IoMgrConfigRefuse(connector, ERR_NOT_SUPPORTED, "this device has no TCP.");
+}
+
+#if MODBUS_MAX_CONNECTIONS > 0
+static SOCKADDRESS address_of(const IoConfigConnector *connector)
+{
+    return (SOCKADDRESS){number(connector, MODBUS_PARAM_ADDRESS, 0),
+                         (RTS_UI16)number(connector, MODBUS_PARAM_PORT, MODBUS_PORT)};
+}
+
+static void begin_client(MODBUS_LINK *link, const IoConfigConnector *connector)
+{
+    const SOCKADDRESS peer = address_of(connector);
+
+    ModbusTcpBeginClient(link, &peer);
+}
+
+static void begin_server(MODBUS_SERVER *server, const IoConfigConnector *connector)
+{
+    const SOCKADDRESS own = address_of(connector);
+
+    (void)ModbusServerTcpOpen(server, &own); /* there is room for all servers */
+}
+
+static void close_client(MODBUS_LINK *link)
+{
+    if (link->type != NULL)
+        ModbusTcpClose(link);
+}
+
+static void close_servers(void)
+{
+    ModbusServerTcpClose();
+}
+#else
+static void begin_client(MODBUS_LINK *link, const IoConfigConnector *connector)
+{
+    RTS_UNUSED(link);
+    RTS_UNUSED(connector);
+}
+
+static void begin_server(MODBUS_SERVER *server, const IoConfigConnector *connector)
+{
+    RTS_UNUSED(server);
+    RTS_UNUSED(connector);
+}
+
+static void close_client(MODBUS_LINK *link)
+{
+    RTS_UNUSED(link);
+}
+
+static void close_servers(void)
+{
+}
+#endif
+
+/* ---- devices of a client ---- */
+
+static bool is_job_good(const MODBUS_JOB *job)
+{
+    const MODBUS_FUNCTION *function = ModbusFindFunction(job->function);
+    RTS_UI32 reverse = job->flags >> MODBUS_JOB_REVERSE_SHIFT & 14;
+
+    return function != NULL && function->table != 0 && (reverse & (reverse - 1)) == 0 &&
+           (job->read_count == 0) == (function->most_read == 0) && job->read_count <= function->most_read &&
+           (job->write_count == 0) == (function->most_written == 0) && job->write_count <= function->most_written &&
+           (reverse == 0 || ((2u * job->read_count) % reverse == 0 && (2u * job->write_count) % reverse == 0)) &&
+           (job->interval_ms != 0 || (job->flags & MODBUS_JOB_ON_CHANGE) != 0);
+}
+
+static RTS_RESULT add_job(MODBUS_SETUP *setup, const IoConfigConnector *connector, const MODBUS_JOB *job)
+{
+    MODBUS_JOB_STATE *state = &setup->jobs[setup->job_count];
+    const MODBUS_FUNCTION *function = ModbusFindFunction(job->function);
+    RTS_UI32 write_size;
+
+    if (!is_job_good(job))
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "one of its jobs cannot be a request.");
+    if (setup->job_count == MODBUS_MAX_JOBS)
+        return refuse_number(connector, "reads and writes of Modbus", MODBUS_MAX_JOBS);
+    write_size = ModbusDataSize(function, job->write_count);
+    state->job = job;
+    state->in = take_data(setup, ModbusDataSize(function, job->read_count));
+    state->out = take_data(setup, write_size);
+    state->written = take_data(setup, write_size);
+    if (state->in == NULL || state->out == NULL || state->written == NULL)
+        return refuse_number(connector, "bytes of Modbus data", MODBUS_DATA_SIZE);
+    setup->job_count++;
+    return ERR_OK;
+}
+
+static RTS_RESULT add_jobs(MODBUS_SETUP *setup, MODBUS_DEVICE *device, const IoConfigConnector *connector)
+{
+    const MODBUS_JOB *job;
+    RTS_RESULT result = ERR_OK;
+
+    device->jobs = setup->jobs + setup->job_count;
+    while (result == ERR_OK &&
+           (job = structure(connector, MODBUS_PARAM_JOB + device->job_count, sizeof(MODBUS_JOB))) != NULL) {
+        result = add_job(setup, connector, job);
+        device->job_count += result == ERR_OK;
+    }
+    return result;
+}
+
+static RTS_RESULT add_device(MODBUS_SETUP *setup, const IoConfigConnector *connector)
+{
+    MODBUS_DEVICE *device = &setup->devices[setup->device_count];
+    RTS_UI32 unit = number(connector, MODBUS_PARAM_UNIT, 1);
+
+    if (setup->device_count == MODBUS_MAX_DEVICES)
+        return refuse_number(connector, "Modbus devices", MODBUS_MAX_DEVICES);
+    if (unit > UINT8_MAX)
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "there is no unit %u.", (unsigned)unit);
+    device->unit = (RTS_UI8)unit;
+    device->timeout_ms = number(connector, MODBUS_PARAM_TIMEOUT, DEFAULT_TIMEOUT_MS);
+    setup->noted[setup->device_count++].connector = connector;
+    return add_jobs(setup, device, connector);
+}
+
+static RTS_RESULT add_client(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connector,
+                             bool is_tcp)
+{
+    MODBUS_CLIENT_LINE *line = &setup->clients[setup->client_count];
+    RTS_UI32 first = setup->device_count;
+    RTS_RESULT result = ERR_OK;
+
+    if (setup->client_count == MODBUS_MAX_CLIENTS)
+        return refuse_number(connector, "Modbus lines", MODBUS_MAX_CLIENTS);
+    if (is_tcp)
+        begin_client(&line->client.link, connector);
+    else
+        result = open_line(&line->client.link, connector);
+    if (result != ERR_OK || !IoMgrConfigIsMine(connector, driver))
+        return result;
+    line->noted.connector = connector;
+    setup->client_count++;
+    for (RTS_UI32 i = IoMgrConfigGetIndex(connector) + 1; result == ERR_OK; i++) {
+        const IoConfigConnector *child = IoMgrConfigGetConnector(i);
+        if (child == NULL)
+            break;
+        if (child->parent == IoMgrConfigGetIndex(connector) && IoMgrConfigIsMine(child, driver))
+            result = add_device(setup, child);
+    }
+    ModbusClientBegin(&line->client, setup->devices + first, setup->device_count - first);
+    return result;
+}
+
+/* ---- servers ---- */
+
+static bool is_range_good(const MODBUS_RANGE *range)
+{
+    const RTS_UI32 registers = MODBUS_HOLDING_REGISTERS | MODBUS_INPUT_REGISTERS;
+    const RTS_UI32 bits = MODBUS_COILS | MODBUS_DISCRETE_INPUTS;
+    const RTS_UI32 addresses = 0x10000;
+
+    if (range->bits == 0 || range->bits > addresses * MODBUS_REGISTER_BITS || (range->tables & (registers | bits)) == 0 ||
+        range->reverse == 0 || range->reverse > 8 || (range->reverse & (range->reverse - 1)) != 0)
+        return false;
+    if ((range->tables & bits) != 0 && range->first_bit + range->bits > addresses)
+        return false;
+    if ((range->tables & registers) == 0)
+        return range->reverse == 2;
+    return range->bits % MODBUS_REGISTER_BITS == 0 && range->bits % (8u * range->reverse) == 0 &&
+           range->first_register + range->bits / MODBUS_REGISTER_BITS <= addresses;
+}
+
+static RTS_RESULT add_range(MODBUS_SETUP *setup, const IoConfigConnector *connector, const MODBUS_RANGE *range)
+{
+    MODBUS_MEMORY *memory = &setup->ranges[setup->range_count];
+
+    if (!is_range_good(range))
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "one of its ranges cannot be.");
+    if (setup->range_count == MODBUS_MAX_RANGES)
+        return refuse_number(connector, "ranges of Modbus servers", MODBUS_MAX_RANGES);
+    memory->range = range;
+    memory->data = take_data(setup, (range->bits + 7) / 8);
+    if (memory->data == NULL)
+        return refuse_number(connector, "bytes of Modbus data", MODBUS_DATA_SIZE);
+    setup->range_count++;
+    return ERR_OK;
+}
+
+static RTS_RESULT add_ranges(MODBUS_SETUP *setup, MODBUS_SERVER *server, const IoConfigConnector *connector)
+{
+    const MODBUS_RANGE *range;
+    RTS_RESULT result = ERR_OK;
+
+    server->memory = setup->ranges + setup->range_count;
+    while (result == ERR_OK &&
+           (range = structure(connector, MODBUS_PARAM_RANGE + server->range_count, sizeof(MODBUS_RANGE))) != NULL) {
+        result = add_range(setup, connector, range);
+        server->range_count += result == ERR_OK;
+    }
+    return result;
+}
+
+static void describe(MODBUS_SERVER *server, const IoConfigConnector *connector)
+{
+    const SYS_TARGET *target = SysTargetGet();
+    const char *const otherwise[MODBUS_OBJECTS] = {target->vendor_name, target->device_name, "", NULL,
+                                                   target->device_name};
+
+    for (RTS_UI32 i = 0; i < MODBUS_OBJECTS; i++) {
+        const char *text = IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, MODBUS_PARAM_OBJECT + i));
+        server->object[i] = text != NULL ? text : otherwise[i];
+    }
+}
+
+static RTS_RESULT add_server(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connector,
+                             bool is_tcp)
+{
+    MODBUS_SERVER_LINE *line = &setup->servers[setup->server_count];
+    RTS_RESULT result = ERR_OK;
+
+    if (setup->server_count == MODBUS_MAX_SERVERS)
+        return refuse_number(connector, "Modbus servers", MODBUS_MAX_SERVERS);
+    line->server.tcp = is_tcp;
+    line->server.unit = (RTS_UI8)number(connector, MODBUS_PARAM_UNIT, is_tcp ? 0 : 1);
+    describe(&line->server, connector);
+    if (!is_tcp)
+        result = open_line(&line->link, connector);
+    if (result != ERR_OK || !IoMgrConfigIsMine(connector, driver))
+        return result;
+    line->noted.connector = connector;
+    setup->server_count++;
+    result = add_ranges(setup, &line->server, connector);
+    if (is_tcp && result == ERR_OK)
+        begin_server(&line->server, connector);
+    return result;
+}
+
+/* ---- all ---- */
+
+static RTS_RESULT add_line(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connector)
+{
+    RTS_UI32 role = number(connector, MODBUS_PARAM_ROLE, 0);
+    bool is_tcp = role == MODBUS_ROLE_TCP_CLIENT || role == MODBUS_ROLE_TCP_SERVER;
+
+    if (is_tcp && !HAS_TCP)
+        return refuse_tcp(connector);
+    switch (role) {
+    case MODBUS_ROLE_SERIAL_CLIENT:
+    case MODBUS_ROLE_TCP_CLIENT:
+        return add_client(setup, driver, connector, is_tcp);
+    case MODBUS_ROLE_SERIAL_SERVER:
+    case MODBUS_ROLE_TCP_SERVER:
+        return add_server(setup, driver, connector, is_tcp);
+    default:
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "it is neither a client nor a server.");
+    }
+}
+
+static void close_all(MODBUS_SETUP *setup)
+{
+    for (RTS_UI32 i = 0; i < setup->client_count; i++) {
+        MODBUS_CLIENT_LINE *line = &setup->clients[i];
+        if (number(line->noted.connector, MODBUS_PARAM_ROLE, 0) == MODBUS_ROLE_TCP_CLIENT)
+            close_client(&line->client.link);
+        else
+            close_line(&line->client.link);
+    }
+    for (RTS_UI32 i = 0; i < setup->server_count; i++)
+        close_line(&setup->servers[i].link);
+    close_servers();
+}
+
+RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connectors, int count)
+{
+    RTS_RESULT result = ERR_OK;
+
+    close_all(setup);
+    memset(setup, 0, sizeof(*setup));
+    for (int i = 0; i < count && result == ERR_OK; i++) {
+        if (connectors[i].parent == IO_CONFIG_NONE && IoMgrConfigIsMine(&connectors[i], driver))
+            result = add_line(setup, driver, &connectors[i]);
+    }
+    return result;
+}
+
+/* ---- finding ---- */
+
+MODBUS_PLACE ModbusFindPlace(MODBUS_SETUP *setup, const IoConfigConnector *connector)
+{
+    MODBUS_PLACE place = {NULL, NULL};
+
+    for (RTS_UI32 i = 0; i < setup->device_count && place.device == NULL; i++) {
+        if (setup->noted[i].connector == connector)
+            place.device = &setup->devices[i];
+    }
+    for (RTS_UI32 i = 0; i < setup->server_count && place.server == NULL; i++) {
+        if (setup->servers[i].noted.connector == connector)
+            place.server = &setup->servers[i];
+    }
+    return place;
+}
+
+static RTS_UI8 *memory_of_job(const MODBUS_DEVICE *device, RTS_UI32 index, bool is_output, RTS_UI32 *bits)
+{
+    const MODBUS_JOB_STATE *state = &device->jobs[index];
+    const MODBUS_FUNCTION *function;
+
+    if (index >= device->job_count)
+        return NULL;
+    function = ModbusFindFunction(state->job->function);
+    *bits = (is_output ? state->job->write_count : state->job->read_count) * (RTS_UI32)function->count_of_bits;
+    return is_output ? state->out : state->in;
+}
+
+static RTS_UI8 *memory_of_range(const MODBUS_SERVER *server, RTS_UI32 index, RTS_UI32 *bits)
+{
+    if (index >= server->range_count)
+        return NULL;
+    *bits = server->memory[index].range->bits;
+    return server->memory[index].data;
+}
+
+RTS_UI8 *ModbusFindMemory(const MODBUS_PLACE *place, RTS_UI32 parameter, bool is_output, RTS_UI32 *bits)
+{
+    if (place->device != NULL)
+        return memory_of_job(place->device, parameter - MODBUS_PARAM_JOB, is_output, bits);
+    return place->server != NULL ? memory_of_range(&place->server->server, parameter - MODBUS_PARAM_RANGE, bits) : NULL;
+}

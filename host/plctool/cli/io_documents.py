@@ -1,0 +1,166 @@
+"""What `plctool io` does, and what other commands say of inputs and outputs: functions that return the document that
+`--json` prints."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from plctool.errors import UsageError, did_you_mean
+from plctool.files import make_folder, read_image, write_atomically
+
+if TYPE_CHECKING:
+    from plctool.device import Plc
+    from plctool.iec.types import Type
+    from plctool.io.device_file import DeviceFile
+
+Document = dict[str, Any]
+
+
+# ---- files -----------------------------------------------------------------------------------------------------------
+
+
+def channels_of(path: Path) -> Document:
+    """The channels of an image."""
+    from plctool.debug.symbols import find_symbols
+    from plctool.image.file import describe_image
+
+    symbols = find_symbols(int(describe_image(read_image(path))["crc"], 16), path)
+    return {"channels": symbols.io.get("channels", [])}
+
+
+def oldest_input(channels: Sequence[Document]) -> Document | None:
+    """The input whose data may be the oldest when it is used."""
+    inputs = [c for c in channels if not c["output"] and c["age_us"] is not None]
+    oldest = max(inputs, key=lambda c: int(c["age_us"]), default=None)
+    if oldest is None:
+        return None
+    return {"channel": f"{oldest['device']}.{oldest['channel']}", "age_us": oldest["age_us"]}
+
+
+def devices_of(data: bytes) -> list[Document]:
+    """The devices in the I/O configuration of an image."""
+    from plctool.core import lib
+    from plctool.image.file import parse_image
+    from plctool.io.configuration import parse_configuration
+
+    image = parse_image(data)
+    if image.io is None:
+        return []
+    offset, size = image.io
+    configuration = parse_configuration(image.code[offset : offset + size])
+    maps = [m for task in configuration.task_maps for m in task.connectors]
+    places = [
+        {(c.parameter, c.parameter_bit) for m in maps if m.connector == i for c in m.channels}
+        for i in range(len(configuration.connectors))
+    ]
+    return [
+        {
+            "name": c.name,
+            "driver": c.driver,
+            "optional": bool(c.flags & lib.CF_OPTIONAL),
+            "channels": len(used),
+            "parameters": len(c.parameters),
+        }
+        for c, used in zip(configuration.connectors, places, strict=True)
+    ]
+
+
+def init(path: Path, device: Path | None) -> Document:
+    """Writes a description to begin with. Raises UsageError if there is one already."""
+    from plctool.io.beginning import beginning
+
+    if path.exists():
+        raise UsageError(f"{path} is there already; write another one, or remove it first.", "exists")
+    if not path.name.endswith(".io.toml"):
+        raise UsageError(f"A description is called NAME.io.toml; write {path.stem}.io.toml.", "bad-output")
+    board = None if device is None else _board(device)
+    write_atomically(
+        path, beginning(board, None if device is None else _beside(device, path)).encode("ascii", "replace")
+    )
+    return {"description": str(path)}
+
+
+def _beside(device: Path, path: Path) -> str:
+    """How a description at `path` names a device file."""
+    return Path(os.path.relpath(device.resolve(), path.resolve().parent)).as_posix()
+
+
+def export_board(device: Path, folder: Path) -> Document:
+    """Writes the C header of a board from what its vendor says of it (`device.toml`)."""
+    from plctool.io.board_header import board_header
+
+    name, text = board_header(_board(device))
+    make_folder(folder)
+    write_atomically(folder / name, text.encode("ascii", "replace"))
+    return {"header": str(folder / name)}
+
+
+def _board(path: Path) -> DeviceFile:
+    """A device file without mistakes. Raises CompileError with all of them."""
+    from plctool.compiler import CompileError
+    from plctool.compiler.diagnostics import Diagnostic
+    from plctool.compiler.source import Source
+    from plctool.io.description import load_device
+    from plctool.io.mistakes import CODE
+
+    device, mistakes, text = load_device(path)
+    found = [Diagnostic(m.pos.file, m.pos.line, m.pos.column, m.severity, CODE, m.message) for m in mistakes.found]
+    if device is None or found:
+        raise CompileError(found, [Source(str(path), text)])
+    return device
+
+
+# ---- on a controller -------------------------------------------------------------------------------------------------
+
+
+def status(plc: Plc) -> Document:
+    """How the devices of the program are."""
+    return {"devices": [{**vars(device), "state": device.state} for device in plc.io_devices()]}
+
+
+def scan(plc: Plc, bus: str) -> Document:
+    """What is on a bus."""
+    return {"bus": bus, "devices": [vars(module) for module in plc.io_scan(bus)]}
+
+
+def identify(plc: Plc, device: str) -> Document:
+    """A device shows itself."""
+    plc.io_identify(device)
+    return {"device": device, "identified": True}
+
+
+def parameter(plc: Plc, device: str, parameter: str, type_name: str | None, text: str | None = None) -> Document:
+    """Reads a parameter, or sets it to what `text` says. `parameter`: a number, or a name of the description;
+    `type_name`: of one that the description does not have."""
+    from plctool.iec.value_texts import literal, parse_value
+
+    number, t = _parameter(plc, device, parameter, type_name)
+    if text is not None:
+        plc.io_write_parameter(device, number, t, parse_value(t, text))
+    value = plc.io_read_parameter(device, number, t)
+    return {"device": device, "parameter": parameter, "id": number, "value": value, "text": literal(t, value)}
+
+
+def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> tuple[int, Type]:
+    """Number and type of a parameter."""
+    from plctool.iec.types import ELEMENTARY, StringType
+
+    known: list[Document] = []
+    with suppress(UsageError):  # without symbols numbers will do
+        devices = plc.symbols().io.get("devices", [])
+        known = next((d["parameters"] for d in devices if d["name"].casefold() == device.casefold()), [])
+    found = next((p for p in known if parameter.casefold() in (p["name"].casefold(), str(p["id"]))), None)
+    number = int(parameter, 0) if parameter[:1].isdigit() else None
+    if found is None and number is None:
+        hint = did_you_mean(parameter, (p["name"] for p in known)) or "; give its number, and its type by --type"
+        raise UsageError(f"{device} has no parameter {parameter}{hint}.", "unknown-parameter")
+    name = (type_name or (found["type"] if found else "UDINT")).upper()
+    length = name.removeprefix("STRING[").removesuffix("]")
+    t: Type | None = StringType(int(length)) if length.isdigit() else ELEMENTARY.get(name)
+    if t is None:
+        raise UsageError(f"A parameter cannot be {name}; use for example UINT, REAL or STRING[20].", "bad-type")
+    return found["id"] if found else number or 0, t

@@ -1,0 +1,221 @@
+/*
+ * test_io_gpio.c - IoDrvGpio: lines of the board as inputs and outputs, edges that start tasks, lines that are not there.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "IoDrvGpio.h"
+#include "io_driver.h"
+
+static APP_REFUSAL refusal;
+
+/* Line 0 is DI0, line 1 is DO0; the program copies input byte 0 to output byte 0. */
+static void begin_lines(void)
+{
+    begin_io();
+    CHECK_EQUAL(IoDrvGpio_Hook(CH_INIT2), ERR_OK);
+    SimGpioUnplug(0);
+    (void)SimGpioSet("DI0", 0);
+    io_init(&io);
+    io_add_connector(&io, "Board", "IoDrvGpio");
+    add_copying_task("Main", 10000, 0);
+    io_add_channel(&io, 0, IO_MAP_INPUTS, 0, GPIO_INPUTS, 0, 0, 1);
+    io_add_channel(&io, 0, IO_MAP_OUTPUTS, 0, GPIO_OUTPUTS, 1, 0, 1);
+}
+
+static void add_lines(RTS_UI32 in_options, RTS_UI32 out_options)
+{
+    io_add_text_parameter(&io, GPIO_LINE + 0, "DI0");
+    io_add_text_parameter(&io, GPIO_LINE + 1, "DO0");
+    io_add_parameter(&io, GPIO_OPTIONS + 0, 8, in_options);
+    io_add_parameter(&io, GPIO_OPTIONS + 1, 8, out_options | GPIO_OPTION_OUT);
+}
+
+static void end_lines(void)
+{
+    CHECK_EQUAL(IoDrvGpio_Hook(CH_EXIT2), ERR_OK);
+}
+
+static void check_refused(RTS_RESULT result, const char *text)
+{
+    emit_io(&spec, &io);
+    build_image(&image, &spec);
+    CHECK_EQUAL(download_part(&image, image.size, &refusal), result);
+    if (strstr(refusal.text, text) == NULL)
+        fprintf(stderr, "refused with: %s\n", refusal.text);
+    CHECK(strstr(refusal.text, text) != NULL);
+    end_lines();
+}
+
+static void a_line_follows_another_one(void)
+{
+    begin_lines();
+    add_lines(0, 0);
+    start_io();
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(SimGpioGet("DO0"), 1);
+    CHECK_EQUAL(SimGpioSet("DI0", 0), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(SimGpioGet("DO0"), 0);
+    end_lines();
+}
+
+static void lines_may_be_true_when_they_are_low(void)
+{
+    begin_lines();
+    add_lines(GPIO_OPTION_ACTIVE_LOW, GPIO_OPTION_ACTIVE_LOW);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(SimGpioGet("DO0"), 1); /* FALSE */
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 1);
+    CHECK_EQUAL(SimGpioGet("DO0"), 0);
+    end_lines();
+}
+
+static void an_edge_starts_a_task(void)
+{
+    RTS_UI32 entry;
+
+    begin_lines();
+    add_lines(GPIO_OPTION_RISING, 0);
+    io_add_text_parameter(&io, GPIO_EVENT + 0, "door");
+    entry = here(&spec);
+    add_task(&spec, "OnDoor", KIND_EXTERNAL, 0, entry)->event_offset = CRC32Update(0, "door", 4);
+    emit_add(&spec, APP_AREA_DATA, 0, 1);
+    emit_ret(&spec);
+    start_io();
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 0), 0);
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    CHECK_EQUAL(SimGpioSet("DI0", 0), ERR_OK);
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_DATA, 0), 2);
+    end_lines();
+}
+
+static void a_task_that_waits_for_an_event_of_no_line(void)
+{
+    begin_lines();
+    add_lines(0, 0);
+    add_task(&spec, "OnDoor", KIND_EXTERNAL, 0, 0)->event_offset = 77;
+    check_refused(ERR_NO_OBJECT, "Task OnDoor waits for an event that is not here.");
+}
+
+static void a_line_that_the_board_has_not(void)
+{
+    begin_lines();
+    io_add_text_parameter(&io, GPIO_LINE + 0, "DI9");
+    check_refused(ERR_NO_OBJECT, "Board (IoDrvGpio): this device has no line DI9.");
+}
+
+static void a_line_that_something_else_has(void)
+{
+    begin_lines();
+    add_lines(0, 0);
+    CHECK_EQUAL(SimGpioTake("DO0", 1), ERR_OK);
+    check_refused(ERR_OPERATION_DENIED, "Board (IoDrvGpio): line DO0 is in use by something else.");
+    CHECK_EQUAL(SimGpioTake("DO0", 0), ERR_OK);
+}
+
+static void a_line_that_is_named_twice(void)
+{
+    begin_lines();
+    io_add_text_parameter(&io, GPIO_LINE + 0, "DI0");
+    io_add_text_parameter(&io, GPIO_LINE + 1, "DI0");
+    check_refused(ERR_OPERATION_DENIED, "line DI0 is in use");
+}
+
+static void an_input_as_an_output(void)
+{
+    begin_lines();
+    io_add_text_parameter(&io, GPIO_LINE + 0, "DI0");
+    io_add_parameter(&io, GPIO_OPTIONS + 0, 8, GPIO_OPTION_OUT);
+    check_refused(ERR_NOT_SUPPORTED, "line DI0 cannot do what its options ask for.");
+}
+
+static void a_channel_that_is_no_line(void)
+{
+    begin_lines();
+    add_lines(0, 0);
+    io_add_channel(&io, 0, IO_MAP_INPUTS, 0, GPIO_INPUTS, 32, 8, 1);
+    check_refused(ERR_OUT_OF_LIMITS, "it has no channel 1.32.");
+}
+
+static void a_held_output_stays_over_a_download(void)
+{
+    begin_lines();
+    add_lines(0, 0);
+    io.channels[1].map.flags = IO_HOLD;
+    start_io();
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(AppStopApplication(), ERR_OK);
+    CHECK_EQUAL(SimGpioGet("DO0"), 1);
+    add_task(&spec, "More", KIND_CYCLIC, 10000, 0);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(SimGpioGet("DO0"), 1);
+    end_lines();
+}
+
+static void lines_are_given_back_with_the_application(void)
+{
+    begin_lines();
+    add_lines(0, 0);
+    start_io();
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    CHECK_EQUAL(IoDrvGpio_Hook(CH_COMM_CYCLE), ERR_OK);
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    spec.code_size = 0;
+    spec_init(&spec);
+    add_copying_task("Main", 10000, 0);
+    spec.areas[APP_AREA_INPUT] = 32;
+    spec.areas[APP_AREA_OUTPUT] = 32;
+    io.connectors[0].parameter_count = 0;
+    io.head.parameters = 0;
+    io_add_text_parameter(&io, GPIO_LINE + 0, "DO0");
+    io.channel_count = 0;
+    CHECK_EQUAL(load_io(), ERR_OK); /* another direction: it was free */
+    end_lines();
+}
+
+static void a_chip_that_has_gone_comes_back(void)
+{
+    begin_lines();
+    add_lines(0, 0);
+    io.connectors[0].state = 16;
+    start_io();
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    SimGpioUnplug(1);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0); /* on_error */
+    CHECK_EQUAL(AppGetAreaAddress(APP_AREA_DATA, 16 + 12, 1)[0], 0);
+    SimGpioUnplug(0);
+    CHECK_EQUAL(SimAdvance(ms(150)), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 1);
+    CHECK_EQUAL(SimGpioGet("DO0"), 1);
+    CHECK(log_has("Board is lost") && log_has("Board is back"));
+    end_lines();
+}
+
+int main(void)
+{
+    NEEDS_X86_64;
+    RUN(a_line_follows_another_one);
+    RUN(lines_may_be_true_when_they_are_low);
+    RUN(an_edge_starts_a_task);
+    RUN(a_task_that_waits_for_an_event_of_no_line);
+    RUN(a_line_that_the_board_has_not);
+    RUN(a_line_that_something_else_has);
+    RUN(a_line_that_is_named_twice);
+    RUN(an_input_as_an_output);
+    RUN(a_channel_that_is_no_line);
+    RUN(a_held_output_stays_over_a_download);
+    RUN(lines_are_given_back_with_the_application);
+    RUN(a_chip_that_has_gone_comes_back);
+    return test_result();
+}

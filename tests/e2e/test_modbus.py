@@ -1,0 +1,374 @@
+"""Modbus of a real plcrt with other programs: pymodbus, mbpoll and libmodbus as clients, pymodbus as devices."""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import shutil
+import socket
+import struct
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+from modbus_support import Devices, Wire, eventually, free_port
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+from pymodbus.client.base import ModbusBaseSyncClient
+
+import plctool
+from plctool.compiler import compile_sources
+from plctool.device import Plc
+from plctool.testing.plcrt import Plcrt
+
+CONNECTIONS = 32  # MODBUS_MAX_CONNECTIONS of plcrt
+UNIT = 7
+
+PROGRAM = """
+PROGRAM Main
+VAR
+    n : DINT; setpoint : INT; ratio : REAL; recipe : ARRAY[0..9] OF INT; enable, lamp : BOOL;
+    echo : INT; half : REAL; sum : DINT; alive : BOOL;
+    rtu_set : INT; rtu_get : INT;
+    power, energy : REAL; counter : UDINT; speed, reference : INT; pump : BOOL; level : INT;
+END_VAR
+VAR i : INT; END_VAR
+n := n + 1;
+echo := setpoint;
+half := ratio / 2.0;
+alive := enable;
+lamp := enable;
+sum := 0;
+FOR i := 0 TO 9 DO sum := sum + recipe[i]; END_FOR
+rtu_get := rtu_set + 1;
+END_PROGRAM
+CONFIGURATION C RESOURCE R ON PLC
+    TASK T(INTERVAL := T#10ms, PRIORITY := 1);
+    PROGRAM Main WITH T : Main;
+END_RESOURCE END_CONFIGURATION
+"""
+
+DESCRIPTION = """
+[modbus.server.tcp]
+name = "Scada"
+address = "127.0.0.1"
+port = {server}
+as_bits = true
+input = {{ 30001 = "Main.half", 30003 = "Main.sum" }}
+coils = {{ 5001 = "Main.enable" }}
+discrete = {{ 15001 = "Main.lamp" }}
+identification = {{ vendor = "Acme", product = "Tanks", version = "1.2" }}
+[modbus.server.tcp.holding]
+40001 = "Main.setpoint"
+40002 = "Main.ratio"
+40011 = "Main.recipe"
+40030 = {{ var = "Main.echo", read_only = true }}
+
+[modbus.server.rs485]
+port = "{slave_line}"
+unit = {unit}
+holding = {{ 40001 = "Main.rtu_set" }}
+input = {{ 30001 = "Main.rtu_get" }}
+
+[[modbus.rs485]]
+port = "{master_line}"
+baud = 38400
+[[modbus.rs485.device]]
+name = "Meter"
+unit = 3
+timeout = "T#100ms"
+[[modbus.rs485.device.read]]
+function = 3
+address = 40001
+every = "T#50ms"
+vars = ["Main.power", "Main.energy"]
+[[modbus.rs485.device.write]]
+function = 15
+address = 801
+every = "T#100ms"
+var = "Main.pump"
+[[modbus.rs485.device]]
+name = "Absent"
+unit = 4
+timeout = "T#100ms"
+[[modbus.rs485.device.read]]
+function = 4
+address = 30001
+every = "T#50ms"
+var = "Main.level"
+
+[[modbus.tcp]]
+host = "127.0.0.1"
+port = {drive}
+[[modbus.tcp.device]]
+name = "Drive"
+unit = 1
+timeout = "T#500ms"
+order = "CDAB"
+[[modbus.tcp.device.read]]
+function = 4
+address = 30005
+every = "T#50ms"
+var = "Main.counter"
+on_error = "zero"
+[[modbus.tcp.device.write]]
+function = 16
+address = 40021
+on_change = true
+verify = true
+vars = ["Main.speed"]
+"""
+
+
+@dataclass
+class Plant:
+    """The PLC with its program, and all that is around it."""
+
+    plc: Plc
+    server: int  # TCP port
+    slave: Wire
+    master: Wire
+    meter: Devices
+    drive: Devices
+
+    def tcp(self) -> ModbusTcpClient:
+        """A client of the PLC's server."""
+        return ModbusTcpClient("127.0.0.1", port=self.server, timeout=10, retries=0)
+
+    def rtu(self) -> ModbusSerialClient:
+        """A client on the serial line."""
+        return ModbusSerialClient(self.slave.other, baudrate=19200, timeout=10, retries=0)
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
+    folder = tmp_path_factory.mktemp("modbus")
+    server, drive = free_port(), free_port()
+    with Wire() as slave, Wire() as master:
+        master.absent = {4}
+        (folder / "main.st").write_text(PROGRAM)
+        places = {"server": server, "drive": drive, "unit": UNIT, "slave_line": slave.plc, "master_line": master.plc}
+        (folder / "main.io.toml").write_text(DESCRIPTION.format(**places))
+        image = folder / "main.cdl"
+        compile_sources([folder / "main.st"]).write(image)
+        meter = Devices([3], serial=master.other, baud=38400)
+        drives = Devices([1], tcp=drive)
+        with meter, drives, Plcrt(folder / "flash") as plcrt, plctool.connect(f"serial:{plcrt.port}") as plc:
+            plc.flash(image)
+            yield Plant(plc, server, slave, master, meter, drives)
+
+
+@pytest.fixture(params=["tcp", "rtu"])
+def client(request: pytest.FixtureRequest, plant: Plant) -> Iterator[ModbusBaseSyncClient]:
+    """A client of the PLC on either line."""
+    made = plant.tcp() if request.param == "tcp" else plant.rtu()
+    eventually(made.connect)
+    yield made
+    made.close()
+
+
+def words(value: float) -> list[int]:
+    """A REAL in registers, the high one first."""
+    high, low = struct.unpack(">HH", struct.pack(">f", value))
+    return [high, low]
+
+
+# ---- the PLC as a server -------------------------------------------------------------------------------------------
+
+
+def test_program_sees_what_is_written_and_the_client_what_it_computes(plant: Plant) -> None:
+    with plant.tcp() as client:
+        assert not client.write_register(0, 0x1234).isError()
+        assert not client.write_registers(1, words(2.5)).isError()
+        assert not client.write_registers(10, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]).isError()
+        assert not client.write_coil(5000, True).isError()
+        eventually(lambda: plant.plc.read("Main.setpoint", "Main.ratio", "Main.alive") ==
+                   {"Main.setpoint": 0x1234, "Main.ratio": 2.5, "Main.alive": True})  # fmt: skip
+        eventually(lambda: client.read_input_registers(0, count=2).registers == words(1.25))
+        eventually(lambda: client.read_input_registers(2, count=2).registers == [0, 55])
+        eventually(lambda: client.read_discrete_inputs(5000, count=1).bits[0])
+        eventually(lambda: client.read_holding_registers(29, count=1).registers == [0x1234])
+        assert client.read_coils(0, count=16).bits == [bool(0x1234 >> i & 1) for i in range(16)]
+
+
+def test_every_function_works_on_either_line(client: ModbusBaseSyncClient) -> None:
+    rtu = {"device_id": UNIT}
+    assert not client.write_register(0, 0xF0, **rtu).isError()
+    assert not client.mask_write_register(address=0, and_mask=0xF2, or_mask=0x25, **rtu).isError()
+    assert client.read_holding_registers(0, count=1, **rtu).registers == [0xF5]
+    assert not client.write_registers(0, [5], **rtu).isError()
+    found = client.readwrite_registers(read_address=0, read_count=1, write_address=0, values=[77], **rtu)
+    assert found.registers == [77]
+    eventually(lambda: not client.read_input_registers(0, count=1, **rtu).isError())
+    assert client.report_device_id(**rtu).isError() is False
+    information = client.read_device_information(**rtu).information
+    assert set(information) >= {0, 1, 2}
+
+
+def test_what_cannot_be_is_an_exception(client: ModbusBaseSyncClient) -> None:
+    illegal_function, illegal_address = 1, 2
+    rtu = {"device_id": UNIT}
+    assert client.read_holding_registers(500, count=1, **rtu).exception_code == illegal_address
+    assert client.write_register(500, 1, **rtu).exception_code == illegal_address
+    assert client.read_exception_status(**rtu).exception_code == illegal_function
+    assert client.read_coils(60000, count=8, **rtu).exception_code == illegal_address
+
+
+def test_read_only_registers_are_not_written(plant: Plant) -> None:
+    with plant.tcp() as client:
+        assert client.write_register(29, 1).exception_code == 2
+        assert client.write_registers(0, [1, 2, 3, 4]).exception_code == 2  # the fourth is not there
+
+
+def test_identification_is_that_of_the_description(plant: Plant) -> None:
+    with plant.tcp() as client:
+        information = client.read_device_information().information
+        assert [information[i] for i in range(3)] == [b"Acme", b"Tanks", b"1.2"]
+
+
+def test_real_is_never_torn(plant: Plant) -> None:
+    """A client writes and reads a REAL as a whole while the program uses it."""
+    with plant.tcp() as client:
+        for value in (1.0, -1.0) * 100:
+            assert not client.write_registers(1, words(value)).isError()
+            assert client.read_holding_registers(1, count=2).registers == words(value)
+            assert plant.plc.read("Main.ratio") in (1.0, -1.0, 2.5)
+
+
+def test_one_client_more_than_there_is_room_for_replaces_the_idlest(plant: Plant) -> None:
+    sockets = [socket.create_connection(("127.0.0.1", plant.server), timeout=20) for _ in range(CONNECTIONS)]
+    question = bytes([0, 1, 0, 0, 0, 6, 1, 3, 0, 0, 0, 1])
+    for one in sockets[1:]:
+        one.sendall(question)
+        assert one.recv(100)[7] == 3
+    with plant.tcp() as client:
+        assert not client.read_holding_registers(0, count=1).isError()
+        assert sockets[0].recv(1) == b""
+    for one in sockets[1:]:
+        one.sendall(question)
+        assert one.recv(100)[7] == 3
+    for one in sockets:
+        one.close()
+
+
+def test_flood_of_requests_is_replied_to_in_order(plant: Plant) -> None:
+    count = 3000
+    with socket.create_connection(("127.0.0.1", plant.server), timeout=60) as flood, plant.tcp() as client:
+        requests = b"".join(struct.pack(">HHHBBHH", i, 0, 6, 1, 3, 0, 1) for i in range(count))
+        flood.sendall(requests)
+        assert not client.read_holding_registers(0, count=1).isError()
+        replies = b""
+        while len(replies) < 11 * count:
+            part = flood.recv(65536)
+            assert part
+            replies += part
+        assert [struct.unpack(">H", replies[11 * i : 11 * i + 2])[0] for i in range(count)] == list(range(count))
+
+
+def test_mbpoll_reads_and_writes(plant: Plant) -> None:
+    if shutil.which("mbpoll") is None:
+        pytest.skip("mbpoll is not installed: apt-get install mbpoll")
+    command = ["mbpoll", "-m", "tcp", "-p", str(plant.server), "-a", "1", "-r", "1", "-1"]
+    done = subprocess.run([*command, "127.0.0.1", "321"], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = subprocess.run([*command, "-c", "1", "127.0.0.1"], capture_output=True, text=True, check=False, timeout=60)
+    assert "[1]:" in done.stdout
+    assert "321" in done.stdout
+
+
+def test_libmodbus_reads_and_writes(plant: Plant) -> None:
+    name = ctypes.util.find_library("modbus") or "libmodbus.so.5"
+    try:
+        library = ctypes.CDLL(name)
+    except OSError:
+        pytest.skip("libmodbus is not installed: apt-get install libmodbus5")
+    library.modbus_new_tcp.restype = ctypes.c_void_p
+    context = ctypes.c_void_p(library.modbus_new_tcp(b"127.0.0.1", plant.server))
+    assert library.modbus_connect(context) == 0
+    sent, received = (ctypes.c_uint16 * 123)(*range(123)), (ctypes.c_uint16 * 125)()
+    assert library.modbus_write_registers(context, 10, 10, sent) == 10
+    assert library.modbus_read_registers(context, 10, 10, received) == 10
+    assert list(received[:10]) == list(range(10))
+    assert library.modbus_read_registers(context, 500, 1, received) == -1
+    library.modbus_close(context)
+    library.modbus_free(context)
+
+
+# ---- the PLC as a client -------------------------------------------------------------------------------------------
+
+
+def ok(plant: Plant, device: str) -> bool:
+    """Whether the program sees a device as well."""
+    return bool(plant.plc.read(f"{device}.ok"))
+
+
+def test_registers_of_a_device_reach_the_program(plant: Plant) -> None:
+    eventually(lambda: ok(plant, "Meter"))
+    plant.meter.memory[3][0:4] = words(12.5) + words(-3.0)
+    eventually(lambda: plant.plc.read("Main.power", "Main.energy") == {"Main.power": 12.5, "Main.energy": -3.0})
+
+
+def test_outputs_reach_the_device(plant: Plant) -> None:
+    eventually(lambda: ok(plant, "Meter"))
+    plant.plc.write({"Main.pump": True})
+    eventually(lambda: plant.meter.memory[3][50] & 1 == 1)
+    plant.plc.write({"Main.pump": False})
+    eventually(lambda: plant.meter.memory[3][50] & 1 == 0)
+
+
+def test_absent_device_is_said_to_be_and_holds_up_no_other(plant: Plant) -> None:
+    eventually(lambda: ok(plant, "Meter") and plant.plc.read("Absent.errors") >= 2)
+    assert not ok(plant, "Absent")
+    before = plant.meter.count(3)
+    eventually(lambda: plant.meter.count(3) >= before + 100)
+
+
+def test_low_register_may_come_first(plant: Plant) -> None:
+    eventually(lambda: ok(plant, "Drive"))
+    plant.drive.memory[1][4:6] = [0x5678, 0x1234]
+    eventually(lambda: plant.plc.read("Main.counter") == 0x12345678)
+
+
+def test_change_is_written_once_and_verified(plant: Plant) -> None:
+    eventually(lambda: ok(plant, "Drive"))
+    plant.plc.write({"Main.speed": 0})
+    eventually(lambda: plant.drive.memory[1][20] == 0)
+    before = plant.drive.requests.count((1, 16))
+    plant.plc.write({"Main.speed": 1500})
+    eventually(lambda: plant.drive.memory[1][20] == 1500)
+    reads = plant.drive.count(1)
+    eventually(lambda: plant.drive.count(1) >= reads + 20)
+    assert plant.drive.requests.count((1, 16)) == before + 1
+
+
+def test_device_that_was_switched_off_comes_back_with_its_outputs(plant: Plant) -> None:
+    eventually(lambda: ok(plant, "Drive"))
+    plant.plc.write({"Main.speed": 321})
+    eventually(lambda: plant.drive.memory[1][20] == 321)
+    plant.drive.memory[1][4:6] = [7, 0]
+    eventually(lambda: plant.plc.read("Main.counter") == 7)
+    plant.drive.__exit__()
+    eventually(lambda: not ok(plant, "Drive") and plant.plc.read("Main.counter") == 0)
+    plant.drive.memory.clear()
+    plant.drive.__enter__()
+    eventually(lambda: ok(plant, "Drive"))
+    eventually(lambda: plant.drive.memory[1][20] == 321)
+
+
+def test_line_that_was_pulled_comes_back_without_a_command(plant: Plant) -> None:
+    eventually(lambda: ok(plant, "Meter"))
+    plant.master.pulled = True
+    eventually(lambda: not ok(plant, "Meter"))
+    plant.master.pulled = False
+    eventually(lambda: ok(plant, "Meter"))
+
+
+def test_damaged_frames_are_not_taken(plant: Plant) -> None:
+    eventually(lambda: ok(plant, "Meter"))
+    before = plant.plc.read("Main.power")
+    plant.master.flipped = True
+    plant.meter.memory[3][0:2] = words(99.0)
+    eventually(lambda: not ok(plant, "Meter"))
+    assert plant.plc.read("Main.power") == before
+    plant.master.flipped = False
+    eventually(lambda: plant.plc.read("Main.power") == 99.0)
