@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from plctool.compiler.broken_units import is_independent, remaining
 from plctool.compiler.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.library import Library, standard_library
@@ -100,18 +101,21 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
 def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
     world = program.world
     declared = names_asked_for([source.text for source in sources], world.names.library.names)
-    texts: list[tuple[Source, Parsed]] = []
-    broken: list[Source] = []
-    for source in sources:
-        before = world.diagnostics.errors
-        texts.append((source, parse_all(source, world.diagnostics.at(source).error, declared=declared)))
-        if world.diagnostics.errors > before or any(found.code == "xml" for found in source.findings):
-            broken.append(source)
+    texts = [(source, parse_all(source, world.diagnostics.at(source).error, declared=declared)) for source in sources]
+    syntax = [d for d in world.diagnostics.sorted() if d.severity == "error"]
     for source in sources:
         world.diagnostics.found_by_reader(source)
-    if broken:
-        _name_what_is_missing(program, sources, broken)
+    if syntax or any(found.code == "xml" for source in sources for found in source.findings):
+        _check_the_others(program, texts, syntax)
         return None
+    return _check_parsed(program, sources, texts, suite)
+
+
+def _check_parsed(
+    program: Program, sources: Sequence[Source], texts: Sequence[tuple[Source, Parsed]], suite: TestSuite | None
+) -> TypedProgram | None:
+    """All but the syntax."""
+    world = program.world
     parsed = [(source, _looked_at(source, text, world.diagnostics)) for source, text in texts]
     tests = None if suite is None else suite.begin(program)
     if tests is not None:
@@ -173,20 +177,28 @@ def _declare_devices(world: World) -> None:
         world.names.register_globals(declarations, source)
 
 
-def _name_what_is_missing(program: Program, sources: Sequence[Source], broken: Sequence[Source]) -> None:
-    """Names that nothing declares in the files without syntax errors: a mistake in one file hides no library that the
-    others need. Other errors wait, because they may follow from what the `broken` files declare."""
+def _check_the_others(program: Program, texts: Sequence[tuple[Source, Parsed]], syntax: Sequence[Diagnostic]) -> None:
+    """Errors of the units without syntax errors: a mistake in one hides no others, nor a library that they need.
+    What may follow from the broken units waits."""
     found = program.world.diagnostics
-    whole = [source for source in sources if source not in broken]
-    if not whole:
-        return
-    declared = {name for s in sources if s not in whole for name in declared_names(s.original or s.text)}
+    whole: list[tuple[Source, Parsed]] = []
+    hidden: set[str] = set()
+    for source, parsed in texts:
+        if any(f.code == "xml" for f in source.findings):
+            hidden |= declared_names(source.original or source.text)
+            continue
+        rest = remaining(source, parsed.declarations, [d.line for d in syntax if d.file == source.path])
+        hidden |= rest.hidden
+        whole.append((source, replace(parsed, declarations=rest.declarations)))
     other = Program(program.world.names.library)
     other.world.diagnostics.limit = sys.maxsize
-    _check(other, whole, None)
+    _check_parsed(other, [source for source, _ in whole], whole, None)
     for d in other.world.diagnostics.sorted():
-        if d.missing and d.missing.casefold() not in declared:
-            found.missing(Pos(d.file, d.line, d.column), d.missing, d.message)
+        pos = Pos(d.file, d.line, d.column)
+        if d.missing and d.missing.casefold() not in hidden:
+            found.missing(pos, d.missing, d.message)
+        elif d.severity == "error" and not d.missing and is_independent(d, (source for source, _ in whole), hidden):
+            found.error(pos, d.code, d.message)
 
 
 def _looked_at(source: Source, parsed: Parsed, diagnostics: Diagnostics) -> list[Declaration]:
