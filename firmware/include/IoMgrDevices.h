@@ -13,7 +13,7 @@
 #include "CmpStd.h"
 #include "IoConfig.h"
 
-/* ---- diagnosis (8.8). From any context, interrupts too. ---- */
+/* ---- diagnostics (8.8). From any context, interrupts too. ---- */
 
 /* Sets and resets CF_* of a connector. One that sets CF_CONNECTOR_BUS_ERROR or CF_CONNECTOR_ERROR counts as an error,
  * each time. */

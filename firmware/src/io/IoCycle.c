@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A driver is in one of its functions at a time, and nobody waits for it. Who finds it busy leaves a note in
+ * A driver is in one of its functions at a time, and no caller waits for it. One that finds it busy leaves a note in
  * IO_DRIVER.pending; who is in it looks for notes before it goes, and does what they say. So outputs of a task that runs
  * once are never forgotten.
  */
@@ -66,7 +66,7 @@ static RTS_UI32 take_notes(IO_DRIVER *driver)
     return notes;
 }
 
-/* Not just a load: of it and note() one is first, so either a note is seen here, or who left it sees that nobody is in. */
+/* Not just a load: of it and note() one is first, so either a note is seen here, or its writer sees that the driver is free. */
 static bool has_notes(IO_DRIVER *driver)
 {
     return SysAtomicAdd(&driver->pending, 0) != 0;

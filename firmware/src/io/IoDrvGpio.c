@@ -22,7 +22,7 @@ RTS_STATIC_ASSERT((int)IO_GPIO_LINES == 32, a_value_has_a_bit_for_each_line);
 RTS_STATIC_ASSERT(SCHED_MAX_EXTERNAL_EVENTS <= 32, events_have_a_bit_each);
 
 typedef struct {
-    const IoConfigConnector *connector; /* NULL: nobody uses the group now */
+    const IoConfigConnector *connector; /* NULL: the group is not in use now */
     RTS_UI32 outputs;                   /* lines that are some */
     RTS_UI8 in[4];                      /* as they were read */
     RTS_UI8 out[4];                     /* to be written */
@@ -194,7 +194,7 @@ static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int 
     return result;
 }
 
-/* What nobody has taken over from the application before. */
+/* Groups that the previous application had and this one has not. */
 static void close_unused(void)
 {
     RTS_UI32 i;

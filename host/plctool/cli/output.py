@@ -84,7 +84,7 @@ def build_text(document: dict[str, Any]) -> str:
         lines.append(f"{io['channels']} channels of inputs and outputs")
         if oldest := io["oldest_input"]:
             lines[-1] += f"; oldest input: {oldest['channel']}, up to {age_text(oldest['age_us'])}"
-        lines += [f"line {line['name']}: {100 * line['load']:.0f} % of its time" for line in io["lines"]]
+        lines += [f"line {line['name']} is {line['load']:.0%} in use" for line in io["lines"]]
     return "\n".join(lines)
 
 
