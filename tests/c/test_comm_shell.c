@@ -60,8 +60,8 @@ static const char *ask(const char *command)
 
 static void help_names_every_command(void)
 {
-    static const char *const names[] = {"?",       "rtsinfo",  "applist",      "getprgstat", "startprg",
-                                        "stopprg", "resetprg", "resetprgcold", "tasklist",   "plcload"};
+    static const char *const names[] = {"?",        "rtsinfo",      "applist",  "getprgstat", "startprg",   "stopprg",
+                                        "resetprg", "resetprgcold", "tasklist", "plcload",    "channelinfo"};
     char line[64];
 
     setup();
@@ -158,6 +158,22 @@ static void the_load_is_that_of_cyclic_tasks(void)
     CHECK(strcmp(ask("plcload"), "PLC load: 35%\r\n") == 0);
 }
 
+static void channels_come_with_what_went_wrong(void)
+{
+    char line[64];
+
+    setup();
+    CLIENT lost = client;
+    lost.channel ^= 1;
+    client_send_ack(&lost, 0, 0);
+    CHECK(client_take(&client, NULL, reply.message) > 0); /* the complaint */
+    snprintf(line, sizeof(line), "Channel %u: logged in, messages up to %u bytes", (unsigned)client.channel,
+             (unsigned)client.limit);
+    CHECK(strstr(ask("channelinfo"), line) != NULL);
+    CHECK(strstr(text, "Channels opened: 1, refused 0, failed 0") != NULL);
+    CHECK(strstr(text, "of another channel 1, repeated 0") != NULL);
+}
+
 static void a_command_need_not_have_a_nul_and_is_bounded(void)
 {
     static const RTS_UI8 bare[] = {TAG_SHELL_COMMAND, 7, 'a', 'p', 'p', 'l', 'i', 's', 't'};
@@ -186,6 +202,7 @@ int main(void)
     RUN(it_needs_a_login);
     RUN(a_long_answer_comes_in_parts);
     RUN(the_load_is_that_of_cyclic_tasks);
+    RUN(channels_come_with_what_went_wrong);
     RUN(a_command_need_not_have_a_nul_and_is_bounded);
     return test_result();
 }

@@ -13,6 +13,7 @@
 
 #include "CMUtils.h"
 #include "CmpAppEmbedded.h"
+#include "CmpChannelServerEmbedded.h"
 #include "CmpDevice.h"
 #include "CmpIecTask.h"
 #include "CmpSrv.h"
@@ -128,6 +129,31 @@ static void print_load(SHELL_OUTPUT *out)
     print(out, "PLC load: %u%%", (unsigned)percent);
 }
 
+static void print_counters(SHELL_OUTPUT *out)
+{
+    const CHANNEL_COUNTERS *channel = ChannelGetCounters();
+    const ROUTER_COUNTERS *router = RouterGetCounters();
+
+    print(out, "Packets: %u, malformed %u, for others %u, ignored %u", (unsigned)router->handled,
+          (unsigned)router->malformed, (unsigned)router->not_for_us, (unsigned)router->ignored);
+    print(out, "Channels opened: %u, refused %u, failed %u", (unsigned)channel->opened, (unsigned)channel->refused,
+          (unsigned)channel->failed);
+    print(out, "Blocks: malformed %u, of another channel %u, repeated %u, lost %u; replies repeated: %u",
+          (unsigned)channel->malformed, (unsigned)channel->foreign, (unsigned)channel->duplicates,
+          (unsigned)channel->gaps, (unsigned)channel->repeats);
+}
+
+static void print_channels(SHELL_OUTPUT *out)
+{
+    COMM_CLIENT *client;
+
+    for (RTS_UI32 i = 0; (client = ChannelGetClient(i)) != NULL; i++)
+        if (ChannelIsOpen(client))
+            print(out, "Channel %u: %s, messages up to %u bytes", (unsigned)client->channel.id,
+                  SrvIsLoggedIn(client) ? "logged in" : "no login", (unsigned)client->channel.limit);
+    print_counters(out);
+}
+
 static RTS_RESULT reset_warm(void)
 {
     return AppReset(RESET_OPTION_WARM);
@@ -150,6 +176,7 @@ static const SHELL_COMMAND commands[] = {
     {"resetprg", "warm reset of the application", RIGHT_CONTROL, reset_warm, NULL},
     {"resetprgcold", "cold reset of the application", RIGHT_CONTROL, reset_cold, NULL},
     {"tasklist", "tasks and their times", RIGHT_VIEW, NULL, print_tasks},
+    {"channelinfo", "channels, and what went wrong on the way to them", RIGHT_VIEW, NULL, print_channels},
     {"plcload", "share of the time that cyclic tasks take", RIGHT_VIEW, NULL, print_load},
 };
 
