@@ -60,7 +60,7 @@ def processor_ns(pid: int) -> int:
         (["--flash", "f", "--baud", "115201"], "115200"),
         (["--flash", "f", "--baud", "fast"], "--baud fast"),
         (["--flash", "f", "--serial", "pty:"], "pty:/tmp/plc"),
-        (["--flash", "f", "--can", "can0"], "--serial"),
+        (["--flash", "f", "--can", "can0", "--node", "300"], "give 1 to 127"),
         (["--flash", "f", "--udp", "127.0.0.1:4"], "--udp 127.0.0.1:4 is not a valid"),
         (["--flash", "f", "--udp=1740"], "192.168.1.5:1"),
         (["--flash", "f", "--tcp", "host:1"], "--tcp host:1 is not a valid"),
