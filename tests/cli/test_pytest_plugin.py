@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -29,9 +30,11 @@ def test_in_python():
 """
 
 
-def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+def run_pytest(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "pytest", "-p", "plctool.pytest_plugin", "-p", "no:cacheprovider", "-v"]
-    return subprocess.run([*command, *words], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    env = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # where plctool is installed, it would be loaded twice
+    words = (*command, *options)
+    return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, timeout=120, check=False)
 
 
 @pytest.fixture

@@ -84,8 +84,8 @@ class Recorder(Simulator):
             assert place is not None
             self.writes.append((*place, bytes(self._memory(symbol))))
 
-    def run_cycles(self, count: int) -> None:
-        super().run_cycles(count, check=False)
+    def run_cycles(self, count: int, *, check: bool = False) -> None:
+        super().run_cycles(count, check=check)
         self._remember(Step(STEP_CYCLES, count, self.writes))
 
     def run_ms(self, ms: int) -> None:
