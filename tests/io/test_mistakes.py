@@ -111,3 +111,10 @@ def test_what_the_board_has_not_is_reported(tmp_path: Path, description: str, li
 def test_unreadable_description_hides_what_follows_from_it(tmp_path: Path) -> None:
     program = "PROGRAM Main\nVAR x : BOOL; END_VAR\nx := Bench.ok;\nEND_PROGRAM\n"
     assert len(messages(tmp_path, program, "[[sim]]\nname = ")) == 1
+
+
+def test_a_mistake_does_not_leave_channels_that_overlap(tmp_path: Path) -> None:
+    description = "[sim]\nin = { a = 'Main.start', b = 'Main.level' }\nout = { c = 'Main.motr' }"
+    found = messages(tmp_path, PROGRAM, description)
+    check(found, 3, "did you mean motor?")
+    assert not [text for text in found if "shares its memory" in text]

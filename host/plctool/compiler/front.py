@@ -143,7 +143,8 @@ def _check_parsed(
         world.io.report_written_inputs(world.pous, world.diagnostics)
     allocation = world.allocation
     _check_sizes(world, sources)
-    report_overlaps(allocation.variables, world.diagnostics)
+    if not world.diagnostics.errors:  # else channels may have no addresses yet
+        report_overlaps(allocation.variables, world.diagnostics)
     if not application.tasks and not world.names.tests and not world.diagnostics.errors and sources:
         world.diagnostics.warning(sources[0].pos(0), "no-program", "there is no PROGRAM, so nothing would run")
     typed = TypedProgram(
