@@ -53,9 +53,6 @@ X(CmpAppSrv)
 #if HAS_CmpLogSrv
 X(CmpLogSrv)
 #endif
-#if HAS_CmpPlcShell
-X(CmpPlcShell)
-#endif
 #if HAS_CmpMonitor2
 X(CmpMonitor2)
 #endif
@@ -65,6 +62,9 @@ X(CmpIoMgrSrv)
 X(CmpRouterEmbedded)
 X(CmpNameServiceServer)
 X(CmpChannelServerEmbedded)
+#if HAS_CmpPlcShell
+X(CmpPlcShell)
+#endif
 #if HAS_CmpBlkDrvSimpleCom
 X(CmpBlkDrvSimpleCom)
 #endif
