@@ -32,6 +32,15 @@ RTS_RESULT IoMgrUnregisterInstance(IO_DRIVER *driver);
 /* Whether the configuration gives an enabled connector to a driver. */
 bool IoMgrConfigIsMine(const IoConfigConnector *connector, const IO_DRIVER *driver);
 
+/* `type`: IO_MAP_INPUTS or IO_MAP_OUTPUTS. */
+typedef RTS_RESULT (*PF_IO_CHANNEL)(const IoConfigConnector *connector, const IoConfigChannelMap *channel,
+                                    RTS_UI32 type);
+
+/* In IoDrvUpdateMapping: shows a driver all channels of its own, one for each task that uses it, until `visit` returns an
+ * error, which is returned. */
+RTS_RESULT IoMgrConfigEachChannel(const IoConfigTaskMap *task_maps, int count, const IO_DRIVER *driver,
+                                  PF_IO_CHANNEL visit);
+
 /*
  * Why a driver refuses its configuration, in IoDrvUpdateConfiguration and IoDrvUpdateMapping: a sentence without the name
  * of the connector, which is put before it. The application is refused with it, and the driver returns what this

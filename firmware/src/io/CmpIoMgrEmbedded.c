@@ -81,6 +81,34 @@ bool IoMgrConfigIsMine(const IoConfigConnector *connector, const IO_DRIVER *driv
     return IoDeviceGetDriver(IoMgrConfigGetIndex(connector)) == driver;
 }
 
+static RTS_RESULT each_of_map(const IoConfigConnectorMap *map, RTS_UI32 type, PF_IO_CHANNEL visit)
+{
+    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
+    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
+    RTS_RESULT result = ERR_OK;
+    RTS_UI32 i;
+
+    for (i = 0; result == ERR_OK && i < map->channel_map_count; i++)
+        result = visit(connector, &channel[i], type);
+    return result;
+}
+
+RTS_RESULT IoMgrConfigEachChannel(const IoConfigTaskMap *task_maps, int count, const IO_DRIVER *driver,
+                                  PF_IO_CHANNEL visit)
+{
+    RTS_RESULT result = ERR_OK;
+
+    for (; count > 0; count--, task_maps++) {
+        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_maps);
+        RTS_UI32 i;
+        for (i = 0; result == ERR_OK && i < task_maps->connector_map_count; i++) {
+            if (IoDeviceGetDriver(map[i].connector) == driver)
+                result = each_of_map(&map[i], task_maps->type, visit);
+        }
+    }
+    return result;
+}
+
 /* ---- load and unload ---- */
 
 RTS_RESULT IoMgrConfigRefuse(const IoConfigConnector *connector, RTS_RESULT result, const char *format, ...)

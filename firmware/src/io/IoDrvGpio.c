@@ -211,31 +211,17 @@ static bool is_channel(const IoConfigChannelMap *channel, RTS_UI32 type)
            channel->bits <= IO_GPIO_LINES && channel->parameter_bit <= (RTS_UI32)IO_GPIO_LINES - channel->bits;
 }
 
-static RTS_RESULT check_map(const IoConfigConnectorMap *map, RTS_UI32 type)
+static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
 {
-    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
-    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
-    RTS_UI32 count = map->channel_map_count;
-
-    for (; count > 0 && IoMgrConfigIsMine(connector, &gpio_driver); count--, channel++) {
-        if (!is_channel(channel, type))
-            return IoMgrConfigRefuse(connector, ERR_OUT_OF_LIMITS, "it has no channel %u.%u.",
-                                     (unsigned)channel->parameter, (unsigned)channel->parameter_bit);
-    }
-    return ERR_OK;
+    if (is_channel(channel, type))
+        return ERR_OK;
+    return IoMgrConfigRefuse(connector, ERR_OUT_OF_LIMITS, "it has no channel %u.%u.", (unsigned)channel->parameter,
+                             (unsigned)channel->parameter_bit);
 }
 
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    RTS_RESULT result = ERR_OK;
-
-    for (; count > 0; count--, task_maps++) {
-        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_maps);
-        RTS_UI32 maps = task_maps->connector_map_count;
-        for (; maps > 0 && result == ERR_OK; maps--)
-            result = check_map(map++, task_maps->type);
-    }
-    return result;
+    return IoMgrConfigEachChannel(task_maps, count, &gpio_driver, check_channel);
 }
 
 /* ---- cycles ---- */

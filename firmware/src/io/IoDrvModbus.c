@@ -48,30 +48,19 @@ static bool is_channel_good(const MODBUS_PLACE *place, const IoConfigChannelMap 
 }
 
 /* A device of a line that is optional, and not used, has no data. */
-static RTS_RESULT check_map(const IoConfigConnectorMap *map, bool is_output)
+static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
 {
-    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
-    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
     MODBUS_PLACE place = ModbusFindPlace(&setup, connector);
 
-    if (!IoMgrConfigIsMine(connector, &driver) || (place.device == NULL && place.server == NULL))
+    if ((place.device == NULL && place.server == NULL) || is_channel_good(&place, channel, type == IO_MAP_OUTPUTS))
         return ERR_OK;
-    for (RTS_UI32 i = 0; i < map->channel_map_count; i++) {
-        if (!is_channel_good(&place, &channel[i], is_output))
-            return IoMgrConfigRefuse(connector, ERR_PARAMETER, "a channel is not in its data.");
-    }
-    return ERR_OK;
+    return IoMgrConfigRefuse(connector, ERR_PARAMETER, "a channel is not in its data.");
 }
 
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    RTS_RESULT result = ERR_OK;
+    RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
 
-    for (int i = 0; i < count; i++) {
-        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(&task_maps[i]);
-        for (RTS_UI32 k = 0; result == ERR_OK && k < task_maps[i].connector_map_count; k++)
-            result = check_map(&map[k], task_maps[i].type == IO_MAP_OUTPUTS);
-    }
     is_running = result == ERR_OK;
     return result;
 }

@@ -131,35 +131,23 @@ static BLOCK *find_block(RTS_UI32 connector, RTS_UI32 parameter)
 }
 
 /* Makes the block of a channel long enough. */
-static RTS_RESULT add_channel(RTS_UI32 connector, const IoConfigChannelMap *channel, bool is_output)
+static RTS_RESULT add_channel(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
 {
-    BLOCK *block = find_block(connector, channel->parameter);
+    RTS_UI32 index = IoMgrConfigGetIndex(connector);
+    BLOCK *block = find_block(index, channel->parameter);
     RTS_UI32 size = (channel->parameter_bit + channel->bits + 7) / 8;
 
     if (size > IO_SIM_MEMORY || block == sim.block + IO_SIM_MAX_BLOCKS)
-        return IoMgrConfigRefuse(IoMgrConfigGetConnector(connector), ERR_NOMEMORY, "simulated devices are small here.");
+        return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "simulated devices are small here.");
     if (block == sim.block + sim.blocks) {
-        block->connector = (RTS_UI16)connector;
+        block->connector = (RTS_UI16)index;
         block->parameter = channel->parameter;
-        block->is_output = is_output;
+        block->is_output = type == IO_MAP_OUTPUTS;
         sim.blocks++;
     }
     if (block->size < size)
         block->size = size;
     return ERR_OK;
-}
-
-static RTS_RESULT add_channels(const IoConfigConnectorMap *map, bool is_output)
-{
-    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
-    RTS_UI32 count = map->channel_map_count;
-    RTS_RESULT result = ERR_OK;
-
-    if (!IoMgrConfigIsMine(IoMgrConfigGetConnector(map->connector), &sim_driver))
-        return ERR_OK;
-    for (; count > 0 && result == ERR_OK; count--)
-        result = add_channel(map->connector, channel++, is_output);
-    return result;
 }
 
 static RTS_RESULT place_blocks(void)
@@ -179,16 +167,10 @@ static RTS_RESULT place_blocks(void)
 
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    RTS_RESULT result = ERR_OK;
+    RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &sim_driver, add_channel);
     const IoConfigConnector *connector;
     RTS_UI32 i;
 
-    for (; count > 0; count--, task_maps++) {
-        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_maps);
-        RTS_UI32 maps = task_maps->connector_map_count;
-        for (; maps > 0 && result == ERR_OK; maps--)
-            result = add_channels(map++, task_maps->type == IO_MAP_OUTPUTS);
-    }
     if (result == ERR_OK)
         result = place_blocks();
     for (i = 0; result == ERR_OK && (connector = IoMgrConfigGetConnector(i)) != NULL; i++) {

@@ -59,40 +59,19 @@ static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int 
 }
 
 /* Write here: what parameters have channels, and how long each is. */
-static RTS_RESULT check_channel(const IoConfigChannelMap *channel, RTS_UI32 type)
+static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
 {
     RTS_UI32 parameter = type == IO_MAP_INPUTS ? BLANK_INPUTS : BLANK_OUTPUTS;
 
     if (channel->parameter == parameter && channel->parameter_bit + channel->bits <= 8 * BLANK_SIZE)
         return ERR_OK;
-    return IoMgrConfigRefuse(blank.connector, ERR_OUT_OF_LIMITS, "it has no bit %u of parameter %u.",
+    return IoMgrConfigRefuse(connector, ERR_OUT_OF_LIMITS, "it has no bit %u of parameter %u.",
                              (unsigned)channel->parameter_bit, (unsigned)channel->parameter);
-}
-
-static RTS_RESULT check_map(const IoConfigConnectorMap *map, RTS_UI32 type)
-{
-    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
-    RTS_UI32 count = map->channel_map_count;
-    RTS_RESULT result = ERR_OK;
-
-    if (!IoMgrConfigIsMine(IoMgrConfigGetConnector(map->connector), &blank_driver))
-        return ERR_OK;
-    for (; count > 0 && result == ERR_OK; count--)
-        result = check_channel(channel++, type);
-    return result;
 }
 
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    RTS_RESULT result = ERR_OK;
-
-    for (; count > 0; count--, task_maps++) {
-        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_maps);
-        RTS_UI32 maps = task_maps->connector_map_count;
-        for (; maps > 0 && result == ERR_OK; maps--)
-            result = check_map(map++, task_maps->type);
-    }
-    return result;
+    return IoMgrConfigEachChannel(task_maps, count, &blank_driver, check_channel);
 }
 
 /* ---- cycles ---- */
