@@ -13,10 +13,9 @@ from collections.abc import Iterable
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
-from plctool.compiler.syntax.ast import Modifier, Section
+from plctool.compiler.syntax.ast import ACCESS, Modifier, Section
 
 KEEPING = frozenset((Modifier.RETAIN, Modifier.NON_RETAIN, Modifier.PERSISTENT))
-ACCESS = frozenset((Modifier.PUBLIC, Modifier.PRIVATE, Modifier.PROTECTED, Modifier.INTERNAL))
 _CONSTANT = frozenset((Modifier.CONSTANT,))
 _NONE = frozenset[Modifier]()
 

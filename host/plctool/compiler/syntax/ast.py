@@ -279,6 +279,9 @@ class Modifier(StrEnum):
     PERSISTENT = "PERSISTENT"
 
 
+ACCESS = frozenset((Modifier.PUBLIC, Modifier.PRIVATE, Modifier.PROTECTED, Modifier.INTERNAL))
+
+
 class Section(StrEnum):
     """A section of declarations, by its keyword."""
 

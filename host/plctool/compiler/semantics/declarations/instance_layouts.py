@@ -40,7 +40,6 @@ from plctool.iec.types import Field, Keep, ReferenceType, StringType, StructType
 
 # ---- function blocks ----
 
-_ACCESS = {ast.Modifier.PUBLIC, ast.Modifier.PRIVATE, ast.Modifier.PROTECTED, ast.Modifier.INTERNAL}
 _MEMBER_MAY = {
     Role.INPUT: May.BE_EDGE | May.HAVE_OPEN_ADDRESS, Role.OUTPUT: May.HAVE_OPEN_ADDRESS,
     Role.IN_OUT: May.BE_OPEN_ARRAY, Role.LOCAL: May.HAVE_OPEN_ADDRESS, Role.STEP: May.BE_PLAIN,
@@ -124,7 +123,7 @@ class Blocks:
             for offset, name in line.names:
                 symbol = VarSymbol(name, scope.pos(offset), t, role, default=default)
                 symbol.given, symbol.used = line.init is not None, direction is not None
-                symbol.access = next(iter(block.qualifiers & _ACCESS), None)
+                symbol.access = next(iter(block.qualifiers & ast.ACCESS), None)
                 symbol.open_area = line.location.text[1] if line.location is not None else ""
                 symbol.constant = ast.Modifier.CONSTANT in block.qualifiers
                 symbol.is_path = "instance-path" in line.attributes
