@@ -76,6 +76,8 @@ def run_campaign(campaign: Campaign, most: int | None, jobs: int) -> Result:
                 result.fallen[number] = reason
                 result.titles[number] = _cases[number].title
     result.seconds = time.monotonic() - begin
+    fell = f", {len(result.fallen)} fell" if result.fallen else ""
+    print(f"{campaign.name}: {result.count} cases in {result.seconds:.0f} s{fell}", flush=True)
     return result
 
 
