@@ -87,6 +87,44 @@ static void what_ran_before_runs_with_its_own_inputs_again(void)
     CHECK_EQUAL(output_at(0), 0x77);
 }
 
+/* IoDrvSim takes every connector after a restart: what is left in flash would run. */
+static void a_refused_application_does_not_run_after_a_restart(void)
+{
+    begin_io();
+    CHECK_EQUAL(IoDrvSim_Hook(CH_EXIT2), ERR_OK);
+    add_copying_task("Main", 10000, 0);
+    plant.refuses = "Plant";
+    CHECK_EQUAL(try_load(), ERR_NO_OBJECT);
+    CHECK_EQUAL(app_state(), AS_NONE);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK_EQUAL(app_state(), AS_NONE);
+    CHECK(log_has("No boot project"));
+}
+
+static void one_that_failed_is_what_boots_again_after_a_refused_one(void)
+{
+    APP_SPEC dying;
+    APP_BYTES old;
+
+    begin_io();
+    CHECK_EQUAL(IoDrvSim_Hook(CH_EXIT2), ERR_OK);
+    spec_counter(&dying, 9);
+    dying.tasks[0].entry_offset = here(&dying);
+    emit_divide_by_zero(&dying);
+    build_image(&old, &dying);
+    CHECK_EQUAL(download(&old), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    add_copying_task("Main", 10000, 0);
+    plant.refuses = "Plant";
+    CHECK_EQUAL(try_load(), ERR_NO_OBJECT);
+    CHECK_EQUAL(SimStart(), ERR_OK);
+    CHECK(app_state() != AS_RUN);
+    CHECK_EQUAL(app_exception(), RTSEXCPT_DIVIDEBYZERO);
+    CHECK(log_has("not started: it failed before"));
+}
+
 static void an_optional_device_that_the_driver_refuses_is_left_out(void)
 {
     begin_with_old();
@@ -135,6 +173,8 @@ int main(void)
     RUN(a_device_that_is_not_enabled_needs_no_driver);
     RUN(a_configuration_that_the_driver_refuses);
     RUN(what_ran_before_runs_with_its_own_inputs_again);
+    RUN(a_refused_application_does_not_run_after_a_restart);
+    RUN(one_that_failed_is_what_boots_again_after_a_refused_one);
     RUN(an_optional_device_that_the_driver_refuses_is_left_out);
     RUN(a_part_that_the_runtime_does_not_know);
     RUN(a_boot_project_is_refused_like_a_download);

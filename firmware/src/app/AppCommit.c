@@ -190,6 +190,12 @@ void AppCommitOpen(void)
         report_loss();
 }
 
+void AppCommitTakeBack(RTS_UI32 slot)
+{
+    AppCommitWipe(slot);
+    AppCommitOpen();
+}
+
 /* Writes what has been changed. */
 static RTS_RESULT write_record(const char *text)
 {

@@ -62,6 +62,9 @@ RTS_UI32 AppCommitOtherSlot(RTS_UI32 slot);
  * before still is, and the image is deleted. */
 RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after);
 
+/* Takes AppCommitInstall back before a record knows of it: the image in `slot` is deleted, and what was before is again. */
+void AppCommitTakeBack(RTS_UI32 slot);
+
 /*
  * Each of these writes a record that is in force from then on, atomically. ERR_DEVICE flash fault: the previous one
  * stays, or it is this one but may be lost when power is.

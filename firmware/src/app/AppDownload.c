@@ -92,11 +92,13 @@ void AppDownloadAbort(void)
     download.open = false;
 }
 
-/* Goes back to the application that ran until now. */
+/* Goes back to the application that ran until now, if it can; in any case the refused one does not boot. */
 static void put_back(RTS_UI32 failed_slot, bool ran)
 {
     if (AppRollBack(failed_slot))
         (void)(ran ? AppStart() : AppInitialise());
+    else
+        AppCommitTakeBack(failed_slot);
 }
 
 /* The checked image takes the place of the old application. */
