@@ -27,9 +27,12 @@ SHARED = [
     "CmpItf.h",
     "CmpLog.h",
     "CmpPackets.h",
+    "AppRecord.h",
+    "BoardFacts.h",
     "CmpSrvNumbers.h",
     "Sim.h",
     "SimLink.h",
+    "SimBoards.h",
     "SysFlashLog.h",
 ]
 

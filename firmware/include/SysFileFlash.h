@@ -27,6 +27,24 @@ typedef struct {
     RTS_UI32 size;
 } FILE_AREA;
 
+/*
+ * Where they are in a flash of `size` bytes when the port does not say: both logs are after the slots, which share what is
+ * left. A half of the retain log is a sixteenth of the flash and a sector. Nothing else counts, so that firmware of other
+ * sizes finds what this one has written. The slots have no bytes where the flash is too small.
+ */
+#define FILE_COMMIT_SIZE(sector) (2 * (sector))
+#define FILE_RETAIN_SIZE(size, sector) (2 * (sector) * ((size) / 16 / (sector) + 1))
+#define FILE_LOGS_SIZE(size, sector) (FILE_COMMIT_SIZE(sector) + FILE_RETAIN_SIZE(size, sector))
+#define FILE_SLOT_SIZE(size, sector) \
+    ((size) > FILE_LOGS_SIZE(size, sector) ? ((size) - FILE_LOGS_SIZE(size, sector)) / 2 / (sector) * (sector) : 0)
+#define FILE_MAP_OF(size, sector)                                                                    \
+    {0, FILE_SLOT_SIZE(size, sector)}, {FILE_SLOT_SIZE(size, sector), FILE_SLOT_SIZE(size, sector)}, \
+        {2 * FILE_SLOT_SIZE(size, sector), FILE_COMMIT_SIZE(sector)},                                \
+    {                                                                                                \
+        2 * FILE_SLOT_SIZE(size, sector) + FILE_COMMIT_SIZE(sector), FILE_RETAIN_SIZE(size, sector)  \
+    }
+
+#ifndef RTS_CFFI
 const FILE_AREA *SysFileGetArea(RTS_UI32 file);
 
 /* Opens for writing from the start; erases as it goes. */
@@ -54,5 +72,6 @@ RTS_RESULT SysFileCRC32(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size, RTS_UI32 
 RTS_RESULT SysFileErase(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size);
 
 RTS_RESULT SysFileFlash_Hook(CMP_HOOK hook);
+#endif
 
 #endif

@@ -51,6 +51,11 @@
 #define APP_MEMORY_SIZE 256
 #endif
 
+/* The largest code of an application, bytes: where it runs in RAM. 0: what fits a slot of the flash. */
+#ifndef APP_MAX_CODE_SIZE
+#define APP_MAX_CODE_SIZE 0
+#endif
+
 /* 1: the port gives the memory of the areas (SysMem.h), to keep programs from writing beyond them. 0: a variable. */
 #ifndef APP_AREAS_FROM_PORT
 #define APP_AREAS_FROM_PORT 0
@@ -243,6 +248,11 @@
  * {"SysTarget", "NodeName", 0, "name in a scan"}. */
 #ifndef SETTINGS_TABLE
 #define SETTINGS_TABLE
+#endif
+
+/* Which of several configurations of a board this one is: for plctool. */
+#ifndef RTS_CONFIG_NAME
+#define RTS_CONFIG_NAME ""
 #endif
 
 /* FILE_MAP {offset, size}, ...: where slot A, slot B, the commit log and the retain log are in flash, if not where

@@ -18,7 +18,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SECTOR = PORT_FLASH_SECTOR_SIZE, UNIT = PORT_FLASH_PROGRAM_SIZE };
+enum { SECTOR = BOARD_FLASH_SECTOR_SIZE, UNIT = BOARD_FLASH_PROGRAM_SIZE };
 
 static char path[64];
 static const RTS_UI8 pattern[2 * UNIT] = "0123456789abcde";
@@ -76,7 +76,7 @@ static off_t file_size(void)
 static void a_new_file_is_erased_flash(void)
 {
     const SYS_FLASH *flash = new_flash();
-    CHECK(flash->size == PORT_FLASH_SIZE && flash->size % flash->sector_size == 0);
+    CHECK(flash->size == BOARD_FLASH_SIZE && flash->size % flash->sector_size == 0);
     CHECK_EQUAL(file_size(), (off_t)flash->size);
     CHECK_EQUAL(byte_at(flash, 0), flash->erased);
     CHECK_EQUAL(byte_at(flash, flash->size - 1), flash->erased);
@@ -209,9 +209,9 @@ static void a_file_that_is_no_flash_is_refused_and_not_touched(void)
 {
     (void)new_flash();
     PortFlashClose();
-    CHECK_EQUAL(truncate(path, PORT_FLASH_SIZE + 1), 0);
+    CHECK_EQUAL(truncate(path, BOARD_FLASH_SIZE + 1), 0);
     check_refused("not a flash file");
-    CHECK_EQUAL(file_size(), PORT_FLASH_SIZE + 1);
+    CHECK_EQUAL(file_size(), BOARD_FLASH_SIZE + 1);
     unlink(path);
     int notes = open(path, O_WRONLY | O_CREAT, 0600);
     CHECK_EQUAL(write(notes, pattern, sizeof(pattern)), sizeof(pattern));
@@ -258,7 +258,7 @@ static void code_that_does_not_exist_is_not_mapped(void)
 {
     (void)new_flash();
     CHECK(SysFlashMapCode(2, 0, 16) == NULL);
-    CHECK(SysFlashMapCode(0, PORT_FLASH_SIZE - 8, 16) == NULL);
+    CHECK(SysFlashMapCode(0, BOARD_FLASH_SIZE - 8, 16) == NULL);
     CHECK(SysFlashMapCode(0, 0, PORT_CODE_SIZE + 1) == NULL);
     SysFlashReleaseCode(2);
 }

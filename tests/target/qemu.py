@@ -129,6 +129,7 @@ class Board:
     def __init__(self, machine: str, firmware: Path, folder: Path) -> None:
         self.machine, self.firmware, self.folder = machine, firmware, folder
         self.flash_file = folder / "flash.bin"
+        self.starts_from = ["-kernel", str(firmware)]  # options of QEMU: what is in its memory when power comes
         self._process: subprocess.Popen[bytes] | None = None
         self._port = self._second_port = 0
         if not self.flash_file.exists():
@@ -154,7 +155,7 @@ class Board:
         icount = CLOCKS[clock]
         command = [
             "qemu-system-arm", *_machine_options(self.machine, self.flash_file),
-            "-display", "none", "-monitor", "none", "-kernel", str(self.firmware),
+            "-display", "none", "-monitor", "none", *self.starts_from,
             *(2 * ["-serial", f"tcp:{LOCALHOST}:0,server=on,wait=off,nodelay=on"]),
             "-qmp", "unix:qmp,server,nowait",
             *(["-icount", icount] if icount else []),

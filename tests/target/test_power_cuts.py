@@ -27,6 +27,7 @@ from qemu import Board
 from plctool.debug.symbols import symbol_path
 from plctool.device import Plc
 from plctool.errors import PlcError
+from plctool.image.board import read_firmware
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
 
@@ -103,7 +104,7 @@ def replacement(tmp_path_factory: pytest.TempPathFactory) -> Replacement:
     board.power_off()
     before = board.read_flash(0, FLASH_SIZE)
 
-    base = board.address_of("file_flash")
+    base = read_firmware(board.firmware).board.flash.address
     arguments = f"base={base},size={FLASH_SIZE},memory={board.flash_file},out={record}"
     board.power_on("exact", plugin=f"file={plugin},{arguments}")
     with Plc(Connection(board.line())) as plc:

@@ -10,13 +10,15 @@
 #define _GNU_SOURCE
 #include "IecStack.h"
 
+#include "rts_config.h"
+
 #include <sys/mman.h>
 
 #if defined(__SANITIZE_ADDRESS__)
 #include <sanitizer/asan_interface.h>
 #endif
 
-#define STACK_SIZE ((size_t)1024 * 1024)
+#define STACK_SIZE ((size_t)RTS_IEC_STACK_SIZE)
 #define GUARD_SIZE ((size_t)16 * 1024 * 1024)
 #define SIGNAL_SIZE ((size_t)64 * 1024) /* a signal frame with all vector registers takes up to 20 KiB */
 

@@ -39,7 +39,7 @@ static RTS_RESULT fault(const char *what, RTS_UI32 offset)
 
 static bool inside(RTS_UI32 offset, RTS_UI32 size)
 {
-    return size <= PORT_FLASH_SIZE && offset <= PORT_FLASH_SIZE - size;
+    return size <= BOARD_FLASH_SIZE && offset <= BOARD_FLASH_SIZE - size;
 }
 
 static bool read_all(int file, RTS_UI8 *data, size_t size, off_t offset)
@@ -87,7 +87,7 @@ static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 
 static bool is_erased(int file, off_t from, off_t to)
 {
-    RTS_UI8 block[PORT_FLASH_SECTOR_SIZE];
+    RTS_UI8 block[BOARD_FLASH_SECTOR_SIZE];
     for (; from < to; from += (off_t)sizeof(block)) {
         size_t size = to - from < (off_t)sizeof(block) ? (size_t)(to - from) : sizeof(block);
         if (!read_all(file, block, size, from)) {
@@ -107,7 +107,7 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
     if (!inside(offset, size)) {
         return fault("program outside", offset);
     }
-    if (offset % PORT_FLASH_PROGRAM_SIZE != 0 || size % PORT_FLASH_PROGRAM_SIZE != 0) {
+    if (offset % BOARD_FLASH_PROGRAM_SIZE != 0 || size % BOARD_FLASH_PROGRAM_SIZE != 0) {
         return fault("program not aligned", offset);
     }
     if (!is_erased(state.file, offset, (off_t)offset + size)) {
@@ -118,8 +118,8 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
 
 static RTS_RESULT flash_erase(RTS_UI32 offset)
 {
-    RTS_UI8 sector[PORT_FLASH_SECTOR_SIZE];
-    if (!inside(offset, PORT_FLASH_SECTOR_SIZE) || offset % PORT_FLASH_SECTOR_SIZE != 0) {
+    RTS_UI8 sector[BOARD_FLASH_SECTOR_SIZE];
+    if (!inside(offset, BOARD_FLASH_SECTOR_SIZE) || offset % BOARD_FLASH_SECTOR_SIZE != 0) {
         return fault("erase inside a sector", offset);
     }
     memset(sector, ERASED, sizeof(sector));
@@ -133,9 +133,9 @@ static RTS_RESULT flash_sync(void)
 
 /* Read-only memory, which no wild pointer changes. */
 static const SYS_FLASH flash = {
-    .size = PORT_FLASH_SIZE,
-    .sector_size = PORT_FLASH_SECTOR_SIZE,
-    .program_size = PORT_FLASH_PROGRAM_SIZE,
+    .size = BOARD_FLASH_SIZE,
+    .sector_size = BOARD_FLASH_SECTOR_SIZE,
+    .program_size = BOARD_FLASH_PROGRAM_SIZE,
     .erased = ERASED,
     .read = flash_read,
     .program = flash_program,
@@ -178,9 +178,9 @@ void SysFlashReleaseCode(RTS_UI32 slot)
 /* Brings a new file, or one whose creation was cut short, to full size with erased bytes. */
 static bool fill_erased(int file, off_t from)
 {
-    RTS_UI8 block[PORT_FLASH_SECTOR_SIZE];
+    RTS_UI8 block[BOARD_FLASH_SECTOR_SIZE];
     memset(block, ERASED, sizeof(block));
-    while (from < PORT_FLASH_SIZE) {
+    while (from < BOARD_FLASH_SIZE) {
         size_t size = sizeof(block) - (size_t)from % sizeof(block);
         if (!write_all(file, block, size, from)) {
             return false;
@@ -224,7 +224,7 @@ static bool lock_file(int file, const char *path, PORT_REASON *reason)
 /* A flash file, or the beginning of one: other files are not overwritten. */
 static bool is_flash_file(int file, off_t size)
 {
-    return size == PORT_FLASH_SIZE || (size < PORT_FLASH_SIZE && is_erased(file, 0, size));
+    return size == BOARD_FLASH_SIZE || (size < BOARD_FLASH_SIZE && is_erased(file, 0, size));
 }
 
 static bool prepare_file(int file, const char *path, PORT_REASON *reason)
@@ -239,7 +239,7 @@ static bool prepare_file(int file, const char *path, PORT_REASON *reason)
             reason,
             "%s is not a flash file of plcrt, or not all of one: it has %lld bytes and not %d; it is left as it is, "
             "put a copy of it in its place or name another file",
-            path, (long long)info.st_size, PORT_FLASH_SIZE);
+            path, (long long)info.st_size, BOARD_FLASH_SIZE);
         return false;
     }
     if (!fill_erased(file, lseek(file, 0, SEEK_END)) || !sync_folder(path)) {

@@ -9,6 +9,7 @@
 #include "CmpSettings.h"
 #include "CompactDownload.h"
 #include "port.h"
+#include "rts_config.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,14 +18,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#if defined(__x86_64__)
-#define PORT_TARGET_ID TARGET_ID_X86_64_LINUX
-#elif defined(__aarch64__)
-#define PORT_TARGET_ID TARGET_ID_AARCH64_LINUX
-#else
-#error "SysTarget.c: give this architecture a target id in CompactDownload.h and in plctool."
-#endif
-
 static struct {
     char node_name[65];
     char serial_number[17];
@@ -32,9 +25,9 @@ static struct {
 
 static const SYS_TARGET target = {
     .type = TARGET_TYPE_PROGRAMMABLE,
-    .id = PORT_TARGET_ID,
+    .id = BOARD_TARGET_ID,
     .version = 0x01000000,
-    .device_name = "plcrt",
+    .device_name = BOARD_DEVICE_NAME,
     .vendor_name = "Open PLC runtime",
     .node_name = state.node_name,
     .serial_number = state.serial_number,

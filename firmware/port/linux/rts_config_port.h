@@ -40,16 +40,29 @@
 /* plcrt --event */
 #define SCHED_MAX_EXTERNAL_EVENTS 8
 
+/* What images are built for. */
+#if defined(__x86_64__)
+#define BOARD_TARGET_ID TARGET_ID_X86_64_LINUX
+#elif defined(__aarch64__)
+#define BOARD_TARGET_ID TARGET_ID_AARCH64_LINUX
+#else
+#error "Give this architecture a target id in CompactDownload.h and in plctool."
+#endif
+#define BOARD_DEVICE_NAME "plcrt"
+
 /* The flash file [bytes]. Geometry of a common serial NOR flash, programmed in the units of an STM32's. */
-#define PORT_FLASH_SIZE (4 * 1024 * 1024)
-#define PORT_FLASH_SECTOR_SIZE 4096
-#define PORT_FLASH_PROGRAM_SIZE 8
+#define BOARD_FLASH_SIZE (4 * 1024 * 1024)
+#define BOARD_FLASH_SECTOR_SIZE 4096
+#define BOARD_FLASH_PROGRAM_SIZE 8
 
 /* Holds the longest reason why an image was refused. */
 #define LOG_TEXT_SIZE 240
 
 /* The largest code segment that can be made executable, per slot [bytes]: a slot is less than half of the flash. */
-#define PORT_CODE_SIZE (PORT_FLASH_SIZE / 2)
+#define PORT_CODE_SIZE (BOARD_FLASH_SIZE / 2)
+
+/* Stack of the IEC code of a thread [bytes]. */
+#define RTS_IEC_STACK_SIZE (1024 * 1024)
 
 /* Stack of a task's thread [bytes], on which the runtime runs and IEC code does not (IecStack.c); the thread sanitizer
  * needs 1 MiB. The zone below it has no memory. */

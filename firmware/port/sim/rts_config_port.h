@@ -38,6 +38,9 @@
 #define SIM_FLASH_PROGRAM_SIZE 8
 #define SIM_FLASH_ERASED 0xFF
 
+/* Stack of the IEC code [bytes]: that of the Linux port. */
+#define RTS_IEC_STACK_SIZE (1024 * 1024)
+
 /* Bytes the simulated serial line holds in each direction. */
 #define SIM_COM_SIZE (64 * 1024)
 

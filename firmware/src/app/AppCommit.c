@@ -16,28 +16,9 @@
 #include "SysFlash.h"
 #include "SysFlashLog.h"
 
-RTS_STATIC_ASSERT(sizeof(COMMIT) == 32, commit_is_32_bytes);
+enum { BEGUN_MAX = 0xFE };
 
-enum { COMMIT_TAG = 0x324D4D43, BEGUN_MAX = 0xFE };
-
-/* What the log holds: the commit, and with it why the application failed, which is of no use without a log. */
-typedef struct {
-    COMMIT commit;
-    APP_EXCEPTION exception;        /* that the active application is in */
-    char text[APP_CRASH_TEXT_SIZE]; /* the port's words, "" without */
-} RECORD;
-
-enum { HAS_CAUSE = LOG_MAX_ENTRIES > 0, RECORD_SIZE = HAS_CAUSE ? sizeof(RECORD) : sizeof(COMMIT) };
-
-/* The first unit after an image. */
-typedef struct {
-    RTS_UI32 number;
-    RTS_UI32 crc; /* of the image */
-    RTS_UI32 retain_after;
-    RTS_UI32 check; /* that it was programmed whole; the image has a CRC of its own */
-} SEAL;
-
-RTS_STATIC_ASSERT(sizeof(SEAL) == FILE_ALIGN, a_seal_is_programmed_at_once);
+RTS_STATIC_ASSERT(sizeof(APP_SEAL) == FILE_ALIGN, a_seal_is_programmed_at_once);
 
 static struct {
     FLASH_LOG log; /* its `opened` says whether anything is known */
@@ -80,7 +61,7 @@ void AppCommitWipe(RTS_UI32 slot)
 
 /* ---- seals ---- */
 
-static RTS_UI32 seal_check(const SEAL *seal)
+RTS_UI32 AppSealCheck(const APP_SEAL *seal)
 {
     return ~(seal->number ^ seal->crc ^ seal->retain_after);
 }
@@ -91,11 +72,11 @@ static bool take_seal(RTS_UI32 slot, RTS_UI32 known)
 {
     const COMMIT_SLOT *recorded = &state.commit.slot[slot];
     CDL_HEADER header;
-    SEAL seal;
+    APP_SEAL seal;
 
     if (SysFileRead(slot, 0, &header, sizeof header) != ERR_OK ||
         SysFileRead(slot, SysFileAlign(header.total_size), &seal, sizeof seal) != ERR_OK ||
-        seal.check != seal_check(&seal) || seal.crc != header.crc)
+        seal.check != AppSealCheck(&seal) || seal.crc != header.crc)
         return true;
     if ((RTS_I32)(seal.number - known) <= 0)
         return recorded->size == 0 || recorded->crc == seal.crc;
@@ -119,9 +100,9 @@ static bool take_seals(void)
 
 RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
 {
-    SEAL seal = {state.commit.number + 1, crc, retain_after, 0};
+    APP_SEAL seal = {state.commit.number + 1, crc, retain_after, 0};
 
-    seal.check = seal_check(&seal);
+    seal.check = AppSealCheck(&seal);
     if (SysFileWrite(slot, &seal, sizeof seal) == ERR_OK && SysFileClose(slot) == ERR_OK)
         (void)take_seals();
     if (state.commit.active == slot)
@@ -132,7 +113,6 @@ RTS_RESULT AppCommitInstall(RTS_UI32 slot, RTS_UI32 crc, RTS_UI32 retain_after)
 
 /* ---- records ---- */
 
-/* Another layout of the flash is another kind of record, because it would mean other places. */
 static RTS_UI32 record_tag(void)
 {
     return COMMIT_TAG + SysFileGetArea(FILE_SLOT_B)->offset;
@@ -140,11 +120,11 @@ static RTS_UI32 record_tag(void)
 
 static RTS_RESULT read_record(void)
 {
-    RECORD record;
-    void *data = HAS_CAUSE ? (void *)&record : (void *)&state.commit;
-    RTS_RESULT result = FlashLogReadNewest(&state.log, record_tag(), data, RECORD_SIZE);
+    COMMIT_RECORD record;
+    void *data = COMMIT_HAS_CAUSE ? (void *)&record : (void *)&state.commit;
+    RTS_RESULT result = FlashLogReadNewest(&state.log, record_tag(), data, COMMIT_RECORD_SIZE);
 
-    if (HAS_CAUSE && result == ERR_OK) {
+    if (COMMIT_HAS_CAUSE && result == ERR_OK) {
         state.commit = record.commit;
         record.text[sizeof record.text - 1] = '\0'; /* whatever the flash holds */
         if (AppCommitIsDead())
@@ -179,7 +159,7 @@ void AppCommitOpen(void)
         state.log.opened = result;
         return;
     }
-    if (result == ERR_OK && FlashLogIsMarked(&state.log, RECORD_SIZE))
+    if (result == ERR_OK && FlashLogIsMarked(&state.log, COMMIT_RECORD_SIZE))
         state.commit.begun = 0;
     if (!take_seals() || (state.commit.active >= SLOT_COUNT && state.commit.active != SLOT_NONE)) {
         forget_record(); /* not one of ours: the seals count */
@@ -199,18 +179,18 @@ void AppCommitTakeBack(RTS_UI32 slot)
 /* Writes what has been changed. */
 static RTS_RESULT write_record(const char *text)
 {
-    RECORD record;
-    const void *data = HAS_CAUSE ? (void *)&record : (void *)&state.commit;
+    COMMIT_RECORD record;
+    const void *data = COMMIT_HAS_CAUSE ? (void *)&record : (void *)&state.commit;
     RTS_RESULT result;
 
-    if (HAS_CAUSE) {
+    if (COMMIT_HAS_CAUSE) {
         memset(&record, 0, sizeof record);
         record.commit = state.commit;
         record.exception = *AppExceptionGet();
         if (APP_CRASH_TEXT_SIZE > 1)
             memcpy(record.text, text, CMUtlStrNLen(text, sizeof record.text - 1));
     }
-    result = FlashLogAppend(&state.log, record_tag(), data, RECORD_SIZE);
+    result = FlashLogAppend(&state.log, record_tag(), data, COMMIT_RECORD_SIZE);
     if (result != ERR_OK)
         LogAdd(CMPID_CmpAppEmbedded, LOG_ERROR, result, "Commit record cannot be written");
     return result;

@@ -3,42 +3,17 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A slot says itself that its image is a program of the device: after the image follows a seal, one unit that is
- * programmed when all else is in flash and checked. Seals are numbered, so that the newest program is found even when
- * nothing else is left. What happened to the programs since is in a log of commit records, each with the complete state
+ * A slot says itself that its image is a program of the device: after the image follows a seal (AppRecord.h), so that the
+ * newest program is found even when nothing else is left. What happened to the programs since is in a log of commit
+ * records, each with the complete state
  * of both slots: the newest valid one counts, unless a slot has a newer seal. From main only.
  */
 #ifndef APPCOMMIT_H
 #define APPCOMMIT_H
 
+#include "AppRecord.h"
 #include "CmpErrors.h"
 #include "CmpStd.h"
-
-/* What is known about the image in a slot. */
-enum {
-    SLOT_EMPTY = 0,
-    SLOT_TRIAL = 1,   /* downloaded; stopped in good order since it was last started */
-    SLOT_STARTED = 2, /* started, and has not proven itself yet */
-    SLOT_PROVEN = 3,  /* ran for APP_PROVE_US without exception */
-    SLOT_FAILED = 4,  /* failed before it was proven: run on request only */
-    SLOT_HALTED = 5,  /* proven, but failed in its initialisation: run on request only */
-};
-
-enum { SLOT_COUNT = 2, SLOT_NONE = 0xFF };
-
-typedef struct {
-    RTS_UI32 size;
-    RTS_UI32 crc;
-    RTS_UI32 retain_after; /* retain records up to this number are not of this application */
-} COMMIT_SLOT;
-
-typedef struct {
-    RTS_UI8 active;            /* slot of the application, SLOT_NONE without one */
-    RTS_UI8 begun;             /* how many initialisations of it in a row were begun and not finished */
-    RTS_UI8 state[SLOT_COUNT]; /* SLOT_* */
-    RTS_UI32 number;           /* of the newest seal */
-    COMMIT_SLOT slot[SLOT_COUNT];
-} COMMIT;
 
 /* Finds out what is in flash. If the application failed, it is in that exception again. */
 void AppCommitOpen(void);

@@ -65,29 +65,17 @@ static bool map_files(void)
 
 #else
 
-/*
- * Both logs are after the slots, which share what is left. A half of the retain log is a sixteenth of the flash and
- * a sector. Nothing else counts, so that firmware of other sizes finds what this one has written. False when
- * nothing is left for the slots.
- */
+/* False when nothing is left for the slots. */
 static bool map_files(void)
 {
     const SYS_FLASH *flash = SysFlashGet();
     RTS_UI32 sector = flash->sector_size;
-    RTS_UI32 commit = 2 * sector;
-    RTS_UI32 retain = commit * (flash->size / 16 / sector + 1);
-    RTS_UI32 rest = flash->size > commit + retain ? flash->size - commit - retain : 0;
-    RTS_UI32 slot = rest / 2 / sector * sector;
-    const RTS_UI32 sizes[FILE_COUNT] = {slot, slot, commit, retain};
-    RTS_UI32 offset = 0;
+    const FILE_AREA map[FILE_COUNT] = {FILE_MAP_OF(flash->size, sector)};
     RTS_UI32 i;
 
-    for (i = 0; i < FILE_COUNT; i++) {
-        files[i].area.offset = offset;
-        files[i].area.size = sizes[i];
-        offset += sizes[i];
-    }
-    return slot > 0;
+    for (i = 0; i < FILE_COUNT; i++)
+        files[i].area = map[i];
+    return map[FILE_SLOT_A].size > 0;
 }
 
 #endif

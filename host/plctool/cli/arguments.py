@@ -75,8 +75,17 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_warnings(check)
     _add_io_files(check)
 
-    info = command("info", "describe an image")
+    info = command("info", "describe an image, or the programs in a .bin or .hex of 'plctool image'")
     _add_image(info)
+
+    image = command("image", "write what a production programmer burns: a flash with its program")
+    _add_image(image)
+    board = image.add_argument("--board", metavar="NAME", help="such as plcrt, mps2-an385/standard")
+    board.completer = lambda **words: _board_names()  # type: ignore[attr-defined]  # for argcomplete
+    image.add_argument(
+        "--firmware", type=Path, metavar="FILE.elf", help="burn it as well; for a board that plctool does not know"
+    )
+    image.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.hex|.bin")
 
     symbols = command("symbols", "list the variables of an image with their types")
     _add_image(symbols)
@@ -210,6 +219,12 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     param.add_argument("parameter", metavar="NAME|ID[=VALUE]", help="set: with its value")
     param.add_argument("--type", metavar="TYPE", help="of one that the description does not have; default: UDINT")
     _add_link(param, symbols=True)
+
+
+def _board_names() -> list[str]:
+    from plctool.image.board import known_boards
+
+    return [board.slug for board in known_boards()]
 
 
 def _add_sources(parser: argparse.ArgumentParser) -> None:

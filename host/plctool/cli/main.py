@@ -69,7 +69,18 @@ def _check(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace) -> int:
+    from plctool.cli.image_documents import production_info
+    from plctool.image.production import is_production
+
+    if is_production(args.image):
+        return _show(args, production_info(args.image), output.production_info_text)
     return _show(args, documents.info(args.image), output.info_text)
+
+
+def _image(args: argparse.Namespace) -> int:
+    from plctool.cli.image_documents import production
+
+    return _show(args, production(args.image, args.board, args.firmware, args.output), output.production_text)
 
 
 def _symbols(args: argparse.Namespace) -> int:
@@ -388,7 +399,7 @@ IO_ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
 }  # fmt: skip
 
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
-    "build": _build, "check": _check, "info": _info, "symbols": _symbols, "run": _run, "test": _test,
+    "build": _build, "check": _check, "info": _info, "image": _image, "symbols": _symbols, "run": _run, "test": _test,
     "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
     "tasks": _tasks, "log": _log, "shell": _shell, "port-check": _port_check,

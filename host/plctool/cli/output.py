@@ -180,6 +180,24 @@ def info_text(document: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def production_text(document: dict[str, Any]) -> str:
+    """What was written, and a line for each piece."""
+    pieces = [{**p, "address": f"0x{p['address']}"} for p in document["pieces"]]
+    head = f"{document['output']}: {document['board']} with program CRC {document['crc']}"
+    return f"{head}\n{table(pieces, ('address', 'size', 'what'))}"
+
+
+def production_info_text(document: dict[str, Any]) -> str:
+    """The parts, and each program as an image is described."""
+    parts = [{**p, "address": f"0x{p['address']}"} for p in document["parts"]]
+    lines = [table(parts, ("address", "size"))]
+    for program in document["programs"]:
+        seal = "without a valid seal, so that no device runs it" if program["seal"] is None else "sealed"
+        image = {name: value for name, value in program.items() if name not in ("address", "seal")}
+        lines += ["", f"program at 0x{program['address']}, {seal}:", info_text(image)]
+    return "\n".join(lines)
+
+
 def gateways_text(document: dict[str, Any]) -> str:
     """A line for each gateway, and one for each tool it serves."""
     return "\n".join(map(_gateway_text, document["gateways"])) or "No gateway runs."

@@ -17,7 +17,11 @@
 #define BOARD_DEVICE_NAME "LM3S6965 board"
 #define BOARD_NODE_NAME "lm3s6965"
 
-/* The EEPROM that applications and files have, bytes. */
+/* The EEPROM that applications and files have, bytes; the code of applications is copied from it to RAM. */
 #define BOARD_FLASH_SIZE 0x10000u
+#define BOARD_FLASH_SECTOR_SIZE 1024u
+#ifndef APP_MAX_CODE_SIZE
+#define APP_MAX_CODE_SIZE RTS_CODE_RAM_SIZE
+#endif
 
 #endif

@@ -63,13 +63,16 @@ void BoardWatchdogKick(void)
 
 /* ---- identity ---- */
 
+/* In the last sector of the PSRAM. */
+#define FACTORY_DATA (BOARD_FLASH_ADDRESS + 16 * 1024 * 1024 - BOARD_FLASH_SECTOR_SIZE)
+
 enum { SERIAL_NUMBER_SIZE = 16 };
 static char serial_number[SERIAL_NUMBER_SIZE];
 
 /* The number the factory wrote after the file area, or a default when there is none. */
 static const char *read_serial_number(void)
 {
-    extern const char factory_data[];
+    const char *factory_data = (const char *)(uintptr_t)FACTORY_DATA;
     RTS_UI32 length = 0;
     while (length < SERIAL_NUMBER_SIZE - 1 && factory_data[length] > ' ' && factory_data[length] <= '~') {
         serial_number[length] = factory_data[length];

@@ -11,21 +11,21 @@
 #include "CortexM.h"
 #include "SysFlash.h"
 
-extern RTS_UI8 file_flash[]; /* of the linker script */
+#define FILE_FLASH ((RTS_UI8 *)(uintptr_t)BOARD_FLASH_ADDRESS)
 
-enum { SECTOR_SIZE = 4096, PROGRAM_SIZE = 8, ERASED = 0xFF, FLASH_LOG2 = 24 };
+enum { SECTOR_SIZE = BOARD_FLASH_SECTOR_SIZE, PROGRAM_SIZE = 8, ERASED = 0xFF, FLASH_LOG2 = 24 };
 #define ERASED_WORD (ERASED * 0x01010101u)
 
 static void protect(RTS_UI32 attributes)
 {
-    MpuProtect(MPU_BOARD, (uintptr_t)file_flash, FLASH_LOG2, attributes);
+    MpuProtect(MPU_BOARD, (uintptr_t)FILE_FLASH, FLASH_LOG2, attributes);
 }
 
 static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
 {
     if (offset > BOARD_FLASH_SIZE || size > BOARD_FLASH_SIZE - offset)
         return ERR_DEVICE;
-    memcpy(data, file_flash + offset, size);
+    memcpy(data, FILE_FLASH + offset, size);
     return ERR_OK;
 }
 
@@ -40,13 +40,13 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
 {
     if (offset > BOARD_FLASH_SIZE || size > BOARD_FLASH_SIZE - offset)
         return ERR_DEVICE;
-    if (offset % PROGRAM_SIZE || size % PROGRAM_SIZE || !is_erased(file_flash + offset, size))
+    if (offset % PROGRAM_SIZE || size % PROGRAM_SIZE || !is_erased(FILE_FLASH + offset, size))
         return ERR_DEVICE;
     protect(MPU_WRITE_PRIVILEGED);
     for (RTS_UI32 done = 0; done < size; done += sizeof(RTS_UI32)) {
         RTS_UI32 word;
         memcpy(&word, (const RTS_UI8 *)data + done, sizeof(word));
-        *(volatile RTS_UI32 *)(uintptr_t)(file_flash + offset + done) = word;
+        *(volatile RTS_UI32 *)(uintptr_t)(FILE_FLASH + offset + done) = word;
     }
     protect(MPU_READ_ONLY);
     return ERR_OK;
@@ -58,7 +58,7 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
         return ERR_DEVICE;
     protect(MPU_WRITE_PRIVILEGED);
     for (RTS_UI32 done = 0; done < SECTOR_SIZE; done += sizeof(RTS_UI32))
-        *(volatile RTS_UI32 *)(uintptr_t)(file_flash + offset + done) = ERASED_WORD;
+        *(volatile RTS_UI32 *)(uintptr_t)(FILE_FLASH + offset + done) = ERASED_WORD;
     protect(MPU_READ_ONLY);
     return ERR_OK;
 }
@@ -82,7 +82,7 @@ const SYS_FLASH *SysFlashGet(void)
         .sector_size = SECTOR_SIZE,
         .program_size = PROGRAM_SIZE,
         .erased = ERASED,
-        .mapped = file_flash,
+        .mapped = FILE_FLASH,
         .read = flash_read,
         .program = flash_program,
         .erase = flash_erase,

@@ -14,7 +14,9 @@
 #define BOARD_DEVICE_NAME "MPS2 AN500"
 #define BOARD_NODE_NAME "mps2-an500"
 
-/* The flash that applications and files have, bytes. */
+/* The flash that applications and files have: a part of the PSRAM. Sizes in bytes. */
+#define BOARD_FLASH_ADDRESS 0x60000000u
 #define BOARD_FLASH_SIZE 0x80000u
+#define BOARD_FLASH_SECTOR_SIZE 4096u
 
 #endif

@@ -7,6 +7,7 @@
 #ifndef RTS_CONFIG_SIZE_H
 #define RTS_CONFIG_SIZE_H
 
+#define RTS_CONFIG_NAME "can"
 #define APP_CRASH_TEXT_SIZE 1
 #define APP_MAX_TASKS 3
 #define NETSERVER_MESSAGE_SIZE 576 /* more than that and two tools at a time do not fit into 12 KiB */

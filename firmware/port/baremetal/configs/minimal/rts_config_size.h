@@ -7,6 +7,7 @@
 #ifndef RTS_CONFIG_SIZE_H
 #define RTS_CONFIG_SIZE_H
 
+#define RTS_CONFIG_NAME "minimal"
 #define APP_CRASH_TEXT_SIZE 1
 #define APP_MAX_TASKS 2
 #define APP_MAX_IMPORTS 16

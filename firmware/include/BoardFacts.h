@@ -1,0 +1,39 @@
+/*
+ * BoardFacts.h - what plctool has to know of a firmware and its board without asking it (shared with the host).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * Made of what the firmware itself is compiled with. In the ELF file of a firmware it is the section `board_facts`, which
+ * takes no flash (sections.ld); plctool has those of the boards here. A port has one whose rts_config_port.h gives
+ * BOARD_TARGET_ID, BOARD_DEVICE_NAME, BOARD_FLASH_SIZE, BOARD_FLASH_SECTOR_SIZE and, if it is memory of the processor,
+ * BOARD_FLASH_ADDRESS.
+ */
+#ifndef BOARDFACTS_H
+#define BOARDFACTS_H
+
+#include "CompactDownload.h"
+#include "SysFileFlash.h"
+
+enum { BOARD_FACTS_MAGIC = 0x54434642, BOARD_NAME_SIZE = 32 };
+
+typedef struct {
+    RTS_UI32 magic; /* BOARD_FACTS_MAGIC */
+    RTS_UI32 size;  /* of this struct; another one is that of another version */
+    RTS_UI32 target_id;
+    RTS_UI32 has_address;   /* whether the flash is memory of the processor */
+    RTS_UI32 flash_address; /* where; else 0 */
+    RTS_UI32 flash_size;    /* bytes, as all sizes here */
+    RTS_UI32 sector_size;
+    RTS_UI32 erased;              /* value of an erased byte */
+    FILE_AREA file[FILE_COUNT];   /* where each FILE_* is in the flash */
+    RTS_UI32 area[APP_AREA_CODE]; /* RAM of the areas data, retain, input, output, memory */
+    RTS_UI32 code;                /* largest code segment; 0: what fits a slot */
+    RTS_UI32 stack;               /* of the IEC code of a task; 0: not known */
+    RTS_UI32 tasks;               /* most of an application */
+    RTS_UI32 imports;             /* most external functions of an application */
+    RTS_UI32 record;              /* data of a commit record (AppRecord.h) */
+    char name[BOARD_NAME_SIZE];   /* BOARD_DEVICE_NAME */
+    char config[BOARD_NAME_SIZE]; /* RTS_CONFIG_NAME, "" without */
+} BOARD_FACTS;
+
+#endif

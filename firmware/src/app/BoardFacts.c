@@ -1,0 +1,51 @@
+/*
+ * BoardFacts.c - what plctool has to know of a firmware and its board.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "BoardFacts.h"
+
+#include "AppRecord.h"
+#include "rts_config.h"
+
+#ifdef BOARD_FLASH_SECTOR_SIZE
+
+#ifndef BOARD_FLASH_ERASED
+#define BOARD_FLASH_ERASED 0xFF
+#endif
+
+#ifdef BOARD_FLASH_ADDRESS
+enum { HAS_ADDRESS = 1, ADDRESS = BOARD_FLASH_ADDRESS };
+#else
+enum { HAS_ADDRESS = 0, ADDRESS = 0 };
+#endif
+
+#ifndef FILE_MAP
+#define FILE_MAP FILE_MAP_OF(BOARD_FLASH_SIZE, BOARD_FLASH_SECTOR_SIZE)
+#endif
+
+RTS_STATIC_ASSERT(sizeof(BOARD_DEVICE_NAME) <= BOARD_NAME_SIZE && sizeof(RTS_CONFIG_NAME) <= BOARD_NAME_SIZE,
+                  names_fit);
+
+/* Found by its section. The alignment is that of the struct, so that several are an array. */
+__attribute__((used, section("board_facts"), aligned(4))) static const BOARD_FACTS facts = {
+    .magic = BOARD_FACTS_MAGIC,
+    .size = sizeof(BOARD_FACTS),
+    .target_id = BOARD_TARGET_ID,
+    .has_address = HAS_ADDRESS,
+    .flash_address = ADDRESS,
+    .flash_size = BOARD_FLASH_SIZE,
+    .sector_size = BOARD_FLASH_SECTOR_SIZE,
+    .erased = BOARD_FLASH_ERASED,
+    .file = {FILE_MAP},
+    .area = {APP_DATA_SIZE, APP_RETAIN_SIZE, APP_INPUT_SIZE, APP_OUTPUT_SIZE, APP_MEMORY_SIZE},
+    .code = APP_MAX_CODE_SIZE,
+    .stack = RTS_IEC_STACK_SIZE,
+    .tasks = APP_MAX_TASKS,
+    .imports = APP_MAX_IMPORTS,
+    .record = COMMIT_RECORD_SIZE,
+    .name = BOARD_DEVICE_NAME,
+    .config = RTS_CONFIG_NAME,
+};
+
+#endif

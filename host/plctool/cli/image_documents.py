@@ -1,0 +1,42 @@
+"""What the commands on production images do, as functions that return the document `--json` prints."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from plctool.errors import UsageError
+from plctool.files import read_image
+
+Document = dict[str, Any]
+
+
+def production(image: Path, board: str | None, firmware: Path | None, output: Path) -> Document:
+    """Writes what a programmer burns to `output`. Raises UsageError when the parts do not go together."""
+    from plctool.image.board import board_of, read_firmware
+    from plctool.image.file import image_crc
+    from plctool.image.production import is_production, production_pieces, write_production
+
+    if not is_production(output):
+        raise UsageError(f"{output} is neither .bin nor .hex; write for example -o {output.stem}.hex.", "bad-output")
+    of_firmware = None if firmware is None else read_firmware(firmware)
+    wanted = board_of(board, of_firmware)
+    data = read_image(image)
+    pieces = production_pieces(data, wanted, of_firmware)
+    write_production(output, pieces, wanted)
+    return {
+        "output": str(output),
+        "board": wanted.title,
+        "target": wanted.target,
+        "crc": f"{image_crc(data):08X}",
+        "pieces": [
+            {"address": f"{p.segment.address:08X}", "size": len(p.segment.data), "what": p.what} for p in pieces
+        ],
+    }
+
+
+def production_info(path: Path) -> Document:
+    """What is in a .bin or .hex."""
+    from plctool.image.production import describe_production
+
+    return describe_production(path, read_image(path))

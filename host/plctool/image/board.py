@@ -1,0 +1,225 @@
+"""What is known of a board without asking it: its flash, and what its firmware has room for (`BoardFacts.h`).
+
+The facts are those its firmware is compiled with. plcrt and the boards of this repository are in the C core; any other
+firmware has its own in its ELF file.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from elftools.common.exceptions import ELFError
+from elftools.elf.elffile import ELFFile
+
+from plctool.core import ffi, lib
+from plctool.errors import UsageError, did_you_mean
+from plctool.iec.areas import Area
+from plctool.image.file import target_name
+
+SLOT_A, SLOT_B, COMMIT, RETAIN = (int(n) for n in (lib.FILE_SLOT_A, lib.FILE_SLOT_B, lib.FILE_COMMIT, lib.FILE_RETAIN))
+_SECTION = "board_facts"
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the flash: `offset` and `size` in bytes, both multiples of a sector."""
+
+    offset: int
+    size: int
+
+
+@dataclass(frozen=True)
+class Flash:
+    """The flash that keeps programs. `address`: where it is in the memory of the processor; None if it is not memory.
+    `files`: by FILE_*."""
+
+    address: int | None
+    size: int
+    sector_size: int
+    erased: int
+    files: tuple[Part, ...]
+
+
+@dataclass(frozen=True)
+class Board:
+    """`limits`: what a program may need at most, by the names of `limits.py`. `record`: bytes of a commit record."""
+
+    name: str
+    config: str
+    device_id: int
+    flash: Flash
+    record: int
+    limits: dict[str, int] = field(hash=False)
+
+    @property
+    def target(self) -> str:
+        return target_name(self.device_id)
+
+    @property
+    def title(self) -> str:
+        """How messages call it."""
+        return f"{self.name} ({self.config})" if self.config else self.name
+
+    @property
+    def slug(self) -> str:
+        """What `--board` calls it, such as mps2-an385/standard."""
+        return f"{_slug(self.name)}/{self.config}" if self.config else _slug(self.name)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Bytes that are programmed at an address."""
+
+    address: int
+    data: bytes
+
+    @property
+    def end(self) -> int:
+        return self.address + len(self.data)
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """An ELF file: what it has in memory, and the facts of its board."""
+
+    path: Path
+    board: Board
+    segments: tuple[Segment, ...]
+
+
+def _slug(name: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", name.casefold()).strip("-")
+
+
+@cache
+def known_boards() -> tuple[Board, ...]:
+    """plcrt, and the boards of this repository with each firmware they have."""
+    return tuple(map(_board, _all_facts()))
+
+
+def _all_facts() -> Iterator[Any]:
+    index = 0
+    while (facts := lib.SimBoard(index)) != ffi.NULL:
+        yield facts
+        index += 1
+
+
+def _board(facts: Any) -> Board:
+    files = tuple(Part(int(f.offset), int(f.size)) for f in facts.file)
+    address = int(facts.flash_address) if facts.has_address else None
+    flash = Flash(address, int(facts.flash_size), int(facts.sector_size), int(facts.erased), files)
+    slot = min(files[SLOT_A].size, files[SLOT_B].size) - ffi.sizeof("APP_SEAL")
+    limits = {
+        "tasks": int(facts.tasks),
+        "functions": int(facts.imports),
+        **{Area(index).name.lower(): int(size) for index, size in enumerate(facts.area)},
+        "code": int(facts.code) or slot,
+        "image": slot,
+    }
+    if facts.stack:
+        limits["stack"] = int(facts.stack)
+    name, config = (ffi.string(text).decode("ascii", "replace") for text in (facts.name, facts.config))
+    return Board(name, config, int(facts.target_id), flash, int(facts.record), limits)
+
+
+def find_board(text: str) -> Board:
+    """The board that `--board` names. Raises UsageError when it is not known, or has several firmwares."""
+    boards = known_boards()
+    name, _, config = text.partition("/")
+    found = [b for b in boards if _slug(b.name) == _slug(name) and (not config or b.config == config.casefold())]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        names = ", ".join(b.slug for b in found)
+        raise UsageError(
+            f"{found[0].name} has several firmwares; say which one it has: {names}, or give its ELF file with "
+            "--firmware.",
+            "no-such-board",
+        )
+    slugs = [b.slug for b in boards]
+    raise UsageError(
+        f"There is no board '{text}'{did_you_mean(text, slugs)}. Choose one of {', '.join(slugs)}; for a board of your "
+        "own give its ELF file with --firmware.",
+        "no-such-board",
+    )
+
+
+def read_firmware(path: Path) -> Firmware:
+    """Raises UsageError when it is not a firmware that says what its board is."""
+    try:
+        with path.open("rb") as file:
+            elf = ELFFile(file)
+            section = elf.get_section_by_name(_SECTION)
+            data = b"" if section is None else section.data()
+            segments = tuple(
+                Segment(int(s["p_paddr"]), s.data())
+                for s in elf.iter_segments("PT_LOAD")
+                if s["p_filesz"] and section is not None
+            )
+    except OSError as error:
+        raise UsageError(f"The firmware {path} cannot be read: {error.strerror}.", "no-firmware") from None
+    except ELFError:
+        raise UsageError(
+            f"{path} is not an ELF file; name what the linker wrote, not a .bin or .hex.", "bad-firmware"
+        ) from None
+    facts = ffi.new("BOARD_FACTS *")
+    if not data:
+        raise UsageError(
+            f"{path} does not say what its board is; give BOARD_FLASH_SECTOR_SIZE and the others of BoardFacts.h in "
+            "its rts_config_port.h, and build it again. plcrt has no firmware in its flash.",
+            "bad-firmware",
+        )
+    ffi.buffer(facts)[: min(len(data), ffi.sizeof("BOARD_FACTS"))] = data[: ffi.sizeof("BOARD_FACTS")]
+    if facts.magic != lib.BOARD_FACTS_MAGIC or facts.size != ffi.sizeof("BOARD_FACTS") or len(data) != facts.size:
+        raise UsageError(
+            f"{path} is a firmware of another version of plctool; build it again with this one.", "bad-firmware"
+        )
+    return Firmware(path, _board(facts), segments)
+
+
+def board_of(name: str | None, firmware: Firmware | None) -> Board:
+    """The board that both agree on. Raises UsageError when they do not, or neither is given."""
+    if firmware is None:
+        if name is None:
+            raise UsageError("Name the board with --board, or give its ELF file with --firmware.", "usage")
+        return find_board(name)
+    board = firmware.board
+    if name is None:
+        return board
+    wanted, _, config = name.partition("/")
+    if _slug(wanted) != _slug(board.name) or config.casefold() not in ("", board.config):
+        raise UsageError(
+            f"{firmware.path} is the firmware of {board.title}, not of {name}; name it --board {board.slug}, or give "
+            "the firmware of the other.",
+            "other-firmware",
+        )
+    for known in known_boards():
+        if _slug(known.name) == _slug(board.name) and known.flash != board.flash:
+            raise UsageError(
+                f"{firmware.path} has another map of the flash than {known.name} of this plctool: "
+                f"{_difference(board.flash, known.flash)}. Leave --board out to go by the firmware, or build it again.",
+                "other-firmware",
+            )
+    return board
+
+
+def _difference(of_firmware: Flash, known: Flash) -> str:
+    for name, one, other in (
+        ("its address is", of_firmware.address, known.address),
+        ("its size is", of_firmware.size, known.size),
+        ("its sectors have", of_firmware.sector_size, known.sector_size),
+        ("slot B is at", of_firmware.files[SLOT_B].offset, known.files[SLOT_B].offset),
+        ("the commit log is at", of_firmware.files[COMMIT].offset, known.files[COMMIT].offset),
+    ):
+        if one != other:
+            return f"{name} {_hex(one)}, not {_hex(other)}"
+    return "its files have other sizes"
+
+
+def _hex(number: int | None) -> str:
+    return "none" if number is None else f"0x{number:X}"

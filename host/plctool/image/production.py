@@ -1,0 +1,213 @@
+"""What a production programmer burns: the flash of a device with its program, and with its firmware if wanted.
+
+It is what the device itself leaves after a download that was not started yet: the image and its seal in slot A, and a
+first commit record. What the programmer must not leave as it was is there as erased bytes: the logs, and the beginning
+of slot B.
+"""
+
+from __future__ import annotations
+
+import io
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from intelhex import HexReaderError, IntelHex
+
+from plctool.core import ffi, lib
+from plctool.errors import UsageError
+from plctool.files import write_atomically
+from plctool.iec.types import align_up
+from plctool.image.board import COMMIT, RETAIN, SLOT_A, SLOT_B, Board, Firmware, Segment
+from plctool.image.file import describe_image, image_crc, parse_image, target_name
+from plctool.image.limits import check_fit, needs_of_image
+
+BIN, HEX = ".bin", ".hex"
+_FIRST = 1  # number of the first seal, and of the first record
+_MOST_BIN = 64 * 1024 * 1024  # bytes; a file with more of them has mostly gaps
+_ALIGN = int(lib.FILE_ALIGN)
+_TAG = int(lib.CDL_HEADER_TAG).to_bytes(4, "little")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Bytes at an address, and what they are."""
+
+    what: str
+    segment: Segment
+
+
+def production_pieces(image: bytes, board: Board, firmware: Firmware | None) -> list[Piece]:
+    """All that is burned, by address. Raises UsageError when the image is not for this board or does not fit it, and
+    when the firmware is where the programs are."""
+    parsed = parse_image(image)
+    if parsed.device_id != board.device_id:
+        raise UsageError(
+            f"The image is for {target_name(parsed.device_id)}, {board.title} needs {board.target}; build it with "
+            f"--target {board.target}.",
+            "other-target",
+        )
+    check_fit(
+        needs_of_image(parsed, len(image)),
+        board.limits,
+        board.title,
+        "Make the program smaller, or use a firmware with more room.",
+    )
+    pieces = list(_flash_pieces(image, board))
+    if firmware is not None:
+        _check_apart(firmware, board)
+        pieces += [Piece("firmware", segment) for segment in firmware.segments]
+    return sorted(pieces, key=lambda piece: piece.segment.address)
+
+
+def _check_apart(firmware: Firmware, board: Board) -> None:
+    """The firmware is nowhere in the flash for programs."""
+    flash = board.flash
+    if flash.address is None:
+        raise UsageError(
+            f"{board.title} keeps programs in a memory of their own, without the firmware; burn the firmware as "
+            f"it is and make this image with --board {board.slug} alone.",
+            "overlap",
+        )
+    for segment in firmware.segments:
+        if segment.address < flash.address + flash.size and flash.address < segment.end:
+            raise UsageError(
+                f"The firmware at 0x{segment.address:08X} to 0x{segment.end - 1:08X} is over the flash for programs at "
+                f"0x{flash.address:08X} to 0x{flash.address + flash.size - 1:08X}; give the firmware less room in its "
+                "linker script, or the programs another BOARD_FLASH_ADDRESS.",
+                "overlap",
+            )
+
+
+def _flash_pieces(image: bytes, board: Board) -> Iterator[Piece]:
+    flash = board.flash
+    base = flash.address or 0
+
+    def piece(what: str, file: int, data: bytes) -> Piece:
+        return Piece(what, Segment(base + flash.files[file].offset, data))
+
+    padding = bytes([flash.erased]) * (align_up(len(image), _ALIGN) - len(image))
+    yield piece("program", SLOT_A, image + padding + _seal(image_crc(image)))
+    yield piece("empty slot", SLOT_B, bytes([flash.erased]) * flash.sector_size)
+    record = _commit_record(image, board)
+    yield piece("commit log", COMMIT, record.ljust(flash.files[COMMIT].size, bytes([flash.erased])))
+    yield piece("retain log", RETAIN, bytes([flash.erased]) * flash.files[RETAIN].size)
+
+
+def _seal(crc: int) -> bytes:
+    seal = ffi.new("APP_SEAL *", {"number": _FIRST, "crc": crc})
+    seal.check = lib.AppSealCheck(seal)
+    return bytes(ffi.buffer(seal))
+
+
+def _commit_record(image: bytes, board: Board) -> bytes:
+    slots = [{"size": len(image), "crc": image_crc(image)}, {}]
+    state = [lib.SLOT_TRIAL, lib.SLOT_EMPTY]
+    commit = ffi.new("COMMIT *", {"active": SLOT_A, "state": state, "number": _FIRST, "slot": slots})
+    data = bytes(ffi.buffer(commit)).ljust(board.record, b"\0")
+    tag = lib.COMMIT_TAG + board.flash.files[SLOT_B].offset
+    head = ffi.new(
+        "FLASH_LOG_HEAD *", {"magic": lib.FLASH_LOG_MAGIC, "sequence": _FIRST, "tag": tag, "size": len(data)}
+    )
+    head.crc = zlib.crc32(bytes(ffi.buffer(head))[: ffi.offsetof("FLASH_LOG_HEAD", "crc")] + data)
+    return bytes(ffi.buffer(head)) + data
+
+
+# ---- files ----------------------------------------------------------------------------------------------------------
+
+
+def write_production(path: Path, pieces: Iterable[Piece], board: Board) -> None:
+    """Writes .hex: the pieces, or else everything from the first to the last byte, all of the flash included. Raises
+    UsageError."""
+    segments = [piece.segment for piece in pieces]
+    if path.suffix.lower() == HEX:
+        write_atomically(path, _hex(segments))
+    else:
+        write_atomically(path, _bin(segments, board, path))
+
+
+def _hex(segments: list[Segment]) -> bytes:
+    content, text = IntelHex(), io.StringIO()
+    for segment in segments:
+        content.frombytes(segment.data, segment.address)
+    content.write_hex_file(text)
+    return text.getvalue().encode("ascii")
+
+
+def _bin(segments: list[Segment], board: Board, path: Path) -> bytes:
+    base = board.flash.address or 0
+    start, end = min(base, segments[0].address), max(base + board.flash.size, segments[-1].end)
+    if end - start > _MOST_BIN:
+        raise UsageError(
+            f"From 0x{start:08X} to 0x{end - 1:08X} is too much for a .bin, which has no gaps; write {path.stem}.hex, "
+            "or leave --firmware out.",
+            "bad-output",
+        )
+    data = bytearray([board.flash.erased]) * (end - start)
+    for segment in segments:
+        data[segment.address - start : segment.end - start] = segment.data
+    return bytes(data)
+
+
+def is_production(path: Path) -> bool:
+    """Whether the name is that of such a file."""
+    return path.suffix.lower() in (BIN, HEX)
+
+
+def describe_production(path: Path, data: bytes) -> dict[str, Any]:
+    """What `plctool info` shows of a .bin or .hex: the parts with content, and the programs with their seals. Addresses
+    of a .bin count from its beginning. Raises UsageError when no program is in it."""
+    segments = list(_segments(path, data))
+    programs = [program for segment in segments for program in _programs(segment)]
+    if not programs:
+        raise UsageError(
+            f"{path} has no program of plctool in it, or not all of one; make it with 'plctool image'.", "bad-image"
+        )
+    parts = [{"address": f"{s.address:08X}", "size": len(s.data)} for s in segments]
+    return {"file": str(path), "parts": parts, "programs": programs}
+
+
+def _segments(path: Path, data: bytes) -> Iterator[Segment]:
+    if path.suffix.lower() == BIN:
+        yield Segment(0, data)
+        return
+    content = IntelHex()
+    try:
+        content.loadhex(io.StringIO(data.decode("ascii")))
+    except (HexReaderError, UnicodeDecodeError):
+        raise UsageError(f"{path} is not an Intel HEX file, or damaged; write it again.", "bad-image") from None
+    for start, end in content.segments():
+        yield Segment(start, bytes(content.tobinarray(start=start, end=end - 1)))
+
+
+def _programs(segment: Segment) -> Iterator[dict[str, Any]]:
+    data, at = segment.data, 0
+    while (at := data.find(_TAG, at)) >= 0:
+        image = _image_at(data, at)
+        if image is None:
+            at += len(_TAG)
+            continue
+        yield {"address": f"{segment.address + at:08X}", "seal": _seal_number(data, at, image), **describe_image(image)}
+        at += len(image)
+
+
+def _image_at(data: bytes, at: int) -> bytes | None:
+    size = ffi.offsetof("CDL_HEADER", "total_size")
+    image = data[at : at + int.from_bytes(data[at + size : at + size + 4], "little")]
+    try:
+        parse_image(image)
+    except UsageError:
+        return None
+    return image
+
+
+def _seal_number(data: bytes, at: int, image: bytes) -> int | None:
+    """The number of the seal after an image; None if there is no valid one: a device would not run it."""
+    start = at + align_up(len(image), _ALIGN)
+    seal = ffi.new("APP_SEAL *")
+    raw = data[start : start + ffi.sizeof("APP_SEAL")]
+    ffi.buffer(seal)[: len(raw)] = raw
+    valid = seal.number and seal.crc == image_crc(image) and seal.check == lib.AppSealCheck(seal)
+    return int(seal.number) if valid else None

@@ -1,0 +1,205 @@
+"""`plctool image` writes what a programmer burns, refuses what does not go together, and `info` reads it back."""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from intelhex import IntelHex
+
+from plctool.core import ffi, lib
+from plctool.image.board import known_boards
+
+PROGRAM = "PROGRAM Main VAR n : DINT; END_VAR n := n + 1; END_PROGRAM"
+TASKS = "".join(f"PROGRAM P{i} VAR n : DINT; END_VAR n := n + 1; END_PROGRAM\n" for i in range(3)) + (
+    "CONFIGURATION C RESOURCE R ON PLC\n"
+    + "".join(f"TASK T{i}(INTERVAL := T#1s); PROGRAM I{i} WITH T{i} : P{i};\n" for i in range(3))
+    + "END_RESOURCE END_CONFIGURATION"
+)
+SIZE = 4 * 1024 * 1024  # of plcrt's flash
+FLASH = 0x2100_0000  # of the mps2-an385
+
+
+@pytest.fixture
+def build(tool: Any, scratch: Path) -> Callable[..., Path]:
+    def build(text: str = PROGRAM, *options: str) -> Path:
+        (scratch / "app.st").write_text(text)
+        assert tool("build", "app.st", "-o", "app.cdl", *options).status == 0
+        return scratch / "app.cdl"
+
+    return build
+
+
+@pytest.fixture
+def for_m3(build: Callable[..., Path]) -> Path:
+    return build(PROGRAM, "--target", "cortex-m3")
+
+
+def facts(slug: str, **changes: int) -> bytes:
+    """Those of a board, with changes."""
+    index = [board.slug for board in known_boards()].index(slug)
+    copy = ffi.new("BOARD_FACTS *", lib.SimBoard(index)[0])
+    for name, value in changes.items():
+        setattr(copy, name, value)
+    return bytes(ffi.buffer(copy))
+
+
+def elf(data: bytes, section: str = "board_facts", address: int = 0, size: int = 64) -> bytes:
+    """The file of a firmware: one segment, and one section that is not loaded."""
+    names = f"\0{section}\0.shstrtab\0".encode()
+    code = bytes(range(size % 256 or 1)) + bytes(size - (size % 256 or 1))
+    at_code = 52 + 32
+    at_data = at_code + len(code)
+    at_names = at_data + len(data)
+    at_sections = at_names + len(names)
+    head = b"\x7fELF\1\1\1" + bytes(9)
+    head += struct.pack("<HHIIIIIHHHHHH", 2, 40, 1, address, 52, at_sections, 0, 52, 32, 1, 40, 3, 2)
+    segment = struct.pack("<8I", 1, at_code, address, address, len(code), len(code), 5, 4)
+    none = bytes(40)
+    of_data = struct.pack("<10I", 1, 1, 0, 0, at_data, len(data), 0, 0, 4, 0)
+    of_names = struct.pack("<10I", 2 + len(section), 3, 0, 0, at_names, len(names), 0, 0, 1, 0)
+    return head + segment + code + data + names + none + of_data + of_names
+
+
+def refused(done: Any, *words: str) -> None:
+    assert done.status == 2
+    for word in words:
+        assert word in done.err
+
+
+def test_bin_is_the_whole_flash_and_info_reads_it_back(tool: Any, scratch: Path, build: Any) -> None:
+    image = build().read_bytes()
+    document = tool("image", "app.cdl", "--board", "plcrt", "-o", "flash.bin", "--json").json
+    data = (scratch / "flash.bin").read_bytes()
+    assert len(data) == SIZE
+    assert data.startswith(image)
+    assert {piece["what"] for piece in document["pieces"]} == {"program", "empty slot", "commit log", "retain log"}
+    (program,) = tool("info", "flash.bin", "--json").json["programs"]
+    described = tool("info", "app.cdl", "--json").json
+    assert program["crc"] == described["crc"] == document["crc"]
+    assert program["seal"] == 1
+    assert program["tasks"] == described["tasks"]
+
+
+def test_hex_has_the_same_bytes_and_nothing_of_the_rest(tool: Any, scratch: Path, for_m3: Path) -> None:
+    for name in ("flash.bin", "flash.hex"):
+        assert tool("image", "app.cdl", "--board", "mps2-an385/standard", "-o", name).status == 0
+    content = IntelHex(str(scratch / "flash.hex"))
+    data = (scratch / "flash.bin").read_bytes()
+    assert content.minaddr() == FLASH
+    assert all(data[address - FLASH] == content[address] for address in content.addresses())
+    inside = {address - FLASH for address in content.addresses()}
+    assert all(byte == 0xFF for offset, byte in enumerate(data) if offset not in inside)
+    (program,) = tool("info", "flash.hex", "--json").json["programs"]
+    assert (program["address"], program["seal"]) == (f"{FLASH:08X}", 1)
+
+
+def test_logs_of_a_used_device_are_overwritten(tool: Any, scratch: Path, for_m3: Path) -> None:
+    tool("image", "app.cdl", "--board", "mps2-an385/standard", "-o", "flash.hex")
+    content = IntelHex(str(scratch / "flash.hex"))
+    flash = next(board.flash for board in known_boards() if board.slug == "mps2-an385/standard")
+    for file in (lib.FILE_COMMIT, lib.FILE_RETAIN):
+        begin = FLASH + flash.files[file].offset
+        assert set(range(begin, begin + flash.files[file].size)) <= set(content.addresses())
+    slot = FLASH + flash.files[lib.FILE_SLOT_B].offset
+    assert all(content[address] == 0xFF for address in range(slot, slot + flash.sector_size))
+
+
+def test_firmware_is_burned_too(tool: Any, scratch: Path, for_m3: Path) -> None:
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard")))
+    done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "flash.hex", "--json")
+    assert done.json["board"] == "MPS2 AN385 (standard)"
+    content = IntelHex(str(scratch / "flash.hex"))
+    assert bytes(content.tobinarray(start=0, end=63)) == bytes(range(64))
+    assert len(tool("info", "flash.hex", "--json").json["programs"]) == 1
+
+
+def test_an_image_for_another_target_is_refused(tool: Any, build: Any) -> None:
+    build()
+    done = tool("image", "app.cdl", "--board", "mps2-an385/full", "-o", "flash.hex")
+    refused(done, "x86_64-linux", "MPS2 AN385 (full)", "--target cortex-m3")
+
+
+def test_a_program_that_does_not_fit_is_refused(tool: Any, build: Any) -> None:
+    build(TASKS, "--target", "cortex-m3")
+    assert tool("image", "app.cdl", "--board", "mps2-an385/standard", "-o", "flash.hex").status == 0
+    done = tool("image", "app.cdl", "--board", "mps2-an385/minimal", "-o", "flash.hex")
+    refused(done, "needs 3 tasks, the device has 2 (T0, T1, T2)")
+
+
+def test_unknown_and_ambiguous_boards_are_refused(tool: Any, for_m3: Path) -> None:
+    refused(tool("image", "app.cdl", "--board", "mps2-an385", "-o", "x.hex"), "mps2-an385/minimal", "say which")
+    refused(tool("image", "app.cdl", "--board", "plrct", "-o", "x.hex"), "did you mean plcrt?")
+    refused(tool("image", "app.cdl", "-o", "x.hex"), "--board")
+
+
+def test_a_firmware_of_another_board_is_refused(tool: Any, scratch: Path, for_m3: Path) -> None:
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an386/standard")))
+    done = tool("image", "app.cdl", "--board", "mps2-an385/standard", "--firmware", "fw.elf", "-o", "x.hex")
+    refused(done, "firmware of MPS2 AN386 (standard)")
+    done = tool("image", "app.cdl", "--board", "mps2-an386/full", "--firmware", "fw.elf", "-o", "x.hex")
+    refused(done, "firmware of MPS2 AN386 (standard)")
+
+
+def test_a_firmware_with_another_map_is_refused(tool: Any, scratch: Path, for_m3: Path) -> None:
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard", sector_size=8192)))
+    done = tool("image", "app.cdl", "--board", "mps2-an385/standard", "--firmware", "fw.elf", "-o", "x.hex")
+    refused(done, "another map", "sectors have 0x2000, not 0x1000")
+
+
+def test_firmware_over_the_programs_is_refused(tool: Any, scratch: Path, for_m3: Path) -> None:
+    for address in (FLASH - 32, FLASH + 0x10000):
+        (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard"), address=address))
+        done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex")
+        refused(done, f"firmware at 0x{address:08X}", "over the flash for programs at 0x21000000 to 0x2107FFFF")
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard"), address=FLASH - 64))
+    assert tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex").status == 0
+
+
+def test_a_memory_of_its_own_has_no_firmware(tool: Any, scratch: Path, for_m3: Path) -> None:
+    for address in (0, 0x0800_0000):
+        (scratch / "fw.elf").write_bytes(elf(facts("lm3s6965-board/standard"), address=address))
+        done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex")
+        refused(done, "a memory of their own", "--board lm3s6965-board/standard alone")
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        (b"nothing", "not an ELF file"),
+        (elf(b"", section="other"), "does not say what its board is"),
+        (elf(facts("mps2-an385/full")[:-4]), "another version"),
+        (elf(facts("mps2-an385/full", size=4)), "another version"),
+    ],
+)
+def test_what_is_no_firmware_is_refused(tool: Any, scratch: Path, for_m3: Path, content: bytes, word: str) -> None:
+    (scratch / "fw.elf").write_bytes(content)
+    refused(tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex"), word)
+
+
+def test_output_that_cannot_be_is_refused(tool: Any, scratch: Path, for_m3: Path) -> None:
+    (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard")))
+    refused(tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.bin"), "write x.hex")
+    refused(tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.elf"), "neither .bin nor .hex")
+    refused(tool("image", "none.cdl", "--board", "plcrt", "-o", "x.hex"), "none.cdl")
+
+
+def test_info_of_a_file_without_program_or_seal(tool: Any, scratch: Path, build: Any) -> None:
+    image = build().read_bytes()
+    (scratch / "x.bin").write_bytes(b"\xff" * 4096)
+    refused(tool("info", "x.bin"), "no program")
+    (scratch / "x.bin").write_bytes(image[:-1].ljust(4096, b"\xff"))
+    refused(tool("info", "x.bin"), "no program")
+    (scratch / "x.hex").write_text("no hex")
+    refused(tool("info", "x.hex"), "not an Intel HEX file")
+    content, text = IntelHex(), io.StringIO()
+    content.frombytes(image, 0x1000)
+    content.write_hex_file(text)
+    (scratch / "x.hex").write_text(text.getvalue())
+    (program,) = tool("info", "x.hex", "--json").json["programs"]
+    assert (program["address"], program["seal"]) == ("00001000", None)
+    assert "without a valid seal" in tool("info", "x.hex").out
