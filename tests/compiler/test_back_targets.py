@@ -131,7 +131,7 @@ END_FUNCTION
 PROGRAM Main VAR n : INT; i : DINT; END_VAR n := Far(i); END_PROGRAM
 """
     )
-    code = parse_image(compile_sources([path], target=target, level=level, checks="none").image).code
+    code = parse_image(compile_sources([path], target=target, level=level, checks="none", limits=False).image).code
     assert (PROBES[target] in code) == probed
 
 

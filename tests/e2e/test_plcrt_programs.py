@@ -62,7 +62,7 @@ END_FUNCTION
     ids=["null", "stack"],
 )
 def test_what_no_check_stops_the_processor_does(tool, plcrt, eventually, text, name):
-    image = tool.build("fault", text, "--checks", "none")
+    image = tool.build("fault", text, "--checks", "none", "--no-limits")
     tool("flash", "--port", plcrt.port, str(image))
     fault = eventually(lambda: status(tool, plcrt)["exception"])
     assert fault["name"] == name

@@ -35,7 +35,7 @@ TASKS = {
 def build(folder: Path, text: str, level: Level = 2, checks: str = "all") -> BuildResult:
     path = folder / "main.st"
     path.write_text(text)
-    return compile_sources([path], level=level, checks=checks)
+    return compile_sources([path], level=level, checks=checks, limits=False)
 
 
 def code_after(plc: Simulator, ms: int = 50) -> int:

@@ -57,6 +57,10 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}"
     )
     target.completer = lambda **words: TARGETS  # type: ignore[attr-defined]  # for argcomplete
+    _add_board(build, "whose limits the program must keep, such as mps2-an385/standard")
+    build.add_argument(
+        "--no-limits", action="store_true", help="build also what no device that plctool knows has room for"
+    )
     build.add_argument(
         "-O", dest="level", type=_level, metavar="0..3|s", default=2, help="optimisation, s for small code; default: 2"
     )
@@ -80,8 +84,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     image = command("image", "write what a production programmer burns: a flash with its program")
     _add_image(image)
-    board = image.add_argument("--board", metavar="NAME", help="such as plcrt, mps2-an385/standard")
-    board.completer = lambda **words: _board_names()  # type: ignore[attr-defined]  # for argcomplete
+    _add_board(image, "such as plcrt, mps2-an385/standard")
     image.add_argument(
         "--firmware", type=Path, metavar="FILE.elf", help="burn it as well; for a board that plctool does not know"
     )
@@ -221,10 +224,13 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_link(param, symbols=True)
 
 
-def _board_names() -> list[str]:
-    from plctool.image.board import known_boards
+def _add_board(parser: argparse.ArgumentParser, text: str) -> None:
+    def names(**words: object) -> list[str]:
+        from plctool.image.board import known_boards
 
-    return [board.slug for board in known_boards()]
+        return [board.slug for board in known_boards()]
+
+    parser.add_argument("--board", metavar="NAME", help=text).completer = names  # type: ignore[attr-defined]
 
 
 def _add_sources(parser: argparse.ArgumentParser) -> None:

@@ -50,6 +50,8 @@ def build(
     debug: bool,
     warnings: WarningOptions,
     io: IoFiles,
+    board: str | None = None,
+    limits: bool = True,
 ) -> tuple[Document, list[str]]:
     """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as users read them.
 
@@ -60,7 +62,17 @@ def build(
     from plctool.debug.symbols import symbol_path
 
     check_output(output, paths, f"-o {output.stem}.cdl")
-    result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug, warnings=warnings, io=io)
+    result = compile_sources(
+        paths,
+        target=target,
+        level=level,
+        checks=checks,
+        debug=debug,
+        warnings=warnings,
+        io=io,
+        board=board,
+        limits=limits,
+    )
     result.write(output)
     channels = result.symbols.io.get("channels", [])
     document = {
@@ -69,6 +81,7 @@ def build(
         "crc": f"{result.crc:08X}",
         "size": len(result.image),
         "target": result.symbols.target,
+        "needs": {name: need.amount for name, need in result.needs.items()},
         "warnings": [diagnostic_document(w) for w in result.warnings],
     }
     if channels:

@@ -50,8 +50,9 @@ def _print_warnings(args: argparse.Namespace, warnings: Sequence[str]) -> None:
 
 def _build(args: argparse.Namespace) -> int:
     document, warnings = documents.build(
-        args.sources, args.output, args.target, args.level, args.checks, args.debug, _warnings(args), _io_files(args)
-    )
+        args.sources, args.output, args.target, args.level, args.checks, args.debug, _warnings(args), _io_files(args),
+        args.board, not args.no_limits,
+    )  # fmt: skip
     _print_warnings(args, warnings)
     return _show(args, document, output.build_text)
 

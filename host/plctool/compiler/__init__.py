@@ -121,26 +121,33 @@ def compile_sources(
     debug: bool = False,
     warnings: WarningOptions | None = None,
     io: IoFiles = IoFiles(),
+    board: str | None = None,
+    limits: bool = True,
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
     said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
-    inputs and outputs.
+    inputs and outputs; `board`: one that plctool knows, such as mps2-an385/standard, to whose target and limits the
+    program is held; without `limits` it may need more than any device has.
 
-    Raises CompileError when the program has errors, UsageError for options that make no sense, InternalError when
-    the compiler has a bug.
+    Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
+    does not fit its device, InternalError when the compiler has a bug.
     """
     from plctool.compiler.build import build_program
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
     from plctool.compiler.diagnostics import render
+    from plctool.compiler.fit import check_program_fits
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
+    from plctool.image.board import find_board
     from plctool.image.file import ApplicationInfo
     from plctool.image.targets import find_target
 
     number, size = (2, True) if level == "s" else (level, False)
     description = load_io(paths, io)
-    options = Options(find_target(_target(target, description)), number, parse_checks(checks), debug, size)
+    known = None if board is None else find_board(board)
+    wanted = target or (None if known is None else known.target)
+    options = Options(find_target(_target(wanted, description)), number, parse_checks(checks), debug, size)
     sources = load_sources(paths)
     shown = [*sources, *io_sources(description)]
     with bugs_reported():
@@ -151,5 +158,7 @@ def compile_sources(
     info = ApplicationInfo(project=Path(paths[0]).stem, date=int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
     with bugs_reported():
         built = build_program(checked.program, options, info)
+    if limits:
+        check_program_fits(built.needs, options.target, known, None if description is None else description.device)
     found = checked.diagnostics
     return replace(built, warnings=found, rendered_warnings=[render(d, shown) for d in found])

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from plctool.compiler.codegen.emit import emit_objects
 from plctool.compiler.codegen.link import Linked, link
 from plctool.compiler.codegen.lower import Lowered, lower
 from plctool.compiler.codegen.lower_unit import Options
+from plctool.compiler.codegen.stack import deepest_calls
 from plctool.compiler.diagnostics import Diagnostic
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.io_configuration import assign_tasks, configuration_of, io_document
@@ -24,6 +26,7 @@ from plctool.iec.areas import Area
 from plctool.iec.types import CLASS_NUMBER, base_of
 from plctool.iec.values import encode
 from plctool.image.file import ApplicationInfo, ExternalFunction, Image, ImagePart, ImageTask, build_image, image_crc
+from plctool.image.limits import Need, largest, needs_of_image, of_area
 from plctool.image.targets import Machine, Target
 from plctool.io.configuration import pack_configuration
 
@@ -33,11 +36,13 @@ _CODE_ALIGN = int(lib.APP_CODE_ALIGN)
 
 @dataclass(frozen=True)
 class BuildResult:
-    """An image and its symbols. `sizes`: bytes of code made from each POU's source, inlined copies included."""
+    """An image and its symbols. `sizes`: bytes of code made from each POU's source, inlined copies included; `needs`:
+    what a device must have room for, by the names of `LIMITS`."""
 
     image: bytes
     symbols: SymbolTable
     sizes: dict[str, int] = field(default_factory=dict)
+    needs: dict[str, Need] = field(default_factory=dict)
     warnings: list[Diagnostic] = field(default_factory=list)
     rendered_warnings: list[str] = field(default_factory=list)
 
@@ -66,7 +71,7 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     symbols = _symbols(program, lowered, linked, target, info.project)
     kept = kept_parts(v for v in program.globals if v.area is Area.RETAIN)
     code, io = linked.code, None
-    if program.io is not None:
+    if program.io is not None and program.io.connectors:
         assign_tasks(program, program.io)
         configuration = pack_configuration(configuration_of(program, program.io))
         code += bytes(-len(code) % _CODE_ALIGN)
@@ -92,7 +97,37 @@ def _build(program: TypedProgram, options: Options, info: ApplicationInfo) -> Bu
     )
     built = build_image(image)
     symbols.image_crc = image_crc(built)
-    return BuildResult(built, symbols, code_sizes(symbols, len(linked.code)))
+    sizes = code_sizes(symbols, len(linked.code))
+    return BuildResult(built, symbols, sizes, _needs(program, lowered, linked, image, len(built), sizes, target))
+
+
+def _needs(
+    program: TypedProgram,
+    lowered: Lowered,
+    linked: Linked,
+    image: Image,
+    size: int,
+    sizes: dict[str, int],
+    target: Target,
+) -> dict[str, Need]:
+    needs = needs_of_image(image, size)
+    for area in program.area_sizes:
+        parts = ((v.name, v.type.size) for v in program.globals if v.area is area)
+        name = of_area(area)
+        if name in needs:
+            needs[name] = replace(needs[name], parts=largest(parts))
+    for name in ("code", "image"):
+        needs[name] = replace(needs[name], parts=tuple(sizes.items()))
+    roots = [linked.symbols[name].offset for name in (*lowered.tasks, *lowered.functions.values())]
+    chain = deepest_calls(linked.code, target.machine, linked.frames, roots)
+    names = {symbol.offset: name for name, symbol in linked.symbols.items()}
+    names |= {linked.symbols[name].offset: pou.name for name, pou in lowered.pous.items() if name in linked.symbols}
+    names |= {linked.symbols[name].offset: task.name for name, task in zip(lowered.tasks, program.tasks, strict=True)}
+    frames: Counter[str] = Counter()
+    for offset, frame in chain:
+        frames[names[offset]] += frame
+    needs["stack"] = Need(frames.total(), largest((+frames).items()), deepest=True)
+    return needs
 
 
 def _entry(linked: Linked, name: str, target: Target) -> int:

@@ -20,6 +20,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError, did_you_mean
 from plctool.iec.areas import Area
 from plctool.image.file import target_name
+from plctool.image.limits import of_area
 
 SLOT_A, SLOT_B, COMMIT, RETAIN = (int(n) for n in (lib.FILE_SLOT_A, lib.FILE_SLOT_B, lib.FILE_COMMIT, lib.FILE_RETAIN))
 _SECTION = "board_facts"
@@ -117,7 +118,7 @@ def _board(facts: Any) -> Board:
     limits = {
         "tasks": int(facts.tasks),
         "functions": int(facts.imports),
-        **{Area(index).name.lower(): int(size) for index, size in enumerate(facts.area)},
+        **{of_area(Area(index)): int(size) for index, size in enumerate(facts.area)},
         "code": int(facts.code) or slot,
         "image": slot,
     }

@@ -14,14 +14,16 @@ LIMITS = {
     "functions": "C functions",
     "data": "bytes of variables",
     "retain": "bytes of RETAIN variables",
-    "input": "bytes of inputs (%I)",
-    "output": "bytes of outputs (%Q)",
+    "inputs": "bytes of inputs (%I)",
+    "outputs": "bytes of outputs (%Q)",
     "memory": "bytes of %M",
     "code": "bytes of code",
     "image": "bytes of flash for the image",
     "stack": "bytes of stack",
 }
 """What a device may limit, and what messages call it."""
+
+_OF_AREA = {Area.INPUT: "inputs", Area.OUTPUT: "outputs"}
 
 _LARGEST = 3
 
@@ -36,6 +38,11 @@ class Need:
     deepest: bool = False
 
 
+def of_area(area: Area) -> str:
+    """The limit of an area."""
+    return _OF_AREA.get(area, area.name.lower())
+
+
 def largest(parts: Iterable[tuple[str, int]]) -> tuple[tuple[str, int], ...]:
     """In the order of messages."""
     return tuple(sorted(parts, key=lambda part: (-part[1], part[0])))
@@ -46,7 +53,7 @@ def needs_of_image(image: Image, size: int) -> dict[str, Need]:
     return {
         "tasks": Need(len(image.tasks), tuple((task.name, 1) for task in image.tasks)),
         "functions": Need(len(image.externals), tuple((e.name, 1) for e in image.externals)),
-        **{Area(index).name.lower(): Need(amount) for index, amount in image.areas.items()},
+        **{of_area(Area(index)): Need(amount) for index, amount in image.areas.items()},
         "code": Need(len(image.code)),
         "image": Need(size),
     }

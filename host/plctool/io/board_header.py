@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from plctool.iec.types import StringType
-from plctool.io.device_file import DeviceFile, Module
+from plctool.io.device_file import IO_LIMITS, DeviceFile, Module
 
 
 def board_header(device: DeviceFile) -> tuple[str, str]:
@@ -31,9 +31,10 @@ def board_header(device: DeviceFile) -> tuple[str, str]:
         lines.append("")
     for module in device.modules.values():
         lines += [*_module(module), ""]
-    for limit, value in device.limits.items():
+    limits = {name: value for name, value in device.limits.items() if name in IO_LIMITS}
+    for limit, value in limits.items():
         lines.append(f"#define IO_LIMIT_{limit.upper()} {value}")
-    lines += [""] * bool(device.limits) + ["#endif", ""]
+    lines += [""] * bool(limits) + ["#endif", ""]
     return name, "\n".join(lines)
 
 

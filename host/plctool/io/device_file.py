@@ -9,6 +9,11 @@ inputs = 64                               # bytes
 outputs = 64
 connectors = 4
 channels = 64
+tasks = 3                                 # of the program; also functions, memory, image (its slot of the flash)
+data = 4096                               # bytes
+retain = 512
+code = 65536
+stack = 1024                              # of each task
 
 [gpio]                                    # lines of IoDrvGpio, by the names printed on the board
 in  = { DI0 = 0, DI1 = { line = 1, text = "terminal X1.2" } }
@@ -38,8 +43,10 @@ from plctool.io.tables import Entry, Table, each
 
 MAX_LINE = 63  # characters
 MAX_ID = 0x7FFF_FFFF
-LIMITS = {"inputs": 1 << 16, "outputs": 1 << 16, "connectors": 0xFFFE, "channels": 0xFFFE}
-"""What a vendor may limit, and the largest value of each; inputs and outputs in bytes."""
+IO_LIMITS = {"inputs": 1 << 16, "outputs": 1 << 16, "connectors": 0xFFFE, "channels": 0xFFFE}
+PROGRAM_LIMITS = dict.fromkeys(("tasks", "functions", "data", "retain", "memory", "code", "image", "stack"), MAX_ID)
+LIMITS = IO_LIMITS | PROGRAM_LIMITS
+"""What a vendor may limit, and the largest value of each; sizes in bytes."""
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from plctool.compiler.codegen.relocations import (
     stub,
     thumb_addend,
 )
+from plctool.compiler.codegen.stack import Frames, read_frames
 from plctool.compiler.typed import External
 from plctool.errors import UsageError
 from plctool.iec.types import align_up
@@ -51,13 +52,15 @@ class LinkedSymbol:
 class Linked:
     """`code`: the block. `lines`: sorted by address, an address being an offset in the block. `debug`: the objects with
     nothing but their debugging information, in which addresses are such offsets too, or -1 outside of the block.
-    `imports`: the compiler calls that got a stub, in the order of their slots, starting with `first_slot`."""
+    `imports`: the compiler calls that got a stub, in the order of their slots, starting with `first_slot`. `frames`: of
+    the functions."""
 
     code: bytes
     symbols: dict[str, LinkedSymbol]
     lines: list[Line]
     debug: list[bytes]
     imports: list[External]
+    frames: Frames
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,7 @@ class _Linker:
         imports = [COMPILER_CALLS[name] for name in self._stubs]
         self._relocate_debug()
         debug = [_only_debug(sections, data) for sections, data in self._objects]
-        return Linked(bytes(code), symbols, self._lines(), debug, imports)
+        return Linked(bytes(code), symbols, self._lines(), debug, imports, self._frames())
 
     def _reach(self, start: set[int]) -> list[int]:
         """The sections that the given ones refer to, directly or not, code first."""
@@ -246,6 +249,13 @@ class _Linker:
         if target.is_debug:
             return symbol.value + addend
         return self._address(symbol) + addend if target.offset >= 0 else -1
+
+    def _frames(self) -> Frames:
+        found: Frames = {}
+        for section in self._sections:
+            if section.name == ".debug_frame":
+                found |= read_frames(section.data, self._target.pointer_size)
+        return found
 
     def _lines(self) -> list[Line]:
         """The line tables of the sections in the block."""

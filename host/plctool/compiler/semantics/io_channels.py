@@ -360,8 +360,8 @@ def _check_limits(description: Description, allocation: Allocation, diagnostics:
         "connectors": (len(description.connectors), "devices"),
         "channels": (len(description.channels), "channels"),
     }
-    for name, limit in device.limits.items():
-        count, what = used[name]
+    for name, (count, what) in used.items():
+        limit = device.limits.get(name, count)
         if count > limit:
             where = description.channels[0][1].pos if description.channels else Pos(description.path, 1, 1)
             diagnostics.error(where, CODE, f"there are {count} {what}; {device.title} has room for {limit}")

@@ -1,0 +1,147 @@
+"""How much stack a program needs: the frames of its functions, and the deepest chain of calls.
+
+What C functions of the runtime take is not counted, nor what the processor pushes when it is interrupted.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator
+
+from plctool.compiler.codegen.calls import branches
+from plctool.image.targets import Machine
+
+Frames = dict[int, tuple[int, int]]
+"""Size of the code and of the frame of each function, by its offset in the block; in bytes."""
+
+
+def deepest_calls(code: bytes, machine: Machine, frames: Frames, roots: Iterable[int]) -> list[tuple[int, int]]:
+    """The chain of calls from one of `roots` that needs most: functions with the bytes of their frames."""
+    called = _calls(code, machine, frames)
+    deepest: dict[int, tuple[int, int | None, bool]] = {}  # bytes; what is called; the frame is still there
+
+    def need(function: int) -> int:
+        if function not in deepest:
+            own = frames[function][1]
+            deepest[function] = (own, None, True)  # the answer within what only looks like a recursion
+            for target, returns in called.get(function, {}).items():
+                amount = need(target) + (own if returns else 0)
+                if amount > deepest[function][0]:
+                    deepest[function] = (amount, target, returns)
+        return deepest[function][0]
+
+    root = max((r for r in roots if r in frames), key=need, default=None)
+    chain: list[tuple[int, int]] = []
+    while root is not None and root not in (function for function, _ in chain):
+        _, target, keeps = deepest[root]
+        chain.append((root, frames[root][1] if keeps else 0))
+        root = target
+    return chain
+
+
+def _calls(code: bytes, machine: Machine, frames: Frames) -> dict[int, dict[int, bool]]:
+    """By caller: what it calls (true), or jumps to at its end."""
+    starts = sorted(frames)
+    found: dict[int, dict[int, bool]] = {}
+    for branch in branches(code, machine, frames.keys()):
+        caller = starts[bisect_right(starts, branch.place) - 1]
+        inside = caller <= branch.place < caller + frames[caller][0]
+        if inside and branch.target != caller:
+            targets = found.setdefault(caller, {})
+            targets[branch.target] = targets.get(branch.target, False) or branch.returns
+    return found
+
+
+# ---- the frames -----------------------------------------------------------------------------------------------------
+
+_ADVANCE, _OFFSET, _RESTORE = 0x40, 0x80, 0xC0
+_SKIPPED = {0x00: "", 0x01: "a", 0x02: "1", 0x03: "2", 0x04: "4", 0x05: "uu", 0x06: "u", 0x07: "u", 0x08: "u",
+            0x09: "uu", 0x0A: "", 0x0B: "", 0x0D: "u", 0x0F: "b", 0x10: "ub", 0x11: "us", 0x12: "us", 0x13: "s",
+            0x14: "uu", 0x15: "us", 0x16: "ub", 0x2E: "u"}  # fmt: skip
+"""Operands of the instructions that leave the size of the frame alone (DWARF 4, 7.23): address, fixed size, LEB128,
+block."""
+
+
+def read_frames(data: bytes, address_size: int) -> Frames:
+    """From a .debug_frame whose addresses are offsets in the block (DWARF 4, 6.4.1): the largest distance between the
+    stack pointer before the call and within the function. Functions that are no part of the block are left out."""
+    initial: dict[int, int] = {}
+    frames: Frames = {}
+    at = 0
+    while at + 8 <= len(data):
+        length = int.from_bytes(data[at : at + 4], "little")
+        reader = _Reader(data, at + 8, at + 4 + length, address_size)
+        cie = int.from_bytes(data[at + 4 : at + 8], "little")
+        if cie == 0xFFFF_FFFF:
+            initial[at] = _largest_frame(reader.after_head())
+        else:
+            begin, size = reader.fixed(address_size), reader.fixed(address_size)
+            if begin >> (8 * address_size - 1) == 0:
+                frames[begin] = (size, max(initial.get(cie, 0), _largest_frame(reader)))
+        at += 4 + length
+    return frames
+
+
+class _Reader:
+    def __init__(self, data: bytes, at: int, end: int, address_size: int) -> None:
+        self._data, self._at, self._end, self._address_size = data, at, end, address_size
+
+    def __bool__(self) -> bool:
+        return self._at < self._end
+
+    def fixed(self, size: int) -> int:
+        self._at += size
+        return int.from_bytes(self._data[self._at - size : self._at], "little")
+
+    def unsigned(self) -> int:
+        """An LEB128 number; of a signed one only that it is passed."""
+        value = shift = 0
+        while True:
+            byte = self.fixed(1)
+            value |= (byte & 0x7F) << shift
+            shift += 7
+            if byte < 0x80:
+                return value
+
+    def after_head(self) -> _Reader:
+        """Passes what a CIE has before its instructions."""
+        version = self.fixed(1)
+        while self.fixed(1):
+            pass
+        if version >= 4:
+            self.fixed(2)
+        for _ in range(3):  # alignment of code and data, register of the return address
+            self.unsigned()
+        return self
+
+    def skip(self, operands: str) -> None:
+        for kind in operands:
+            if kind == "a":
+                self.fixed(self._address_size)
+            elif kind in "us":
+                self.unsigned()
+            elif kind == "b":
+                self.fixed(self.unsigned())
+            else:
+                self.fixed(int(kind))
+
+
+def _largest_frame(reader: _Reader) -> int:
+    return max(_frame_sizes(reader), default=0)
+
+
+def _frame_sizes(reader: _Reader) -> Iterator[int]:
+    while reader:
+        code = reader.fixed(1)
+        if code & 0xC0 == _OFFSET:
+            reader.unsigned()
+        elif code & 0xC0 in (_ADVANCE, _RESTORE):
+            pass
+        elif code in (0x0C, 0x0E):  # DW_CFA_def_cfa, DW_CFA_def_cfa_offset
+            if code == 0x0C:
+                reader.unsigned()
+            yield reader.unsigned()
+        elif code in _SKIPPED:
+            reader.skip(_SKIPPED[code])
+        else:
+            return  # unknown: what follows cannot be read

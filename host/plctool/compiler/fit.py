@@ -1,0 +1,33 @@
+"""Whether a program fits its device, found out before it is flashed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from plctool.core import lib
+from plctool.image.board import Board, known_boards
+from plctool.image.limits import LIMITS, Need, check_fit
+from plctool.image.targets import Target
+from plctool.io.device_file import PROGRAM_LIMITS, DeviceFile
+
+_OTHERWISE = "say so in a device file (docs/io.md) or build with --no-limits"
+
+
+def check_program_fits(
+    needs: Mapping[str, Need], target: Target, board: Board | None, device: DeviceFile | None
+) -> None:
+    """Compares with what `board` has, else with the limits of the device file, else with the most that any firmware of
+    this repository has on this processor. Raises UsageError saying what does not fit, and what needs most of it."""
+    own = {} if device is None else {name: n for name, n in device.limits.items() if name in PROGRAM_LIMITS}
+    if board is not None:
+        check_fit(needs, board.limits, board.title, "Make the program smaller.")
+    elif own and device is not None:
+        check_fit(
+            needs, own, device.title,
+            f"Make the program smaller; if the firmware has more room, correct {device.path}.",
+        )  # fmt: skip
+    else:
+        same = [b for b in known_boards() if b.device_id == getattr(lib, target.device_id)]
+        limits = {name: max(b.limits.get(name, 0) for b in same) for name in LIMITS} if same else {}
+        names = " or ".join(dict.fromkeys(b.name for b in same))
+        check_fit(needs, limits, names, f"Make the program smaller; if your firmware has more room, {_OTHERWISE}.")

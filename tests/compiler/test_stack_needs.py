@@ -1,0 +1,92 @@
+"""How much stack a program needs is read from its machine code: the same chain of calls on every target."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from plctool.compiler import compile_sources
+from plctool.compiler.codegen.calls import branches
+from plctool.image.targets import TARGETS
+
+LEVELS = (0, 2, "s")
+# Arrays that stay, in functions that are called from two places each, so that they are not inlined at -O0 and -Os.
+CHAIN = """FUNCTION Leaf : DINT
+VAR_INPUT n : DINT; END_VAR
+VAR t : ARRAY[0..99] OF DINT; i : DINT; END_VAR
+FOR i := 0 TO 99 DO t[i] := n * i; END_FOR
+Leaf := t[n];
+END_FUNCTION
+FUNCTION Branch : DINT
+VAR_INPUT n : DINT; END_VAR
+VAR t : ARRAY[0..49] OF DINT; i : DINT; END_VAR
+FOR i := 0 TO 49 DO t[i] := Leaf(i) XOR n; END_FOR
+Branch := Leaf(t[n]) + t[n + 1];
+END_FUNCTION
+FUNCTION Wide : DINT
+VAR_INPUT n : DINT; END_VAR
+VAR t : ARRAY[0..139] OF DINT; i : DINT; END_VAR
+FOR i := 0 TO 139 DO t[i] := n + i; END_FOR
+Wide := t[n];
+END_FUNCTION
+PROGRAM Main
+VAR a, b : DINT; END_VAR
+a := Branch(a) + Wide(b);
+b := Branch(b) - Wide(a);
+END_PROGRAM
+"""
+LEAF, BRANCH, WIDE = 400, 200, 560
+
+
+@pytest.fixture
+def chain(tmp_path: Path) -> Path:
+    (tmp_path / "chain.st").write_text(CHAIN)
+    return tmp_path / "chain.st"
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_deepest_chain_counts_and_no_other(chain: Path, target: str, level: int) -> None:
+    need = compile_sources([chain], target=target, level=level).needs["stack"]
+    inlined = LEAF + BRANCH + WIDE  # at most: what is inlined may lie side by side
+    assert LEAF + BRANCH <= need.amount < inlined + 400
+    assert need.amount == sum(amount for _, amount in need.parts)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_each_frame_is_named(chain: Path, target: str) -> None:
+    frames = dict(compile_sources([chain], target=target, level=0).needs["stack"].parts)
+    assert LEAF <= frames["Leaf"] < LEAF + 100
+    assert BRANCH <= frames["Branch"] < BRANCH + 100
+    assert "Wide" not in frames
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_methods_called_through_an_interface_count(tmp_path: Path, target: str) -> None:
+    """Which one runs is known when it runs: the deepest counts."""
+    classes = "\n".join(
+        f"""FUNCTION_BLOCK B{i} IMPLEMENTS IRun
+VAR n : DINT; END_VAR
+METHOD Run : DINT
+VAR t : ARRAY[0..{size}] OF DINT; i : DINT; END_VAR
+FOR i := 0 TO {size} DO t[i] := n * i; END_FOR
+Run := t[n];
+END_METHOD
+END_FUNCTION_BLOCK"""
+        for i, size in enumerate((9, 299, 19))
+    )
+    (tmp_path / "app.st").write_text(
+        f"INTERFACE IRun METHOD Run : DINT END_METHOD END_INTERFACE\n{classes}\n"
+        "PROGRAM Main VAR b0 : B0; b1 : B1; b2 : B2; which : IRun; n : DINT; END_VAR\n"
+        "CASE n OF 0: which := b0; 1: which := b1; ELSE which := b2; END_CASE\nn := which.Run() + n;\nEND_PROGRAM"
+    )
+    need = compile_sources([tmp_path], target=target, level=0).needs["stack"]
+    assert 1200 <= need.amount < 1500
+
+
+def test_a_distance_that_looks_like_a_call_leads_to_a_function_or_is_none() -> None:
+    for target in TARGETS.values():
+        assert list(branches(bytes(64), target.machine, frozenset({4}))) == []
+        assert list(branches(b"\xff" * 64, target.machine, frozenset({1}))) == []
+        assert list(branches(b"\xe8\xf0", target.machine, frozenset({0}))) == []
