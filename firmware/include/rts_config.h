@@ -343,8 +343,8 @@
 #define COM_QUEUE_SIZE 640
 #endif
 
-/* Whether block driver, router and channel server count what arrives, is dropped and is repeated: for tests, and for a
- * look with the debugger at a bad line. 300 bytes of flash, 80 of RAM. */
+/* Whether block driver, router and channel server count what arrives, is dropped and is repeated: for `channelinfo` of
+ * the PLC shell, or a look with the debugger at a bad line. 300 bytes of flash, 80 of RAM. */
 #ifndef COMM_COUNTERS
 #define COMM_COUNTERS 1
 #endif
