@@ -155,7 +155,7 @@ i := n;
 END_PROGRAM
 """
     )
-    built = compile_sources([path], level=level, checks="none")
+    built = compile_sources([path], level=level, checks="none", limits=False)
     with Simulator(built.image, built.symbols) as plc:
         plc.run_cycles(1, check=False)
         assert places(plc, built.symbols) in ([("Far", 1), ("Main", 9)], [("Main", 7)])  # the latter when inlined
