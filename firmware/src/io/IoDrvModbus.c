@@ -33,10 +33,14 @@ static const IoDrvInfo *get_info(void)
 
 /* ---- configuration ---- */
 
+/* What is asked for is set up when it is known what is copied. */
 static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
 {
+    RTS_UNUSED(connectors);
+    RTS_UNUSED(count);
     is_running = false;
-    return ModbusSetUp(&setup, &driver, connectors, count);
+    ModbusGiveBack(&setup);
+    return ERR_OK;
 }
 
 static bool is_channel_good(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, bool is_output)
@@ -54,13 +58,18 @@ static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConf
 
     if ((place.device == NULL && place.server == NULL) || is_channel_good(&place, channel, type == IO_MAP_OUTPUTS))
         return ERR_OK;
-    return IoMgrConfigRefuse(connector, ERR_PARAMETER, "a channel is not in its data.");
+    return MODBUS_REFUSE(connector, ERR_PARAMETER, "a channel is not in its data.");
 }
 
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
+    RTS_RESULT result;
 
+    do {
+        result = ModbusSetUp(&setup, &driver);
+        if (result == ERR_OK)
+            result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
+    } while (result == ERR_PENDING);
     is_running = result == ERR_OK;
     return result;
 }
