@@ -60,9 +60,9 @@ typedef struct {
     MODBUS_JOB_STATE *job;
     MODBUS_REQUEST request;
     bool sent;  /* else it waits for the link */
-    bool waits; /* the last byte has left, the time-out runs */
+    bool waits; /* the last byte has left */
     bool verifies;
-    RTS_I64 since_ns; /* since when it waits for the link, or for the reply */
+    RTS_I64 since_ns; /* from when it waits for the link, or for the reply: the time-out runs */
     RTS_UI16 transaction;
     RTS_UI8 head[MODBUS_HEAD_SIZE];
 } MODBUS_CLIENT;

@@ -35,6 +35,8 @@ typedef struct {
     RTS_UI32 (*receive)(MODBUS_LINK *link, RTS_I64 now_ns);
     /* Begins to send a PDU of this size that is in the buffer, to or from the unit there. */
     void (*send)(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
+    /* What was sent is of no use any more: nothing more of it leaves, as far as that can be helped. TCP: closes. */
+    void (*give_up)(MODBUS_LINK *link);
 } MODBUS_LINK_TYPE;
 
 struct MODBUS_LINK {

@@ -22,7 +22,7 @@ void fakes_begin(void)
     fakes.now_ns = NS_PER_S;
     fakes.char_ns = (RTS_I64)NS_PER_S * BITS_PER_CHAR / BAUD;
     fakes.write_limit = FAKE_LINE_ROOM;
-    fakes.send_limit = FAKE_SOCKET_ROOM;
+    fakes.send_limit = fakes.window = FAKE_SOCKET_ROOM;
     fakes.connect_result = ERR_OK;
 }
 
@@ -199,7 +199,7 @@ RTS_RESULT SysSockRecv(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, RTS_UI32
 RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *taken)
 {
     FAKE_SOCKET *to = &fakes.sockets[socket];
-    RTS_UI32 room = FAKE_SOCKET_ROOM - to->out_size;
+    RTS_UI32 room = fakes.window > to->out_size ? fakes.window - to->out_size : 0;
 
     *taken = size < room ? size : room;
     *taken = *taken < fakes.send_limit ? *taken : fakes.send_limit;

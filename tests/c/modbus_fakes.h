@@ -51,7 +51,8 @@ typedef struct {
     RTS_UI32 listeners;
     RTS_RESULT connect_result; /* ERR_OK, ERR_PENDING, ERR_NET_NOTCONNECTED */
     RTS_UI32 connects;
-    RTS_UI32 send_limit;
+    RTS_UI32 send_limit; /* bytes that one SysSockSend takes */
+    RTS_UI32 window;     /* bytes that a socket takes before they are read */
 } MODBUS_FAKES;
 
 extern MODBUS_FAKES fakes;

@@ -18,6 +18,7 @@ static MODBUS_DEVICE devices[2];
 static MODBUS_JOB_STATE states[2];
 static RTS_UI8 in[2][2];
 static bool silent;
+static RTS_UI8 silent_unit;
 static bool refuses; /* the gateway: for unit 2 */
 static RTS_UI16 transaction_offset;
 static RTS_UI32 asked;
@@ -32,6 +33,7 @@ static void begin(RTS_UI32 count)
     memset(states, 0, sizeof(states));
     memset(in, 0, sizeof(in));
     silent = refuses = false;
+    silent_unit = 0;
     transaction_offset = 0;
     asked = 0;
     for (RTS_UI32 i = 0; i < 2; i++) {
@@ -59,7 +61,7 @@ static void serve(void)
     asked++;
     if (!silent && refuses && unit == 2)
         net_put_pdu(socket, ModbusGet16(socket->out), unit, (const RTS_UI8[]){0x83, MODBUS_NO_TARGET}, 2);
-    else if (!silent)
+    else if (!silent && unit != silent_unit)
         net_put_pdu(socket, (RTS_UI16)(ModbusGet16(socket->out) + transaction_offset), unit,
                     (const RTS_UI8[]){3, 2, 0, (RTS_UI8)asked}, 4);
     socket->out_size = 0;
@@ -134,7 +136,7 @@ static void a_reply_of_another_transaction_is_passed_over(void)
     begin(1);
     run_ms(200);
     transaction_offset = 1;
-    run_ms(1000);
+    run_ms(3000);
     CHECK(ModbusDeviceIsLost(&devices[0]));
     CHECK(devices[0].counters.others >= 2);
     transaction_offset = 0;
@@ -156,14 +158,63 @@ static void a_device_that_the_gateway_does_not_reach_is_lost(void)
     CHECK(ModbusDeviceIsGood(&devices[1]));
 }
 
-static void a_silent_device_does_not_end_the_connection(void)
+/* What was asked may be on its way still. */
+static void a_request_without_reply_ends_the_connection(void)
 {
     begin(1);
     run_ms(200);
     silent = true;
-    run_ms(1000);
+    while (devices[0].counters.timeouts == 0)
+        run_ms(1);
+    CHECK(!fakes.sockets[0].open);
+    silent = false;
+    run_ms(INTERVAL_MS);
+    CHECK_EQUAL(fakes.connects, 2);
+    CHECK_EQUAL(devices[0].counters.timeouts, 1);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+static void a_silent_device_of_a_gateway_costs_the_others_little(void)
+{
+    RTS_UI32 before;
+
+    begin(2);
+    silent_unit = 2;
+    run_ms(60000);
+    CHECK(ModbusDeviceIsLost(&devices[1]));
+    before = devices[0].counters.requests;
+    run_ms(120000);
+    CHECK(devices[0].counters.requests - before >= 120000 / INTERVAL_MS - 8);
+    CHECK_EQUAL(devices[0].counters.timeouts, 0);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+/* Its window is closed: it takes no bytes, or half a request. */
+static void a_peer_that_takes_nothing_is_lost_and_comes_back(void)
+{
+    for (RTS_UI32 taken = 0; taken < REQUEST_SIZE; taken += REQUEST_SIZE / 2) {
+        begin(1);
+        run_ms(200);
+        fakes.window = taken;
+        run_ms(3000);
+        CHECK(ModbusDeviceIsLost(&devices[0]));
+        fakes.window = FAKE_SOCKET_ROOM;
+        run_ms(2500);
+        CHECK(ModbusDeviceIsGood(&devices[0]));
+    }
+}
+
+/* Frames that are no reply do not keep a request from being late. */
+static void a_peer_that_talks_all_the_time_is_lost(void)
+{
+    begin(1);
+    run_ms(200);
+    silent = true;
+    for (RTS_UI32 i = 0; i < 500; i++) {
+        net_put_pdu(newest(), 0x5A5A, 1, (const RTS_UI8[]){3, 2, 0, 0}, 4);
+        run_ms(1);
+    }
     CHECK(ModbusDeviceIsLost(&devices[0]));
-    CHECK_EQUAL(fakes.connects, 1);
 }
 
 static void what_is_no_frame_ends_the_connection(void)
@@ -188,7 +239,10 @@ int main(void)
     RUN(a_lost_connection_is_made_again);
     RUN(a_reply_of_another_transaction_is_passed_over);
     RUN(a_device_that_the_gateway_does_not_reach_is_lost);
-    RUN(a_silent_device_does_not_end_the_connection);
+    RUN(a_request_without_reply_ends_the_connection);
+    RUN(a_silent_device_of_a_gateway_costs_the_others_little);
+    RUN(a_peer_that_takes_nothing_is_lost_and_comes_back);
+    RUN(a_peer_that_talks_all_the_time_is_lost);
     RUN(what_is_no_frame_ends_the_connection);
     return test_result();
 }

@@ -205,6 +205,18 @@ static void every_reply_can_be_lost_and_the_next_comes(void)
     CHECK(works());
 }
 
+/* The master would take it for the reply to what it has asked meanwhile. */
+static void a_reply_that_does_not_leave_in_time_is_given_up(void)
+{
+    begin();
+    fakes.write_limit = 0;
+    CHECK(!works());
+    fakes.write_limit = FAKE_LINE_ROOM;
+    run_ms(300);
+    CHECK_EQUAL(reply_size, 0);
+    CHECK(works());
+}
+
 int main(void)
 {
     RUN(crc_is_that_of_the_standard);
@@ -217,6 +229,7 @@ int main(void)
     RUN(frames_have_256_bytes_at_most);
     RUN(a_line_that_takes_few_bytes_at_a_time_sends_all);
     RUN(a_flood_does_not_stop_the_server);
+    RUN(a_reply_that_does_not_leave_in_time_is_given_up);
     RUN(every_reply_can_be_lost_and_the_next_comes);
     return test_result();
 }

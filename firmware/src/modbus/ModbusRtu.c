@@ -30,7 +30,7 @@ RTS_UI16 ModbusCrc(const RTS_UI8 *data, RTS_UI32 size)
     return (RTS_UI16)crc;
 }
 
-static const MODBUS_LINK_TYPE rtu = {ModbusRtuReady, ModbusRtuReceive, ModbusRtuSend};
+static const MODBUS_LINK_TYPE rtu = {ModbusRtuReady, ModbusRtuReceive, ModbusRtuSend, ModbusRtuGiveUp};
 
 void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *settings)
 {
@@ -47,6 +47,13 @@ void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *set
 
 /* ---- sending ---- */
 
+void ModbusRtuGiveUp(MODBUS_LINK *link)
+{
+    if (link->sending)
+        link->fill = 0;
+    link->sending = false;
+}
+
 /* The line is busy until the last byte has left, which is later than that the port took it. */
 static void transmit(MODBUS_LINK *link, RTS_I64 now_ns)
 {
@@ -54,8 +61,7 @@ static void transmit(MODBUS_LINK *link, RTS_I64 now_ns)
                                                      (RTS_UI32)link->fill - link->sent));
     if (link->sent < link->fill)
         return;
-    link->sending = false;
-    link->fill = 0;
+    ModbusRtuGiveUp(link);
     if (link->moved_ns < now_ns)
         link->moved_ns = now_ns;
 }

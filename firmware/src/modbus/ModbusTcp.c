@@ -10,7 +10,9 @@
 
 enum { NS_PER_MS = 1000000, LENGTH_MIN = 2, LENGTH_MAX = 1 + MODBUS_MAX_PDU };
 
-static const MODBUS_LINK_TYPE tcp = {ModbusTcpReady, ModbusTcpReceive, ModbusTcpSend};
+static const RTS_I64 LONG_AGO_NS = -(RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS;
+
+static const MODBUS_LINK_TYPE tcp = {ModbusTcpReady, ModbusTcpReceive, ModbusTcpSend, ModbusTcpGiveUp};
 
 static bool is_open(const MODBUS_LINK *link)
 {
@@ -31,7 +33,7 @@ void ModbusTcpBegin(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns)
 
 void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
 {
-    ModbusTcpBegin(link, RTS_INVALID_HANDLE, -(RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS);
+    ModbusTcpBegin(link, RTS_INVALID_HANDLE, LONG_AGO_NS);
     link->peer = *peer;
 }
 
@@ -43,6 +45,13 @@ void ModbusTcpClose(MODBUS_LINK *link)
     link->sending = false;
     link->connecting = false;
     link->fill = 0;
+}
+
+/* The peer was there, and is connected to again at once. */
+void ModbusTcpGiveUp(MODBUS_LINK *link)
+{
+    ModbusTcpClose(link);
+    link->began_ns = LONG_AGO_NS;
 }
 
 static void connect_again(MODBUS_LINK *link, RTS_I64 now_ns)
