@@ -22,5 +22,6 @@ bool ModbusRtuReady(MODBUS_LINK *link, RTS_I64 now_ns);
 RTS_UI32 ModbusRtuReceive(MODBUS_LINK *link, RTS_I64 now_ns);
 void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
 void ModbusRtuGiveUp(MODBUS_LINK *link);
+void ModbusRtuClose(MODBUS_LINK *link);
 
 #endif

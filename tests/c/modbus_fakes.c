@@ -121,6 +121,11 @@ RTS_I64 SysComGetByteNs(RTS_UI32 index)
     return fakes.last_byte_ns;
 }
 
+void SysComClose(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+}
+
 /* ---- the network ---- */
 
 FAKE_SOCKET *net_dial(void)
@@ -206,6 +211,13 @@ RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RT
     memcpy(to->out + to->out_size, data, *taken);
     to->out_size += *taken;
     return to->peer_gone ? ERR_NET_NOTCONNECTED : ERR_OK;
+}
+
+/* What it sent and nobody has read is lost. */
+void SysSockReset(RTS_HANDLE socket)
+{
+    fakes.sockets[socket].out_size = 0;
+    fakes.sockets[socket].open = false;
 }
 
 void SysSockClose(RTS_HANDLE socket)

@@ -106,6 +106,11 @@ RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RT
     return SysSockRecv(socket, (RTS_UI8 *)data, size, taken);
 }
 
+void SysSockReset(RTS_HANDLE socket)
+{
+    SysSockClose(socket);
+}
+
 void SysSockClose(RTS_HANDLE socket)
 {
     line.listeners -= socket == SERVER_LISTENS;

@@ -86,7 +86,6 @@ static RTS_RESULT open_line(MODBUS_LINK *link, const IoConfigConnector *connecto
         number(connector, MODBUS_PARAM_RS485, 0) != 0,
     };
 
-    link->handle = RTS_INVALID_HANDLE;
     if (name == NULL)
         return MODBUS_REFUSE(connector, ERR_PARAMETER, "the name of its serial line is missing.");
     if (settings.baud < LEAST_BAUD || settings.parity > SYSCOM_PARITY_ODD || settings.stop_bits < 1 ||
@@ -99,10 +98,11 @@ static RTS_RESULT open_line(MODBUS_LINK *link, const IoConfigConnector *connecto
     return ERR_OK;
 }
 
-static void close_line(MODBUS_LINK *link)
+/* Of a server on TCP the link is not used. */
+static void close_link(MODBUS_LINK *link)
 {
-    if (link->type != NULL && link->handle != RTS_INVALID_HANDLE)
-        SysComClose(link->handle);
+    if (link->type != NULL)
+        link->type->close(link);
 }
 
 /* ---- TCP ---- */
@@ -133,12 +133,6 @@ static void begin_server(MODBUS_SERVER *server, const IoConfigConnector *connect
     (void)ModbusServerTcpOpen(server, &own); /* there is room for all servers */
 }
 
-static void close_client(MODBUS_LINK *link)
-{
-    if (link->type != NULL)
-        ModbusTcpClose(link);
-}
-
 static void close_servers(void)
 {
     ModbusServerTcpClose();
@@ -154,11 +148,6 @@ static void begin_server(MODBUS_SERVER *server, const IoConfigConnector *connect
 {
     RTS_UNUSED(server);
     RTS_UNUSED(connector);
-}
-
-static void close_client(MODBUS_LINK *link)
-{
-    RTS_UNUSED(link);
 }
 
 static void close_servers(void)
@@ -365,15 +354,10 @@ static RTS_RESULT add_line(MODBUS_SETUP *setup, const IO_DRIVER *driver, const I
 
 static void close_all(MODBUS_SETUP *setup)
 {
-    for (RTS_UI32 i = 0; i < setup->client_count; i++) {
-        MODBUS_CLIENT_LINE *line = &setup->clients[i];
-        if (number(line->noted.connector, MODBUS_PARAM_ROLE, 0) == MODBUS_ROLE_TCP_CLIENT)
-            close_client(&line->client.link);
-        else
-            close_line(&line->client.link);
-    }
+    for (RTS_UI32 i = 0; i < setup->client_count; i++)
+        close_link(&setup->clients[i].client.link);
     for (RTS_UI32 i = 0; i < setup->server_count; i++)
-        close_line(&setup->servers[i].link);
+        close_link(&setup->servers[i].link);
     close_servers();
 }
 

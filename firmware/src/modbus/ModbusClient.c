@@ -393,7 +393,7 @@ static bool is_too_late(const MODBUS_CLIENT *client, RTS_I64 now_ns)
 
 static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
-    if (client->waits && client->device->unit == MODBUS_BROADCAST) {
+    if (client->waits && client->device->unit == MODBUS_BROADCAST && client->link.type->broadcasts) {
         end(client, true, now_ns);
         return;
     }

@@ -30,7 +30,8 @@ RTS_UI16 ModbusCrc(const RTS_UI8 *data, RTS_UI32 size)
     return (RTS_UI16)crc;
 }
 
-static const MODBUS_LINK_TYPE rtu = {ModbusRtuReady, ModbusRtuReceive, ModbusRtuSend, ModbusRtuGiveUp};
+static const MODBUS_LINK_TYPE rtu = {ModbusRtuReady,  ModbusRtuReceive, ModbusRtuSend,
+                                     ModbusRtuGiveUp, ModbusRtuClose,   true};
 
 void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *settings)
 {
@@ -43,6 +44,11 @@ void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *set
     link->char_ns = (RTS_I64)(NS_PER_S / settings->baud * bits);
     link->silence_ns = settings->baud > FAST_BAUD ? FAST_SILENCE_NS : link->char_ns * HALVES_OF_SILENCE / 2;
     link->moved_ns = 0;
+}
+
+void ModbusRtuClose(MODBUS_LINK *link)
+{
+    SysComClose(link->handle);
 }
 
 /* ---- sending ---- */
