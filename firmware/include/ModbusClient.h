@@ -20,7 +20,7 @@ typedef struct {
     const MODBUS_JOB *job;
     RTS_UI8 *in;      /* what was read last */
     RTS_UI8 *out;     /* what is to be written */
-    RTS_UI8 *written; /* what the device has of it; as much room as `out` */
+    RTS_UI8 *written; /* what the device has of it; as much room as `out`, which the driver uses before `has_out` */
     bool has_out;     /* `out` was filled, nothing is written before */
     bool is_written;  /* `written` is valid */
     bool good;        /* its last try was */

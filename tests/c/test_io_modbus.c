@@ -161,6 +161,13 @@ static void add_read_job(RTS_UI32 index, RTS_UI16 registers)
     add_structure(MODBUS_PARAM_JOB + index, &job, sizeof job);
 }
 
+static void add_write_job(RTS_UI8 function, RTS_UI16 count)
+{
+    const MODBUS_JOB job = {.function = function, .write_count = count, .interval_ms = 20};
+
+    add_structure(MODBUS_PARAM_JOB, &job, sizeof job);
+}
+
 static void add_range(RTS_UI32 index, RTS_UI16 first, RTS_UI32 registers)
 {
     const MODBUS_RANGE range = {.tables = MODBUS_HOLDING_REGISTERS,
@@ -200,6 +207,103 @@ static bool is_written(RTS_UI16 address)
     run_passes(4);
     line.in_size = 0;
     return line.out_size == sizeof request && memcmp(line.out, request, sizeof request) == 0;
+}
+
+/* ---- outputs ---- */
+
+enum { OUTPUT_AT = 4, HEAD = 7 /* before the data of a request to write */ };
+
+/* A register of the job, at the same place in the outputs. */
+static IoConfigChannelMap *add_output(RTS_UI16 task, RTS_UI32 number, RTS_UI32 flags)
+{
+    RTS_UI32 bit = MODBUS_REGISTER_BITS * number;
+    IoConfigChannelMap *map =
+        io_add_channel(&io, task, IO_MAP_OUTPUTS, 1, MODBUS_PARAM_JOB, bit, 8 * OUTPUT_AT + bit, MODBUS_REGISTER_BITS);
+
+    map->flags = (RTS_UI16)flags;
+    return map;
+}
+
+/* A device with some registers or coils that are written together; a task sets all the outputs. */
+static void begin_outputs(RTS_UI8 function, RTS_UI16 count)
+{
+    begin();
+    (void)add_line(MODBUS_ROLE_SERIAL_CLIENT);
+    (void)add_device("Drive", UNIT);
+    add_write_job(function, count);
+    spec.tasks[0].entry_offset = here(&spec);
+    emit_set(&spec, APP_AREA_OUTPUT, OUTPUT_AT, 0x44332211);
+    emit_add(&spec, APP_AREA_DATA, 0, 1);
+    emit_ret(&spec);
+}
+
+static bool has_written(const char *data)
+{
+    return line.asked[UNIT] != 0 && memcmp(line.out + HEAD, data, 4) == 0;
+}
+
+static void outputs_are_safe_before_the_program_runs(void)
+{
+    begin_outputs(MODBUS_WRITE_REGISTERS, 2);
+    (void)add_output(0, 0, IO_ZERO);
+    add_output(0, 1, IO_VALUE)->value = 0x5566;
+    CHECK_EQUAL(load_io(), ERR_OK);
+    run_long();
+    CHECK(has_written("\0\0\x66\x55"));
+}
+
+/* What the device has of those that hold is not known: the request waits until the program gives it. */
+static void outputs_that_hold_are_not_written_before_the_program_runs(void)
+{
+    for (RTS_UI32 held = 0; held <= 1; held++) {
+        begin_outputs(MODBUS_WRITE_REGISTERS, 2);
+        (void)add_output(0, held, IO_HOLD);
+        add_output(0, 1 - held, IO_VALUE)->value = 0x5566;
+        CHECK_EQUAL(load_io(), ERR_OK);
+        run_long();
+        CHECK_EQUAL(line.asked[UNIT], 0);
+        CHECK_EQUAL(AppStartApplication(), ERR_OK);
+        run_long();
+        CHECK(has_written("\x11\x22\x33\x44"));
+        CHECK_EQUAL(AppStopApplication(), ERR_OK);
+        run_long();
+        CHECK(has_written(held == 0 ? "\x11\x22\x66\x55" : "\x66\x55\x33\x44"));
+    }
+}
+
+static void single_bits_hold_like_registers(void)
+{
+    begin_outputs(MODBUS_WRITE_COILS, 5);
+    for (RTS_UI32 i = 0; i < 5; i++)
+        io_add_channel(&io, 0, IO_MAP_OUTPUTS, 1, MODBUS_PARAM_JOB, i, 8 * OUTPUT_AT + i, 1)->flags =
+            i == 3 ? IO_HOLD : IO_ZERO;
+    CHECK_EQUAL(load_io(), ERR_OK);
+    run_long();
+    CHECK_EQUAL(line.asked[UNIT], 0);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    run_long();
+    CHECK(line.asked[UNIT] != 0);
+    CHECK_EQUAL(line.out[HEAD], 0x11);
+}
+
+/* The other one runs when bit 7 of the counter is set. */
+static void outputs_of_two_tasks_are_not_written_before_both_have_run(void)
+{
+    CDL_TASK *task;
+
+    begin_outputs(MODBUS_WRITE_REGISTERS, 2);
+    task = add_task(&spec, "Event", KIND_EVENT, 0, here(&spec));
+    task->event_area = APP_AREA_DATA;
+    task->event_ignored = 0x7F;
+    emit_ret(&spec);
+    (void)add_output(0, 0, IO_HOLD);
+    (void)add_output(1, 1, IO_HOLD);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    run_passes(1200 / PASS_MS);
+    CHECK_EQUAL(line.asked[UNIT], 0);
+    run_passes(200 / PASS_MS);
+    CHECK(has_written("\x11\x22\x33\x44"));
 }
 
 /* ---- what is optional and refused ---- */
@@ -335,6 +439,10 @@ static void a_server_comes_after_one_that_is_left_out(void)
 int main(void)
 {
     NEEDS_X86_64;
+    RUN(outputs_are_safe_before_the_program_runs);
+    RUN(outputs_that_hold_are_not_written_before_the_program_runs);
+    RUN(single_bits_hold_like_registers);
+    RUN(outputs_of_two_tasks_are_not_written_before_both_have_run);
     RUN(an_optional_device_is_left_out_with_all_its_jobs);
     RUN(an_optional_device_that_is_left_out_takes_no_room);
     RUN(an_optional_device_with_a_channel_that_cannot_be_is_not_asked);
