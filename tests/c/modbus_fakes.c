@@ -21,7 +21,7 @@ void fakes_begin(void)
     memset(&fakes, 0, sizeof(fakes));
     fakes.now_ns = NS_PER_S;
     fakes.char_ns = (RTS_I64)NS_PER_S * BITS_PER_CHAR / BAUD;
-    fakes.write_limit = FAKE_LINE_ROOM;
+    fakes.write_limit = fakes.read_limit = FAKE_LINE_ROOM;
     fakes.send_limit = fakes.window = FAKE_SOCKET_ROOM;
     fakes.connect_result = ERR_OK;
 }
@@ -92,6 +92,13 @@ RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
     RTS_UI32 count = 0;
 
     RTS_UNUSED(index);
+    size = size < fakes.read_limit ? size : fakes.read_limit;
+    fakes.reads++;
+    if (fakes.babbles && fakes.reads < FAKE_READS) {
+        memset(data, 0x55, size);
+        fakes.last_byte_ns = fakes.now_ns;
+        return size;
+    }
     while (to->read < to->size && count < size && to->time_ns[to->read] <= fakes.now_ns) {
         fakes.last_byte_ns = to->time_ns[to->read];
         data[count++] = to->data[to->read++];
