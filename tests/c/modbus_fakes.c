@@ -220,7 +220,7 @@ RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RT
     return to->peer_gone ? ERR_NET_NOTCONNECTED : ERR_OK;
 }
 
-/* What it sent and nobody has read is lost. */
+/* What it sent and the peer has not read is lost. */
 void SysSockReset(RTS_HANDLE socket)
 {
     fakes.sockets[socket].out_size = 0;

@@ -40,7 +40,7 @@ typedef struct {
     RTS_I64 last_byte_ns;
     RTS_UI32 write_limit; /* bytes that one SysComWrite takes */
     RTS_UI32 read_limit;  /* bytes that one SysComRead gives */
-    bool babbles;         /* whoever reads gets as many bytes as wanted, of this moment, FAKE_READS times */
+    bool babbles;         /* SysComRead gives as many bytes as wanted, of this moment, FAKE_READS times */
     RTS_UI32 reads;
     bool pulled; /* nothing arrives, in either direction */
     RTS_UI32 locks;

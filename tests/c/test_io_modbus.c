@@ -63,7 +63,7 @@ RTS_UI32 __wrap_SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
     return size;
 }
 
-/* ---- the network: nobody is there ---- */
+/* ---- the network: no peer is there ---- */
 
 RTS_RESULT SysSockListen(const SOCKADDRESS *own, RTS_HANDLE *listener)
 {

@@ -187,7 +187,7 @@ static void a_frame_that_goes_on_is_not_taken(void)
 }
 
 /* Its bytes come as fast as they are read: each pass ends all the same. */
-static void a_line_that_babbles_holds_up_nobody(void)
+static void a_line_that_babbles_holds_up_no_pass(void)
 {
     static RTS_UI8 pdu[MODBUS_MAX_PDU];
 
@@ -273,7 +273,7 @@ int main(void)
     RUN(half_a_frame_is_forgotten_after_silence);
     RUN(a_frame_that_is_too_long_is_forgotten);
     RUN(a_frame_that_goes_on_is_not_taken);
-    RUN(a_line_that_babbles_holds_up_nobody);
+    RUN(a_line_that_babbles_holds_up_no_pass);
     RUN(frames_have_256_bytes_at_most);
     RUN(a_line_that_takes_few_bytes_at_a_time_sends_all);
     RUN(a_flood_does_not_stop_the_server);

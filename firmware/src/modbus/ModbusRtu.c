@@ -12,7 +12,7 @@ enum {
     HALVES_OF_SILENCE = 7, /* 3.5 characters */
     FRAME_MIN = 1 + 1 + MODBUS_CRC_SIZE,
     ROOM = MODBUS_FRAME_SIZE - MODBUS_AT_UNIT,
-    READS_MAX = 4, /* in one pass: a line that babbles holds up nobody */
+    READS_MAX = 4, /* in one pass: a line that babbles does not hold up main */
 };
 
 RTS_UI16 ModbusCrc(const RTS_UI8 *data, RTS_UI32 size)
@@ -69,7 +69,8 @@ static void transmit(MODBUS_LINK *link, RTS_I64 now_ns)
                                                      (RTS_UI32)link->fill - link->sent));
     if (link->sent < link->fill)
         return;
-    ModbusRtuGiveUp(link);
+    link->sending = false;
+    link->fill = 0;
     if (link->moved_ns < now_ns)
         link->moved_ns = now_ns;
 }
@@ -109,7 +110,7 @@ static bool take_bytes(MODBUS_LINK *link)
 {
     RTS_UI8 *frame = link->frame + MODBUS_AT_UNIT;
 
-    for (RTS_UI32 i = 0; i < READS_MAX; i++) {
+    for (RTS_UI32 left = READS_MAX; left > 0; left--) {
         RTS_UI32 at = link->fill < ROOM ? link->fill : 0;
         RTS_UI32 size = SysComRead(link->handle, frame + at, ROOM - at);
         if (size == 0)
