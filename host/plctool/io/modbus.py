@@ -41,11 +41,11 @@ from typing import Any
 
 from plctool.core import ffi, lib
 from plctool.files import Pos
-from plctool.iec.types import BOOL, BYTE, UDINT, ArrayType, StringType, StructType, Type, base_of
+from plctool.iec.types import BOOL, BYTE, UDINT, ArrayType, Elementary, StringType, StructType, Type, base_of
 from plctool.io.channels import channel_of, is_target, read_channel, read_substitute
 from plctool.io.common import read_connector
 from plctool.io.mistakes import Mistakes
-from plctool.io.model import HOLD, ZERO, Channel, Connector, Context, Parameter, Substitute, bits_of
+from plctool.io.model import HOLD, ZERO, Channel, Connector, Context, Parameter, Substitute, bits_of, holds_bools
 from plctool.io.tables import Entry, Table, each
 
 DRIVER = "IoDrvModbus"
@@ -145,6 +145,21 @@ def registers_of(t: Type) -> int:
     return 1 if element_size(t) == 1 else -(-t.size // 2)
 
 
+def fits_coils(t: Type) -> bool:
+    """Whether coils can have a variable: all its bits in memory are its value. An array of BOOL has a byte for each
+    element, a structure and a string have bytes that mean nothing."""
+    inner = base_of(t)
+    while isinstance(inner, ArrayType):
+        inner = base_of(inner.element)
+    return isinstance(inner, Elementary) and not holds_bools(t)
+
+
+def _cannot_have(channel: Channel, what: str) -> str:
+    t = channel.variable_type
+    hint = "use registers" if isinstance(t, StringType) else "name its elements"
+    return f"{channel.target} is {t}, which {what} cannot have: {hint}"
+
+
 def _reverse_for(t: Type, order: _Order) -> int | None:
     """The group of bytes in reverse order (Modbus.h) with which a variable needs no more; None: there is none."""
     size = element_size(t)
@@ -220,6 +235,10 @@ class ModbusDevice(Connector):
     def _bits(self, job: _Job, mistakes: Mistakes) -> tuple[int, int, int] | None:
         at = 0
         for channel in job.channels:
+            assert channel.variable_type is not None
+            if not fits_coils(channel.variable_type):
+                mistakes.error(channel.pos, _cannot_have(channel, "coils"))
+                return None
             if channel.size_bits > 1 and at % 8:
                 message = f"{channel.target} would begin within a byte: name it before variables of type BOOL"
                 mistakes.error(channel.pos, message)
@@ -232,7 +251,7 @@ class ModbusDevice(Connector):
         types = [c.variable_type for c in job.channels if c.variable_type is not None]
         for channel, t in zip(job.channels, types, strict=True):
             if element_size(t) < 0:
-                mistakes.error(channel.pos, f"{channel.target} is {t}, which registers cannot have: name its elements")
+                mistakes.error(channel.pos, _cannot_have(channel, "registers"))
                 return None
         reverse = self._common_reverse(job, types, mistakes)
         if reverse is None:
@@ -528,7 +547,8 @@ class ModbusServer(Connector):
         for group in _groups(self.objects):
             if any(o.channel.variable_type is None for o in group):
                 continue
-            made = self._bit_range(group[0]) if group[0].table in (_COILS, _DISCRETE) else self._range(group, mistakes)
+            of_bits = group[0].table in (_COILS, _DISCRETE)
+            made = self._bit_range(group[0], mistakes) if of_bits else self._range(group, mistakes)
             if made is None or not _is_free(group[0], made, used, mistakes):
                 continue
             for o in group:
@@ -537,7 +557,12 @@ class ModbusServer(Connector):
             self.parameters.append(_structure(int(lib.MODBUS_PARAM_RANGE) + number, value))
             number += 1
 
-    def _bit_range(self, found: _Object) -> dict[str, int]:
+    def _bit_range(self, found: _Object, mistakes: Mistakes) -> dict[str, int] | None:
+        t = found.channel.variable_type
+        assert t is not None
+        if not fits_coils(t):
+            mistakes.error(found.pos, _cannot_have(found.channel, "coils"))
+            return None
         found.channel.parameter_bit = 0
         return {
             "tables": found.table,
@@ -552,8 +577,7 @@ class ModbusServer(Connector):
         t = first.channel.variable_type
         assert t is not None
         if element_size(t) < 0:
-            target = first.channel.target
-            mistakes.error(first.pos, f"{target} is {t}, which registers cannot have: name its elements")
+            mistakes.error(first.pos, _cannot_have(first.channel, "registers"))
             return None
         reverse = _reverse_for(t, self.order)
         if reverse is None:
