@@ -153,6 +153,21 @@ def test_registers_have_the_bytes_of_the_variables_in_their_order(found: list[Va
     assert sent(copied(channels, found, 8 * len(wanted)), reverse) == wanted
 
 
+@settings(max_examples=100, deadline=None)
+@given(variables().filter(lambda v: v.type.size <= 2), ORDERS, st.binary(min_size=2, max_size=2))
+def test_mask_write_changes_the_bits_of_the_variable_only(variable: Variable, order: str, before: bytes) -> None:
+    made, channels, mistakes = job([variable], 22, order)
+    assert made is not None, mistakes.found
+    reverse = max(1, made.flags >> lib.MODBUS_JOB_REVERSE_SHIFT & 14)  # type: ignore[attr-defined]
+    data = sent(copied(channels, [variable], 16), reverse)
+    mask = made.mask.to_bytes(2, "big")  # type: ignore[attr-defined]
+    after = bytes((b & ~m & 0xFF) | (d & m) for b, d, m in zip(before, data, mask, strict=True))
+    ones = Variable(variable.type, b"\1" if variable.type is BOOL else b"\xff" * variable.type.size)
+    own = in_registers(ones, order)
+    wanted = in_registers(variable, order)
+    assert after == bytes((b & ~o & 0xFF) | w for b, o, w in zip(before, own, wanted, strict=True))
+
+
 def server_range(variable: Variable, table: int, order: str, bit: int | None = None) -> tuple[object | None, Channel]:
     """The structure that the driver gets for a server with one object; None after a mistake."""
     mistakes = Mistakes()

@@ -256,14 +256,18 @@ class ModbusDevice(Connector):
         reverse = self._common_reverse(job, types, mistakes)
         if reverse is None:
             return None
-        at = mask = 0
+        at = 0
         for channel, t in zip(job.channels, types, strict=True):
             channel.parameter_bit = _place(t, at, reverse, self.order)
             size = element_size(t)
             channel.big_endian = size >= 2 and reverse != (_reverse_for(t, self.order) or 0)
-            mask |= 1 if bits_of(t) == 1 else 0xFF if size == 1 else 0xFFFF
             at += registers_of(t)
-        return at, _REVERSE_FLAGS[reverse], mask
+        return at, _REVERSE_FLAGS[reverse], self._mask(types[0])
+
+    def _mask(self, t: Type) -> int:
+        """The bits of a register, as it is sent, that a variable has."""
+        mask = 1 if bits_of(t) == 1 else 0xFF if element_size(t) == 1 else 0xFFFF
+        return mask if self.order.high_byte_first else (mask << 8 | mask >> 8) & 0xFFFF
 
     def _common_reverse(self, job: _Job, types: list[Type], mistakes: Mistakes) -> int | None:
         """One for all variables. Where there is none, numbers are turned round one by one, which arrays cannot be."""
