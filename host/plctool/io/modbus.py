@@ -551,6 +551,8 @@ class ModbusServer(Connector):
         for group in _groups(self.objects):
             if any(o.channel.variable_type is None for o in group):
                 continue
+            if not _are_bits_of_one(group, mistakes):
+                continue
             of_bits = group[0].table in (_COILS, _DISCRETE)
             made = self._bit_range(group[0], mistakes) if of_bits else self._range(group, mistakes)
             if made is None or not _is_free(group[0], made, used, mistakes):
@@ -620,6 +622,26 @@ def _groups(objects: list[_Object]) -> Iterator[list[_Object]]:
     yield from groups.values()
 
 
+def _are_bits_of_one(group: list[_Object], mistakes: Mistakes) -> bool:
+    """Whether objects can share the memory of a register: none is a bit twice, and the network may write all or none.
+    That is said of the register as a whole."""
+    seen: dict[int | None, _Object] = {}
+    first = group[0]
+    for o in group:
+        other = seen.setdefault(o.bit, o)
+        if other is not o:
+            mistakes.error(o.pos, f"{o.channel.name} is the bit {other.channel.name} in line {other.pos.line}")
+        elif o.writable is not first.writable:
+            words = ("is read_only", "can be written")
+            one, two = words[o.writable], words[first.writable]
+            message = f"{o.channel.name} {one}, {first.channel.name} in line {first.pos.line} {two}"
+            mistakes.error(o.pos, f"{message}: the bits of one register are all the same")
+        else:
+            continue
+        return False
+    return True
+
+
 def _is_free(found: _Object, made: dict[str, int], used: list[tuple[int, int, int, str]], mistakes: Mistakes) -> bool:
     """Whether no other range has these addresses; then they are used."""
     parts = []
@@ -679,6 +701,10 @@ def _identify(table: Table, server: ModbusServer) -> None:
 
 
 def _read_object(entry: Entry, table: Table, kind: int) -> _Object | None:
+    if isinstance(entry.value, Table) and (bits := entry.value.keys_of_digits()):
+        message = f'a bit of a register is written in quotes: "{entry.key}.{bits[0]}"'
+        table.mistakes.error(entry.key_pos, message)
+        return None
     match = _KEY.fullmatch(entry.key)
     first = wire_address(int(match[1]), kind) if match else None
     bit = int(match[2]) if match and match[2] is not None else None

@@ -51,6 +51,10 @@ class Table:
     def __contains__(self, key: str) -> bool:
         return key in self._values
 
+    def keys_of_digits(self) -> list[str]:
+        """The keys that are numbers: what TOML makes of `40001.3`."""
+        return [key for key in self._values if key.isdigit()]
+
     # ---- reporting ----
 
     def error(self, message: str, key: str | None = None) -> None:
