@@ -14,8 +14,8 @@ from plctool.core import ffi, lib
 from plctool.files import Pos
 from plctool.iec.types import BOOL, ELEMENTARY, ArrayType, Field, StringType, StructType, Type
 from plctool.io.mistakes import Mistakes
-from plctool.io.model import Channel
 from plctool.io.modbus import _FUNCTIONS, _ORDERS, ModbusDevice, ModbusLine, ModbusServer, _Job, _Object
+from plctool.io.model import Channel
 
 POS = Pos("main.io.toml", 1, 1)
 INT, REAL, BYTE = ELEMENTARY["INT"], ELEMENTARY["REAL"], ELEMENTARY["BYTE"]

@@ -66,7 +66,7 @@ def read_substitute(table: Table, key: str, default: Substitute) -> Substitute:
         return default
     if isinstance(value, str) and value in _WORDS:
         return _WORDS[value]
-    if isinstance(value, list | dict):
+    if not isinstance(value, str | int | float):
         table.error(f'{key} can be "hold", "zero" or a value', key)
         return default
     return Substitute(VALUE, value, table.value_pos(key))

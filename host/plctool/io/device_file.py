@@ -29,8 +29,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from plctool.errors import UsageError
 from plctool.files import Pos
 from plctool.iec.types import DEFAULT_STRING_LENGTH, ELEMENTARY, Elementary, Kind, StringType, Type
+from plctool.iec.values import encode
 from plctool.io.mistakes import Mistakes
 from plctool.io.names import MAX_NAME, is_name
 from plctool.io.positions import TomlText
@@ -262,12 +264,21 @@ def parameter_problem(parameter: ModuleParameter, value: Any) -> str:
     elif t.kind in (Kind.INT, Kind.BIT):
         if type(value) is not int:
             return "has to be an integer"
-    elif not isinstance(value, str):
-        return f"has to be a text such as a {t} has in ST"
     else:
-        return ""
+        return _text_problem(t, value)
     low, high = _range(t, parameter)
     return "" if low <= value <= high else f"is {value}; it can be {low} to {high}"
+
+
+def _text_problem(t: Elementary, value: Any) -> str:
+    """The same for a duration, a date or a character."""
+    if not isinstance(value, str):
+        return f"has to be a text such as a {t} has in ST"
+    try:
+        encode(t, value)
+    except UsageError as error:
+        return f"cannot be that: {error.message.rstrip('.')}"
+    return ""
 
 
 def _range(t: Elementary, parameter: ModuleParameter) -> tuple[float, float]:

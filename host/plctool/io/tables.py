@@ -101,7 +101,7 @@ class Table:
     def duration_us(
         self, key: str, low_us: int, high_us: int, default_us: int | None = None, *, required: str = ""
     ) -> int | None:
-        """A duration such as "T#200ms", in microseconds."""
+        """A duration such as "T#200ms", in microseconds, of whole milliseconds."""
         found = self._value(key, str, None, required)
         if found is None:
             return default_us
@@ -112,6 +112,9 @@ class Table:
             return default_us
         if not low_us <= us <= high_us:
             self.error(f"{key} is {found}; it can be {_duration(low_us)} to {_duration(high_us)}", key)
+            return default_us
+        if us % 1000:
+            self.error(f"{key} is {found}; it has to be whole milliseconds", key)
             return default_us
         return us
 
@@ -182,7 +185,10 @@ class Table:
         for key in ("in", "out"):
             names = self.table(key)
             for entry in names.items() if names is not None else ():
-                yield entry, key == "out"
+                if entry.key:
+                    yield entry, key == "out"
+                else:
+                    self.mistakes.error(entry.key_pos, "a channel needs a name")
 
     def _inner(self, path: Path, values: dict[str, Any]) -> Table:
         return Table(self._text, (*self._path, *path), values, self.mistakes)
@@ -209,6 +215,4 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _duration(us: int) -> str:
-    if us % 1000:
-        return f"T#{us}us"
     return f"T#{us // 1000_000}s" if us and us % 1000_000 == 0 else f"T#{us // 1000}ms"

@@ -24,8 +24,9 @@ from plctool.errors import UsageError
 from plctool.iec.addresses import parse_address
 from plctool.iec.areas import Area
 from plctool.iec.literals import LiteralKind
-from plctool.iec.types import Elementary, Kind, Type, base_of
+from plctool.iec.types import BOOL, Elementary, Kind, Type, base_of
 from plctool.iec.values import encode
+from plctool.io.configuration import MAX_BITS, MAX_ENTRIES
 from plctool.io.layout import lay_out
 from plctool.io.mistakes import CODE, Mistakes
 from plctool.io.model import VALUE, Channel, Connector, Description, bits_of, holds_bools
@@ -315,6 +316,8 @@ def _misfit(connector: Connector, channel: Channel) -> str:
     if channel.bits is not None and (bits_of(t) != channel.bits or holds_bools(t)):
         has = f"{channel.bits} bits" if wanted is None else f"{wanted}"
         return f"{channel.target} is {t}, but {name} is {has}{_fitting(channel)}"
+    if bits_of(t) > MAX_BITS:
+        return f"{channel.target} has {bits_of(t)} bits; a channel has at most {MAX_BITS}: name its elements"
     base, other = base_of(t), base_of(wanted) if wanted is not None else None
     if isinstance(base, Elementary) and isinstance(other, Elementary) and not _same_kind(base, other):
         return f"{channel.target} is {t}, but {name} is {wanted}: declare it as {wanted}"
@@ -328,6 +331,8 @@ def _bad_substitute(channel: Channel) -> str:
         return ""
     assert channel.variable_type is not None
     key = "on_stop" if channel.output else "on_error"
+    if isinstance(given.value, bool) and base_of(channel.variable_type) is not BOOL:
+        return f"{key} is true or false, but {channel.target} is {channel.variable_type}"
     try:
         data = encode(channel.variable_type, given.value)
     except UsageError as error:
@@ -373,16 +378,17 @@ def _check_tasks(description: Description, tasks: Sequence[str], diagnostics: Di
 
 def _check_limits(description: Description, allocation: Allocation, diagnostics: Diagnostics) -> None:
     device = description.device
-    if device is None:
-        return
+    limits = {name: (MAX_ENTRIES, "an image") for name in ("connectors", "channels")}
+    if device is not None:
+        limits |= {name: (limit, device.title) for name, limit in device.limits.items()}
     used = {
         "inputs": (allocation.sizes[Area.INPUT], "bytes of inputs"),
         "outputs": (allocation.sizes[Area.OUTPUT], "bytes of outputs"),
         "connectors": (len(description.connectors), "devices"),
         "channels": (len(description.channels), "channels"),
     }
-    for name, limit in device.limits.items():
+    for name, (limit, title) in limits.items():
         count, what = used[name]
         if count > limit:
             where = description.channels[0][1].pos if description.channels else Pos(description.path, 1, 1)
-            diagnostics.error(where, CODE, f"there are {count} {what}; {device.title} has room for {limit}")
+            diagnostics.error(where, CODE, f"there are {count} {what}; {title} has room for {limit}")
