@@ -80,7 +80,7 @@ def test_more_than_the_tables_have_room_for_is_refused() -> None:
     maps = tuple(TaskMap(task, 0, (ConnectorMap(0, channels),)) for task in range(2))
     device = ConnectorEntry("c", "d", 1, 1)
     pack_configuration(Configuration((device,), maps[:1]))
-    with pytest.raises(UsageError, match="There are 65536 channels, each once for every task .* room for 65534"):
+    with pytest.raises(UsageError, match=r"There are 65536 channels, each once for every task .* room for 65534"):
         pack_configuration(Configuration((device,), maps))
     with pytest.raises(UsageError, match="There are 65535 devices"):
         pack_configuration(Configuration((device,) * 0xFFFF, ()))
