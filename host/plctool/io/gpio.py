@@ -16,11 +16,11 @@ from plctool.iec.types import BOOL, USINT, StringType
 from plctool.io.channels import channel_of
 from plctool.io.common import read_connector
 from plctool.io.model import Channel, Connector, Context, Parameter
+from plctool.io.names import MAX_LINE, is_line
 from plctool.io.tables import Entry, Table
 
 DRIVER = "IoDrvGpio"
 LINES = int(lib.IO_GPIO_LINES)
-_MAX_TEXT = 63  # of a line or an event
 _PULLS = {"none": 0, "up": int(lib.GPIO_OPTION_PULL_UP), "down": int(lib.GPIO_OPTION_PULL_DOWN)}
 _RISING, _FALLING = int(lib.GPIO_OPTION_RISING), int(lib.GPIO_OPTION_FALLING)
 _EDGES = {"rising": _RISING, "falling": _FALLING, "both": _RISING | _FALLING}
@@ -89,8 +89,8 @@ def _options(entry: Entry, output: bool) -> tuple[int, str]:
         return options | int(lib.GPIO_OPTION_OPEN_DRAIN) * table.flag("open_drain"), ""
     options |= table.choice("pull", _PULLS, 0) or 0
     event, edge = table.text("event", "") or "", table.choice("edge", _EDGES)
-    if len(event) > _MAX_TEXT or not event.isascii():
-        table.error(f"the name of an event has at most {_MAX_TEXT} ASCII characters", "event")
+    if "event" in table and not is_line(event):
+        table.error(f"the name of an event has 1 to {MAX_LINE} ASCII characters", "event")
     if edge is not None and not event:
         table.error("edge says when the event is posted; name it: event = ...", "edge")
     return options | ((edge or _RISING) if event else 0), event
@@ -100,9 +100,9 @@ def _name(entry: Entry, table: Table, context: Context, output: bool) -> str | N
     """What the port calls a line; None after a mistake."""
     device = context.device
     if device is None:
-        if 0 < len(entry.key) <= _MAX_TEXT and entry.key.isascii():
+        if is_line(entry.key):
             return entry.key
-        table.mistakes.error(entry.key_pos, f"the name of a line has 1 to {_MAX_TEXT} ASCII characters")
+        table.mistakes.error(entry.key_pos, f"the name of a line has 1 to {MAX_LINE} ASCII characters")
         return None
     line = device.lines.get(entry.key)
     if line is None:

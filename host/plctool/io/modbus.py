@@ -46,12 +46,11 @@ from plctool.io.channels import channel_of, is_target, read_channel, read_substi
 from plctool.io.common import read_connector
 from plctool.io.mistakes import Mistakes
 from plctool.io.model import HOLD, ZERO, Channel, Connector, Context, Parameter, Substitute, bits_of, holds_bools
+from plctool.io.names import MAX_LINE, MAX_NAME, is_line
 from plctool.io.tables import Entry, Table, each
 
 DRIVER = "IoDrvModbus"
 
-_MAX_NAME = 31
-_MAX_LINE = 63
 _MAX_UNIT = int(lib.MODBUS_MAX_UNIT)
 _REGISTER = int(lib.MODBUS_REGISTER_BITS)
 _LAST = 65535  # address on the wire
@@ -378,8 +377,8 @@ def _serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
     """Adds the parameters of a serial line; its baud, and the bits of a character."""
     bauds = {str(b): b for b in _BAUDS}
     port = table.text("port", required="/dev/ttyS1") or "?"
-    if not 0 < len(port) <= _MAX_LINE or not port.isascii():
-        table.error(f"port has 1 to {_MAX_LINE} ASCII characters", "port")
+    if not is_line(port):
+        table.error(f"port has 1 to {MAX_LINE} ASCII characters", "port")
     baud = table.number("baud", _BAUDS[0], _BAUDS[-1], 19200, unit="baud") or 19200
     if str(baud) not in bauds:
         table.error(f"{baud} is not a speed of serial lines: write {', '.join(bauds)}", "baud")
@@ -397,7 +396,7 @@ def _serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
 
 def _default_name(table: Table, key: str) -> str:
     found = table.text(key)
-    return f"modbus_{(found or 'line').rpartition('/')[2]}"[:_MAX_NAME]
+    return f"modbus_{(found or 'line').rpartition('/')[2]}"[:MAX_NAME]
 
 
 def _serial_client(table: Table) -> ModbusLine:
@@ -692,8 +691,8 @@ def _identify(table: Table, server: ModbusServer) -> None:
         text = names.text(key) if names is not None else None
         if text is None or names is None:
             continue
-        if not 0 < len(text) <= _MAX_LINE or not text.isascii():
-            names.error(f"{key} has 1 to {_MAX_LINE} ASCII characters", key)
+        if not is_line(text):
+            names.error(f"{key} has 1 to {MAX_LINE} ASCII characters", key)
         else:
             server.parameters.append(_text(int(lib.MODBUS_PARAM_OBJECT) + number, text, key))
     if names is not None:
