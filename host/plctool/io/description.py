@@ -7,6 +7,7 @@ from pathlib import Path
 
 from plctool.errors import UsageError
 from plctool.files import Pos
+from plctool.io.board_header import check_names
 from plctool.io.device_file import DeviceFile, read_device_file
 from plctool.io.kinds import KINDS
 from plctool.io.mistakes import Mistakes
@@ -89,10 +90,12 @@ def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
     """A device file with what is wrong with it, and its text. Raises UsageError if it cannot be read."""
     mistakes, text = Mistakes(), _read(path)
     try:
-        return read_device_file(TomlText(str(path), text), mistakes), mistakes, text
+        device = read_device_file(TomlText(str(path), text), mistakes)
     except BadToml as error:
         mistakes.error(error.pos, _not_toml(error))
         return None, mistakes, text
+    check_names(device, mistakes)
+    return device, mistakes, text
 
 
 def _not_toml(error: BadToml) -> str:

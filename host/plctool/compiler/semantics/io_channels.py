@@ -378,7 +378,7 @@ def _check_tasks(description: Description, tasks: Sequence[str], diagnostics: Di
 
 def _check_limits(description: Description, allocation: Allocation, diagnostics: Diagnostics) -> None:
     device = description.device
-    limits = {name: (MAX_ENTRIES, "an image") for name in ("connectors", "channels")}
+    limits = dict.fromkeys(("connectors", "channels"), (MAX_ENTRIES, "an image"))
     if device is not None:
         limits |= {name: (limit, device.title) for name, limit in device.limits.items()}
     used = {
