@@ -19,13 +19,14 @@ SUFFIX = ".io.toml"
 
 
 def find_description(sources: Sequence[Path]) -> Path | None:
-    """The description beside the sources, or in a folder of them; None if there is none. Of several, that with the name
-    of a source. Raises UsageError if it is not clear which one is meant."""
-    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in sources)
-    found = sorted(file for folder in folders for file in folder.glob(f"*{SUFFIX}") if file.is_file())
+    """The description beside the sources, or in a folder of them; None if there is none. Of several, that beside a
+    source of its name. Raises UsageError if it is not clear which one is meant."""
+    folders = {(path if path.is_dir() else path.parent).resolve(): path for path in reversed(sources)}
+    named = [path if path.is_dir() else path.parent for path in folders.values()]
+    found = sorted(file for folder in named for file in folder.glob(f"*{SUFFIX}") if file.is_file())
     if len(found) > 1:
-        own = {f"{source.stem}{SUFFIX}" for source in sources}
-        found = [file for file in found if file.name in own] or found
+        own = {source.with_name(f"{source.stem}{SUFFIX}").resolve() for source in sources if source.is_file()}
+        found = [file for file in found if file.resolve() in own] or found
     if len(found) > 1:
         names = ", ".join(str(file) for file in found)
         raise UsageError(f"There are several descriptions of inputs and outputs; choose one with --io: {names}.", "io")
