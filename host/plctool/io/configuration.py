@@ -10,7 +10,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError
 
 NONE = int(lib.IO_CONFIG_NONE)
-NOWHERE = 0xFFFF_FFFF  # IO_CONFIG_NOWHERE, a macro that cffi does not see as a number
+NOWHERE = int(lib.IO_CONFIG_NOWHERE)
 ALIGN = 4
 MAX_ENTRIES = NONE - 1  # of each table
 MAX_BITS = 0xFFFF  # of a channel

@@ -7,11 +7,11 @@ is the default, or None.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from plctool.errors import UsageError, did_you_mean
+from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import Pos
 from plctool.iec.types import LTIME
 from plctool.iec.value_texts import parse_time
@@ -69,7 +69,7 @@ class Table:
         """Reports the keys that nothing has asked for."""
         for key in self._values:
             if key not in self._read:
-                known = f"; {self._title()} has {_listed(self._asked)}" if self._asked else ""
+                known = f"; {self._title()} has {listed(self._asked, 'or')}" if self._asked else ""
                 hint = did_you_mean(key, self._asked) or known
                 self.mistakes.error(self._text.key_pos((*self._path, key)), f"there is no '{key}' here{hint}")
 
@@ -126,7 +126,7 @@ class Table:
         if found is None:
             return default
         if found not in choices:
-            hint = did_you_mean(found, choices) or f"; it can be {_listed(list(choices))}"
+            hint = did_you_mean(found, choices) or f"; it can be {listed(choices, 'or')}"
             self.error(f"{key} cannot be '{found}'{hint}", key)
             return default
         return choices[found]
@@ -207,11 +207,6 @@ def each(tables: Iterable[Table], read: Callable[[Table], T | None]) -> list[T]:
 
 def _word(value: object) -> str:
     return _WORDS.get(type(value), "a date")
-
-
-def _listed(names: Sequence[str]) -> str:
-    *most, last = names
-    return f"{', '.join(most)} or {last}" if most else last
 
 
 def _duration(us: int) -> str:
