@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import tomllib
@@ -14,6 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from plctool.cli.io_documents import export_board, init
+from plctool.errors import UsageError
 from plctool.iec.types import ELEMENTARY
 from plctool.io.beginning import toml_value
 from plctool.io.description import load_description, load_device
@@ -165,3 +167,12 @@ def test_board_whose_name_begins_with_a_digit_has_a_header(tmp_path: Path) -> No
     header = Path(export_board(tmp_path / "device.toml", tmp_path)["header"])
     assert header.name == "16IOIo.h"
     assert "#ifndef BOARD_16IOIO_H" in header.read_text()
+
+
+def test_device_file_whose_name_is_no_text_is_refused(tmp_path: Path) -> None:
+    folder = os.fsencode(tmp_path) + b"/x\xff"
+    os.mkdir(folder)
+    device = Path(os.fsdecode(folder)) / "device.toml"
+    device.write_text("name = 'IO'\n")
+    with pytest.raises(UsageError, match="is not UTF-8"):
+        init(tmp_path / "new.io.toml", device)

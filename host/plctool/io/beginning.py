@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from plctool.errors import UsageError
 from plctool.iec.values import decode
 from plctool.io.device_file import DeviceFile, Module, ModuleParameter, parameter_problem
 
@@ -43,8 +44,11 @@ def beginning(device: DeviceFile | None, device_path: str | None) -> str:
 
 
 def toml_value(value: str | float) -> str:
-    """A text, number or BOOL as TOML has it."""
+    """A text, number or BOOL as TOML has it. Raises UsageError for the name of a file that is no text."""
     if isinstance(value, str):
+        if any("\ud800" <= character <= "\udfff" for character in value):
+            shown = value.encode("ascii", "backslashreplace").decode()
+            raise UsageError(f"{shown} is not UTF-8, which a description has to be; rename the file or folder.", "io")
         return '"' + "".join(map(_escaped, value)) + '"'
     return str(value).lower() if isinstance(value, bool) else str(value)
 
