@@ -32,7 +32,7 @@ MISTAKES = [
     (f"[sim]\nx{'.a' * DEEP} = 1", "2: there is no 'x' here"),
     (f"[sim{'.a' * DEEP}]", "there is no 'a' here"),
     # what a channel becomes
-    ("[sim.in]\na = { var = 'Main.d', on_error = 2020-01-01 }", "2: on_error can be \"hold\", \"zero\" or a value"),
+    ("[sim.in]\na = { var = 'Main.d', on_error = 2020-01-01 }", 'a value; a date is written as in ST: "D#2024-02-29"'),
     ("[sim.in]\na = { var = 'Main.level', on_error = 12:00:00 }", "2: on_error can be \"hold\", \"zero\" or a value"),
     ("[sim.in]\na = { var = 'Main.level', on_error = 1.5 }", "2: on_error: '1.5' is not a value of INT"),
     ("[sim.in]\na = { var = 'Main.level', on_error = 1e300 }", "2: on_error: "),

@@ -520,7 +520,7 @@ def _wrong_reference(text: str, table: int) -> str:
 
 # ---- servers -------------------------------------------------------------------------------------------------------
 
-_KEY = re.compile(r"(\d{1,6})(?:\.(\d{1,2}))?")
+_KEY = re.compile(r"(\d{1,6})(?:\.(\d{1,2}))?", re.ASCII)
 
 
 @dataclass
