@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  */
 #include "IoDrvGpio.h"
+#include "SysGpio.h"
 #include "io_driver.h"
 
 static APP_REFUSAL refusal;
@@ -143,6 +144,33 @@ static void a_channel_that_is_no_line(void)
     check_refused(ERR_OUT_OF_LIMITS, "it has no channel 1.32.");
 }
 
+/* A second connector with the line `name`, number 0. */
+static IoConfigConnector *add_connector_of(const char *name, RTS_UI32 options)
+{
+    IoConfigConnector *connector = io_add_connector(&io, name, "IoDrvGpio");
+
+    io_add_text_parameter(&io, GPIO_LINE + 0, name);
+    io_add_parameter(&io, GPIO_OPTIONS + 0, 8, options);
+    return connector;
+}
+
+static void lines_of_a_refused_channel_are_free(void)
+{
+    SYS_GPIO_LINE line = {"DO1", GPIO_OPTION_OUT, RTS_INVALID_HANDLE};
+
+    begin_lines();
+    add_lines(0, 0);
+    add_connector_of("DO1", GPIO_OPTION_OUT)->flags |= CF_OPTIONAL;
+    io_add_channel(&io, 0, IO_MAP_INPUTS, 1, GPIO_INPUTS, 32, 8, 1);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK(log_has("Not used: DO1 (IoDrvGpio): it has no channel 1.32."));
+    CHECK_EQUAL(SimAdvance(ms(1)), ERR_OK);
+    CHECK_EQUAL(IoDrvGpio_Hook(CH_COMM_CYCLE), ERR_OK);
+    CHECK_EQUAL(SysGpioAdd(2, 0, &line), ERR_OK);
+    SysGpioClose(2);
+    end_lines();
+}
+
 static void a_held_output_stays_over_a_download(void)
 {
     begin_lines();
@@ -214,6 +242,7 @@ int main(void)
     RUN(a_line_that_is_named_twice);
     RUN(an_input_as_an_output);
     RUN(a_channel_that_is_no_line);
+    RUN(lines_of_a_refused_channel_are_free);
     RUN(a_held_output_stays_over_a_download);
     RUN(lines_are_given_back_with_the_application);
     RUN(a_chip_that_has_gone_comes_back);

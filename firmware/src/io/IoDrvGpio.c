@@ -194,7 +194,7 @@ static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int 
     return result;
 }
 
-/* Groups that the previous application had and this one has not. */
+/* Groups that the previous application had and this one has not, or that are refused. */
 static void close_unused(void)
 {
     RTS_UI32 i;
@@ -219,9 +219,17 @@ static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConf
                              (unsigned)channel->parameter_bit);
 }
 
+/* Connectors that are refused here, and optional, have no driver any more: nobody else would give their lines back. */
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    return IoMgrConfigEachChannel(task_maps, count, &gpio_driver, check_channel);
+    RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &gpio_driver, check_channel);
+    RTS_UI32 i;
+
+    for (i = 0; i < IO_GPIO_GROUPS; i++) {
+        if (groups[i].connector != NULL && !IoMgrConfigIsMine(groups[i].connector, &gpio_driver))
+            groups[i].connector = NULL;
+    }
+    return result;
 }
 
 /* ---- cycles ---- */
