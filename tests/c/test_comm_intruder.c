@@ -87,6 +87,31 @@ static void a_close_request_works_again_when_the_guessing_has_ended(void)
     CHECK(!is_served(&client));
 }
 
+static void a_close_request_in_vain_does_not_make_the_next_one_vain(void)
+{
+    start();
+    guess_all_ids(INTRUDER, CHANNEL_PKG_CLOSE_REQ);
+    RTS_UI32 foreign = counters()->foreign;
+    pass(CHANNEL_COMPLAINT_MS - 1);
+    client_send_close(&client);
+    CHECK_EQUAL(counters()->foreign, foreign);
+    CHECK(is_served(&client));
+    pass(1);
+    client_send_close(&client);
+    CHECK(!is_served(&client));
+}
+
+static void right_after_the_start_nothing_has_been_guessed(void)
+{
+    fakes_init();
+    fakes.now_ms = 1;
+    fakes_run_init_hooks();
+    client_init(&client, ADDRESS);
+    CHECK(client_connect(&client));
+    client_send_close(&client);
+    CHECK(!is_served(&client));
+}
+
 static void blocks_in_the_name_of_the_client_close_nothing(void)
 {
     start();
@@ -224,6 +249,8 @@ int main(void)
     RUN(guessing_all_ids_from_elsewhere_closes_nothing);
     RUN(guessing_all_ids_in_the_name_of_the_client_closes_nothing);
     RUN(a_close_request_works_again_when_the_guessing_has_ended);
+    RUN(a_close_request_in_vain_does_not_make_the_next_one_vain);
+    RUN(right_after_the_start_nothing_has_been_guessed);
     RUN(blocks_in_the_name_of_the_client_close_nothing);
     RUN(a_channel_without_login_ends);
     RUN(a_channel_with_login_stays);

@@ -555,10 +555,10 @@ static void handle_close(const ROUTER_PEER *peer, const CHANNEL_CLOSE *close, RT
         return;
     }
     COMM_CLIENT *client = find_owner(peer, BytesGet16(close->id));
-    if (client != NULL && !is_guessing(now_ms))
-        forget_channel(client);
-    else
+    if (client == NULL)
         note_guess(now_ms);
+    else if (!is_guessing(now_ms))
+        forget_channel(client);
 }
 
 static void handle_meta_package(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 now_ms)
@@ -659,6 +659,8 @@ static void reset_all(void)
 {
     CMP_CLEAR(clients);
     CMP_CLEAR(server);
+    if (COMM_ENDPOINTS)
+        server.guessed_at = SysTimeGetMs() - CHANNEL_COMPLAINT_MS;
     if (COMM_COUNTERS)
         CMP_CLEAR(counters);
 }
