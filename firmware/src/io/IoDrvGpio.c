@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A connector is a group of lines (SysGpio.h). A group whose lines stay the same over a download stays open, so that
- * outputs that hold their value do so.
+ * A connector is a group of lines (SysGpio.h). A group whose lines stay the same over a download stays open, whatever its
+ * place among the connectors, so that outputs that hold their value do so.
  */
 #include "IoDrvGpio.h"
 
@@ -158,40 +158,48 @@ static RTS_RESULT open_group(GROUP *group, const IoConfigConnector *connector, c
     return result;
 }
 
-static RTS_RESULT use_group(GROUP *group, const IoConfigConnector *connector)
+/* The group of a connector; of NULL, one that is free. NULL: there is none. */
+static GROUP *find_group(const IoConfigConnector *connector)
 {
+    GROUP *group = groups;
+
+    while (group < groups + IO_GPIO_GROUPS && group->connector != connector)
+        group++;
+    return group < groups + IO_GPIO_GROUPS ? group : NULL;
+}
+
+/* A group that has the lines of a connector already becomes that of the connector. */
+static RTS_RESULT keep_group(const IoConfigConnector *connector)
+{
+    RTS_UI32 lines = crc_of_lines(connector);
+    RTS_UI32 i = 0;
+
+    while (i < IO_GPIO_GROUPS && (groups[i].connector != NULL || groups[i].lines != lines))
+        i++;
+    if (i < IO_GPIO_GROUPS) {
+        groups[i].connector = connector;
+        IoMgrConfigNoteAlive(connector);
+    }
+    return ERR_OK;
+}
+
+static RTS_RESULT take_group(const IoConfigConnector *connector)
+{
+    GROUP *group = find_group(NULL);
     const char *bad = "";
     RTS_RESULT result;
 
-    if (group == groups + IO_GPIO_GROUPS)
+    if (find_group(connector) != NULL)
+        return ERR_OK;
+    if (group == NULL)
         return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "this device can have %u groups of lines.",
                                  (unsigned)IO_GPIO_GROUPS);
-    if (group->lines == crc_of_lines(connector)) {
-        group->connector = connector;
-        IoMgrConfigNoteAlive(connector);
-        return ERR_OK;
-    }
-    close_group(group);
     memset(group->out, 0, sizeof group->out);
     result = open_group(group, connector, &bad);
-    return result == ERR_OK ? ERR_OK : IoMgrConfigRefuse(connector, result, reason_of(result), bad);
-}
-
-static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
-{
-    GROUP *group = groups;
-    RTS_RESULT result = ERR_OK;
-    RTS_UI32 i;
-
-    for (i = 0; i < IO_GPIO_GROUPS; i++)
-        groups[i].connector = NULL;
-    for (; count > 0 && result == ERR_OK; count--, connectors++) {
-        if (IoMgrConfigIsMine(connectors, &gpio_driver)) {
-            result = use_group(group, connectors);
-            group += group < groups + IO_GPIO_GROUPS;
-        }
-    }
-    return result;
+    if (result == ERR_OK)
+        return ERR_OK;
+    group->connector = NULL;
+    return IoMgrConfigRefuse(connector, result, reason_of(result), bad);
 }
 
 /* Groups that the previous application had and this one has not, or that are refused. */
@@ -203,6 +211,33 @@ static void close_unused(void)
         if (groups[i].connector == NULL)
             close_group(&groups[i]);
     }
+}
+
+static RTS_RESULT each_of_mine(const IoConfigConnector *connectors, int count,
+                               RTS_RESULT (*visit)(const IoConfigConnector *connector))
+{
+    RTS_RESULT result = ERR_OK;
+
+    for (; count > 0 && result == ERR_OK; count--, connectors++) {
+        if (IoMgrConfigIsMine(connectors, &gpio_driver))
+            result = visit(connectors);
+    }
+    return result;
+}
+
+/* What is not needed any more is given back before anything is taken: a line may have gone to another group. Without an
+ * application (count 0) that is left to main: the next one, of the same download, may keep its lines. */
+static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < IO_GPIO_GROUPS; i++)
+        groups[i].connector = NULL;
+    if (count == 0)
+        return ERR_OK;
+    (void)each_of_mine(connectors, count, keep_group);
+    close_unused();
+    return each_of_mine(connectors, count, take_group);
 }
 
 static bool is_channel(const IoConfigChannelMap *channel, RTS_UI32 type)
@@ -234,15 +269,10 @@ static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 
 /* ---- cycles ---- */
 
-/* A connector that has lines has a group, open or not. */
-static GROUP *find_group(const IoConfigConnectorMap *map)
+/* A connector that has channels has a group, open or not. */
+static GROUP *group_of(const IoConfigConnectorMap *map)
 {
-    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
-    GROUP *group = groups;
-
-    while (group->connector != connector)
-        group++;
-    return group;
+    return find_group(IoMgrConfigGetConnector(map->connector));
 }
 
 static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
@@ -250,7 +280,7 @@ static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
     for (; count > 0; count--, maps++) {
         const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
         RTS_UI32 channels = maps->channel_map_count;
-        GROUP *group = find_group(maps);
+        GROUP *group = group_of(maps);
         RTS_UI32 values;
         RTS_UI32 lock;
         RTS_RESULT result = SysGpioRead((RTS_UI32)(group - groups), &values);
@@ -273,7 +303,7 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
     for (; count > 0; count--, maps++) {
         const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
         RTS_UI32 channels = maps->channel_map_count;
-        GROUP *group = find_group(maps);
+        GROUP *group = group_of(maps);
         RTS_UI32 lock = SysLockEnter();
         RTS_RESULT result;
 
@@ -293,12 +323,10 @@ static RTS_RESULT diagnose(const IoConfigConnector *connector)
 {
     IO_DEVICE_STATE state;
     const char *bad;
-    GROUP *group = groups;
+    GROUP *group = find_group(connector);
 
     (void)IoMgrGetState(IoMgrConfigGetIndex(connector), &state);
-    while (group < groups + IO_GPIO_GROUPS && group->connector != connector)
-        group++;
-    if (state.ok || group == groups + IO_GPIO_GROUPS)
+    if (state.ok || group == NULL)
         return ERR_OK;
     close_group(group);
     return open_group(group, connector, &bad);
