@@ -438,7 +438,7 @@ RTS_RESULT CmpBlkDrvCan_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT && COMM_COUNTERS)
         CMP_CLEAR(counters);
-    else if (hook == CH_INIT_COMM)
+    else if (hook == CH_INIT3) /* before an application can take the line */
         open_bus();
     else if (hook == CH_COMM_CYCLE)
         cycle();
