@@ -243,6 +243,12 @@ void PortCanHandOver(void)
     close_line();
 }
 
+bool PortCanHas(const char *path)
+{
+    return can.configured && can.is_slcan &&
+           (strcmp(can.name, path) == 0 || PortIsDevice(can.slave >= 0 ? can.slave : can.line.file, path));
+}
+
 const char *PortCanPtyName(void)
 {
     return can.configured && can.pty_name[0] != '\0' ? can.pty_name : NULL;
