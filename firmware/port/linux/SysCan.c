@@ -265,7 +265,7 @@ void SysCanGetAddress(RTS_UI32 index, CAN_ADDRESS *address)
 {
     RTS_UNUSED(index);
     address->base = can.options.base;
-    address->node = (RTS_UI8)can.options.node;
+    address->node = can.options.node;
 }
 
 RTS_RESULT SysCanOpen(RTS_UI32 index, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
