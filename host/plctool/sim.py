@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from plctool.compiler import Level
 
 _FLASH_SIZE = 4 << 20  # bytes: room for two slots of any program that fits plcrt
+_MAX_CYCLES = 0xFFFF_FFFF  # of one call of the C core
 _SECTOR = 4096
 _PROGRAM_UNIT = 8
 MAX_NS = 2**62  # at once; the clock goes twice as far
@@ -225,6 +226,8 @@ class Simulator(Controller):
     def run_cycles(self, count: int, *, check: bool = True) -> None:
         """Runs until the first task has made `count` more cycles. Raises ProgramStopped when the program stopped with
         an exception; without `check`, `status()` has it."""
+        if count > _MAX_CYCLES:
+            raise UsageError(f"At most {_MAX_CYCLES} cycles are run at once.", "cycles")
         for step in repeat(1, count) if self._plants else (count,):
             self._run_cycles(step)
             self._step_plants()

@@ -27,7 +27,9 @@ class PlantProgram:
 
     def __init__(self, image: bytes, symbols: SymbolTable) -> None:
         command = [sys.executable, "-m", __name__]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(  # Ctrl-C is for this process: the plant ends with it
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
         self._symbols = symbols
         self._names: dict[str, tuple[bool, str]] | None = None  # by channel: whether it is an output, and the variable
         self._now_ns = 0
@@ -83,9 +85,14 @@ class PlantProgram:
     def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
         assert self._process.stdin
         assert self._process.stdout
-        self._process.stdin.write(json.dumps(request) + "\n")
-        self._process.stdin.flush()
-        reply: dict[str, Any] = json.loads(self._process.stdout.readline() or '{"error": "its process ended"}')
+        ended = '{"error": "its process ended"}'
+        try:
+            self._process.stdin.write(json.dumps(request) + "\n")
+            self._process.stdin.flush()
+            line = self._process.stdout.readline() or ended
+        except BrokenPipeError:
+            line = ended
+        reply: dict[str, Any] = json.loads(line)
         if "error" in reply:
             raise DeviceError(f"The plant failed: {reply['error']}", "plant")
         return reply

@@ -129,6 +129,33 @@ def test_plant_that_is_none_is_an_error(tool, program: Path, text: str | None, r
     assert reason in tool("run", "app.cdl", "--plant", "plant.py").err
 
 
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("def step(plc):\n    plc.set_input('level', 1 / 0)\n", "plant.py:2: ZeroDivisionError: division by zero"),
+        ("import math\nmath.nothing\n", "plant.py:2: AttributeError"),
+        ("def step(plc)\n", "plant.py:1: expected ':'"),
+        ("EVERY_MS = 'often'\ndef step(plc): pass\n", "EVERY_MS in plant.py is not a number of milliseconds above 0"),
+        ("def step(plc, what): pass\n", "plant.py: TypeError"),
+    ],
+)
+def test_mistake_in_a_plant_is_said_with_its_line(tool, program: Path, text: str, reason: str) -> None:  # type: ignore[no-untyped-def]
+    (program / "plant.py").write_text(text)
+    tool("build", "main.st")
+    done = tool("run", "app.cdl", "--cycles", "3", "--plant", "plant.py")
+    assert done.status == 2
+    assert reason in done.err
+
+
+def test_plant_has_nothing_of_the_board_beside_it(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
+    (program / "main.io.toml").write_text('device = "device.toml"\n' + DESCRIPTION)
+    (program / "device.toml").write_text(DEVICE)
+    (program / "plant.st").write_text("PROGRAM P\nVAR level : INT; END_VAR\nlevel := level + 1;\nEND_PROGRAM\n")
+    tool("build", "main.st", "--target", "x86_64-linux")
+    found = tool("run", "app.cdl", "--time", "T#95ms", "--plant", "plant.st", "--get", "Bench.level", "--json").json
+    assert found["values"]["Bench.level"] == 9
+
+
 def test_board_says_what_to_compile_for(tool, program: Path) -> None:  # type: ignore[no-untyped-def]
     (program / "device.toml").write_text(DEVICE)
     assert tool("build", "main.st", "--device", "device.toml", "--json").json["target"] == "cortex-m3"

@@ -12,7 +12,7 @@ import pytest
 from plctool.core import lib
 from plctool.errors import LinkError, UsageError
 from plctool.link import names, router
-from plctool.link.canbus import CanTransport, PythonCanBus, SharedBus, split_place
+from plctool.link.canbus import CanTransport, PythonCanBus, SharedBus, open_bus, split_place
 from plctool.link.channel import ChannelLost
 
 BASE = 0x1F400000
@@ -224,3 +224,39 @@ def test_several_transports_share_a_bus(wire: Wire) -> None:
 def test_what_is_no_interface_is_wrong_use(place: str) -> None:
     with pytest.raises(UsageError, match="is not a CAN interface"):
         split_place(place)
+
+
+class FullBus:
+    """A bus where frames of others come without a pause."""
+
+    def __init__(self) -> None:
+        self.frames = 0
+
+    def send(self, message: can.Message) -> None:
+        pass
+
+    def receive(self, timeout: float) -> can.Message:
+        self.frames += 1
+        return can.Message(arbitration_id=0x123, is_extended_id=False, data=b"1")
+
+    def now(self) -> float:
+        return self.frames * 1e-4  # s: 10 000 frames per second
+
+    def fileno(self) -> int | None:
+        return None
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_bus_full_of_foreign_frames_does_not_hold_the_tool() -> None:
+    bus = FullBus()
+    tool = CanTransport("full", bus)
+    begun = bus.now()
+    assert tool.receive(0.1) is None
+    assert bus.now() - begun < 1.0
+
+
+def test_an_interface_that_needs_more_than_a_channel_is_an_error() -> None:
+    with pytest.raises(LinkError, match="Cannot open CAN socketcand:host"):
+        open_bus("socketcand:host", 500_000, 0)

@@ -71,6 +71,12 @@ def test_a_time_that_cannot_pass_is_refused(plc, time):
     assert lib.SimNow() == 0
 
 
+@pytest.mark.parametrize("count", [2**32, 2**64])
+def test_more_cycles_than_are_counted_are_refused(plc, count):
+    with pytest.raises(UsageError, match="At most 4294967295 cycles"):
+        plc.run_cycles(count)
+
+
 @pytest.mark.parametrize("ns", [-1, 2**63 - 1, 2**63 - 2])
 def test_the_clock_does_not_overflow(plc, ns):
     plc.run_for(ms=10)

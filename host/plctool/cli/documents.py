@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from plctool.cli import io_documents
+from plctool.cli.plants import attached
 from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from plctool.port_check import Outcome
     from plctool.port_check import Report as PortReport
     from plctool.sim import Simulator
-    from plctool.sim_plant import PlantProgram
     from plctool.st_tests import Report as TestReport
 
 Document = dict[str, Any]
@@ -237,7 +237,7 @@ def run(
         table = plc.symbols()
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
-        with _attached(plc, plant) if plant is not None else nullcontext():
+        with attached(plc, plant) if plant is not None else nullcontext():
             if trace:
                 _run_traced(plc, cycles, time_ms, trace)
             elif time_ms is None:
@@ -261,41 +261,6 @@ def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: 
     lines = trace_csv(plc, trace.names, cycles, time_ms)
     write_atomically(trace.path, "".join(lines).encode())
     plc.check_running()
-
-
-@contextmanager
-def _attached(plc: Simulator, path: Path) -> Iterator[None]:
-    """The plant in a file is connected to a simulator: Python with a function `step`, or a program in ST."""
-    if path.suffix == ".py":
-        _attach_python(plc, path)
-        yield
-        return
-    from plctool.sim_plant import PlantProgram
-
-    with PlantProgram.from_file(path) if path.suffix == ".cdl" else _compiled_plant(path) as plant:
-        plc.attach(plant, plant.every_ms)
-        yield
-
-
-def _compiled_plant(path: Path) -> PlantProgram:
-    from plctool.compiler import compile_sources
-    from plctool.sim_plant import PlantProgram
-
-    built = compile_sources([path])
-    return PlantProgram(built.image, built.symbols)
-
-
-def _attach_python(plc: Simulator, path: Path) -> None:
-    import runpy
-
-    try:
-        names = runpy.run_path(str(path))
-    except OSError as error:
-        raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-plant") from None
-    step = names.get("step")
-    if not callable(step):
-        raise UsageError(f"{path} has no function step; write: def step(plc): ...", "no-plant")
-    plc.attach(step, float(names.get("EVERY_MS", 1)))
 
 
 def bench(path: Path, cycles: int) -> Document:

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 
 
+_LAST_PARAMETER = 0xFFFF_FFFF
+
+
 # ---- files -----------------------------------------------------------------------------------------------------------
 
 
@@ -161,7 +164,11 @@ def _parameter(plc: Plc, device: str, parameter: str, type_name: str | None) -> 
         devices = plc.symbols().io.get("devices", [])
         known = next((d["parameters"] for d in devices if d["name"].casefold() == device.casefold()), [])
     found = next((p for p in known if parameter.casefold() in (p["name"].casefold(), str(p["id"]))), None)
-    number = int(parameter, 0) if parameter[:1].isdigit() else None
+    number = None
+    with suppress(ValueError):
+        number = int(parameter, 0)
+    if number is not None and not 0 <= number <= _LAST_PARAMETER:
+        raise UsageError(f"{parameter} is not the number of a parameter; they are of 32 bits.", "unknown-parameter")
     if found is None and number is None:
         hint = did_you_mean(parameter, (p["name"] for p in known)) or "; give its number, and its type by --type"
         raise UsageError(f"{device} has no parameter {parameter}{hint}.", "unknown-parameter")

@@ -49,10 +49,12 @@ def load_sources(paths: Sequence[Path | str]) -> list[Source]:
 @dataclass(frozen=True)
 class IoFiles:
     """Where the inputs and outputs are described: `description` (by default what is beside the sources), and the
-    vendor's `device` (by default what the description names)."""
+    vendor's `device` (by default what the description names). Not `wanted`: there are none, whatever lies beside the
+    sources."""
 
     description: Path | None = None
     device: Path | None = None
+    wanted: bool = True
 
 
 def load_io(paths: Sequence[Path | str], files: IoFiles | None = None) -> Description | None:
@@ -61,6 +63,8 @@ def load_io(paths: Sequence[Path | str], files: IoFiles | None = None) -> Descri
     from plctool.io.description import find_description, load_description
 
     files = files or IoFiles()
+    if not files.wanted:
+        return None
     found = files.description or find_description(list(map(Path, paths)))
     if found is None and files.device is not None:
         raise UsageError(f"There is no description (NAME.io.toml) that uses {files.device}; name it with --io.", "io")
@@ -119,8 +123,8 @@ def compile_sources(
     io: IoFiles = IoFiles(),
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
-    said otherwise; `target`: that of the board (`device.toml`) unless
-    said otherwise, else x86_64-linux; `io`: its inputs and outputs.
+    said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
+    inputs and outputs.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense, InternalError when
     the compiler has a bug.

@@ -191,7 +191,7 @@ def open_bus(place: str, bit_rate: int, data_bit_rate: int) -> can.BusABC:
         if interface == "slcan":
             return _open_slcan(channel, bit_rate, data_bit_rate)
         return can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
-    except (can.CanError, OSError, ValueError, ImportError) as error:
+    except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
         raise LinkError(f"Cannot open CAN {place}: {_advice(error)}", "open") from error
 
 
@@ -331,9 +331,10 @@ class CanTransport:
         busy = any(node.isotp.transmitting() or node.isotp.is_rx_active() for node in self._nodes.values())
         try:
             message = self._bus.receive(min(timeout, _TICK) if busy else timeout)
+            end = self.now() + _TICK  # a bus may be full of frames of others
             while message is not None:
                 self._take(message)
-                message = self._bus.receive(0.0)
+                message = self._bus.receive(0.0) if self.now() < end else None
         except (can.CanError, OSError) as error:
             raise self._lost(error) from error
         self._serve()

@@ -16,6 +16,7 @@ NO_PARENT = int(lib.IO_CONFIG_NONE)
 NEVER_MS = 0xFFFF_FFFF  # age of data that never came, or longer ago
 _PENDING_POLL = 0.1  # s
 _PENDING_LIMIT = 60.0  # s that a scan may take to go on
+_MOST_MODULES = 1000  # on one bus; a Modbus line has 247
 
 _STATE = Layout("IO_STATE")
 _PARAMETER = Layout("IO_PARAMETER")
@@ -75,6 +76,8 @@ def _list_from(session: Session, start: int) -> list[IoDevice]:
     found = []
     for entry in tags.containers(lib.TAG_IO_ENTRY):
         state = _STATE.unpack(entry.bytes(lib.TAG_IO_STATE, _STATE.size))
+        if state.index < start:  # asked again from there, it would never end
+            continue
         name, driver = entry.text(lib.TAG_IO_NAME), entry.text(lib.TAG_IO_DRIVER)
         parent = None if state.parent == NO_PARENT else state.parent
         age = None if state.age_ms == NEVER_MS else state.age_ms
@@ -105,15 +108,17 @@ def identify(session: Session, connector: int) -> None:
 
 
 def scan(session: Session, connector: int) -> Iterator[IoModule]:
-    """What is on a bus, each when it is found. Raises DeviceError if the driver cannot scan."""
+    """What is on a bus, each when it is found. Raises DeviceError if the driver cannot scan, or does not come to an
+    end."""
     start, deadline = 0, time.monotonic() + _PENDING_LIMIT
-    while True:
+    while start <= _MOST_MODULES and time.monotonic() < deadline:
         bus, first = bintag.u32(lib.TAG_IO_CONNECTOR, connector), bintag.u32(lib.TAG_IO_START, start)
         tags = _call(session, lib.SRV_IO_SCAN, bus, first)
         result = tags.u16(lib.TAG_IO_RESULT)
         if result not in (lib.ERR_OK, lib.ERR_PENDING, lib.ERR_NO_OBJECT):
             _check(tags, "scan")
-        for content in _contents(tags, lib.TAG_IO_MODULE, _MODULE.size):
+        contents = list(_contents(tags, lib.TAG_IO_MODULE, _MODULE.size))
+        for content in contents:
             module = _MODULE.unpack(content)
             name = content[_MODULE.size :].split(b"\0")[0].decode("latin-1")
             yield IoModule(module.slot, name, module.vendor, module.product, module.revision)
@@ -121,9 +126,10 @@ def scan(session: Session, connector: int) -> Iterator[IoModule]:
         if result == lib.ERR_NO_OBJECT:
             return
         if result == lib.ERR_PENDING:
-            if time.monotonic() > deadline:
-                raise DeviceError("The scan does not go on; look at the log of the device.", "scan", result)
             time.sleep(_PENDING_POLL)
+        elif not contents:
+            break
+    raise DeviceError("The scan does not come to an end; look at the log of the device.", "scan", lib.ERR_TIMEOUT)
 
 
 def _call(session: Session, service: int, *tags: bintag.Tag) -> bintag.Tags:

@@ -1,0 +1,76 @@
+"""What the inputs and outputs of a simulated controller are connected to, as the file of `run --plant` says."""
+
+from __future__ import annotations
+
+import runpy
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from plctool.errors import PlcError, UsageError
+
+if TYPE_CHECKING:
+    from plctool.sim import Simulator
+    from plctool.sim_plant import PlantProgram
+
+_LONGEST_MS = 1e9
+
+
+@contextmanager
+def attached(plc: Simulator, path: Path) -> Iterator[None]:
+    """The plant in a file is connected to a simulator: Python with a function `step`, or a program in ST. Raises
+    UsageError, with file and line, when Python code of the plant fails."""
+    if path.suffix == ".py":
+        plc.attach(*_python_plant(path))
+        yield
+        return
+    from plctool.sim_plant import PlantProgram
+
+    with PlantProgram.from_file(path) if path.suffix == ".cdl" else _compiled_plant(path) as plant:
+        plc.attach(plant, plant.every_ms)
+        yield
+
+
+def _compiled_plant(path: Path) -> PlantProgram:
+    """It runs on this machine, and its variables are its own, whatever description and board lie beside it."""
+    from plctool.compiler import IoFiles, compile_sources
+    from plctool.image.targets import host_target
+    from plctool.sim_plant import PlantProgram
+
+    built = compile_sources([path], target=host_target(), io=IoFiles(wanted=False))
+    return PlantProgram(built.image, built.symbols)
+
+
+def _python_plant(path: Path) -> tuple[Callable[[Simulator], None], float]:
+    """Its function, and how often it is called [ms]."""
+    with _said_with_its_line(path):
+        names = runpy.run_path(str(path))
+    step, every = names.get("step"), names.get("EVERY_MS", 1)
+    if not callable(step):
+        raise UsageError(f"{path} has no function step; write: def step(plc): ...", "no-plant")
+    if not isinstance(every, int | float) or not 0 < every < _LONGEST_MS:
+        raise UsageError(f"EVERY_MS in {path} is not a number of milliseconds above 0.", "no-plant")
+
+    def guarded(plc: Simulator) -> None:
+        with _said_with_its_line(path):
+            step(plc)
+
+    return guarded, every
+
+
+@contextmanager
+def _said_with_its_line(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except PlcError:
+        raise
+    except SyntaxError as error:
+        raise UsageError(f"{error.filename}:{error.lineno}: {error.msg}", "no-plant") from error
+    except Exception as error:
+        own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+        if not own and isinstance(error, OSError):
+            raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-plant") from None
+        place = f"{path}:{own[-1].lineno}" if own else str(path)
+        raise UsageError(f"{place}: {type(error).__name__}: {error}", "no-plant") from error
