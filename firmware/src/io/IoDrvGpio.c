@@ -265,7 +265,7 @@ static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConf
                              (unsigned)channel->parameter_bit);
 }
 
-/* Connectors that are refused here, and optional, have no driver any more: nobody else would give their lines back. */
+/* Connectors that are refused here, and optional, have no driver any more: their lines are given back here. */
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
     RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &gpio_driver, check_channel);
