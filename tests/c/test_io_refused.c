@@ -183,6 +183,18 @@ static void an_optional_device_that_the_driver_refuses_is_left_out(void)
     CHECK(log_has("Not used: Spare (IoDrvTest): there is no line DI9."));
 }
 
+/* What it took in vain it gives back, and keeps nothing that points into the application. */
+static void a_driver_whose_devices_were_all_refused_is_told_of_the_end(void)
+{
+    begin_with_old();
+    io.connectors[0].flags |= CF_OPTIONAL;
+    plant.refuses = "Plant";
+    CHECK_EQUAL(try_load(), ERR_OK);
+    memset(plant.calls, 0, sizeof plant.calls);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    CHECK(strcmp(plant.calls, "c") == 0);
+}
+
 static void a_part_that_the_runtime_does_not_know(void)
 {
     CDL_SEGMENT blob;
@@ -227,6 +239,7 @@ int main(void)
     RUN(a_refused_application_does_not_run_after_a_restart);
     RUN(one_that_failed_is_what_boots_again_after_a_refused_one);
     RUN(an_optional_device_that_the_driver_refuses_is_left_out);
+    RUN(a_driver_whose_devices_were_all_refused_is_told_of_the_end);
     RUN(a_part_that_the_runtime_does_not_know);
     RUN(a_boot_project_is_refused_like_a_download);
     return test_result();

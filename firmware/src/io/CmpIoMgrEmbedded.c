@@ -198,6 +198,7 @@ static RTS_RESULT load(const IO_CONFIG *config, const CDL_TASK *tasks, RTS_UI32 
     return result == ERR_OK ? ERR_OK : APP_REFUSE(refusal, result, "Raise CYCLE_MAX_PHASES of this firmware.");
 }
 
+/* Drivers without connectors too: theirs may have been refused, optional, after they took hardware. */
 static void unload(void)
 {
     IO_DRIVER *driver;
@@ -205,10 +206,8 @@ static void unload(void)
     if (IoTablesCountConnectors() == 0)
         return;
     IoCycleUnload();
-    for (driver = manager.drivers; driver != NULL; driver = driver->next) {
-        if (has_connector(driver))
-            (void)driver->functions->IoDrvUpdateConfiguration(IoMgrConfigGetConnector(0), 0);
-    }
+    for (driver = manager.drivers; driver != NULL; driver = driver->next)
+        (void)driver->functions->IoDrvUpdateConfiguration(IoMgrConfigGetConnector(0), 0);
     IoTablesSet(NULL, NULL);
 }
 
