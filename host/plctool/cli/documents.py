@@ -16,10 +16,13 @@ from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
 if TYPE_CHECKING:
-    from plctool.compiler import IoFiles, Level
+    from plctool.cli.projects import Settings
+    from plctool.compiler import IoFiles
+    from plctool.compiler.build import BuildResult
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.warnings import WarningOptions
     from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
+    from plctool.debug.symbols import SymbolTable
     from plctool.device import Plc
     from plctool.link.transports import Link
     from plctool.port_check import Outcome
@@ -41,26 +44,20 @@ class Interrupted(PlcError):
 # ---- files -----------------------------------------------------------------------------------------------------------
 
 
-def build(
-    paths: Sequence[Path],
-    output: Path,
-    target: str | None,
-    level: Level,
-    checks: str,
-    debug: bool,
-    warnings: WarningOptions,
-    io: IoFiles,
-) -> tuple[Document, list[str]]:
-    """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as users read them.
+def build(settings: Settings) -> tuple[Document, list[str]]:
+    """Compiles to an image and the symbol file beside it. Returns the document and the warnings as users read them.
 
-    Raises CompileError when the program has errors, UsageError when `output` would overwrite a source. Files appear
+    Raises CompileError when the program has errors, UsageError when the image would overwrite a source. Files appear
     complete or not at all.
     """
-    from plctool.compiler import compile_sources
     from plctool.debug.symbols import symbol_path
+    from plctool.files import make_folder
 
-    check_output(output, paths, f"-o {output.stem}.cdl")
-    result = compile_sources(paths, target=target, level=level, checks=checks, debug=debug, warnings=warnings, io=io)
+    output = settings.output
+    check_output(output, settings.paths, f"-o {output.stem}.cdl")
+    result = _compile(settings, settings.target)
+    if settings.own_folder:
+        make_folder(output.parent)
     result.write(output)
     channels = result.symbols.io.get("channels", [])
     document = {
@@ -76,6 +73,27 @@ def build(
     return document, result.rendered_warnings
 
 
+def _compile(settings: Settings, target: str | None) -> BuildResult:
+    from plctool.compiler import compile_sources
+
+    return compile_sources(
+        settings.paths,
+        target=target,
+        level=settings.level,
+        checks=settings.checks,
+        debug=settings.debug,
+        warnings=settings.warnings,
+        io=settings.io,
+    )
+
+
+def new(folder: Path, template: str) -> Document:
+    """Makes a project."""
+    from plctool.templates import new_project
+
+    return {"folder": str(folder), "files": [str(file) for file in new_project(folder, template)]}
+
+
 def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
     """A file that is written must not replace a source or a symbol file. `better`: what to type instead."""
     from plctool.compiler.source_files import SUFFIXES
@@ -88,13 +106,14 @@ def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
 
 def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles | None = None) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
-    from plctool.compiler import check_with_tests, io_sources, load_io, load_sources
+    from plctool.compiler import check_with_tests, io_sources, program_files
     from plctool.compiler.diagnostics import render_all
     from plctool.compiler.missing_names import Use, missing_names
 
-    sources = load_sources(paths)
-    result = check_with_tests(sources, warnings, lambda: load_io(paths, io))
-    shown = [*sources, *io_sources(load_io(paths, io))]
+    files = program_files(paths, io)
+    sources = files.load_sources()
+    result = check_with_tests(sources, warnings, files.load_io)
+    shown = [*sources, *io_sources(files.load_io())]
     uses = [Use(d.missing, d.file, d.line) for d in result.diagnostics if d.missing]
     document: Document = {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}
     if uses:
@@ -215,8 +234,24 @@ class TraceFile:
     path: Path
 
 
+@dataclass(frozen=True)
+class Built:
+    """A program that was compiled and is in no file."""
+
+    image: bytes
+    symbols: SymbolTable
+
+
+def built_for_here(settings: Settings) -> tuple[Built, list[str]]:
+    """A program compiled for this machine, whatever it is for otherwise, and the warnings as users read them."""
+    from plctool.image.targets import host_target
+
+    result = _compile(settings, host_target())
+    return Built(result.image, result.symbols), result.rendered_warnings
+
+
 def run(
-    path: Path,
+    program: Path | Built,
     cycles: int | None,
     time_ms: int | None,
     sets: Mapping[str, str],
@@ -229,11 +264,9 @@ def run(
 
     Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
-    from plctool.sim import Simulator
-
     if trace:
-        check_output(trace.path, [path], "-o trace.csv")
-    with Simulator.from_file(path) as plc:
+        check_output(trace.path, [program] if isinstance(program, Path) else [], "-o trace.csv")
+    with _simulator(program) as plc:
         table = plc.symbols()
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
@@ -252,6 +285,14 @@ def run(
             **({"trace": str(trace.path)} if trace else {}),
         }
         return document, reading.texts
+
+
+def _simulator(program: Path | Built) -> Simulator:
+    from plctool.sim import Simulator
+
+    if isinstance(program, Path):
+        return Simulator.from_file(program)
+    return Simulator(program.image, program.symbols)
 
 
 def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: TraceFile) -> None:

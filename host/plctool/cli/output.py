@@ -77,6 +77,12 @@ def run_text(document: dict[str, Any], texts: dict[str, str]) -> str:
     return f"{values_text(texts)}\n{document['cycles']} cycles, {document['time_ms']:.10g} ms".lstrip()
 
 
+def new_text(document: dict[str, Any]) -> str:
+    """What was made, and what to type next."""
+    files = "\n".join(f"  {file}" for file in document["files"])
+    return f"{files}\nNext: cd {document['folder']}, then 'plctool test', 'plctool run --time T#5s', 'plctool build'."
+
+
 def build_text(document: dict[str, Any]) -> str:
     """What was built, and how old inputs may be."""
     lines = [f"{document['image']}: {document['size']} bytes, CRC {document['crc']}"]

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler import CompileError, IoFiles, io_sources, load_io, load_sources
+from plctool.compiler import CompileError, IoFiles, io_sources, program_files
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
@@ -81,8 +81,9 @@ class TestProgram:
         warnings: WarningOptions = ALL_WARNINGS,
         io: IoFiles | None = None,
     ) -> None:
-        description = load_io(paths, io)
-        self.sources = load_sources(paths)
+        files = program_files(paths, io)
+        description = files.load_io()
+        self.sources = files.load_sources()
         self._suite = TestSuite()
         self._level = level
         with _power(), bugs_reported():
