@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from plctool.errors import UsageError
-from plctool.files import read_utf8
+from plctool.files import Pos, read_utf8
 from plctool.image.file import ApplicationInfo
 from plctool.image.targets import TARGETS
-from plctool.io.mistakes import Mistakes
+from plctool.io.mistakes import Mistake, Mistakes
 from plctool.io.positions import BadToml, TomlText
 from plctool.io.tables import Entry, Table
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from plctool.compiler import Level
 
 PROJECT_FILE = "plc.toml"
+LIBRARY_FILE = "library.toml"
 DEFAULT_IMAGE = "app.cdl"
 _LEVELS: dict[object, Level] = {0: 0, 1: 1, 2: 2, 3: 3, "s": "s"}
 _MAX_TEXT = 255  # characters of what the image says about the project
@@ -39,6 +40,7 @@ class Project:
 
     file: Path
     sources: list[Path]
+    libraries: list[Path]
     output: Path
     target: str | None = None
     device: Path | None = None
@@ -84,10 +86,6 @@ def _from_here(path: Path) -> Path:
 def read_checked(path: str, text: str, what: str, read: Callable[[Table], T]) -> T:
     """What `read` makes of a TOML text. Raises CompileError with all mistakes in it, each with its location. `what`:
     how messages call the file."""
-    from plctool.compiler import CompileError
-    from plctool.compiler.diagnostics import Diagnostic
-    from plctool.compiler.source import Source
-
     mistakes, made = Mistakes(), None
     try:
         toml = TomlText(path, text)
@@ -96,11 +94,24 @@ def read_checked(path: str, text: str, what: str, read: Callable[[Table], T]) ->
         table.close()
     except BadToml as error:
         mistakes.error(error.pos, f"this is not TOML: {error.message[:1].lower()}{error.message[1:]}")
-    found = sorted(mistakes.found, key=lambda m: (m.pos.line, m.pos.column))
-    if found or made is None:
-        diagnostics = [Diagnostic(m.pos.file, m.pos.line, m.pos.column, m.severity, "toml", m.message) for m in found]
-        raise CompileError(diagnostics, [Source(path, text)])
+    if mistakes.found or made is None:
+        raise _refusal(mistakes.found, path, text)
     return made
+
+
+def error_at(pos: Pos, message: str, text: str) -> UsageError:
+    """The same for one mistake, in a file with this text, that is seen from outside."""
+    return _refusal([Mistake(pos, message)], pos.file, text)
+
+
+def _refusal(mistakes: Sequence[Mistake], path: str, text: str) -> UsageError:
+    from plctool.compiler import CompileError
+    from plctool.compiler.diagnostics import Diagnostic
+    from plctool.compiler.source import Source
+
+    found = sorted(mistakes, key=lambda m: (m.pos.line, m.pos.column))
+    diagnostics = [Diagnostic(m.pos.file, m.pos.line, m.pos.column, m.severity, "toml", m.message) for m in found]
+    return CompileError(diagnostics, [Source(path, text)])
 
 
 def read_project(file: Path) -> Project:
@@ -116,6 +127,7 @@ def _project(file: Path, table: Table) -> Project:
     project = Project(
         file,
         _sources(folder, table),
+        _libraries(folder, table),
         folder / (table.text("output") or DEFAULT_IMAGE),
         table.choice("target", {name: name for name in TARGETS}),
         _file(folder, table, "device"),
@@ -176,6 +188,21 @@ def _matching(folder: Path, entry: Entry, table: Table) -> list[Path]:
     if not files:
         table.mistakes.error(entry.pos, f"no source fits {path}")
     return files
+
+
+def _libraries(folder: Path, table: Table) -> list[Path]:
+    """Libraries, and folders of them. Names that need no files are left out."""
+    from plctool.compiler.library_files import is_stand_in, libraries_at, no_library
+
+    found: list[Path] = []
+    for entry in table.strings("libraries"):
+        path = folder / entry.value
+        if libraries_at(path):
+            found.append(path)
+        elif not is_stand_in(entry.value.partition(",")[0].strip()):
+            message = no_library(path).rstrip(".")
+            table.mistakes.error(entry.pos, f"{message[:1].lower()}{message[1:]}")
+    return found
 
 
 def _level(options: Table) -> Level | None:

@@ -24,7 +24,7 @@ def write(folder: Path, text: str) -> None:
     (folder / "plc.toml").write_text(text)
 
 
-@pytest.mark.parametrize("template", ["minimal", "io"])
+@pytest.mark.parametrize("template", ["minimal", "io", "library"])
 def test_new_project_is_checked_tested_run_and_built_without_arguments(
     tool: Any, scratch: Path, monkeypatch: pytest.MonkeyPatch, template: str
 ) -> None:
@@ -155,6 +155,8 @@ def test_inputs_and_outputs_are_those_that_the_project_names(tool: Any, project:
 @pytest.mark.parametrize(
     ("text", "found"),
     [
+        ('libraries = ["src", "nowhere"]', "1:14: error: src is not a library: it has no library.toml"),
+        ('libraries = ["Tc2_Standrad"]', "1:14: error: there is no library Tc2_Standrad; a library is a folder"),
         ('souces = ["src"]', "1:1: error: there is no 'souces' here; did you mean sources?"),
         ("zzz = 1", "1:1: error: there is no 'zzz' here; plc.toml has"),
         ('sources = ["src"]\n[options]\ncheks = "all"', "3:1: error: there is no 'cheks' here; did you mean checks?"),

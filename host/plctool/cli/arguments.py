@@ -76,6 +76,9 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     check = command("check", "print every diagnostic of a program")
     _add_sources(check)
+    check.add_argument(
+        "--missing", action="store_true", help="print one table: the names it needs of libraries of other systems"
+    )
     _add_warnings(check)
     _add_io_files(check)
 
@@ -229,6 +232,10 @@ def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "sources", nargs="*", type=Path, metavar="FILE.st|DIR",
         help="for a folder, all sources in it; without any, the project of the current folder (plc.toml)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--library", action="append", default=[], type=Path, metavar="DIR|FILE.zip",
+        help="a library (with library.toml), or a folder of them; may be repeated",
     )  # fmt: skip
 
 

@@ -17,10 +17,10 @@ from plctool.files import read_image, write_atomically
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
-    from plctool.compiler import IoFiles
     from plctool.compiler.build import BuildResult
     from plctool.compiler.diagnostics import Diagnostic
-    from plctool.compiler.warnings import WarningOptions
+    from plctool.compiler.missing_names import Missing, Use
+    from plctool.compiler.source import Source
     from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
     from plctool.debug.symbols import SymbolTable
     from plctool.device import Plc
@@ -84,6 +84,7 @@ def _compile(settings: Settings, target: str | None) -> BuildResult:
         debug=settings.debug,
         warnings=settings.warnings,
         io=settings.io,
+        libraries=settings.libraries,
     )
 
 
@@ -104,24 +105,53 @@ def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
         raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
 
 
-def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles | None = None) -> tuple[Document, list[str]]:
+def check(settings: Settings) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
-    from plctool.compiler import check_with_tests, io_sources, program_files
     from plctool.compiler.diagnostics import render_all
-    from plctool.compiler.missing_names import Use, missing_names
+    from plctool.compiler.missing_names import missing_names
 
-    files = program_files(paths, io)
-    sources = files.load_sources()
-    result = check_with_tests(sources, warnings, files.load_io)
-    shown = [*sources, *io_sources(files.load_io())]
-    uses = [Use(d.missing, d.file, d.line) for d in result.diagnostics if d.missing]
-    document: Document = {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}
-    if uses:
-        document["missing"] = [
-            {"name": m.name, "library": m.library, "count": m.count, "file": m.first.file, "line": m.first.line}
-            for m in missing_names(uses)
-        ]
-    return document, render_all(result.diagnostics, shown)
+    diagnostics, _, shown = _checked(settings)
+    document: Document = {"diagnostics": [diagnostic_document(d) for d in diagnostics]}
+    if uses := _missing(diagnostics):
+        document["missing"] = [_missing_document(m) for m in missing_names(uses)]
+    return document, render_all(diagnostics, shown)
+
+
+def missing(settings: Settings) -> Document:
+    """The names of libraries of other systems that a program uses: those that nothing declares, and those that the
+    standard library has. `other_errors`: how many there are besides."""
+    from plctool.compiler.missing_names import missing_names
+    from plctool.compiler.stand_ins import library_of_stand_in, uses_of_stand_ins
+
+    diagnostics, sources, _ = _checked(settings)
+    absent = [_missing_document(m) | {"stand_in": False} for m in missing_names(_missing(diagnostics))]
+    present = [
+        _missing_document(m) | {"library": library_of_stand_in(m.name), "stand_in": True}
+        for m in missing_names(uses_of_stand_ins(sources))
+    ]
+    others = sum(d.severity == "error" and not d.missing for d in diagnostics)
+    return {"missing": absent + present, "other_errors": others}
+
+
+def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[Source]]:
+    """Every diagnostic of a program, its sources, and all files that diagnostics are about."""
+    from plctool.compiler import check_with_tests, io_sources, library_sources, program_files
+
+    files = program_files(settings.paths, settings.io, settings.libraries)
+    sources, libraries = files.load_sources(), files.load_libraries()
+    result = check_with_tests(sources, settings.warnings, files.load_io, libraries)
+    return result.diagnostics, sources, [*sources, *io_sources(files.load_io()), *library_sources(libraries)]
+
+
+def _missing(diagnostics: Sequence[Diagnostic]) -> list[Use]:
+    from plctool.compiler.missing_names import Use
+
+    return [Use(d.missing, d.file, d.line) for d in diagnostics if d.missing]
+
+
+def _missing_document(name: Missing) -> Document:
+    first = name.first
+    return {"name": name.name, "library": name.library, "count": name.count, "file": first.file, "line": first.line}
 
 
 def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:
@@ -209,15 +239,20 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
     }
 
 
-def test(
-    paths: Sequence[Path], pattern: str, level: int, junit: Path | None, warnings: WarningOptions, io: IoFiles
-) -> tuple[Document, TestReport]:
+def test(settings: Settings, pattern: str, junit: Path | None) -> tuple[Document, TestReport]:
     """Runs the unit tests of a program, and writes their report to `junit` as well."""
     from plctool import st_tests
 
     if junit:
-        check_output(junit, paths, "--junit report.xml")
-    report = st_tests.run_tests(paths, pattern=pattern, level=level, warnings=warnings, io=io)
+        check_output(junit, settings.paths, "--junit report.xml")
+    report = st_tests.run_tests(
+        settings.paths,
+        pattern=pattern,
+        level=int(settings.level),
+        warnings=settings.warnings,
+        io=settings.io,
+        libraries=settings.libraries,
+    )
     if junit:
         write_atomically(junit, st_tests.junit_xml(report))
     return report.document(), report

@@ -56,7 +56,11 @@ def _settings(args: argparse.Namespace) -> Settings:
 
 def _check(args: argparse.Namespace) -> int:
     settings = _settings(args)
-    document, texts = documents.check(settings.paths, settings.warnings, settings.io)
+    if args.missing:
+        document = documents.missing(settings)
+        _show(args, document, output.missing_text)
+        return EXIT_OK if all(name["stand_in"] for name in document["missing"]) else EXIT_USAGE
+    document, texts = documents.check(settings)
     _show(args, document, lambda d: output.coloured("\n".join(texts), sys.stdout))
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
 
@@ -97,10 +101,7 @@ def _program_to_run(args: argparse.Namespace) -> Path | documents.Built:
 def _test(args: argparse.Namespace) -> int:
     from plctool.st_tests import report_text
 
-    settings = _settings(args)
-    document, report = documents.test(
-        settings.paths, args.filter, args.level, args.junit, settings.warnings, settings.io
-    )
+    document, report = documents.test(_settings(args), args.filter, args.junit)
     _print_warnings(args, report.warning_texts())
     _show(args, document, lambda d: report_text(report, colour=output.wants_colour(sys.stdout)))
     return EXIT_FAILED if report.failed else EXIT_OK

@@ -24,6 +24,7 @@ class Settings:
     paths: Sequence[Path]
     io: IoFiles
     warnings: WarningOptions
+    libraries: Sequence[Path] = ()
     output: Path = Path(DEFAULT_IMAGE)
     own_folder: bool = False
     target: str | None = None
@@ -41,6 +42,7 @@ def settings_of(args: argparse.Namespace) -> Settings:
         args.sources if file is None else [file],
         IoFiles(args.io, args.device),
         _warnings(args, project),
+        args.library,
         own_folder=project is not None and getattr(args, "output", None) is None,
         **_of_build(args, project),
     )
@@ -48,7 +50,7 @@ def settings_of(args: argparse.Namespace) -> Settings:
 
 def settings_of_project(file: Path) -> Settings:
     """The settings of a command that has none of these arguments."""
-    nothing = argparse.Namespace(sources=[file], io=None, device=None, no_warn=[], werror=None)
+    nothing = argparse.Namespace(sources=[file], io=None, device=None, no_warn=[], werror=None, library=[])
     return settings_of(nothing)
 
 

@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from plctool.compiler.build import BuildResult
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.front import CheckResult
+    from plctool.compiler.imports import ImportedLibrary
     from plctool.compiler.source import Source
     from plctool.compiler.warnings import WarningOptions
     from plctool.io.model import Description
 
 __all__ = [
     "CompileError", "IoFiles", "Level", "ProgramFiles", "check_sources", "check_with_tests", "compile_sources",
-    "io_sources", "load_io", "load_sources", "program_files",
+    "io_sources", "library_sources", "load_io", "load_sources", "program_files",
 ]  # fmt: skip
 
 Level = int | Literal["s"]
@@ -67,15 +68,22 @@ def io_sources(io: Description | None) -> list[Source]:
     return [] if io is None else [Source(path, text) for path, text in io.contents.items()]
 
 
+def library_sources(libraries: Sequence[ImportedLibrary]) -> list[Source]:
+    """What messages about libraries quote."""
+    return [source for library in libraries for source in library.sources]
+
+
 def check_sources(paths: Sequence[Path | str]) -> CheckResult:
     """Every diagnostic of a program and its unit tests, without building it."""
-    return check_with_tests(load_sources(paths), load=lambda: load_io(paths))
+    files = program_files(paths)
+    return check_with_tests(files.load_sources(), load=files.load_io, libraries=files.load_libraries())
 
 
 def check_with_tests(
     sources: Sequence[Source],
     warnings: WarningOptions | None = None,
     load: Callable[[], Description | None] = lambda: None,
+    libraries: Sequence[ImportedLibrary] = (),
 ) -> CheckResult:
     """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
     `load` gets the inputs and outputs for each of both."""
@@ -84,12 +92,13 @@ def check_with_tests(
     from plctool.compiler.warnings import ALL_WARNINGS
 
     with bugs_reported():
-        result = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=load())
+        result = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=load(), libraries=libraries)
         if not result.has_tests:
             return result
         from plctool.compiler.semantics.unit_tests import TestSuite
 
-        tests = check_sources(sources, tests=TestSuite(), warnings=warnings or ALL_WARNINGS, io=load())
+        suite = TestSuite()
+        tests = check_sources(sources, tests=suite, warnings=warnings or ALL_WARNINGS, io=load(), libraries=libraries)
     found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
     found_sorted = sorted(found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
     return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)
@@ -104,10 +113,12 @@ def compile_sources(
     debug: bool = False,
     warnings: WarningOptions | None = None,
     io: IoFiles | None = None,
+    libraries: Sequence[Path | str] = (),
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
     said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
-    inputs and outputs. Of a project its files are taken, its options are for the command line.
+    inputs and outputs; `libraries`: folders or .zips of those that it uses. Of a project its files are taken, its
+    options are for the command line.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense, InternalError when
     the compiler has a bug.
@@ -121,13 +132,14 @@ def compile_sources(
     from plctool.image.targets import find_target
 
     number, size = (2, True) if level == "s" else (level, False)
-    files = program_files(paths, io)
+    files = program_files(paths, io, libraries)
     description = files.load_io()
     options = Options(find_target(_target(target, description)), number, parse_checks(checks), debug, size)
     sources = files.load_sources()
-    shown = [*sources, *io_sources(description)]
+    imported = files.load_libraries()
+    shown = [*sources, *io_sources(description), *library_sources(imported)]
     with bugs_reported():
-        checked = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=description)
+        checked = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=description, libraries=imported)
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.

@@ -1,4 +1,4 @@
-"""What a program is made of: its sources, and the description of its inputs and outputs.
+"""What a program is made of: its sources, its libraries, and the description of its inputs and outputs.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -15,6 +15,7 @@ from plctool.image.file import ApplicationInfo
 from plctool.project import project_named, read_project
 
 if TYPE_CHECKING:
+    from plctool.compiler.imports import ImportedLibrary
     from plctool.compiler.source import Source
     from plctool.io.model import Description
 
@@ -32,11 +33,12 @@ class IoFiles:
 
 @dataclass(frozen=True)
 class ProgramFiles:
-    """`sources`: files and folders; `beside`: where a description may be, if `io` names none; `info`: what the image
-    says about the program."""
+    """`sources`: files and folders; `libraries`: those given, or folders of them; `beside`: where a description may be,
+    if `io` names none; `info`: what the image says about the program."""
 
     sources: Sequence[Path]
     beside: Sequence[Path]
+    libraries: Sequence[Path]
     io: IoFiles
     info: ApplicationInfo
 
@@ -48,6 +50,13 @@ class ProgramFiles:
             return load(self.sources)
         except OSError as error:
             raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
+
+    def load_libraries(self) -> list[ImportedLibrary]:
+        """The libraries, and those that they need. Raises UsageError for what is missing or does not fit together."""
+        from plctool.compiler.imports import import_libraries
+        from plctool.compiler.library_files import resolve_libraries
+
+        return import_libraries(resolve_libraries(self.libraries)) if self.libraries else []
 
     def load_io(self) -> Description | None:
         """The inputs and outputs, for one check; None if there is no description. Raises UsageError for a file that
@@ -63,14 +72,18 @@ class ProgramFiles:
         return None if found is None else load_description(found, device)
 
 
-def program_files(paths: Sequence[Path | str], io: IoFiles | None = None) -> ProgramFiles:
+def program_files(
+    paths: Sequence[Path | str], io: IoFiles | None = None, libraries: Sequence[Path | str] = ()
+) -> ProgramFiles:
     """The files of a program: those named, or those of the project that is named. What `io` names holds before what
-    the project names. Raises CompileError for mistakes in a project file."""
+    the project names; `libraries` are added to its own. Raises CompileError for mistakes in a project file."""
     named = list(map(Path, paths))
+    given = list(map(Path, libraries))
     io = io or IoFiles()
     file = project_named(named)
     if file is None:
-        return ProgramFiles(named, named, io, ApplicationInfo(project=named[0].stem if named else ""))
+        return ProgramFiles(named, named, given, io, ApplicationInfo(project=named[0].stem if named else ""))
     project = read_project(file)
     io = IoFiles(io.description or project.io, io.device or project.device, io.wanted)
-    return ProgramFiles(project.sources, [file, *project.sources], io, project.info)
+    beside = [file, *project.sources]
+    return ProgramFiles(project.sources, beside, [*given, *project.libraries], io, project.info)

@@ -11,6 +11,7 @@ from plctool.files import make_folder, write_atomically
 TEMPLATES = {
     "minimal": "a program and its test",
     "io": "a program with inputs and outputs, in memory until there is hardware",
+    "library": "a library with a program that uses it",
 }
 """By name, what a project begins with."""
 
