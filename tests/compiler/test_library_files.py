@@ -14,6 +14,7 @@ from plctool.compiler import imports, library_zip, load_sources, program_files
 from plctool.compiler.front import parse_all
 from plctool.compiler.library_files import resolve_libraries
 from plctool.errors import UsageError
+from plctool.st_tests import run_tests
 
 GET = "FUNCTION Get : INT\nGet := 7;\nEND_FUNCTION\n"
 USE = "PROGRAM Main\nVAR n : INT; END_VAR\nn := Lib.Get();\nEND_PROGRAM\n"
@@ -147,6 +148,15 @@ def test_two_libraries_with_one_namespace_are_refused(tmp_path: Path) -> None:
     a, b = library(tmp_path, "A", {"a.st": GET}), library(tmp_path, "B", {"b.st": GET})
     (b / "library.toml").write_text('name = "B"\nversion = "1"\nnamespace = "a"\n')
     assert "have the same namespace" in refusal(a, b)
+
+
+def test_library_that_is_checked_by_itself_has_what_it_needs(tmp_path: Path) -> None:
+    library(tmp_path, "Base", {"b.st": GET})
+    test = "TEST 'own'\nASSERT_EQ(Top.Twice(), 14);\nASSERT_EQ(Twice(), 14);\nEND_TEST\n"
+    top = library(
+        tmp_path, "Top", {"t.st": GET.replace("Get", "Twice").replace("7", "2 * Base.Get()") + test}, Base="1"
+    )
+    assert [outcome.failure for outcome in run_tests([top]).outcomes] == [None]
 
 
 # ---- library.toml ----

@@ -264,14 +264,15 @@ def _readable(path: Path) -> LibraryFiles | None:
         return None
 
 
-def resolve_libraries(paths: Iterable[Path]) -> list[LibraryFiles]:
-    """The libraries of these paths, and those that they need. Raises UsageError, with the line of library.toml where
+def resolve_libraries(paths: Iterable[Path], sources: Iterable[Path] = ()) -> list[LibraryFiles]:
+    """The libraries of these paths, and those that they need, and those that `sources` need if a library is among them:
+    one that is checked or tested by itself. Raises UsageError, with the line of library.toml where
     there is one, for what is missing, does not fit together or needs itself."""
     resolution = _Resolution()
     given = [read_library(library) for path in paths for library in find_libraries(path)]
     for library in given:
         resolution.add(library)
-    for library in given:
+    for library in (*given, *(read_library(path) for path in sources if is_library(path))):
         resolution.complete(library)
     found = list(resolution.found.values())
     _check_namespaces(found)

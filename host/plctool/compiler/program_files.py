@@ -56,7 +56,7 @@ class ProgramFiles:
         from plctool.compiler.imports import import_libraries
         from plctool.compiler.library_files import resolve_libraries
 
-        return import_libraries(resolve_libraries(self.libraries)) if self.libraries else []
+        return import_libraries(resolve_libraries(self.libraries, self.sources))
 
     def load_io(self) -> Description | None:
         """The inputs and outputs, for one check; None if there is no description. Raises UsageError for a file that
