@@ -10,6 +10,7 @@ from library_support import check, library, messages
 from plctool import Simulator
 from plctool.compiler import compile_sources
 from plctool.image.targets import host_target
+from plctool.st_tests import run_tests
 
 PUMPS = {
     "pump.st": """TYPE State : (Off, Running, Failed := 7); END_TYPE
@@ -166,8 +167,6 @@ def test_tests_programs_and_configurations_of_a_library_are_its_own(tmp_path: Pa
 
 
 def test_tests_of_a_program_use_and_mock_its_libraries(tmp_path: Path) -> None:
-    from plctool.st_tests import run_tests
-
     home = library(tmp_path, "Pumps", PUMPS)
     (tmp_path / "t.st").write_text(
         "TEST 'use'\nASSERT_EQ(Pumps.Twice(3), 6);\nEND_TEST\n"
@@ -175,6 +174,31 @@ def test_tests_of_a_program_use_and_mock_its_libraries(tmp_path: Path) -> None:
     )
     report = run_tests([tmp_path / "t.st"], libraries=[home])
     assert [outcome.failure for outcome in report.outcomes] == [None, None]
+
+
+def test_functions_and_blocks_of_a_library_are_mocked(tmp_path: Path) -> None:
+    outside = "{attribute 'external' := 'read_it'}\nFUNCTION ReadIt : INT\nEND_FUNCTION\n"
+    reads = "FUNCTION Reads : INT\nReads := ReadIt() + 1;\nEND_FUNCTION\n"
+    home = library(tmp_path, "Pumps", {**PUMPS, "out.st": outside + reads})
+    (tmp_path / "t.st").write_text(
+        "TEST 'function'\nMOCK_FUNCTION Twice RETURNS 42;\nASSERT_EQ(Pumps.Twice(3), 42);\nEND_TEST\n"
+        "TEST 'block'\nVAR p : Pumps.Pump; END_VAR\nMOCK p;\np();\nASSERT_EQ(p.n, 0);\n"
+        "MOCK_VERIFY_CALLED(p);\nEND_TEST\n"
+        "TEST 'method'\nVAR p : Pumps.Pump; END_VAR\nMOCK_FUNCTION p.Go RETURNS FALSE;\n"
+        "ASSERT_FALSE(p.Go());\nEND_TEST\n"
+        "TEST 'in C'\nMOCK_FUNCTION ReadIt RETURNS 6;\nASSERT_EQ(Pumps.Reads(), 7);\nEND_TEST\n"
+        "TEST 'in C, not mocked'\nASSERT_EQ(Pumps.Reads(), 7);\nEND_TEST\n"
+    )
+    report = run_tests([tmp_path / "t.st"], libraries=[home])
+    *right, last = [outcome.failure for outcome in report.outcomes]
+    assert right == [None] * 4
+    assert last is not None and "mock it with MOCK_FUNCTION" in last.text
+
+
+def test_mistake_in_the_syntax_of_a_library_has_no_further_errors(tmp_path: Path) -> None:
+    home = library(tmp_path, "Lib", {"f.st": "FUNCTION Get : INT\nGet := ;\nEND_FUNCTION"})
+    found = messages(check(tmp_path, "PROGRAM Main\nVAR n : INT; END_VAR\nn := Get();\nn := 'x';\nEND_PROGRAM", home))
+    assert [message[:7] for message in found] == ["f.st:2:"]
 
 
 def test_project_of_python_has_its_libraries(tmp_path: Path) -> None:

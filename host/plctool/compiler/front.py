@@ -127,7 +127,8 @@ def _check_parsed(
     for source, declarations in parsed:
         world.names.register(declarations)
         world.names.register_globals(declarations, source)
-    _import(program, sources)
+    if not _import(program, sources):
+        return None
     _declare_devices(world)
     world.io.begin(world.names, world.diagnostics)
     if not world.io.readable:
@@ -177,9 +178,10 @@ def _names_asked_for(program: Program, sources: Sequence[Source]) -> frozenset[s
     return names_asked_for([source.text for source in sources], lambda: names)
 
 
-def _import(program: Program, sources: Sequence[Source]) -> None:
-    """Parses what the program needs of its libraries."""
+def _import(program: Program, sources: Sequence[Source]) -> bool:
+    """Parses what the program needs of its libraries. False after an error, from which many others would follow."""
     names, diagnostics = program.world.names, program.world.diagnostics
+    before = diagnostics.errors
     names.begin_imports(program.libraries)
     needed = needed_parts((source.text for source in sources), program.libraries)
     diagnostics.quiet(part.source.path for _, part in needed)
@@ -187,7 +189,8 @@ def _import(program: Program, sources: Sequence[Source]) -> None:
     for library, part in needed:
         diagnostics.found_by_reader(part.source)
         parsed = parse_all(part.source, diagnostics.at(part.source).error, part.start, part.end, declared)
-        names.add_import(library, part.source, names.rewritten(parsed.declarations))
+        names.add_import(library, part.source, parsed.declarations)
+    return diagnostics.errors == before
 
 
 def _declare_devices(world: World) -> None:

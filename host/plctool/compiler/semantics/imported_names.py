@@ -19,6 +19,8 @@ from plctool.compiler.typed import Pos
 Report = Callable[[str, Pos, Pos], None]
 """Says that a name is declared twice: the name, where, and where the first time."""
 
+_NAMED = (ast.PouDecl, ast.TypeDecl, ast.GlobalBlock)
+
 Found = Unit | GlobalSymbol | Namespace
 
 
@@ -45,9 +47,9 @@ class ImportedNames:
 
     def add(self, library: ImportedLibrary, source: Source, declarations: Sequence[ast.Declaration]) -> None:
         """Makes known what a part of a library declares. Its programs, tests and configurations are its own."""
+        put_into(library, declarations)
         for decl in declarations:
-            if isinstance(decl, ast.PouDecl | ast.TypeDecl | ast.GlobalBlock):
-                decl.namespace = _within(library, decl.namespace)
+            if isinstance(decl, _NAMED) and decl.namespace is not None:
                 self.namespaces.setdefault(decl.namespace.name.casefold(), decl.namespace.name)
             if isinstance(decl, ast.PouDecl) and decl.keyword is not ast.Unit.PROGRAM:
                 self._add_unit(PouSymbol(decl, False), decl.full_name)
@@ -124,6 +126,13 @@ class ImportedNames:
     def _full(self, key: str) -> str:
         found = self._bare.get(key, ())
         return next(iter(found)).casefold() if len(found) == 1 else key
+
+
+def put_into(library: ImportedLibrary, declarations: Sequence[ast.Declaration]) -> None:
+    """Puts declarations into the namespace of their library, unless they are in it already."""
+    for decl in declarations:
+        if isinstance(decl, _NAMED) and not (decl.namespace is not None and decl.namespace.imported):
+            decl.namespace = _within(library, decl.namespace)
 
 
 def _within(library: ImportedLibrary, space: ast.Namespace | None) -> ast.Namespace:

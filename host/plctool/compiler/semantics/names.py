@@ -16,7 +16,7 @@ from plctool.compiler.imports import ImportedLibrary
 from plctool.compiler.library import Library, without_library
 from plctool.compiler.semantics import sfc
 from plctool.compiler.semantics.generics import GROUPS
-from plctool.compiler.semantics.imported_names import ImportedNames, enum_names
+from plctool.compiler.semantics.imported_names import ImportedNames, enum_names, put_into
 from plctool.compiler.semantics.symbols import GlobalSymbol, Namespace, PouSymbol, Symbol, TypeSymbol, Unit
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
@@ -101,6 +101,8 @@ class Names:
 
     def add_import(self, library: ImportedLibrary, source: Source, declarations: Sequence[ast.Declaration]) -> None:
         """Makes known what a part of a library declares."""
+        put_into(library, declarations)
+        declarations = self.rewritten(list(declarations))
         for decl in declarations:
             if isinstance(decl, ast.PouDecl):
                 self.has_members = self.has_members or bool(decl.members) or decl.keyword is ast.Unit.INTERFACE
