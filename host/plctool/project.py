@@ -128,7 +128,7 @@ def _project(file: Path, table: Table) -> Project:
         file,
         _sources(folder, table),
         _libraries(folder, table),
-        folder / (table.text("output") or DEFAULT_IMAGE),
+        _output(folder, table),
         table.choice("target", {name: name for name in TARGETS}),
         _file(folder, table, "device"),
         _file(folder, table, "io"),
@@ -144,12 +144,32 @@ def _project(file: Path, table: Table) -> Project:
     return project
 
 
+def _path(folder: Path, entry: Entry, table: Table) -> Path | None:
+    """The path that a text names; None after a mistake."""
+    if not entry.value or not entry.value.isprintable():
+        table.mistakes.error(entry.pos, "a path is not empty, and has no control characters")
+        return None
+    return folder / str(entry.value)
+
+
+def _path_of(folder: Path, table: Table, key: str) -> Path | None:
+    name = table.text(key)
+    pos = table.value_pos(key)
+    return None if name is None else _path(folder, Entry(key, pos, name, pos), table)
+
+
+def _output(folder: Path, table: Table) -> Path:
+    path = _path_of(folder, table, "output") or folder / DEFAULT_IMAGE
+    if path.is_dir():
+        table.error(f'{path} is a folder; write for example output = "{DEFAULT_IMAGE}"', "output")
+    return path
+
+
 def _file(folder: Path, table: Table, key: str) -> Path | None:
     """A file that has to be there."""
-    name = table.text(key)
-    if name is None:
+    path = _path_of(folder, table, key)
+    if path is None:
         return None
-    path = folder / name
     if not path.is_file():
         table.error(f"there is no file {path}", key)
         return None
@@ -174,7 +194,9 @@ def _matching(folder: Path, entry: Entry, table: Table) -> list[Path]:
     from plctool.compiler.source_files import READERS
 
     text = entry.value
-    path = folder / text
+    path = _path(folder, entry, table)
+    if path is None:
+        return []
     if path.exists():
         return [path]
     if not _PATTERN.search(text):
@@ -196,7 +218,9 @@ def _libraries(folder: Path, table: Table) -> list[Path]:
 
     found: list[Path] = []
     for entry in table.strings("libraries"):
-        path = folder / entry.value
+        path = _path(folder, entry, table)
+        if path is None:
+            continue
         if libraries_at(path):
             found.append(path)
         elif not is_stand_in(entry.value.partition(",")[0].strip()):
