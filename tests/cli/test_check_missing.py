@@ -76,6 +76,14 @@ def test_project_with_descriptions_and_broken_files_is_looked_through(tool: Any,
     assert set(rows(tool("check", "--missing", "--json").json)) == {"MC_Power", "BLINK"}
 
 
+def test_stand_ins_are_known_with_the_library_in_front(tool: Any, scratch: Path) -> None:
+    calls = "SysMem.SysMemSet(ADR(n), 0, 2);\nTc2_System.MEMSET(ADR(n), 0, 2);\nb();\n"
+    (scratch / "main.st").write_text(f"PROGRAM Main\nVAR n : INT; b : Util.BLINK; END_VAR\n{calls}END_PROGRAM\n")
+    done = tool("check", "main.st", "--missing", "--json")
+    assert (done.status, done.json["other_errors"]) == (0, 0)
+    assert set(rows(done.json)) == {"SysMemSet", "MEMSET", "BLINK"}
+
+
 @pytest.mark.parametrize("name", [n for names in (*FUNCTIONS.values(), *BLOCKS.values()) for n in names])
 def test_stand_ins_are_in_the_standard_library(name: str) -> None:
     assert name in standard_library().names()

@@ -76,7 +76,9 @@ def test_library_is_read_in_every_format_of_sources(tmp_path: Path) -> None:
     assert messages(check(tmp_path, USE, zipped(tmp_path / "lib.zip", files))) == []
 
 
-@pytest.mark.parametrize("name", ["Standard", "Util", "tc2_system", "Tc2_Utilities", "Tc2_Standard, * (System)"])
+@pytest.mark.parametrize(
+    "name", ["Standard", "Util", "SysMem", "tc2_system", "Tc2_Utilities", "Tc2_Standard, * (System)"]
+)
 def test_names_of_standard_libraries_need_no_files(tmp_path: Path, name: str) -> None:
     top = library(tmp_path, "Lib", {"get.st": GET})
     (top / "library.toml").write_text(f'name = "Lib"\nversion = "1"\n[dependencies]\n"{name}" = "3.5.17.0"\n')

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from plctool.compiler.library import STAND_INS
 from plctool.compiler.library_zip import is_zip, read_zip
 from plctool.compiler.source import Source
 from plctool.compiler.source_files import load, read_contents
@@ -24,11 +25,6 @@ from plctool.files import Pos, read_utf8
 from plctool.iec.types import ELEMENTARY
 from plctool.io.tables import Table
 from plctool.project import LIBRARY_FILE, error_at, read_checked
-
-STAND_INS = (
-    "Standard", "Standard64", "Util", "Tc2_Standard", "Tc2_System", "Tc2_Utilities", "IBaseLibrary", "__System",
-)  # fmt: skip
-"""Libraries of other systems that the standard library stands in for, as far as it has their names."""
 
 _STAND_INS = {name.casefold() for name in STAND_INS}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
