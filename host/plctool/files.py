@@ -35,6 +35,16 @@ def write_atomically(path: Path, data: bytes) -> None:
         raise UsageError(f"{path} cannot be written: {error.strerror}.", "cannot-write") from None
 
 
+def read_utf8(path: Path, code: str) -> str:
+    """The text of a file, perhaps with a byte order mark. Raises UsageError with that code for one that is none."""
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror}.", code) from None
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path} is not UTF-8 at byte {error.start}; save it as UTF-8.", code) from None
+
+
 def read_image(path: Path) -> bytes:
     """The bytes of an image file, whatever they are."""
     try:

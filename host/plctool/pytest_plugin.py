@@ -1,6 +1,7 @@
 """A plugin for pytest: the TEST blocks of `.st` files are tests like others, with their names, lines and failures.
 
-The program of a test is all sources of its folder, or those that `plc_sources` in the configuration of pytest names.
+The program of a test is the project that has it among its sources, else all sources of its folder; or those that
+`plc_sources` in the configuration of pytest names.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ _PROGRAMS: pytest.StashKey[dict[tuple[Path, ...], TestProgram]] = pytest.StashKe
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addini("plc_sources", "sources of the program that TEST blocks test; default: their folder", type="paths")
+    parser.addini(
+        "plc_sources", "sources of the program that TEST blocks test; default: their project or folder", type="paths"
+    )
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
@@ -49,11 +52,22 @@ class StFile(pytest.File):
         """Each program is checked and compiled once."""
         from plctool.st_tests import TestProgram
 
-        sources = tuple(self.config.getini("plc_sources")) or (self.path.parent,)
+        sources = tuple(self.config.getini("plc_sources")) or (self._project() or self.path.parent,)
         programs = self.config.stash.setdefault(_PROGRAMS, {})
         if sources not in programs:
             programs[sources] = TestProgram(sources)
         return programs[sources]
+
+    def _project(self) -> Path | None:
+        """The project file of the nearest folder that has one, if this file is one of its sources."""
+        from plctool.compiler import load_sources
+        from plctool.project import find_project
+
+        project = find_project(self.path.parent)
+        if project is None:
+            return None
+        files = {Path(source.path).resolve() for source in load_sources([project])}
+        return project if self.path.resolve() in files else None
 
 
 class StFailure(Exception):

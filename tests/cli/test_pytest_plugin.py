@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from plctool.templates import new_project
+
 TESTS = """TEST 'counts by one'
 VAR c : Counter; END_VAR
 c();
@@ -74,3 +76,10 @@ def test_errors_of_the_compiler_are_errors_of_the_collection(project: Path) -> N
     done = run_pytest(project)
     assert done.returncode == 2
     assert re.search(r"counter\.st:1:\d+: error: .*\bm\b", done.stdout) and "Traceback" not in done.stdout
+
+
+@pytest.mark.parametrize("template", ["minimal", "io", "library"])
+def test_program_of_a_test_is_the_project_that_has_it(tmp_path: Path, template: str) -> None:
+    new_project(tmp_path / "pump", template)
+    done = run_pytest(tmp_path)
+    assert "1 passed" in done.stdout, done.stdout

@@ -19,7 +19,7 @@ from test_source_files import BLOCK as TC_BLOCK
 from test_source_files import GENERATED, TASK
 
 from plctool.compiler.front import check_sources
-from plctool.compiler.source_files import read_file
+from plctool.compiler.source_files import load
 
 LADDER = pou(
     "Rungs",
@@ -63,7 +63,7 @@ def test_a_mutated_file_gives_diagnostics_with_a_line(tmp_path: Path, name: str,
         text = text[:begin] + data.draw(st.sampled_from([*SPLICES, text[:80]])) + text[begin + length :]
     path = tmp_path / name
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
-    sources = read_file(path)
+    sources = load([path])
     assert sources
     for source in sources:
         for found in source.findings:
@@ -79,5 +79,5 @@ def test_a_mutated_file_gives_diagnostics_with_a_line(tmp_path: Path, name: str,
 def test_what_is_mutated_is_right_by_itself(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_text(SAMPLES[name], "utf-8")
-    errors = [d.message for d in check_sources(read_file(path)).diagnostics if d.severity == "error"]
+    errors = [d.message for d in check_sources(load([path])).diagnostics if d.severity == "error"]
     assert not [message for message in errors if "unknown" not in message and "no program" not in message]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NoReturn
 from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
 from plctool.link.transports import TRANSPORTS
+from plctool.templates import DEFAULT_TEMPLATE, TEMPLATES
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -52,7 +53,9 @@ def parser() -> argparse.ArgumentParser:
 def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build = command("build", "compile a program to an image")
     _add_sources(build)
-    build.add_argument("-o", "--output", type=Path, default=Path("app.cdl"), metavar="IMAGE", help="default: app.cdl")
+    build.add_argument(
+        "-o", "--output", type=Path, metavar="IMAGE", help="default: app.cdl, of a project beside plc.toml"
+    )
     target = build.add_argument(
         "--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}"
     )
@@ -62,20 +65,24 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--no-limits", action="store_true", help="build also what no device that plctool knows has room for"
     )
     build.add_argument(
-        "-O", dest="level", type=_level, metavar="0..3|s", default=2, help="optimisation, s for small code; default: 2"
+        "-O", dest="level", type=_level, metavar="0..3|s", help="optimisation, s for small code; default: 2"
     )
     build.add_argument(
         "--checks",
-        default="all",
         metavar="all|none|LIST",
         help="run-time checks: div, bounds, subrange, null; default: all",
     )
-    build.add_argument("--debug", action="store_true", help="optimise less, so that the code is close to its source")
+    build.add_argument(
+        "--debug", action=argparse.BooleanOptionalAction, help="optimise less, so that the code is close to its source"
+    )
     _add_warnings(build)
     _add_io_files(build)
 
     check = command("check", "print every diagnostic of a program")
     _add_sources(check)
+    check.add_argument(
+        "--missing", action="store_true", help="print one table: the names it needs of libraries of other systems"
+    )
     _add_warnings(check)
     _add_io_files(check)
 
@@ -94,8 +101,17 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_image(symbols)
     symbols.add_argument("patterns", nargs="*", metavar="PATTERN", help="names with * and ?: 'Main.pump.*'")
 
-    run = command("run", "run an image in this process, on a virtual clock")
-    _add_image(run)
+    new = command("new", "make a project that builds, runs and has a passing test")
+    new.add_argument("folder", type=Path, metavar="NAME", help="of the project, and of the folder that is made for it")
+    kinds = "; ".join(f"{name}: {text}" for name, text in TEMPLATES.items())
+    new.add_argument(
+        "--template", choices=TEMPLATES, default=DEFAULT_TEMPLATE, help=f"{kinds}; default: {DEFAULT_TEMPLATE}"
+    )
+
+    run = command("run", "run a program in this process, on a virtual clock")
+    run.add_argument(
+        "image", type=Path, nargs="?", help="what 'plctool build' wrote; without one the project is compiled and run"
+    )
     length = run.add_mutually_exclusive_group()
     length.add_argument("--cycles", type=_count, metavar="N", help="number of cycles of the first task; default: 1")
     length.add_argument("--time", type=_duration_ms, metavar="T#10s", help="how much virtual time, instead of cycles")
@@ -234,7 +250,14 @@ def _add_board(parser: argparse.ArgumentParser, text: str) -> None:
 
 
 def _add_sources(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("sources", nargs="+", type=Path, metavar="FILE.st|DIR", help="for a folder, all sources in it")
+    parser.add_argument(
+        "sources", nargs="*", type=Path, metavar="FILE.st|DIR",
+        help="for a folder, all sources in it; without any, the project of the current folder (plc.toml)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--library", action="append", default=[], type=Path, metavar="DIR|FILE.zip",
+        help="a library (with library.toml), or a folder of them; may be repeated",
+    )  # fmt: skip
 
 
 def _add_image(parser: argparse.ArgumentParser) -> None:
@@ -253,7 +276,7 @@ def _add_warnings(parser: argparse.ArgumentParser) -> None:
         metavar="NAME,...",
         help="do not report these warnings; may be repeated",
     )
-    parser.add_argument("--werror", action="store_true", help="treat warnings as errors")
+    parser.add_argument("--werror", action=argparse.BooleanOptionalAction, help="treat warnings as errors")
 
 
 def _add_io_files(parser: argparse.ArgumentParser) -> None:

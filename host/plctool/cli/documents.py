@@ -17,10 +17,13 @@ from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
 if TYPE_CHECKING:
-    from plctool.compiler import IoFiles, Level
+    from plctool.cli.projects import Settings
+    from plctool.compiler.build import BuildResult
     from plctool.compiler.diagnostics import Diagnostic
-    from plctool.compiler.warnings import WarningOptions
+    from plctool.compiler.missing_names import Missing, Use
+    from plctool.compiler.source import Source
     from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
+    from plctool.debug.symbols import SymbolTable
     from plctool.device import Plc
     from plctool.link.transports import Link
     from plctool.port_check import Outcome
@@ -41,38 +44,20 @@ class Interrupted(PlcError):
 # ---- files -----------------------------------------------------------------------------------------------------------
 
 
-def build(
-    paths: Sequence[Path],
-    output: Path,
-    target: str | None,
-    level: Level,
-    checks: str,
-    debug: bool,
-    warnings: WarningOptions,
-    io: IoFiles,
-    board: str | None = None,
-    limits: bool = True,
-) -> tuple[Document, list[str]]:
-    """Compiles to `output` and the symbol file beside it. Returns the document and the warnings as users read them.
+def build(settings: Settings) -> tuple[Document, list[str]]:
+    """Compiles to an image and the symbol file beside it. Returns the document and the warnings as users read them.
 
-    Raises CompileError when the program has errors, UsageError when `output` would overwrite a source. Files appear
+    Raises CompileError when the program has errors, UsageError when the image would overwrite a source. Files appear
     complete or not at all.
     """
-    from plctool.compiler import compile_sources
     from plctool.debug.symbols import symbol_path
+    from plctool.files import make_folder
 
-    check_output(output, paths, f"-o {output.stem}.cdl")
-    result = compile_sources(
-        paths,
-        target=target,
-        level=level,
-        checks=checks,
-        debug=debug,
-        warnings=warnings,
-        io=io,
-        board=board,
-        limits=limits,
-    )
+    output = settings.output
+    check_output(output, settings.paths, f"-o {output.stem}.cdl")
+    result = _compile(settings, settings.target)
+    if settings.own_folder:
+        make_folder(output.parent)
     result.write(output)
     channels = result.symbols.io.get("channels", [])
     document = {
@@ -89,6 +74,30 @@ def build(
     return document, result.rendered_warnings
 
 
+def _compile(settings: Settings, target: str | None) -> BuildResult:
+    from plctool.compiler import compile_sources
+
+    return compile_sources(
+        settings.paths,
+        target=target,
+        level=settings.level,
+        checks=settings.checks,
+        debug=settings.debug,
+        warnings=settings.warnings,
+        io=settings.io,
+        libraries=settings.libraries,
+        board=settings.board,
+        limits=settings.limits,
+    )
+
+
+def new(folder: Path, template: str) -> Document:
+    """Makes a project."""
+    from plctool.templates import new_project
+
+    return {"folder": str(folder), "files": [str(file) for file in new_project(folder, template)]}
+
+
 def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
     """A file that is written must not replace a source or a symbol file. `better`: what to type instead."""
     from plctool.compiler.source_files import SUFFIXES
@@ -99,23 +108,53 @@ def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
         raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
 
 
-def check(paths: Sequence[Path], warnings: WarningOptions, io: IoFiles | None = None) -> tuple[Document, list[str]]:
+def check(settings: Settings) -> tuple[Document, list[str]]:
     """Every diagnostic of a program, also as users read them, and the names it uses that nothing declares."""
-    from plctool.compiler import check_with_tests, io_sources, load_io, load_sources
     from plctool.compiler.diagnostics import render_all
-    from plctool.compiler.missing_names import Use, missing_names
+    from plctool.compiler.missing_names import missing_names
 
-    sources = load_sources(paths)
-    result = check_with_tests(sources, warnings, lambda: load_io(paths, io))
-    shown = [*sources, *io_sources(load_io(paths, io))]
-    uses = [Use(d.missing, d.file, d.line) for d in result.diagnostics if d.missing]
-    document: Document = {"diagnostics": [diagnostic_document(d) for d in result.diagnostics]}
-    if uses:
-        document["missing"] = [
-            {"name": m.name, "library": m.library, "count": m.count, "file": m.first.file, "line": m.first.line}
-            for m in missing_names(uses)
-        ]
-    return document, render_all(result.diagnostics, shown)
+    diagnostics, _, shown = _checked(settings)
+    document: Document = {"diagnostics": [diagnostic_document(d) for d in diagnostics]}
+    if uses := _missing(diagnostics):
+        document["missing"] = [_missing_document(m) for m in missing_names(uses)]
+    return document, render_all(diagnostics, shown)
+
+
+def missing(settings: Settings) -> Document:
+    """The names of libraries of other systems that a program uses: those that nothing declares, and those that the
+    standard library has. `other_errors`: how many there are besides."""
+    from plctool.compiler.missing_names import missing_names
+    from plctool.compiler.stand_ins import library_of_stand_in, uses_of_stand_ins
+
+    diagnostics, sources, _ = _checked(settings)
+    absent = [_missing_document(m) | {"stand_in": False} for m in missing_names(_missing(diagnostics))]
+    present = [
+        _missing_document(m) | {"library": library_of_stand_in(m.name), "stand_in": True}
+        for m in missing_names(uses_of_stand_ins(sources))
+    ]
+    others = sum(d.severity == "error" and not d.missing for d in diagnostics)
+    return {"missing": absent + present, "other_errors": others}
+
+
+def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[Source]]:
+    """Every diagnostic of a program, its sources, and all files that diagnostics are about."""
+    from plctool.compiler import check_with_tests, io_sources, library_sources, program_files
+
+    files = program_files(settings.paths, settings.io, settings.libraries)
+    sources, libraries = files.load_sources(), files.load_libraries()
+    result = check_with_tests(sources, settings.warnings, files.load_io, libraries)
+    return result.diagnostics, sources, [*sources, *io_sources(files.load_io()), *library_sources(libraries)]
+
+
+def _missing(diagnostics: Sequence[Diagnostic]) -> list[Use]:
+    from plctool.compiler.missing_names import Use
+
+    return [Use(d.missing, d.file, d.line) for d in diagnostics if d.missing]
+
+
+def _missing_document(name: Missing) -> Document:
+    first = name.first
+    return {"name": name.name, "library": name.library, "count": name.count, "file": first.file, "line": first.line}
 
 
 def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Document:
@@ -203,15 +242,20 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
     }
 
 
-def test(
-    paths: Sequence[Path], pattern: str, level: int, junit: Path | None, warnings: WarningOptions, io: IoFiles
-) -> tuple[Document, TestReport]:
+def test(settings: Settings, pattern: str, junit: Path | None) -> tuple[Document, TestReport]:
     """Runs the unit tests of a program, and writes their report to `junit` as well."""
     from plctool import st_tests
 
     if junit:
-        check_output(junit, paths, "--junit report.xml")
-    report = st_tests.run_tests(paths, pattern=pattern, level=level, warnings=warnings, io=io)
+        check_output(junit, settings.paths, "--junit report.xml")
+    report = st_tests.run_tests(
+        settings.paths,
+        pattern=pattern,
+        level=int(settings.level),
+        warnings=settings.warnings,
+        io=settings.io,
+        libraries=settings.libraries,
+    )
     if junit:
         write_atomically(junit, st_tests.junit_xml(report))
     return report.document(), report
@@ -228,8 +272,24 @@ class TraceFile:
     path: Path
 
 
+@dataclass(frozen=True)
+class Built:
+    """A program that was compiled and is in no file."""
+
+    image: bytes
+    symbols: SymbolTable
+
+
+def built_for_here(settings: Settings) -> tuple[Built, list[str]]:
+    """A program compiled for this machine, whatever it is for otherwise, and the warnings as users read them."""
+    from plctool.image.targets import host_target
+
+    result = _compile(settings, host_target())
+    return Built(result.image, result.symbols), result.rendered_warnings
+
+
 def run(
-    path: Path,
+    program: Path | Built,
     cycles: int | None,
     time_ms: int | None,
     sets: Mapping[str, str],
@@ -242,11 +302,9 @@ def run(
 
     Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
-    from plctool.sim import Simulator
-
     if trace:
-        check_output(trace.path, [path], "-o trace.csv")
-    with Simulator.from_file(path) as plc:
+        check_output(trace.path, [program] if isinstance(program, Path) else [], "-o trace.csv")
+    with _simulator(program) as plc:
         table = plc.symbols()
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
         plc.write({name: table.resolve(name).parse(text) for name, text in sets.items()})
@@ -265,6 +323,14 @@ def run(
             **({"trace": str(trace.path)} if trace else {}),
         }
         return document, reading.texts
+
+
+def _simulator(program: Path | Built) -> Simulator:
+    from plctool.sim import Simulator
+
+    if isinstance(program, Path):
+        return Simulator.from_file(program)
+    return Simulator(program.image, program.symbols)
 
 
 def _run_traced(plc: Simulator, cycles: int | None, time_ms: int | None, trace: TraceFile) -> None:

@@ -11,7 +11,6 @@ from plctool.io.positions import BadToml, TomlText
 from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link
 
 VARIABLE = "PLC_LINK"
-PROJECT_FILE = "plc.toml"
 
 
 def link_of(args: argparse.Namespace) -> Link:
@@ -60,11 +59,10 @@ def _options(args: argparse.Namespace) -> dict[str, Value]:
 def _default_link() -> Link | None:
     if text := os.environ.get(VARIABLE):
         return _parse(text, f"the environment's {VARIABLE}")
-    for folder in (Path.cwd(), *Path.cwd().parents):
-        file = folder / PROJECT_FILE
-        if file.is_file():
-            return _link_in(file)
-    return None
+    from plctool.project import find_project
+
+    file = find_project()
+    return None if file is None else _link_in(file)
 
 
 def _link_in(file: Path) -> Link | None:

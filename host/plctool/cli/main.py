@@ -9,6 +9,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stdout, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from plctool.cli import documents, io_documents, output
@@ -20,8 +21,7 @@ from plctool.link.transports import Link
 from plctool.version import plctool_version
 
 if TYPE_CHECKING:
-    from plctool.compiler import IoFiles
-    from plctool.compiler.warnings import WarningOptions
+    from plctool.cli.projects import Settings
     from plctool.controller import OtherTool
     from plctool.device import Plc
 
@@ -36,12 +36,6 @@ LATER_COMMANDS = {
 # ---- commands on files -----------------------------------------------------------------------------------------------
 
 
-def _warnings(args: argparse.Namespace) -> WarningOptions:
-    from plctool.compiler.warnings import warning_options
-
-    return warning_options(args.no_warn, as_errors=args.werror)
-
-
 def _print_warnings(args: argparse.Namespace, warnings: Sequence[str]) -> None:
     if not args.json:
         for warning in warnings:
@@ -49,24 +43,30 @@ def _print_warnings(args: argparse.Namespace, warnings: Sequence[str]) -> None:
 
 
 def _build(args: argparse.Namespace) -> int:
-    document, warnings = documents.build(
-        args.sources, args.output, args.target, args.level, args.checks, args.debug, _warnings(args), _io_files(args),
-        args.board, not args.no_limits,
-    )  # fmt: skip
+    document, warnings = documents.build(_settings(args))
     _print_warnings(args, warnings)
     return _show(args, document, output.build_text)
 
 
-def _io_files(args: argparse.Namespace) -> IoFiles:
-    from plctool.compiler import IoFiles
+def _settings(args: argparse.Namespace) -> Settings:
+    from plctool.cli.projects import settings_of
 
-    return IoFiles(args.io, args.device)
+    return settings_of(args)
 
 
 def _check(args: argparse.Namespace) -> int:
-    document, texts = documents.check(args.sources, _warnings(args), _io_files(args))
+    settings = _settings(args)
+    if args.missing:
+        document = documents.missing(settings)
+        _show(args, document, output.missing_text)
+        return EXIT_OK if all(name["stand_in"] for name in document["missing"]) else EXIT_USAGE
+    document, texts = documents.check(settings)
     _show(args, document, lambda d: output.coloured("\n".join(texts), sys.stdout))
     return EXIT_USAGE if any(d["severity"] == "error" for d in document["diagnostics"]) else EXIT_OK
+
+
+def _new(args: argparse.Namespace) -> int:
+    return _show(args, documents.new(args.folder, args.template), output.new_text)
 
 
 def _info(args: argparse.Namespace) -> int:
@@ -90,16 +90,29 @@ def _symbols(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     trace = documents.TraceFile(args.trace, args.output) if args.trace else None
-    document, texts = documents.run(args.image, args.cycles, args.time, pairs(args.set), args.get, args.plant, trace)
+    document, texts = documents.run(
+        _program_to_run(args), args.cycles, args.time, pairs(args.set), args.get, args.plant, trace
+    )
     return _show(args, document, lambda d: output.run_text(d, texts))
+
+
+def _program_to_run(args: argparse.Namespace) -> Path | documents.Built:
+    """The image that the arguments name, or the project, compiled for this machine."""
+    from plctool.cli.projects import needed_project, settings_of_project
+    from plctool.project import project_named
+
+    file = needed_project() if args.image is None else project_named([args.image])
+    if file is None:
+        return Path(args.image)
+    built, warnings = documents.built_for_here(settings_of_project(file))
+    _print_warnings(args, warnings)
+    return built
 
 
 def _test(args: argparse.Namespace) -> int:
     from plctool.st_tests import report_text
 
-    document, report = documents.test(
-        args.sources, args.filter, args.level, args.junit, _warnings(args), _io_files(args)
-    )
+    document, report = documents.test(_settings(args), args.filter, args.junit)
     _print_warnings(args, report.warning_texts())
     _show(args, document, lambda d: report_text(report, colour=output.wants_colour(sys.stdout)))
     return EXIT_FAILED if report.failed else EXIT_OK
@@ -400,7 +413,8 @@ IO_ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
 }  # fmt: skip
 
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
-    "build": _build, "check": _check, "info": _info, "image": _image, "symbols": _symbols, "run": _run, "test": _test,
+    "build": _build, "check": _check, "info": _info, "image": _image, "symbols": _symbols, "run": _run,
+    "test": _test, "new": _new,
     "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
     "tasks": _tasks, "log": _log, "shell": _shell, "port-check": _port_check,

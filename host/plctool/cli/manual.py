@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator
 
-from plctool.cli.links import PROJECT_FILE, VARIABLE
+from plctool.cli.links import VARIABLE
+from plctool.project import PROJECT_FILE
 from plctool.version import plctool_version
 
 _ENVIRONMENT = {
@@ -15,7 +16,8 @@ _ENVIRONMENT = {
     "NO_COLOR": "if set, diagnostics have no colours on a terminal either",
 }
 _FILES = {
-    PROJECT_FILE: f'in this folder or one above: link = "serial:/dev/ttyS0" is the link when {VARIABLE} is not set',
+    PROJECT_FILE: "the project of this folder or of one above: sources, target, options, which build, check, test and "
+    f"run take when no sources are named, and the link when {VARIABLE} is not set",
 }
 _EXIT_STATUS = {
     "0": "success",

@@ -77,6 +77,36 @@ def run_text(document: dict[str, Any], texts: dict[str, str]) -> str:
     return f"{values_text(texts)}\n{document['cycles']} cycles, {document['time_ms']:.10g} ms".lstrip()
 
 
+def missing_text(document: dict[str, Any]) -> str:
+    """What a program needs of libraries of other systems, a line for each name, and how much of it there is not."""
+    names = document["missing"]
+    rows = [
+        {
+            "name": n["name"],
+            "library": n["library"] or "not known",
+            "uses": n["count"],
+            "stand-in": "yes" if n["stand_in"] else "no",
+            "first at": f"{n['file']}:{n['line']}",
+        }
+        for n in names
+    ]
+    absent = [n for n in names if not n["stand_in"]]
+    libraries = {n["library"] for n in absent if n["library"]}
+    known = f", of which {sum(bool(n['library']) for n in absent)} seem to be of {len(libraries)} libraries"
+    end = [f"{len(absent)} names are missing{known if libraries else ''}; {len(names) - len(absent)} have a stand-in."]
+    if absent:
+        end.append("Give their sources with the program or as a library (--library), or declare the names.")
+    if others := document["other_errors"]:
+        end.append(f"Errors about other things: {others}; 'plctool check' shows them.")
+    return "\n".join([*([table(rows, rows[0])] if rows else []), *end])
+
+
+def new_text(document: dict[str, Any]) -> str:
+    """What was made, and what to type next."""
+    files = "\n".join(f"  {file}" for file in document["files"])
+    return f"{files}\nNext: cd {document['folder']}, then 'plctool test', 'plctool run --time T#5s', 'plctool build'."
+
+
 def build_text(document: dict[str, Any]) -> str:
     """What was built, and how old inputs may be."""
     lines = [f"{document['image']}: {document['size']} bytes, CRC {document['crc']}"]

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from plctool.compiler.program_files import IoFiles, ProgramFiles, program_files
 from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET
 
@@ -18,9 +19,15 @@ if TYPE_CHECKING:
     from plctool.compiler.build import BuildResult
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.front import CheckResult
+    from plctool.compiler.imports import ImportedLibrary
     from plctool.compiler.source import Source
     from plctool.compiler.warnings import WarningOptions
     from plctool.io.model import Description
+
+__all__ = [
+    "CompileError", "IoFiles", "Level", "ProgramFiles", "check_sources", "check_with_tests", "compile_sources",
+    "io_sources", "library_sources", "load_io", "load_sources", "program_files",
+]  # fmt: skip
 
 Level = int | Literal["s"]
 """How much is optimised: 0 .. 3, or "s" for small code."""
@@ -37,38 +44,15 @@ class CompileError(UsageError):
 
 
 def load_sources(paths: Sequence[Path | str]) -> list[Source]:
-    """The files named, and all sources in the folders named. Raises UsageError when there is nothing to read."""
-    from plctool.compiler.source_files import load
-
-    try:
-        return load(map(Path, paths))
-    except OSError as error:
-        raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
-
-
-@dataclass(frozen=True)
-class IoFiles:
-    """Where the inputs and outputs are described: `description` (by default what is beside the sources), and the
-    vendor's `device` (by default what the description names). Not `wanted`: there are none, whatever lies beside the
-    sources."""
-
-    description: Path | None = None
-    device: Path | None = None
-    wanted: bool = True
+    """The files named, and all sources in the folders named; of a project those that it names. Raises UsageError when
+    there is nothing to read."""
+    return program_files(paths).load_sources()
 
 
 def load_io(paths: Sequence[Path | str], files: IoFiles | None = None) -> Description | None:
     """The description of the inputs and outputs of a program; None if it has none. It serves one check. Raises
     UsageError for a file that cannot be read, and when it is not clear which one is meant."""
-    from plctool.io.description import find_description, load_description
-
-    files = files or IoFiles()
-    if not files.wanted:
-        return None
-    found = files.description or find_description(list(map(Path, paths)))
-    if found is None and files.device is not None:
-        raise UsageError(f"There is no description (NAME.io.toml) that uses {files.device}; name it with --io.", "io")
-    return None if found is None else load_description(found, files.device)
+    return program_files(paths, files).load_io()
 
 
 def _target(wanted: str | None, io: Description | None) -> str:
@@ -84,15 +68,22 @@ def io_sources(io: Description | None) -> list[Source]:
     return [] if io is None else [Source(path, text) for path, text in io.contents.items()]
 
 
+def library_sources(libraries: Sequence[ImportedLibrary]) -> list[Source]:
+    """What messages about libraries quote."""
+    return [source for library in libraries for source in library.sources]
+
+
 def check_sources(paths: Sequence[Path | str]) -> CheckResult:
     """Every diagnostic of a program and its unit tests, without building it."""
-    return check_with_tests(load_sources(paths), load=lambda: load_io(paths))
+    files = program_files(paths)
+    return check_with_tests(files.load_sources(), load=files.load_io, libraries=files.load_libraries())
 
 
 def check_with_tests(
     sources: Sequence[Source],
     warnings: WarningOptions | None = None,
     load: Callable[[], Description | None] = lambda: None,
+    libraries: Sequence[ImportedLibrary] = (),
 ) -> CheckResult:
     """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
     `load` gets the inputs and outputs for each of both."""
@@ -101,12 +92,13 @@ def check_with_tests(
     from plctool.compiler.warnings import ALL_WARNINGS
 
     with bugs_reported():
-        result = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=load())
+        result = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=load(), libraries=libraries)
         if not result.has_tests:
             return result
         from plctool.compiler.semantics.unit_tests import TestSuite
 
-        tests = check_sources(sources, tests=TestSuite(), warnings=warnings or ALL_WARNINGS, io=load())
+        suite = TestSuite()
+        tests = check_sources(sources, tests=suite, warnings=warnings or ALL_WARNINGS, io=load(), libraries=libraries)
     found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
     found_sorted = sorted(found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
     return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)
@@ -120,14 +112,16 @@ def compile_sources(
     checks: str = "all",
     debug: bool = False,
     warnings: WarningOptions | None = None,
-    io: IoFiles = IoFiles(),
+    io: IoFiles | None = None,
+    libraries: Sequence[Path | str] = (),
     board: str | None = None,
     limits: bool = True,
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
     said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
-    inputs and outputs; `board`: one that plctool knows, such as mps2-an385/standard, to whose target and limits the
-    program is held; without `limits` it may need more than any device has.
+    inputs and outputs; `libraries`: folders or .zips of those that it uses. Of a project its files are taken, its
+    options are for the command line. `board`: one that plctool knows, such as mps2-an385/standard, to whose target and
+    limits the program is held; without `limits` it may need more than any device has.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
@@ -140,22 +134,23 @@ def compile_sources(
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
     from plctool.image.board import find_board
-    from plctool.image.file import ApplicationInfo
     from plctool.image.targets import find_target
 
     number, size = (2, True) if level == "s" else (level, False)
-    description = load_io(paths, io)
+    files = program_files(paths, io, libraries)
+    description = files.load_io()
     known = None if board is None else find_board(board)
     wanted = target or (None if known is None else known.target)
     options = Options(find_target(_target(wanted, description)), number, parse_checks(checks), debug, size)
-    sources = load_sources(paths)
-    shown = [*sources, *io_sources(description)]
+    sources = files.load_sources()
+    imported = files.load_libraries()
+    shown = [*sources, *io_sources(description), *library_sources(imported)]
     with bugs_reported():
-        checked = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=description)
+        checked = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=description, libraries=imported)
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.
-    info = ApplicationInfo(project=Path(paths[0]).stem, date=int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
+    info = replace(files.info, date=int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
     with bugs_reported():
         built = build_program(checked.program, options, info)
     if limits:

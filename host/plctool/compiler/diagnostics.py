@@ -74,6 +74,10 @@ class Diagnostics:
         else:
             self._add(pos, "warning", code, message)
 
+    def quiet(self, paths: Iterable[str]) -> None:
+        """There are no warnings about these files."""
+        self._quiet |= frozenset(paths)
+
     def mute(self, source: Source) -> None:
         """Heeds the pragmas of a text that turn warnings off."""
         for code, ranges in switched_off(source).items():

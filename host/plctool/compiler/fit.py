@@ -18,7 +18,9 @@ def check_program_fits(
 ) -> None:
     """Compares with what `board` has, else with the limits of the device file, else with the most that any firmware of
     this repository has on this processor. Raises UsageError saying what does not fit, and what needs most of it."""
-    own = {} if device is None else {name: n for name, n in device.limits.items() if name in PROGRAM_LIMITS}
+    own: dict[str, int] = {}
+    if device is not None and device.target in ("", target.name):  # not when it is built for a simulator
+        own = {name: n for name, n in device.limits.items() if name in PROGRAM_LIMITS}
     if board is not None:
         check_fit(needs, board.limits, board.title, "Make the program smaller.")
     elif own and device is not None:

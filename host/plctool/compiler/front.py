@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from plctool.compiler.broken_units import is_independent, remaining
 from plctool.compiler.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
 from plctool.compiler.garbage import no_collection
+from plctool.compiler.imports import ImportedLibrary, needed_parts
 from plctool.compiler.library import Library, standard_library
 from plctool.compiler.missing_names import declared_names
 from plctool.compiler.nesting import NestingError, room_for_nesting
@@ -63,12 +64,14 @@ def check_sources(
     tests: TestSuite | None = None,
     warnings: WarningOptions = ALL_WARNINGS,
     io: Description | None = None,
+    libraries: Sequence[ImportedLibrary] = (),
 ) -> CheckResult:
     """Checks the files of a program together.
 
     `library`: whether the standard library is there; `library_sources`: other library sources in place of it. `tests`:
     takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
-    `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check. Whatever the
+    `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check.
+    `libraries`: what the program uses besides the standard library. Whatever the
     sources contain, the result is a program or diagnostics, never an exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
@@ -76,6 +79,7 @@ def check_sources(
     diagnostics = program.world.diagnostics
     diagnostics.options = warnings
     program.world.io = IoChannels(io)
+    program.libraries = libraries
     with no_collection(), room_for_nesting():
         typed = _guarded(program, sources, tests)
     has_tests = bool(program.world.names.tests)
@@ -100,7 +104,7 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
 
 def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
     world = program.world
-    declared = names_asked_for([source.text for source in sources], world.names.library.names)
+    declared = _names_asked_for(program, sources)
     texts = [(source, parse_all(source, world.diagnostics.at(source).error, declared=declared)) for source in sources]
     syntax = [d for d in world.diagnostics.sorted() if d.severity == "error"]
     for source in sources:
@@ -123,6 +127,8 @@ def _check_parsed(
     for source, declarations in parsed:
         world.names.register(declarations)
         world.names.register_globals(declarations, source)
+    if not _import(program, sources):
+        return None
     _declare_devices(world)
     world.io.begin(world.names, world.diagnostics)
     if not world.io.readable:
@@ -167,6 +173,26 @@ def _check_parsed(
     return typed
 
 
+def _names_asked_for(program: Program, sources: Sequence[Source]) -> frozenset[str]:
+    names = [*program.world.names.library.names(), *(name for library in program.libraries for name in library.by_name)]
+    return names_asked_for([source.text for source in sources], lambda: names)
+
+
+def _import(program: Program, sources: Sequence[Source]) -> bool:
+    """Parses what the program needs of its libraries. False after an error, from which many others would follow."""
+    names, diagnostics = program.world.names, program.world.diagnostics
+    before = diagnostics.errors
+    names.begin_imports(program.libraries)
+    needed = needed_parts((source.text for source in sources), program.libraries)
+    diagnostics.quiet(part.source.path for _, part in needed)
+    declared = _names_asked_for(program, [part.source for _, part in needed])
+    for library, part in needed:
+        diagnostics.found_by_reader(part.source)
+        parsed = parse_all(part.source, diagnostics.at(part.source).error, part.start, part.end, declared)
+        names.add_import(library, part.source, parsed.declarations)
+    return diagnostics.errors == before
+
+
 def _declare_devices(world: World) -> None:
     """The variables of the devices that the description names."""
     if world.io.description is None:
@@ -192,6 +218,7 @@ def _check_the_others(program: Program, texts: Sequence[tuple[Source, Parsed]], 
         hidden |= rest.hidden
         whole.append((source, replace(parsed, declarations=rest.declarations)))
     other = Program(program.world.names.library)
+    other.libraries = program.libraries
     other.world.diagnostics.limit = sys.maxsize
     _check_parsed(other, [source for source, _ in whole], whole, None)
     for d in other.world.diagnostics.sorted():

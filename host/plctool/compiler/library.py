@@ -20,10 +20,13 @@ _FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
 _OPENING = re.compile(
     r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
 )
-_NAMESPACES = (
-    "standard", "standard64", "util", "tc2_standard", "tc2_system", "tc2_utilities", "__system", "ibaselibrary",
+STAND_INS = (
+    "Standard", "Standard64", "Util", "SysMem", "IBaseLibrary", "__System",
+    "Tc2_Standard", "Tc2_System", "Tc2_Utilities",
 )  # fmt: skip
-_QUALIFIED = re.compile(rf"(?:{'|'.join(_NAMESPACES)})\.(?=\w+$)", re.IGNORECASE)
+"""Libraries of other systems that this one stands in for, as far as it has their names."""
+
+_QUALIFIED = re.compile(rf"(?:{'|'.join(STAND_INS)})\.(?=\w+$)", re.IGNORECASE)
 _STRUCT = re.compile(r"\bSTRUCT\b.*?\bEND_STRUCT\b", re.DOTALL)
 _DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
 

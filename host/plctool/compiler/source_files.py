@@ -13,6 +13,7 @@ from plctool.compiler.formats import beremiz, codesys2, global_lists, object_tex
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.source import Finding, Source
 from plctool.errors import UsageError
+from plctool.project import LIBRARY_FILE
 
 Reader = Callable[[str, str], list[Source]]
 """Makes sources from the path and the text of a file."""
@@ -59,8 +60,18 @@ def load(paths: Iterable[Path]) -> list[Source]:
     files: dict[Path, None] = {}
     for path in paths:
         files.update(dict.fromkeys(_files(path)))
+    return _read_all(files, Path.read_bytes)
+
+
+def read_contents(contents: Mapping[Path, bytes]) -> list[Source]:
+    """The sources among files that are not on disk, such as those of a .zip."""
+    wanted = [path for path, data in contents.items() if _has_sources(path, data)]
+    return _read_all(wanted, contents.__getitem__)
+
+
+def _read_all(files: Iterable[Path], content: Callable[[Path], bytes]) -> list[Source]:
     with no_collection():
-        read = {file: read_file(file) for file in files}
+        read = {file: _read(file, content(file)) for file in files}
     for owner, members in _members(read).items():
         read[owner] = object_text.with_members(read[owner][0], [read.pop(member)[0] for member in members])
     return [source for sources in read.values() for source in sources]
@@ -85,9 +96,8 @@ def _owner(file: Path) -> Path | None:
     return file.parent.with_suffix(file.suffix) if file.parent.name else None
 
 
-def read_file(path: Path) -> list[Source]:
+def _read(path: Path, data: bytes) -> list[Source]:
     """What a file holds."""
-    data = path.read_bytes()
     refused = unreadable.refusal(path, data)
     if refused:
         return [Source(str(path), "", findings=(Finding(1, 1, "file", refused),))]
@@ -109,7 +119,8 @@ def _files(path: Path) -> list[Path]:
 
 
 def find_sources(folder: Path) -> list[Path]:
-    """The source files in a folder and those below it; of a TwinCAT project, those that belong to it.
+    """The source files in a folder and those below it; of a TwinCAT project, those that belong to it. Libraries below
+    it are not part of it.
 
     Raises UsageError when there are none, or several projects.
     """
@@ -117,7 +128,8 @@ def find_sources(folder: Path) -> list[Path]:
     if len(projects) > 1:
         names = ", ".join(str(path) for path in projects)
         raise UsageError(f"There are several PLC projects in {folder}; give one of them: {names}.", "no-source")
-    found = sorted(path for path in folder.rglob("*") if _is_source(path))
+    libraries = {file.parent for file in folder.rglob(LIBRARY_FILE)} - {folder}
+    found = sorted(path for path in folder.rglob("*") if _is_source(path) and libraries.isdisjoint(path.parents))
     found = [path for path in found if not _is_generated(path, found)]
     if projects:
         home = projects[0].parent
@@ -143,7 +155,13 @@ def _is_source(path: Path) -> bool:
     if suffix != ".xml":
         return True
     with path.open("rb") as file:
-        return plcopen.is_project(decode(file.read(plcopen.HEAD)))
+        return _has_sources(path, file.read(plcopen.HEAD))
+
+
+def _has_sources(path: Path, data: bytes) -> bool:
+    """Whether a file, of which this is at least the beginning, is one."""
+    suffix = path.suffix.lower()
+    return suffix in SUFFIXES or (suffix == ".xml" and plcopen.is_project(decode(data[: plcopen.HEAD])))
 
 
 def _is_generated(path: Path, found: Container[Path]) -> bool:

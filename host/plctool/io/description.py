@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from plctool.errors import UsageError
-from plctool.files import Pos
+from plctool.files import Pos, read_utf8
 from plctool.io.board_header import check_names
 from plctool.io.device_file import DeviceFile, read_device_file
 from plctool.io.kinds import KINDS
@@ -36,16 +36,7 @@ def find_description(sources: Sequence[Path]) -> Path | None:
 def load_description(path: Path, device: Path | None = None) -> Description:
     """Reads a description and the device file: `device`, else the one it names. What is wrong with them is in
     `mistakes`. Raises UsageError for a file that cannot be read."""
-    return read_description(str(path), _read(path), device)
-
-
-def _read(path: Path) -> str:
-    try:
-        return path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise UsageError(f"{path} cannot be read: {error.strerror}.", "io") from None
-    except UnicodeDecodeError as error:
-        raise UsageError(f"{path} is not UTF-8 at byte {error.start}; save it as UTF-8.", "io") from None
+    return read_description(str(path), read_utf8(path, "io"), device)
 
 
 def read_description(path: str, text: str, device: Path | None = None) -> Description:
@@ -89,7 +80,7 @@ def _device_file(path: Path, made: Description) -> DeviceFile | None:
 
 def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
     """A device file with what is wrong with it, and its text. Raises UsageError if it cannot be read."""
-    mistakes, text = Mistakes(), _read(path)
+    mistakes, text = Mistakes(), read_utf8(path, "io")
     try:
         device = read_device_file(TomlText(str(path), text), mistakes)
     except BadToml as error:

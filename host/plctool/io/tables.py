@@ -36,14 +36,17 @@ class Entry:
 
 
 class Table:
-    """`name` is what users call it: `modbus.rs485`."""
+    """`name` is what users call it: `modbus.rs485`; `what` the whole file."""
 
-    def __init__(self, text: TomlText, path: Path, values: dict[str, Any], mistakes: Mistakes) -> None:
+    def __init__(
+        self, text: TomlText, path: Path, values: dict[str, Any], mistakes: Mistakes, what: str = "a description"
+    ) -> None:
         self._text = text
         self._path = path
         self._values = values
         self._read: set[str] = set()
         self._asked: list[str] = []
+        self._what = what
         self.mistakes = mistakes
         self.name = ".".join(str(p) for p in path if isinstance(p, str))
         self.pos = text.value_pos(path) if path else Pos(text.path, 1, 1)
@@ -74,7 +77,7 @@ class Table:
                 self.mistakes.error(self._text.key_pos((*self._path, key)), f"there is no '{key}' here{hint}")
 
     def _title(self) -> str:
-        return f"[{self.name}]" if self.name else "a description"
+        return f"[{self.name}]" if self.name else self._what
 
     # ---- values ----
 
@@ -131,6 +134,24 @@ class Table:
             return default
         return choices[found]
 
+    def strings(self, key: str) -> list[Entry]:
+        """The strings of a list, each with its location; a single one may stand without brackets."""
+        self._ask(key)
+        found = self._values.get(key, [])
+        if isinstance(found, str):
+            return [Entry(key, self._text.key_pos((*self._path, key)), found, self.value_pos(key))]
+        if not isinstance(found, list):
+            self.error(f'{key} is {_word(found)}; it has to be a list such as ["a", "b"]', key)
+            return []
+        entries = [Entry(key, pos, v, pos) for n, v in enumerate(found) for pos in [self._element_pos(key, n)]]
+        for entry in entries:
+            if not isinstance(entry.value, str):
+                self.mistakes.error(entry.pos, f"this is {_word(entry.value)}; it has to be {_WORDS[str]}")
+        return [entry for entry in entries if isinstance(entry.value, str)]
+
+    def _element_pos(self, key: str, number: int) -> Pos:
+        return self._text.value_pos((*self._path, key, number))
+
     def raw(self, key: str) -> Any:
         """The value as TOML has it; None if it is missing. The caller checks it."""
         self._ask(key)
@@ -160,6 +181,10 @@ class Table:
         """The table of a key; None if there is none."""
         found = self._value(key, dict, None, "")
         return None if found is None else self._inner((key,), found)
+
+    def empty(self, key: str) -> Table:
+        """A table without keys, in place of one that is missing."""
+        return self._inner((key,), {})
 
     def tables(self, key: str) -> list[Table]:
         """The tables of `[[key]]`; a single one may be written `[key]`."""
@@ -191,7 +216,7 @@ class Table:
                     self.mistakes.error(entry.key_pos, "a channel needs a name")
 
     def _inner(self, path: Path, values: dict[str, Any]) -> Table:
-        return Table(self._text, (*self._path, *path), values, self.mistakes)
+        return Table(self._text, (*self._path, *path), values, self.mistakes, self._what)
 
 
 def each(tables: Iterable[Table], read: Callable[[Table], T | None]) -> list[T]:

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler import CompileError, IoFiles, io_sources, load_io, load_sources
+from plctool.compiler import CompileError, IoFiles, io_sources, library_sources, program_files
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
@@ -50,14 +50,15 @@ def run_tests(
     level: int = 0,
     warnings: WarningOptions = ALL_WARNINGS,
     io: IoFiles | None = None,
+    libraries: Sequence[Path | str] = (),
 ) -> Report:
     """Runs the tests in sources whose name matches `pattern` (with * and ?) or contains it; case does not matter.
 
-    `level`: optimisation; the lowest compiles fastest, and the results are the same. `io`: inputs and outputs. Raises
-    CompileError when the program has errors, UsageError when there are no tests.
+    `level`: optimisation; the lowest compiles fastest, and the results are the same. `io`: inputs and outputs;
+    `libraries`: those it uses. Raises CompileError when the program has errors, UsageError when there are no tests.
     """
     begin = time.perf_counter()
-    program = TestProgram(paths, level=level, warnings=warnings, io=io)
+    program = TestProgram(paths, level=level, warnings=warnings, io=io, libraries=libraries)
     chosen = [i for i, case in enumerate(program.cases) if _fits(case.name.casefold(), pattern.casefold())]
     if not chosen:
         what = f"no test matches '{pattern}'" if program.cases else "there are no tests: write TEST 'name' ... END_TEST"
@@ -80,14 +81,18 @@ class TestProgram:
         level: int = 0,
         warnings: WarningOptions = ALL_WARNINGS,
         io: IoFiles | None = None,
+        libraries: Sequence[Path | str] = (),
     ) -> None:
-        description = load_io(paths, io)
-        self.sources = load_sources(paths)
+        files = program_files(paths, io, libraries)
+        description, imported = files.load_io(), files.load_libraries()
+        self.sources = files.load_sources()
         self._suite = TestSuite()
         self._level = level
         with _power(), bugs_reported():
-            checked = check_sources(self.sources, tests=self._suite, warnings=warnings, io=description)
-        self.sources += io_sources(description)
+            checked = check_sources(
+                self.sources, tests=self._suite, warnings=warnings, io=description, libraries=imported
+            )
+        self.sources += [*io_sources(description), *library_sources(imported)]
         if checked.program is None:
             raise CompileError([d for d in checked.diagnostics if d.severity == "error"], self.sources)
         self._program = checked.program

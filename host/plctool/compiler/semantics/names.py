@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.imports import ImportedLibrary
 from plctool.compiler.library import Library, without_library
 from plctool.compiler.semantics import sfc
 from plctool.compiler.semantics.generics import GROUPS
+from plctool.compiler.semantics.imported_names import ImportedNames, enum_names, put_into
 from plctool.compiler.semantics.symbols import GlobalSymbol, Namespace, PouSymbol, Symbol, TypeSymbol, Unit
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
@@ -22,11 +24,6 @@ from plctool.compiler.typed import Pos
 from plctool.iec.types import ELEMENTARY
 
 _RESERVED = {*ELEMENTARY, "STRING", "WSTRING", *GROUPS}
-
-
-def _enum_names(symbol: TypeSymbol) -> list[str]:
-    spec = symbol.decl.spec
-    return [name for _, name, _ in spec.values] if isinstance(spec, ast.EnumSpec) else []
 
 
 def _is_in_namespace(decl: ast.GlobalBlock) -> bool:
@@ -63,6 +60,7 @@ class Names:
         self.tests: list[ast.TestDecl] = []
         self.has_members = False  # whether anything has methods, actions or properties
         self.rewritten: Callable[[list[ast.Declaration]], list[ast.Declaration]] = list  # what unit tests replace
+        self.imported = ImportedNames((), self._duplicate)
         self._units: dict[str, Unit] = {}
         self._globals: dict[str, GlobalSymbol] = {}
         self._lists: dict[str, Namespace] = {}
@@ -82,7 +80,7 @@ class Names:
             elif isinstance(decl, ast.TypeDecl):
                 symbol = TypeSymbol(decl, library)
                 self._add(symbol, library=library, full_name=symbol.full_name)
-                for name in _enum_names(symbol) if not decl.qualified else ():
+                for name in enum_names(symbol) if not decl.qualified else ():
                     self._enum_values.setdefault(name.casefold(), []).append(symbol)
             elif isinstance(decl, ast.TestDecl):
                 self.tests.append(decl)
@@ -95,6 +93,22 @@ class Names:
                 self.instance_blocks += decl.instance_blocks
                 for block in decl.globals:
                     self._add_globals(block, decl.source, prefix="", library=library)
+
+    def begin_imports(self, libraries: Sequence[ImportedLibrary]) -> None:
+        """Makes the namespaces of libraries known."""
+        self.imported = ImportedNames(libraries, self._duplicate)
+        self.namespaces.update(self.imported.namespaces)
+
+    def add_import(self, library: ImportedLibrary, source: Source, declarations: Sequence[ast.Declaration]) -> None:
+        """Makes known what a part of a library declares."""
+        put_into(library, declarations)
+        declarations = self.rewritten(list(declarations))
+        for decl in declarations:
+            if isinstance(decl, ast.PouDecl):
+                self.has_members = self.has_members or bool(decl.members) or decl.keyword is ast.Unit.INTERFACE
+                sfc.declare(decl, self.diagnostics)
+        self.imported.add(library, source, declarations)
+        self.namespaces.update(self.imported.namespaces)
 
     def register_globals(self, declarations: Sequence[ast.Declaration], source: Source) -> None:
         """The VAR_GLOBAL of a file are known as `x` and as `<file>.x`. A file with nothing else is a named list: there
@@ -170,22 +184,27 @@ class Names:
 
     # ---- finding them ----
 
-    def lookup(self, key: str, *, library: bool) -> Symbol | None:
-        """A global name: the program's own before the library's; inside the library the other way round. Variables come
+    def lookup(self, key: str, *, library: bool, imported: bool = False) -> Symbol | None:
+        """A global name: the program's own before those of its libraries and of the standard library; inside the
+        standard library the other way round, inside one that is `imported` without those of the program. Variables come
         before types, so that `motor : Motor` hides nothing that is needed (see `unit`)."""
         if library and (symbol := self._library_symbol(key)) is not None:
             return symbol
+        own = None if imported else self._own(key)
+        return own or self.imported.lookup(key) or self._library_symbol(key)
+
+    def _own(self, key: str) -> Symbol | None:
         return (
             self._globals.get(key)
             or self.instance(key, self._units.get(key))
             or self._units.get(key)
             or self._lists.get(key)
-            or self._library_symbol(key)
         )
 
-    def unit(self, key: str, *, library: bool) -> Unit | None:
+    def unit(self, key: str, *, library: bool, imported: bool = False) -> Unit | None:
         """A type, function, function block or program by its name."""
-        own = self._units.get(key)
+        own = None if imported else self._units.get(key)
+        own = own or self.imported.unit(key)
         if own is not None and not library:
             return own
         other = self._library_symbol(key)
@@ -215,12 +234,13 @@ class Names:
         return self._ambiguous.get(name.casefold(), [])
 
     def is_user_name(self, name: str) -> bool:
-        """Whether the program itself declares a global name."""
-        return name.casefold() in self._units
+        """Whether the program declares a global name, or a library that has its namespace in front."""
+        return name.casefold() in self._units or self.imported.has(name)
 
-    def enumerations_with(self, name: str) -> list[TypeSymbol]:
-        """The enumerations that have a value of that name."""
-        return self._enum_values.get(name.casefold(), [])
+    def enumerations_with(self, name: str, *, imported: bool = False) -> list[TypeSymbol]:
+        """The enumerations that have a value of that name: those of the program before those of libraries."""
+        own = [] if imported else self._enum_values.get(name.casefold(), [])
+        return own or self.imported.enumerations_with(name.casefold())
 
     # ---- all of a kind ----
 
@@ -302,14 +322,16 @@ class Names:
         """The bare names of what a namespace holds, for suggestions."""
         prefix = namespace.casefold() + "."
         keys = [key for key in (*self._units, *self._globals, *self.namespaces) if key.startswith(prefix)]
-        return [key.removeprefix(prefix) for key in keys if "." not in key.removeprefix(prefix)]
+        keys += self.imported.names_in(prefix)
+        return [key[len(prefix) :] for key in keys if "." not in key[len(prefix) :]]
 
     def qualified_names(self, name: str) -> list[str]:
         """What a name could mean that needs that of its list or enumeration in front."""
         key = name.casefold()
         found = [f"{s.name}.{m.name}" for s in self._lists.values() if (m := s.members.get(key)) is not None]
+        found += self.imported.choices(name)
         types = [s for s in self._units.values() if isinstance(s, TypeSymbol) and s.decl.qualified]
-        return found + [f"{t.decl.name}.{v}" for t in types for v in _enum_names(t) if v.casefold() == key]
+        return found + [f"{t.decl.name}.{v}" for t in types for v in enum_names(t) if v.casefold() == key]
 
     def program_variables(self, name: str) -> list[str]:
         """What a name is in the PROGRAMs that have a variable of it, with the instance in front."""
@@ -322,16 +344,16 @@ class Names:
 
     def visible_names(self) -> list[str]:
         """Names of globals, functions and enumeration values, for suggestions."""
-        values = [name for s in self._units.values() if isinstance(s, TypeSymbol) for name in _enum_names(s)]
+        values = [name for s in self._units.values() if isinstance(s, TypeSymbol) for name in enum_names(s)]
         units = [s.decl.name for s in self._units.values()]
         named = [s.name for s in self._globals.values()]
         named += [s.name for s in self._lists.values()] + [instance.name for instance in self.planned.values()]
-        return units + named + values + self.library.names()
+        return units + named + values + self.imported.known + self.library.names()
 
     def type_names(self) -> list[str]:
         """Names of types and function blocks, for suggestions."""
-        return [s.decl.name for s in self._units.values()] + self.library.names()
+        return [s.decl.name for s in self._units.values()] + self.imported.known + self.library.names()
 
     def function_names(self) -> list[str]:
         """Names of functions, for suggestions."""
-        return [s.decl.name for s in self.functions()] + self.library.names()
+        return [s.decl.name for s in self.functions()] + self.imported.known + self.library.names()

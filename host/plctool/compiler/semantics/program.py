@@ -5,6 +5,9 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from plctool.compiler.imports import ImportedLibrary
 from plctool.compiler.internal import note_position
 from plctool.compiler.library import Library
 from plctool.compiler.semantics.checker import Checker
@@ -40,6 +43,7 @@ class Program:
         self._classes = Classes(world, self.types, self._functions)
         self._blocks = Blocks(world, self.types, self.variables, units, self._classes)
         self.programs = Programs(world, self.types, self.variables, units, self._classes)
+        self.libraries: Sequence[ImportedLibrary] = ()
         self.startup: Pou | None = None  # calls FB_Init
         self.shutdown: Pou | None = None  # calls FB_Exit
         world.names.declared_instance = self.programs.instance

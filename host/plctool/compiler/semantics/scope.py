@@ -48,7 +48,7 @@ class Scope:
     here, as function blocks: in unit tests; `outer` what a method sees of the unit `cls` around it; `sees_inside`: VAR
     of instances may be read, as tests and VAR_CONFIG do; `writes_inside`: and all of them written, as tests do; `edges`
     what the body sees in place of inputs with R_EDGE; `path` the namespaces to look into, case-folded, innermost first;
-    `space` the one this is in.
+    `space` the one this is in; `imported`: that is of a library that is given as source.
     """
 
     globals: Names
@@ -66,12 +66,14 @@ class Scope:
     edges: dict[str, Symbol] = field(default_factory=dict)
     path: tuple[str, ...] = ()
     space: str = ""
+    imported: bool = False
 
     def enter(self, namespace: ast.Namespace | None) -> None:
         """Makes what is in a namespace, in those around it and in those it is USING known by bare names."""
         if namespace is None:
             return
         self.space = namespace.name.casefold()
+        self.imported = namespace.imported
         parts = self.space.split(".") if self.space else []
         enclosing = [".".join(parts[:n]) for n in range(len(parts), 0, -1)]
         self.path = tuple(enclosing)
@@ -129,7 +131,7 @@ class Scope:
             symbol = self.globals.lookup(f"{space}.{key}", library=self.library)
             if symbol is not None:
                 return symbol
-        found = self.globals.lookup(key.removeprefix("."), library=self.library)
+        found = self.globals.lookup(key.removeprefix("."), library=self.library, imported=self.imported)
         bare = self._without_foreign(key) if found is None else ""
         return self.globals.own_unit(bare) or self.globals.own_list(bare) if bare else found
 
@@ -139,7 +141,7 @@ class Scope:
         if key in self.programs:
             return self.programs[key]
         spaces = (f"{space}.{key}" for space in self.path)
-        found = (self.globals.unit(k, library=self.library) for k in (*spaces, key))
+        found = (self.globals.unit(k, library=self.library, imported=self.imported) for k in (*spaces, key))
         symbol = next((symbol for symbol in found if symbol is not None), None)
         return symbol or self.globals.own_unit(self._without_foreign(key))
 
@@ -147,9 +149,14 @@ class Scope:
         """A name without the namespace of a library that is given as source: `tcunit.x` is `x` where nothing else is
         known as `tcunit`. "" when it has none."""
         first, _, rest = key.partition(".")
-        known = not first or not rest or first in self.names or first in self.outer
+        known = not first or not rest or first in self.names or first in self.outer or self.imported
         known = known or first in self.globals.namespaces
         return "" if known or self.globals.lookup(first, library=self.library) is not None else rest
+
+    def choices(self, name: str) -> str:
+        """What to write for a name that several libraries have; "" for others."""
+        found = self.globals.imported.choices(name)
+        return f"; write {' or '.join(found)}" if found else ""
 
     def pos(self, offset: int) -> Pos:
         """Line and column of an offset in this source."""

@@ -103,7 +103,7 @@ class TestProgram:
     def prepare(self, parsed: list[tuple[Source, list[ast.Declaration]]]) -> list[tuple[Source, list[ast.Declaration]]]:
         """Adds to the syntax tree what MOCK needs."""
         names = self._world.names
-        names.register([raising()])
+        names.register([raising()], library=True)
         everything = [decl for _, declarations in parsed for decl in declarations]
         mocks = Mocks((d for d in everything if isinstance(d, ast.TestDecl)), self._world.diagnostics)
         names.rewritten = mocks.rewritten

@@ -370,11 +370,13 @@ class TypeDecl:
 @dataclass(slots=True, eq=False)
 class Namespace:
     """Where a declaration stands: the dotted name of its NAMESPACE, "" for none, and what it is USING. `internal`: of
-    an INTERNAL one, the namespace around it, which may use it; "" if there is none."""
+    an INTERNAL one, the namespace around it, which may use it; "" if there is none. `imported`: it is that of a
+    library, which does not see the program."""
 
     name: str = ""
     using: list[tuple[int, str]] = field(default_factory=list)
     internal: str | None = None
+    imported: bool = False
 
 
 @dataclass(slots=True, eq=False)

@@ -190,6 +190,7 @@ class TypeDeclarations:
             upper = spec.name.upper()
             hint = did_you_mean(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])
             hint = f"; write {TYPES[upper]}" if upper in TYPES else hint
+            hint = scope.choices(spec.name) or hint
             if upper == "ENUM":
                 hint = "; an enumeration is written Name : (First, Second);"
             if hint:

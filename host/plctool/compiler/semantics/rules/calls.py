@@ -240,6 +240,7 @@ def _call_by_bare_name(c: Checker, node: ast.Call, expected: Type | None) -> Exp
     if c.scope.inherits_unknown(c.scope.cls):
         return error_value(c.pos(node.pos))  # it may be an inherited method
     hint = f"; {FUNCTIONS[name.upper()]}" if name.upper() in FUNCTIONS else function_hint(c, name)
+    hint = c.scope.choices(name) or hint
     if hint:
         return c.error(callee.pos, "unknown", f"unknown function {name}{hint}")
     return c.missing(callee.pos, name, f"unknown function {name}")

@@ -124,7 +124,7 @@ def _enumerated(c: Checker, node: ast.Name, expected: Type | None) -> Expr | Non
     """The value of an enumeration by its bare name; None when there is none of that name."""
     if isinstance(expected, EnumType) and expected.inline and expected.has(node.name):
         return _value_of(c, expected, node.name, node.pos, node.pos)
-    symbols = c.world.names.enumerations_with(node.name)
+    symbols = c.world.names.enumerations_with(node.name, imported=c.scope.imported)
     types = [t for s in symbols if isinstance(t := c.world.declared.type_of(s), EnumType)]
     if len(types) > 1 and expected in types:
         types = [t for t in types if t is expected]

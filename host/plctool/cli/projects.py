@@ -1,0 +1,91 @@
+"""What a command on sources works with: what its arguments say, and where they say nothing, what the project says."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from plctool.compiler import IoFiles, Level
+from plctool.compiler.warnings import WarningOptions, warning_options
+from plctool.errors import UsageError
+from plctool.project import DEFAULT_IMAGE, PROJECT_FILE, Project, find_project, project_named, read_project
+
+DEFAULT_LEVEL: Level = 2
+
+
+@dataclass(frozen=True)
+class Settings:
+    """`paths`: sources, or the project file that names them; `own_folder`: the project says where `output` is, so that
+    its folder may be made; the others as in `compile_sources`."""
+
+    paths: Sequence[Path]
+    io: IoFiles
+    warnings: WarningOptions
+    libraries: Sequence[Path] = ()
+    output: Path = Path(DEFAULT_IMAGE)
+    own_folder: bool = False
+    target: str | None = None
+    level: Level = DEFAULT_LEVEL
+    checks: str = "all"
+    debug: bool = False
+    board: str | None = None
+    limits: bool = True
+
+
+def settings_of(args: argparse.Namespace) -> Settings:
+    """The settings of a command that has the arguments of `build`, or some of them. Raises UsageError if it names no
+    sources and there is no project, CompileError for mistakes in the project file."""
+    file = project_named(args.sources) if args.sources else needed_project()
+    project = None if file is None else read_project(file)
+    return Settings(
+        args.sources if file is None else [file],
+        IoFiles(args.io, args.device),
+        _warnings(args, project),
+        args.library,
+        own_folder=project is not None and getattr(args, "output", None) is None,
+        board=getattr(args, "board", None),
+        limits=not getattr(args, "no_limits", False),
+        **_of_build(args, project),
+    )
+
+
+def settings_of_project(file: Path) -> Settings:
+    """The settings of a command that has none of these arguments."""
+    nothing = argparse.Namespace(sources=[file], io=None, device=None, no_warn=[], werror=None, library=[])
+    return settings_of(nothing)
+
+
+def needed_project() -> Path:
+    """The project of the current folder. Raises UsageError if there is none."""
+    file = find_project()
+    if file is None:
+        raise UsageError(
+            f"There is no project here ({PROJECT_FILE}, in this folder or one above it): name the sources, "
+            "or make a project with 'plctool new NAME'.",
+            "no-project",
+        )
+    return file
+
+
+def _warnings(args: argparse.Namespace, project: Project | None) -> WarningOptions:
+    """Names that are not wanted add up."""
+    names = [*args.no_warn, *(project.no_warn if project is not None else ())]
+    werror = args.werror
+    if werror is None:
+        werror = project is not None and project.werror
+    return warning_options(names, as_errors=werror)
+
+
+def _of_build(args: argparse.Namespace, project: Project | None) -> dict[str, Any]:
+    """Those that were chosen: by the arguments, else by the project. A board has its own target."""
+    chosen = {}
+    for name in ("output", "target", "level", "checks", "debug"):
+        value = getattr(args, name, None)
+        if value is None and project is not None and not (name == "target" and getattr(args, "board", None)):
+            value = getattr(project, name)
+        if value is not None:
+            chosen[name] = value
+    return chosen

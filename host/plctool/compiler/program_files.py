@@ -1,0 +1,89 @@
+"""What a program is made of: its sources, its libraries, and the description of its inputs and outputs.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from plctool.errors import UsageError
+from plctool.image.file import ApplicationInfo
+from plctool.project import project_named, read_project
+
+if TYPE_CHECKING:
+    from plctool.compiler.imports import ImportedLibrary
+    from plctool.compiler.source import Source
+    from plctool.io.model import Description
+
+
+@dataclass(frozen=True)
+class IoFiles:
+    """Where the inputs and outputs are described: `description` (by default what is beside the sources), and the
+    vendor's `device` (by default what the description names). Not `wanted`: there are none, whatever lies beside the
+    sources."""
+
+    description: Path | None = None
+    device: Path | None = None
+    wanted: bool = True
+
+
+@dataclass(frozen=True)
+class ProgramFiles:
+    """`sources`: files and folders; `libraries`: those given, or folders of them; `beside`: where a description may be,
+    if `io` names none; `info`: what the image says about the program."""
+
+    sources: Sequence[Path]
+    beside: Sequence[Path]
+    libraries: Sequence[Path]
+    io: IoFiles
+    info: ApplicationInfo
+
+    def load_sources(self) -> list[Source]:
+        """All sources. Raises UsageError when there is nothing to read."""
+        from plctool.compiler.source_files import load
+
+        try:
+            return load(self.sources)
+        except OSError as error:
+            raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
+
+    def load_libraries(self) -> list[ImportedLibrary]:
+        """The libraries, and those that they need. Raises UsageError for what is missing or does not fit together."""
+        from plctool.compiler.imports import import_libraries
+        from plctool.compiler.library_files import resolve_libraries
+
+        return import_libraries(resolve_libraries(self.libraries, self.sources))
+
+    def load_io(self) -> Description | None:
+        """The inputs and outputs, for one check; None if there is no description. Raises UsageError for a file that
+        cannot be read, and when it is not clear which one is meant."""
+        from plctool.io.description import find_description, load_description
+
+        if not self.io.wanted:
+            return None
+        device = self.io.device
+        found = self.io.description or find_description(self.beside)
+        if found is None and device is not None:
+            raise UsageError(f"There is no description (NAME.io.toml) that uses {device}; name it with --io.", "io")
+        return None if found is None else load_description(found, device)
+
+
+def program_files(
+    paths: Sequence[Path | str], io: IoFiles | None = None, libraries: Sequence[Path | str] = ()
+) -> ProgramFiles:
+    """The files of a program: those named, or those of the project that is named. What `io` names holds before what
+    the project names; `libraries` are added to its own. Raises CompileError for mistakes in a project file."""
+    named = list(map(Path, paths))
+    given = list(map(Path, libraries))
+    io = io or IoFiles()
+    file = project_named(named)
+    if file is None:
+        return ProgramFiles(named, named, given, io, ApplicationInfo(project=named[0].stem if named else ""))
+    project = read_project(file)
+    io = IoFiles(io.description or project.io, io.device or project.device, io.wanted)
+    beside = [file, *project.sources]
+    return ProgramFiles(project.sources, beside, [*given, *project.libraries], io, project.info)
