@@ -44,7 +44,9 @@ def _server() -> socket.socket:
     """Where requests go: JSON with the files stdin, stdout, stderr and a pipe for the process id and its end."""
     here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with there:
-        process = subprocess.Popen([sys.executable, __file__, str(there.fileno())], pass_fds=[there.fileno()])
+        command = [sys.executable, __file__, str(there.fileno())]
+        env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        process = subprocess.Popen(command, pass_fds=[there.fileno()], env=env)
 
     def end() -> None:
         here.close()
@@ -59,7 +61,7 @@ def run_plctool(
     words: Sequence[str], folder: Path, env: Mapping[str, str], timeout: float
 ) -> subprocess.CompletedProcess[str]:
     """Runs `plctool WORDS` in a folder; raises TimeoutExpired after `timeout` [s], as subprocess.run does."""
-    request = {"words": words, "folder": str(folder), "env": dict(env), "path": sys.path}
+    request = {"words": words, "folder": str(folder), "env": dict(env)}
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err, open(os.devnull) as nothing:
         reader, writer = os.pipe()
         with open(reader) as told:
@@ -115,7 +117,6 @@ def _work(request: dict[str, Any], streams: list[int]) -> NoReturn:
     os.chdir(request["folder"])
     os.environ.clear()
     os.environ.update(request["env"])
-    sys.path[:] = request["path"]  # which gateways get that the command starts
     sys.argv = ["plctool", *request["words"]]
     sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115 # buffered as a file
     try:
