@@ -11,7 +11,6 @@ process printed is in meson-logs/, and here if it failed.
 from __future__ import annotations
 
 import argparse
-import compileall
 import contextlib
 import json
 import os
@@ -170,8 +169,6 @@ def main() -> int:
     parser.add_argument("--meson", required=True)
     parser.add_argument("builds", nargs="+", type=Path)
     args = parser.parse_args()
-    # Tests start plctool some thousand times, and write no bytecode themselves: compiling it took half of each start.
-    compileall.compile_dir(ROOT / "host" / "plctool", quiet=1)
     jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
     jobs.sort(key=lambda job: -job.seconds)
     begin, used, counts, failures, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
