@@ -22,6 +22,7 @@ typedef struct {
 } CAN_COUNTERS;
 
 const CAN_COUNTERS *BlkDrvCanGetCounters(void);
+extern const BLK_COUNTERS BlkDrvCanCounters;
 
 RTS_RESULT CmpBlkDrvCan_Hook(CMP_HOOK hook);
 

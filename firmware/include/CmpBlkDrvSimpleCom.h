@@ -20,6 +20,7 @@ typedef struct {
 
 /* NULL when the port has no such line. */
 const COM_COUNTERS *BlkDrvComGetCounters(RTS_UI32 line);
+extern const BLK_COUNTERS BlkDrvComCounters;
 
 RTS_RESULT CmpBlkDrvSimpleCom_Hook(CMP_HOOK hook);
 

@@ -23,6 +23,7 @@ typedef struct {
 } TCP_COUNTERS;
 
 const TCP_COUNTERS *BlkDrvTcpGetCounters(void);
+extern const BLK_COUNTERS BlkDrvTcpCounters;
 
 RTS_RESULT CmpBlkDrvTcp_Hook(CMP_HOOK hook);
 

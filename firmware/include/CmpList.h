@@ -12,6 +12,10 @@
  *
  * SysFoo has the hook SysFoo_Hook and the number CMPID_SysFoo. What is not chosen takes no flash.
  */
+#include "CmpBlkDrvCan.h"
+#include "CmpBlkDrvSimpleCom.h"
+#include "CmpBlkDrvTcp.h"
+#include "CmpBlkDrvUdp.h"
 #include "CmpItf.h"
 
 #define X(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
@@ -29,5 +33,23 @@ const CMP_NAME cmp_names[] = {
 #include "CmpOrder.h"
 };
 #undef X
+
+#ifdef HAS_CmpPlcShell
+const BLK_COUNTERS *const BlkCounters[] = {
+#ifdef HAS_CmpBlkDrvSimpleCom
+    &BlkDrvComCounters,
+#endif
+#ifdef HAS_CmpBlkDrvCan
+    &BlkDrvCanCounters,
+#endif
+#ifdef HAS_CmpBlkDrvTcp
+    &BlkDrvTcpCounters,
+#endif
+#ifdef HAS_CmpBlkDrvUdp
+    &BlkDrvUdpCounters,
+#endif
+    NULL,
+};
+#endif
 
 const RTS_SIZE cmp_component_count = RTS_COUNT(cmp_hooks);

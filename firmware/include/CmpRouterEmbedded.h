@@ -12,7 +12,7 @@
 #include "CmpSrvNumbers.h"
 #include "rts_config.h"
 
-/* Counts what happened on one of the layers 2 to 4, for tests and debuggers. */
+/* Counts what happened on one of the layers 2 to 4, for the PLC shell and debuggers. */
 #define COMM_COUNT(counter) ((void)(COMM_COUNTERS && ++(counter)))
 
 /* A packet to send, in pieces, so that no layer has to assemble it in a buffer of its own. */
@@ -53,6 +53,18 @@ typedef struct ROUTER_PEER {
     RTS_UI8 address_words; /* 1..ROUTER_MAX_ADDRESS */
     RTS_UI8 address[2 * ROUTER_MAX_ADDRESS];
 } ROUTER_PEER;
+
+/* The counters of a block driver with their names, for the PLC shell. */
+typedef struct {
+    const char *driver;
+    const char *const *names;
+    RTS_UI32 count;
+    const RTS_UI32 *values; /* `count` of each line */
+    RTS_UI32 lines;
+} BLK_COUNTERS;
+
+/* Of the drivers that a port has, NULL after them (CmpList.h). */
+extern const BLK_COUNTERS *const BlkCounters[];
 
 /* What happened to packets since start. */
 typedef struct {

@@ -127,15 +127,16 @@
 #define APP_CRASH_TEXT_SIZE 32
 #endif
 
-/* A cycle of a task without watchdog, and initialisation code, is aborted after this long [us], so that an
- * endless loop never takes the device away. */
+/* A cycle of a task without watchdog is aborted after this long [us], so that an endless loop never takes the device
+ * away. */
 #ifndef APP_DEFAULT_WATCHDOG_US
 #define APP_DEFAULT_WATCHDOG_US 10000000
 #endif
 
-/* Initialisation code is aborted after this long [us]: communication waits for it, and so does a reset. */
+/* Initialisation code is aborted after this long [us]: communication waits for it, and a reset answers within a second,
+ * also that of a program whose initialisation does not end. */
 #ifndef APP_INIT_WATCHDOG_US
-#define APP_INIT_WATCHDOG_US APP_DEFAULT_WATCHDOG_US
+#define APP_INIT_WATCHDOG_US 700000
 #endif
 
 /* No cycle takes longer than this, whatever WATCHDOG and SENSITIVITY of its task say [us]; 0: no such limit. For ports
@@ -343,8 +344,8 @@
 #define COM_QUEUE_SIZE 640
 #endif
 
-/* Whether block driver, router and channel server count what arrives, is dropped and is repeated: for tests, and for a
- * look with the debugger at a bad line. 300 bytes of flash, 80 of RAM. */
+/* Whether block driver, router and channel server count what arrives, is dropped and is repeated: for `channelinfo` of
+ * the PLC shell, or a look with the debugger at a bad line. 300 bytes of flash, 80 of RAM. */
 #ifndef COMM_COUNTERS
 #define COMM_COUNTERS 1
 #endif

@@ -308,6 +308,17 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
 
 /* ---- start ---- */
 
+const BLK_COUNTERS *const BlkCounters[] = {
+    &BlkDrvComCounters,
+#if COMM_CAN_TESTED
+    &BlkDrvCanCounters,
+#elif COMM_ENDPOINTS
+    &BlkDrvTcpCounters,
+    &BlkDrvUdpCounters,
+#endif
+    NULL,
+};
+
 void fakes_hook(CMP_HOOK hook)
 {
     static const PF_HOOK_FUNCTION hooks[] = {

@@ -174,6 +174,19 @@ static void channels_come_with_what_went_wrong(void)
     CHECK(strstr(text, "of another channel 1, repeated 0") != NULL);
 }
 
+static void lines_come_with_what_went_wrong(void)
+{
+    static const char wrong[] = "#<wrong#>#<1#>";
+
+    setup();
+    CHECK(strstr(ask("channelinfo"), "Line serial 1: frames 0, CRC errors 0, too long 0, too short 0, ") != NULL);
+    memcpy(fakes.line_in, wrong, sizeof(wrong) - 1);
+    fakes.line_in_size = sizeof(wrong) - 1;
+    fakes_cycle(1);
+    CHECK(strstr(ask("channelinfo"), "Line serial 1: frames 0, CRC errors 1, too long 0, too short 1, ") != NULL);
+    CHECK(strstr(text, ", unfinished 0, ends without start 0\r\n") != NULL);
+}
+
 static void a_command_need_not_have_a_nul_and_is_bounded(void)
 {
     static const RTS_UI8 bare[] = {TAG_SHELL_COMMAND, 7, 'a', 'p', 'p', 'l', 'i', 's', 't'};
@@ -203,6 +216,8 @@ int main(void)
     RUN(a_long_answer_comes_in_parts);
     RUN(the_load_is_that_of_cyclic_tasks);
     RUN(channels_come_with_what_went_wrong);
+    RUN(lines_come_with_what_went_wrong);
+    RUN(lines_come_with_what_went_wrong);
     RUN(a_command_need_not_have_a_nul_and_is_bounded);
     return test_result();
 }

@@ -86,6 +86,16 @@ def test_no_function_grows_without_limit_by_inlining() -> None:
     assert "noinline" in signature(lowered(large_callers(100)), "st.Block0")
 
 
+@pytest.mark.parametrize(("target", "room"), [("x86_64-linux", 4096), ("cortex-m3", 256), ("rv32imac", 256)])
+def test_a_caller_has_no_room_for_large_variables_of_a_function_before_it_calls(target: str, room: int) -> None:
+    """Its stack would overflow in every cycle, and an interrupt would find it out."""
+    call = "PROGRAM Main VAR n : DINT; trip : BOOL; END_VAR IF trip THEN n := Large(n); END_IF END_PROGRAM"
+    function = "FUNCTION Large : DINT VAR_INPUT i : DINT; END_VAR VAR f : ARRAY[1..{}] OF DINT; END_VAR {} END_FUNCTION"
+    for count, inlined in ((room // 4 - 8, True), (room // 4 + 1, False)):
+        text = f"{function.format(count, 'f[i] := i; Large := f[i + 1];')} {call}"
+        assert ("noinline" not in signature(lowered(text, target), "st.Large")) is inlined
+
+
 def long_body(statement: str, count: int = 1000) -> str:
     body = "\n".join([*["n := n + n * 3 - 1; m := m + n;"] * count, statement])
     return f"PROGRAM Main VAR n, m : DINT; END_VAR\n{body}\nEND_PROGRAM"

@@ -177,4 +177,5 @@ def test_cycles_on_another_processor_do_not_stop_the_clock_of_an_endless_loop(to
     connected.write({"go": True})
     exception = eventually(lambda: connected.status().exception)
     assert (exception.name, exception.task) == ("WATCHDOG", "Endless")
-    assert connected.tasks()[1].cycles - cycles < 40  # not six times as long
+    busy = connected.tasks()[1]
+    assert (busy.cycles - cycles) * busy.min_us < 3 * 400_000  # processors are shared fairly; it was six times as long

@@ -179,7 +179,7 @@ def test_a_request_of_a_tool_that_left_while_it_waited_is_not_carried_out(
 def test_scan_beside_other_tools_finds_the_device_and_keeps_the_channel(served: Served) -> None:
     tool = served.connect()
     tool.read("Main.count")
-    nodes = served.tool().scan(0.5)
+    nodes = served.tool().scan(PATIENCE, enough=1)
     assert [node.node_name for node in nodes] == ["press-3"]
     tool.read("Main.count")
     assert logins(served) == 1

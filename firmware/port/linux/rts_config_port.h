@@ -29,9 +29,6 @@
 /* Less than the patience of plctool with a device that does not answer, and of what ends plcrt [us]. */
 #define APP_DEFAULT_WATCHDOG_US 5000000
 
-/* A reset answers within a second, also that of a program whose initialisation does not end [us]. */
-#define APP_INIT_WATCHDOG_US 700000
-
 /* Every task is a thread of its own; their processor time is known. */
 #define SCHED_EVENTS_IN_TIMERS 1
 #define SCHED_FREEWHEELING_IN_TIMERS 1

@@ -71,6 +71,11 @@ static struct {
 
 static CAN_COUNTERS counters;
 
+static const char *const counter_names[] = {
+    "packets", "aborted", "too long", "without session", "unsent", "scans", "frames of the same node", "bus off"};
+RTS_STATIC_ASSERT(sizeof(CAN_COUNTERS) == sizeof(RTS_UI32) * RTS_COUNT(counter_names), each_counter_has_a_name);
+const BLK_COUNTERS BlkDrvCanCounters = {"CAN", counter_names, RTS_COUNT(counter_names), &counters.packets, 1};
+
 #define FOR_EACH_RX(session) for (RX_SESSION *session = can.rx; session < can.rx + CAN_RX_SESSIONS; session++)
 #define FOR_EACH_TX(session) for (TX_SESSION *session = can.tx; session < can.tx + CAN_TX_SESSIONS; session++)
 

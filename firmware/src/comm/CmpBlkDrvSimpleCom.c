@@ -56,6 +56,12 @@ typedef struct {
 static COM_LINE lines[COM_MAX_LINES];
 static COM_COUNTERS counters[COM_MAX_LINES];
 
+static const char *const counter_names[] = {"frames",      "CRC errors", "too long",          "too short",
+                                            "bad escapes", "unfinished", "ends without start"};
+RTS_STATIC_ASSERT(sizeof(COM_COUNTERS) == sizeof(RTS_UI32) * RTS_COUNT(counter_names), each_counter_has_a_name);
+const BLK_COUNTERS BlkDrvComCounters = {"serial", counter_names, RTS_COUNT(counter_names), &counters[0].frames,
+                                        COM_MAX_LINES};
+
 /* ---- receiving ---- */
 
 /* Hands a frame up when its CRC is right. */

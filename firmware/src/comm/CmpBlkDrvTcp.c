@@ -52,6 +52,11 @@ static struct {
 
 static TCP_COUNTERS counters;
 
+static const char *const counter_names[] = {"accepted",   "frames", "displaced", "bad magic",
+                                            "bad length", "late",   "idle",      "disconnected"};
+RTS_STATIC_ASSERT(sizeof(TCP_COUNTERS) == sizeof(RTS_UI32) * RTS_COUNT(counter_names), each_counter_has_a_name);
+const BLK_COUNTERS BlkDrvTcpCounters = {"TCP", counter_names, RTS_COUNT(counter_names), &counters.accepted, 1};
+
 static const RTS_HANDLE NO_SOCKET = RTS_INVALID_HANDLE;
 
 #define FOR_EACH_CONNECTION(connection) \

@@ -35,6 +35,10 @@ static struct {
 
 static UDP_COUNTERS counters;
 
+static const char *const counter_names[] = {"packets", "too long", "without reply"};
+RTS_STATIC_ASSERT(sizeof(UDP_COUNTERS) == sizeof(RTS_UI32) * RTS_COUNT(counter_names), each_counter_has_a_name);
+const BLK_COUNTERS BlkDrvUdpCounters = {"UDP", counter_names, RTS_COUNT(counter_names), &counters.packets, 1};
+
 static const RTS_HANDLE NO_SOCKET = RTS_INVALID_HANDLE;
 
 RTS_UI32 BlkDrvUdpPutAddress(RTS_UI32 ip, RTS_UI32 prefix, RTS_UI32 index, RTS_UI8 *address)

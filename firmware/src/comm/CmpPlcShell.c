@@ -51,17 +51,33 @@ static void put(SHELL_OUTPUT *out, const char *text, RTS_UI32 size)
     out->more = out->more || fits < size;
 }
 
+static void put_formatted(SHELL_OUTPUT *out, const char *format, va_list arguments)
+{
+    enum { PIECE_SIZE = 160 };
+    char piece[PIECE_SIZE];
+
+    put(out, piece, (RTS_UI32)CMUtlvsnprintf(piece, sizeof(piece), format, arguments));
+}
+
+/* A line, or the end of one. */
 static void print(SHELL_OUTPUT *out, const char *format, ...)
 {
-    enum { LINE_SIZE = 160 };
-    char line[LINE_SIZE];
     va_list arguments;
 
     va_start(arguments, format);
-    RTS_SIZE size = CMUtlvsnprintf(line, sizeof(line), format, arguments);
+    put_formatted(out, format, arguments);
     va_end(arguments);
-    put(out, line, (RTS_UI32)size);
     put(out, "\r\n", 2);
+}
+
+/* A part of a line. */
+static void print_part(SHELL_OUTPUT *out, const char *format, ...)
+{
+    va_list arguments;
+
+    va_start(arguments, format);
+    put_formatted(out, format, arguments);
+    va_end(arguments);
 }
 
 /* ---- commands ---- */
@@ -143,6 +159,23 @@ static void print_counters(SHELL_OUTPUT *out)
           (unsigned)channel->gaps, (unsigned)channel->repeats);
 }
 
+static void print_line(SHELL_OUTPUT *out, const BLK_COUNTERS *counters, RTS_UI32 line)
+{
+    const RTS_UI32 *values = counters->values + line * counters->count;
+
+    print_part(out, "Line %s %u:", counters->driver, (unsigned)(line + 1));
+    for (RTS_UI32 i = 0; i < counters->count; i++)
+        print_part(out, "%s %s %u", i == 0 ? "" : ",", counters->names[i], (unsigned)values[i]);
+    print(out, "");
+}
+
+static void print_lines(SHELL_OUTPUT *out)
+{
+    for (const BLK_COUNTERS *const *counters = BlkCounters; *counters != NULL; counters++)
+        for (RTS_UI32 line = 0; line < (*counters)->lines; line++)
+            print_line(out, *counters, line);
+}
+
 static void print_channels(SHELL_OUTPUT *out)
 {
     COMM_CLIENT *client;
@@ -152,6 +185,7 @@ static void print_channels(SHELL_OUTPUT *out)
             print(out, "Channel %u: %s, messages up to %u bytes", (unsigned)client->channel.id,
                   SrvIsLoggedIn(client) ? "logged in" : "no login", (unsigned)client->channel.limit);
     print_counters(out);
+    print_lines(out);
 }
 
 static RTS_RESULT reset_warm(void)
@@ -176,7 +210,7 @@ static const SHELL_COMMAND commands[] = {
     {"resetprg", "warm reset of the application", RIGHT_CONTROL, reset_warm, NULL},
     {"resetprgcold", "cold reset of the application", RIGHT_CONTROL, reset_cold, NULL},
     {"tasklist", "tasks and their times", RIGHT_VIEW, NULL, print_tasks},
-    {"channelinfo", "channels, and what went wrong on the way to them", RIGHT_VIEW, NULL, print_channels},
+    {"channelinfo", "channels and lines, and what went wrong there", RIGHT_VIEW, NULL, print_channels},
     {"plcload", "share of the time that cyclic tasks take", RIGHT_VIEW, NULL, print_load},
 };
 

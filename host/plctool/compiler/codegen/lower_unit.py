@@ -20,7 +20,7 @@ from plctool.image.targets import Target
 
 _ALWAYS = 'nounwind "no-builtins"'
 _PROBES = ' "probe-stack"="inline-asm"'
-_LARGE_FRAME = 4096  # bytes of local variables
+_LARGE_FRAME, _LARGE_FRAME_OF_CONTROLLER = 4096, 256  # bytes of local variables
 _INLINED = 225  # LLVM's measure of what it inlines when it does not have to save room
 
 
@@ -143,7 +143,8 @@ class Unit:
         """The attributes for LLVM about inlining a POU: the standard library is made for it, if there is room."""
         if pou.kind is PouKind.PROGRAM or self.options.debug or pou in self._sections:
             return "noinline"
-        if sum(variable.type.size for variable in pou.locals) > _LARGE_FRAME:
+        large = _LARGE_FRAME_OF_CONTROLLER if self.options.compact else _LARGE_FRAME
+        if sum(variable.type.size for variable in pou.locals) > large:
             return "noinline"  # or its caller would need that room, and probe it, also when it does not call
         return "inlinehint" if not pou.checks and (pou.no_init or not self.options.compact) else ""
 

@@ -9,11 +9,41 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterable
+from enum import StrEnum
 
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.ast import ACCESS, Modifier, Section
+
+
+class Kind(StrEnum):
+    """What holds declarations, as messages call it."""
+
+    FUNCTION = "FUNCTION"
+    FUNCTION_BLOCK = "FUNCTION_BLOCK"
+    CLASS = "CLASS"
+    PROGRAM = "PROGRAM"
+    METHOD = "METHOD"
+    INTERFACE_METHOD = "method of an INTERFACE"
+    PROPERTY = "PROPERTY"
+    INTERFACE_PROPERTY = "property of an INTERFACE"
+    ACTION = "ACTION"
+    CONFIGURATION = "CONFIGURATION"
+    FILE = "file"
+    TEST = "TEST"
+    SETUP = "SETUP"
+    TEARDOWN = "TEARDOWN"
+    INTERFACE = "INTERFACE"
+    TYPE = "TYPE"
+
+
+_IN_INTERFACE = {
+    Kind.METHOD: Kind.INTERFACE_METHOD,
+    Kind.PROPERTY: Kind.INTERFACE_PROPERTY,
+}
+_OF_TESTS = (Kind.TEST, Kind.SETUP, Kind.TEARDOWN)
+_BLOCKS = (Kind.PROGRAM, Kind.FUNCTION_BLOCK, Kind.CLASS)
 
 KEEPING = frozenset((Modifier.RETAIN, Modifier.NON_RETAIN, Modifier.PERSISTENT))
 _CONSTANT = frozenset((Modifier.CONSTANT,))
@@ -29,49 +59,48 @@ _PARAMETERS = {Section.VAR_INPUT: _CONSTANT, Section.VAR_OUTPUT: _NONE, Section.
 _LASTING = {**_CALL, Section.VAR_INPUT: _CONSTANT | KEEPING, Section.VAR_OUTPUT: KEEPING, Section.VAR_IN_OUT: _CONSTANT}
 _TEST = {Section.VAR: _CONSTANT, Section.VAR_TEMP: _CONSTANT, Section.VAR_EXTERNAL: _CONSTANT}
 
-SECTIONS: dict[str, dict[Section, frozenset[Modifier]]] = {
-    "FUNCTION": {**_CALL, **_PARAMETERS},
-    "FUNCTION_BLOCK": {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS},
-    "CLASS": {**_CALL, Section.VAR: _CONSTANT | KEEPING | ACCESS},
-    "PROGRAM": {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS},
-    "METHOD": {**_CALL, **_PARAMETERS, Section.VAR_INST: KEEPING},
-    "method of an INTERFACE": _PARAMETERS,
-    "PROPERTY": {**_CALL, Section.VAR_INST: KEEPING},
-    "property of an INTERFACE": {},
-    "ACTION": {},
-    "CONFIGURATION": {Section.VAR_GLOBAL: _CONSTANT | KEEPING},
-    "file": {Section.VAR_GLOBAL: _CONSTANT | KEEPING | {Modifier.PUBLIC, Modifier.INTERNAL}},
-    "TEST": _TEST,
-    "SETUP": _TEST,
-    "TEARDOWN": _TEST,
+SECTIONS: dict[Kind, dict[Section, frozenset[Modifier]]] = {
+    Kind.FUNCTION: {**_CALL, **_PARAMETERS},
+    Kind.FUNCTION_BLOCK: {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS},
+    Kind.CLASS: {**_CALL, Section.VAR: _CONSTANT | KEEPING | ACCESS},
+    Kind.PROGRAM: {**_LASTING, Section.VAR: _CONSTANT | KEEPING | ACCESS},
+    Kind.METHOD: {**_CALL, **_PARAMETERS, Section.VAR_INST: KEEPING},
+    Kind.INTERFACE_METHOD: _PARAMETERS,
+    Kind.PROPERTY: {**_CALL, Section.VAR_INST: KEEPING},
+    Kind.INTERFACE_PROPERTY: {},
+    Kind.ACTION: {},
+    Kind.CONFIGURATION: {Section.VAR_GLOBAL: _CONSTANT | KEEPING},
+    Kind.FILE: {Section.VAR_GLOBAL: _CONSTANT | KEEPING | {Modifier.PUBLIC, Modifier.INTERNAL}},
+    Kind.TEST: _TEST,
+    Kind.SETUP: _TEST,
+    Kind.TEARDOWN: _TEST,
 }
 """For each kind of unit its sections, and for each of those the qualifiers that do something there."""
 
 _OBJECTS = ACCESS | {Modifier.FINAL, Modifier.ABSTRACT, Modifier.OVERRIDE}
-MODIFIERS: dict[str, frozenset[Modifier]] = {
-    "FUNCTION": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
-    "FUNCTION_BLOCK": frozenset((Modifier.PUBLIC, Modifier.INTERNAL, Modifier.ABSTRACT, Modifier.FINAL)),
-    "CLASS": frozenset((Modifier.PUBLIC, Modifier.INTERNAL, Modifier.ABSTRACT, Modifier.FINAL)),
-    "PROGRAM": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
-    "INTERFACE": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
-    "METHOD": _OBJECTS,
-    "PROPERTY": _OBJECTS,
-    "method of an INTERFACE": frozenset((Modifier.PUBLIC, Modifier.ABSTRACT)),
-    "property of an INTERFACE": frozenset((Modifier.PUBLIC, Modifier.ABSTRACT)),
-    "ACTION": _NONE,
-    "TYPE": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
-    "NAMESPACE": frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
+MODIFIERS: dict[Kind, frozenset[Modifier]] = {
+    Kind.FUNCTION: frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
+    Kind.FUNCTION_BLOCK: frozenset((Modifier.PUBLIC, Modifier.INTERNAL, Modifier.ABSTRACT, Modifier.FINAL)),
+    Kind.CLASS: frozenset((Modifier.PUBLIC, Modifier.INTERNAL, Modifier.ABSTRACT, Modifier.FINAL)),
+    Kind.PROGRAM: frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
+    Kind.INTERFACE: frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
+    Kind.METHOD: _OBJECTS,
+    Kind.PROPERTY: _OBJECTS,
+    Kind.INTERFACE_METHOD: frozenset((Modifier.PUBLIC, Modifier.ABSTRACT)),
+    Kind.INTERFACE_PROPERTY: frozenset((Modifier.PUBLIC, Modifier.ABSTRACT)),
+    Kind.ACTION: _NONE,
+    Kind.TYPE: frozenset((Modifier.PUBLIC, Modifier.INTERNAL)),
 }
 """For each kind of unit the words that may stand before its name."""
 
 _INSTEAD_OF_SECTION = {
-    ("FUNCTION", Section.VAR_INST): "VAR_STAT keeps a value from call to call",
-    ("FUNCTION_BLOCK", Section.VAR_INST): "VAR keeps its value from call to call",
-    ("PROGRAM", Section.VAR_INST): "VAR keeps its value from cycle to cycle",
-    ("CLASS", Section.VAR_INST): "VAR keeps its value",
-    ("CLASS", Section.VAR_INPUT): "nothing calls a CLASS itself; write VAR PUBLIC, or an input of a METHOD",
-    ("CLASS", Section.VAR_OUTPUT): "nothing calls a CLASS itself; write VAR PUBLIC, or an output of a METHOD",
-    ("CLASS", Section.VAR_IN_OUT): "nothing calls a CLASS itself; write it into a METHOD",
+    (Kind.FUNCTION, Section.VAR_INST): "VAR_STAT keeps a value from call to call",
+    (Kind.FUNCTION_BLOCK, Section.VAR_INST): "VAR keeps its value from call to call",
+    (Kind.PROGRAM, Section.VAR_INST): "VAR keeps its value from cycle to cycle",
+    (Kind.CLASS, Section.VAR_INST): "VAR keeps its value",
+    (Kind.CLASS, Section.VAR_INPUT): "nothing calls a CLASS itself; write VAR PUBLIC, or an input of a METHOD",
+    (Kind.CLASS, Section.VAR_OUTPUT): "nothing calls a CLASS itself; write VAR PUBLIC, or an output of a METHOD",
+    (Kind.CLASS, Section.VAR_IN_OUT): "nothing calls a CLASS itself; write it into a METHOD",
 }
 
 
@@ -97,20 +126,20 @@ class _Check:
         if isinstance(decl, ast.PouDecl):
             self._unit(decl, _kind(decl))
         elif isinstance(decl, ast.TypeDecl):
-            for word in sorted(decl.modifiers - MODIFIERS["TYPE"]):
-                self._error(decl.pos, _wrong_modifier("TYPE", word))
+            for word in sorted(decl.modifiers - MODIFIERS[Kind.TYPE]):
+                self._error(decl.pos, _wrong_modifier(Kind.TYPE, word))
         elif isinstance(decl, ast.GlobalBlock):
-            self._section("file", decl.block)
+            self._section(Kind.FILE, decl.block)
         elif isinstance(decl, ast.TestDecl):
             for block in decl.blocks:
-                if block.keyword in SECTIONS[decl.keyword]:  # the others are refused where tests are declared
-                    self._section(decl.keyword, block)
+                if block.keyword in SECTIONS[Kind(decl.keyword)]:  # others are refused where tests are declared
+                    self._section(Kind(decl.keyword), block)
         elif isinstance(decl, ast.ConfigurationDecl):
             self._configuration(decl)
 
     def _configuration(self, decl: ast.ConfigurationDecl) -> None:
         for block in decl.globals:
-            self._section("CONFIGURATION", block)
+            self._section(Kind.CONFIGURATION, block)
         for instance in decl.programs:
             for qualifier in instance.qualifiers - KEEPING:
                 message = f"a program cannot be {qualifier}; RETAIN, NON_RETAIN or PERSISTENT may stand here"
@@ -118,15 +147,18 @@ class _Check:
 
     # ---- units ----
 
-    def _unit(self, decl: ast.PouDecl, kind: str) -> None:
+    def _unit(self, decl: ast.PouDecl, kind: Kind) -> None:
         self._modifiers(decl, kind)
         for block in decl.blocks[_given(decl) :]:
             self._section(kind, block)
         if "external" in decl.attributes and decl.keyword is ast.Unit.FUNCTION:
             self._external(decl)
         for member in decl.members:
-            inside = f"{_kind(member).lower()} of an INTERFACE" if kind == "INTERFACE" else _kind(member)
-            self._unit(member, inside)
+            inside = _IN_INTERFACE.get(_kind(member)) if kind is Kind.INTERFACE else _kind(member)
+            if inside is not None:
+                self._unit(member, inside)
+            else:
+                self._error(member.pos, f"an INTERFACE has no {member.keyword}; it has METHOD and PROPERTY")
 
     def _external(self, decl: ast.PouDecl) -> None:
         """What the C function does is not said here."""
@@ -137,7 +169,7 @@ class _Check:
                 message = f"{decl.name} is written in C, so it has no {block.keyword} here"
                 self._error(block.pos, message)
 
-    def _modifiers(self, decl: ast.PouDecl, kind: str) -> None:
+    def _modifiers(self, decl: ast.PouDecl, kind: Kind) -> None:
         given = decl.modifiers - {Modifier.CLASS}
         for word in sorted(given - MODIFIERS[kind]):
             self._error(decl.pos, _wrong_modifier(kind, word))
@@ -151,7 +183,7 @@ class _Check:
 
     # ---- sections ----
 
-    def _section(self, kind: str, block: ast.VarBlock) -> None:
+    def _section(self, kind: Kind, block: ast.VarBlock) -> None:
         keyword = block.keyword
         allowed = SECTIONS[kind].get(keyword)
         if allowed is None:
@@ -163,7 +195,7 @@ class _Check:
         for line in block.decls:
             self._line(block, line)
 
-    def _combination(self, kind: str, block: ast.VarBlock) -> None:
+    def _combination(self, kind: Kind, block: ast.VarBlock) -> None:
         given = block.qualifiers
         keeps = sorted(given & {Modifier.RETAIN, Modifier.PERSISTENT})
         if keeps and Modifier.NON_RETAIN in given:
@@ -173,7 +205,7 @@ class _Check:
             self._error(block.pos, f"a variable cannot be {' and '.join(access)}; choose one")
         if keeps and Modifier.CONSTANT in given:
             self._warning(block.pos, f"{keeps[0]} has no effect here: a constant never changes; leave it out")
-        if kind == "PROGRAM" and access and access != [Modifier.PUBLIC]:
+        if kind is Kind.PROGRAM and access and access != [Modifier.PUBLIC]:
             message = f"{access[0]} has no effect in a PROGRAM: other POUs see its variables all the same; leave it out"
             self._warning(block.pos, message)
 
@@ -196,17 +228,17 @@ def _given(decl: ast.PouDecl) -> int:
     return int(decl.keyword is ast.Unit.SET)
 
 
-def _kind(decl: ast.PouDecl) -> str:
+def _kind(decl: ast.PouDecl) -> Kind:
     if Modifier.CLASS in decl.modifiers:
-        return "CLASS"
-    return "PROPERTY" if decl.is_property else decl.keyword
+        return Kind.CLASS
+    return Kind.PROPERTY if decl.is_property else Kind(decl.keyword)
 
 
-def _with_article(kind: str) -> str:
+def _with_article(kind: Kind) -> str:
     return f"{'an' if kind[0] in 'AI' else 'a'} {kind}"
 
 
-def _wrong_section(kind: str, keyword: Section) -> str:
+def _wrong_section(kind: Kind, keyword: Section) -> str:
     advice = _INSTEAD_OF_SECTION.get((kind, keyword)) or f"it has {_listed(SECTIONS[kind])}"
     return f"{_with_article(kind)} has no {keyword}; {advice}"
 
@@ -216,14 +248,14 @@ def _listed(words: Iterable[str], conjunction: str = "and") -> str:
     return f"{', '.join(most)} {conjunction} {last}" if most else last
 
 
-def _wrong_modifier(kind: str, word: str) -> str:
-    if kind.endswith("INTERFACE") and kind != "INTERFACE":
+def _wrong_modifier(kind: Kind, word: str) -> str:
+    if kind in _IN_INTERFACE.values():
         return f"what an INTERFACE declares is PUBLIC and to be implemented; leave out {word}"
     allowed = sorted(MODIFIERS[kind])
     return f"{_with_article(kind)} cannot be {word}; it may be {_listed(allowed, 'or')}"
 
 
-def _wrong_qualifier(kind: str, keyword: Section, word: str) -> str:
+def _wrong_qualifier(kind: Kind, keyword: Section, word: str) -> str:
     if word in (Modifier.FINAL, Modifier.ABSTRACT, Modifier.OVERRIDE):
         return f"{word} is for blocks and methods, not for variables; leave it out"
     if word in ACCESS:
@@ -234,7 +266,7 @@ def _wrong_qualifier(kind: str, keyword: Section, word: str) -> str:
     return f"a {keyword} cannot be {word}: {_why_not_kept(kind, keyword)}"
 
 
-def _wrong_access(kind: str, keyword: Section, word: str) -> str:
+def _wrong_access(kind: Kind, keyword: Section, word: str) -> str:
     if keyword in (Section.VAR_INPUT, Section.VAR_OUTPUT, Section.VAR_IN_OUT):
         return f"{word} is for VAR; a {keyword} is visible to all callers; leave it out"
     if keyword is Section.VAR_GLOBAL:
@@ -244,12 +276,12 @@ def _wrong_access(kind: str, keyword: Section, word: str) -> str:
     )
 
 
-def _why_not_kept(kind: str, keyword: Section) -> str:
+def _why_not_kept(kind: Kind, keyword: Section) -> str:
     if keyword is Section.VAR_IN_OUT:
         return "it is a variable of the caller; write it where that is declared"
     if keyword is Section.VAR_EXTERNAL:
         return "it only repeats a VAR_GLOBAL; write it there"
-    if kind in ("TEST", "SETUP", "TEARDOWN"):
+    if kind in _OF_TESTS:
         return "a test is initialised each time; leave it out"
-    lasting = Section.VAR if kind in ("PROGRAM", "FUNCTION_BLOCK", "CLASS") else Section.VAR_STAT
+    lasting = Section.VAR if kind in _BLOCKS else Section.VAR_STAT
     return f"it lives for one call; {lasting} RETAIN keeps a value"
