@@ -82,7 +82,7 @@ def _content(file: IO[str]) -> str:
 
 
 def _serve(requests: socket.socket) -> None:
-    """Until nobody can ask any more and no command runs. Of each, the pipe gets the process id, and then its end."""
+    """Until pytest has ended and no command runs. The pipe of each gets the process id, and then its end."""
     tellers: dict[int, tuple[int, int]] = {}  # by file of the process: its id, and the pipe
     asked = [requests]
     while asked or tellers:
@@ -103,7 +103,7 @@ def _serve(requests: socket.socket) -> None:
             else:
                 pid, teller = tellers.pop(ready)
                 _, status = os.waitpid(pid, 0)
-                with contextlib.suppress(BrokenPipeError):  # nobody waited so long
+                with contextlib.suppress(BrokenPipeError):  # it was not waited for
                     os.write(teller, b"%d\n" % os.waitstatus_to_exitcode(status))
                 os.close(teller)
                 os.close(ready)

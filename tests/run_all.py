@@ -169,6 +169,7 @@ def main() -> int:
     parser.add_argument("--meson", required=True)
     parser.add_argument("builds", nargs="+", type=Path)
     args = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # tests send it; `make test &` would have it ignored
     jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
     jobs.sort(key=lambda job: -job.seconds)
     begin, used, counts, failures, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
