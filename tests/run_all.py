@@ -26,6 +26,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 C_TESTS_SECONDS = 60  # of one folder, about
+SKIPPED = 77  # exit status, as for meson: there was nothing that could be tested
 LOOK_EVERY = 0.02  # for processes that ended [s]
 
 
@@ -88,8 +89,14 @@ class Done:
     used: float
 
     @property
+    def is_good(self) -> bool:
+        return self.status in (0, SKIPPED)
+
+    @property
     def outcome(self) -> Outcome:
         """Of its tests; a process that failed without a test that did is a failure of its own."""
+        if self.status == SKIPPED:
+            return Outcome(Counter(skipped=1), [])
         if not self.job.report.exists():
             outcome = Outcome(Counter({"failed" if self.status else "passed": 1}), [])
         elif self.job.report.suffix == ".xml":
@@ -175,14 +182,14 @@ def main() -> int:
     begin, used, counts, failures, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
     for number, done in enumerate(run(jobs, (os.cpu_count() or 1) + 1), 1):
         outcome = done.outcome
-        result = "failed" if done.status else "ok"
+        result = "ok" if done.is_good else "failed"
         print(
             f"{number}/{len(jobs)} {done.job.name}: {result}, {done.seconds:.1f} s, {done.used:.1f} s of processors",
             flush=True,
         )
-        if done.status:
+        if not done.is_good:
             print(done.job.output.read_text(errors="replace"), flush=True)
-        status |= bool(done.status)
+        status |= not done.is_good
         used += done.used
         counts += outcome.counts
         failures += [f"{done.job.name}: {failure}" for failure in outcome.failures]
