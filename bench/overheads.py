@@ -9,12 +9,13 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 BOARDS = {"mps2-an385": "build-cm3", "mps2-an386": "build-cm4f"}
-FIRMWARE = "firmware/port/baremetal/firmware-standard.elf"
+FIRMWARE = "firmware/port/baremetal/firmware-{}.elf"
+CONFIGS = ("standard", "full")  # the second one has lines of the board
 
 
 def main() -> None:
-    for machine, build in BOARDS.items():
-        firmware = ROOT / build / FIRMWARE
+    for machine, build, config in ((*board, config) for board in BOARDS.items() for config in CONFIGS):
+        firmware = ROOT / build / FIRMWARE.format(config)
         print()
         if shutil.which("qemu-system-arm") is None:
             print(f"{machine}: left out, qemu-system-arm not found")

@@ -22,7 +22,8 @@ ROOT = Path(plctool.__file__).parent
 FLOORS = (
     ("errors", "core", "version"),
     ("files", "iec"),
-    ("image", "io"),
+    ("image",),
+    ("io",),
     ("debug",),
     ("link",),
     ("gateway",),

@@ -18,10 +18,10 @@ typedef enum {
     CH_INIT_SYSTEM2,      /* what needs other system components */
     CH_INIT,              /* all other components: reset all own state, call no other */
     CH_INIT2,             /* all others are initialised; create events */
-    CH_INIT3,             /* register for events, services, external functions */
+    CH_INIT3,             /* register for events, services, external functions; open the lines of the communication */
     CH_INIT_SYSTEM_TASKS, /* timers and tasks the application needs */
     CH_INIT_TASKS,        /* boot project, IEC tasks */
-    CH_INIT_COMM,         /* open the communication */
+    CH_INIT_COMM,         /* begin to serve others */
     CH_INIT_FINISHED,
     CH_COMM_CYCLE, /* main loop: never blocks */
     CH_EXIT_COMM,

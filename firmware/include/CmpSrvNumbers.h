@@ -42,7 +42,8 @@ enum {
     CAN_ID_BASE = 0x1F400000, /* of 29-bit identifiers: base | target << 8 | source; base has zeros there */
     CAN_TARGET_SHIFT = 8,
     CAN_ADDRESS_MASK = 0xFF,
-    CAN_NODE_MAX = 127, /* devices are 1..127, as in CANopen */
+    CAN_BASE_MASK = 0x1FFF0000, /* what of a base may be set */
+    CAN_NODE_MAX = 127,         /* devices are 1..127, as in CANopen */
     CAN_TOOL_MIN = 128,
     CAN_TOOL_MAX = 254,
     CAN_TO_ALL = 255,

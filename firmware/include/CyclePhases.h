@@ -51,8 +51,22 @@ void AppEnterSafeState(void);
 /* Whether any are registered. */
 bool CyclePhasesExist(void);
 
-/* Calls those registered for `when`. */
-void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task, const IEC_CONTEXT *context);
+/* By CYCLE_PHASE, in the order of registration. */
+typedef struct CYCLE_ENTRY {
+    PF_CYCLE_PHASE run;
+    struct CYCLE_ENTRY *next;
+} CYCLE_ENTRY;
+extern CYCLE_ENTRY *cycle_phases[];
+
+/* Calls those registered for `when`. Most phases have none, so it is inlined. */
+static inline __attribute__((always_inline)) void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task,
+                                                                 const IEC_CONTEXT *context)
+{
+    const CYCLE_ENTRY *entry;
+
+    for (entry = cycle_phases[when]; entry != NULL; entry = entry->next)
+        entry->run(task, context);
+}
 
 /* Forgets all, as after power on. */
 void CyclePhasesForget(void);

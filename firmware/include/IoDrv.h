@@ -52,8 +52,9 @@ typedef struct {
      * From main, while no task runs and after the loader has checked the configuration: an application is loaded. The
      * driver looks for its connectors (IoMgrConfigGetFirstConnector; IoMgrConfigIsMine), takes the hardware they need and
      * gives back what it had before. What it points to is valid until the next call. `count` 0: there is no application any
-     * more, everything is given back. Below 10 ms; no bus traffic: what takes longer is begun here and goes on in
-     * CH_COMM_CYCLE. Errors: see IoMgrConfigRefuse; then there is no IoDrvUpdateMapping, but a call with 0.
+     * more, everything is given back; this call comes for a driver without connectors too. Below 10 ms; no bus traffic:
+     * what takes longer is begun here and goes on in CH_COMM_CYCLE. Errors: see IoMgrConfigRefuse; then there is no
+     * IoDrvUpdateMapping, but a call with 0.
      */
     RTS_RESULT (*IoDrvUpdateConfiguration)(const IoConfigConnector *connectors, int count);
 

@@ -20,7 +20,7 @@ typedef struct {
     const MODBUS_JOB *job;
     RTS_UI8 *in;      /* what was read last */
     RTS_UI8 *out;     /* what is to be written */
-    RTS_UI8 *written; /* what the device has of it; as much room as `out` */
+    RTS_UI8 *written; /* what the device has of it; as much room as `out`, which the driver uses before `has_out` */
     bool has_out;     /* `out` was filled, nothing is written before */
     bool is_written;  /* `written` is valid */
     bool good;        /* its last try was */
@@ -60,9 +60,9 @@ typedef struct {
     MODBUS_JOB_STATE *job;
     MODBUS_REQUEST request;
     bool sent;  /* else it waits for the link */
-    bool waits; /* the last byte has left, the time-out runs */
+    bool waits; /* the last byte has left */
     bool verifies;
-    RTS_I64 since_ns; /* since when it waits for the link, or for the reply */
+    RTS_I64 since_ns; /* from when it waits for the link, or for the reply: the time-out runs */
     RTS_UI16 transaction;
     RTS_UI8 head[MODBUS_HEAD_SIZE];
 } MODBUS_CLIENT;

@@ -21,5 +21,7 @@ void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *set
 bool ModbusRtuReady(MODBUS_LINK *link, RTS_I64 now_ns);
 RTS_UI32 ModbusRtuReceive(MODBUS_LINK *link, RTS_I64 now_ns);
 void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
+void ModbusRtuGiveUp(MODBUS_LINK *link);
+void ModbusRtuClose(MODBUS_LINK *link);
 
 #endif

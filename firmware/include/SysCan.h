@@ -64,13 +64,14 @@ typedef struct {
 
 /* How a node is addressed (docs/can.md). */
 typedef struct {
-    RTS_UI32 base; /* of the 29-bit identifiers: CAN_ID_BASE, if the user has not chosen another one */
-    RTS_UI8 node;  /* 1..127, as set by switches or stored; 0: none, it takes no part */
+    RTS_UI32 base; /* of the 29-bit identifiers, its last 16 bits 0: CAN_ID_BASE, if the user has chosen no other */
+    RTS_UI32 node; /* 1..127, as set by switches or stored; 0: none, it takes no part */
 } CAN_ADDRESS;
 
 /* How many controllers the port has configured. */
 RTS_UI32 SysCanGetCount(void);
 
+/* What the user has chosen, as it is: what cannot be is refused, and said in the log, by who asks. */
 void SysCanGetAddress(RTS_UI32 index, CAN_ADDRESS *address);
 
 /* Opens a controller at a bit rate, 0: the port's own; `data_bit_rate` not 0: FD frames may be sent, and received. What

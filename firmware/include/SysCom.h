@@ -4,7 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Called by CmpBlkDrvSimpleCom and IoDrvModbus from main. Nothing blocks: a port buffers received bytes (interrupt
- * driven) and bytes to send. A line is used by one component at a time.
+ * driven) and bytes to send. A line is used by one component at a time: those that the controller is reached by are
+ * opened before an application can ask for them.
  */
 #ifndef SYSCOM_H
 #define SYSCOM_H
@@ -31,7 +32,7 @@ typedef struct {
 } SYSCOM_SETTINGS;
 
 /* Opens a line of a field bus, by the name that the port gives its lines ("/dev/ttyS1", "COM2"), and returns its index.
- * ERR_NO_OBJECT: the port has no such line; ERR_DUPLICATE: it is in use; ERR_NOT_SUPPORTED: it cannot run like that;
+ * ERR_NO_OBJECT: the port has no such line; ERR_DUPLICATE: it is open; ERR_NOT_SUPPORTED: it cannot run like that;
  * ERR_DEVICE: it cannot be opened. Only a firmware with a field bus needs it, and SysComGetByteNs. */
 RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index);
 

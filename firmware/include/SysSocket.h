@@ -57,6 +57,9 @@ RTS_RESULT SysSockRecvFrom(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, SOCK
 /* Sends a datagram. ERR_NOBUFFER if there is no room now. ERR_OK does not mean that it arrives. */
 RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, const SOCKADDRESS *to);
 
+/* Closes a connection at once: what was taken, and has not arrived, is not sent any more. Only a field bus needs it. */
+void SysSockReset(RTS_HANDLE socket);
+
 /* Closes a connection, after sending what was taken; or returns a socket of SysSockOpen, which may be opened again. */
 void SysSockClose(RTS_HANDLE socket);
 

@@ -56,6 +56,12 @@ class LinkError(PlcError):
         super().__init__(message, code)
 
 
+def listed(words: Iterable[str], conjunction: str = "and") -> str:
+    """`a, b and c`."""
+    *most, last = words
+    return f"{', '.join(most)} {conjunction} {last}" if most else last
+
+
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:
     """`; did you mean X?` for the candidate most like `name`, else nothing."""
     from difflib import get_close_matches

@@ -32,7 +32,7 @@ than the description says; answers: so many next answers are bad."""
 @dataclass(frozen=True)
 class SimChannel:
     """A channel of the symbol file. `bit`: the first of its `bits` in the parameter of the device; `area_bit`: in the
-    inputs or outputs."""
+    inputs or outputs. `enabled`: the device is; else there is none that could measure anything."""
 
     device: str
     name: str
@@ -43,6 +43,7 @@ class SimChannel:
     bit: int
     bits: int
     big_endian: bool
+    enabled: bool
 
     @property
     def title(self) -> str:
@@ -68,7 +69,10 @@ class SimIo:
     """The channels of the program with these symbols."""
 
     def __init__(self, symbols: SymbolTable) -> None:
-        self.channels = [_channel(entry, symbols) for entry in symbols.io.get("channels", [])]
+        disabled = {d["name"] for d in symbols.io.get("devices", []) if not d.get("enabled", True)}
+        self.channels = [
+            _channel(entry, symbols, entry["device"] not in disabled) for entry in symbols.io.get("channels", [])
+        ]
         self._names: dict[str, list[SimChannel]] = {}
         for c in self.channels:
             for name in {c.title.casefold(), c.name.casefold(), c.symbol.name.casefold()}:
@@ -85,23 +89,30 @@ class SimIo:
         hint = did_you_mean(name, [c.title for c in self.channels]) or "; 'plctool io map' lists them"
         raise UsageError(f"There is no channel {name}{hint}.", "unknown-channel")
 
+    def _enabled(self, name: str) -> SimChannel:
+        channel = self.find(name)
+        if not channel.enabled:
+            hint = "take enabled = false out of its description"
+            raise UsageError(f"{channel.title} is of a device that is not enabled; {hint}.", "not-enabled")
+        return channel
+
     def set_input(self, name: str, value: Any) -> None:
         """What a device measures from now on. Raises UsageError for a value that does not fit."""
-        channel = self.find(name)
+        channel = self._enabled(name)
         if channel.output:
             raise UsageError(f"{channel.title} is an output: the program sets it.", "output")
         channel.write(encode(channel.symbol.type, value))
 
     def value(self, name: str) -> Any:
         """What a device has now: an output as it left the program, or as it is while that is stopped."""
-        channel = self.find(name)
+        channel = self._enabled(name)
         return decode(channel.symbol.type, channel.read())
 
     def follow(self, first_bit: int, end_bit: int, memory: Callable[[int, int], bytes]) -> None:
         """Bits of the inputs were written: the devices measure that from now on. `memory` gives bytes of the inputs, by
         offset and size."""
         for c in self.channels:
-            if not c.output and c.area_bit < end_bit and first_bit < c.area_bit + c.bits:
+            if c.enabled and not c.output and c.area_bit < end_bit and first_bit < c.area_bit + c.bits:
                 data = memory(c.area_bit // 8, -(-c.bits // 8))
                 shift = c.area_bit % 8
                 c.write(bytes([data[0] >> shift & (1 << c.bits) - 1]) if c.bits < 8 else data)
@@ -114,7 +125,7 @@ def set_fault(device: str, fault: str, value: int) -> None:
     _check(lib.SimIoFault(device.encode("ascii", "replace"), FAULTS[fault], value), device)
 
 
-def _channel(entry: dict[str, Any], symbols: SymbolTable) -> SimChannel:
+def _channel(entry: dict[str, Any], symbols: SymbolTable, enabled: bool) -> SimChannel:
     address = parse_address(entry["address"])
     assert address is not None
     area_bit = address.offset * 8 + address.bit
@@ -123,7 +134,7 @@ def _channel(entry: dict[str, Any], symbols: SymbolTable) -> SimChannel:
         symbol = Symbol(symbol.name, symbol.area, symbol.offset, BOOL, symbol.bit)
     return SimChannel(
         entry["device"], entry["channel"], entry["output"], symbol, area_bit, entry["parameter"],
-        entry["parameter_bit"], entry["bits"], entry["big_endian"],
+        entry["parameter_bit"], entry["bits"], entry["big_endian"], enabled,
     )  # fmt: skip
 
 

@@ -71,32 +71,19 @@ static RTS_RESULT test_configure(const IoConfigConnector *connectors, int count)
     return ERR_OK;
 }
 
-static RTS_RESULT check_channels(const IoConfigConnectorMap *map)
+static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
 {
-    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
-    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
-    RTS_UI32 i;
-
-    for (i = 0; i < map->channel_map_count && IoMgrConfigIsMine(connector, &test_driver); i++, channel++) {
-        if (channel->bits > 8 * DRIVER_MEMORY || channel->parameter_bit > 8u * DRIVER_MEMORY - channel->bits)
-            return IoMgrConfigRefuse(connector, ERR_OUT_OF_LIMITS, "it has no bit %u.",
-                                     (unsigned)channel->parameter_bit);
-    }
+    RTS_UNUSED(type);
+    if (channel->bits > 8 * DRIVER_MEMORY || channel->parameter_bit > 8u * DRIVER_MEMORY - channel->bits)
+        return IoMgrConfigRefuse(connector, ERR_OUT_OF_LIMITS, "it has no bit %u.", (unsigned)channel->parameter_bit);
     return ERR_OK;
 }
 
 static RTS_RESULT test_map(const IoConfigTaskMap *task_maps, int count)
 {
-    RTS_RESULT result = ERR_OK;
-
     called('M');
-    for (; count > 0; count--, task_maps++) {
-        const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_maps);
-        RTS_UI32 i;
-        for (i = 0; i < task_maps->connector_map_count && result == ERR_OK && !plant.is_careless; i++)
-            result = check_channels(map + i);
-    }
-    return result;
+    return plant.is_careless ? (RTS_RESULT)ERR_OK
+                             : IoMgrConfigEachChannel(task_maps, count, &test_driver, check_channel);
 }
 
 static RTS_RESULT test_read(const IoConfigConnectorMap *maps, int count)

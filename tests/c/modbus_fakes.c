@@ -21,8 +21,8 @@ void fakes_begin(void)
     memset(&fakes, 0, sizeof(fakes));
     fakes.now_ns = NS_PER_S;
     fakes.char_ns = (RTS_I64)NS_PER_S * BITS_PER_CHAR / BAUD;
-    fakes.write_limit = FAKE_LINE_ROOM;
-    fakes.send_limit = FAKE_SOCKET_ROOM;
+    fakes.write_limit = fakes.read_limit = FAKE_LINE_ROOM;
+    fakes.send_limit = fakes.window = FAKE_SOCKET_ROOM;
     fakes.connect_result = ERR_OK;
 }
 
@@ -92,6 +92,13 @@ RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
     RTS_UI32 count = 0;
 
     RTS_UNUSED(index);
+    size = size < fakes.read_limit ? size : fakes.read_limit;
+    fakes.reads++;
+    if (fakes.babbles && fakes.reads < FAKE_READS) {
+        memset(data, 0x55, size);
+        fakes.last_byte_ns = fakes.now_ns;
+        return size;
+    }
     while (to->read < to->size && count < size && to->time_ns[to->read] <= fakes.now_ns) {
         fakes.last_byte_ns = to->time_ns[to->read];
         data[count++] = to->data[to->read++];
@@ -119,6 +126,11 @@ RTS_I64 SysComGetByteNs(RTS_UI32 index)
 {
     RTS_UNUSED(index);
     return fakes.last_byte_ns;
+}
+
+void SysComClose(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
 }
 
 /* ---- the network ---- */
@@ -199,13 +211,20 @@ RTS_RESULT SysSockRecv(RTS_HANDLE socket, RTS_UI8 *data, RTS_UI32 size, RTS_UI32
 RTS_RESULT SysSockSend(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 *taken)
 {
     FAKE_SOCKET *to = &fakes.sockets[socket];
-    RTS_UI32 room = FAKE_SOCKET_ROOM - to->out_size;
+    RTS_UI32 room = fakes.window > to->out_size ? fakes.window - to->out_size : 0;
 
     *taken = size < room ? size : room;
     *taken = *taken < fakes.send_limit ? *taken : fakes.send_limit;
     memcpy(to->out + to->out_size, data, *taken);
     to->out_size += *taken;
     return to->peer_gone ? ERR_NET_NOTCONNECTED : ERR_OK;
+}
+
+/* What it sent and the peer has not read is lost. */
+void SysSockReset(RTS_HANDLE socket)
+{
+    fakes.sockets[socket].out_size = 0;
+    fakes.sockets[socket].open = false;
 }
 
 void SysSockClose(RTS_HANDLE socket)

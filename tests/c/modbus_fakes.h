@@ -12,7 +12,7 @@
 #include "ModbusLink.h"
 #include "SysCom.h"
 
-enum { FAKE_LINE_ROOM = 4096, FAKE_SOCKETS = 64, FAKE_SOCKET_ROOM = 4096, FAKE_LISTENER = 1000 };
+enum { FAKE_LINE_ROOM = 4096, FAKE_SOCKETS = 64, FAKE_SOCKET_ROOM = 4096, FAKE_LISTENER = 1000, FAKE_READS = 1000000 };
 
 typedef struct {
     RTS_UI8 data[FAKE_LINE_ROOM];
@@ -39,7 +39,10 @@ typedef struct {
     FAKE_BYTES from_device;
     RTS_I64 last_byte_ns;
     RTS_UI32 write_limit; /* bytes that one SysComWrite takes */
-    bool pulled;          /* nothing arrives, in either direction */
+    RTS_UI32 read_limit;  /* bytes that one SysComRead gives */
+    bool babbles;         /* SysComRead gives as many bytes as wanted, of this moment, FAKE_READS times */
+    RTS_UI32 reads;
+    bool pulled; /* nothing arrives, in either direction */
     RTS_UI32 locks;
     bool locked;
 
@@ -51,7 +54,8 @@ typedef struct {
     RTS_UI32 listeners;
     RTS_RESULT connect_result; /* ERR_OK, ERR_PENDING, ERR_NET_NOTCONNECTED */
     RTS_UI32 connects;
-    RTS_UI32 send_limit;
+    RTS_UI32 send_limit; /* bytes that one SysSockSend takes */
+    RTS_UI32 window;     /* bytes that a socket takes before they are read */
 } MODBUS_FAKES;
 
 extern MODBUS_FAKES fakes;

@@ -324,6 +324,25 @@ static void a_device_without_a_number_takes_no_part(void)
     can_end();
 }
 
+static void an_address_that_cannot_be_is_refused(void)
+{
+    static const CAN_ADDRESS bad[] = {
+        {CAN_ID_BASE, 128}, {CAN_ID_BASE, 257}, {CAN_ID_BASE, 0xFFFFFFFF}, {CAN_ID_BASE | 0x100, 5}, {0x3F400000, 5}};
+
+    for (RTS_UI32 i = 0; i < RTS_COUNT(bad); i++) {
+        can_start(500 * KBIT, 0);
+        SimCanSetAddress(bad[i].node, bad[i].base);
+        RTS_UI32 logged = fakes.log_added;
+        fakes_run_init_hooks();
+        CHECK_EQUAL(fakes.log_added, logged + 1);
+        CAN_TOOL *tool = can_tool(200);
+        scan(tool, CAN_TO_ALL, 0, 1);
+        can_pass(100);
+        CHECK_EQUAL(tool->count, 0);
+        can_end();
+    }
+}
+
 int main(void)
 {
     RUN(a_tool_logs_in_on_classic_can_and_fd);
@@ -340,5 +359,6 @@ int main(void)
     RUN(destroyed_frames_are_not_even_noticed);
     RUN(the_device_comes_back_from_bus_off);
     RUN(a_device_without_a_number_takes_no_part);
+    RUN(an_address_that_cannot_be_is_refused);
     return test_result();
 }

@@ -89,6 +89,52 @@ static void what_the_configuration_says_can_be_read_from_outside(void)
     CHECK_EQUAL(IoMgrIdentify(4), ERR_INVALIDID);
 }
 
+static const IoConfigChannelMap word = {.bits = 16};
+static const IoConfigChannelMap turned_word = {.bits = 16, .flags = IO_CHANNEL_BIG_ENDIAN};
+static const IoConfigChannelMap bit = {.parameter_bit = 5, .area_bit = 1, .bits = 1};
+
+static void the_order_of_bytes_is_that_of_the_device(void)
+{
+    static const RTS_UI8 memory[] = {0x22, 0x11};
+    static const RTS_UI8 other[] = {0x11, 0x22};
+
+    begin_tree();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    IoMgrCopyInputLE(&word, memory);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x1122);
+    IoMgrCopyInputBE(&word, memory);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x2211);
+    IoMgrCopyInputLE(&turned_word, memory);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x2211);
+    IoMgrCopyInputBE(&turned_word, memory);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x1122);
+    IoMgrCopyInputBE(&bit, other);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x1120);
+    IoMgrCopyInputBE(&bit, memory);
+    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x1122);
+}
+
+static void outputs_come_in_the_order_of_the_device(void)
+{
+    RTS_UI8 *outputs;
+    RTS_UI8 memory[2] = {0, 0};
+
+    begin_tree();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    outputs = AppGetAreaAddress(APP_AREA_OUTPUT, 0, 2);
+    outputs[0] = 0x22;
+    outputs[1] = 0x11;
+    IoMgrCopyOutputLE(&word, memory);
+    CHECK(memory[0] == 0x22 && memory[1] == 0x11);
+    IoMgrCopyOutputBE(&word, memory);
+    CHECK(memory[0] == 0x11 && memory[1] == 0x22);
+    IoMgrCopyOutputBE(&turned_word, memory);
+    CHECK(memory[0] == 0x22 && memory[1] == 0x11);
+    outputs[0] = 0;
+    IoMgrCopyOutputBE(&bit, memory);
+    CHECK(memory[0] == 0x02 && memory[1] == 0x11);
+}
+
 /* Each byte takes some values; what is accepted runs, and writes nothing but its areas. */
 static void each_byte_may_be_damaged(void)
 {
@@ -127,6 +173,8 @@ int main(void)
     RUN(connectors_are_found_by_type_and_parent);
     RUN(parameters_are_found_by_id);
     RUN(what_the_configuration_says_can_be_read_from_outside);
+    RUN(the_order_of_bytes_is_that_of_the_device);
+    RUN(outputs_come_in_the_order_of_the_device);
     RUN(each_byte_may_be_damaged);
     return test_result();
 }

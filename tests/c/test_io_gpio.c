@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  */
 #include "IoDrvGpio.h"
+#include "SysGpio.h"
 #include "io_driver.h"
 
 static APP_REFUSAL refusal;
@@ -143,6 +144,33 @@ static void a_channel_that_is_no_line(void)
     check_refused(ERR_OUT_OF_LIMITS, "it has no channel 1.32.");
 }
 
+/* A second connector with the line `name`, number 0. */
+static IoConfigConnector *add_connector_of(const char *name, RTS_UI32 options)
+{
+    IoConfigConnector *connector = io_add_connector(&io, name, "IoDrvGpio");
+
+    io_add_text_parameter(&io, GPIO_LINE + 0, name);
+    io_add_parameter(&io, GPIO_OPTIONS + 0, 8, options);
+    return connector;
+}
+
+static void lines_of_a_refused_channel_are_free(void)
+{
+    SYS_GPIO_LINE line = {"DO1", GPIO_OPTION_OUT, RTS_INVALID_HANDLE};
+
+    begin_lines();
+    add_lines(0, 0);
+    add_connector_of("DO1", GPIO_OPTION_OUT)->flags |= CF_OPTIONAL;
+    io_add_channel(&io, 0, IO_MAP_INPUTS, 1, GPIO_INPUTS, 32, 8, 1);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK(log_has("Not used: DO1 (IoDrvGpio): it has no channel 1.32."));
+    CHECK_EQUAL(SimAdvance(ms(1)), ERR_OK);
+    CHECK_EQUAL(IoDrvGpio_Hook(CH_COMM_CYCLE), ERR_OK);
+    CHECK_EQUAL(SysGpioAdd(2, 0, &line), ERR_OK);
+    SysGpioClose(2);
+    end_lines();
+}
+
 static void a_held_output_stays_over_a_download(void)
 {
     begin_lines();
@@ -160,6 +188,82 @@ static void a_held_output_stays_over_a_download(void)
     end_lines();
 }
 
+/* Another application, for which connectors are to follow. */
+static void begin_lines_again(void)
+{
+    spec_init(&spec);
+    spec.areas[APP_AREA_INPUT] = 32;
+    spec.areas[APP_AREA_OUTPUT] = 32;
+    io_init(&io);
+    add_copying_task("Main", 10000, 0);
+}
+
+static void groups_of_lines_may_be_removed_added_and_change_places(void)
+{
+    static const char *const orders[][3] = {{"DI0", "DI1", NULL}, {"DI1", NULL},        {"DI0", NULL},
+                                            {"DI0", "DI1", NULL}, {"DI1", "DI0", NULL}, {"DI2", "DI1", NULL}};
+    RTS_UI32 i;
+
+    begin_lines();
+    for (i = 0; i < RTS_COUNT(orders); i++) {
+        const char *const *name = orders[i];
+        begin_lines_again();
+        for (; *name != NULL; name++)
+            add_connector_of(*name, 0);
+        CHECK_EQUAL(load_io(), ERR_OK);
+    }
+    end_lines();
+}
+
+static void lines_may_move_to_another_group(void)
+{
+    begin_lines();
+    begin_lines_again();
+    add_connector_of("DI0", 0);
+    add_connector_of("DO0", GPIO_OPTION_OUT);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    begin_lines_again();
+    add_connector_of("DO0", GPIO_OPTION_OUT);
+    io_add_connector(&io, "Both", "IoDrvGpio");
+    io_add_text_parameter(&io, GPIO_LINE + 0, "DI1");
+    io_add_text_parameter(&io, GPIO_LINE + 1, "DI0");
+    CHECK_EQUAL(load_io(), ERR_OK);
+    end_lines();
+}
+
+/* The held output is the second group at first, then the only one. */
+static void a_held_output_stays_when_its_group_moves(void)
+{
+    begin_lines();
+    begin_lines_again();
+    add_connector_of("DI0", 0);
+    add_connector_of("DO0", GPIO_OPTION_OUT);
+    io_add_channel(&io, 0, IO_MAP_INPUTS, 0, GPIO_INPUTS, 0, 0, 1);
+    io_add_channel(&io, 0, IO_MAP_OUTPUTS, 1, GPIO_OUTPUTS, 0, 0, 1)->flags = IO_HOLD;
+    start_io();
+    CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
+    CHECK_EQUAL(SimAdvance(0), ERR_OK);
+    CHECK_EQUAL(SimGpioGet("DO0"), 1);
+    begin_lines_again();
+    add_connector_of("DO0", GPIO_OPTION_OUT);
+    io_add_channel(&io, 0, IO_MAP_OUTPUTS, 0, GPIO_OUTPUTS, 0, 0, 1)->flags = IO_HOLD;
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(SimGpioGet("DO0"), 1);
+    end_lines();
+}
+
+/* An optional connector that is refused takes no group from those that follow. */
+static void a_refused_connector_leaves_its_group(void)
+{
+    begin_lines();
+    begin_lines_again();
+    add_connector_of("DI9", 0)->flags |= CF_OPTIONAL;
+    add_connector_of("DI0", 0);
+    add_connector_of("DI1", 0);
+    CHECK_EQUAL(load_io(), ERR_OK);
+    end_lines();
+}
+
 static void lines_are_given_back_with_the_application(void)
 {
     begin_lines();
@@ -168,15 +272,8 @@ static void lines_are_given_back_with_the_application(void)
     CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
     CHECK_EQUAL(IoDrvGpio_Hook(CH_COMM_CYCLE), ERR_OK);
     CHECK_EQUAL(SimGpioSet("DI0", 1), ERR_OK);
-    spec.code_size = 0;
-    spec_init(&spec);
-    add_copying_task("Main", 10000, 0);
-    spec.areas[APP_AREA_INPUT] = 32;
-    spec.areas[APP_AREA_OUTPUT] = 32;
-    io.connectors[0].parameter_count = 0;
-    io.head.parameters = 0;
-    io_add_text_parameter(&io, GPIO_LINE + 0, "DO0");
-    io.channel_count = 0;
+    begin_lines_again();
+    add_connector_of("DO0", 0);
     CHECK_EQUAL(load_io(), ERR_OK); /* another direction: it was free */
     end_lines();
 }
@@ -214,7 +311,12 @@ int main(void)
     RUN(a_line_that_is_named_twice);
     RUN(an_input_as_an_output);
     RUN(a_channel_that_is_no_line);
+    RUN(lines_of_a_refused_channel_are_free);
     RUN(a_held_output_stays_over_a_download);
+    RUN(groups_of_lines_may_be_removed_added_and_change_places);
+    RUN(lines_may_move_to_another_group);
+    RUN(a_held_output_stays_when_its_group_moves);
+    RUN(a_refused_connector_leaves_its_group);
     RUN(lines_are_given_back_with_the_application);
     RUN(a_chip_that_has_gone_comes_back);
     return test_result();

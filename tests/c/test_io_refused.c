@@ -63,6 +63,55 @@ static void a_device_that_is_not_enabled_needs_no_driver(void)
     CHECK(!log_has("Meter"));
 }
 
+static void a_device_that_is_left_out_is_told_of_once(void)
+{
+    begin_with_old();
+    io_add_connector(&io, "Spare", "IoDrvTest")->flags |= CF_OPTIONAL;
+    io_add_channel(&io, 0, IO_MAP_INPUTS, 1, DRIVER_INPUTS, 8 * DRIVER_MEMORY, 64, 8);
+    io_add_channel(&io, 0, IO_MAP_INPUTS, 1, DRIVER_INPUTS, 8 * DRIVER_MEMORY + 8, 72, 8);
+    CHECK_EQUAL(try_load(), ERR_OK);
+    CHECK(log_has("Not used: Spare (IoDrvTest): it has no bit 512."));
+    CHECK(!log_has("it has no bit 520."));
+}
+
+enum { FIRST = 1, LARGE, LAST, PARAMETER = 1 };
+
+/* Simulated devices with an output of a byte each; that of the large one is too far away. */
+static void add_simulated(void)
+{
+    static const char *const names[] = {"First", "Large", "Last"};
+
+    for (RTS_UI16 i = FIRST; i <= LAST; i++) {
+        IoConfigConnector *connector = io_add_connector(&io, names[i - FIRST], "IoDrvSim");
+        if (i == LARGE)
+            connector->flags |= CF_OPTIONAL;
+        io_add_channel(&io, 0, IO_MAP_OUTPUTS, i, PARAMETER, i == LARGE ? 8 * (IO_SIM_MEMORY - 1) : 0, 8 * i, 8);
+    }
+}
+
+static RTS_UI8 simulated(RTS_UI32 connector)
+{
+    RTS_UI8 value = 0;
+
+    CHECK_EQUAL(IoMgrReadParameter(connector, PARAMETER, &value, 8, 0), ERR_OK);
+    return value;
+}
+
+static void a_simulated_device_that_is_left_out_leaves_the_others_their_memory(void)
+{
+    begin_io();
+    add_copying_task("Main", 10000, 0);
+    add_bytes(0, IO_MAP_INPUTS, 0, 4);
+    add_simulated();
+    CHECK_EQUAL(try_load(), ERR_OK);
+    CHECK(log_has("Not used: Large (IoDrvSim): all simulated devices together have 16384 bytes here."));
+    CHECK_EQUAL(AppStartApplication(), ERR_OK);
+    memcpy(plant.in, "\x00\x11\x22\x33", 4);
+    CHECK_EQUAL(SimAdvance(ms(20)), ERR_OK);
+    CHECK_EQUAL(simulated(FIRST), 0x11);
+    CHECK_EQUAL(simulated(LAST), 0x33);
+}
+
 static void a_configuration_that_the_driver_refuses(void)
 {
     begin_with_old();
@@ -134,6 +183,18 @@ static void an_optional_device_that_the_driver_refuses_is_left_out(void)
     CHECK(log_has("Not used: Spare (IoDrvTest): there is no line DI9."));
 }
 
+/* What it took in vain it gives back, and keeps nothing that points into the application. */
+static void a_driver_whose_devices_were_all_refused_is_told_of_the_end(void)
+{
+    begin_with_old();
+    io.connectors[0].flags |= CF_OPTIONAL;
+    plant.refuses = "Plant";
+    CHECK_EQUAL(try_load(), ERR_OK);
+    memset(plant.calls, 0, sizeof plant.calls);
+    CHECK_EQUAL(AppReset(RESET_OPTION_ORIGIN), ERR_OK);
+    CHECK(strcmp(plant.calls, "c") == 0);
+}
+
 static void a_part_that_the_runtime_does_not_know(void)
 {
     CDL_SEGMENT blob;
@@ -171,11 +232,14 @@ int main(void)
     RUN(a_missing_driver);
     RUN(an_optional_device_without_driver_is_left_out);
     RUN(a_device_that_is_not_enabled_needs_no_driver);
+    RUN(a_device_that_is_left_out_is_told_of_once);
+    RUN(a_simulated_device_that_is_left_out_leaves_the_others_their_memory);
     RUN(a_configuration_that_the_driver_refuses);
     RUN(what_ran_before_runs_with_its_own_inputs_again);
     RUN(a_refused_application_does_not_run_after_a_restart);
     RUN(one_that_failed_is_what_boots_again_after_a_refused_one);
     RUN(an_optional_device_that_the_driver_refuses_is_left_out);
+    RUN(a_driver_whose_devices_were_all_refused_is_told_of_the_end);
     RUN(a_part_that_the_runtime_does_not_know);
     RUN(a_boot_project_is_refused_like_a_download);
     return test_result();

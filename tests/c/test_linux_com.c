@@ -255,6 +255,69 @@ static void a_line_belongs_to_one_component(void)
     unlink(name);
 }
 
+/* A second name of the device: as udev gives it by vendor and number. */
+static const char *add_link(const char *name)
+{
+    static char link[80];
+    snprintf(link, sizeof(link), "%s.link", name);
+    unlink(link);
+    CHECK_EQUAL(symlink(name, link), 0);
+    return link;
+}
+
+static void a_line_with_another_name_is_the_same(void)
+{
+    const char *name = name_of_bus();
+    const char *link = add_link(name);
+    RTS_UI32 line = 0;
+    RTS_UI32 other = 0;
+    int end = plug_in(name);
+    open_com(name);
+    CHECK_EQUAL(SysComOpenPort(link, &slow, &line), ERR_DUPLICATE);
+    close_com();
+    CHECK_EQUAL(SysComOpenPort(name, &slow, &line), ERR_OK);
+    CHECK_EQUAL(SysComOpenPort(link, &slow, &other), ERR_DUPLICATE);
+    SysComClose(line);
+    CHECK_EQUAL(SysComOpenPort(link, &slow, &line), ERR_OK);
+    SysComClose(line);
+    close(end);
+    unlink(name);
+    unlink(link);
+}
+
+static void the_pseudo_terminal_of_the_tool_is_in_use(void)
+{
+    char own_name[64];
+    RTS_UI32 line = 0;
+    open_com("pty");
+    snprintf(own_name, sizeof(own_name), "%s", PortComPtyName());
+    CHECK_EQUAL(SysComOpenPort(own_name, &slow, &line), ERR_DUPLICATE);
+    close_com();
+}
+
+static void a_line_that_carries_can_is_in_use(void)
+{
+    const PORT_CAN_OPTIONS options = {.node = 1, .base = 0x1F400000, .bit_rate = 500000};
+    const char *name = name_of_bus();
+    const char *link = add_link(name);
+    char text[80];
+    PORT_REASON reason = {"", false};
+    RTS_UI32 line = 0;
+    int end = plug_in(name);
+    snprintf(text, sizeof(text), "slcan:%s", name);
+    CHECK(PortCanOpen(text, &options, &reason));
+    CHECK_EQUAL(SysComOpenPort(name, &slow, &line), ERR_DUPLICATE);
+    CHECK_EQUAL(SysComOpenPort(link, &slow, &line), ERR_DUPLICATE);
+    PortCanClose();
+    CHECK(PortCanOpen("slcan:pty", &options, &reason));
+    snprintf(text, sizeof(text), "%s", PortCanPtyName());
+    CHECK_EQUAL(SysComOpenPort(text, &slow, &line), ERR_DUPLICATE);
+    PortCanClose();
+    close(end);
+    unlink(name);
+    unlink(link);
+}
+
 static void a_line_that_is_not_plugged_in_is_waited_for(void)
 {
     const char *name = name_of_bus();
@@ -419,6 +482,9 @@ int main(void)
     RUN(a_device_that_goes_away_is_taken_up_again);
     RUN(a_line_of_a_field_bus_is_opened_by_name);
     RUN(a_line_belongs_to_one_component);
+    RUN(a_line_with_another_name_is_the_same);
+    RUN(the_pseudo_terminal_of_the_tool_is_in_use);
+    RUN(a_line_that_carries_can_is_in_use);
     RUN(a_line_that_is_not_plugged_in_is_waited_for);
     RUN(a_line_that_cannot_run_like_that_is_refused);
     RUN(what_cannot_be_opened_is_said);

@@ -562,6 +562,53 @@ static void a_line_that_was_pulled_comes_back_with_all_devices(void)
         CHECK(ModbusDeviceIsGood(&devices[i]));
 }
 
+/* An adapter that was pulled: the port takes nothing more. */
+static void a_line_that_takes_no_bytes_is_lost_and_comes_back(void)
+{
+    begin(2);
+    add(0, write_job(0, 50));
+    add(1, read_job(50));
+    states[0][0].has_out = true;
+    out[0][0][0] = 1;
+    run_ms(300);
+    fakes.write_limit = 0;
+    run_ms(3000);
+    CHECK(ModbusDeviceIsLost(&devices[0]) && ModbusDeviceIsLost(&devices[1]));
+    CHECK(devices[0].counters.requests > 2);
+    out[0][0][0] = 2;
+    fakes.write_limit = FAKE_LINE_ROOM;
+    while (remotes[0].data[8] == 1)
+        run_ms(1);
+    CHECK_EQUAL(remotes[0].data[8], 2); /* nothing of the time before is sent */
+    run_ms(2000);
+    CHECK(ModbusDeviceIsGood(&devices[0]) && ModbusDeviceIsGood(&devices[1]));
+}
+
+static void a_broadcast_that_does_not_leave_is_no_success(void)
+{
+    begin(1);
+    devices[0].unit = MODBUS_BROADCAST;
+    add(0, write_job(0, 50));
+    states[0][0].has_out = true;
+    fakes.write_limit = 0;
+    run_ms(1000);
+    CHECK(ModbusDeviceIsLost(&devices[0]));
+}
+
+/* It takes longer than the time-out to send. */
+static void a_slow_line_is_not_late(void)
+{
+    begin(1);
+    devices[0].timeout_ms = 12;
+    add(0, (MODBUS_JOB){MODBUS_WRITE_REGISTERS, 0, 0, 0, 0, REGISTERS, 0, 50});
+    states[0][0].has_out = true;
+    out[0][0][0] = 1;
+    fakes.write_limit = 1;
+    run_ms(1000);
+    CHECK_EQUAL(devices[0].counters.timeouts, 0);
+    CHECK_EQUAL(remotes[0].data[0], 1);
+}
+
 static void a_device_that_comes_back_gets_all_outputs_again(void)
 {
     begin(1);
@@ -632,6 +679,9 @@ int main(void)
     RUN(a_dead_device_costs_the_others_less_than_one_time_out_a_minute);
     RUN(a_short_loss_is_over_after_some_seconds);
     RUN(a_line_that_was_pulled_comes_back_with_all_devices);
+    RUN(a_line_that_takes_no_bytes_is_lost_and_comes_back);
+    RUN(a_broadcast_that_does_not_leave_is_no_success);
+    RUN(a_slow_line_is_not_late);
     RUN(a_device_that_comes_back_gets_all_outputs_again);
     RUN(a_broadcast_waits_for_no_reply);
     RUN(data_are_taken_and_given_under_the_lock);

@@ -10,14 +10,17 @@
 #include "rts_config.h"
 #include "test.h"
 
-enum { MS = 1000000, TIMEOUT_MS = 100, INTERVAL_MS = 50, REQUEST_SIZE = 12 };
+enum { MS = 1000000, TIMEOUT_MS = 100, INTERVAL_MS = 50, REQUEST_SIZE = 12, NO_UNIT = 0xFF };
 
 static const MODBUS_JOB job = {MODBUS_READ_HOLDING_REGISTERS, 0, 0, 1, 0, 0, 0, INTERVAL_MS};
+static const MODBUS_JOB write_job = {MODBUS_WRITE_REGISTER, 0, 0, 0, 0, 1, 0, INTERVAL_MS};
 static MODBUS_CLIENT client;
 static MODBUS_DEVICE devices[2];
 static MODBUS_JOB_STATE states[2];
 static RTS_UI8 in[2][2];
 static bool silent;
+static RTS_UI8 silent_unit;
+static bool is_cut;  /* the network: what is sent waits */
 static bool refuses; /* the gateway: for unit 2 */
 static RTS_UI16 transaction_offset;
 static RTS_UI32 asked;
@@ -32,6 +35,8 @@ static void begin(RTS_UI32 count)
     memset(states, 0, sizeof(states));
     memset(in, 0, sizeof(in));
     silent = refuses = false;
+    is_cut = false;
+    silent_unit = NO_UNIT;
     transaction_offset = 0;
     asked = 0;
     for (RTS_UI32 i = 0; i < 2; i++) {
@@ -48,20 +53,30 @@ static FAKE_SOCKET *newest(void)
     return &fakes.sockets[fakes.used - 1];
 }
 
+static void reply_to(FAKE_SOCKET *socket, RTS_UI8 unit)
+{
+    RTS_UI16 transaction = ModbusGet16(socket->out);
+
+    if (refuses && unit == 2)
+        net_put_pdu(socket, transaction, unit, (const RTS_UI8[]){0x83, MODBUS_NO_TARGET}, 2);
+    else if (socket->out[7] == MODBUS_WRITE_REGISTER)
+        net_put_pdu(socket, transaction, unit, socket->out + 7, REQUEST_SIZE - 7);
+    else
+        net_put_pdu(socket, (RTS_UI16)(transaction + transaction_offset), unit,
+                    (const RTS_UI8[]){3, 2, 0, (RTS_UI8)asked}, 4);
+}
+
 /* The server at the other end of the newest connection: its register has the number of requests so far. */
 static void serve(void)
 {
     FAKE_SOCKET *socket = newest();
     RTS_UI8 unit = socket->out[6];
 
-    if (fakes.used == 0 || !socket->open || socket->out_size < REQUEST_SIZE)
+    if (fakes.used == 0 || is_cut || !socket->open || socket->out_size < REQUEST_SIZE)
         return;
     asked++;
-    if (!silent && refuses && unit == 2)
-        net_put_pdu(socket, ModbusGet16(socket->out), unit, (const RTS_UI8[]){0x83, MODBUS_NO_TARGET}, 2);
-    else if (!silent)
-        net_put_pdu(socket, (RTS_UI16)(ModbusGet16(socket->out) + transaction_offset), unit,
-                    (const RTS_UI8[]){3, 2, 0, (RTS_UI8)asked}, 4);
+    if (!silent && unit != silent_unit)
+        reply_to(socket, unit);
     socket->out_size = 0;
 }
 
@@ -134,7 +149,7 @@ static void a_reply_of_another_transaction_is_passed_over(void)
     begin(1);
     run_ms(200);
     transaction_offset = 1;
-    run_ms(1000);
+    run_ms(3000);
     CHECK(ModbusDeviceIsLost(&devices[0]));
     CHECK(devices[0].counters.others >= 2);
     transaction_offset = 0;
@@ -156,14 +171,111 @@ static void a_device_that_the_gateway_does_not_reach_is_lost(void)
     CHECK(ModbusDeviceIsGood(&devices[1]));
 }
 
-static void a_silent_device_does_not_end_the_connection(void)
+/* What was asked may be on its way still. */
+static void a_request_without_reply_ends_the_connection(void)
 {
     begin(1);
     run_ms(200);
     silent = true;
-    run_ms(1000);
+    while (devices[0].counters.timeouts == 0)
+        run_ms(1);
+    CHECK(!fakes.sockets[0].open);
+    silent = false;
+    run_ms(INTERVAL_MS);
+    CHECK_EQUAL(fakes.connects, 2);
+    CHECK_EQUAL(devices[0].counters.timeouts, 1);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+static void a_silent_device_of_a_gateway_costs_the_others_little(void)
+{
+    RTS_UI32 before;
+
+    begin(2);
+    silent_unit = 2;
+    run_ms(60000);
+    CHECK(ModbusDeviceIsLost(&devices[1]));
+    before = devices[0].counters.requests;
+    run_ms(120000);
+    CHECK(devices[0].counters.requests - before >= 120000 / INTERVAL_MS - 8);
+    CHECK_EQUAL(devices[0].counters.timeouts, 0);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+/* Its window is closed: it takes no bytes, or half a request. */
+static void a_peer_that_takes_nothing_is_lost_and_comes_back(void)
+{
+    for (RTS_UI32 taken = 0; taken < REQUEST_SIZE; taken += REQUEST_SIZE / 2) {
+        begin(1);
+        run_ms(200);
+        fakes.window = taken;
+        run_ms(3000);
+        CHECK(ModbusDeviceIsLost(&devices[0]));
+        fakes.window = FAKE_SOCKET_ROOM;
+        run_ms(2500);
+        CHECK(ModbusDeviceIsGood(&devices[0]));
+    }
+}
+
+/* Frames that are no reply do not keep a request from being late. */
+static void a_peer_that_talks_all_the_time_is_lost(void)
+{
+    begin(1);
+    run_ms(200);
+    silent = true;
+    for (RTS_UI32 i = 0; i < 500; i++) {
+        net_put_pdu(newest(), 0x5A5A, 1, (const RTS_UI8[]){3, 2, 0, 0}, 4);
+        run_ms(1);
+    }
     CHECK(ModbusDeviceIsLost(&devices[0]));
-    CHECK_EQUAL(fakes.connects, 1);
+}
+
+static RTS_UI32 bytes_on_their_way(void)
+{
+    RTS_UI32 size = 0;
+
+    for (RTS_UI32 i = 0; i < fakes.used; i++)
+        size += fakes.sockets[i].out_size;
+    return size;
+}
+
+static void begin_writes(RTS_UI8 unit)
+{
+    static RTS_UI8 out[2];
+    static RTS_UI8 written[2];
+
+    begin(1);
+    devices[0].unit = unit;
+    states[0] = (MODBUS_JOB_STATE){.job = &write_job, .out = out, .written = written, .has_out = true};
+    run_ms(200);
+    CHECK(ModbusDeviceIsGood(&devices[0]));
+}
+
+/* The network brings what it has taken when it is back, minutes later, but not what was reset. */
+static void what_was_not_replied_to_is_not_written_later(void)
+{
+    for (RTS_UI8 unit = 0; unit <= 1; unit++) {
+        begin_writes(unit);
+        is_cut = true;
+        for (RTS_UI32 i = 0; i < 50; i++) {
+            run_ms(100);
+            CHECK(bytes_on_their_way() <= REQUEST_SIZE);
+        }
+        CHECK(ModbusDeviceIsLost(&devices[0]));
+        is_cut = false;
+        run_ms(2500);
+        CHECK(ModbusDeviceIsGood(&devices[0]));
+    }
+}
+
+static void what_is_on_its_way_is_not_written_after_the_application(void)
+{
+    begin_writes(1);
+    is_cut = true;
+    while (bytes_on_their_way() == 0)
+        run_ms(1);
+    client.link.type->close(&client.link);
+    CHECK_EQUAL(bytes_on_their_way(), 0);
 }
 
 static void what_is_no_frame_ends_the_connection(void)
@@ -188,7 +300,12 @@ int main(void)
     RUN(a_lost_connection_is_made_again);
     RUN(a_reply_of_another_transaction_is_passed_over);
     RUN(a_device_that_the_gateway_does_not_reach_is_lost);
-    RUN(a_silent_device_does_not_end_the_connection);
+    RUN(a_request_without_reply_ends_the_connection);
+    RUN(a_silent_device_of_a_gateway_costs_the_others_little);
+    RUN(a_peer_that_takes_nothing_is_lost_and_comes_back);
+    RUN(a_peer_that_talks_all_the_time_is_lost);
+    RUN(what_was_not_replied_to_is_not_written_later);
+    RUN(what_is_on_its_way_is_not_written_after_the_application);
     RUN(what_is_no_frame_ends_the_connection);
     return test_result();
 }

@@ -162,6 +162,52 @@ static void a_frame_that_is_too_long_is_forgotten(void)
     CHECK(works());
 }
 
+/* Also if its beginning is a good one. */
+static void a_frame_that_goes_on_is_not_taken(void)
+{
+    static RTS_UI8 frame[257];
+    RTS_UI16 crc;
+
+    for (RTS_UI32 limit = 1; limit <= FAKE_LINE_ROOM; limit *= 4) {
+        begin();
+        fakes.read_limit = limit;
+        memcpy(frame, read_two, sizeof(read_two));
+        crc = ModbusCrc(frame, 254);
+        frame[254] = (RTS_UI8)crc;
+        frame[255] = (RTS_UI8)(crc >> 8);
+        line_send(frame, 256);
+        run_ms(300);
+        CHECK_EQUAL(server.requests, 1);
+        line_send(frame, 257);
+        run_ms(300);
+        CHECK_EQUAL(server.requests, 1);
+        CHECK_EQUAL(link.bad_frames, 1);
+        CHECK(works());
+    }
+}
+
+/* Its bytes come as fast as they are read: each pass ends all the same. */
+static void a_line_that_babbles_holds_up_no_pass(void)
+{
+    static RTS_UI8 pdu[MODBUS_MAX_PDU];
+
+    begin();
+    fakes.babbles = true;
+    for (RTS_UI32 i = 0; i < 10; i++, fakes.now_ns += STEP_NS) {
+        fakes.reads = 0;
+        CHECK(!ModbusServerPoll(&server, &link, fakes.now_ns));
+        CHECK(!ModbusRtuReady(&link, fakes.now_ns));
+        CHECK(fakes.reads <= 4);
+    }
+    memcpy(link.frame + MODBUS_AT_PDU, pdu, sizeof(pdu));
+    fakes.reads = 0;
+    ModbusRtuSend(&link, sizeof(pdu), fakes.now_ns);
+    CHECK_EQUAL(fakes.reads, 1);
+    fakes.babbles = false;
+    run_ms(300);
+    CHECK(works());
+}
+
 /* The longest frame there is has 256 bytes: a CRC that fits after more must not count. */
 static void frames_have_256_bytes_at_most(void)
 {
@@ -205,6 +251,18 @@ static void every_reply_can_be_lost_and_the_next_comes(void)
     CHECK(works());
 }
 
+/* The master would take it for the reply to what it has asked meanwhile. */
+static void a_reply_that_does_not_leave_in_time_is_given_up(void)
+{
+    begin();
+    fakes.write_limit = 0;
+    CHECK(!works());
+    fakes.write_limit = FAKE_LINE_ROOM;
+    run_ms(300);
+    CHECK_EQUAL(reply_size, 0);
+    CHECK(works());
+}
+
 int main(void)
 {
     RUN(crc_is_that_of_the_standard);
@@ -214,9 +272,12 @@ int main(void)
     RUN(a_wrong_crc_gets_no_reply);
     RUN(half_a_frame_is_forgotten_after_silence);
     RUN(a_frame_that_is_too_long_is_forgotten);
+    RUN(a_frame_that_goes_on_is_not_taken);
+    RUN(a_line_that_babbles_holds_up_no_pass);
     RUN(frames_have_256_bytes_at_most);
     RUN(a_line_that_takes_few_bytes_at_a_time_sends_all);
     RUN(a_flood_does_not_stop_the_server);
+    RUN(a_reply_that_does_not_leave_in_time_is_given_up);
     RUN(every_reply_can_be_lost_and_the_next_comes);
     return test_result();
 }

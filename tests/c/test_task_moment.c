@@ -84,12 +84,7 @@ bool CyclePhasesExist(void)
     return false;
 }
 
-void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task, const IEC_CONTEXT *context)
-{
-    RTS_UNUSED(when);
-    RTS_UNUSED(task);
-    RTS_UNUSED(context);
-}
+CYCLE_ENTRY *cycle_phases[CYCLE_SAFE_STATE + 1];
 
 void CyclePhasesForget(void)
 {

@@ -364,9 +364,9 @@ def test_instances_in_arrays_are_called_by_index() -> None:
     [
         ("c(UP := b);", "1: the VAR_IN_OUT TOTAL of COUNTER is missing"),
         ("c(UPP := b, TOTAL := d);", "3: COUNTER has no parameter UPP; did you mean UP?"),
-        ("c(UP := i, TOTAL := d);", "9: INT does not fit BOOL; write INT_TO_BOOL(...)"),
+        ("c(UP := i, TOTAL := d);", "9: INT does not fit BOOL; write INT_TO_BOOL(...), or compare it: <> 0"),
         ("c(TOTAL := d, Q := b);", "15: Q is given with =>"),
-        ("c(TOTAL := d, N => b);", "15: INT does not fit BOOL; write INT_TO_BOOL(...)"),
+        ("c(TOTAL := d, N => b);", "15: INT does not fit BOOL; write INT_TO_BOOL(...), or compare it: <> 0"),
         ("c(TOTAL := d, N => 5);", "20: the output N needs a variable"),
         ("b := c(TOTAL := d);", "6: a call of the function block COUNTER is a statement and has no value"),
         ("c.Q := b;", "1: Q is an output of COUNTER and cannot be assigned to"),

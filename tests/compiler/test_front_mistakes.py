@@ -44,6 +44,14 @@ def in_declaration(line: str) -> list[str]:
         ("a := 1;\nINT c;\na := 2;", [f"2: {DECLARE}"]),
         ("a := 1;\nc : INT;\na := 2;", [f"2: {DECLARE}"]),
         ("a := 1;\nc : INT := 5;\na := 2;", [f"2: {DECLARE}"]),
+        ("a := NULL;", ["1: NULL is for pointers, references and interfaces; it does not fit INT"]),
+        ("x := 1 < a < 5;", [
+            "1: < cannot compare BOOL with INT; to compare a value twice, write a < b AND b < c"
+        ]),
+        ("IF a THEN\nb := 1;\nEND_IF;", ["1: INT does not fit BOOL; write INT_TO_BOOL(...), or compare it: <> 0"]),
+        ("CASE x OF\nTRUE: a := 1;\nEND_CASE;", [
+            "1: CASE needs an integer or an enumeration, not BOOL; write IF"
+        ]),
         ("lab:\na := 1;", ["1: JMP and labels are not supported; write a loop, IF, EXIT or RETURN"]),
         ("IF a := 1 THEN\nb := 1;\nEND_IF;", ["1: a comparison is written =; := assigns"]),
         ("WHILE a := 1 DO\nb := 1;\nEND_WHILE;", ["1: a comparison is written =; := assigns"]),

@@ -84,8 +84,8 @@ def test_return_ends_a_unit() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("IF i THEN ; END_IF;", "4: INT does not fit BOOL; write INT_TO_BOOL(...)"),
-        ("WHILE r DO ; END_WHILE;", "7: REAL does not fit BOOL; write REAL_TO_BOOL(...)"),
+        ("IF i THEN ; END_IF;", "4: INT does not fit BOOL; write INT_TO_BOOL(...), or compare it: <> 0"),
+        ("WHILE r DO ; END_WHILE;", "7: REAL does not fit BOOL; write REAL_TO_BOOL(...), or compare it: <> 0"),
         ("CASE r OF 1: ; END_CASE;", "6: CASE needs an integer or an enumeration, not REAL"),
         ("CASE i OF 1..5: ; 3: ; END_CASE;", "19: 3 is a label in line 7 already"),
         ("CASE i OF 3: ; 1..5: ; END_CASE;", "16: 3 is a label in line 7 already"),
@@ -105,7 +105,7 @@ def test_return_ends_a_unit() -> None:
         ("ABS(i) := 6;", "1: the left side of := needs a variable"),
         ("MAX(i, j).1 := b;", "1: the left side of := needs a variable"),
         ("i S= b;", "1: S= needs a BOOL variable, not INT"),
-        ("b S= i;", "6: INT does not fit BOOL; write INT_TO_BOOL(...)"),
+        ("b S= i;", "6: INT does not fit BOOL; write INT_TO_BOOL(...), or compare it: <> 0"),
         ("i X= b;", "3: X has no place here; an assignment is written :=, S= or R="),
         ("i REF= j;", "1: the left side of REF= is a REFERENCE TO, not INT"),
         ("nothing := 1;", "1: unknown name nothing"),

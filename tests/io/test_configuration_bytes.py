@@ -73,3 +73,14 @@ def test_ranges_of_tables_follow_each_other() -> None:
     packed = pack_configuration(Configuration(tuple(connectors), ()))
     firsts = [int.from_bytes(packed[16 + 24 * n + 8 : 16 + 24 * n + 10], "little") for n in range(3)]
     assert firsts == [0, *accumulate(sizes)][:3]
+
+
+def test_more_than_the_tables_have_room_for_is_refused() -> None:
+    channels = (ChannelEntry(1, 0, 0, 1, 0),) * 0x8000
+    maps = tuple(TaskMap(task, 0, (ConnectorMap(0, channels),)) for task in range(2))
+    device = ConnectorEntry("c", "d", 1, 1)
+    pack_configuration(Configuration((device,), maps[:1]))
+    with pytest.raises(UsageError, match=r"There are 65536 channels, each once for every task .* room for 65534"):
+        pack_configuration(Configuration((device,), maps))
+    with pytest.raises(UsageError, match="There are 65535 devices"):
+        pack_configuration(Configuration((device,) * 0xFFFF, ()))

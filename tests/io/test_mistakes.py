@@ -33,6 +33,10 @@ out = { DO0 = "PC0" }
 name = "Analog"
 driver = "IoDrvAdc"
 in = { AI0 = { type = "INT", parameter = 1 } }
+[module.out]
+DO = { type = "BYTE", parameter = 2 }
+DO7 = { type = "BOOL", parameter = 2, bit = 7 }
+DO8 = { type = "BOOL", parameter = 2, bit = 8 }
 [module.parameter]
 range = { id = 100, type = "USINT", choices = { low = 0, high = 1 } }
 """
@@ -90,6 +94,7 @@ DEVICE_MISTAKES = [
     ("[local.Analog]\nrange = 'mid'", 2, "range cannot be 'mid'; it can be low, high"),
     ("[local.Analog]\nrange = 'low'\nin = { AI1 = 'Main.level' }", 3, "Analog has no input AI1; it has AI0"),
     ("[local.Analog]\nrange = 'low'\nin = { AI0 = 'Main.power' }", 3, "Main.power is REAL, but Analog.AI0 is INT"),
+    ("[local.Analog]\nrange = 'low'\nout = { DO = '%QB1', DO8 = '%QX2.0', DO7 = '%QX3.0' }", 3, "DO7 has bits of DO"),
     ("[sim.in]\na = '%IX0.0'\nb = '%IX0.1'\nc = '%IX0.2'", 2, "there are 3 channels; IO-16 has room for 2"),
 ]  # fmt: skip
 

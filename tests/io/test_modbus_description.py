@@ -198,6 +198,18 @@ MISTAKES = [
     (server('"40001.3" = "Main.word_1"'), "a bit of a register is for a BOOL"),
     (server('465536 = "Main.real_1"'), "goes beyond the last address"),
     (server('40001 = "Main.word_1"', coils='5 = "Main.on"', bits="true"), "are at the same addresses of the coils"),
+    (
+        server('"40001.0" = { var = "Main.on", read_only = true }, "40001.1" = "Main.off"'),
+        "40001.1 can be written, 40001.0 in line 3 is read_only: the bits of one register are all the same",
+    ),
+    (
+        server('"40001.1" = "Main.off", "40001.0" = { var = "Main.on", read_only = true }'),
+        "40001.0 is read_only, 40001.1 in line 3 can be written: the bits of one register are all the same",
+    ),
+    (server('"\u0664000\u0661" = "Main.word_1"'), "is not the address of holding registers"),
+    (server('"40001.3" = "Main.on", "40001.03" = "Main.off"'), "40001.03 is the bit 40001.3 in line 3"),
+    (server('"40001.3" = "Main.on", "400001.3" = "Main.off"'), "400001.3 is the bit 40001.3 in line 3"),
+    (server('40001.3 = "Main.on", 40001.4 = "Main.off"'), 'a bit of a register is written in quotes: "40001.3"'),
     ('[modbus.server.tcp]\naddress = "plc"', "'plc' is not an address"),
     ("[modbus.serve.tcp]\nport = 1", "there is no 'serve' here"),
 ]

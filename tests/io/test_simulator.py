@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from io_support import build
 
@@ -141,3 +143,15 @@ def test_image_survives_a_restart(plc: Simulator) -> None:
     plc.start()
     plc.run_cycles(1)
     assert plc.output("DO0") is True
+
+
+def test_input_of_a_device_that_is_not_enabled_is_plain_memory(tmp_path: Path) -> None:
+    built = build(tmp_path, PROGRAM, DESCRIPTION + '[[sim]]\nname = "Spare"\nenabled = false\nin = { n = "Main.n" }\n')
+    with Simulator(built.image, built.symbols) as plc:
+        plc.write({"Main.n": 5})
+        assert plc.read("Main.n") == 5
+        with pytest.raises(UsageError, match=r"Spare.n is of a device that is not enabled"):
+            plc.set_input("Spare.n", 5)
+        plc.set_input("level", 5)
+        plc.run_cycles(1)
+        assert plc.read("Main.speed") == 1.25

@@ -115,6 +115,27 @@ def count_images(machine: str, firmware: Firmware, folder: Path) -> list[int]:
     return counts
 
 
+LINES = """
+[gpio.in]
+BUTTON0 = "Main.pressed"
+[gpio.out]
+LED0 = "Main.lit"
+LED1 = "Main.dark"
+"""
+
+
+def count_lines(machine: str, firmware: Firmware, folder: Path) -> list[int]:
+    """A cycle of a program without lines of the board, and with them."""
+    text = program("VAR pressed, lit, dark : BOOL; END_VAR", "lit := pressed; dark := NOT pressed;")
+    counts = []
+    for described in (False, True):
+        if described:
+            (folder / "lines.io.toml").write_text(LINES)
+        built = compile_text(text, TARGETS[machine], folder, checks="none")
+        counts.append(Counter(machine, firmware, built, folder).count("AlarmIrq", firmware.functions["main"]))
+    return counts
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("machine", choices=TARGETS)
@@ -134,12 +155,15 @@ def main() -> None:
         one = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names[:1]) and None)
         more = counter.count("SrvHandleMessage", caller, lambda plc: plc.read_all(full_names) and None)
         alone, shared = count_images(args.machine, firmware, Path(folder))
-    print(f"{args.machine}: instructions of the runtime")
+        lines = count_lines(args.machine, firmware, Path(folder)) if "IoDrvGpio_Hook" in firmware.functions else []
+    print(f"{args.machine}: instructions of the runtime, {args.firmware.stem}")
     print(f"{cycle:6}  a task cycle: from the alarm's interrupt back to the main loop")
     print(f"{until_program:6}    of it the switch to the task: until its program begins")
     print(
         f"{shared - alone:6}  more for copies of {IMAGE_BYTES} bytes of inputs and outputs that another task uses too"
     )
+    if lines:
+        print(f"{lines[1] - lines[0]:6}  more for three lines of the board: one input, two outputs")
     print(f"{one:6}  a request that reads one variable")
     print(f"{(more - one) / (VARIABLES - 1):6.0f}  each further variable")
 

@@ -127,3 +127,18 @@ def test_board_is_a_client(make_board: Callable[..., Any], tmp_path: Path) -> No
         device.registers[0:4] = bytes([0x42, 0xC8, 0, 0])  # 100.0
         eventually(lambda: plc.read("Main.ok") and plc.read("Main.ratio") == 100.0)
         eventually(lambda: device.registers[18:20] == bytes([0, 50]))
+
+
+def test_the_line_of_the_tool_is_no_field_bus(make_board: Callable[..., Any], tmp_path: Path) -> None:
+    """Neither when an application comes over it, nor when the board starts with that application."""
+    refusal = "Not used: Bus (IoDrvModbus): the serial line"  # "COM1" is in use: the board's log has short entries
+    board = make_board("modbus")
+    board.power_on("host")
+    own_line = SERVER.replace("COM2", "COM1").replace("unit = 17", "unit = 17\noptional = true")
+    with load(board, tmp_path, own_line, "ok := Bus.ok;") as plc:
+        assert any(entry.text.startswith(refusal) for entry in plc.log())
+    board.power_off()
+    board.power_on("host")
+    with Plc(Connection(board.line())) as plc:
+        assert any(entry.text.startswith(refusal) for entry in plc.log())
+        assert plc.status().state == "run"

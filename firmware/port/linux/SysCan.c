@@ -243,6 +243,12 @@ void PortCanHandOver(void)
     close_line();
 }
 
+bool PortCanHas(const char *path)
+{
+    return can.configured && can.is_slcan &&
+           (strcmp(can.name, path) == 0 || PortIsDevice(can.slave >= 0 ? can.slave : can.line.file, path));
+}
+
 const char *PortCanPtyName(void)
 {
     return can.configured && can.pty_name[0] != '\0' ? can.pty_name : NULL;
@@ -259,7 +265,7 @@ void SysCanGetAddress(RTS_UI32 index, CAN_ADDRESS *address)
 {
     RTS_UNUSED(index);
     address->base = can.options.base;
-    address->node = (RTS_UI8)can.options.node;
+    address->node = can.options.node;
 }
 
 RTS_RESULT SysCanOpen(RTS_UI32 index, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)

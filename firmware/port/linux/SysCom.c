@@ -356,33 +356,43 @@ RTS_RESULT SysComOpen(RTS_UI32 index)
     return ERR_OK;
 }
 
-/* A line of this path that is in use, or a free one; NULL: there are too many. */
-static LINE *find_line(const char *path)
+/* Whether a line in use has this path, or the device that it leads to. */
+static bool has_device(const LINE *line, const char *path)
 {
-    LINE *found = NULL;
-    if (state.configured && strcmp(own->path, path) == 0) {
-        return own;
+    int file = line == own && state.slave >= 0 ? state.slave : line->source.file;
+    return strcmp(line->path, path) == 0 || PortIsDevice(file, path);
+}
+
+static bool is_in_use(const char *path)
+{
+    bool used = PortCanHas(path) || (state.configured && has_device(own, path));
+    for (const LINE *line = lines + 1; line < lines + LINES; line++) {
+        used |= line->open && has_device(line, path);
     }
-    for (LINE *line = lines + 1; line < lines + LINES; line++) {
-        if (line->open && strcmp(line->path, path) == 0) {
-            return line;
-        }
-        found = line->open ? found : line;
+    return used;
+}
+
+/* NULL: there are too many. */
+static LINE *find_free_line(void)
+{
+    LINE *line = lines + 1;
+    while (line < lines + LINES && line->open) {
+        line++;
     }
-    return found;
+    return line < lines + LINES ? line : NULL;
 }
 
 RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
 {
-    LINE *line = find_line(name);
-    if (strlen(name) >= sizeof(line->path) || name[0] == '\0') {
+    LINE *line = find_free_line();
+    if (strlen(name) >= sizeof(line->path) || name[0] == '\0' || line == NULL) {
         return ERR_NO_OBJECT;
     }
     if (!PortComKnowsBaud(settings->baud)) {
         return ERR_NOT_SUPPORTED;
     }
-    if (line == NULL || line == own || line->open) {
-        return line == NULL ? ERR_NO_OBJECT : ERR_DUPLICATE;
+    if (is_in_use(name)) {
+        return ERR_DUPLICATE;
     }
     forget(line);
     line->settings = *settings;

@@ -449,6 +449,13 @@ RTS_RESULT SysSockSendTo(RTS_HANDLE socket, const RTS_UI8 *data, RTS_UI32 size, 
     return sent || !is_later() ? ERR_OK : ERR_NOBUFFER;
 }
 
+void SysSockReset(RTS_HANDLE socket)
+{
+    struct linger none = {.l_onoff = 1, .l_linger = 0};
+    (void)setsockopt(file_of(socket), SOL_SOCKET, SO_LINGER, &none, sizeof(none));
+    SysSockClose(socket);
+}
+
 void SysSockClose(RTS_HANDLE socket)
 {
     PORT_SOURCE *source = find(socket);

@@ -200,7 +200,7 @@ static RTS_UI32 parse_can_base(const char *text)
 {
     char *end = "";
     RTS_UI32 base = parse_number(text, 0x1FFFFFFF, &end);
-    if (base == UINT32_MAX || (base & 0xFFFF) != 0 || *end != '\0') {
+    if (base == UINT32_MAX || (base & ~(RTS_UI32)CAN_BASE_MASK) != 0 || *end != '\0') {
         refuse("--can-base %s is not a base of identifiers: give 29 bits of which the last 16 are 0, as 0x1F400000",
                text);
     }

@@ -18,6 +18,9 @@ typedef struct {
 
 void PortReason(PORT_REASON *reason, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* Whether `path` leads to the device that is open as `file`: a device may have several names (links of udev). */
+bool PortIsDevice(int file, const char *path);
+
 /* ---- the wait of main ---- */
 
 /*
@@ -99,6 +102,8 @@ bool PortCanOpen(const char *text, const PORT_CAN_OPTIONS *options, PORT_REASON 
 void PortCanClose(void);
 /* As PortComHandOver. */
 void PortCanHandOver(void);
+/* Whether CAN is on the serial line of this path. */
+bool PortCanHas(const char *path);
 /* Name of the pseudo terminal, NULL when there is none. */
 const char *PortCanPtyName(void);
 

@@ -387,7 +387,7 @@ void SimCanReset(RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
 
 void SimCanSetAddress(RTS_UI32 node, RTS_UI32 base)
 {
-    bus.address = (CAN_ADDRESS){base, (RTS_UI8)node};
+    bus.address = (CAN_ADDRESS){base, node};
 }
 
 /* ---- nodes ---- */

@@ -11,28 +11,25 @@
 #include "CmpItf.h"
 #include "rts_config.h"
 
-typedef struct {
-    CYCLE_PHASE when;
-    PF_CYCLE_PHASE run;
-} ENTRY;
-
 enum { PLACES = CYCLE_MAX_PHASES > 0 ? CYCLE_MAX_PHASES : 1 };
 
-/* In the order of registration. */
+CYCLE_ENTRY *cycle_phases[CYCLE_SAFE_STATE + 1];
+
 static struct {
     RTS_UI32 count;
-    RTS_UI32 used; /* a bit for each phase that has one */
-    ENTRY row[PLACES];
+    CYCLE_ENTRY row[PLACES];
 } phases;
 
 RTS_RESULT CyclePhaseRegister(CYCLE_PHASE when, PF_CYCLE_PHASE run)
 {
+    CYCLE_ENTRY **end = &cycle_phases[when];
+
     if (CYCLE_MAX_PHASES == 0 || phases.count == PLACES)
         return ERR_NOMEMORY;
-    phases.row[phases.count].when = when;
-    phases.row[phases.count].run = run;
-    phases.count++;
-    phases.used |= 1u << when;
+    while (*end != NULL)
+        end = &(*end)->next;
+    *end = &phases.row[phases.count++];
+    (*end)->run = run;
     return ERR_OK;
 }
 
@@ -41,26 +38,17 @@ bool CyclePhasesExist(void)
     return CYCLE_MAX_PHASES > 0 && phases.count > 0;
 }
 
-void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task, const IEC_CONTEXT *context)
-{
-    RTS_UI32 i;
-
-    if (CYCLE_MAX_PHASES == 0 || (phases.used >> when & 1) == 0)
-        return;
-    for (i = 0; i < phases.count; i++) {
-        if (phases.row[i].when == when)
-            phases.row[i].run(task, context);
-    }
-}
-
 void CyclePhasesForget(void)
 {
-    if (CYCLE_MAX_PHASES > 0)
+    if (CYCLE_MAX_PHASES > 0) {
         CMP_CLEAR(phases);
+        CMP_CLEAR(cycle_phases);
+    }
 }
 
 void AppEnterSafeState(void)
 {
     AppAreasClearOutputs();
-    CyclePhasesRun(CYCLE_SAFE_STATE, 0, NULL);
+    if (CyclePhasesExist())
+        CyclePhasesRun(CYCLE_SAFE_STATE, 0, NULL);
 }

@@ -397,12 +397,26 @@ static RTS_RESULT open_controller(void)
 {
     const RTS_UI32 mask = 0x1FFFFFFF & ~(RTS_UI32)CAN_ADDRESS_MASK;
     const CAN_FILTER filters[FILTERS] = {
-        {can.own.base | (RTS_UI32)can.own.node << CAN_TARGET_SHIFT, mask, true},
+        {can.own.base | can.own.node << CAN_TARGET_SHIFT, mask, true},
         {can.own.base | (RTS_UI32)CAN_TO_ALL << CAN_TARGET_SHIFT, mask, true},
     };
     RTS_RESULT result = SysCanOpen(CONTROLLER, 0, 0);
 
     return result == ERR_OK ? SysCanSetFilters(CONTROLLER, filters, FILTERS) : result;
+}
+
+/* Says what is not. */
+static bool is_address_possible(const CAN_ADDRESS *address)
+{
+    if (address->node > CAN_NODE_MAX)
+        LogAdd(CMPID_CmpBlkDrvCan, LOG_ERROR, ERR_OUT_OF_LIMITS, "CAN is off: node %u is not 1 to %u",
+               (unsigned)address->node, (unsigned)CAN_NODE_MAX);
+    else if ((address->base & ~(RTS_UI32)CAN_BASE_MASK) != 0)
+        LogAdd(CMPID_CmpBlkDrvCan, LOG_ERROR, ERR_OUT_OF_LIMITS,
+               "CAN is off: base 0x%X lacks its 16 zeros, or is above 29 bits", (unsigned)address->base);
+    else
+        return true;
+    return false;
 }
 
 static void open_bus(void)
@@ -411,12 +425,12 @@ static void open_bus(void)
     if (SysCanGetCount() == 0)
         return;
     SysCanGetAddress(CONTROLLER, &can.own);
-    if (can.own.node == 0 || can.own.node > CAN_NODE_MAX)
+    if (can.own.node == 0 || !is_address_possible(&can.own))
         return;
     can.driver.type = BLK_DRV_TYPE_CAN;
     can.driver.point_to_point = 1;
     can.driver.address_words = 1;
-    can.driver.address[1] = can.own.node;
+    can.driver.address[1] = (RTS_UI8)can.own.node;
     can.driver.send = can_send;
     RTS_RESULT result = open_controller();
     can.open = result == ERR_OK;
@@ -443,7 +457,7 @@ RTS_RESULT CmpBlkDrvCan_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT && COMM_COUNTERS)
         CMP_CLEAR(counters);
-    else if (hook == CH_INIT_COMM)
+    else if (hook == CH_INIT3) /* before an application can take the line */
         open_bus();
     else if (hook == CH_COMM_CYCLE)
         cycle();

@@ -306,7 +306,7 @@ RTS_RESULT CmpBlkDrvSimpleCom_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT)
         reset_lines();
-    else if (hook == CH_INIT_COMM)
+    else if (hook == CH_INIT3) /* before an application can take the line */
         open_lines();
     else if (hook == CH_COMM_CYCLE)
         cycle();

@@ -376,7 +376,7 @@ RTS_RESULT CmpBlkDrvTcp_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT && COMM_COUNTERS)
         CMP_CLEAR(counters);
-    else if (hook == CH_INIT_COMM)
+    else if (hook == CH_INIT3) /* before an application can take the port */
         open_all();
     else if (hook == CH_COMM_CYCLE)
         cycle();

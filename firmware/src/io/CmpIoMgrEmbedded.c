@@ -81,14 +81,16 @@ bool IoMgrConfigIsMine(const IoConfigConnector *connector, const IO_DRIVER *driv
     return IoDeviceGetDriver(IoMgrConfigGetIndex(connector)) == driver;
 }
 
-static RTS_RESULT each_of_map(const IoConfigConnectorMap *map, RTS_UI32 type, PF_IO_CHANNEL visit)
+/* No more of them once the driver has gone on without the connector. */
+static RTS_RESULT each_of_map(const IoConfigConnectorMap *map, RTS_UI32 type, const IO_DRIVER *driver,
+                              PF_IO_CHANNEL visit)
 {
     const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
     const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
     RTS_RESULT result = ERR_OK;
     RTS_UI32 i;
 
-    for (i = 0; result == ERR_OK && i < map->channel_map_count; i++)
+    for (i = 0; result == ERR_OK && i < map->channel_map_count && IoDeviceGetDriver(map->connector) == driver; i++)
         result = visit(connector, &channel[i], type);
     return result;
 }
@@ -101,10 +103,8 @@ RTS_RESULT IoMgrConfigEachChannel(const IoConfigTaskMap *task_maps, int count, c
     for (; count > 0; count--, task_maps++) {
         const IoConfigConnectorMap *map = IoMgrConfigGetConnectorMaps(task_maps);
         RTS_UI32 i;
-        for (i = 0; result == ERR_OK && i < task_maps->connector_map_count; i++) {
-            if (IoDeviceGetDriver(map[i].connector) == driver)
-                result = each_of_map(&map[i], task_maps->type, visit);
-        }
+        for (i = 0; result == ERR_OK && i < task_maps->connector_map_count; i++)
+            result = each_of_map(&map[i], task_maps->type, driver, visit);
     }
     return result;
 }
@@ -198,6 +198,7 @@ static RTS_RESULT load(const IO_CONFIG *config, const CDL_TASK *tasks, RTS_UI32 
     return result == ERR_OK ? ERR_OK : APP_REFUSE(refusal, result, "Raise CYCLE_MAX_PHASES of this firmware.");
 }
 
+/* Drivers without connectors too: theirs may have been refused, optional, after they took hardware. */
 static void unload(void)
 {
     IO_DRIVER *driver;
@@ -205,10 +206,8 @@ static void unload(void)
     if (IoTablesCountConnectors() == 0)
         return;
     IoCycleUnload();
-    for (driver = manager.drivers; driver != NULL; driver = driver->next) {
-        if (has_connector(driver))
-            (void)driver->functions->IoDrvUpdateConfiguration(IoMgrConfigGetConnector(0), 0);
-    }
+    for (driver = manager.drivers; driver != NULL; driver = driver->next)
+        (void)driver->functions->IoDrvUpdateConfiguration(IoMgrConfigGetConnector(0), 0);
     IoTablesSet(NULL, NULL);
 }
 

@@ -27,19 +27,25 @@
 #define PENDING_BUS_CYCLE 0x40000000u
 RTS_STATIC_ASSERT(APP_MAX_TASKS < 30, tasks_have_a_bit_each);
 
-enum { NO_MAP = 0xFF };
-RTS_STATIC_ASSERT(2 * APP_MAX_TASKS < NO_MAP, task_maps_can_be_indexed);
+/* What there is to do in the cycle of a task, found out when the configuration is loaded. */
+typedef struct {
+    const IoConfigTaskMap *map[2]; /* by IO_MAP_*; NULL: it uses none */
+    bool has_devices;              /* of which it is the bus task */
+} WORK;
 
 static struct {
     IO_DRIVER *drivers; /* all there are, while there is a configuration */
     bool is_loaded;
     bool has_phases;
-    RTS_UI8 map_of[APP_MAX_TASKS][2]; /* which task map, by IO_MAP_*; NO_MAP */
+    WORK work[APP_MAX_TASKS];
 } state;
 
 /* ---- one driver, one caller ---- */
 
-static bool enter_driver(IO_DRIVER *driver)
+/* Inlined, as what is done at both ends of each call of a driver. */
+#define CYCLE_INLINE static inline __attribute__((always_inline))
+
+CYCLE_INLINE bool enter_driver(IO_DRIVER *driver)
 {
     if (SysAtomicReplace(&driver->busy, 0, 1))
         return true;
@@ -66,21 +72,28 @@ static RTS_UI32 take_notes(IO_DRIVER *driver)
     return notes;
 }
 
-/* Not just a load: of it and note() one is first, so either a note is seen here, or its writer sees that the driver is free. */
-static bool has_notes(IO_DRIVER *driver)
+/* Not just a load on several cores: of it and note() one is first, so either a note is seen here, or its writer sees that
+ * the driver is free. */
+CYCLE_INLINE bool has_notes(IO_DRIVER *driver)
 {
-    return SysAtomicAdd(&driver->pending, 0) != 0;
+    return (RTS_ONE_CORE ? SysAtomicLoad(&driver->pending) : SysAtomicAdd(&driver->pending, 0)) != 0;
 }
 
 static void do_notes(IO_DRIVER *driver, RTS_UI32 notes);
 
-static void leave_driver(IO_DRIVER *driver)
+static void follow_notes(IO_DRIVER *driver)
 {
-    SysAtomicStore(&driver->busy, 0);
     while (has_notes(driver) && SysAtomicReplace(&driver->busy, 0, 1)) {
         do_notes(driver, take_notes(driver));
         SysAtomicStore(&driver->busy, 0);
     }
+}
+
+CYCLE_INLINE void leave_driver(IO_DRIVER *driver)
+{
+    SysAtomicStore(&driver->busy, 0);
+    if (has_notes(driver))
+        follow_notes(driver);
 }
 
 /* Enters, or leaves a note for who is in; false then. */
@@ -96,18 +109,11 @@ static bool enter_or_note(IO_DRIVER *driver, RTS_UI32 what)
 
 /* ---- maps ---- */
 
-static const IoConfigTaskMap *get_map(RTS_UI32 task, RTS_UI32 type)
-{
-    RTS_UI32 index = state.is_loaded ? state.map_of[task][type] : NO_MAP;
-
-    return index != NO_MAP ? IoTablesGetTaskMaps() + index : NULL;
-}
-
 typedef IO_DRIVER *(*PF_DRIVER_OF)(RTS_UI32 connector);
 
-/* The end of those connectors from `map` on that go to one driver, or to none. */
-static const IoConfigConnectorMap *end_of_run(const IoConfigConnectorMap *map, const IoConfigConnectorMap *end,
-                                              PF_DRIVER_OF driver_of, const IO_DRIVER *driver)
+/* The end of those connectors from `map` on that go to one driver, or to none. Mostly there is one. */
+CYCLE_INLINE const IoConfigConnectorMap *end_of_run(const IoConfigConnectorMap *map, const IoConfigConnectorMap *end,
+                                                    PF_DRIVER_OF driver_of, const IO_DRIVER *driver)
 {
     while (++map < end && driver_of(map->connector) == driver) {
     }
@@ -209,7 +215,7 @@ static void write_outputs(RTS_UI32 task, const IoConfigTaskMap *task_map)
         next = end_of_run(map, end, IoDeviceGetDriver, driver);
         if (driver == NULL || driver->functions->IoDrvWriteOutputs == NULL || !enter_or_note(driver, 1u << task))
             continue;
-        write_all(driver, map, (int)(next - map));
+        (void)driver->functions->IoDrvWriteOutputs(map, (int)(next - map));
         leave_driver(driver);
     }
 }
@@ -263,7 +269,7 @@ static void do_notes(IO_DRIVER *driver, RTS_UI32 notes)
     RTS_UI32 task;
 
     for (task = 0; task < APP_MAX_TASKS; task++) {
-        const IoConfigTaskMap *map = get_map(task, IO_MAP_OUTPUTS);
+        const IoConfigTaskMap *map = state.work[task].map[IO_MAP_OUTPUTS];
         if (map != NULL && (is_safe || (notes >> task & 1) != 0))
             write_to(driver, map, is_safe ? write_safe : write_all);
     }
@@ -275,24 +281,26 @@ static void do_notes(IO_DRIVER *driver, RTS_UI32 notes)
 
 static void before_code(RTS_UI32 task, const IEC_CONTEXT *context)
 {
-    const IoConfigTaskMap *map = get_map(task, IO_MAP_INPUTS);
+    const WORK *work = &state.work[task];
 
     RTS_UNUSED(context);
-    if (map != NULL) {
-        read_inputs(map);
+    if (work->map[IO_MAP_INPUTS] != NULL) {
+        read_inputs(work->map[IO_MAP_INPUTS]);
         SchedNoteEvents();
     }
-    IoDevicesUpdate(task);
+    if (work->has_devices)
+        IoDevicesUpdate(task);
 }
 
 static void after_code(RTS_UI32 task, const IEC_CONTEXT *context)
 {
-    const IoConfigTaskMap *map = get_map(task, IO_MAP_OUTPUTS);
+    const WORK *work = &state.work[task];
 
     RTS_UNUSED(context);
-    if (map != NULL)
-        write_outputs(task, map);
-    start_bus_cycles(task);
+    if (work->map[IO_MAP_OUTPUTS] != NULL)
+        write_outputs(task, work->map[IO_MAP_OUTPUTS]);
+    if (work->has_devices)
+        start_bus_cycles(task);
 }
 
 /* ---- the safe state ---- */
@@ -379,15 +387,26 @@ static void enter_safe_state(RTS_UI32 task, const IEC_CONTEXT *context)
 
 /* ---- begin and end ---- */
 
-static void index_maps(void)
+/* Something to do in its bus task: a variable of the program to bring up to date, or a bus cycle. */
+static bool has_bus_work(RTS_UI32 connector)
+{
+    const IO_DRIVER *driver = IoDeviceGetDriver(connector);
+
+    return IoMgrConfigGetConnector(connector)->state != IO_CONFIG_NOWHERE ||
+           (driver != NULL && driver->functions->IoDrvStartBusCycle != NULL && IoDeviceHasBusCycle(connector));
+}
+
+static void find_work(void)
 {
     RTS_UI32 i;
 
-    memset(state.map_of, NO_MAP, sizeof state.map_of);
+    memset(state.work, 0, sizeof state.work);
     for (i = 0; i < IoTablesCountTaskMaps(); i++) {
         const IoConfigTaskMap *map = IoTablesGetTaskMaps() + i;
-        state.map_of[map->task][map->type] = (RTS_UI8)i;
+        state.work[map->task].map[map->type] = map;
     }
+    for (i = 0; i < IoTablesCountConnectors(); i++)
+        state.work[IoDeviceGetBusTask(i)].has_devices |= has_bus_work(i);
 }
 
 static RTS_RESULT register_phases(void)
@@ -408,7 +427,7 @@ RTS_RESULT IoCycleLoad(IO_DRIVER *drivers)
 
     if (result != ERR_OK)
         return result;
-    index_maps();
+    find_work();
     state.drivers = drivers;
     state.is_loaded = true;
     make_safe();
@@ -423,6 +442,7 @@ void IoCycleUnload(void)
         driver->pending = 0;
     state.drivers = NULL;
     state.is_loaded = false;
+    memset(state.work, 0, sizeof state.work);
 }
 
 void IoCycleForget(void)
@@ -437,7 +457,7 @@ void IoCycleKeepUp(void)
     RTS_UI32 task;
 
     for (task = 0; task < APP_MAX_TASKS; task++) {
-        const IoConfigTaskMap *map = get_map(task, IO_MAP_INPUTS);
+        const IoConfigTaskMap *map = state.work[task].map[IO_MAP_INPUTS];
         if (map != NULL)
             read_inputs(map);
     }

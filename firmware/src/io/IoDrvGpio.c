@@ -3,8 +3,8 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * A connector is a group of lines (SysGpio.h). A group whose lines stay the same over a download stays open, so that
- * outputs that hold their value do so.
+ * A connector is a group of lines (SysGpio.h). A group whose lines stay the same over a download stays open, whatever its
+ * place among the connectors, so that outputs that hold their value do so.
  */
 #include "IoDrvGpio.h"
 
@@ -22,12 +22,12 @@ RTS_STATIC_ASSERT((int)IO_GPIO_LINES == 32, a_value_has_a_bit_for_each_line);
 RTS_STATIC_ASSERT(SCHED_MAX_EXTERNAL_EVENTS <= 32, events_have_a_bit_each);
 
 typedef struct {
-    const IoConfigConnector *connector; /* NULL: the group is not in use now */
-    RTS_UI32 outputs;                   /* lines that are some */
-    RTS_UI8 in[4];                      /* as they were read */
-    RTS_UI8 out[4];                     /* to be written */
-    RTS_UI32 lines;                     /* CRC of what they are; 0: closed */
-    RTS_UI32 events;                    /* handles of those that are registered for it, a bit each */
+    RTS_UI32 user;    /* index of its connector + 1; 0: the group is not in use now */
+    RTS_UI32 outputs; /* lines that are some */
+    RTS_UI8 in[4];    /* as they were read */
+    RTS_UI8 out[4];   /* to be written */
+    RTS_UI32 lines;   /* CRC of what they are; 0: closed */
+    RTS_UI32 events;  /* handles of those that are registered for it, a bit each */
 } GROUP;
 
 static GROUP groups[IO_GPIO_GROUPS];
@@ -43,6 +43,16 @@ static const IoDrvInfo *get_info(void)
 }
 
 /* ---- configuration ---- */
+
+static RTS_UI32 user_of(const IoConfigConnector *connector)
+{
+    return IoMgrConfigGetIndex(connector) + 1;
+}
+
+static const IoConfigConnector *connector_of(const GROUP *group)
+{
+    return IoMgrConfigGetConnector(group->user - 1);
+}
 
 static void close_group(GROUP *group)
 {
@@ -121,8 +131,9 @@ static const char *reason_of(RTS_RESULT result)
 /* *bad: the line or event that is refused. */
 static RTS_RESULT add_line(GROUP *group, RTS_UI32 number, const char **bad)
 {
-    const char *event = get_text(group->connector, GPIO_EVENT + number);
-    SYS_GPIO_LINE line = {get_text(group->connector, GPIO_LINE + number), get_options(group->connector, number), 0};
+    const IoConfigConnector *connector = connector_of(group);
+    const char *event = get_text(connector, GPIO_EVENT + number);
+    SYS_GPIO_LINE line = {get_text(connector, GPIO_LINE + number), get_options(connector, number), 0};
     RTS_RESULT result;
 
     if (line.name == NULL)
@@ -145,7 +156,7 @@ static RTS_RESULT open_group(GROUP *group, const IoConfigConnector *connector, c
     RTS_RESULT result = ERR_OK;
     RTS_UI32 n;
 
-    group->connector = connector;
+    group->user = user_of(connector);
     group->lines = crc_of_lines(connector);
     for (n = 0; n < IO_GPIO_LINES && result == ERR_OK; n++)
         result = add_line(group, n, bad);
@@ -158,51 +169,86 @@ static RTS_RESULT open_group(GROUP *group, const IoConfigConnector *connector, c
     return result;
 }
 
-static RTS_RESULT use_group(GROUP *group, const IoConfigConnector *connector)
+/* The group of a user; of 0, one that is free. NULL: there is none. */
+static GROUP *find_group(RTS_UI32 user)
 {
+    GROUP *group = groups;
+
+    while (group < groups + IO_GPIO_GROUPS && group->user != user)
+        group++;
+    return group < groups + IO_GPIO_GROUPS ? group : NULL;
+}
+
+/* A group that has the lines of a connector already becomes that of the connector. */
+static RTS_RESULT keep_group(const IoConfigConnector *connector)
+{
+    RTS_UI32 lines = crc_of_lines(connector);
+    RTS_UI32 i = 0;
+
+    while (i < IO_GPIO_GROUPS && (groups[i].user != 0 || groups[i].lines != lines))
+        i++;
+    if (i < IO_GPIO_GROUPS) {
+        groups[i].user = user_of(connector);
+        IoMgrConfigNoteAlive(connector);
+    }
+    return ERR_OK;
+}
+
+static RTS_RESULT take_group(const IoConfigConnector *connector)
+{
+    GROUP *group = find_group(0);
     const char *bad = "";
     RTS_RESULT result;
 
-    if (group == groups + IO_GPIO_GROUPS)
+    if (find_group(user_of(connector)) != NULL)
+        return ERR_OK;
+    if (group == NULL)
         return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "this device can have %u groups of lines.",
                                  (unsigned)IO_GPIO_GROUPS);
-    if (group->lines == crc_of_lines(connector)) {
-        group->connector = connector;
-        IoMgrConfigNoteAlive(connector);
-        return ERR_OK;
-    }
-    close_group(group);
     memset(group->out, 0, sizeof group->out);
     result = open_group(group, connector, &bad);
-    return result == ERR_OK ? ERR_OK : IoMgrConfigRefuse(connector, result, reason_of(result), bad);
+    if (result == ERR_OK)
+        return ERR_OK;
+    group->user = 0;
+    return IoMgrConfigRefuse(connector, result, reason_of(result), bad);
 }
 
-static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
-{
-    GROUP *group = groups;
-    RTS_RESULT result = ERR_OK;
-    RTS_UI32 i;
-
-    for (i = 0; i < IO_GPIO_GROUPS; i++)
-        groups[i].connector = NULL;
-    for (; count > 0 && result == ERR_OK; count--, connectors++) {
-        if (IoMgrConfigIsMine(connectors, &gpio_driver)) {
-            result = use_group(group, connectors);
-            group += group < groups + IO_GPIO_GROUPS;
-        }
-    }
-    return result;
-}
-
-/* Groups that the previous application had and this one has not. */
+/* Groups that the previous application had and this one has not, or that are refused. */
 static void close_unused(void)
 {
     RTS_UI32 i;
 
     for (i = 0; i < IO_GPIO_GROUPS; i++) {
-        if (groups[i].connector == NULL)
+        if (groups[i].user == 0)
             close_group(&groups[i]);
     }
+}
+
+static RTS_RESULT each_of_mine(const IoConfigConnector *connectors, int count,
+                               RTS_RESULT (*visit)(const IoConfigConnector *connector))
+{
+    RTS_RESULT result = ERR_OK;
+
+    for (; count > 0 && result == ERR_OK; count--, connectors++) {
+        if (IoMgrConfigIsMine(connectors, &gpio_driver))
+            result = visit(connectors);
+    }
+    return result;
+}
+
+/* What is not needed any more is given back before anything is taken: a line may have gone to another group. Without an
+ * application (count 0) that is left to main: the next one, of the same download, may keep its lines. */
+static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
+{
+    RTS_UI32 i;
+
+    for (i = 0; i < IO_GPIO_GROUPS; i++)
+        groups[i].user = 0;
+    if (count == 0)
+        return ERR_OK;
+    (void)each_of_mine(connectors, count, keep_group);
+    close_unused();
+    return each_of_mine(connectors, count, take_group);
 }
 
 static bool is_channel(const IoConfigChannelMap *channel, RTS_UI32 type)
@@ -219,22 +265,29 @@ static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConf
                              (unsigned)channel->parameter_bit);
 }
 
+/* Connectors that are refused here, and optional, have no driver any more: their lines are given back here. */
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    return IoMgrConfigEachChannel(task_maps, count, &gpio_driver, check_channel);
+    RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &gpio_driver, check_channel);
+    RTS_UI32 i;
+
+    for (i = 0; i < IO_GPIO_GROUPS; i++) {
+        if (groups[i].user != 0 && !IoMgrConfigIsMine(connector_of(&groups[i]), &gpio_driver))
+            groups[i].user = 0;
+    }
+    return result;
 }
 
 /* ---- cycles ---- */
 
-/* A connector that has lines has a group, open or not. */
-static GROUP *find_group(const IoConfigConnectorMap *map)
+/* Its number. A connector that has channels has a group, open or not. */
+static RTS_UI32 group_of(const IoConfigConnectorMap *map)
 {
-    const IoConfigConnector *connector = IoMgrConfigGetConnector(map->connector);
-    GROUP *group = groups;
+    RTS_UI32 number = 0;
 
-    while (group->connector != connector)
-        group++;
-    return group;
+    while (groups[number].user != map->connector + 1u)
+        number++;
+    return number;
 }
 
 static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
@@ -242,13 +295,14 @@ static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
     for (; count > 0; count--, maps++) {
         const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
         RTS_UI32 channels = maps->channel_map_count;
-        GROUP *group = find_group(maps);
+        RTS_UI32 number = group_of(maps);
+        GROUP *group = &groups[number];
         RTS_UI32 values;
         RTS_UI32 lock;
-        RTS_RESULT result = SysGpioRead((RTS_UI32)(group - groups), &values);
+        RTS_RESULT result = SysGpioRead(number, &values);
 
         if (result != ERR_OK) {
-            IoMgrConfigSetDiagnosis(group->connector, CF_CONNECTOR_ERROR);
+            IoMgrConfigSetDiagnosis(connector_of(group), CF_CONNECTOR_ERROR);
             continue;
         }
         BytesPut32(group->in, values);
@@ -265,17 +319,18 @@ static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
     for (; count > 0; count--, maps++) {
         const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
         RTS_UI32 channels = maps->channel_map_count;
-        GROUP *group = find_group(maps);
+        RTS_UI32 number = group_of(maps);
+        GROUP *group = &groups[number];
         RTS_UI32 lock = SysLockEnter();
         RTS_RESULT result;
 
         for (; channels > 0; channels--)
             IoMgrCopyOutputLE(channel++, group->out);
         SysLockLeave(lock);
-        result = group->lines != 0 ? SysGpioWrite((RTS_UI32)(group - groups), group->outputs, BytesGet32(group->out))
-                                   : (RTS_RESULT)ERR_DEVICE;
+        result =
+            group->lines != 0 ? SysGpioWrite(number, group->outputs, BytesGet32(group->out)) : (RTS_RESULT)ERR_DEVICE;
         if (result != ERR_OK)
-            IoMgrConfigSetDiagnosis(group->connector, CF_CONNECTOR_ERROR);
+            IoMgrConfigSetDiagnosis(connector_of(group), CF_CONNECTOR_ERROR);
     }
     return ERR_OK;
 }
@@ -285,12 +340,10 @@ static RTS_RESULT diagnose(const IoConfigConnector *connector)
 {
     IO_DEVICE_STATE state;
     const char *bad;
-    GROUP *group = groups;
+    GROUP *group = find_group(user_of(connector));
 
     (void)IoMgrGetState(IoMgrConfigGetIndex(connector), &state);
-    while (group < groups + IO_GPIO_GROUPS && group->connector != connector)
-        group++;
-    if (state.ok || group == groups + IO_GPIO_GROUPS)
+    if (state.ok || group == NULL)
         return ERR_OK;
     close_group(group);
     return open_group(group, connector, &bad);

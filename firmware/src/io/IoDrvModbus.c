@@ -33,10 +33,14 @@ static const IoDrvInfo *get_info(void)
 
 /* ---- configuration ---- */
 
+/* What is asked for is set up when it is known what is copied. */
 static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
 {
+    RTS_UNUSED(connectors);
+    RTS_UNUSED(count);
     is_running = false;
-    return ModbusSetUp(&setup, &driver, connectors, count);
+    ModbusGiveBack(&setup);
+    return ERR_OK;
 }
 
 static bool is_channel_good(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, bool is_output)
@@ -47,27 +51,57 @@ static bool is_channel_good(const MODBUS_PLACE *place, const IoConfigChannelMap 
            channel->bits <= bits - channel->parameter_bit;
 }
 
+static MODBUS_JOB_STATE *job_of(const MODBUS_PLACE *place, const IoConfigChannelMap *channel)
+{
+    return &place->device->jobs[channel->parameter - MODBUS_PARAM_JOB];
+}
+
+/* In each of its bytes: a channel is whole ones, or within one. */
+static RTS_UI32 mask_of(const IoConfigChannelMap *channel)
+{
+    return channel->bits >= 8 ? 0xFF : ((1u << channel->bits) - 1) << channel->parameter_bit % 8;
+}
+
+/* Until a job has all its outputs, `written` has the bits that are missing. */
+static void mark(MODBUS_JOB_STATE *job, const IoConfigChannelMap *channel, bool missing)
+{
+    RTS_UI8 *byte = job->written + channel->parameter_bit / 8;
+    RTS_UI32 mask = mask_of(channel);
+
+    for (RTS_UI32 i = 0; i < (channel->bits + 7u) / 8; i++)
+        byte[i] = (RTS_UI8)(missing ? byte[i] | mask : byte[i] & ~mask);
+}
+
 /* A device of a line that is optional, and not used, has no data. */
 static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
 {
     MODBUS_PLACE place = ModbusFindPlace(&setup, connector);
 
-    if ((place.device == NULL && place.server == NULL) || is_channel_good(&place, channel, type == IO_MAP_OUTPUTS))
+    if (place.device == NULL && place.server == NULL)
         return ERR_OK;
-    return IoMgrConfigRefuse(connector, ERR_PARAMETER, "a channel is not in its data.");
+    if (!is_channel_good(&place, channel, type == IO_MAP_OUTPUTS))
+        return MODBUS_REFUSE(connector, ERR_PARAMETER, "a channel is not in its data.");
+    if (place.device != NULL && type == IO_MAP_OUTPUTS)
+        mark(job_of(&place, channel), channel, true);
+    return ERR_OK;
 }
 
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
+    RTS_RESULT result;
 
+    do {
+        result = ModbusSetUp(&setup, &driver);
+        if (result == ERR_OK)
+            result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
+    } while (result == ERR_PENDING);
     is_running = result == ERR_OK;
     return result;
 }
 
 /* ---- tasks ---- */
 
-typedef void (*PF_COPY)(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory);
+typedef void (*PF_COPY)(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory, RTS_UI32 bits);
 
 static void copy_all(const IoConfigConnectorMap *maps, int count, bool is_output, PF_COPY copy)
 {
@@ -80,24 +114,38 @@ static void copy_all(const IoConfigConnectorMap *maps, int count, bool is_output
         for (RTS_UI32 i = 0; i < maps->channel_map_count; i++) {
             RTS_UI8 *memory = ModbusFindMemory(&place, channel[i].parameter, is_output, &bits);
             if (memory != NULL)
-                copy(&place, &channel[i], memory);
+                copy(&place, &channel[i], memory, bits);
         }
     }
     SysLockLeave(lock);
 }
 
-static void copy_input(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory)
+static void copy_input(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory, RTS_UI32 bits)
 {
     RTS_UNUSED(place);
+    RTS_UNUSED(bits);
     IoMgrCopyInputLE(channel, memory);
 }
 
-/* From now on the job may be done: it has values of the program, or of the safe state. */
-static void copy_output(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory)
+/* The job may be done when all that it writes is of the program, or of the safe state: what holds its value is not in
+ * that, and other tasks may run later. */
+static void note_output(MODBUS_JOB_STATE *job, const IoConfigChannelMap *channel, RTS_UI32 bits)
+{
+    RTS_UI32 size = (bits + 7) / 8;
+
+    if ((job->written[channel->parameter_bit / 8] & mask_of(channel)) == 0)
+        return;
+    mark(job, channel, false);
+    while (size > 0 && job->written[size - 1] == 0)
+        size--;
+    job->has_out = size == 0;
+}
+
+static void copy_output(const MODBUS_PLACE *place, const IoConfigChannelMap *channel, RTS_UI8 *memory, RTS_UI32 bits)
 {
     IoMgrCopyOutputLE(channel, memory);
-    if (place->device != NULL)
-        place->device->jobs[channel->parameter - MODBUS_PARAM_JOB].has_out = true;
+    if (place->device != NULL && !job_of(place, channel)->has_out)
+        note_output(job_of(place, channel), channel, bits);
 }
 
 static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)

@@ -150,19 +150,23 @@ static RTS_RESULT add_channel(const IoConfigConnector *connector, const IoConfig
     return ERR_OK;
 }
 
+/* A block for which there is no room has none. */
 static RTS_RESULT place_blocks(void)
 {
+    RTS_RESULT result = ERR_OK;
     RTS_UI32 used = 0;
-    RTS_UI32 i;
+    BLOCK *block;
 
-    for (i = 0; i < sim.blocks; i++) {
-        sim.block[i].at = used;
-        if (sim.block[i].size > IO_SIM_MEMORY - used)
-            return IoMgrConfigRefuse(IoMgrConfigGetConnector(sim.block[i].connector), ERR_NOMEMORY,
-                                     "all simulated devices together have %u bytes here.", (unsigned)IO_SIM_MEMORY);
-        used += sim.block[i].size;
+    for (block = sim.block; result == ERR_OK && block < sim.block + sim.blocks; block++) {
+        block->at = used;
+        if (block->size > IO_SIM_MEMORY - used) {
+            block->size = 0;
+            result = IoMgrConfigRefuse(IoMgrConfigGetConnector(block->connector), ERR_NOMEMORY,
+                                       "all simulated devices together have %u bytes here.", (unsigned)IO_SIM_MEMORY);
+        }
+        used += block->size;
     }
-    return ERR_OK;
+    return result;
 }
 
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
@@ -283,10 +287,15 @@ static RTS_UI8 *find_memory(const IoConfigConnector *connector, RTS_UI32 id, RTS
     RTS_UI32 index = IoMgrConfigGetIndex(connector);
     BLOCK *block = find_block(index, id);
     bool is_fault = id - IO_SIM_ABSENT < RTS_COUNT(sim.devices[0].fault);
-    RTS_UI32 size = is_fault ? sizeof(RTS_UI32) : block->size;
+    RTS_UI32 size = sizeof(RTS_UI32);
 
-    *result = is_fault || block < sim.block + sim.blocks ? ERR_OUT_OF_LIMITS : ERR_NO_OBJECT;
-    if (*result == ERR_NO_OBJECT || bits > 8 * size || bit_offset > 8 * size - bits)
+    *result = ERR_NO_OBJECT;
+    if (!is_fault && block == sim.block + sim.blocks)
+        return NULL;
+    if (!is_fault)
+        size = block->size;
+    *result = ERR_OUT_OF_LIMITS;
+    if (bits > 8 * size || bit_offset > 8 * size - bits)
         return NULL;
     *result = ERR_OK;
     return is_fault ? (RTS_UI8 *)fault_of(index, id) : &sim.device[block->at];

@@ -185,7 +185,10 @@ const IoConfigChannelMap *IoMgrConfigGetChannelMaps(const IoConfigConnectorMap *
 
 /* ---- copies ---- */
 
-static void copy_bytes(RTS_UI8 *to, const RTS_UI8 *from, RTS_UI32 size, bool swapped)
+/* Inlined, but for bytes: a bit is a few instructions, and there may be many. */
+#define COPY_INLINE static inline __attribute__((always_inline))
+
+static __attribute__((noinline)) void copy_bytes(RTS_UI8 *to, const RTS_UI8 *from, RTS_UI32 size, bool swapped)
 {
     if (!swapped) {
         memcpy(to, from, size);
@@ -195,30 +198,37 @@ static void copy_bytes(RTS_UI8 *to, const RTS_UI8 *from, RTS_UI32 size, bool swa
     }
 }
 
-/* Whole bytes, or bits that are within one byte on both sides. */
-static void copy(RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from, RTS_UI32 from_bit, RTS_UI32 bits, bool swapped)
+/* Within one byte on both sides. */
+COPY_INLINE void copy_bits(RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from, RTS_UI32 from_bit, RTS_UI32 bits)
 {
+    RTS_UI32 mask = ((1u << bits) - 1) << (to_bit & 7);
+    RTS_UI32 value = (RTS_UI32)from[from_bit >> 3] >> (from_bit & 7) << (to_bit & 7);
+
     to += to_bit >> 3;
-    from += from_bit >> 3;
-    if (((to_bit | from_bit | bits) & 7) == 0) {
-        copy_bytes(to, from, bits >> 3, swapped);
-    } else {
-        RTS_UI32 mask = ((1u << bits) - 1) << (to_bit & 7);
-        RTS_UI32 value = (RTS_UI32)*from >> (from_bit & 7) << (to_bit & 7);
-        *to = (RTS_UI8)((*to & ~mask) | (value & mask));
-    }
+    *to = (RTS_UI8)((*to & ~mask) | (value & mask));
 }
 
-static void copy_input(const IoConfigChannelMap *channel, const void *memory, RTS_UI32 turned)
+/* Whole bytes, or bits. */
+COPY_INLINE void copy(const IoConfigChannelMap *channel, RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from,
+                      RTS_UI32 from_bit, RTS_UI32 turned)
 {
-    copy(tables.areas[APP_AREA_INPUT], channel->area_bit, memory, channel->parameter_bit, channel->bits,
-         (channel->flags & IO_CHANNEL_BIG_ENDIAN) != turned);
+    RTS_UI32 bits = channel->bits;
+
+    if (((to_bit | from_bit | bits) & 7) != 0)
+        copy_bits(to, to_bit, from, from_bit, bits);
+    else
+        copy_bytes(to + (to_bit >> 3), from + (from_bit >> 3), bits >> 3,
+                   (channel->flags & IO_CHANNEL_BIG_ENDIAN) != turned);
 }
 
-static void copy_output(const IoConfigChannelMap *channel, void *memory, RTS_UI32 turned)
+COPY_INLINE void copy_input(const IoConfigChannelMap *channel, const void *memory, RTS_UI32 turned)
 {
-    copy(memory, channel->parameter_bit, tables.areas[APP_AREA_OUTPUT], channel->area_bit, channel->bits,
-         (channel->flags & IO_CHANNEL_BIG_ENDIAN) != turned);
+    copy(channel, tables.areas[APP_AREA_INPUT], channel->area_bit, memory, channel->parameter_bit, turned);
+}
+
+COPY_INLINE void copy_output(const IoConfigChannelMap *channel, void *memory, RTS_UI32 turned)
+{
+    copy(channel, memory, channel->parameter_bit, tables.areas[APP_AREA_OUTPUT], channel->area_bit, turned);
 }
 
 void IoMgrCopyInputLE(const IoConfigChannelMap *channel, const void *memory)
@@ -249,7 +259,7 @@ void IoTablesSetChannel(RTS_UI32 type, const IoConfigChannelMap *channel, RTS_UI
 
     if (((at | channel->bits) & 7) != 0) {
         RTS_UI8 byte = (RTS_UI8)value;
-        copy(area, at, &byte, 0, channel->bits, false);
+        copy_bits(area, at, &byte, 0, channel->bits);
         return;
     }
     for (bits = channel->bits; bits > 0; bits -= 8, at += 8, value >>= 8)

@@ -39,9 +39,14 @@ static const void *structure(const IoConfigConnector *connector, RTS_UI32 id, RT
                                                             : NULL;
 }
 
+RTS_RESULT ModbusRefused(RTS_RESULT result)
+{
+    return result == ERR_OK ? (RTS_RESULT)ERR_PENDING : result;
+}
+
 static RTS_RESULT refuse_number(const IoConfigConnector *connector, const char *what, RTS_UI32 most)
 {
-    return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "this device has room for %u %s.", (unsigned)most, what);
+    return MODBUS_REFUSE(connector, ERR_NOMEMORY, "this device has room for %u %s.", (unsigned)most, what);
 }
 
 /* Bytes of the data, zero; NULL: no room. */
@@ -61,11 +66,11 @@ static RTS_RESULT refuse_line(const IoConfigConnector *connector, RTS_RESULT res
 {
     switch (result) {
     case ERR_NO_OBJECT:
-        return IoMgrConfigRefuse(connector, result, "this device has no serial line \"%s\".", name);
+        return MODBUS_REFUSE(connector, result, "this device has no serial line \"%s\".", name);
     case ERR_DUPLICATE:
-        return IoMgrConfigRefuse(connector, result, "the serial line \"%s\" is in use.", name);
+        return MODBUS_REFUSE(connector, result, "the serial line \"%s\" is in use.", name);
     default:
-        return IoMgrConfigRefuse(connector, result, "the serial line \"%s\" cannot run with these settings.", name);
+        return MODBUS_REFUSE(connector, result, "the serial line \"%s\" cannot run with these settings.", name);
     }
 }
 
@@ -81,9 +86,8 @@ static RTS_RESULT open_line(MODBUS_LINK *link, const IoConfigConnector *connecto
         number(connector, MODBUS_PARAM_RS485, 0) != 0,
     };
 
-    link->handle = RTS_INVALID_HANDLE;
     if (name == NULL)
-        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "the name of its serial line is missing.");
+        return MODBUS_REFUSE(connector, ERR_PARAMETER, "the name of its serial line is missing.");
     if (settings.baud < LEAST_BAUD || settings.parity > SYSCOM_PARITY_ODD || settings.stop_bits < 1 ||
         settings.stop_bits > 2)
         return refuse_line(connector, ERR_NOT_SUPPORTED, name);
@@ -94,17 +98,18 @@ static RTS_RESULT open_line(MODBUS_LINK *link, const IoConfigConnector *connecto
     return ERR_OK;
 }
 
-static void close_line(MODBUS_LINK *link)
+/* Of a server on TCP the link is not used. */
+static void close_link(MODBUS_LINK *link)
 {
-    if (link->type != NULL && link->handle != RTS_INVALID_HANDLE)
-        SysComClose(link->handle);
+    if (link->type != NULL)
+        link->type->close(link);
 }
 
 /* ---- TCP ---- */
 
 static RTS_RESULT refuse_tcp(const IoConfigConnector *connector)
 {
-    return IoMgrConfigRefuse(connector, ERR_NOT_SUPPORTED, "this device has no TCP.");
+    return MODBUS_REFUSE(connector, ERR_NOT_SUPPORTED, "this device has no TCP.");
 }
 
 #if MODBUS_MAX_CONNECTIONS > 0
@@ -128,12 +133,6 @@ static void begin_server(MODBUS_SERVER *server, const IoConfigConnector *connect
     (void)ModbusServerTcpOpen(server, &own); /* there is room for all servers */
 }
 
-static void close_client(MODBUS_LINK *link)
-{
-    if (link->type != NULL)
-        ModbusTcpClose(link);
-}
-
 static void close_servers(void)
 {
     ModbusServerTcpClose();
@@ -149,11 +148,6 @@ static void begin_server(MODBUS_SERVER *server, const IoConfigConnector *connect
 {
     RTS_UNUSED(server);
     RTS_UNUSED(connector);
-}
-
-static void close_client(MODBUS_LINK *link)
-{
-    RTS_UNUSED(link);
 }
 
 static void close_servers(void)
@@ -182,7 +176,7 @@ static RTS_RESULT add_job(MODBUS_SETUP *setup, const IoConfigConnector *connecto
     RTS_UI32 write_size;
 
     if (!is_job_good(job))
-        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "one of its jobs cannot be a request.");
+        return MODBUS_REFUSE(connector, ERR_PARAMETER, "one of its jobs cannot be a request.");
     if (setup->job_count == MODBUS_MAX_JOBS)
         return refuse_number(connector, "reads and writes of Modbus", MODBUS_MAX_JOBS);
     write_size = ModbusDataSize(function, job->write_count);
@@ -205,7 +199,7 @@ static RTS_RESULT add_jobs(MODBUS_SETUP *setup, MODBUS_DEVICE *device, const IoC
     while (result == ERR_OK &&
            (job = structure(connector, MODBUS_PARAM_JOB + device->job_count, sizeof(MODBUS_JOB))) != NULL) {
         result = add_job(setup, connector, job);
-        device->job_count += result == ERR_OK;
+        device->job_count++;
     }
     return result;
 }
@@ -218,7 +212,7 @@ static RTS_RESULT add_device(MODBUS_SETUP *setup, const IoConfigConnector *conne
     if (setup->device_count == MODBUS_MAX_DEVICES)
         return refuse_number(connector, "Modbus devices", MODBUS_MAX_DEVICES);
     if (unit > UINT8_MAX)
-        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "there is no unit %u.", (unsigned)unit);
+        return MODBUS_REFUSE(connector, ERR_PARAMETER, "there is no unit %u.", (unsigned)unit);
     device->unit = (RTS_UI8)unit;
     device->timeout_ms = number(connector, MODBUS_PARAM_TIMEOUT, DEFAULT_TIMEOUT_MS);
     setup->noted[setup->device_count++].connector = connector;
@@ -229,7 +223,9 @@ static RTS_RESULT add_client(MODBUS_SETUP *setup, const IO_DRIVER *driver, const
                              bool is_tcp)
 {
     MODBUS_CLIENT_LINE *line = &setup->clients[setup->client_count];
+    RTS_UI32 index = IoMgrConfigGetIndex(connector);
     RTS_UI32 first = setup->device_count;
+    const IoConfigConnector *child;
     RTS_RESULT result = ERR_OK;
 
     if (setup->client_count == MODBUS_MAX_CLIENTS)
@@ -238,15 +234,12 @@ static RTS_RESULT add_client(MODBUS_SETUP *setup, const IO_DRIVER *driver, const
         begin_client(&line->client.link, connector);
     else
         result = open_line(&line->client.link, connector);
-    if (result != ERR_OK || !IoMgrConfigIsMine(connector, driver))
+    if (result != ERR_OK)
         return result;
     line->noted.connector = connector;
     setup->client_count++;
-    for (RTS_UI32 i = IoMgrConfigGetIndex(connector) + 1; result == ERR_OK; i++) {
-        const IoConfigConnector *child = IoMgrConfigGetConnector(i);
-        if (child == NULL)
-            break;
-        if (child->parent == IoMgrConfigGetIndex(connector) && IoMgrConfigIsMine(child, driver))
+    for (RTS_UI32 i = index + 1; result == ERR_OK && (child = IoMgrConfigGetConnector(i)) != NULL; i++) {
+        if (child->parent == index && IoMgrConfigIsMine(child, driver))
             result = add_device(setup, child);
     }
     ModbusClientBegin(&line->client, setup->devices + first, setup->device_count - first);
@@ -278,7 +271,7 @@ static RTS_RESULT add_range(MODBUS_SETUP *setup, const IoConfigConnector *connec
     MODBUS_MEMORY *memory = &setup->ranges[setup->range_count];
 
     if (!is_range_good(range))
-        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "one of its ranges cannot be.");
+        return MODBUS_REFUSE(connector, ERR_PARAMETER, "one of its ranges cannot be.");
     if (setup->range_count == MODBUS_MAX_RANGES)
         return refuse_number(connector, "ranges of Modbus servers", MODBUS_MAX_RANGES);
     memory->range = range;
@@ -298,7 +291,7 @@ static RTS_RESULT add_ranges(MODBUS_SETUP *setup, MODBUS_SERVER *server, const I
     while (result == ERR_OK &&
            (range = structure(connector, MODBUS_PARAM_RANGE + server->range_count, sizeof(MODBUS_RANGE))) != NULL) {
         result = add_range(setup, connector, range);
-        server->range_count += result == ERR_OK;
+        server->range_count++;
     }
     return result;
 }
@@ -316,8 +309,7 @@ static void describe(MODBUS_SERVER *server, const IoConfigConnector *connector)
     }
 }
 
-static RTS_RESULT add_server(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connector,
-                             bool is_tcp)
+static RTS_RESULT add_server(MODBUS_SETUP *setup, const IoConfigConnector *connector, bool is_tcp)
 {
     MODBUS_SERVER_LINE *line = &setup->servers[setup->server_count];
     RTS_RESULT result = ERR_OK;
@@ -329,7 +321,7 @@ static RTS_RESULT add_server(MODBUS_SETUP *setup, const IO_DRIVER *driver, const
     describe(&line->server, connector);
     if (!is_tcp)
         result = open_line(&line->link, connector);
-    if (result != ERR_OK || !IoMgrConfigIsMine(connector, driver))
+    if (result != ERR_OK)
         return result;
     line->noted.connector = connector;
     setup->server_count++;
@@ -354,35 +346,36 @@ static RTS_RESULT add_line(MODBUS_SETUP *setup, const IO_DRIVER *driver, const I
         return add_client(setup, driver, connector, is_tcp);
     case MODBUS_ROLE_SERIAL_SERVER:
     case MODBUS_ROLE_TCP_SERVER:
-        return add_server(setup, driver, connector, is_tcp);
+        return add_server(setup, connector, is_tcp);
     default:
-        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "it is neither a client nor a server.");
+        return MODBUS_REFUSE(connector, ERR_PARAMETER, "it is neither a client nor a server.");
     }
 }
 
 static void close_all(MODBUS_SETUP *setup)
 {
-    for (RTS_UI32 i = 0; i < setup->client_count; i++) {
-        MODBUS_CLIENT_LINE *line = &setup->clients[i];
-        if (number(line->noted.connector, MODBUS_PARAM_ROLE, 0) == MODBUS_ROLE_TCP_CLIENT)
-            close_client(&line->client.link);
-        else
-            close_line(&line->client.link);
-    }
+    for (RTS_UI32 i = 0; i < setup->client_count; i++)
+        close_link(&setup->clients[i].client.link);
     for (RTS_UI32 i = 0; i < setup->server_count; i++)
-        close_line(&setup->servers[i].link);
+        close_link(&setup->servers[i].link);
     close_servers();
 }
 
-RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connectors, int count)
+void ModbusGiveBack(MODBUS_SETUP *setup)
 {
-    RTS_RESULT result = ERR_OK;
-
     close_all(setup);
     memset(setup, 0, sizeof(*setup));
-    for (int i = 0; i < count && result == ERR_OK; i++) {
-        if (connectors[i].parent == IO_CONFIG_NONE && IoMgrConfigIsMine(&connectors[i], driver))
-            result = add_line(setup, driver, &connectors[i]);
+}
+
+RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver)
+{
+    const IoConfigConnector *connector;
+    RTS_RESULT result = ERR_OK;
+
+    ModbusGiveBack(setup);
+    for (RTS_UI32 i = 0; result == ERR_OK && (connector = IoMgrConfigGetConnector(i)) != NULL; i++) {
+        if (connector->parent == IO_CONFIG_NONE && IoMgrConfigIsMine(connector, driver))
+            result = add_line(setup, driver, connector);
     }
     return result;
 }

@@ -51,8 +51,17 @@ typedef struct {
     RTS_UI8 data[MODBUS_DATA_SIZE];
 } MODBUS_SETUP;
 
-/* Closes what is open, and sets up what the connectors of `driver` ask for. Errors: see IoMgrConfigRefuse. */
-RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver, const IoConfigConnector *connectors, int count);
+/* What is optional and refused is as if it were not configured: all is set up again without it. So this is
+ * IoMgrConfigRefuse, but with ERR_PENDING instead of ERR_OK. */
+#define MODBUS_REFUSE(...) ModbusRefused(IoMgrConfigRefuse(__VA_ARGS__))
+RTS_RESULT ModbusRefused(RTS_RESULT result);
+
+/* Closes what is open, and sets up what the connectors of `driver` ask for. Errors: see MODBUS_REFUSE; ERR_PENDING: it
+ * is to be called again. */
+RTS_RESULT ModbusSetUp(MODBUS_SETUP *setup, const IO_DRIVER *driver);
+
+/* Closes what is open. */
+void ModbusGiveBack(MODBUS_SETUP *setup);
 
 /* What a connector is: one of them, or none if both are NULL. */
 typedef struct {

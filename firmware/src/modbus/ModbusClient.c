@@ -169,6 +169,13 @@ static void describe(MODBUS_CLIENT *client)
     request->write_count = 0;
 }
 
+/* From when the last byte has left, or should have. */
+static void begin_to_wait(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    client->waits = !client->link.sending;
+    client->since_ns = client->link.moved_ns > now_ns ? client->link.moved_ns : now_ns;
+}
+
 static void send(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     MODBUS_LINK *link = &client->link;
@@ -185,8 +192,8 @@ static void send(MODBUS_CLIENT *client, RTS_I64 now_ns)
     client->device->counters.requests++;
     client->device->asked = true;
     client->sent = true;
-    client->waits = false;
     link->type->send(link, size, now_ns);
+    begin_to_wait(client, now_ns);
 }
 
 /* ---- results ---- */
@@ -384,6 +391,16 @@ static bool is_too_late(const MODBUS_CLIENT *client, RTS_I64 now_ns)
     return now_ns - client->since_ns >= client->device->timeout_ms * NS_PER_MS;
 }
 
+static void end_late(MODBUS_CLIENT *client, RTS_I64 now_ns)
+{
+    if (client->waits && client->device->unit == MODBUS_BROADCAST && client->link.type->broadcasts) {
+        end(client, true, now_ns);
+        return;
+    }
+    client->link.type->give_up(&client->link);
+    fail(client, now_ns);
+}
+
 static void wait_for_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     MODBUS_LINK *link = &client->link;
@@ -393,18 +410,12 @@ static void wait_for_reply(MODBUS_CLIENT *client, RTS_I64 now_ns)
         fail(client, now_ns);
         return;
     }
-    if (!client->waits && !link->sending) {
-        client->waits = true;
-        client->since_ns = link->moved_ns > now_ns ? link->moved_ns : now_ns;
-    }
+    if (!client->waits && !link->sending)
+        begin_to_wait(client, now_ns);
     if (size != 0)
         take_frame(client, size, now_ns);
-    else if (client->waits && is_too_late(client, now_ns)) {
-        if (client->device->unit == MODBUS_BROADCAST)
-            end(client, true, now_ns);
-        else
-            fail(client, now_ns);
-    }
+    if (client->device != NULL && client->sent && is_too_late(client, now_ns)) /* it was not the reply */
+        end_late(client, now_ns);
 }
 
 /* ---- passes ---- */

@@ -12,6 +12,7 @@ enum {
     HALVES_OF_SILENCE = 7, /* 3.5 characters */
     FRAME_MIN = 1 + 1 + MODBUS_CRC_SIZE,
     ROOM = MODBUS_FRAME_SIZE - MODBUS_AT_UNIT,
+    READS_MAX = 4, /* in one pass: a line that babbles does not hold up main */
 };
 
 RTS_UI16 ModbusCrc(const RTS_UI8 *data, RTS_UI32 size)
@@ -30,7 +31,8 @@ RTS_UI16 ModbusCrc(const RTS_UI8 *data, RTS_UI32 size)
     return (RTS_UI16)crc;
 }
 
-static const MODBUS_LINK_TYPE rtu = {ModbusRtuReady, ModbusRtuReceive, ModbusRtuSend};
+static const MODBUS_LINK_TYPE rtu = {ModbusRtuReady,  ModbusRtuReceive, ModbusRtuSend,
+                                     ModbusRtuGiveUp, ModbusRtuClose,   true};
 
 void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *settings)
 {
@@ -45,7 +47,20 @@ void ModbusRtuBegin(MODBUS_LINK *link, RTS_UI32 line, const SYSCOM_SETTINGS *set
     link->moved_ns = 0;
 }
 
+void ModbusRtuClose(MODBUS_LINK *link)
+{
+    SysComClose(link->handle);
+}
+
 /* ---- sending ---- */
+
+void ModbusRtuGiveUp(MODBUS_LINK *link)
+{
+    if (!link->sending)
+        return;
+    link->sending = false;
+    link->fill = 0;
+}
 
 /* The line is busy until the last byte has left, which is later than that the port took it. */
 static void transmit(MODBUS_LINK *link, RTS_I64 now_ns)
@@ -60,13 +75,12 @@ static void transmit(MODBUS_LINK *link, RTS_I64 now_ns)
         link->moved_ns = now_ns;
 }
 
-/* What has come before the request belongs to nothing. */
+/* What has come since all was read, just before, belongs to nothing. */
 static void forget_received(MODBUS_LINK *link)
 {
     RTS_UI8 chunk[16];
 
-    while (SysComRead(link->handle, chunk, sizeof(chunk)) == sizeof(chunk))
-        ;
+    (void)SysComRead(link->handle, chunk, sizeof(chunk));
 }
 
 void ModbusRtuSend(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns)
@@ -91,18 +105,20 @@ static bool is_quiet(const MODBUS_LINK *link, RTS_I64 now_ns)
     return now_ns - SysComGetByteNs(link->handle) >= link->silence_ns;
 }
 
-/* What is too long for a frame is read all the same, and kept no more: it ends like one. */
-static void take_bytes(MODBUS_LINK *link)
+/* True when all that has come was read. What is too long for a frame stays so: its bytes are written over. */
+static bool take_bytes(MODBUS_LINK *link)
 {
     RTS_UI8 *frame = link->frame + MODBUS_AT_UNIT;
-    RTS_UI32 size;
 
-    do {
-        if (link->fill == ROOM)
-            link->fill = ROOM - 1;
-        size = SysComRead(link->handle, frame + link->fill, (RTS_UI32)ROOM - link->fill);
-        link->fill = (RTS_UI16)(link->fill + size);
-    } while (size != 0);
+    for (RTS_UI32 left = READS_MAX; left > 0; left--) {
+        RTS_UI32 at = link->fill < ROOM ? link->fill : 0;
+        RTS_UI32 size = SysComRead(link->handle, frame + at, ROOM - at);
+        if (size == 0)
+            return true;
+        if (link->fill < ROOM)
+            link->fill = (RTS_UI16)(at + size);
+    }
+    return false;
 }
 
 /* The size of the PDU, 0 if the frame is not good. */
@@ -125,8 +141,7 @@ RTS_UI32 ModbusRtuReceive(MODBUS_LINK *link, RTS_I64 now_ns)
         transmit(link, now_ns);
         return 0;
     }
-    take_bytes(link);
-    return link->fill != 0 && is_quiet(link, now_ns) ? end_frame(link) : 0;
+    return take_bytes(link) && link->fill != 0 && is_quiet(link, now_ns) ? end_frame(link) : 0;
 }
 
 bool ModbusRtuReady(MODBUS_LINK *link, RTS_I64 now_ns)

@@ -14,7 +14,7 @@
 #include "ModbusPdu.h"
 #include "SysLock.h"
 
-enum { TEXT_MAX = 100, REGISTER_SIZE = 2, ANY_UNIT = 255 };
+enum { TEXT_MAX = 100, REGISTER_SIZE = 2, ANY_UNIT = 255, LATE_NS = 100000000 };
 
 /* ---- memory ---- */
 
@@ -309,14 +309,24 @@ static RTS_UI32 reply_no_target(RTS_UI8 *pdu)
     return 2;
 }
 
+/* A reply on a serial line does not say to which request it is: one that the port does not take in time would be that
+ * to a later one. */
+static void give_up_late(const MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
+{
+    if (!server->tcp && link->sending && now_ns - link->moved_ns >= LATE_NS)
+        link->type->give_up(link);
+}
+
 bool ModbusServerPoll(MODBUS_SERVER *server, MODBUS_LINK *link, RTS_I64 now_ns)
 {
     RTS_UI32 size = link->type->receive(link, now_ns);
     RTS_UI8 unit = link->frame[MODBUS_AT_UNIT];
     RTS_UI8 *pdu = link->frame + MODBUS_AT_PDU;
 
-    if (size == 0)
+    if (size == 0) {
+        give_up_late(server, link, now_ns);
         return false;
+    }
     if (is_for(server, unit))
         size = ModbusServerReply(server, pdu, size);
     else

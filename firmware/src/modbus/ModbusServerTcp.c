@@ -70,7 +70,7 @@ static void begin(MODBUS_SERVER *server, RTS_HANDLE socket, RTS_I64 now_ns)
     }
     place->server = server;
     place->link.bad_frames = 0;
-    ModbusTcpBegin(&place->link, socket, now_ns);
+    ModbusTcpBeginServer(&place->link, socket, now_ns);
 }
 
 static void serve(CONNECTION *connection, RTS_I64 now_ns)

@@ -10,7 +10,12 @@
 
 enum { NS_PER_MS = 1000000, LENGTH_MIN = 2, LENGTH_MAX = 1 + MODBUS_MAX_PDU };
 
-static const MODBUS_LINK_TYPE tcp = {ModbusTcpReady, ModbusTcpReceive, ModbusTcpSend};
+static const RTS_I64 LONG_AGO_NS = -(RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS;
+
+static const MODBUS_LINK_TYPE of_client = {ModbusTcpReady,  ModbusTcpReceive, ModbusTcpSend,
+                                           ModbusTcpGiveUp, ModbusTcpClose,   false};
+static const MODBUS_LINK_TYPE of_server = {ModbusTcpReady, ModbusTcpReceive, ModbusTcpSend,
+                                           ModbusTcpClose, ModbusTcpClose,   false};
 
 static bool is_open(const MODBUS_LINK *link)
 {
@@ -19,9 +24,8 @@ static bool is_open(const MODBUS_LINK *link)
 
 /* ---- connections ---- */
 
-void ModbusTcpBegin(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns)
+static void begin(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns)
 {
-    link->type = &tcp;
     link->handle = socket;
     link->sending = false;
     link->connecting = false;
@@ -29,15 +33,24 @@ void ModbusTcpBegin(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns)
     link->began_ns = link->moved_ns = now_ns;
 }
 
+void ModbusTcpBeginServer(MODBUS_LINK *link, RTS_HANDLE socket, RTS_I64 now_ns)
+{
+    link->type = &of_server;
+    begin(link, socket, now_ns);
+}
+
 void ModbusTcpBeginClient(MODBUS_LINK *link, const SOCKADDRESS *peer)
 {
-    ModbusTcpBegin(link, RTS_INVALID_HANDLE, -(RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS);
+    link->type = &of_client;
+    begin(link, RTS_INVALID_HANDLE, LONG_AGO_NS);
     link->peer = *peer;
 }
 
 void ModbusTcpClose(MODBUS_LINK *link)
 {
-    if (is_open(link))
+    if (is_open(link) && link->type == &of_client)
+        SysSockReset(link->handle);
+    else if (is_open(link))
         SysSockClose(link->handle);
     link->handle = RTS_INVALID_HANDLE;
     link->sending = false;
@@ -45,11 +58,18 @@ void ModbusTcpClose(MODBUS_LINK *link)
     link->fill = 0;
 }
 
+/* The peer was there, and is connected to again at once. */
+void ModbusTcpGiveUp(MODBUS_LINK *link)
+{
+    ModbusTcpClose(link);
+    link->began_ns = LONG_AGO_NS;
+}
+
 static void connect_again(MODBUS_LINK *link, RTS_I64 now_ns)
 {
     if (now_ns - link->began_ns < (RTS_I64)MODBUS_RECONNECT_MS * NS_PER_MS)
         return;
-    ModbusTcpBegin(link, SysSockConnect(&link->peer), now_ns);
+    begin(link, SysSockConnect(&link->peer), now_ns);
     link->connecting = is_open(link);
 }
 

@@ -8,9 +8,10 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from plctool.cli import io_documents
+from plctool.cli.io_documents import Document
 from plctool.cli.plants import attached
 from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from plctool.sim import Simulator
     from plctool.st_tests import Report as TestReport
 
-Document = dict[str, Any]
 Texts = dict[str, str]
 """Values of variables by name, as ST writes them."""
 

@@ -88,9 +88,7 @@ def init(path: Path, device: Path | None) -> Document:
     if not path.name.endswith(".io.toml"):
         raise UsageError(f"A description is called NAME.io.toml; write {path.stem}.io.toml.", "bad-output")
     board = None if device is None else _board(device)
-    write_atomically(
-        path, beginning(board, None if device is None else _beside(device, path)).encode("ascii", "replace")
-    )
+    write_atomically(path, beginning(board, None if device is None else _beside(device, path)).encode())
     return {"description": str(path)}
 
 
@@ -105,7 +103,7 @@ def export_board(device: Path, folder: Path) -> Document:
 
     name, text = board_header(_board(device))
     make_folder(folder)
-    write_atomically(folder / name, text.encode("ascii", "replace"))
+    write_atomically(folder / name, text.encode("ascii"))
     return {"header": str(folder / name)}
 
 

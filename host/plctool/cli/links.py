@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import os
-import tomllib
 from pathlib import Path
 
 from plctool.errors import LinkError, UsageError
+from plctool.io.positions import BadToml, TomlText
 from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link
 
 VARIABLE = "PLC_LINK"
@@ -70,11 +70,14 @@ def _default_link() -> Link | None:
 def _link_in(file: Path) -> Link | None:
     """What a project says. Raises UsageError for a file that cannot be understood."""
     try:
-        text = tomllib.loads(file.read_text()).get("link")
+        text = TomlText(str(file), file.read_bytes().decode("utf-8-sig")).values.get("link")
     except OSError as error:
         raise UsageError(f"{file} cannot be read: {error.strerror}.", "bad-project") from None
-    except ValueError as error:  # of TOML or UTF-8
-        raise UsageError(f"{file} is not TOML: {error}.", "bad-project") from None
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{file} is not UTF-8 at byte {error.start}; save it as UTF-8.", "bad-project") from None
+    except BadToml as error:
+        where = f"{file}:{error.pos.line}:{error.pos.column}"
+        raise UsageError(f"{where} is not TOML: {error.message}.", "bad-project") from None
     if text is not None and not isinstance(text, str):
         raise UsageError(f'{file}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project")
     return _parse(text, str(file)) if text else None

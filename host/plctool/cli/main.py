@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.cli import documents, io_documents, output
 from plctool.cli.arguments import pairs, parser
-from plctool.cli.documents import Document
+from plctool.cli.io_documents import Document
 from plctool.cli.links import all_serial_ports, link_of, names_no_link
 from plctool.errors import InternalError, PlcError, UsageError
 from plctool.link.transports import Link

@@ -128,6 +128,7 @@ def io_document(program: TypedProgram, description: Description) -> dict[str, An
         {
             "name": connector.name,
             "driver": connector.driver,
+            "enabled": connector.enabled,
             "load": connector.load,
             "parameters": [{"name": p.name, "id": p.id, "type": _type_name(p)} for p in connector.parameters if p.name],
         }

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from plctool.io.device_file import DeviceFile, Module, ModuleParameter
+from plctool.errors import UsageError
+from plctool.iec.values import decode
+from plctool.io.device_file import DeviceFile, Module, ModuleParameter, parameter_problem
 
 _HEAD = """\
 # Inputs and outputs: docs/io.md. A channel leads to a variable (Main.start), or to an address (%IX0.1).
@@ -29,7 +31,7 @@ def beginning(device: DeviceFile | None, device_path: str | None) -> str:
     """The text. `device_path`: how the description names the device file."""
     if device is None:
         return _HEAD + _WITHOUT_DEVICE
-    lines = [_HEAD, f'device = "{device_path}"', ""]
+    lines = [_HEAD, f"device = {toml_value(device_path or '')}", ""]
     if device.lines:
         lines += ["# Lines of the board.", "# [gpio]", "# [gpio.in]"]
         lines += [_channel(line.name, line.text) for line in device.lines.values() if not line.output]
@@ -39,6 +41,22 @@ def beginning(device: DeviceFile | None, device_path: str | None) -> str:
     for module in device.modules.values():
         lines += [*_module(module), ""]
     return "\n".join(lines)
+
+
+def toml_value(value: str | float) -> str:
+    """A text, number or BOOL as TOML has it. Raises UsageError for the name of a file that is no text."""
+    if isinstance(value, str):
+        if any("\ud800" <= character <= "\udfff" for character in value):
+            shown = value.encode("ascii", "backslashreplace").decode()
+            raise UsageError(f"{shown} is not UTF-8, which a description has to be; rename the file or folder.", "io")
+        return '"' + "".join(map(_escaped, value)) + '"'
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _escaped(character: str) -> str:
+    if character in '"\\':
+        return f"\\{character}"
+    return character if character.isprintable() else f"\\U{ord(character):08X}"
 
 
 def _channel(name: str, text: str) -> str:
@@ -57,10 +75,20 @@ def _module(module: Module) -> Iterator[str]:
 
 
 def _parameter(p: ModuleParameter) -> str:
-    value = p.default
-    if value is None:
-        value = next(iter(p.choices), p.low if p.low is not None else 0)
-    shown = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
     limits = f"{p.low} to {p.high}" if p.low is not None and p.high is not None else ""
     also = "; ".join(part for part in (", ".join(p.choices), limits, p.text) if part)
-    return f"# {p.name} = {shown}" + (f"  # {also}" if also else "")
+    return f"# {p.name} = {toml_value(_value(p))}" + (f"  # {also}" if also else "")
+
+
+def _value(p: ModuleParameter) -> str | float:
+    """The default, or without one a value that the parameter can have."""
+    if p.default is not None:
+        return p.default  # type: ignore[no-any-return]  # it was checked
+    if p.choices:
+        return next(iter(p.choices))
+    zero: str | float = decode(p.type, bytes(p.type.size))
+    if not parameter_problem(p, zero):
+        return zero
+    if isinstance(zero, str):
+        return "-"  # a character
+    return p.low if p.low is not None and p.low > 0 else p.high or 0

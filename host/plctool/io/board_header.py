@@ -4,16 +4,40 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 
+from plctool.files import Pos
 from plctool.iec.types import StringType
 from plctool.io.device_file import DeviceFile, Module
+from plctool.io.mistakes import Mistakes
+
+_INT_MAX = 0x7FFF_FFFF
+
+
+@dataclass(frozen=True)
+class _Definition:
+    """A name of the header: of a macro, or with `enum` of an enumerator. `pos`: of what it is made."""
+
+    name: str
+    value: str
+    pos: Pos
+    comment: str = ""
+    enum: bool = False
+
+    def __str__(self) -> str:
+        comment = f" /* {self.comment} */" if self.comment else ""
+        return (
+            f"    {self.name} = {self.value},{comment}" if self.enum else f"#define {self.name} {self.value}{comment}"
+        )
+
+
+_Line = _Definition | str
 
 
 def board_header(device: DeviceFile) -> tuple[str, str]:
     """Name and text of the header."""
-    name = f"{_c_name(device.name) or 'Board'}Io.h"
-    guard = _c_name(name).upper()
-    lines = [
+    name, guard = _names(device)
+    head = [
         "/*",
         f" * {name} - inputs and outputs of {_comment(device.title)}.",
         " *",
@@ -23,43 +47,92 @@ def board_header(device: DeviceFile) -> tuple[str, str]:
         f"#define {guard}",
         "",
     ]
+    return name, "\n".join([*head, *map(str, _lines(device)), "#endif", ""])
+
+
+def check_names(device: DeviceFile, mistakes: Mistakes) -> None:
+    """Reports what would have a name in the header that something else has."""
+    _, guard = _names(device)
+    seen = {guard: Pos(device.path, 1, 1)}
+    for line in _lines(device):
+        if not isinstance(line, _Definition):
+            continue
+        if line.name in seen:
+            where = f"in line {seen[line.name].line}"
+            message = f"this is {line.name} in the C header, as what is {where}; choose another name"
+            mistakes.error(line.pos, message)
+        seen[line.name] = line.pos
+
+
+def _names(device: DeviceFile) -> tuple[str, str]:
+    """That of the file, and of its include guard."""
+    name = f"{_c_name(device.name) or 'Board'}Io.h"
+    guard = _c_name(name).upper()
+    return name, guard if not guard[0].isdigit() else f"BOARD_{guard}"
+
+
+def _lines(device: DeviceFile) -> Iterator[_Line]:
     if device.lines:
-        lines += ["/* Lines, by the names that SysGpio gets. */"]
+        yield "/* Lines, by the names that SysGpio gets. */"
         for line in device.lines.values():
-            text = f" /* {'output' if line.output else 'input'}{_also(line.text)} */"
-            lines.append(f'#define IO_LINE_{line.name} "{line.line}"{text}')
-        lines.append("")
+            comment = f"{'output' if line.output else 'input'}{_also(line.text)}"
+            yield _Definition(f"IO_LINE_{line.name}", _string(line.line), line.pos, comment)
+        yield ""
     for module in device.modules.values():
-        lines += [*_module(module), ""]
+        yield from _module(module)
+        yield ""
     for limit, value in device.limits.items():
-        lines.append(f"#define IO_LIMIT_{limit.upper()} {value}")
-    lines += [""] * bool(device.limits) + ["#endif", ""]
-    return name, "\n".join(lines)
+        yield _Definition(f"IO_LIMIT_{limit.upper()}", str(value), Pos(device.path, 1, 1))
+    if device.limits:
+        yield ""
 
 
-def _module(module: Module) -> Iterator[str]:
-    prefix = _c_name(module.name).upper()
-    yield f'#define {prefix}_DRIVER "{module.driver}"'
+def _module(module: Module) -> Iterator[_Line]:
+    prefix = module.name.upper()
+    yield _Definition(f"{prefix}_DRIVER", _string(module.driver), module.pos)
     if module.channels:
         yield "/* Channels: the parameter that has each, and its first bit there. */"
         yield "enum {"
         for c in module.channels.values():
-            yield f"    {prefix}_{c.name} = {c.parameter}, /* {c.type}{_also(c.text)} */"
-            yield f"    {prefix}_{c.name}_BIT = {c.bit},"
+            yield _Definition(f"{prefix}_{c.name}", str(c.parameter), c.pos, f"{c.type}{_also(c.text)}", True)
+            yield _Definition(f"{prefix}_{c.name}_BIT", str(c.bit), c.pos, enum=True)
         yield "};"
     if module.parameters:
         yield "/* Parameters that an engineer may set. */"
         yield "enum {"
         for p in module.parameters.values():
-            yield f"    {prefix}_{p.name} = {p.id}, /* {p.type}{_also(p.text)} */"
-            for word, value in p.choices.items():
-                if not isinstance(p.type, StringType) and type(value) is int:
-                    yield f"    {prefix}_{p.name}_{_c_name(word)} = {value},"
+            yield _Definition(f"{prefix}_{p.name}", str(p.id), p.pos, f"{p.type}{_also(p.text)}", True)
+        choices = list(_choices(module))
+        yield from (d for d in choices if d.enum)
         yield "};"
+        yield from (d for d in choices if not d.enum)
+
+
+def _choices(module: Module) -> Iterator[_Definition]:
+    """What the words of numbers stand for; an enumerator is an int."""
+    for p in module.parameters.values():
+        for word, value in p.choices.items():
+            if isinstance(p.type, StringType) or type(value) is not int:
+                continue
+            name = f"{module.name.upper()}_{p.name}_{_c_name(word)}"
+            is_int = -_INT_MAX <= value <= _INT_MAX
+            yield _Definition(name, str(value) if is_int else _long(value), p.pos, enum=is_int)
+
+
+def _long(value: int) -> str:
+    """A constant that no int may have."""
+    if value < 0:
+        return f"({value + 1}ll - 1)"
+    return f"{value}ull"
 
 
 def _c_name(text: str) -> str:
     return re.sub(r"\W", "_", text, flags=re.ASCII)
+
+
+def _string(text: str) -> str:
+    """A string of C; two ? could be a trigraph."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("?", "\\?") + '"'
 
 
 def _also(text: str) -> str:
@@ -67,4 +140,6 @@ def _also(text: str) -> str:
 
 
 def _comment(text: str) -> str:
-    return text.replace("*/", "* /").replace("\n", " ")
+    """What a comment may have: ASCII, not the signs of another one, and no trigraph."""
+    plain = text.encode("ascii", "replace").decode()
+    return re.sub(r"(?<=\?)\?|(?<=\*)/|(?<=/)\*", r" \g<0>", plain)

@@ -66,8 +66,9 @@ def read_substitute(table: Table, key: str, default: Substitute) -> Substitute:
         return default
     if isinstance(value, str) and value in _WORDS:
         return _WORDS[value]
-    if isinstance(value, list | dict):
-        table.error(f'{key} can be "hold", "zero" or a value', key)
+    if not isinstance(value, str | int | float):
+        hint = "" if isinstance(value, list | dict) else '; a date is written as in ST: "D#2024-02-29"'
+        table.error(f'{key} can be "hold", "zero" or a value{hint}', key)
         return default
     return Substitute(VALUE, value, table.value_pos(key))
 

@@ -10,8 +10,10 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError
 
 NONE = int(lib.IO_CONFIG_NONE)
-NOWHERE = 0xFFFF_FFFF  # IO_CONFIG_NOWHERE, a macro that cffi does not see as a number
+NOWHERE = int(lib.IO_CONFIG_NOWHERE)
 ALIGN = 4
+MAX_ENTRIES = NONE - 1  # of each table
+MAX_BITS = 0xFFFF  # of a channel
 
 T = TypeVar("T")
 
@@ -82,8 +84,17 @@ class Configuration:
 # ---- writing -------------------------------------------------------------------------------------------------------
 
 
+_TITLES = {
+    "connectors": "devices of inputs and outputs",
+    "parameters": "parameters of devices",
+    "task_maps": "tasks with inputs and outputs",
+    "connector_maps": "devices, each once for every task that uses it",
+    "channel_maps": "channels, each once for every task that uses it",
+}
+
+
 def pack_configuration(configuration: Configuration) -> bytes:
-    """The bytes, whose number is a multiple of 4."""
+    """The bytes, whose number is a multiple of 4. Raises UsageError for more than they have room for."""
     return _Writer(configuration).packed()
 
 
@@ -97,6 +108,16 @@ class _Writer:
         parameters = [p for c in self._configuration.connectors for p in c.parameters]
         connector_maps = [c for t in self._configuration.task_maps for c in t.connectors]
         channels = [c for m in connector_maps for c in m.channels]
+        counts = {
+            "connectors": len(self._configuration.connectors),
+            "parameters": len(parameters),
+            "task_maps": len(self._configuration.task_maps),
+            "connector_maps": len(connector_maps),
+            "channel_maps": len(channels),
+        }
+        for name, count in counts.items():
+            if count > MAX_ENTRIES:
+                raise UsageError(f"There are {count} {_TITLES[name]}; an image has room for {MAX_ENTRIES}.", "io")
         tables = [
             *self._connectors(),
             *map(self._parameter, parameters),
@@ -104,16 +125,7 @@ class _Writer:
             *self._connector_maps(connector_maps),
             *(_struct("IoConfigChannelMap", **vars(c)) for c in channels),
         ]
-        head = _struct(
-            "IO_CONFIG",
-            version=int(lib.IO_CONFIG_VERSION),
-            connectors=len(self._configuration.connectors),
-            parameters=len(parameters),
-            task_maps=len(self._configuration.task_maps),
-            connector_maps=len(connector_maps),
-            channel_maps=len(channels),
-            data_size=len(self._data),
-        )
+        head = _struct("IO_CONFIG", version=int(lib.IO_CONFIG_VERSION), **counts, data_size=len(self._data))
         return b"".join((head, *tables, bytes(self._data)))
 
     def _connectors(self) -> Iterator[bytes]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from plctool.errors import UsageError
 from plctool.files import Pos
+from plctool.io.board_header import check_names
 from plctool.io.device_file import DeviceFile, read_device_file
 from plctool.io.kinds import KINDS
 from plctool.io.mistakes import Mistakes
@@ -18,13 +19,14 @@ SUFFIX = ".io.toml"
 
 
 def find_description(sources: Sequence[Path]) -> Path | None:
-    """The description beside the sources, or in a folder of them; None if there is none. Of several, that with the name
-    of a source. Raises UsageError if it is not clear which one is meant."""
-    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in sources)
-    found = sorted(file for folder in folders for file in folder.glob(f"*{SUFFIX}") if file.is_file())
+    """The description beside the sources, or in a folder of them; None if there is none. Of several, that beside a
+    source of its name. Raises UsageError if it is not clear which one is meant."""
+    folders = {(path if path.is_dir() else path.parent).resolve(): path for path in reversed(sources)}
+    named = [path if path.is_dir() else path.parent for path in folders.values()]
+    found = sorted(file for folder in named for file in folder.glob(f"*{SUFFIX}") if file.is_file())
     if len(found) > 1:
-        own = {f"{source.stem}{SUFFIX}" for source in sources}
-        found = [file for file in found if file.name in own] or found
+        own = {source.with_name(f"{source.stem}{SUFFIX}").resolve() for source in sources if source.is_file()}
+        found = [file for file in found if file.resolve() in own] or found
     if len(found) > 1:
         names = ", ".join(str(file) for file in found)
         raise UsageError(f"There are several descriptions of inputs and outputs; choose one with --io: {names}.", "io")
@@ -89,10 +91,12 @@ def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
     """A device file with what is wrong with it, and its text. Raises UsageError if it cannot be read."""
     mistakes, text = Mistakes(), _read(path)
     try:
-        return read_device_file(TomlText(str(path), text), mistakes), mistakes, text
+        device = read_device_file(TomlText(str(path), text), mistakes)
     except BadToml as error:
         mistakes.error(error.pos, _not_toml(error))
         return None, mistakes, text
+    check_names(device, mistakes)
+    return device, mistakes, text
 
 
 def _not_toml(error: BadToml) -> str:

@@ -10,9 +10,9 @@ outputs = 64
 connectors = 4
 channels = 64
 
-[gpio]                                    # lines of IoDrvGpio, by the names printed on the board
-in  = { DI0 = 0, DI1 = { line = 1, text = "terminal X1.2" } }
-out = { DO0 = 16 }
+[gpio]                                    # lines of IoDrvGpio: the names printed on the board, those of the port
+in  = { DI0 = "PA5", DI1 = { line = "PA6", text = "terminal X1.2" } }
+out = { DO0 = "PC0" }
 
 [[module]]                                # what a driver of the vendor's own has
 name = "Analog"
@@ -25,21 +25,28 @@ filter = { id = 101, type = "UINT", low = 0, high = 1000, default = 10, text = "
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from plctool.errors import UsageError
 from plctool.files import Pos
-from plctool.iec.types import DEFAULT_STRING_LENGTH, ELEMENTARY, Elementary, Kind, StringType, Type
+from plctool.iec.types import BOOL, DEFAULT_STRING_LENGTH, ELEMENTARY, Elementary, Kind, StringType, Type
+from plctool.iec.values import encode
+from plctool.image.targets import TARGETS
 from plctool.io.mistakes import Mistakes
-from plctool.io.names import MAX_NAME, is_name
+from plctool.io.names import MAX_LINE, MAX_NAME, is_line, is_name
 from plctool.io.positions import TomlText
 from plctool.io.tables import Entry, Table, each
 
-MAX_LINE = 63  # characters
 MAX_ID = 0x7FFF_FFFF
 LIMITS = {"inputs": 1 << 16, "outputs": 1 << 16, "connectors": 0xFFFE, "channels": 0xFFFE}
 """What a vendor may limit, and the largest value of each; inputs and outputs in bytes."""
+
+
+OWN_KEYS = ("name", "task", "optional", "enabled", "in", "out")
+"""What [local.MODULE] has besides the parameters."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,7 @@ class ModuleChannel:
     parameter: int
     bit: int
     text: str
+    pos: Pos
 
 
 @dataclass(frozen=True)
@@ -77,6 +85,7 @@ class ModuleParameter:
     default: Any
     choices: dict[str, Any]
     text: str
+    pos: Pos
 
 
 @dataclass
@@ -85,6 +94,7 @@ class Module:
 
     name: str
     driver: str
+    pos: Pos
     channels: dict[str, ModuleChannel] = field(default_factory=dict)
     parameters: dict[str, ModuleParameter] = field(default_factory=dict)
 
@@ -110,8 +120,8 @@ class DeviceFile:
 def read_device_file(text: TomlText, mistakes: Mistakes) -> DeviceFile:
     """What the text says; mistakes are reported."""
     root = Table(text, (), text.values, mistakes)
-    device = DeviceFile(text.path, root.text("name", "") or "", root.text("vendor", "") or "")
-    device.target = root.text("target", "") or ""
+    device = DeviceFile(text.path, _one_line(root, "name"), _one_line(root, "vendor"))
+    device.target = root.choice("target", {name: name for name in TARGETS}) or ""
     limits = root.table("limits")
     if limits is not None:
         for name, largest in LIMITS.items():
@@ -125,23 +135,41 @@ def read_device_file(text: TomlText, mistakes: Mistakes) -> DeviceFile:
             device.lines[line.name] = line
         gpio.close()
     for module in each(root.tables("module"), _module):
+        other = next((m for m in device.modules.values() if m.name.casefold() == module.name.casefold()), None)
+        if other is not None:
+            mistakes.error(module.pos, f"there is a module {other.name} in line {other.pos.line} already")
         device.modules[module.name] = module
     root.close()
     return device
+
+
+def _one_line(table: Table, key: str) -> str:
+    """A text that is shown; "" if it is missing."""
+    text = table.text(key, "") or ""
+    if not text.isprintable():
+        table.error(f"{key} has to be one line, without control characters", key)
+        return ""
+    return text
 
 
 def _entries(table: Table) -> Iterator[tuple[Entry, bool]]:
     """The channels in `in` and `out`, and whether each is an output."""
     seen: set[str] = set()
     for entry, output in table.channels():
-        if entry.key in seen:
+        if entry.key.casefold() in seen:
             table.mistakes.error(entry.key_pos, f"{entry.key} is there already; names are unique")
-        elif not is_name(entry.key):
-            message = f"'{entry.key}' cannot be a name in C; use at most {MAX_NAME} letters, digits and _"
-            table.mistakes.error(entry.key_pos, message)
-        else:
-            seen.add(entry.key)
+        elif _is_c_name(entry, table.mistakes):
+            seen.add(entry.key.casefold())
             yield entry, output
+
+
+def _is_c_name(entry: Entry, mistakes: Mistakes) -> bool:
+    """Whether a key can be a name in C; reports it if not."""
+    if not is_name(entry.key):
+        message = f"'{entry.key}' cannot be a name in C; use at most {MAX_NAME} letters, digits and _"
+        mistakes.error(entry.key_pos, message)
+        return False
+    return True
 
 
 def _lines(table: Table) -> Iterator[Line]:
@@ -150,11 +178,13 @@ def _lines(table: Table) -> Iterator[Line]:
         text, line = "", entry.value
         if isinstance(line, Table):
             inner = line
-            line, text = inner.text("line", entry.key), inner.text("text", "") or ""
+            line, text = inner.text("line", entry.key), _one_line(inner, "text")
             inner.close()
-        if not isinstance(line, str) or not 0 < len(line) <= MAX_LINE or not line.isascii():
+        if not isinstance(line, str):
             example = f'{entry.key} = "PA5"'
             table.mistakes.error(entry.pos, f"{entry.key} needs the name that the port gives its line: {example}")
+        elif not is_line(line):
+            table.mistakes.error(entry.pos, f"the name of a line has 1 to {MAX_LINE} ASCII characters")
         elif line in used:
             table.mistakes.error(entry.pos, f"{entry.key} is the line {line}, as {used[line]} is")
         else:
@@ -164,19 +194,39 @@ def _lines(table: Table) -> Iterator[Line]:
 
 def _module(table: Table) -> Module | None:
     name, driver = table.text("name", required="Analog"), table.text("driver", required="IoDrvAcmeAdc")
-    if driver is not None and not 0 < len(driver) <= MAX_NAME:
-        table.error(f"the name of a driver has 1 to {MAX_NAME} letters", "driver")
-    module = Module(name or "", driver or "")
+    if name is not None and not is_name(name):
+        table.error(f"'{name}' cannot be a name in C; use at most {MAX_NAME} letters, digits and _", "name")
+        name = None
+    if driver is not None and not (0 < len(driver) <= MAX_NAME and driver.isascii() and driver.isprintable()):
+        table.error(f"the name of a driver has 1 to {MAX_NAME} ASCII characters", "driver")
+        driver = None
+    module = Module(name or "", driver or "", table.value_pos("name"))
     for entry, output in _entries(table):
         channel = _channel(entry, output, table.mistakes)
         if channel is not None:
-            module.channels[channel.name] = channel
+            _add_channel(module, channel, table.mistakes)
     parameters = table.table("parameter")
     for entry in parameters.items() if parameters is not None else ():
         parameter = _parameter(entry, table.mistakes)
         if parameter is not None:
-            module.parameters[parameter.name] = parameter
+            _add_parameter(module, parameter, table.mistakes)
     return module if name and driver else None
+
+
+def _add_channel(module: Module, channel: ModuleChannel, mistakes: Mistakes) -> None:
+    place = (channel.output, channel.parameter, channel.bit, channel.type)
+    for other in module.channels.values():
+        if (other.output, other.parameter, other.bit, other.type) == place:
+            message = f"{channel.name} is at the parameter and bit of {other.name} in line {other.pos.line}"
+            mistakes.error(channel.pos, message)
+    module.channels[channel.name] = channel
+
+
+def _add_parameter(module: Module, parameter: ModuleParameter, mistakes: Mistakes) -> None:
+    for other in module.parameters.values():
+        if other.id == parameter.id:
+            mistakes.error(parameter.pos, f"{parameter.name} has the id of {other.name} in line {other.pos.line}")
+    module.parameters[parameter.name] = parameter
 
 
 def _channel(entry: Entry, output: bool, mistakes: Mistakes) -> ModuleChannel | None:
@@ -186,11 +236,14 @@ def _channel(entry: Entry, output: bool, mistakes: Mistakes) -> ModuleChannel | 
         return None
     t = _type(inner)
     parameter, bit = inner.number("parameter", 0, MAX_ID, required=True), inner.number("bit", 0, 0xFFFF, 0)
-    text = inner.text("text", "") or ""
+    text = _one_line(inner, "text")
     inner.close()
     if t is None or parameter is None or bit is None:
         return None
-    return ModuleChannel(entry.key, output, t, parameter, bit, text)
+    if t is not BOOL and bit % 8:
+        inner.error(f"bit is {bit}; {t} begins at a multiple of 8", "bit")
+        return None
+    return ModuleChannel(entry.key, output, t, parameter, bit, text, entry.key_pos)
 
 
 def _type(table: Table) -> Type | None:
@@ -213,28 +266,58 @@ def _parameter(entry: Entry, mistakes: Mistakes) -> ModuleParameter | None:
     number = inner.number("id", 0, MAX_ID, required=True)
     t = _type(inner)
     low, high = inner.raw("low"), inner.raw("high")
-    for key, value in (("low", low), ("high", high)):
-        if value is not None and type(value) not in (int, float):
-            inner.error(f"{key} has to be a number", key)
-            return None
     words = inner.table("choices")
     choices = {choice.key: choice.value for choice in words.items()} if words is not None else {}
-    text, default = inner.text("text", "") or "", inner.raw("default")
-    if number is None or t is None:
-        inner.close()
+    text, default = _one_line(inner, "text"), inner.raw("default")
+    inner.close()
+    if entry.key in OWN_KEYS:
+        mistakes.error(
+            entry.key_pos, f"a parameter cannot be {entry.key}, which all modules have; give it another name"
+        )
         return None
-    made = ModuleParameter(entry.key, number, t, low, high, default, choices, text)
-    plain = replace(made, choices={})
-    for word, value in choices.items():
-        problem = parameter_problem(plain, value)
-        if problem:
-            inner.error(f"the choice {word} of {entry.key} {problem}", "choices")
+    if number is None or t is None or not _is_c_name(entry, mistakes) or not _are_limits(inner, t, low, high):
+        return None
+    made = ModuleParameter(entry.key, number, t, low, high, default, choices, text, entry.key_pos)
+    _check_choices(inner, made)
     if default is not None:
         problem = parameter_problem(made, default)
         if problem:
             inner.error(f"the default of {entry.key} {problem}", "default")
-    inner.close()
     return made
+
+
+def _are_limits(table: Table, t: Type, low: Any, high: Any) -> bool:
+    """Whether these are limits of a number of this type, or missing; reports them if not."""
+    if isinstance(t, Elementary) and t.kind in (Kind.INT, Kind.BIT, Kind.REAL):
+        allowed = (int, float) if t.kind is Kind.REAL else (int,)
+        least, most = _range_of(t)
+        for key, value in (("low", low), ("high", high)):
+            if value is None:
+                continue
+            if type(value) not in allowed:
+                table.error(f"{key} has to be {'a number' if t.kind is Kind.REAL else 'an integer'}", key)
+                return False
+            if not least <= value <= most:
+                table.error(f"{key} is {value}; a {t} can be {least} to {most}", key)
+                return False
+        if low is not None and high is not None and low > high:
+            table.error(f"low is {low}, more than high, which is {high}", "low")
+            return False
+        return True
+    given = [key for key, value in (("low", low), ("high", high)) if value is not None]
+    for key in given:
+        table.error(f"{key} is for numbers; this is {t}", key)
+    return not given
+
+
+def _check_choices(table: Table, made: ModuleParameter) -> None:
+    plain = replace(made, choices={})
+    for word, value in made.choices.items():
+        problem = parameter_problem(plain, value)
+        if problem:
+            table.error(f"the choice {word} of {made.name} {problem}", "choices")
+        if not word or not word.isprintable():
+            table.error(f"a choice of {made.name} needs a word of one line", "choices")
 
 
 def parameter_value(parameter: ModuleParameter, value: Any) -> Any:
@@ -244,14 +327,19 @@ def parameter_value(parameter: ModuleParameter, value: Any) -> Any:
 
 def parameter_problem(parameter: ModuleParameter, value: Any) -> str:
     """What is wrong with a value, as the end of a sentence; "" for nothing."""
+    meant = parameter_value(parameter, value)
+    problem = _problem(parameter, meant)
+    if parameter.choices and (problem or meant not in parameter.choices.values()):
+        shown = str(value).lower() if isinstance(value, bool) else repr(value)
+        return f"cannot be {shown}; it can be {', '.join(parameter.choices)}"
+    return problem
+
+
+def _problem(parameter: ModuleParameter, value: Any) -> str:
+    """The same without the choices."""
     t = parameter.type
-    if parameter.choices and (not isinstance(value, str) or value not in parameter.choices):
-        if value not in parameter.choices.values():
-            return f"cannot be {value!r}; it can be {', '.join(parameter.choices)}"
-        return ""
-    value = parameter_value(parameter, value)
     if isinstance(t, StringType):
-        fits = isinstance(value, str) and len(value) <= t.length and value.isascii()
+        fits = isinstance(value, str) and len(value) <= t.length and value.isascii() and value.isprintable()
         return "" if fits else f"has to be a text of at most {t.length} ASCII characters"
     assert isinstance(t, Elementary)
     if t.kind is Kind.BOOL:
@@ -262,18 +350,28 @@ def parameter_problem(parameter: ModuleParameter, value: Any) -> str:
     elif t.kind in (Kind.INT, Kind.BIT):
         if type(value) is not int:
             return "has to be an integer"
-    elif not isinstance(value, str):
-        return f"has to be a text such as a {t} has in ST"
     else:
-        return ""
-    low, high = _range(t, parameter)
+        return _text_problem(t, value)
+    low, high = _range_of(t)
+    low = low if parameter.low is None else max(low, parameter.low)
+    high = high if parameter.high is None else min(high, parameter.high)
     return "" if low <= value <= high else f"is {value}; it can be {low} to {high}"
 
 
-def _range(t: Elementary, parameter: ModuleParameter) -> tuple[float, float]:
+def _text_problem(t: Elementary, value: Any) -> str:
+    """The same for a duration, a date or a character."""
+    if not isinstance(value, str):
+        return f"has to be a text such as a {t} has in ST"
+    try:
+        encode(t, value)
+    except UsageError as error:
+        return f"cannot be that: {error.message.rstrip('.')}"
+    return ""
+
+
+def _range_of(t: Elementary) -> tuple[float, float]:
+    """The least and the largest number of a type."""
     if t.kind is Kind.REAL:
-        low, high = -3.4e38, 3.4e38
-    else:
-        low, high = (-(1 << t.bits - 1), (1 << t.bits - 1) - 1) if t.signed else (0, (1 << t.bits) - 1)
-    low = low if parameter.low is None else max(low, parameter.low)
-    return low, high if parameter.high is None else min(high, parameter.high)
+        largest = 3.4028234663852886e38 if t.bits == 32 else sys.float_info.max
+        return -largest, largest
+    return (-(1 << t.bits - 1), (1 << t.bits - 1) - 1) if t.signed else (0, (1 << t.bits) - 1)

@@ -12,15 +12,16 @@ from dataclasses import dataclass, replace
 
 from plctool.core import lib
 from plctool.errors import did_you_mean
+from plctool.files import Pos
 from plctool.iec.types import BOOL, USINT, StringType
 from plctool.io.channels import channel_of
 from plctool.io.common import read_connector
 from plctool.io.model import Channel, Connector, Context, Parameter
+from plctool.io.names import MAX_LINE, is_line, numbered
 from plctool.io.tables import Entry, Table
 
 DRIVER = "IoDrvGpio"
 LINES = int(lib.IO_GPIO_LINES)
-_MAX_TEXT = 63  # of a line or an event
 _PULLS = {"none": 0, "up": int(lib.GPIO_OPTION_PULL_UP), "down": int(lib.GPIO_OPTION_PULL_DOWN)}
 _RISING, _FALLING = int(lib.GPIO_OPTION_RISING), int(lib.GPIO_OPTION_FALLING)
 _EDGES = {"rising": _RISING, "falling": _FALLING, "both": _RISING | _FALLING}
@@ -39,10 +40,11 @@ class _Line:
 def read_gpio(table: Table, context: Context) -> list[Connector]:
     """The lines of a table, on as many connectors as they need."""
     first = read_connector(Connector, table, DRIVER, default_name="gpio")
-    lines = list(_lines(table, context))
+    lines = list(_lines(table, context, context.lines if first.enabled else {}))
     connectors = [first]
     for number in range(1, -(-len(lines) // LINES)):
-        connectors.append(replace(first, name=f"{first.name}_{number + 1}", parameters=[], channels=[], variable=False))
+        name = numbered(first.name, number + 1)
+        connectors.append(replace(first, name=name, parameters=[], channels=[], variable=False))
     for connector, start in zip(connectors, range(0, len(lines) or 1, LINES), strict=True):
         _fill(connector, lines[start : start + LINES])
     return connectors
@@ -63,8 +65,8 @@ def _fill(connector: Connector, lines: list[_Line]) -> None:
     connector.parameters.sort(key=lambda p: p.id)
 
 
-def _lines(table: Table, context: Context) -> Iterator[_Line]:
-    used: dict[str, str] = {}
+def _lines(table: Table, context: Context, used: dict[str, Pos]) -> Iterator[_Line]:
+    """`used`: where each line of the board that is in use was named."""
     for entry, output in table.channels():
         name = _name(entry, table, context, output)
         options, event = _options(entry, output)
@@ -72,9 +74,10 @@ def _lines(table: Table, context: Context) -> Iterator[_Line]:
         if name is None or channel is None:
             continue
         if name in used:
-            table.mistakes.error(entry.key_pos, f"{entry.key} is the line {name}, which {used[name]} has already")
+            where = f"in line {used[name].line}"
+            table.mistakes.error(entry.key_pos, f"{entry.key} is the line {name}, which is in use {where} already")
             continue
-        used[name] = entry.key
+        used[name] = entry.key_pos
         yield _Line(channel, name, options, event)
 
 
@@ -89,8 +92,8 @@ def _options(entry: Entry, output: bool) -> tuple[int, str]:
         return options | int(lib.GPIO_OPTION_OPEN_DRAIN) * table.flag("open_drain"), ""
     options |= table.choice("pull", _PULLS, 0) or 0
     event, edge = table.text("event", "") or "", table.choice("edge", _EDGES)
-    if len(event) > _MAX_TEXT or not event.isascii():
-        table.error(f"the name of an event has at most {_MAX_TEXT} ASCII characters", "event")
+    if "event" in table and not is_line(event):
+        table.error(f"the name of an event has 1 to {MAX_LINE} ASCII characters", "event")
     if edge is not None and not event:
         table.error("edge says when the event is posted; name it: event = ...", "edge")
     return options | ((edge or _RISING) if event else 0), event
@@ -100,9 +103,9 @@ def _name(entry: Entry, table: Table, context: Context, output: bool) -> str | N
     """What the port calls a line; None after a mistake."""
     device = context.device
     if device is None:
-        if 0 < len(entry.key) <= _MAX_TEXT and entry.key.isascii():
+        if is_line(entry.key):
             return entry.key
-        table.mistakes.error(entry.key_pos, f"the name of a line has 1 to {_MAX_TEXT} ASCII characters")
+        table.mistakes.error(entry.key_pos, f"the name of a line has 1 to {MAX_LINE} ASCII characters")
         return None
     line = device.lines.get(entry.key)
     if line is None:

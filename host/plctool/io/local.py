@@ -12,7 +12,7 @@ from plctool.io.channels import channel_of
 from plctool.io.common import read_connector
 from plctool.io.device_file import Module, parameter_problem, parameter_value
 from plctool.io.mistakes import Mistakes
-from plctool.io.model import Connector, Context, Parameter, bits_of
+from plctool.io.model import Channel, Connector, Context, Parameter, bits_of
 from plctool.io.tables import Entry, Table
 
 
@@ -65,6 +65,17 @@ def _add_channel(connector: Connector, entry: Entry, module: Module, output: boo
         return
     bits, t = bits_of(known.type), known.type
     channel = channel_of(entry, mistakes, output=output, bits=bits, type=t, parameter=known.parameter)
-    if channel is not None:
-        channel.parameter_bit = known.bit
-        connector.channels.append(channel)
+    if channel is None:
+        return
+    channel.parameter_bit = known.bit
+    other = next((c for c in connector.channels if output and c.output and _overlap(c, channel)), None)
+    if other is not None:
+        mistakes.error(channel.pos, f"{channel.name} has bits of {other.name}, which is used in line {other.pos.line}")
+    connector.channels.append(channel)
+
+
+def _overlap(one: Channel, other: Channel) -> bool:
+    """Whether two channels of known size are in the same bits of a parameter."""
+    start, end = other.parameter_bit, other.parameter_bit + other.size_bits
+    same = one.parameter == other.parameter
+    return same and one.parameter_bit < end and start < one.parameter_bit + one.size_bits

@@ -41,17 +41,16 @@ from typing import Any
 
 from plctool.core import ffi, lib
 from plctool.files import Pos
-from plctool.iec.types import BOOL, BYTE, UDINT, ArrayType, StringType, StructType, Type, base_of
+from plctool.iec.types import BOOL, BYTE, UDINT, ArrayType, Elementary, StringType, StructType, Type, base_of
 from plctool.io.channels import channel_of, is_target, read_channel, read_substitute
 from plctool.io.common import read_connector
 from plctool.io.mistakes import Mistakes
-from plctool.io.model import HOLD, ZERO, Channel, Connector, Context, Parameter, Substitute, bits_of
+from plctool.io.model import HOLD, ZERO, Channel, Connector, Context, Parameter, Substitute, bits_of, holds_bools
+from plctool.io.names import MAX_LINE, MAX_NAME, is_line
 from plctool.io.tables import Entry, Table, each
 
 DRIVER = "IoDrvModbus"
 
-_MAX_NAME = 31
-_MAX_LINE = 63
 _MAX_UNIT = int(lib.MODBUS_MAX_UNIT)
 _REGISTER = int(lib.MODBUS_REGISTER_BITS)
 _LAST = 65535  # address on the wire
@@ -145,6 +144,21 @@ def registers_of(t: Type) -> int:
     return 1 if element_size(t) == 1 else -(-t.size // 2)
 
 
+def fits_coils(t: Type) -> bool:
+    """Whether coils can have a variable: all its bits in memory are its value. An array of BOOL has a byte for each
+    element, a structure and a string have bytes that mean nothing."""
+    inner = base_of(t)
+    while isinstance(inner, ArrayType):
+        inner = base_of(inner.element)
+    return isinstance(inner, Elementary) and not holds_bools(t)
+
+
+def _cannot_have(channel: Channel, what: str) -> str:
+    t = channel.variable_type
+    hint = "use registers" if isinstance(t, StringType) else "name its elements"
+    return f"{channel.target} is {t}, which {what} cannot have: {hint}"
+
+
 def _reverse_for(t: Type, order: _Order) -> int | None:
     """The group of bytes in reverse order (Modbus.h) with which a variable needs no more; None: there is none."""
     size = element_size(t)
@@ -220,6 +234,10 @@ class ModbusDevice(Connector):
     def _bits(self, job: _Job, mistakes: Mistakes) -> tuple[int, int, int] | None:
         at = 0
         for channel in job.channels:
+            assert channel.variable_type is not None
+            if not fits_coils(channel.variable_type):
+                mistakes.error(channel.pos, _cannot_have(channel, "coils"))
+                return None
             if channel.size_bits > 1 and at % 8:
                 message = f"{channel.target} would begin within a byte: name it before variables of type BOOL"
                 mistakes.error(channel.pos, message)
@@ -232,19 +250,23 @@ class ModbusDevice(Connector):
         types = [c.variable_type for c in job.channels if c.variable_type is not None]
         for channel, t in zip(job.channels, types, strict=True):
             if element_size(t) < 0:
-                mistakes.error(channel.pos, f"{channel.target} is {t}, which registers cannot have: name its elements")
+                mistakes.error(channel.pos, _cannot_have(channel, "registers"))
                 return None
         reverse = self._common_reverse(job, types, mistakes)
         if reverse is None:
             return None
-        at = mask = 0
+        at = 0
         for channel, t in zip(job.channels, types, strict=True):
             channel.parameter_bit = _place(t, at, reverse, self.order)
             size = element_size(t)
             channel.big_endian = size >= 2 and reverse != (_reverse_for(t, self.order) or 0)
-            mask |= 1 if bits_of(t) == 1 else 0xFF if size == 1 else 0xFFFF
             at += registers_of(t)
-        return at, _REVERSE_FLAGS[reverse], mask
+        return at, _REVERSE_FLAGS[reverse], self._mask(types[0])
+
+    def _mask(self, t: Type) -> int:
+        """The bits of a register, as it is sent, that a variable has."""
+        mask = 1 if bits_of(t) == 1 else 0xFF if element_size(t) == 1 else 0xFFFF
+        return mask if self.order.high_byte_first else (mask << 8 | mask >> 8) & 0xFFFF
 
     def _common_reverse(self, job: _Job, types: list[Type], mistakes: Mistakes) -> int | None:
         """One for all variables. Where there is none, numbers are turned round one by one, which arrays cannot be."""
@@ -355,8 +377,8 @@ def _serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
     """Adds the parameters of a serial line; its baud, and the bits of a character."""
     bauds = {str(b): b for b in _BAUDS}
     port = table.text("port", required="/dev/ttyS1") or "?"
-    if not 0 < len(port) <= _MAX_LINE or not port.isascii():
-        table.error(f"port has 1 to {_MAX_LINE} ASCII characters", "port")
+    if not is_line(port):
+        table.error(f"port has 1 to {MAX_LINE} ASCII characters", "port")
     baud = table.number("baud", _BAUDS[0], _BAUDS[-1], 19200, unit="baud") or 19200
     if str(baud) not in bauds:
         table.error(f"{baud} is not a speed of serial lines: write {', '.join(bauds)}", "baud")
@@ -374,7 +396,7 @@ def _serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
 
 def _default_name(table: Table, key: str) -> str:
     found = table.text(key)
-    return f"modbus_{(found or 'line').rpartition('/')[2]}"[:_MAX_NAME]
+    return f"modbus_{(found or 'line').rpartition('/')[2]}"[:MAX_NAME]
 
 
 def _serial_client(table: Table) -> ModbusLine:
@@ -498,7 +520,7 @@ def _wrong_reference(text: str, table: int) -> str:
 
 # ---- servers -------------------------------------------------------------------------------------------------------
 
-_KEY = re.compile(r"(\d{1,6})(?:\.(\d{1,2}))?")
+_KEY = re.compile(r"(\d{1,6})(?:\.(\d{1,2}))?", re.ASCII)
 
 
 @dataclass
@@ -528,7 +550,10 @@ class ModbusServer(Connector):
         for group in _groups(self.objects):
             if any(o.channel.variable_type is None for o in group):
                 continue
-            made = self._bit_range(group[0]) if group[0].table in (_COILS, _DISCRETE) else self._range(group, mistakes)
+            if not _are_bits_of_one(group, mistakes):
+                continue
+            of_bits = group[0].table in (_COILS, _DISCRETE)
+            made = self._bit_range(group[0], mistakes) if of_bits else self._range(group, mistakes)
             if made is None or not _is_free(group[0], made, used, mistakes):
                 continue
             for o in group:
@@ -537,7 +562,12 @@ class ModbusServer(Connector):
             self.parameters.append(_structure(int(lib.MODBUS_PARAM_RANGE) + number, value))
             number += 1
 
-    def _bit_range(self, found: _Object) -> dict[str, int]:
+    def _bit_range(self, found: _Object, mistakes: Mistakes) -> dict[str, int] | None:
+        t = found.channel.variable_type
+        assert t is not None
+        if not fits_coils(t):
+            mistakes.error(found.pos, _cannot_have(found.channel, "coils"))
+            return None
         found.channel.parameter_bit = 0
         return {
             "tables": found.table,
@@ -552,8 +582,7 @@ class ModbusServer(Connector):
         t = first.channel.variable_type
         assert t is not None
         if element_size(t) < 0:
-            target = first.channel.target
-            mistakes.error(first.pos, f"{target} is {t}, which registers cannot have: name its elements")
+            mistakes.error(first.pos, _cannot_have(first.channel, "registers"))
             return None
         reverse = _reverse_for(t, self.order)
         if reverse is None:
@@ -590,6 +619,26 @@ def _groups(objects: list[_Object]) -> Iterator[list[_Object]]:
         key = (found.table, found.first) if found.bit is not None else (-1, number)
         groups.setdefault(key, []).append(found)
     yield from groups.values()
+
+
+def _are_bits_of_one(group: list[_Object], mistakes: Mistakes) -> bool:
+    """Whether objects can share the memory of a register: none is a bit twice, and the network may write all or none.
+    That is said of the register as a whole."""
+    seen: dict[int | None, _Object] = {}
+    first = group[0]
+    for o in group:
+        other = seen.setdefault(o.bit, o)
+        if other is not o:
+            mistakes.error(o.pos, f"{o.channel.name} is the bit {other.channel.name} in line {other.pos.line}")
+        elif o.writable is not first.writable:
+            words = ("is read_only", "can be written")
+            one, two = words[o.writable], words[first.writable]
+            message = f"{o.channel.name} {one}, {first.channel.name} in line {first.pos.line} {two}"
+            mistakes.error(o.pos, f"{message}: the bits of one register are all the same")
+        else:
+            continue
+        return False
+    return True
 
 
 def _is_free(found: _Object, made: dict[str, int], used: list[tuple[int, int, int, str]], mistakes: Mistakes) -> bool:
@@ -642,8 +691,8 @@ def _identify(table: Table, server: ModbusServer) -> None:
         text = names.text(key) if names is not None else None
         if text is None or names is None:
             continue
-        if not 0 < len(text) <= _MAX_LINE or not text.isascii():
-            names.error(f"{key} has 1 to {_MAX_LINE} ASCII characters", key)
+        if not is_line(text):
+            names.error(f"{key} has 1 to {MAX_LINE} ASCII characters", key)
         else:
             server.parameters.append(_text(int(lib.MODBUS_PARAM_OBJECT) + number, text, key))
     if names is not None:
@@ -651,6 +700,10 @@ def _identify(table: Table, server: ModbusServer) -> None:
 
 
 def _read_object(entry: Entry, table: Table, kind: int) -> _Object | None:
+    if isinstance(entry.value, Table) and (bits := entry.value.keys_of_digits()):
+        message = f'a bit of a register is written in quotes: "{entry.key}.{bits[0]}"'
+        table.mistakes.error(entry.key_pos, message)
+        return None
     match = _KEY.fullmatch(entry.key)
     first = wire_address(int(match[1]), kind) if match else None
     bit = int(match[2]) if match and match[2] is not None else None

@@ -113,10 +113,12 @@ class Connector:
 
 @dataclass
 class Context:
-    """What kinds share. `device`: what the vendor says of the board, None if nothing."""
+    """What kinds share. `device`: what the vendor says of the board, None if nothing. `lines`: where each line of the
+    board that is in use was named."""
 
     mistakes: Mistakes
     device: DeviceFile | None = None
+    lines: dict[str, Pos] = field(default_factory=dict)
 
 
 @dataclass

@@ -15,6 +15,9 @@ from typing import Any
 
 from plctool.files import Pos
 
+Token = tuple[str, int, int]
+"""Its kind, or the sign itself; the offsets of its first character and the one after its last."""
+
 Path = tuple[str | int, ...]
 """Keys, and indices of elements, that lead to a value."""
 
@@ -23,6 +26,9 @@ _TOKEN = re.compile(
     r"(?P<text>\"\"\"(?:[^\\]|\\.)*?\"{3,5}|'''.*?'{3,5}|\"(?:[^\"\\\n]|\\.)*\"|'[^'\n]*'|[^\s\[\]{}=,.\#\"']+)",
     re.DOTALL,
 )
+_TOO_LARGE = "a number has at most 64 bits"
+_MAX_DEPTH = 100  # brackets within each other: what reads them calls itself
+_LEAST, _LARGEST = -(1 << 63), (1 << 64) - 1
 _PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
@@ -41,11 +47,35 @@ class TomlText:
         self.path = path
         self.text = text
         self._starts = [0, *(m.end() for m in re.finditer("\n", text))]
+        tokens = _tokens(text)
+        self._check_depth(tokens)
         try:
             self.values: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise BadToml(*self._where(str(error))) from None
-        self._places = _Scanner(text).places
+        except ValueError:  # Python converts no more digits than these
+            longest = max(tokens, key=lambda t: 0 if text[t[1]] in "\"'" else t[2] - t[1])
+            raise BadToml(self.pos(longest[1]), _TOO_LARGE) from None
+        self._places = _Scanner(text, tokens).places
+        self._check_numbers()
+
+    def _check_depth(self, tokens: list[Token]) -> None:
+        depth = 0
+        for kind, start, _ in tokens:
+            depth += (kind in ("[", "{")) - (kind in ("]", "}"))
+            if depth > _MAX_DEPTH:
+                raise BadToml(self.pos(start), f"there are more than {_MAX_DEPTH} brackets within each other")
+
+    def _check_numbers(self) -> None:
+        left: list[tuple[Path, Any]] = [((), self.values)]
+        while left:
+            path, value = left.pop()
+            if isinstance(value, dict):
+                left += [((*path, key), inner) for key, inner in value.items()]
+            elif isinstance(value, list):
+                left += [((*path, number), inner) for number, inner in enumerate(value)]
+            elif isinstance(value, int) and not _LEAST <= value <= _LARGEST:
+                raise BadToml(self.value_pos(path), _TOO_LARGE)
 
     def _where(self, message: str) -> tuple[Pos, str]:
         match = _PLACE.search(message)
@@ -76,14 +106,18 @@ class BadToml(Exception):
         self.message = message
 
 
+def _tokens(text: str) -> list[Token]:
+    return [
+        (m.group() if m.lastgroup == "sign" else str(m.lastgroup), m.start(), m.end())
+        for m in _TOKEN.finditer(text)
+        if m.lastgroup != "space"
+    ]
+
+
 class _Scanner:
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, tokens: list[Token]) -> None:
         self._text = text
-        self._tokens: list[tuple[str, int, int]] = [
-            (m.group() if m.lastgroup == "sign" else str(m.lastgroup), m.start(), m.end())
-            for m in _TOKEN.finditer(text)
-            if m.lastgroup != "space"
-        ]
+        self._tokens = tokens
         self._at = 0
         self._counts: dict[Path, int] = {}  # of arrays of tables
         self.places: dict[Path, Place] = {}

@@ -7,11 +7,11 @@ is the default, or None.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from plctool.errors import UsageError, did_you_mean
+from plctool.errors import UsageError, did_you_mean, listed
 from plctool.files import Pos
 from plctool.iec.types import LTIME
 from plctool.iec.value_texts import parse_time
@@ -51,6 +51,10 @@ class Table:
     def __contains__(self, key: str) -> bool:
         return key in self._values
 
+    def keys_of_digits(self) -> list[str]:
+        """The keys that are numbers: what TOML makes of `40001.3`."""
+        return [key for key in self._values if key.isdigit()]
+
     # ---- reporting ----
 
     def error(self, message: str, key: str | None = None) -> None:
@@ -65,7 +69,7 @@ class Table:
         """Reports the keys that nothing has asked for."""
         for key in self._values:
             if key not in self._read:
-                known = f"; {self._title()} has {_listed(self._asked)}" if self._asked else ""
+                known = f"; {self._title()} has {listed(self._asked, 'or')}" if self._asked else ""
                 hint = did_you_mean(key, self._asked) or known
                 self.mistakes.error(self._text.key_pos((*self._path, key)), f"there is no '{key}' here{hint}")
 
@@ -97,7 +101,7 @@ class Table:
     def duration_us(
         self, key: str, low_us: int, high_us: int, default_us: int | None = None, *, required: str = ""
     ) -> int | None:
-        """A duration such as "T#200ms", in microseconds."""
+        """A duration such as "T#200ms", in microseconds, of whole milliseconds."""
         found = self._value(key, str, None, required)
         if found is None:
             return default_us
@@ -109,6 +113,9 @@ class Table:
         if not low_us <= us <= high_us:
             self.error(f"{key} is {found}; it can be {_duration(low_us)} to {_duration(high_us)}", key)
             return default_us
+        if us % 1000:
+            self.error(f"{key} is {found}; it has to be whole milliseconds", key)
+            return default_us
         return us
 
     def choice(
@@ -119,7 +126,7 @@ class Table:
         if found is None:
             return default
         if found not in choices:
-            hint = did_you_mean(found, choices) or f"; it can be {_listed(list(choices))}"
+            hint = did_you_mean(found, choices) or f"; it can be {listed(choices, 'or')}"
             self.error(f"{key} cannot be '{found}'{hint}", key)
             return default
         return choices[found]
@@ -178,7 +185,10 @@ class Table:
         for key in ("in", "out"):
             names = self.table(key)
             for entry in names.items() if names is not None else ():
-                yield entry, key == "out"
+                if entry.key:
+                    yield entry, key == "out"
+                else:
+                    self.mistakes.error(entry.key_pos, "a channel needs a name")
 
     def _inner(self, path: Path, values: dict[str, Any]) -> Table:
         return Table(self._text, (*self._path, *path), values, self.mistakes)
@@ -199,12 +209,5 @@ def _word(value: object) -> str:
     return _WORDS.get(type(value), "a date")
 
 
-def _listed(names: Sequence[str]) -> str:
-    *most, last = names
-    return f"{', '.join(most)} or {last}" if most else last
-
-
 def _duration(us: int) -> str:
-    if us % 1000:
-        return f"T#{us}us"
     return f"T#{us // 1000_000}s" if us and us % 1000_000 == 0 else f"T#{us // 1000}ms"

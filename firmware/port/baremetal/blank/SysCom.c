@@ -44,9 +44,10 @@ RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
     return 0;
 }
 
-/* Write here, for a field bus: find the line of this name, and do what SysComOpen does with these settings. With rs485 the
- * port drives the bus from the first start bit to the last stop bit: take it back in the interrupt that comes when
- * the shift register is empty, not when the data register is. */
+/* Write here, for a field bus: find the line of this name; ERR_DUPLICATE if it is open, so that no application takes the
+ * line that the tool uses; else do what SysComOpen does with these settings. With rs485 the port drives the bus from the
+ * first start bit to the last stop bit: take it back in the interrupt that comes when the shift register is empty, not
+ * when the data register is. */
 RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index)
 {
     RTS_UNUSED(name);

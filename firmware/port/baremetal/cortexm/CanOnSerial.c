@@ -37,7 +37,7 @@ void SysCanGetAddress(RTS_UI32 index, CAN_ADDRESS *address)
 {
     RTS_UNUSED(index);
     address->base = (RTS_UI32)SettgGetIntValue("CmpBlkDrvCan", "Base", CAN_ID_BASE);
-    address->node = (RTS_UI8)SettgGetIntValue("CmpBlkDrvCan", "Node", CAN_NODE);
+    address->node = (RTS_UI32)SettgGetIntValue("CmpBlkDrvCan", "Node", CAN_NODE);
 }
 
 RTS_RESULT SysCanOpen(RTS_UI32 index, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)

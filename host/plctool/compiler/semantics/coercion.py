@@ -99,6 +99,9 @@ class Coercion:
             kind = "METHOD" if e.instance is not None else "FUNCTION"
             message = f"{name} gives no result; call it as a statement, or declare {kind} {name} : {target}"
             return self._error(e.pos, "type", message)
+        if e.type is NULL_TYPE:
+            message = f"NULL is for pointers, references and interfaces; it does not fit {target}"
+            return self._error(e.pos, "type", message)
         return self._error(e.pos, "type", f"{e.type} does not fit {target}")
 
     def _no_scalars(self, e: Expr, target: Type) -> Expr:
@@ -114,7 +117,8 @@ class Coercion:
         return self._mismatch(e, target)
 
     def _needs(self, e: Expr, source: str, target: str) -> Expr:
-        message = f"{e.type} does not fit {target}; write {source}_TO_{target}(...)"
+        compared = ", or compare it: <> 0" if target == "BOOL" and not isinstance(e.type, StringType) else ""
+        message = f"{e.type} does not fit {target}; write {source}_TO_{target}(...){compared}"
         return self._error(e.pos, "type", message)
 
     # ---- by kind ----

@@ -32,6 +32,7 @@ from plctool.compiler.typed import (
     TaskKind,
     VarPlace,
 )
+from plctool.errors import listed
 from plctool.iec.types import BOOL, LTIME, TIME, StringType
 
 # ---- the properties of a TASK ----
@@ -75,9 +76,8 @@ class _Reader:
         for offset, name, value in decl.properties:
             read = self._properties.get(name.upper())
             if read is None or isinstance(value, ast.ArrayInit | ast.StructInit):
-                *most, last = self._properties
                 hint = did_you_mean(name, self._properties)
-                scope.error(offset, "unknown", f"a TASK has {', '.join(most)} and {last}, not {name}{hint}")
+                scope.error(offset, "unknown", f"a TASK has {listed(self._properties)}, not {name}{hint}")
             elif name.upper() in given:
                 scope.error(offset, "duplicate", f"{name.upper()} of the task {decl.name} is given twice")
             else:

@@ -24,8 +24,9 @@ from plctool.errors import UsageError
 from plctool.iec.addresses import parse_address
 from plctool.iec.areas import Area
 from plctool.iec.literals import LiteralKind
-from plctool.iec.types import Elementary, Kind, Type, base_of
+from plctool.iec.types import BOOL, Elementary, Kind, Type, base_of
 from plctool.iec.values import encode
+from plctool.io.configuration import MAX_BITS, MAX_ENTRIES
 from plctool.io.layout import lay_out
 from plctool.io.mistakes import CODE, Mistakes
 from plctool.io.model import VALUE, Channel, Connector, Description, bits_of, holds_bools
@@ -65,6 +66,7 @@ class IoChannels:
     def __init__(self, description: Description | None = None) -> None:
         self.description = description
         self._channels: dict[str, Channel] = {}  # by the full name of what they lead to, case-folded
+        self._connected: dict[Variable, list[tuple[int, int, Channel]]] = {}  # bytes of it: first, end
         self.variables: dict[str, Variable] = {}  # that have become inputs or outputs, by full name case-folded
 
     @property
@@ -86,9 +88,7 @@ class IoChannels:
             channel.variable = _full_name(channel.target, names)
             first = self._channels.setdefault(channel.variable.casefold(), channel)
             if first is not channel:
-                where = _where(first.pos, channel.pos)
-                message = f"{channel.target} belongs to the channel {first.name} {where} already"
-                diagnostics.error(channel.pos, CODE, message)
+                diagnostics.error(*_twice(channel, first))
         for connector in self.description.connectors:
             key = connector.name.casefold()
             if connector.variable and (key in names.planned or names.own_unit(key) is not None):
@@ -117,6 +117,9 @@ class IoChannels:
     def parts(self, variables: Iterable[Variable]) -> list[Channel]:
         """The channels that lead to no whole variable."""
         self.variables = {v.name.casefold(): v for v in variables if v.storage is Storage.AREA}
+        self._connected = {
+            v: [(0, v.type.size, self._channels[key])] for key, v in self.variables.items() if key in self._channels
+        }
         return [c for key, c in self._channels.items() if key not in self.variables]
 
     def source(self) -> Source:
@@ -140,13 +143,29 @@ class IoChannels:
         assert path is not None
         return path
 
-    def place(self, channel: Channel, t: Type, allocation: Allocation) -> Variable:
-        """The input or output that is copied to or from what the channel names."""
+    def place(
+        self, channel: Channel, t: Type, root: Variable, offset: int, allocation: Allocation, diagnostics: Diagnostics
+    ) -> Variable | None:
+        """The input or output that is copied to or from what the channel names: a `t` at an offset in a variable. None
+        if that variable has an address, so that nothing is to be copied."""
+        self._connect(channel, root, offset, offset + t.size, diagnostics)
         variable = Variable(channel.target, t, Storage.AREA, channel.pos, _area(channel))
-        variable.shared_output = True  # a global instance is copied by every task
         self.variables[channel.variable.casefold()] = variable
+        if root.area in (Area.INPUT, Area.OUTPUT) and root.offset >= 0:
+            variable.area, variable.offset = root.area, root.offset + offset
+            return None
+        variable.shared_output = True  # a global instance is copied by every task
         allocation.add(variable)
         return variable
+
+    def _connect(self, channel: Channel, root: Variable, start: int, end: int, diagnostics: Diagnostics) -> None:
+        """Notes that a channel leads to these bytes of a variable, whatever it calls them; reports another one that
+        does."""
+        others = self._connected.setdefault(root, [])
+        other = next((c for first, stop, c in others if first < end and start < stop), None)
+        if other is not None:
+            diagnostics.error(*_twice(channel, other))
+        others.append((start, end, channel))
 
     # ---- when all is known ----
 
@@ -270,6 +289,13 @@ def _where(first: Pos, pos: Pos) -> str:
     return f"in line {first.line}" if first.file == pos.file else f"in {first.file}:{first.line}"
 
 
+def _twice(one: Channel, other: Channel, verb: str = "belongs to", end: str = "already") -> tuple[Pos, str, str]:
+    """Two channels have the same memory: an error at the second of them."""
+    first, second = sorted((one, other), key=lambda c: (c.pos.file, c.pos.line, c.pos.column))
+    where = _where(first.pos, second.pos)
+    return second.pos, CODE, f"{second.target} {verb} the channel {first.name} {where} {end}"
+
+
 def _misplaced(channel: Channel, variable: Variable) -> str:
     """Why a variable is not where its channel needs it."""
     name = channel.target
@@ -290,6 +316,8 @@ def _misfit(connector: Connector, channel: Channel) -> str:
     if channel.bits is not None and (bits_of(t) != channel.bits or holds_bools(t)):
         has = f"{channel.bits} bits" if wanted is None else f"{wanted}"
         return f"{channel.target} is {t}, but {name} is {has}{_fitting(channel)}"
+    if bits_of(t) > MAX_BITS:
+        return f"{channel.target} has {bits_of(t)} bits; a channel has at most {MAX_BITS}: name its elements"
     base, other = base_of(t), base_of(wanted) if wanted is not None else None
     if isinstance(base, Elementary) and isinstance(other, Elementary) and not _same_kind(base, other):
         return f"{channel.target} is {t}, but {name} is {wanted}: declare it as {wanted}"
@@ -303,6 +331,8 @@ def _bad_substitute(channel: Channel) -> str:
         return ""
     assert channel.variable_type is not None
     key = "on_stop" if channel.output else "on_error"
+    if isinstance(given.value, bool) and base_of(channel.variable_type) is not BOOL:
+        return f"{key} is true or false, but {channel.target} is {channel.variable_type}"
     try:
         data = encode(channel.variable_type, given.value)
     except UsageError as error:
@@ -333,11 +363,7 @@ def _report_double_use(description: Description, diagnostics: Diagnostics) -> No
         last: Channel | None = None
         for start, channel in channels:
             if last is not None and start < last.area_bit + last.size_bits:
-                one, other = sorted((last, channel), key=lambda c: (c.pos.file, c.pos.line, c.pos.column))
-                message = (
-                    f"{other.target} is where the channel {one.name} {_where(one.pos, other.pos)} leads to already"
-                )
-                diagnostics.error(other.pos, CODE, message)
+                diagnostics.error(*_twice(last, channel, "is where", "leads to already"))
             if last is None or start + channel.size_bits > last.area_bit + last.size_bits:
                 last = channel
 
@@ -352,16 +378,17 @@ def _check_tasks(description: Description, tasks: Sequence[str], diagnostics: Di
 
 def _check_limits(description: Description, allocation: Allocation, diagnostics: Diagnostics) -> None:
     device = description.device
-    if device is None:
-        return
+    limits = dict.fromkeys(("connectors", "channels"), (MAX_ENTRIES, "an image"))
+    if device is not None:
+        limits |= {name: (limit, device.title) for name, limit in device.limits.items()}
     used = {
         "inputs": (allocation.sizes[Area.INPUT], "bytes of inputs"),
         "outputs": (allocation.sizes[Area.OUTPUT], "bytes of outputs"),
         "connectors": (len(description.connectors), "devices"),
         "channels": (len(description.channels), "channels"),
     }
-    for name, limit in device.limits.items():
+    for name, (limit, title) in limits.items():
         count, what = used[name]
         if count > limit:
             where = description.channels[0][1].pos if description.channels else Pos(description.path, 1, 1)
-            diagnostics.error(where, CODE, f"there are {count} {what}; {device.title} has room for {limit}")
+            diagnostics.error(where, CODE, f"there are {count} {what}; {title} has room for {limit}")

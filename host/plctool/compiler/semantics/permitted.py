@@ -15,6 +15,7 @@ from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.ast import ACCESS, Modifier, Section
+from plctool.errors import listed
 
 
 class Kind(StrEnum):
@@ -239,20 +240,15 @@ def _with_article(kind: Kind) -> str:
 
 
 def _wrong_section(kind: Kind, keyword: Section) -> str:
-    advice = _INSTEAD_OF_SECTION.get((kind, keyword)) or f"it has {_listed(SECTIONS[kind])}"
+    advice = _INSTEAD_OF_SECTION.get((kind, keyword)) or f"it has {listed(SECTIONS[kind] or ['no variables'])}"
     return f"{_with_article(kind)} has no {keyword}; {advice}"
-
-
-def _listed(words: Iterable[str], conjunction: str = "and") -> str:
-    *most, last = words or ["no variables"]
-    return f"{', '.join(most)} {conjunction} {last}" if most else last
 
 
 def _wrong_modifier(kind: Kind, word: str) -> str:
     if kind in _IN_INTERFACE.values():
         return f"what an INTERFACE declares is PUBLIC and to be implemented; leave out {word}"
     allowed = sorted(MODIFIERS[kind])
-    return f"{_with_article(kind)} cannot be {word}; it may be {_listed(allowed, 'or')}"
+    return f"{_with_article(kind)} cannot be {word}; it may be {listed(allowed, 'or')}"
 
 
 def _wrong_qualifier(kind: Kind, keyword: Section, word: str) -> str:

@@ -20,8 +20,9 @@ enum { LINES = 4, FIRST_BUTTON = 2 };
 static struct {
     RTS_UI8 user; /* group + 1; 0: free */
     RTS_UI8 number;
-    RTS_UI8 options;
 } lines[LINES];
+
+static RTS_UI32 active_low; /* lines, a bit each */
 
 /* LINES when there is none of that name. */
 static RTS_UI32 find(const char *name)
@@ -47,7 +48,8 @@ RTS_RESULT SysGpioAdd(RTS_UI32 group, RTS_UI32 number, const SYS_GPIO_LINE *line
         return ERR_NOT_SUPPORTED;
     lines[i].user = (RTS_UI8)(group + 1);
     lines[i].number = (RTS_UI8)number;
-    lines[i].options = (RTS_UI8)line->options;
+    active_low &= ~(1u << i);
+    active_low |= (RTS_UI32)((line->options & GPIO_OPTION_ACTIVE_LOW) != 0) << i;
     return ERR_OK;
 }
 
@@ -72,15 +74,15 @@ void SysGpioPoll(void)
 
 RTS_RESULT SysGpioRead(RTS_UI32 group, RTS_UI32 *values)
 {
-    RTS_UI32 levels = (FPGA_LED & 3u) | (FPGA_BUTTON & 3u) << FIRST_BUTTON;
+    RTS_UI32 levels = ((FPGA_LED & 3u) | (FPGA_BUTTON & 3u) << FIRST_BUTTON) ^ active_low;
+    RTS_UI32 found = 0;
     RTS_UI32 i;
 
-    *values = 0;
-    for (i = 0; i < LINES; i++) {
-        RTS_UI32 level = (levels >> i & 1) ^ ((lines[i].options & GPIO_OPTION_ACTIVE_LOW) != 0);
+    for (i = 0; i < LINES; i++, levels >>= 1) {
         if (lines[i].user == group + 1)
-            *values |= level << lines[i].number;
+            found |= (levels & 1) << lines[i].number;
     }
+    *values = found;
     return ERR_OK;
 }
 
@@ -90,8 +92,9 @@ RTS_RESULT SysGpioWrite(RTS_UI32 group, RTS_UI32 mask, RTS_UI32 values)
     RTS_UI32 i;
 
     for (i = 0; i < FIRST_BUTTON; i++) {
-        RTS_UI32 level = (values >> lines[i].number & 1) ^ ((lines[i].options & GPIO_OPTION_ACTIVE_LOW) != 0);
-        if (lines[i].user == group + 1 && (mask >> lines[i].number & 1) != 0)
+        RTS_UI32 number = lines[i].number;
+        RTS_UI32 level = (values >> number ^ active_low >> i) & 1;
+        if (lines[i].user == group + 1 && (mask >> number & 1) != 0)
             leds = (leds & ~(1u << i)) | level << i;
     }
     FPGA_LED = leds;

@@ -13,6 +13,7 @@ from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.symbols import ERROR, ClassInfo, Member, PouSymbol
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
+from plctool.errors import listed
 from plctool.iec.types import BOOL
 
 # ---- who extends whom ----
@@ -161,7 +162,7 @@ def _check_interfaces(world: World, cls: ClassInfo) -> None:
                 _check_implementation(world, member, wanted)
         if missing and not cls.abstract:
             pos = cls.symbol.decl.source.pos(cls.symbol.decl.pos)
-            message = f"{cls.name} does not implement {_listed(missing)} of {interface.name}"
+            message = f"{cls.name} does not implement {listed(missing)} of {interface.name}"
             world.diagnostics.error(pos, "inheritance", message)
 
 
@@ -184,16 +185,12 @@ def _check_complete(world: World, cls: ClassInfo) -> None:
         base = base.base
     if missing:
         pos = cls.symbol.decl.source.pos(cls.symbol.decl.pos)
-        message = f"{cls.name} has to implement {_listed(list(missing.values()))}, or to be ABSTRACT"
+        message = f"{cls.name} has to implement {listed(missing.values())}, or to be ABSTRACT"
         world.diagnostics.error(pos, "inheritance", message)
 
 
 def _described(member: Member) -> str:
     return f"{member.decl.keyword} of {member.decl.name}" if member.is_property else member.decl.name
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _error(world: World, member: Member, message: str) -> None:

@@ -241,8 +241,11 @@ class InstanceConfig:
             elif any(part in self._world.blocks for part in instances_in(place.type)):
                 scope.error(path.pos, "place", f"{channel.target} is {place.type}; name a variable in it")
             else:
-                outside = io.place(channel, place.type, allocation)
-                copies.append(_Copy(fixed.variable, place, whole(outside, outside.pos), outside.area))
+                outside = io.place(
+                    channel, place.type, fixed.variable, fixed.offset, allocation, self._world.diagnostics
+                )
+                if outside is not None:
+                    copies.append(_Copy(fixed.variable, place, whole(outside, outside.pos), outside.area))
         return copies
 
     # ---- variables without an address ----

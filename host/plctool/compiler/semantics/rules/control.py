@@ -164,7 +164,9 @@ def case_statement(c: Checker, node: ast.Case) -> list[Statement]:
     selector = c.settled(node.selector)
     base = elementary(selector.type)
     if selector.type is not ERROR and (base is None or base.kind not in NUMBERS):
-        selector = c.error(node.selector.pos, "type", f"CASE needs an integer or an enumeration, not {selector.type}")
+        hint = "; write IF" if base is BOOL else ""
+        message = f"CASE needs an integer or an enumeration, not {selector.type}{hint}"
+        selector = c.error(node.selector.pos, "type", message)
     seen = _Labels()
     branches = []
     for labels, body in node.branches:

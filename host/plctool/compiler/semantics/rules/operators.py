@@ -256,7 +256,10 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
     if isinstance(t, StructType | ArrayType) or (isinstance(t, PointerType) and op not in (BinaryOp.EQ, BinaryOp.NE)):
         t = None
     if t is None:
-        return c.error(offset, "type", f"{op.value} cannot compare {left.type} with {right.type}")
+        hint = ""
+        if isinstance(left, Binary) and left.op in _COMPARISONS:
+            hint = f"; to compare a value twice, write a {left.op.value} b AND b {op.value} c"
+        return c.error(offset, "type", f"{op.value} cannot compare {left.type} with {right.type}{hint}")
     if isinstance(t, StringType):
         return _build(c, op, c.coerce(left, t), c.coerce(right, t), BOOL, offset)
     if t in _UNTYPED:

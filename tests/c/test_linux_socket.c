@@ -1,0 +1,112 @@
+/*
+ * test_linux_socket.c - SysSocket: what a closed connection still sends, and one that is reset does not.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#define _GNU_SOURCE
+#include "SysSocket.h"
+
+#include "SysTime.h"
+#include "port.h"
+#include "test.h"
+
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum { WAIT_MS = 10000 };
+
+typedef struct {
+    int listener;
+    int file; /* its end of the connection */
+    RTS_HANDLE socket;
+} PEER;
+
+/* Connects to a peer that reads nothing yet, and has little room. */
+static void begin(PEER *peer)
+{
+    struct sockaddr_in own = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t size = sizeof(own);
+    int room = 4096;
+    RTS_I64 deadline = SysTimeGetNs() + WAIT_MS * (RTS_I64)1000000;
+
+    peer->listener = socket(AF_INET, SOCK_STREAM, 0);
+    CHECK_EQUAL(setsockopt(peer->listener, SOL_SOCKET, SO_RCVBUF, &room, sizeof(room)), 0);
+    CHECK_EQUAL(bind(peer->listener, (struct sockaddr *)&own, size), 0);
+    CHECK_EQUAL(listen(peer->listener, 1), 0);
+    CHECK_EQUAL(getsockname(peer->listener, (struct sockaddr *)&own, &size), 0);
+    peer->socket = SysSockConnect(&(SOCKADDRESS){INADDR_LOOPBACK, ntohs(own.sin_port)});
+    while (SysSockGetConnected(peer->socket) == ERR_PENDING && SysTimeGetNs() < deadline)
+        (void)PortWait(1);
+    peer->file = accept(peer->listener, NULL, NULL);
+    CHECK(peer->file >= 0);
+}
+
+static void end(PEER *peer)
+{
+    close(peer->file);
+    close(peer->listener);
+}
+
+/* Sends until nothing more is taken. */
+static size_t fill(RTS_HANDLE socket)
+{
+    static RTS_UI8 data[65536];
+    size_t all = 0;
+    RTS_UI32 taken;
+
+    do {
+        CHECK_EQUAL(SysSockSend(socket, data, sizeof(data), &taken), ERR_OK);
+        all += taken;
+    } while (taken != 0);
+    return all;
+}
+
+/* What the peer gets until the connection ends; *how: 0, or -1 if it was reset. */
+static size_t drain(const PEER *peer, ssize_t *how)
+{
+    static RTS_UI8 data[65536];
+    struct pollfd polled = {.fd = peer->file, .events = POLLIN};
+    size_t all = 0;
+
+    do {
+        CHECK_EQUAL(poll(&polled, 1, WAIT_MS), 1);
+        *how = read(peer->file, data, sizeof(data));
+        all += *how > 0 ? (size_t)*how : 0;
+    } while (*how > 0);
+    return all;
+}
+
+static void a_closed_connection_sends_what_was_taken(void)
+{
+    PEER peer;
+    ssize_t how;
+
+    begin(&peer);
+    size_t sent = fill(peer.socket);
+    SysSockClose(peer.socket);
+    CHECK_EQUAL(drain(&peer, &how), sent);
+    CHECK_EQUAL(how, 0);
+    end(&peer);
+}
+
+static void one_that_is_reset_sends_nothing_more(void)
+{
+    PEER peer;
+    ssize_t how;
+
+    begin(&peer);
+    size_t sent = fill(peer.socket);
+    SysSockReset(peer.socket);
+    CHECK(drain(&peer, &how) < sent);
+    CHECK_EQUAL(how, -1);
+    end(&peer);
+}
+
+int main(void)
+{
+    RUN(a_closed_connection_sends_what_was_taken);
+    RUN(one_that_is_reset_sends_nothing_more);
+    return test_result();
+}
