@@ -87,7 +87,7 @@ build/build.ninja: $(VENV)/dev
 	$(MESON) setup build
 
 build-sanitized/build.ninja: $(VENV)/dev
-	$(MESON) setup build-sanitized -Db_sanitize=address,undefined -Db_lundef=false
+	$(MESON) setup build-sanitized -Dhost=false -Doptimization=1 -Db_sanitize=address,undefined -Db_lundef=false
 
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini

@@ -1,22 +1,33 @@
-"""Runs `meson test` in the build folders given and prints the failures and one closing line over all of them.
+"""Runs the tests of the build folders given as one pool, and prints the failures and one closing line over all.
 
-C tests count as one test each; pytest suites are counted by their own tests, from the JUnit files they leave.
+A process runs for each processor and one more, because some tests wait more than they work. Those with the highest
+priority, which is about their seconds, come first, so that no processor idles while the last long one ends. The C
+tests of a folder, which are short, are one process: a `meson test`.
+
+C tests count as one test each; pytest suites are counted by their own tests, from the JUnit files they leave. What a
+process printed is in meson-logs/, and here if it failed.
 """
 
 from __future__ import annotations
 
 import argparse
-import compileall
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ET
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+C_TESTS_SECONDS = 60  # of one folder, about
+SKIPPED = 77  # exit status, as for meson: there was nothing that could be tested
+LOOK_EVERY = 0.02  # for processes that ended [s]
 
 
 @dataclass
@@ -25,6 +36,76 @@ class Outcome:
 
     counts: Counter[str]
     failures: list[str]
+
+
+@dataclass(frozen=True)
+class Job:
+    """What one process tests. `seconds`: it takes, about; `timeout` [s]: it is given; `report`: where it leaves what
+    became of its tests, if it does."""
+
+    name: str
+    command: list[str]
+    seconds: int
+    timeout: float
+    report: Path
+    output: Path
+    folder: str | None = None
+    env: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass
+class Running:
+    """The process of a job, and when it began and is killed [s of time.monotonic]."""
+
+    job: Job
+    process: subprocess.Popen[bytes]
+    begin: float
+    end: float
+
+    @classmethod
+    def start(cls, job: Job) -> Running:
+        job.report.unlink(missing_ok=True)
+        with job.output.open("wb") as output:
+            process = subprocess.Popen(
+                job.command, cwd=job.folder, env=os.environ | job.env, start_new_session=True,
+                stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+            )  # fmt: skip
+        now = time.monotonic()
+        return cls(job, process, now, now + job.timeout)
+
+    def kill(self) -> None:
+        """With all it started; its end is still to be waited for."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+
+
+@dataclass
+class Done:
+    """A job that ended. `seconds`: from begin to end; `used`: of processors, with the processes it waited for."""
+
+    job: Job
+    status: int
+    seconds: float
+    used: float
+
+    @property
+    def is_good(self) -> bool:
+        return self.status in (0, SKIPPED)
+
+    @property
+    def outcome(self) -> Outcome:
+        """Of its tests; a process that failed without a test that did is a failure of its own."""
+        if self.status == SKIPPED:
+            return Outcome(Counter(skipped=1), [])
+        if not self.job.report.exists():
+            outcome = Outcome(Counter({"failed" if self.status else "passed": 1}), [])
+        elif self.job.report.suffix == ".xml":
+            outcome = pytest_outcome(self.job.report)
+        else:
+            outcome = meson_outcome(self.job.report)
+        if self.status and not outcome.failures:
+            outcome.failures.append(f"exit status {self.status}, see {self.job.output}")
+        return outcome
 
 
 def pytest_outcome(report: Path) -> Outcome:
@@ -40,28 +121,54 @@ def pytest_outcome(report: Path) -> Outcome:
     return Outcome(Counter(passed=total - failed - skipped, failed=failed, skipped=skipped), failures)
 
 
-def meson_outcome(test: dict[str, str]) -> Outcome:
-    """A test in the log of meson that is no pytest suite."""
-    outcome = {"OK": "passed", "SKIP": "skipped"}.get(test["result"], "failed")
-    return Outcome(Counter({outcome: 1}), [f"{test['name']}: {test['result']}"] if outcome == "failed" else [])
+def meson_outcome(log: Path) -> Outcome:
+    """The tests in a log of meson."""
+    tests = [json.loads(line) for line in log.read_text().splitlines()]
+    outcomes = [{"OK": "passed", "SKIP": "skipped"}.get(test["result"], "failed") for test in tests]
+    failures = [f"{t['name']}: {t['result']}" for t, o in zip(tests, outcomes, strict=True) if o == "failed"]
+    return Outcome(Counter(outcomes), failures)
 
 
-def run(meson: str, build: Path) -> tuple[int, Outcome]:
-    """One `meson test`; its exit status and the outcome of its tests."""
-    reports = build / "pytest-reports"
-    for old in reports.glob("*.xml"):
-        old.unlink()
-    processes = (os.cpu_count() or 1) + 1  # some tests wait more than they work
-    command = [meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild", "--num-processes", str(processes)]
-    status = subprocess.run(command, check=False).returncode
-    total = Outcome(Counter(), [])
-    for line in (build / "meson-logs" / "testlog.json").read_text().splitlines():
-        test = json.loads(line)
-        report = reports / f"{test['name'].rsplit(':', 1)[-1]}.xml"
-        outcome = pytest_outcome(report) if report.exists() else meson_outcome(test)
-        total.counts += outcome.counts
-        total.failures += [f"{build.name}: {failure}" for failure in outcome.failures]
-    return status, total
+def jobs_of(meson: str, build: Path) -> Iterator[Job]:
+    """All tests of a build folder."""
+    logs, reports = build / "meson-logs", build / "pytest-reports"
+    command = [meson, "test", "-C", str(build), "--print-errorlogs", "--no-rebuild", "--num-processes", "1"]
+    yield Job(
+        f"{build.name} c", [*command, "--suite", "c"], C_TESTS_SECONDS, float("inf"),
+        logs / "testlog.json", logs / "c.txt",
+    )  # fmt: skip
+    for test in json.loads(subprocess.check_output([meson, "introspect", "--tests", str(build)])):
+        name = test["name"]
+        if any(suite.endswith(":python") for suite in test["suite"]):
+            yield Job(
+                f"{build.name} {name}", test["cmd"], test["priority"], test["timeout"],
+                reports / f"{name}.xml", logs / f"{name}.txt", test["workdir"], test["env"],
+            )  # fmt: skip
+
+
+def run(jobs: Iterable[Job], at_once: int) -> Iterator[Done]:
+    """Runs them in this order, so many at once, and gives them as they end."""
+    waiting = list(reversed(list(jobs)))
+    running: dict[int, Running] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < at_once:
+                started = Running.start(waiting.pop())
+                running[started.process.pid] = started
+            for late in running.values():
+                if time.monotonic() > late.end:
+                    late.kill()
+            pid, status, usage = os.wait4(-1, os.WNOHANG)
+            if pid:
+                ended = running.pop(pid)
+                ended.process.returncode = os.waitstatus_to_exitcode(status)
+                seconds = time.monotonic() - ended.begin
+                yield Done(ended.job, ended.process.returncode, seconds, usage.ru_utime + usage.ru_stime)
+            else:
+                time.sleep(LOOK_EVERY)
+    finally:
+        for left in running.values():
+            left.kill()
 
 
 def main() -> int:
@@ -69,18 +176,26 @@ def main() -> int:
     parser.add_argument("--meson", required=True)
     parser.add_argument("builds", nargs="+", type=Path)
     args = parser.parse_args()
-    # Tests start plctool some thousand times, and write no bytecode themselves: compiling it took half of each start.
-    compileall.compile_dir(ROOT / "host" / "plctool", quiet=1)
-    status, total = 0, Outcome(Counter(), [])
-    for build in args.builds:
-        print(f"==== {build}", flush=True)
-        one_status, outcome = run(args.meson, build)
-        status = status or one_status
-        total.counts += outcome.counts
-        total.failures += outcome.failures
-    for failure in total.failures:
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # tests send it; `make test &` would have it ignored
+    jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
+    jobs.sort(key=lambda job: -job.seconds)
+    begin, used, counts, failures, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
+    for number, done in enumerate(run(jobs, (os.cpu_count() or 1) + 1), 1):
+        outcome = done.outcome
+        result = "ok" if done.is_good else "failed"
+        print(
+            f"{number}/{len(jobs)} {done.job.name}: {result}, {done.seconds:.1f} s, {done.used:.1f} s of processors",
+            flush=True,
+        )
+        if not done.is_good:
+            print(done.job.output.read_text(errors="replace"), flush=True)
+        status |= not done.is_good
+        used += done.used
+        counts += outcome.counts
+        failures += [f"{done.job.name}: {failure}" for failure in outcome.failures]
+    for failure in failures:
         print(f"FAILED {failure}")
-    counts = total.counts
+    print(f"{time.monotonic() - begin:.0f} s, {used:.0f} s of processors")
     print(f"{counts['passed']} passed, {counts['failed']} failed, {counts['skipped']} skipped")
     return status
 

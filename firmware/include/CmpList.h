@@ -12,10 +12,6 @@
  *
  * SysFoo has the hook SysFoo_Hook and the number CMPID_SysFoo. What is not chosen takes no flash.
  */
-#include "CmpBlkDrvCan.h"
-#include "CmpBlkDrvSimpleCom.h"
-#include "CmpBlkDrvTcp.h"
-#include "CmpBlkDrvUdp.h"
 #include "CmpItf.h"
 
 #define X(component) RTS_RESULT component##_Hook(CMP_HOOK hook);
@@ -35,7 +31,9 @@ const CMP_NAME cmp_names[] = {
 #undef X
 
 #ifdef HAS_CmpPlcShell
-const BLK_COUNTERS *const BlkCounters[] = {
+extern const struct BLK_COUNTERS BlkDrvComCounters, BlkDrvCanCounters, BlkDrvTcpCounters, BlkDrvUdpCounters;
+
+const struct BLK_COUNTERS *const BlkCounters[] = {
 #ifdef HAS_CmpBlkDrvSimpleCom
     &BlkDrvComCounters,
 #endif

@@ -55,7 +55,7 @@ typedef struct ROUTER_PEER {
 } ROUTER_PEER;
 
 /* The counters of a block driver with their names, for the PLC shell. */
-typedef struct {
+typedef struct BLK_COUNTERS {
     const char *driver;
     const char *const *names;
     RTS_UI32 count;

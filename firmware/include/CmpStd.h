@@ -46,8 +46,11 @@ typedef void (*RTS_PFN)(void);
 /* Of a function whose frame or whose name is needed, by what measures it, when the program is optimised as a whole. */
 #ifdef __GNUC__
 #define RTS_NOINLINE __attribute__((noinline))
+/* Of a small function that runs in each cycle, also where the compiler saves room. */
+#define RTS_INLINE inline __attribute__((always_inline))
 #else
 #define RTS_NOINLINE
+#define RTS_INLINE inline
 #endif
 #endif
 

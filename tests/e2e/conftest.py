@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from plctool_commands import run_plctool
 
 from plctool.testing.plcrt import Plcrt, find_plcrt
 
@@ -40,11 +43,7 @@ class Tool:
     folder: Path
 
     def __call__(self, *args: str, timeout: float = 120) -> Done:
-        env = os.environ | {"XDG_CACHE_HOME": str(self.folder / "cache")}
-        command = [sys.executable, "-m", "plctool", *args]
-        done = subprocess.run(
-            command, cwd=self.folder, env=env, capture_output=True, text=True, timeout=timeout, check=False
-        )
+        done = run_plctool(args, self.folder, os.environ | {"XDG_CACHE_HOME": str(self.folder / "cache")}, timeout)
         return Done(done.returncode, done.stdout, done.stderr)
 
     def ok(self, *args: str, timeout: float = 120) -> Any:

@@ -98,18 +98,33 @@ static uint8_t range_of(uint8_t count)
     return (uint8_t)(1u << range);
 }
 
-/* Notes what the last input reached; true when something of it is new. Of inputs that are only sorted out it does not
- * matter how often they reach it: that keeps a corpus small. */
-static bool note_hits(void)
+/* Those of `count` places from `first` on; true when something is new. */
+static bool note_places(size_t first, size_t count)
 {
     bool is_new = false;
 
-    for (size_t i = 0; i < MAP_SIZE; i++) {
+    for (size_t i = first; i < first + count; i++) {
         uint8_t range = options.inputs == 0 ? 1 : range_of(hits[i]);
         if (hits[i] != 0 && (reached[i] & range) == 0) {
             reached[i] |= range;
             is_new = true;
         }
+    }
+    return is_new;
+}
+
+/* Notes what the last input reached; true when something of it is new. Of inputs that are only sorted out it does not
+ * matter how often they reach it: that keeps a corpus small. Few places are reached, and to pass over the others eight
+ * by eight makes most targets several times as fast. */
+static bool note_hits(void)
+{
+    bool is_new = false;
+    uint64_t eight;
+
+    for (size_t i = 0; i < MAP_SIZE; i += sizeof(eight)) {
+        memcpy(&eight, hits + i, sizeof(eight));
+        if (eight != 0 && note_places(i, sizeof(eight)))
+            is_new = true;
     }
     return is_new;
 }

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from environment import ROOT, TARGET, eventually
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from plctool_commands import run_plctool
 
 CYCLES = 60  # at least, of the benchmark before its checksum is looked at
 
@@ -75,12 +78,11 @@ class Engineer:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.port = ""
-        self._env = os.environ | {"XDG_CACHE_HOME": str(folder / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+        self._env = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
 
     def types(self, *words: str) -> Any:
         """A command; what it answers to --json."""
-        command = [sys.executable, "-m", "plctool", *words, "--json"]
-        done = subprocess.run(command, cwd=self.folder, env=self._env, capture_output=True, text=True, timeout=120)
+        done = run_plctool([*words, "--json"], self.folder, self._env, timeout=120)
         assert done.returncode == 0, f"plctool {' '.join(words)}: {done.stdout}{done.stderr}"
         return json.loads(done.stdout)
 

@@ -40,7 +40,7 @@ RTS_RESULT IecTaskStartAll(void)
 }
 
 /* Not inlined: it is called from three places. */
-__attribute__((noinline)) void IecTaskStopAll(void)
+RTS_NOINLINE void IecTaskStopAll(void)
 {
     IecCycleStop();
     SchedStop();

@@ -59,16 +59,14 @@ enum { NS_PER_MS = 1000000, NS_PER_US = 1000 };
 
 /* ---- guards: a few instructions, shorter than a call ---- */
 
-#define GUARD_INLINE inline __attribute__((always_inline))
-
-static GUARD_INLINE void guard_begin(GUARD *guard, RTS_I64 now_ns)
+static RTS_INLINE void guard_begin(GUARD *guard, RTS_I64 now_ns)
 {
     guard->start_ns = now_ns;
     SysAtomicStore(&guard->phase, guard->phase + 1);
     SysAtomicFence(); /* what sees a write of the cycle sees that it runs */
 }
 
-static GUARD_INLINE void guard_end(GUARD *guard)
+static RTS_INLINE void guard_end(GUARD *guard)
 {
     SysAtomicStore(&guard->phase, guard->phase + 1);
 }
@@ -238,7 +236,7 @@ static void run_phases_after(TASK *task)
 }
 
 /* Not inlined, because the compiler then computes the place of the task in the list again for each field. */
-static __attribute__((noinline)) bool run_cycle(TASK *task, RTS_I64 due_ns)
+static RTS_NOINLINE bool run_cycle(TASK *task, RTS_I64 due_ns)
 {
     RTS_I64 start_ns = SysTimeGetNs();
     RTS_I64 used_before_ns = used_ns(task);

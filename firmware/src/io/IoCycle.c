@@ -43,9 +43,7 @@ static struct {
 /* ---- one driver, one caller ---- */
 
 /* Inlined, as what is done at both ends of each call of a driver. */
-#define CYCLE_INLINE static inline __attribute__((always_inline))
-
-CYCLE_INLINE bool enter_driver(IO_DRIVER *driver)
+static RTS_INLINE bool enter_driver(IO_DRIVER *driver)
 {
     if (SysAtomicReplace(&driver->busy, 0, 1))
         return true;
@@ -74,7 +72,7 @@ static RTS_UI32 take_notes(IO_DRIVER *driver)
 
 /* Not just a load on several cores: of it and note() one is first, so either a note is seen here, or its writer sees that
  * the driver is free. */
-CYCLE_INLINE bool has_notes(IO_DRIVER *driver)
+static RTS_INLINE bool has_notes(IO_DRIVER *driver)
 {
     return (RTS_ONE_CORE ? SysAtomicLoad(&driver->pending) : SysAtomicAdd(&driver->pending, 0)) != 0;
 }
@@ -89,7 +87,7 @@ static void follow_notes(IO_DRIVER *driver)
     }
 }
 
-CYCLE_INLINE void leave_driver(IO_DRIVER *driver)
+static RTS_INLINE void leave_driver(IO_DRIVER *driver)
 {
     SysAtomicStore(&driver->busy, 0);
     if (has_notes(driver))
@@ -112,8 +110,9 @@ static bool enter_or_note(IO_DRIVER *driver, RTS_UI32 what)
 typedef IO_DRIVER *(*PF_DRIVER_OF)(RTS_UI32 connector);
 
 /* The end of those connectors from `map` on that go to one driver, or to none. Mostly there is one. */
-CYCLE_INLINE const IoConfigConnectorMap *end_of_run(const IoConfigConnectorMap *map, const IoConfigConnectorMap *end,
-                                                    PF_DRIVER_OF driver_of, const IO_DRIVER *driver)
+static RTS_INLINE const IoConfigConnectorMap *end_of_run(const IoConfigConnectorMap *map,
+                                                         const IoConfigConnectorMap *end, PF_DRIVER_OF driver_of,
+                                                         const IO_DRIVER *driver)
 {
     while (++map < end && driver_of(map->connector) == driver) {
     }

@@ -186,9 +186,7 @@ const IoConfigChannelMap *IoMgrConfigGetChannelMaps(const IoConfigConnectorMap *
 /* ---- copies ---- */
 
 /* Inlined, but for bytes: a bit is a few instructions, and there may be many. */
-#define COPY_INLINE static inline __attribute__((always_inline))
-
-static __attribute__((noinline)) void copy_bytes(RTS_UI8 *to, const RTS_UI8 *from, RTS_UI32 size, bool swapped)
+static RTS_NOINLINE void copy_bytes(RTS_UI8 *to, const RTS_UI8 *from, RTS_UI32 size, bool swapped)
 {
     if (!swapped) {
         memcpy(to, from, size);
@@ -199,7 +197,7 @@ static __attribute__((noinline)) void copy_bytes(RTS_UI8 *to, const RTS_UI8 *fro
 }
 
 /* Within one byte on both sides. */
-COPY_INLINE void copy_bits(RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from, RTS_UI32 from_bit, RTS_UI32 bits)
+static RTS_INLINE void copy_bits(RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from, RTS_UI32 from_bit, RTS_UI32 bits)
 {
     RTS_UI32 mask = ((1u << bits) - 1) << (to_bit & 7);
     RTS_UI32 value = (RTS_UI32)from[from_bit >> 3] >> (from_bit & 7) << (to_bit & 7);
@@ -209,8 +207,8 @@ COPY_INLINE void copy_bits(RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from, RT
 }
 
 /* Whole bytes, or bits. */
-COPY_INLINE void copy(const IoConfigChannelMap *channel, RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from,
-                      RTS_UI32 from_bit, RTS_UI32 turned)
+static RTS_INLINE void copy(const IoConfigChannelMap *channel, RTS_UI8 *to, RTS_UI32 to_bit, const RTS_UI8 *from,
+                            RTS_UI32 from_bit, RTS_UI32 turned)
 {
     RTS_UI32 bits = channel->bits;
 
@@ -221,12 +219,12 @@ COPY_INLINE void copy(const IoConfigChannelMap *channel, RTS_UI8 *to, RTS_UI32 t
                    (channel->flags & IO_CHANNEL_BIG_ENDIAN) != turned);
 }
 
-COPY_INLINE void copy_input(const IoConfigChannelMap *channel, const void *memory, RTS_UI32 turned)
+static RTS_INLINE void copy_input(const IoConfigChannelMap *channel, const void *memory, RTS_UI32 turned)
 {
     copy(channel, tables.areas[APP_AREA_INPUT], channel->area_bit, memory, channel->parameter_bit, turned);
 }
 
-COPY_INLINE void copy_output(const IoConfigChannelMap *channel, void *memory, RTS_UI32 turned)
+static RTS_INLINE void copy_output(const IoConfigChannelMap *channel, void *memory, RTS_UI32 turned)
 {
     copy(channel, memory, channel->parameter_bit, tables.areas[APP_AREA_OUTPUT], channel->area_bit, turned);
 }

@@ -6,12 +6,9 @@ applied, everything else (writable data, absolute addresses, undefined symbols) 
 
 from __future__ import annotations
 
-import io
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-from elftools.elf.elffile import ELFFile
 
 from plctool.compiler.codegen.compiler_calls import COMPILER_CALLS
 from plctool.compiler.codegen.line_table import Line, in_order, read_line_table
@@ -37,6 +34,7 @@ from plctool.image.targets import Machine, Target
 _WRITABLE, _ALLOCATED, _EXECUTABLE = 1, 2, 4
 _DROPPED = (".ARM.exidx", ".ARM.extab", ".eh_frame")
 _FUNCTION = 2  # STT_FUNC
+_SYMBOL_TABLE, _RELOCATIONS_WITH_ADDENDS, _NO_BITS, _RELOCATIONS = 2, 4, 8, 9  # SHT_SYMTAB, RELA, NOBITS, REL
 _THUMBS = (Machine.THUMB, Machine.THUMB_V6M)
 
 
@@ -277,22 +275,51 @@ def _only_debug(sections: list[_Section], data: bytes) -> bytes:
 
 def _read_elf(data: bytes, target: Target, base: int) -> tuple[list[_Section], list[_ElfSymbol]]:
     """`base`: index of the first section; symbols refer to sections by index."""
-    elf = ELFFile(io.BytesIO(data))
     wide = target.pointer_size == 8
+    headers = _read_section_headers(data, wide)
+    bodies = [b"" if h.type == _NO_BITS else data[h.offset : h.offset + h.size] for h in headers]
     sections: list[_Section] = []
     symbols: list[_ElfSymbol] = []
-    for s in elf.iter_sections():
-        body = b"" if s["sh_type"] == "SHT_NOBITS" or s.name.startswith(_DROPPED) else s.data()
-        sections.append(_Section(s.name, body, s["sh_flags"], max(s["sh_addralign"], 1), [], s["sh_offset"]))
-    for s in elf.iter_sections():
-        if s["sh_type"] == "SHT_SYMTAB":
-            symbols = _read_symbols(s.data(), elf.get_section(s["sh_link"]).data(), len(sections), base, wide)
-    for s in elf.iter_sections():
-        owner = sections[s["sh_info"]] if s["sh_type"] in ("SHT_REL", "SHT_RELA") else None
+    for h, body in zip(headers, bodies, strict=True):
+        kept = b"" if h.name.startswith(_DROPPED) else body
+        sections.append(_Section(h.name, kept, h.flags, max(h.alignment, 1), [], h.offset))
+    for h, body in zip(headers, bodies, strict=True):
+        if h.type == _SYMBOL_TABLE:
+            symbols = _read_symbols(body, bodies[h.link], len(sections), base, wide)
+    for h, body in zip(headers, bodies, strict=True):
+        owner = sections[h.info] if h.type in (_RELOCATIONS, _RELOCATIONS_WITH_ADDENDS) else None
         if owner is not None and owner.data and (owner.flags & _ALLOCATED or owner.is_debug):
-            entries = _read_relocations(s.data(), s["sh_type"] == "SHT_RELA", wide, owner.data)
+            entries = _read_relocations(body, h.type == _RELOCATIONS_WITH_ADDENDS, wide, owner.data)
             owner.relocations = [(offset, kind, symbols[number], addend) for offset, kind, number, addend in entries]
     return sections, symbols
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What the section header table says of a section. `offset`, `size` [bytes]: its place in the file; `link`, `info`:
+    sections that belong to it, depending on its type."""
+
+    name: str
+    type: int
+    flags: int
+    offset: int
+    size: int
+    link: int
+    info: int
+    alignment: int
+
+
+def _read_section_headers(data: bytes, wide: bool) -> list[_Header]:
+    """The section header table of an ELF file, whose place and size are in the file's header."""
+    table, entry, count, of_names = struct.unpack_from("<Q10x3H" if wide else "<I10x3H", data, 40 if wide else 32)
+    layout = "<IIQ8xQQIIQ" if wide else "<III4xIIIII"
+    rows = [struct.unpack_from(layout, data, table + entry * number) for number in range(count)]
+    names = rows[of_names][3]
+    return [_Header(_name_at(data, names + row[0]), *row[1:]) for row in rows]
+
+
+def _name_at(data: bytes, place: int) -> str:
+    return data[place : data.index(0, place)].decode()
 
 
 def _read_symbols(data: bytes, names: bytes, section_count: int, base: int, wide: bool) -> list[_ElfSymbol]:
@@ -302,9 +329,8 @@ def _read_symbols(data: bytes, names: bytes, section_count: int, base: int, wide
             name, info, _, section, value, size = fields
         else:
             name, value, size, info, _, section = fields
-        text = names[name : names.index(0, name)].decode()
         index = base + section if 0 < section < section_count else 0
-        symbols.append(_ElfSymbol(text, index, value, size, info & 15, info >> 4 == 1))
+        symbols.append(_ElfSymbol(_name_at(names, name), index, value, size, info & 15, info >> 4 == 1))
     return symbols
 
 

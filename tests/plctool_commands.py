@@ -1,0 +1,146 @@
+"""plctool's commands as processes of their own, without the imports that are most of the work of a short command.
+
+A server, this file as a program, has imported plctool and forks for each command. What that leaves out is the start of
+Python, the imports and the tables of the grammar; `python -m plctool` is tested in tests/cli and tests/docs.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import gc
+import importlib
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import traceback
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import IO, Any, NoReturn
+
+IMPORTED = (
+    "plctool.cli.main",
+    "plctool.compiler.build",
+    "plctool.compiler.library",
+    "plctool.device",
+    "plctool.gateway.client",
+    "plctool.port_check",
+    "plctool.sim",
+    "plctool.st_tests",
+    "plctool.trace_file",
+)
+LONGEST = 1 << 18  # bytes of a request; the environment is its greatest part
+
+
+@cache
+def _server() -> socket.socket:
+    """Where requests go: JSON with the files stdin, stdout, stderr and a pipe for the process id and its end."""
+    here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with there:
+        command = [sys.executable, __file__, str(there.fileno())]
+        env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        process = subprocess.Popen(command, pass_fds=[there.fileno()], env=env)
+
+    def end() -> None:
+        here.close()
+        process.wait()
+
+    here.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, LONGEST)
+    atexit.register(end)
+    return here
+
+
+def run_plctool(
+    words: Sequence[str], folder: Path, env: Mapping[str, str], timeout: float
+) -> subprocess.CompletedProcess[str]:
+    """Runs `plctool WORDS` in a folder; raises TimeoutExpired after `timeout` [s], as subprocess.run does."""
+    request = {"words": words, "folder": str(folder), "env": dict(env)}
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err, open(os.devnull) as nothing:
+        reader, writer = os.pipe()
+        with open(reader) as told:
+            files = [nothing.fileno(), out.fileno(), err.fileno(), writer]
+            socket.send_fds(_server(), [json.dumps(request).encode()], files)
+            os.close(writer)
+            pid = int(told.readline())
+            if not select.select([told], [], [], timeout)[0]:
+                os.kill(pid, signal.SIGKILL)
+                raise subprocess.TimeoutExpired(["plctool", *words], timeout, _content(out), _content(err))
+            status = int(told.readline())
+        return subprocess.CompletedProcess(["plctool", *words], status, _content(out), _content(err))
+
+
+def _content(file: IO[str]) -> str:
+    file.seek(0)
+    return file.read()
+
+
+def _serve(requests: socket.socket) -> None:
+    """Until pytest has ended and no command runs. The pipe of each gets the process id, and then its end."""
+    tellers: dict[int, tuple[int, int]] = {}  # by file of the process: its id, and the pipe
+    asked = [requests]
+    while asked or tellers:
+        for ready in select.select([*asked, *tellers], [], [])[0]:
+            if ready is requests:
+                data, files, _, _ = socket.recv_fds(requests, LONGEST, 4)
+                if not data:
+                    asked = []
+                    continue
+                *streams, teller = files
+                if (pid := os.fork()) == 0:
+                    requests.close()
+                    _work(json.loads(data), streams)
+                os.write(teller, b"%d\n" % pid)
+                tellers[os.pidfd_open(pid)] = pid, teller
+                for file in streams:
+                    os.close(file)
+            else:
+                pid, teller = tellers.pop(ready)
+                _, status = os.waitpid(pid, 0)
+                with contextlib.suppress(BrokenPipeError):  # it was not waited for
+                    os.write(teller, b"%d\n" % os.waitstatus_to_exitcode(status))
+                os.close(teller)
+                os.close(ready)
+
+
+def _work(request: dict[str, Any], streams: list[int]) -> NoReturn:
+    """The process of a command."""
+    for number, file in enumerate(streams):
+        os.dup2(file, number)
+    os.closerange(3, max(streams) + 64)
+    os.chdir(request["folder"])
+    os.environ.clear()
+    os.environ.update(request["env"])
+    sys.argv = ["plctool", *request["words"]]
+    sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115 # buffered as a file
+    try:
+        status = sys.modules["plctool.cli.main"].main()
+    except SystemExit as end:
+        status = end.code or 0
+    except BaseException:
+        traceback.print_exc()
+        status = 1
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread() and not thread.daemon:
+            thread.join()
+    sys.stdout.flush()
+    os._exit(status)  # without taking everything down that was imported
+
+
+def main() -> None:
+    for module in IMPORTED:
+        importlib.import_module(module)
+    sys.modules["plctool.compiler.syntax.tables"].load_tables()
+    gc.freeze()  # so that the pages stay common to all processes
+    with socket.socket(fileno=int(sys.argv[1])) as requests:
+        _serve(requests)
+
+
+if __name__ == "__main__":
+    main()
