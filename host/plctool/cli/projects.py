@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from plctool.compiler import IoFiles, Level
+from plctool.compiler.project import Project, read_project
 from plctool.compiler.warnings import WarningOptions, warning_options
 from plctool.errors import UsageError
-from plctool.project import DEFAULT_IMAGE, PROJECT_FILE, Project, find_project, project_named, read_project
+from plctool.project import DEFAULT_IMAGE, PROJECT_FILE, find_project, project_named
 
 DEFAULT_LEVEL: Level = 2
 

@@ -9,15 +9,15 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
+from plctool.compiler.diagnostics import CompileError
+from plctool.compiler.level import Level
 from plctool.compiler.program_files import IoFiles, ProgramFiles, program_files
-from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET
 
 if TYPE_CHECKING:
     from plctool.compiler.build import BuildResult
-    from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.front import CheckResult
     from plctool.compiler.imports import ImportedLibrary
     from plctool.compiler.source import Source
@@ -28,19 +28,6 @@ __all__ = [
     "CompileError", "IoFiles", "Level", "ProgramFiles", "check_sources", "check_with_tests", "compile_sources",
     "io_sources", "library_sources", "load_io", "load_sources", "program_files",
 ]  # fmt: skip
-
-Level = int | Literal["s"]
-"""How much is optimised: 0 .. 3, or "s" for small code."""
-
-
-class CompileError(UsageError):
-    """The program has errors. The message has all diagnostics as users read them; `diagnostics` is for programs."""
-
-    def __init__(self, diagnostics: Sequence[Diagnostic], sources: Sequence[Source]) -> None:
-        from plctool.compiler.diagnostics import render_all
-
-        super().__init__("\n".join(render_all(diagnostics, sources)), "compile")
-        self.diagnostics = list(diagnostics)
 
 
 def load_sources(paths: Sequence[Path | str]) -> list[Source]:

@@ -13,6 +13,7 @@ from plctool.compiler.missing_names import Use, table
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Pos
 from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
+from plctool.errors import UsageError
 from plctool.errors import did_you_mean as did_you_mean
 
 Severity = Literal["error", "warning"]
@@ -167,3 +168,11 @@ def _part_of(line: str, column: int) -> tuple[str, int]:
     begin = max(0, min(column - MAX_LINE // 2, len(line) - MAX_LINE))
     before, behind = "..." * (begin > 0), "..." * (begin + MAX_LINE < len(line))
     return before + line[begin : begin + MAX_LINE] + behind, column - begin + len(before)
+
+
+class CompileError(UsageError):
+    """The program has errors. The message has all diagnostics as users read them; `diagnostics` is for programs."""
+
+    def __init__(self, diagnostics: Sequence[Diagnostic], sources: Sequence[Source]) -> None:
+        super().__init__("\n".join(render_all(diagnostics, sources)), "compile")
+        self.diagnostics = list(diagnostics)

@@ -20,11 +20,12 @@ from plctool.compiler.library_zip import is_zip, read_zip
 from plctool.compiler.source import Source
 from plctool.compiler.source_files import load, read_contents
 from plctool.compiler.syntax.lexer import KEYWORDS
+from plctool.compiler.toml_files import error_at, read_checked
 from plctool.errors import UsageError, did_you_mean
 from plctool.files import Pos, read_utf8
 from plctool.iec.types import ELEMENTARY
 from plctool.io.tables import Table
-from plctool.project import LIBRARY_FILE, error_at, read_checked
+from plctool.project import LIBRARY_FILE
 
 _STAND_INS = {name.casefold() for name in STAND_INS}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)

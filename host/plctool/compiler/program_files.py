@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from plctool.errors import UsageError
 from plctool.image.file import ApplicationInfo
-from plctool.project import project_named, read_project
+from plctool.project import project_named
 
 if TYPE_CHECKING:
     from plctool.compiler.imports import ImportedLibrary
@@ -83,6 +83,8 @@ def program_files(
     file = project_named(named)
     if file is None:
         return ProgramFiles(named, named, given, io, ApplicationInfo(project=named[0].stem if named else ""))
+    from plctool.compiler.project import read_project
+
     project = read_project(file)
     io = IoFiles(io.description or project.io, io.device or project.device, io.wanted)
     beside = [file, *project.sources]

@@ -1,0 +1,212 @@
+"""The project file: what belongs to a program, what it is built for and with which options.
+
+What it says holds where the command line says nothing else. Its paths begin at its own folder.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from plctool.compiler.codegen.lower_unit import parse_checks
+from plctool.compiler.level import Level
+from plctool.compiler.library_files import is_stand_in, libraries_at, no_library
+from plctool.compiler.source_files import READERS
+from plctool.compiler.toml_files import read_checked
+from plctool.compiler.warnings import WARNINGS
+from plctool.errors import UsageError, did_you_mean
+from plctool.files import read_utf8
+from plctool.image.file import ApplicationInfo
+from plctool.image.targets import TARGETS
+from plctool.io.tables import Entry, Table
+from plctool.project import DEFAULT_IMAGE, PROJECT_FILE
+
+_LEVELS: dict[object, Level] = {0: 0, 1: 1, 2: 2, 3: 3, "s": "s"}
+_MAX_TEXT = 255  # characters of what the image says about the project
+_PATTERN = re.compile(r"[*?\[]")
+
+
+@dataclass(frozen=True)
+class Project:
+    """What a project file says, with paths as seen from the current folder. None and empty: it says nothing."""
+
+    file: Path
+    sources: list[Path]
+    libraries: list[Path]
+    output: Path
+    target: str | None = None
+    device: Path | None = None
+    io: Path | None = None
+    level: Level | None = None
+    checks: str | None = None
+    debug: bool = False
+    no_warn: list[str] = field(default_factory=list)
+    werror: bool = False
+    info: ApplicationInfo = field(default_factory=ApplicationInfo)
+
+
+def read_project(file: Path) -> Project:
+    """Reads a project file. Raises CompileError for mistakes in it, UsageError if it cannot be read."""
+    return read_checked(str(file), read_utf8(file, "bad-project"), PROJECT_FILE, lambda table: _project(file, table))
+
+
+def _project(file: Path, table: Table) -> Project:
+    folder = file.parent
+    options = table.table("options") or table.empty("options")
+    information = table.table("information") or table.empty("information")
+    table.text("link")  # what it says is checked where it is used (cli/links.py)
+    project = Project(
+        file,
+        _sources(folder, table),
+        _libraries(folder, table),
+        _output(folder, table),
+        table.choice("target", {name: name for name in TARGETS}),
+        _file(folder, table, "device"),
+        _file(folder, table, "io"),
+        _level(options),
+        _checks(options),
+        options.flag("debug"),
+        _warnings(options),
+        options.flag("werror"),
+        _information(folder, information),
+    )
+    options.close()
+    information.close()
+    return project
+
+
+def _path(folder: Path, entry: Entry, table: Table) -> Path | None:
+    """The path that a text names; None after a mistake."""
+    if not entry.value or not entry.value.isprintable():
+        table.mistakes.error(entry.pos, "a path is not empty, and has no control characters")
+        return None
+    return folder / str(entry.value)
+
+
+def _path_of(folder: Path, table: Table, key: str) -> Path | None:
+    name = table.text(key)
+    pos = table.value_pos(key)
+    return None if name is None else _path(folder, Entry(key, pos, name, pos), table)
+
+
+def _output(folder: Path, table: Table) -> Path:
+    path = _path_of(folder, table, "output") or folder / DEFAULT_IMAGE
+    if path.is_dir():
+        table.error(f'{path} is a folder; write for example output = "{DEFAULT_IMAGE}"', "output")
+    return path
+
+
+def _file(folder: Path, table: Table, key: str) -> Path | None:
+    """A file that has to be there."""
+    path = _path_of(folder, table, key)
+    if path is None:
+        return None
+    if not path.is_file():
+        table.error(f"there is no file {path}", key)
+        return None
+    return path
+
+
+def _sources(folder: Path, table: Table) -> list[Path]:
+    """Files, folders and patterns; without any the whole folder."""
+    if "sources" not in table:
+        table.strings("sources")
+        return [folder]
+    found: dict[Path, None] = {}
+    for entry in table.strings("sources"):
+        found.update(dict.fromkeys(_matching(folder, entry, table)))
+    if not found and not table.mistakes.found:
+        table.error('there are no sources here; write for example sources = ["src"]', "sources")
+    return list(found)
+
+
+def _matching(folder: Path, entry: Entry, table: Table) -> list[Path]:
+    """The sources that an entry of the list names."""
+    text = entry.value
+    path = _path(folder, entry, table)
+    if path is None:
+        return []
+    if path.exists():
+        return [path]
+    if not _PATTERN.search(text):
+        table.mistakes.error(entry.pos, f"there is no file or folder {path}")
+        return []
+    try:
+        files = sorted(p for p in folder.glob(text) if p.is_file() and p.suffix.lower() in READERS)
+    except (ValueError, NotImplementedError):  # an absolute pattern, or ** beside other characters
+        table.mistakes.error(entry.pos, f"'{text}' is not a pattern; write for example \"src/**/*.st\"")
+        return []
+    if not files:
+        table.mistakes.error(entry.pos, f"no source fits {path}")
+    return files
+
+
+def _libraries(folder: Path, table: Table) -> list[Path]:
+    """Libraries, and folders of them. Names that need no files are left out."""
+    found: list[Path] = []
+    for entry in table.strings("libraries"):
+        path = _path(folder, entry, table)
+        if path is None:
+            continue
+        if libraries_at(path):
+            found.append(path)
+        elif not is_stand_in(entry.value.partition(",")[0].strip()):
+            message = no_library(path).rstrip(".")
+            table.mistakes.error(entry.pos, f"{message[:1].lower()}{message[1:]}")
+    return found
+
+
+def _level(options: Table) -> Level | None:
+    value = options.raw("optimisation")
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | str) or value not in _LEVELS:
+        options.error('optimisation can be 0, 1, 2 or 3, or "s" for small code', "optimisation")
+        return None
+    return _LEVELS[value]
+
+
+def _checks(options: Table) -> str | None:
+    value = options.raw("checks")
+    if value is None:
+        return None
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        options.error('checks can be "all", "none" or a list such as ["div", "bounds"]', "checks")
+        return None
+    text = ",".join(names) or "none"
+    try:
+        parse_checks(text)
+    except UsageError as error:
+        options.error(error.message.rstrip("."), "checks")
+        return None
+    return text
+
+
+def _warnings(options: Table) -> list[str]:
+    names = []
+    for entry in options.strings("no-warn"):
+        if entry.value in WARNINGS:
+            names.append(entry.value)
+        else:
+            hint = did_you_mean(entry.value, WARNINGS) or f"; the names are {', '.join(WARNINGS)}"
+            options.mistakes.error(entry.pos, f"there is no warning '{entry.value}'{hint}")
+    return names
+
+
+def _information(folder: Path, table: Table) -> ApplicationInfo:
+    name = _shown(table, "name") or folder.resolve().name
+    return ApplicationInfo(name, _shown(table, "author"), _shown(table, "version"), _shown(table, "description"))
+
+
+def _shown(table: Table, key: str) -> str:
+    """A text that the image carries."""
+    text = table.text(key) or ""
+    if not text.isascii() or not text.isprintable():
+        table.error(f"{key} goes into the image, which takes ASCII only; write other letters with those", key)
+    elif len(text) > _MAX_TEXT:
+        table.error(f"{key} has {len(text)} characters; it can have {_MAX_TEXT}", key)
+    return text
