@@ -161,14 +161,26 @@ class Controller(ABC):
         begin = self._now()
         if not skipped:
             self._download(data, is_there or unchecked, lambda done: progress(done, len(data)))
-            found = self.raw_status().image_crc
-            if found != crc:
-                raise DeviceError(f"The device has image {found:08X} instead of {crc:08X}; flash again.", "verify")
+            self._check_downloaded(crc)
         seconds = self._now() - begin
         persistent = None if skipped else self._kept_changes(status.image_crc, crc)
         if start and not (skipped and status.state is AppState.RUN):
+            self._check_initialised()
             self.start()
         return FlashResult(len(data), seconds, skipped, self.raw_status().state, persistent)
+
+    def _check_downloaded(self, crc: int) -> None:
+        found = self.raw_status()
+        if found.image_crc != crc:
+            message = f"The device has image {found.image_crc:08X} instead of {crc:08X}; flash again."
+            raise DeviceError(message, "verify")
+
+    def _check_initialised(self) -> None:
+        """A controller that went down meanwhile, and came back, would start the program before it."""
+        exception = self.raw_status().exception
+        if exception is not None:
+            message = f"The program stopped in its initialisation: {exception.name}; 'plctool status' says where."
+            raise DeviceError(message, "initialisation")
 
     def _kept_changes(self, before: int, after: int) -> KeptChanges | None:
         """By the CRCs of both images."""

@@ -240,7 +240,8 @@ class Images(Campaign):
             raise Fallen(f"after its death the image is not there, stopped, with the reason: {seen}")
 
     def _judge(self, flash: Flash, ended: Ended, crc: int) -> str:
-        """The image was taken. It may run if it did, or be given up for the program before."""
+        """The image was taken. It may run if it did, or be given up for the program before; what did not kill it in its
+        first run may do so in the next."""
         seen = look_again(self.shop, flash, after=ended)
         if seen.crc == crc and seen.state is AppState.RUN:
             return ITSELF

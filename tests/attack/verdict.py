@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from campaign import Fallen
 from look import LOOK_MS, Seen, expect_running, look
@@ -19,11 +21,22 @@ def look_at(shop: Workshop, device: Device) -> Seen:
 
 def look_again(shop: Workshop, flash: Flash, after: Ended | None = None, stay_stopped: bool = False) -> Seen:
     """What it says after power came back, or after its death. Raises Fallen when it does not come back."""
-    ended = flash.power(partial(look_at, shop), after=after, stay_stopped=stay_stopped)
+    ended = supervised(flash, partial(look_at, shop), after, stay_stopped)
     if ended.how != "used":
         raise Fallen(f"after the attack the runtime {ended.how} {ended.signal}".strip())
     seen: Seen = ended.value
     return seen
+
+
+def supervised(
+    flash: Flash, use: Callable[[Device], Any], after: Ended | None = None, stay_stopped: bool = False
+) -> Ended:
+    """A life. When the program there kills it, though it had proven itself, the program stays stopped in the next, as
+    plcrt's supervisor has it."""
+    ended = flash.power(use, after=after, stay_stopped=stay_stopped)
+    if ended.how == "died" and not stay_stopped:
+        ended = flash.power(use, after=ended, stay_stopped=True)
+    return ended
 
 
 def check_can_be_flashed(shop: Workshop, flash: Flash) -> None:
@@ -34,7 +47,7 @@ def check_can_be_flashed(shop: Workshop, flash: Flash) -> None:
         device.run(PROVING_MS)
 
     try:
-        ended = flash.power(use)
+        ended = supervised(flash, use)
     except DeviceError as error:
         raise Fallen(f"no program can be flashed any more: {error}") from None
     if ended != Ended("used"):

@@ -451,6 +451,7 @@ class FakePlc:
         if self.refuse:
             return lib.ERR_APP_UNRESOLVED_REFERENCE, self.refuse
         self.image, self.state, self.operating = bytes(self.received), lib.AS_STOP, 0
+        self.exception = (lib.RTSEXCPT_NOEXCEPTION, 0xFFFFFFFF, -1)
         return lib.ERR_OK, ""
 
     def _task_info(self, tags: bintag.Tags) -> list[bintag.Tag]:

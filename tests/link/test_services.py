@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError
-from plctool.link import l7, monitoring, services
+from plctool.link import bintag, l7, monitoring, services
 from plctool.link.connection import Connection
 from plctool.link.monitoring import AreaRange, Write
 from plctool.link.services import AppException, AppState
@@ -167,6 +167,44 @@ def test_a_refused_start_names_the_reason() -> None:
     bench.plc.operating = lib.OS_EXCEPTION
     with pytest.raises(DeviceError, match=r"refused the start: .*reset it first \(ERR_INVALID_STATE\)"):
         services.start(bench.session)
+
+
+def lose_starts(bench: Bench, count: int, monkeypatch: pytest.MonkeyPatch, died: bool) -> list[int]:
+    """The first starts end with the channel; `died`: because the program took the controller down. The list gets the
+    starts that arrived."""
+    real, starts = bench.plc._control, []
+
+    def control(tags: bintag.Tags, state: int) -> list[bintag.Tag]:
+        starts.append(state)
+        if len(starts) > count:
+            return real(tags, state)
+        if died:
+            bench.plc.operating, bench.plc.exception = (
+                lib.OS_EXCEPTION,
+                (lib.RTSEXCPT_BOOTPROJECT_CRASH, 0xFFFFFFFF, -1),
+            )
+        bench.device.restart()
+        return []
+
+    bench.plc.state = lib.AS_STOP
+    monkeypatch.setattr(bench.plc, "_control", control)
+    return starts
+
+
+def test_a_program_that_takes_the_controller_down_is_not_started_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller would start the program before it, which is not what was asked for."""
+    bench = Bench()
+    starts = lose_starts(bench, 1, monkeypatch, died=True)
+    with pytest.raises(DeviceError, match="went down when the program started"):
+        services.start(bench.session)
+    assert starts == [lib.AS_RUN]
+
+
+def test_a_start_that_was_lost_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench()
+    starts = lose_starts(bench, 1, monkeypatch, died=False)
+    services.start(bench.session)
+    assert (bench.plc.state, starts) == (lib.AS_RUN, [lib.AS_RUN] * 2)
 
 
 def test_tasks() -> None:

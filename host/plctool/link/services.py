@@ -193,26 +193,42 @@ def app_state(state: int, operating: int) -> AppState:
 
 
 def start(session: Session) -> None:
-    _control(session, lib.SRV_APP_START, "start")
+    """Starts the application; again only when the controller is there as it was. One that went down with the program
+    and came back would start the program before it."""
+    for left in (1, 0):
+        try:
+            session.ensure()
+            return _check_control(_control(session, lib.SRV_APP_START), "start")
+        except ChannelLost:
+            if not left:
+                raise
+        status = read_status(session)
+        if status.exception is not None:
+            raise DeviceError("The controller went down when the program started; see the log.", "died")
+        if status.state is AppState.RUN:
+            return None
+    return None
 
 
 def stop(session: Session) -> None:
-    _control(session, lib.SRV_APP_STOP, "stop")
+    _check_control(session.recover(partial(_control, session, lib.SRV_APP_STOP)), "stop")
 
 
 def reset(session: Session, option: int) -> None:
     """`option` is RESET_OPTION_*; origin deletes the application."""
-    _control(session, lib.SRV_APP_RESET, "reset", bintag.u32(lib.TAG_APP_OPTION, option))
+    which = bintag.u32(lib.TAG_APP_OPTION, option)
+    _check_control(session.recover(partial(_control, session, lib.SRV_APP_RESET, which)), "reset")
     session.forget_application()
 
 
-def _control(session: Session, service: int, action: str, *options: bintag.Tag) -> None:
-    def request() -> bintag.Tags:
-        number = bintag.u32(lib.TAG_APP_SESSION, session.application().session)
-        descriptor = bintag.container(lib.TAG_APP_DESCRIPTOR, number, *options)
-        return session.call(lib.SG_APPLICATION, service, [descriptor], _SLOW)
+def _control(session: Session, service: int, *options: bintag.Tag) -> bintag.Tags:
+    number = bintag.u32(lib.TAG_APP_SESSION, session.application().session)
+    descriptor = bintag.container(lib.TAG_APP_DESCRIPTOR, number, *options)
+    return session.call(lib.SG_APPLICATION, service, [descriptor], _SLOW)
 
-    l7.check_result(session.recover(request).u16(lib.TAG_SERVICE_RESULT), action)
+
+def _check_control(reply: bintag.Tags, action: str) -> None:
+    l7.check_result(reply.u16(lib.TAG_SERVICE_RESULT), action)
 
 
 def read_application_info(session: Session) -> dict[str, str]:
