@@ -16,7 +16,8 @@ def build(folder: Path, program: str, description: str, device: str = "") -> Bui
     (folder / "main.io.toml").write_text(description)
     if device:
         (folder / "device.toml").write_text(device)
-    return compile_sources([folder / "main.st"], io=IoFiles(device=folder / "device.toml" if device else None))
+    files = IoFiles(device=folder / "device.toml" if device else None)
+    return compile_sources([folder / "main.st"], io=files, limits=False)
 
 
 def messages(folder: Path, program: str, description: str, device: str = "") -> list[str]:
