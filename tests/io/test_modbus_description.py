@@ -226,3 +226,22 @@ def test_build_prints_the_load_of_a_line(tmp_path: Path, capsys: pytest.CaptureF
     (tmp_path / "main.io.toml").write_text(device("word_1"))
     assert main(["build", str(tmp_path), "-o", str(tmp_path / "main.cdl")]) == 0
     assert "modbus_ttyS1 is 30% in use" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("tables", "what"),
+    [
+        ('[[modbus.rs485]]\nname = "A"\nport = "COM2"\n[[modbus.rs485]]\nname = "B"\nport = "COM2"\n', "the line COM2"),
+        (
+            '[[modbus.rs485]]\nname = "A"\nport = "COM2"\n[[modbus.server.rs485]]\nname = "B"\nport = "COM2"\n',
+            "the line COM2",
+        ),
+        (
+            '[[modbus.server.tcp]]\nname = "A"\n[[modbus.server.tcp]]\nname = "B"\nport = 502\n',
+            "the TCP port 502 of 0.0.0.0",
+        ),
+    ],
+)
+def test_two_devices_cannot_have_one_line_or_port(tmp_path: Path, tables: str, what: str) -> None:
+    found = messages(tmp_path, PROGRAM, tables)
+    assert any(f"B cannot have {what}, which A in line 2 has" in message for message in found), found

@@ -67,6 +67,7 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
             table.close()
     root.close()
     _check_names(made.connectors, mistakes)
+    _check_taken(made.connectors, mistakes)
     return made
 
 
@@ -92,6 +93,16 @@ def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
 
 def _not_toml(error: BadToml) -> str:
     return f"this is not TOML: {error.message[:1].lower()}{error.message[1:]}"
+
+
+def _check_taken(connectors: Sequence[Connector], mistakes: Mistakes) -> None:
+    """Two devices cannot have the same line, or listen at the same port."""
+    seen: dict[str, Connector] = {}
+    for connector in filter(lambda c: c.takes, connectors):
+        first = seen.setdefault(connector.takes, connector)
+        if first is not connector:
+            message = f"{connector.name} cannot have {connector.takes}, which {first.name} in line {first.pos.line} has"
+            mistakes.error(connector.pos, message)
 
 
 def _check_names(connectors: Sequence[Connector], mistakes: Mistakes) -> None:

@@ -379,6 +379,7 @@ def _serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
     port = table.text("port", required="/dev/ttyS1") or "?"
     if not is_line(port):
         table.error(f"port has 1 to {MAX_LINE} ASCII characters", "port")
+    connector.takes = f"the line {port}"
     baud = table.number("baud", _BAUDS[0], _BAUDS[-1], 19200, unit="baud") or 19200
     if str(baud) not in bauds:
         table.error(f"{baud} is not a speed of serial lines: write {', '.join(bauds)}", "baud")
@@ -727,7 +728,9 @@ def _read_serial_server(table: Table) -> Connector:
 
 def _read_tcp_server(table: Table) -> Connector:
     server = _read_server(table, "modbus_server", int(lib.MODBUS_ROLE_TCP_SERVER))
-    server.parameters += _address_parameters(table, "address", "0.0.0.0")
+    address, port = _address_parameters(table, "address", "0.0.0.0")
+    server.parameters += [address, port]
+    server.takes = f"the TCP port {port.value} of {ipaddress.IPv4Address(int(address.value))}"
     unit = table.number("unit", 0, _MAX_UNIT, 0)
     server.parameters.append(_number(int(lib.MODBUS_PARAM_UNIT), unit or 0, "unit"))
     return server

@@ -105,6 +105,7 @@ class Connector:
     parameters: list[Parameter] = field(default_factory=list)
     channels: list[Channel] = field(default_factory=list)
     state_offset: int | None = None  # of its IO_DEVICE in the data area; set by the compiler
+    takes: str = ""  # what one device alone can have, such as "the line /dev/ttyS1"
     load: float | None = None  # of a line: the share of the time that its cyclic requests take; set by complete()
 
     def complete(self, mistakes: Mistakes) -> None:
