@@ -13,6 +13,7 @@ Prints what was lost (a bit that one side wrote and another one undid), changed 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parents[2]
+os.environ.setdefault("PLCRT", str(ROOT / "build/firmware/port/linux/plcrt"))
 sys.path[:0] = [str(ROOT / "host"), str(ROOT / "build" / "host"), str(ROOT / "tests" / "target")]
 
 from plctool.compiler import compile_sources  # noqa: E402
