@@ -37,7 +37,7 @@ class Program:
     """Main calls unit 0, that calls unit 1 ..., the last one divides by zero in the fourth cycle."""
 
     def __init__(self, units: list[Unit]) -> None:
-        self.lines: list[str] = []
+        self.lines = ["VAR_GLOBAL seen : DINT; END_VAR"]
         self.places: list[tuple[str, int]] = []  # unit and line of the calls, the innermost first
         for n in reversed(range(len(units))):
             self._unit(n, units)
@@ -84,8 +84,8 @@ class Program:
         if units[callee].twice:
             self.lines += [call.format(callee, "1000")]
         self.places.append((name, len(self.lines) + 1))
-        # A call at the end may become a jump; what follows it is not known before, or it would not be done there.
-        self.lines += [call.format(callee, argument), "x := x + cycle;" if name == "Main" else "x := x + n;"]
+        # A call at the end may become a jump; a global variable has to be written after the call, which may not return.
+        self.lines += [call.format(callee, argument), "x := x + cycle;" if name == "Main" else "x := x + n; seen := x;"]
 
 
 def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
@@ -104,6 +104,14 @@ def places(plc: Simulator, symbols: SymbolTable) -> list[tuple[str, int]]:
         Unit("METHOD", 0, True),
         Unit("FUNCTION_BLOCK", 2, True),
         Unit("FUNCTION_BLOCK", 2, False),
+    ]
+)
+@example(
+    units=[
+        Unit("FUNCTION", 0, False),
+        Unit("FUNCTION_BLOCK", 57, False),
+        Unit("FUNCTION", 0, False),
+        Unit("FUNCTION_BLOCK", 57, False),
     ]
 )
 def test_each_call_is_reported(tmp_path_factory, level: Level, units: list[Unit]) -> None:
