@@ -132,13 +132,19 @@ static const uintptr_t *readable(const IEC_STACK *stack, uintptr_t pointer)
     return (const uintptr_t *)(from >= stack->bottom && from < stack->top ? from : stack->top);
 }
 
+/* Whether the handler is to leave the IEC code. From then on a break is too late, also one that interrupts this handler:
+ * what leaves it (with a sanitizer, more than is here) is not made to be interrupted by itself. */
+static bool begin_to_leave(CONTEXT *context)
+{
+    return context != NULL && __atomic_exchange_n(&context->stack.running, 0, __ATOMIC_ACQ_REL) != 0;
+}
+
 static void leave(CONTEXT *context, RTS_UI32 code, PLACE place)
 {
     const uintptr_t *end = (const uintptr_t *)context->stack.top;
     SysExceptTrace(place.address, readable(&context->stack, place.stack), end, place.link);
     context->exception.code = code;
     context->exception.address = place.address;
-    __atomic_store_n(&context->stack.running, 0, __ATOMIC_RELEASE);
     IecStackLeave(&context->stack);
 }
 
@@ -200,7 +206,7 @@ static void on_fault(int number, siginfo_t *info, void *ucontext)
 {
     CONTEXT *context = self();
     SIGNAL *signal = find_signal(number);
-    if (runs_iec_code(context)) {
+    if (begin_to_leave(context)) {
         leave(context, fault_code(context, signal, info), place_of(ucontext));
     }
     chain(signal, info, ucontext);
@@ -211,7 +217,8 @@ static void on_break(int number, siginfo_t *info, void *ucontext)
     CONTEXT *context = self();
     RTS_UNUSED(number);
     RTS_UNUSED(info);
-    if (runs_iec_code(context) && __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round) {
+    if (runs_iec_code(context) && __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round &&
+        begin_to_leave(context)) {
         leave(context, context->break_code, place_of(ucontext));
     }
 }
@@ -378,7 +385,7 @@ bool SysExceptTry(void (*fn)(void *arg), void *arg, RTS_EXCEPTION *exception)
 void SysExceptRaise(RTS_UI32 code, uintptr_t address, const void *stack)
 {
     CONTEXT *context = self();
-    if (!runs_iec_code(context)) {
+    if (!begin_to_leave(context)) {
         fatal("an exception was raised outside of IEC code");
     }
     leave(context, code, (PLACE){.address = address, .stack = (uintptr_t)stack});
