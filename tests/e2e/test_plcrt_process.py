@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 from elftools.elf.elffile import ELFFile
 from elftools.elf.enums import ENUM_DT_FLAGS
+from processes import processor_ns
 
 from plctool import connect
 from plctool.link import simplecom
@@ -41,12 +42,6 @@ def device_name(port: str) -> str:
     """Opens the port as a client of its own, asks, and leaves."""
     with Connection(SerialTransport(port)) as connection:
         return read_identity(Session(connection)).device_name
-
-
-def processor_ns(pid: int) -> int:
-    """Processor time of all threads so far, exactly: the clock ticks of /proc/PID/stat are too coarse."""
-    threads = Path(f"/proc/{pid}/task").iterdir()
-    return sum(int((thread / "schedstat").read_text().split()[0]) for thread in threads)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import threading
 import time
 
 import pytest
+from processes import processor_ns
 
 from plctool.errors import PlcError
 from plctool.gateway.control import dismiss_idle
@@ -153,7 +154,14 @@ def test_a_death_in_initialisation_leaves_the_device_reachable(tool, plcrt, coun
     prove(tool, plcrt, counter, eventually)
     good = status(tool, plcrt)["image_crc"]
     image = tool.build("slow", SLOW_START).read_bytes()
-    killer = threading.Timer(0.4, lambda: kill_worker(number))  # long before the initialisation ends
+    before = processor_ns(plcrt.worker)
+
+    def kill() -> None:  # nothing but the initialisation takes that long, and it takes longer
+        while processor_ns(plcrt.worker) < before + 200_000_000:
+            time.sleep(0.01)
+        kill_worker(number)
+
+    killer = threading.Thread(target=kill)
     dismiss_idle(plcrt.port)  # the gateway of the command before
     with Connection(SerialTransport(plcrt.port)) as connection, contextlib.suppress(PlcError):
         session = Session(connection)
