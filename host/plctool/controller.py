@@ -165,22 +165,20 @@ class Controller(ABC):
         seconds = self._now() - begin
         persistent = None if skipped else self._kept_changes(status.image_crc, crc)
         if start and not (skipped and status.state is AppState.RUN):
-            self._check_initialised()
             self.start()
-        return FlashResult(len(data), seconds, skipped, self.raw_status().state, persistent)
+        now = self.raw_status()
+        if now.image_crc != crc:
+            message = (
+                "The controller went down when the program was initialised, and started the one before; see the log."
+            )
+            raise DeviceError(message, "died")
+        return FlashResult(len(data), seconds, skipped, now.state, persistent)
 
     def _check_downloaded(self, crc: int) -> None:
         found = self.raw_status()
         if found.image_crc != crc:
             message = f"The device has image {found.image_crc:08X} instead of {crc:08X}; flash again."
             raise DeviceError(message, "verify")
-
-    def _check_initialised(self) -> None:
-        """A controller that went down meanwhile, and came back, would start the program before it."""
-        exception = self.raw_status().exception
-        if exception is not None:
-            message = f"The program stopped in its initialisation: {exception.name}; 'plctool status' says where."
-            raise DeviceError(message, "initialisation")
 
     def _kept_changes(self, before: int, after: int) -> KeptChanges | None:
         """By the CRCs of both images."""
