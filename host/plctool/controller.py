@@ -169,7 +169,7 @@ class Controller(ABC):
         now = self.raw_status()
         if now.image_crc != crc:
             message = (
-                "The controller went down when the program was initialised, and started the one before; see the log."
+                "The controller went down when the program was initialised, and started the previous one; see the log."
             )
             raise DeviceError(message, "died")
         return FlashResult(len(data), seconds, skipped, now.state, persistent)
