@@ -195,8 +195,19 @@ def test_a_program_that_takes_the_controller_down_is_not_started_again(monkeypat
     """The controller would start the program before it, which is not what was asked for."""
     bench = Bench()
     starts = lose_starts(bench, 1, monkeypatch, died=True)
-    with pytest.raises(DeviceError, match="went down when the program started"):
+    with pytest.raises(DeviceError, match="No reply came to the start, and the program is stopped with an exception"):
         services.start(bench.session)
+    assert starts == [lib.AS_RUN]
+
+
+def test_a_program_that_took_the_controller_down_before_can_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The channel was lost then; the start itself is not."""
+    bench = Bench()
+    services.read_status(bench.session)
+    starts = lose_starts(bench, 0, monkeypatch, died=True)
+    bench.plc.exception = (lib.RTSEXCPT_BOOTPROJECT_CRASH, 0xFFFFFFFF, -1)
+    bench.device.restart()
+    services.start(bench.session)
     assert starts == [lib.AS_RUN]
 
 

@@ -193,21 +193,19 @@ def app_state(state: int, operating: int) -> AppState:
 
 
 def start(session: Session) -> None:
-    """Starts the application; again only when the controller is there as it was. One that went down with the program
-    and came back would start the program before it."""
-    for left in (1, 0):
-        try:
-            session.ensure()
-            return _check_control(_control(session, lib.SRV_APP_START), "start")
-        except ChannelLost:
-            if not left:
-                raise
+    """Starts the application. Not again when no reply came and it is stopped with an exception: a controller that went
+    down with it, and came back, would start the previous one."""
+    read_status(session)  # a channel that was lost before is opened again here
+    try:
+        _check_control(_control(session, lib.SRV_APP_START), "start")
+        return
+    except ChannelLost:
         status = read_status(session)
-        if status.exception is not None:
-            raise DeviceError("The controller went down when the program started; see the log.", "died")
-        if status.state is AppState.RUN:
-            return None
-    return None
+    if status.exception is not None:
+        message = "No reply came to the start, and the program is stopped with an exception; see the log."
+        raise DeviceError(message, "died")
+    if status.state is not AppState.RUN:
+        _check_control(_control(session, lib.SRV_APP_START), "start")
 
 
 def stop(session: Session) -> None:
