@@ -1,4 +1,5 @@
-"""Runs the tests of the build folders given as one pool, and prints the failures and one closing line over all.
+"""Runs the tests of the build folders given as one pool, and prints what was skipped, the failures and one closing
+line over all.
 
 A process runs for each processor and one more, because some tests wait more than they work. Those with the highest
 priority, which is about their seconds, come first, so that no processor idles while the last long one ends. The C
@@ -32,10 +33,12 @@ LOOK_EVERY = 0.02  # for processes that ended [s]
 
 @dataclass
 class Outcome:
-    """Of some tests: their number by outcome, and the first line of each failure after the name of its test."""
+    """Of some tests: their number by outcome, and the first line of each failure, and of the reason of each skip, after
+    the name of the test."""
 
     counts: Counter[str]
     failures: list[str]
+    skips: list[str]
 
 
 @dataclass(frozen=True)
@@ -96,9 +99,9 @@ class Done:
     def outcome(self) -> Outcome:
         """Of its tests; a process that failed without a test that did is a failure of its own."""
         if self.status == SKIPPED:
-            return Outcome(Counter(skipped=1), [])
+            return Outcome(Counter(skipped=1), [], [_first_line(self.job.output.read_text(errors="replace"))])
         if not self.job.report.exists():
-            outcome = Outcome(Counter({"failed" if self.status else "passed": 1}), [])
+            outcome = Outcome(Counter({"failed" if self.status else "passed": 1}), [], [])
         elif self.job.report.suffix == ".xml":
             outcome = pytest_outcome(self.job.report)
         else:
@@ -108,17 +111,26 @@ class Done:
         return outcome
 
 
+def _first_line(text: str) -> str:
+    return next(iter(text.strip().splitlines()), "")
+
+
 def pytest_outcome(report: Path) -> Outcome:
     """The tests in a pytest JUnit file."""
     suite = next(ET.parse(report).getroot().iter("testsuite"))
     total, failed, skipped = (int(suite.get(key, "0")) for key in ("tests", "failures", "skipped"))
     failed += int(suite.get("errors", "0"))
-    failures = [
-        f"{case.get('classname')}::{case.get('name')}: {problem.get('message', '').splitlines()[0]}"
-        for case in suite.iter("testcase")
-        for problem in (*case.findall("failure"), *case.findall("error"))
-    ]
-    return Outcome(Counter(passed=total - failed - skipped, failed=failed, skipped=skipped), failures)
+
+    def messages(*tags: str) -> list[str]:
+        return [
+            f"{case.get('classname')}::{case.get('name')}: {_first_line(found.get('message', ''))}"
+            for case in suite.iter("testcase")
+            for tag in tags
+            for found in case.findall(tag)
+        ]
+
+    counts = Counter(passed=total - failed - skipped, failed=failed, skipped=skipped)
+    return Outcome(counts, messages("failure", "error"), messages("skipped"))
 
 
 def meson_outcome(log: Path) -> Outcome:
@@ -126,7 +138,9 @@ def meson_outcome(log: Path) -> Outcome:
     tests = [json.loads(line) for line in log.read_text().splitlines()]
     outcomes = [{"OK": "passed", "SKIP": "skipped"}.get(test["result"], "failed") for test in tests]
     failures = [f"{t['name']}: {t['result']}" for t, o in zip(tests, outcomes, strict=True) if o == "failed"]
-    return Outcome(Counter(outcomes), failures)
+    skipped = [t for t, o in zip(tests, outcomes, strict=True) if o == "skipped"]
+    skips = [f"{t['name']}: {_first_line(t.get('stdout', '') + t.get('stderr', ''))}" for t in skipped]
+    return Outcome(Counter(outcomes), failures, skips)
 
 
 def jobs_of(meson: str, build: Path) -> Iterator[Job]:
@@ -179,7 +193,7 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # tests send it; `make test &` would have it ignored
     jobs = [job for build in args.builds for job in jobs_of(args.meson, build.resolve())]
     jobs.sort(key=lambda job: -job.seconds)
-    begin, used, counts, failures, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
+    begin, used, counts, lines, status = time.monotonic(), 0.0, Counter[str](), list[str](), 0
     for number, done in enumerate(run(jobs, (os.cpu_count() or 1) + 1), 1):
         outcome = done.outcome
         result = "ok" if done.is_good else "failed"
@@ -192,9 +206,9 @@ def main() -> int:
         status |= not done.is_good
         used += done.used
         counts += outcome.counts
-        failures += [f"{done.job.name}: {failure}" for failure in outcome.failures]
-    for failure in failures:
-        print(f"FAILED {failure}")
+        lines += [f"SKIPPED {done.job.name}: {skip}" for skip in outcome.skips]
+        lines += [f"FAILED {done.job.name}: {failure}" for failure in outcome.failures]
+    print(*sorted(lines, reverse=True), sep="\n")
     print(f"{time.monotonic() - begin:.0f} s, {used:.0f} s of processors")
     print(f"{counts['passed']} passed, {counts['failed']} failed, {counts['skipped']} skipped")
     return status
