@@ -102,7 +102,7 @@ $(VENV)/installed: $(VENV)/bootstrapped pyproject.toml meson.build $(shell find 
 
 # What a developer needs on top.
 $(VENV)/dev: $(VENV)/bootstrapped pyproject.toml
-	./bootstrap.sh --cross
+	./bootstrap.sh --tests
 	$(BIN)/python tests/install_dev.py pyproject.toml
 	touch $@
 

@@ -1,6 +1,7 @@
 #!/bin/sh
 # bootstrap.sh VENV     makes a virtual environment, with what it needs from Debian: a C compiler, Python's headers and venv
-# bootstrap.sh --cross  installs cross compilers and QEMU, for the tests on Cortex-M, RISC-V and AArch64
+# bootstrap.sh --tests  installs what some tests need: cross compilers and QEMU, for Cortex-M, RISC-V and AArch64, and
+#                       programs of others that speak Modbus
 #
 # Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the second that
 # some tests will be left out.
@@ -14,7 +15,7 @@ install() {
     DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
-if [ "$1" = --cross ]; then
+if [ "$1" = --tests ]; then
     set --
     command -v arm-none-eabi-gcc >/dev/null || set -- "$@" gcc-arm-none-eabi picolibc-arm-none-eabi
     command -v qemu-system-arm >/dev/null || set -- "$@" qemu-system-arm
@@ -22,7 +23,9 @@ if [ "$1" = --cross ]; then
     command -v qemu-system-riscv32 >/dev/null || set -- "$@" qemu-system-misc
     command -v aarch64-linux-gnu-gcc >/dev/null || set -- "$@" gcc-aarch64-linux-gnu libc6-dev-arm64-cross
     command -v qemu-aarch64 >/dev/null || set -- "$@" qemu-user
-    [ $# = 0 ] || install "$@" || echo "Tests on other processors are left out; for them: sudo apt-get install $*" >&2
+    command -v mbpoll >/dev/null || set -- "$@" mbpoll
+    ls /usr/lib/*/libmodbus.so.5 >/dev/null 2>&1 || set -- "$@" libmodbus5
+    [ $# = 0 ] || install "$@" || echo "Some tests are left out; for them: sudo apt-get install $*" >&2
     exit 0
 fi
 
