@@ -17,6 +17,7 @@ from plctool.cli.arguments import pairs, parser
 from plctool.cli.io_documents import Document
 from plctool.cli.links import all_serial_ports, link_of, names_no_link
 from plctool.errors import InternalError, PlcError, UsageError
+from plctool.files import path_error
 from plctool.link.transports import Link
 from plctool.version import plctool_version
 
@@ -512,5 +513,7 @@ def _run_reported(words: Sequence[str], as_json: bool) -> int:
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         raise
+    except OSError as error:
+        return _internal_error(error, as_json) if error.filename is None else _report(path_error(error), as_json)
     except Exception as error:
         return _internal_error(error, as_json)

@@ -7,6 +7,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -94,7 +95,7 @@ def _path_of(folder: Path, table: Table, key: str) -> Path | None:
 
 def _output(folder: Path, table: Table) -> Path:
     path = _path_of(folder, table, "output") or folder / DEFAULT_IMAGE
-    if path.is_dir():
+    if os.path.isdir(path):  # False as well for a name that no file can have, as below
         table.error(f'{path} is a folder; write for example output = "{DEFAULT_IMAGE}"', "output")
     return path
 
@@ -104,7 +105,7 @@ def _file(folder: Path, table: Table, key: str) -> Path | None:
     path = _path_of(folder, table, key)
     if path is None:
         return None
-    if not path.is_file():
+    if not os.path.isfile(path):
         table.error(f"there is no file {path}", key)
         return None
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -53,7 +54,7 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
     named = root.text("device")
     if device is None and named is not None:
         device = Path(path).parent / named
-        if not device.is_file():
+        if not os.path.isfile(device):  # False as well for a name that no file can have
             root.error(f"there is no file {device}", "device")
             device = None
     if device is not None:
