@@ -8,7 +8,6 @@ from programs import COUNTER
 
 from plctool.cli.image_documents import production
 from plctool.device import Plc
-from plctool.errors import UsageError
 from plctool.image.board import read_firmware
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
@@ -28,12 +27,15 @@ def test_a_burned_flash_runs_its_program_at_once(make_board, build, tmp_path):
     built = build(COUNTER)
     slug = read_firmware(firmware(CONFIG)).board.slug
     production(built.path, slug, None, tmp_path / "flash.bin")
-    board = make_board()
-    board.write_flash(0, (tmp_path / "flash.bin").read_bytes())
-    with board:
-        check(board, built)
-    with board:
-        check(board, built)
+    check_burned(make_board(), built, tmp_path / "flash.bin")
+
+
+def check_burned(board, built, flash):
+    """Both the first start and one from what the first left."""
+    board.write_flash(0, flash.read_bytes())
+    for _ in range(2):
+        with board:
+            check(board, built)
 
 
 @pytest.mark.skipif(not IS_MPS2, reason="programs have a memory of their own")
@@ -47,6 +49,8 @@ def test_one_file_has_firmware_and_program(make_board, build, tmp_path):
 
 
 @pytest.mark.skipif(IS_MPS2, reason="firmware and programs are in one address space")
-def test_firmware_is_not_burned_into_another_memory(build, tmp_path):
-    with pytest.raises(UsageError, match="a memory of their own"):
-        production(build(COUNTER).path, None, firmware(CONFIG), tmp_path / "all.hex")
+def test_a_memory_of_their_own_is_burned_for_a_board_that_only_its_firmware_describes(make_board, build, tmp_path):
+    built = build(COUNTER)
+    document = production(built.path, None, firmware(CONFIG), tmp_path / "eeprom.bin")
+    assert document["burn_apart"] == str(firmware(CONFIG))
+    check_burned(make_board(), built, tmp_path / "eeprom.bin")

@@ -93,7 +93,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_image(image)
     _add_board(image, "such as plcrt, mps2-an385/standard")
     image.add_argument(
-        "--firmware", type=Path, metavar="FILE.elf", help="burn it as well; for a board that plctool does not know"
+        "--firmware", type=Path, metavar="FILE.elf", help="burn it as well; a board of your own is read from it"
     )
     image.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.hex|.bin")
 
