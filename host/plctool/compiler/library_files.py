@@ -9,6 +9,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -153,7 +154,7 @@ def _dependencies(table: Table) -> Iterator[Dependency]:
 
 def is_library(path: Path) -> bool:
     """Whether a path is that of a library, as far as can be seen from outside."""
-    return (path / LIBRARY_FILE).is_file() or (is_zip(path) and path.is_file())
+    return os.path.isfile(path / LIBRARY_FILE) or (is_zip(path) and os.path.isfile(path))
 
 
 def libraries_at(path: Path) -> list[Path]:
@@ -179,9 +180,10 @@ def find_libraries(path: Path) -> list[Path]:
 
 def no_library(path: Path) -> str:
     """What to say about a path that is not one of a library."""
-    what = f"{path} is not a library: it has no {LIBRARY_FILE}" if path.exists() else f"there is no library {path}"
+    exists = os.path.exists(path)
+    what = f"{path} is not a library: it has no {LIBRARY_FILE}" if exists else f"There is no library {path}"
     hint = did_you_mean(path.name, STAND_INS)
-    return f"{what[:1].upper()}{what[1:]}; a library is a folder or .zip with a {LIBRARY_FILE}{hint}."
+    return f"{what}; a library is a folder or .zip with a {LIBRARY_FILE}{hint}."
 
 
 # ---- all that a program needs ----
