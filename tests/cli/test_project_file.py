@@ -43,20 +43,6 @@ def test_new_project_is_checked_tested_run_and_built_without_arguments(
     assert done.json["info"]["version"] == "0.1.0"
 
 
-@pytest.mark.parametrize("name", ["2pumps", "a-b", "größer", "a" * 64])
-def test_new_project_has_a_name(tool: Any, name: str) -> None:
-    done = tool("new", name)
-    assert done.status == 2 and "letters, digits and _" in done.err
-    assert not Path(name).exists()
-
-
-def test_new_project_replaces_nothing(tool: Any, scratch: Path) -> None:
-    (scratch / "pump").mkdir()
-    assert tool("new", "pump").status == 0
-    done = tool("new", "pump")
-    assert done.status == 2 and "pump exists already" in done.err
-
-
 def test_project_is_found_from_a_folder_below_it(tool: Any, project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(project, 'sources = ["src"]')
     monkeypatch.chdir(project / "src")

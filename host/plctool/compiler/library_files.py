@@ -120,10 +120,10 @@ def _read(path: Path, text: str, table: Table) -> LibraryFiles:
     name = table.text("name", required="Util") or ""
     namespace = table.text("namespace", name) or ""
     version = table.text("version", required="1.0.0") or ""
-    if name and not _is_free(name):
-        table.error(f"'{name}' cannot be the name of a library; it has letters, digits and _", "name")
-    if namespace != name and not _is_free(namespace):
-        table.error(f"'{namespace}' cannot be a namespace; it has letters, digits and _", "namespace")
+    if name and (wrong := wrong_with_name(name)):
+        table.error(f"'{name}' cannot be the name of a library: {wrong}", "name")
+    if namespace != name and (wrong := wrong_with_name(namespace)):
+        table.error(f"'{namespace}' cannot be a namespace: {wrong}", "namespace")
     if version and not _VERSION.fullmatch(version):
         table.error(f"'{version}' is not a version; write numbers: \"1.2.0\"", "version")
     for key in ("author", "description"):
@@ -134,9 +134,13 @@ def _read(path: Path, text: str, table: Table) -> LibraryFiles:
     )
 
 
-def _is_free(name: str) -> bool:
-    """Whether a name can stand in front of others."""
-    return _NAME.fullmatch(name) is not None and name.upper() not in KEYWORDS and name.upper() not in ELEMENTARY
+def wrong_with_name(name: str) -> str:
+    """Why a name cannot stand in front of others; "" if it can."""
+    if not _NAME.fullmatch(name):
+        return "it has letters, digits and _, and does not begin with a digit"
+    if name.upper() in KEYWORDS or name.upper() in ELEMENTARY:
+        return "it is a word of the language; choose another"
+    return ""
 
 
 def _dependencies(table: Table) -> Iterator[Dependency]:
