@@ -22,7 +22,7 @@ typedef struct {
 } CAN_COUNTERS;
 
 const CAN_COUNTERS *BlkDrvCanGetCounters(void);
-extern const BLK_COUNTERS BlkDrvCanCounters;
+extern const BLK_COUNTERS BlkDrvCanCounters; /* the same with names */
 
 RTS_RESULT CmpBlkDrvCan_Hook(CMP_HOOK hook);
 

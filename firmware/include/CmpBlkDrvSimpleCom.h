@@ -20,7 +20,7 @@ typedef struct {
 
 /* NULL when the port has no such line. */
 const COM_COUNTERS *BlkDrvComGetCounters(RTS_UI32 line);
-extern const BLK_COUNTERS BlkDrvComCounters;
+extern const BLK_COUNTERS BlkDrvComCounters; /* the same with names */
 
 RTS_RESULT CmpBlkDrvSimpleCom_Hook(CMP_HOOK hook);
 

@@ -23,7 +23,7 @@ typedef struct {
 } TCP_COUNTERS;
 
 const TCP_COUNTERS *BlkDrvTcpGetCounters(void);
-extern const BLK_COUNTERS BlkDrvTcpCounters;
+extern const BLK_COUNTERS BlkDrvTcpCounters; /* the same with names */
 
 RTS_RESULT CmpBlkDrvTcp_Hook(CMP_HOOK hook);
 

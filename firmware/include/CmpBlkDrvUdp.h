@@ -22,7 +22,7 @@ typedef struct {
 RTS_UI32 BlkDrvUdpPutAddress(RTS_UI32 ip, RTS_UI32 prefix, RTS_UI32 index, RTS_UI8 *address);
 
 const UDP_COUNTERS *BlkDrvUdpGetCounters(void);
-extern const BLK_COUNTERS BlkDrvUdpCounters;
+extern const BLK_COUNTERS BlkDrvUdpCounters; /* the same with names */
 
 RTS_RESULT CmpBlkDrvUdp_Hook(CMP_HOOK hook);
 

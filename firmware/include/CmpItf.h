@@ -21,7 +21,7 @@ typedef enum {
     CH_INIT3,             /* register for events, services, external functions; open the lines of the communication */
     CH_INIT_SYSTEM_TASKS, /* timers and tasks the application needs */
     CH_INIT_TASKS,        /* boot project, IEC tasks */
-    CH_INIT_COMM,         /* begin to serve others */
+    CH_INIT_COMM,         /* begin to serve others: for a port, block drivers do in CH_INIT3 */
     CH_INIT_FINISHED,
     CH_COMM_CYCLE, /* main loop: never blocks */
     CH_EXIT_COMM,

@@ -59,8 +59,7 @@ typedef struct CYCLE_ENTRY {
 extern CYCLE_ENTRY *cycle_phases[];
 
 /* Calls those registered for `when`. Most phases have none, so it is inlined. */
-static inline __attribute__((always_inline)) void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task,
-                                                                 const IEC_CONTEXT *context)
+static RTS_INLINE void CyclePhasesRun(CYCLE_PHASE when, RTS_UI32 task, const IEC_CONTEXT *context)
 {
     const CYCLE_ENTRY *entry;
 

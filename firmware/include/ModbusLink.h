@@ -26,7 +26,8 @@ enum {
 
 typedef struct MODBUS_LINK MODBUS_LINK;
 
-/* The functions of a serial line (ModbusRtu.h), and of the connection of a client or a server (ModbusTcp.h). None of them blocks; `now_ns`: SysTimeGetNs, or the clock of a test. */
+/* The functions of a serial line (ModbusRtu.h), and of the connection of a client or a server (ModbusTcp.h). None of
+ * them blocks; `now_ns`: SysTimeGetNs, or the clock of a test. */
 typedef struct {
     /* Whether a request may be sent now: the line is quiet, the connection is there. Opens what is not open. */
     bool (*ready)(MODBUS_LINK *link, RTS_I64 now_ns);
@@ -35,7 +36,7 @@ typedef struct {
     RTS_UI32 (*receive)(MODBUS_LINK *link, RTS_I64 now_ns);
     /* Begins to send a PDU of this size that is in the buffer, to or from the unit there. */
     void (*send)(MODBUS_LINK *link, RTS_UI32 pdu_size, RTS_I64 now_ns);
-    /* What was sent is of no use any more: nothing more of it leaves. TCP: closes, to connect again. */
+    /* What was sent is of no use any more: nothing more of it leaves. A client on TCP closes, to connect again. */
     void (*give_up)(MODBUS_LINK *link);
     /* Closes a line, or the connection of a client. */
     void (*close)(MODBUS_LINK *link);

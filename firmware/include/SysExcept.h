@@ -125,7 +125,7 @@ void SysExceptShutdown(void);
 /* Where the code of the application is; size 0: there is none. From main, while no IEC code runs. */
 void SysExceptCodeRange(const RTS_UI8 *start, RTS_UI32 size);
 bool SysExceptIsCode(uintptr_t address);
-/* The offset in it of an address for which SysExceptIsCode is true. */
+/* The offset in it of an address for which SysExceptIsCode or SysExceptIsReturn is true. */
 RTS_UI32 SysExceptCodeOffset(uintptr_t address);
 
 /* Whether a word may be an address that a call in the application's code returns to. */

@@ -51,9 +51,15 @@
 #define APP_MEMORY_SIZE 256
 #endif
 
-/* The largest code of an application, bytes: where it runs in RAM. 0: what fits a slot of the flash. */
+/* The largest code of an application, bytes: where it runs in RAM, the RAM that each of the two slots has for it. 0:
+ * what fits a slot of the flash. */
 #ifndef APP_MAX_CODE_SIZE
 #define APP_MAX_CODE_SIZE 0
+#endif
+
+/* What an erased byte of the flash is that the applications have. */
+#ifndef BOARD_FLASH_ERASED
+#define BOARD_FLASH_ERASED 0xFF
 #endif
 
 /* 1: the port gives the memory of the areas (SysMem.h), to keep programs from writing beyond them. 0: a variable. */
@@ -355,7 +361,7 @@
 #endif
 
 /* Whether block driver, router and channel server count what arrives, is dropped and is repeated: for `channelinfo` of
- * the PLC shell, or a look with the debugger at a bad line. 300 bytes of flash, 80 of RAM. */
+ * the PLC shell, or a look with the debugger at a bad line. 300 bytes of flash, 80 of RAM; with the shell 300 more. */
 #ifndef COMM_COUNTERS
 #define COMM_COUNTERS 1
 #endif

@@ -217,7 +217,6 @@ int main(void)
     RUN(the_load_is_that_of_cyclic_tasks);
     RUN(channels_come_with_what_went_wrong);
     RUN(lines_come_with_what_went_wrong);
-    RUN(lines_come_with_what_went_wrong);
     RUN(a_command_need_not_have_a_nul_and_is_bounded);
     return test_result();
 }

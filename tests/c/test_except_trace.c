@@ -29,14 +29,24 @@ static void only_words_that_lead_into_the_code_are_kept(void)
     const EXCEPT_TRACE *trace = SysExceptGetTrace();
 
     setup();
-    stack[0] = in_code(0) - 1;
-    stack[1] = in_code(63);
-    stack[2] = in_code(64);
-    stack[3] = in_code(0);
+    stack[0] = in_code(0);
+    stack[1] = in_code(64);
+    stack[2] = in_code(65);
+    stack[3] = in_code(1);
     SysExceptTrace(in_code(5), stack, stack + 4, 0);
     CHECK_EQUAL(trace->count, 2);
-    CHECK(trace->call[0].target == 63 && trace->call[0].distance == sizeof stack[0]);
-    CHECK(trace->call[1].target == 0 && trace->call[1].distance == 3 * sizeof stack[0]);
+    CHECK(trace->call[0].target == 64 && trace->call[0].distance == sizeof stack[0]);
+    CHECK(trace->call[1].target == 1 && trace->call[1].distance == 3 * sizeof stack[0]);
+}
+
+/* What points to the start of the code is a function. */
+static void a_return_has_a_call_before_it(void)
+{
+    setup();
+    CHECK(!SysExceptIsReturn(in_code(0)));
+    CHECK(SysExceptIsReturn(in_code(1)));
+    CHECK(SysExceptIsReturn(in_code(64))); /* by what does not come back */
+    CHECK(!SysExceptIsReturn(in_code(65)));
 }
 
 static void the_link_register_is_distinguished(void)
@@ -55,10 +65,10 @@ static void a_full_trace_keeps_the_nearest(void)
 
     setup();
     for (i = 0; i < RTS_COUNT(stack); i++)
-        stack[i] = in_code(i);
+        stack[i] = in_code(1 + i);
     SysExceptTrace(in_code(5), stack, stack + RTS_COUNT(stack), 0);
     CHECK_EQUAL(trace->count, EXCEPT_MAX_CALLS);
-    CHECK_EQUAL(trace->call[EXCEPT_MAX_CALLS - 1].target, EXCEPT_MAX_CALLS - 1);
+    CHECK_EQUAL(trace->call[EXCEPT_MAX_CALLS - 1].target, EXCEPT_MAX_CALLS);
 }
 
 static void the_first_exception_counts_until_it_is_forgotten(void)
@@ -111,6 +121,7 @@ static void without_code_there_are_no_calls(void)
 
 int main(void)
 {
+    RUN(a_return_has_a_call_before_it);
     RUN(only_words_that_lead_into_the_code_are_kept);
     RUN(the_link_register_is_distinguished);
     RUN(a_full_trace_keeps_the_nearest);

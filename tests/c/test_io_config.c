@@ -93,6 +93,13 @@ static const IoConfigChannelMap word = {.bits = 16};
 static const IoConfigChannelMap turned_word = {.bits = 16, .flags = IO_CHANNEL_BIG_ENDIAN};
 static const IoConfigChannelMap bit = {.parameter_bit = 5, .area_bit = 1, .bits = 1};
 
+static RTS_UI32 input_of(void (*copy)(const IoConfigChannelMap *channel, const void *memory),
+                         const IoConfigChannelMap *channel, const RTS_UI8 *memory)
+{
+    copy(channel, memory);
+    return read_u32(APP_AREA_INPUT, 0);
+}
+
 static void the_order_of_bytes_is_that_of_the_device(void)
 {
     static const RTS_UI8 memory[] = {0x22, 0x11};
@@ -100,18 +107,12 @@ static void the_order_of_bytes_is_that_of_the_device(void)
 
     begin_tree();
     CHECK_EQUAL(load_io(), ERR_OK);
-    IoMgrCopyInputLE(&word, memory);
-    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x1122);
-    IoMgrCopyInputBE(&word, memory);
-    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x2211);
-    IoMgrCopyInputLE(&turned_word, memory);
-    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x2211);
-    IoMgrCopyInputBE(&turned_word, memory);
-    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x1122);
-    IoMgrCopyInputBE(&bit, other);
-    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x1120);
-    IoMgrCopyInputBE(&bit, memory);
-    CHECK_EQUAL(read_u32(APP_AREA_INPUT, 0), 0x1122);
+    CHECK_EQUAL(input_of(IoMgrCopyInputLE, &word, memory), 0x1122);
+    CHECK_EQUAL(input_of(IoMgrCopyInputBE, &word, memory), 0x2211);
+    CHECK_EQUAL(input_of(IoMgrCopyInputLE, &turned_word, memory), 0x2211);
+    CHECK_EQUAL(input_of(IoMgrCopyInputBE, &turned_word, memory), 0x1122);
+    CHECK_EQUAL(input_of(IoMgrCopyInputBE, &bit, other), 0x1120); /* in what was there */
+    CHECK_EQUAL(input_of(IoMgrCopyInputBE, &bit, memory), 0x1122);
 }
 
 static void outputs_come_in_the_order_of_the_device(void)

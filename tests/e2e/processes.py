@@ -1,11 +1,13 @@
-"""What /proc says of a process."""
+"""What Linux knows of processes."""
 
 from __future__ import annotations
 
-from pathlib import Path
+import time
+
+PROCESS_CLOCK = 2  # CPUCLOCK_SCHED: what clock_getcpuclockid(3) makes of a process id
 
 
 def processor_ns(pid: int) -> int:
-    """Processor time of all threads so far, exactly: the clock ticks of /proc/PID/stat are too coarse."""
-    threads = Path(f"/proc/{pid}/task").iterdir()
-    return sum(int((thread / "schedstat").read_text().split()[0]) for thread in threads)
+    """Processor time of all threads so far, of those that have ended too: exactly, where /proc/PID/stat counts clock
+    ticks."""
+    return time.clock_gettime_ns(~pid << 3 | PROCESS_CLOCK)

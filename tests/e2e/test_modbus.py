@@ -405,9 +405,10 @@ def test_optional_line_that_is_in_use_is_left_out(plant: Plant) -> None:
 
 
 def test_line_that_two_want_refuses_the_image(plant: Plant, tmp_path: Path) -> None:
-    description = '[[modbus.rs485]]\nport = "{0}"\n[[modbus.rs485]]\nname = "Twice"\nport = "{0}"\n'
+    description = '[[modbus.rs485]]\nport = "{}"\n[[modbus.rs485]]\nname = "Twice"\nport = "{}"\n'
     (tmp_path / "main.st").write_text(PROGRAM)
-    (tmp_path / "main.io.toml").write_text(description.format(plant.master.plc))
+    second_name = f"/.{plant.master.plc}"  # that it is the same line is known to the controller only
+    (tmp_path / "main.io.toml").write_text(description.format(plant.master.plc, second_name))
     compile_sources([tmp_path / "main.st"]).write(tmp_path / "main.cdl")
     with pytest.raises(PlcError, match=r"Twice \(IoDrvModbus\): the serial line \".*\" is in use"):
         plant.plc.flash(tmp_path / "main.cdl")

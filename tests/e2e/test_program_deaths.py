@@ -157,7 +157,7 @@ def test_a_death_in_initialisation_leaves_the_device_reachable(tool, plcrt, coun
     before = processor_ns(plcrt.worker)
 
     def kill() -> None:  # nothing but the initialisation takes that long, and it takes longer
-        while processor_ns(plcrt.worker) < before + 200_000_000:
+        while processor_ns(plcrt.worker) < before + 100_000_000:
             time.sleep(0.01)
         kill_worker(number)
 

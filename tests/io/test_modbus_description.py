@@ -245,3 +245,9 @@ def test_build_prints_the_load_of_a_line(tmp_path: Path, capsys: pytest.CaptureF
 def test_two_devices_cannot_have_one_line_or_port(tmp_path: Path, tables: str, what: str) -> None:
     found = messages(tmp_path, PROGRAM, tables)
     assert any(f"B cannot have {what}, which A in line 2 has" in message for message in found), found
+
+
+@pytest.mark.parametrize("key", ["optional = true", "enabled = false"])
+def test_device_that_need_not_be_there_may_name_what_another_one_has(tmp_path: Path, key: str) -> None:
+    tables = '[[modbus.rs485]]\nname = "A"\nport = "COM2"\n[[modbus.rs485]]\nname = "B"\nport = "COM2"\n'
+    assert not any("cannot have" in message for message in messages(tmp_path, PROGRAM, f"{tables}{key}\n"))

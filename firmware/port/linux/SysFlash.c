@@ -22,7 +22,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { CODE_SLOTS = 2, ERASED = 0xFF };
+enum { CODE_SLOTS = 2, ERASED = BOARD_FLASH_ERASED };
 
 static struct {
     int file;

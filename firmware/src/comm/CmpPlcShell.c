@@ -184,6 +184,8 @@ static void print_channels(SHELL_OUTPUT *out)
         if (ChannelIsOpen(client))
             print(out, "Channel %u: %s, messages up to %u bytes", (unsigned)client->channel.id,
                   SrvIsLoggedIn(client) ? "logged in" : "no login", (unsigned)client->channel.limit);
+    if (!COMM_COUNTERS)
+        return;
     print_counters(out);
     print_lines(out);
 }

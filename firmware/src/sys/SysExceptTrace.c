@@ -35,9 +35,10 @@ RTS_UI32 SysExceptCodeOffset(uintptr_t address)
     return (RTS_UI32)(address - code.start);
 }
 
+/* The last byte of the call is code: what points to the start of the code is a function. */
 bool SysExceptIsReturn(uintptr_t word)
 {
-    return SysExceptIsCode(word) && (word & APP_ENTRY_MODE_BIT) == APP_ENTRY_MODE_BIT;
+    return (word & APP_ENTRY_MODE_BIT) == APP_ENTRY_MODE_BIT && SysExceptIsCode(word - APP_ENTRY_MODE_BIT - 1);
 }
 
 #if EXCEPT_MAX_CALLS > 0

@@ -96,9 +96,9 @@ def _not_toml(error: BadToml) -> str:
 
 
 def _check_taken(connectors: Sequence[Connector], mistakes: Mistakes) -> None:
-    """Two devices cannot have the same line, or listen at the same port."""
+    """Two devices cannot have the same line, or listen at the same port; one that is optional goes without."""
     seen: dict[str, Connector] = {}
-    for connector in filter(lambda c: c.takes, connectors):
+    for connector in (c for c in connectors if c.takes and c.enabled and not c.optional):
         first = seen.setdefault(connector.takes, connector)
         if first is not connector:
             message = f"{connector.name} cannot have {connector.takes}, which {first.name} in line {first.pos.line} has"

@@ -9,12 +9,13 @@
 
 enum { SLOT_COUNT = 2 };
 
-static RTS_UI8 code_ram[SLOT_COUNT][RTS_CODE_RAM_SIZE] __attribute__((aligned(16)));
-RTS_STATIC_ASSERT(RTS_CODE_RAM_SIZE % APP_CODE_ALIGN == 0, each_slot_is_aligned);
+RTS_STATIC_ASSERT(APP_MAX_CODE_SIZE > 0, the_port_says_how_much_ram_code_has);
+static RTS_UI8 code_ram[SLOT_COUNT][APP_MAX_CODE_SIZE] __attribute__((aligned(16)));
+RTS_STATIC_ASSERT(APP_MAX_CODE_SIZE % APP_CODE_ALIGN == 0, each_slot_is_aligned);
 
 const RTS_UI8 *SysFlashMapCode(RTS_UI32 slot, RTS_UI32 offset, RTS_UI32 size)
 {
-    if (slot >= SLOT_COUNT || size > RTS_CODE_RAM_SIZE || SysFlashGet()->read(offset, code_ram[slot], size) != ERR_OK)
+    if (slot >= SLOT_COUNT || size > APP_MAX_CODE_SIZE || SysFlashGet()->read(offset, code_ram[slot], size) != ERR_OK)
         return NULL;
     CpuBarrier(); /* the first fetch sees the new code; a core with caches cleans and invalidates them here */
     return code_ram[slot];

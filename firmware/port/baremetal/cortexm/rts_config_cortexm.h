@@ -67,11 +67,6 @@ void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry);
 #define APP_GATED(function) function##_gate
 #endif
 
-/* With CodeInRam.c: RAM for the code of an application, bytes for each of the two slots. */
-#ifndef RTS_CODE_RAM_SIZE
-#define RTS_CODE_RAM_SIZE 8192
-#endif
-
 /* The main stack, bytes, a multiple of 32, without what an FPU adds. It holds the check of a new application's image,
  * and on top of it about 210 for each task and 140 for an interrupt above them. */
 #ifndef RTS_MAIN_STACK_SIZE

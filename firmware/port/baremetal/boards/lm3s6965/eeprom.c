@@ -23,7 +23,7 @@ enum { PINS = 3 << 2, MASTER_ENABLE = 1 << 4, PERIOD_400KHZ = BOARD_CLOCK_HZ / (
 enum { RUN = 1, START = 2, STOP = 4, ACK = 8 }; /* written to MCS */
 enum { BUSY = 1, ERROR = 2 };                   /* read from it */
 enum { CHIP_WRITE = 0x50 << 1, CHIP_READ = CHIP_WRITE | 1, PAGE_SIZE = 128 };
-enum { SECTOR_SIZE = BOARD_FLASH_SECTOR_SIZE, PROGRAM_SIZE = 4, ERASED = 0xFF };
+enum { SECTOR_SIZE = BOARD_FLASH_SECTOR_SIZE, PROGRAM_SIZE = 4, ERASED = BOARD_FLASH_ERASED };
 enum { BUSY_TRIES = 1000 }; /* a page takes 5 ms, a refused address 25 us */
 
 static bool step(RTS_UI32 what)

@@ -11,7 +11,7 @@
 #define APP_MAX_TASKS 4
 #define APP_MAX_IMPORTS 64
 #define APP_DATA_SIZE 16384
-#define APP_MAX_CODE_SIZE RTS_CODE_RAM_SIZE /* CodeInRam.c */
+#define APP_MAX_CODE_SIZE 8192 /* CodeInRam.c */
 #define APP_RETAIN_SIZE 2048
 #define APP_MEMORY_SIZE 1024
 #define IO_MAX_CONNECTORS 8
