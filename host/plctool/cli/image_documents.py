@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from plctool.cli.io_documents import Document
 from plctool.errors import UsageError
 from plctool.files import read_image
-
-Document = dict[str, Any]
 
 
 def production(image: Path, board: str | None, firmware: Path | None, output: Path) -> Document:

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from plctool.errors import LinkError, UsageError
+from plctool.files import read_utf8
 from plctool.io.positions import BadToml, TomlText
 from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link
 
@@ -68,14 +69,10 @@ def _default_link() -> Link | None:
 def _link_in(file: Path) -> Link | None:
     """What a project says. Raises UsageError for a file that cannot be understood."""
     try:
-        text = TomlText(str(file), file.read_bytes().decode("utf-8-sig")).values.get("link")
-    except OSError as error:
-        raise UsageError(f"{file} cannot be read: {error.strerror}.", "bad-project") from None
-    except UnicodeDecodeError as error:
-        raise UsageError(f"{file} is not UTF-8 at byte {error.start}; save it as UTF-8.", "bad-project") from None
+        text = TomlText(str(file), read_utf8(file, "bad-project")).values.get("link")
     except BadToml as error:
         where = f"{file}:{error.pos.line}:{error.pos.column}"
-        raise UsageError(f"{where} is not TOML: {error.message}.", "bad-project") from None
+        raise UsageError(f"{where}: {error.message}.", "bad-project") from None
     if text is not None and not isinstance(text, str):
         raise UsageError(f'{file}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project")
     return _parse(text, str(file)) if text else None

@@ -23,7 +23,7 @@ from plctool.compiler.source_files import load, read_contents
 from plctool.compiler.syntax.lexer import KEYWORDS
 from plctool.compiler.toml_files import error_at, read_checked
 from plctool.errors import UsageError, did_you_mean
-from plctool.files import Pos, read_utf8
+from plctool.files import Pos, decode_utf8, read_utf8
 from plctool.iec.types import ELEMENTARY
 from plctool.io.tables import Table
 from plctool.project import LIBRARY_FILE
@@ -106,11 +106,7 @@ def read_library(path: Path) -> LibraryFiles:
         data = contents.get(path / LIBRARY_FILE)
         if data is None:
             raise UsageError(f"{path} has no {LIBRARY_FILE}, neither at its top nor in its only folder.", "bad-library")
-        try:
-            text = data.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            message = f"{path / LIBRARY_FILE} is not UTF-8 at byte {error.start}; save it as UTF-8."
-            raise UsageError(message, "bad-library") from None
+        text = decode_utf8(data, path / LIBRARY_FILE, "bad-library")
     else:
         text = read_utf8(path / LIBRARY_FILE, "bad-library")
     return read_checked(str(path / LIBRARY_FILE), text, LIBRARY_FILE, lambda table: _read(path, text, table))
