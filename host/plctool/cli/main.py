@@ -80,7 +80,10 @@ def _info(args: argparse.Namespace) -> int:
 
 def _image(args: argparse.Namespace) -> int:
     from plctool.cli.image_documents import production
+    from plctool.cli.overwriting import check_not_read
 
+    inputs = [file for file in (args.image, args.firmware) if file is not None]
+    check_not_read(args.output, inputs, f"-o {args.output.stem}-production{args.output.suffix}")
     return _show(args, production(args.image, args.board, args.firmware, args.output), output.production_text)
 
 

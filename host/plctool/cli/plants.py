@@ -33,6 +33,16 @@ def attached(plc: Simulator, path: Path) -> Iterator[None]:
         yield
 
 
+def files_of_plant(path: Path) -> Iterator[Path]:
+    """The files that `attached` reads."""
+    from plctool.compiler import IoFiles, program_files
+
+    if path.suffix in (".py", ".cdl"):
+        yield path
+    else:
+        yield from program_files([path], IoFiles(wanted=False)).every_file()
+
+
 def _compiled_plant(path: Path) -> PlantProgram:
     """It runs on this machine, and its variables are its own, whatever description and board lie beside it."""
     from plctool.compiler import IoFiles, compile_sources

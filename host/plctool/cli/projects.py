@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler import IoFiles, Level
+from plctool.compiler import IoFiles, Level, ProgramFiles, program_files
 from plctool.compiler.project import Project, read_project
 from plctool.compiler.warnings import WarningOptions, warning_options
 from plctool.errors import UsageError
@@ -34,6 +34,11 @@ class Settings:
     debug: bool = False
     board: str | None = None
     limits: bool = True
+
+    @property
+    def files(self) -> ProgramFiles:
+        """What the program is made of. Raises CompileError for mistakes in a project file."""
+        return program_files(self.paths, self.io, self.libraries)
 
 
 def settings_of(args: argparse.Namespace) -> Settings:

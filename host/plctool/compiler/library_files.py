@@ -19,7 +19,7 @@ from pathlib import Path
 from plctool.compiler.library import STAND_INS
 from plctool.compiler.library_zip import is_zip, read_zip
 from plctool.compiler.source import Source
-from plctool.compiler.source_files import load, read_contents
+from plctool.compiler.source_files import files_read, load, read_contents
 from plctool.compiler.syntax.lexer import KEYWORDS
 from plctool.compiler.toml_files import error_at, read_checked
 from plctool.errors import UsageError, did_you_mean
@@ -82,6 +82,11 @@ class LibraryFiles:
         if not sources:
             raise UsageError(f"The library {self.path} has no source file (.st, .exp, .TcPOU ...).", "bad-library")
         return sources
+
+    @property
+    def files(self) -> list[Path]:
+        """What is read of it."""
+        return [self.path] if is_zip(self.path) else [self.path / LIBRARY_FILE, *files_read([self.path])]
 
     @property
     def manifest_path(self) -> str:

@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,7 +49,21 @@ class ProgramFiles:
         try:
             return load(self.sources)
         except OSError as error:
-            raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
+            raise _unreadable(error) from None
+
+    def every_file(self) -> Iterator[Path]:
+        """All files that are read to compile it, but the project file. Raises what the other functions do."""
+        from plctool.compiler.library_files import resolve_libraries
+        from plctool.compiler.source_files import files_read
+
+        try:
+            yield from files_read(self.sources)
+        except OSError as error:
+            raise _unreadable(error) from None
+        for library in resolve_libraries(self.libraries, self.sources):
+            yield from library.files
+        io = self.load_io()
+        yield from map(Path, io.contents if io is not None else ())
 
     def load_libraries(self) -> list[ImportedLibrary]:
         """The libraries, and those that they need. Raises UsageError for what is missing or does not fit together."""
@@ -70,6 +84,10 @@ class ProgramFiles:
         if found is None and device is not None:
             raise UsageError(f"There is no description (NAME.io.toml) that uses {device}; name it with --io.", "io")
         return None if found is None else load_description(found, device)
+
+
+def _unreadable(error: OSError) -> UsageError:
+    return UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source")
 
 
 def program_files(
