@@ -15,7 +15,19 @@ VARIABLE = "PLC_LINK"
 
 
 def link_of(args: argparse.Namespace) -> Link:
-    """The link of a command; options such as --baud also hold for one that the arguments do not name."""
+    """The link of a command. Raises UsageError if there is none."""
+    link = find_link(args)
+    if link is None:
+        raise UsageError(
+            f"Say where the device is: --port /dev/ttyS0, for example, or once and for all in the environment: "
+            f"{VARIABLE}=serial:/dev/ttyS0.",
+            "no-link",
+        )
+    return link
+
+
+def find_link(args: argparse.Namespace) -> Link | None:
+    """The same, if there is one; options such as --baud also hold for one that the arguments do not name."""
     given = _given(args)
     if len(given) > 1:
         flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
@@ -23,18 +35,7 @@ def link_of(args: argparse.Namespace) -> Link:
     if given:
         return make_link(given[0], getattr(args, TRANSPORTS[given[0]].flag), **_options(args))
     link = _default_link()
-    if link is None:
-        raise UsageError(
-            f"Say where the device is: --port /dev/ttyS0, for example, or once and for all in the environment: "
-            f"{VARIABLE}=serial:/dev/ttyS0.",
-            "no-link",
-        )
-    return make_link(link.scheme, link.place, **{**link.options, **_options(args)})
-
-
-def names_no_link(args: argparse.Namespace) -> bool:
-    """Whether neither the arguments nor the environment name a link."""
-    return not _given(args) and _default_link() is None
+    return None if link is None else make_link(link.scheme, link.place, **{**link.options, **_options(args)})
 
 
 def all_serial_ports(args: argparse.Namespace) -> list[Link]:
