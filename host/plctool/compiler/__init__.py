@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import CompileError
 from plctool.compiler.level import Level
-from plctool.compiler.program_files import IoFiles, Program, ProgramFiles, program_files
+from plctool.compiler.program_files import IoFiles, ProgramFiles, Sources, program_files
 from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from plctool.io.model import Description
 
 __all__ = [
-    "CompileError", "IoFiles", "Level", "Program", "ProgramFiles", "check_sources", "check_with_tests",
+    "CompileError", "IoFiles", "Level", "ProgramFiles", "Sources", "check_sources", "check_with_tests",
     "compile_sources", "io_sources", "library_sources", "load_io", "load_sources", "program_files",
 ]  # fmt: skip
 
@@ -95,7 +95,7 @@ def check_with_tests(
 
 
 def compile_sources(
-    paths: Program,
+    paths: Sources,
     *,
     target: str | None = None,
     level: Level = 2,

@@ -108,11 +108,11 @@ def _unreadable(error: OSError) -> UsageError:
     return UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source")
 
 
-Program = Sequence[Path | str] | ProgramFiles
+Sources = Sequence[Path | str] | ProgramFiles
 """What a program is made of: its sources or its project, or all of it as `program_files` found it."""
 
 
-def program_files(paths: Program, io: IoFiles | None = None, libraries: Sequence[Path | str] = ()) -> ProgramFiles:
+def program_files(paths: Sources, io: IoFiles | None = None, libraries: Sequence[Path | str] = ()) -> ProgramFiles:
     """The files of a program: those named, or those of the project that is named. What `io` names holds before what
     the project names; `libraries` are added to its own. What was found before stays as it is. Raises CompileError for
     mistakes in a project file."""
