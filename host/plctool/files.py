@@ -65,9 +65,16 @@ def write_atomically(path: Path, data: bytes) -> None:
 def read_utf8(path: Path, code: str) -> str:
     """The text of a file, perhaps with a byte order mark. Raises UsageError with that code for one that is none."""
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        data = path.read_bytes()
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}.", code) from None
+    return decode_utf8(data, path, code)
+
+
+def decode_utf8(data: bytes, path: Path, code: str) -> str:
+    """The same for what was read of a file."""
+    try:
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UsageError(f"{path} is not UTF-8 at byte {error.start}; save it as UTF-8.", code) from None
 

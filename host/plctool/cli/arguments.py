@@ -97,7 +97,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--firmware",
         type=usable_path,
         metavar="FILE.elf",
-        help="burn it as well; for a board that plctool does not know",
+        help="burn it as well; a board of your own is read from it",
     )
     image.add_argument("-o", "--output", type=usable_path, required=True, metavar="FILE.hex|.bin")
 

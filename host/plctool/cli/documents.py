@@ -82,14 +82,12 @@ def _compile(settings: Settings, target: str | None) -> BuildResult:
     from plctool.compiler import compile_sources
 
     return compile_sources(
-        settings.paths,
+        settings.files,
         target=target,
         level=settings.level,
         checks=settings.checks,
         debug=settings.debug,
         warnings=settings.warnings,
-        io=settings.io,
-        libraries=settings.libraries,
         board=settings.board,
         limits=settings.limits,
     )
@@ -132,9 +130,9 @@ def missing(settings: Settings) -> Document:
 
 def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[Source]]:
     """Every diagnostic of a program, its sources, and all files that diagnostics are about."""
-    from plctool.compiler import check_with_tests, io_sources, library_sources, program_files
+    from plctool.compiler import check_with_tests, io_sources, library_sources
 
-    files = program_files(settings.paths, settings.io, settings.libraries)
+    files = settings.files
     sources, libraries = files.load_sources(), files.load_libraries()
     result = check_with_tests(sources, settings.warnings, files.load_io, libraries)
     return result.diagnostics, sources, [*sources, *io_sources(files.load_io()), *library_sources(libraries)]
@@ -244,14 +242,7 @@ def test(settings: Settings, pattern: str, junit: Path | None) -> tuple[Document
 
     if junit:
         check_output(junit, settings.files.every_file(), "--junit report.xml")
-    report = st_tests.run_tests(
-        settings.paths,
-        pattern=pattern,
-        level=int(settings.level),
-        warnings=settings.warnings,
-        io=settings.io,
-        libraries=settings.libraries,
-    )
+    report = st_tests.run_tests(settings.files, pattern=pattern, level=int(settings.level), warnings=settings.warnings)
     if junit:
         write_atomically(junit, st_tests.junit_xml(report))
     return report.document(), report

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from plctool.cli import documents, io_documents, output
 from plctool.cli.arguments import pairs, parser
 from plctool.cli.io_documents import Document
-from plctool.cli.links import all_serial_ports, link_of, names_no_link
+from plctool.cli.links import all_serial_ports, find_link, link_of
 from plctool.errors import InternalError, PlcError, UsageError
 from plctool.files import path_error
 from plctool.link.transports import Link
@@ -258,10 +258,11 @@ class _Progress:
 
 
 def _scan(args: argparse.Namespace) -> int:
-    if names_no_link(args):
+    link = find_link(args)
+    if link is None:
         document = documents.scan_all(all_serial_ports(args), _gateway_wanted(args), _me(args))
     else:
-        document = documents.scan(link_of(args), _gateway_wanted(args), _me(args))
+        document = documents.scan(link, _gateway_wanted(args), _me(args))
     return _show(args, document, lambda d: output.table(d["devices"], d["devices"][0]))
 
 

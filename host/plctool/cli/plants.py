@@ -78,9 +78,12 @@ def _said_with_its_line(path: Path) -> Iterator[None]:
         raise
     except SyntaxError as error:
         raise UsageError(f"{error.filename}:{error.lineno}: {error.msg}", "no-plant") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         if not own and isinstance(error, OSError):
             raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-plant") from None
         place = f"{path}:{own[-1].lineno}" if own else str(path)
-        raise UsageError(f"{place}: {type(error).__name__}: {error}", "no-plant") from error
+        reason = f"{type(error).__name__}: {error}"
+        if isinstance(error, SystemExit):
+            reason = "exit would end plctool, not the plant; return instead."
+        raise UsageError(f"{place}: {reason}", "no-plant") from error

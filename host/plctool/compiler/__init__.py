@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import CompileError
 from plctool.compiler.level import Level
-from plctool.compiler.program_files import IoFiles, ProgramFiles, program_files
+from plctool.compiler.program_files import IoFiles, ProgramFiles, Sources, program_files
 from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from plctool.io.model import Description
 
 __all__ = [
-    "CompileError", "IoFiles", "Level", "ProgramFiles", "check_sources", "check_with_tests", "compile_sources",
-    "io_sources", "library_sources", "load_io", "load_sources", "program_files",
+    "CompileError", "IoFiles", "Level", "ProgramFiles", "Sources", "check_sources", "check_with_tests",
+    "compile_sources", "io_sources", "library_sources", "load_io", "load_sources", "program_files",
 ]  # fmt: skip
 
 
@@ -95,7 +95,7 @@ def check_with_tests(
 
 
 def compile_sources(
-    paths: Sequence[Path | str],
+    paths: Sources,
     *,
     target: str | None = None,
     level: Level = 2,
@@ -109,10 +109,10 @@ def compile_sources(
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
     said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
-    inputs and outputs; `libraries`: folders or .zips of those that it uses. Of a project its files are taken, its
-    options are for the command line. `board`: one that plctool knows, such as mps2-an385/standard, to whose target and
-    limits the program is held, so that another `target` is refused; without `limits` it may need more than any device
-    has.
+    inputs and outputs; `libraries`: folders or .zips of those that it uses; both are in `ProgramFiles` already. Of a
+    project its files are taken, its options are for the command line. `board`: one that plctool knows, such as
+    mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused; without
+    `limits` it may need more than any device has.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
