@@ -25,21 +25,14 @@ def find_project(folder: Path | None = None) -> Path | None:
 
 def project_named(paths: Sequence[Path]) -> Path | None:
     """The project file that stands for all of a program: named itself, or by its folder. None: these are sources.
-    Raises UsageError if there is something else beside it, and for a path that cannot be."""
+    Raises UsageError if there is something else beside it."""
     for path in paths:
         file = path if path.name == PROJECT_FILE else path / PROJECT_FILE
-        if _is_file(file, path):
+        if file.is_file():
             if len(paths) > 1:
                 raise UsageError(f"{path} is a project; name it alone, it says which sources it has.", "bad-project")
             return file
     return None
-
-
-def _is_file(file: Path, named: Path) -> bool:
-    try:
-        return file.is_file()
-    except OSError as error:  # such as a name that is too long
-        raise UsageError(f"{named} cannot be used: {error.strerror}.", "no-source") from None
 
 
 def _from_here(path: Path) -> Path:

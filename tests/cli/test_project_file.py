@@ -100,7 +100,7 @@ def test_sources_are_files_folders_and_patterns(tool: Any, project: Path) -> Non
 def test_a_name_that_no_file_can_have_is_refused(tool: Any, project: Path) -> None:
     for words in (["check", LONG], ["build", LONG], ["run", LONG], ["check", "src", "--library", LONG]):
         done = tool(*words)
-        assert done.status == 2 and LONG in done.err and "Internal" not in done.err
+        assert done.status == 2 and f"{LONG[:80]}... cannot be the path of a file" in done.err
 
 
 def test_options_of_the_project_hold_where_the_command_line_says_nothing(tool: Any, project: Path) -> None:
