@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import os
 import struct
 import sys
 import threading
 from collections.abc import Sequence
-from itertools import chain
+from contextlib import suppress
 
 from plant import EVERY_MS, Plant
 
@@ -95,23 +96,28 @@ def real(registers: list[int]) -> float:
 
 async def serve(port: int) -> None:
     """Until the process is ended."""
-    device, loop = Device(Plant(), port), asyncio.get_running_loop()
-    await device.plug_in()
+    device = Device(Plant(), port)
+    try:
+        await device.plug_in()
+    except RuntimeError:  # of pymodbus
+        sys.exit(f"Port {port} is in use; choose another one with --port, and in tanks.io.toml.")
     print(f"modbus: 127.0.0.1:{device.port}", flush=True)
-    pressed: asyncio.Queue[str] = asyncio.Queue()
-    threading.Thread(target=read_keys, args=(loop, pressed), daemon=True).start()
-    moving = asyncio.create_task(device.run())
+    await asyncio.gather(device.run(), follow_keys(device))
+
+
+async def follow_keys(device: Device) -> None:
+    """Pulls the bus at Enter, and plugs it in at the next one; until the end of stdin."""
+    loop, pressed = asyncio.get_running_loop(), asyncio.Queue[bytes]()
+
+    def read() -> None:
+        while got := os.read(sys.stdin.fileno(), 100):
+            loop.call_soon_threadsafe(pressed.put_nowait, got)
+
+    threading.Thread(target=read, daemon=True).start()
     while await pressed.get():
         await (device.pull() if device.server else device.plug_in())
         state = "connected" if device.server else "pulled"
         print(f"bus {state}; process tank {device.plant.process.level:.1f} %", flush=True)
-    await moving
-
-
-def read_keys(loop: asyncio.AbstractEventLoop, pressed: asyncio.Queue[str]) -> None:
-    """Passes on each line of stdin, and "" at its end."""
-    for line in chain(iter(sys.stdin.readline, ""), [""]):
-        loop.call_soon_threadsafe(pressed.put_nowait, line)
 
 
 def main() -> None:
@@ -119,13 +125,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="The plant as a Modbus device. Enter pulls the bus.")
     help = "TCP port on this machine, 0 for any that is free (%(default)s)"
     parser.add_argument("--port", type=int, default=5020, help=help)
-    port = parser.parse_args().port
-    try:
-        asyncio.run(serve(port))
-    except KeyboardInterrupt:
-        pass
-    except RuntimeError:  # of pymodbus
-        sys.exit(f"Port {port} is in use; choose another one with --port, and in tanks.io.toml.")
+    with suppress(KeyboardInterrupt):
+        asyncio.run(serve(parser.parse_args().port))
 
 
 if __name__ == "__main__":
