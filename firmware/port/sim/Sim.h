@@ -55,7 +55,7 @@ RTS_RESULT SimCommCycle(void);
 /* Virtual time since SimStart [ns]. */
 RTS_I64 SimNow(void);
 
-/* Cycles that take longer than this in real time [ms] are aborted as endless; the default is
+/* Cycles that take longer than this in real time [ms] are aborted as endless; the default, and what 0 sets, is
  * SIM_CYCLE_LIMIT_MS. */
 void SimSetCycleLimit(RTS_UI32 ms);
 

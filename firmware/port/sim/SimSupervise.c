@@ -101,7 +101,7 @@ void SimSuperviseStart(void)
 
 void SimSetCycleLimit(RTS_UI32 ms)
 {
-    SysAtomicStore(&supervisor.limit_ms, ms);
+    SysAtomicStore(&supervisor.limit_ms, ms ? ms : SIM_CYCLE_LIMIT_MS);
 }
 
 void SimMutexLock(void)
