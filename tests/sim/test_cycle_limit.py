@@ -1,4 +1,4 @@
-"""The simulator aborts a cycle that takes too long in real time: that cycle, never one of another program."""
+"""The simulator aborts a cycle that takes too long on the processor: that cycle, never one of another program."""
 
 from __future__ import annotations
 
