@@ -32,7 +32,7 @@ from plctool.sim import Simulator
 from plctool.st_tests.report import TEST_NAME, Failure, Outcome, Report
 
 LIMIT_MS = 10_000
-"""Time of the processor after which a test is taken for an endless loop: millions of cycles of a program are one cycle here."""
+"""Time of the processor after which a test is taken for an endless loop: it may be millions of cycles of a program."""
 
 _IN_TEST = re.compile(rf"{TEST_NAME.pattern}|SETUP|TEARDOWN")
 _COMPARED = {"ASSERT_GT": "> ", "ASSERT_GE": ">= ", "ASSERT_LT": "< ", "ASSERT_LE": "<= "}
