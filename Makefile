@@ -100,9 +100,9 @@ build-cm%/build.ninja: $(VENV)/dev
 build-lm3s6965/build.ninja: $(VENV)/dev
 	$(MESON) setup build-lm3s6965 --cross-file cross/lm3s6965.ini
 
-# What a user gets: the package with its two commands.
+# What a user gets: the package with its two commands; and the plant of the demo speaks Modbus.
 $(VENV)/installed: $(VENV)/bootstrapped pyproject.toml meson.build $(shell find firmware host examples -type f -not -path '*/__pycache__/*')
-	$(BIN)/pip install --quiet .
+	$(BIN)/pip install --quiet '.[demo]'
 	touch $@
 
 # What a developer needs on top.
