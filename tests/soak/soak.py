@@ -310,7 +310,7 @@ class Soak:
             self.errors.append(f"{line.kind}, channel {line.channels}:\n{traceback.format_exc()}")
 
     def _settled(self) -> Use:
-        """When the number of files has been the same for longer than the device waits for anybody."""
+        """When the number of files has been the same for longer than the device waits for a client."""
         use, since = use_of(self.worker), time.monotonic()
         while time.monotonic() < since + SETTLED:
             time.sleep(0.5)
