@@ -74,11 +74,11 @@ ATTACKED := build$(if $(findstring --sanitized,$(ARGS)),-sanitized)
 
 attack: $(ATTACKED)/build.ninja
 	$(MESON) configure $(ATTACKED) -Dhost=true
-	$(MESON) compile -C $(ATTACKED)
+	ninja -C $(ATTACKED) under_attack
 	$(BIN)/python tests/attack/run.py $(ARGS)
 
 soak: build/build.ninja
-	$(MESON) compile -C build
+	ninja -C build under_attack
 	$(BIN)/python tests/soak/soak.py $(ARGS)
 
 FUZZED := build build-sanitized
