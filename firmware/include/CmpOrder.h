@@ -48,6 +48,9 @@ PORT_COMPONENTS(X)
 X(CmpAppEmbedded)
 #if HAS_COMMUNICATION
 X(CmpSrv)
+#if HAS_CmpUserMgr
+X(CmpUserMgr)
+#endif
 X(CmpDevice)
 X(CmpAppSrv)
 #if HAS_CmpLogSrv
