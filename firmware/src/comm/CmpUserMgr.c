@@ -21,7 +21,7 @@
 #if COMM_PASSWORD
 
 RTS_STATIC_ASSERT(sizeof(((USER_VERIFIER *)0)->key) == SHA256_SIZE, a_key_is_a_digest);
-RTS_STATIC_ASSERT((int)PASSWORD_PAUSE_MS < (int)CHANNEL_LOGIN_MS, a_channel_outlives_the_pause);
+RTS_STATIC_ASSERT((int)PASSWORD_PAUSE_MS < (int)CHANNEL_SETTLE_MS, a_channel_is_kept_for_the_pause);
 
 static struct {
     bool reported; /* that there are wrong ones, since the last right one */
