@@ -20,7 +20,8 @@
 bool AppHasPassword(void);
 const USER_VERIFIER *AppPasswordGet(void);
 
-/* `verifier` without iterations removes it. ERR_DEVICE flash fault, the previous one stays. */
+/* `verifier` without iterations removes it. ERR_PARAMETER: nobody can know it; ERR_DEVICE flash fault; the previous one
+ * stays. */
 RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier);
 
 /* Removes it in a runtime that has not started: CH_INIT_SYSTEM2 has run, and no other hook after it. ERR_DEVICE;

@@ -204,6 +204,25 @@ static void setting_it_leaves_the_program_as_it_is(void)
     CHECK(gets_in(first));
 }
 
+static void what_nobody_can_know_is_refused(void)
+{
+    static const RTS_UI32 numbers[] = {1, PASSWORD_MIN_ITERATIONS - 1, PASSWORD_MAX_ITERATIONS + 1, 0xFFFFFFFF};
+    RTS_UI8 content[2 + sizeof(USER_VERIFIER)] = {TAG_USER_VERIFIER, sizeof(USER_VERIFIER)};
+    USER_VERIFIER verifier = password_verifier(second);
+
+    start_with(first);
+    for (RTS_UI32 i = 0; i <= RTS_COUNT(numbers); i++) {
+        if (i < RTS_COUNT(numbers))
+            BytesPut32(verifier.iterations, numbers[i]);
+        else
+            verifier = (USER_VERIFIER){.iterations = {0, 0x27}};
+        memcpy(content + 2, &verifier, sizeof(verifier));
+        CHECK(client_request(&client, SG_USERMGR, SRV_USER_SET_CREDENTIALS, content, sizeof(content), &reply));
+        CHECK_EQUAL(reply_number(&reply, TAG_SERVICE_RESULT), ERR_PARAMETER);
+        CHECK(keeps(first));
+    }
+}
+
 static RTS_UI32 set_result;
 
 static void change(void *key)
@@ -258,6 +277,7 @@ int main(void)
     RUN(it_is_there_after_the_next_start);
     RUN(downloads_starts_and_resets_leave_it);
     RUN(setting_it_leaves_the_program_as_it_is);
+    RUN(what_nobody_can_know_is_refused);
     RUN(every_cut_leaves_the_old_or_the_new_one);
     return test_result();
 }

@@ -124,12 +124,23 @@ static RTS_UI32 record_tag(void)
     return COMMIT_TAG + SysFileGetArea(FILE_SLOT_B)->offset;
 }
 
+#if COMM_PASSWORD
+/* Whether somebody may know it. */
+static bool is_password(const USER_VERIFIER *verifier)
+{
+    static const USER_VERIFIER none;
+    RTS_UI32 iterations = BytesGet32(verifier->iterations);
+
+    return iterations >= PASSWORD_MIN_ITERATIONS && iterations <= PASSWORD_MAX_ITERATIONS &&
+           memcmp(verifier->key, none.key, sizeof none.key) != 0;
+}
+#endif
+
+/* A record may hold anything: what is no password shall not lock the device. */
 static void take_password(const COMMIT_RECORD *record)
 {
 #if COMM_PASSWORD
-    RTS_UI32 iterations = BytesGet32(record->password.iterations);
-
-    if (iterations >= PASSWORD_MIN_ITERATIONS && iterations <= PASSWORD_MAX_ITERATIONS)
+    if (is_password(&record->password))
         state.password = record->password;
 #else
     RTS_UNUSED(record);
@@ -329,6 +340,8 @@ RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier)
     char text[APP_CRASH_TEXT_SIZE];
     RTS_RESULT result;
 
+    if (BytesGet32(verifier->iterations) != 0 && !is_password(verifier))
+        return ERR_PARAMETER;
     read_text(text);
     state.password = *verifier;
     result = write_record(text);

@@ -105,13 +105,6 @@ static void end_others(const COMM_CLIENT *one)
             SrvEndSession(client);
 }
 
-static bool is_sound(const USER_VERIFIER *verifier)
-{
-    RTS_UI32 iterations = BytesGet32(verifier->iterations);
-
-    return iterations == 0 || (iterations >= PASSWORD_MIN_ITERATIONS && iterations <= PASSWORD_MAX_ITERATIONS);
-}
-
 static RTS_RESULT set_credentials(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     BTAG tag;
@@ -120,8 +113,7 @@ static RTS_RESULT set_credentials(SRV_REQUEST *request, BTAG_WRITER *reply)
 
     if (result != ERR_OK)
         return result;
-    const USER_VERIFIER *verifier = (const USER_VERIFIER *)tag.data;
-    result = is_sound(verifier) ? AppPasswordSet(verifier) : ERR_PARAMETER;
+    result = AppPasswordSet((const USER_VERIFIER *)tag.data);
     if (result == ERR_OK) {
         end_others(request->client);
         LogAdd(CMPID_CmpUserMgr, LOG_INFO, ERR_OK, "Password %s", AppHasPassword() ? "set" : "removed");
