@@ -20,7 +20,7 @@
 bool AppHasPassword(void);
 const USER_VERIFIER *AppPasswordGet(void);
 
-/* `verifier` without iterations removes it. ERR_PARAMETER: nobody can know it; ERR_DEVICE flash fault; the previous one
+/* `verifier` without iterations removes it. ERR_PARAMETER: no tool can have made it; ERR_DEVICE flash fault; the previous one
  * stays. */
 RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier);
 

@@ -18,8 +18,8 @@
 /* A new challenge for this client, good for one proof. */
 const DEV_CHALLENGE *UserChallenge(COMM_CLIENT *client);
 
-/* ERR_OK: it proves the password, for the challenge of this client. ERR_NO_ACCESS_RIGHTS: it does not, and this channel,
- * whoever has it, gets ERR_NOT_READY_YET for PASSWORD_PAUSE_MS. */
+/* ERR_OK: it proves the password, for the challenge of this client. ERR_NO_ACCESS_RIGHTS: it does not, and this
+ * channel, also for its next client, gets ERR_NOT_READY_YET for PASSWORD_PAUSE_MS. */
 RTS_RESULT UserCheckProof(COMM_CLIENT *client, const DEV_PROOF *proof);
 
 RTS_RESULT CmpUserMgr_Hook(CMP_HOOK hook);

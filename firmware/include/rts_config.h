@@ -434,7 +434,7 @@
 #define SRV_INFORMATION 1
 #endif
 
-/* Whether a password can be set (CmpUserMgr; docs/security.md): 1.6 KiB of flash, 60 bytes of RAM and 30 of each client, 52
+/* Whether a password can be set (CmpUserMgr; docs/security.md): 1.8 KiB of flash, 60 bytes of RAM and 44 of each client, 52
  * bytes of each commit record. */
 #ifndef COMM_PASSWORD
 #define COMM_PASSWORD 0

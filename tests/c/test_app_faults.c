@@ -294,7 +294,8 @@ static void a_cut_in_a_rollback_leaves_it_to_the_next_start(void)
             SimSetStart(&start);
             result = SimStart();
             CHECK_EQUAL(SimStart(), ERR_OK);
-            CHECK(running_step() == 1 || (running_step() == 2 && operation <= record + 1)); /* its death was not noted */
+            CHECK(running_step() == 1 ||
+                  (running_step() == 2 && operation <= record + 1)); /* its death was not noted */
             CHECK_EQUAL(SimFlashViolations(), 0);
             if (result == ERR_OK)
                 break;

@@ -202,7 +202,7 @@ static void a_stranger_does_not_delay_others(void)
     CHECK_EQUAL(password_login(&other, right), ERR_OK);
 }
 
-/* A stranger who never pauses, with all channels but the one that somebody else gets. */
+/* A stranger who never pauses. */
 static void guesses_are_few_though_a_stranger_takes_channel_after_channel(void)
 {
     enum { SECONDS = 60 };

@@ -44,8 +44,7 @@ static bool gets_in_without(void)
     BTAG_READER login;
     static const RTS_UI8 content[] = {0x22, 0x02, 0x01, 0x00};
 
-    return reconnect() &&
-           client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply) &&
+    return reconnect() && client_request(&client, SG_DEVICE, SRV_DEV_LOGIN, content, sizeof(content), &reply) &&
            BTagFindContainer(&reply.tags, TAG_DEV_LOGIN_REPLY, &login) == ERR_OK &&
            BTagFindUnsigned(&login, TAG_DEV_SESSION_ID, &client.session) == ERR_OK;
 }

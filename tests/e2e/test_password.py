@@ -1,4 +1,4 @@
-"""A device with a password: the real tool and the real runtime, over a serial line with and without a gateway, and TCP."""
+"""A device with a password: the real tool and the real runtime, over a serial line, a gateway and TCP."""
 
 from __future__ import annotations
 

@@ -131,6 +131,7 @@ enum {
     OPTION_TCP,
 };
 
+/* clang-format off */
 static const struct option long_options[] = {
     {"flash", required_argument, NULL, OPTION_FLASH},
     {"serial", required_argument, NULL, OPTION_SERIAL},
@@ -149,6 +150,7 @@ static const struct option long_options[] = {
     {"tcp", optional_argument, NULL, OPTION_TCP},
     {NULL, 0, NULL, 0},
 };
+/* clang-format on */
 
 static const char *take_serial(const char *text)
 {
@@ -523,7 +525,7 @@ static bool open_when_free(const OPTIONS *options, PORT_REASON *reason)
     return opened;
 }
 
-/* For who has forgotten it: whoever may write the file has the device anyway. */
+/* For users who have forgotten it: those who may write the file have the device anyway. */
 static int reset_password(const OPTIONS *options, PORT_REASON *reason)
 {
     if (!PortFlashOpen(options->flash, reason)) {

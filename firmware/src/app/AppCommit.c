@@ -125,7 +125,7 @@ static RTS_UI32 record_tag(void)
 }
 
 #if COMM_PASSWORD
-/* Whether somebody may know it. */
+/* Whether a tool can have set it. */
 static bool is_password(const USER_VERIFIER *verifier)
 {
     static const USER_VERIFIER none;

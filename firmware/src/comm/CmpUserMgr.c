@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Guessing is slowed down by channel, not by peer: a peer can take another address, but there are only so many channels.
- * A stranger delays nobody for longer than the pause, because who has got a channel keeps it meanwhile.
+ * A stranger delays no client for longer than the pause, because one that has got a channel keeps it meanwhile.
  */
 #include "CmpUserMgr.h"
 
@@ -108,8 +108,7 @@ static void end_others(const COMM_CLIENT *one)
 static RTS_RESULT set_credentials(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     BTAG tag;
-    RTS_RESULT result =
-        BTagFind(&request->tags, TAG_USER_VERIFIER, sizeof(USER_VERIFIER), sizeof(USER_VERIFIER), &tag);
+    RTS_RESULT result = BTagFind(&request->tags, TAG_USER_VERIFIER, sizeof(USER_VERIFIER), sizeof(USER_VERIFIER), &tag);
 
     if (result != ERR_OK)
         return result;

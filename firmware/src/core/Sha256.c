@@ -51,10 +51,10 @@ static RTS_UI32 extend(RTS_UI32 *schedule, RTS_UI32 t)
 /* A step (6.2.2, step 3) on the variables a to h, with the sum of constant and word. */
 static void step(RTS_UI32 *v, RTS_UI32 sum)
 {
-    RTS_UI32 t1 = v[7] + (rotate(v[4], 6) ^ rotate(v[4], 11) ^ rotate(v[4], 25)) +
-                  ((v[4] & v[5]) ^ (~v[4] & v[6])) + sum;
-    RTS_UI32 t2 = (rotate(v[0], 2) ^ rotate(v[0], 13) ^ rotate(v[0], 22)) +
-                  ((v[0] & v[1]) ^ (v[0] & v[2]) ^ (v[1] & v[2]));
+    RTS_UI32 t1 =
+        v[7] + (rotate(v[4], 6) ^ rotate(v[4], 11) ^ rotate(v[4], 25)) + ((v[4] & v[5]) ^ (~v[4] & v[6])) + sum;
+    RTS_UI32 t2 =
+        (rotate(v[0], 2) ^ rotate(v[0], 13) ^ rotate(v[0], 22)) + ((v[0] & v[1]) ^ (v[0] & v[2]) ^ (v[1] & v[2]));
 
     memmove(v + 1, v, (HASH_WORDS - 1) * sizeof(*v));
     v[4] += t1;

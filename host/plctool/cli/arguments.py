@@ -185,7 +185,7 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
 
     passwd = command("passwd", "set, change or remove the password of a device")
     _add_link(passwd)
-    passwd.add_argument("--remove", action="store_true", help="everybody who reaches the device may use it again")
+    passwd.add_argument("--remove", action="store_true", help="every tool that reaches the device may use it again")
     passwd.add_argument(
         "--new-password-file", type=Path, metavar="FILE",
         help="its first line; else the environment's PLC_NEW_PASSWORD, or what you type",
