@@ -48,10 +48,6 @@ PORT_COMPONENTS(X)
 X(CmpAppEmbedded)
 #if HAS_COMMUNICATION
 X(CmpSrv)
-#if HAS_CmpUserMgr
-X(CmpUserMgr)
-#endif
-X(CmpDevice)
 X(CmpAppSrv)
 #if HAS_CmpLogSrv
 X(CmpLogSrv)
@@ -65,6 +61,10 @@ X(CmpIoMgrSrv)
 X(CmpRouterEmbedded)
 X(CmpNameServiceServer)
 X(CmpChannelServerEmbedded)
+#if HAS_CmpUserMgr
+X(CmpUserMgr)
+#endif
+X(CmpDevice)
 #if HAS_CmpPlcShell
 X(CmpPlcShell)
 #endif
