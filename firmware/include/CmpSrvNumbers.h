@@ -282,7 +282,7 @@ enum {
 enum {
     PASSWORD_MIN_ITERATIONS = 4096,
     PASSWORD_MAX_ITERATIONS = 10000000,
-    PASSWORD_PAUSE_MS = 900, /* after a wrong proof its channel has to wait for so long; less than CHANNEL_SETTLE_MS */
+    PASSWORD_PAUSE_MS = 600, /* after a wrong proof its channel has to wait for so long; less than CHANNEL_SETTLE_MS */
 };
 
 /* Log (4.10). */

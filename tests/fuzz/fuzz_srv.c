@@ -102,7 +102,7 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 /* Puts the sessions where the first inputs have "SSSS" or the header its zero. */
 static void repair(uint8_t *message, size_t size, RTS_UI32 session, RTS_UI32 app_session)
 {
-    message[5] = 0;
+    message[5] &= 0x3F;
     BytesPut32(message + 8, session);
     BytesPut32(message + 12, (RTS_UI32)(size - 20));
     for (size_t i = 20; i + 4 <= size; i++)

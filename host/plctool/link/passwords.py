@@ -8,6 +8,7 @@ import hmac
 import secrets
 import unicodedata
 from collections.abc import Callable
+from functools import lru_cache
 
 from plctool.core import lib
 from plctool.errors import DeviceError, LinkError, UsageError
@@ -81,6 +82,7 @@ def is_same(a: str, b: str) -> bool:
     return hmac.compare_digest(_bytes(a), _bytes(b))
 
 
+@lru_cache(maxsize=1)  # a login may be tried several times
 def _client_key(password: str, salt: bytes, iterations: int) -> bytes:
     salted = hashlib.pbkdf2_hmac("sha256", _bytes(password), salt, iterations)
     return hmac.digest(salted, b"Client Key", "sha256")
