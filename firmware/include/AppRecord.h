@@ -54,6 +54,7 @@ enum { COMMIT_TAG = 0x324D4D43 };
 
 #ifndef RTS_CFFI
 
+#include "CmpPackets.h"
 #include "rts_config.h"
 
 /* A record: the commit, and with it why the application failed, which is of no use without a log. */
@@ -61,6 +62,9 @@ typedef struct {
     COMMIT commit;
     APP_EXCEPTION exception;        /* that the active application is in; all zero when it is in none */
     char text[APP_CRASH_TEXT_SIZE]; /* the port's words, "" without */
+#if COMM_PASSWORD
+    USER_VERIFIER password;
+#endif
 } COMMIT_RECORD;
 
 enum {
@@ -69,6 +73,7 @@ enum {
 };
 
 RTS_STATIC_ASSERT(sizeof(COMMIT) == 32, commit_is_32_bytes);
+RTS_STATIC_ASSERT(COMMIT_HAS_CAUSE || !COMM_PASSWORD, a_password_is_in_the_whole_record);
 
 #endif
 

@@ -84,6 +84,7 @@ enum {
     CMPID_IoDrvSim = 0x0024,
     CMPID_IoDrvGpio = 0x0025,
     CMPID_IoDrvModbus = 0x0026,
+    CMPID_CmpUserMgr = 0x0027,
 };
 
 /* Name of a component, "" when unknown. */

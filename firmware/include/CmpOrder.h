@@ -48,7 +48,6 @@ PORT_COMPONENTS(X)
 X(CmpAppEmbedded)
 #if HAS_COMMUNICATION
 X(CmpSrv)
-X(CmpDevice)
 X(CmpAppSrv)
 #if HAS_CmpLogSrv
 X(CmpLogSrv)
@@ -62,6 +61,10 @@ X(CmpIoMgrSrv)
 X(CmpRouterEmbedded)
 X(CmpNameServiceServer)
 X(CmpChannelServerEmbedded)
+#if HAS_CmpUserMgr
+X(CmpUserMgr)
+#endif
+X(CmpDevice)
 #if HAS_CmpPlcShell
 X(CmpPlcShell)
 #endif

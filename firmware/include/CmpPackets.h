@@ -205,6 +205,26 @@ typedef struct {
     WIRE_UI32 unused; /* bytes of it that were never used */
 } DEV_STACK;
 
+/* TAG_DEV_CHALLENGE (own). */
+typedef struct {
+    RTS_UI8 nonce[16]; /* of the device, for one proof */
+    RTS_UI8 salt[16];
+    WIRE_UI32 iterations;
+} DEV_CHALLENGE;
+
+/* TAG_DEV_PROOF (own). */
+typedef struct {
+    RTS_UI8 nonce[16]; /* of the client */
+    RTS_UI8 proof[32];
+} DEV_PROOF;
+
+/* TAG_USER_VERIFIER (own). What a device keeps of a password; no iterations: there is none. */
+typedef struct {
+    RTS_UI8 key[32]; /* StoredKey of RFC 5802 */
+    RTS_UI8 salt[16];
+    WIRE_UI32 iterations;
+} USER_VERIFIER;
+
 /* The reply to SRV_APP_LOGIN and SRV_APP_CREATE. */
 typedef struct {
     WIRE_UI16 result;

@@ -24,14 +24,16 @@ typedef struct {
 /* Writes the content of the reply. Any result but ERR_OK replaces that content by TAG_ERROR with the result. */
 typedef RTS_RESULT (*SRV_HANDLER)(SRV_REQUEST *request, BTAG_WRITER *reply);
 
-/* What a client may do; a set of bits. A login gives all of them, as long as there are no users. */
+/* What a client may do; a set of bits. A login gives all of them, as there are no users. */
 enum {
-    RIGHT_NONE = 0,     /* for services that need no login: identity and state of the device */
+    RIGHT_NONE = 0,     /* for services that need no login: identity of the device, login */
     RIGHT_VIEW = 1,     /* reads variables */
     RIGHT_WRITE = 2,    /* writes variables */
     RIGHT_CONTROL = 4,  /* starts, stops, resets */
     RIGHT_DOWNLOAD = 8, /* replaces the application */
     RIGHT_ALL = RIGHT_VIEW | RIGHT_WRITE | RIGHT_CONTROL | RIGHT_DOWNLOAD,
+    RIGHT_LOOK = COMM_PASSWORD ? RIGHT_VIEW | 0x10 : RIGHT_NONE, /* state of the application: needs a login with a
+                                                                  * password only */
 };
 
 typedef struct {

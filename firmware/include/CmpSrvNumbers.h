@@ -135,6 +135,7 @@ enum {
     SG_APPLICATION = 2,
     SG_LOG = 5,
     SG_IOMGR = 0x0B,
+    SG_USERMGR = 0x0C,
     SG_PLCSHELL = 0x11,
     SG_MONITORING2 = 0x1B,
 };
@@ -156,7 +157,9 @@ enum {
     TAG_DEV_RTS_VERSION = 0x06,
     TAG_DEV_MAX_CHANNELS = 0x08,
     TAG_DEV_SERIAL_NUMBER = 0x09,
-    TAG_DEV_STACK = 0x60, /* own */
+    TAG_DEV_STACK = 0x60,     /* own */
+    TAG_DEV_CHALLENGE = 0x61, /* own */
+    TAG_DEV_PROOF = 0x62,     /* own */
     TAG_DEV_CREDENTIALS = 0x81,
     TAG_DEV_USER = 0x10,
     TAG_DEV_LOGIN_REPLY = 0x82,
@@ -170,6 +173,7 @@ enum {
     TAG_DEV_ECHO_DATA = 0x53,
     TAG_DEV_CLIENT_INFO = 0x83,
     DEV_CRYPT_XOR = 1,
+    DEV_CRYPT_PROOF = 0x100, /* own: DEV_CHALLENGE and DEV_PROOF */
     DEV_SETTING_MONITOR2 = 4,
 };
 
@@ -266,6 +270,19 @@ enum {
     TAG_IO_NAME = 0x08,
     TAG_IO_DRIVER = 0x09,
     TAG_IO_MODULE = 0x0A,
+};
+
+/* Users; what is in them is our own (4.14). */
+enum {
+    SRV_USER_SET_CREDENTIALS = 0x0C,
+    TAG_USER_VERIFIER = 0x60,
+};
+
+/* A password (own; docs/security.md). */
+enum {
+    PASSWORD_MIN_ITERATIONS = 4096,
+    PASSWORD_MAX_ITERATIONS = 10000000,
+    PASSWORD_PAUSE_MS = 600, /* after a wrong proof its channel has to wait for so long; less than CHANNEL_SETTLE_MS */
 };
 
 /* Log (4.10). */

@@ -68,6 +68,10 @@ typedef struct {
     RTS_UI32 id;          /* 0: none */
     RTS_UI32 app_session; /* 0: none */
     RTS_UI32 rights;      /* RIGHT_*; 0 before the login */
+#if COMM_PASSWORD
+    bool challenged;         /* `challenge` has been asked for, and no proof has come yet */
+    DEV_CHALLENGE challenge; /* CmpUserMgr's */
+#endif
 } SRV_SESSION;
 
 /* ---- both ---- */
@@ -75,6 +79,10 @@ typedef struct {
 typedef struct {
     CHANNEL channel;
     SRV_SESSION session;
+#if COMM_PASSWORD
+    bool login_paused; /* by CmpUserMgr, for all that get this channel, from then on */
+    RTS_UI32 paused_since;
+#endif
     COMM_MESSAGE request;
     COMM_MESSAGE reply;
 } COMM_CLIENT;

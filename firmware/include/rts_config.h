@@ -434,6 +434,12 @@
 #define SRV_INFORMATION 1
 #endif
 
+/* Whether a password can be set (CmpUserMgr; docs/security.md): 1.8 KiB of flash, 60 bytes of RAM and 44 of each client, 52
+ * bytes of each commit record. */
+#ifndef COMM_PASSWORD
+#define COMM_PASSWORD 0
+#endif
+
 /* Whether scans in the older versions of the name service are answered too; 110 bytes of flash. */
 #ifndef NS_OLD_VERSIONS
 #define NS_OLD_VERSIONS 1

@@ -25,10 +25,12 @@ from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLin
 from plctool.link.io_services import IoDevice, IoModule
 from plctool.link.monitoring import APP_CHANGED, AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
+from plctool.link.passwords import AskPassword, no_password
 from plctool.link.services import Identity, LogEntry, Stack, Status, TaskInfo
 from plctool.link.session import Session
 from plctool.link.transports import Link, can_transport, open_transport, parse_link, share_bus
 
+PASSWORD_VARIABLE = "PLC_PASSWORD"
 _BUSY_POLL = 0.2  # shortest time between two looks at a device that another tool keeps to itself [s]
 
 
@@ -38,23 +40,33 @@ def connect(
     *,
     gateway: bool | None = None,
     tool: str | None = None,
+    password: str | AskPassword | None = None,
 ) -> Plc:
     """Opens a link to a controller, such as "serial:/dev/ttyS0", "serial:/dev/ttyS0?baud=9600" or
     "serial:socket://host:port".
 
     `symbols` names a symbol file when it is neither in the cache nor beside the image. A serial port of this machine is
     shared with other tools through a gateway where there can be one; with `gateway` false, or PLCTOOL_GATEWAY=off, it
-    is opened by this process and locked. `tool` is how this one is shown to other tools. Raises UsageError for what is
-    not a link, LinkError when it cannot be opened; whether a controller answers shows with the first call.
+    is opened by this process and locked. `tool` is how this one is shown to other tools. `password` is that of the
+    controller, or a function that is called when it has one; without either the environment's PLC_PASSWORD. Raises
+    UsageError for what is not a link, LinkError when it cannot be opened; whether a controller answers, and takes the
+    password, shows with the first call.
     """
-    return Plc(_open_link(link, gateway, tool), Path(symbols) if symbols else None)
+    ask = _asking(password)
+    return Plc(_open_link(link, gateway, tool, ask), Path(symbols) if symbols else None, ask)
+
+
+def _asking(password: str | AskPassword | None) -> AskPassword:
+    if callable(password):
+        return password
+    return lambda: os.environ.get(PASSWORD_VARIABLE) if password is None else password
 
 
 def scan(
     link: str | Link, seconds: float = SCAN_SECONDS, *, gateway: bool | None = None, tool: str | None = None
 ) -> list[Node]:
     """The controllers that answer on a link within `seconds`. Raises LinkError when there are none."""
-    connection = _open_link(link, gateway, tool)
+    connection = _open_link(link, gateway, tool, no_password)
     try:
         nodes = connection.scan(seconds)
         if not nodes:
@@ -64,7 +76,7 @@ def scan(
         connection.close()
 
 
-def _open_link(text: str | Link, gateway: bool | None, tool: str | None) -> MessageLink:
+def _open_link(text: str | Link, gateway: bool | None, tool: str | None, ask_password: AskPassword) -> MessageLink:
     """A way to the device, through a gateway where that is possible and wanted."""
     link = parse_link(text) if isinstance(text, str) else text
     if link.is_shared:
@@ -72,21 +84,23 @@ def _open_link(text: str | Link, gateway: bool | None, tool: str | None) -> Mess
             gateway = os.environ.get("PLCTOOL_GATEWAY", "on").lower() not in ("off", "no", "0")
         if gateway:
             with suppress(NoGateway):
-                return connect_gateway(link, tool or Path(sys.argv[0]).name or "Python")
+                return connect_gateway(link, tool or Path(sys.argv[0]).name or "Python", ask_password)
         else:
             dismiss_idle(link.place)
     return Connection(open_transport(link), _choice(link))
 
 
 @contextmanager
-def connect_several(link: Link, symbols: Path | None = None) -> Iterator[dict[str, Plc]]:
+def connect_several(
+    link: Link, symbols: Path | None = None, password: str | AskPassword | None = None
+) -> Iterator[dict[str, Plc]]:
     """The controllers that the nodes of a link on a bus name, each for a thread of its own. Raises LinkError."""
     bus = share_bus(link)
     opened: dict[str, Plc] = {}
     try:
         for node in link.nodes or []:
             one = link.of_node(node)
-            opened[node] = Plc(Connection(can_transport(one, bus.part()), _choice(one)), symbols)
+            opened[node] = Plc(Connection(can_transport(one, bus.part()), _choice(one)), symbols, _asking(password))
         yield opened
     finally:
         for plc in opened.values():
@@ -106,10 +120,16 @@ def _choice(link: Link) -> Choice | None:
 class Plc(Controller):
     """A controller on a link. Channel and login are made at the first call and renewed by themselves."""
 
-    def __init__(self, connection: MessageLink, symbols: Path | None = None) -> None:
+    def __init__(
+        self, connection: MessageLink, symbols: Path | None = None, ask_password: AskPassword = no_password
+    ) -> None:
         super().__init__()
         self._connection = connection
-        self._session = GatewaySession(connection) if isinstance(connection, GatewayConnection) else Session(connection)
+        self._session = (
+            GatewaySession(connection)
+            if isinstance(connection, GatewayConnection)
+            else Session(connection, ask_password)
+        )
         self._symbol_file = symbols
 
     def close(self) -> None:
@@ -140,6 +160,12 @@ class Plc(Controller):
     def shell(self, command: str) -> str:
         """The answer of the controller's PLC shell, in lines; `?` lists its commands."""
         return services.run_shell(self._session, command)
+
+    def set_password(self, password: str | None) -> None:
+        """Sets the password of the controller, of at least 8 characters, or removes it with None. The logins of other
+        tools end. It is not sent, but what is sent would help who hears it to guess it: set it on a line of your
+        own."""
+        services.set_password(self._session, password)
 
     # ---- inputs and outputs ----
 

@@ -11,6 +11,7 @@
 
 #include "../../firmware/src/app/AppLife.h"
 #include "CmpAppSrv.h"
+#include "CmpBytes.h"
 #include "CmpBlkDrvCan.h"
 #include "CmpBlkDrvSimpleCom.h"
 #include "CmpBlkDrvTcp.h"
@@ -23,6 +24,7 @@
 #include "CmpNameServiceServer.h"
 #include "CmpRouterEmbedded.h"
 #include "CmpSrv.h"
+#include "CmpUserMgr.h"
 #include "Sim.h"
 #include "SimLink.h"
 #include "SysCom.h"
@@ -306,6 +308,27 @@ RTS_RESULT AppDownloadEnd(APP_REFUSAL *refusal)
     return fakes.end_result;
 }
 
+/* ---- password ---- */
+
+#if COMM_PASSWORD
+bool AppHasPassword(void)
+{
+    return BytesGet32(fakes.password.iterations) != 0;
+}
+
+const USER_VERIFIER *AppPasswordGet(void)
+{
+    return &fakes.password;
+}
+
+RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier)
+{
+    if (fakes.password_result == ERR_OK)
+        fakes.password = *verifier;
+    return fakes.password_result;
+}
+#endif
+
 /* ---- start ---- */
 
 const BLK_COUNTERS *const BlkCounters[] = {
@@ -323,6 +346,9 @@ void fakes_hook(CMP_HOOK hook)
 {
     static const PF_HOOK_FUNCTION hooks[] = {
         CmpSrv_Hook,
+#if COMM_PASSWORD
+        CmpUserMgr_Hook,
+#endif
         CmpDevice_Hook,
         CmpAppSrv_Hook,
         CmpMonitor2_Hook,

@@ -6,6 +6,7 @@
 #ifndef COMM_FAKES_H
 #define COMM_FAKES_H
 
+#include "AppPassword.h"
 #include "CmpAppEmbedded.h"
 #include "CmpIecTask.h"
 #include "CmpItf.h"
@@ -55,6 +56,10 @@ typedef struct {
     RTS_RESULT end_result;
     const char *end_text;
 
+#if COMM_PASSWORD
+    USER_VERIFIER password;
+    RTS_RESULT password_result; /* of setting it */
+#endif
     LOG_ENTRY log[FAKE_LOG_SIZE];
     RTS_UI32 log_count;
     IEC_TASK_INFO tasks[FAKE_TASKS];

@@ -3,7 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
+#include "AppRecord.h"
 #include "CmpEventMgr.h"
+#include "SysFlashLog.h"
 #include "SysTimer.h"
 #include "app_device.h"
 
@@ -440,7 +442,7 @@ static void power_on_of_a_proven_application_writes_one_record(void)
     CHECK_EQUAL(SimStart(), ERR_OK);
     CHECK_EQUAL(app_state(), AS_RUN);
     operations = SimFlashOps();
-    CHECK(operations <= (20 + 32 + 12 + APP_CRASH_TEXT_SIZE + 15) / 16 + 1); /* and marks it */
+    CHECK(operations <= (FLASH_LOG_HEAD_SIZE + COMMIT_RECORD_SIZE + 15) / 16 + 1); /* and marks it */
     CHECK_EQUAL(SimFlashCalls(SIM_ERASE), 0);
     CHECK_EQUAL(AppStopApplication(), ERR_OK);
     CHECK_EQUAL(AppStartApplication(), ERR_OK);

@@ -8,6 +8,7 @@ here: they are what runs this test (see WITHOUT_RUNNING).
 
 from __future__ import annotations
 
+import itertools
 import os
 import random
 import re
@@ -64,6 +65,8 @@ class Reader:
             return
         line = line.replace(SHOWN_BROADCAST, BROADCAST).replace(SHOWN_ADDRESS, self.address)
         words = shlex.split(line.replace(SHOWN_PORT, self.port))
+        environment = dict(word.split("=", 1) for word in itertools.takewhile(lambda word: "=" in word, words))
+        words = words[len(environment) :]
         if words[0] == "python":
             self.start_plant(words[1:])
             return
@@ -72,8 +75,8 @@ class Reader:
             return
         assert words[0] == "plctool", f"this test does not know how to run: {line}"
         done = subprocess.run(
-            [sys.executable, "-m", "plctool", *words[1:]], cwd=self.folder, env=self.env, capture_output=True,
-            text=True, timeout=180, check=False,
+            [sys.executable, "-m", "plctool", *words[1:]], cwd=self.folder, env=self.env | environment,
+            capture_output=True, text=True, timeout=180, check=False,
         )  # fmt: skip
         assert done.returncode == 0, f"{line}\nexit {done.returncode}\n{done.stdout}{done.stderr}"
 

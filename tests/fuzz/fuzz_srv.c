@@ -5,18 +5,20 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Input: a message without its first 4 bytes. When bit 7 of the group is set the session and the application session
- * are repaired wherever they are expected.
+ * are repaired wherever they are expected; when bit 6 is, the device has a password, and a challenge has been asked for.
  */
 #include <string.h>
 
 #include "CmpBytes.h"
 #include "CmpChannelServerEmbedded.h"
 #include "CmpSrv.h"
+#include "CmpUserMgr.h"
 #include "comm_fakes.h"
 #include "comm_client.h"
 #include "fuzz.h"
 
 enum { HEAD = 16 }; /* group, service, session, content length, customer id */
+enum { HAS_PASSWORD = 0x40 };
 
 static size_t seed(uint8_t *data, uint8_t group, uint8_t service, const char *content, size_t size)
 {
@@ -79,6 +81,14 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
     case 18:
         return SEED(0x1B, 1, APP "\x81\x01\x1B" "\x82\x01\x18\x02\x01\x04\x05\x13\x02\x10\x00\x06\x00"
                                  "\x09\x08\x02\x20\x00\x0E\x09\x08\x03\x04\x00\x00\x00\x0E");
+    case 21:
+        return SEED(0x0C, 0x0C, "\x60\x34" "0123456789abcdef0123456789abcdef" "0123456789abcdef" "\x88\x13\0\0");
+    case 22:
+    case 23: {
+        size_t size = SEED(1, 2, "\x22\x02\0\x01" "\x62\x30" "0123456789abcdef" "0123456789abcdef0123456789abcdef");
+        data[1] |= HAS_PASSWORD;
+        return index == 22 ? size : HEAD + 4;
+    }
     case 20:
         return SEED(0x11, 1, "\x13\x04\x01\0\0\0\x10\x02" "?\0");
     case 19:
@@ -92,12 +102,20 @@ size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 /* Puts the sessions where the first inputs have "SSSS" or the header its zero. */
 static void repair(uint8_t *message, size_t size, RTS_UI32 session, RTS_UI32 app_session)
 {
-    message[5] &= 0x7F;
+    message[5] &= 0x3F;
     BytesPut32(message + 8, session);
     BytesPut32(message + 12, (RTS_UI32)(size - 20));
     for (size_t i = 20; i + 4 <= size; i++)
         if (memcmp(message + i, "SSSS", 4) == 0)
             BytesPut32(message + i, app_session);
+}
+
+static void set_password(void)
+{
+#if COMM_PASSWORD
+    BytesPut32(fakes.password.iterations, PASSWORD_MIN_ITERATIONS);
+    (void)UserChallenge(ChannelGetClient(0));
+#endif
 }
 
 /* Pointers of which some lead into areas: 0x10 of the data area into memory, from there on into the retain area. */
@@ -149,6 +167,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     RTS_UI32 app_session = SrvCreateAppSession(ChannelGetClient(0));
     memcpy(message, "\x55\xCD\x10\x00", 4);
     memcpy(message + 4, data, size);
+    if (message[5] & HAS_PASSWORD)
+        set_password();
     if (message[5] & 0x80)
         repair(message, size + 4, session, app_session);
     uint8_t *copy = malloc(size + 4);

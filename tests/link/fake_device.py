@@ -6,7 +6,9 @@ sleeps: `FakeLine.receive` moves the clock to the next event.
 
 from __future__ import annotations
 
+import hashlib
 import heapq
+import hmac
 import itertools
 import math
 import struct
@@ -324,6 +326,9 @@ class FakePlc:
         self.tasks: list[tuple[list[int], str]] = []
         self.requests: list[tuple[int, int]] = []
         self.writes = 0
+        self.password = b""  # its verifier
+        self.wrong = 0  # proofs of another one
+        self.pauses = 0  # proofs from now on that come too early after a wrong one
 
     @property
     def crc(self) -> int:
@@ -362,16 +367,36 @@ class FakePlc:
             (lib.SG_MONITORING2, lib.SRV_MON2_WRITE): self._write,
             (lib.SG_LOG, lib.SRV_LOG_GET_ENTRIES): self._log,
             (lib.SG_PLCSHELL, lib.SRV_SHELL_EXECUTE): self._shell,
+            (lib.SG_USERMGR, lib.SRV_USER_SET_CREDENTIALS): self._set_credentials,
         }
 
     def _login(self, tags: bintag.Tags) -> list[bintag.Tag]:
-        return [
-            bintag.container(
-                lib.TAG_DEV_LOGIN_REPLY,
-                bintag.u16(lib.TAG_DEV_LOGIN_RESULT, 0),
-                bintag.u32(lib.TAG_DEV_SESSION_ID, self.LOGIN),
-            )
-        ]
+        crypt, proof = tags.u32(lib.TAG_DEV_CRYPT_TYPE), tags.find(lib.TAG_DEV_PROOF)
+        session = bintag.u32(lib.TAG_DEV_SESSION_ID, self.LOGIN)
+        if not any(self.password):
+            return self._login_reply(lib.ERR_OK, session)
+        if crypt != lib.DEV_CRYPT_PROOF:
+            return self._login_reply(lib.ERR_NO_ACCESS_RIGHTS)
+        key, salt_and_iterations = self.password[:32], self.password[32:]
+        if proof is None:
+            self._challenge = len(self.requests).to_bytes(16, "little") + salt_and_iterations
+            return self._login_reply(lib.ERR_PENDING, bintag.raw(lib.TAG_DEV_CHALLENGE, self._challenge))
+        if self.pauses:
+            self.pauses -= 1
+            return self._login_reply(lib.ERR_NOT_READY_YET)
+        signature = hmac.digest(key, self._challenge + proof[:16], "sha256")
+        client_key = bytes(a ^ b for a, b in zip(signature, proof[16:], strict=True))
+        if hashlib.sha256(client_key).digest() == key:
+            return self._login_reply(lib.ERR_OK, session)
+        self.wrong += 1
+        return self._login_reply(lib.ERR_NO_ACCESS_RIGHTS)
+
+    def _login_reply(self, result: int, *more: bintag.Tag) -> list[bintag.Tag]:
+        return [bintag.container(lib.TAG_DEV_LOGIN_REPLY, bintag.u16(lib.TAG_DEV_LOGIN_RESULT, result), *more)]
+
+    def _set_credentials(self, tags: bintag.Tags) -> list[bintag.Tag]:
+        self.password = tags.bytes(lib.TAG_USER_VERIFIER, 52)
+        return [bintag.u16(lib.TAG_SERVICE_RESULT, 0)]
 
     def _echo(self, tags: bintag.Tags) -> list[bintag.Tag]:
         data = tags.bytes(lib.TAG_DEV_ECHO_DATA)

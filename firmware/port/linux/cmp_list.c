@@ -15,6 +15,7 @@
 #define HAS_IoDrvModbus 1
 #define HAS_CmpIoMgrSrv 1
 #define HAS_COMMUNICATION 1
+#define HAS_CmpUserMgr 1
 #define HAS_CmpLogSrv 1
 #define HAS_CmpPlcShell 1
 #define HAS_CmpMonitor2 1

@@ -8,11 +8,13 @@
  * on SIGTERM only: SIGINT from a terminal reaches both.
  */
 #define _GNU_SOURCE
+#include "AppPassword.h"
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
 #include "CmpSrvNumbers.h"
 #include "Supervisor.h"
 #include "SysExcept.h"
+#include "SysFileFlash.h"
 #include "port.h"
 #include "rts_config.h"
 
@@ -42,6 +44,7 @@ typedef struct {
     char *event[SCHED_MAX_EXTERNAL_EVENTS]; /* NAME=PIPE */
     RTS_UI32 event_count;
     bool alone;
+    bool reset_password;
 } OPTIONS;
 
 static const char usage[] =
@@ -68,6 +71,8 @@ static const char usage[] =
     "  --can-base ID   of the 29-bit identifiers, 0x1F400000 if not given: docs/can.md\n"
     "  --name NAME     of the device in a scan; the name of this machine if not given\n"
     "  --event N=PIPE  each byte written into the named pipe is the external event N of tasks\n"
+    "  --reset-password\n"
+    "                  removes the password that is in the flash file, and ends\n"
     "  --no-supervisor runs the controller in this process, for debuggers: nothing starts it again when it dies\n"
     "  --version       prints the version\n"
     "  --help          prints this\n"
@@ -114,6 +119,7 @@ enum {
     OPTION_BAUD,
     OPTION_EVENT,
     OPTION_ALONE,
+    OPTION_RESET_PASSWORD,
     OPTION_VERSION,
     OPTION_HELP,
     OPTION_CAN,
@@ -125,12 +131,14 @@ enum {
     OPTION_TCP,
 };
 
+/* clang-format off */
 static const struct option long_options[] = {
     {"flash", required_argument, NULL, OPTION_FLASH},
     {"serial", required_argument, NULL, OPTION_SERIAL},
     {"baud", required_argument, NULL, OPTION_BAUD},
     {"event", required_argument, NULL, OPTION_EVENT},
     {"no-supervisor", no_argument, NULL, OPTION_ALONE},
+    {"reset-password", no_argument, NULL, OPTION_RESET_PASSWORD},
     {"version", no_argument, NULL, OPTION_VERSION},
     {"help", no_argument, NULL, OPTION_HELP},
     {"can", required_argument, NULL, OPTION_CAN},
@@ -142,6 +150,7 @@ static const struct option long_options[] = {
     {"tcp", optional_argument, NULL, OPTION_TCP},
     {NULL, 0, NULL, 0},
 };
+/* clang-format on */
 
 static const char *take_serial(const char *text)
 {
@@ -250,6 +259,9 @@ static void take_option(OPTIONS *options, int option)
         break;
     case OPTION_ALONE:
         options->alone = true;
+        break;
+    case OPTION_RESET_PASSWORD:
+        options->reset_password = true;
         break;
     case OPTION_VERSION:
         print_and_exit("plcrt " PLCRT_VERSION "\n");
@@ -513,12 +525,38 @@ static bool open_when_free(const OPTIONS *options, PORT_REASON *reason)
     return opened;
 }
 
+/* For users who have forgotten it: those who may write the file have the device anyway. */
+static int reset_password(const OPTIONS *options, PORT_REASON *reason)
+{
+    if (!PortFlashOpen(options->flash, reason)) {
+        fprintf(stderr, "plcrt: %s\n", reason->text);
+        return EXIT_RUNTIME;
+    }
+    RTS_RESULT result = SysFileFlash_Hook(CH_INIT_SYSTEM2);
+    if (result == ERR_OK) {
+        result = AppPasswordReset();
+    }
+    PortFlashClose();
+    if (result == ERR_OK) {
+        printf("The password in %s is removed.\n", options->flash);
+    } else if (result == ERR_NO_OBJECT) {
+        printf("There is no password in %s.\n", options->flash);
+    } else {
+        fprintf(stderr, "plcrt: the password in %s cannot be removed: error 0x%04X\n", options->flash,
+                (unsigned)result);
+    }
+    return result == ERR_OK || result == ERR_NO_OBJECT ? EXIT_SUCCESS : EXIT_RUNTIME;
+}
+
 int main(int argc, char **argv)
 {
     OPTIONS options = parse_options(argc, argv);
     PORT_REASON reason = {.busy = false};
     hold_standard_streams();
     ignore_signals();
+    if (options.reset_password) {
+        return reset_password(&options, &reason);
+    }
     if (!open_when_free(&options, &reason) || !open_events(&options, &reason)) {
         fprintf(stderr, "plcrt: %s\n", reason.text);
         return EXIT_RUNTIME;

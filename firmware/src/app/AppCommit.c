@@ -8,9 +8,12 @@
 #include <string.h>
 
 #include "AppException.h"
+#include "AppPassword.h"
 #include "CMUtils.h"
+#include "CmpBytes.h"
 #include "CmpItf.h"
 #include "CmpLog.h"
+#include "CmpSrvNumbers.h"
 #include "CompactDownload.h"
 #include "SysExcept.h"
 #include "SysFlash.h"
@@ -23,6 +26,9 @@ RTS_STATIC_ASSERT(sizeof(APP_SEAL) == FILE_ALIGN, a_seal_is_programmed_at_once);
 static struct {
     FLASH_LOG log; /* its `opened` says whether anything is known */
     COMMIT commit; /* what is in flash, or should be and could not be written */
+#if COMM_PASSWORD
+    USER_VERIFIER password; /* also when the commit of its record does not count */
+#endif
 } state;
 
 RTS_RESULT AppCommitResult(void)
@@ -118,6 +124,38 @@ static RTS_UI32 record_tag(void)
     return COMMIT_TAG + SysFileGetArea(FILE_SLOT_B)->offset;
 }
 
+#if COMM_PASSWORD
+/* Whether a tool can have set it. */
+static bool is_password(const USER_VERIFIER *verifier)
+{
+    static const USER_VERIFIER none;
+    RTS_UI32 iterations = BytesGet32(verifier->iterations);
+
+    return iterations >= PASSWORD_MIN_ITERATIONS && iterations <= PASSWORD_MAX_ITERATIONS &&
+           memcmp(verifier->key, none.key, sizeof none.key) != 0;
+}
+#endif
+
+/* A record may hold anything: what is no password shall not lock the device. */
+static void take_password(const COMMIT_RECORD *record)
+{
+#if COMM_PASSWORD
+    if (is_password(&record->password))
+        state.password = record->password;
+#else
+    RTS_UNUSED(record);
+#endif
+}
+
+static void put_password(COMMIT_RECORD *record)
+{
+#if COMM_PASSWORD
+    record->password = state.password;
+#else
+    RTS_UNUSED(record);
+#endif
+}
+
 static RTS_RESULT read_record(void)
 {
     COMMIT_RECORD record;
@@ -126,6 +164,7 @@ static RTS_RESULT read_record(void)
 
     if (COMMIT_HAS_CAUSE && result == ERR_OK) {
         state.commit = record.commit;
+        take_password(&record);
         record.text[sizeof record.text - 1] = '\0'; /* whatever the flash holds */
         if (AppCommitIsDead())
             AppExceptionSet(&record.exception, record.text);
@@ -148,11 +187,19 @@ static void forget_record(void)
     state.commit.active = SLOT_NONE;
 }
 
+static void forget_password(void)
+{
+#if COMM_PASSWORD
+    memset(&state.password, 0, sizeof state.password);
+#endif
+}
+
 void AppCommitOpen(void)
 {
     RTS_RESULT result = FlashLogOpen(&state.log, FILE_COMMIT);
 
     forget_record();
+    forget_password();
     if (result == ERR_OK)
         result = read_record();
     if (result != ERR_OK && result != ERR_NO_OBJECT) {
@@ -187,6 +234,7 @@ static RTS_RESULT write_record(const char *text)
         memset(&record, 0, sizeof record);
         record.commit = state.commit;
         record.exception = *AppExceptionGet();
+        put_password(&record);
         if (APP_CRASH_TEXT_SIZE > 1)
             memcpy(record.text, text, CMUtlStrNLen(text, sizeof record.text - 1));
     }
@@ -260,3 +308,56 @@ void AppCommitDone(void)
     if (FlashLogMark(&state.log) != ERR_OK)
         (void)write_record(""); /* says so as well */
 }
+
+/* ---- the password ---- */
+
+#if COMM_PASSWORD
+
+const USER_VERIFIER *AppPasswordGet(void)
+{
+    return &state.password;
+}
+
+bool AppHasPassword(void)
+{
+    return BytesGet32(state.password.iterations) != 0;
+}
+
+/* The port's words in the newest record, which the next one shall have as well. */
+static void read_text(char *text)
+{
+    COMMIT_RECORD record;
+
+    text[0] = '\0';
+    if (APP_CRASH_TEXT_SIZE > 1 && FlashLogReadNewest(&state.log, record_tag(), &record, sizeof record) == ERR_OK)
+        memcpy(text, record.text, sizeof record.text);
+    text[APP_CRASH_TEXT_SIZE - 1] = '\0';
+}
+
+RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier)
+{
+    const USER_VERIFIER before = state.password;
+    char text[APP_CRASH_TEXT_SIZE];
+    RTS_RESULT result;
+
+    if (BytesGet32(verifier->iterations) != 0 && !is_password(verifier))
+        return ERR_PARAMETER;
+    read_text(text);
+    state.password = *verifier;
+    result = write_record(text);
+    if (result != ERR_OK)
+        state.password = before;
+    return result;
+}
+
+RTS_RESULT AppPasswordReset(void)
+{
+    static const USER_VERIFIER none;
+
+    AppCommitOpen();
+    if (AppCommitResult() != ERR_OK)
+        return AppCommitResult();
+    return AppHasPassword() ? AppPasswordSet(&none) : ERR_NO_OBJECT;
+}
+
+#endif

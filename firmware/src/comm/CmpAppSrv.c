@@ -392,12 +392,12 @@ static const SRV_SERVICE services[] = {
     {SRV_APP_START, RIGHT_CONTROL, start},
     {SRV_APP_STOP, RIGHT_CONTROL, stop},
     {SRV_APP_RESET, RIGHT_CONTROL, reset},
-    {SRV_APP_READ_STATUS, RIGHT_NONE, read_status},
+    {SRV_APP_READ_STATUS, RIGHT_LOOK, read_status},
     {SRV_APP_DOWNLOAD_COMPACT, RIGHT_DOWNLOAD, download_compact},
 #if SRV_INFORMATION
-    {SRV_APP_READ_APPLICATION_LIST, RIGHT_NONE, read_application_list},
-    {SRV_APP_READ_APPLICATION_INFO, RIGHT_NONE, read_application_info},
-    {SRV_APP_READ_TASK_INFO, RIGHT_NONE, read_task_info},
+    {SRV_APP_READ_APPLICATION_LIST, RIGHT_LOOK, read_application_list},
+    {SRV_APP_READ_APPLICATION_INFO, RIGHT_LOOK, read_application_info},
+    {SRV_APP_READ_TASK_INFO, RIGHT_LOOK, read_task_info},
 #endif
 };
 

@@ -3,8 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * There is no user management: a login only prevents changes by programs that did not mean to make
- * any.
+ * There are no users. Without a password a login only prevents changes by programs that did not mean to make any.
  */
 #include "CmpDevice.h"
 
@@ -12,6 +11,7 @@
 #include "CmpBytes.h"
 #include "CmpPackets.h"
 #include "CmpSrv.h"
+#include "CmpUserMgr.h"
 #include "SysTarget.h"
 #include "rts_config.h"
 
@@ -84,11 +84,49 @@ static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
 static RTS_RESULT session_create(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvCreateSession(request->client));
-    BTagWrite32(reply, TAG_DEV_AUTH_TYPE, DEV_CRYPT_XOR);
+    BTagWrite32(reply, TAG_DEV_AUTH_TYPE, AppHasPassword() ? DEV_CRYPT_PROOF : DEV_CRYPT_XOR);
     return ERR_OK;
 }
 
-/* User and password are not looked at, so that clients with odd encodings of "nobody" can log in too. */
+/* The session of a client that has logged in. */
+static void write_login(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_OK);
+    BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvLogin(request->client, request->session));
+    BTagWrite32(reply, TAG_DEV_SETTINGS, DEV_SETTING_MONITOR2);
+}
+
+#if COMM_PASSWORD
+/* The first step gets a challenge, the second one, on the same channel, has the proof. */
+static RTS_RESULT login_with_password(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    BTAG proof;
+    RTS_RESULT result = BTagFind(&request->tags, TAG_DEV_PROOF, sizeof(DEV_PROOF), sizeof(DEV_PROOF), &proof);
+
+    if (result == ERR_L7_TAG_MISSING) {
+        BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_PENDING);
+        BTagWrite(reply, TAG_DEV_CHALLENGE, BTAG_ALIGN_0, UserChallenge(request->client), sizeof(DEV_CHALLENGE));
+        return ERR_OK;
+    }
+    if (result != ERR_OK)
+        return result;
+    result = UserCheckProof(request->client, (const DEV_PROOF *)proof.data);
+    if (result == ERR_OK)
+        write_login(request, reply);
+    else
+        BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, result);
+    return ERR_OK;
+}
+#else
+static RTS_RESULT login_with_password(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UNUSED(request);
+    RTS_UNUSED(reply);
+    return ERR_NOT_SUPPORTED;
+}
+#endif
+
+/* Without a password the user is not looked at, so that clients with odd encodings of "nobody" can log in, too. */
 static RTS_RESULT login(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
     RTS_UI32 crypt = 0;
@@ -97,15 +135,16 @@ static RTS_RESULT login(SRV_REQUEST *request, BTAG_WRITER *reply)
     if (result != ERR_OK)
         return result;
     BTagOpen(reply, TAG_DEV_LOGIN_REPLY, BTAG_ALIGN_0);
-    if (crypt & DEV_CRYPT_XOR) {
-        BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_OK);
-        BTagWrite32(reply, TAG_DEV_SESSION_ID, SrvLogin(request->client, request->session));
-        BTagWrite32(reply, TAG_DEV_SETTINGS, DEV_SETTING_MONITOR2);
-    } else {
+    if (AppHasPassword() && (crypt & DEV_CRYPT_PROOF))
+        result = login_with_password(request, reply);
+    else if (AppHasPassword())
+        BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_NO_ACCESS_RIGHTS);
+    else if (crypt & DEV_CRYPT_XOR)
+        write_login(request, reply);
+    else
         BTagWrite16(reply, TAG_DEV_LOGIN_RESULT, ERR_NOT_SUPPORTED);
-    }
     BTagClose(reply);
-    return ERR_OK;
+    return result;
 }
 
 static RTS_RESULT logout(SRV_REQUEST *request, BTAG_WRITER *reply)
@@ -152,7 +191,7 @@ static const SRV_SERVICE services[] = {
     {SRV_DEV_LOGIN, RIGHT_NONE, login},
     {SRV_DEV_LOGOUT, RIGHT_NONE, logout},
 #if SRV_INFORMATION
-    {SRV_DEV_ECHO, RIGHT_NONE, echo},
+    {SRV_DEV_ECHO, RIGHT_LOOK, echo},
 #endif
     {SRV_DEV_SESSION_CREATE, RIGHT_NONE, session_create},
 };

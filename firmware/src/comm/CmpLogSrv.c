@@ -56,7 +56,7 @@ static RTS_RESULT get_entries(SRV_REQUEST *request, BTAG_WRITER *reply)
 }
 
 static const SRV_SERVICE services[] = {
-    {SRV_LOG_GET_ENTRIES, RIGHT_NONE, get_entries},
+    {SRV_LOG_GET_ENTRIES, RIGHT_LOOK, get_entries},
 };
 
 RTS_RESULT CmpLogSrv_Hook(CMP_HOOK hook)

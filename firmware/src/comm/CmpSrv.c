@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "AppPassword.h"
 #include "CmpBytes.h"
 #include "CmpPackets.h"
 #include "SysTarget.h"
@@ -113,7 +114,7 @@ static const SRV_SERVICE *find_service(const SRV_GROUP *group, RTS_UI16 service)
 
 static RTS_RESULT check_right(const SRV_SERVICE *service, const SRV_REQUEST *request)
 {
-    if (service->right == RIGHT_NONE)
+    if (service->right == RIGHT_NONE || (service->right == RIGHT_LOOK && !AppHasPassword()))
         return ERR_OK;
     if (!is_session(request->client, request->session))
         return ERR_INVALID_SESSION_ID;

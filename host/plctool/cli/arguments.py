@@ -203,6 +203,14 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_link(shell)
     shell.add_argument("words", nargs="+", metavar="COMMAND", help="for example ?, rtsinfo, tasklist, plcload")
 
+    passwd = command("passwd", "set, change or remove the password of a device")
+    _add_link(passwd)
+    passwd.add_argument("--remove", action="store_true", help="every tool that reaches the device may use it again")
+    passwd.add_argument(
+        "--new-password-file", type=Path, metavar="FILE",
+        help="its first line; else the environment's PLC_NEW_PASSWORD, or what you type",
+    )  # fmt: skip
+
     port = command("port-check", "check a port: run programs on a board and compare the results with what is expected")
     port.add_argument("--yes", action="store_true", help="replace the program that is on the board")
     port.add_argument("--power-cycle", action="store_true", help="also ask for the board to be switched off and on")
@@ -316,6 +324,10 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
         default = f"; default: {option.default}" if option.default else ""
         link.add_argument(f"--{name}", metavar="N", help=f"{option.help}{default}")
     link.add_argument("--no-gateway", action="store_true", help="do not share the port, as with PLCTOOL_GATEWAY=off")
+    link.add_argument(
+        "--password-file", type=Path, metavar="FILE",
+        help="first line: the device's password, if it has one; else the environment's PLC_PASSWORD, or what you type",
+    )  # fmt: skip
     if symbols:
         parser.add_argument(
             "--symbols", type=usable_path, metavar="FILE.sym", help="if they are not found automatically"

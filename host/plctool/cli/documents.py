@@ -503,6 +503,12 @@ def shell(plc: Plc, command: str) -> Document:
     return {"command": command, "answer": plc.shell(command)}
 
 
+def passwd(plc: Plc, password: str | None) -> Document:
+    """Sets or removes the password; whether there is one now."""
+    plc.set_password(password)
+    return {"password": password is not None}
+
+
 def log(plc: Controller) -> Document:
     """The log; the exception that holds the program at present comes with its source line."""
     from plctool.core import lib

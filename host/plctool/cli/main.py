@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from plctool.cli.projects import Settings
     from plctool.controller import OtherTool
     from plctool.device import Plc
+    from plctool.link.passwords import AskPassword
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 130, 141
@@ -164,7 +165,23 @@ def _demo(args: argparse.Namespace) -> int:
 def _connect(args: argparse.Namespace) -> Plc:
     from plctool.device import connect
 
-    return connect(link_of(args), getattr(args, "symbols", None), gateway=_gateway_wanted(args), tool=_me(args))
+    return connect(
+        link_of(args),
+        getattr(args, "symbols", None),
+        gateway=_gateway_wanted(args),
+        tool=_me(args),
+        password=_password_source(args),
+    )
+
+
+def _password_source(args: argparse.Namespace) -> AskPassword:
+    """One for all links of this command, so that users are asked once."""
+    from plctool.cli.passwords import password_source
+
+    if "password" not in args:
+        args.password = password_source(args.password_file)
+    source: AskPassword = args.password
+    return source
 
 
 def _gateway_wanted(args: argparse.Namespace) -> bool | None:
@@ -187,7 +204,7 @@ def _on_device(args: argparse.Namespace, operation: Callable[[Plc], Document], t
 def _flash_several(args: argparse.Namespace, link: Link) -> int:
     from plctool.device import connect_several
 
-    with connect_several(link) as plcs, _Progress(not args.json) as progress:
+    with connect_several(link, password=_password_source(args)) as plcs, _Progress(not args.json) as progress:
         document, errors = documents.flash_several(
             plcs,
             args.image,
@@ -292,6 +309,16 @@ def _log(args: argparse.Namespace) -> int:
 
 def _shell(args: argparse.Namespace) -> int:
     return _on_device(args, lambda plc: documents.shell(plc, " ".join(args.words)), lambda d: str(d["answer"]))
+
+
+def _passwd(args: argparse.Namespace) -> int:
+    from plctool.cli.passwords import new_password
+
+    def change(plc: Plc) -> Document:
+        plc.raw_status()  # asks for the present one first
+        return documents.passwd(plc, None if args.remove else new_password(args.new_password_file))
+
+    return _on_device(args, change, lambda d: "The password is set." if d["password"] else "The password is removed.")
 
 
 def _port_check(args: argparse.Namespace) -> int:
@@ -422,7 +449,7 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "test": _test, "new": _new,
     "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
-    "tasks": _tasks, "log": _log, "shell": _shell, "port-check": _port_check,
+    "tasks": _tasks, "log": _log, "shell": _shell, "passwd": _passwd, "port-check": _port_check,
     "read": _read, "write": _write, "watch": _watch, "gateway": _gateway, "completion": _completion, "man": _man,
 }  # fmt: skip
 

@@ -34,6 +34,7 @@ from plctool.gateway.place import NoGateway, Place, find_holder, find_place, loc
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import PATIENCE, SCAN_SECONDS
 from plctool.link.names import Node
+from plctool.link.passwords import AskPassword, no_password, password_needed
 from plctool.link.session import Application, Session
 from plctool.link.transports import Link
 
@@ -51,13 +52,13 @@ class Ended(Exception):
 # ---- finding and starting ----
 
 
-def connect_gateway(link: Link, words: str) -> GatewayConnection:
+def connect_gateway(link: Link, words: str, ask_password: AskPassword = no_password) -> GatewayConnection:
     """A connection through the gateway of a link, which is started when it does not run. `words`: how this one is shown
-    to other tools.
+    to other tools. `ask_password`: asked when the device has a password, whether the gateway is logged in or not.
 
     Raises NoGateway when there can be none, LinkError when the line cannot be opened or not be shared.
     """
-    return GatewayConnection(find_place(link.place), link, words)
+    return GatewayConnection(find_place(link.place), link, words, ask_password)
 
 
 def _attach(place: Place, link: Link, words: str) -> Pipe:
@@ -207,13 +208,15 @@ def failure(said: dict[str, Any]) -> LinkError | DeviceError:
 class GatewayConnection:
     """A MessageLink through the gateway of a line. Finds the gateway again, or starts another one, when it was lost."""
 
-    def __init__(self, place: Place, link: Link, words: str) -> None:
+    def __init__(self, place: Place, link: Link, words: str, ask_password: AskPassword = no_password) -> None:
         self.session = 0  # id of the device's session, while the channel is open
         self.buffer_size = 0
         self.best_size = 0
         self._place = place
         self._link = link
         self._words = words
+        self._ask_password = ask_password
+        self._password: str | None = None  # that was right
         self._numbers = itertools.count(1)
         self._generation: int | None = None  # of the channel; None while none is open
         self._purpose: str | None = None  # why this tool keeps the device to itself
@@ -231,10 +234,26 @@ class GatewayConnection:
         return time.monotonic()
 
     def open(self) -> None:
-        """Has a channel opened unless there is one. Raises LinkError when no device answers."""
-        opened = self._call("open")
+        """Has a channel opened unless there is one. Raises LinkError when no device answers, DeviceError without its
+        password."""
+        opened = self._call_open()
         self.session, self.buffer_size = int(opened["session"]), int(opened["buffer_size"])
         self.best_size, self._generation = int(opened["best_size"]), int(opened["generation"])
+
+    def _call_open(self) -> dict[str, Any]:
+        try:
+            return self._call("open", password=self._password)
+        except DeviceError as error:
+            password = self._ask_password() if error.code == password_needed().code else None
+            if password is None:
+                raise
+        opened = self._call("open", password=password)
+        self._password = password
+        return opened
+
+    def forget_channel(self) -> None:
+        """The next request needs `open` first."""
+        self._generation = None
 
     def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes:
         """Sends a request and returns the reply. Raises ChannelLost when the channel is gone or the gateway ended."""
@@ -273,6 +292,10 @@ class GatewayConnection:
         """See Connection."""
         nodes = self._call("scan", seconds + PATIENCE, seconds=seconds, enough=enough)["nodes"]
         return [Node(**node | {"address": bytes.fromhex(node["address"])}) for node in nodes]
+
+    def wait(self, seconds: float) -> None:
+        """See MessageLink."""
+        time.sleep(seconds)
 
     def close(self) -> None:
         """Leaves the gateway; never raises."""
@@ -436,6 +459,10 @@ class GatewaySession(Session):
 
     def exclusive(self, purpose: str) -> AbstractContextManager[None]:
         return self._gateway.exclusive(purpose)
+
+    def forget_login(self) -> None:
+        super().forget_login()
+        self._gateway.forget_channel()
 
     def forget_application(self) -> None:
         if session := self.application_session:

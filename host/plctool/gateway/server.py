@@ -293,7 +293,8 @@ class _Guest:
     def _call(self, call: dict[str, Any]) -> dict[str, Any]:
         match call.get("op"):
             case "open":
-                return asdict(self._device.open(self._known()))
+                password = call.get("password")
+                return asdict(self._device.open(self._known(), password if isinstance(password, str) else None))
             case "application":
                 application = self._device.application(self._known(), _integer(call, "generation"))
                 return {"session": application.session, "data_guid": application.data_guid.hex()}

@@ -11,12 +11,13 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 
 from plctool.core import lib
-from plctool.errors import LinkError
+from plctool.errors import DeviceError, LinkError
 from plctool.gateway.frames import BUSY
 from plctool.link import l7
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import Connection
 from plctool.link.names import Node
+from plctool.link.passwords import is_same, password_needed, wrong_password
 from plctool.link.session import Application, Session
 
 CLAIM_SILENCE = 30.0  # a tool that has reserved the device and sends nothing for so long loses it [s]
@@ -65,6 +66,7 @@ class Tool:
     beat: Callable[[], None] = lambda: None  # tells it to wait on; raises when it is gone
     since: float = field(default_factory=time.monotonic)
     silent_since: float = field(default_factory=time.monotonic)  # math.inf while it asks for something
+    login: int = 0  # the one that it has opened, with the password if the device has one
 
     def __str__(self) -> str:
         return f"{self.words} (pid {self.pid})"
@@ -94,7 +96,8 @@ class SharedDevice:
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._session = Session(connection)
+        self._session = Session(connection, lambda: self._given)
+        self._given: str | None = None  # the password, by the tool whose turn it is
         self._turns = Turns()
         self._claim: Claim | None = None
         self._claiming = threading.Lock()
@@ -110,12 +113,23 @@ class SharedDevice:
 
     # ---- what tools ask for ----
 
-    def open(self, tool: Tool) -> OpenChannel:
-        """Opens a channel and logs in, unless that is done."""
+    def open(self, tool: Tool, password: str | None) -> OpenChannel:
+        """Opens a channel and logs in, unless that is done. A login is for the tools that give the password it was made
+        with; raises DeviceError for others."""
         with self._turn(tool):
+            self._given = password
             session = self._session.ensure()
+            self._check_password(password)
+            tool.login = self._session.logins
             connection = self._connection
             return OpenChannel(self._session.logins, session, connection.buffer_size, connection.best_size)
+
+    def _check_password(self, given: str | None) -> None:
+        needed = self._session.password
+        if needed is not None and given is None:
+            raise password_needed()
+        if needed is not None and given is not None and not is_same(given, needed):
+            raise wrong_password()
 
     def application(self, tool: Tool, generation: int) -> Application:
         """The login to the application, one for all tools."""
@@ -132,7 +146,9 @@ class SharedDevice:
         """A request and its reply. Raises ChannelLost."""
         with self._turn(tool, generation):
             self._note(message)
-            return self._connection.exchange(message, patience)
+            answer = self._connection.exchange(message, patience)
+            self._note_end(message, answer)
+            return answer
 
     def stream(
         self,
@@ -178,14 +194,15 @@ class SharedDevice:
                 tool.check()
                 self._refuse_others(tool)  # it may have been claimed meanwhile
                 if generation is not None:
-                    self._check_generation(generation)
+                    self._check_generation(tool, generation)
                 yield
         finally:
             tool.silent_since = time.monotonic()
 
-    def _check_generation(self, generation: int) -> None:
+    def _check_generation(self, tool: Tool, generation: int) -> None:
         """The code says that the device has not taken the request, so it may be repeated on another channel."""
-        if generation != self._session.logins or not self._connection.is_open:
+        may_use = self._session.password is None or tool.login == generation
+        if generation != self._session.logins or not self._session.is_logged_in or not may_use:
             raise ChannelLost("The channel to the device was closed; try again.", "closed")
 
     # ---- claims ----
@@ -239,3 +256,17 @@ class SharedDevice:
         changes = (lib.SRV_APP_DOWNLOAD_COMPACT, lib.SRV_APP_RESET)
         if request.group == lib.SG_APPLICATION and request.service in changes:
             self._session.forget_application()
+
+    def _note_end(self, message: bytes, answer: bytes) -> None:
+        """A login ends with the password it was made with: every tool has to give the new one. And the device may have
+        ended it, because another client set a password."""
+        try:
+            request = l7.decode(message)
+            l7.decode_reply(answer, request)
+            ended = request.group == lib.SG_USERMGR
+        except DeviceError as error:
+            ended = error.result == lib.ERR_INVALID_SESSION_ID
+        except LinkError:
+            return
+        if ended:
+            self._session.forget_login()

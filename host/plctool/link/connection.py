@@ -91,6 +91,9 @@ class MessageLink(Protocol):
     def now(self) -> float:
         """Monotonic time in seconds; virtual for virtual lines."""
 
+    def wait(self, seconds: float) -> None:
+        """Lets time pass, less than a channel bears without a package."""
+
     def close(self) -> None: ...
 
 
@@ -220,6 +223,12 @@ class Connection:
                     found[node.address] = replace(node, place=self.transport.places.get(node.address, ""))
             now = self.transport.now()
         return list(found.values())
+
+    def wait(self, seconds: float) -> None:
+        """See MessageLink."""
+        end = self.now() + seconds
+        while (left := end - self.now()) > 0:
+            self._receive(left)
 
     def close(self) -> None:
         """Closes channel and transport; never raises."""

@@ -18,6 +18,7 @@ from plctool.image.file import image_crc
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
 from plctool.link.names import version_text
+from plctool.link.passwords import verifier_of
 from plctool.link.session import Session
 from plctool.link.wire import Layout, signed32
 
@@ -166,6 +167,24 @@ def echo(session: Session, data: bytes) -> bytes:
         bintag.raw(lib.TAG_DEV_ECHO_DATA, data),
     ]
     return session.recover(lambda: session.call(lib.SG_DEVICE, lib.SRV_DEV_ECHO, tags)).bytes(lib.TAG_DEV_ECHO_DATA)
+
+
+def set_password(session: Session, password: str | None) -> None:
+    """Sets the password of the device, or removes it. Other logins end. Raises UsageError for a password that is too
+    short or too long, DeviceError when the device does not take it, as one that has no passwords."""
+    tags = [bintag.raw(lib.TAG_USER_VERIFIER, verifier_of(password))]
+    try:
+        call = partial(session.call, lib.SG_USERMGR, lib.SRV_USER_SET_CREDENTIALS, tags, _SLOW)
+        reply = session.recover(call, repeatable=False)
+    except DeviceError as error:
+        if error.result not in (lib.ERR_L7_UNKNOWNCMDGROUP, lib.ERR_L7_UNKNOWNCMD):
+            raise
+        raise DeviceError(
+            "The firmware of this device has no passwords; build one with COMM_PASSWORD (docs/porting.md).",
+            "no-passwords",
+            error.result,
+        ) from None
+    l7.check_result(reply.u16(lib.TAG_SERVICE_RESULT), "password")
 
 
 # ---- application -----------------------------------------------------------------------------------------------------

@@ -12,12 +12,16 @@ from plctool.errors import DeviceError
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
 from plctool.link.connection import PATIENCE, MessageLink
+from plctool.link.passwords import AskPassword, no_password, password_needed, proof_of, wrong_password
 from plctool.link.wire import Layout
 
 _T = TypeVar("_T")
 _TRIES = 3
 _APPLICATION = "Application"
 _LOGIN_REPLY = Layout("APP_LOGIN_REPLY")
+_CHALLENGE_SIZE = Layout("DEV_CHALLENGE").size
+_PAUSE = 0.1  # between two tries while the device takes no password, because of a wrong one before [s]
+_PAUSE_PATIENCE = 3 * lib.PASSWORD_PAUSE_MS / 1000  # [s]
 
 
 @dataclass(frozen=True)
@@ -35,9 +39,11 @@ class Application:
 class Session:
     """Calls services of one device. Channel and logins are made when first needed."""
 
-    def __init__(self, connection: MessageLink) -> None:
+    def __init__(self, connection: MessageLink, ask_password: AskPassword = no_password) -> None:
         self.connection = connection
-        self.logins = 0  # how often it has logged in; each needs a channel of its own
+        self.logins = 0  # how often it has logged in
+        self.password: str | None = None  # that the last login needed
+        self._ask_password = ask_password
         self._id: int | None = None
         self._application: Application | None = None
 
@@ -45,7 +51,13 @@ class Session:
         self, group: int, service: int, tags: Iterable[bintag.Tag] = (), patience: float = PATIENCE
     ) -> bintag.Tags:
         """One request and its reply. Raises ChannelLost when the channel is gone, DeviceError when refused."""
-        reply = self._exchange(self.message(group, service, bintag.encode(tags)), patience)
+        try:
+            reply = self._exchange(self.message(group, service, bintag.encode(tags)), patience)
+        except DeviceError as error:
+            if error.result != lib.ERR_INVALID_SESSION_ID:
+                raise
+            self.forget_login()
+            raise ChannelLost("The login on the device has ended; try again.", "closed") from None
         if _wants_application_login(group, reply):
             self.forget_application()
             raise ChannelLost("Another tool took the login to the application; try again.", "closed")
@@ -57,7 +69,7 @@ class Session:
 
     def ensure(self) -> int:
         """Opens a channel and logs in, unless that is done. Returns the id of the session."""
-        if self.connection.is_open and self._id is not None:
+        if self.is_logged_in and self._id is not None:
             return self._id
         self._id = self._application = None
         if not self.connection.is_open:
@@ -65,6 +77,14 @@ class Session:
         self._id = self._login()
         self.logins += 1
         return self._id
+
+    @property
+    def is_logged_in(self) -> bool:
+        return self.connection.is_open and self._id is not None
+
+    def forget_login(self) -> None:
+        """To be called when the device has ended the session; the channel stays."""
+        self._id = self._application = None
 
     def application(self) -> Application:
         """The login to the application on the device. Raises DeviceError when there is none."""
@@ -109,15 +129,45 @@ class Session:
         return l7.decode_reply(self.connection.exchange(l7.encode(request), patience), request)
 
     def _login(self) -> int:
-        """Anonymous login: there is no user management. Returns the session id."""
-        tags = [
-            bintag.u32(lib.TAG_DEV_CRYPT_TYPE, lib.DEV_CRYPT_XOR),
-            bintag.container(lib.TAG_DEV_CREDENTIALS, bintag.u16(lib.TAG_DEV_USER, 0)),
-        ]
-        request = l7.Message(lib.SG_DEVICE, lib.SRV_DEV_LOGIN, lib.L7_SESSION_INITIAL, bintag.encode(tags))
-        reply = self._exchange(request).container(lib.TAG_DEV_LOGIN_REPLY)
-        l7.check_result(reply.u16(lib.TAG_DEV_LOGIN_RESULT), "login")
+        """Logs in, with the password if the device has one. Returns the session id. Raises DeviceError without
+        it."""
+        self.password = None
+        user = bintag.container(lib.TAG_DEV_CREDENTIALS, bintag.u16(lib.TAG_DEV_USER, 0))
+        result, reply = self._ask_for_login(lib.DEV_CRYPT_XOR, user)
+        if result == lib.ERR_NO_ACCESS_RIGHTS:
+            reply = self._login_with_password(result)
+        else:
+            l7.check_result(result, "login")
         return reply.u32(lib.TAG_DEV_SESSION_ID)
+
+    def _login_with_password(self, refused: int) -> bintag.Tags:
+        """`refused`: the result of the login without one. A wrong password, also of a previous client, makes the
+        device wait."""
+        end = self.connection.now() + _PAUSE_PATIENCE
+        while True:
+            result, reply = self._ask_for_login(lib.DEV_CRYPT_PROOF)
+            if result != lib.ERR_PENDING:  # it is not one of ours
+                l7.check_result(refused, "login")
+            password = self._ask_password()
+            if password is None:
+                raise password_needed()
+            proof = proof_of(password, reply.bytes(lib.TAG_DEV_CHALLENGE, _CHALLENGE_SIZE))
+            result, reply = self._ask_for_login(lib.DEV_CRYPT_PROOF, bintag.raw(lib.TAG_DEV_PROOF, proof))
+            if result == lib.ERR_NOT_READY_YET and self.connection.now() < end:
+                self.connection.wait(_PAUSE)
+            elif result in (lib.ERR_NO_ACCESS_RIGHTS, lib.ERR_NOT_READY_YET):
+                raise wrong_password()
+            else:
+                l7.check_result(result, "login")
+                self.password = password
+                return reply
+
+    def _ask_for_login(self, crypt_type: int, *tags: bintag.Tag) -> tuple[int, bintag.Tags]:
+        """The result of a login, and the elements with it."""
+        content = bintag.encode([bintag.u32(lib.TAG_DEV_CRYPT_TYPE, crypt_type), *tags])
+        request = l7.Message(lib.SG_DEVICE, lib.SRV_DEV_LOGIN, lib.L7_SESSION_INITIAL, content)
+        reply = self._exchange(request).container(lib.TAG_DEV_LOGIN_REPLY)
+        return reply.u16(lib.TAG_DEV_LOGIN_RESULT), reply
 
     def _login_application(self) -> Application:
         tags = self.call(lib.SG_APPLICATION, lib.SRV_APP_LOGIN, [bintag.text(lib.TAG_APP_LOGIN_NAME, _APPLICATION)])

@@ -14,6 +14,7 @@
 #define HAS_IoDrvGpio 1
 #define HAS_CmpIoMgrSrv 1
 #define HAS_COMMUNICATION 1
+#define HAS_CmpUserMgr 1
 #define HAS_CmpLogSrv 1
 #define HAS_CmpPlcShell 1
 #define HAS_CmpMonitor2 1

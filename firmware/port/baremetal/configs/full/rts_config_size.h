@@ -18,6 +18,7 @@
 #define RTS_MAIN_STACK_SIZE 3584 /* a driver refuses its configuration, and what ran before is loaded again */
 #define RTS_IEC_STACK_SIZE 2048
 #define NETSERVER_MESSAGE_SIZE 2048
+#define COMM_PASSWORD 1
 #ifndef COMM_MAX_CLIENTS
 #define COMM_MAX_CLIENTS 2
 #endif
