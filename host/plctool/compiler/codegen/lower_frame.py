@@ -269,6 +269,13 @@ class Body(Frame):
         self.effects = effects
         self.on_return = "return"
         self.loops: list[tuple[str, str]] = []  # labels for CONTINUE and EXIT
+        self._labels: dict[str, str] = {}
+
+    def label(self, name: str) -> str:
+        """The block that a label of the program begins."""
+        if name not in self._labels:
+            self._labels[name] = self.fn.label("label")
+        return self._labels[name]
 
     def statements(self, body: list[Statement]) -> None:
         """Statements in their order."""

@@ -14,6 +14,8 @@ from typing import Any, TypeVar
 from plctool.compiler.internal import note_position
 from plctool.compiler.nesting import MAX_DEPTH, NestingError
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, settle
+from plctool.compiler.semantics.labels import Labels
+from plctool.compiler.semantics.pitfalls import Loop
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.world import World
@@ -37,6 +39,8 @@ class Checker:
         self.pos: Callable[[int], Pos] = scope.source.pos
         self.special_calls: SpecialCalls = special_calls or {}
         self.loops = 0  # around the statement
+        self.labels = Labels([])  # of the body
+        self.around: list[list[ast.Stmt]] = []  # the statements it is one of, those around them ...
         self._expressions = 0
         self._statements = 0
 
@@ -108,6 +112,11 @@ class Checker:
         """Reports that nothing is known by a name; the value that stands for the expression."""
         self.scope.missing(offset, name, message)
         return error_value(self.pos(offset))
+
+    def note_loop(self, loop: Loop) -> None:
+        """Notes a loop, to be looked at when all bodies are checked: whether it ends."""
+        if self.scope.pou is not None and not self.scope.library:
+            self.world.loops.append((self.scope.pou, loop))
 
     def warning(self, offset: int, code: str, message: str) -> None:
         """Reports a warning."""

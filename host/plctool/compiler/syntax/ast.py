@@ -649,7 +649,31 @@ class Return:
     condition: Expr | None = None
 
 
-Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return
+@dataclass(slots=True, eq=False)
+class Label:
+    """`name:`, where a JMP goes on."""
+
+    pos: int
+    name: str
+
+
+@dataclass(slots=True, eq=False)
+class Jump:
+    """`JMP name;`"""
+
+    pos: int
+    name: str
+    name_pos: int
+
+
+Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return | Label | Jump
+
+
+def inner_bodies(statement: Stmt) -> list[list[Stmt]]:
+    """The statements in a statement, as the lists they stand in."""
+    if isinstance(statement, If | Case):
+        return [*(body for _, body in statement.branches), statement.otherwise]
+    return [statement.body] if isinstance(statement, For | While | RepeatUntil) else []
 
 
 # ---- looking through a tree ----------------------------------------------------------------------------------------
