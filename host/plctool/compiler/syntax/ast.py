@@ -255,6 +255,7 @@ class StructSpec:
     fields: list[VarDecl]
     union: bool = False
     base: NamedType | None = None  # what it EXTENDS
+    pack_mode: str | None = None  # the value of the attribute
 
 
 TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | StructSpec

@@ -17,6 +17,7 @@ from plctool.compiler.syntax.lexer import Report, Token
 from plctool.iec import literals
 from plctool.iec.types import ELEMENTARY
 
+_KINDS_OF_TYPES = {ast.EnumSpec: "enumeration", ast.StructSpec: "STRUCT"}
 _TYPE_NAMES = frozenset((*ELEMENTARY, "STRING", "WSTRING", *slips.TYPES))
 _Init = TypeVar("_Init", bound="ast.Init | None")
 
@@ -111,11 +112,13 @@ class Builder:
         return self.units.arrange(units)
 
     def types(self, keyword: Token, *decls: Any) -> list[Any]:
-        kinds = {decl: "enumeration" if isinstance(decl.spec, ast.EnumSpec) else "TYPE" for decl in _listed(decls)}
-        first = "enumeration" if "enumeration" in kinds.values() else "TYPE"
+        kinds = {decl: _KINDS_OF_TYPES.get(type(decl.spec), "TYPE") for decl in _listed(decls)}
+        first = next((kind for kind in kinds.values() if kind != "TYPE"), "TYPE")
         of_all = self._attributes_at(keyword.pos, first)
         for decl, kind in kinds.items():
             decl.attributes = {**of_all, **self._attributes_at(decl.pos, kind)}
+            if isinstance(decl.spec, ast.StructSpec):
+                decl.spec.pack_mode = decl.attributes.get("pack_mode")
         return list(kinds)
 
     def type_decl(self, *rest: Any) -> ast.TypeDecl:

@@ -40,6 +40,7 @@ from plctool.compiler.typed import (
     ValuePlace,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import is_unaligned
 from plctool.iec.types import (
     BOOL,
     LREAL,
@@ -265,6 +266,8 @@ def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
         e = e if takes_array(t, e.type) else c.coerce(e, t)
         return e if may_copy(c, e, node.pos) else error_value(c.pos(node.pos))
     place = referenced_place(c, node, t.target, name, output=False)
+    if place is not None and is_unaligned(place):
+        return c.error(node.pos, "type", packed(place, "a reference"))
     return error_value(c.pos(node.pos)) if place is None else refer(place, t)
 
 
@@ -278,6 +281,13 @@ def _is_slip(node: ast.Expr, t: Type, name: str) -> bool:
     ):
         return False
     return node.left.name.casefold() == name.casefold()
+
+
+def packed(place: Place, what: str) -> str:
+    """Why something that keeps an address cannot have that of a place in a packed structure."""
+    return (
+        f"this {place.type} is packed, and {what} needs one at a multiple of {place.type.align}; copy it to a variable"
+    )
 
 
 def refer(place: Place, t: ReferenceType) -> Expr:

@@ -10,6 +10,7 @@ from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of, total_size
 from plctool.compiler.semantics.rules import intrinsics
+from plctool.compiler.semantics.rules.arguments import packed
 from plctool.compiler.semantics.rules.conversion_calls import conversion, conversion_hint
 from plctool.compiler.semantics.rules.intrinsics import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.members import space_of
@@ -36,6 +37,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import is_unaligned
 from plctool.iec.types import (
     BOOL,
     BYTE,
@@ -58,15 +60,15 @@ _OF_VARIABLES = ("SIZEOF", "XSIZEOF", "ADR", "REF", "__ISVALIDREF")
 """Functions whose argument is a variable or a type, not a value."""
 
 
-def of_variable(c: Checker, name: str, node: ast.Call) -> Expr:
-    """The call of one of _OF_VARIABLES."""
+def of_variable(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr:
+    """The call of one of _OF_VARIABLES; `expected` is the type the surroundings would like."""
     if len(node.args) != 1 or node.args[0].value is None:
         return c.error(node.pos, "arguments", f"{name} takes 1 argument, not {len(node.args)}")
     argument = node.args[0].value
     if name == "__ISVALIDREF":
         return _is_valid(c, argument)
     if name not in ("SIZEOF", "XSIZEOF"):
-        return _address_of(c, argument, RawPointerType if name == "ADR" else PointerType)
+        return _address_of(c, argument, RawPointerType if name == "ADR" else PointerType, expected)
     if isinstance(argument, ast.Name):
         symbol = c.scope.lookup(argument.name)
         is_block = isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK
@@ -110,7 +112,7 @@ def _size(c: Checker, t: Type, node: ast.Call) -> Expr:
     return Const(t.size, UNTYPED_INT, c.pos(node.pos))
 
 
-def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
+def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType], expected: Type | None) -> Expr:
     """ADR(x), REF(x); of a constant, the address of a variable that holds it."""
     constant = _constant_text(c, node)
     if constant is not None and isinstance(constant.type, StringType):
@@ -122,8 +124,18 @@ def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
         return error_value(c.pos(node.pos))
     if isinstance(place, BitPlace):
         return c.error(node.pos, "type", "a single bit has no address")
+    if kind is PointerType and is_unaligned(place):
+        return c.error(node.pos, "type", packed(place, "a reference"))
+    if is_unaligned(place) and not _is_of_bytes(expected):
+        message = f"this {place.type} is packed, and some processors stop when they read it through a pointer to it"
+        c.warning(node.pos, "pointer", f"{message}; copy it with MEMCPY, or use a pointer to the structure")
     t = place.type.element if isinstance(place.type, OpenArrayType) else place.type
     return AddressOf(place, kind(t), c.pos(node.pos))
+
+
+def _is_of_bytes(t: Type | None) -> bool:
+    """Whether what is wanted is a pointer to something that may be anywhere, or the number of an address."""
+    return t is not None and (not isinstance(t, PointerType) or t.target.align == 1)
 
 
 def _constant_text(c: Checker, node: ast.Expr) -> Const | None:
@@ -239,7 +251,7 @@ _FUNCTIONS = intrinsics.FUNCTIONS | _ON_VARIABLES
 def built_in_call(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
     """The call of a built-in function; None when there is none of that name."""
     if name in _OF_VARIABLES:
-        return of_variable(c, name, node)
+        return of_variable(c, name, node, expected)
     if name in _PLACES:
         return _place(c, name, node)
     function = _FUNCTIONS.get(name)
