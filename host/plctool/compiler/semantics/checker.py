@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from plctool.compiler.internal import note_position
-from plctool.compiler.nesting import MAX_DEPTH, NestingError
+from plctool.compiler.nesting import MAX_DEPTH, OPERATORS, NestingError
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, settle
 from plctool.compiler.semantics.labels import Labels
 from plctool.compiler.semantics.pitfalls import Loop
@@ -46,15 +46,16 @@ class Checker:
 
     def expr(self, node: ast.Expr, expected: Type | None = None) -> Expr:
         """The typed expression; `expected` is the type the surroundings would like. Untyped constants stay untyped."""
-        self._expressions += 1
-        if self._expressions > MAX_DEPTH:
+        level = 1 if type(node) is ast.Binary else OPERATORS
+        self._expressions += level
+        if self._expressions > MAX_DEPTH * OPERATORS:
             raise NestingError(self.pos(node.pos))
         try:
             e = EXPRESSION_RULES[type(node)](self, node, expected)
         except Exception as error:
             note_position(error, self.pos(node.pos))
             raise
-        self._expressions -= 1
+        self._expressions -= level
         return e
 
     def statement(self, node: ast.Stmt) -> list[Statement]:

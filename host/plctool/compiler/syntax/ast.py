@@ -399,6 +399,7 @@ class PouDecl:
     members: list[PouDecl] = field(default_factory=list)
     namespace: Namespace | None = None
     chart: Chart | None = None  # in place of the body
+    accesses: list[AccessLine] = field(default_factory=list)  # VAR_ACCESS of a PROGRAM
 
     @property
     def full_name(self) -> str:

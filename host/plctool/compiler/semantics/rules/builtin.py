@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import error_value, place_of, settle
+from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of, total_size
 from plctool.compiler.semantics.rules import intrinsics
 from plctool.compiler.semantics.rules.arguments import packed
@@ -25,6 +25,7 @@ from plctool.compiler.typed import (
     Call,
     CallStatement,
     Const,
+    Convert,
     DerefPlace,
     Expr,
     Intrinsic,
@@ -41,6 +42,7 @@ from plctool.compiler.typed_nodes import is_unaligned
 from plctool.iec.types import (
     BOOL,
     BYTE,
+    DINT,
     ELEMENTARY,
     UDINT,
     ArrayType,
@@ -51,6 +53,7 @@ from plctool.iec.types import (
     ReferenceType,
     StringType,
     StructType,
+    SubrangeType,
     Type,
 )
 
@@ -170,12 +173,20 @@ def _bound(c: Checker, f: Applied) -> Expr:
     array, dimension = f.args
     if not isinstance(array.type, ArrayType):
         return c.error(f.node.pos, "type", f"{f.name} needs an array, not {array.type}")
-    count = len(array.type.bounds)
-    number = dimension.value if isinstance(dimension, Const) else None
-    if not isinstance(number, int) or not 1 <= number <= count:
-        which = "the constant 1" if count == 1 else f"a constant from 1 to {count}"
-        return c.error(f.node.args[1].pos, "range", f"the dimension of {array.type} is {which}")
-    return bounds_of(place_of(array))[number - 1][f.name == "UPPER_BOUND"]
+    count, pos = len(array.type.bounds), c.pos(f.node.pos)
+    bounds = [pair[f.name == "UPPER_BOUND"] for pair in bounds_of(place_of(array))]
+    base = elementary(dimension.type)
+    if isinstance(dimension, Const) or base is None or base.kind not in NUMBERS:
+        number = dimension.value if isinstance(dimension, Const) else None
+        if not isinstance(number, int) or not 1 <= number <= count:
+            which = "1" if count == 1 else f"a number from 1 to {count}"
+            return c.error(f.node.args[1].pos, "range", f"the dimension of {array.type} is {which}")
+        return bounds[number - 1]
+    within = c.coerce(dimension, SubrangeType(f"DINT (1..{count})", DINT, 1, count))
+    if within.type is ERROR:
+        return within
+    index = Binary(BinaryOp.SUB, Convert(within, DINT, pos), Const(1, DINT, pos), DINT, pos)
+    return IntrinsicCall(Intrinsic.MUX, [index, *(c.coerce(bound, DINT) for bound in bounds)], DINT, pos)
 
 
 _ON_VARIABLES: dict[str, BuiltIn] = {
