@@ -227,6 +227,7 @@ def test_a_loop_that_cannot_end(body: str, expected: str) -> None:
         "WHILE i < 9 DO i := i + 1; again: IF x THEN CONTINUE; END_IF; JMP again; END_WHILE;",
         "again: tm(IN := TRUE); IF NOT tm.Q THEN JMP again; END_IF;",
         "FOR i := 1 TO 10 DO IF x THEN JMP lab; END_IF; i := 3; lab: j := 1; END_FOR;",
+        "FOR i := 1 TO 10 DO IF x THEN CONTINUE; END_IF; i := 3; END_FOR;",
         "WHILE Twice(1) > 5 DO j := 1; END_WHILE;",
         "FOR i := 32760 TO 32767 DO j := j + 1; END_FOR;",  # ends at the limit of the type
     ],

@@ -117,8 +117,8 @@ def _never_passed(loop: For) -> str:
     """A FOR whose body sets its variable back."""
     if not isinstance(loop.var, VarPlace) or not isinstance(loop.stop, Const) or not isinstance(loop.step, Const):
         return ""
-    if any(isinstance(node, Jump) for node in walk(loop.body)):
-        return ""
+    if has_exit(loop.body, (Continue,)) or any(isinstance(node, Jump) for node in walk(loop.body)):
+        return ""  # perhaps around what sets it back
     for statement in loop.body:
         if not isinstance(statement, Assign) or not isinstance(statement.value, Const):
             continue
