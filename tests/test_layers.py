@@ -22,7 +22,7 @@ ROOT = Path(plctool.__file__).parent
 FLOORS = (
     ("errors", "core", "version"),
     ("files", "iec", "project"),
-    ("image", "templates"),
+    ("image",),
     ("io",),
     ("debug",),
     ("link",),
@@ -30,7 +30,7 @@ FLOORS = (
     ("controller", "compiler", "sim_io"),
     ("device", "sim"),
     ("", "sim_plant"),
-    ("port_check", "st_tests", "testing", "trace_file"),
+    ("port_check", "st_tests", "templates", "testing", "trace_file"),
     ("cli", "pytest_plugin"),
     ("__main__",),
 )

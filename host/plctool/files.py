@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 from plctool.errors import UsageError
+
+_SHOWN = 80  # characters of an invalid path
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,30 @@ class Pos:
     file: str
     line: int
     column: int
+
+
+def usable_path(text: str) -> Path:
+    """A path that a user gave. Raises UsageError if no file can have it: it is too long, has a NUL or
+    is a link to itself."""
+    try:
+        os.stat(text)
+    except ValueError:
+        raise _no_path(text, "it has a character that no name has") from None
+    except OSError as error:
+        if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
+            raise _no_path(text, error.strerror or "it is refused") from None
+    return Path(text)
+
+
+def _no_path(text: str, why: str) -> UsageError:
+    shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+    shown = "".join(c if c.isprintable() else "?" for c in shown)
+    return UsageError(f"{shown} cannot be the path of a file: {why}; give another one.", "path")
+
+
+def path_error(error: OSError) -> UsageError:
+    """What to say of a file that the system refuses, where nothing better is known."""
+    return UsageError(f"{os.fsdecode(error.filename)} cannot be used: {error.strerror}.", "path")
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -38,9 +65,16 @@ def write_atomically(path: Path, data: bytes) -> None:
 def read_utf8(path: Path, code: str) -> str:
     """The text of a file, perhaps with a byte order mark. Raises UsageError with that code for one that is none."""
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        data = path.read_bytes()
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}.", code) from None
+    return decode_utf8(data, path, code)
+
+
+def decode_utf8(data: bytes, path: Path, code: str) -> str:
+    """The same for what was read of a file."""
+    try:
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UsageError(f"{path} is not UTF-8 at byte {error.start}; save it as UTF-8.", code) from None
 

@@ -16,11 +16,13 @@ import pytest
 from plctool.errors import PlcError
 
 if TYPE_CHECKING:
+    from plctool.compiler import ProgramFiles
     from plctool.st_tests import TestProgram
     from plctool.st_tests.report import Failure
 
 _TEST = re.compile(rb"^\s*TEST\s+['\"]", re.IGNORECASE | re.MULTILINE)
 _PROGRAMS: pytest.StashKey[dict[tuple[Path, ...], TestProgram]] = pytest.StashKey()
+_PROJECTS: pytest.StashKey[dict[Path, ProgramFiles]] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -55,19 +57,22 @@ class StFile(pytest.File):
         sources = tuple(self.config.getini("plc_sources")) or (self._project() or self.path.parent,)
         programs = self.config.stash.setdefault(_PROGRAMS, {})
         if sources not in programs:
-            programs[sources] = TestProgram(sources)
+            projects = self.config.stash.setdefault(_PROJECTS, {})
+            programs[sources] = TestProgram(projects.get(sources[0], sources))
         return programs[sources]
 
     def _project(self) -> Path | None:
-        """The project file of the nearest folder that has one, if this file is one of its sources."""
-        from plctool.compiler import load_sources
+        """The project file of the nearest folder that has one, if this file is one of its sources. It is read once."""
+        from plctool.compiler import program_files
         from plctool.project import find_project
 
-        project = find_project(self.path.parent)
-        if project is None:
+        file = find_project(self.path.parent)
+        if file is None:
             return None
-        files = {Path(source.path).resolve() for source in load_sources([project])}
-        return project if self.path.resolve() in files else None
+        projects = self.config.stash.setdefault(_PROJECTS, {})
+        if file not in projects:
+            projects[file] = program_files([file])
+        return file if projects[file].has_source(self.path) else None
 
 
 class StFailure(Exception):

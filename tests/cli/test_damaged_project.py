@@ -11,8 +11,8 @@ import pytest
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (b"a = 1\nlink = ", "plc.toml:2:7 is not TOML: Invalid value"),
-        (b"a = 1\nlink = " + b"9" * 5000, "plc.toml:2:8 is not TOML: a number has at most 64 bits"),
+        (b"a = 1\nlink = ", "plc.toml:2:7: this is not TOML: invalid value"),
+        (b"a = 1\nlink = " + b"9" * 5000, "plc.toml:2:8: this is not TOML: a number has at most 64 bits"),
         (b"a = 1\nlink = " + b"[" * 3000 + b"]" * 3000, "is not TOML: there are more than 100 brackets"),
         (b'link = "\xff"', "is not UTF-8 at byte 8; save it as UTF-8"),
         (b"link = 2020-01-01", "link is not a text"),

@@ -137,6 +137,9 @@ def test_plant_that_is_none_is_an_error(tool, program: Path, text: str | None, r
         ("def step(plc)\n", "plant.py:1: expected ':'"),
         ("EVERY_MS = 'often'\ndef step(plc): pass\n", "EVERY_MS in plant.py is not a number of milliseconds above 0"),
         ("def step(plc, what): pass\n", "plant.py: TypeError"),
+        ("import sys\nsys.exit()\ndef step(plc): pass\n", "plant.py:2: exit would end plctool, not the plant; return"),
+        ("def step(plc):\n    raise SystemExit('over')\n", "plant.py:2: exit would end plctool, not the plant; return"),
+        ("def step(plc):\n    exit(3)\n", "plant.py:2: exit would end plctool, not the plant; return"),
     ],
 )
 def test_mistake_in_a_plant_is_said_with_its_line(tool, program: Path, text: str, reason: str) -> None:  # type: ignore[no-untyped-def]

@@ -39,7 +39,7 @@ def for_m3(build: Callable[..., Path]) -> Path:
     return build(PROGRAM, "--target", "cortex-m3")
 
 
-def facts(slug: str, **changes: int) -> bytes:
+def facts(slug: str, **changes: int | bytes) -> bytes:
     """Those of a board, with changes."""
     index = [board.slug for board in known_boards()].index(slug)
     copy = ffi.new("BOARD_FACTS *", lib.SimBoard(index)[0])
@@ -112,7 +112,7 @@ def test_logs_of_a_used_device_are_overwritten(tool: Any, scratch: Path, for_m3:
 def test_firmware_is_burned_too(tool: Any, scratch: Path, for_m3: Path) -> None:
     (scratch / "fw.elf").write_bytes(elf(facts("mps2-an385/standard")))
     done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "flash.hex", "--json")
-    assert done.json["board"] == "MPS2 AN385 (standard)"
+    assert (done.json["board"], done.json["burn_apart"]) == ("MPS2 AN385 (standard)", None)
     content = IntelHex(str(scratch / "flash.hex"))
     assert bytes(content.tobinarray(start=0, end=63)) == bytes(range(64))
     assert len(tool("info", "flash.hex", "--json").json["programs"]) == 1
@@ -160,11 +160,29 @@ def test_firmware_over_the_programs_is_refused(tool: Any, scratch: Path, for_m3:
     assert tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex").status == 0
 
 
-def test_a_memory_of_its_own_has_no_firmware(tool: Any, scratch: Path, for_m3: Path) -> None:
+def test_a_memory_of_its_own_is_written_without_the_firmware(tool: Any, scratch: Path, for_m3: Path) -> None:
+    """Also where the firmware has the addresses that the memory counts from 0, as those of a board of one's own."""
+    of_own = facts("lm3s6965-board/standard", name=b"Acme EEPROM")
     for address in (0, 0x0800_0000):
-        (scratch / "fw.elf").write_bytes(elf(facts("lm3s6965-board/standard"), address=address))
-        done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex")
-        refused(done, "a memory of their own", "--board lm3s6965-board/standard alone")
+        (scratch / "fw.elf").write_bytes(elf(of_own, address=address))
+        for name in ("x.hex", "x.bin"):
+            done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", name)
+            assert done.status == 0
+            assert "Acme EEPROM (standard)" in done.out
+            assert "burn fw.elf into the processor as it is" in done.out
+            assert tool("image", "app.cdl", "--board", "lm3s6965-board/standard", "-o", f"known-{name}").status == 0
+            assert (scratch / name).read_bytes() == (scratch / f"known-{name}").read_bytes()
+    document = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex", "--json").json
+    assert document["burn_apart"] == "fw.elf"
+    assert [piece["what"] for piece in document["pieces"] if piece["address"] == "00000000"] == ["program"]
+
+
+def test_the_program_of_a_memory_of_its_own_is_checked(tool: Any, scratch: Path, build: Any) -> None:
+    (scratch / "fw.elf").write_bytes(elf(facts("lm3s6965-board/minimal", name=b"Acme EEPROM")))
+    build(TASKS, "--target", "cortex-m3")
+    refused(tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex"), "needs 3 tasks", "has 2")
+    build()
+    refused(tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex"), "x86_64-linux", "Acme EEPROM (minimal)")
 
 
 @pytest.mark.parametrize(

@@ -100,6 +100,27 @@ def test_a_board_gives_target_and_limits(refused: Any, tool: Any, scratch: Path)
     assert document["needs"]["tasks"] == 3
 
 
+def test_a_board_and_a_target_that_it_does_not_have_are_refused(tool: Any, scratch: Path) -> None:
+    (scratch / "app.st").write_text(tasks(1))
+    words = ("build", "app.st", "--board", "mps2-an385/standard", "--target")
+    done = tool(*words, "cortex-m4f")
+    assert done.status == 2
+    assert done.err == (
+        "plctool: MPS2 AN385 (standard) has a cortex-m3, not a cortex-m4f; leave out --target, or name a board "
+        "that has it.\n"
+    )
+    assert not (scratch / "app.cdl").exists()
+    assert tool(*words, "cortex-m4f", "--no-limits").status == 2
+    assert "There is no target 'z80'" in tool(*words, "z80").err
+    assert tool(*words, "cortex-m3").status == 0
+
+
+def test_a_board_of_the_command_line_holds_before_the_target_of_the_project(tool: Any, scratch: Path) -> None:
+    (scratch / "plc.toml").write_text('target = "cortex-m4f"\n')
+    (scratch / "app.st").write_text(tasks(1))
+    assert tool("build", "--board", "mps2-an385/standard", "--json").json["target"] == "cortex-m3"
+
+
 def test_code_that_does_not_fit_names_the_largest_units(refused: Any) -> None:
     many = "\n".join(f"n := n * {i + 3} + {i}; m[n MOD 10] := n;" for i in range(400))
     text = f"PROGRAM Main VAR n : DINT; m : ARRAY[0..9] OF DINT; END_VAR\n{many}\nEND_PROGRAM"

@@ -9,6 +9,8 @@ import pytest
 
 from plctool import Simulator
 
+LONG = "x" * 256  # bytes; a name has 255
+PATHS = ("sources", "libraries", "output", "device", "io")
 MAIN = "PROGRAM Main\nVAR n : INT; a : ARRAY[0..1] OF INT; i : INT := 5; END_VAR\nn := n + 1;\nEND_PROGRAM\n"
 
 
@@ -39,20 +41,6 @@ def test_new_project_is_checked_tested_run_and_built_without_arguments(
     done = tool("info", "app.cdl", "--json")
     assert done.json["info"]["project"] == "pump"
     assert done.json["info"]["version"] == "0.1.0"
-
-
-@pytest.mark.parametrize("name", ["2pumps", "a-b", "größer", "a" * 64])
-def test_new_project_has_a_name(tool: Any, name: str) -> None:
-    done = tool("new", name)
-    assert done.status == 2 and "letters, digits and _" in done.err
-    assert not Path(name).exists()
-
-
-def test_new_project_replaces_nothing(tool: Any, scratch: Path) -> None:
-    (scratch / "pump").mkdir()
-    assert tool("new", "pump").status == 0
-    done = tool("new", "pump")
-    assert done.status == 2 and "pump exists already" in done.err
 
 
 def test_project_is_found_from_a_folder_below_it(tool: Any, project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,6 +97,12 @@ def test_sources_are_files_folders_and_patterns(tool: Any, project: Path) -> Non
     assert "unknown function f_b" in tool("check").out
 
 
+def test_a_name_that_no_file_can_have_is_refused(tool: Any, project: Path) -> None:
+    for words in (["check", LONG], ["build", LONG], ["run", LONG], ["check", "src", "--library", LONG]):
+        done = tool(*words)
+        assert done.status == 2 and f"{LONG[:80]}... cannot be the path of a file" in done.err
+
+
 def test_options_of_the_project_hold_where_the_command_line_says_nothing(tool: Any, project: Path) -> None:
     (project / "src/main.st").write_text(MAIN.replace("n + 1", "a[i]"))
     write(project, 'sources = "src"\ntarget = "cortex-m3"\n[options]\nchecks = ["div"]\nno-warn = ["unused"]')
@@ -163,7 +157,11 @@ def test_inputs_and_outputs_are_those_that_the_project_names(tool: Any, project:
         ('[information]\nnames = "a"', "2:1: error: there is no 'names' here; did you mean name?"),
         ('sources = ["src", "scr"]', "1:19: error: there is no file or folder scr"),
         ('sources = ["*.exp"]', "1:12: error: no source fits *.exp"),
-        ('sources = ["/*.st"]', "1:12: error: '/*.st' is not a pattern"),
+        ('sources = ["/*.st"]', "1:12: error: '/*.st' is absolute; a pattern begins at the folder of plc.toml"),
+        ('sources = ["src/**.st"]', "1:12: error: ** is for folders, and stands alone between two /"),
+        ('sources = ["***"]', "1:12: error: ** is for folders, and stands alone between two /"),
+        *((f'{key} = "{LONG}"', f"1:{len(key) + 4}: error: {LONG} cannot be used: File name too") for key in PATHS),
+        (f'sources = "{LONG}*"', f"1:11: error: {LONG}* cannot be used: File name too long"),
         ('sources = ["\\u0000"]', "1:12: error: a path is not empty, and has no control characters"),
         ('sources = "src"\noutput = "a\\u0000"', "2:10: error: a path is not empty, and has no control characters"),
         ('libraries = "\\n"', "1:13: error: a path is not empty, and has no control characters"),

@@ -219,8 +219,9 @@ def test_huge_zip_is_refused_before_it_is_unpacked(tmp_path: Path, monkeypatch: 
     bomb = {"library.toml": manifest("Lib"), "get.st": " " * (library_zip.MAX_BYTES + 1)}
     path = zipped(tmp_path / "lib.zip", bomb)
     assert path.stat().st_size < 200_000
-    monkeypatch.setattr(zipfile.ZipFile, "read", lambda *words: pytest.fail("it is unpacked"))
-    assert "has 64 MiB of files; a library has at most 64 MiB" in refusal(path)
+    monkeypatch.setattr(zipfile.ZipExtFile, "read", lambda *words: pytest.fail("it is unpacked"))
+    found = refusal(path)
+    assert "unpacks to 67108" in found and "at most 67108864 bytes (64 MiB)" in found and "give it as a folder" in found
     many = zipped(tmp_path / "many.zip", {f"{n}.st": "" for n in range(library_zip.MAX_FILES + 1)})
     assert "has 10001 files; a library has at most 10000" in refusal(many)
 
@@ -231,6 +232,72 @@ def test_zip_that_lies_about_sizes_is_refused(tmp_path: Path) -> None:
     assert data.count(struct.pack("<I", 1_000_000)) == 2
     path.write_bytes(data.replace(struct.pack("<I", 1_000_000), struct.pack("<I", 10)))
     assert "cannot be read as a .zip" in refusal(path)
+
+
+@pytest.mark.parametrize("stated", [10, 1 << 20])
+def test_bomb_that_states_a_small_size_is_not_unpacked(tmp_path: Path, stated: int) -> None:
+    import tracemalloc
+
+    size = 200 << 20
+    path = tmp_path / "lib.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("library.toml", manifest("Lib"))
+        with archive.open("get.st", "w") as file:
+            for _ in range(size >> 20):
+                file.write(bytes(1 << 20))
+    data = path.read_bytes()
+    assert data.count(struct.pack("<I", size)) == 2
+    path.write_bytes(data.replace(struct.pack("<I", size), struct.pack("<I", stated)))
+    tracemalloc.start()
+    try:
+        assert "cannot be read as a .zip" in refusal(path)
+        assert tracemalloc.get_traced_memory()[1] < 16 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_zip_with_a_size_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    path = zipped(tmp_path / "lib.zip", {"library.toml": manifest("Lib"), "get.st": GET + " " * 100_000})
+    size = struct.pack("<I", len(GET) + 100_000)
+    path.write_bytes(path.read_bytes().replace(size, struct.pack("<I", 200_000)))
+    assert "cannot be read as a .zip" in refusal(path)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_zip_with_another_compression_is_refused_and_says_which_to_use(tmp_path: Path, method: int) -> None:
+    path = zipped(tmp_path / "lib.zip", {"library.toml": manifest("Lib")})
+    with zipfile.ZipFile(path, "a", method) as archive:
+        archive.writestr("get.st", GET)
+    found = refusal(path)
+    assert "'get.st'" in found and "make it again with 'deflate'" in found
+
+
+def test_zip_without_compression_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "lib.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr("library.toml", manifest("Lib"))
+        archive.writestr("get.st", GET)
+    assert messages(check(tmp_path, USE, path)) == []
+
+
+def test_zip_with_control_characters_in_a_name_is_refused_without_printing_them(tmp_path: Path) -> None:
+    path = zipped(tmp_path / "lib.zip", {"library.toml": manifest("Lib"), "\x1b[2Jget.st": GET})
+    found = refusal(path)
+    assert "\x1b" not in found and "get.st" in found
+
+
+@pytest.mark.parametrize("name", ["GET.st", "./get.st", ".//get.st"])
+def test_zip_with_two_names_of_one_file_is_refused(tmp_path: Path, name: str) -> None:
+    path = zipped(tmp_path / "lib.zip", {"library.toml": manifest("Lib"), "get.st": GET, name: GET})
+    assert "twice" in refusal(path)
+
+
+def test_zip_with_an_empty_name_is_refused(tmp_path: Path) -> None:
+    path = zipped(tmp_path / "lib.zip", {"library.toml": manifest("Lib"), "x": GET})
+    data = bytearray(path.read_bytes())
+    data[data.rindex(b"PK\x01\x02") + 28] = 0
+    path.write_bytes(data)
+    assert str(path) in refusal(path)
 
 
 @pytest.mark.parametrize("damage", ["empty", "cut", "byte", "text", "encrypted", "method", "twice"])

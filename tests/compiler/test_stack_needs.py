@@ -8,7 +8,8 @@ import pytest
 
 from plctool.compiler import compile_sources
 from plctool.compiler.codegen.calls import branches
-from plctool.image.targets import TARGETS
+from plctool.compiler.codegen.stack import deepest_calls
+from plctool.image.targets import TARGETS, Machine
 
 LEVELS = (0, 2, "s")
 # Arrays that stay, in functions that are called from two places each, so that they are not inlined at -O0 and -Os.
@@ -90,3 +91,46 @@ def test_a_distance_that_looks_like_a_call_leads_to_a_function_or_is_none() -> N
         assert list(branches(bytes(64), target.machine, frozenset({4}))) == []
         assert list(branches(b"\xff" * 64, target.machine, frozenset({1}))) == []
         assert list(branches(b"\xe8\xf0", target.machine, frozenset({0}))) == []
+
+
+def x86_calls(chain: list[list[int]]) -> tuple[bytes, dict[int, tuple[int, int]]]:
+    """Machine code of functions that call those of these numbers, and their frames: 16 bytes each."""
+    size = 5 * max(map(len, chain)) + 1
+    code = b""
+    for number, targets in enumerate(chain):
+        calls = b"".join(
+            b"\xe8" + (target * size - (number * size + 5 * (i + 1))).to_bytes(4, "little", signed=True)
+            for i, target in enumerate(targets)
+        )
+        code += calls.ljust(size, b"\xc3")
+    return code, {number * size: (size, 16) for number in range(len(chain))}
+
+
+@pytest.mark.parametrize("length", [1, 2, 1500, 10_000])
+def test_chain_of_calls_may_be_long(length: int) -> None:
+    code, frames = x86_calls([*([n + 1] for n in range(length - 1)), []])
+    chain = deepest_calls(code, Machine.X86_64, frames, [0])
+    assert [offset for offset, _ in chain] == sorted(frames)
+    assert sum(amount for _, amount in chain) == 16 * length
+
+
+def test_calls_that_meet_again_are_followed_once() -> None:
+    length = 2000  # with 2 ** 1000 ways through them
+    code, frames = x86_calls([[min(n + 1, length - 1), min(n + 2, length - 1)] for n in range(length - 1)] + [[]])
+    assert sum(amount for _, amount in deepest_calls(code, Machine.X86_64, frames, [0])) == 16 * length
+
+
+def test_what_looks_like_a_recursion_has_an_end() -> None:
+    code, frames = x86_calls([[1, 2], [0, 2], [1, 0]])
+    assert 16 < sum(amount for _, amount in deepest_calls(code, Machine.X86_64, frames, [0])) <= 48
+
+
+def test_program_with_a_chain_of_1500_functions_is_built(tmp_path: Path) -> None:
+    first = "FUNCTION F0 : DINT VAR_INPUT x : DINT; END_VAR F0 := x; END_FUNCTION"
+    calls = "".join(
+        f"FUNCTION F{i} : DINT VAR_INPUT x : DINT; END_VAR F{i} := F{i - 1}(x) + F{i - 1}(2); END_FUNCTION\n"
+        for i in range(1, 1500)
+    )
+    main = "PROGRAM Main VAR n : DINT; END_VAR IF n > 0 THEN n := F1499(n); END_IF END_PROGRAM"
+    (tmp_path / "long.st").write_text(f"{first}\n{calls}{main}")
+    assert compile_sources([tmp_path / "long.st"], level=0, limits=False).needs["stack"].amount >= 1500 * 8

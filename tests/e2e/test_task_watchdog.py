@@ -83,7 +83,8 @@ def test_a_task_within_its_watchdog_goes_on(tool, plcrt, eventually):
     assert exception(tool, plcrt) is None
 
 
-# The slow task has its work, and then may loop; the fast one loops in the midst of it. All on one processor.
+# The slow task has its work, some 30 ms of it, and then may loop; the fast one, which comes more often than that, loops
+# in the midst of it. All on one processor.
 HELD_UP = """VAR_GLOBAL
     go, slow_loops : BOOL;
     begun, finished : DINT; (* cycles of the slow task *)
@@ -114,7 +115,7 @@ END_IF
 END_PROGRAM
 
 CONFIGURATION Config
-    TASK FastTask(INTERVAL := T#50ms, PRIORITY := 1, WATCHDOG := T#500ms);
+    TASK FastTask(INTERVAL := T#10ms, PRIORITY := 1, WATCHDOG := T#500ms);
     TASK SlowTask(INTERVAL := T#50ms, PRIORITY := 2, WATCHDOG := T#500ms);
     PROGRAM Fast WITH FastTask : Fast;
     PROGRAM Slow WITH SlowTask : Slow;

@@ -14,7 +14,9 @@ from plctool.core import ffi, lib
 from plctool.files import Pos
 from plctool.iec.types import BOOL, ELEMENTARY, ArrayType, Field, StringType, StructType, Type
 from plctool.io.mistakes import Mistakes
-from plctool.io.modbus import _FUNCTIONS, _ORDERS, ModbusDevice, ModbusLine, ModbusServer, _Job, _Object
+from plctool.io.modbus import registers
+from plctool.io.modbus.client import FUNCTIONS, Job, ModbusDevice, ModbusLine
+from plctool.io.modbus.server import ModbusServer, Object
 from plctool.io.model import Channel
 
 POS = Pos("main.io.toml", 1, 1)
@@ -115,8 +117,8 @@ def job(found: Sequence[Variable], function: int, order: str) -> tuple[object | 
     """The structure that the driver gets, None after a mistake."""
     mistakes, line = Mistakes(), ModbusLine("line", "IoDrvModbus", POS)
     channels = [Channel(f"v{i}", f"Main.v{i}", POS, True, variable_type=v.type) for i, v in enumerate(found)]
-    device = ModbusDevice("device", "IoDrvModbus", POS, parent=line, order=_ORDERS[order])
-    device.jobs = [_Job(_FUNCTIONS[function], 0, 100_000, False, False, channels, POS)]
+    device = ModbusDevice("device", "IoDrvModbus", POS, parent=line, order=registers.ORDERS[order])
+    device.jobs = [Job(FUNCTIONS[function], 0, 100_000, False, False, channels, POS)]
     device.complete(mistakes)
     if mistakes.found:
         return None, channels, mistakes
@@ -172,8 +174,8 @@ def server_range(variable: Variable, table: int, order: str, bit: int | None = N
     """The structure that the driver gets for a server with one object; None after a mistake."""
     mistakes = Mistakes()
     channel = Channel("1", "Main.v", POS, True, variable_type=variable.type)
-    server = ModbusServer("server", "IoDrvModbus", POS, order=_ORDERS[order])
-    server.objects = [_Object(table, 0, bit, False, channel, POS)]
+    server = ModbusServer("server", "IoDrvModbus", POS, order=registers.ORDERS[order])
+    server.objects = [Object(table, 0, bit, False, channel, POS)]
     server.complete(mistakes)
     if mistakes.found:
         return None, channel

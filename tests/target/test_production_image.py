@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
 from environment import CONFIG, eventually, firmware
 from programs import COUNTER
 
 from plctool.cli.image_documents import production
 from plctool.device import Plc
-from plctool.errors import UsageError
 from plctool.image.board import read_firmware
 from plctool.link.connection import Connection
 from plctool.link.services import AppState
@@ -28,22 +26,26 @@ def test_a_burned_flash_runs_its_program_at_once(make_board, build, tmp_path):
     built = build(COUNTER)
     slug = read_firmware(firmware(CONFIG)).board.slug
     production(built.path, slug, None, tmp_path / "flash.bin")
-    board = make_board()
-    board.write_flash(0, (tmp_path / "flash.bin").read_bytes())
+    check_burned(make_board(), built, tmp_path / "flash.bin")
+
+
+def check_burned(board, built, flash):
+    """The first start, and one from what the first left."""
+    board.write_flash(0, flash.read_bytes())
     with board:
         kept = check(board, built)
     with board:
         assert check(board, built) > kept
 
 
-def test_one_file_has_firmware_and_program(make_board, build, tmp_path):
-    """Or says why not, when programs have a memory of their own."""
-    built = build(COUNTER)
-    if read_firmware(firmware(CONFIG)).board.flash.address is None:
-        with pytest.raises(UsageError, match="a memory of their own"):
-            production(built.path, None, firmware(CONFIG), tmp_path / "all.hex")
+def test_firmware_describes_its_board(make_board, build, tmp_path):
+    """It is in the same file as the program, unless programs have a memory of their own."""
+    built, elf = build(COUNTER), firmware(CONFIG)
+    if read_firmware(elf).board.flash.address is None:
+        assert production(built.path, None, elf, tmp_path / "memory.bin")["burn_apart"] == str(elf)
+        check_burned(make_board(), built, tmp_path / "memory.bin")
         return
-    production(built.path, None, firmware(CONFIG), tmp_path / "all.hex")
+    production(built.path, None, elf, tmp_path / "all.hex")
     board = make_board()
     board.starts_from = ["-device", f"loader,file={tmp_path / 'all.hex'}"]
     with board:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from plctool.errors import UsageError
+from plctool.files import usable_path
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
 from plctool.link.transports import TRANSPORTS
 from plctool.templates import DEFAULT_TEMPLATE, TEMPLATES
@@ -54,7 +55,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build = command("build", "compile a program to an image")
     _add_sources(build)
     build.add_argument(
-        "-o", "--output", type=Path, metavar="IMAGE", help="default: app.cdl, of a project beside plc.toml"
+        "-o", "--output", type=usable_path, metavar="IMAGE", help="default: app.cdl, of a project beside plc.toml"
     )
     target = build.add_argument(
         "--target", metavar="NAME", help=f"processor; default: that of the board, or {DEFAULT_TARGET}"
@@ -93,16 +94,21 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_image(image)
     _add_board(image, "such as plcrt, mps2-an385/standard")
     image.add_argument(
-        "--firmware", type=Path, metavar="FILE.elf", help="burn it as well; for a board that plctool does not know"
+        "--firmware",
+        type=usable_path,
+        metavar="FILE.elf",
+        help="burn it as well; a board of your own is read from it",
     )
-    image.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.hex|.bin")
+    image.add_argument("-o", "--output", type=usable_path, required=True, metavar="FILE.hex|.bin")
 
     symbols = command("symbols", "list the variables of an image with their types")
     _add_image(symbols)
     symbols.add_argument("patterns", nargs="*", metavar="PATTERN", help="names with * and ?: 'Main.pump.*'")
 
     new = command("new", "make a project that builds, runs and has a passing test")
-    new.add_argument("folder", type=Path, metavar="NAME", help="of the project, and of the folder that is made for it")
+    new.add_argument(
+        "folder", type=usable_path, metavar="NAME", help="of the project, and of the folder that is made for it"
+    )
     kinds = "; ".join(f"{name}: {text}" for name, text in TEMPLATES.items())
     new.add_argument(
         "--template", choices=TEMPLATES, default=DEFAULT_TEMPLATE, help=f"{kinds}; default: {DEFAULT_TEMPLATE}"
@@ -110,7 +116,10 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     run = command("run", "run a program in this process, on a virtual clock")
     run.add_argument(
-        "image", type=Path, nargs="?", help="what 'plctool build' wrote; without one the project is compiled and run"
+        "image",
+        type=usable_path,
+        nargs="?",
+        help="what 'plctool build' wrote; without one the project is compiled and run",
     )
     length = run.add_mutually_exclusive_group()
     length.add_argument("--cycles", type=_count, metavar="N", help="number of cycles of the first task; default: 1")
@@ -124,7 +133,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
 
     run.add_argument(
         "--plant",
-        type=Path,
+        type=usable_path,
         metavar="FILE.py|.st|.cdl",
         help="what the inputs and outputs are connected to: Python with 'def step(plc)', or a program (docs/io.md)",
     )
@@ -132,7 +141,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         "--trace", nargs="+", default=[], metavar="NAME", help="write the values after each cycle to a CSV file"
     )
     run.add_argument(
-        "-o", "--output", type=Path, default=Path("trace.csv"), metavar="FILE", help="of --trace; default: trace.csv"
+        "-o",
+        "--output",
+        type=usable_path,
+        default=Path("trace.csv"),
+        metavar="FILE",
+        help="of --trace; default: trace.csv",
     )
 
     test = command("test", "run the unit tests of a program in this process, on a virtual clock")
@@ -144,16 +158,22 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         metavar="PATTERN",
         help="only tests whose name contains PATTERN (or matches it, with * and ?)",
     )
-    test.add_argument("--junit", type=Path, metavar="FILE", help="write a report in JUnit's format as well")
+    test.add_argument("--junit", type=usable_path, metavar="FILE", help="write a report in JUnit's format as well")
     test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
     _add_warnings(test)
     _add_io_files(test)
 
     export = command("export-itf", "write a C header, and a C file to fill in, for functions implemented in C")
-    export.add_argument("sources", nargs="*", type=Path, metavar="FILE.st|DIR", help="for a folder, all sources in it")
-    export.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: the current folder")
+    export.add_argument(
+        "sources", nargs="*", type=usable_path, metavar="FILE.st|DIR", help="for a folder, all sources in it"
+    )
+    export.add_argument(
+        "-o", "--output", type=usable_path, default=Path(), metavar="DIR", help="default: the current folder"
+    )
     export.add_argument("--force", action="store_true", help="also replace an implementation that is there already")
-    export.add_argument("--device", type=Path, metavar="FILE.toml", help="write the C header of this board instead")
+    export.add_argument(
+        "--device", type=usable_path, metavar="FILE.toml", help="write the C header of this board instead"
+    )
 
     bench = command("bench", "measure the time of a cycle on this machine")
     _add_image(bench)
@@ -223,8 +243,8 @@ def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     io_map = action("map", "list the channels of an image with their variables and tasks")
     _add_image(io_map)
     init = action("init", "write a description with comments, to begin with")
-    init.add_argument("file", type=Path, nargs="?", default=Path("main.io.toml"), metavar="FILE.io.toml")
-    init.add_argument("--device", type=Path, metavar="FILE.toml", help="what the vendor says of the board")
+    init.add_argument("file", type=usable_path, nargs="?", default=Path("main.io.toml"), metavar="FILE.io.toml")
+    init.add_argument("--device", type=usable_path, metavar="FILE.toml", help="what the vendor says of the board")
     _add_link(action("status", "show how the devices of the running program are"))
     scan = action("scan", "list what is on a bus")
     scan.add_argument("io_device", metavar="BUS", help="its name in 'plctool io status'")
@@ -251,17 +271,17 @@ def _add_board(parser: argparse.ArgumentParser, text: str) -> None:
 
 def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "sources", nargs="*", type=Path, metavar="FILE.st|DIR",
+        "sources", nargs="*", type=usable_path, metavar="FILE.st|DIR",
         help="for a folder, all sources in it; without any, the project of the current folder (plc.toml)",
     )  # fmt: skip
     parser.add_argument(
-        "--library", action="append", default=[], type=Path, metavar="DIR|FILE.zip",
+        "--library", action="append", default=[], type=usable_path, metavar="DIR|FILE.zip",
         help="a library (with library.toml), or a folder of them; may be repeated",
     )  # fmt: skip
 
 
 def _add_image(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("image", type=Path, help="what 'plctool build' wrote")
+    parser.add_argument("image", type=usable_path, help="what 'plctool build' wrote")
 
 
 def _add_names(parser: argparse.ArgumentParser) -> None:
@@ -281,9 +301,9 @@ def _add_warnings(parser: argparse.ArgumentParser) -> None:
 
 def _add_io_files(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--io", type=Path, metavar="FILE.io.toml", help="inputs and outputs; default: what is beside the sources"
+        "--io", type=usable_path, metavar="FILE.io.toml", help="inputs and outputs; default: what is beside the sources"
     )
-    parser.add_argument("--device", type=Path, metavar="FILE.toml", help="what the vendor says of the board")
+    parser.add_argument("--device", type=usable_path, metavar="FILE.toml", help="what the vendor says of the board")
 
 
 def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
@@ -297,7 +317,9 @@ def _add_link(parser: argparse.ArgumentParser, symbols: bool = False) -> None:
         link.add_argument(f"--{name}", metavar="N", help=f"{option.help}{default}")
     link.add_argument("--no-gateway", action="store_true", help="do not share the port, as with PLCTOOL_GATEWAY=off")
     if symbols:
-        parser.add_argument("--symbols", type=Path, metavar="FILE.sym", help="if they are not found automatically")
+        parser.add_argument(
+            "--symbols", type=usable_path, metavar="FILE.sym", help="if they are not found automatically"
+        )
 
 
 def _count(text: str) -> int:

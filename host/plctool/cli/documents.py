@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 from plctool.cli import io_documents
 from plctool.cli.io_documents import Document
-from plctool.cli.plants import attached
+from plctool.cli.overwriting import check_not_read, check_output
+from plctool.cli.plants import attached, files_of_plant
 from plctool.errors import LinkError, PlcError, UsageError
 from plctool.files import read_image, write_atomically
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from plctool.compiler.build import BuildResult
     from plctool.compiler.diagnostics import Diagnostic
     from plctool.compiler.missing_names import Missing, Use
+    from plctool.compiler.program_files import ProgramFiles
     from plctool.compiler.source import Source
     from plctool.controller import Controller, ExceptionInfo, OtherTool, PlcStatus
     from plctool.debug.symbols import SymbolTable
@@ -47,14 +49,16 @@ class Interrupted(PlcError):
 def build(settings: Settings) -> tuple[Document, list[str]]:
     """Compiles to an image and the symbol file beside it. Returns the document and the warnings as users read them.
 
-    Raises CompileError when the program has errors, UsageError when the image would overwrite a source. Files appear
-    complete or not at all.
+    Raises CompileError when the program has errors, UsageError when the image would overwrite one of its files. Files
+    appear complete or not at all.
     """
     from plctool.debug.symbols import symbol_path
     from plctool.files import make_folder
 
     output = settings.output
-    check_output(output, settings.paths, f"-o {output.stem}.cdl")
+    inputs = settings.files.every_file
+    check_output(output, inputs(), f"-o {output.stem}.cdl")
+    check_not_read(symbol_path(output), inputs(), f"-o {output.stem}-image.cdl")
     result = _compile(settings, settings.target)
     if settings.own_folder:
         make_folder(output.parent)
@@ -78,14 +82,12 @@ def _compile(settings: Settings, target: str | None) -> BuildResult:
     from plctool.compiler import compile_sources
 
     return compile_sources(
-        settings.paths,
+        settings.files,
         target=target,
         level=settings.level,
         checks=settings.checks,
         debug=settings.debug,
         warnings=settings.warnings,
-        io=settings.io,
-        libraries=settings.libraries,
         board=settings.board,
         limits=settings.limits,
     )
@@ -96,16 +98,6 @@ def new(folder: Path, template: str) -> Document:
     from plctool.templates import new_project
 
     return {"folder": str(folder), "files": [str(file) for file in new_project(folder, template)]}
-
-
-def check_output(output: Path, sources: Sequence[Path], better: str) -> None:
-    """A file that is written must not replace a source or a symbol file. `better`: what to type instead."""
-    from plctool.compiler.source_files import SUFFIXES
-
-    is_source = output.suffix.lower() in SUFFIXES or output.resolve() in {source.resolve() for source in sources}
-    if is_source or output.suffix == ".sym":
-        kind = "source" if is_source else "symbol file"
-        raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
 
 
 def check(settings: Settings) -> tuple[Document, list[str]]:
@@ -138,9 +130,9 @@ def missing(settings: Settings) -> Document:
 
 def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[Source]]:
     """Every diagnostic of a program, its sources, and all files that diagnostics are about."""
-    from plctool.compiler import check_with_tests, io_sources, library_sources, program_files
+    from plctool.compiler import check_with_tests, io_sources, library_sources
 
-    files = program_files(settings.paths, settings.io, settings.libraries)
+    files = settings.files
     sources, libraries = files.load_sources(), files.load_libraries()
     result = check_with_tests(sources, settings.warnings, files.load_io, libraries)
     return result.diagnostics, sources, [*sources, *io_sources(files.load_io()), *library_sources(libraries)]
@@ -162,7 +154,7 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
 
     Raises CompileError when the sources have errors, UsageError when no function is implemented in C.
     """
-    from plctool.compiler import CompileError, load_sources
+    from plctool.compiler import CompileError, load_sources, program_files
     from plctool.compiler.export_itf import export_interface as export
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
@@ -182,9 +174,11 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
         )
     interface = export(paths[0].resolve().stem, functions)
     header, source = folder / interface.header_name, folder / interface.source_name
+    written = force or not source.exists()
+    for file in (header, source) if written else (header,):
+        check_not_read(file, program_files(paths).every_file(), "-o interface, a folder for it")
     make_folder(folder)
     write_atomically(header, interface.header.encode("latin-1", "replace"))
-    written = force or not source.exists()
     if written:
         write_atomically(source, interface.source.encode("latin-1", "replace"))
     return {
@@ -247,15 +241,8 @@ def test(settings: Settings, pattern: str, junit: Path | None) -> tuple[Document
     from plctool import st_tests
 
     if junit:
-        check_output(junit, settings.paths, "--junit report.xml")
-    report = st_tests.run_tests(
-        settings.paths,
-        pattern=pattern,
-        level=int(settings.level),
-        warnings=settings.warnings,
-        io=settings.io,
-        libraries=settings.libraries,
-    )
+        check_output(junit, settings.files.every_file(), "--junit report.xml")
+    report = st_tests.run_tests(settings.files, pattern=pattern, level=int(settings.level), warnings=settings.warnings)
     if junit:
         write_atomically(junit, st_tests.junit_xml(report))
     return report.document(), report
@@ -274,10 +261,11 @@ class TraceFile:
 
 @dataclass(frozen=True)
 class Built:
-    """A program that was compiled and is in no file."""
+    """A program that was compiled from `files`, and is in none itself."""
 
     image: bytes
     symbols: SymbolTable
+    files: ProgramFiles
 
 
 def built_for_here(settings: Settings) -> tuple[Built, list[str]]:
@@ -285,7 +273,7 @@ def built_for_here(settings: Settings) -> tuple[Built, list[str]]:
     from plctool.image.targets import host_target
 
     result = _compile(settings, host_target())
-    return Built(result.image, result.symbols), result.rendered_warnings
+    return Built(result.image, result.symbols, settings.files), result.rendered_warnings
 
 
 def run(
@@ -303,7 +291,7 @@ def run(
     Raises DeviceError when the program stops with an exception; what was traced until then is in its file.
     """
     if trace:
-        check_output(trace.path, [program] if isinstance(program, Path) else [], "-o trace.csv")
+        check_output(trace.path, _inputs(program, plant), "-o trace.csv")
     with _simulator(program) as plc:
         table = plc.symbols()
         table.select([*gets, *(trace.names if trace else ())])  # a wrong name is reported before the run
@@ -323,6 +311,16 @@ def run(
             **({"trace": str(trace.path)} if trace else {}),
         }
         return document, reading.texts
+
+
+def _inputs(program: Path | Built, plant: Path | None) -> Iterator[Path]:
+    """The files that `run` reads."""
+    if isinstance(program, Path):
+        yield program
+    else:
+        yield from program.files.every_file()
+    if plant is not None:
+        yield from files_of_plant(plant)
 
 
 def _simulator(program: Path | Built) -> Simulator:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from plctool.cli.io_documents import Document
 from plctool.errors import UsageError
 from plctool.files import read_image
 
-Document = dict[str, Any]
-
 
 def production(image: Path, board: str | None, firmware: Path | None, output: Path) -> Document:
-    """Writes what a programmer burns to `output`. Raises UsageError when the parts do not go together."""
+    """Writes what a programmer burns to `output`; "burn_apart" is the firmware that cannot be in it. Raises UsageError
+    when the parts do not go together."""
     from plctool.image.board import board_of, read_firmware
     from plctool.image.file import image_crc
     from plctool.image.production import is_production, production_pieces, write_production
@@ -24,6 +23,7 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
     data = read_image(image)
     pieces = production_pieces(data, wanted, of_firmware)
     write_production(output, pieces, wanted)
+    apart = None if firmware is None or wanted.flash.address is not None else str(firmware)
     return {
         "output": str(output),
         "board": wanted.title,
@@ -32,6 +32,7 @@ def production(image: Path, board: str | None, firmware: Path | None, output: Pa
         "pieces": [
             {"address": f"{p.segment.address:08X}", "size": len(p.segment.data), "what": p.what} for p in pieces
         ],
+        "burn_apart": apart,
     }
 
 

@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from plctool.cli.overwriting import check_not_read
 from plctool.errors import UsageError, did_you_mean
 from plctool.files import make_folder, read_image, write_atomically
 
@@ -102,6 +103,7 @@ def export_board(device: Path, folder: Path) -> Document:
     from plctool.io.board_header import board_header
 
     name, text = board_header(_board(device))
+    check_not_read(folder / name, [device], "-o interface, a folder for it")
     make_folder(folder)
     write_atomically(folder / name, text.encode("ascii"))
     return {"header": str(folder / name)}

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from plctool.errors import LinkError, UsageError
+from plctool.files import read_utf8
 from plctool.io.positions import BadToml, TomlText
 from plctool.link.transports import TRANSPORTS, Link, Value, make_link, parse_link
 
@@ -14,7 +15,19 @@ VARIABLE = "PLC_LINK"
 
 
 def link_of(args: argparse.Namespace) -> Link:
-    """The link of a command; options such as --baud also hold for one that the arguments do not name."""
+    """The link of a command. Raises UsageError if there is none."""
+    link = find_link(args)
+    if link is None:
+        raise UsageError(
+            f"Say where the device is: --port /dev/ttyS0, for example, or once and for all in the environment: "
+            f"{VARIABLE}=serial:/dev/ttyS0.",
+            "no-link",
+        )
+    return link
+
+
+def find_link(args: argparse.Namespace) -> Link | None:
+    """The same, if there is one; options such as --baud also hold for one that the arguments do not name."""
     given = _given(args)
     if len(given) > 1:
         flags = " or ".join(f"--{TRANSPORTS[scheme].flag}" for scheme in given)
@@ -22,18 +35,7 @@ def link_of(args: argparse.Namespace) -> Link:
     if given:
         return make_link(given[0], getattr(args, TRANSPORTS[given[0]].flag), **_options(args))
     link = _default_link()
-    if link is None:
-        raise UsageError(
-            f"Say where the device is: --port /dev/ttyS0, for example, or once and for all in the environment: "
-            f"{VARIABLE}=serial:/dev/ttyS0.",
-            "no-link",
-        )
-    return make_link(link.scheme, link.place, **{**link.options, **_options(args)})
-
-
-def names_no_link(args: argparse.Namespace) -> bool:
-    """Whether neither the arguments nor the environment name a link."""
-    return not _given(args) and _default_link() is None
+    return None if link is None else make_link(link.scheme, link.place, **{**link.options, **_options(args)})
 
 
 def all_serial_ports(args: argparse.Namespace) -> list[Link]:
@@ -68,14 +70,10 @@ def _default_link() -> Link | None:
 def _link_in(file: Path) -> Link | None:
     """What a project says. Raises UsageError for a file that cannot be understood."""
     try:
-        text = TomlText(str(file), file.read_bytes().decode("utf-8-sig")).values.get("link")
-    except OSError as error:
-        raise UsageError(f"{file} cannot be read: {error.strerror}.", "bad-project") from None
-    except UnicodeDecodeError as error:
-        raise UsageError(f"{file} is not UTF-8 at byte {error.start}; save it as UTF-8.", "bad-project") from None
+        text = TomlText(str(file), read_utf8(file, "bad-project")).values.get("link")
     except BadToml as error:
         where = f"{file}:{error.pos.line}:{error.pos.column}"
-        raise UsageError(f"{where} is not TOML: {error.message}.", "bad-project") from None
+        raise UsageError(f"{where}: {error.message}.", "bad-project") from None
     if text is not None and not isinstance(text, str):
         raise UsageError(f'{file}: link is not a text; write for example link = "serial:/dev/ttyS0".', "bad-project")
     return _parse(text, str(file)) if text else None

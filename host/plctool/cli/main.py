@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 from plctool.cli import documents, io_documents, output
 from plctool.cli.arguments import pairs, parser
 from plctool.cli.io_documents import Document
-from plctool.cli.links import all_serial_ports, link_of, names_no_link
+from plctool.cli.links import all_serial_ports, find_link, link_of
 from plctool.errors import InternalError, PlcError, UsageError
+from plctool.files import path_error
 from plctool.link.transports import Link
 from plctool.version import plctool_version
 
@@ -80,7 +81,10 @@ def _info(args: argparse.Namespace) -> int:
 
 def _image(args: argparse.Namespace) -> int:
     from plctool.cli.image_documents import production
+    from plctool.cli.overwriting import check_not_read
 
+    inputs = [file for file in (args.image, args.firmware) if file is not None]
+    check_not_read(args.output, inputs, f"-o {args.output.stem}-production{args.output.suffix}")
     return _show(args, production(args.image, args.board, args.firmware, args.output), output.production_text)
 
 
@@ -254,10 +258,11 @@ class _Progress:
 
 
 def _scan(args: argparse.Namespace) -> int:
-    if names_no_link(args):
+    link = find_link(args)
+    if link is None:
         document = documents.scan_all(all_serial_ports(args), _gateway_wanted(args), _me(args))
     else:
-        document = documents.scan(link_of(args), _gateway_wanted(args), _me(args))
+        document = documents.scan(link, _gateway_wanted(args), _me(args))
     return _show(args, document, lambda d: output.table(d["devices"], d["devices"][0]))
 
 
@@ -509,5 +514,7 @@ def _run_reported(words: Sequence[str], as_json: bool) -> int:
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         raise
+    except OSError as error:
+        return _internal_error(error, as_json) if error.filename is None else _report(path_error(error), as_json)
     except Exception as error:
         return _internal_error(error, as_json)

@@ -211,10 +211,13 @@ def info_text(document: dict[str, Any]) -> str:
 
 
 def production_text(document: dict[str, Any]) -> str:
-    """What was written, and a line for each piece."""
+    """What was written, a line for each piece, and what is burned besides."""
     pieces = [{**p, "address": f"0x{p['address']}"} for p in document["pieces"]]
     head = f"{document['output']}: {document['board']} with program CRC {document['crc']}"
-    return f"{head}\n{table(pieces, ('address', 'size', 'what'))}"
+    lines = [head, table(pieces, ("address", "size", "what"))]
+    if document["burn_apart"]:
+        lines.append(f"Programs have a memory of their own: burn {document['burn_apart']} into the processor as it is.")
+    return "\n".join(lines)
 
 
 def production_info_text(document: dict[str, Any]) -> str:

@@ -33,6 +33,16 @@ def attached(plc: Simulator, path: Path) -> Iterator[None]:
         yield
 
 
+def files_of_plant(path: Path) -> Iterator[Path]:
+    """The files that `attached` reads."""
+    from plctool.compiler import IoFiles, program_files
+
+    if path.suffix in (".py", ".cdl"):
+        yield path
+    else:
+        yield from program_files([path], IoFiles(wanted=False)).every_file()
+
+
 def _compiled_plant(path: Path) -> PlantProgram:
     """It runs on this machine, and its variables are its own, whatever description and board lie beside it."""
     from plctool.compiler import IoFiles, compile_sources
@@ -68,9 +78,12 @@ def _said_with_its_line(path: Path) -> Iterator[None]:
         raise
     except SyntaxError as error:
         raise UsageError(f"{error.filename}:{error.lineno}: {error.msg}", "no-plant") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         own = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         if not own and isinstance(error, OSError):
             raise UsageError(f"{path} cannot be read: {error.strerror}.", "no-plant") from None
         place = f"{path}:{own[-1].lineno}" if own else str(path)
-        raise UsageError(f"{place}: {type(error).__name__}: {error}", "no-plant") from error
+        reason = f"{type(error).__name__}: {error}"
+        if isinstance(error, SystemExit):
+            reason = "exit would end plctool, not the plant; return instead."
+        raise UsageError(f"{place}: {reason}", "no-plant") from error

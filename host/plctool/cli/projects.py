@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler import IoFiles, Level
-from plctool.compiler.project import Project, read_project
+from plctool.compiler import IoFiles, Level, ProgramFiles, program_files
+from plctool.compiler.project import Project
 from plctool.compiler.warnings import WarningOptions, warning_options
 from plctool.errors import UsageError
-from plctool.project import DEFAULT_IMAGE, PROJECT_FILE, find_project, project_named
+from plctool.project import DEFAULT_IMAGE, PROJECT_FILE, find_project
 
 DEFAULT_LEVEL: Level = 2
 
 
 @dataclass(frozen=True)
 class Settings:
-    """`paths`: sources, or the project file that names them; `own_folder`: the project says where `output` is, so that
-    its folder may be made; the others as in `compile_sources`."""
+    """`files`: what the program is made of; `own_folder`: the project says where `output` is, so that its folder may be
+    made; the others as in `compile_sources`."""
 
-    paths: Sequence[Path]
-    io: IoFiles
+    files: ProgramFiles
     warnings: WarningOptions
-    libraries: Sequence[Path] = ()
     output: Path = Path(DEFAULT_IMAGE)
     own_folder: bool = False
     target: str | None = None
@@ -39,13 +36,11 @@ class Settings:
 def settings_of(args: argparse.Namespace) -> Settings:
     """The settings of a command that has the arguments of `build`, or some of them. Raises UsageError if it names no
     sources and there is no project, CompileError for mistakes in the project file."""
-    file = project_named(args.sources) if args.sources else needed_project()
-    project = None if file is None else read_project(file)
+    files = program_files(args.sources or [needed_project()], IoFiles(args.io, args.device), args.library)
+    project = files.project
     return Settings(
-        args.sources if file is None else [file],
-        IoFiles(args.io, args.device),
+        files,
         _warnings(args, project),
-        args.library,
         own_folder=project is not None and getattr(args, "output", None) is None,
         board=getattr(args, "board", None),
         limits=not getattr(args, "no_limits", False),

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler.diagnostics import CompileError
 from plctool.compiler.level import Level
-from plctool.compiler.program_files import IoFiles, ProgramFiles, program_files
+from plctool.compiler.program_files import IoFiles, ProgramFiles, Sources, program_files
+from plctool.errors import UsageError
 from plctool.image.targets import DEFAULT_TARGET
 
 if TYPE_CHECKING:
@@ -22,11 +23,12 @@ if TYPE_CHECKING:
     from plctool.compiler.imports import ImportedLibrary
     from plctool.compiler.source import Source
     from plctool.compiler.warnings import WarningOptions
+    from plctool.image.board import Board
     from plctool.io.model import Description
 
 __all__ = [
-    "CompileError", "IoFiles", "Level", "ProgramFiles", "check_sources", "check_with_tests", "compile_sources",
-    "io_sources", "library_sources", "load_io", "load_sources", "program_files",
+    "CompileError", "IoFiles", "Level", "ProgramFiles", "Sources", "check_sources", "check_with_tests",
+    "compile_sources", "io_sources", "library_sources", "load_io", "load_sources", "program_files",
 ]  # fmt: skip
 
 
@@ -42,10 +44,11 @@ def load_io(paths: Sequence[Path | str], files: IoFiles | None = None) -> Descri
     return program_files(paths, files).load_io()
 
 
-def _target(wanted: str | None, io: Description | None) -> str:
+def _target(wanted: str | None, board: Board | None, io: Description | None) -> str:
     """The processor to compile for."""
-    board = io.device.target if io is not None and io.device is not None else ""
-    return wanted or board or DEFAULT_TARGET
+    of_board = "" if board is None else board.target
+    of_device = io.device.target if io is not None and io.device is not None else ""
+    return wanted or of_board or of_device or DEFAULT_TARGET
 
 
 def io_sources(io: Description | None) -> list[Source]:
@@ -92,7 +95,7 @@ def check_with_tests(
 
 
 def compile_sources(
-    paths: Sequence[Path | str],
+    paths: Sources,
     *,
     target: str | None = None,
     level: Level = 2,
@@ -106,9 +109,10 @@ def compile_sources(
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
     said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
-    inputs and outputs; `libraries`: folders or .zips of those that it uses. Of a project its files are taken, its
-    options are for the command line. `board`: one that plctool knows, such as mps2-an385/standard, to whose target and
-    limits the program is held; without `limits` it may need more than any device has.
+    inputs and outputs; `libraries`: folders or .zips of those that it uses; both are in `ProgramFiles` already. Of a
+    project its files are taken, its options are for the command line. `board`: one that plctool knows, such as
+    mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused; without
+    `limits` it may need more than any device has.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
@@ -127,8 +131,13 @@ def compile_sources(
     files = program_files(paths, io, libraries)
     description = files.load_io()
     known = None if board is None else find_board(board)
-    wanted = target or (None if known is None else known.target)
-    options = Options(find_target(_target(wanted, description)), number, parse_checks(checks), debug, size)
+    options = Options(find_target(_target(target, known, description)), number, parse_checks(checks), debug, size)
+    if known is not None and known.target != options.target.name:
+        raise UsageError(
+            f"{known.title} has a {known.target}, not a {options.target.name}; leave out --target, or name a board "
+            "that has it.",
+            "bad-target",
+        )
     sources = files.load_sources()
     imported = files.load_libraries()
     shown = [*sources, *io_sources(description), *library_sources(imported)]

@@ -10,31 +10,28 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from plctool.compiler.library_files import LibraryFiles
 from plctool.compiler.missing_names import declared_names
 from plctool.compiler.source import Source
+from plctool.compiler.syntax.conditions import has_conditions
+from plctool.compiler.syntax.plain_text import NAME, plain_text, without_structures
 
-_WORD = re.compile(r"[A-Za-z_]\w*")
+_WORD = re.compile(NAME, re.ASCII)
 _UNITS = ("FUNCTION_BLOCK", "FUNCTION", "PROGRAM", "INTERFACE", "CLASS", "TYPE")
 _OTHERS = (
     "VAR_GLOBAL", "VAR_CONFIG", "VAR_ACCESS", "NAMESPACE", "CONFIGURATION", "USING", "TEST", "SETUP", "TEARDOWN",
     "METHOD", "ACTION", "PROPERTY",
 )  # fmt: skip
-_SCAN = re.compile(
-    r"\(\*|//[^\n]*|/\*.*?\*/|'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\"|"
-    r"\{\s*(?P<condition>IF|define|undefine)\b|\{[^}]*\}|"
-    rf"\b(?P<end>END_)?(?P<word>{'|'.join((*_UNITS, *_OTHERS))})\b",
-    re.IGNORECASE | re.DOTALL,
-)
-_ENUMERATION = re.compile(r":\s*(\([^()]*\))")
-_COMMENT = re.compile(r"\(\*|\*\)")
-_UNIT_NAME = re.compile(r"(?:\s|\b(?:PUBLIC|PRIVATE|INTERNAL|ABSTRACT|FINAL)\b)*([A-Za-z_]\w*)", re.IGNORECASE)
-_STRUCT = re.compile(r"\b(?:STRUCT|UNION)\b.*?\bEND_(?:STRUCT|UNION)\b", re.IGNORECASE | re.DOTALL)
-_TYPE_NAME = re.compile(r"([A-Za-z_]\w*)\s*(?::|(?=[,)]))")
+_KEYWORD = re.compile(rf"(?<!\.)\b(END_)?({'|'.join((*_UNITS, *_OTHERS))})\b", re.IGNORECASE)
+_IN_PARENTHESES = r"\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\)"
+_ENUMERATION = re.compile(rf":\s*(?:{NAME}\s*)?({_IN_PARENTHESES})", re.ASCII)
+_MODIFIER = "PUBLIC|PRIVATE|PROTECTED|INTERNAL|ABSTRACT|FINAL|OVERRIDE"
+_UNIT_NAMES = re.compile(rf"\s*(?:(?:{_MODIFIER})\b\s*)*(?:{NAME})?", re.IGNORECASE | re.ASCII)
+_TYPE_NAME = re.compile(rf"({NAME})\s*(?::|(?=[,)])|EXTENDS\b)", re.IGNORECASE | re.ASCII)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +113,11 @@ def needed_parts(texts: Iterable[str], libraries: Sequence[ImportedLibrary]) -> 
 def parts_of(source: Source) -> list[Part]:
     """A part for each unit, with the comments and attributes before it. What is not plain units is one part."""
     text = source.text
-    units = None if source.findings else _units(text)
+    plain = plain_text(text, strings=False)
+    units = None if source.findings or has_conditions(text) else _units(plain)
     if units is None:
-        names = words_of("\n".join(_ENUMERATION.findall(text))) | declared_names(text) | {source.stem.casefold()}
+        enumerations = words_of("\n".join(_ENUMERATION.findall(plain)))
+        names = enumerations | declared_names(text) | declared_names(plain) | {source.stem.casefold()}
         return [Part(source, 0, len(text), names)]
     parts, start = [], 0
     for names, end in units:
@@ -128,47 +127,27 @@ def parts_of(source: Source) -> list[Part]:
 
 
 def _units(text: str) -> list[tuple[frozenset[str], int]] | None:
-    """Names and end of each unit; None for a text with other things in it, or that is not as it should be."""
+    """Names and end of each unit in a plain text; None for one with other things in it, or that is not as it should
+    be."""
     found: list[tuple[frozenset[str], int]] = []
     opened: tuple[str, int] | None = None
-    for word, ends, start, end in _keywords(text):
+    for match in _KEYWORD.finditer(text):
+        word, ends = match[2].upper(), match[1] is not None
         if opened is None:
             if ends or word not in _UNITS:
                 return None
-            opened = (word, end)
+            opened = (word, match.end())
         elif word == opened[0] and ends:
-            found.append((_names(word, text[opened[1] : start]), end))
+            found.append((_names(word, text[opened[1] : match.start()]), match.end()))
             opened = None
         elif word == opened[0]:
             return None
     return None if opened is not None else found
 
 
-def _keywords(text: str) -> Iterator[tuple[str, bool, int, int]]:
-    """The words that begin and end units, with their offsets; comments and strings are left out. A condition counts as
-    a word, because it may leave units out."""
-    at = 0
-    while match := _SCAN.search(text, at):
-        at = match.end()
-        if match.group() == "(*":
-            at = _end_of_comment(text, at)
-        elif match["condition"]:
-            yield "IF", False, match.start(), at
-        elif match["word"] and not text[: match.start()].endswith("."):
-            yield match["word"].upper(), match["end"] is not None, match.start(), at
-
-
-def _end_of_comment(text: str, at: int) -> int:
-    depth = 1
-    while depth and (match := _COMMENT.search(text, at)):
-        depth += 1 if match.group() == "(*" else -1
-        at = match.end()
-    return at if depth == 0 else len(text)
-
-
 def _names(keyword: str, text: str) -> frozenset[str]:
-    """What the text after the first word of a unit declares."""
+    """What the plain text after the first word of a unit declares. A name may be that of a modifier."""
     if keyword == "TYPE":
-        return frozenset(_TYPE_NAME.findall(_STRUCT.sub("", text)))
-    match = _UNIT_NAME.match(text)
-    return frozenset([match[1]] if match else [])
+        return frozenset(_TYPE_NAME.findall(without_structures(text)))
+    match = _UNIT_NAMES.match(text)
+    return words_of(match.group()) if match else frozenset()

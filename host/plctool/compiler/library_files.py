@@ -9,6 +9,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,11 +19,11 @@ from pathlib import Path
 from plctool.compiler.library import STAND_INS
 from plctool.compiler.library_zip import is_zip, read_zip
 from plctool.compiler.source import Source
-from plctool.compiler.source_files import load, read_contents
+from plctool.compiler.source_files import files_read, load, read_contents
 from plctool.compiler.syntax.lexer import KEYWORDS
 from plctool.compiler.toml_files import error_at, read_checked
 from plctool.errors import UsageError, did_you_mean
-from plctool.files import Pos, read_utf8
+from plctool.files import Pos, decode_utf8, read_utf8
 from plctool.iec.types import ELEMENTARY
 from plctool.io.tables import Table
 from plctool.project import LIBRARY_FILE
@@ -83,6 +84,11 @@ class LibraryFiles:
         return sources
 
     @property
+    def files(self) -> list[Path]:
+        """What is read of it."""
+        return [self.path] if is_zip(self.path) else [self.path / LIBRARY_FILE, *files_read([self.path])]
+
+    @property
     def manifest_path(self) -> str:
         """What messages call its library.toml."""
         return str(self.path / LIBRARY_FILE)
@@ -105,11 +111,7 @@ def read_library(path: Path) -> LibraryFiles:
         data = contents.get(path / LIBRARY_FILE)
         if data is None:
             raise UsageError(f"{path} has no {LIBRARY_FILE}, neither at its top nor in its only folder.", "bad-library")
-        try:
-            text = data.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            message = f"{path / LIBRARY_FILE} is not UTF-8 at byte {error.start}; save it as UTF-8."
-            raise UsageError(message, "bad-library") from None
+        text = decode_utf8(data, path / LIBRARY_FILE, "bad-library")
     else:
         text = read_utf8(path / LIBRARY_FILE, "bad-library")
     return read_checked(str(path / LIBRARY_FILE), text, LIBRARY_FILE, lambda table: _read(path, text, table))
@@ -119,10 +121,10 @@ def _read(path: Path, text: str, table: Table) -> LibraryFiles:
     name = table.text("name", required="Util") or ""
     namespace = table.text("namespace", name) or ""
     version = table.text("version", required="1.0.0") or ""
-    if name and not _is_free(name):
-        table.error(f"'{name}' cannot be the name of a library; it has letters, digits and _", "name")
-    if namespace != name and not _is_free(namespace):
-        table.error(f"'{namespace}' cannot be a namespace; it has letters, digits and _", "namespace")
+    if name and (wrong := wrong_with_name(name)):
+        table.error(f"'{name}' cannot be the name of a library: {wrong}", "name")
+    if namespace != name and (wrong := wrong_with_name(namespace)):
+        table.error(f"'{namespace}' cannot be a namespace: {wrong}", "namespace")
     if version and not _VERSION.fullmatch(version):
         table.error(f"'{version}' is not a version; write numbers: \"1.2.0\"", "version")
     for key in ("author", "description"):
@@ -133,9 +135,13 @@ def _read(path: Path, text: str, table: Table) -> LibraryFiles:
     )
 
 
-def _is_free(name: str) -> bool:
-    """Whether a name can stand in front of others."""
-    return _NAME.fullmatch(name) is not None and name.upper() not in KEYWORDS and name.upper() not in ELEMENTARY
+def wrong_with_name(name: str) -> str:
+    """Why a name cannot stand in front of others; "" if it can."""
+    if not _NAME.fullmatch(name):
+        return "it has letters, digits and _, and does not begin with a digit"
+    if name.upper() in KEYWORDS or name.upper() in ELEMENTARY:
+        return "it is a word of the language; choose another"
+    return ""
 
 
 def _dependencies(table: Table) -> Iterator[Dependency]:
@@ -153,7 +159,7 @@ def _dependencies(table: Table) -> Iterator[Dependency]:
 
 def is_library(path: Path) -> bool:
     """Whether a path is that of a library, as far as can be seen from outside."""
-    return (path / LIBRARY_FILE).is_file() or (is_zip(path) and path.is_file())
+    return os.path.isfile(path / LIBRARY_FILE) or (is_zip(path) and os.path.isfile(path))
 
 
 def libraries_at(path: Path) -> list[Path]:
@@ -179,9 +185,10 @@ def find_libraries(path: Path) -> list[Path]:
 
 def no_library(path: Path) -> str:
     """What to say about a path that is not one of a library."""
-    what = f"{path} is not a library: it has no {LIBRARY_FILE}" if path.exists() else f"there is no library {path}"
+    exists = os.path.exists(path)
+    what = f"{path} is not a library: it has no {LIBRARY_FILE}" if exists else f"There is no library {path}"
     hint = did_you_mean(path.name, STAND_INS)
-    return f"{what[:1].upper()}{what[1:]}; a library is a folder or .zip with a {LIBRARY_FILE}{hint}."
+    return f"{what}; a library is a folder or .zip with a {LIBRARY_FILE}{hint}."
 
 
 # ---- all that a program needs ----

@@ -5,8 +5,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-import lzma
 import stat
+import struct
 import zipfile
 import zlib
 from functools import lru_cache
@@ -19,8 +19,14 @@ MAX_FILES = 10_000
 MAX_BYTES = 64 << 20
 """Unpacked, of all files together."""
 
+_SMALLER = "make it again without what is no source, or give it as a folder"
 _ENCRYPTED = 1
-_BROKEN = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError, ValueError)
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Those of which zipfile unpacks no more than it is asked for."""
+_OTHER_METHODS = {9: "deflate64", zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "LZMA"}
+_BROKEN = (
+    zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, OverflowError, RuntimeError, ValueError,
+)  # fmt: skip
 
 
 def is_zip(path: Path) -> bool:
@@ -42,14 +48,23 @@ def read_zip(path: Path) -> dict[Path, bytes]:
 def _read(path: Path, changed: int) -> dict[Path, bytes]:
     try:
         with zipfile.ZipFile(path) as archive:
-            infos = [info for info in archive.infolist() if not info.is_dir()]
+            infos = [info for info in archive.infolist() if not info.filename.endswith("/")]
             _check(path, infos)
             wanted = [info for info in infos if _is_wanted(info.filename)]
-            return _without_folder(path, {info.filename: archive.read(info) for info in wanted})
+            return _without_folder(path, {info.filename: _content(archive, info) for info in wanted})
     except UsageError:
         raise
     except _BROKEN as error:
         raise _refused(path, f"cannot be read as a .zip: {error}; make it again") from None
+
+
+def _content(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
+    """A file, of which no more is unpacked than the size that was checked."""
+    with archive.open(info) as file:
+        data = file.read(info.file_size)
+    if len(data) != info.file_size:
+        raise zipfile.BadZipFile(f"the size of '{info.filename}' is not {info.file_size}")
+    return data
 
 
 def _refused(path: Path, why: str) -> UsageError:
@@ -57,22 +72,28 @@ def _refused(path: Path, why: str) -> UsageError:
 
 
 def _check(path: Path, infos: list[zipfile.ZipInfo]) -> None:
-    """Before anything is unpacked. The sizes are those that it states; what unpacks to more is no valid .zip."""
+    """Before anything is unpacked. The sizes are those that it states; a file of another size is no valid .zip."""
     if len(infos) > MAX_FILES:
-        raise _refused(path, f"has {len(infos)} files; a library has at most {MAX_FILES}")
+        raise _refused(path, f"has {len(infos)} files; a library has at most {MAX_FILES}: {_SMALLER}")
     size = sum(info.file_size for info in infos)
     if size > MAX_BYTES:
-        raise _refused(path, f"has {size >> 20} MiB of files; a library has at most {MAX_BYTES >> 20} MiB")
-    names = set()
+        limit = f"{MAX_BYTES} bytes ({MAX_BYTES >> 20} MiB)"
+        raise _refused(path, f"unpacks to {size} bytes; a library has at most {limit}: {_SMALLER}")
+    names: set[str] = set()
     for info in infos:
-        name = info.filename
+        name, key = info.filename, str(PurePosixPath(info.filename)).casefold()
+        if not name.isprintable():
+            raise _refused(path, f"has the file {name!a}, with control characters; make it again without these")
         if _leaves(name) or _leaves(info.orig_filename) or stat.S_ISLNK(info.external_attr >> 16):
             raise _refused(path, f"has the file '{name}', which leads out of it; make it again without that")
         if info.flag_bits & _ENCRYPTED:
             raise _refused(path, "is encrypted; make it again without a password")
-        if name.casefold() in names:
+        if info.compress_type not in _METHODS:
+            what = _OTHER_METHODS.get(info.compress_type, str(info.compress_type))
+            raise _refused(path, f"has the file '{name}' in the compression {what}; make it again with 'deflate'")
+        if key in names:
             raise _refused(path, f"has the file '{name}' twice; make it again")
-        names.add(name.casefold())
+        names.add(key)
 
 
 def _leaves(name: str) -> bool:

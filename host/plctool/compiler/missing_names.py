@@ -48,7 +48,7 @@ _LIBRARIES = [
 
 _DECLARED = re.compile(
     r"\b(?:PROGRAM|FUNCTION_BLOCK|FUNCTION|INTERFACE|CLASS|TYPE|METHOD|PROPERTY|ACTION|NAMESPACE)"
-    r"(?:\s+(?:ABSTRACT|FINAL|PUBLIC|INTERNAL|PRIVATE|PROTECTED))*\s+(\w+)|\b(\w++)\s*+(?::(?!=)|,|\bAT\b|\))",
+    r"(?:\s+(?:ABSTRACT|FINAL|PUBLIC|INTERNAL|PRIVATE|PROTECTED))*\s+(\w+)|\b(\w++)\s*+(?::(?!=)|,|\bAT\b|\bEXTENDS\b|\))",
     re.IGNORECASE,
 )
 

@@ -5,8 +5,9 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from plctool.project import project_named
 
 if TYPE_CHECKING:
     from plctool.compiler.imports import ImportedLibrary
+    from plctool.compiler.project import Project
     from plctool.compiler.source import Source
     from plctool.io.model import Description
 
@@ -34,13 +36,33 @@ class IoFiles:
 @dataclass(frozen=True)
 class ProgramFiles:
     """`sources`: files and folders; `libraries`: those given, or folders of them; `beside`: where a description may be,
-    if `io` names none; `info`: what the image says about the program."""
+    if `io` names none; `info`: what the image says about the program; `project`: that which names them, if one does."""
 
     sources: Sequence[Path]
     beside: Sequence[Path]
     libraries: Sequence[Path]
     io: IoFiles
     info: ApplicationInfo
+    project: Project | None = None
+
+    @cached_property
+    def source_files(self) -> Sequence[Path]:
+        """The files of the sources, and projects of other systems that name them; not read yet. Raises UsageError when
+        there is nothing to read."""
+        from plctool.compiler.source_files import files_read
+
+        try:
+            return list(files_read(self.sources))
+        except OSError as error:
+            raise _unreadable(error) from None
+
+    @cached_property
+    def _resolved(self) -> frozenset[Path]:
+        return frozenset(path.resolve() for path in self.source_files)
+
+    def has_source(self, path: Path) -> bool:
+        """Whether a file is one of the sources, by whatever name. Raises UsageError when there is nothing to read."""
+        return path.resolve() in self._resolved
 
     def load_sources(self) -> list[Source]:
         """All sources. Raises UsageError when there is nothing to read."""
@@ -49,7 +71,17 @@ class ProgramFiles:
         try:
             return load(self.sources)
         except OSError as error:
-            raise UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source") from None
+            raise _unreadable(error) from None
+
+    def every_file(self) -> Iterator[Path]:
+        """All files that are read to compile it, but the project file. Raises what the other functions do."""
+        from plctool.compiler.library_files import resolve_libraries
+
+        yield from self.source_files
+        for library in resolve_libraries(self.libraries, self.sources):
+            yield from library.files
+        io = self.load_io()
+        yield from map(Path, io.contents if io is not None else ())
 
     def load_libraries(self) -> list[ImportedLibrary]:
         """The libraries, and those that they need. Raises UsageError for what is missing or does not fit together."""
@@ -72,11 +104,20 @@ class ProgramFiles:
         return None if found is None else load_description(found, device)
 
 
-def program_files(
-    paths: Sequence[Path | str], io: IoFiles | None = None, libraries: Sequence[Path | str] = ()
-) -> ProgramFiles:
+def _unreadable(error: OSError) -> UsageError:
+    return UsageError(f"{error.filename} cannot be read: {error.strerror}.", "no-source")
+
+
+Sources = Sequence[Path | str] | ProgramFiles
+"""What a program is made of: its sources or its project, or all of it as `program_files` found it."""
+
+
+def program_files(paths: Sources, io: IoFiles | None = None, libraries: Sequence[Path | str] = ()) -> ProgramFiles:
     """The files of a program: those named, or those of the project that is named. What `io` names holds before what
-    the project names; `libraries` are added to its own. Raises CompileError for mistakes in a project file."""
+    the project names; `libraries` are added to its own. What was found before stays as it is. Raises CompileError for
+    mistakes in a project file."""
+    if isinstance(paths, ProgramFiles):
+        return paths
     named = list(map(Path, paths))
     given = list(map(Path, libraries))
     io = io or IoFiles()
@@ -88,4 +129,4 @@ def program_files(
     project = read_project(file)
     io = IoFiles(io.description or project.io, io.device or project.device, io.wanted)
     beside = [file, *project.sources]
-    return ProgramFiles(project.sources, beside, [*given, *project.libraries], io, project.info)
+    return ProgramFiles(project.sources, beside, [*given, *project.libraries], io, project.info, project)

@@ -7,9 +7,10 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from plctool.compiler.codegen.lower_unit import parse_checks
 from plctool.compiler.level import Level
@@ -79,11 +80,17 @@ def _project(file: Path, table: Table) -> Project:
 
 
 def _path(folder: Path, entry: Entry, table: Table) -> Path | None:
-    """The path that a text names; None after a mistake."""
+    """The path that a text names; None after a mistake. Whether it exists may be asked of it."""
     if not entry.value or not entry.value.isprintable():
         table.mistakes.error(entry.pos, "a path is not empty, and has no control characters")
         return None
-    return folder / str(entry.value)
+    path = folder / str(entry.value)
+    try:
+        path.exists()
+    except OSError as error:
+        table.mistakes.error(entry.pos, f"{path} cannot be used: {error.strerror}")
+        return None
+    return path
 
 
 def _path_of(folder: Path, table: Table, key: str) -> Path | None:
@@ -94,7 +101,7 @@ def _path_of(folder: Path, table: Table, key: str) -> Path | None:
 
 def _output(folder: Path, table: Table) -> Path:
     path = _path_of(folder, table, "output") or folder / DEFAULT_IMAGE
-    if path.is_dir():
+    if os.path.isdir(path):  # False as well for a name that no file can have, as below
         table.error(f'{path} is a folder; write for example output = "{DEFAULT_IMAGE}"', "output")
     return path
 
@@ -104,7 +111,7 @@ def _file(folder: Path, table: Table, key: str) -> Path | None:
     path = _path_of(folder, table, key)
     if path is None:
         return None
-    if not path.is_file():
+    if not os.path.isfile(path):
         table.error(f"there is no file {path}", key)
         return None
     return path
@@ -134,14 +141,23 @@ def _matching(folder: Path, entry: Entry, table: Table) -> list[Path]:
     if not _PATTERN.search(text):
         table.mistakes.error(entry.pos, f"there is no file or folder {path}")
         return []
-    try:
-        files = sorted(p for p in folder.glob(text) if p.is_file() and p.suffix.lower() in READERS)
-    except (ValueError, NotImplementedError):  # an absolute pattern, or ** beside other characters
-        table.mistakes.error(entry.pos, f"'{text}' is not a pattern; write for example \"src/**/*.st\"")
+    if wrong := _wrong_with_pattern(text):
+        table.mistakes.error(entry.pos, f'{wrong}; write for example "src/**/*.st"')
         return []
+    files = sorted(p for p in folder.glob(text) if p.is_file() and p.suffix.lower() in READERS)
     if not files:
         table.mistakes.error(entry.pos, f"no source fits {path}")
     return files
+
+
+def _wrong_with_pattern(text: str) -> str:
+    """Why `Path.glob` does not take a pattern; "" if it does."""
+    pattern = PurePath(text)
+    if pattern.anchor:
+        return f"'{text}' is absolute; a pattern begins at the folder of {PROJECT_FILE}"
+    if any("**" in part and part != "**" for part in pattern.parts):
+        return "** is for folders, and stands alone between two /"
+    return ""
 
 
 def _libraries(folder: Path, table: Table) -> list[Path]:

@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 import codecs
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from plctool.compiler.formats import beremiz, codesys2, global_lists, object_text, plcopen, twincat, unreadable
@@ -61,6 +61,14 @@ def load(paths: Iterable[Path]) -> list[Source]:
     for path in paths:
         files.update(dict.fromkeys(_files(path)))
     return _read_all(files, Path.read_bytes)
+
+
+def files_read(paths: Iterable[Path]) -> Iterator[Path]:
+    """The files that `load` reads, and the projects that name them; the same errors."""
+    for path in paths:
+        if not path.is_dir():
+            yield path
+        yield from _files(path)
 
 
 def read_contents(contents: Mapping[Path, bytes]) -> list[Source]:

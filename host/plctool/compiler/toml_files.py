@@ -29,7 +29,7 @@ def read_checked(path: str, text: str, what: str, read: Callable[[Table], T]) ->
         made = read(table)
         table.close()
     except BadToml as error:
-        mistakes.error(error.pos, f"this is not TOML: {error.message[:1].lower()}{error.message[1:]}")
+        mistakes.error(error.pos, error.message)
     if mistakes.found or made is None:
         raise _refusal(mistakes.found, path, text)
     return made

@@ -29,9 +29,16 @@ _POINTERS: dict[str, type[PointerType]] = {
 
 
 def describe(t: Type, types: dict[str, Any]) -> None:
-    """Adds a type and those it consists of to `types`, by name."""
-    if isinstance(t, Elementary) or t.name in types:
-        return
+    """Adds a type and those it consists of to `types`, by name, however deep these are."""
+    waiting = [t]
+    while waiting:
+        t = waiting.pop()
+        if not isinstance(t, Elementary) and t.name not in types:
+            waiting += reversed(_describe(t, types))
+
+
+def _describe(t: Type, types: dict[str, Any]) -> list[Type]:
+    """Adds a type alone; returns what it consists of."""
     entry: dict[str, Any] = {}
     types[t.name] = entry
     if isinstance(t, StringType):
@@ -42,23 +49,22 @@ def describe(t: Type, types: dict[str, Any]) -> None:
         entry.update(kind="subrange", base=t.base.name, low=t.low, high=t.high)
     elif isinstance(t, OpenArrayType):
         entry.update(kind="open array", element=t.element.name, dimensions=len(t.bounds))
-        describe(t.element, types)
+        return [t.element]
     elif isinstance(t, ArrayType):
         entry.update(kind="array", element=t.element.name, bounds=[list(b) for b in t.bounds])
-        describe(t.element, types)
+        return [t.element]
     elif isinstance(t, InterfaceType):
         entry.update(kind="interface")
     elif isinstance(t, PointerType):
         entry.update(kind=t.name.removesuffix(f" {t.target}"), target=t.target.name)
-        describe(t.target, types)
-    else:
-        assert isinstance(t, StructType)
+        return [t.target]
+    elif isinstance(t, StructType):
         entry.update(kind="struct", size=t.size, align=t.align, union=t.union)
         entry["fields"] = [[f.name, f.type.name, f.offset] for f in t.fields]
         if t.properties:
             entry["properties"] = t.properties
-        for f in t.fields:
-            describe(f.type, types)
+        return [f.type for f in t.fields]
+    return []
 
 
 class DescribedTypes:

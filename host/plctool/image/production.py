@@ -1,5 +1,8 @@
 """What a production programmer burns: the flash of a device with its program, and with its firmware if wanted.
 
+Where programs have a memory of their own, such as a serial EEPROM, a file is what that memory contains. Its addresses
+are not those of the processor, so that the firmware is not in it, and only read for the facts of its board.
+
 It is what the device itself leaves after a download that was not started yet: the image and its seal in slot A, and a
 first commit record. What the programmer must not leave as it was is there as erased bytes: the logs, and the beginning
 of slot B.
@@ -20,7 +23,7 @@ from plctool.core import ffi, lib
 from plctool.errors import UsageError
 from plctool.files import write_atomically
 from plctool.iec.types import align_up
-from plctool.image.board import COMMIT, RETAIN, SLOT_A, SLOT_B, Board, Firmware, Segment
+from plctool.image.board import COMMIT, RETAIN, SLOT_A, SLOT_B, Board, Firmware, Flash, Segment
 from plctool.image.file import describe_image, image_crc, parse_image, target_name
 from plctool.image.limits import check_fit, needs_of_image
 
@@ -40,8 +43,8 @@ class Piece:
 
 
 def production_pieces(image: bytes, board: Board, firmware: Firmware | None) -> list[Piece]:
-    """All that is burned, by address. Raises UsageError when the image is not for this board or does not fit it, and
-    when the firmware is where the programs are."""
+    """All that is burned, by address: the firmware too, unless programs have a memory of their own. Raises UsageError
+    when the image is not for this board or does not fit it, and when the firmware is where the programs are."""
     parsed = parse_image(image)
     if parsed.device_id != board.device_id:
         raise UsageError(
@@ -56,26 +59,20 @@ def production_pieces(image: bytes, board: Board, firmware: Firmware | None) -> 
         "Make the program smaller, or use a firmware with more room.",
     )
     pieces = list(_flash_pieces(image, board))
-    if firmware is not None:
-        _check_apart(firmware, board)
+    if firmware is not None and board.flash.address is not None:
+        _check_apart(firmware, board.flash, board.flash.address)
         pieces += [Piece("firmware", segment) for segment in firmware.segments]
     return sorted(pieces, key=lambda piece: piece.segment.address)
 
 
-def _check_apart(firmware: Firmware, board: Board) -> None:
-    """The firmware is nowhere in the flash for programs."""
-    flash = board.flash
-    if flash.address is None:
-        raise UsageError(
-            f"{board.title} keeps programs in a memory of their own, without the firmware; burn the firmware as "
-            f"it is and make this image with --board {board.slug} alone.",
-            "overlap",
-        )
+def _check_apart(firmware: Firmware, flash: Flash, address: int) -> None:
+    """The firmware is nowhere in the flash for programs, which is at an address of the processor."""
+    end = address + flash.size
     for segment in firmware.segments:
-        if segment.address < flash.address + flash.size and flash.address < segment.end:
+        if segment.address < end and address < segment.end:
             raise UsageError(
                 f"The firmware at 0x{segment.address:08X} to 0x{segment.end - 1:08X} is over the flash for programs at "
-                f"0x{flash.address:08X} to 0x{flash.address + flash.size - 1:08X}; give the firmware less room in its "
+                f"0x{address:08X} to 0x{end - 1:08X}; give the firmware less room in its "
                 "linker script, or the programs another BOARD_FLASH_ADDRESS.",
                 "overlap",
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -46,14 +47,14 @@ def read_description(path: str, text: str, device: Path | None = None) -> Descri
     try:
         toml = TomlText(path, text)
     except BadToml as error:
-        mistakes.error(error.pos, _not_toml(error))
+        mistakes.error(error.pos, error.message)
         made.readable = False
         return made
     root = Table(toml, (), toml.values, mistakes)
     named = root.text("device")
     if device is None and named is not None:
         device = Path(path).parent / named
-        if not device.is_file():
+        if not os.path.isfile(device):  # False as well for a name that no file can have
             root.error(f"there is no file {device}", "device")
             device = None
     if device is not None:
@@ -85,14 +86,10 @@ def load_device(path: Path) -> tuple[DeviceFile | None, Mistakes, str]:
     try:
         device = read_device_file(TomlText(str(path), text), mistakes)
     except BadToml as error:
-        mistakes.error(error.pos, _not_toml(error))
+        mistakes.error(error.pos, error.message)
         return None, mistakes, text
     check_names(device, mistakes)
     return device, mistakes, text
-
-
-def _not_toml(error: BadToml) -> str:
-    return f"this is not TOML: {error.message[:1].lower()}{error.message[1:]}"
 
 
 def _check_taken(connectors: Sequence[Connector], mistakes: Mistakes) -> None:

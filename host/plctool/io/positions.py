@@ -98,12 +98,12 @@ class TomlText:
 
 
 class BadToml(Exception):
-    """A text is not TOML."""
+    """A text is not TOML; `message` says so, and why."""
 
-    def __init__(self, pos: Pos, message: str) -> None:
-        super().__init__(message)
+    def __init__(self, pos: Pos, reason: str) -> None:
         self.pos = pos
-        self.message = message
+        self.message = f"this is not TOML: {reason[:1].lower()}{reason[1:]}"
+        super().__init__(self.message)
 
 
 def _tokens(text: str) -> list[Token]:

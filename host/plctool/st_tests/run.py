@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from plctool.compiler import CompileError, IoFiles, io_sources, library_sources, program_files
+from plctool.compiler import CompileError, IoFiles, Sources, io_sources, library_sources, program_files
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
@@ -44,7 +44,7 @@ _EXCEPTIONS = {
 
 
 def run_tests(
-    paths: Sequence[Path | str],
+    paths: Sources,
     *,
     pattern: str = "*",
     level: int = 0,
@@ -76,7 +76,7 @@ class TestProgram:
 
     def __init__(
         self,
-        paths: Sequence[Path | str],
+        paths: Sources,
         *,
         level: int = 0,
         warnings: WarningOptions = ALL_WARNINGS,

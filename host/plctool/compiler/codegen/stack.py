@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 from plctool.compiler.codegen.calls import branches
 from plctool.image.targets import Machine
@@ -14,35 +15,62 @@ from plctool.image.targets import Machine
 Frames = dict[int, tuple[int, int]]
 """Size of the code and of the frame of each function, by its offset in the block; in bytes."""
 
+_Calls = dict[int, dict[int, bool]]
+"""By caller: what it calls (true), or jumps to at its end."""
+
 
 def deepest_calls(code: bytes, machine: Machine, frames: Frames, roots: Iterable[int]) -> list[tuple[int, int]]:
     """The chain of calls from one of `roots` that needs most: functions with the bytes of their frames."""
     called = _calls(code, machine, frames)
-    deepest: dict[int, tuple[int, int | None, bool]] = {}  # bytes; what is called; the frame is still there
+    deepest: dict[int, _Deepest] = {}
+    known = [root for root in roots if root in frames]
+    for root in known:
+        _measure(root, called, frames, deepest)
+    at = max(known, key=lambda root: deepest[root].amount, default=None)
+    chain: dict[int, int] = {}
+    while at is not None and at not in chain:
+        found = deepest[at]
+        chain[at] = frames[at][1] if found.keeps else 0
+        at = found.target
+    return list(chain.items())
 
-    def need(function: int) -> int:
+
+class _Deepest(NamedTuple):
+    """What a function needs with the deepest of its calls: `amount` of bytes, what it calls then, and whether its frame
+    is still there."""
+
+    amount: int
+    target: int | None = None
+    keeps: bool = True
+
+
+def _measure(root: int, called: _Calls, frames: Frames, deepest: dict[int, _Deepest]) -> None:
+    """Adds to `deepest` a function and all that it leads to, however long the chain of calls is."""
+    path: list[tuple[int, Iterator[int]]] = []
+
+    def enter(function: int) -> None:
         if function not in deepest:
-            own = frames[function][1]
-            deepest[function] = (own, None, True)  # the answer within what only looks like a recursion
-            for target, returns in called.get(function, {}).items():
-                amount = need(target) + (own if returns else 0)
-                if amount > deepest[function][0]:
-                    deepest[function] = (amount, target, returns)
-        return deepest[function][0]
+            deepest[function] = _Deepest(frames[function][1])  # the answer within what only looks like a recursion
+            path.append((function, iter(called.get(function, ()))))
 
-    root = max((r for r in roots if r in frames), key=need, default=None)
-    chain: list[tuple[int, int]] = []
-    while root is not None and root not in (function for function, _ in chain):
-        _, target, keeps = deepest[root]
-        chain.append((root, frames[root][1] if keeps else 0))
-        root = target
-    return chain
+    enter(root)
+    while path:
+        function, targets = path[-1]
+        target = next(targets, None)
+        if target is not None:
+            enter(target)
+            continue
+        path.pop()
+        own = frames[function][1]
+        for target, returns in called.get(function, {}).items():
+            amount = deepest[target].amount + (own if returns else 0)
+            if amount > deepest[function].amount:
+                deepest[function] = _Deepest(amount, target, returns)
 
 
-def _calls(code: bytes, machine: Machine, frames: Frames) -> dict[int, dict[int, bool]]:
-    """By caller: what it calls (true), or jumps to at its end."""
+def _calls(code: bytes, machine: Machine, frames: Frames) -> _Calls:
     starts = sorted(frames)
-    found: dict[int, dict[int, bool]] = {}
+    found: _Calls = {}
     for branch in branches(code, machine, frames.keys()):
         caller = starts[bisect_right(starts, branch.place) - 1]
         inside = caller <= branch.place < caller + frames[caller][0]

@@ -10,20 +10,28 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from plctool.compiler.syntax.plain_text import NAME, plain_text, without_structures
+
 _DIRECTIVE = re.compile(r"\{\s*(define|undefine|IF|ELSIF|ELSE|END_IF)\b(.*)\}", re.IGNORECASE | re.DOTALL)
+_BEGINS = re.compile(r"\{\s*(?:define|undefine|IF)\b", re.IGNORECASE)
 _DEFINE = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:'.*')?\s*", re.DOTALL)
 _TOKEN = re.compile(
-    r"\s*(?:defined\s*\(\s*(?:(?P<kind>pou|type|variable)\s*:\s*)?(?P<name>[A-Za-z_]\w*)\s*\)|(?P<word>AND|OR|NOT|\(|\)))",
-    re.IGNORECASE,
+    r"\s*(?:defined\s*\(\s*(?:(?P<kind>pou|type|variable)\s*:\s*)?(?P<name>"
+    + NAME
+    + r")\s*\)|(?P<word>AND|OR|NOT|\(|\)))",
+    re.IGNORECASE | re.ASCII,
 )
 _ASKS = re.compile(r"\bdefined\s*\(\s*(?:pou|type|variable)\s*:", re.IGNORECASE)
 _UNIT = re.compile(
-    r"^\s*(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|INTERFACE|CLASS|TYPE)\s+"
-    r"(?:(?:PUBLIC|PRIVATE|INTERNAL|ABSTRACT|FINAL)\s+)*([A-Za-z_]\w*)",
-    re.IGNORECASE | re.MULTILINE,
+    r"(?<!\.)\b(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|INTERFACE|CLASS)\s+"
+    rf"(?:(?:PUBLIC|PRIVATE|INTERNAL|ABSTRACT|FINAL)\s+)*({NAME})",
+    re.IGNORECASE | re.ASCII,
 )
+_TYPES = re.compile(r"(?<!\.)\bTYPE\b(.*?)\bEND_TYPE\b", re.IGNORECASE | re.DOTALL)
+_TYPE = re.compile(rf"({NAME})\s*(?::(?!=)|EXTENDS\b)", re.IGNORECASE | re.ASCII)
 _GLOBALS = re.compile(r"\bVAR_GLOBAL\b(.*?)\bEND_VAR\b", re.IGNORECASE | re.DOTALL)
-_VARIABLE = re.compile(r"([A-Za-z_]\w*)\s*(?:AT\s*%[\w.*]+\s*)?:(?!=)")
+_VARIABLES = re.compile(rf"((?:{NAME}\s*,\s*)*{NAME})\s*(?:AT\s*%[\w.*]+\s*)?:(?!=)", re.IGNORECASE | re.ASCII)
+_NAME = re.compile(NAME, re.ASCII)
 
 
 def names_asked_for(texts: Sequence[str], library: Callable[[], Iterable[str]]) -> frozenset[str]:
@@ -31,9 +39,22 @@ def names_asked_for(texts: Sequence[str], library: Callable[[], Iterable[str]]) 
     asks. Branches that are left out count as well."""
     if not any(map(_ASKS.search, texts)):
         return frozenset()
-    found = {name for text in texts for name in _UNIT.findall(text)}
-    found.update(name for text in texts for block in _GLOBALS.findall(text) for name in _VARIABLE.findall(block))
+    found = {name for text in texts for name in _declared(plain_text(text, strings=False))}
     return frozenset(name.upper() for name in (*found, *library()))
+
+
+def _declared(text: str) -> Iterator[str]:
+    yield from _UNIT.findall(text)
+    for block in _TYPES.findall(text):
+        yield from _TYPE.findall(without_structures(block))
+    for block in _GLOBALS.findall(text):
+        for names in _VARIABLES.findall(block):
+            yield from _NAME.findall(names)
+
+
+def has_conditions(text: str) -> bool:
+    """Whether some of a text may be left out."""
+    return _BEGINS.search(text) is not None
 
 
 class _NotUnderstood(Exception):

@@ -10,13 +10,18 @@ from collections.abc import Callable, Iterator
 
 from plctool.compiler.syntax import slips
 from plctool.compiler.syntax.conditions import Conditions
+from plctool.compiler.syntax.plain_text import FLAT_COMMENT, NAME, comment_ends
 
 _TOKEN = re.compile(
     r"""\s*(?:
-    (?P<WORD>[A-Za-z_\xC0-\uFFFF][\w\xC0-\uFFFF]*+(?!\#))
+    (?P<WORD>"""
+    + NAME
+    + r"""(?!\#))
   | (?P<PUNCT>:=|\?=|=>|<=|>=|<>|\*\*|\.\.|\((?!\*)|/(?![/*])|[-+*)\[\]:;,.<>^]|=(?!=)|&(?!&))
   | (?P<NUMBER>\d[\d_]*+(?:\#\w++|(?:\.\d[\d_]*+|\.(?=[eE][+-]?\d|[^\w.]))?(?:[eE][+-]?\d++)?)(?!\w))
-  | (?P<SKIP>//[^\n]*|\(\*(?:[^(*]++|\((?!\*)|\*(?!\)))*+\*\)|/\*(?:[^/*]++|/(?!\*)|\*(?!/))*+\*/)
+  | (?P<SKIP>"""
+    + FLAT_COMMENT
+    + r""")
   | (?P<DATE>(?i:L?(?:DATE_AND_TIME|DATE|DT|D|TIME_OF_DAY|TOD))\#[\d:._-]+)
   | (?P<STRING>(?i:(?:W?STRING|W?CHAR)\#)?(?:'(?:[^'$\n]|\$[^\n])*'|"(?:[^"$\n]|\$[^\n])*"))
   | (?P<TYPED>[A-Za-z_]\w*\#(?:[+-]?\d[\d_]*(?:\.[\d_]+)?[eE][+-]?\d+|[+-]?\w+(?:\.\w+)*(?:\#\w+)?)?)
@@ -94,13 +99,12 @@ _STATEMENT_IN_C = re.compile(r"\{[^']*;\s*\}")  # pragmas with a text have quote
 _OPEN_PARENTHESIS = re.compile(r"\s*\(")
 _NAMED_ARGUMENT = re.compile(r"\s*\(\s*[A-Za-z_]\w*\s*(?::=|=>)", re.ASCII)
 _PART_FOLLOWS = re.compile(r"\s*[:.,^\[]")
-_NAME = re.compile(r"\s+[A-Za-z_]")
+_NAME = re.compile(r"\s+[A-Za-z_\xC0-\uFFFF]")
 _ADDRESS = re.compile(r"\s*%")
 _PRIORITY = re.compile(r"\s*\(\s*PRIORITY\s*:=", re.IGNORECASE)
 _DECLARED = re.compile(r"\s*(?:,|:(?!=))")
 _LABEL = re.compile(r"\s+[A-Za-z_]\w*\s*:(?!=)")
 _QUOTE = re.compile(r"\s*['\"]")
-_COMMENT_MARK = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
 Report = Callable[[int, str, str], None]  # offset, code, message
 
@@ -191,18 +195,15 @@ class Lexer:
     def _skip_comment(self, mark: str, at: int) -> int:
         """The end of a comment that holds comments, or of the text. One that is not closed ends at the first mark:
         there are systems where comments do not nest."""
-        start, depth, first = at - 2, 1, 0
-        for match in _COMMENT_MARK[mark].finditer(self.text, at, self._end):
-            depth += 1 if match.group() == mark else -1
-            first = first or (match.end() if match.group() != mark else 0)
-            if depth == 0:
-                return match.end()
-        if first:
+        whole, first = comment_ends(self.text, mark, at, self._end)
+        if whole >= 0:
+            return whole
+        if first >= 0:
             opened = self.text.find(mark, at, first)
             message = f"a comment in a comment: this {mark} is not closed, so the outer comment ends where it would end"
             self.pragmas.append((opened, f"{{warning '{message}'}}"))
             return first
-        self._report(start, "comment", "this comment is not closed")
+        self._report(at - 2, "comment", "this comment is not closed")
         return self._end
 
     def _skip_branch(self, at: int) -> int:
@@ -267,10 +268,12 @@ class Lexer:
         return self._end if end < 0 else end
 
 
+# What follows a token is looked for in `text`, the plain text with strings (`plain_text`).
+
+
 def is_followed_by_name(token: Token, text: str) -> bool:
     """Whether MOCK, METHOD ... start something, as in `MOCK pump.valve;`: another name follows, as it never does
-    after a
-    variable of that name."""
+    after a variable of that name."""
     if token.type == "TRANSITION" and _PRIORITY.match(text, token.end):
         return True
     return (_ADDRESS if token.type == "_AT" else _NAME).match(text, token.end) is not None

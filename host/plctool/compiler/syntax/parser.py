@@ -27,6 +27,7 @@ from plctool.compiler.syntax.lexer import (
     meant,
     modified,
 )
+from plctool.compiler.syntax.plain_text import plain_text
 from plctool.compiler.syntax.syntax_errors import Recovery
 from plctool.compiler.syntax.tables import Rule, Tables, load_tables
 
@@ -156,15 +157,15 @@ def parse_all(
     lexer = Lexer(source.text, recovery.report_token, start, end, declared)
     places: dict[int, str] = {}
     builder.source, builder.attributes, builder.places, builder.report = source, lexer.attributes, places, report
-    feed = parser.feed
+    feed, text = parser.feed, plain_text(source.text, strings=True)
     for token in lexer:
         if token.type in _AMBIGUOUS:
-            _decide(token, parser, recovery, source.text)
+            _decide(token, parser, recovery, text)
             if token.type == "LEFT_OUT":
                 continue
         if recovery.skipping and not recovery.resume(token):
             continue
-        if feed(token) or (_is_name_after_all(token, parser, source.text) and feed(token)):
+        if feed(token) or (_is_name_after_all(token, parser, text) and feed(token)):
             recovery.accept(token)
         else:
             recovery.handle(token)

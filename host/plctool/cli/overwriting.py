@@ -1,0 +1,46 @@
+"""A file that a command writes must not replace one that it reads, or one that a user wrote by hand."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from plctool.errors import UsageError
+
+_PROJECTS = (".plcproj", ".tsproj")
+
+
+def check_output(output: Path, inputs: Iterable[Path], better: str) -> None:
+    """Refuses an output with the name of a source, a symbol file or a settings file, and one that is among `inputs`,
+    which are looked at only if the file exists. `better`: what to type instead."""
+    kind = _kind(output)
+    if kind:
+        raise UsageError(f"{output} has the name of a {kind}; write for example {better}.", "bad-output")
+    check_not_read(output, inputs, better)
+
+
+def check_not_read(output: Path, inputs: Iterable[Path], better: str) -> None:
+    """The same for a file whose name is given: it is not among `inputs`, by whatever name."""
+    if os.path.isfile(output) and any(_same(output, file) for file in inputs):
+        raise UsageError(
+            f"{output} is a file that this command reads, so it is not overwritten; write for example {better}.",
+            "bad-output",
+        )
+
+
+def _kind(output: Path) -> str:
+    from plctool.compiler.source_files import SUFFIXES
+
+    suffix = output.suffix.lower()
+    if suffix in SUFFIXES:
+        return "source"
+    kinds = {".sym": "symbol file", ".toml": "settings file", **dict.fromkeys(_PROJECTS, "project")}
+    return kinds.get(suffix, "")
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return False

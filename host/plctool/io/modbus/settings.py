@@ -1,0 +1,76 @@
+"""What the settings of a client and of a server have in common: their serial lines, addresses and parameters."""
+
+from __future__ import annotations
+
+import ipaddress
+from typing import Any
+
+from plctool.core import ffi, lib
+from plctool.iec.types import BYTE, UDINT, ArrayType, StringType
+from plctool.io.model import Connector, Parameter
+from plctool.io.names import MAX_LINE, MAX_NAME, is_line
+from plctool.io.tables import Table
+
+DRIVER = "IoDrvModbus"
+MAX_UNIT = int(lib.MODBUS_MAX_UNIT)  # of a serial line
+_PARITIES = {"none": 0, "even": 1, "odd": 2}
+_BAUDS = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600)
+
+
+def number_parameter(number: int, value: int, name: str = "") -> Parameter:
+    """Number `number` of the driver; `name`: that of the setting it is from."""
+    return Parameter(number, UDINT, value, name)
+
+
+def text_parameter(number: int, value: str, name: str = "") -> Parameter:
+    """The same for a text."""
+    return Parameter(number, StringType(len(value)), value, name)
+
+
+def structure_parameter(number: int, value: Any) -> Parameter:
+    """The same for a struct of Modbus.h."""
+    data = bytes(ffi.buffer(value))
+    return Parameter(number, ArrayType(BYTE, ((0, len(data) - 1),)), data)
+
+
+def default_name(table: Table, key: str) -> str:
+    """What a line is called that has no name."""
+    found = table.text(key)
+    return f"modbus_{(found or 'line').rpartition('/')[2]}"[:MAX_NAME]
+
+
+def serial_settings(table: Table, connector: Connector) -> tuple[int, int]:
+    """Adds the parameters of a serial line; its baud, and the bits of a character."""
+    bauds = {str(b): b for b in _BAUDS}
+    port = table.text("port", required="/dev/ttyS1") or "?"
+    if not is_line(port):
+        table.error(f"port has 1 to {MAX_LINE} ASCII characters", "port")
+    connector.takes = f"the line {port}"
+    baud = table.number("baud", _BAUDS[0], _BAUDS[-1], 19200, unit="baud") or 19200
+    if str(baud) not in bauds:
+        table.error(f"{baud} is not a speed of serial lines: write {', '.join(bauds)}", "baud")
+    parity = table.choice("parity", _PARITIES, _PARITIES["even"])
+    stop_bits = table.number("stop_bits", 1, 2, 1) or 1
+    connector.parameters += [
+        text_parameter(int(lib.MODBUS_PARAM_LINE), port, "port"),
+        number_parameter(int(lib.MODBUS_PARAM_BAUD), baud, "baud"),
+        number_parameter(int(lib.MODBUS_PARAM_PARITY), parity or 0, "parity"),
+        number_parameter(int(lib.MODBUS_PARAM_STOP_BITS), stop_bits, "stop_bits"),
+        number_parameter(int(lib.MODBUS_PARAM_RS485), int(table.flag("drive")), "drive"),
+    ]
+    return baud, 9 + (parity != 0) + stop_bits
+
+
+def address_parameters(table: Table, key: str, default: str) -> list[Parameter]:
+    """The IPv4 address that `key` gives, and the port."""
+    host = table.text(key, default or None, required="" if default else "192.168.0.7") or "0.0.0.0"
+    try:
+        address = int(ipaddress.IPv4Address(host))
+    except ValueError:
+        table.error(f"'{host}' is not an address: write for example \"192.168.0.7\"", key)
+        address = 0
+    port = table.number("port", 1, 65535, int(lib.MODBUS_PORT))
+    return [
+        number_parameter(int(lib.MODBUS_PARAM_ADDRESS), address, key),
+        number_parameter(int(lib.MODBUS_PARAM_PORT), port or int(lib.MODBUS_PORT), "port"),
+    ]
