@@ -61,7 +61,8 @@ def source(variables: dict[str, tuple[Any, str]]) -> str:
     for name, (kind, qualifier) in variables.items():
         if isinstance(kind, Struct):
             lines = " ".join(f"{m} : {declaration(k)};" for m, k in kind.members)
-            types.append(f"{{attribute 'pack_mode' := '{kind.pack}'}}\nTYPE T_{name} : STRUCT {lines} END_STRUCT END_TYPE")
+            types.append(f"{{attribute 'pack_mode' := '{kind.pack}'}}")
+            types.append(f"TYPE T_{name} : STRUCT {lines} END_STRUCT END_TYPE")
             sections.append(f"VAR {qualifier} {name} : T_{name}; END_VAR")
         else:
             sections.append(f"VAR {qualifier} {name} : {declaration(kind)}; END_VAR")

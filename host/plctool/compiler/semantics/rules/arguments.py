@@ -216,6 +216,8 @@ def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tu
     place = place_of(e)
     if isinstance(place, BitPlace):
         place = ValuePlace(e, e.type, e.pos)
+    elif is_unaligned(place):
+        c.warning(offset, "pointer", packed_and_pointed_to(place))
     return handed(place, e.type, total_size(place))
 
 
@@ -288,6 +290,12 @@ def packed(place: Place, what: str) -> str:
     return (
         f"this {place.type} is packed, and {what} needs one at a multiple of {place.type.align}; copy it to a variable"
     )
+
+
+def packed_and_pointed_to(place: Place) -> str:
+    """What may go wrong with a pointer to a place in a packed structure."""
+    message = f"this {place.type} is packed, and some processors stop when they read it through a pointer to it"
+    return f"{message}; copy it with MEMCPY, or use a pointer to the structure"
 
 
 def refer(place: Place, t: ReferenceType) -> Expr:

@@ -10,7 +10,7 @@ from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of, total_size
 from plctool.compiler.semantics.rules import intrinsics
-from plctool.compiler.semantics.rules.arguments import packed
+from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to
 from plctool.compiler.semantics.rules.conversion_calls import conversion, conversion_hint
 from plctool.compiler.semantics.rules.intrinsics import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.members import space_of
@@ -130,8 +130,7 @@ def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType], expected: T
     if kind is PointerType and is_unaligned(place):
         return c.error(node.pos, "type", packed(place, "a reference"))
     if is_unaligned(place) and not _is_of_bytes(expected):
-        message = f"this {place.type} is packed, and some processors stop when they read it through a pointer to it"
-        c.warning(node.pos, "pointer", f"{message}; copy it with MEMCPY, or use a pointer to the structure")
+        c.warning(node.pos, "pointer", packed_and_pointed_to(place))
     t = place.type.element if isinstance(place.type, OpenArrayType) else place.type
     return AddressOf(place, kind(t), c.pos(node.pos))
 
