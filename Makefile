@@ -4,6 +4,7 @@
 # make wheel  dist/*.whl for this kind of Linux and every Python from 3.11 on, tried in those that are here
 # make size   flash and RAM of the bare-metal runtime, per component
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
+# make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500")
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each
 #
 # Everything is installed into .venv and built in build*/; Debian packages that are missing are installed when you are root.
@@ -17,7 +18,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
 BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
 
-.PHONY: demo test test-vcan lint format bench size wheel attack fuzz all clean
+.PHONY: demo test test-vcan lint format bench size wheel attack soak fuzz all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -76,6 +77,10 @@ attack: $(ATTACKED)/build.ninja
 	$(MESON) compile -C $(ATTACKED)
 	$(BIN)/python tests/attack/run.py $(ARGS)
 
+soak: build/build.ninja
+	$(MESON) compile -C build
+	$(BIN)/python tests/soak/soak.py $(ARGS)
+
 FUZZED := build build-sanitized
 FUZZ_SECONDS ?= 60
 
@@ -95,9 +100,9 @@ build-cm%/build.ninja: $(VENV)/dev
 build-lm3s6965/build.ninja: $(VENV)/dev
 	$(MESON) setup build-lm3s6965 --cross-file cross/lm3s6965.ini
 
-# What a user gets: the package with its two commands.
+# What a user gets: the package with its two commands; and the plant of the demo speaks Modbus.
 $(VENV)/installed: $(VENV)/bootstrapped pyproject.toml meson.build $(shell find firmware host examples -type f -not -path '*/__pycache__/*')
-	$(BIN)/pip install --quiet .
+	$(BIN)/pip install --quiet '.[demo]'
 	touch $@
 
 # What a developer needs on top.

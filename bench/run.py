@@ -17,13 +17,15 @@ import overheads
 import targets
 
 import plctool
-from plctool.compiler import compile_sources
+from plctool.compiler import IoFiles, compile_sources
 from plctool.compiler.build import BuildResult
 from plctool.sim import Simulator
 from plctool.testing.line import BITS_PER_BYTE, SerialLine
 from plctool.testing.plcrt import Plcrt
 
 ROOT = Path(__file__).parents[1]
+TANKS = [ROOT / f"examples/tanks/{name}.st" for name in ("types", "blocks", "control", "plant")]
+TANKS += [ROOT / "bench/tanks.st"]
 BAUD = 115200
 CYCLES = 1000  # of the control task before its state is compared with that of the C twin
 CALLS = 900_000
@@ -189,7 +191,7 @@ def bench_tanks() -> None:
     print("\nexamples/tanks, ns per cycle of each task, beside the same program in C")
     twins = {level: run_twin(level) for level in ("-O2", "-O3")}
     for checks in ("all", "none"):
-        result = compile_sources([ROOT / "examples/tanks"], checks=checks)
+        result = compile_sources(TANKS, checks=checks, io=IoFiles(wanted=False))
         with Simulator(result.image, result.symbols) as plc:
             plc.run_cycles(CYCLES)
             same = {level: checksum(plc) == twin[0] for level, twin in twins.items()}

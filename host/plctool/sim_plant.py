@@ -2,8 +2,8 @@
 
 A process has one runtime, so the plant runs in another, on a virtual clock of its own that follows the controller's.
 Its variables are found by the names of the controller's channels: for the channel `motor` of the device `Bench` it has
-a variable `Bench_motor` or `motor` in one of its programs. Outputs of the controller are written to the plant, and what
-the plant makes of them is what the inputs measure.
+a variable `Bench_motor` or `motor` in one of its programs; so it has for the channel `Main.motor` of a bus. Outputs of
+the controller are written to the plant, and what the plant makes of them is what the inputs measure.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any, Self
 from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.errors import DeviceError, PlcError, UsageError
 from plctool.files import read_image
+from plctool.iec.types import StructType
 from plctool.image.file import image_crc
 from plctool.sim import Simulator
 
@@ -69,16 +70,17 @@ class PlantProgram:
             plc.set_input(channel, values[variable])
 
     def _connections(self, plc: Simulator) -> dict[str, tuple[bool, str]]:
-        own: dict[str, str] = {}
-        for name in self._symbols.variables:
-            own.setdefault(name.rpartition(".")[2].casefold(), name)
+        own: dict[tuple[str, bool], str] = {}  # a tank is not the lamp of the same name
+        for name, symbol in self._symbols.variables.items():
+            own.setdefault((_last(name), isinstance(symbol.type, StructType)), name)
         found = {}
         for c in plc.io.channels:
-            variable = own.get(f"{c.device}_{c.name}".casefold()) or own.get(c.name.casefold())
+            name, whole = _last(c.name), isinstance(c.symbol.type, StructType)
+            variable = own.get((f"{c.device}_{name}".casefold(), whole)) or own.get((name, whole))
             if variable is not None:
                 found[c.title] = (c.output, variable)
         if not found:
-            names = ", ".join(c.name for c in plc.io.channels)
+            names = ", ".join(_last(c.name) for c in plc.io.channels)
             raise UsageError(f"The plant has none of the variables {names}; declare those that it needs.", "no-plant")
         return found
 
@@ -96,6 +98,11 @@ class PlantProgram:
         if "error" in reply:
             raise DeviceError(f"The plant failed: {reply['error']}", "plant")
         return reply
+
+
+def _last(name: str) -> str:
+    """`motor` of `Main.motor`, for comparison."""
+    return name.rpartition(".")[2].casefold()
 
 
 def _serve() -> None:

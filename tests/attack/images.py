@@ -20,7 +20,7 @@ from plctool.errors import DeviceError
 from plctool.link.services import AppState
 
 COUNT = 10_000
-CYCLE_LIMIT_MS = 500  # in which an endless loop is broken, real time
+CYCLE_LIMIT_MS = 500  # in which an endless loop is aborted, time of the processor
 
 # Something of everything an image can hold.
 RICH = """

@@ -190,6 +190,25 @@ static void those_who_hold_channels_without_login_give_way_after_a_while(void)
     CHECK(comes_in(&newcomer) && client_login(&newcomer));
 }
 
+/* With time that passes as it does, cycle by cycle. */
+static void those_who_logged_in_and_went_without_a_word_give_way_after_a_while(void)
+{
+    CLIENT gone[COMM_MAX_CLIENTS];
+    CLIENT newcomer;
+
+    fakes_start();
+    for (RTS_UI16 i = 0; i < RTS_COUNT(gone); i++) {
+        client_init(&gone[i], (RTS_UI16)(INTRUDER + i));
+        CHECK(client_open(&gone[i]) && client_login(&gone[i]));
+    }
+    client_init(&newcomer, ADDRESS);
+    for (RTS_UI32 ms = 0; ms < CHANNEL_IDLE_MS; ms += 500) {
+        CHECK(!comes_in(&newcomer));
+        pass(500);
+    }
+    CHECK(comes_in(&newcomer) && client_login(&newcomer));
+}
+
 /* Reads memory, files and traces in other runtimes: groups 0x0F, 8 and their neighbours. */
 static void there_are_no_services_but_those_of_the_documentation(void)
 {
@@ -257,6 +276,7 @@ int main(void)
     RUN(after_a_logout_there_is_time_for_another_login);
     RUN(a_storm_of_open_requests_does_not_end_a_login);
     RUN(those_who_hold_channels_without_login_give_way_after_a_while);
+    RUN(those_who_logged_in_and_went_without_a_word_give_way_after_a_while);
     RUN(there_are_no_services_but_those_of_the_documentation);
     RUN(every_service_survives_every_tag_of_every_size);
     return test_result();

@@ -172,9 +172,18 @@ def test_an_exception_in_what_is_tested_names_its_own_line(tool: Tool) -> None:
     assert failure(tool, "ASSERT_EQ(Half(0), 1);", before)["line"] == 3
 
 
-def test_an_endless_loop_ends(tool: Tool) -> None:
+@pytest.fixture
+def limit_s(monkeypatch: pytest.MonkeyPatch) -> float:
+    """Seconds after which a test is taken for an endless loop: less than 10, but more than a cycle may take."""
+    monkeypatch.setattr("plctool.st_tests.run.LIMIT_MS", 3000)
+    return 3.0
+
+
+def test_an_endless_loop_ends(tool: Tool, limit_s: float) -> None:
+    begin = time.monotonic()
     found = failure(tool, "VAR i : INT; END_VAR\nWHILE TRUE DO i := i + 1; END_WHILE")
     assert (found["kind"], found["line"]) == ("WATCHDOG", 3)
+    assert time.monotonic() - begin > limit_s, "a test has more time than a cycle"
 
 
 def test_teardown_runs_after_an_exception_on_the_variables_as_they_are(tool: Tool, monkeypatch: Any) -> None:
@@ -190,7 +199,7 @@ def test_teardown_runs_after_an_exception_on_the_variables_as_they_are(tool: Too
     assert found == [42]
 
 
-def test_an_endless_loop_in_teardown_ends_too(tool: Tool) -> None:
+def test_an_endless_loop_in_teardown_ends_too(tool: Tool, limit_s: float) -> None:
     before = "TEARDOWN WHILE TRUE DO ; END_WHILE END_TEARDOWN\n"
     assert failure(tool, "VAR i : INT; END_VAR i := 1 / i;", before)["kind"] == "DIVIDEBYZERO"
 

@@ -198,6 +198,16 @@ def test_method_that_never_assigns_its_result_is_a_warning_but_not_fb_init() -> 
 # ---- names -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("of_test", "unused"), [("plant : Plant;", 0), ("number : INT;", 1)])
+def test_program_that_only_a_test_runs_is_no_warning(of_test: str, unused: int) -> None:
+    """It is there for the tests: the plant of a controller."""
+    text = f"""PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM
+    PROGRAM Plant VAR n : INT; END_VAR n := n + 1; END_PROGRAM
+    CONFIGURATION C RESOURCE R ON D TASK T(INTERVAL := T#10ms); PROGRAM M WITH T : Main; END_RESOURCE END_CONFIGURATION
+    TEST 'both' VAR {of_test} END_VAR ASSERT_TRUE(TRUE); END_TEST"""
+    assert len(warned(text, "unused")) == unused
+
+
 def test_every_warning_of_the_compiler_has_a_name() -> None:
     """Whatever is reported as a warning can be turned off."""
     used: set[object] = set()

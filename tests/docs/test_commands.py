@@ -1,8 +1,8 @@
 """Every command and every Python example in README and docs is run, in the order in which a reader would type them.
 
-`sh` blocks run in a folder of their own with the repository's examples in it. `plcrt` goes on in the background, as
-it does for the
-reader in another terminal, and the port it prints takes the place of the one in the text. `make` and `pip` are not run
+`sh` blocks run in a folder of their own with the repository's examples in it. `plcrt` and the plant of an example go on
+in the background, as they do for the reader in another terminal, and the port that plcrt prints takes the place of the
+one in the text. `make` and `pip` are not run
 here: they are what runs this test (see WITHOUT_RUNNING).
 """
 
@@ -12,7 +12,9 @@ import os
 import random
 import re
 import shlex
+import shutil
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -27,6 +29,7 @@ ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^```(sh|python|(?:iecst|toml) \S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN_PORT = "/dev/pts/4"
+SHOWN_MODBUS_PORT = "5020"
 SHOWN_ADDRESS, SHOWN_BROADCAST = "192.168.1.5", "192.168.1.255"
 BROADCAST = "127.255.255.255"
 
@@ -53,13 +56,17 @@ class Reader:
         self.port = SHOWN_PORT
         self.address = f"127.{random.randint(1, 250)}.{random.randint(1, 250)}.1"  # all its ports are free
         self.env = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
-        os.symlink(ROOT / "examples", folder / "examples")
+        self.plant: subprocess.Popen[bytes] | None = None
+        self._copy_examples()
 
     def type(self, line: str) -> None:
         if line.startswith(WITHOUT_RUNNING):
             return
         line = line.replace(SHOWN_BROADCAST, BROADCAST).replace(SHOWN_ADDRESS, self.address)
         words = shlex.split(line.replace(SHOWN_PORT, self.port))
+        if words[0] == "python":
+            self.start_plant(words[1:])
+            return
         if words[0] == "plcrt":
             self.start_runtime(words[1:])
             return
@@ -69,6 +76,30 @@ class Reader:
             text=True, timeout=180, check=False,
         )  # fmt: skip
         assert done.returncode == 0, f"{line}\nexit {done.returncode}\n{done.stdout}{done.stderr}"
+
+    def _copy_examples(self) -> None:
+        """With a port that is free here."""
+        shutil.copytree(ROOT / "examples", self.folder / "examples", ignore=shutil.ignore_patterns("__pycache__"))
+        with socket.create_server(("127.0.0.1", 0)) as found:
+            port = found.getsockname()[1]
+        for file in (self.folder / "examples" / "tanks" / name for name in ("tanks.io.toml", "plant_server.py")):
+            text = file.read_text()
+            assert SHOWN_MODBUS_PORT in text
+            file.write_text(text.replace(SHOWN_MODBUS_PORT, str(port)))
+
+    def start_plant(self, command: list[str]) -> None:
+        """A process that goes on until the end, and says when it has begun."""
+        self.plant = subprocess.Popen(
+            ends_with_us([sys.executable, *command]), cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE
+        )
+        assert self.plant.stdout
+        assert self.plant.stdout.readline()
+
+    def stop_plant(self) -> None:
+        if self.plant:
+            assert self.plant.poll() is None
+            self.plant.kill()
+            self.plant.communicate()
 
     def start_runtime(self, options: list[str]) -> None:
         self.stop_runtime()
@@ -110,6 +141,7 @@ def reader(tmp_path: Path) -> Iterator[Reader]:
     typing = Reader(tmp_path)
     yield typing
     typing.stop_runtime()
+    typing.stop_plant()
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)

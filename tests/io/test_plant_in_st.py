@@ -47,6 +47,50 @@ def test_controller_keeps_the_level_of_the_plant(tmp_path: Path) -> None:
     assert min(levels[10:]) == pytest.approx(30, abs=3)
 
 
+MODBUS = """\
+[[modbus.tcp]]
+host = "127.0.0.1"
+[[modbus.tcp.device]]
+name = "Tank"
+[[modbus.tcp.device.read]]
+function = 4
+address = 30001
+every = "T#20ms"
+var = "Main.level"
+[[modbus.tcp.device.write]]
+function = 5
+address = 1
+on_change = true
+var = "Main.pump"
+"""
+
+
+def test_plant_is_on_a_bus_too(tmp_path: Path) -> None:
+    """There channels have the names of variables."""
+    built = build(tmp_path, PROGRAM, MODBUS)
+    with plant(tmp_path, PLANT) as tank, Simulator(built.image, built.symbols) as plc:
+        plc.attach(tank, tank.every_ms)
+        plc.run_for(seconds=2)
+        assert plc.output("Main.pump") is True
+        assert plc.read("Main.level") > 30.0
+
+
+def test_block_in_the_plant_may_have_the_name_of_a_channel(tmp_path: Path) -> None:
+    built = build(tmp_path, PROGRAM, DESCRIPTION)
+    text = """\
+FUNCTION_BLOCK Motor VAR runs : BOOL; END_VAR runs := TRUE; END_FUNCTION_BLOCK
+PROGRAM Plant
+VAR pump : Motor; level : REAL; END_VAR
+pump();
+level := level + 1.0;
+END_PROGRAM
+"""
+    with plant(tmp_path, text) as tank, Simulator(built.image, built.symbols) as plc:
+        plc.attach(tank, tank.every_ms)
+        plc.run_for(100)
+        assert plc.read("Main.level") > 0.0
+
+
 def test_exception_of_the_plant_is_named(tmp_path: Path) -> None:
     built = build(tmp_path, PROGRAM, DESCRIPTION)
     text = "PROGRAM Plant\nVAR level : REAL; n, m : INT; END_VAR\nn := 1 / m;\nEND_PROGRAM\n"

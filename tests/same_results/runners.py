@@ -43,7 +43,8 @@ _LINUX_SOURCES = [
 # Picolibc keeps the clock to itself unless a flag says that there is one.
 _BARE_FLAGS = [
     "--specs=picolibc.specs", "--oslib=semihost", "--crt0=hosted", "-Wl,--gc-sections",
-    "-D_POSIX_TIMERS", "-D_POSIX_MONOTONIC_CLOCK", f"-I{HERE / 'bare'}", f"-I{FIRMWARE / 'port/baremetal/cortexm'}",
+    "-D_POSIX_TIMERS", "-D_POSIX_MONOTONIC_CLOCK", "-D_POSIX_C_SOURCE=200809L",
+    f"-I{HERE / 'bare'}", f"-I{FIRMWARE / 'port/baremetal/cortexm'}",
     "-Wl,--defsym=__stack_size=64K",
 ]  # fmt: skip
 

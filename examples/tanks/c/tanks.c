@@ -4,7 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * The same algorithm, in the same order and in single precision: after the same cycles both hold the same levels, bit for bit
- * (compile with -ffp-contract=off). Run plant_cycle every 5 ms, control_cycle every 10 ms, the plant first.
+ * (compile with -ffp-contract=off). Run plant_cycle and control_cycle every 10 ms, the plant first.
  */
 #include "tanks.h"
 
@@ -13,7 +13,7 @@
 #include <string.h>
 
 #define CONTROL_STEP 0.010f
-#define PLANT_STEP 0.005f
+#define PLANT_STEP 0.010f
 
 /* ---- standard function blocks ---- */
 
@@ -141,9 +141,9 @@ enum { MODE_OFF, MODE_MANUAL, MODE_AUTOMATIC };
 static struct {
     float setpoint, manual_speed;
     int mode;
-    bool acknowledge;
+    bool plant_ok, acknowledge;
     pid_parameters parameters;
-    bool pump, inlet, alarm_low, alarm_high, alarm_supply, horn;
+    bool pump, inlet, alarm_low, alarm_high, alarm_supply, alarm_plant, horn;
     float speed;
     pid_state pid;
     bool supply_ok, supply_full, worth_pumping;
@@ -165,16 +165,18 @@ void control_cycle(int32_t now_ms)
 
     hysteresis(&control.supply_ok, field.level1, 12.0f, 6.0f);
     hysteresis(&control.worth_pumping, wanted_speed, 5.0f, 1.0f);
-    control.pump =
-        guard_motor(&control.guard, control.worth_pumping, control.supply_ok && field.level2 < 95.0f, now_ms);
+    control.pump = guard_motor(&control.guard, control.worth_pumping,
+                               control.plant_ok && control.supply_ok && field.level2 < 95.0f, now_ms);
     control.speed = control.pump ? wanted_speed : 0.0f;
-    control.inlet = !hysteresis(&control.supply_full, field.level1, 85.0f, 60.0f);
+    hysteresis(&control.supply_full, field.level1, 85.0f, 60.0f);
+    control.inlet = control.plant_ok && !control.supply_full;
 
     watch_level(&control.process_alarm, field.level2, 10.0f, 90.0f, control.acknowledge, now_ms);
     watch_level(&control.supply_alarm, field.level1, 10.0f, 95.0f, control.acknowledge, now_ms);
     control.alarm_low = control.process_alarm.low.q;
     control.alarm_high = control.process_alarm.high.q;
     control.alarm_supply = control.supply_alarm.low.q || control.supply_alarm.high.q;
+    control.alarm_plant = !control.plant_ok;
     control.horn = control.process_alarm.pending || control.supply_alarm.pending;
 
     field.pump = control.pump;
@@ -220,6 +222,7 @@ void tanks_init(void)
     memset(&field, 0, sizeof field);
     memset(&control, 0, sizeof control);
     memset(&plant, 0, sizeof plant);
+    control.plant_ok = true;
     control.setpoint = 50.0f;
     control.manual_speed = 30.0f;
     control.mode = MODE_AUTOMATIC;

@@ -11,7 +11,7 @@
 /* Puts everything into the state of a cold start. */
 void tanks_init(void);
 
-/* One cycle of the plant (every 5 ms) and of the controller (every 10 ms); `now_ms` is the time of the cycle. */
+/* One cycle of the plant and of the controller, every 10 ms; `now_ms` is the time of the cycle. */
 void plant_cycle(int32_t now_ms);
 void control_cycle(int32_t now_ms);
 

@@ -55,8 +55,8 @@ RTS_RESULT SimCommCycle(void);
 /* Virtual time since SimStart [ns]. */
 RTS_I64 SimNow(void);
 
-/* Cycles that take longer than this in real time [ms] are aborted as endless; the default is
- * SIM_CYCLE_LIMIT_MS. */
+/* Cycles that take longer than this in time of the processor [ms] are aborted as endless; the default, and what 0 sets,
+ * is SIM_CYCLE_LIMIT_MS. */
 void SimSetCycleLimit(RTS_UI32 ms);
 
 /* ---- the device ---- */

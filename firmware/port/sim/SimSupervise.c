@@ -3,8 +3,9 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * In an endless loop virtual time stands still, so the watchdog of the runtime never expires. A thread looks, in real
- * time, whether one and the same cycle has been running for too long.
+ * In an endless loop virtual time stands still, so the watchdog of the runtime never expires. A thread looks, in time
+ * of the processor, which does not depend on what else the machine does, whether one and the same cycle has been
+ * running for too long.
  */
 #define _GNU_SOURCE
 #include <pthread.h>
@@ -35,11 +36,11 @@ static struct {
     RTS_UI32 limit_ms;
 } supervisor = {0, 0, SIM_CYCLE_LIMIT_MS};
 
-static RTS_I64 real_ms(void)
+static RTS_I64 processor_ms(void)
 {
     struct timespec now;
 
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
     return (RTS_I64)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
@@ -50,8 +51,8 @@ static void look(RTS_UI32 index, SEEN *seen)
 
     if (!IecTaskReadGuard(index, &guard) || runtime != seen->runtime || guard.serial != seen->serial ||
         guard.start_ns != seen->start_ns) {
-        *seen = (SEEN){runtime, guard.serial, guard.start_ns, real_ms()};
-    } else if (real_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms)) {
+        *seen = (SEEN){runtime, guard.serial, guard.start_ns, processor_ms()};
+    } else if (processor_ms() - seen->since_ms > SysAtomicLoad(&supervisor.limit_ms)) {
         SysExceptBreak(guard.arg, RTSEXCPT_WATCHDOG);
     }
 }
@@ -101,7 +102,7 @@ void SimSuperviseStart(void)
 
 void SimSetCycleLimit(RTS_UI32 ms)
 {
-    SysAtomicStore(&supervisor.limit_ms, ms);
+    SysAtomicStore(&supervisor.limit_ms, ms ? ms : SIM_CYCLE_LIMIT_MS);
 }
 
 void SimMutexLock(void)

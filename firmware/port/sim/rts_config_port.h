@@ -44,8 +44,8 @@
 /* Bytes the simulated serial line holds in each direction. */
 #define SIM_COM_SIZE (64 * 1024)
 
-/* A cycle that takes longer than this in real time is aborted [ms]: virtual time stands still in an endless
- * loop. */
+/* A cycle that takes longer than this in time of the processor is aborted [ms]: virtual time stands still in an
+ * endless loop. */
 #define SIM_CYCLE_LIMIT_MS 2000
 
 #endif

@@ -215,10 +215,12 @@ static bool is_taken(const COMM_CLIENT *client, RTS_UI32 now_ms)
 }
 
 /* The channel is in use by a client that may be about to log in: another one that only opens does not end it. */
-static bool is_settling(const CHANNEL *channel, RTS_UI32 now_ms)
+static bool is_settling(const COMM_CLIENT *client, RTS_UI32 now_ms)
 {
-    return COMM_ENDPOINTS && channel->id != 0 && !channel->fresh && !is_gone(&channel->peer) &&
-           now_ms - channel->anonymous_since < CHANNEL_SETTLE_MS;
+    const CHANNEL *channel = &client->channel;
+
+    return COMM_ENDPOINTS && channel->id != 0 && !SrvIsLoggedIn(client) && !channel->fresh &&
+           !is_gone(&channel->peer) && now_ms - channel->anonymous_since < CHANNEL_SETTLE_MS;
 }
 
 /* Whether `a` is the better one to give to a new peer: it is free, or was never used, or has been silent longer. */
@@ -239,7 +241,7 @@ static COMM_CLIENT *claim_client(const ROUTER_PEER *peer, RTS_UI32 now_ms)
     FOR_EACH_CLIENT (client) {
         if (client->channel.id != 0 && RouterIsSamePeer(peer, &client->channel.peer))
             return client;
-        if (!is_taken(client, now_ms) && !is_settling(&client->channel, now_ms) &&
+        if (!is_taken(client, now_ms) && !is_settling(client, now_ms) &&
             (found == NULL || is_better(&client->channel, &found->channel, now_ms)))
             found = client;
     }

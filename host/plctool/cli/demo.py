@@ -1,4 +1,4 @@
-"""`plctool demo`: the whole story on this machine, with the real runtime and the real tool, in about half a minute."""
+"""`plctool demo`: the whole story on this machine, with the real runtime and the real tool, in less than a minute."""
 
 from __future__ import annotations
 
@@ -7,27 +7,29 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 import plctool
-from plctool.compiler import compile_sources
+from plctool.compiler import IoFiles, compile_sources
 from plctool.device import Plc
 from plctool.errors import DeviceError, PlcError
 from plctool.testing.plcrt import Plcrt
+from plctool.testing.tanks import PlantServer, describe_tanks, examples
 
-SHOWN = ("Control.setpoint", "Plant.level1", "Plant.level2", "Control.pump", "Control.alarm_low")
+SHOWN = (
+    "Control.setpoint", "Control.level2", "Control.pump", "Control.speed", "Control.inlet", "Control.alarm_plant",
+    "Plant.ok",
+)  # fmt: skip
 SETTLED_PERCENT = 1.5
-SETTLE_LIMIT_S = 40.0
-BAR_WIDTH = 30
+LIMIT_S = 40.0
+POLL_S = 0.5
+SHOW_EVERY_S = 1.0
+BAR_WIDTH = 22
 
-
-def examples() -> Path:
-    """The folder of examples: in the installed package, or at the root of the source tree."""
-    package = Path(__file__).parents[1]
-    inside = package / "examples"
-    return inside if inside.is_dir() else package.parents[1] / "examples"
+Values = dict[str, Any]
 
 
 class Story:
@@ -67,32 +69,52 @@ def flash(story: Story, plc: Plc, image: Path) -> None:
     story.say(f"{result.bytes} bytes in {result.seconds:.2f} s; state: {plc.status().state}")
 
 
-def show_levels(story: Story, plc: Plc, until: Callable[[dict[str, float], float], bool]) -> None:
-    """Prints the controlled level about twice a second until `until(values, seconds)` is true."""
+def line_of(values: Values, seconds: float) -> str:
+    """What the program sees and does, in a line."""
+    level, setpoint = values["Control.level2"], values["Control.setpoint"]
+    seen = f"{level:4.1f} % [green]{bar(level, setpoint)}[/]"
+    if not values["Plant.ok"]:
+        seen = f"[yellow]{'Plant.ok = FALSE':{len('50.0 % ') + BAR_WIDTH}}[/]"
+    inlet = "open" if values["Control.inlet"] else "shut"
+    return f"{seconds:4.1f} s  {seen} wanted {setpoint:.0f} %  pump {values['Control.speed']:3.0f} %  inlet {inlet}"
+
+
+def show(story: Story, plc: Plc, until: Callable[[Values, float], bool]) -> None:
+    """Prints a line each second until `until(values, seconds)` is true; an error when it never is."""
     begin = time.monotonic()
+    shown = 0.0
     while True:
         values = plc.read(*SHOWN)
         seconds = time.monotonic() - begin
-        level, setpoint = values["Plant.level2"], values["Control.setpoint"]
-        story.say(f"{seconds:5.1f} s  level {level:5.1f} %  [green]{bar(level, setpoint)}[/]  wanted {setpoint:.0f} %")
-        if until(values, seconds):
+        done = until(values, seconds)
+        if done or seconds >= shown:
+            story.say(line_of(values, seconds))
+            shown = seconds + SHOW_EVERY_S - POLL_S / 2
+        if done:
             return
-        time.sleep(0.5)
+        if seconds > LIMIT_S:
+            raise DeviceError(f"that did not happen within {LIMIT_S:.0f} s", "demo")
+        time.sleep(POLL_S)
 
 
 def settle(story: Story, plc: Plc) -> None:
-    """Waits until the level has been at the set point three times in a row; an error when it never does."""
+    """Waits until the level has been at the set point three times in a row."""
     in_band = 0
 
-    def settled(values: dict[str, float], seconds: float) -> bool:
+    def settled(values: Values, seconds: float) -> bool:
         nonlocal in_band
-        near = abs(values["Plant.level2"] - values["Control.setpoint"]) < SETTLED_PERCENT
+        near = values["Plant.ok"] and abs(values["Control.level2"] - values["Control.setpoint"]) < SETTLED_PERCENT
         in_band = in_band + 1 if near else 0
-        if seconds > SETTLE_LIMIT_S:
-            raise DeviceError(f"the level did not settle within {SETTLE_LIMIT_S:.0f} s", "demo")
         return in_band >= 3
 
-    show_levels(story, plc, settled)
+    show(story, plc, settled)
+
+
+def lose_plant(story: Story, plc: Plc, plant: PlantServer) -> None:
+    story.say(f"the plant says: {plant.press_enter()}")
+    show(story, plc, lambda v, seconds: seconds > 4 and v["Control.alarm_plant"] and not v["Control.pump"])
+    story.say(f"the plant says: {plant.press_enter()}")
+    settle(story, plc)
 
 
 def refuse_damaged(story: Story, plc: Plc, image: Path, folder: Path) -> None:
@@ -107,7 +129,7 @@ def refuse_damaged(story: Story, plc: Plc, image: Path, folder: Path) -> None:
         story.say(f"[yellow]refused:[/] {error}")
     else:
         raise DeviceError("the damaged image was accepted", "demo")
-    show_levels(story, plc, lambda values, seconds: seconds > 1)
+    show(story, plc, lambda values, seconds: seconds > 1)
     more = plc.tasks()[0].cycles - cycles
     if plc.status().state != "run" or more <= 0:
         raise DeviceError("the old program does not run any more", "demo")
@@ -122,23 +144,26 @@ def run(console: Console) -> None:
         image = folder / "tanks.cdl"
         runtime = Plcrt(folder / "plc.flash")
 
-        story.tell("Compile examples/tanks (Structured Text) to native code")
-        begin = time.monotonic()
-        result = compile_sources([examples() / "tanks"])
-        result.write(image)
-        story.say(f"tanks.cdl: {image.stat().st_size} bytes of image, {time.monotonic() - begin:.2f} s")
+        story.tell("Start the plant: two tanks, a Modbus device on TCP")
+        with PlantServer() as plant, runtime:
+            story.say(f"modbus: 127.0.0.1:{plant.port}")
 
-        story.tell("Start the runtime, plcrt, on a pseudo terminal")
-        with runtime:
-            story.say(f"serial: {runtime.port}")
+            story.tell("Compile examples/tanks: Structured Text, and what it is connected to")
+            begin = time.monotonic()
+            result = compile_sources([examples() / "tanks"], io=IoFiles(describe_tanks(folder, plant.port)))
+            result.write(image)
+            story.say(f"tanks.cdl: {image.stat().st_size} bytes of image, {time.monotonic() - begin:.2f} s")
+
             with plctool.connect(f"serial:{runtime.port}") as plc:
-                story.tell("Flash it over the serial line")
+                story.tell("Flash it over a serial line to the runtime, plcrt")
                 flash(story, plc, image)
-                story.tell("Watch the controller fill the second tank")
+                story.tell("Watch the controller fill the second tank, over Modbus")
                 settle(story, plc)
                 story.tell("Change the set point to 65 %; the controller settles again")
                 plc.write({"Control.setpoint": 65.0})
                 settle(story, plc)
+                story.tell("Pull the bus: the program sees it and stops; plug it in: it goes on")
+                lose_plant(story, plc, plant)
                 story.tell("Send a damaged image (one bit flipped)")
                 refuse_damaged(story, plc, image, folder)
 
@@ -150,7 +175,7 @@ def run(console: Console) -> None:
                 story.say(f"state after restart: {status.state}, image {status.image_crc:08X}")
                 if status.state != "run":
                     raise DeviceError("the boot project did not come back", "demo")
-                show_levels(story, plc, lambda values, seconds: seconds > 2)
+                show(story, plc, lambda values, seconds: seconds > 3 and values["Plant.ok"])
     console.print(
         "\n[bold green]That was the whole story.[/] Next: README.md, and examples/ for programs to start from."
     )

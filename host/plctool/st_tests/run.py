@@ -31,6 +31,9 @@ from plctool.image.targets import find_target, host_target
 from plctool.sim import Simulator
 from plctool.st_tests.report import TEST_NAME, Failure, Outcome, Report
 
+LIMIT_MS = 10_000
+"""Time of the processor after which a test is taken for an endless loop: it may be millions of cycles of a program."""
+
 _IN_TEST = re.compile(rf"{TEST_NAME.pattern}|SETUP|TEARDOWN")
 _COMPARED = {"ASSERT_GT": "> ", "ASSERT_GE": ">= ", "ASSERT_LT": "< ", "ASSERT_LE": "<= "}
 _EXCEPTIONS = {
@@ -106,7 +109,7 @@ class TestProgram:
 
     def run(self, numbers: Iterable[int]) -> Iterator[Outcome]:
         """Runs the tests with these indices in `cases`, each from a cold start."""
-        with Simulator(self._built.image, self._built.symbols, start=False) as plc:
+        with _more_time(), Simulator(self._built.image, self._built.symbols, start=False) as plc:
             bench = _Bench(plc, self._built, self._suite, self._program.area_sizes)
             for number in numbers:
                 yield bench.run(number)
@@ -124,6 +127,16 @@ def _power() -> Iterator[None]:
         yield
     finally:
         lib.SimStop()
+
+
+@contextmanager
+def _more_time() -> Iterator[None]:
+    """A cycle of the simulator may be as long as a test."""
+    lib.SimSetCycleLimit(LIMIT_MS)
+    try:
+        yield
+    finally:
+        lib.SimSetCycleLimit(0)
 
 
 class _Bench:

@@ -260,6 +260,12 @@ class Names:
         """The PROGRAM declarations in order."""
         return [s for s in self.pou_symbols() if s.keyword is ast.Unit.PROGRAM]
 
+    def types_of_tests(self) -> set[str]:
+        """The names of the types that tests have variables of, case-folded, without namespaces."""
+        lines = [line for test in self.tests for block in test.blocks for line in block.decls]
+        named = [line.type.name for line in lines if isinstance(line.type, ast.NamedType)]
+        return {name.rpartition(".")[2].casefold() for name in named}
+
     def globals(self) -> list[GlobalSymbol]:
         """All global variables the program itself declares; those with a name that others have too, twice."""
         return [*self._globals.values(), *(symbol for same in self._ambiguous.values() for symbol in same)]

@@ -213,10 +213,12 @@ class Programs:
         return bool(others)
 
     def report_unused(self) -> None:
-        """Warns of programs that are never run."""
+        """Warns of programs that are never run. What tests run may be there for them alone, such as a plant."""
         names = self._world.names
+        tested = names.types_of_tests()
         for symbol in names.program_symbols():
-            if not any(name.casefold() in self._declared for name in names.instances_of(symbol)):
+            run = any(name.casefold() in self._declared for name in names.instances_of(symbol))
+            if not run and symbol.decl.name.casefold() not in tested:
                 message = f"the program {symbol.decl.name} is never run: no task does, and nothing calls it"
                 self._world.diagnostics.warning(symbol.decl.source.pos(symbol.decl.pos), "unused", message)
 

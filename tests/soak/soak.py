@@ -1,0 +1,419 @@
+"""Soak: for a long time clients do what tools do, and what they should not: on every line of one plcrt at once, and in
+virtual time.
+
+    soak.py                  10 000 channels on each line: serial, CAN, TCP, UDP
+    soak.py --channels 100   fewer
+    soak.py --seed 5         other turns
+
+A turn is a channel and what is done with it: variables are written and read back, a long message is echoed, a download
+is begun, replies are not fetched. Some clients vanish in the middle of that, without closing, and there is noise
+between the frames. Prints what was done, and exits 1 if the program is not as it was, a client was shut out for longer
+than PATIENCE, the memory or the open files of the controller have grown, or a cycle is missing in virtual time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import socket
+import sys
+import threading
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).resolve().parents[2]
+os.environ.setdefault("PLCRT", str(ROOT / "build/firmware/port/linux/plcrt"))
+os.environ["PLCTOOL_GATEWAY"] = "off"
+sys.path[:0] = [str(ROOT / "host"), str(ROOT / "build" / "host")]
+
+from plctool.compiler import compile_sources  # noqa: E402
+from plctool.core import lib  # noqa: E402
+from plctool.device import Plc, connect  # noqa: E402
+from plctool.errors import LinkError, PlcError  # noqa: E402
+from plctool.link import services  # noqa: E402
+from plctool.link.connection import Connection  # noqa: E402
+from plctool.link.session import Session  # noqa: E402
+from plctool.link.transports import open_transport, parse_link  # noqa: E402
+from plctool.sim import Simulator  # noqa: E402
+from plctool.testing.can_hub import CanHub  # noqa: E402
+from plctool.testing.plcrt import Plcrt  # noqa: E402
+
+KINDS = ("serial", "can", "tcp", "udp")
+PATIENCE = 30.0  # a client that is shut out for longer has been locked out [s]
+SETTLED = 8.0  # the device waits for no client longer than that [s]
+WARM_UP = 0.1  # share of the channels after which memory is measured first
+MAX_GROWTH = 64  # KiB: pages of stacks that are used for the first time
+ECHO = 3000  # bytes: several packages
+INTERVAL_NS = 5_000_000  # of the task
+
+# A variable for each line. `damaged`: cycles that found something else than what was left.
+PROGRAM = """
+PROGRAM Main
+VAR
+    serial, can, tcp, udp : UDINT;
+    cycles, damaged : UDINT;
+    table : ARRAY[0..99] OF UDINT;
+    i : INT;
+END_VAR
+FOR i := 0 TO 99 DO
+    IF table[i] <> cycles * INT_TO_UDINT(i) THEN damaged := damaged + 1; END_IF
+END_FOR
+cycles := cycles + 1;
+FOR i := 0 TO 99 DO
+    table[i] := cycles * INT_TO_UDINT(i);
+END_FOR
+END_PROGRAM
+CONFIGURATION Soak
+    TASK Fast(INTERVAL := T#5ms);
+    PROGRAM Main WITH Fast : Main;
+END_CONFIGURATION
+"""
+OTHER = """
+PROGRAM Main
+VAR
+    a : ARRAY[0..29999] OF DINT := [{values}];
+END_VAR
+a[0] := a[0] + 1;
+END_PROGRAM
+"""
+
+
+class Vanished(Exception):
+    """A client goes without a word."""
+
+
+def build(folder: Path, name: str, text: str) -> Path:
+    source, image = folder / f"{name}.st", folder / f"{name}.cdl"
+    source.write_text(text)
+    compile_sources([source]).write(image)
+    return image
+
+
+def other_image(folder: Path) -> bytes:
+    """One that is long on the line: its values are no loop that fills."""
+    values = ", ".join(str(i * i % 65521) for i in range(30_000))
+    return build(folder, "other", OTHER.format(values=values)).read_bytes()
+
+
+# ---- one line ----
+
+
+@dataclass
+class Line:
+    """A line and the one client on it."""
+
+    kind: str
+    link: str
+    noise: Callable[[bytes], None]
+    symbols: Path
+    other: bytes
+    random: random.Random
+    channels: int = 0
+    done: Counter[str] = field(default_factory=Counter)
+    refused: Counter[str] = field(default_factory=Counter)
+    longest: float = 0.0  # turn, with all tries [s]
+
+    def __str__(self) -> str:
+        done = ", ".join(f"{count} {name}" for name, count in sorted(self.done.items()))
+        refused = ", ".join(f"{count} {code}" for code, count in sorted(self.refused.items())) or "none"
+        return f"{self.channels} channels: {done}; refused: {refused}; longest {self.longest:.1f} s"
+
+    def turn(self) -> None:
+        """One channel and what is done with it. It is tried until there is a place for it: clients that have vanished
+        hold theirs until the device misses them, and a new channel is given away before others. Raises PlcError when
+        that takes too long, or the device says what it must not."""
+        name, action = self.random.choice(TURNS)
+        begin = time.monotonic()
+        while not self._try(action):
+            if time.monotonic() > begin + PATIENCE:
+                raise PlcError(f"there was no place for longer than {PATIENCE} s", "soak")
+            time.sleep(self.random.uniform(0.01, 0.1))
+        self.done[name] += 1
+        self.longest = max(self.longest, time.monotonic() - begin)
+
+    def _try(self, action: Callable[[Line, Connection], None]) -> bool:
+        """False if there was no place."""
+        connection = Connection(open_transport(parse_link(self.link)))
+        try:
+            connection.open()
+            self.channels += 1
+            action(self, connection)
+        except Vanished:
+            connection.transport.close()
+            return True
+        except LinkError as error:
+            connection.close()
+            if error.code != "busy":
+                raise
+            self.refused[error.code] += 1
+            return False
+        connection.close()
+        return True
+
+    # ---- what is done with a channel ----
+
+    def knock(self, connection: Connection) -> None:
+        """Nothing."""
+
+    def vanish(self, connection: Connection) -> None:
+        Session(connection).ensure()
+        raise Vanished
+
+    def talk(self, connection: Connection) -> None:
+        plc = Plc(connection, self.symbols)
+        number = self.random.randrange(1 << 32)
+        plc.write({f"Main.{self.kind}": number})
+        if (found := plc.read(f"Main.{self.kind}")) != number:
+            raise PlcError(f"{number} was written, {found} read", "soak")
+
+    def echo(self, connection: Connection) -> None:
+        data = self.random.randbytes(ECHO)
+        if services.echo(Session(connection), data) != data:
+            raise PlcError("the echo is another one", "soak")
+
+    def half_a_download(self, connection: Connection) -> None:
+        """Another client may be at it, and is not disturbed."""
+        until = self.random.randrange(len(self.other) // 2)  # of the other half not all is under way
+
+        def go_until(arrived: int) -> None:
+            if arrived >= until:
+                raise Vanished
+
+        try:
+            services.download(Session(connection), self.other, restart=True, progress=go_until)
+        except LinkError:
+            raise
+        except PlcError as error:
+            self.refused[error.code] += 1
+
+    def fetch_nothing(self, connection: Connection) -> None:
+        """Many requests, of whose replies one is read."""
+        stream = connection.stream([b"\0" * ECHO] * 20)
+        with suppress(StopIteration, PlcError):
+            next(stream)
+        raise Vanished
+
+    def make_noise(self, connection: Connection) -> None:
+        """In the midst of a conversation."""
+        for _ in range(3):
+            self.noise(self.random.randbytes(self.random.randrange(1, 200)))
+            self.talk(connection)
+
+
+# Those without a word are few: each takes one of the places until the device misses it.
+TURNS: list[tuple[str, Callable[[Line, Connection], None]]] = [
+    *[("talk", Line.talk)] * 50,
+    *[("knock", Line.knock)] * 30,
+    *[("echo", Line.echo)] * 10,
+    *[("noise", Line.make_noise)] * 5,
+    ("vanish", Line.vanish),
+    ("half a download", Line.half_a_download),
+    ("fetch nothing", Line.fetch_nothing),
+]
+
+
+# ---- noise ----
+
+
+def to_file(path: str) -> Callable[[bytes], None]:
+    """Into a terminal that a client has as well."""
+
+    def send(data: bytes) -> None:
+        terminal = os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+        with suppress(BlockingIOError):
+            os.write(terminal, data)
+        os.close(terminal)
+
+    return send
+
+
+def to_tcp(place: str) -> Callable[[bytes], None]:
+    host, _, port = place.rpartition(":")
+
+    def send(data: bytes) -> None:
+        with suppress(OSError), socket.create_connection((host, int(port)), timeout=PATIENCE) as connection:
+            connection.sendall(data)
+
+    return send
+
+
+def to_udp(place: str) -> Callable[[bytes], None]:
+    host, _, port = place.rpartition(":")
+
+    def send(data: bytes) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as datagrams:
+            datagrams.sendto(data, (host, int(port)))
+
+    return send
+
+
+# ---- the controller ----
+
+
+@dataclass(frozen=True)
+class Use:
+    """What the controller uses: memory in KiB, that it may write and that is in RAM, and files."""
+
+    data: int
+    resident: int
+    files: int
+
+    def __str__(self) -> str:
+        return f"{self.data} KiB of data, {self.resident} KiB resident, {self.files} files"
+
+
+def use_of(pid: int) -> Use:
+    status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
+    files = len(os.listdir(f"/proc/{pid}/fd"))
+    return Use(int(status["VmData"].split()[0]), int(status["VmRSS"].split()[0]), files)
+
+
+def worker_of(plcrt: Plcrt) -> int:
+    if (worker := plcrt.worker) is None:
+        raise PlcError("the controller is being started again", "soak")
+    return worker
+
+
+class Soak:
+    """The lines of one plcrt, each with a thread."""
+
+    def __init__(self, lines: list[Line], plcrt: Plcrt) -> None:
+        self.lines = lines
+        self.plcrt = plcrt
+        self.worker = worker_of(plcrt)
+        self.errors: list[str] = []
+
+    def run(self, channels: int) -> Use:
+        """Until each line has had so many channels, or one has failed. What the controller uses then, when it has
+        missed those that vanished."""
+        threads = [threading.Thread(target=self._serve, args=(line, channels)) for line in self.lines]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        return self._settled()
+
+    def _serve(self, line: Line, channels: int) -> None:
+        try:
+            while line.channels < channels and not self.errors:
+                line.turn()
+        except PlcError as error:
+            self.errors.append(f"{line.kind}, channel {line.channels}: {error} ({error.code})")
+        except Exception:
+            self.errors.append(f"{line.kind}, channel {line.channels}:\n{traceback.format_exc()}")
+
+    def _settled(self) -> Use:
+        """When the number of files has been the same for longer than the device waits for a client."""
+        use, since = use_of(self.worker), time.monotonic()
+        while time.monotonic() < since + SETTLED:
+            time.sleep(0.5)
+            now = use_of(self.worker)
+            if now.files != use.files:
+                use, since = now, time.monotonic()
+        return now
+
+    def check_program(self, image: Path) -> tuple[int, int]:
+        """Cycles and the longest delay of one [us]. Raises PlcError when the program is not as it was."""
+        if worker_of(self.plcrt) != self.worker:
+            raise PlcError("the controller died and was started again", "soak")
+        with connect(f"tcp:{self.plcrt.tcp}", image.with_suffix(".sym")) as plc:
+            status = plc.status()
+            values = plc.read_all(["Main.cycles", "Main.damaged"])
+            task = plc.tasks()[0]
+        if status.state != "run" or values["Main.damaged"]:
+            raise PlcError(
+                f"the program is in the state {status.state}, {values['Main.damaged']} cycles damaged", "soak"
+            )
+        return values["Main.cycles"], task.jitter_us
+
+
+# ---- all of it ----
+
+
+def lines_of(plcrt: Plcrt, hub: CanHub, folder: Path, seed: int) -> list[Line]:
+    links = {
+        "serial": (f"serial:{plcrt.port}", to_file(plcrt.port)),
+        "can": (f"can:slcan:{hub.paths[0]}?node=1", to_file(hub.paths[1])),
+        "tcp": (f"tcp:{plcrt.tcp}", to_tcp(plcrt.tcp)),
+        "udp": (f"udp:{plcrt.udp}", to_udp(plcrt.udp)),
+    }
+    other = other_image(folder)
+    symbols = folder / "soak.sym"
+    return [
+        Line(kind, *links[kind], symbols=symbols, other=other, random=random.Random(f"{seed} {kind}")) for kind in KINDS
+    ]
+
+
+def soak(folder: Path, channels: int, seed: int) -> list[str]:
+    """What went wrong."""
+    image = build(folder, "soak", PROGRAM)
+    address = f"127.{random.randint(1, 250)}.{random.randint(1, 250)}.{random.randint(1, 250)}"  # its ports are fixed
+    with ExitStack() as stack:
+        hub = stack.enter_context(CanHub(3))
+        options = ("--tcp", "0", "--udp", address, "--can", f"slcan:{hub.paths[2]}")
+        plcrt = stack.enter_context(Plcrt(folder / "plc.flash", *options))
+        with connect(f"tcp:{plcrt.tcp}") as plc:
+            plc.flash(image)
+        lines = lines_of(plcrt, hub, folder, seed)
+        soaked, begin = Soak(lines, plcrt), time.monotonic()
+        before = soaked.run(round(channels * WARM_UP) + 1)
+        after = soaked.run(channels) if not soaked.errors else before
+        seconds = time.monotonic() - begin
+        for line in lines:
+            print(f"{line.kind:7} {line}")
+        print(f"before: {before}\nafter:  {after}")
+        errors = list(soaked.errors)
+        if after.data > before.data or after.resident > before.resident + MAX_GROWTH or after.files > before.files:
+            errors.append("the controller uses more than before")
+        try:
+            cycles, delay = soaked.check_program(image)
+            print(f"{cycles} cycles of 5 ms in {seconds:.0f} s, delayed by {delay} us at most")
+        except PlcError as error:
+            errors.append(str(error))
+        return errors
+
+
+# ---- in virtual time ----
+
+
+def to_simulator(data: bytes) -> None:
+    lib.SimLinkSend(data, len(data))
+
+
+def virtual(folder: Path, channels: int, seed: int) -> list[str]:
+    """What went wrong: there is one cycle for each interval of the task, whatever the client does."""
+    image = build(folder, "soak", PROGRAM)
+    line = Line(
+        "udp", "sim:", to_simulator, image.with_suffix(".sym"), other_image(folder), random.Random(f"{seed} virtual")
+    )
+    with Simulator.from_file(image) as plc:
+        while line.channels < channels:
+            lib.SimRunFor(line.random.randrange(3 * INTERVAL_NS))
+            line.turn()
+        cycles, damaged = plc.read("Main.cycles"), plc.read("Main.damaged")
+        missing = lib.SimNow() // INTERVAL_NS + 1 - cycles  # the first one is at 0
+    print(f"{'virtual':7} {line}; {cycles} cycles of 5 ms, {missing} missing")
+    return [f"{missing} cycles are missing, {damaged} are damaged in virtual time"] if missing or damaged else []
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--channels", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    with TemporaryDirectory() as folder:
+        errors = virtual(Path(folder), args.channels, args.seed)
+        errors += soak(Path(folder), args.channels, args.seed)
+    print("\n".join(errors) or "nothing was lost")
+    return 1 if errors else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
