@@ -100,6 +100,22 @@ def test_any_file_name_will_do(tool: Tool, library: str) -> None:
     compile_c("-c", document["source"], "-o", "library.o")
 
 
+@needs_compiler
+def test_a_packed_structure_is_packed_in_c(tool: Tool) -> None:
+    """The header itself asserts sizes and offsets."""
+    packed = "".join(
+        f"{{attribute 'pack_mode' := '{mode}'}}\n"
+        f"Packed{mode} : STRUCT head : BYTE; value : LREAL; next : POINTER TO INT; END_STRUCT\n"
+        for mode in (1, 2, 4, 8)
+    )
+    members = "".join(f"p{mode} : Packed{mode}; " for mode in (1, 2, 4, 8))
+    all_of_them = f"{{attribute 'pack_mode' := '1'}}\nAll : STRUCT head : BYTE; {members} END_STRUCT\n"
+    function = "{attribute 'external' := 'take'}\nFUNCTION Take\nVAR_INPUT a : All; END_VAR\nEND_FUNCTION\n"
+    Path("packed.st").write_text(f"TYPE\n{packed}{all_of_them}END_TYPE\n{function}", "utf-8")
+    assert tool("export-itf", "packed.st").status == 0
+    compile_c("-c", "packed.c", "-o", "packed.o")
+
+
 def test_an_array_of_any_size_comes_with_its_bounds(tool: Tool) -> None:
     export(tool)
     words = " ".join(Path("sensorsItf.h").read_text("utf-8").split())

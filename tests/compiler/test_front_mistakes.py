@@ -52,7 +52,11 @@ def in_declaration(line: str) -> list[str]:
         ("CASE x OF\nTRUE: a := 1;\nEND_CASE;", [
             "1: CASE needs an integer or an enumeration, not BOOL; write IF"
         ]),
-        ("lab:\na := 1;", ["1: JMP and labels are not supported; write a loop, IF, EXIT or RETURN"]),
+        ("a: = 1;", ["1: an assignment is written a := ..., without a blank"]),
+        ("a : 1;", ["1: an assignment is written a := ..."]),
+        ("arr[1]:\na := 1;", ["1: a label is one name, such as again:, and not in front of the statements of a CASE"]),
+        ("a := 1;\nc : STRING[5];", [f"2: {DECLARE.replace('INT', 'STRING')}"]),
+        ("JMP;", ["1: unknown name JMP"]),
         ("IF a := 1 THEN\nb := 1;\nEND_IF;", ["1: a comparison is written =; := assigns"]),
         ("WHILE a := 1 DO\nb := 1;\nEND_WHILE;", ["1: a comparison is written =; := assigns"]),
         ("tm(IN := TRUE, PT := 5s);", ["1: a duration is written T#5s, not 5s"]),
@@ -92,7 +96,7 @@ def in_declaration(line: str) -> list[str]:
         ("a := strlen(s);", ["1: unknown function strlen; write LEN"]),
         ("a := 1; # first", ["1: # has no place in a program; a comment is written // or (* *)"]),
         ("a := 1; -- first\nb := 2;", ["1: a comment is written // or (* *)"]),
-        ("GOTO lab;", ["1: JMP and labels are not supported; write a loop, IF, EXIT or RETURN"]),
+        ("GOTO lab;", ["1: a jump is written JMP lab; and its label lab:"]),
     ],
 )  # fmt: skip
 def test_a_mistake_in_a_body(body: str, said: list[str]) -> None:

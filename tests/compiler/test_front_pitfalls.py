@@ -185,6 +185,10 @@ NOTHING = (
             "FOR i := 1 TO 10 DO i := 3; END_FOR;",
             "this loop never ends: its body sets i to 3 each time; leave that to the FOR",
         ),
+        ("again: i := i + 1; JMP again;", "nothing leads around this JMP; put it into an IF"),
+        ("again: j := j + 1; IF i < 10 THEN n := 1; JMP again; END_IF;", NOTHING.format("i")),
+        ("again: IF TRUE THEN JMP again; END_IF;", "its condition is always TRUE"),
+        ("WHILE i < 10 DO lab: j := j + 1; IF j < 5 THEN JMP lab; END_IF; END_WHILE;", NOTHING.format("i")),
     ],
 )
 def test_a_loop_that_cannot_end(body: str, expected: str) -> None:
@@ -216,6 +220,15 @@ def test_a_loop_that_cannot_end(body: str, expected: str) -> None:
         "FOR i := 1 TO 10 DO IF x THEN i := 10; END_IF; END_FOR;",
         "WHILE FALSE DO i := 1; END_WHILE;",
         "REPEAT i := 1; UNTIL TRUE END_REPEAT;",
+        "WHILE TRUE DO IF x THEN JMP out; END_IF; END_WHILE; out: i := 1;",
+        "again: i := i + 1; IF i < 10 THEN JMP again; END_IF;",
+        "again: i := i + 1; IF i > 10 THEN RETURN; END_IF; JMP again;",
+        "again: i := i + 1; IF i > 10 THEN JMP out; END_IF; JMP again; out: ;",
+        "WHILE i < 9 DO i := i + 1; again: IF x THEN CONTINUE; END_IF; JMP again; END_WHILE;",
+        "again: tm(IN := TRUE); IF NOT tm.Q THEN JMP again; END_IF;",
+        "FOR i := 1 TO 10 DO IF x THEN JMP lab; END_IF; i := 3; lab: j := 1; END_FOR;",
+        "FOR i := 1 TO 10 DO IF x THEN CONTINUE; END_IF; i := 3; END_FOR;",
+        "WHILE Twice(1) > 5 DO j := 1; END_WHILE;",
         "FOR i := 32760 TO 32767 DO j := j + 1; END_FOR;",  # ends at the limit of the type
     ],
 )

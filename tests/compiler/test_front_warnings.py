@@ -57,6 +57,12 @@ def in_main(body: str, code: str) -> list[str]:
         ("REPEAT i := 1; UNTIL FALSE END_REPEAT; j := 1;", [40]),
         ("REPEAT i := 1; EXIT; UNTIL FALSE END_REPEAT; j := 1;", []),
         ("FOR i := 1 TO 3 DO RETURN; END_FOR; j := 1;", []),
+        ("JMP lab; i := 1; lab: j := 1;", [10]),
+        ("RETURN; lab: i := 1; JMP lab;", []),
+        ("RETURN; i := 1; lab: i := 1; RETURN; i := 2; JMP lab;", [9, 38]),
+        ("IF b THEN JMP lab; ELSE RETURN; END_IF; i := 1; lab: j := 1;", [41]),
+        ("RETURN; lab: i := 1;", [9]),
+        ("WHILE TRUE DO IF b THEN JMP lab; END_IF; END_WHILE; i := 1; lab: j := 1;", [53]),
     ],
 )
 def test_statement_that_is_never_reached_is_a_warning(body: str, columns: list[int]) -> None:

@@ -158,7 +158,7 @@ class Writer:
     def statement(self, depth: int) -> str:
         if depth == 0 or self.r.random() < 0.45:
             return self.assignment()
-        choices: list[Callable[[int], str]] = [self._if, self._case, self._leave, lambda _: self._call()]
+        choices: list[Callable[[int], str]] = [self._if, self._case, self._leave, self._jump, lambda _: self._call()]
         if self.loops < 2:
             choices += [self._for, self._while, self._repeat]
         return self.r.choice(choices)(depth - 1)
@@ -219,6 +219,16 @@ class Writer:
     def _leave(self, depth: int) -> str:
         word = self.pick("EXIT", "CONTINUE", "RETURN") if self.loops else "RETURN"
         return f"IF {self.expression('bool')} THEN {word}; END_IF;"
+
+    def _jump(self, depth: int) -> str:
+        """Around statements, or back to repeat them; in an IF, as a branch of a CASE has no labels of its own."""
+        self.counters += 1
+        turn, label = f"turn{self.counters}", f"place{self.counters}"
+        body, condition = self.statements(depth, 2), self.expression("bool")
+        if self.r.random() < 0.5:
+            return f"IF TRUE THEN\nIF {condition} THEN JMP {label}; END_IF\n{body}\n{label}:\nEND_IF;"
+        again = f"IF {turn} < 3 AND ({condition}) THEN JMP {label}; END_IF"
+        return f"IF TRUE THEN\n{turn} := 0;\n{label}:\n{turn} := {turn} + 1;\n{body}\n{again}\nEND_IF;"
 
     def _call(self) -> str:
         return self.r.choice(self.calls)() if self.calls and not self.loops else self.assignment()

@@ -65,6 +65,18 @@ def test_a_task_that_exceeds_its_watchdog_stops_where_it_was(tool, plcrt, eventu
     assert counted(tool, plcrt) == before  # the other task starts no new cycle
 
 
+def test_a_loop_made_of_a_jump_is_broken_as_well(tool, plcrt, eventually):
+    text = PROGRAM.replace("{properties}", "WATCHDOG := T#100ms")
+    loop = "FOR i := 1 TO 2000000000 DO\n        n := n * 3 + i;\n    END_FOR"
+    assert loop in text
+    text = text.replace(loop, "again:\n        n := n * 3 + i;\n    JMP again;")
+    tool.ok("flash", "--port", plcrt.port, str(tool.build("jumping", text)))
+    tool.ok("write", "--port", plcrt.port, "Main.slow=TRUE")
+    fault = eventually(lambda: exception(tool, plcrt))
+    assert (fault["name"], fault["task"], fault["pou"]) == ("WATCHDOG", "Fast", "Main")
+    assert fault["line"] in LOOP
+
+
 def test_a_task_within_its_watchdog_goes_on(tool, plcrt, eventually):
     started(tool, plcrt, "WATCHDOG := T#10s")
     eventually(lambda: counted(tool, plcrt) > 20)

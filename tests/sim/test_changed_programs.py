@@ -38,6 +38,7 @@ class Array:
 @dataclass(frozen=True)
 class Struct:
     members: tuple[tuple[str, Any], ...]
+    pack: int = 8
 
 
 scalars = st.sampled_from(
@@ -47,7 +48,7 @@ scalar = scalars.map(Scalar)
 text = st.builds(Text, st.sampled_from(["STRING", "WSTRING"]), st.integers(1, 6))
 array = st.builds(lambda low, more, e: Array(low, low + more, e), st.integers(-2, 2), st.integers(0, 3), scalar)
 members = st.dictionaries(st.sampled_from("xyz"), scalar | text | array, min_size=1)
-struct = members.map(lambda m: Struct(tuple(m.items())))
+struct = st.builds(lambda m, pack: Struct(tuple(m.items()), pack), members, st.sampled_from([2, 4, 8]))
 programs = st.dictionaries(
     st.sampled_from(["a", "b", "c", "d"]),
     st.tuples(scalar | text | array | struct, st.sampled_from(["", "RETAIN", "PERSISTENT"])),
@@ -60,6 +61,7 @@ def source(variables: dict[str, tuple[Any, str]]) -> str:
     for name, (kind, qualifier) in variables.items():
         if isinstance(kind, Struct):
             lines = " ".join(f"{m} : {declaration(k)};" for m, k in kind.members)
+            types.append(f"{{attribute 'pack_mode' := '{kind.pack}'}}")
             types.append(f"TYPE T_{name} : STRUCT {lines} END_STRUCT END_TYPE")
             sections.append(f"VAR {qualifier} {name} : T_{name}; END_VAR")
         else:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources
+from plctool.controller import ProgramStopped
 from plctool.core import lib
 from plctool.errors import DeviceError
 from plctool.sim import Simulator
@@ -51,3 +52,22 @@ def test_initialisations_of_programs_one_after_the_other_are_not_one_long_cycle(
         longest = max(longest, seconds)
         limit_s = 3 * longest
         lib.SimSetCycleLimit(int(1000 * limit_s))
+
+
+@pytest.mark.parametrize("level", [0, 2])
+@pytest.mark.parametrize(
+    "loop", ["again: n := n + 1; JMP again;", "again: JMP again;", "again: IF go THEN JMP again; END_IF"]
+)
+def test_a_loop_made_of_a_jump_is_aborted_as_well(loop: str, level: int, tmp_path: Path) -> None:
+    """Even one that does nothing stays a loop."""
+    path = tmp_path / "main.st"
+    path.write_text(
+        f"PROGRAM Main\nVAR n : DINT; go : BOOL; END_VAR\nIF NOT go THEN RETURN; END_IF\n{loop}\nEND_PROGRAM\n"
+    )
+    lib.SimSetCycleLimit(100)
+    built = compile_sources([path], level=level)
+    with Simulator(built.image, built.symbols) as plc:
+        plc.run_cycles(1)
+        plc.write({"Main.go": True})
+        with pytest.raises(ProgramStopped, match=r"WATCHDOG in task Main, Main, .*main\.st:4"):
+            plc.run_cycles(1)

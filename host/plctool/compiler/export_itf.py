@@ -17,6 +17,7 @@ from plctool.compiler.semantics.declarations.functions import interface_text
 from plctool.compiler.typed import Direction, Parameter, Pou
 from plctool.errors import UsageError
 from plctool.iec.types import (
+    MAX_ALIGN,
     ArrayType,
     Elementary,
     EnumType,
@@ -220,9 +221,12 @@ def _type_lines(t: EnumType | StructType) -> Iterable[str]:
     if isinstance(t, EnumType):
         values = ", ".join(f"{t.name}_{name} = {value}" for name, value in t.values.items())
         return [f"typedef {_value(t.base)} {t.name};", f"enum {{ {values} }};"]
-    lines = ["typedef struct {"]
+    packed = t.pack < MAX_ALIGN
+    lines = [f"#pragma pack(push, {t.pack})"] if packed else []
+    lines += ["typedef struct {"]
     lines += [f"    {_field(f.type, c_name(f.name))};" for f in t.fields]
-    lines += [f"}} {t.name};", f"RTS_STATIC_ASSERT(sizeof({t.name}) == {t.size}, {t.name}_size);"]
+    lines += [f"}} {t.name};", *(["#pragma pack(pop)"] if packed else [])]
+    lines += [f"RTS_STATIC_ASSERT(sizeof({t.name}) == {t.size}, {t.name}_size);"]
     lines += [
         f"RTS_STATIC_ASSERT(offsetof({t.name}, {c_name(f.name)}) == {f.offset}, {t.name}_{c_name(f.name)});"
         for f in t.fields

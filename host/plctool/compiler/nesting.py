@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from plctool.compiler.typed import Pos
 
 MAX_DEPTH = 400  # levels of nesting in one expression or of statements; the check and the lowering recurse over them
-_RECURSION_LIMIT = 20_000  # calls of Python functions; enough for that
+OPERATORS = 8  # operators that need no more room than one other level: a sum has a level for each of its terms
+_RECURSION_LIMIT = 40_000  # calls of Python functions; enough for that
 
 
 class NestingError(Exception):

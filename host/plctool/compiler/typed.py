@@ -437,7 +437,23 @@ class Return(Node):
     pos: Pos
 
 
-Statement = Assign | CallStatement | FbCall | If | Case | For | While | Repeat | Exit | Continue | Return
+@dataclass
+class Label(Node):
+    """Where a Jump goes on. `name` exists once in the body."""
+
+    name: str
+    pos: Pos
+
+
+@dataclass
+class Jump(Node):
+    """To the Label of that name, which is among the statements around it or around those."""
+
+    name: str
+    pos: Pos
+
+
+Statement = Assign | CallStatement | FbCall | If | Case | For | While | Repeat | Exit | Continue | Return | Label | Jump
 
 
 # ---- program organisation units and the whole -----------------------------------------------------------------------

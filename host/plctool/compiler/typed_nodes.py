@@ -9,6 +9,7 @@ from typing import TypeVar
 from plctool.compiler.typed import (
     AddressOf,
     Assign,
+    BitPlace,
     Call,
     Const,
     Continue,
@@ -17,6 +18,8 @@ from plctool.compiler.typed import (
     Exit,
     FbCall,
     For,
+    IndexPlace,
+    MemberPlace,
     Node,
     Place,
     Pou,
@@ -26,6 +29,7 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.iec.types import alignment_at
 
 T = TypeVar("T")
 _WALKED = frozenset(Node.__subclasses__()) - {Const, Exit, Continue}  # without those no question is about
@@ -71,6 +75,20 @@ def root_of(place: Place) -> Variable | None:
             return None
         place = place.base
     return None if place.var.storage is Storage.REFERENCE else place.var
+
+
+def alignment(place: Place) -> int:
+    """What the address of a place is a multiple of [bytes]: less than its type wants in a packed structure."""
+    if isinstance(place, MemberPlace):
+        return alignment_at(place.offset, alignment(place.base))
+    if isinstance(place, IndexPlace | BitPlace):
+        return min(alignment(place.base), place.type.align)
+    return place.type.align
+
+
+def is_unaligned(place: Place) -> bool:
+    """Whether only statements that know where it is can use a place: it is in a packed structure."""
+    return alignment(place) < place.type.align
 
 
 def written_places(node: object) -> Iterator[Place]:

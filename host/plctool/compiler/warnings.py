@@ -43,7 +43,7 @@ WARNINGS = {
     "truncated": "a string is longer than the STRING it goes to",
     "unlocated": "a variable AT %I*, %Q* or %M* has no address in VAR_CONFIG",
     "unreachable": "a statement is never reached",
-    "unused": "a variable or program is never used, or the result of a call",
+    "unused": "a variable, label or program is never used, not even by a test, or the result of a call",
     "widening": "a product is computed in a type that is narrower than where it goes",
     "written-input": "a program writes an input, which the next cycle overwrites",
 }

@@ -1,5 +1,7 @@
 """Addresses such as %IX0.3. Words, double words ... are numbered, as CODESYS does it: %IW1 is bytes 2 and 3.
 
+One such as %IX4.0.1 or %IW0.1 counts modules, their channels and so on: where that is only a description can say.
+
 SPDX-License-Identifier: Apache-2.0
 """
 
@@ -13,6 +15,7 @@ from plctool.iec.types import BOOL, ELEMENTARY, Elementary
 
 AREAS = {"I": Area.INPUT, "Q": Area.OUTPUT, "M": Area.MEMORY}
 _ADDRESS = re.compile(r"%([IQM])([XBWDL]?)(\d{1,6})(?:\.(\d{1,3}))?")
+_IN_MODULE = re.compile(r"%([IQM])([XBWDL]?)\d{1,6}(?:\.\d{1,6})+")
 _WIDTHS = {"X": 0, "": 0, "B": 8, "W": 16, "D": 32, "L": 64}
 _TYPES: dict[int, Elementary] = {
     0: BOOL, 8: ELEMENTARY["BYTE"], 16: ELEMENTARY["WORD"], 32: ELEMENTARY["DWORD"], 64: ELEMENTARY["LWORD"],
@@ -32,6 +35,34 @@ class Address:
     def type(self) -> Elementary:
         """Of what is there when no declaration says otherwise."""
         return _TYPES[self.width]
+
+
+@dataclass(frozen=True)
+class ModuleAddress:
+    """`text` in capitals; `width` in bits, 0 for a single one."""
+
+    text: str
+    area: Area
+    width: int
+
+    @property
+    def type(self) -> Elementary:
+        """Of what is there when no declaration says otherwise."""
+        return _TYPES[self.width]
+
+    @property
+    def numbered(self) -> str:
+        """An address that counts bytes or words and looks alike."""
+        return self.text.partition(".")[0] + (".0" if self.width == 0 else "")
+
+
+def parse_module_address(text: str) -> ModuleAddress | None:
+    """What `%IX4.0.1` or `%IW0.1` means; None when the text is no such address. `%IX0.9` is none: it lacks a bit."""
+    match = _IN_MODULE.fullmatch(text.upper())
+    if match is None:
+        return None
+    width = _WIDTHS[match[2]]
+    return ModuleAddress(match[0], AREAS[match[1]], width) if width or match[0].count(".") > 1 else None
 
 
 def parse_address(text: str) -> Address | None:

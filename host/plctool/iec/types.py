@@ -25,6 +25,9 @@ class Kind(Enum):
     CHAR = "char"
 
 
+MAX_ALIGN = 8  # bytes: no type wants more
+
+
 class Type:
     """Base of all types. `size` and `align` are in bytes."""
 
@@ -327,6 +330,7 @@ class StructType(Type):
     base: StructType | None = None
     interfaces: list[StructType] = field(default_factory=list)
     properties: list[str] = field(default_factory=list)  # what looks like a member but is not
+    pack: int = MAX_ALIGN  # members are at multiples of this [bytes] or of what their type wants, whichever is less
 
     @property
     def root(self) -> StructType:
@@ -342,13 +346,16 @@ class StructType(Type):
     def lay_out(self, *, behind_base: bool = False) -> None:
         """Gives every field its offset. Call once, when all field types are known and laid out. `behind_base`: own
         fields do not use the padding at the end of the base, which is copied as a whole when it is assigned."""
-        end, align = 0, 1
-        for number, f in enumerate(self.fields):
-            if behind_base and self.base is not None and number == len(self.base.fields):
-                end = self.base.size
-            f.offset = 0 if self.union else align_up(end, f.type.align)
+        end, align, own = 0, 1, self.fields
+        if behind_base and self.base is not None:
+            end, align, own = self.base.size, self.base.align, self.fields[len(self.base.fields) :]
+            for f, of_base in zip(self.fields, self.base.fields, strict=False):
+                f.offset = of_base.offset
+        for f in own:
+            multiple = min(f.type.align, self.pack)
+            f.offset = 0 if self.union else align_up(end, multiple)
             end = max(end, f.offset + f.type.size)
-            align = max(align, f.type.align)
+            align = max(align, multiple)
         self._align = align
         self._size = align_up(max(end, 1), align)
 
@@ -363,6 +370,11 @@ class StructType(Type):
     @property
     def align(self) -> int:
         return self._align
+
+
+def alignment_at(offset: int, align: int) -> int:
+    """What an address is a multiple of that is `offset` bytes after a multiple of `align`, in bytes."""
+    return min(align, offset & -offset) if offset else align
 
 
 def align_up(value: int, align: int) -> int:

@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from plctool.files import Pos
-from plctool.iec.addresses import parse_address
+from plctool.iec.addresses import parse_address, parse_module_address
 from plctool.iec.areas import Area
 from plctool.iec.types import Type
 from plctool.io.mistakes import Mistakes
@@ -76,7 +76,7 @@ def read_substitute(table: Table, key: str, default: Substitute) -> Substitute:
 def is_target(text: str, pos: Pos, mistakes: Mistakes, *, output: bool) -> bool:
     """Whether a text can name what a channel leads to; reports it if not."""
     if text.startswith("%"):
-        address = parse_address(text)
+        address = parse_address(text) or parse_module_address(text)
         letter, wanted = ("Q", Area.OUTPUT) if output else ("I", Area.INPUT)
         if address is None:
             mistakes.error(pos, f"{text} is not an address such as %{letter}X0.3 or %{letter}W2")

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from plctool.core import lib
 from plctool.files import Pos
+from plctool.iec.addresses import parse_address
 from plctool.iec.types import BOOL, ArrayType, Type, base_of
 from plctool.io.mistakes import Mistakes
 
@@ -54,9 +55,10 @@ class Substitute:
 class Channel:
     """An input or output. `parameter` and `parameter_bit`: where the driver has it.
 
-    `name`: within its connector, as the engineer or the vendor calls it. `target`: a variable (`Main.start`) or an
-    address (`%IX0.1`), written at `pos`. `bits`: its size, 1 for a BOOL; None: that of the variable. `type`: what the
-    device has, None if any type of that size will do. `age_us`: how old a value may be when the driver hands it over, 0
+    `name`: within its connector, as the engineer or the vendor calls it. `target`: a variable (`Main.start`), an
+    address (`%IX0.1`), or that of a module's channel at which a variable is (`%IX4.0.1`), written at `pos`. `bits`: its
+    size, 1 for a BOOL; None: that of the variable. `type`: what the device has, None if any type of that size will do.
+    `age_us`: how old a value may be when the driver hands it over, 0
     if it reads the line itself. The compiler sets what follows.
     """
 
@@ -76,6 +78,11 @@ class Channel:
     area_bit: int = -1
     variable: str = ""  # its full name; "" for an address without one
     tasks: list[int] = field(default_factory=list)  # that use it
+
+    @property
+    def at_address(self) -> bool:
+        """Whether it leads to a place that its target gives, not to that of a variable."""
+        return parse_address(self.target) is not None
 
     @property
     def size_bits(self) -> int:

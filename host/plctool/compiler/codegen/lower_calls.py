@@ -27,6 +27,10 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
     arguments = [] if pou.external else [CONTEXT]
     if e.instance is not None:
         arguments.append(f"ptr {frame.address(frame.ref(e.instance))}")
+    if result is not None and result.unaligned:
+        temporary = frame.temporary(result.type)
+        write_back.append((temporary, result))
+        result = temporary
     if result is not None:
         arguments.append(f"ptr {frame.address(result)}")
         arguments += [f"i32 {_result_capacity(frame, pou, result)}"] if pou.cuts_result else []
@@ -36,8 +40,11 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
         arguments += [f"{text} {operand}" for text, operand in zip(types, operands, strict=True)]
     value = _call_instruction(frame, pou, e.dispatch, arguments)
     for temporary, place in write_back:
-        wanted = temporary.type if place.bit >= 0 else place.type
-        frame.store(place, convert(frame, frame.load(temporary), temporary.type, wanted))
+        if is_scalar(place.type):
+            wanted = temporary.type if place.bit >= 0 else place.type
+            frame.store(place, convert(frame, frame.load(temporary), temporary.type, wanted))
+        else:
+            frame.copy(place, temporary, place.type.size)
     return value
 
 
@@ -81,7 +88,7 @@ def _operands(
         if is_scalar(t) and not parameter.by_reference:
             value = frame.value(argument)
             return [lowest_bit(frame, value)] if pou.external and is_bool(t) else [value]
-        ref = materialised(frame, argument)
+        ref = _aligned(frame, materialised(frame, argument))
     else:
         ref = frame.ref(argument)
         if parameter.direction is Direction.INPUT and is_scalar(t) and not parameter.by_reference:
@@ -92,4 +99,21 @@ def _operands(
                 frame.store(temporary, frame.load(ref))
             write_back.append((temporary, ref))
             ref = temporary
+        elif ref.unaligned:
+            temporary = _aligned(frame, ref)
+            if parameter.direction is not Direction.INPUT:
+                write_back.append((temporary, ref))
+            ref = temporary
     return [frame.address(ref), ref.capacity] if isinstance(t, StringType) else [frame.address(ref)]
+
+
+def _aligned(frame: Frame, ref: Ref) -> Ref:
+    """A variable, or a copy of it where the callee could not read it at its address."""
+    if not ref.unaligned:
+        return ref
+    copy = frame.temporary(ref.type)
+    if is_scalar(ref.type):
+        frame.store(copy, frame.load(ref))
+    else:
+        frame.copy(copy, ref, ref.type.size)
+    return copy

@@ -17,7 +17,7 @@ from plctool.compiler.internal import note_position
 from plctool.compiler.typed import Expr, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
 from plctool.iec.areas import Area
-from plctool.iec.types import Elementary, StringType, Type, base_of, is_scalar
+from plctool.iec.types import MAX_ALIGN, Elementary, StringType, Type, alignment_at, base_of, is_scalar
 
 TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)
 FrameType = TypeVar("FrameType", bound="Frame")
@@ -34,7 +34,8 @@ class Ref:
 
     `tag`: alias tag or "". `direct`: reached by name only, not through a pointer. `capacity`: of a STRING
     [characters], an i32. `bit`: the bit of an integer that a BOOL lives in, -1 for none; `type` is then that
-    integer's. `loose`: a character that may never have been written (after the NUL).
+    integer's. `loose`: a character that may never have been written (after the NUL). `sure`: the address is a multiple
+    of so many bytes whatever the type wants, of which a packed structure has less.
     """
 
     pointer: Value
@@ -45,10 +46,22 @@ class Ref:
     capacity: Value = NO_CAPACITY
     bit: int = -1
     loose: bool = False
+    sure: int = MAX_ALIGN
+
+    @property
+    def align(self) -> int:
+        """What the address is a multiple of, in bytes."""
+        return min(self.type.align, self.sure)
+
+    @property
+    def unaligned(self) -> bool:
+        """Whether code that expects a whole variable of the type cannot have this address."""
+        return self.sure < self.type.align
 
     def member(self, offset: int, t: Type, tag: str = "") -> Ref:
         """A part of it, `offset` bytes further on."""
-        return Ref(self.pointer, self.offset + offset, t, tag, self.direct, string_capacity(t))
+        sure = alignment_at(offset, self.align)
+        return Ref(self.pointer, self.offset + offset, t, tag, self.direct, string_capacity(t), sure=sure)
 
 
 def string_capacity(t: Type) -> Value:
@@ -178,13 +191,13 @@ class Frame:
         pointer = self.fn.value(
             f"getelementptr {flags}[{t.size} x i8], ptr {self.address(ref)}, {self.pointer_int} {index}"
         )
-        return replace(ref, pointer=pointer, offset=0, type=t, capacity=string_capacity(t))
+        return replace(ref, pointer=pointer, offset=0, type=t, capacity=string_capacity(t), sure=ref.align)
 
     def load(self, ref: Ref) -> Value:
         """The scalar at `ref`."""
         fn = self.fn
         text = value_type(ref.type)
-        value = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.type.align}{ref.tag}")
+        value = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.align}{ref.tag}")
         if ref.loose:
             return fn.value(f"freeze {text} {value}")
         if ref.bit >= 0:
@@ -200,17 +213,17 @@ class Frame:
         address = self.address(ref)
         if ref.bit >= 0:
             value = self._with_bit(ref, text, value)
-        fn.do(f"store {text} {value}, ptr {address}, align {ref.type.align}{ref.tag}")
+        fn.do(f"store {text} {value}, ptr {address}, align {ref.align}{ref.tag}")
         if text == "ptr" and self.unit.target.pointer_size == 4:  # pointers take 8 bytes in memory on every target
             upper = self.address(replace(ref, offset=ref.offset + 4))
-            fn.do(f"store i32 0, ptr {upper}, align 4{ref.tag}")
+            fn.do(f"store i32 0, ptr {upper}, align {min(4, ref.align)}{ref.tag}")
 
     def _with_bit(self, ref: Ref, text: str, value: Value) -> Value:
         fn = self.fn
         base = base_of(ref.type)
         assert isinstance(base, Elementary)
         mask = 1 << ref.bit
-        old = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.type.align}{ref.tag}")
+        old = fn.value(f"load {text}, ptr {self.address(ref)}, align {ref.align}{ref.tag}")
         if value.constant == 1:
             return fn.value(f"or {text} {old}, {mask}")
         cleared = fn.value(f"and {text} {old}, {~mask}")
@@ -224,7 +237,7 @@ class Frame:
     def copy(self, target: Ref, source: Ref, size: int) -> None:
         """Copies `size` bytes between places that are the same or do not overlap."""
         if size:
-            align = min(target.type.align, source.type.align)
+            align = min(target.align, source.align)
             name, size_type = "memcpy" if target.direct and source.direct else "memmove", self.pointer_int
             self.fn.do(
                 f"call void @llvm.{name}.p0.p0.{size_type}(ptr align {align} {self.address(target)}, "
@@ -238,7 +251,7 @@ class Frame:
             return
         size_type = self.pointer_int
         self.fn.do(
-            f"call void @llvm.memset.p0.{size_type}(ptr align {ref.type.align} {self.address(ref)}, i8 0, "
+            f"call void @llvm.memset.p0.{size_type}(ptr align {ref.align} {self.address(ref)}, i8 0, "
             f"{size_type} {ref.type.size}, i1 false)"
         )
 
@@ -269,6 +282,13 @@ class Body(Frame):
         self.effects = effects
         self.on_return = "return"
         self.loops: list[tuple[str, str]] = []  # labels for CONTINUE and EXIT
+        self._labels: dict[str, str] = {}
+
+    def label(self, name: str) -> str:
+        """The block that a label of the program begins."""
+        if name not in self._labels:
+            self._labels[name] = self.fn.label("label")
+        return self._labels[name]
 
     def statements(self, body: list[Statement]) -> None:
         """Statements in their order."""

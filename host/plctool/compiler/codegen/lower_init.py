@@ -88,7 +88,7 @@ def _initialise_scalar(frame: Frame, ref: Ref, initial: ScalarInit) -> None:
 
 
 def _initialise_struct(frame: Frame, ref: Ref, t: StructType, initial: Initial | None) -> None:
-    if initial is None:
+    if initial is None and not ref.unaligned:
         if any(image_of(frame.unit, t, None)):
             frame.fn.call(frame.unit.initialiser(t), [f"ptr {frame.address(ref)}"])
         return
@@ -153,7 +153,7 @@ def _repeat(frame: Frame, ref: Ref, element: Type, count: int, initial: Initial 
     fn.do(f"store {width} 0, ptr {counter}")
     fn.begin(loop)
     index = fn.value(f"load {width}, ptr {counter}")
-    initialise(frame, frame.element(Ref(base, 0, element), index, element, counted=True), initial)
+    initialise(frame, frame.element(Ref(base, 0, element, sure=ref.align), index, element, counted=True), initial)
     following = fn.value(f"add {width} {index}, 1")
     fn.do(f"store {width} {following}, ptr {counter}")
     fn.branch_if(fn.value(f"icmp ult {width} {following}, {count}"), loop, end)

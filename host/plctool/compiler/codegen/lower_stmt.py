@@ -17,6 +17,8 @@ from plctool.compiler.typed import (
     Exit,
     Expr,
     If,
+    Jump,
+    Label,
     Load,
     Place,
     Return,
@@ -99,6 +101,18 @@ def continue_statement(frame: Body, s: Continue) -> None:
 def return_statement(frame: Body, s: Return) -> None:
     """To the end of the body."""
     frame.fn.branch(frame.on_return)
+
+
+@rule(STATEMENTS, Label)
+def label(frame: Body, s: Label) -> None:
+    """Begins a block."""
+    frame.fn.begin(frame.label(s.name))
+
+
+@rule(STATEMENTS, Jump)
+def jump(frame: Body, s: Jump) -> None:
+    """To its label."""
+    frame.fn.branch(frame.label(s.name))
 
 
 @rule(STATEMENTS, Case)

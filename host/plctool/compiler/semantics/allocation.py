@@ -12,8 +12,8 @@ from plctool.compiler.semantics.conversions import elementary
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import Role, VarSymbol
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Initial, Storage, Variable
-from plctool.iec.addresses import Address, parse_address
+from plctool.compiler.typed import Initial, Pos, Storage, Variable
+from plctool.iec.addresses import Address, ModuleAddress, parse_address, parse_module_address
 from plctool.iec.areas import Area
 from plctool.iec.types import BOOL, Type, align_up, base_of
 
@@ -54,8 +54,33 @@ def _read_address(node: ast.DirectAddress, scope: Scope) -> Address | None:
     """What `%IW2` means; None after an error."""
     address = parse_address(node.text)
     if address is None:
-        scope.error(node.pos, "location", f"{node.text} is not an address such as %IX0.3 or %QW2")
+        scope.error(node.pos, "location", _not_an_address(node.text))
     return address
+
+
+def _not_an_address(text: str) -> str:
+    address = parse_module_address(text)
+    if address is None:
+        return f"{text} is not an address such as %IX0.3 or %QW2"
+    if address.area is Area.MEMORY:
+        return f"{text}: the memory %M has no modules; number its bytes or words, as in {address.numbered}"
+    return f"{text} is in a module, and only a channel of a description of inputs and outputs may lead there"
+
+
+def module_address(location: ast.DirectAddress | None) -> ModuleAddress | None:
+    """What `%IX4.0.1` means, None when it is none such; the memory has no modules."""
+    address = None if location is None else parse_module_address(location.text)
+    return None if address is None or address.area is Area.MEMORY else address
+
+
+def misfit(t: Type, text: str, width: int) -> str:
+    """Why a variable cannot be at an address of that width in bits (0: a single one); "" when it can."""
+    base = elementary(t)
+    if width == 0 and base_of(t) is not BOOL:
+        return f"{text} is a bit, {t} is not"
+    if width and base is not None and base.bits != width:
+        return f"{t} has {base.bits} bits, {text} {width}"
+    return ""
 
 
 def located(
@@ -65,13 +90,8 @@ def located(
     address = _read_address(location, scope)
     if address is None:
         return None
-    base = elementary(t)
-    problem = ""
-    if address.width == 0 and base_of(t) is not BOOL:
-        problem = f"{location.text} is a bit, {t} is not"
-    elif address.width and base is not None and base.bits != address.width:
-        problem = f"{t} has {base.bits} bits, {location.text} {address.width}"
-    elif address.offset % t.align:
+    problem = misfit(t, location.text, address.width)
+    if not problem and address.offset % t.align:
         problem = f"{t} needs an address that is a multiple of {t.align} bytes"
     elif address.offset + t.size > MAX_ADDRESS + 1:
         problem = f"{location.text} is too far; addresses end at byte {MAX_ADDRESS}"
@@ -99,8 +119,22 @@ class DirectVariables:
         variable = None if address is None else located(key, address.type, None, node, scope, node.pos)
         if address is None or variable is None:
             return None
+        return self._add(key, variable)
+
+    def in_module(self, address: ModuleAddress, pos: Pos, bound: str) -> VarSymbol | None:
+        """The variable at an address of modules: the one that is called `bound`, or if that is "" one of its own. None
+        if the program has not declared it yet."""
+        symbol = self._known.get(address.text)
+        if symbol is not None:
+            return symbol
+        if not bound:
+            return self._add(address.text, Variable(address.text, address.type, Storage.AREA, pos, address.area))
+        variable = next((v for v in self._allocation.variables if v.name == bound), None)
+        return None if variable is None else VarSymbol(bound, pos, variable.type, Role.GLOBAL, variable)
+
+    def _add(self, key: str, variable: Variable) -> VarSymbol:
         self._allocation.add(variable)
-        symbol = self._known[key] = VarSymbol(key, variable.pos, address.type, Role.GLOBAL, variable)
+        symbol = self._known[key] = VarSymbol(key, variable.pos, variable.type, Role.GLOBAL, variable)
         return symbol
 
 

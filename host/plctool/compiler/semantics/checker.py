@@ -12,8 +12,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from plctool.compiler.internal import note_position
-from plctool.compiler.nesting import MAX_DEPTH, NestingError
+from plctool.compiler.nesting import MAX_DEPTH, OPERATORS, NestingError
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, settle
+from plctool.compiler.semantics.labels import Labels
+from plctool.compiler.semantics.pitfalls import Loop
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.world import World
@@ -37,20 +39,23 @@ class Checker:
         self.pos: Callable[[int], Pos] = scope.source.pos
         self.special_calls: SpecialCalls = special_calls or {}
         self.loops = 0  # around the statement
+        self.labels = Labels([])  # of the body
+        self.around: list[list[ast.Stmt]] = []  # the statements it is one of, those around them ...
         self._expressions = 0
         self._statements = 0
 
     def expr(self, node: ast.Expr, expected: Type | None = None) -> Expr:
         """The typed expression; `expected` is the type the surroundings would like. Untyped constants stay untyped."""
-        self._expressions += 1
-        if self._expressions > MAX_DEPTH:
+        level = 1 if type(node) is ast.Binary else OPERATORS
+        self._expressions += level
+        if self._expressions > MAX_DEPTH * OPERATORS:
             raise NestingError(self.pos(node.pos))
         try:
             e = EXPRESSION_RULES[type(node)](self, node, expected)
         except Exception as error:
             note_position(error, self.pos(node.pos))
             raise
-        self._expressions -= 1
+        self._expressions -= level
         return e
 
     def statement(self, node: ast.Stmt) -> list[Statement]:
@@ -108,6 +113,11 @@ class Checker:
         """Reports that nothing is known by a name; the value that stands for the expression."""
         self.scope.missing(offset, name, message)
         return error_value(self.pos(offset))
+
+    def note_loop(self, loop: Loop) -> None:
+        """Notes a loop, to be looked at when all bodies are checked: whether it ends."""
+        if self.scope.pou is not None and not self.scope.library:
+            self.world.loops.append((self.scope.pou, loop))
 
     def warning(self, offset: int, code: str, message: str) -> None:
         """Reports a warning."""

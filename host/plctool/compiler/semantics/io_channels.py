@@ -2,7 +2,8 @@
 
 A variable of a program, or a global one, that a channel names lives in the inputs or outputs, as if it had AT: where is
 decided when the whole program is known (`io/layout.py`). A part of a variable, or of an instance, that a channel names
-is copied by the task, as VAR_CONFIG does it.
+is copied by the task, as VAR_CONFIG does it. What is declared at an address of modules, such as %IX4.0.1, is where the
+channel that names this address leads.
 
 SPDX-License-Identifier: Apache-2.0
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from plctool.compiler.diagnostics import Diagnostics, did_you_mean
 from plctool.compiler.semantics.allocation import Allocation
@@ -21,7 +23,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Pos, Pou, Storage, Task, Variable
 from plctool.compiler.typed_nodes import root_of, walk, written_places
 from plctool.errors import UsageError
-from plctool.iec.addresses import parse_address
+from plctool.iec.addresses import ModuleAddress, parse_address, parse_module_address
 from plctool.iec.areas import Area
 from plctool.iec.literals import LiteralKind
 from plctool.iec.types import BOOL, Elementary, Kind, Type, base_of
@@ -66,6 +68,9 @@ class IoChannels:
     def __init__(self, description: Description | None = None) -> None:
         self.description = description
         self._channels: dict[str, Channel] = {}  # by the full name of what they lead to, case-folded
+        self._in_modules: dict[str, Channel] = {}  # by the address that they name, such as %IX4.0.1
+        self._unmapped: dict[ModuleAddress, Pos] = {}  # such addresses that no channel names, where they are first
+        self._faulty = False  # the description has errors, so there may be more channels
         self._connected: dict[Variable, list[tuple[int, int, Channel]]] = {}  # bytes of it: first, end
         self.variables: dict[str, Variable] = {}  # that have become inputs or outputs, by full name case-folded
 
@@ -81,9 +86,15 @@ class IoChannels:
         in."""
         if self.description is None:
             return
+        self._faulty = any(mistake.severity == "error" for mistake in self.description.mistakes.found)
         report(self.description.mistakes, diagnostics)
         for _, channel in self.description.channels:
+            if channel.at_address:
+                continue
             if channel.target.startswith("%"):
+                first = self._in_modules.setdefault(channel.target.upper(), channel)
+                if first is not channel:
+                    diagnostics.error(*_twice(channel, first))
                 continue
             channel.variable = _full_name(channel.target, names)
             first = self._channels.setdefault(channel.variable.casefold(), channel)
@@ -111,6 +122,28 @@ class IoChannels:
             message = f"{names[0]} is declared AT %{letter}*, but the channel {channel.name} is an {_kind(channel)}"
             diagnostics.error(channel.pos, CODE, message)
         return True
+
+    def bind(self, address: ModuleAddress, names: Sequence[str], pos: Pos, diagnostics: Diagnostics) -> None:
+        """Notes that the variable with these names, the first of them in full, is at an address of modules: it lives
+        where a channel leads that names the one or the other."""
+        channel = self._in_modules.get(address.text)
+        if channel is None:
+            if not self.claims(address.text[1], names, diagnostics):
+                self._unmapped.setdefault(address, pos)
+            return
+        if channel.variable:
+            message = f"{address.text} is {channel.variable} already; use that variable, or another address"
+            diagnostics.error(pos, "location", message)
+            return
+        channel.variable = names[0]
+        other = self._channels.setdefault(names[0].casefold(), channel)
+        if other is not channel:
+            diagnostics.error(*_twice(channel, other))
+
+    def bound(self, address: ModuleAddress) -> str:
+        """The full name of the variable at an address of modules, "" if there is none yet."""
+        channel = self._in_modules.get(address.text)
+        return "" if channel is None else channel.variable
 
     # ---- parts of variables ----
 
@@ -172,13 +205,17 @@ class IoChannels:
     def finish(self, allocation: Allocation, tasks: Sequence[Task] | None, diagnostics: Diagnostics) -> None:
         """Gives the variables their addresses, and the channels type and place. `tasks`: None for unit tests, which
         have none of the program's."""
+        self._report_unmapped(diagnostics)
         if self.description is None or diagnostics.errors:
             return
         if tasks is not None:
             _check_tasks(self.description, [task.name for task in tasks], diagnostics)
         for _, channel in self.description.channels:
-            if channel.target.startswith("%"):
+            if channel.at_address:
                 self._reserve(channel, allocation)
+            elif not channel.variable:
+                self._declare(channel, allocation)
+        self.variables |= {v.name.casefold(): v for v in allocation.variables if v.name.casefold() in self._channels}
         for area in (Area.INPUT, Area.OUTPUT):
             open_ones = {v.name: v for v in allocation.variables if v.area is area and v.offset < 0}
             if open_ones:
@@ -191,6 +228,25 @@ class IoChannels:
         if not diagnostics.errors:
             self._finish_devices(allocation, diagnostics)
 
+    def _report_unmapped(self, diagnostics: Diagnostics) -> None:
+        """One error for all, at the first of them: mostly the description as a whole is still missing."""
+        if not self._unmapped or self._faulty:
+            return
+        address, pos = next(iter(self._unmapped.items()))
+        more = f" (and {len(self._unmapped) - 1} more)" if len(self._unmapped) > 1 else ""
+        where = "NAME.io.toml" if self.description is None else Path(self.description.path).name
+        message = f"no channel leads to {address.text}{more}, and only a description of inputs and outputs can say"
+        hint = f"name {address.text} in {where}, or number the bytes or words as in {address.numbered}"
+        diagnostics.error(pos, "location", f"{message} where it is; {hint}")
+
+    def _declare(self, channel: Channel, allocation: Allocation) -> None:
+        """The input or output of a channel that names an address of modules at which there is no variable."""
+        address = parse_module_address(channel.target)
+        assert address is not None
+        channel.variable = address.text
+        self._channels[address.text.casefold()] = channel
+        allocation.add(Variable(address.text, address.type, Storage.AREA, channel.pos, address.area))
+
     @staticmethod
     def _reserve(channel: Channel, allocation: Allocation) -> None:
         """The area goes as far as a channel without a variable does."""
@@ -200,7 +256,7 @@ class IoChannels:
         allocation.sizes[address.area] = max(allocation.sizes[address.area], end)
 
     def _settle(self, connector: Connector, channel: Channel, diagnostics: Diagnostics) -> None:
-        if channel.target.startswith("%"):
+        if channel.at_address:
             address = parse_address(channel.target)
             assert address is not None
             channel.variable_type = address.type

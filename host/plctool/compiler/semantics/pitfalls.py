@@ -9,6 +9,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.diagnostics import Diagnostics
@@ -24,6 +25,7 @@ from plctool.compiler.typed import (
     Call,
     Case,
     Const,
+    Continue,
     Convert,
     DerefPlace,
     Direction,
@@ -34,6 +36,9 @@ from plctool.compiler.typed import (
     If,
     Intrinsic,
     IntrinsicCall,
+    Jump,
+    Label,
+    Pos,
     Pou,
     Repeat,
     Return,
@@ -63,7 +68,17 @@ from plctool.iec.types import (
 
 # ---- loops that cannot end as they are written ----
 
-Loop = While | Repeat | For
+
+@dataclass
+class JumpLoop:
+    """What a JMP back repeats, from its label on. `condition`: of the IF that ends with it; None without one."""
+
+    condition: Expr | None
+    body: list[Statement]
+    pos: Pos
+
+
+Loop = While | Repeat | For | JumpLoop
 _CLOCKS = (Intrinsic.TIME, Intrinsic.LTIME)
 
 
@@ -71,20 +86,29 @@ def report_endless(loops: Iterable[tuple[Pou, Loop]], diagnostics: Diagnostics) 
     """Warns of the loops that never end once they run. Each comes with the unit it stands in."""
     effects = Effects()
     for pou, loop in loops:
-        if has_exit(loop.body) or any(isinstance(node, Return) for node in walk(loop.body)):
+        if _is_left(loop):
             continue
         why = _never_passed(loop) if isinstance(loop, For) else _never_met(loop, pou, effects)
         if why:
             diagnostics.warning(loop.pos, "endless", f"this loop never ends: {why}")
 
 
-def has_exit(statements: list[Statement]) -> bool:
-    """Whether an EXIT leaves the loop whose body this is."""
+def _is_left(loop: Loop) -> bool:
+    """Whether a statement in its body leaves a loop. A CONTINUE in one made of a JMP is of a loop around it."""
+    leaving = (Exit, Continue) if isinstance(loop, JumpLoop) else (Exit,)
+    nodes = list(walk(loop.body))
+    labels = {node.name for node in nodes if isinstance(node, Label)}
+    jumps_out = any(isinstance(node, Jump) and node.name not in labels for node in nodes)
+    return jumps_out or has_exit(loop.body, leaving) or any(isinstance(node, Return) for node in nodes)
+
+
+def has_exit(statements: list[Statement], leaving: tuple[type[Statement], ...] = (Exit,)) -> bool:
+    """Whether an EXIT leaves the loop whose body this is; `leaving`: one of these."""
     for statement in statements:
         bodies: list[list[Statement]] = []
         if isinstance(statement, If | Case):
             bodies = [*(body for _, body in statement.branches), statement.otherwise]
-        if isinstance(statement, Exit) or any(map(has_exit, bodies)):
+        if isinstance(statement, leaving) or any(has_exit(body, leaving) for body in bodies):
             return True
     return False
 
@@ -93,6 +117,8 @@ def _never_passed(loop: For) -> str:
     """A FOR whose body sets its variable back."""
     if not isinstance(loop.var, VarPlace) or not isinstance(loop.stop, Const) or not isinstance(loop.step, Const):
         return ""
+    if has_exit(loop.body, (Continue,)) or any(isinstance(node, Jump) for node in walk(loop.body)):
+        return ""  # perhaps around what sets it back
     for statement in loop.body:
         if not isinstance(statement, Assign) or not isinstance(statement.value, Const):
             continue
@@ -105,8 +131,10 @@ def _never_passed(loop: For) -> str:
     return ""
 
 
-def _never_met(loop: While | Repeat, pou: Pou, effects: Effects) -> str:
-    condition = loop.condition if isinstance(loop, While) else loop.until
+def _never_met(loop: While | Repeat | JumpLoop, pou: Pou, effects: Effects) -> str:
+    condition = loop.until if isinstance(loop, Repeat) else loop.condition
+    if condition is None:
+        return "nothing leads around this JMP; put it into an IF"
     if isinstance(condition, Const):
         ends = bool(condition.value) is isinstance(loop, Repeat)
         value = "FALSE" if isinstance(loop, Repeat) else "TRUE"
@@ -117,6 +145,8 @@ def _never_met(loop: While | Repeat, pou: Pou, effects: Effects) -> str:
     names = list(dict.fromkeys(_name(variable) for variable in variables))
     if any(isinstance(node, IntrinsicCall) and node.intrinsic in _CLOCKS for node in walk(condition)):
         names.append("TIME(), which is the time of the cycle")
+    if not names:
+        return ""  # a function of constants, which may well be FALSE
     listed = f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else names[0]
     return f"nothing in it changes {listed}; change it in the body, or write IF to test once in each cycle"
 
@@ -150,10 +180,10 @@ def _is_own(variable: Variable, pou: Pou) -> bool:
     return variable.storage in (Storage.LOCAL, Storage.SELF)
 
 
-def _may_change(loop: While | Repeat, variable: Variable, pou: Pou, effects: Effects) -> bool:
+def _may_change(loop: While | Repeat | JumpLoop, variable: Variable, pou: Pou, effects: Effects) -> bool:
     if effects.has_address_taken(variable, pou):
         return True
-    condition = loop.condition if isinstance(loop, While) else loop.until
+    condition = loop.until if isinstance(loop, Repeat) else loop.condition
     for node in walk([loop.body, condition]):
         for place in written_places(node):
             root = root_of(place)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.library import Library
 from plctool.compiler.nesting import NestingError
-from plctool.compiler.semantics.allocation import Allocation, DirectVariables
+from plctool.compiler.semantics.allocation import Allocation, DirectVariables, module_address
 from plctool.compiler.semantics.call_graph import CallGraph
 from plctool.compiler.semantics.coercion import Coercion
 from plctool.compiler.semantics.dynamic_types import Dispatches
@@ -143,6 +143,19 @@ class World:
             self._parameter_defaults[key] = variable
             self.allocation.add(variable)
         return variable
+
+    def at_address(self, node: ast.DirectAddress, scope: Scope) -> VarSymbol | None:
+        """What a statement means by an address such as %IW2; None after an error."""
+        address = module_address(node)
+        if address is None:
+            return self.direct.find(node, scope)
+        bound, pos = self.io.bound(address), scope.pos(node.pos)
+        if not bound:
+            self.io.bind(address, (address.text,), pos, self.diagnostics)
+        symbol = self.direct.in_module(address, pos, bound)
+        if symbol is None:
+            scope.error(node.pos, "location", f"{node.text} is {bound}; use that name here")
+        return symbol
 
     def text(self, constant: Const) -> Variable:
         """Memory that holds a text for those who ask for its address."""

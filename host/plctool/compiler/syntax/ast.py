@@ -255,6 +255,7 @@ class StructSpec:
     fields: list[VarDecl]
     union: bool = False
     base: NamedType | None = None  # what it EXTENDS
+    pack_mode: str | None = None  # the value of the attribute
 
 
 TypeSpec = NamedType | SubrangeSpec | EnumSpec | ArraySpec | PointerSpec | StructSpec
@@ -398,6 +399,7 @@ class PouDecl:
     members: list[PouDecl] = field(default_factory=list)
     namespace: Namespace | None = None
     chart: Chart | None = None  # in place of the body
+    accesses: list[AccessLine] = field(default_factory=list)  # VAR_ACCESS of a PROGRAM
 
     @property
     def full_name(self) -> str:
@@ -649,7 +651,31 @@ class Return:
     condition: Expr | None = None
 
 
-Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return
+@dataclass(slots=True, eq=False)
+class Label:
+    """`name:`, where a JMP goes on."""
+
+    pos: int
+    name: str
+
+
+@dataclass(slots=True, eq=False)
+class Jump:
+    """`JMP name;`"""
+
+    pos: int
+    name: str
+    name_pos: int
+
+
+Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return | Label | Jump
+
+
+def inner_bodies(statement: Stmt) -> list[list[Stmt]]:
+    """The statements in a statement, as the lists they stand in."""
+    if isinstance(statement, If | Case):
+        return [*(body for _, body in statement.branches), statement.otherwise]
+    return [statement.body] if isinstance(statement, For | While | RepeatUntil) else []
 
 
 # ---- looking through a tree ----------------------------------------------------------------------------------------

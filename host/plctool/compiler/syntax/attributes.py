@@ -18,6 +18,7 @@ Attributes = dict[int, dict[str, str]]
 
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
+    "pack_mode": frozenset(("STRUCT",)),
     "strict": frozenset(("enumeration",)),
     "to_string": frozenset(("enumeration",)),
     "call_after_init": frozenset(("FUNCTION_BLOCK", "METHOD")),
@@ -56,7 +57,6 @@ UNHEEDED = {
     "no_init": "every variable starts with its initial value",
     "no_check": "--checks chooses which checks are compiled in",
     "no_virtual_actions": "actions of a derived block override those of its base",
-    "pack_mode": _LAYOUT,
     "c++_compatible": _LAYOUT,
     "relative_offset": _LAYOUT,
     "subsequent": "write a STRUCT, whose members follow each other",

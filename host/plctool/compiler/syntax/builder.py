@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from plctool.compiler.source import Source
-from plctool.compiler.syntax import ast
+from plctool.compiler.syntax import ast, slips
 from plctool.compiler.syntax.attributes import Attributes
 from plctool.compiler.syntax.builder_chart import read_action, read_priority
 from plctool.compiler.syntax.builder_units import Arrangement
@@ -17,6 +17,8 @@ from plctool.compiler.syntax.lexer import Report, Token
 from plctool.iec import literals
 from plctool.iec.types import ELEMENTARY
 
+_KINDS_OF_TYPES = {ast.EnumSpec: "enumeration", ast.StructSpec: "STRUCT"}
+_TYPE_NAMES = frozenset((*ELEMENTARY, "STRING", "WSTRING", *slips.TYPES))
 _Init = TypeVar("_Init", bound="ast.Init | None")
 
 _PRECEDENCE = {
@@ -67,6 +69,18 @@ def _listed(children: tuple[Any, ...]) -> list[Any]:
     return [c for c in children if c is not None]
 
 
+def _type_in(statement: ast.Stmt) -> str:
+    """The name of the type when a statement is what follows the colon of a declaration, else ""."""
+    if isinstance(statement, ast.Assign):
+        target = statement.targets[0]
+        return target.name if isinstance(target, ast.Name) and target.name.upper() in _TYPE_NAMES else ""
+    value = statement.value if isinstance(statement, ast.ExprStmt) else None
+    if isinstance(value, ast.Name):
+        return slips.TYPES.get(value.name.upper(), value.name)
+    base = value.base if isinstance(value, ast.Index) else None
+    return base.name if isinstance(base, ast.Name) and base.name.upper() in _TYPE_NAMES else ""
+
+
 def _placed(init: _Init, pos: int) -> _Init:
     """An initial value; `()` has no token of its own, so it stands where its name does."""
     if isinstance(init, ast.StructInit) and init.pos < 0:
@@ -98,11 +112,13 @@ class Builder:
         return self.units.arrange(units)
 
     def types(self, keyword: Token, *decls: Any) -> list[Any]:
-        kinds = {decl: "enumeration" if isinstance(decl.spec, ast.EnumSpec) else "TYPE" for decl in _listed(decls)}
-        first = "enumeration" if "enumeration" in kinds.values() else "TYPE"
+        kinds = {decl: _KINDS_OF_TYPES.get(type(decl.spec), "TYPE") for decl in _listed(decls)}
+        first = next((kind for kind in kinds.values() if kind != "TYPE"), "TYPE")
         of_all = self._attributes_at(keyword.pos, first)
         for decl, kind in kinds.items():
             decl.attributes = {**of_all, **self._attributes_at(decl.pos, kind)}
+            if isinstance(decl.spec, ast.StructSpec):
+                decl.spec.pack_mode = decl.attributes.get("pack_mode")
         return list(kinds)
 
     def type_decl(self, *rest: Any) -> ast.TypeDecl:
@@ -402,7 +418,20 @@ class Builder:
     # ---- statements ----
 
     def stmts(self, *children: Any) -> list[Any]:
-        return [c for c in children if c is not None]
+        found = [c for c in children if c is not None]
+        return self._without_declarations(found) if any(type(c) is ast.Label for c in found) else found
+
+    def _without_declarations(self, found: list[ast.Stmt]) -> list[ast.Stmt]:
+        """Reports `speed : INT;`, which reads as a label with a statement, and leaves it out."""
+        kept: list[ast.Stmt] = []
+        for statement in found:
+            previous = kept[-1] if kept else None
+            if isinstance(previous, ast.Label) and (declared := _type_in(statement)):
+                self.report(previous.pos, "syntax", slips.DECLARED.format(name=previous.name, type=declared))
+                kept.pop()
+            else:
+                kept.append(statement)
+        return kept
 
     def empty(self) -> None:
         return None
@@ -473,6 +502,12 @@ class Builder:
 
     def continue_stmt(self, keyword: Token) -> ast.Continue:
         return ast.Continue(keyword.pos)
+
+    def label(self, name: Token) -> ast.Label:
+        return ast.Label(name.pos, name.text)
+
+    def jump(self, keyword: Token, label: Token) -> ast.Jump:
+        return ast.Jump(keyword.pos, label.text, label.pos)
 
     def return_stmt(self, keyword: Token, condition: ast.Expr | None) -> ast.Return:
         return ast.Return(keyword.pos, condition)

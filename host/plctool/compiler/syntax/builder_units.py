@@ -67,8 +67,17 @@ class Arrangement:
                 decl.members.append(part)
             elif isinstance(part, ast.Namespace):
                 _namespace(decl).using += part.using
+            elif isinstance(part, ast.InstanceBlock):
+                self._give_access(decl, part)
             else:
                 decl.blocks.append(part)
+
+    def _give_access(self, decl: ast.PouDecl, block: ast.InstanceBlock) -> None:
+        lines = [line for line in block.lines if isinstance(line, ast.AccessLine)]
+        if decl.keyword is ast.Unit.PROGRAM:
+            decl.accesses += lines
+        elif lines:
+            self._report(lines[0].pos, "syntax", "VAR_ACCESS stands in a PROGRAM or in the CONFIGURATION")
 
     def _chart(self, decl: ast.PouDecl, parts: Sequence[Any]) -> tuple[ast.Chart | None, Sequence[Any]]:
         """The steps and transitions, and the rest."""

@@ -20,7 +20,7 @@ _TYPE = (
 _TYPE_FIRST = rf"(?:^|;|\bVAR)[ \t]*(?P<here>{_TYPE}[ \t]+(?P<name>[A-Za-z_]\w*)[ \t]*)(?=[;:\[,=])"
 _UNIT = r"\s*(?P<unit>ms|us|ns|s|m|h|d)\b"
 _IN_VARIABLES = "a variable is declared with its name first: {name} : {type};"
-_IN_BODY = "variables are declared in VAR ... END_VAR before the statements: {name} : {type};"
+_IN_BODY = slips.DECLARED
 _CHOICE = "a choice is written CASE a OF 1: ...; ELSE ...; END_CASE"
 _CONSTANT = "constants are declared in VAR CONSTANT ... END_VAR"
 _POINTER = "a pointer is declared POINTER TO {name}"
@@ -121,7 +121,11 @@ _HINTS = (
     _hint(r"\bSWITCH\b[^;]*", _CHOICE),
     _hint(r"\bCASE\s+\w+\s*:(?!=)", _CHOICE),
     _hint(r"\bBEGIN\s+\w+\s*", "there is no BEGIN; the statements follow END_VAR"),
-    _hint(r"\bGOTO\s+\w+\s*", slips.REFUSED["JMP"].message),
+    _hint(r"\bGOTO\s+(?P<name>\w+)\s*", "a jump is written JMP {name}; and its label {name}:"),
+    _hint(rf"(?<![\w.])(?P<name>{_NAME})\s*:\s+(?P<here>=)", "an assignment is written {name} := ..., without a blank",
+          "here", "body"),
+    _hint(rf"(?:^|;)[ \t]*(?P<name>{_NAME})\s*:\s+(?P<here>[-+\d'(])", "an assignment is written {name} := ...", "here",
+          "body"),
     _hint(r":\s*(?P<here>(?:unsigned|signed|long|short)\s+\w+)",
           "there is no unsigned; write UINT, UDINT ... for a type without negative numbers", "here", "declaration"),
     _hint(_TYPE_FIRST, _typed(_IN_VARIABLES), "here", "declaration"),

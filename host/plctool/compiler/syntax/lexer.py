@@ -59,7 +59,7 @@ KEYWORDS = {
     **{k: k for k in (
         "TYPE", "STRUCT", "UNION", "OVERLAP", "ARRAY", "POINTER", "REFERENCE", "REF_TO", "FUNCTION", "FUNCTION_BLOCK",
         "PROGRAM", "CONFIGURATION", "RESOURCE", "TASK", "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE",
-        "RETURN", "TRUE", "FALSE", "NULL", "NOT", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
+        "RETURN", "JMP", "TRUE", "FALSE", "NULL", "NOT", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION",
         "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET", "SET", "ACTION", "NAMESPACE", "USING",
         "PROPERTY_GET", "PROPERTY_SET", "INITIAL_STEP", "STEP", "TRANSITION",
     )},
@@ -76,7 +76,7 @@ KEYWORDS = {
 KEYWORDS |= dict.fromkeys(slips.WORDS, "MISSPELT") | dict.fromkeys(slips.REFUSED, "REFUSED")
 
 SOFT = frozenset((
-    "MISSPELT", "REFUSED",
+    "MISSPELT", "REFUSED", "JMP",
     "QUALIFIER", "TEXT", "POINTER", "REFERENCE", "RESOURCE", "TASK", "_ON", "_WITH", "_AT", "_TO", "_BY", "OVERLAP",
     "UNION", "TEST", "SETUP", "TEARDOWN", "MOCK", "MOCK_FUNCTION", "CLASS", "INTERFACE", "METHOD", "PROPERTY", "GET",
     "SET", "ACTION", "NAMESPACE", "USING", "MODIFIER", "_EXTENDS", "_IMPLEMENTS", "INITIAL_STEP", "STEP", "TRANSITION",
@@ -88,7 +88,7 @@ _OPERATOR_FUNCTIONS = frozenset(("AND", "OR", "XOR", "MOD"))  # names before a p
 
 OPENING = frozenset((
     "MOCK", "MOCK_FUNCTION", "METHOD", "PROPERTY", "ACTION", "MODIFIER", "NAMESPACE", "USING", "INITIAL_STEP", "STEP",
-    "TRANSITION", "PROPERTY_GET", "PROPERTY_SET", "_AT",
+    "TRANSITION", "PROPERTY_GET", "PROPERTY_SET", "_AT", "JMP",
 ))  # fmt: skip
 """Terminals that are names where no name (after AT, no address) follows."""
 

@@ -23,6 +23,9 @@ CHOICE = "a choice between two values is written SEL(condition, value_if_false, 
 CHARACTERS = {"#": "a comment is written // or (* *)", "?": CHOICE}
 """Characters that begin nothing, and what may have been meant."""
 
+DECLARED = "variables are declared in VAR ... END_VAR before the statements: {name} : {type};"
+"""What to say of a declaration among statements."""
+
 WORDS = {
     "ELSEIF": "ELSIF",
     "VAR_INOUT": "VAR_IN_OUT",
@@ -73,7 +76,6 @@ class Refusal:
 _GRAPHIC = "this is a diagram; only Structured Text can be compiled"
 
 REFUSED = {
-    "JMP": Refusal("JMP and labels are not supported; write a loop, IF, EXIT or RETURN", ";"),
     "__TRY": Refusal("exceptions cannot be caught, they stop the program; test beforehand what may fail", "__ENDTRY"),
     "VAR_GENERIC": Refusal("blocks of any size are not supported; write one with VAR CONSTANT for each", "END_VAR"),
     "_LD_BODY": Refusal(_GRAPHIC),

@@ -35,7 +35,7 @@ _UNITS = {
     "TEARDOWN",
 }  # fmt: skip
 _INSTRUCTIONS = {"LD", "LDN", "ST", "STN", "CAL", "CALC", "CALCN", "JMPC", "JMPCN", "RETC", "RETCN"}
-_STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
+_STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP"}
 _CHART = {"INITIAL_STEP", "STEP", "TRANSITION"}
 _SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, *_CHART, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL", END}
 _ITEMS = ("stmt", "var_decl", "type_decl", "config_item", "unit", "expr_stmt", "step")  # can be left out as a whole
@@ -379,7 +379,7 @@ class Recovery:
         if self._item(stack) != "stmt":
             return ""
         if token.type == "_COLON":
-            return slips.REFUSED["JMP"].message
+            return "a label is one name, such as again:, and not in front of the statements of a CASE"
         if token.type == "_ASSIGN" and self._shift(stack, "_RPAR") is not None:
             return "values by name are for declarations and calls; assign the members one by one"
         if _is_doubled(token, self._source.text) and self._shift(stack, "_ASSIGN") is not None:

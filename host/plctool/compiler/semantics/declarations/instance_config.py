@@ -9,8 +9,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -74,6 +74,9 @@ class _Copy:
     def outwards(self) -> Assign | None:
         """What is done after them."""
         return None if self.area is Area.INPUT else Assign(self.outside, load(self.place), self.place.pos)
+
+
+_Access = tuple[str, ast.Expr, ast.AccessLine, Scope]  # the new name, of what, where that is written
 
 
 class InstanceConfig:
@@ -294,18 +297,36 @@ class InstanceConfig:
 
     def _access(self) -> None:
         seen: set[str] = set()
-        for line, scope in self._lines():
-            if not isinstance(line, ast.AccessLine):
-                continue
-            if line.name.casefold() in seen:
+        for name, path, line, scope in (*self._given_access(), *self._given_by_programs()):
+            if name.casefold() in seen:
                 scope.error(line.pos, "duplicate", f"{line.name} is in VAR_ACCESS already")
-            seen.add(line.name.casefold())
-            found = self._find(self._relative(line.path), line.type, scope, "VAR_ACCESS")
+            seen.add(name.casefold())
+            found = self._find(path, line.type, scope, "VAR_ACCESS")
             if found is not None:
                 (place, fixed), of = found, found[1].variable
-                alias = Variable(line.name, place.type, of.storage, scope.pos(line.pos), of.area, bit=fixed.bit)
+                alias = Variable(name, place.type, of.storage, scope.pos(line.pos), of.area, bit=fixed.bit)
                 alias.constant = not line.writable
                 self._accesses.append((alias, of, fixed.offset))
+
+    def _given_access(self) -> Iterator[_Access]:
+        for line, scope in self._lines():
+            if isinstance(line, ast.AccessLine):
+                yield line.name, self._relative(line.path), line, scope
+
+    def _given_by_programs(self) -> Iterator[_Access]:
+        """The lines of VAR_ACCESS in a PROGRAM: each instance of it gets `Main.name`, for what is in it."""
+        names, variables = self._world.names, self._world.allocation.variables
+        for instance in [i for i in names.planned.values() if i.symbol.decl.accesses]:
+            names.instance(instance.name.casefold())  # declares its variables, if nothing has needed them yet
+            declared = {variable.name.casefold() for variable in variables}
+            for line in instance.symbol.decl.accesses:
+                scope = self._world.scope_of(instance.symbol)
+                scope.sees_inside = True
+                name = f"{instance.name}.{line.name}"
+                if name.casefold() in declared:
+                    scope.error(line.pos, "duplicate", f"{instance.name} has a {line.name} already")
+                    continue
+                yield name, _inside(instance.name, line.path), line, scope
 
     # ---- both ----
 
@@ -331,6 +352,15 @@ class InstanceConfig:
 def _lies_at(variable: Variable, offset: int) -> bool:
     """Whether it is that part of the instance; constants and VAR_STAT are none."""
     return variable.storage is Storage.SELF and variable.offset == offset
+
+
+def _inside(instance: str, path: ast.Expr) -> ast.Expr:
+    """The path of a variable of a program, from outside."""
+    if isinstance(path, ast.Name):
+        return ast.Member(path.pos, ast.Name(path.pos, instance), path.name, path.pos)
+    if isinstance(path, ast.Member | ast.Index | ast.BitAccess | ast.Deref):
+        return replace(path, base=_inside(instance, path.base))
+    return path
 
 
 def _example(t: Type) -> str:

@@ -267,8 +267,8 @@ class Programs:
                     continue
                 self._variables.check_kept(name, t, own, scope, offset)
                 full_name = f"{info.name}.{name}"
-                location = self._variables.address(line.location, t, symbol.pos, full_name)
-                wanted = own if location is not None else keep
+                location = self._variables.address(line.location, t, scope, symbol.pos, full_name)
+                wanted = own if location is not None or self._world.io.area(full_name) is not None else keep
                 symbol.variable = self._variables.area_variable(full_name, t, init, location, wanted, scope, offset)
                 if symbol.variable is None:
                     continue

@@ -29,6 +29,7 @@ from plctool.iec.types import (
     DEFAULT_STRING_LENGTH,
     ELEMENTARY,
     INT,
+    MAX_ALIGN,
     MAX_SIZE,
     ArrayType,
     EnumType,
@@ -40,11 +41,13 @@ from plctool.iec.types import (
     StringType,
     StructType,
     Type,
+    alignment_at,
 )  # fmt: skip
 
 MAX_STRING = 0xFFFF
 MAX_TYPE_DEPTH = 50  # levels of arrays of structs of arrays ...
 _STRINGS = ("STRING", "WSTRING")
+_PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
 _DIALECT: dict[str, Type] = {"BIT": BOOL, "PVOID": RawPointerType(BYTE)}
 
 
@@ -317,7 +320,9 @@ class TypeDeclarations:
                     defaults[field_name] = default
         if any(f.type is ERROR for f in t.fields):
             return ERROR, None
+        t.pack = self._pack(spec, scope)
         t.lay_out(behind_base=True)
+        self._check_alignment(t, spec, scope)
         self._place_members(t, located)
         if t.size > MAX_SIZE:
             scope.error(spec.pos, "size", f"a struct of {t.size} bytes is too large")
@@ -325,6 +330,37 @@ class TypeDeclarations:
         if defaults:
             self._world.defaults[name] = StructInit(defaults)
         return t, self.struct_default(t)
+
+    @staticmethod
+    def _pack(spec: ast.StructSpec, scope: Scope) -> int:
+        """What {attribute 'pack_mode'} says members are multiples of [bytes] at most."""
+        if spec.pack_mode is None:
+            return MAX_ALIGN
+        pack = _PACK_MODES.get(spec.pack_mode.strip())
+        if pack is None:
+            message = f"pack_mode is 1, 2, 4 or 8 (0 is 1 as well), not '{spec.pack_mode}'"
+            scope.error(spec.pos, "attribute", message)
+        return pack or MAX_ALIGN
+
+    def _check_alignment(self, t: StructType, spec: ast.StructSpec, scope: Scope) -> None:
+        """Reports members of which other code than this program's statements has the address: it would read them at
+        addresses that some processors refuse."""
+        for f in t.fields:
+            if alignment_at(f.offset, t.align) >= f.type.align or not self._is_handed_out(f.type):
+                continue
+            pos = next((offset for d in spec.fields for offset, name in d.names if name == f.name), spec.pos)
+            message = f"{f.name} is {f.type}, which pack_mode would move to an address that is no multiple"
+            scope.error(
+                pos, "attribute", f"{message} of {f.type.align}; give it a larger pack_mode, or declare it outside"
+            )
+
+    def _is_handed_out(self, t: Type) -> bool:
+        """Whether a type holds an instance or a WSTRING."""
+        if isinstance(t, ArrayType):
+            return self._is_handed_out(t.element)
+        if isinstance(t, StructType):
+            return t in self._world.blocks or any(self._is_handed_out(f.type) for f in t.fields)
+        return isinstance(t, StringType) and t.wide
 
     def _place_members(self, t: StructType, located: dict[str, VarSymbol]) -> None:
         """Notes the members with AT %I* and the like, now that they have their offsets."""

@@ -6,7 +6,7 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from plctool.compiler.kept import is_kept
-from plctool.compiler.semantics.allocation import is_open, located
+from plctool.compiler.semantics.allocation import is_open, located, misfit, module_address
 from plctool.compiler.semantics.declarations.instance_config import InstanceConfig
 from plctool.compiler.semantics.declarations.type_declarations import May, TypeDeclarations
 from plctool.compiler.semantics.instances import instances_in, require_instances
@@ -132,7 +132,7 @@ class Variables:
         else:
             result = VarSymbol(symbol.name, scope.pos(symbol.pos), t, Role.GLOBAL, default=init)
             if t is not ERROR:
-                location = self.address(symbol.decl.location, t, result.pos, symbol.full_name, symbol.name)
+                location = self.address(symbol.decl.location, t, scope, result.pos, symbol.full_name, symbol.name)
                 keep = Keep.of(symbol.qualifiers)
                 self.check_kept(symbol.name, t, keep, scope, symbol.pos)
                 result.variable = self.area_variable(symbol.full_name, t, init, location, keep, scope, symbol.pos)
@@ -143,8 +143,19 @@ class Variables:
         symbol.symbol = result
         return result
 
-    def address(self, location: ast.DirectAddress | None, t: Type, pos: Pos, *names: str) -> ast.DirectAddress | None:
-        """Where a variable with these names is: for `AT %I*` VAR_CONFIG says it. None: it has no address."""
+    def address(
+        self, location: ast.DirectAddress | None, t: Type, scope: Scope, pos: Pos, *names: str
+    ) -> ast.DirectAddress | None:
+        """Where a variable with these names is: for `AT %I*` VAR_CONFIG says it. None: it has no address, but perhaps a
+        channel, as it must if it is in a module."""
+        in_module = module_address(location)
+        if location is not None and in_module is not None:
+            problem = misfit(t, location.text, in_module.width)
+            if problem:
+                scope.error(location.pos, "location", problem)
+            else:
+                self._world.io.bind(in_module, names, scope.pos(location.pos), self._world.diagnostics)
+            return None
         if location is None or not is_open(location):
             return location
         claimed = self._world.io.claims(location.text[1], names, self._world.diagnostics)

@@ -40,6 +40,7 @@ from plctool.compiler.typed import (
     ValuePlace,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import is_unaligned
 from plctool.iec.types import (
     BOOL,
     LREAL,
@@ -215,6 +216,8 @@ def _described(c: Checker, actual: Actual, symbol: VarSymbol, offset: int) -> tu
     place = place_of(e)
     if isinstance(place, BitPlace):
         place = ValuePlace(e, e.type, e.pos)
+    elif is_unaligned(place):
+        c.warning(offset, "pointer", packed_and_pointed_to(place))
     return handed(place, e.type, total_size(place))
 
 
@@ -265,6 +268,8 @@ def input_value(c: Checker, node: ast.Expr, t: Type, name: str) -> Expr:
         e = e if takes_array(t, e.type) else c.coerce(e, t)
         return e if may_copy(c, e, node.pos) else error_value(c.pos(node.pos))
     place = referenced_place(c, node, t.target, name, output=False)
+    if place is not None and is_unaligned(place):
+        return c.error(node.pos, "type", packed(place, "a reference"))
     return error_value(c.pos(node.pos)) if place is None else refer(place, t)
 
 
@@ -278,6 +283,19 @@ def _is_slip(node: ast.Expr, t: Type, name: str) -> bool:
     ):
         return False
     return node.left.name.casefold() == name.casefold()
+
+
+def packed(place: Place, what: str) -> str:
+    """Why something that keeps an address cannot have that of a place in a packed structure."""
+    return (
+        f"this {place.type} is packed, and {what} needs one at a multiple of {place.type.align}; copy it to a variable"
+    )
+
+
+def packed_and_pointed_to(place: Place) -> str:
+    """What may go wrong with a pointer to a place in a packed structure."""
+    message = f"this {place.type} is packed, and some processors stop when they read it through a pointer to it"
+    return f"{message}; copy it with MEMCPY, or use a pointer to the structure"
 
 
 def refer(place: Place, t: ReferenceType) -> Expr:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.semantics.checker import Checker
-from plctool.compiler.semantics.conversions import error_value, place_of, settle
+from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of, total_size
 from plctool.compiler.semantics.rules import intrinsics
+from plctool.compiler.semantics.rules.arguments import packed, packed_and_pointed_to
 from plctool.compiler.semantics.rules.conversion_calls import conversion, conversion_hint
 from plctool.compiler.semantics.rules.intrinsics import Applied, BuiltIn, named
 from plctool.compiler.semantics.rules.members import space_of
@@ -24,6 +25,7 @@ from plctool.compiler.typed import (
     Call,
     CallStatement,
     Const,
+    Convert,
     DerefPlace,
     Expr,
     Intrinsic,
@@ -36,9 +38,11 @@ from plctool.compiler.typed import (
     Variable,
     VarPlace,
 )
+from plctool.compiler.typed_nodes import is_unaligned
 from plctool.iec.types import (
     BOOL,
     BYTE,
+    DINT,
     ELEMENTARY,
     UDINT,
     ArrayType,
@@ -49,6 +53,7 @@ from plctool.iec.types import (
     ReferenceType,
     StringType,
     StructType,
+    SubrangeType,
     Type,
 )
 
@@ -58,15 +63,15 @@ _OF_VARIABLES = ("SIZEOF", "XSIZEOF", "ADR", "REF", "__ISVALIDREF")
 """Functions whose argument is a variable or a type, not a value."""
 
 
-def of_variable(c: Checker, name: str, node: ast.Call) -> Expr:
-    """The call of one of _OF_VARIABLES."""
+def of_variable(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr:
+    """The call of one of _OF_VARIABLES; `expected` is the type the surroundings would like."""
     if len(node.args) != 1 or node.args[0].value is None:
         return c.error(node.pos, "arguments", f"{name} takes 1 argument, not {len(node.args)}")
     argument = node.args[0].value
     if name == "__ISVALIDREF":
         return _is_valid(c, argument)
     if name not in ("SIZEOF", "XSIZEOF"):
-        return _address_of(c, argument, RawPointerType if name == "ADR" else PointerType)
+        return _address_of(c, argument, RawPointerType if name == "ADR" else PointerType, expected)
     if isinstance(argument, ast.Name):
         symbol = c.scope.lookup(argument.name)
         is_block = isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK
@@ -110,7 +115,7 @@ def _size(c: Checker, t: Type, node: ast.Call) -> Expr:
     return Const(t.size, UNTYPED_INT, c.pos(node.pos))
 
 
-def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
+def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType], expected: Type | None) -> Expr:
     """ADR(x), REF(x); of a constant, the address of a variable that holds it."""
     constant = _constant_text(c, node)
     if constant is not None and isinstance(constant.type, StringType):
@@ -122,8 +127,17 @@ def _address_of(c: Checker, node: ast.Expr, kind: type[PointerType]) -> Expr:
         return error_value(c.pos(node.pos))
     if isinstance(place, BitPlace):
         return c.error(node.pos, "type", "a single bit has no address")
+    if kind is PointerType and is_unaligned(place):
+        return c.error(node.pos, "type", packed(place, "a reference"))
+    if is_unaligned(place) and not _is_of_bytes(expected):
+        c.warning(node.pos, "pointer", packed_and_pointed_to(place))
     t = place.type.element if isinstance(place.type, OpenArrayType) else place.type
     return AddressOf(place, kind(t), c.pos(node.pos))
+
+
+def _is_of_bytes(t: Type | None) -> bool:
+    """Whether what is wanted is a pointer to something that may be anywhere, or the number of an address."""
+    return t is not None and (not isinstance(t, PointerType) or t.target.align == 1)
 
 
 def _constant_text(c: Checker, node: ast.Expr) -> Const | None:
@@ -158,12 +172,20 @@ def _bound(c: Checker, f: Applied) -> Expr:
     array, dimension = f.args
     if not isinstance(array.type, ArrayType):
         return c.error(f.node.pos, "type", f"{f.name} needs an array, not {array.type}")
-    count = len(array.type.bounds)
-    number = dimension.value if isinstance(dimension, Const) else None
-    if not isinstance(number, int) or not 1 <= number <= count:
-        which = "the constant 1" if count == 1 else f"a constant from 1 to {count}"
-        return c.error(f.node.args[1].pos, "range", f"the dimension of {array.type} is {which}")
-    return bounds_of(place_of(array))[number - 1][f.name == "UPPER_BOUND"]
+    count, pos = len(array.type.bounds), c.pos(f.node.pos)
+    bounds = [pair[f.name == "UPPER_BOUND"] for pair in bounds_of(place_of(array))]
+    base = elementary(dimension.type)
+    if isinstance(dimension, Const) or base is None or base.kind not in NUMBERS:
+        number = dimension.value if isinstance(dimension, Const) else None
+        if not isinstance(number, int) or not 1 <= number <= count:
+            which = "1" if count == 1 else f"a number from 1 to {count}"
+            return c.error(f.node.args[1].pos, "range", f"the dimension of {array.type} is {which}")
+        return bounds[number - 1]
+    within = c.coerce(dimension, SubrangeType(f"DINT (1..{count})", DINT, 1, count))
+    if within.type is ERROR:
+        return within
+    index = Binary(BinaryOp.SUB, Convert(within, DINT, pos), Const(1, DINT, pos), DINT, pos)
+    return IntrinsicCall(Intrinsic.MUX, [index, *(c.coerce(bound, DINT) for bound in bounds)], DINT, pos)
 
 
 _ON_VARIABLES: dict[str, BuiltIn] = {
@@ -239,7 +261,7 @@ _FUNCTIONS = intrinsics.FUNCTIONS | _ON_VARIABLES
 def built_in_call(c: Checker, name: str, node: ast.Call, expected: Type | None) -> Expr | None:
     """The call of a built-in function; None when there is none of that name."""
     if name in _OF_VARIABLES:
-        return of_variable(c, name, node)
+        return of_variable(c, name, node, expected)
     if name in _PLACES:
         return _place(c, name, node)
     function = _FUNCTIONS.get(name)

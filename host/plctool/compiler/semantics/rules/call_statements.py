@@ -15,6 +15,7 @@ from plctool.compiler.semantics.rules.arguments import (
     bind,
     input_value,
     named_function,
+    packed,
     parameter_names,
     referenced_place,
     split_enable,
@@ -43,6 +44,7 @@ from plctool.compiler.typed import (
     UnaryOp,
     Variable,
 )
+from plctool.compiler.typed_nodes import is_unaligned
 from plctool.iec.types import BOOL, StringType, StructType
 
 # ---- instances and programs ----
@@ -181,6 +183,9 @@ def _block_in_out(
         c.error(argument.pos, "place", f"the instance keeps the address of {name}, so it needs a variable")
         return None
     place = referenced_place(c, argument.value, variable.type, name, output=False, constant=constant)
+    if place is not None and is_unaligned(place):
+        c.error(argument.pos, "type", packed(place, f"the VAR_IN_OUT {name} of an instance"))
+        return None
     if place is None or not isinstance(place.type, StringType) or not isinstance(variable.type, StringType):
         return place
     if place.type.length < variable.type.length:

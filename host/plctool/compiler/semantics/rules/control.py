@@ -10,7 +10,9 @@ from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.checker import Checker, checks_statement
 from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary, is_untyped
 from plctool.compiler.semantics.instances import INITIALISERS
-from plctool.compiler.semantics.pitfalls import Loop, has_exit
+from plctool.compiler.semantics.labels import Labels
+from plctool.compiler.semantics.pitfalls import has_exit
+from plctool.compiler.semantics.rules.jumps import note_loops, report_repeated
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, Role, VarSymbol
@@ -23,6 +25,7 @@ from plctool.compiler.typed import (
     Expr,
     For,
     If,
+    Jump,
     Repeat,
     Return,
     Statement,
@@ -36,16 +39,21 @@ from plctool.iec.types import BOOL, EnumType, Type, is_scalar
 
 
 def check_body(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
-    """The typed statements; what cannot be reached is reported once."""
+    """The typed statements; what cannot be reached is reported once, up to a label that a JMP names."""
     result: list[Statement] = []
     ended = reported = False
+    c.around.append(nodes)
     for node in nodes:
+        if c.labels.is_target(node):
+            ended = reported = False
         if ended:
             report_unreachable(c, node.pos)
         found = c.statement(node)
         reported = reported or ended
         ended = not reported and _ends(found)
         result += found
+    c.around.pop()
+    note_loops(c, result)
     return result
 
 
@@ -53,6 +61,8 @@ def write_body(c: Checker, nodes: list[ast.Stmt]) -> None:
     """Checks the statements into the unit of the scope."""
     pou = c.scope.pou
     assert pou is not None
+    c.labels = Labels(nodes)
+    report_repeated(c)
     try:
         pou.body = [*c.scope.prologue, *check_body(c, nodes)]
     except NestingError as error:
@@ -88,7 +98,7 @@ def _ends(statements: list[Statement]) -> bool:
         return _is_constant(last.condition, 1) and not has_exit(last.body)
     if isinstance(last, Repeat):
         return _is_constant(last.until, 0) and not has_exit(last.body)
-    return isinstance(last, Return | Exit | Continue)
+    return isinstance(last, Return | Exit | Continue | Jump)
 
 
 def _is_constant(e: Expr, value: int) -> bool:
@@ -264,10 +274,9 @@ def _step_value(c: Checker, node: ast.Expr, target: Type) -> Expr:
     return c.coerce(e, target)
 
 
-def _noted(c: Checker, loop: Loop) -> Loop:
-    """The loop, which is looked at once more when all bodies are checked: whether it ends."""
-    if c.scope.pou is not None and not c.scope.library:
-        c.world.loops.append((c.scope.pou, loop))
+def _noted(c: Checker, loop: While | Repeat | For) -> Statement:
+    """The loop, which is looked at once more when all bodies are checked."""
+    c.note_loop(loop)
     return loop
 
 

@@ -226,7 +226,7 @@ def direct_address(c: Checker, node: ast.DirectAddress, expected: Type | None) -
     if isinstance(symbol, GlobalSymbol):
         symbol = c.world.declared.variable(symbol)
     if not isinstance(symbol, VarSymbol):
-        symbol = c.world.direct.find(node, c.scope)
+        symbol = c.world.at_address(node, c.scope)
     return error_value(c.pos(node.pos)) if symbol is None else variable_value(symbol, c.pos(node.pos))
 
 
