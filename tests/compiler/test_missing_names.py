@@ -8,7 +8,7 @@ import pytest
 
 from plctool.cli.documents import check
 from plctool.cli.projects import Settings
-from plctool.compiler import IoFiles
+from plctool.compiler import program_files
 from plctool.compiler.front import check_sources
 from plctool.compiler.missing_names import library_of
 from plctool.compiler.source import Source
@@ -72,7 +72,7 @@ def test_unknown_names_do_not_hide_other_errors() -> None:
 def test_many_missing_names_are_one_line_for_each_library(tmp_path: Path) -> None:
     calls = "".join(f"MC_Thing{i}(a);\n" for i in range(30)) + "ADSLOGSTR(a);\nADSLOGSTR(a);\nWxyz(a);\n"
     (tmp_path / "main.st").write_text(f"PROGRAM Main\nVAR a : INT; END_VAR\n{calls}a := 'x';\nEND_PROGRAM\n")
-    document, texts = check(Settings([tmp_path], IoFiles(), ALL_WARNINGS))
+    document, texts = check(Settings(program_files([tmp_path]), ALL_WARNINGS))
     assert "STRING" in texts[0]
     assert texts[-5:-1] == [
         "The program uses 32 names that nothing declares, in 33 places:",
@@ -88,7 +88,7 @@ def test_many_missing_names_are_one_line_for_each_library(tmp_path: Path) -> Non
 
 def test_few_missing_names_are_shown_where_they_are(tmp_path: Path) -> None:
     (tmp_path / "main.st").write_text("PROGRAM Main\nADSLOGSTR(1);\nEND_PROGRAM\n")
-    _, texts = check(Settings([tmp_path], IoFiles(), ALL_WARNINGS))
+    _, texts = check(Settings(program_files([tmp_path]), ALL_WARNINGS))
     assert texts[0].endswith("main.st:2:1: error: unknown function ADSLOGSTR\nADSLOGSTR(1);\n^")
 
 
