@@ -85,6 +85,7 @@ enum {
     CMPID_IoDrvGpio = 0x0025,
     CMPID_IoDrvModbus = 0x0026,
     CMPID_CmpUserMgr = 0x0027,
+    CMPID_RunLamp = 0x0028,
 };
 
 /* Name of a component, "" when unknown. */

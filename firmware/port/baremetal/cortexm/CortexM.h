@@ -175,6 +175,9 @@ void BoardAlarmSet(RTS_UI32 ns);
 void BoardWatchdogStart(RTS_UI32 ms);
 void BoardWatchdogKick(void);
 
+/* The lamp that shows whether the program runs (RunLamp.c, the full configuration); empty for a board without one. */
+void BoardRunLamp(bool on);
+
 /* Whether there is something for the main loop to do since the last call (received bytes), so that it does not sleep. */
 bool BoardHasWork(void);
 

@@ -23,11 +23,15 @@
 #define WATCHDOG_LOAD REG32(WATCHDOG + 0x00)
 #define WATCHDOG_CTL REG32(WATCHDOG + 0x08)
 #define WATCHDOG_ICR REG32(WATCHDOG + 0x0C)
+#define PORT_F 0x40025000u
+#define PORT_F_DATA(pins) REG32(PORT_F + ((pins) << 2))
+#define PORT_F_DIR REG32(PORT_F + 0x400)
+#define PORT_F_DEN REG32(PORT_F + 0x51C)
 
 enum { RCC_PWRDN = 1 << 13, RCC_BYPASS = 1 << 11, RCC_USESYSDIV = 1 << 22, RCC_DIV_4 = 3 << 23, RCC_8MHZ = 14 << 6 };
 enum { RIS_PLL_LOCKED = 1 << 6, RESC_WATCHDOG = 1 << 3 };
-enum { RCGC0_WATCHDOG = 1 << 3, RCGC1_UART0_I2C0_TIMER0 = 1 << 0 | 1 << 12 | 1 << 16, RCGC2_PORTS_A_B = 3 };
-enum { TIMER_ONE_SHOT = 1, TIMER_TIME_OUT = 1, WATCHDOG_INTEN_RESEN = 3 };
+enum { RCGC0_WATCHDOG = 1 << 3, RCGC1_UART0_I2C0_TIMER0 = 1 << 0 | 1 << 12 | 1 << 16, RCGC2_PORTS_A_B_F = 3 | 1 << 5 };
+enum { TIMER_ONE_SHOT = 1, TIMER_TIME_OUT = 1, WATCHDOG_INTEN_RESEN = 3, STATUS_LED = 1 << 0 };
 
 /* Where nothing is there is a bus fault; not in QEMU, which swallows writes. Below the RAM a large frame would pass all
  * stacks unnoticed; the upper half of the addresses is where wild pointers lead. */
@@ -51,7 +55,7 @@ void BoardInit(void)
     SYSCTL_RESC = 0;
     SYSCTL_RCGC0 |= RCGC0_WATCHDOG;
     SYSCTL_RCGC1 |= RCGC1_UART0_I2C0_TIMER0;
-    SYSCTL_RCGC2 |= RCGC2_PORTS_A_B;
+    SYSCTL_RCGC2 |= RCGC2_PORTS_A_B_F;
     TIMER_TAMR = TIMER_ONE_SHOT;
     TIMER_IMR = TIMER_TIME_OUT;
     IrqEnable(IRQ_TIMER0A, LEVEL_DEVICE);
@@ -85,6 +89,13 @@ void BoardWatchdogStart(RTS_UI32 ms)
 void BoardWatchdogKick(void)
 {
     WATCHDOG_ICR = 1;
+}
+
+void BoardRunLamp(bool on)
+{
+    PORT_F_DIR |= STATUS_LED;
+    PORT_F_DEN |= STATUS_LED;
+    PORT_F_DATA(STATUS_LED) = on ? STATUS_LED : 0;
 }
 
 /* ---- identity ---- */

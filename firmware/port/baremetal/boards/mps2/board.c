@@ -16,6 +16,7 @@
 #define WATCHDOG_CTRL REG32(WATCHDOG + 0x8)
 #define WATCHDOG_INTCLR REG32(WATCHDOG + 0xC)
 #define WATCHDOG_LOCK REG32(WATCHDOG + 0xC00)
+#define SCC_LAMPS REG32(0x4002F004u) /* CFG1 */
 
 /* What is below the RAM swallows writes without a fault: a large frame that passes all stacks would go unnoticed. */
 enum { MPU_BELOW_RAM = MPU_BOARD + 1, BELOW_RAM_LOG2 = 16 };
@@ -59,6 +60,12 @@ void BoardWatchdogKick(void)
     WATCHDOG_LOCK = WATCHDOG_KEY;
     WATCHDOG_INTCLR = 1;
     WATCHDOG_LOCK = 0;
+}
+
+/* The first of those beside the display. */
+void BoardRunLamp(bool on)
+{
+    SCC_LAMPS = on;
 }
 
 /* ---- identity ---- */

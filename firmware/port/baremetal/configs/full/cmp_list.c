@@ -19,5 +19,5 @@
 #define HAS_CmpPlcShell 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
-#define PORT_COMPONENTS(X) X(CmpIntCalls) X(CmpRealCalls) X(CmpLrealCalls)
+#define PORT_COMPONENTS(X) X(CmpIntCalls) X(CmpRealCalls) X(CmpLrealCalls) X(RunLamp)
 #include "CmpList.h"
