@@ -139,31 +139,33 @@ class Line:
         self.longest = max(self.longest, time.monotonic() - begin)
 
     def _try(self, action: Callable[[Line, Connection], None]) -> bool:
-        """False if there was no place."""
+        """False if there was no place, or the channel was given away before the login."""
         connection = Connection(open_transport(parse_link(self.link)))
         try:
             connection.open()
-            self.channels += 1
-            action(self, connection)
-        except Vanished:
-            connection.transport.close()
-            return True
+            if action is not Line.knock:
+                Session(connection).ensure()
         except LinkError as error:
             connection.close()
-            if error.code != "busy":
+            if error.code not in ("busy", "closed"):
                 raise
             self.refused[error.code] += 1
             return False
-        connection.close()
+        self.channels += 1
+        try:
+            action(self, connection)
+        except Vanished:
+            connection.transport.close()
+        else:
+            connection.close()
         return True
 
     # ---- what is done with a channel ----
 
     def knock(self, connection: Connection) -> None:
-        """Nothing."""
+        """Nothing, not even a login."""
 
     def vanish(self, connection: Connection) -> None:
-        Session(connection).ensure()
         raise Vanished
 
     def talk(self, connection: Connection) -> None:
