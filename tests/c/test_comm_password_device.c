@@ -138,14 +138,15 @@ static void nothing_gives_away_what_the_device_keeps(void)
     RTS_UI32 session = client.session;
     for (RTS_UI32 group = 0; group < 0x80; group++) {
         for (RTS_UI32 service = 0; service < 0x100; service++) {
-            if (group == SG_DEVICE && service == SRV_DEV_SESSION_CREATE)
-                continue; /* ends the login */
+            if (group == SG_DEVICE && (service == SRV_DEV_SESSION_CREATE || service == SRV_DEV_LOGOUT))
+                continue; /* they end the login */
             (void)error_of(group, service, session);
             for (RTS_UI32 at = 0; at + 8 <= reply.size; at++)
                 for (RTS_UI32 part = 0; part < sizeof(kept.key); part += 8)
                     CHECK(memcmp(reply.message + at, kept.key + part, 8) != 0);
         }
     }
+    CHECK(SrvIsLoggedIn(ChannelGetClient(0)));
 }
 
 static void the_identity_is_there_for_all(void)
@@ -252,8 +253,11 @@ static void every_cut_leaves_the_old_or_the_new_one(void)
                 RTS_UI32 ops = SimFlashOps();
                 SimFlashCut(++operation, modes[mode]);
                 done = SimCall(change, (void *)second) == ERR_OK; /* a fault is no cut */
+                bool refused = done && set_result != ERR_OK;
                 done = done && (modes[mode] != SIM_FAULT || SimFlashOps() - ops < operation);
+                CHECK(!refused || keeps(first));
                 CHECK_EQUAL(SimStart(), ERR_OK);
+                CHECK(!refused || keeps(first));
                 CHECK(!gets_in_without());
                 CHECK(keeps(first) != keeps(second));
                 CHECK(gets_in(keeps(first) ? first : second));

@@ -345,8 +345,10 @@ RTS_RESULT AppPasswordSet(const USER_VERIFIER *verifier)
     read_text(text);
     state.password = *verifier;
     result = write_record(text);
-    if (result != ERR_OK)
+    if (result != ERR_OK) {
         state.password = before;
+        (void)write_record(text); /* the record may be there in spite of the error */
+    }
     return result;
 }
 

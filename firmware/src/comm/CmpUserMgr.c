@@ -4,7 +4,8 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * Guessing is slowed down by channel, not by peer: a peer can take another address, but there are only so many channels.
- * A stranger delays no client for longer than the pause, because one that has got a channel keeps it meanwhile.
+ * On a network a stranger delays no client for longer than the pause, because one that has got a channel keeps it
+ * meanwhile.
  */
 #include "CmpUserMgr.h"
 
