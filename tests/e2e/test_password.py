@@ -199,6 +199,9 @@ def test_it_survives_a_kill_and_plcrt_can_reset_it(tool, plcrt, counter, monkeyp
     assert (done.returncode, done.stderr) == (0, "") and "is removed" in done.stdout
     again = subprocess.run(reset, capture_output=True, text=True, timeout=60)
     assert again.returncode == 0 and "There is no password" in again.stdout
+    mistyped = plcrt.flash.with_suffix(".mistyped")
+    wrong = subprocess.run([*reset, "--flash", str(mistyped)], capture_output=True, text=True, timeout=60)
+    assert wrong.returncode != 0 and "No such file" in wrong.stderr and not mistyped.exists()
     plcrt.start()
     assert tool.ok("status", "--port", plcrt.port)["state"] == "run"
 

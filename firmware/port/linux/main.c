@@ -528,6 +528,10 @@ static bool open_when_free(const OPTIONS *options, PORT_REASON *reason)
 /* For users who have forgotten it: those who may write the file have the device anyway. */
 static int reset_password(const OPTIONS *options, PORT_REASON *reason)
 {
+    if (access(options->flash, F_OK) != 0) { /* opening would make it */
+        fprintf(stderr, "plcrt: %s: %s\n", options->flash, strerror(errno));
+        return EXIT_RUNTIME;
+    }
     if (!PortFlashOpen(options->flash, reason)) {
         fprintf(stderr, "plcrt: %s\n", reason->text);
         return EXIT_RUNTIME;
