@@ -48,8 +48,9 @@ from plctool.testing.plcrt import Plcrt  # noqa: E402
 KINDS = ("serial", "can", "tcp", "udp")
 PATIENCE = 30.0  # a client that is shut out for longer has been locked out [s]
 SETTLED = 8.0  # the device waits for no client longer than that [s]
-WARM_UP = 0.1  # share of the channels after which memory is measured first
+WARM_UP = 20  # channels of each line at least, or a tenth, after which memory is measured first
 MAX_GROWTH = 64  # KiB: pages of stacks that are used for the first time
+IN_USE = "invalid-state"  # code of a download while another client has one
 ECHO = 3000  # bytes: several packages
 INTERVAL_NS = 5_000_000  # of the task
 
@@ -134,7 +135,7 @@ class Line:
         while not self._try(action):
             if time.monotonic() > begin + PATIENCE:
                 raise PlcError(f"there was no place for longer than {PATIENCE} s", "soak")
-            time.sleep(self.random.uniform(0.01, 0.1))
+            time.sleep(random.uniform(0.01, 0.1))  # not of the seed: how often depends on the machine
         self.done[name] += 1
         self.longest = max(self.longest, time.monotonic() - begin)
 
@@ -190,15 +191,15 @@ class Line:
 
         try:
             services.download(Session(connection), self.other, restart=True, progress=go_until)
-        except LinkError:
-            raise
         except PlcError as error:
+            if error.code != IN_USE:
+                raise
             self.refused[error.code] += 1
 
     def fetch_nothing(self, connection: Connection) -> None:
         """Many requests, of whose replies one is read."""
         stream = connection.stream([b"\0" * ECHO] * 20)
-        with suppress(StopIteration, PlcError):
+        with suppress(StopIteration, LinkError):
             next(stream)
         raise Vanished
 
@@ -261,20 +262,24 @@ def to_udp(place: str) -> Callable[[bytes], None]:
 
 @dataclass(frozen=True)
 class Use:
-    """What the controller uses: memory in KiB, that it may write and that is in RAM, and files."""
+    """What the controller uses: memory in KiB, that it may write and what of it is in RAM, and files."""
 
     data: int
     resident: int
     files: int
 
     def __str__(self) -> str:
-        return f"{self.data} KiB of data, {self.resident} KiB resident, {self.files} files"
+        return f"{self.data} KiB of data, {self.resident} KiB in RAM, {self.files} files"
 
 
 def use_of(pid: int) -> Use:
-    status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
-    files = len(os.listdir(f"/proc/{pid}/fd"))
-    return Use(int(status["VmData"].split()[0]), int(status["VmRSS"].split()[0]), files)
+    """Exactly: the resident size of /proc/PID/status is not, and has pages of files. Raises OSError or KeyError when it
+    died."""
+    process = Path(f"/proc/{pid}")
+    lines = (process / "status").read_text() + (process / "smaps_rollup").read_text()
+    kib = {name: int(rest.split()[0]) for name, _, rest in (line.partition(":") for line in lines.splitlines())
+           if rest.endswith("kB")}  # fmt: skip
+    return Use(kib["VmData"], kib["Anonymous"], len(os.listdir(process / "fd")))
 
 
 def worker_of(plcrt: Plcrt) -> int:
@@ -294,13 +299,16 @@ class Soak:
 
     def run(self, channels: int) -> Use:
         """Until each line has had so many channels, or one has failed. What the controller uses then, when it has
-        missed those that vanished."""
+        missed those that vanished. Raises PlcError when it has died."""
         threads = [threading.Thread(target=self._serve, args=(line, channels)) for line in self.lines]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
-        return self._settled()
+        try:
+            return self._settled()
+        except (OSError, KeyError):
+            raise PlcError("the controller died", "soak") from None
 
     def _serve(self, line: Line, channels: int) -> None:
         try:
@@ -320,6 +328,11 @@ class Soak:
             if now.files != use.files:
                 use, since = now, time.monotonic()
         return now
+
+    def check_use(self, before: Use, after: Use) -> None:
+        print(f"before: {before}\nafter:  {after}")
+        if after.data > before.data or after.resident > before.resident + MAX_GROWTH or after.files > before.files:
+            raise PlcError("the controller uses more than before", "soak")
 
     def check_program(self, image: Path) -> tuple[int, int]:
         """Cycles and the longest delay of one [us]. Raises PlcError when the program is not as it was."""
@@ -365,21 +378,18 @@ def soak(folder: Path, channels: int, seed: int) -> list[str]:
             plc.flash(image)
         lines = lines_of(plcrt, hub, folder, seed)
         soaked, begin = Soak(lines, plcrt), time.monotonic()
-        before = soaked.run(round(channels * WARM_UP) + 1)
-        after = soaked.run(channels) if not soaked.errors else before
-        seconds = time.monotonic() - begin
-        for line in lines:
-            print(f"{line.kind:7} {line}")
-        print(f"before: {before}\nafter:  {after}")
-        errors = list(soaked.errors)
-        if after.data > before.data or after.resident > before.resident + MAX_GROWTH or after.files > before.files:
-            errors.append("the controller uses more than before")
         try:
+            before = soaked.run(max(WARM_UP, channels // 10))
+            after = soaked.run(channels)
+            soaked.check_use(before, after)
             cycles, delay = soaked.check_program(image)
+            seconds = time.monotonic() - begin
             print(f"{cycles} cycles of 5 ms in {seconds:.0f} s, delayed by {delay} us at most")
         except PlcError as error:
-            errors.append(str(error))
-        return errors
+            soaked.errors.append(str(error))
+        for line in lines:
+            print(f"{line.kind:7} {line}")
+        return soaked.errors
 
 
 # ---- in virtual time ----
@@ -396,9 +406,12 @@ def virtual(folder: Path, channels: int, seed: int) -> list[str]:
         "udp", "sim:", to_simulator, image.with_suffix(".sym"), other_image(folder), random.Random(f"{seed} virtual")
     )
     with Simulator.from_file(image) as plc:
-        while line.channels < channels:
-            lib.SimRunFor(line.random.randrange(3 * INTERVAL_NS))
-            line.turn()
+        try:
+            while line.channels < channels:
+                lib.SimRunFor(line.random.randrange(3 * INTERVAL_NS))
+                line.turn()
+        except PlcError as error:
+            return [f"virtual, channel {line.channels}: {error} ({error.code})"]
         cycles, damaged = plc.read("Main.cycles"), plc.read("Main.damaged")
         missing = lib.SimNow() // INTERVAL_NS + 1 - cycles  # the first one is at 0
     print(f"{'virtual':7} {line}; {cycles} cycles of 5 ms, {missing} missing")
