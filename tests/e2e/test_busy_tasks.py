@@ -75,7 +75,7 @@ def test_values_of_a_freewheeling_task_are_read_between_its_cycles(tool, connect
 
 
 LOOPS = """VAR_GLOBAL
-    run : BOOL;
+    run, looping : BOOL;
     n : DINT;
 END_VAR
 PROGRAM Loops
@@ -84,6 +84,7 @@ VAR
 END_VAR
 n := n + 1;
 WHILE run DO
+    looping := TRUE;
     x := x + 1;
 END_WHILE
 END_PROGRAM
@@ -100,10 +101,10 @@ END_CONFIGURATION
 """
 
 
-def test_tasks_that_take_all_processors_can_be_stopped(tool, connected):
+def test_tasks_that_take_all_processors_can_be_stopped(tool, connected, eventually):
     connected.flash(tool.build("loops", LOOPS, "-O0"))
     connected.write({"run": True})
-    connected.status()
+    eventually(lambda: connected.read("looping"))
     connected.stop()
     exception = connected.status().exception
     assert exception is not None and exception.name == "STOP_TIMEOUT"
