@@ -453,7 +453,31 @@ class Jump(Node):
     pos: Pos
 
 
-Statement = Assign | CallStatement | FbCall | If | Case | For | While | Repeat | Exit | Continue | Return | Label | Jump
+@dataclass
+class Catch(Node):
+    """What follows an exception. `exception`: takes its number, RTSEXCPT_*."""
+
+    children: ClassVar = ("exception", "body")
+    exception: Place
+    body: list[Statement]
+    pos: Pos
+
+
+@dataclass
+class Try(Node):
+    """`body`; an exception in it or in what it calls goes on in `catch`. `last` runs after these, however they are
+    left; nothing leads out of it but an exception."""
+
+    children: ClassVar = ("body", "catch", "last")
+    body: list[Statement]
+    catch: Catch | None
+    last: list[Statement]
+    pos: Pos
+
+
+Statement = (
+    Assign | CallStatement | FbCall | If | Case | For | While | Repeat | Exit | Continue | Return | Label | Jump | Try
+)
 
 
 # ---- program organisation units and the whole -----------------------------------------------------------------------

@@ -11,6 +11,7 @@ from plctool.compiler.typed import (
     Assign,
     BitPlace,
     Call,
+    Catch,
     Const,
     Continue,
     DerefPlace,
@@ -97,6 +98,8 @@ def written_places(node: object) -> Iterator[Place]:
         yield node.target
     elif isinstance(node, For):
         yield node.var
+    elif isinstance(node, Catch):
+        yield node.exception
     elif isinstance(node, AddressOf):
         yield node.place
     elif isinstance(node, FbCall):

@@ -16,6 +16,7 @@ from plctool.compiler.typed import (
     Assign,
     BitPlace,
     Call,
+    Catch,
     Const,
     Direction,
     FbCall,
@@ -219,6 +220,8 @@ class _Units:
             self._write(node.target, unit)
         elif isinstance(node, For):
             self._write(node.var, unit)
+        elif isinstance(node, Catch):
+            self._write(node.exception, unit)
         elif isinstance(node, FbCall):
             called = list(callees(node))
             unit.callees += called
