@@ -243,8 +243,8 @@ class Writer:
 
     def variables(self) -> str:
         """The VAR section every unit has; it fills `names`."""
-        lines, names = ["p : Point;", "row : Row;", "both : Both;", "tally : DINT;", "in_level : Level;"]
-        lines.append("trouble : __SYSTEM.ExceptionCode;"), self.names
+        lines, names = ["p : Point;", "row : Row;", "both : Both;", "tally : DINT;", "in_level : Level;"], self.names
+        lines.append("trouble : __SYSTEM.ExceptionCode;")
         names.clear()
         names |= {"number": ["p.x", "tally", "row[0]", "both.d", "in_level"], "real": ["p.y"], "time": [], "enum": []}
         names |= {"bool": ["p.on", "both.b[1].3"], "text": ["p.name"]}

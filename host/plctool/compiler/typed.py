@@ -454,23 +454,15 @@ class Jump(Node):
 
 
 @dataclass
-class Catch(Node):
-    """What follows an exception. `exception`: takes its number, RTSEXCPT_*."""
-
-    children: ClassVar = ("exception", "body")
-    exception: Place
-    body: list[Statement]
-    pos: Pos
-
-
-@dataclass
 class Try(Node):
-    """`body`; an exception in it or in what it calls goes on in `catch`. `last` runs after these, however they are
-    left; nothing leads out of it but an exception."""
+    """`body`; `exception` gets the number (RTSEXCPT_*) of an exception in it or in what it calls, which goes on in
+    `caught`; outward if that is None. `last` runs after these, however they are left; nothing leads out of it but an
+    exception."""
 
-    children: ClassVar = ("body", "catch", "last")
+    children: ClassVar = ("body", "exception", "caught", "last")
     body: list[Statement]
-    catch: Catch | None
+    exception: Place | None
+    caught: list[Statement]
     last: list[Statement]
     pos: Pos
 

@@ -11,7 +11,6 @@ from plctool.compiler.typed import (
     Assign,
     BitPlace,
     Call,
-    Catch,
     Const,
     Continue,
     DerefPlace,
@@ -26,6 +25,7 @@ from plctool.compiler.typed import (
     Pou,
     SelfPlace,
     Storage,
+    Try,
     ValuePlace,
     Variable,
     VarPlace,
@@ -98,7 +98,7 @@ def written_places(node: object) -> Iterator[Place]:
         yield node.target
     elif isinstance(node, For):
         yield node.var
-    elif isinstance(node, Catch):
+    elif isinstance(node, Try) and node.exception is not None:
         yield node.exception
     elif isinstance(node, AddressOf):
         yield node.place

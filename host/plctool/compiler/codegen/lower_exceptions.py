@@ -86,7 +86,7 @@ def try_statement(frame: Body, s: Try) -> None:
 
 def _with_catch(frame: Body, s: Try) -> None:
     fn, outer = frame.fn, frame.handler
-    if s.catch is None:
+    if s.exception is None:
         frame.statements(s.body)
         return
     label, end = fn.label("catch"), fn.label("endtry")
@@ -96,12 +96,12 @@ def _with_catch(frame: Body, s: Try) -> None:
     fn.branch(end)
     frame.write_raises(handler)
     fn.begin_detached(label)
-    frame.at(s.catch.pos)
+    frame.at(s.exception.pos)
     code = fn.value(f"load i32, ptr {frame.raised}")
     frame.set_raised(number(0))
-    place: Ref = frame.ref(s.catch.exception)
+    place: Ref = frame.ref(s.exception)
     frame.store(place, code)
-    frame.statements(s.catch.body)
+    frame.statements(s.caught)
     fn.begin(end)
 
 

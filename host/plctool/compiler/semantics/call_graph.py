@@ -16,7 +16,6 @@ from plctool.compiler.typed import (
     Assign,
     BitPlace,
     Call,
-    Catch,
     Const,
     Direction,
     FbCall,
@@ -30,6 +29,7 @@ from plctool.compiler.typed import (
     SelfPlace,
     Storage,
     Task,
+    Try,
     Variable,
     VarPlace,
 )
@@ -220,7 +220,7 @@ class _Units:
             self._write(node.target, unit)
         elif isinstance(node, For):
             self._write(node.var, unit)
-        elif isinstance(node, Catch):
+        elif isinstance(node, Try) and node.exception is not None:
             self._write(node.exception, unit)
         elif isinstance(node, FbCall):
             called = list(callees(node))

@@ -110,7 +110,7 @@ def has_exit(statements: list[Statement], leaving: tuple[type[Statement], ...] =
         if isinstance(statement, If | Case):
             bodies = [*(body for _, body in statement.branches), statement.otherwise]
         elif isinstance(statement, Try):
-            bodies = [statement.body, statement.catch.body if statement.catch is not None else []]
+            bodies = [statement.body, statement.caught]
         if isinstance(statement, leaving) or any(has_exit(body, leaving) for body in bodies):
             return True
     return False

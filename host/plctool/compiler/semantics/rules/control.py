@@ -19,7 +19,6 @@ from plctool.compiler.semantics.symbols import ERROR, Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Case,
-    Catch,
     Const,
     Continue,
     Exit,
@@ -27,6 +26,7 @@ from plctool.compiler.typed import (
     For,
     If,
     Jump,
+    Place,
     Repeat,
     Return,
     Statement,
@@ -97,7 +97,7 @@ def _ends(statements: list[Statement]) -> bool:
     if isinstance(last, If | Case):
         return _ends(last.otherwise) and all(_ends(body) for _, body in last.branches)
     if isinstance(last, Try):
-        return _ends(last.body) and (last.catch is None or _ends(last.catch.body))
+        return _ends(last.body) and (last.exception is None or _ends(last.caught))
     if isinstance(last, While):
         return _is_constant(last.condition, 1) and not has_exit(last.body)
     if isinstance(last, Repeat):
@@ -358,18 +358,18 @@ def try_statement(c: Checker, node: ast.Try) -> list[Statement]:
         message = "this __TRY has no __CATCH; write __CATCH(exc), exc : __SYSTEM.ExceptionCode, and what to do then"
         c.error(node.pos, "statement", message)
     body = check_body(c, node.body)
-    catch = None if node.catch is None else _catch(c, node.catch)
-    return [Try(body, catch, _last(c, node.last or []), pos)]
+    exception = None if node.catch is None else _exception(c, node.catch.var)
+    caught = [] if node.catch is None else check_body(c, node.catch.body)
+    return [Try(body, exception, caught, _last(c, node.last or []), pos)]
 
 
-def _catch(c: Checker, node: ast.Catch) -> Catch | None:
-    place = changeable_place(c, node.var, "__CATCH", "take the number of an exception")
-    body = check_body(c, node.body)
-    if place is None:
-        return None
-    if not isinstance(place.type, EnumType) or place.type.name.casefold() != "exceptioncode":
-        c.error(node.var.pos, "type", f"__CATCH needs a variable of __SYSTEM.ExceptionCode, not of {place.type}")
-    return Catch(place, body, c.pos(node.var.pos))
+def _exception(c: Checker, node: ast.Expr) -> Place | None:
+    """The variable that takes the number of an exception."""
+    place = changeable_place(c, node, "__CATCH", "take the number of an exception")
+    t = None if place is None else place.type
+    if t is not None and (not isinstance(t, EnumType) or t.name.casefold() != "exceptioncode"):
+        c.error(node.pos, "type", f"__CATCH needs a variable of __SYSTEM.ExceptionCode, not of {t}")
+    return place
 
 
 def _last(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
