@@ -21,7 +21,7 @@ from plctool.compiler.semantics.assertions import FAILED, NUMBER, Assertion, Ope
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.controller import ExceptionInfo
-from plctool.core import ffi, lib
+from plctool.core import lib
 from plctool.debug.symbols import SourceLine
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
@@ -109,8 +109,9 @@ class TestProgram:
 
     def run(self, numbers: Iterable[int]) -> Iterator[Outcome]:
         """Runs the tests with these indices in `cases`, each from a cold start."""
-        with _more_time(), Simulator(self._built.image, self._built.symbols, start=False) as plc:
-            bench = _Bench(plc, self._built, self._suite, self._program.area_sizes)
+        built = self._built
+        with Simulator(built.image, built.symbols, start=False, cycle_limit_ms=LIMIT_MS) as plc:
+            bench = _Bench(plc, built, self._suite, self._program.area_sizes)
             for number in numbers:
                 yield bench.run(number)
 
@@ -121,22 +122,16 @@ def _fits(name: str, pattern: str) -> bool:
 
 @contextmanager
 def _power() -> Iterator[None]:
-    """The simulator without a program: so that the compiler can see which C functions there are."""
-    lib.SimStart()
+    """The first simulator is on, with or without a program: so that the compiler can see which C functions there
+    are."""
+    begin = not lib.SimIsOn()
+    if begin:
+        lib.SimStart()
     try:
         yield
     finally:
-        lib.SimStop()
-
-
-@contextmanager
-def _more_time() -> Iterator[None]:
-    """A cycle of the simulator may be as long as a test."""
-    lib.SimSetCycleLimit(LIMIT_MS)
-    try:
-        yield
-    finally:
-        lib.SimSetCycleLimit(0)
+        if begin:
+            lib.SimStop()
 
 
 class _Bench:
@@ -168,11 +163,11 @@ class _Bench:
 
     def _continue(self, number: int) -> None:
         """Runs the test with this number on the variables as they are after an exception."""
-        areas = {lib.AppGetAreaAddress(area.value, 0, size): size for area, size in self._sizes.items() if size}
-        kept = {address: bytes(ffi.buffer(address, size)) for address, size in areas.items()}
+        areas = [self._plc.memory(area, 0, size) for area, size in self._sizes.items() if size]
+        kept = [bytes(area) for area in areas]
         self._plc.reset("cold")
-        for address, content in kept.items():
-            ffi.memmove(address, content, len(content))
+        for area, content in zip(areas, kept, strict=True):
+            area[:] = content
         self._cycle(number)
 
     def _exception(self, case: TestCase) -> Failure | None:
