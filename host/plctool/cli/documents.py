@@ -236,9 +236,7 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
     }
 
 
-def test(
-    settings: Settings, pattern: str, junit: Path | None, coverage: Path | None
-) -> tuple[Document, TestReport]:
+def test(settings: Settings, pattern: str, junit: Path | None, coverage: Path | None) -> tuple[Document, TestReport]:
     """Runs the unit tests of a program, and writes their report to `junit` as well, and which lines ran into the folder
     `coverage`."""
     from plctool import st_tests
