@@ -286,6 +286,7 @@ class Intrinsic(Enum):
     TIME = "TIME"  # () -> TIME of this cycle [ms]
     LTIME = "LTIME"  # () -> LTIME of this cycle [ns]
     BITCAST = "BITCAST"  # same size, bits kept (REAL <-> DWORD, LREAL <-> LWORD)
+    EXCHANGE = "EXCHANGE"  # (address of a DINT, old, new) -> BOOL: it was old and is new, in one step
     STRING_SIZE = "STRING_SIZE"  # (string place load) -> capacity in characters of the actual argument
 
 
@@ -467,8 +468,40 @@ class Try(Node):
     pos: Pos
 
 
+@dataclass
+class Initialise(Node):
+    """Gives a place the initial value of its type, whatever it held."""
+
+    children: ClassVar = ("place",)
+    place: Place
+    pos: Pos
+
+
+@dataclass
+class Raise(Node):
+    """Raises RTSEXCPT_* `code`, whatever is checked."""
+
+    code: int
+    pos: Pos
+
+
 Statement = (
-    Assign | CallStatement | FbCall | If | Case | For | While | Repeat | Exit | Continue | Return | Label | Jump | Try
+    Assign
+    | CallStatement
+    | FbCall
+    | If
+    | Case
+    | For
+    | While
+    | Repeat
+    | Exit
+    | Continue
+    | Return
+    | Label
+    | Jump
+    | Try
+    | Initialise
+    | Raise
 )
 
 

@@ -19,6 +19,7 @@ from plctool.compiler.typed import (
     FbCall,
     For,
     IndexPlace,
+    Initialise,
     MemberPlace,
     Node,
     Place,
@@ -98,6 +99,8 @@ def written_places(node: object) -> Iterator[Place]:
         yield node.target
     elif isinstance(node, For):
         yield node.var
+    elif isinstance(node, Initialise):
+        yield node.place
     elif isinstance(node, Try) and node.exception is not None:
         yield node.exception
     elif isinstance(node, AddressOf):

@@ -48,6 +48,11 @@ class Target:
     )
 
     @property
+    def exchanges(self) -> bool:
+        """Whether the processor compares and exchanges a word in one step, as tasks that interrupt each other need."""
+        return self.machine is not Machine.THUMB_V6M
+
+    @property
     def compact(self) -> bool:
         """Whether programs are in a small flash."""
         return self.pointer_size == 4

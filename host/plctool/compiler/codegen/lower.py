@@ -18,6 +18,7 @@ from plctool.compiler.codegen.string_functions import string_function
 from plctool.compiler.internal import note_position
 from plctool.compiler.typed import External, Pou, Task, TypedProgram, Variable
 from plctool.core import lib
+from plctool.errors import UsageError
 from plctool.iec.areas import Area
 from plctool.iec.types import BOOL, is_scalar
 
@@ -67,6 +68,12 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
             (dispatch, raises), name = list(unit.dispatchers.items())[chosen]
             write_dispatcher(unit, name, dispatch, raises=raises)
             chosen += 1
+    if unit.exchanges and len(program.tasks) > 1 and not unit.target.exchanges:
+        raise UsageError(
+            f"__NEW in a program with several tasks needs a processor that compares and exchanges in one step, which "
+            f"{unit.target.name} does not; use one task, or another target.",
+            "target",
+        )
     _struct_initialisers(unit)
     for name in sorted(unit.helpers):
         unit.module.add_helper(string_function(name, unit.target, unit.strings))

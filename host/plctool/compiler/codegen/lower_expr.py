@@ -196,6 +196,8 @@ def intrinsic(frame: Frame, e: IntrinsicCall) -> Value:
         choice, no, yes = truth(frame, e.args[0]), frame.value(e.args[1]), frame.value(e.args[2])
         return select(frame, choice, yes, no, t)
     values = [frame.value(arg) for arg in e.args]
+    if op is Intrinsic.EXCHANGE:
+        return _exchange(frame, *values)
     if op in (Intrinsic.SHL, Intrinsic.SHR):
         return shift(frame, op, values[0], t, values[1], e.args[1].type, known_integer(e.args[1]))
     if op in (Intrinsic.ROL, Intrinsic.ROR):
@@ -210,6 +212,19 @@ def intrinsic(frame: Frame, e: IntrinsicCall) -> Value:
         return square_root(frame, values[0], t)
     assert op is Intrinsic.BITCAST, op
     return bitcast(frame, values[0], first, t)
+
+
+def _exchange(frame: Frame, address: Value, old: Value, new: Value) -> Value:
+    """Whether a DINT was `old`; then it is `new`."""
+    fn = frame.fn
+    frame.unit.exchanges = True
+    if frame.unit.target.exchanges:
+        pair = fn.value(f"cmpxchg ptr {address}, i32 {old}, i32 {new} seq_cst seq_cst")
+        return fn.value(f"zext i1 {fn.value(f'extractvalue {{ i32, i1 }} {pair}, 1')} to i8")
+    found = fn.value(f"load i32, ptr {address}")
+    same = fn.value(f"icmp eq i32 {found}, {old}")
+    fn.do(f"store i32 {fn.value(f'select i1 {same}, i32 {new}, i32 {found}')}, ptr {address}")
+    return fn.value(f"zext i1 {same} to i8")
 
 
 def _choose(frame: Frame, selector: Value, selector_type: Type, values: list[Value], text: str) -> Value:

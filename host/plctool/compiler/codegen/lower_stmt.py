@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from plctool.compiler.codegen.ir import FALSE
 from plctool.compiler.codegen.lower_blocks import assign_aggregate
 from plctool.compiler.codegen.lower_calls import call_function
 from plctool.compiler.codegen.lower_expr import truth
 from plctool.compiler.codegen.lower_frame import STATEMENTS, Body, rule
+from plctool.compiler.codegen.lower_init import initialise
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.codegen.signatures import result_in_memory
 from plctool.compiler.typed import (
@@ -17,10 +19,12 @@ from plctool.compiler.typed import (
     Exit,
     Expr,
     If,
+    Initialise,
     Jump,
     Label,
     Load,
     Place,
+    Raise,
     Return,
     Storage,
     Variable,
@@ -61,6 +65,20 @@ def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
         for node in walk(arguments)
         if isinstance(node, VarPlace)
     )
+
+
+@rule(STATEMENTS, Initialise)
+def initialised(frame: Body, s: Initialise) -> None:
+    """As at the start of the program."""
+    ref = frame.ref(s.place)
+    frame.clear(ref)
+    initialise(frame, ref, None)
+
+
+@rule(STATEMENTS, Raise)
+def raised(frame: Body, s: Raise) -> None:
+    """An exception in any case."""
+    frame.require(FALSE, s.code, s.pos)
 
 
 @rule(STATEMENTS, CallStatement)

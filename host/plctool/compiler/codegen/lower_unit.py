@@ -101,6 +101,7 @@ class Unit:
         self.area_sizes = area_sizes
         self.defaults = defaults
         self.imports: list[External] = []
+        self.exchanges = False  # tasks exclude each other by Intrinsic.EXCHANGE
         self._sections: set[Pou] = set()
         self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
         self.pous: dict[tuple[Pou, bool], str] = {}  # symbol of every POU; True: returns its exceptions

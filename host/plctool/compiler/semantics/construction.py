@@ -21,11 +21,13 @@ from plctool.compiler.semantics.instances import (
     starters,
 )
 from plctool.compiler.semantics.symbols import NOTHING, Member
-from plctool.compiler.semantics.world import World
+from plctool.compiler.semantics.world import Pool, World
 from plctool.compiler.typed import (
     AddressOf,
     ArrayInit,
     Assign,
+    Binary,
+    BinaryOp,
     Call,
     CallStatement,
     ComputedInit,
@@ -80,18 +82,21 @@ def construct(world: World) -> tuple[Pou | None, Pou | None]:
     start = Pou("FB_Init", PouKind.FUNCTION, Pos("", 1, 1))
     flag = Variable("init_retains", BOOL, Storage.LOCAL, start.pos)
     start.parameters.append(Parameter(flag, Direction.INPUT))
-    builder = _Construction(world, start, Load(VarPlace(flag, BOOL, start.pos), BOOL, start.pos))
-    for variable in world.allocation.variables:
+    builder = Construction(world, start, Load(VarPlace(flag, BOOL, start.pos), BOOL, start.pos))
+    pools = {pool.elements for pool in world.pools.values()}
+    variables = [variable for variable in world.allocation.variables if variable not in pools]
+    for variable in variables:
         start.body += builder.variable(variable)
     if start.body:
         world.pous.append(start)
     for pou in world.pous:
         if pou is not start:
-            local = _Construction(world, pou, Const(1, BOOL, pou.pos))
+            local = Construction(world, pou, Const(1, BOOL, pou.pos))
             pou.body = [s for v in list(pou.locals) for s in local.variable(v)] + pou.body
     end = Pou("FB_Exit", PouKind.FUNCTION, Pos("", 1, 1))
-    exits = _Destruction(world, end)
-    end.body = [s for v in reversed(world.allocation.variables) for s in exits.variable(v)]
+    exits = Destruction(world, end)
+    end.body = [s for pool in world.pools.values() for s in exits.pool(pool, world.closers[pool.type])]
+    end.body += [s for v in reversed(variables) for s in exits.variable(v)]
     if end.body:
         world.pous.append(end)
     return start if start.body else None, end if end.body else None
@@ -113,7 +118,9 @@ def _kept_function() -> Pou:
 _KEPT = _kept_function()
 
 
-class _Construction:
+class Construction:
+    """The FB_Init of what variables hold, and the initial values that are calculated, written into `pou`."""
+
     def __init__(self, world: World, pou: Pou, init_retains: Expr) -> None:
         self._world = world
         self._pou = pou
@@ -124,7 +131,7 @@ class _Construction:
         """What a variable and all instances in it need."""
         keep = variable.keep if variable.area is Area.RETAIN else None
         path = variable.name if variable.storage is Storage.AREA else f"{self._pou.name}.{variable.name}"
-        return self._place(whole(variable, variable.pos), variable.initial, variable.pos, keep, path)
+        return self.place(whole(variable, variable.pos), variable.initial, variable.pos, keep, path)
 
     def _needs(self, t: Type) -> bool:
         while isinstance(t, ArrayType):
@@ -139,8 +146,8 @@ class _Construction:
             self._needed[t] = known
         return known
 
-    def _place(self, place: Place, initial: Initial | None, pos: Pos, keep: Keep | None, path: str) -> list[Statement]:
-        """`keep`: None outside of the retain area; `path`: the name of the place."""
+    def place(self, place: Place, initial: Initial | None, pos: Pos, keep: Keep | None, path: str) -> list[Statement]:
+        """What a place and all instances in it need. `keep`: None outside of the retain area; `path`: its name."""
         t = place.type
         if isinstance(initial, ComputedInit):
             assign = Assign(place, initial.value, pos)
@@ -158,7 +165,7 @@ class _Construction:
         named = path_members(self._world, t)
         for f in t.fields:
             part, own = MemberPlace(place, f.offset, f.type, pos), None if keep is None else keep.of_member(f.keep)
-            statements += self._place(part, complete.members.get(f.name), pos, own, f"{path}.{f.name}")
+            statements += self.place(part, complete.members.get(f.name), pos, own, f"{path}.{f.name}")
             if f.name in named and isinstance(f.type, StringType):
                 statements.append(Assign(part, Const(path[: f.type.length], f.type, pos), pos))
         for member in initialisers(self._world, t):
@@ -206,12 +213,12 @@ class _Construction:
         for count, value in runs:
             if count >= _LOOP_FROM and not self._is_named(t.element):
                 loop, element = _loop(self._pou, base, t.element, first, first + count - 1)
-                loop.body = self._place(element, value, pos, keep, path)
+                loop.body = self.place(element, value, pos, keep, path)
                 statements.append(loop)
             else:
                 for n in range(first, first + count):
                     element = IndexPlace(base, [Const(n, DINT, pos)], t.element, pos)
-                    statements += self._place(element, value, pos, keep, f"{path}[{_index_text(t, n)}]")
+                    statements += self.place(element, value, pos, keep, f"{path}[{_index_text(t, n)}]")
             first += count
         return statements
 
@@ -245,7 +252,7 @@ class _Construction:
         return CallStatement(Call(info.pou, args, result, pos, instance=place), pos)
 
 
-class _Destruction:
+class Destruction:
     """The FB_Exit of what variables hold: of a derived block before that of its base, of a block before its members."""
 
     def __init__(self, world: World, pou: Pou) -> None:
@@ -254,20 +261,33 @@ class _Destruction:
 
     def variable(self, variable: Variable) -> list[Statement]:
         """The calls for a variable and all instances in it."""
-        return self._place(VarPlace(variable, variable.type, variable.pos))
+        return self.place(VarPlace(variable, variable.type, variable.pos))
 
-    def _place(self, place: Place) -> list[Statement]:
+    def pool(self, pool: Pool, closer: Pou) -> list[Statement]:
+        """The calls for what __NEW made and nothing deleted."""
+        pos = pool.elements.pos
+        loop, element = _loop(self._pou, whole(pool.elements, pos), pool.type, 0, pool.count - 1)
+        if not self.place(element):
+            return []
+        state = IndexPlace(whole(pool.state, pos), element.indices, DINT, pos)
+        made = Binary(BinaryOp.GT, Load(state, DINT, pos), Const(1, DINT, pos), BOOL, pos)
+        ended = Call(closer, [AddressOf(element, RawPointerType(BYTE), pos)], BOOL, pos)
+        loop.body = [If([(made, [CallStatement(ended, pos)])], [], pos)]
+        return [loop]
+
+    def place(self, place: Place) -> list[Statement]:
+        """The calls for a place and all instances in it."""
         t, pos = place.type, place.pos
         if not any(finalisers(self._world, instance) for instance in instances_in(t)):
             return []
         if isinstance(t, ArrayType):
             loop, element = _loop(self._pou, _flat(place, t, pos), t.element, t.count - 1, 0)
-            loop.body = self._place(element)
+            loop.body = self.place(element)
             return [loop]
         assert isinstance(t, StructType)
         statements = [self._call(member, place) for member in finalisers(self._world, t)]
         for f in reversed(t.fields):
-            statements += self._place(MemberPlace(place, f.offset, f.type, pos))
+            statements += self.place(MemberPlace(place, f.offset, f.type, pos))
         return statements
 
     def _call(self, member: Member, place: Place) -> Statement:
@@ -290,7 +310,7 @@ def _index_text(t: ArrayType, number: int) -> str:
     return ",".join(reversed(found))
 
 
-def _loop(pou: Pou, base: Place, t: Type, first: int, last: int) -> tuple[For, Place]:
+def _loop(pou: Pou, base: Place, t: Type, first: int, last: int) -> tuple[For, IndexPlace]:
     """A loop over elements of an array, upwards or downwards, without a body; and the element it is about."""
     pos = base.pos
     counter = Variable(f"element {len(pou.locals)}", DINT, Storage.LOCAL, pos)

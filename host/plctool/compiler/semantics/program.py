@@ -21,6 +21,7 @@ from plctool.compiler.semantics.declarations.unit_variables import UnitVariables
 from plctool.compiler.semantics.declarations.variables import Variables
 from plctool.compiler.semantics.generics import describes_any, is_generic
 from plctool.compiler.semantics.pitfalls import report_endless
+from plctool.compiler.semantics.pools import write_pools
 from plctool.compiler.semantics.rules.control import report_unused, write_body
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.sfc_statements import statements_of
@@ -84,6 +85,7 @@ class Program:
             checked += self._check_queue()
         for scope in checked:
             report_unused(scope)
+        write_pools(world)
         self.startup, self.shutdown = construct(world)
         world.pous += world.dispatches.queries.pous()
         self._classes.find_targets(

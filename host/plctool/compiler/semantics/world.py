@@ -84,6 +84,20 @@ class Declared:
     interface: Callable[[PouSymbol], InterfaceType]
 
 
+# ---- what __NEW takes ----
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """The elements of a type for __NEW, with the state of each of them. `create`: takes and initialises them."""
+
+    type: StructType
+    count: int
+    elements: Variable
+    state: Variable
+    create: Pou
+
+
 # ---- the check of one program ----
 
 
@@ -112,6 +126,8 @@ class World:
         self._texts: dict[tuple[int | float | str, Type], Variable] = {}
         self._parameter_defaults: dict[tuple[str, int], Variable] = {}
         self.constants: dict[str, Const] = {}  # that have no memory, by full name
+        self.pools: dict[StructType, Pool] = {}
+        self.closers: dict[StructType, Pou] = {}  # what ends the elements that a POINTER TO the type leads to
         self.clock: dict[str, Variable] | None = None  # what TIME and LTIME read in unit tests
         self.pous: list[Pou] = []
         self.loops: list[tuple[Pou, Loop]] = []  # of the program, each with the unit it stands in

@@ -19,6 +19,7 @@ Attributes = dict[int, dict[str, str]]
 HEEDED: dict[str, frozenset[str]] = {
     "qualified_only": frozenset(("VAR_GLOBAL", "enumeration")),
     "pack_mode": frozenset(("STRUCT",)),
+    "pool": frozenset(("STRUCT", "FUNCTION_BLOCK")),
     "strict": frozenset(("enumeration",)),
     "to_string": frozenset(("enumeration",)),
     "call_after_init": frozenset(("FUNCTION_BLOCK", "METHOD")),

@@ -84,11 +84,7 @@ REFUSED = {
 }
 """Words that begin what this compiler leaves out."""
 
-_NO_MEMORY = "nothing is allocated while the program runs; declare an instance, or an array of them"
-
 REFUSED_CALLS = {
-    "__NEW": _NO_MEMORY,
-    "__DELETE": _NO_MEMORY,
     "BITADR": "a bit has no address of its own here; use the variable itself, or ADR and a bit number",
     "INDEXOF": "a POU has no number here; call it by its name",
     "INI": "an instance gets its initial values when the program starts; assign them one by one",

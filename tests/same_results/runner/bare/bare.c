@@ -204,3 +204,11 @@ __attribute__((naked)) void IecCall(uintptr_t entry, const IEC_CONTEXT *context,
 #error "bare.c: say how this processor enters compiled code."
 #endif
 }
+
+/* ---- functions of a host ---- */
+
+/* There is no host here that could implement functions. */
+RTS_RESULT SimFunctionsRegister(void)
+{
+    return ERR_OK;
+}

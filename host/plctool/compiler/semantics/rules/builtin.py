@@ -167,6 +167,16 @@ def _string_size(c: Checker, f: Applied) -> Expr:
     return IntrinsicCall(Intrinsic.STRING_SIZE, [loaded], UDINT, c.pos(f.node.pos))
 
 
+def _exchange(c: Checker, f: Applied) -> Expr:
+    """`__EXCHANGE(variable, old, new)` of the standard library."""
+    if not c.scope.library:
+        return c.missing(f.node.pos, f.name, f"unknown function {f.name}")
+    variable, old, new = f.args
+    address = AddressOf(place_of(variable), PointerType(DINT), variable.pos)
+    args: list[Expr] = [address, c.coerce(old, DINT), c.coerce(new, DINT)]
+    return IntrinsicCall(Intrinsic.EXCHANGE, args, BOOL, c.pos(f.node.pos))
+
+
 def _bound(c: Checker, f: Applied) -> Expr:
     """`LOWER_BOUND(array, dimension)`"""
     array, dimension = f.args
@@ -190,6 +200,7 @@ def _bound(c: Checker, f: Applied) -> Expr:
 
 _ON_VARIABLES: dict[str, BuiltIn] = {
     "STRING_SIZE": BuiltIn(_string_size, 1, 1),
+    "__EXCHANGE": BuiltIn(_exchange, 3, 3),
     "LOWER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
     "UPPER_BOUND": BuiltIn(_bound, 2, 2, named("ARR", "DIM")),
 }

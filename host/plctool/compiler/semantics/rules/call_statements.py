@@ -23,6 +23,7 @@ from plctool.compiler.semantics.rules.arguments import (
 from plctool.compiler.semantics.rules.calls import body_dispatch, call
 from plctool.compiler.semantics.rules.members import bound_member, called_program, is_called_by_name, variable_value
 from plctool.compiler.semantics.rules.places import changeable_place
+from plctool.compiler.semantics.rules.pools import DELETE, delete
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, BlockInfo, GlobalSymbol, ProgramInfo, Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
@@ -238,6 +239,8 @@ def call_statement(c: Checker, statement: ast.ExprStmt) -> list[Statement]:
         special = c.special_calls.get(node.callee.name.upper())
         if special is not None:
             return special(node)
+        if node.callee.name.upper() == DELETE:
+            return delete(c, node)
     if not isinstance(node, ast.Call) and is_called_by_name(c, node):
         node = ast.Call(node.pos, node, [])
     if isinstance(node, ast.Call):

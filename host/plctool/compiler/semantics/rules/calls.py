@@ -15,6 +15,7 @@ from plctool.compiler.semantics.rules.builtin import QUERIES, built_in_call, fun
 from plctool.compiler.semantics.rules.intrinsics import overloaded_form
 from plctool.compiler.semantics.rules.library_calls import call_symbol, call_text_function, overload_call
 from plctool.compiler.semantics.rules.members import Bound, bound_member, dotted_name, instance_member, usable
+from plctool.compiler.semantics.rules.pools import DELETE, NEW, new
 from plctool.compiler.semantics.symbols import (
     ERROR,
     BlockInfo,
@@ -173,6 +174,10 @@ def call(c: Checker, node: ast.Call, expected: Type | None) -> Expr:
     callee = node.callee
     if isinstance(callee, ast.Name) and callee.name.upper() in QUERIES:
         return query(c, node)
+    if isinstance(callee, ast.Name) and callee.name.upper() == NEW:
+        return new(c, node)
+    if isinstance(callee, ast.Name) and callee.name.upper() == DELETE:
+        return c.error(node.pos, "statement", "__DELETE is a statement and has no value")
     bound = bound_member(c, callee, called=True)
     if bound is not None:
         return method_call(c, bound, node)

@@ -15,7 +15,7 @@ from plctool.compiler.semantics.pitfalls import has_exit
 from plctool.compiler.semantics.rules.jumps import note_loops, report_leaving, report_repeated
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.scope import Scope
-from plctool.compiler.semantics.symbols import ERROR, Role, VarSymbol
+from plctool.compiler.semantics.symbols import ERROR, Role, TypeSymbol, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import (
     Case,
@@ -366,10 +366,12 @@ def try_statement(c: Checker, node: ast.Try) -> list[Statement]:
 def _exception(c: Checker, node: ast.Expr) -> Place | None:
     """The variable that takes the number of an exception."""
     place = changeable_place(c, node, "__CATCH", "take the number of an exception")
-    t = None if place is None else place.type
-    if t is not None and (not isinstance(t, EnumType) or t.name.casefold() != "exceptioncode"):
-        c.error(node.pos, "type", f"__CATCH needs a variable of __SYSTEM.ExceptionCode, not of {t}")
-    return place
+    wanted = c.world.names.unit("exceptioncode", library=True)
+    assert isinstance(wanted, TypeSymbol)
+    if place is None or place.type is c.world.declared.type_of(wanted):
+        return place
+    c.error(node.pos, "type", f"__CATCH needs a variable of __SYSTEM.ExceptionCode, not of {place.type}")
+    return None
 
 
 def _last(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
