@@ -39,26 +39,31 @@ CLOCKS = {
 
 @dataclass(frozen=True)
 class Machine:
-    """How QEMU is called for a machine: its program, what keeps applications (`{file}`), by which option it takes
-    firmware, and the size of that file, with which it has to begin: erased, or as if it had never been."""
+    """How QEMU is called for a machine: its program, what keeps applications (`{file}`), and by which option it takes
+    firmware. `flash_size`: of that file, of which the first `erased` bytes are; the others are as if they had never
+    been. `flash_base`: where it is in memory; `has_commands`: stores into it are commands."""
 
     program: str
     options: tuple[str, ...]
     flash_size: int = FLASH_SIZE
     takes: str = "-kernel"
-    erased: int = 0  # bytes from the beginning
+    erased: int = 0
+    flash_base: int | None = None
+    has_commands: bool = False
 
 
-def _mps2(name: str) -> Machine:
+def _mps2(name: str, flash_base: int) -> Machine:
     """A part of its memory keeps them."""
     memory = "memory-backend-file,id=nv,size=16M,mem-path={file},share=on"
-    return Machine("qemu-system-arm", ("-M", f"{name},memory-backend=nv", "-object", memory))
+    return Machine(
+        "qemu-system-arm", ("-M", f"{name},memory-backend=nv", "-object", memory), flash_base=flash_base
+    )
 
 
 MACHINES = {
-    "mps2-an385": _mps2("mps2-an385"),
-    "mps2-an386": _mps2("mps2-an386"),
-    "mps2-an500": _mps2("mps2-an500"),
+    "mps2-an385": _mps2("mps2-an385", 0x2100_0000),
+    "mps2-an386": _mps2("mps2-an386", 0x2100_0000),
+    "mps2-an500": _mps2("mps2-an500", 0x6000_0000),
     "lm3s6965evb": Machine(
         "qemu-system-arm",
         ("-M", "lm3s6965evb", "-drive", "if=none,id=nv,format=raw,file={file}",
@@ -70,7 +75,9 @@ MACHINES = {
         ("-M", "virt", "-rtc", "clock=vm", "-drive", "if=pflash,unit=1,format=raw,file={file}"),
         32 * 1024 * 1024,
         "-bios",
-        erased=4 * 1024 * 1024,  # its sectors are so large that erasing them all takes seconds
+        erased=4 * 1024 * 1024,  # as it comes from the factory; its sectors are large
+        flash_base=0x2200_0000,
+        has_commands=True,
     ),
 }  # fmt: skip
 

@@ -32,8 +32,6 @@ from plctool.link.connection import Connection
 from plctool.link.services import AppState
 
 HERE = Path(__file__).parent
-FLASH_SIZE = 0x80000  # of the area for programs and files
-SECTOR_SIZE = 4096
 STORE = struct.Struct("<I8s")
 PROVEN = 3500  # cycles of 1 ms after which a program has proven itself
 IN_SLOT = 40  # cuts to try in the slot
@@ -43,11 +41,10 @@ AT_ONCE = 2  # boards
 
 @dataclass(frozen=True)
 class Cut:
-    """What a power cut leaves: the flash after `stores` stores; `in_slot`: the last one was into the new slot."""
+    """A power cut after `stores` stores; `in_slot`: the last one was into the new slot."""
 
     stores: int
     in_slot: bool
-    flash: bytes
 
 
 @dataclass(frozen=True)
@@ -59,19 +56,21 @@ class Replacement:
     kept: int  # the retain variable of the old program before
     before: bytes
     stores: list[tuple[int, bytes]]
+    sector_size: int
 
     @property
     def slot(self) -> range:
         """The sectors that the new program was written to."""
-        begin = bytes(self._after()).index(self.new.image)
+        begin = self.after(len(self.stores)).index(self.new.image)
         end = begin + len(self.new.image)
-        return range(begin // SECTOR_SIZE * SECTOR_SIZE, -(-end // SECTOR_SIZE) * SECTOR_SIZE)
+        return range(begin // self.sector_size * self.sector_size, -(-end // self.sector_size) * self.sector_size)
 
-    def _after(self) -> bytearray:
+    def after(self, stores: int) -> bytes:
+        """The flash after the first of them."""
         flash = bytearray(self.before)
-        for offset, block in self.stores:
+        for offset, block in self.stores[:stores]:
             flash[offset : offset + len(block)] = block
-        return flash
+        return bytes(flash)
 
     def cuts(self) -> Iterator[Cut]:
         """Every cut that leaves something else than the previous one."""
@@ -80,7 +79,7 @@ class Replacement:
         for n, (offset, block) in enumerate(self.stores, 1):
             if flash[offset : offset + len(block)] != block:
                 flash[offset : offset + len(block)] = block
-                yield Cut(n, offset in slot, bytes(flash))
+                yield Cut(n, offset in slot)
 
 
 @pytest.fixture(scope="module")
@@ -102,10 +101,12 @@ def replacement(tmp_path_factory: pytest.TempPathFactory) -> Replacement:
         plc.stop()  # saves the retain variable
         kept = plc.read("Main.kept")
     board.power_off()
-    before = board.read_flash(0, FLASH_SIZE)
+    flash = read_firmware(board.firmware).board.flash
+    before = board.read_flash(0, flash.size)
 
-    base = read_firmware(board.firmware).board.flash.address
-    arguments = f"base={base},size={FLASH_SIZE},memory={board.flash_file},out={record}"
+    arguments = f"base={board.qemu.flash_base},size={flash.size},memory={board.flash_file},out={record}"
+    if board.qemu.has_commands:
+        arguments += f",sector={flash.sector_size}"
     board.power_on("exact", plugin=f"file={plugin},{arguments}")
     with Plc(Connection(board.line())) as plc:
         plc.stop()
@@ -113,7 +114,7 @@ def replacement(tmp_path_factory: pytest.TempPathFactory) -> Replacement:
         plc.flash(new.path)
         eventually(lambda: plc.read("Fast.n") > PROVEN)
     board.power_off()
-    return Replacement(old, new, kept, before, list(STORE.iter_unpack(record.read_bytes())))
+    return Replacement(old, new, kept, before, list(STORE.iter_unpack(record.read_bytes())), flash.sector_size)
 
 
 def test_the_running_program_is_untouched_by_the_download(replacement):
@@ -134,7 +135,7 @@ def selected(replacement: Replacement) -> list[Cut]:
 
 def survivor(board: Board, replacement: Replacement, cut: Cut) -> str:
     """What runs after the cut: "old" with its retain variable, or "new". A program can be flashed afterwards."""
-    board.write_flash(0, cut.flash)
+    board.write_flash(0, replacement.after(cut.stores))
     with board, Plc(Connection(board.line()), symbol_path(replacement.old.path)) as plc:
         status = plc.status()
         assert status.state is AppState.RUN, f"after {cut.stores} stores"

@@ -23,7 +23,7 @@
 #define CLINT_MTIMECMP_HIGH REG32((BOARD_CLINT) + 0x4004u)
 #define CLINT_MTIME REG32((BOARD_CLINT) + 0xBFF8u)
 
-/* Bits of mie and mip, and numbers of the causes in mcause. */
+/* Bits of mie and mip. */
 enum { INTERRUPT_SOFTWARE = 3, INTERRUPT_TIMER = 7, INTERRUPT_EXTERNAL = 11 };
 enum { MSTATUS_MIE = 1 << 3, MSTATUS_MPIE = 1 << 7, MSTATUS_MPP = 3 << 11 };
 

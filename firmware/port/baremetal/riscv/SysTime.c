@@ -84,7 +84,7 @@ static void count_ticks(void)
         clock.on_tick(clock.ns);
 }
 
-void ClockInterrupt(void)
+RTS_NOINLINE void ClockInterrupt(void)
 {
     count_ticks();
     if (clock.is_alarm_set && (RTS_I32)(CLINT_MTIME - clock.alarm) >= 0) {

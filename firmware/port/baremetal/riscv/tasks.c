@@ -14,23 +14,23 @@ static struct {
     RTS_UI32 pending; /* bit n: timer n */
     RTS_UI8 level[SYSTIMER_COUNT];
     volatile RTS_UI8 running; /* the best level that runs */
-} tasks = {.running = LEVEL_MAIN};
+} waiting = {.running = LEVEL_MAIN};
 
 void CpuTaskSetLevel(RTS_UI32 timer, RTS_UI32 level)
 {
-    tasks.level[timer] = (RTS_UI8)level;
+    waiting.level[timer] = (RTS_UI8)level;
 }
 
 void CpuTaskTrigger(RTS_UI32 timer)
 {
-    __atomic_fetch_or(&tasks.pending, 1u << timer, __ATOMIC_RELAXED);
+    __atomic_fetch_or(&waiting.pending, 1u << timer, __ATOMIC_RELAXED);
     CLINT_MSIP = 1;
     (void)CLINT_MSIP; /* it has arrived: a better task runs before the caller goes on */
 }
 
 void CpuTaskForget(RTS_UI32 timer)
 {
-    __atomic_fetch_and(&tasks.pending, ~(1u << timer), __ATOMIC_RELAXED);
+    __atomic_fetch_and(&waiting.pending, ~(1u << timer), __ATOMIC_RELAXED);
 }
 
 /* The pending timer of the best level, if that is better than `level`; else SYSTIMER_COUNT. */
@@ -38,26 +38,26 @@ static RTS_UI32 find_pending(RTS_UI32 level)
 {
     RTS_UI32 found = SYSTIMER_COUNT;
     for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
-        if ((tasks.pending >> i & 1) != 0 && tasks.level[i] < level) {
-            level = tasks.level[i];
+        if ((waiting.pending >> i & 1) != 0 && waiting.level[i] < level) {
+            level = waiting.level[i];
             found = i;
         }
     }
     return found;
 }
 
-void TasksInterrupt(void)
+RTS_NOINLINE void TasksInterrupt(void)
 {
-    RTS_UI8 interrupted = tasks.running;
+    RTS_UI8 interrupted = waiting.running;
     RTS_UI32 timer;
 
     CLINT_MSIP = 0;
     while ((timer = find_pending(interrupted)) < SYSTIMER_COUNT) {
         CpuTaskForget(timer);
-        tasks.running = tasks.level[timer];
+        waiting.running = waiting.level[timer];
         CSR_SET("mstatus", MSTATUS_MIE);
         SysTimerRun(timer);
         CSR_CLEAR("mstatus", MSTATUS_MIE);
-        tasks.running = interrupted;
+        waiting.running = interrupted;
     }
 }

@@ -20,17 +20,26 @@ __attribute__((used, noreturn)) static void runtime_fault(RTS_UI32 pc)
     ResetNow(RESET_FATAL, pc);
 }
 
+/* Of several pending interrupts devices and the clock come before tasks; which one a processor takes first differs, and
+ * QEMU's order is its own. */
+static void interrupt(RTS_UI32 pc)
+{
+    RTS_UI32 pending = CSR_READ("mip") & CSR_READ("mie");
+
+    if (pending & 1 << INTERRUPT_EXTERNAL)
+        BoardInterrupt(pc);
+    else if (pending & 1 << INTERRUPT_TIMER)
+        ClockInterrupt();
+    else if (pending & 1 << INTERRUPT_SOFTWARE)
+        TasksInterrupt();
+}
+
 __attribute__((used)) static void trap_dispatch(FRAME *frame)
 {
-    enum { MCAUSE_INTERRUPT = (int)0x80000000 };
     RTS_UI32 cause = CpuFaultStatus();
 
-    if (cause == ((RTS_UI32)MCAUSE_INTERRUPT | INTERRUPT_TIMER))
-        ClockInterrupt();
-    else if (cause == ((RTS_UI32)MCAUSE_INTERRUPT | INTERRUPT_SOFTWARE))
-        TasksInterrupt();
-    else if (cause == ((RTS_UI32)MCAUSE_INTERRUPT | INTERRUPT_EXTERNAL))
-        BoardInterrupt(frame->pc);
+    if ((RTS_I32)cause < 0)
+        interrupt(frame->pc);
     else
         SysExceptTrap(frame, cause);
 }
