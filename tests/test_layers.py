@@ -20,7 +20,8 @@ ROOT = Path(plctool.__file__).parent
 
 # From the ground up; the packages and modules of one line do not know each other. "" is what `import plctool` gives.
 FLOORS = (
-    ("errors", "core", "version"),
+    ("errors", "version"),
+    ("core",),
     ("files", "iec", "project"),
     ("image",),
     ("io",),

@@ -9,17 +9,19 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import partial
 from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from plctool.controller import Controller
-from plctool.core import error_name, ffi, lib
+from plctool.core import error_name, give_back_core, lib, take_core
 from plctool.debug.symbols import SymbolTable, find_symbols
 from plctool.debug.trace import Trace
 from plctool.debug.variables import Change, Symbol, unreachable
 from plctool.errors import DeviceError, UsageError
 from plctool.files import read_image
+from plctool.iec.areas import Area
 from plctool.image.file import image_crc, parse_image
 from plctool.image.targets import host_target
 from plctool.link import l7
@@ -39,27 +41,28 @@ MAX_NS = 2**62  # at once; the clock goes twice as far
 
 
 class Simulator(Controller):
-    """A controller in this process, with a program in it, started. There can be only one at a time in a process.
+    """A controller in this process, with a program in it, started. Each has a clock of its own; all of a process are
+    used by one thread.
 
-    Its symbols are `symbols`, else what is found by the CRC of the image. Raises DeviceError for an image that is
+    Its symbols are `symbols`, else what is found by the CRC of the image. A cycle that takes longer than
+    `cycle_limit_ms` of the processor's time is aborted; 0: SIM_CYCLE_LIMIT_MS. Raises DeviceError for an image that is
     refused and when the program fails.
     """
 
-    _running: Simulator | None = None
     _io: tuple[SymbolTable, SimIo] | None = None
 
-    def __init__(self, image: bytes, symbols: SymbolTable | None = None, *, start: bool = True) -> None:
-        if Simulator._running is not None:
-            raise UsageError("There is a simulator already; close it first, one process has one controller.", "busy")
+    def __init__(
+        self, image: bytes, symbols: SymbolTable | None = None, *, start: bool = True, cycle_limit_ms: int = 0
+    ) -> None:
         super().__init__()
         self._plants: list[_Plant] = []
         if symbols is not None:
             self.add_symbols(symbols)
-        _check(lib.SimFlashConfigure(_FLASH_SIZE, _SECTOR, _PROGRAM_UNIT, 0xFF), "The simulated flash cannot be made")
-        _check(lib.SimStart(), "The simulator does not start")
-        Simulator._running = self
-        lib.SimForgetEvents()
+        self._core = take_core()
+        self._ffi, self._lib = self._core.ffi, self._core.lib
+        self._closed = False
         try:
+            self._power_on(cycle_limit_ms)
             self._download(image, restart=True, progress=lambda done: None)
             if start:
                 self.start()
@@ -75,29 +78,50 @@ class Simulator(Controller):
         return cls(image, find_symbols(parse_image(image).crc, file), start=start)
 
     @classmethod
-    def from_sources(cls, *paths: Path | str, level: Level = 2, checks: str = "all", start: bool = True) -> Simulator:
+    def from_sources(
+        cls,
+        *paths: Path | str,
+        level: Level = 2,
+        checks: str = "all",
+        start: bool = True,
+        cycle_limit_ms: int = 0,
+    ) -> Simulator:
         """The program in source files and folders, compiled for this. `level` and `checks` as in `compile_sources`,
         which says what is raised."""
         from plctool.compiler import compile_sources  # only here: what runs images needs no compiler
 
         built = compile_sources(paths, target=host_target(), level=level, checks=checks)
-        return cls(built.image, built.symbols, start=start)
+        return cls(built.image, built.symbols, start=start, cycle_limit_ms=cycle_limit_ms)
+
+    def _power_on(self, cycle_limit_ms: int) -> None:
+        """With an empty flash and no events."""
+        made = self._lib.SimFlashConfigure(_FLASH_SIZE, _SECTOR, _PROGRAM_UNIT, 0xFF)
+        _check(made, "The simulated flash cannot be made")
+        self._limited = cycle_limit_ms > 0
+        if self._limited:
+            self._lib.SimSetCycleLimit(cycle_limit_ms)
+        _check(self._lib.SimStart(), "The simulator does not start")
+        self._lib.SimForgetEvents()
 
     def close(self) -> None:
-        """Shuts the runtime down; another Simulator may be made then."""
-        if Simulator._running is self:
-            lib.SimStop()
-            Simulator._running = None
+        """Shuts the runtime down."""
+        if not self._closed:
+            self._closed = True
+            self._lib.SimStop()
+            if self._limited:
+                self._lib.SimSetCycleLimit(0)
+            self._lib = self._ffi = _Closed()  # before another one has the runtime
+            give_back_core(self._core)
 
     # ---- the program ----
 
     def _download(self, data: bytes, restart: bool, progress: Callable[[int], None]) -> None:
         self._add_events(data)
-        _check(lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
-        _check(lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")
-        refusal = ffi.new("APP_REFUSAL *")
-        result = lib.AppDownloadEnd(refusal)
-        l7.check_result(result, "download", ffi.string(refusal.text).decode("latin-1") if result else "")
+        _check(self._lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
+        _check(self._lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")
+        refusal = self._ffi.new("APP_REFUSAL *")
+        result = self._lib.AppDownloadEnd(refusal)
+        l7.check_result(result, "download", self._ffi.string(refusal.text).decode("latin-1") if result else "")
         progress(len(data))
 
     def _add_events(self, image: bytes) -> None:
@@ -105,45 +129,46 @@ class Simulator(Controller):
         with suppress(UsageError):  # a bad image is refused with the reason of the device
             for task in parse_image(image).tasks:
                 if task.external:
-                    _check(lib.SimAddEvent(task.external.encode("ascii")), "The simulator has too many events")
+                    _check(self._lib.SimAddEvent(task.external.encode("ascii")), "The simulator has too many events")
 
     def post(self, event: str) -> None:
         """An external event happens: what waits for it runs when time passes. Raises DeviceError when nothing does."""
-        _check(lib.SimPostEvent(event.encode("ascii", "replace")), f"The program does not wait for the event {event}")
+        posted = self._lib.SimPostEvent(event.encode("ascii", "replace"))
+        _check(posted, f"The program does not wait for the event {event}")
 
     def start(self) -> None:
         """Starts the program; the first cycle of each task is due at once."""
         self._application_crc()
-        l7.check_result(lib.AppStartApplication(), "start")
+        l7.check_result(self._lib.AppStartApplication(), "start")
 
     def stop(self) -> None:
         self._application_crc()
-        l7.check_result(lib.AppStopApplication(), "stop")
+        l7.check_result(self._lib.AppStopApplication(), "stop")
 
     def _reset(self, option: int) -> None:
         self._application_crc()
-        l7.check_result(lib.AppReset(option), "reset")
+        l7.check_result(self._lib.AppReset(option), "reset")
 
     def restart(self) -> None:
         """Power off and on again: what is in flash survives."""
-        lib.SimStop()
-        _check(lib.SimStart(), "The simulator does not start")
+        self._lib.SimStop()
+        _check(self._lib.SimStart(), "The simulator does not start")
         for plant in self._plants:  # the clock begins at 0 again
             plant.due_ns = self.now_ns + plant.every_ns
 
     def raw_status(self) -> Status:
-        c = ffi.new("APP_STATUS *")
-        lib.AppGetStatus(c)
+        c = self._ffi.new("APP_STATUS *")
+        self._lib.AppGetStatus(c)
         exception = None
         if c.exception.code != lib.RTSEXCPT_NOEXCEPTION:
-            found = lib.SysExceptGetTrace()
+            found = self._lib.SysExceptGetTrace()
             trace = Trace.of((call.target, call.distance) for call in found.call[0 : found.count])
             exception = AppException.of(c.exception.code, c.exception.code_offset, c.exception.task, trace)
         return Status(app_state(c.state, c.op_state), c.image_crc, c.image_size, exception, c.op_state)
 
     def _application_crc(self) -> int:
-        c = ffi.new("APP_STATUS *")
-        lib.AppGetStatus(c)
+        c = self._ffi.new("APP_STATUS *")
+        self._lib.AppGetStatus(c)
         if c.state == lib.AS_NONE:
             raise no_application()
         return int(c.image_crc)
@@ -151,10 +176,10 @@ class Simulator(Controller):
     def tasks(self) -> list[TaskInfo]:
         """Statistics of the tasks; the times are real, measured on this machine."""
         infos = []
-        for index in range(lib.IecTaskGetCount()):
-            c = ffi.new("IEC_TASK_INFO *")
-            _check(lib.IecTaskGetInfo(index, c), "The task has no statistics")
-            name = ffi.string(c.name).decode("latin-1")
+        for index in range(self._lib.IecTaskGetCount()):
+            c = self._ffi.new("IEC_TASK_INFO *")
+            _check(self._lib.IecTaskGetInfo(index, c), "The task has no statistics")
+            name = self._ffi.string(c.name).decode("latin-1")
             infos.append(
                 TaskInfo(
                     name, c.kind, c.priority, c.interval_us, c.cycles, c.last_us, c.avg_us, c.min_us, c.max_us,
@@ -165,10 +190,10 @@ class Simulator(Controller):
 
     def log(self, after: int = 0) -> list[LogEntry]:
         entries = []
-        c = ffi.new("LOG_ENTRY *")
-        while lib.LogGetEntry(after + 1, c) == lib.ERR_OK:
+        c = self._ffi.new("LOG_ENTRY *")
+        while self._lib.LogGetEntry(after + 1, c) == lib.ERR_OK:
             after = c.handle
-            component, text = ffi.string(lib.CMGetComponentName(c.component)), ffi.string(c.text)
+            component, text = self._ffi.string(self._lib.CMGetComponentName(c.component)), self._ffi.string(c.text)
             entries.append(
                 LogEntry(after, c.time_ns, component.decode("latin-1"), c.log_class, c.error, text.decode("latin-1"))
             )
@@ -181,7 +206,7 @@ class Simulator(Controller):
         """The channels of the program. Raises UsageError if its symbols are not found."""
         symbols = self.symbols()
         if self._io is None or self._io[0] is not symbols:
-            self._io = (symbols, SimIo(symbols))
+            self._io = (symbols, SimIo(symbols, self._core))
         return self._io[1]
 
     def set_input(self, name: str, value: Any) -> None:
@@ -196,7 +221,7 @@ class Simulator(Controller):
 
     def fault(self, device: str, fault: str, value: int = 1) -> None:
         """Makes a device fail: "absent", "late" (ms), "type", "answers" (how many are bad); 0 ends it."""
-        set_fault(device, fault, value)
+        set_fault(self._core, device, fault, value)
 
     def attach(self, step: Callable[[Simulator], None], every_ms: float = 1) -> None:
         """A plant: `step(plc)` is called each `every_ms` of virtual time, from now on, while time passes. It reads
@@ -221,7 +246,7 @@ class Simulator(Controller):
     @property
     def now_ns(self) -> int:
         """Virtual time since power on [ns]."""
-        return int(lib.SimNow())
+        return int(self._lib.SimNow())
 
     def run_cycles(self, count: int, *, check: bool = True) -> None:
         """Runs until the first task has made `count` more cycles. Raises ProgramStopped when the program stopped with
@@ -237,7 +262,7 @@ class Simulator(Controller):
             self.check_running()
 
     def _run_cycles(self, count: int) -> None:
-        result = lib.SimRunCycles(count) if count > 0 else lib.ERR_OK
+        result = self._lib.SimRunCycles(count) if count > 0 else lib.ERR_OK
         if result == lib.ERR_TIMEOUT:
             message = "The first task waits for something that does not happen; give a time (--time) instead."
             raise DeviceError(message, "waits", result)
@@ -253,16 +278,16 @@ class Simulator(Controller):
             raise UsageError(f"Time passes forwards, and for at most {MAX_NS // 10**9} s.", "time")
         end = self.now_ns + ns
         while self._plants and (due := min(p.due_ns for p in self._plants)) <= end:
-            _check(lib.SimRunFor(max(0, due - self.now_ns)), "Time does not advance")
+            _check(self._lib.SimRunFor(max(0, due - self.now_ns)), "Time does not advance")
             self._step_plants()
-        _check(lib.SimRunFor(max(0, end - self.now_ns)), "Time does not advance")
+        _check(self._lib.SimRunFor(max(0, end - self.now_ns)), "Time does not advance")
         if check:
             self.check_running()
 
     def bench(self, task: int, cycles: int) -> tuple[float, float]:
         """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""
-        code, cycle = ffi.new("double *"), ffi.new("double *")
-        _check(lib.SimBench(task, cycles, code, cycle), "The benchmark failed")
+        code, cycle = self._ffi.new("double *"), self._ffi.new("double *")
+        _check(self._lib.SimBench(task, cycles, code, cycle), "The benchmark failed")
         return code[0], cycle[0]
 
     # ---- variables ----
@@ -284,7 +309,11 @@ class Simulator(Controller):
             if is_input(symbol) and table.io:
                 first = symbol.offset * 8 + (symbol.bit or 0)
                 bits = 1 if symbol.bit is not None else symbol.size * 8
-                self.io.follow(first, first + bits, _input_memory)
+                self.io.follow(first, first + bits, partial(self.memory, Area.INPUT))
+
+    def memory(self, area: Area, offset: int, size: int) -> memoryview:
+        """Bytes of an area, to read and to write, until this simulator is closed."""
+        return memoryview(self._ffi.buffer(self._lib.AppGetAreaAddress(area.value, offset, size), size))
 
     def _content(self, symbol: Symbol) -> bytes | None:
         if symbol.fixed is not None:
@@ -295,9 +324,9 @@ class Simulator(Controller):
     def _memory(self, symbol: Symbol) -> Any:
         """A variable as a writable buffer; None when a pointer to it leads to none."""
         place = self._place(symbol)
-        address = ffi.NULL if place is None else lib.AppGetAreaAddress(*place, symbol.size)
-        if address != ffi.NULL:
-            return ffi.buffer(address, symbol.size)
+        address = self._ffi.NULL if place is None else self._lib.AppGetAreaAddress(*place, symbol.size)
+        if address != self._ffi.NULL:
+            return self._ffi.buffer(address, symbol.size)
         if symbol.pointer is not None:
             return None
         raise DeviceError(
@@ -309,10 +338,17 @@ class Simulator(Controller):
         if symbol.pointer is None:
             return symbol.area, symbol.offset
         held = self._memory(symbol.pointer)
-        area, offset = ffi.new("RTS_UI32 *"), ffi.new("RTS_UI32 *")
-        if held is None or not lib.AppFindArea(int.from_bytes(held[:], "little"), area, offset):
+        area, offset = self._ffi.new("RTS_UI32 *"), self._ffi.new("RTS_UI32 *")
+        if held is None or not self._lib.AppFindArea(int.from_bytes(held[:], "little"), area, offset):
             return None
         return area[0], offset[0] + symbol.offset
+
+
+class _Closed:
+    """Instead of the runtime of a simulator that has none any more."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise UsageError("The simulator is closed; make another one.", "closed")
 
 
 @dataclass
@@ -322,11 +358,6 @@ class _Plant:
     step: Callable[[Simulator], None]
     every_ns: int
     due_ns: int
-
-
-def _input_memory(offset: int, size: int) -> bytes:
-    """Bytes of the inputs."""
-    return bytes(ffi.buffer(lib.AppGetAreaAddress(lib.APP_AREA_INPUT, offset, size), size))
 
 
 def _check(result: int, what: str) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from plctool.core import error_name, ffi, lib
+from plctool.core import Core, error_name, lib
 from plctool.debug.symbols import SymbolTable
 from plctool.debug.variables import Symbol
 from plctool.errors import DeviceError, UsageError, did_you_mean
@@ -31,9 +31,11 @@ than the description says; answers: so many next answers are bad."""
 
 @dataclass(frozen=True)
 class SimChannel:
-    """A channel of the symbol file. `bit`: the first of its `bits` in the parameter of the device; `area_bit`: in the
-    inputs or outputs. `enabled`: the device is; else there is none that could measure anything."""
+    """A channel of the symbol file. `core`: the runtime that simulates it; `bit`: the first of its `bits` in the
+    parameter of the device; `area_bit`: in the inputs or outputs. `enabled`: the device is; else there is none that
+    could measure anything."""
 
+    core: Core
     device: str
     name: str
     output: bool
@@ -52,14 +54,15 @@ class SimChannel:
 
     def read(self) -> bytes:
         """What the device has now."""
+        ffi = self.core.ffi
         data = ffi.new("RTS_UI8[]", -(-self.bits // 8))
-        _check(lib.SimIoRead(self.device.encode(), self.parameter, self.bit, self.bits, data), self.title)
+        _check(self.core.lib.SimIoRead(self.device.encode(), self.parameter, self.bit, self.bits, data), self.title)
         return self._ordered(bytes(ffi.buffer(data)))
 
     def write(self, data: bytes) -> None:
         """What the device measures from now on."""
         ordered = self._ordered(data)
-        _check(lib.SimIoWrite(self.device.encode(), self.parameter, self.bit, self.bits, ordered), self.title)
+        _check(self.core.lib.SimIoWrite(self.device.encode(), self.parameter, self.bit, self.bits, ordered), self.title)
 
     def _ordered(self, data: bytes) -> bytes:
         return data[::-1] if self.big_endian else data
@@ -68,10 +71,10 @@ class SimChannel:
 class SimIo:
     """The channels of the program with these symbols."""
 
-    def __init__(self, symbols: SymbolTable) -> None:
+    def __init__(self, symbols: SymbolTable, core: Core) -> None:
         disabled = {d["name"] for d in symbols.io.get("devices", []) if not d.get("enabled", True)}
         self.channels = [
-            _channel(entry, symbols, entry["device"] not in disabled) for entry in symbols.io.get("channels", [])
+            _channel(core, entry, symbols, entry["device"] not in disabled) for entry in symbols.io.get("channels", [])
         ]
         self._names: dict[str, list[SimChannel]] = {}
         for c in self.channels:
@@ -108,24 +111,24 @@ class SimIo:
         channel = self._enabled(name)
         return decode(channel.symbol.type, channel.read())
 
-    def follow(self, first_bit: int, end_bit: int, memory: Callable[[int, int], bytes]) -> None:
+    def follow(self, first_bit: int, end_bit: int, memory: Callable[[int, int], memoryview]) -> None:
         """Bits of the inputs were written: the devices measure that from now on. `memory` gives bytes of the inputs, by
         offset and size."""
         for c in self.channels:
             if c.enabled and not c.output and c.area_bit < end_bit and first_bit < c.area_bit + c.bits:
-                data = memory(c.area_bit // 8, -(-c.bits // 8))
+                data = bytes(memory(c.area_bit // 8, -(-c.bits // 8)))
                 shift = c.area_bit % 8
                 c.write(bytes([data[0] >> shift & (1 << c.bits) - 1]) if c.bits < 8 else data)
 
 
-def set_fault(device: str, fault: str, value: int) -> None:
+def set_fault(core: Core, device: str, fault: str, value: int) -> None:
     """Makes a simulated device fail (FAULTS), or with 0 work again."""
     if fault not in FAULTS:
         raise UsageError(f"There is no fault '{fault}'; choose one of {', '.join(FAULTS)}.", "bad-fault")
-    _check(lib.SimIoFault(device.encode("ascii", "replace"), FAULTS[fault], value), device)
+    _check(core.lib.SimIoFault(device.encode("ascii", "replace"), FAULTS[fault], value), device)
 
 
-def _channel(entry: dict[str, Any], symbols: SymbolTable, enabled: bool) -> SimChannel:
+def _channel(core: Core, entry: dict[str, Any], symbols: SymbolTable, enabled: bool) -> SimChannel:
     address = parse_address(entry["address"])
     assert address is not None
     area_bit = address.offset * 8 + address.bit
@@ -133,7 +136,7 @@ def _channel(entry: dict[str, Any], symbols: SymbolTable, enabled: bool) -> SimC
     if entry["bits"] == 1 and base_of(symbol.type) is not BOOL:  # an address of a bit
         symbol = Symbol(symbol.name, symbol.area, symbol.offset, BOOL, symbol.bit)
     return SimChannel(
-        entry["device"], entry["channel"], entry["output"], symbol, area_bit, entry["parameter"],
+        core, entry["device"], entry["channel"], entry["output"], symbol, area_bit, entry["parameter"],
         entry["parameter_bit"], entry["bits"], entry["big_endian"], enabled,
     )  # fmt: skip
 

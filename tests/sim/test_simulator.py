@@ -156,11 +156,6 @@ def test_a_refused_image_leaves_the_program_running(plc, built):
     assert plc.read("Main.n") == 10
 
 
-def test_there_is_one_simulator_at_a_time(plc, built):
-    with pytest.raises(UsageError, match="close"):
-        Simulator(built.image, built.symbols)
-
-
 def test_tasks_have_statistics(plc):
     plc.run_cycles(100)
     (task,) = plc.tasks()

@@ -215,11 +215,13 @@ static void on_fault(int number, siginfo_t *info, void *ucontext)
 static void on_break(int number, siginfo_t *info, void *ucontext)
 {
     CONTEXT *context = self();
-    RTS_UNUSED(number);
-    RTS_UNUSED(info);
+    const struct sigaction *previous = &find_signal(number)->previous;
     if (runs_iec_code(context) && __atomic_load_n(&context->break_round, __ATOMIC_ACQUIRE) == context->round &&
         begin_to_leave(context)) {
         leave(context, context->break_code, place_of(ucontext));
+    }
+    if ((previous->sa_flags & SA_SIGINFO) != 0) {
+        previous->sa_sigaction(number, info, ucontext); /* another runtime of this process, which may have sent it */
     }
 }
 

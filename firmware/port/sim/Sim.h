@@ -32,6 +32,9 @@ void SimSetStart(const SYS_START *start);
 /* Shuts down in good order. Does nothing when it is off. */
 void SimStop(void);
 
+/* Whether power is on. */
+bool SimIsOn(void);
+
 /* ---- time ---- */
 
 /*

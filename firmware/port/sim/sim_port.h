@@ -23,9 +23,6 @@ void SimSuperviseStart(void);
 void SimMutexLock(void);
 void SimMutexUnlock(void);
 
-/* Whether a runtime runs. */
-bool SimIsOn(void);
-
 /* The events of the device become known to a runtime that starts. ERR_NOMEMORY. */
 RTS_RESULT SimEventRegisterAll(void);
 

@@ -159,6 +159,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
         help="only tests whose name contains PATTERN (or matches it, with * and ?)",
     )
     test.add_argument("--junit", type=usable_path, metavar="FILE", help="write a report in JUnit's format as well")
+    test.add_argument(
+        "--coverage",
+        type=usable_path,
+        metavar="DIR",
+        help="say which lines ran, and write index.html and cobertura.xml into this folder",
+    )
     test.add_argument("-O", dest="level", type=int, choices=range(4), default=0, help="optimisation; default: 0")
     _add_warnings(test)
     _add_io_files(test)

@@ -236,15 +236,26 @@ def variables(path: Path, patterns: Sequence[str]) -> Document:
     }
 
 
-def test(settings: Settings, pattern: str, junit: Path | None) -> tuple[Document, TestReport]:
-    """Runs the unit tests of a program, and writes their report to `junit` as well."""
+def test(settings: Settings, pattern: str, junit: Path | None, coverage: Path | None) -> tuple[Document, TestReport]:
+    """Runs the unit tests of a program, and writes their report to `junit` as well, and which lines ran into the folder
+    `coverage`."""
     from plctool import st_tests
 
     if junit:
         check_output(junit, settings.files.every_file(), "--junit report.xml")
-    report = st_tests.run_tests(settings.files, pattern=pattern, level=int(settings.level), warnings=settings.warnings)
+    if coverage:
+        check_output(coverage / "cobertura.xml", settings.files.every_file(), "--coverage coverage")
+    report = st_tests.run_tests(
+        settings.files,
+        pattern=pattern,
+        level=int(settings.level),
+        warnings=settings.warnings,
+        coverage=coverage is not None,
+    )
     if junit:
         write_atomically(junit, st_tests.junit_xml(report))
+    if coverage and report.coverage:
+        report.coverage.write_reports(coverage)
     return report.document(), report
 
 

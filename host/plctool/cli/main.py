@@ -117,7 +117,7 @@ def _program_to_run(args: argparse.Namespace) -> Path | documents.Built:
 def _test(args: argparse.Namespace) -> int:
     from plctool.st_tests import report_text
 
-    document, report = documents.test(_settings(args), args.filter, args.junit)
+    document, report = documents.test(_settings(args), args.filter, args.junit, args.coverage)
     _print_warnings(args, report.warning_texts())
     _show(args, document, lambda d: report_text(report, colour=output.wants_colour(sys.stdout)))
     return EXIT_FAILED if report.failed else EXIT_OK

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 from plctool.compiler.front import Diagnostic, render
 from plctool.debug.symbols import SourceLine
+from plctool.st_tests.coverage import Coverage
 
 if TYPE_CHECKING:
     from plctool.compiler.source import Source
@@ -51,12 +52,14 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Report:
-    """All outcomes in the order of the sources. `seconds`: with compiling. `warnings`: of the compiler."""
+    """All outcomes in the order of the sources. `seconds`: with compiling. `warnings`: of the compiler. `coverage`: if
+    it is wanted."""
 
     outcomes: list[Outcome]
     seconds: float
     sources: Sequence[Source]
     warnings: Sequence[Diagnostic] = ()
+    coverage: Coverage | None = None
 
     @property
     def failed(self) -> int:
@@ -79,6 +82,7 @@ class Report:
             "failed": self.failed,
             "seconds": round(self.seconds, 3),
             "warnings": [asdict(warning) for warning in self.warnings],
+            "coverage": self.coverage and self.coverage.document(),
         }
 
 
@@ -102,6 +106,8 @@ def report_text(report: Report, *, colour: bool = False) -> str:
     failed, total = report.failed, len(report.outcomes)
     lines.append("")
     lines.append(f"{total} tests, {total - failed} passed, {failed} failed ({report.seconds:.2f} s)")
+    if report.coverage is not None:
+        lines += ["", report.coverage.text()]
     return "\n".join(lines)
 
 

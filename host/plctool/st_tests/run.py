@@ -18,10 +18,11 @@ from plctool.compiler.codegen.lower_unit import Options
 from plctool.compiler.front import check_sources
 from plctool.compiler.internal import bugs_reported
 from plctool.compiler.semantics.assertions import FAILED, NUMBER, Assertion, Operand
+from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.unit_tests import TestCase, TestSuite
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.controller import ExceptionInfo
-from plctool.core import ffi, lib
+from plctool.core import lib
 from plctool.debug.symbols import SourceLine
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
@@ -29,6 +30,7 @@ from plctool.iec.value_texts import literal
 from plctool.iec.values import decode
 from plctool.image.targets import find_target, host_target
 from plctool.sim import Simulator
+from plctool.st_tests.coverage import Coverage, marked
 from plctool.st_tests.report import TEST_NAME, Failure, Outcome, Report
 
 LIMIT_MS = 10_000
@@ -54,26 +56,28 @@ def run_tests(
     warnings: WarningOptions = ALL_WARNINGS,
     io: IoFiles | None = None,
     libraries: Sequence[Path | str] = (),
+    coverage: bool = False,
 ) -> Report:
     """Runs the tests in sources whose name matches `pattern` (with * and ?) or contains it; case does not matter.
 
     `level`: optimisation; the lowest compiles fastest, and the results are the same. `io`: inputs and outputs;
-    `libraries`: those it uses. Raises CompileError when the program has errors, UsageError when there are no tests.
+    `libraries`: those it uses; `coverage`: whether to note which statements run. Raises CompileError when the program
+    has errors, UsageError when there are no tests.
     """
     begin = time.perf_counter()
-    program = TestProgram(paths, level=level, warnings=warnings, io=io, libraries=libraries)
+    program = TestProgram(paths, level=level, warnings=warnings, io=io, libraries=libraries, coverage=coverage)
     chosen = [i for i, case in enumerate(program.cases) if _fits(case.name.casefold(), pattern.casefold())]
     if not chosen:
         what = f"no test matches '{pattern}'" if program.cases else "there are no tests: write TEST 'name' ... END_TEST"
         raise UsageError(f"{what[:1].upper()}{what[1:]}.", "no-tests")
     outcomes = list(program.run(chosen))
-    return Report(outcomes, time.perf_counter() - begin, program.sources, program.diagnostics)
+    return Report(outcomes, time.perf_counter() - begin, program.sources, program.diagnostics, program.coverage)
 
 
 class TestProgram:
     """A program with its tests, compiled when the first one runs. `cases`: the tests, in the order of the sources;
-    `diagnostics`: warnings of the compiler; `io`: inputs and outputs. Raises CompileError when the program has
-    errors."""
+    `diagnostics`: warnings of the compiler; `io`: inputs and outputs; `coverage`: which statements ran, if that is
+    wanted. Raises CompileError when the program has errors."""
 
     __test__ = False  # nothing for pytest to collect
 
@@ -85,11 +89,13 @@ class TestProgram:
         warnings: WarningOptions = ALL_WARNINGS,
         io: IoFiles | None = None,
         libraries: Sequence[Path | str] = (),
+        coverage: bool = False,
     ) -> None:
         files = program_files(paths, io, libraries)
         description, imported = files.load_io(), files.load_libraries()
         self.sources = files.load_sources()
-        self._suite = TestSuite()
+        marks = StatementMarks() if coverage else None
+        self._suite = TestSuite(marks)
         self._level = level
         with _power(), bugs_reported():
             checked = check_sources(
@@ -100,6 +106,7 @@ class TestProgram:
             raise CompileError([d for d in checked.diagnostics if d.severity == "error"], self.sources)
         self._program = checked.program
         self.cases = self._suite.cases
+        self.coverage = Coverage(marks.places, self.sources) if marks else None
         self.diagnostics = checked.diagnostics
 
     @cached_property
@@ -109,10 +116,14 @@ class TestProgram:
 
     def run(self, numbers: Iterable[int]) -> Iterator[Outcome]:
         """Runs the tests with these indices in `cases`, each from a cold start."""
-        with _more_time(), Simulator(self._built.image, self._built.symbols, start=False) as plc:
-            bench = _Bench(plc, self._built, self._suite, self._program.area_sizes)
+        built = self._built
+        with Simulator(built.image, built.symbols, start=False, cycle_limit_ms=LIMIT_MS) as plc:
+            bench = _Bench(plc, built, self._suite, self._program.area_sizes)
             for number in numbers:
-                yield bench.run(number)
+                outcome = bench.run(number)
+                if self.coverage is not None:
+                    self.coverage.add(marked(plc))
+                yield outcome
 
 
 def _fits(name: str, pattern: str) -> bool:
@@ -121,22 +132,16 @@ def _fits(name: str, pattern: str) -> bool:
 
 @contextmanager
 def _power() -> Iterator[None]:
-    """The simulator without a program: so that the compiler can see which C functions there are."""
-    lib.SimStart()
+    """The first simulator is on, with or without a program: so that the compiler can see which C functions there
+    are."""
+    begin = not lib.SimIsOn()
+    if begin:
+        lib.SimStart()
     try:
         yield
     finally:
-        lib.SimStop()
-
-
-@contextmanager
-def _more_time() -> Iterator[None]:
-    """A cycle of the simulator may be as long as a test."""
-    lib.SimSetCycleLimit(LIMIT_MS)
-    try:
-        yield
-    finally:
-        lib.SimSetCycleLimit(0)
+        if begin:
+            lib.SimStop()
 
 
 class _Bench:
@@ -168,11 +173,11 @@ class _Bench:
 
     def _continue(self, number: int) -> None:
         """Runs the test with this number on the variables as they are after an exception."""
-        areas = {lib.AppGetAreaAddress(area.value, 0, size): size for area, size in self._sizes.items() if size}
-        kept = {address: bytes(ffi.buffer(address, size)) for address, size in areas.items()}
+        areas = [self._plc.memory(area, 0, size) for area, size in self._sizes.items() if size]
+        kept = [bytes(area) for area in areas]
         self._plc.reset("cold")
-        for address, content in kept.items():
-            ffi.memmove(address, content, len(content))
+        for area, content in zip(areas, kept, strict=True):
+            area[:] = content
         self._cycle(number)
 
     def _exception(self, case: TestCase) -> Failure | None:

@@ -27,6 +27,7 @@ from plctool.compiler.semantics.declarations.type_declarations import May
 from plctool.compiler.semantics.mocks import Mocks, raising
 from plctool.compiler.semantics.program import Program
 from plctool.compiler.semantics.scope import Scope
+from plctool.compiler.semantics.statement_marks import StatementMarks
 from plctool.compiler.semantics.symbols import ERROR, NOTHING, PouSymbol, Role, VarSymbol
 from plctool.compiler.semantics.unit_test_statements import TestBody
 from plctool.compiler.source import Source
@@ -71,9 +72,10 @@ class _File:
 
 
 class TestSuite:
-    """The tests of one program; filled by `check_sources`."""
+    """The tests of one program; filled by `check_sources`. `marks`: takes the statements, for coverage."""
 
-    def __init__(self) -> None:
+    def __init__(self, marks: StatementMarks | None = None) -> None:
+        self.marks = marks
         self.cases: list[TestCase] = []
         self.asserts: list[Assertion] = []  # the first one has number 1
         self.teardowns: dict[str, int] = {}  # by file
@@ -101,12 +103,16 @@ class TestProgram:
     # ---- the steps of the check ----
 
     def prepare(self, parsed: list[tuple[Source, list[ast.Declaration]]]) -> list[tuple[Source, list[ast.Declaration]]]:
-        """Adds to the syntax tree what MOCK needs."""
+        """Adds to the syntax tree what MOCK and the coverage need."""
         names = self._world.names
         names.register([raising()], library=True)
         everything = [decl for _, declarations in parsed for decl in declarations]
         mocks = Mocks((d for d in everything if isinstance(d, ast.TestDecl)), self._world.diagnostics)
         names.rewritten = mocks.rewritten
+        marks = self._suite.marks
+        if marks is not None:
+            parsed = [(source, marks.marked(declarations)) for source, declarations in parsed]
+            names.register_globals([marks.variable(Source("", ""))], Source("", ""))
         return [(source, mocks.rewritten(declarations)) for source, declarations in parsed]
 
     def configure(self) -> Application:
