@@ -20,8 +20,8 @@ static void log_reset_cause(void)
     if (record->cause < RESET_FATAL)
         LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);
     else
-        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%X, " CPU_FAULT_STATUS " 0x%X", names[record->cause],
-               (unsigned)record->pc, (unsigned)record->status);
+        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%X, " CPU_FAULT_STATUS " 0x%X",
+               names[record->cause], (unsigned)record->pc, (unsigned)record->status);
 }
 
 /* Whatever hangs, the main loop, the clock or the tasks, ends in a reset. Once a millisecond is enough. */

@@ -11,11 +11,15 @@
 enum { STACK_PAINT = 0x5A, FRAME_MAX = 128 /* of ResetHandler */ };
 
 /* Of the linker script. */
-extern RTS_UI8 data_start[], data_end[], data_load[], bss_start[], bss_end[];
+extern RTS_UI8 data_start[], data_end[], data_load[], bss_start[], bss_end[], stack_bottom[];
 
 /* Of main, and of everything that interrupts it but application code. */
 enum { MAIN_STACK_SIZE = RTS_MAIN_STACK_SIZE + CPU_CONTEXTS_SIZE + STACK_GUARD - STACK_GUARD_LEAST };
 __attribute__((section(".noinit.main_stack"), aligned(STACK_GUARD), used)) static RTS_UI8 main_stack[MAIN_STACK_SIZE];
+
+/* A large guard may be locked since before a reset (the PMP of QEMU 7.2). A small one is painted with the stack: where that
+ * begins is an address that the program has anyway. */
+enum { UNPAINTED = STACK_GUARD > STACK_GUARD_LEAST ? STACK_GUARD : 0 };
 
 int main(void);
 
@@ -29,11 +33,11 @@ SYS_STACK SysTargetGetStack(void)
 
 void ResetHandler(void)
 {
+    RTS_UI8 *const lowest = stack_bottom + UNPAINTED;
     CpuMask();
     memcpy(data_start, data_load, (size_t)(data_end - data_start));
     memset(bss_start, 0, (size_t)(bss_end - bss_start));
-    memset(main_stack + STACK_GUARD, STACK_PAINT,
-           (size_t)((RTS_UI8 *)__builtin_frame_address(0) - main_stack) - STACK_GUARD - FRAME_MAX);
+    memset(lowest, STACK_PAINT, (size_t)((RTS_UI8 *)__builtin_frame_address(0) - lowest) - FRAME_MAX);
     CpuInit();
     ResetInit();
     SysExceptInit();

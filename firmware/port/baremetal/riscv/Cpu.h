@@ -27,11 +27,11 @@
 enum { INTERRUPT_SOFTWARE = 3, INTERRUPT_TIMER = 7, INTERRUPT_EXTERNAL = 11 };
 enum { MSTATUS_MIE = 1 << 3, MSTATUS_MPIE = 1 << 7, MSTATUS_MPP = 3 << 11 };
 
-#define CSR_READ(name)                                   \
-    (__extension__({                                     \
-        RTS_UI32 value_;                                 \
+#define CSR_READ(name)                                     \
+    (__extension__({                                       \
+        RTS_UI32 value_;                                   \
         __asm__ volatile("csrr %0, " name : "=r"(value_)); \
-        value_;                                          \
+        value_;                                            \
     }))
 #define CSR_WRITE(name, value) __asm__ volatile("csrw " name ", %0" ::"r"((RTS_UI32)(value)) : "memory")
 #define CSR_SET(name, bits) __asm__ volatile("csrs " name ", %0" ::"r"((RTS_UI32)(bits)) : "memory")

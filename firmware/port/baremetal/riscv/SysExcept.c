@@ -71,8 +71,8 @@ static RTS_UI32 napot(uintptr_t base, RTS_UI32 log2_size)
 
 static void set_address(RTS_UI32 entry, RTS_UI32 address)
 {
-#define CASE(n)                         \
-    case n:                             \
+#define CASE(n)                           \
+    case n:                               \
         CSR_WRITE("pmpaddr" #n, address); \
         break
     switch (entry) {

@@ -34,8 +34,8 @@ static void rights_cannot_be_taken(void)
     CHECK_EQUAL(primask | basepri, 0);
 }
 
-#define RUN_PRIVILEGE_TESTS()                                               \
-    do {                                                                    \
-        TEST_RUN(store_into_registers_of_the_processor_changes_nothing);    \
-        TEST_RUN(rights_cannot_be_taken);                                   \
+#define RUN_PRIVILEGE_TESTS()                                            \
+    do {                                                                 \
+        TEST_RUN(store_into_registers_of_the_processor_changes_nothing); \
+        TEST_RUN(rights_cannot_be_taken);                                \
     } while (0)

@@ -42,4 +42,3 @@ static void keep_registers_busy(void *arg)
     }
     *(volatile RTS_UI32 *)arg += bad;
 }
-

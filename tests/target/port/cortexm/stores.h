@@ -33,4 +33,3 @@ static void store_by_unprivileged_instruction(void *arg)
 }
 
 #define OTHER_STORES store_two_words, store_by_unprivileged_instruction, store_four_words
-

@@ -28,10 +28,10 @@ __attribute__((naked, unused)) static void compiled_entry(void)
 }
 
 /* Pushes a return address into `program`; goes on with `then`. */
-#define PUSH_RETURN_ADDRESS(then)                                                                                      \
-    __asm__ volatile("addi sp, sp, -16\n\tsw %0, 0(sp)\n\tsw zero, 4(sp)\n\t" then ::"r"((uintptr_t)program + \
-                                                                                        RETURN_OFFSET)                 \
-                     : "memory")
+#define PUSH_RETURN_ADDRESS(then)                                                                               \
+    __asm__ volatile(                                                                                           \
+        "addi sp, sp, -16\n\tsw %0, 0(sp)\n\tsw zero, 4(sp)\n\t" then ::"r"((uintptr_t)program + RETURN_OFFSET) \
+        : "memory")
 
 /* ---- what the processor says of a fault of the runtime ---- */
 

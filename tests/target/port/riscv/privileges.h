@@ -3,12 +3,12 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#define WRITES(name)                                               \
-    static void write_##name(void *arg)                            \
-    {                                                              \
-        RTS_UNUSED(arg);                                           \
+#define WRITES(name)                                                  \
+    static void write_##name(void *arg)                               \
+    {                                                                 \
+        RTS_UNUSED(arg);                                              \
         __asm__ volatile("li t0, -1\n\tcsrw " #name ", t0" ::: "t0"); \
-        in_bss[0] = 1;                                             \
+        in_bss[0] = 1;                                                \
     }
 
 WRITES(mstatus)
@@ -29,8 +29,8 @@ static void return_to_machine_mode(void *arg)
 static void rights_cannot_be_taken(void)
 {
     static void (*const attempts[])(void *) = {
-        write_mstatus, write_mtvec, write_mie, write_mscratch, write_mepc, write_pmpcfg0, write_pmpaddr2,
-        return_to_machine_mode,
+        write_mstatus, write_mtvec,   write_mie,      write_mscratch,
+        write_mepc,    write_pmpcfg0, write_pmpaddr2, return_to_machine_mode,
     };
     in_bss[0] = 0;
     for (RTS_UI32 i = 0; i < RTS_COUNT(attempts); i++) {

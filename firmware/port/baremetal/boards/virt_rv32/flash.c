@@ -34,15 +34,21 @@ static RTS_RESULT flash_read(RTS_UI32 offset, void *data, RTS_UI32 size)
     return ERR_OK;
 }
 
-/* Waits for the command at `offset`, after which the flash is memory again. */
-static bool finish(RTS_UI32 offset)
+/* Whether the command at `offset` ends well. */
+static bool wait_for_end(RTS_UI32 offset)
 {
     RTS_UI32 status = 0;
     for (RTS_UI32 i = 0; i < READY_TRIES && (status & STATUS_READY) != STATUS_READY; i++)
         status = REG32(FLASH + offset);
+    return (status & (STATUS_READY | STATUS_ERRORS)) == STATUS_READY;
+}
+
+/* The flash is memory again. */
+static RTS_RESULT end_commands(bool worked)
+{
     REG32(FLASH) = BOTH(CMD_CLEAR_STATUS);
     REG32(FLASH) = BOTH(CMD_READ);
-    return (status & (STATUS_READY | STATUS_ERRORS)) == STATUS_READY;
+    return worked ? ERR_OK : ERR_DEVICE;
 }
 
 static bool is_erased(RTS_UI32 offset, RTS_UI32 size)
@@ -57,15 +63,15 @@ static RTS_RESULT flash_program(RTS_UI32 offset, const void *data, RTS_UI32 size
 {
     if (!is_inside(offset, size) || offset % PROGRAM_SIZE || size % PROGRAM_SIZE || !is_erased(offset, size))
         return ERR_DEVICE;
-    for (RTS_UI32 done = 0; done < size; done += PROGRAM_SIZE) {
+    bool works = true;
+    for (RTS_UI32 done = 0; done < size && works; done += PROGRAM_SIZE) {
         RTS_UI32 word;
         memcpy(&word, (const RTS_UI8 *)data + done, sizeof(word));
         REG32(FLASH + offset + done) = BOTH(CMD_PROGRAM);
         REG32(FLASH + offset + done) = word;
-        if (!finish(offset + done))
-            return ERR_DEVICE;
+        works = wait_for_end(offset + done);
     }
-    return ERR_OK;
+    return end_commands(works);
 }
 
 static RTS_RESULT flash_erase(RTS_UI32 offset)
@@ -74,7 +80,7 @@ static RTS_RESULT flash_erase(RTS_UI32 offset)
         return ERR_DEVICE;
     REG32(FLASH + offset) = BOTH(CMD_ERASE);
     REG32(FLASH + offset) = BOTH(CMD_CONFIRM);
-    return finish(offset) ? ERR_OK : ERR_DEVICE;
+    return end_commands(wait_for_end(offset));
 }
 
 /* Each command has ended before the next call. */

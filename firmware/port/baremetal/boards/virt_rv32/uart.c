@@ -14,7 +14,7 @@
 #define UART_LSR UART_REG(5)
 
 enum { UART_CLOCK = 3686400 };
-enum { IER_RX_TX = 3, FCR_ON_AND_EMPTY = 7 | 2 << 6 /* 8 bytes or a pause interrupt */ };
+enum { IER_RX_TX = 3, FCR_ON_AND_EMPTY = 7 | 3 << 6 /* 14 bytes or a pause interrupt */ };
 enum { LCR_8 = 3, LCR_STOP_2 = 1 << 2, LCR_PARITY = 1 << 3, LCR_EVEN = 1 << 4, LCR_DIVISOR = 1 << 7 };
 enum { LSR_RECEIVED = 1 << 0, LSR_FIFO_EMPTY = 1 << 5, FIFO_SIZE = 16 };
 
