@@ -55,9 +55,7 @@ class Machine:
 def _mps2(name: str, flash_base: int) -> Machine:
     """A part of its memory keeps them."""
     memory = "memory-backend-file,id=nv,size=16M,mem-path={file},share=on"
-    return Machine(
-        "qemu-system-arm", ("-M", f"{name},memory-backend=nv", "-object", memory), flash_base=flash_base
-    )
+    return Machine("qemu-system-arm", ("-M", f"{name},memory-backend=nv", "-object", memory), flash_base=flash_base)
 
 
 MACHINES = {

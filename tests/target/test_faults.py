@@ -58,7 +58,7 @@ class Fault:
 
 
 def undefined_instruction(built: Built, line: int) -> bytes:
-    """As if the flash had lost some bits, or the compiler its mind: no instruction in place of what a line compiles to."""
+    """As if the flash had lost some bits, or the compiler its mind: what a line compiles to is no instruction."""
     offset = next(offset for offset, _, number in built.symbols.lines if number == line)
     image = bytearray(built.image)
     at = image.index(parse_image(built.image).code) + offset
