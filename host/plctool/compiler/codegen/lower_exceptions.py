@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from plctool.compiler.codegen.ir import Value, number
-from plctool.compiler.codegen.lower_frame import STATEMENTS, Body, Frame, Handler, Ref, rule
+from plctool.compiler.codegen.lower_frame import STATEMENTS, Body, Detour, Frame, Handler, Ref, rule
 from plctool.compiler.typed import Try
 
 
@@ -31,7 +31,7 @@ class Catch(Handler):
 
 
 @dataclass(eq=False)
-class Finally(Handler):
+class Finally(Detour):
     """A __FINALLY on the way out. `ways`: what follows it, by number; 0 is the end of the statement."""
 
     label: str
@@ -46,7 +46,6 @@ class Finally(Handler):
         return self.outer.has_lines
 
     def go(self, frame: Frame, then: Callable[[], None]) -> None:
-        """Goes there, and has written what comes `then`."""
         self.ways.append(then)
         frame.fn.do(f"store i32 {len(self.ways) - 1}, ptr {self.way}")
         frame.fn.branch(self.label)

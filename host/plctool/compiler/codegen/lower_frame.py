@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import NULL, Function, Value, number
@@ -19,9 +19,6 @@ from plctool.compiler.typed import Dispatch, Expr, Label, Place, Pos, Pou, State
 from plctool.core import ffi, lib
 from plctool.iec.areas import Area
 from plctool.iec.types import MAX_ALIGN, Elementary, StringType, Type, alignment_at, base_of, is_scalar
-
-if TYPE_CHECKING:
-    from plctool.compiler.codegen.lower_exceptions import Finally
 
 TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)
 FrameType = TypeVar("FrameType", bound="Frame")
@@ -88,6 +85,14 @@ class Handler(ABC):
     @abstractmethod
     def raise_again(self, frame: Frame) -> None:
         """Ends a block by raising what `frame.raised` holds."""
+
+
+class Detour(Handler):
+    """Statements on every way out of those before them."""
+
+    @abstractmethod
+    def go(self, frame: Frame, then: Callable[[], None]) -> None:
+        """Ends a block by going there; `then` writes what follows."""
 
 
 class _Stop(Handler):
@@ -385,7 +390,7 @@ class Body(Frame):
         self.effects = effects
         self.on_return = "return"
         self.loops: list[tuple[str, str, int]] = []  # labels for CONTINUE and EXIT, and how many `finals` are around
-        self.finals: list[Finally] = []  # around the statement, the innermost last
+        self.finals: list[Detour] = []  # around the statement, the innermost last
         self._labels: dict[str, str] = {}
         self._depths: dict[str, int] = {}  # how many `finals` are around a label of the program
 
