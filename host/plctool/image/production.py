@@ -68,15 +68,16 @@ def production_pieces(image: bytes, board: Board, firmware: Firmware | None) -> 
 def _check_apart(firmware: Firmware, flash: Flash, address: int) -> None:
     """The firmware is nowhere in the sectors for programs and logs of the flash, which is at an address of the
     processor; beside them it may be, in a chip that has one flash for all."""
-    for begin, end in _used(flash, address):
-        for segment in firmware.segments:
-            if segment.address < end and begin < segment.end:
-                raise UsageError(
-                    f"The firmware at 0x{segment.address:08X} to 0x{segment.end - 1:08X} is over the flash for programs "
-                    f"at 0x{begin:08X} to 0x{end - 1:08X}; give the firmware less room in its "
-                    "linker script, or the programs another BOARD_FLASH_ADDRESS.",
-                    "overlap",
-                )
+    used = _used(flash, address)
+    for segment in firmware.segments:
+        over = next((run for run in used if segment.address < run[1] and run[0] < segment.end), None)
+        if over is not None:
+            raise UsageError(
+                f"The firmware at 0x{segment.address:08X} to 0x{segment.end - 1:08X} is over the flash for programs at "
+                f"0x{over[0]:08X} to 0x{over[1] - 1:08X}; give the firmware less room in its "
+                "linker script, or the programs another BOARD_FLASH_ADDRESS.",
+                "overlap",
+            )
 
 
 def _used(flash: Flash, address: int) -> list[tuple[int, int]]:
