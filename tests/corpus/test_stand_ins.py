@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from conftest import Tool
+
 from plctool.compiler.imports import words_of
 from plctool.compiler.library import standard_library
 
