@@ -19,7 +19,7 @@ from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.parser import parse_all
 
 ROOT = Path(__file__).parent
-SYSTEMS = ("twincat", "codesys")
+SYSTEMS = ("twincat", "codesys", "openplc")
 PROJECTS = [path for system in SYSTEMS for path in sorted((ROOT / system).iterdir())]
 EXPECTED: dict[str, Any] = tomllib.loads((ROOT / "expected.toml").read_text())
 """By project: `ms` to run, and the values of variables then."""
