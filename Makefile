@@ -18,7 +18,7 @@ export PATH := $(abspath $(BIN)):$(PATH)
 # The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
 BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
 
-.PHONY: demo test test-vcan lint format bench size wheel attack soak fuzz all clean
+.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -38,6 +38,11 @@ all: $(BUILDS:%=%/build.ninja)
 test-vcan: build/build.ninja
 	$(MESON) compile -C build
 	tests/vcan/run build $(BIN)/python || [ $$? -eq 77 ]
+
+# Lines and analog values of a real kernel, in a virtual machine; part of `make test`.
+test-kernel: build/build.ninja
+	$(MESON) compile -C build
+	tests/kernel/run build $(abspath $(BIN)/python) || [ $$? -eq 77 ]
 
 C_FILES = find firmware tests bench examples -name '*.[ch]' -print0
 
