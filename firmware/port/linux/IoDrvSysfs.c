@@ -585,9 +585,17 @@ static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConf
                              (unsigned)channel->parameter_bit);
 }
 
+/* Connectors that are refused here, and optional, have no driver any more. */
 static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
 {
-    return IoMgrConfigEachChannel(task_maps, count, &sysfs_driver, check_channel);
+    RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &sysfs_driver, check_channel);
+    DEVICE *device;
+
+    for (device = devices; device < devices + DEVICES; device++) {
+        if (device->user != 0 && !IoMgrConfigIsMine(IoMgrConfigGetConnector(device->user - 1), &sysfs_driver))
+            device->user = 0;
+    }
+    return result;
 }
 
 /* ---- cycles ---- */
