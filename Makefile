@@ -20,7 +20,7 @@ CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v q
 RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command -v qemu-system-riscv32),build-rv32imac))
 BUILDS := build build-sanitized $(CORTEX_M) $(RISC_V)
 
-.PHONY: demo test test-vcan lint format bench size wheel attack soak fuzz all clean
+.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -40,6 +40,11 @@ all: $(BUILDS:%=%/build.ninja)
 test-vcan: build/build.ninja
 	$(MESON) compile -C build
 	tests/vcan/run build $(BIN)/python || [ $$? -eq 77 ]
+
+# Lines and analog values of a real kernel, in a virtual machine; part of `make test`.
+test-kernel: build/build.ninja
+	$(MESON) compile -C build
+	tests/kernel/run build $(abspath $(BIN)/python) || [ $$? -eq 77 ]
 
 C_FILES = find firmware tests bench examples -name '*.[ch]' -print0
 
