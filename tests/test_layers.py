@@ -48,7 +48,8 @@ APART = (
 NOT_BELOW = {
     "compiler.formats": ("compiler.semantics", "compiler.codegen"),
     "compiler.syntax": ("compiler.formats", "compiler.semantics", "compiler.codegen"),
-    "compiler.semantics": ("compiler.formats", "compiler.codegen"),
+    "compiler.plcopen_export": ("compiler.formats", "compiler.semantics", "compiler.codegen"),
+    "compiler.semantics": ("compiler.formats", "compiler.plcopen_export", "compiler.codegen"),
     "compiler.semantics.rules": ("compiler.semantics.declarations", "compiler.semantics.program"),
     "compiler.semantics.declarations": ("compiler.semantics.program",),
     "compiler.codegen": ("compiler.formats", "compiler.syntax", "compiler.semantics"),

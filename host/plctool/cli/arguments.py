@@ -169,6 +169,12 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     _add_warnings(test)
     _add_io_files(test)
 
+    xml = command("export", "write a program as PLCopen XML, for CODESYS, TwinCAT, OpenPLC Editor and Beremiz")
+    _add_sources(xml)
+    xml.add_argument("-o", "--output", dest="xml", type=usable_path, required=True, metavar="FILE.xml")
+    _add_warnings(xml)
+    _add_io_files(xml)
+
     export = command("export-itf", "write a C header, and a C file to fill in, for functions implemented in C")
     export.add_argument(
         "sources", nargs="*", type=usable_path, metavar="FILE.st|DIR", help="for a folder, all sources in it"

@@ -192,6 +192,41 @@ def export_interface(paths: Sequence[Path], folder: Path, force: bool) -> Docume
     }
 
 
+def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list[str]]:
+    """Writes a program as PLCopen XML; also what is left out, as users read it. `stamp`: when, in seconds since 1970.
+
+    Raises CompileError when the program has errors, or something that PLCopen XML has no place for; UsageError for a
+    file that would be a source of the program itself.
+    """
+    from plctool.compiler import CompileError
+    from plctool.compiler.diagnostics import render
+    from plctool.compiler.front import check_sources, declared_names_asked_for
+    from plctool.compiler.internal import bugs_reported
+    from plctool.compiler.library import standard_library
+    from plctool.compiler.plcopen_export.project import write_project
+
+    files = settings.files
+    check_not_read(output, files.every_file(), "-o exported.xml, in another folder")
+    here = output.resolve()
+    if output.suffix.lower() != ".xml":
+        raise UsageError(f"PLCopen XML is written to a file whose name ends in .xml, not to {output}.", "bad-output")
+    if any(path.is_dir() and here.is_relative_to(path.resolve()) for path in files.sources):
+        message = f"{output} would be a source of this program itself; write it to another folder."
+        raise UsageError(message, "bad-output")
+    sources, libraries = files.load_sources(), files.load_libraries()
+    with bugs_reported():
+        checked = check_sources(sources, warnings=settings.warnings, io=files.load_io(), libraries=libraries)
+        if checked.program is None:
+            raise CompileError(checked.diagnostics, sources)
+        declared = declared_names_asked_for(standard_library(), libraries, sources)
+        written = write_project(sources, files.info.project or output.stem, declared, stamp)
+    if not written.ok:
+        raise CompileError(written.diagnostics, sources)
+    write_atomically(output, written.text.encode())
+    document = {"file": str(output), "left_out": [diagnostic_document(d) for d in written.diagnostics]}
+    return document, [render(d, sources) for d in written.diagnostics]
+
+
 def diagnostic_document(diagnostic: Diagnostic) -> Document:
     return {name: value for name, value in vars(diagnostic).items() if name != "missing"}
 

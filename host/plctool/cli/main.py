@@ -123,6 +123,12 @@ def _test(args: argparse.Namespace) -> int:
     return EXIT_FAILED if report.failed else EXIT_OK
 
 
+def _export(args: argparse.Namespace) -> int:
+    document, warnings = documents.export(_settings(args), args.xml, int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
+    _print_warnings(args, warnings)
+    return _show(args, document, lambda d: str(d["file"]))
+
+
 def _export_itf(args: argparse.Namespace) -> int:
     if args.device is not None:
         return _show(args, io_documents.export_board(args.device, args.output), lambda d: str(d["header"]))
@@ -447,7 +453,7 @@ IO_ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": _build, "check": _check, "info": _info, "image": _image, "symbols": _symbols, "run": _run,
     "test": _test, "new": _new,
-    "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
+    "export": _export, "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
     "tasks": _tasks, "log": _log, "shell": _shell, "passwd": _passwd, "port-check": _port_check,
     "read": _read, "write": _write, "watch": _watch, "gateway": _gateway, "completion": _completion, "man": _man,

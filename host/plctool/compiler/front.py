@@ -191,7 +191,14 @@ def _check_parsed(
 
 
 def _names_asked_for(program: Program, sources: Sequence[Source]) -> frozenset[str]:
-    names = [*program.world.names.library.names(), *(name for library in program.libraries for name in library.by_name)]
+    return declared_names_asked_for(program.world.names.library, program.libraries, sources)
+
+
+def declared_names_asked_for(
+    library: Library, libraries: Sequence[ImportedLibrary], sources: Sequence[Source]
+) -> frozenset[str]:
+    """What {IF defined(pou: NAME)} finds in a program."""
+    names = [*library.names(), *(name for imported in libraries for name in imported.by_name)]
     return names_asked_for([source.text for source in sources], lambda: names)
 
 

@@ -72,7 +72,12 @@ class _Project:
             self._blocks[data_type.get("name").casefold()] = known
         self._walk(root)
         for configuration in _configurations(root):
-            write_configuration(self.text, configuration, self._findings)
+            plain = plain_text(configuration)
+            if _begins_with(plain, {"CONFIGURATION"}):
+                self.text.copied(plain)
+                self.text.made("\n", configuration.at)
+            else:
+                write_configuration(self.text, configuration, self._findings)
 
     def _walk(self, element: Element) -> None:
         for child in element.children:
@@ -172,7 +177,12 @@ class _Project:
         body = self._body(action, unit, f"{unit.name}.{name}")
         for variable, (spec, at) in body.all_variables().items():
             self._findings.add(at, "language", _REFUSED.format(f"{unit.name}.{name}", f"it needs {variable} : {spec}"))
-        self.text.made(f"ACTION {name}:\n", action.at)
+        plain = plain_text(action)
+        if _begins_with(plain, {"ACTION"}):
+            self.text.copied(plain)
+            self.text.made("\n", action.at)
+        else:
+            self.text.made(f"ACTION {name}:\n", action.at)
         if not body.variables:
             body.write(self.text)
         self.text.made("\nEND_ACTION\n", action.at)
@@ -199,8 +209,12 @@ class _Project:
                 unit = self._surroundings(accessor, f"{name}.{keyword}", keeps=False)
                 body = self._body(accessor, unit)
                 self.text.made(f"{keyword}\n", accessor.at)
-                if accessor.child("interface") is not None:
-                    types.blocks(self.text, accessor.children[0])
+                plain = plain_text(accessor)
+                if plain:
+                    self.text.copied(plain)
+                    self.text.made("\n", accessor.at)
+                else:
+                    types.blocks(self.text, accessor.child("interface") or Element("interface", {}, accessor.at))
                 body.write_variables(self.text)
                 body.write(self.text)
                 self.text.made(f"\nEND_{keyword}\n", accessor.at)
@@ -259,5 +273,6 @@ def _begins_with(chunks: list[Chunk], openings: set[str] | frozenset[str]) -> bo
 
 def _configurations(root: Element) -> list[Element]:
     """Where tasks are: the configurations of the standard, or an application of CODESYS."""
-    found = [e for e in root.every("configuration") if any(True for _ in e.every("task", "pouInstance", "globalVars"))]
+    inside = ("task", "pouInstance", "globalVars", "InterfaceAsPlainText")
+    found = [e for e in root.every("configuration") if any(True for _ in e.every(*inside))]
     return found or [e for e in root.every("resource") if any(True for _ in e.every("task"))]

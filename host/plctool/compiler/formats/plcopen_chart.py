@@ -82,7 +82,8 @@ class Chart:
             raise NotTranslatedError(action.at, f"an action of the step {step} is drawn inside the chart")
         qualifier = action.get("qualifier", "N") or "N"
         duration = f", {action.get('duration')}" if action.get("duration") else ""
-        self._body.line(f"    {name}({qualifier}{duration});", action.at)
+        indicator = f", {action.get('indicator')}" if action.get("indicator") else ""
+        self._body.line(f"    {name}({qualifier}{duration}{indicator});", action.at)
 
     # ---- transitions ----
 

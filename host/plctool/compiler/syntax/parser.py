@@ -149,8 +149,10 @@ def parse_all(
     start: int = 0,
     end: int | None = None,
     declared: frozenset[str] = frozenset(),
+    tokens: list[Token] | None = None,
 ) -> Parsed:
-    """All that a text holds. `declared`: what {IF defined(pou: NAME)} finds."""
+    """All that a text holds. `declared`: what {IF defined(pou: NAME)} finds; `tokens` takes those that have a place in
+    the grammar, with the types that they have there."""
     tables, builder, reducers = _machine()
     parser = Parser(tables, reducers)
     recovery = Recovery(parser, source, report)
@@ -167,6 +169,8 @@ def parse_all(
             continue
         if feed(token) or (_is_name_after_all(token, parser, text) and feed(token)):
             recovery.accept(token)
+            if tokens is not None:
+                tokens.append(token)
         else:
             recovery.handle(token)
     result = parser.values[0] if len(parser.values) == 1 else []
