@@ -94,7 +94,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *input, size_t size)
         if (length > size - i)
             length = size - i;
         run(&index, false);
-        FUZZ_CHECK(is_asked()); /* it goes on, or begins anew */
+        FUZZ_CHECK(is_asked()); /* it goes on, or begins again */
         frame[0] = client.device->unit;
         memcpy(frame + 1, input + i, length);
         if (length != 0)

@@ -152,7 +152,7 @@ void ModbusScanPoll(const MODBUS_CLIENT *client, RTS_I64 now_ns)
         ask_next(now_ns);
 }
 
-/* Whether the PC begins anew: it has got the first one, or another line is scanned. */
+/* Whether the PC begins again: it has got the first one, or another line is scanned. */
 static bool begins(const MODBUS_CLIENT *client, RTS_UI32 index)
 {
     return index == 0 && (scan.client != client || scan.found > 1 || scan.taken);

@@ -17,7 +17,7 @@ RTS_RESULT ModbusScan(MODBUS_CLIENT *client, RTS_UI32 index, IoDrvModule *module
 /* Goes on; for every client after ModbusClientPoll. */
 void ModbusScanPoll(const MODBUS_CLIENT *client, RTS_I64 now_ns);
 
-/* Before the clients are set up anew. */
+/* Before the clients are set up again. */
 void ModbusScanEnd(void);
 
 #endif
