@@ -5,8 +5,8 @@
  *
  * A line is a serial line or a TCP connection, which may lead to a gateway with several devices. One request at a time
  * is on its way; of those that are due the one that has been due longest comes next, so that all get their turn on a
- * line that is too slow: calls of once among them. All from main. Data are exchanged with the lock of the process image (SysLock.h): those of one
- * job are of one moment.
+ * line that is too slow: calls of once among them. All from main. Data are exchanged with the lock of the process image
+ * (SysLock.h): those of one job are of one moment.
  */
 #ifndef MODBUSCLIENT_H
 #define MODBUSCLIENT_H

@@ -530,6 +530,25 @@ static void a_scan_that_nobody_goes_on_with_ends(void)
     CHECK_EQUAL(module.slot, 1);
 }
 
+/* The request that was on its way is not taken for the first one of the new scan. */
+static void a_scan_may_begin_again_in_the_middle(void)
+{
+    IoDrvModule module;
+
+    begin_scan();
+    line.identification_of = 1;
+    line.server_id_of = 2;
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(scan_on(0, &module), ERR_OK);
+    CHECK_EQUAL(scan_on(1, &module), ERR_OK);
+    CHECK_EQUAL(IoMgrScanModules(0, 2, &module), ERR_PENDING);
+    run_passes(100 / PASS_MS);
+    CHECK_EQUAL(scan_on(0, &module), ERR_OK);
+    CHECK_EQUAL(module.slot, 1);
+    CHECK_EQUAL(scan_on(1, &module), ERR_OK);
+    CHECK_EQUAL(module.slot, 2);
+}
+
 /* A configuration that is given back while it runs takes its scan along. */
 static void a_scan_ends_with_its_configuration(void)
 {
@@ -556,6 +575,7 @@ int main(void)
 {
     RUN(a_scan_finds_who_replies);
     RUN(a_scan_that_nobody_goes_on_with_ends);
+    RUN(a_scan_may_begin_again_in_the_middle);
     RUN(a_scan_ends_with_its_configuration);
     RUN(only_lines_of_clients_are_scanned);
     NEEDS_X86_64;

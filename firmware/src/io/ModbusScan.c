@@ -158,6 +158,12 @@ static bool begins(const MODBUS_CLIENT *client, RTS_UI32 index)
     return index == 0 && (scan.client != client || scan.found > 1 || scan.taken);
 }
 
+/* Its call is on its way, and cannot be another one before it has ended. */
+static bool is_asking(void)
+{
+    return scan.call != NULL && SysAtomicLoad(&scan.call->state) == MODBUS_CALL_WAITS;
+}
+
 static RTS_RESULT go_on(RTS_I64 now_ns)
 {
     if (scan.over) {
@@ -174,8 +180,13 @@ RTS_RESULT ModbusScan(MODBUS_CLIENT *client, RTS_UI32 index, IoDrvModule *module
 {
     if (client->call_count == 0)
         return ERR_NOT_SUPPORTED;
-    if (begins(client, index))
+    if (begins(client, index)) {
+        if (is_asking()) {
+            scan.wanted = false;
+            return ERR_PENDING;
+        }
         begin(client, now_ns);
+    }
     if (scan.client == client && index == scan.found)
         return go_on(now_ns);
     if (scan.client != client || index + 1 != scan.found)
