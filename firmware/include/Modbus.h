@@ -22,6 +22,7 @@ enum {
     MODBUS_READ_WRITE_REGISTERS = 23,
     MODBUS_ENCAPSULATED = 43,
     MODBUS_DEVICE_IDENTIFICATION = 14, /* MEI type of MODBUS_ENCAPSULATED */
+    MODBUS_ID_HEAD = 7,                /* bytes of its reply before the first object */
     MODBUS_EXCEPTION = 0x80,           /* set in the function code of a reply: an exception code follows */
 };
 

@@ -5,8 +5,8 @@
  *
  * A line is a serial line or a TCP connection, which may lead to a gateway with several devices. One request at a time
  * is on its way; of those that are due the one that has been due longest comes next, so that all get their turn on a
- * line that is too slow. All from main. Data are exchanged with the lock of the process image (SysLock.h): those of one
- * job are of one moment.
+ * line that is too slow: calls of once among them. All from main. Data are exchanged with the lock of the process image
+ * (SysLock.h): those of one job are of one moment.
  */
 #ifndef MODBUSCLIENT_H
 #define MODBUSCLIENT_H
@@ -51,13 +51,33 @@ typedef struct {
 
 enum { MODBUS_TRIES = 2 };
 
+/* A request of once, besides the jobs. Main sends one that waits, and ends it; others fill it and look at it while it
+ * is free or has ended. */
+enum { MODBUS_CALL_FREE, MODBUS_CALL_WAITS, MODBUS_CALL_ENDED };
+
 typedef struct {
+    RTS_UI32 state; /* MODBUS_CALL_*, by SysAtomic.h */
+    struct MODBUS_CLIENT *client;
+    MODBUS_DEVICE *device;  /* one of the client's, or one that is not described */
+    MODBUS_REQUEST request; /* without `data` */
+    RTS_I64 due_ns;         /* since when it waits */
+    RTS_RESULT result;      /* ERR_OK; ERR_TIMEOUT: no reply, or the device is lost; ERR_FAILED: `exception` */
+    RTS_UI8 exception;
+    RTS_UI8 size;                     /* bytes of a reply */
+    RTS_UI8 data[MODBUS_MAX_PDU - 1]; /* as in a PDU: to be written; then those that were read, or, of functions 17 and
+                                         43, all after the function */
+} MODBUS_CALL;
+
+typedef struct MODBUS_CLIENT {
     MODBUS_LINK link;
     RTS_UI32 device_count;
     MODBUS_DEVICE *devices;
+    RTS_UI32 call_count; /* of all lines */
+    MODBUS_CALL *calls;
     /* what is on its way */
     MODBUS_DEVICE *device; /* NULL: nothing */
-    MODBUS_JOB_STATE *job;
+    MODBUS_JOB_STATE *job; /* NULL: a call is */
+    MODBUS_CALL *call;
     MODBUS_REQUEST request;
     bool sent;  /* else it waits for the link */
     bool waits; /* the last byte has left */
@@ -69,6 +89,8 @@ typedef struct {
 
 /* Devices and jobs are zero but for what the configuration says. */
 void ModbusClientBegin(MODBUS_CLIENT *client, MODBUS_DEVICE *devices, RTS_UI32 count);
+/* Where the calls of all clients are, the first one for scans. None unless it is called. */
+void ModbusClientSetCalls(MODBUS_CLIENT *client, MODBUS_CALL *calls, RTS_UI32 count);
 
 void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns);
 

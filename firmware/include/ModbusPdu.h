@@ -40,13 +40,13 @@ RTS_UI32 ModbusDataSize(const MODBUS_FUNCTION *function, RTS_UI32 count);
  * length than it should, or asks for too much), MODBUS_ILLEGAL_ADDRESS (beyond 65535). */
 RTS_UI8 ModbusReadRequest(RTS_UI8 *pdu, RTS_UI32 size, MODBUS_REQUEST *request);
 
-/* Begins a request: all but the data, for which `request->data` gets a place in `pdu` (MODBUS_MAX_PDU bytes). The counts
+/* Begins a request: all but the data (of functions 17 and 43: what follows the function), for which `request->data` gets a place in `pdu` (MODBUS_MAX_PDU bytes). The counts
  * are within the limits. Returns its size, with the data. */
 RTS_UI32 ModbusBeginRequest(MODBUS_REQUEST *request, RTS_UI8 *pdu);
 
 /* What a reply is to a request. */
 typedef enum {
-    MODBUS_REPLY_GOOD,      /* data that were read begin at pdu + 2 */
+    MODBUS_REPLY_GOOD,      /* data that were read begin at pdu + 2; of functions 17 and 43 none are looked at */
     MODBUS_REPLY_EXCEPTION, /* its code is pdu[1] */
     MODBUS_REPLY_OTHER,     /* of another length, function or address: not a reply to this request */
 } MODBUS_REPLY;

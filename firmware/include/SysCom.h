@@ -33,7 +33,8 @@ typedef struct {
 
 /* Opens a line of a field bus, by the name that the port gives its lines ("/dev/ttyS1", "COM2"), and returns its index.
  * ERR_NO_OBJECT: the port has no such line; ERR_DUPLICATE: it is open; ERR_NOT_SUPPORTED: it cannot run like that;
- * ERR_DEVICE: it cannot be opened. Only a firmware with a field bus needs it, and SysComGetByteNs. */
+ * ERR_DEVICE: it cannot be opened. Only a firmware with a field bus needs it, SysComGetByteNs and
+ * SysComDiscard. */
 RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS_UI32 *index);
 
 /* When the last byte came that SysComRead has returned, or a later one, or when it was read, if the port cannot know better
@@ -45,5 +46,9 @@ RTS_UI32 SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size);
 
 /* Queues bytes to send; returns how many were taken (0..size), the others have to be offered again. */
 RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size);
+
+/* Forgets bytes that SysComWrite took and that have not left, as far as the port can: none of them arrives after a
+ * newer request. Of a UART they leave by themselves, so it has nothing to do. */
+void SysComDiscard(RTS_UI32 index);
 
 #endif

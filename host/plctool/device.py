@@ -197,9 +197,9 @@ class Plc(Controller):
         """A device shows itself, by a light for example."""
         io_services.identify(self._session, self.io_device(device).index)
 
-    def io_scan(self, bus: str) -> list[IoModule]:
-        """What is on a bus, whether the program uses it or not."""
-        return list(io_services.scan(self._session, self.io_device(bus).index))
+    def io_scan(self, bus: str) -> Iterator[IoModule]:
+        """What is on a bus, whether the program uses it or not; each when it is found."""
+        return io_services.scan(self._session, self.io_device(bus).index)
 
     # ---- the application ----
 

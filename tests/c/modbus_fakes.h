@@ -38,6 +38,7 @@ typedef struct {
     FAKE_BYTES to_device;
     FAKE_BYTES from_device;
     RTS_I64 last_byte_ns;
+    RTS_UI32 discards;
     RTS_UI32 write_limit; /* bytes that one SysComWrite takes */
     RTS_UI32 read_limit;  /* bytes that one SysComRead gives */
     bool babbles;         /* SysComRead gives as many bytes as wanted, of this moment, FAKE_READS times */

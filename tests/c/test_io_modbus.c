@@ -20,6 +20,8 @@ static struct {
     RTS_UI32 out_size;
     RTS_UI32 asked[OTHER_UNIT + 1]; /* frames by unit */
     RTS_UI32 listeners;
+    RTS_UI8 identification_of; /* this unit has one */
+    RTS_UI8 server_id_of;      /* this one has an ID only */
 } line;
 
 /* ---- the line ---- */
@@ -52,6 +54,36 @@ RTS_UI32 __wrap_SysComRead(RTS_UI32 index, RTS_UI8 *data, RTS_UI32 size)
     return count;
 }
 
+static void reply(RTS_UI8 unit, const char *pdu, RTS_UI32 pdu_size)
+{
+    RTS_UI32 size = 1 + pdu_size;
+    RTS_UI16 crc;
+
+    line.in[0] = unit;
+    memcpy(line.in + 1, pdu, pdu_size);
+    crc = ModbusCrc(line.in, size);
+    line.in[size] = (RTS_UI8)crc;
+    line.in[size + 1] = (RTS_UI8)(crc >> 8);
+    line.in_size = size + MODBUS_CRC_SIZE;
+}
+
+static void reply_who_it_is(const RTS_UI8 *request)
+{
+    static const char identification[] = "\x2B\x0E\x01\x81\x00\x00\x03\x00\x04"
+                                         "Acme\x01\x02P7\x02\x01"
+                                         "2";
+
+    if (request[0] == line.identification_of && request[1] == MODBUS_ENCAPSULATED)
+        reply(request[0], identification, sizeof identification - 1);
+    else if (request[0] == line.server_id_of && request[1] == MODBUS_ENCAPSULATED)
+        reply(request[0], "\xAB\x01", 2);
+    else if (request[0] == line.server_id_of && request[1] == MODBUS_REPORT_SERVER_ID)
+        reply(request[0],
+              "\x11\x06\x14\xFF"
+              "Pump",
+              8);
+}
+
 RTS_UI32 __wrap_SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size);
 RTS_UI32 __wrap_SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
 {
@@ -59,7 +91,9 @@ RTS_UI32 __wrap_SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
         return size;
     memcpy(line.out, data, size);
     line.out_size = size;
-    line.asked[data[0]]++;
+    if (data[0] <= OTHER_UNIT)
+        line.asked[data[0]]++;
+    reply_who_it_is(data);
     return size;
 }
 
@@ -436,8 +470,114 @@ static void a_server_comes_after_one_that_is_left_out(void)
     CHECK_EQUAL(line.closed, line.opened);
 }
 
+/* ---- scan ---- */
+
+enum { WELL_KNOWN_UNIT = 9, ID_UNIT = 20, LONG_MS = 100000 };
+
+static RTS_RESULT scan_on(RTS_UI32 index, IoDrvModule *module)
+{
+    RTS_RESULT result = IoMgrScanModules(0, index, module);
+
+    for (RTS_UI32 i = 0; result == ERR_PENDING && i < LONG_MS / 100; i++) {
+        run_passes(100 / PASS_MS);
+        result = IoMgrScanModules(0, index, module);
+    }
+    return result;
+}
+
+static void begin_scan(void)
+{
+    begin();
+    (void)add_line(MODBUS_ROLE_SERIAL_CLIENT);
+    (void)add_device("Meter", UNIT);
+    add_read_job(0, 2);
+    line.identification_of = WELL_KNOWN_UNIT;
+    line.server_id_of = ID_UNIT;
+}
+
+static void a_scan_finds_who_replies(void)
+{
+    IoDrvModule module;
+
+    begin_scan();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    for (RTS_UI32 i = 0; i < 2; i++) {
+        CHECK_EQUAL(scan_on(0, &module), ERR_OK);
+        CHECK_EQUAL(module.slot, WELL_KNOWN_UNIT);
+        CHECK(strcmp(module.name, "Acme P7 2") == 0);
+        CHECK_EQUAL(scan_on(1, &module), ERR_OK);
+        CHECK_EQUAL(module.slot, ID_UNIT);
+        CHECK(strcmp(module.name, "Pump") == 0);
+        CHECK_EQUAL(scan_on(2, &module), ERR_NO_OBJECT);
+    }
+}
+
+static void a_scan_that_nobody_goes_on_with_ends(void)
+{
+    IoDrvModule module;
+
+    begin_scan();
+    line.identification_of = line.server_id_of = 0;
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(IoMgrScanModules(0, 0, &module), ERR_PENDING);
+    run_passes(20000 / PASS_MS);
+    line.out[0] = 0;
+    line.asked[UNIT] = 0;
+    run_passes(5000 / PASS_MS);
+    CHECK(line.out[0] == UNIT); /* its own device is still asked */
+    line.identification_of = 1; /* the next scan begins with the first unit */
+    CHECK_EQUAL(scan_on(0, &module), ERR_OK);
+    CHECK_EQUAL(module.slot, 1);
+}
+
+/* The request that was on its way is not taken for the first one of the new scan. */
+static void a_scan_may_begin_again_in_the_middle(void)
+{
+    IoDrvModule module;
+
+    begin_scan();
+    line.identification_of = 1;
+    line.server_id_of = 2;
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(scan_on(0, &module), ERR_OK);
+    CHECK_EQUAL(scan_on(1, &module), ERR_OK);
+    CHECK_EQUAL(IoMgrScanModules(0, 2, &module), ERR_PENDING);
+    run_passes(100 / PASS_MS);
+    CHECK_EQUAL(scan_on(0, &module), ERR_OK);
+    CHECK_EQUAL(module.slot, 1);
+    CHECK_EQUAL(scan_on(1, &module), ERR_OK);
+    CHECK_EQUAL(module.slot, 2);
+}
+
+/* A configuration that is given back while it runs takes its scan along. */
+static void a_scan_ends_with_its_configuration(void)
+{
+    IoDrvModule module;
+
+    begin_scan();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(IoMgrScanModules(0, 0, &module), ERR_PENDING);
+    CHECK_EQUAL(IoDrvModbus_Hook(CH_EXIT3), ERR_OK);
+    CHECK_EQUAL(IoMgrScanModules(0, 0, &module), ERR_NOT_SUPPORTED);
+    run_passes(10);
+}
+
+static void only_lines_of_clients_are_scanned(void)
+{
+    IoDrvModule module;
+
+    begin_scan();
+    CHECK_EQUAL(load_io(), ERR_OK);
+    CHECK_EQUAL(IoMgrScanModules(1, 0, &module), ERR_NOT_SUPPORTED);
+}
+
 int main(void)
 {
+    RUN(a_scan_finds_who_replies);
+    RUN(a_scan_that_nobody_goes_on_with_ends);
+    RUN(a_scan_may_begin_again_in_the_middle);
+    RUN(a_scan_ends_with_its_configuration);
+    RUN(only_lines_of_clients_are_scanned);
     NEEDS_X86_64;
     RUN(outputs_are_safe_before_the_program_runs);
     RUN(outputs_that_hold_are_not_written_before_the_program_runs);

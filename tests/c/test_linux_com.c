@@ -345,6 +345,36 @@ static void a_line_that_cannot_run_like_that_is_refused(void)
     CHECK_EQUAL(SysComOpenPort("", &slow, &line), ERR_NO_OBJECT);
 }
 
+/* What the other end has taken over (a page of a pseudo terminal) is gone; the rest never comes. */
+static void what_is_discarded_does_not_arrive(void)
+{
+    const SYSCOM_SETTINGS settings = {19200, SYSCOM_PARITY_EVEN, 1, false};
+    enum { PAGE = 4096 };
+    RTS_UI8 page[PAGE] = {0};
+    RTS_UI32 line, taken = 0, now, arrived = 0;
+    int other = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
+
+    CHECK(other >= 0 && grantpt(other) == 0 && unlockpt(other) == 0);
+    CHECK_EQUAL(SysComOpenPort(ptsname(other), &settings, &line), ERR_OK);
+    while ((now = SysComWrite(line, page, PAGE)) != 0) {
+        taken += now;
+    }
+    CHECK(taken > PAGE);
+    SysComDiscard(line);
+    for (RTS_UI32 i = 0; i < 100; i++) {
+        ssize_t count = read(other, page, PAGE);
+        arrived += count > 0 ? (RTS_UI32)count : 0;
+        sleep_1ms();
+    }
+    CHECK(arrived <= PAGE);
+    CHECK_EQUAL(SysComWrite(line, (const RTS_UI8 *)"new", 3), 3);
+    CHECK_EQUAL(read_client(other, page, 3), 3);
+    CHECK(memcmp(page, "new", 3) == 0);
+    SysComClose(line);
+    SysComDiscard(line);
+    close(other);
+}
+
 static void what_cannot_be_opened_is_said(void)
 {
     PORT_REASON reason = {"", false};
@@ -487,6 +517,7 @@ int main(void)
     RUN(a_line_that_carries_can_is_in_use);
     RUN(a_line_that_is_not_plugged_in_is_waited_for);
     RUN(a_line_that_cannot_run_like_that_is_refused);
+    RUN(what_is_discarded_does_not_arrive);
     RUN(what_cannot_be_opened_is_said);
     RUN(a_device_that_keeps_another_speed_is_refused);
     RUN(a_device_that_another_program_uses_is_refused);

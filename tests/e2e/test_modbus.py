@@ -33,6 +33,7 @@ VAR
     echo : INT; half : REAL; sum : DINT; alive : BOOL;
     rtu_set : INT; rtu_get : INT; ghost_in, ghost_out : INT;
     power, energy : REAL; counter : UDINT; speed, reference : INT; pump : BOOL; level : INT;
+    wanted, given : INT; wanted_real, given_real : REAL;
 END_VAR
 VAR i : INT; END_VAR
 n := n + 1;
@@ -137,6 +138,14 @@ address = 40021
 on_change = true
 verify = true
 vars = ["Main.speed"]
+[[modbus.tcp.device.read_write]]
+every = "T#50ms"
+[modbus.tcp.device.read_write.read]
+address = 40041
+vars = ["Main.given", "Main.given_real"]
+[modbus.tcp.device.read_write.write]
+address = 40041
+vars = ["Main.wanted", "Main.wanted_real"]
 """
 
 
@@ -360,6 +369,24 @@ def test_change_is_written_once_and_verified(plant: Plant) -> None:
     reads = plant.drive.count(1)
     eventually(lambda: plant.drive.count(1) >= reads + 20)
     assert plant.drive.requests.count((1, 16)) == before + 1
+
+
+def test_one_request_writes_and_reads(plant: Plant) -> None:
+    """Function 23: what is read is there after what is written."""
+    plant.plc.write({"Main.wanted": 77, "Main.wanted_real": -0.625})
+    eventually(lambda: plant.plc.read("Main.given") == 77)
+    assert plant.plc.read("Main.given_real") == -0.625
+    assert (1, 23) in plant.drive.requests
+
+
+def test_scan_finds_the_devices_of_a_line(plant: Plant) -> None:
+    """The exchange of data goes on meanwhile. pymodbus says what it is for every unit, without words."""
+    eventually(lambda: ok(plant, "Meter"))
+    asked = plant.meter.count(3)
+    line = next(d for d in plant.plc.io_devices() if d.index == plant.plc.io_device("Meter").parent)
+    found = next(plant.plc.io_scan(line.name))
+    assert (found.slot, found.name) == (1, "")
+    eventually(lambda: plant.meter.count(3) > asked + 20 and ok(plant, "Meter"))
 
 
 def test_device_that_was_switched_off_comes_back_with_its_outputs(plant: Plant) -> None:

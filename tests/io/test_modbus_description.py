@@ -180,7 +180,42 @@ def test_line_that_is_too_slow_is_warned_of(tmp_path: Path) -> None:
     assert any("too slow" in m for m in messages(tmp_path, PROGRAM, text))
 
 
+BOTH = """\
+[[modbus.tcp]]
+host = "127.0.0.1"
+[[modbus.tcp.device]]
+name = "Drive"
+{order}
+[[modbus.tcp.device.read_write]]
+every = "T#100ms"
+[modbus.tcp.device.read_write.read]
+address = 40001
+vars = ["Main.{read}"]
+[modbus.tcp.device.read_write.write]
+address = 40011
+vars = ["Main.{write}"]
+"""
+
+
+def test_one_job_reads_and_writes(tmp_path: Path) -> None:
+    job, channels = read_job(tmp_path, BOTH.format(order='order = "CDAB"', read="words", write="real_1"))
+    assert (job.function, job.read_address, job.read_count) == (23, 0, 10)
+    assert (job.write_address, job.write_count) == (10, 2)
+    assert sorted((c.parameter_bit, c.bits) for c in channels) == [(0, 32), (0, 160)]
+
+
 MISTAKES = [
+    (BOTH.format(order="unit = 3", read="on", write="bools"), "Main.bools"),
+    (BOTH.format(order="", read="reals", write="word_1"), "Main.reals is ARRAY[0..3] OF REAL: with this order"),
+    (BOTH.format(order="", read="word_1", write="word_2").replace("40011", "11"), "11 is not the address of holding"),
+    (
+        BOTH.format(order="", read="word_1", write="word_2").split("[modbus.tcp.device.read_write.write]")[0],
+        "reads and writes: add a table [modbus.tcp.device.read_write.write]",
+    ),
+    (
+        BOTH.format(order="", read="word_1", write="word_2").replace("every", "function = 3\nevery"),
+        "function 3 cannot be here: to read and write at a time there are 23",
+    ),
     (device("word_1", address=30001), "10: 30001 is not the address of holding registers: they are 40001 to 49999"),
     (device("word_1", function=7), "9: function 7 cannot be here: to read there are 1, 2, 3, 4"),
     (device("bools"), "Main.bools"),

@@ -15,7 +15,7 @@ from plctool.files import Pos
 from plctool.iec.types import BOOL, ELEMENTARY, ArrayType, Field, StringType, StructType, Type
 from plctool.io.mistakes import Mistakes
 from plctool.io.modbus import registers
-from plctool.io.modbus.client import FUNCTIONS, Job, ModbusDevice, ModbusLine
+from plctool.io.modbus.client import FUNCTIONS, Job, ModbusDevice, ModbusLine, Part
 from plctool.io.modbus.server import ModbusServer, Object
 from plctool.io.model import Channel
 
@@ -118,7 +118,7 @@ def job(found: Sequence[Variable], function: int, order: str) -> tuple[object | 
     mistakes, line = Mistakes(), ModbusLine("line", "IoDrvModbus", POS)
     channels = [Channel(f"v{i}", f"Main.v{i}", POS, True, variable_type=v.type) for i, v in enumerate(found)]
     device = ModbusDevice("device", "IoDrvModbus", POS, parent=line, order=registers.ORDERS[order])
-    device.jobs = [Job(FUNCTIONS[function], 0, 100_000, False, False, channels, POS)]
+    device.jobs = [Job(FUNCTIONS[function], 100_000, False, False, POS, write=Part(0, channels, POS))]
     device.complete(mistakes)
     if mistakes.found:
         return None, channels, mistakes

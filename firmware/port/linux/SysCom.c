@@ -441,6 +441,16 @@ RTS_UI32 SysComWrite(RTS_UI32 index, const RTS_UI8 *data, RTS_UI32 size)
     return taken;
 }
 
+/* A tty whose line is slow or away (a gateway in the network, a pseudo terminal) may keep pages of old requests. */
+void SysComDiscard(RTS_UI32 index)
+{
+    LINE *line = index < LINES ? &lines[index] : NULL;
+    if (line != NULL && line->open && line->source.file >= 0) {
+        (void)tcflush(line->source.file, TCOFLUSH);
+        line->source.events = POLLIN;
+    }
+}
+
 RTS_I64 SysComGetByteNs(RTS_UI32 index)
 {
     return index < LINES ? lines[index].byte_ns : 0;

@@ -95,6 +95,11 @@ RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS
     return ERR_NO_OBJECT;
 }
 
+void SysComDiscard(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+}
+
 RTS_I64 SysComGetByteNs(RTS_UI32 index)
 {
     RTS_UNUSED(index);

@@ -11,6 +11,7 @@
 
 #include "AppState.h"
 #include "CmpIoMgrEmbedded.h"
+#include "ModbusScan.h"
 #include "ModbusServerTcp.h"
 #include "ModbusSetup.h"
 #include "SysLock.h"
@@ -39,6 +40,7 @@ static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int 
     RTS_UNUSED(connectors);
     RTS_UNUSED(count);
     is_running = false;
+    ModbusScanEnd();
     ModbusGiveBack(&setup);
     return ERR_OK;
 }
@@ -273,6 +275,7 @@ static void cycle(void)
 
     for (RTS_UI32 i = 0; i < setup.client_count; i++) {
         ModbusClientPoll(&setup.clients[i].client, now_ns);
+        ModbusScanPoll(&setup.clients[i].client, now_ns);
         note_client(&setup.clients[i]);
     }
     for (RTS_UI32 i = 0; i < setup.server_count; i++) {
@@ -342,15 +345,24 @@ static RTS_RESULT server_counter(const MODBUS_SERVER_LINE *line, RTS_UI32 id, RT
     }
 }
 
+/* NULL: it is no line of a client. */
+static MODBUS_CLIENT *find_client(const IoConfigConnector *connector)
+{
+    for (RTS_UI32 i = 0; i < setup.client_count; i++) {
+        if (setup.clients[i].noted.connector == connector)
+            return &setup.clients[i].client;
+    }
+    return NULL;
+}
+
 static RTS_RESULT client_counter(const IoConfigConnector *connector, RTS_UI32 id, RTS_UI32 *value)
 {
-    for (RTS_UI32 i = 0; i < setup.client_count && id == MODBUS_PARAM_BAD_FRAMES; i++) {
-        if (setup.clients[i].noted.connector != connector)
-            continue;
-        *value = setup.clients[i].client.link.bad_frames;
-        return ERR_OK;
-    }
-    return ERR_NO_OBJECT;
+    const MODBUS_CLIENT *client = id == MODBUS_PARAM_BAD_FRAMES ? find_client(connector) : NULL;
+
+    if (client == NULL)
+        return ERR_NO_OBJECT;
+    *value = client->link.bad_frames;
+    return ERR_OK;
 }
 
 static RTS_RESULT read_parameter(const IoConfigConnector *connector, RTS_UI32 id, void *data, RTS_UI32 bits,
@@ -372,6 +384,13 @@ static RTS_RESULT read_parameter(const IoConfigConnector *connector, RTS_UI32 id
     return ERR_OK;
 }
 
+static RTS_RESULT scan_modules(const IoConfigConnector *connector, RTS_UI32 index, IoDrvModule *module)
+{
+    MODBUS_CLIENT *client = is_running ? find_client(connector) : NULL;
+
+    return client != NULL ? ModbusScan(client, index, module, SysTimeGetNs()) : (RTS_RESULT)ERR_NOT_SUPPORTED;
+}
+
 /* ---- life ---- */
 
 static const ICmpIoDrv functions = {
@@ -380,6 +399,7 @@ static const ICmpIoDrv functions = {
     .IoDrvUpdateMapping = update_mapping,
     .IoDrvReadInputs = read_inputs,
     .IoDrvWriteOutputs = write_outputs,
+    .IoDrvScanModules = scan_modules,
     .IoDrvReadParameter = read_parameter,
 };
 

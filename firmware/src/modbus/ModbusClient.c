@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "SysAtomic.h"
 #include "SysLock.h"
 #include "rts_config.h"
 
@@ -34,7 +35,14 @@ void ModbusClientBegin(MODBUS_CLIENT *client, MODBUS_DEVICE *devices, RTS_UI32 c
     client->devices = devices;
     client->device_count = count;
     client->device = NULL;
+    client->call_count = 0;
     client->transaction = 0;
+}
+
+void ModbusClientSetCalls(MODBUS_CLIENT *client, MODBUS_CALL *calls, RTS_UI32 count)
+{
+    client->calls = calls;
+    client->call_count = count;
 }
 
 /* ---- which job is next ---- */
@@ -78,6 +86,35 @@ static MODBUS_JOB_STATE *find_due(const MODBUS_DEVICE *device, RTS_I64 *earliest
     return found;
 }
 
+static void end_call(MODBUS_CALL *call, RTS_RESULT result)
+{
+    call->result = result;
+    SysAtomicStore(&call->state, MODBUS_CALL_ENDED);
+}
+
+/* A lost device costs its line no more for those who call it: they need not wait. */
+static bool is_wanted(MODBUS_CALL *call, RTS_I64 now_ns)
+{
+    if (!ModbusDeviceIsLost(call->device) || now_ns >= call->device->retry_ns)
+        return true;
+    end_call(call, ERR_TIMEOUT);
+    return false;
+}
+
+/* Of the calls one that has been due longer than the job that was found. */
+static void choose_call(MODBUS_CLIENT *client, RTS_I64 earliest_ns, RTS_I64 now_ns)
+{
+    for (MODBUS_CALL *call = client->calls; call < client->calls + client->call_count; call++) {
+        if (SysAtomicLoad(&call->state) != MODBUS_CALL_WAITS || call->client != client || call->due_ns > earliest_ns ||
+            !is_wanted(call, now_ns))
+            continue;
+        earliest_ns = call->due_ns;
+        client->device = call->device;
+        client->call = call;
+        client->job = NULL;
+    }
+}
+
 /* The job that is due, and longest. */
 static void choose(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
@@ -94,6 +131,7 @@ static void choose(MODBUS_CLIENT *client, RTS_I64 now_ns)
             client->job = job;
         }
     }
+    choose_call(client, earliest_ns, now_ns);
 }
 
 /* ---- requests ---- */
@@ -151,7 +189,14 @@ static RTS_UI8 function_to_verify(const MODBUS_FUNCTION *function)
     return function->table == MODBUS_COILS ? MODBUS_READ_COILS : MODBUS_READ_HOLDING_REGISTERS;
 }
 
-static void describe(MODBUS_CLIENT *client)
+static void put_call(const MODBUS_CALL *call, const MODBUS_REQUEST *request, RTS_UI32 size, const RTS_UI8 *pdu)
+{
+    RTS_UI32 head = (RTS_UI32)(request->data - pdu);
+
+    memcpy(request->data, call->data, size - head);
+}
+
+static void describe_job(MODBUS_CLIENT *client)
 {
     const MODBUS_JOB *job = client->job->job;
     MODBUS_REQUEST *request = &client->request;
@@ -182,9 +227,14 @@ static void send(MODBUS_CLIENT *client, RTS_I64 now_ns)
     RTS_UI8 *pdu = link->frame + MODBUS_AT_PDU;
     RTS_UI32 size;
 
-    describe(client);
+    if (client->job != NULL)
+        describe_job(client);
+    else
+        client->request = client->call->request;
     size = ModbusBeginRequest(&client->request, pdu);
-    if (client->request.write_count != 0)
+    if (client->job == NULL)
+        put_call(client->call, &client->request, size, pdu);
+    else if (client->request.write_count != 0)
         put_data(client);
     memcpy(client->head, pdu, MODBUS_HEAD_SIZE);
     link->frame[MODBUS_AT_UNIT] = client->device->unit;
@@ -254,7 +304,16 @@ static RTS_I64 pause_of(const MODBUS_CLIENT *client)
     return (client->device->failures == MODBUS_TRIES ? MODBUS_RETRY_SOON_MS : MODBUS_RETRY_MS) * NS_PER_MS;
 }
 
-/* No reply: once more, or the device is lost. */
+static void fail_job(MODBUS_JOB_STATE *job, bool lost, RTS_I64 now_ns)
+{
+    job->good = false;
+    job->is_written = false;
+    job->done_ns = now_ns;
+    if (!lost)
+        job->due_ns = now_ns;
+}
+
+/* No reply: a job is tried once more, or the device is lost. */
 static void fail(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     MODBUS_DEVICE *device = client->device;
@@ -262,20 +321,18 @@ static void fail(MODBUS_CLIENT *client, RTS_I64 now_ns)
     device->counters.timeouts++;
     if (device->failures < UINT8_MAX)
         device->failures++;
-    client->job->good = false;
-    client->job->is_written = false;
-    client->job->done_ns = now_ns;
     if (ModbusDeviceIsLost(device))
         device->retry_ns = now_ns + pause_of(client);
+    if (client->job != NULL)
+        fail_job(client->job, ModbusDeviceIsLost(device), now_ns);
     else
-        client->job->due_ns = now_ns;
+        end_call(client->call, ERR_TIMEOUT);
     client->verifies = false;
     client->device = NULL;
 }
 
-static void end(MODBUS_CLIENT *client, bool good, RTS_I64 now_ns)
+static void end_job(MODBUS_JOB_STATE *job, bool good, RTS_I64 now_ns)
 {
-    MODBUS_JOB_STATE *job = client->job;
     RTS_I64 interval_ns = job->job->interval_ms * NS_PER_MS;
 
     if (!good && interval_ns < REFUSED_MS * NS_PER_MS && job->job->write_count != 0)
@@ -285,6 +342,14 @@ static void end(MODBUS_CLIENT *client, bool good, RTS_I64 now_ns)
     job->done_ns = now_ns;
     job->good = good;
     job->is_written = good && job->job->write_count != 0;
+}
+
+static void end(MODBUS_CLIENT *client, bool good, RTS_I64 now_ns)
+{
+    if (client->job != NULL)
+        end_job(client->job, good, now_ns);
+    else
+        end_call(client->call, good ? ERR_OK : ERR_FAILED);
     client->verifies = false;
     client->device = NULL;
 }
@@ -326,11 +391,28 @@ static void take_data(const MODBUS_CLIENT *client, RTS_UI8 *data)
     SysLockLeave(lock);
 }
 
-static void take_good(MODBUS_CLIENT *client, RTS_UI8 *data, RTS_I64 now_ns)
+/* What follows the function, and of what was read the number of bytes; of a write nothing. */
+static void take_call(const MODBUS_CLIENT *client, const RTS_UI8 *pdu, RTS_UI32 size)
 {
+    MODBUS_CALL *call = client->call;
+    RTS_UI32 head = call->request.function->table == 0 ? 1 : 2;
+
+    call->size =
+        call->request.function->most_written != 0 && call->request.read_count == 0 ? 0 : (RTS_UI8)(size - head);
+    memcpy(call->data, pdu + head, call->size);
+}
+
+static void take_good(MODBUS_CLIENT *client, RTS_UI8 *pdu, RTS_UI32 size, RTS_I64 now_ns)
+{
+    RTS_UI8 *data = pdu + 2;
     bool good = true;
 
     note_reply(client, now_ns);
+    if (client->job == NULL) {
+        take_call(client, pdu, size);
+        end(client, true, now_ns);
+        return;
+    }
     if (client->verifies) {
         good = is_verified(client, data);
         client->device->counters.unverified += !good;
@@ -356,6 +438,8 @@ static void take_exception(MODBUS_CLIENT *client, RTS_UI8 code, RTS_I64 now_ns)
     }
     client->device->counters.exceptions++;
     note_reply(client, now_ns);
+    if (client->job == NULL)
+        client->call->exception = code;
     end(client, false, now_ns);
 }
 
@@ -378,7 +462,7 @@ static void take_frame(MODBUS_CLIENT *client, RTS_UI32 size, RTS_I64 now_ns)
     MODBUS_REPLY reply = check(client, size);
 
     if (reply == MODBUS_REPLY_GOOD)
-        take_good(client, pdu + 2, now_ns);
+        take_good(client, pdu, size, now_ns);
     else if (reply == MODBUS_REPLY_EXCEPTION)
         take_exception(client, pdu[1], now_ns);
     else

@@ -165,12 +165,23 @@ static MODBUS_REPLY check_repeated(const MODBUS_REQUEST *request, const RTS_UI8 
     return size == expected && memcmp(head, pdu, size) == 0 ? MODBUS_REPLY_GOOD : MODBUS_REPLY_OTHER;
 }
 
+/* What a device says of itself: its own length is in the one, and the category that was asked for in the other. */
+static MODBUS_REPLY check_description(const RTS_UI8 *head, const RTS_UI8 *pdu, RTS_UI32 size)
+{
+    bool good =
+        pdu[0] == MODBUS_REPORT_SERVER_ID ? size == 2u + pdu[1] : size >= MODBUS_ID_HEAD && memcmp(head, pdu, 3) == 0;
+
+    return good ? MODBUS_REPLY_GOOD : MODBUS_REPLY_OTHER;
+}
+
 MODBUS_REPLY ModbusCheckReply(const MODBUS_REQUEST *request, const RTS_UI8 *head, const RTS_UI8 *pdu, RTS_UI32 size)
 {
     if (size == 2 && pdu[0] == (request->function->function | MODBUS_EXCEPTION))
         return MODBUS_REPLY_EXCEPTION;
     if (size < 2 || pdu[0] != request->function->function)
         return MODBUS_REPLY_OTHER;
+    if (request->function->table == 0)
+        return check_description(head, pdu, size);
     if (request->function->most_read != 0)
         return check_data_reply(request, pdu, size);
     return check_repeated(request, head, pdu, size);

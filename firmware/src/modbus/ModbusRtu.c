@@ -56,6 +56,7 @@ void ModbusRtuClose(MODBUS_LINK *link)
 
 void ModbusRtuGiveUp(MODBUS_LINK *link)
 {
+    SysComDiscard(link->handle);
     if (!link->sending)
         return;
     link->sending = false;

@@ -205,7 +205,7 @@ static RTS_UI32 reply_server_id(const MODBUS_SERVER *server, RTS_UI8 *pdu)
     return 4 + length;
 }
 
-enum { ID_BASIC = 1, ID_REGULAR = 2, ID_EXTENDED = 3, ID_INDIVIDUAL = 4, ID_CONFORMITY = 0x82, ID_HEAD = 7 };
+enum { ID_BASIC = 1, ID_REGULAR = 2, ID_EXTENDED = 3, ID_INDIVIDUAL = 4, ID_CONFORMITY = 0x82 };
 
 static bool has_object(const MODBUS_SERVER *server, RTS_UI32 object)
 {
@@ -215,7 +215,7 @@ static bool has_object(const MODBUS_SERVER *server, RTS_UI32 object)
 /* Appends objects from `object` to before `end`, as many as there is room for. Returns the size of the reply. */
 static RTS_UI32 put_objects(const MODBUS_SERVER *server, RTS_UI32 object, RTS_UI32 end, RTS_UI8 *pdu)
 {
-    RTS_UI32 size = ID_HEAD;
+    RTS_UI32 size = MODBUS_ID_HEAD;
 
     for (; object < end; object++) {
         if (!has_object(server, object))

@@ -15,7 +15,7 @@ from plctool.link.wire import Layout
 NO_PARENT = int(lib.IO_CONFIG_NONE)
 NEVER_MS = 0xFFFF_FFFF  # age of data that never came, or longer ago
 _PENDING_POLL = 0.1  # s
-_PENDING_LIMIT = 60.0  # s that a scan may take to go on
+_PENDING_LIMIT = 600.0  # s that a scan may take to go on: 247 silent units of a Modbus gateway
 _MOST_MODULES = 1000  # on one bus; a Modbus line has 247
 
 _STATE = Layout("IO_STATE")

@@ -57,6 +57,11 @@ RTS_RESULT SysComOpenPort(const char *name, const SYSCOM_SETTINGS *settings, RTS
 }
 
 /* Write here, for a field bus: what the receive interrupt noted of SysTimeGetNs. */
+void SysComDiscard(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+}
+
 RTS_I64 SysComGetByteNs(RTS_UI32 index)
 {
     RTS_UNUSED(index);

@@ -41,6 +41,7 @@ from plctool.io.tables import Table, each
 
 _MAX_TIMEOUT_US = 60_000_000
 _MAX_INTERVAL_US = 3_600_000_000
+_READ_WRITE = int(lib.MODBUS_READ_WRITE_REGISTERS)
 _TURNAROUND_US = 5000  # what a device takes to reply, for the load of a line
 _REVERSE_FLAGS = {
     1: 0,
@@ -52,15 +53,20 @@ _REVERSE_FLAGS = {
 
 @dataclass(frozen=True)
 class Function:
-    """What a function code is. `most`: bits or registers of one request; `request` and `reply`: bytes of their PDU
-    without data."""
+    """What a function code is. `most_read`, `most_written`: bits or registers of one request, 0: none; `request` and
+    `reply`: bytes of their PDU without data."""
 
     code: int
     table: int
-    most: int
-    writes: bool
+    most_read: int
+    most_written: int
     request: int
     reply: int
+
+    @property
+    def kind(self) -> str:
+        """The table of a description that it is in."""
+        return "read_write" if self.most_read and self.most_written else "read" if self.most_read else "write"
 
     @property
     def of_bits(self) -> bool:
@@ -71,30 +77,57 @@ class Function:
 FUNCTIONS = {
     f.code: f
     for f in (
-        Function(1, COILS, int(lib.MODBUS_MAX_READ_BITS), False, 5, 2),
-        Function(2, DISCRETE, int(lib.MODBUS_MAX_READ_BITS), False, 5, 2),
-        Function(3, HOLDING, int(lib.MODBUS_MAX_READ_REGISTERS), False, 5, 2),
-        Function(4, INPUT, int(lib.MODBUS_MAX_READ_REGISTERS), False, 5, 2),
-        Function(5, COILS, 1, True, 5, 5),
-        Function(6, HOLDING, 1, True, 5, 5),
-        Function(15, COILS, int(lib.MODBUS_MAX_WRITE_BITS), True, 6, 5),
-        Function(16, HOLDING, int(lib.MODBUS_MAX_WRITE_REGISTERS), True, 6, 5),
-        Function(22, HOLDING, 1, True, 7, 7),
+        Function(1, COILS, int(lib.MODBUS_MAX_READ_BITS), 0, 5, 2),
+        Function(2, DISCRETE, int(lib.MODBUS_MAX_READ_BITS), 0, 5, 2),
+        Function(3, HOLDING, int(lib.MODBUS_MAX_READ_REGISTERS), 0, 5, 2),
+        Function(4, INPUT, int(lib.MODBUS_MAX_READ_REGISTERS), 0, 5, 2),
+        Function(5, COILS, 0, 1, 5, 5),
+        Function(6, HOLDING, 0, 1, 5, 5),
+        Function(15, COILS, 0, int(lib.MODBUS_MAX_WRITE_BITS), 6, 5),
+        Function(16, HOLDING, 0, int(lib.MODBUS_MAX_WRITE_REGISTERS), 6, 5),
+        Function(22, HOLDING, 0, 1, 7, 7),
+        Function(23, HOLDING, int(lib.MODBUS_MAX_READ_REGISTERS), int(lib.MODBUS_MAX_READ_WRITE_REGISTERS), 10, 2),
     )
 }
 
 
 @dataclass
+class Part:
+    """What a job reads, or what it writes. `first`: address on the wire; `count`: bits or registers, once the variables
+    are known."""
+
+    first: int
+    channels: list[Channel]
+    pos: Pos
+    count: int = 0
+
+
+def _nothing() -> Part:
+    return Part(0, [], Pos("", 0, 0))
+
+
+@dataclass
 class Job:
-    """A read or write of a device. `first`: address on the wire."""
+    """A read or write of a device, or both at a time."""
 
     function: Function
-    first: int
     interval_us: int
     on_change: bool
     verify: bool
-    channels: list[Channel]
     pos: Pos
+    read: Part = field(default_factory=_nothing)
+    write: Part = field(default_factory=_nothing)
+
+    @property
+    def channels(self) -> list[Channel]:
+        """All of them."""
+        return self.read.channels + self.write.channels
+
+    @property
+    def parts(self) -> list[tuple[Part, int]]:
+        """Each with the most that one request has of it."""
+        both = ((self.read, self.function.most_read), (self.write, self.function.most_written))
+        return [(part, most) for part, most in both if most]
 
 
 @dataclass(eq=False)
@@ -125,32 +158,28 @@ class ModbusDevice(Connector):
         for number, job in enumerate(self.jobs):
             if any(c.variable_type is None for c in job.channels):
                 continue
-            made = self._bits(job, mistakes) if job.function.of_bits else self._registers(job, mistakes)
-            if made is None:
+            flags = self._bits(job, mistakes) if job.function.of_bits else self._registers(job, mistakes)
+            if flags is None or not _fits(job, mistakes):
                 continue
-            count, flags, mask = made
-            if count > job.function.most or job.first + count - 1 > LAST_ADDRESS:
-                mistakes.error(job.pos, _too_much(job, count))
-                continue
-            self._add(number, job, count, flags, mask)
-            self._note_time(job, count, mistakes)
+            self._add(number, job, flags)
+            self._note_time(job, mistakes)
 
-    def _bits(self, job: Job, mistakes: Mistakes) -> tuple[int, int, int] | None:
-        at = 0
-        for channel in job.channels:
-            assert channel.variable_type is not None
-            if not fits_coils(channel.variable_type):
-                mistakes.error(channel.pos, cannot_have(channel, "coils"))
-                return None
-            if channel.size_bits > 1 and at % 8:
-                message = f"{channel.target} would begin within a byte: name it before variables of type BOOL"
-                mistakes.error(channel.pos, message)
-                return None
-            channel.parameter_bit = at
-            at += channel.size_bits
-        return at, 0, 0
+    def _bits(self, job: Job, mistakes: Mistakes) -> int | None:
+        for part, _ in job.parts:
+            for channel in part.channels:
+                assert channel.variable_type is not None
+                if not fits_coils(channel.variable_type):
+                    mistakes.error(channel.pos, cannot_have(channel, "coils"))
+                    return None
+                if channel.size_bits > 1 and part.count % 8:
+                    message = f"{channel.target} would begin within a byte: name it before variables of type BOOL"
+                    mistakes.error(channel.pos, message)
+                    return None
+                channel.parameter_bit = part.count
+                part.count += channel.size_bits
+        return 0
 
-    def _registers(self, job: Job, mistakes: Mistakes) -> tuple[int, int, int] | None:
+    def _registers(self, job: Job, mistakes: Mistakes) -> int | None:
         types = [c.variable_type for c in job.channels if c.variable_type is not None]
         for channel, t in zip(job.channels, types, strict=True):
             if element_size(t) < 0:
@@ -159,16 +188,22 @@ class ModbusDevice(Connector):
         reverse = self._common_reverse(job, types, mistakes)
         if reverse is None:
             return None
-        at = 0
-        for channel, t in zip(job.channels, types, strict=True):
-            channel.parameter_bit = place(t, at, reverse, self.order)
-            size = element_size(t)
-            channel.big_endian = size >= 2 and reverse != (reverse_for(t, self.order) or 0)
-            at += registers_of(t)
-        return at, _REVERSE_FLAGS[reverse], self._mask(types[0])
+        for part, _ in job.parts:
+            self._place(part, reverse)
+        return _REVERSE_FLAGS[reverse]
 
-    def _mask(self, t: Type) -> int:
-        """The bits of a register, as it is sent, that a variable has."""
+    def _place(self, part: Part, reverse: int) -> None:
+        for channel in part.channels:
+            t = channel.variable_type
+            assert t is not None
+            channel.parameter_bit = place(t, part.count, reverse, self.order)
+            channel.big_endian = element_size(t) >= 2 and reverse != (reverse_for(t, self.order) or 0)
+            part.count += registers_of(t)
+
+    def _mask(self, job: Job) -> int:
+        """The bits of a register, as it is sent, that its variable has."""
+        t = job.channels[0].variable_type
+        assert t is not None
         mask = 1 if bits_of(t) == 1 else 0xFF if element_size(t) == 1 else 0xFFFF
         return mask if self.order.high_byte_first else (mask << 8 | mask >> 8) & 0xFFFF
 
@@ -190,19 +225,18 @@ class ModbusDevice(Connector):
             return None
         return 1 if self.order.high_byte_first else 2
 
-    def _add(self, number: int, job: Job, count: int, flags: int, mask: int) -> None:
+    def _add(self, number: int, job: Job, flags: int) -> None:
         flags |= int(lib.MODBUS_JOB_ON_CHANGE) * job.on_change | int(lib.MODBUS_JOB_VERIFY) * job.verify
-        writes = job.function.writes
         value = ffi.new(
             "MODBUS_JOB *",
             {
                 "function": job.function.code,
                 "flags": flags,
-                "read_address": 0 if writes else job.first,
-                "read_count": 0 if writes else count,
-                "write_address": job.first if writes else 0,
-                "write_count": count if writes else 0,
-                "mask": mask if job.function.code == lib.MODBUS_MASK_WRITE_REGISTER else 0,
+                "read_address": job.read.first,
+                "read_count": job.read.count,
+                "write_address": job.write.first,
+                "write_count": job.write.count,
+                "mask": self._mask(job) if job.function.code == lib.MODBUS_MASK_WRITE_REGISTER else 0,
                 "interval_ms": job.interval_us // 1000,
             },
         )
@@ -210,17 +244,14 @@ class ModbusDevice(Connector):
         for channel in job.channels:
             channel.parameter = int(lib.MODBUS_PARAM_JOB) + number
 
-    def _note_time(self, job: Job, count: int, mistakes: Mistakes) -> None:
+    def _note_time(self, job: Job, mistakes: Mistakes) -> None:
         line = self.parent
         assert isinstance(line, ModbusLine)
-        data = -(-count // 8) if job.function.of_bits else 2 * count
-        many = job.function.most > 1
-        writes = job.function.writes
-        took = line.transaction_us(
-            job.function.request + data * (writes and many), job.function.reply + data * (not writes)
-        )
+        function = job.function
+        written = _data_size(function, job.write.count) if function.most_written > 1 else 0
+        took = line.transaction_us(function.request + written, function.reply + _data_size(function, job.read.count))
         if job.verify:
-            took += line.transaction_us(5, 2 + data)
+            took += line.transaction_us(5, 2 + _data_size(function, job.write.count))
         for channel in job.channels:
             channel.age_us = job.interval_us + int(took)
         if line.char_us is None or job.interval_us == 0:
@@ -232,11 +263,22 @@ class ModbusDevice(Connector):
             mistakes.warning(job.pos, message)
 
 
-def _too_much(job: Job, count: int) -> str:
-    what = "bits" if job.function.of_bits else "registers"
-    if count > job.function.most:
-        return f"function {job.function.code} has {job.function.most} {what} at most, these are {count}"
-    return f"{count} {what} from here on are more than the last address"
+def _data_size(function: Function, count: int) -> int:
+    return -(-count // 8) if function.of_bits else 2 * count
+
+
+def _fits(job: Job, mistakes: Mistakes) -> bool:
+    """Whether one request can have it all; reports it if not."""
+    function = job.function
+    what = "bits" if function.of_bits else "registers"
+    for part, most in job.parts:
+        if part.count > most:
+            mistakes.error(part.pos, f"function {function.code} has {most} {what} at most, these are {part.count}")
+            return False
+        if part.first + part.count - 1 > LAST_ADDRESS:
+            mistakes.error(part.pos, f"{part.count} {what} from here on are more than the last address")
+            return False
+    return True
 
 
 # ---- reading ---------------------------------------------------------------------------------------------------------
@@ -274,32 +316,68 @@ def _read_device(table: Table, line: ModbusLine) -> Connector:
         number_parameter(int(lib.MODBUS_PARAM_UNIT), unit or 0, "unit"),
         number_parameter(int(lib.MODBUS_PARAM_TIMEOUT), (timeout_us or 1_000_000) // 1000, "timeout"),
     ]
-    for key, writes in (("read", False), ("write", True)):
-        device.jobs += each(table.tables(key), lambda t, writes=writes: _read_job(t, writes))  # type: ignore[misc]
-    if unit == 0 and serial and any(not j.function.writes for j in device.jobs):
+    for kind in ("read", "write", "read_write"):
+        device.jobs += each(table.tables(kind), lambda t, kind=kind: _read_job(t, kind))  # type: ignore[misc]
+    if unit == 0 and serial and any(j.function.most_read for j in device.jobs):
         table.error("unit 0 is all devices of the line, which do not reply: they can be written only", "unit")
     device.channels = [channel for job in device.jobs for channel in job.channels]
     return device
 
 
-def _read_job(table: Table, writes: bool) -> Job | None:
-    known = [code for code, f in FUNCTIONS.items() if f.writes is writes]
-    code = table.number("function", 1, 127, None, required=True)
-    function = FUNCTIONS.get(code) if code in known and code is not None else None
-    if function is None and code is not None:
-        verb = "write" if writes else "read"
-        table.error(f"function {code} cannot be here: to {verb} there are {', '.join(map(str, known))}", "function")
-    on_change = writes and table.flag("on_change")
+def _read_job(table: Table, kind: str) -> Job | None:
+    function = _read_function(table, kind)
+    on_change = kind == "write" and table.flag("on_change")
     interval_us = table.duration_us("every", 1000, _MAX_INTERVAL_US, None, required="" if on_change else "T#100ms")
-    verify = writes and table.flag("verify")
-    channels = _job_channels(table, writes)
-    first = _read_address(table, function)
-    if function is None or first is None or not channels or (interval_us is None and not on_change):
+    verify = kind != "read" and table.flag("verify")
+    read, write = _nothing(), _nothing()
+    if kind != "write":
+        read = _read_part(table, kind, function, writes=False)
+    if kind != "read":
+        write = _read_part(table, kind, function, writes=True)
+    if function is None or (interval_us is None and not on_change):
         return None
-    if function.most == 1 and len(channels) > 1:
+    job = Job(function, interval_us or 0, on_change, verify, table.pos, read, write)
+    if not all(part.channels for part, _ in job.parts):
+        return None
+    if function.most_written == 1 and len(write.channels) > 1:
         table.error(f"function {function.code} writes one variable; use {15 if function.of_bits else 16}", "vars")
         return None
-    return Job(function, first, interval_us or 0, on_change, verify, channels, table.pos)
+    return job
+
+
+def _read_function(table: Table, kind: str) -> Function | None:
+    known = [code for code, f in FUNCTIONS.items() if f.kind == kind]
+    if known == [_READ_WRITE]:
+        code = table.number("function", 1, 127, _READ_WRITE)
+    else:
+        code = table.number("function", 1, 127, None, required=True)
+    if code is None or code in known:
+        return FUNCTIONS.get(code or 0)
+    verb = "read and write at a time" if kind == "read_write" else kind
+    table.error(f"function {code} cannot be here: to {verb} there are {', '.join(map(str, known))}", "function")
+    return None
+
+
+def _read_part(table: Table, kind: str, function: Function | None, *, writes: bool) -> Part:
+    """What a job reads or writes: it has a table of its own where there are both. Without channels after a mistake."""
+    if kind != "read_write":
+        return _read_variables(table, function, writes=writes)
+    key = "write" if writes else "read"
+    inner = table.table(key)
+    if inner is None:
+        if key not in table:
+            message = f"[{table.name}] reads and writes: add a table [{table.name}.{key}] with its address and vars"
+            table.error(message)
+        return _nothing()
+    part = _read_variables(inner, function, writes=writes)
+    inner.close()
+    return part
+
+
+def _read_variables(table: Table, function: Function | None, *, writes: bool) -> Part:
+    channels = _job_channels(table, writes)
+    first = _read_address(table, function)
+    return _nothing() if first is None or not channels else Part(first, channels, table.pos)
 
 
 def _job_channels(table: Table, writes: bool) -> list[Channel]:

@@ -150,6 +150,11 @@ void SysComClose(RTS_UI32 index)
         uarts[index]->ctrl = 0;
 }
 
+void SysComDiscard(RTS_UI32 index)
+{
+    RTS_UNUSED(index);
+}
+
 RTS_I64 SysComGetByteNs(RTS_UI32 index)
 {
     RTS_UI32 mask = CpuMask();
