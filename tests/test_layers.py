@@ -29,6 +29,7 @@ FLOORS = (
     ("link",),
     ("gateway",),
     ("controller", "compiler", "sim_io"),
+    ("sim_functions",),
     ("device", "sim"),
     ("", "sim_plant"),
     ("port_check", "st_tests", "templates", "testing", "trace_file"),

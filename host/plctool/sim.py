@@ -5,7 +5,7 @@ It is the same C core that runs on a controller, with the simulator port: a day 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
@@ -28,6 +28,7 @@ from plctool.link import l7
 from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
+from plctool.sim_functions import SimFunctions
 from plctool.sim_io import SimIo, is_input, set_fault
 
 if TYPE_CHECKING:
@@ -45,16 +46,24 @@ class Simulator(Controller):
     used by one thread.
 
     Its symbols are `symbols`, else what is found by the CRC of the image. A cycle that takes longer than
-    `cycle_limit_ms` of the processor's time is aborted; 0: SIM_CYCLE_LIMIT_MS. Raises DeviceError for an image that is
+    `cycle_limit_ms` of the processor's time is aborted; 0: SIM_CYCLE_LIMIT_MS. `functions`: those that Python
+    implements. Raises DeviceError for an image that is
     refused and when the program fails.
     """
 
     _io: tuple[SymbolTable, SimIo] | None = None
 
     def __init__(
-        self, image: bytes, symbols: SymbolTable | None = None, *, start: bool = True, cycle_limit_ms: int = 0
+        self,
+        image: bytes,
+        symbols: SymbolTable | None = None,
+        *,
+        start: bool = True,
+        cycle_limit_ms: int = 0,
+        functions: SimFunctions | None = None,
     ) -> None:
         super().__init__()
+        self._functions = functions or SimFunctions()
         self._plants: list[_Plant] = []
         if symbols is not None:
             self.add_symbols(symbols)
@@ -85,13 +94,19 @@ class Simulator(Controller):
         checks: str = "all",
         start: bool = True,
         cycle_limit_ms: int = 0,
+        functions: Mapping[str, Callable[..., Any]] | None = None,
     ) -> Simulator:
         """The program in source files and folders, compiled for this. `level` and `checks` as in `compile_sources`,
-        which says what is raised."""
-        from plctool.compiler import compile_sources  # only here: what runs images needs no compiler
+        which says what is raised. `functions`: FUNCTIONs of the program, by name, that Python implements: they get
+        the values of the inputs, an `Output` for each VAR_OUTPUT and VAR_IN_OUT, and return the result."""
+        # Only here: what runs images needs no compiler.
+        from plctool.compiler import compile_sources
+        from plctool.compiler.semantics.python_functions import PythonFunctions
 
-        built = compile_sources(paths, target=host_target(), level=level, checks=checks)
-        return cls(built.image, built.symbols, start=start, cycle_limit_ms=cycle_limit_ms)
+        python = PythonFunctions(functions) if functions else None
+        built = compile_sources(paths, target=host_target(), level=level, checks=checks, python=python)
+        connected = SimFunctions(functions, python.units) if python else None
+        return cls(built.image, built.symbols, start=start, cycle_limit_ms=cycle_limit_ms, functions=connected)
 
     def _power_on(self, cycle_limit_ms: int) -> None:
         """With an empty flash and no events."""
@@ -100,14 +115,18 @@ class Simulator(Controller):
         self._limited = cycle_limit_ms > 0
         if self._limited:
             self._lib.SimSetCycleLimit(cycle_limit_ms)
+        self._functions.connect(self._core)
         _check(self._lib.SimStart(), "The simulator does not start")
         self._lib.SimForgetEvents()
 
     def close(self) -> None:
         """Shuts the runtime down."""
-        if not self._closed:
+        if self._closed:
+            return
+        with self._functions.while_running():
             self._closed = True
             self._lib.SimStop()
+            self._functions.disconnect(self._core)
             if self._limited:
                 self._lib.SimSetCycleLimit(0)
             self._lib = self._ffi = _Closed()  # before another one has the runtime
@@ -120,7 +139,8 @@ class Simulator(Controller):
         _check(self._lib.AppDownloadBegin(len(data), image_crc(data)), "The image is refused")
         _check(self._lib.AppDownloadWrite(0, data, len(data)), "The image cannot be stored")
         refusal = self._ffi.new("APP_REFUSAL *")
-        result = self._lib.AppDownloadEnd(refusal)
+        with self._functions.while_running():
+            result = self._lib.AppDownloadEnd(refusal)
         l7.check_result(result, "download", self._ffi.string(refusal.text).decode("latin-1") if result else "")
         progress(len(data))
 
@@ -139,20 +159,28 @@ class Simulator(Controller):
     def start(self) -> None:
         """Starts the program; the first cycle of each task is due at once."""
         self._application_crc()
-        l7.check_result(self._lib.AppStartApplication(), "start")
+        with self._functions.while_running():
+            result = self._lib.AppStartApplication()
+        l7.check_result(result, "start")
 
     def stop(self) -> None:
         self._application_crc()
-        l7.check_result(self._lib.AppStopApplication(), "stop")
+        with self._functions.while_running():
+            result = self._lib.AppStopApplication()
+        l7.check_result(result, "stop")
 
     def _reset(self, option: int) -> None:
         self._application_crc()
-        l7.check_result(self._lib.AppReset(option), "reset")
+        with self._functions.while_running():
+            result = self._lib.AppReset(option)
+        l7.check_result(result, "reset")
 
     def restart(self) -> None:
         """Power off and on again: what is in flash survives."""
-        self._lib.SimStop()
-        _check(self._lib.SimStart(), "The simulator does not start")
+        with self._functions.while_running():
+            self._lib.SimStop()
+            result = self._lib.SimStart()
+        _check(result, "The simulator does not start")
         for plant in self._plants:  # the clock begins at 0 again
             plant.due_ns = self.now_ns + plant.every_ns
 
@@ -262,7 +290,8 @@ class Simulator(Controller):
             self.check_running()
 
     def _run_cycles(self, count: int) -> None:
-        result = self._lib.SimRunCycles(count) if count > 0 else lib.ERR_OK
+        with self._functions.while_running():
+            result = self._lib.SimRunCycles(count) if count > 0 else lib.ERR_OK
         if result == lib.ERR_TIMEOUT:
             message = "The first task waits for something that does not happen; give a time (--time) instead."
             raise DeviceError(message, "waits", result)
@@ -278,11 +307,16 @@ class Simulator(Controller):
             raise UsageError(f"Time passes forwards, and for at most {MAX_NS // 10**9} s.", "time")
         end = self.now_ns + ns
         while self._plants and (due := min(p.due_ns for p in self._plants)) <= end:
-            _check(self._lib.SimRunFor(max(0, due - self.now_ns)), "Time does not advance")
+            self._run_for(due - self.now_ns)
             self._step_plants()
-        _check(self._lib.SimRunFor(max(0, end - self.now_ns)), "Time does not advance")
+        self._run_for(end - self.now_ns)
         if check:
             self.check_running()
+
+    def _run_for(self, ns: int) -> None:
+        with self._functions.while_running():
+            result = self._lib.SimRunFor(max(0, ns))
+        _check(result, "Time does not advance")
 
     def bench(self, task: int, cycles: int) -> tuple[float, float]:
         """Real time per call of a task's code alone, and of a complete cycle with what the runtime adds [ns]."""

@@ -4,6 +4,7 @@
  * SPDX-License-Identifier: Apache-2.0
  */
 #define _GNU_SOURCE
+#include "../../firmware/port/linux/IecStack.h"
 #include "SysExcept.h"
 #include "test.h"
 
@@ -11,6 +12,7 @@
 #include <sched.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -200,6 +202,78 @@ static void a_break_outside_of_try_does_nothing(void)
     CHECK_EQUAL(code_of(do_nothing), RTSEXCPT_NOEXCEPTION);
 }
 
+/* ---- calls outside, from IEC code ---- */
+
+typedef struct {
+    uintptr_t thread, iec, outside; /* addresses on their stacks */
+    RTS_UI32 code;                  /* what IEC code raises after it */
+    int returned;
+} OUTSIDE;
+
+static uintptr_t here(void)
+{
+    volatile char place = 0;
+    return (uintptr_t)&place + (uintptr_t)place;
+}
+
+/* A break does not hit it: it is not IEC code. */
+static void run_outside(void *arg)
+{
+    OUTSIDE *o = arg;
+    char frame[2 * 1024 * 1024]; /* larger than all of the IEC stack */
+    memset(frame, 1, sizeof frame);
+    o->outside = here();
+    SysExceptBreak(arg, RTSEXCPT_WATCHDOG);
+    o->returned = frame[sizeof frame - 1];
+}
+
+static void call_outside(void *arg)
+{
+    OUTSIDE *o = arg;
+    o->iec = here();
+    IecStackCallOutside(IecStackOfThread, run_outside, o);
+    if (o->code != RTSEXCPT_NOEXCEPTION) {
+        SysExceptRaise(o->code, 0x1234, NULL);
+    }
+}
+
+static bool near(uintptr_t a, uintptr_t b)
+{
+    return (a > b ? a - b : b - a) < 4 * 1024 * 1024;
+}
+
+static void a_call_outside_runs_on_the_stack_of_the_thread(void)
+{
+    static const RTS_UI32 codes[] = {RTSEXCPT_NOEXCEPTION, RTSEXCPT_ARRAYBOUNDS};
+    for (size_t i = 0; i < 1000; i++) {
+        OUTSIDE o = {.thread = here(), .code = codes[i % 2]};
+        RTS_EXCEPTION exception;
+        CHECK_EQUAL(SysExceptTry(call_outside, &o, &exception), o.code == RTSEXCPT_NOEXCEPTION);
+        CHECK_EQUAL(exception.code, o.code);
+        CHECK(o.returned);
+        CHECK(near(o.outside, o.thread));
+        CHECK(!near(o.iec, o.thread));
+    }
+}
+
+static void fail_outside(void *arg)
+{
+    RTS_UNUSED(arg);
+    read_null(NULL);
+}
+
+static void call_what_fails(void *arg)
+{
+    IecStackCallOutside(IecStackOfThread, fail_outside, arg);
+}
+
+/* It is a fault of the process, not of the program. */
+static void fault_in_a_call_outside(void)
+{
+    RTS_EXCEPTION exception;
+    (void)SysExceptTry(call_what_fails, NULL, &exception);
+}
+
 static void mask_all(int how)
 {
     sigset_t all;
@@ -350,6 +424,11 @@ static void a_fault_outside_of_try_ends_the_process_as_ever(void)
     CHECK_EQUAL(run_child(be_sent_a_fault), 1000 + SIGBUS);
 }
 
+static void a_fault_in_a_call_outside_ends_the_process(void)
+{
+    CHECK_EQUAL(run_child(fault_in_a_call_outside), 1000 + SIGSEGV);
+}
+
 static void a_fault_outside_of_try_goes_to_the_handler_before(void)
 {
     CHECK_EQUAL(run_child(fault_outside_with_handler), 42);
@@ -388,6 +467,8 @@ int main(void)
     RUN(a_break_that_comes_late_does_not_hit_the_next_try);
     RUN(a_break_of_a_thread_that_ended_does_nothing);
     RUN(a_break_of_something_else_does_nothing);
+    RUN(a_call_outside_runs_on_the_stack_of_the_thread);
+    RUN(a_fault_in_a_call_outside_ends_the_process);
     RUN(threads_do_not_disturb_each_other);
     RUN(threads_that_end_leave_room_for_others);
     RUN(a_hundred_thousand_tries_work);

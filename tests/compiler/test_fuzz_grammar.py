@@ -158,7 +158,8 @@ class Writer:
     def statement(self, depth: int) -> str:
         if depth == 0 or self.r.random() < 0.45:
             return self.assignment()
-        choices: list[Callable[[int], str]] = [self._if, self._case, self._leave, self._jump, lambda _: self._call()]
+        choices: list[Callable[[int], str]] = [self._if, self._case, self._leave, self._jump, self._try]
+        choices.append(lambda _: self._call())
         if self.loops < 2:
             choices += [self._for, self._while, self._repeat]
         return self.r.choice(choices)(depth - 1)
@@ -230,6 +231,11 @@ class Writer:
         again = f"IF {turn} < 3 AND ({condition}) THEN JMP {label}; END_IF"
         return f"IF TRUE THEN\n{turn} := 0;\n{label}:\n{turn} := {turn} + 1;\n{body}\n{again}\nEND_IF;"
 
+    def _try(self, depth: int) -> str:
+        body, caught = self.statements(depth), self.statements(depth, 2)
+        last = self.pick("", f"__FINALLY\n{self.assignment()}\n")
+        return f"__TRY\n{body}\n__CATCH(trouble)\n{caught}\n{last}__ENDTRY"
+
     def _call(self) -> str:
         return self.r.choice(self.calls)() if self.calls and not self.loops else self.assignment()
 
@@ -238,6 +244,7 @@ class Writer:
     def variables(self) -> str:
         """The VAR section every unit has; it fills `names`."""
         lines, names = ["p : Point;", "row : Row;", "both : Both;", "tally : DINT;", "in_level : Level;"], self.names
+        lines.append("trouble : __SYSTEM.ExceptionCode;")
         names.clear()
         names |= {"number": ["p.x", "tally", "row[0]", "both.d", "in_level"], "real": ["p.y"], "time": [], "enum": []}
         names |= {"bool": ["p.on", "both.b[1].3"], "text": ["p.name"]}

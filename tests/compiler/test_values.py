@@ -318,3 +318,20 @@ def test_any_text_is_a_value_or_refused(t: Type, text: str) -> None:
             assert len(encode(t, value)) == t.size
         except UsageError as error:
             assert error.message
+
+
+SIMPLE = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=4) | st.timedeltas()
+PYTHON = st.recursive(
+    SIMPLE | st.binary(max_size=4),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=2), inner, max_size=2),
+    max_leaves=4,
+)
+
+
+@settings(max_examples=500, deadline=None)
+@given(st.sampled_from(TYPES), PYTHON)
+def test_any_object_of_python_is_a_value_or_refused(t: Type, value: object) -> None:
+    try:
+        assert len(encode(t, value)) == t.size
+    except UsageError as error:
+        assert error.message

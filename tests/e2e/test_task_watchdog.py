@@ -77,6 +77,21 @@ def test_a_loop_made_of_a_jump_is_broken_as_well(tool, plcrt, eventually):
     assert fault["line"] in LOOP
 
 
+def test_the_watchdog_is_not_caught(tool, plcrt, eventually):
+    text = PROGRAM.replace("{properties}", "WATCHDOG := T#100ms")
+    loop = "FOR i := 1 TO 2000000000 DO\n        n := n * 3 + i;\n    END_FOR"
+    assert loop in text
+    text = text.replace(loop, f"__TRY {loop} __CATCH(exc) went_on := TRUE; __FINALLY went_on := TRUE; __ENDTRY")
+    text = text.replace("    slow : BOOL;", "    slow, went_on : BOOL; exc : __SYSTEM.ExceptionCode;")
+    tool.ok("flash", "--port", plcrt.port, str(tool.build("catching", text)))
+    tool.ok("write", "--port", plcrt.port, "Main.slow=TRUE")
+    fault = eventually(lambda: exception(tool, plcrt))
+    assert (fault["name"], fault["task"], fault["pou"]) == ("WATCHDOG", "Fast", "Main")
+    assert fault["line"] in LOOP
+    values = tool.ok("read", "--port", plcrt.port, "Main.exc", "Main.went_on")["values"]
+    assert values == {"Main.exc": "RTSEXCPT_NOEXCEPTION", "Main.went_on": False}
+
+
 def test_a_task_within_its_watchdog_goes_on(tool, plcrt, eventually):
     started(tool, plcrt, "WATCHDOG := T#10s")
     eventually(lambda: counted(tool, plcrt) > 20)

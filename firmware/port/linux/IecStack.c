@@ -24,6 +24,7 @@
 
 int IecStackSwitch(void (*fn)(void *arg), void *arg, IEC_STACK *stack, RTS_UI32 running);
 void IecStackSwitchBack(IEC_STACK *stack) __attribute__((noreturn));
+void IecStackCallBelow(void (*fn)(void *arg), void *arg, uintptr_t stack_pointer);
 
 RTS_STATIC_ASSERT(offsetof(IEC_STACK, back) == 0 && offsetof(IEC_STACK, top) == 8 && offsetof(IEC_STACK, running) == 16,
                   layout_is_what_the_switch_knows);
@@ -110,6 +111,24 @@ NOT_CHECKED void IecStackLeave(IEC_STACK *stack)
     IecStackSwitchBack(stack);
 }
 
+static void call_on_own(void *arg)
+{
+    CALL *call = arg;
+    IEC_STACK *stack = call->stack;
+    __sanitizer_finish_switch_fiber(stack->sanitizer.own_state, NULL, NULL);
+    call->fn(call->arg);
+    __sanitizer_start_switch_fiber(&stack->sanitizer.own_state, (void *)stack->bottom, STACK_SIZE);
+}
+
+static void call_below(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
+{
+    CALL arguments = {stack, fn, arg};
+    void *iec_state;
+    __sanitizer_start_switch_fiber(&iec_state, stack->sanitizer.own_bottom, stack->sanitizer.own_size);
+    IecStackCallBelow(call_on_own, &arguments, stack->back);
+    __sanitizer_finish_switch_fiber(iec_state, NULL, NULL);
+}
+
 #else
 
 bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
@@ -122,4 +141,16 @@ void IecStackLeave(IEC_STACK *stack)
     IecStackSwitchBack(stack);
 }
 
+static void call_below(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
+{
+    IecStackCallBelow(fn, arg, stack->back);
+}
+
 #endif
+
+void IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg)
+{
+    __atomic_store_n(&stack->running, 0, __ATOMIC_RELEASE);
+    call_below(stack, fn, arg);
+    __atomic_store_n(&stack->running, 1, __ATOMIC_RELEASE);
+}

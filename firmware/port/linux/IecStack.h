@@ -37,6 +37,9 @@ bool IecStackRun(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
 /* Ends the running IecStackRun of this thread, from the IEC stack or from a signal handler. */
 void IecStackLeave(IEC_STACK *stack) __attribute__((noreturn));
 
+/* Calls fn(arg) on the stack of the thread, from the IEC stack. It is not IEC code: no break hits it, and it must return. */
+void IecStackCallOutside(IEC_STACK *stack, void (*fn)(void *arg), void *arg);
+
 /* The record of the calling thread, NULL without: found whatever its registers hold. Reading it in a handler never
  * allocates. */
 extern __thread IEC_STACK *IecStackOfThread __attribute__((tls_model("initial-exec"), visibility("hidden")));

@@ -5,6 +5,7 @@
  *
  *   int IecStackSwitch(void (*fn)(void *arg), void *arg, IEC_STACK *stack, RTS_UI32 running);
  *   void IecStackSwitchBack(IEC_STACK *stack);
+ *   void IecStackCallBelow(void (*fn)(void *arg), void *arg, uintptr_t stack_pointer);
  *
  * All registers that a function preserves are saved on the stack of the thread, so that nothing that IEC code may have
  * destroyed is used after it: neither its stack nor a register it should have preserved. The record's `running` is set once
@@ -20,6 +21,9 @@
     .type IecStackSwitch, %function
     .globl IecStackSwitchBack
     .type IecStackSwitchBack, %function
+    .globl IecStackCallBelow
+    .type IecStackCallBelow, %function
+    .hidden IecStackCallBelow
     .hidden IecStackSwitch
     .hidden IecStackSwitchBack
     .hidden IecStackOfThread
@@ -92,6 +96,26 @@ IecStackSwitchBack:
     jmp go_back
     .size IecStackSwitchBack, . - IecStackSwitchBack
 
+IecStackCallBelow:
+    .cfi_startproc
+    pushq %rbp
+    .cfi_adjust_cfa_offset 8
+    .cfi_rel_offset %rbp, 0
+    movq %rsp, %rbp
+    .cfi_def_cfa_register %rbp
+    movq %rdx, %rsp
+    andq $-16, %rsp
+    movq %rdi, %rax
+    movq %rsi, %rdi
+    call *%rax
+    movq %rbp, %rsp
+    popq %rbp
+    .cfi_def_cfa %rsp, 8
+    .cfi_restore %rbp
+    ret
+    .cfi_endproc
+    .size IecStackCallBelow, . - IecStackCallBelow
+
 #elif defined(__aarch64__)
 
 IecStackSwitch:
@@ -162,6 +186,28 @@ IecStackSwitchBack:
     mov w1, #1
     b go_back
     .size IecStackSwitchBack, . - IecStackSwitchBack
+
+IecStackCallBelow:
+    .cfi_startproc
+    stp x29, x30, [sp, #-16]!
+    .cfi_def_cfa_offset 16
+    .cfi_offset x29, -16
+    .cfi_offset x30, -8
+    mov x29, sp
+    .cfi_def_cfa_register x29
+    mov sp, x2
+    mov x9, x0
+    mov x0, x1
+    blr x9
+    mov sp, x29
+    .cfi_def_cfa_register sp
+    ldp x29, x30, [sp], #16
+    .cfi_def_cfa_offset 0
+    .cfi_restore x29
+    .cfi_restore x30
+    ret
+    .cfi_endproc
+    .size IecStackCallBelow, . - IecStackCallBelow
 
 #else
 #error "IecStackSwitch.S: switch stacks on this architecture as the others do."

@@ -633,5 +633,7 @@ RTS_RESULT SysSim_Hook(CMP_HOOK hook)
     if (hook != CH_INIT3)
         return ERR_OK;
     result = SimEventRegisterAll();
+    if (result == ERR_OK)
+        result = SimFunctionsRegister();
     return result == ERR_OK ? CMRegisterExternal(externals, RTS_COUNT(externals)) : result;
 }

@@ -82,6 +82,18 @@ RTS_RESULT SimPostEvent(const char *name);
 /* Whether IEC code can call a C function of this name (lower case). While power is off nothing can be called. */
 bool SimHasExternal(const char *name);
 
+enum { SIM_MAX_PASSED = 64 };
+
+/*
+ * A function of the program that the host implements: its number, the addresses of its parameters (`count`, at most
+ * SIM_MAX_PASSED), and where its result goes (NULL for none). Returns RTSEXCPT_NOEXCEPTION, or what the program ends
+ * with. It is called in the thread that lets time pass; it must not let time pass itself, nor switch power.
+ */
+typedef RTS_UI32 (*SIM_FUNCTION)(RTS_UI32 number, RTS_UI8 **parameters, RTS_UI32 count, RTS_UI8 *result);
+
+/* All functions of the program that the host implements; NULL: it implements none. Kept when power is off. */
+void SimSetFunction(SIM_FUNCTION function);
+
 /*
  * Real time one call of a task takes [ns], both the best of several batches: its code alone, called back to back with
  * the time of the task advancing by its interval; and a complete IecTaskCycle with the clock readings around it. Starts

@@ -26,6 +26,9 @@ void SimMutexUnlock(void);
 /* The events of the device become known to a runtime that starts. ERR_NOMEMORY. */
 RTS_RESULT SimEventRegisterAll(void);
 
+/* What IEC code calls to reach functions of the host. ERR_NOMEMORY. */
+RTS_RESULT SimFunctionsRegister(void);
+
 RTS_RESULT SysSim_Hook(CMP_HOOK hook);
 
 #endif

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from plctool.compiler.build import BuildResult
     from plctool.compiler.front import CheckResult
     from plctool.compiler.imports import ImportedLibrary
+    from plctool.compiler.semantics.python_functions import PythonFunctions
     from plctool.compiler.source import Source
     from plctool.compiler.warnings import WarningOptions
     from plctool.image.board import Board
@@ -106,13 +107,14 @@ def compile_sources(
     libraries: Sequence[Path | str] = (),
     board: str | None = None,
     limits: bool = True,
+    python: PythonFunctions | None = None,
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
     said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
     inputs and outputs; `libraries`: folders or .zips of those that it uses; both are in `ProgramFiles` already. Of a
     project its files are taken, its options are for the command line. `board`: one that plctool knows, such as
     mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused; without
-    `limits` it may need more than any device has.
+    `limits` it may need more than any device has. `python`: functions that Python implements, in the simulator.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
@@ -142,7 +144,9 @@ def compile_sources(
     imported = files.load_libraries()
     shown = [*sources, *io_sources(description), *library_sources(imported)]
     with bugs_reported():
-        checked = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=description, libraries=imported)
+        checked = check_sources(
+            sources, warnings=warnings or ALL_WARNINGS, io=description, libraries=imported, python=python
+        )
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)
     # No time of build: the same sources give the same image, so that its symbols are found again anywhere.

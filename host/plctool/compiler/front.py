@@ -36,6 +36,7 @@ from plctool.iec.areas import Area
 from plctool.iec.types import MAX_SIZE
 
 if TYPE_CHECKING:
+    from plctool.compiler.semantics.python_functions import PythonFunctions
     from plctool.compiler.semantics.unit_tests import TestSuite
     from plctool.io.model import Description
 
@@ -65,14 +66,16 @@ def check_sources(
     warnings: WarningOptions = ALL_WARNINGS,
     io: Description | None = None,
     libraries: Sequence[ImportedLibrary] = (),
+    python: PythonFunctions | None = None,
 ) -> CheckResult:
     """Checks the files of a program together.
 
     `library`: whether the standard library is there; `library_sources`: other library sources in place of it. `tests`:
     takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
     `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check.
-    `libraries`: what the program uses besides the standard library. Whatever the
-    sources contain, the result is a program or diagnostics, never an exception.
+    `libraries`: what the program uses besides the standard library. `python`: functions that Python implements, in the
+    simulator; raises UsageError for those that cannot be. Whatever the sources contain, the result is a program or
+    diagnostics, never an exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     program = Program(chosen)
@@ -81,16 +84,18 @@ def check_sources(
     program.world.io = IoChannels(io)
     program.libraries = libraries
     with no_collection(), room_for_nesting():
-        typed = _guarded(program, sources, tests)
+        typed = _guarded(program, sources, tests, python)
     has_tests = bool(program.world.names.tests)
     return CheckResult(None if diagnostics.errors else typed, diagnostics.sorted(), has_tests)
 
 
-def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | None) -> TypedProgram | None:
+def _guarded(
+    program: Program, sources: Sequence[Source], tests: TestSuite | None, python: PythonFunctions | None
+) -> TypedProgram | None:
     """The check, with an end to errors and to nesting."""
     try:
         try:
-            return _check(program, sources, tests)
+            return _check(program, sources, tests, python)
         except NestingError as error:
             program.world.nested_too_deeply(error)
         except RecursionError:
@@ -102,7 +107,9 @@ def _guarded(program: Program, sources: Sequence[Source], tests: TestSuite | Non
     return None
 
 
-def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None) -> TypedProgram | None:
+def _check(
+    program: Program, sources: Sequence[Source], suite: TestSuite | None, python: PythonFunctions | None
+) -> TypedProgram | None:
     world = program.world
     declared = _names_asked_for(program, sources)
     texts = [(source, parse_all(source, world.diagnostics.at(source).error, declared=declared)) for source in sources]
@@ -112,11 +119,15 @@ def _check(program: Program, sources: Sequence[Source], suite: TestSuite | None)
     if syntax or any(found.code == "xml" for source in sources for found in source.findings):
         _check_the_others(program, texts, syntax)
         return None
-    return _check_parsed(program, sources, texts, suite)
+    return _check_parsed(program, sources, texts, suite, python)
 
 
 def _check_parsed(
-    program: Program, sources: Sequence[Source], texts: Sequence[tuple[Source, Parsed]], suite: TestSuite | None
+    program: Program,
+    sources: Sequence[Source],
+    texts: Sequence[tuple[Source, Parsed]],
+    suite: TestSuite | None,
+    python: PythonFunctions | None,
 ) -> TypedProgram | None:
     """All but the syntax."""
     world = program.world
@@ -124,6 +135,10 @@ def _check_parsed(
     tests = None if suite is None else suite.begin(program)
     if tests is not None:
         parsed = tests.prepare(parsed)
+    if python is not None:
+        world.names.register(python.interface(), library=True)
+        world.names.rewritten = python.rewritten
+        parsed = [(source, python.rewritten(declarations)) for source, declarations in parsed]
     for source, declarations in parsed:
         world.names.register(declarations)
         world.names.register_globals(declarations, source)
@@ -134,6 +149,8 @@ def _check_parsed(
     if not world.io.readable:
         return None
     program.declare_all()
+    if python is not None:
+        python.finish(program)
     if tests is None:
         application = configure(world, program.config)
     else:
@@ -220,7 +237,7 @@ def _check_the_others(program: Program, texts: Sequence[tuple[Source, Parsed]], 
     other = Program(program.world.names.library)
     other.libraries = program.libraries
     other.world.diagnostics.limit = sys.maxsize
-    _check_parsed(other, [source for source, _ in whole], whole, None)
+    _check_parsed(other, [source for source, _ in whole], whole, None, None)
     for d in other.world.diagnostics.sorted():
         pos = Pos(d.file, d.line, d.column)
         if d.missing and d.missing.casefold() not in hidden:

@@ -15,6 +15,7 @@ from plctool.compiler.diagnostics import Diagnostics
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.parser import parse
+from plctool.core import lib
 
 _FOLDER = Path(__file__).resolve().parent.parent / "stdlib"
 _OPENING = re.compile(
@@ -127,8 +128,18 @@ _VARIANTS: dict[str, list[Variant]] = {
 """What a source is written for once, and is there for other types as well."""
 
 
+def _exception_codes() -> str:
+    """The type of what __CATCH gives, with the numbers of the runtime (SysExcept.h)."""
+    codes = {name: int(getattr(lib, name)) for name in dir(lib) if name.startswith("RTSEXCPT_")}
+    del codes["RTSEXCPT_MASK"]
+    codes["RTSEXCPT_UNKNOWN"] = 0xFFFF_FFFF
+    values = ", ".join(f"{name} := {code}" for name, code in sorted(codes.items(), key=lambda item: item[1]))
+    return f"TYPE\n    ExceptionCode : ({values}) UDINT;\nEND_TYPE\n"
+
+
 @cache
 def standard_library() -> Library:
     """The library that comes with the tool."""
     sources = [Source(f"stdlib/{p.name}", p.read_text("latin-1")) for p in sorted(_FOLDER.glob("*.st"))]
+    sources.append(Source("stdlib/exceptions.st", _exception_codes()))
     return Library([*sources, *(variant(s) for s in sources for variant in _VARIANTS.get(s.path, ()))])

@@ -453,7 +453,23 @@ class Jump(Node):
     pos: Pos
 
 
-Statement = Assign | CallStatement | FbCall | If | Case | For | While | Repeat | Exit | Continue | Return | Label | Jump
+@dataclass
+class Try(Node):
+    """`body`; `exception` gets the number (RTSEXCPT_*) of an exception in it or in what it calls, which goes on in
+    `caught`; outward if that is None. `last` runs after these, however they are left; nothing leads out of it but an
+    exception."""
+
+    children: ClassVar = ("body", "exception", "caught", "last")
+    body: list[Statement]
+    exception: Place | None
+    caught: list[Statement]
+    last: list[Statement]
+    pos: Pos
+
+
+Statement = (
+    Assign | CallStatement | FbCall | If | Case | For | While | Repeat | Exit | Continue | Return | Label | Jump | Try
+)
 
 
 # ---- program organisation units and the whole -----------------------------------------------------------------------

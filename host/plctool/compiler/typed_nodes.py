@@ -25,6 +25,7 @@ from plctool.compiler.typed import (
     Pou,
     SelfPlace,
     Storage,
+    Try,
     ValuePlace,
     Variable,
     VarPlace,
@@ -97,6 +98,8 @@ def written_places(node: object) -> Iterator[Place]:
         yield node.target
     elif isinstance(node, For):
         yield node.var
+    elif isinstance(node, Try) and node.exception is not None:
+        yield node.exception
     elif isinstance(node, AddressOf):
         yield node.place
     elif isinstance(node, FbCall):

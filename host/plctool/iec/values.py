@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import struct
 from datetime import timedelta
-from typing import Any
+from typing import Any, SupportsFloat, SupportsIndex
 
 from plctool.errors import UsageError
 from plctool.iec.types import (
@@ -107,11 +107,18 @@ def encode(t: Type, value: Any) -> bytes:
     assert isinstance(base, Elementary)
     if base.kind is Kind.TIME and isinstance(value, timedelta):
         value = _time_units(value, base)
+    if not _is_number(value):
+        raise bad_value(value, t, "give True or False" if base.kind is Kind.BOOL else "give a number")
     if base.kind is Kind.REAL:
         return _encode_real(base, value)
     if isinstance(value, float) and not value.is_integer():
         raise bad_value(value, t, "write a whole number")
     return _encode_integer(t, base, int(value))
+
+
+def _is_number(value: Any) -> bool:
+    """Also those of other packages; complex numbers are none."""
+    return isinstance(value, SupportsFloat | SupportsIndex)
 
 
 def _time_units(value: timedelta, base: Elementary) -> float:

@@ -79,6 +79,12 @@ void *SysMemAllocArea(size_t size)
     return area;
 }
 
+/* There is no host here that could implement functions. */
+RTS_RESULT SimFunctionsRegister(void)
+{
+    return ERR_OK;
+}
+
 void SimSetCycleLimit(RTS_UI32 ms)
 {
     RTS_UNUSED(ms);

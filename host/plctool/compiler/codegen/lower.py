@@ -56,21 +56,21 @@ def lower(program: TypedProgram, options: Options) -> Lowered:
     done = chosen = 0
     while done < len(unit.pous) or chosen < len(unit.dispatchers):
         if done < len(unit.pous):
-            pou = list(unit.pous)[done]
+            pou, raises = list(unit.pous)[done]
             try:
-                _pou(unit, pou, effects)
+                _pou(unit, pou, effects, raises=raises)
             except Exception as error:
                 note_position(error, pou.pos)
                 raise
             done += 1
         else:
-            dispatch, name = list(unit.dispatchers.items())[chosen]
-            write_dispatcher(unit, name, dispatch)
+            (dispatch, raises), name = list(unit.dispatchers.items())[chosen]
+            write_dispatcher(unit, name, dispatch, raises=raises)
             chosen += 1
     _struct_initialisers(unit)
     for name in sorted(unit.helpers):
         unit.module.add_helper(string_function(name, unit.target, unit.strings))
-    pous = {name: pou for pou, name in unit.pous.items()}
+    pous = {name: pou for (pou, _), name in unit.pous.items()}
     return Lowered(texts(unit.module), tasks, functions, pous, unit.imports)
 
 
@@ -85,18 +85,20 @@ def _task_entry(unit: Unit, number: int, task: Task) -> str:
     return name
 
 
-def _pou(unit: Unit, pou: Pou, effects: Effects) -> None:
+def _pou(unit: Unit, pou: Pou, effects: Effects, *, raises: bool) -> None:
     result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
-    signature = f"{result} @{unit.symbol(pou)}({parameter_list(pou, unit.handed)})"
+    name = unit.symbol(pou, raises=raises)
+    signature = f"{result} @{name}({parameter_list(pou, unit.handed, raises=raises)})"
     fn = Function(signature, unit.attributes(pou), unit.inlining(pou))
-    body = Body(unit, fn, pou, effects)
+    body = Body(unit, fn, pou, effects, raises=raises)
     body.open_scope(pou.name, pou.pos)
     parts = sections(pou)
     if len(parts) > 1:
-        write_calls(body, [unit.section(part) for part in parts])
+        write_calls(body, [unit.section(part, raises=raises) for part in parts])
     else:
         write_body(body)
-    unit.module.add(unit.symbol(pou), fn)
+    body.write_given_up(result)
+    unit.module.add(name, fn)
 
 
 def _code_init(unit: Unit, variables: list[Variable]) -> None:

@@ -47,7 +47,12 @@ def fb_call(frame: Frame, s: FbCall) -> None:
         target = frame.import_function(frame.unit.import_slot(s.block.external))
         frame.fn.do(f"call void {target}(ptr {base}) {frame.unit.external_call}")
     else:
-        frame.fn.call(frame.unit.target_of(s.block, s.dispatch), [CONTEXT, f"ptr {base}", *arguments])
+        raises = frame.returns_exceptions(s.block, s.dispatch)
+        handed_on = [f"ptr {frame.raised}"] if raises else []
+        symbol = frame.unit.target_of(s.block, s.dispatch, raises=raises)
+        frame.fn.call(symbol, [CONTEXT, *handed_on, f"ptr {base}", *arguments])
+        if raises:
+            frame.after_call(s.pos)
     for variable, place in s.outputs:
         _copy_out(frame, _member(frame, s.block, instance, variable), frame.ref(place))
 

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from plctool.compiler.codegen import lower_expr, lower_loops, lower_places, lower_stmt  # noqa: F401  their rules
+from plctool.compiler.codegen import (  # noqa: F401  their rules
+    lower_exceptions,
+    lower_expr,
+    lower_loops,
+    lower_places,
+    lower_stmt,
+)
 from plctool.compiler.codegen.lower_blocks import take_inputs
 from plctool.compiler.codegen.lower_frame import NO_CAPACITY, Body, Ref, string_capacity
 from plctool.compiler.codegen.lower_init import initialise
@@ -51,9 +57,13 @@ def write_calls(frame: Body, parts: list[str]) -> None:
     assert frame.pou is not None
     take_inputs(frame, frame.pou)
     instance = [f"ptr {SELF}"] if frame.pou.kind is PouKind.FUNCTION_BLOCK else []
+    handed_on = [] if frame.raised is None else [f"ptr {frame.raised}"]
     for symbol in parts:
-        frame.fn.call(symbol, [CONTEXT, *instance])
+        frame.fn.call(symbol, [CONTEXT, *handed_on, *instance])
+        if handed_on:
+            frame.after_call(frame.pou.pos)
     frame.fn.terminate("ret void")
+    frame.write_raises()
 
 
 def _stack_memory(frame: Body, var: Variable) -> Ref:

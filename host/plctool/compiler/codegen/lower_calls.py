@@ -25,6 +25,9 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
     pou = e.function
     write_back: list[tuple[Ref, Ref]] = []
     arguments = [] if pou.external else [CONTEXT]
+    raises = frame.returns_exceptions(pou, e.dispatch)
+    if raises:
+        arguments.append(f"ptr {frame.raised}")
     if e.instance is not None:
         arguments.append(f"ptr {frame.address(frame.ref(e.instance))}")
     if result is not None and result.unaligned:
@@ -38,7 +41,9 @@ def call_function(frame: Frame, e: Call, result: Ref | None) -> Value | None:
         operands = _operands(frame, pou, parameter, argument, write_back)
         types = parameter_types(pou, parameter)
         arguments += [f"{text} {operand}" for text, operand in zip(types, operands, strict=True)]
-    value = _call_instruction(frame, pou, e.dispatch, arguments)
+    value = _call_instruction(frame, pou, e.dispatch, arguments, raises=raises)
+    if raises:
+        frame.after_call(e.pos)
     for temporary, place in write_back:
         if is_scalar(place.type):
             wanted = temporary.type if place.bit >= 0 else place.type
@@ -58,7 +63,9 @@ def _result_capacity(frame: Frame, pou: Pou, result: Ref) -> Value:
     return frame.fn.value(f"call i32 @llvm.umin.i32(i32 {declared}, i32 {result.capacity})")
 
 
-def _call_instruction(frame: Frame, pou: Pou, dispatch: Dispatch | None, arguments: list[str]) -> Value | None:
+def _call_instruction(
+    frame: Frame, pou: Pou, dispatch: Dispatch | None, arguments: list[str], *, raises: bool
+) -> Value | None:
     unit, fn = frame.unit, frame.fn
     result = pou.result.type if pou.result is not None and is_scalar(pou.result.type) else None
     if pou.external:
@@ -70,7 +77,7 @@ def _call_instruction(frame: Frame, pou: Pou, dispatch: Dispatch | None, argumen
             return fn.value(text)
         fn.do(text)
         return None
-    symbol = unit.target_of(pou, dispatch)
+    symbol = unit.target_of(pou, dispatch, raises=raises)
     if result is not None:
         return fn.call_value(value_type(result), symbol, arguments)
     fn.call(symbol, arguments)

@@ -12,18 +12,18 @@ from plctool.compiler.typed import Dispatch
 from plctool.iec.types import CLASS_NUMBER, is_scalar
 
 
-def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
+def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch, *, raises: bool) -> None:
     """The function `name`, which has the parameters of its targets. An instance of another class was reached through a
     wrong pointer."""
     pou = dispatch.function
     result = value_type(pou.result.type) if pou.result is not None and is_scalar(pou.result.type) else "void"
-    fn = Function(f"{result} @{name}({parameter_list(pou, unit.handed)})", unit.plain)
-    frame = Frame(unit, fn, None)
+    fn = Function(f"{result} @{name}({parameter_list(pou, unit.handed, raises=raises)})", unit.plain)
+    frame = Frame(unit, fn, None, raises=raises)
     frame.open_scope(pou.name, pou.pos)
-    arguments = [formal.argument for formal in formals(pou, unit.handed)]
+    arguments = [formal.argument for formal in formals(pou, unit.handed, raises=raises)]
     by_symbol: dict[str, list[int]] = {}
     for number, target in dispatch.targets.items():
-        by_symbol.setdefault(unit.symbol(target), []).append(number)
+        by_symbol.setdefault(unit.symbol(target, raises=raises), []).append(number)
     loaded = fn.value(f"load i32, ptr {SELF}, align 4{unit.tag(CLASS_NUMBER)}")
     labels = {symbol: fn.label("class") for symbol in by_symbol}
     unknown = fn.label("unknown")
@@ -40,4 +40,5 @@ def write_dispatcher(unit: Unit, name: str, dispatch: Dispatch) -> None:
     frame.require(FALSE, ACCESS_VIOLATION, pou.pos)
     fn.terminate("unreachable")
     frame.write_raises()
+    frame.write_given_up(result)
     unit.module.add(name, fn)

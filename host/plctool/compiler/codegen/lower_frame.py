@@ -6,18 +6,22 @@ registers here with `rule`. So they have the parts of a node written without kno
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from plctool.compiler.analysis import Effects
 from plctool.compiler.codegen.ir import NULL, Function, Value, number
-from plctool.compiler.codegen.lower_unit import RAISE, Check, Unit, value_type
+from plctool.compiler.codegen.lower_unit import ALL_CHECKS, RAISE, Check, Unit, value_type
 from plctool.compiler.internal import note_position
-from plctool.compiler.typed import Expr, Place, Pos, Pou, Statement, Variable
+from plctool.compiler.typed import Dispatch, Expr, Label, Place, Pos, Pou, Statement, Variable
 from plctool.core import ffi, lib
 from plctool.iec.areas import Area
 from plctool.iec.types import MAX_ALIGN, Elementary, StringType, Type, alignment_at, base_of, is_scalar
+
+if TYPE_CHECKING:
+    from plctool.compiler.codegen.lower_exceptions import Finally
 
 TAGGED_AREAS = frozenset((Area.DATA, Area.RETAIN))  # variables of the other areas may overlap (%MW0, %MX0.3)
 FrameType = TypeVar("FrameType", bound="Frame")
@@ -26,6 +30,7 @@ Written = TypeVar("Written")
 
 
 NO_CAPACITY = Value("")  # of what is not a string
+RAISED = Value("%raised", fixed=True)  # where a function leaves the number of an exception that it returns
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,21 +73,75 @@ def string_capacity(t: Type) -> Value:
     return number(t.length) if isinstance(t, StringType) else NO_CAPACITY
 
 
+class Handler(ABC):
+    """Where an exception goes on."""
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether it stops the task, so that the line where it was raised is reported."""
+        return False
+
+    @abstractmethod
+    def raise_code(self, frame: Frame, code: int) -> None:
+        """Ends a block by raising RTSEXCPT_* `code`."""
+
+    @abstractmethod
+    def raise_again(self, frame: Frame) -> None:
+        """Ends a block by raising what `frame.raised` holds."""
+
+
+class _Stop(Handler):
+    """The runtime, which stops the task."""
+
+    @property
+    def has_lines(self) -> bool:
+        return True
+
+    def raise_code(self, frame: Frame, code: int) -> None:
+        self._call(frame, number(code))
+
+    def raise_again(self, frame: Frame) -> None:
+        self._call(frame, frame.fn.value(f"load i32, ptr {frame.raised}"))
+
+    @staticmethod
+    def _call(frame: Frame, code: Value) -> None:
+        unit = frame.unit
+        target = frame.import_function(unit.import_slot(RAISE))
+        frame.fn.do(f"call void {target}(i32 {code}) {unit.raising}")
+        frame.fn.terminate("unreachable")
+
+
+class _Caller(Handler):
+    """The function that called this one."""
+
+    def raise_code(self, frame: Frame, code: int) -> None:
+        frame.set_raised(number(code))
+        frame.fn.branch(_GIVEN_UP)
+
+    def raise_again(self, frame: Frame) -> None:
+        frame.fn.branch(_GIVEN_UP)
+
+
+_GIVEN_UP = "given.up"
+_STOP, _CALLER = _Stop(), _Caller()
+
+
 class Frame:
     """State of the function being written and access to memory and context."""
 
-    def __init__(self, unit: Unit, fn: Function, pou: Pou | None) -> None:
-        """`pou`: None for functions that have no source."""
+    def __init__(self, unit: Unit, fn: Function, pou: Pou | None, *, raises: bool = False) -> None:
+        """`pou`: None for functions that have no source. `raises`: the form that returns its exceptions."""
         self.unit = unit
         self.fn = fn
         self.pou = pou
-        self.checks = unit.options.checks if pou is None or pou.checks else frozenset[Check]()
+        self.handler: Handler = _CALLER if raises else _STOP
+        self.raised: Value | None = RAISED if raises else None  # where the number of an exception is, 0 without one
         self.locals: dict[Variable, Ref] = {}
         self.shadows: dict[Variable, Value] = {}  # FOR variables that live in a register inside their loop
         self.ranges: dict[Variable, tuple[int, int]] = {}
         self._bases: dict[Area, Value] = {}
         self._addresses: dict[tuple[str, Value, int], Value] = {}  # by block, so that none lives longer than it must
-        self._raises: dict[tuple[int, str], str] = {}
+        self._raises: dict[Handler, dict[tuple[int | None, str], str]] = {}
         self._free: dict[tuple[int, int], list[Value]] = {}
         self._busy: list[tuple[tuple[int, int], Value]] = []
         self.pointer_int = f"i{8 * unit.target.pointer_size}"
@@ -147,29 +206,73 @@ class Frame:
 
     # ---- checks ----
 
+    @property
+    def checks(self) -> frozenset[Check]:
+        """The checks to write: all where what they find is caught."""
+        if self.pou is not None and not self.pou.checks:
+            return frozenset()
+        return self.unit.options.checks if self.handler is _STOP else ALL_CHECKS
+
+    @property
+    def is_caught(self) -> bool:
+        """Whether an exception raised here does not stop the task at once."""
+        return self.handler is not _STOP
+
+    def returns_exceptions(self, pou: Pou, dispatch: Dispatch | None) -> bool:
+        """Whether a POU is called here in the form that returns its exceptions: it may have some, and they are caught.
+        Those of the standard library have none, and none stops a C function."""
+        return self.is_caught and pou.external is None and (pou.checks or dispatch is not None)
+
+    def expect_exceptions(self) -> None:
+        """Makes room for the number of an exception, before a __TRY."""
+        if self.raised is None:
+            self.raised = self.fn.slot("i32")
+        if self.handler is _STOP:
+            self.set_raised(number(0))
+
+    def set_raised(self, code: Value) -> None:
+        """Notes the number of an exception; 0: there is none."""
+        self.fn.do(f"store i32 {code}, ptr {self.raised}")
+
     def require(self, condition: Value, code: int, pos: Pos) -> None:
         """Raises RTSEXCPT_* `code` unless the i1 `condition` holds."""
-        keep = self.fn.debug
-        self.at(pos)
-        key = (code, self.fn.debug)
-        label = self._raises.get(key)
-        if label is None:
-            label = self.fn.label("raise")
-            self._raises[key] = label
-        self.fn.debug = keep
-        ok = self.fn.label("ok")
-        self.fn.branch_if(condition, ok, label)
-        self.fn.begin(ok)
+        self._branch(condition, code, pos)
 
-    def write_raises(self) -> None:
-        """Writes the cold blocks at the end of the function."""
-        fn, unit = self.fn, self.unit
-        for (code, debug), label in self._raises.items():
-            fn.debug = debug
+    def after_call(self, pos: Pos) -> None:
+        """Raises again what a function returned that was called in the form for it."""
+        raised = self.fn.value(f"load i32, ptr {self.raised}")
+        self._branch(self.fn.value(f"icmp eq i32 {raised}, 0"), None, pos)
+
+    def _branch(self, condition: Value, code: int | None, pos: Pos) -> None:
+        fn, keep = self.fn, self.fn.debug
+        self.at(pos)
+        key = (code, fn.debug if self.handler.has_lines else "")
+        labels = self._raises.setdefault(self.handler, {})
+        if key not in labels:
+            labels[key] = fn.label("raise")
+        fn.debug = keep
+        ok = fn.label("ok")
+        fn.branch_if(condition, ok, labels[key])
+        fn.begin(ok)
+
+    def write_raises(self, handler: Handler | None = None) -> None:
+        """Writes the cold blocks that lead to a handler; without one, at the end of the function, to that of its
+        own."""
+        fn, handler, keep = self.fn, handler or self.handler, self.fn.debug
+        for (code, debug), label in self._raises.pop(handler, {}).items():
+            fn.debug = debug or keep
             fn.begin_detached(label)
-            target = self.import_function(unit.import_slot(RAISE))
-            fn.do(f"call void {target}(i32 {code}) {unit.raising}")
-            fn.terminate("unreachable")
+            if code is None:
+                handler.raise_again(self)
+            else:
+                handler.raise_code(self, code)
+        fn.debug = keep
+
+    def write_given_up(self, result: str) -> None:
+        """Writes how a function returns that has raised. `result`: its LLVM type."""
+        if self.raised is RAISED:
+            self.fn.begin_detached(_GIVEN_UP)
+            self.fn.terminate("ret void" if result == "void" else f"ret {result} poison")
 
     # ---- memory ----
 
@@ -277,12 +380,14 @@ class Frame:
 class Body(Frame):
     """The body of one POU."""
 
-    def __init__(self, unit: Unit, fn: Function, pou: Pou, effects: Effects) -> None:
-        super().__init__(unit, fn, pou)
+    def __init__(self, unit: Unit, fn: Function, pou: Pou, effects: Effects, *, raises: bool = False) -> None:
+        super().__init__(unit, fn, pou, raises=raises)
         self.effects = effects
         self.on_return = "return"
-        self.loops: list[tuple[str, str]] = []  # labels for CONTINUE and EXIT
+        self.loops: list[tuple[str, str, int]] = []  # labels for CONTINUE and EXIT, and how many `finals` are around
+        self.finals: list[Finally] = []  # around the statement, the innermost last
         self._labels: dict[str, str] = {}
+        self._depths: dict[str, int] = {}  # how many `finals` are around a label of the program
 
     def label(self, name: str) -> str:
         """The block that a label of the program begins."""
@@ -290,8 +395,22 @@ class Body(Frame):
             self._labels[name] = self.fn.label("label")
         return self._labels[name]
 
+    def leave(self, label: str, depth: int = 0) -> None:
+        """Branches to a block which `depth` of the `finals` are around; those between run first."""
+        if len(self.finals) == depth:
+            self.fn.branch(label)
+            return
+        self.finals[-1].go(self, lambda: self.leave(label, depth))
+
+    def jump(self, name: str) -> None:
+        """Goes on at a label of the program."""
+        self.leave(self.label(name), self._depths[name])
+
     def statements(self, body: list[Statement]) -> None:
         """Statements in their order."""
+        for statement in body:
+            if isinstance(statement, Label):
+                self._depths[statement.name] = len(self.finals)
         for statement in body:
             self.release_temporaries()
             self.at(statement.pos)

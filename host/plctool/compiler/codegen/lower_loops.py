@@ -39,7 +39,7 @@ def repeat_loop(frame: Body, s: Repeat) -> None:
 
 
 def _loop_body(frame: Body, body: list[Statement], on_continue: str, on_exit: str) -> None:
-    frame.loops.append((on_continue, on_exit))
+    frame.loops.append((on_continue, on_exit, len(frame.finals)))
     frame.statements(body)
     frame.loops.pop()
     frame.release_temporaries()

@@ -50,6 +50,8 @@ def _may_write_directly(frame: Body, target: Place, call: Call) -> bool:
     pou = call.function
     if pou.external or not _fits(call, target) or not frame.effects.is_local(pou):
         return False
+    if frame.returns_exceptions(pou, call.dispatch):
+        return False  # an exception leaves the target as it was
     root = root_of(target)
     arguments = (
         call.args[1:] if pou.in_place and _is_whole(call.args[0], root) and _is_whole(target, root) else call.args
@@ -88,19 +90,21 @@ def if_statement(frame: Body, s: If) -> None:
 @rule(STATEMENTS, Exit)
 def exit_statement(frame: Body, s: Exit) -> None:
     """To what follows the loop."""
-    frame.fn.branch(frame.loops[-1][1])
+    _, following, depth = frame.loops[-1]
+    frame.leave(following, depth)
 
 
 @rule(STATEMENTS, Continue)
 def continue_statement(frame: Body, s: Continue) -> None:
     """To the end of the round."""
-    frame.fn.branch(frame.loops[-1][0])
+    again, _, depth = frame.loops[-1]
+    frame.leave(again, depth)
 
 
 @rule(STATEMENTS, Return)
 def return_statement(frame: Body, s: Return) -> None:
     """To the end of the body."""
-    frame.fn.branch(frame.on_return)
+    frame.leave(frame.on_return)
 
 
 @rule(STATEMENTS, Label)
@@ -112,7 +116,7 @@ def label(frame: Body, s: Label) -> None:
 @rule(STATEMENTS, Jump)
 def jump(frame: Body, s: Jump) -> None:
     """To its label."""
-    frame.fn.branch(frame.label(s.name))
+    frame.jump(s.name)
 
 
 @rule(STATEMENTS, Case)

@@ -103,10 +103,10 @@ class Unit:
         self.imports: list[External] = []
         self._sections: set[Pou] = set()
         self.handed: dict[Pou, list[Variable]] = {}  # inputs that function blocks get as parameters
-        self.pous: dict[Pou, str] = {}  # symbol of every POU referred to
+        self.pous: dict[tuple[Pou, bool], str] = {}  # symbol of every POU; True: returns its exceptions
         self.structs: dict[str, StructType] = {}  # types whose default initialiser is needed, by symbol
         self.helpers: set[str] = set()
-        self.dispatchers: dict[Dispatch, str] = {}  # symbol of the function that chooses among several targets
+        self.dispatchers: dict[tuple[Dispatch, bool], str] = {}  # symbols of what chooses among targets
         self.files: dict[str, int] = {}
         self._import_slots: dict[str, int] = {}
         self._symbols: set[str] = set()
@@ -150,32 +150,32 @@ class Unit:
 
     # ---- what is referred to ----
 
-    def symbol(self, pou: Pou) -> str:
-        """The symbol of a POU; puts it in the queue."""
+    def symbol(self, pou: Pou, *, raises: bool = False) -> str:
+        """The symbol of a POU, in the form that returns its exceptions if it `raises`; puts it in the queue."""
         if pou.no_init and pou.name in LIBRARY_FUNCTIONS:
             return self.helper(LIBRARY_FUNCTIONS[pou.name])
-        name = self.pous.get(pou)
+        name = self.pous.get((pou, raises))
         if name is None:
             name = self.unique(f"st.{pou.name}")
-            self.pous[pou] = name
+            self.pous[pou, raises] = name
         return name
 
-    def section(self, part: Pou) -> str:
+    def section(self, part: Pou, *, raises: bool) -> str:
         """The symbol of a part of a POU."""
         self._sections.add(part)
-        return self.symbol(part)
+        return self.symbol(part, raises=raises)
 
-    def target_of(self, pou: Pou, dispatch: Dispatch | None) -> str:
+    def target_of(self, pou: Pou, dispatch: Dispatch | None, *, raises: bool = False) -> str:
         """The symbol that a call of `pou` goes to: of a function that looks at the class when that decides."""
         if dispatch is None:
-            return self.symbol(pou)
+            return self.symbol(pou, raises=raises)
         targets = set(dispatch.targets.values())
         if len(targets) == 1:
-            return self.symbol(targets.pop())
-        name = self.dispatchers.get(dispatch)
+            return self.symbol(targets.pop(), raises=raises)
+        name = self.dispatchers.get((dispatch, raises))
         if name is None:
             name = self.unique(f"class.{pou.name}")
-            self.dispatchers[dispatch] = name
+            self.dispatchers[dispatch, raises] = name
         return name
 
     def unique(self, wanted: str) -> str:

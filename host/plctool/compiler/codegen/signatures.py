@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from plctool.compiler.codegen.ir import Value
 from plctool.compiler.codegen.lower_arith import is_real, is_signed
+from plctool.compiler.codegen.lower_frame import RAISED
 from plctool.compiler.codegen.lower_unit import value_type
 from plctool.compiler.typed import Call, FbCall, Parameter, Pou, PouKind, Storage, TypedProgram, Variable
 from plctool.compiler.typed_nodes import walk
@@ -77,9 +78,11 @@ class Formal:
         return f"{self.type} {self.value}"
 
 
-def formals(pou: Pou, handed: HandedInputs) -> list[Formal]:
-    """The parameters of the function of a unit."""
+def formals(pou: Pou, handed: HandedInputs, *, raises: bool = False) -> list[Formal]:
+    """The parameters of the function of a unit. `raises`: of the form that returns its exceptions."""
     found = [Formal("ptr", Value("%ctx"), "noalias nonnull readonly")]
+    if raises:
+        found.append(Formal("ptr", RAISED, "noalias nonnull"))
     if pou.kind in (PouKind.FUNCTION_BLOCK, PouKind.METHOD):
         found.append(Formal("ptr", SELF, "nonnull"))
     if result_in_memory(pou):
@@ -94,9 +97,9 @@ def formals(pou: Pou, handed: HandedInputs) -> list[Formal]:
     return found
 
 
-def parameter_list(pou: Pou, handed: HandedInputs) -> str:
+def parameter_list(pou: Pou, handed: HandedInputs, *, raises: bool = False) -> str:
     """The parameters of the define line."""
-    return ", ".join(formal.definition for formal in formals(pou, handed))
+    return ", ".join(formal.definition for formal in formals(pou, handed, raises=raises))
 
 
 def handed_inputs(program: TypedProgram, target: Target) -> HandedInputs:

@@ -29,6 +29,7 @@ from plctool.compiler.typed import (
     SelfPlace,
     Storage,
     Task,
+    Try,
     Variable,
     VarPlace,
 )
@@ -219,6 +220,8 @@ class _Units:
             self._write(node.target, unit)
         elif isinstance(node, For):
             self._write(node.var, unit)
+        elif isinstance(node, Try) and node.exception is not None:
+            self._write(node.exception, unit)
         elif isinstance(node, FbCall):
             called = list(callees(node))
             unit.callees += called

@@ -41,6 +41,7 @@ class Checker:
         self.loops = 0  # around the statement
         self.labels = Labels([])  # of the body
         self.around: list[list[ast.Stmt]] = []  # the statements it is one of, those around them ...
+        self.last = 0  # how many of `around` are around the innermost __FINALLY
         self._expressions = 0
         self._statements = 0
 

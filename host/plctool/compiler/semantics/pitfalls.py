@@ -45,6 +45,7 @@ from plctool.compiler.typed import (
     SelfPlace,
     Statement,
     Storage,
+    Try,
     Unary,
     Variable,
     VarPlace,
@@ -108,6 +109,8 @@ def has_exit(statements: list[Statement], leaving: tuple[type[Statement], ...] =
         bodies: list[list[Statement]] = []
         if isinstance(statement, If | Case):
             bodies = [*(body for _, body in statement.branches), statement.otherwise]
+        elif isinstance(statement, Try):
+            bodies = [statement.body, statement.caught]
         if isinstance(statement, leaving) or any(has_exit(body, leaving) for body in bodies):
             return True
     return False

@@ -668,13 +668,34 @@ class Jump:
     name_pos: int
 
 
-Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return | Label | Jump
+@dataclass(slots=True, eq=False)
+class Catch:
+    """`__CATCH(var)` with its statements."""
+
+    var: Expr
+    body: list[Stmt]
+
+
+@dataclass(slots=True, eq=False)
+class Try:
+    """`__TRY body __CATCH(var) ... __FINALLY last __ENDTRY`"""
+
+    pos: int
+    body: list[Stmt]
+    catch: Catch | None
+    last: list[Stmt] | None
+
+
+Stmt = Assign | ExprStmt | If | Case | For | While | RepeatUntil | Exit | Continue | Return | Label | Jump | Try
 
 
 def inner_bodies(statement: Stmt) -> list[list[Stmt]]:
     """The statements in a statement, as the lists they stand in."""
     if isinstance(statement, If | Case):
         return [*(body for _, body in statement.branches), statement.otherwise]
+    if isinstance(statement, Try):
+        caught = [] if statement.catch is None else [statement.catch.body]
+        return [statement.body, *caught, statement.last or []]
     return [statement.body] if isinstance(statement, For | While | RepeatUntil) else []
 
 

@@ -509,6 +509,14 @@ class Builder:
     def jump(self, keyword: Token, label: Token) -> ast.Jump:
         return ast.Jump(keyword.pos, label.text, label.pos)
 
+    def try_stmt(
+        self, keyword: Token, body: list[ast.Stmt], catch: ast.Catch | None, last: list[ast.Stmt] | None
+    ) -> ast.Try:
+        return ast.Try(keyword.pos, body, catch, last)
+
+    def catch(self, var: ast.Expr, body: list[ast.Stmt]) -> ast.Catch:
+        return ast.Catch(var, body)
+
     def return_stmt(self, keyword: Token, condition: ast.Expr | None) -> ast.Return:
         return ast.Return(keyword.pos, condition)
 

@@ -76,7 +76,6 @@ class Refusal:
 _GRAPHIC = "this is a diagram; only Structured Text can be compiled"
 
 REFUSED = {
-    "__TRY": Refusal("exceptions cannot be caught, they stop the program; test beforehand what may fail", "__ENDTRY"),
     "VAR_GENERIC": Refusal("blocks of any size are not supported; write one with VAR CONSTANT for each", "END_VAR"),
     "_LD_BODY": Refusal(_GRAPHIC),
     "_FBD_BODY": Refusal(_GRAPHIC),

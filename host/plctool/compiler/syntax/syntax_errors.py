@@ -28,16 +28,18 @@ _CLOSERS = {
     "PROPERTY_GET": "END_PROPERTY", "PROPERTY_SET": "END_PROPERTY", "GET": "END_GET", "SET": "END_SET",
     "ACTION": "END_ACTION", "NAMESPACE": "END_NAMESPACE",
     "INITIAL_STEP": "END_STEP", "STEP": "END_STEP", "TRANSITION": "END_TRANSITION",
+    "TRY": "__ENDTRY",
 }  # fmt: skip
-_ENDS = {"_" + end for end in _CLOSERS.values()}
+_ENDS = {KEYWORDS[end] for end in _CLOSERS.values()}
 _UNITS = {
     "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "GLOBAL", "CONFIG", "ACCESS", "CONFIGURATION", "TEST", "SETUP",
     "TEARDOWN",
 }  # fmt: skip
 _INSTRUCTIONS = {"LD", "LDN", "ST", "STN", "CAL", "CALC", "CALCN", "JMPC", "JMPCN", "RETC", "RETCN"}
-_STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP"}
+_STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "TRY"}
 _CHART = {"INITIAL_STEP", "STEP", "TRANSITION"}
-_SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, *_CHART, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL", END}
+_SYNC = {*_ENDS, *_UNITS, *_STATEMENTS, *_CHART, "VAR", "STRUCT", "RESOURCE", "TASK", "_ELSE", "_ELSIF", "_UNTIL",
+         "_CATCH", "_FINALLY", END}  # fmt: skip
 _ITEMS = ("stmt", "var_decl", "type_decl", "config_item", "unit", "expr_stmt", "step")  # can be left out as a whole
 
 _INSERTIONS = {
@@ -58,9 +60,9 @@ _WORDS = {
     "_DOTDOT": "..", "_THEN": "THEN", "_DO": "DO", "_OF": "OF", "_TO": "TO", "_UNTIL": "UNTIL", "_ON": "ON",
 }  # fmt: skip
 
-_PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",)}
+_PARTS = {"_ELSE": ("IF", "CASE"), "_ELSIF": ("IF",), "_UNTIL": ("REPEAT",), "_CATCH": ("TRY",), "_FINALLY": ("TRY",)}
 _RETURN = "RETURN takes no value; assign it to the name of the function, then RETURN"
-_BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
+_BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "TRY"}
 _AFTER_DECLARATIONS = re.compile(r"\b(?:END_\w+|VAR(?:_\w+)?|IF|FOR|WHILE|REPEAT|CASE)\b", re.IGNORECASE)
 _ELSE_IF = re.compile(r"\bELSE\s+IF\b", re.IGNORECASE)
 _APART = 3  # an error closer than so many tokens to the previous one is a consequence of it
@@ -224,13 +226,13 @@ class Recovery:
         if token.type in _PARTS and not any(t.type in _PARTS[token.type] for t in self._openers()[:-1]):
             return False
         end = _CLOSERS[opener.type]
-        stack = self._shift(self._parser.states, "_" + end)
+        stack = self._shift(self._parser.states, KEYWORDS[end])
         if stack is None:
             return False
         if token.type in _STATEMENTS and self._shift(stack, token.type) is None:
             return False
         self._report_open(token, opener)
-        self._parser.feed(Token("_" + end, end, token.pos))
+        self._parser.feed(Token(KEYWORDS[end], end, token.pos))
         return True
 
     def _parted_end(self, token: Token) -> bool:
@@ -280,10 +282,10 @@ class Recovery:
             return True
         if token.type not in _ENDS:
             return False
-        if any("_" + _CLOSERS[t.type] == token.type for t in self._openers()):
+        if any(KEYWORDS[_CLOSERS[t.type]] == token.type for t in self._openers()):
             return False
         opener = self._open()
-        name = token.text.upper().removeprefix("END_")
+        name = token.type.removeprefix("_END_")
         if name in self._dropped:
             self._dropped.remove(name)
             return True
@@ -293,7 +295,7 @@ class Recovery:
         line = self._source.pos(opener.pos).line
         end = _CLOSERS[opener.type]
         self._say(token.pos, f"expected {end} for the {opener.text.upper()} in line {line}, not {token.text}")
-        token.type = "_" + end
+        token.type = KEYWORDS[end]
         return self._parser.feed(token)
 
     def _report_open(self, token: Token, opener: Token | None) -> None:
@@ -418,6 +420,7 @@ def _is_doubled(token: Token, text: str) -> bool:
 
 
 def _a(word: str) -> str:
+    word = "__TRY" if word == "TRY" else word
     return f"an {word}" if word[0] in "AEIO" else f"a {word}"
 
 

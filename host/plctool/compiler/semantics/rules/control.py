@@ -12,7 +12,7 @@ from plctool.compiler.semantics.conversions import NUMBERS, SIGNED, elementary, 
 from plctool.compiler.semantics.instances import INITIALISERS
 from plctool.compiler.semantics.labels import Labels
 from plctool.compiler.semantics.pitfalls import has_exit
-from plctool.compiler.semantics.rules.jumps import note_loops, report_repeated
+from plctool.compiler.semantics.rules.jumps import note_loops, report_leaving, report_repeated
 from plctool.compiler.semantics.rules.places import changeable_place
 from plctool.compiler.semantics.scope import Scope
 from plctool.compiler.semantics.symbols import ERROR, Role, VarSymbol
@@ -26,9 +26,11 @@ from plctool.compiler.typed import (
     For,
     If,
     Jump,
+    Place,
     Repeat,
     Return,
     Statement,
+    Try,
     VarPlace,
     While,
 )
@@ -94,6 +96,8 @@ def _ends(statements: list[Statement]) -> bool:
     last = statements[-1]
     if isinstance(last, If | Case):
         return _ends(last.otherwise) and all(_ends(body) for _, body in last.branches)
+    if isinstance(last, Try):
+        return _ends(last.body) and (last.exception is None or _ends(last.caught))
     if isinstance(last, While):
         return _is_constant(last.condition, 1) and not has_exit(last.body)
     if isinstance(last, Repeat):
@@ -307,7 +311,7 @@ def repeat_statement(c: Checker, node: ast.RepeatUntil) -> list[Statement]:
 def exit_statement(c: Checker, node: ast.Exit) -> list[Statement]:
     """EXIT"""
     if not c.loops:
-        c.error(node.pos, "statement", "EXIT stands outside of a loop")
+        return _outside_of_loop(c, node.pos, "EXIT")
     return [Exit(c.pos(node.pos))]
 
 
@@ -315,14 +319,23 @@ def exit_statement(c: Checker, node: ast.Exit) -> list[Statement]:
 def continue_statement(c: Checker, node: ast.Continue) -> list[Statement]:
     """CONTINUE"""
     if not c.loops:
-        c.error(node.pos, "statement", "CONTINUE stands outside of a loop")
+        return _outside_of_loop(c, node.pos, "CONTINUE")
     return [Continue(c.pos(node.pos))]
+
+
+def _outside_of_loop(c: Checker, offset: int, word: str) -> list[Statement]:
+    if c.last:
+        return report_leaving(c, offset, word)
+    c.error(offset, "statement", f"{word} stands outside of a loop")
+    return []
 
 
 @checks_statement(ast.Return)
 def return_statement(c: Checker, node: ast.Return) -> list[Statement]:
     """RETURN, RETURN(condition)"""
     pos = c.pos(node.pos)
+    if c.last:
+        return report_leaving(c, node.pos, "RETURN")
     if node.condition is None:
         return [Return(pos)]
     condition = c.settled(node.condition)
@@ -332,3 +345,37 @@ def return_statement(c: Checker, node: ast.Return) -> list[Statement]:
             c.error(node.condition.pos, "syntax", message)
         return []
     return [If([(condition, [Return(pos)])], [], pos)]
+
+
+# ---- exceptions ----
+
+
+@checks_statement(ast.Try)
+def try_statement(c: Checker, node: ast.Try) -> list[Statement]:
+    """__TRY, __CATCH and __FINALLY"""
+    pos = c.pos(node.pos)
+    if node.catch is None and node.last is None:
+        message = "this __TRY has no __CATCH; write __CATCH(exc), exc : __SYSTEM.ExceptionCode, and what to do then"
+        c.error(node.pos, "statement", message)
+    body = check_body(c, node.body)
+    exception = None if node.catch is None else _exception(c, node.catch.var)
+    caught = [] if node.catch is None else check_body(c, node.catch.body)
+    return [Try(body, exception, caught, _last(c, node.last or []), pos)]
+
+
+def _exception(c: Checker, node: ast.Expr) -> Place | None:
+    """The variable that takes the number of an exception."""
+    place = changeable_place(c, node, "__CATCH", "take the number of an exception")
+    t = None if place is None else place.type
+    if t is not None and (not isinstance(t, EnumType) or t.name.casefold() != "exceptioncode"):
+        c.error(node.pos, "type", f"__CATCH needs a variable of __SYSTEM.ExceptionCode, not of {t}")
+    return place
+
+
+def _last(c: Checker, nodes: list[ast.Stmt]) -> list[Statement]:
+    """The statements of __FINALLY, which nothing leads out of."""
+    loops, last = c.loops, c.last
+    c.loops, c.last = 0, len(c.around)
+    body = check_body(c, nodes)
+    c.loops, c.last = loops, last
+    return body

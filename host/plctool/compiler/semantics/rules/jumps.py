@@ -12,7 +12,8 @@ from plctool.compiler.semantics.pitfalls import JumpLoop
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import If, Jump, Label, Statement
 
-_WORDS = {ast.If: "IF", ast.Case: "CASE", ast.For: "FOR", ast.While: "WHILE", ast.RepeatUntil: "REPEAT"}
+_WORDS = {ast.If: "IF", ast.Case: "CASE", ast.For: "FOR", ast.While: "WHILE", ast.RepeatUntil: "REPEAT",
+          ast.Try: "__TRY"}  # fmt: skip
 
 
 def report_repeated(c: Checker) -> None:
@@ -40,7 +41,15 @@ def jump_statement(c: Checker, node: ast.Jump) -> list[Statement]:
     if not any(among is place.among for among in c.around):
         c.error(node.name_pos, "statement", _leads_inside(c, place))
         return []
+    if not any(among is place.among for among in c.around[c.last :]):
+        return report_leaving(c, node.pos, f"JMP {node.name}")
     return [Jump(node.name.casefold(), c.pos(node.pos))]
+
+
+def report_leaving(c: Checker, offset: int, statement: str) -> list[Statement]:
+    """Reports a statement that would leave a __FINALLY."""
+    c.error(offset, "statement", f"{statement} leads out of __FINALLY, which always runs to its end; write an IF in it")
+    return []
 
 
 def _not_found(c: Checker, name: str) -> str:
