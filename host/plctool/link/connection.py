@@ -204,6 +204,7 @@ class Connection:
             while True:
                 while channel.outstanding < MAX_REQUESTS and (message := next(requests, None)) is not None:
                     channel.send(message, self.transport.now())
+                    self._send_some(channel)  # the next message may take time to make
                 if not channel.outstanding:
                     return
                 self._run(channel, lambda: bool(channel.replies), patience, check)

@@ -276,6 +276,7 @@ def read_tasks(session: Session) -> list[TaskInfo]:
 # ---- download --------------------------------------------------------------------------------------------------------
 
 _BLOCK_OVERHEAD = 44  # layer 7 header and tags around the data of a block, bytes
+_PACKED_SIZE = 4096  # of packed data at most: searching for so much takes less time than the line is ahead, bytes
 _BLOCK_ALIGN = 16  # flash is written best in whole program units
 
 
@@ -358,7 +359,7 @@ class _Transfer:
     def _packed_blocks(self, start_at: int, room: int, longest: int) -> Iterator[tuple[bintag.Tag, int]]:
         self._packer = self._packer or Packer(self._image)
         offset = start_at
-        for block in self._packer.blocks(start_at, room - _PACKED.size, longest):
+        for block in self._packer.blocks(start_at, min(room - _PACKED.size, _PACKED_SIZE), longest):
             if len(block.data) + _PACKED.size < block.size:
                 yield bintag.raw(lib.TAG_CDL_PACKED, _PACKED.pack(unpacked=block.size) + block.data), block.size
             else:
