@@ -14,10 +14,10 @@ from pathlib import Path
 
 import compiling
 import latency
+import links
 import overheads
 import targets
 
-import plctool
 from plctool.compiler import IoFiles, compile_sources
 from plctool.compiler.build import BuildResult
 from plctool.device import Plc
@@ -92,26 +92,6 @@ def bench_serial() -> None:
             share = len(image) * BITS_PER_BYTE / BAUD / taken
             beside = f"share {share:.1%}" + (f"; {seconds[False] / taken:.2f} times as fast" if packed else "")
             line(f"{name}, {len(image)} bytes, {'packed' if packed else 'as it is'}", f"{taken:.2f} s", beside)
-
-
-# ---- network ---------------------------------------------------------------------------------------------------------
-
-
-def bench_network() -> None:
-    print("\nFlashing on this machine, as fast as the tool and plcrt are")
-    result = build(large_program(4000))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "bench.cdl"
-        path.write_bytes(result.image)
-        for kind in ("serial", "tcp", "udp"):
-            with Plcrt(Path(folder) / f"{kind}.flash", "--tcp", "0", "--udp", "127.11.74.0") as runtime:
-                place = {"serial": runtime.port, "tcp": runtime.tcp, "udp": runtime.udp}[kind]
-                with plctool.connect(f"{kind}:{place}", gateway=False) as plc:
-                    plc.identity()
-                    begin = time.monotonic()
-                    plc.flash(path, start=False)
-                    seconds = time.monotonic() - begin
-            line(f"{kind}, {len(result.image)} bytes", f"{len(result.image) / seconds / 1e6:.1f} MB/s")
 
 
 # ---- CAN -------------------------------------------------------------------------------------------------------------
@@ -235,8 +215,8 @@ def main() -> None:
     overheads.main()
     bench_day()
     bench_serial()
-    bench_network()
     bench_can()
+    links.main()
     latency.main()
 
 

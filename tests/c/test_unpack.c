@@ -1,5 +1,5 @@
 /*
- * test_unpack.c - Unpack: what was packed comes back; what nobody packed is refused, and writes no byte too many.
+ * test_unpack.c - Unpack: what was packed comes back; other data are refused, and no byte too many is written.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

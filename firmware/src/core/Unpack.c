@@ -15,7 +15,7 @@ enum {
 typedef struct {
     const RTS_UI8 *data;
     RTS_UI32 left; /* bytes */
-    RTS_UI32 bits; /* of the last byte, with a 1 behind them; those that were taken are above bit 7 */
+    RTS_UI32 bits; /* of the last byte, and a 1 after them; those that were taken are above bit 7 */
     RTS_UI32 distance;
     bool wrong; /* the data end too early, or a number is too large */
 } PACKED;

@@ -121,7 +121,7 @@ class Packer:
 
 
 def _chain(image: bytes, count: int) -> list[int]:
-    """For each place the one before it with the same `count` bytes; -1: none."""
+    """For each place the previous one with the same `count` bytes; -1: none."""
     newest: dict[bytes, int] = {}
     same = []
     for at in range(len(image)):

@@ -213,10 +213,11 @@ def app_state(state: int, operating: int) -> AppState:
     return {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}.get(state, AppState.STOP)
 
 
-def start(session: Session) -> None:
-    """Starts the application. Not again when no reply came and it is stopped with an exception: a controller that went
-    down with it, and came back, would start the previous one."""
-    read_status(session)  # a channel that was lost before is opened again here
+def start(session: Session, checked: bool = False) -> None:
+    """Starts the application; `checked`: the channel has just been used. Not again when no reply came and it is stopped
+    with an exception: a controller that went down with it, and came back, would start the previous one."""
+    if not checked:
+        read_status(session)  # a channel that was lost before is opened again here
     try:
         _check_control(_control(session, lib.SRV_APP_START), "start")
         return
