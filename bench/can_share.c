@@ -1,12 +1,13 @@
 /*
  * can_share.c - how much of a CAN bus carries image bytes during a download, on a simulated bus: virtual time, so the
- * figures are the same on every machine. The device and the tool take no time; what is measured are the frames. Data are sent as plctool
- * sends them: messages that fill their packets, the next one before the reply to the one before has come.
+ * figures are the same on every machine. The device and the tool take no time; what is measured are the frames. Data
+ * are sent as plctool sends them: messages that fill their packets, the next one before the reply to the previous one
+ * has come.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Prints a line for each kind of bus and longest message: its name, that length, bytes, seconds, and the share of what ISO-TP carries at best: packets of
- * the largest size, one after the other, of which all bytes count.
+ * Prints a line for each kind of bus and longest message: its name, that length, bytes, seconds, and the share of what
+ * ISO-TP carries at best: packets of the largest size, one after the other, of which all bytes count.
  */
 #include <stdio.h>
 #include <string.h>

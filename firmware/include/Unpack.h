@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * The window is all that has been written before, so that there is no buffer: whoever keeps it copies from it.
+ * The window is all that has been written before, so that there is no buffer: the sink, which keeps it, copies from it.
  */
 #ifndef UNPACK_H
 #define UNPACK_H

@@ -2,6 +2,7 @@
 
     size.py BUDGET.toml CONFIG=FILE.elf ...             prints the table; exit status 1 when a budget is exceeded
     size.py --update BUDGET.toml CONFIG=FILE.elf ...    makes the present figures the budget of the components
+    size.py --without-budget CONFIG=FILE.elf ...        prints the table
 
 The sections say how much there is, the debugging information which component each function and variable is of: the
 program is optimised as a whole, so the linker does not know any more. A function that was inlined counts where it went.
@@ -36,6 +37,7 @@ APPLICATION_SECTION = ".iec_stack"
 SLACK = 1.04  # the budget of a component is what it takes now, and four per cent
 ROUND = 16
 TOTAL = "total"
+BUDGET = Path(__file__).resolve().parents[2] / "firmware/size-budget.toml"
 
 LIBRARIES = "libraries"  # of the C compiler, perhaps without debugging information
 REST = "strings, padding"  # what has no symbol
@@ -127,6 +129,8 @@ def pieces(elf: ELFFile) -> Iterator[Piece]:
     starts = sorted(lines)
     for address, symbol in symbols.items():
         section, size = elf.get_section(symbol["st_shndx"]).name, symbol["st_size"]
+        if section not in rest:
+            continue  # board_facts
         rest[section] -= size
         if symbol["st_info"]["type"] != "STT_FUNC":
             yield Piece(section, symbol.name, variables.get(address, LIBRARIES), size)
@@ -245,16 +249,20 @@ def update(path: Path, measured: dict[str, dict[str, Usage]], budget: Budget, co
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--update", action="store_true", help="make the present figures the budget")
-    parser.add_argument("budget", type=Path)
-    parser.add_argument("programs", nargs="+", metavar="CONFIG=FILE.elf")
+    parser.add_argument("--without-budget", action="store_true", help="there is none for these programs")
+    parser.add_argument("files", nargs="+", metavar="BUDGET.toml CONFIG=FILE.elf")
     args = parser.parse_args()
-    budget = read_budget(args.budget)
-    programs = {config: Path(file) for config, file in (text.split("=", 1) for text in args.programs)}
+    path = BUDGET if args.without_budget else Path(args.files.pop(0))
+    budget = read_budget(path)
+    programs = {config: Path(file) for config, file in (text.split("=", 1) for text in args.files)}
     measured = {config: measure(file, budget.application) for config, file in programs.items()}
+    if args.without_budget:
+        print_table(measured)
+        return 0
     compiler = compiler_of(next(iter(programs.values())))
     if args.update:
-        update(args.budget, measured, budget, compiler)
-        budget = read_budget(args.budget)
+        update(path, measured, budget, compiler)
+        budget = read_budget(path)
     print_table(measured)
     complaints = [text for config, usage in measured.items() for text in exceeded(config, usage, budget, compiler)]
     goals = [text for config, usage in measured.items() for text in missed_goals(config, usage, budget)]

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysTarget.h"
 
 #define SYSCTL_RIS REG32(0x400FE050u)

@@ -6,7 +6,7 @@
  * The chip's own flash can only be written while nothing runs from it. The EEPROM cannot be mapped: programs run in RAM
  * (CodeInRam.c). It needs no erase; a sector is what is filled with the erased value at once.
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysFlash.h"
 
 /* A controller, and the pins of its port. */
