@@ -1,11 +1,13 @@
 /*
  * can_share.c - how much of a CAN bus carries image bytes during a download, on a simulated bus: virtual time, so the
- * figures are the same on every machine. The device and the tool take no time; what is measured are the frames.
+ * figures are the same on every machine. The device and the tool take no time; what is measured are the frames. Data
+ * are sent as plctool sends them: messages that fill their packets, the next one before the reply to the previous one
+ * has come.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Prints a line for each kind of bus: its name, bytes, seconds, and the share of what ISO-TP carries at best: packets of
- * the largest size, one after the other, of which all bytes count.
+ * Prints a line for each kind of bus and longest message: its name, that length, bytes, seconds, and the share of what
+ * ISO-TP carries at best: packets of the largest size, one after the other, of which all bytes count.
  */
 #include <stdio.h>
 #include <string.h>
@@ -15,26 +17,70 @@
 #include "can_client.h"
 #include "comm_fakes.h"
 
-enum { IMAGE = 16000, PIECE = 4000, KBIT = 1000 };
+enum {
+    IMAGE = 16000,
+    KBIT = 1000,
+    IN_FIRST = CLIENT_PAYLOAD_SIZE - CHANNEL_FIRST_SIZE, /* bytes of a message in its packets */
+    IN_OTHERS = CLIENT_PAYLOAD_SIZE - (int)sizeof(CHANNEL_DATA),
+    HEADS = 44,           /* of the message and its elements */
+    UNIT = 16,            /* pieces are multiples of it */
+    ACKNOWLEDGEMENTS = 4, /* at most, before a reply */
+    UNDER_WAY = 2,        /* messages */
+};
 
 static RTS_UI8 image[IMAGE];
 
-static bool send_piece(CLIENT *client, RTS_UI32 offset)
+static void send_piece(CLIENT *client, RTS_UI32 offset, RTS_UI32 size)
 {
-    static RTS_UI8 content[PIECE + 64];
+    static RTS_UI8 content[NETSERVER_MESSAGE_SIZE];
+    static RTS_UI8 message[NETSERVER_MESSAGE_SIZE];
     CDL_POSITION position;
     BTAG_WRITER writer;
-    static REPLY reply;
 
-    BytesPut32(position.flags, 0);
+    BytesPut32(position.flags, offset == 0 ? 0 : DLF_CONTINUEDOWNLOAD);
     BytesPut32(position.offset, offset);
     BytesPut32(position.total_size, IMAGE);
     BytesPut32(position.crc, 0x12345678);
     BTagWriterInit(&writer, content, sizeof(content));
     BTagWrite(&writer, TAG_CDL_POSITION, BTAG_ALIGN_0, &position, sizeof(position));
-    BTagWrite(&writer, TAG_CDL_DATA, BTAG_ALIGN_0, image + offset, PIECE);
-    return client_call(client, SG_APPLICATION, SRV_APP_DOWNLOAD_COMPACT, &writer, &reply) &&
-           reply_number(&reply, TAG_CDL_NEXT) == offset + PIECE;
+    BTagWrite(&writer, TAG_CDL_DATA, BTAG_ALIGN_0, image + offset, size);
+    client_send_message(
+        client, message,
+        client_message(client, SG_APPLICATION, SRV_APP_DOWNLOAD_COMPACT, content, writer.size, message));
+}
+
+/* What the device has by now, as its next reply says; 0 when there is none. Acknowledgements may come before it. */
+static RTS_UI32 take_reply(CLIENT *client)
+{
+    static RTS_UI8 message[NETSERVER_MESSAGE_SIZE];
+    REPLY reply;
+    RTS_UI32 size = 0;
+
+    for (RTS_UI32 i = 0; i < ACKNOWLEDGEMENTS && size == 0; i++)
+        size = client_take_message(client, message);
+    if (size < 20)
+        return 0;
+    BTagReaderInit(&reply.tags, message + 20, size - 20);
+    return reply_number(&reply, TAG_CDL_NEXT);
+}
+
+/* Bytes of the image in a message of `longest` bytes at most. */
+static RTS_UI32 piece_of(RTS_UI32 longest)
+{
+    return (IN_FIRST + (longest - IN_FIRST) / IN_OTHERS * IN_OTHERS - HEADS) / UNIT * UNIT;
+}
+
+static bool send_image(CLIENT *client, RTS_UI32 longest)
+{
+    RTS_UI32 piece = piece_of(longest);
+    RTS_UI32 arrived = 0;
+
+    for (RTS_UI32 offset = 0; offset < IMAGE; offset += piece) {
+        send_piece(client, offset, IMAGE - offset < piece ? IMAGE - offset : piece);
+        if (offset >= (UNDER_WAY - 1) * piece)
+            arrived = take_reply(client);
+    }
+    return arrived == IMAGE || take_reply(client) == IMAGE;
 }
 
 static double frame_seconds(RTS_UI32 size, bool fd)
@@ -59,31 +105,36 @@ static double best(bool fd)
     return (packet + frame_seconds(1 + left, fd)) / BLK_MAX_SIZE;
 }
 
-static bool measure(const char *name, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
+static bool measure(const char *name, RTS_UI32 longest, RTS_UI32 bit_rate, RTS_UI32 data_bit_rate)
 {
     CLIENT client;
 
     can_start(bit_rate, data_bit_rate);
     can_client(&client, can_tool(200));
-    bool done = client_open(&client) && client_login(&client) && client_login_app(&client);
+    client_send_open(&client, 7, longest);
+    bool done = client_take_open(&client) == CHANNEL_OPEN_OK && client_login(&client) && client_login_app(&client);
     RTS_I64 start = SimCanNow();
-    for (RTS_UI32 offset = 0; done && offset < IMAGE; offset += PIECE)
-        done = send_piece(&client, offset);
+    done = done && send_image(&client, longest);
     double seconds = (double)(SimCanNow() - start) / 1e9;
-    printf("%s\t%d\t%.4f\t%.4f\n", name, IMAGE, seconds, IMAGE * best(data_bit_rate != 0) / seconds);
+    printf("%s\t%u\t%d\t%.4f\t%.4f\n", name, (unsigned)longest, IMAGE, seconds,
+           IMAGE * best(data_bit_rate != 0) / seconds);
     can_end();
     return done;
 }
 
 int main(void)
 {
+    static const RTS_UI32 longest[] = {576, 2048, NETSERVER_MESSAGE_SIZE};
+    bool done = true;
+
     for (RTS_UI32 i = 0, random = 1; i < IMAGE; i++) {
         random = random * 1664525u + 1013904223u;
         image[i] = (RTS_UI8)(random >> 24);
     }
-    return measure("CAN 125 kbit/s", 125 * KBIT, 0) && measure("CAN 500 kbit/s", 500 * KBIT, 0) &&
-                   measure("CAN 1 Mbit/s", 1000 * KBIT, 0) &&
-                   measure("CAN FD 500 kbit/s, 2 Mbit/s", 500 * KBIT, 2000 * KBIT)
-               ? 0
-               : 1;
+    for (RTS_UI32 i = 0; i < RTS_COUNT(longest); i++)
+        done = done && measure("CAN 125 kbit/s", longest[i], 125 * KBIT, 0) &&
+               measure("CAN 500 kbit/s", longest[i], 500 * KBIT, 0) &&
+               measure("CAN 1 Mbit/s", longest[i], 1000 * KBIT, 0) &&
+               measure("CAN FD 500 kbit/s, 2 Mbit/s", longest[i], 500 * KBIT, 2000 * KBIT);
+    return done ? 0 : 1;
 }

@@ -24,6 +24,9 @@
  */
 RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc);
 RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size);
+/* The same for data that are packed (Unpack.h) and unpack to `unpacked` bytes, if the runtime can (APP_UNPACK_SIZE).
+ * ERR_NO_CONSISTENCY, ERR_OUT_OF_LIMITS: they do not; that ends the download too. */
+RTS_RESULT AppDownloadUnpack(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 unpacked);
 RTS_UI32 AppDownloadOffset(void); /* bytes received so far; an aborted transfer continues here */
 /* Whether the download that has begun is that of this image. It outlives the channel it came through. */
 bool AppDownloadIsOf(RTS_UI32 total_size, RTS_UI32 image_crc);

@@ -267,6 +267,11 @@ typedef struct {
     WIRE_UI32 crc; /* of the image */
 } CDL_POSITION;
 
+/* TAG_CDL_PACKED (own). Then the packed data, see Unpack.h. */
+typedef struct {
+    WIRE_UI32 unpacked; /* bytes of the image that they are */
+} CDL_PACKED;
+
 /* TAG_TASK_INFO (own). Then the name with NUL. Times in us. */
 typedef struct {
     WIRE_UI32 kind; /* KIND_* */
@@ -354,6 +359,7 @@ WIRE_SIZE(APP_POSITION, 6);
 WIRE_SIZE(APP_LAST_EXCEPTION, 12);
 WIRE_SIZE(APP_IMAGE_IDENTITY, 8);
 WIRE_SIZE(CDL_POSITION, 16);
+WIRE_SIZE(CDL_PACKED, 4);
 WIRE_SIZE(TASK_INFO, 40);
 WIRE_SIZE(MON2_APPLICATION, 20);
 WIRE_SIZE(MON2_VALUE, 6);

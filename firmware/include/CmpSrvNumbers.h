@@ -218,6 +218,8 @@ enum {
     TAG_CDL_DATA = 0x03,
     TAG_CDL_NEXT = 0x04,
     TAG_CDL_REASON = 0x05,
+    TAG_CDL_PACKED = 0x06,
+    TAG_CDL_UNPACKS = 0x07,
 };
 
 /* Task information (own). */

@@ -28,6 +28,12 @@
 #define APP_REFUSAL_TEXT_SIZE (64 + 6 * APP_MAX_IMPORTS)
 #endif
 
+/* Bytes of an image that one message of packed data (Unpack.h) may unpack to: how long main is busy with it. 700 bytes of
+ * flash, no RAM. 0: data come as they are. */
+#ifndef APP_UNPACK_SIZE
+#define APP_UNPACK_SIZE 0
+#endif
+
 /* Words of the stack that are kept of an exception, from which the host finds the calls that led there; 8 bytes each.
  * 0: only the place is known. */
 #ifndef EXCEPT_MAX_CALLS

@@ -164,7 +164,9 @@ class Controller(ABC):
             self._check_downloaded(crc)
         seconds = self._now() - begin
         persistent = None if skipped else self._kept_changes(status.image_crc, crc)
-        if start and not (skipped and status.state is AppState.RUN):
+        if start and not skipped:
+            self._start_checked()
+        elif start and status.state is not AppState.RUN:
             self.start()
         now = self.raw_status()
         if now.image_crc != crc:
@@ -173,6 +175,10 @@ class Controller(ABC):
             )
             raise DeviceError(message, "died")
         return FlashResult(len(data), seconds, skipped, now.state, persistent)
+
+    def _start_checked(self) -> None:
+        """As `start`, just after the controller has replied."""
+        self.start()
 
     def _check_downloaded(self, crc: int) -> None:
         found = self.raw_status()

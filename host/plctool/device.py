@@ -206,6 +206,9 @@ class Plc(Controller):
     def start(self) -> None:
         services.start(self._session)
 
+    def _start_checked(self) -> None:
+        services.start(self._session, checked=True)
+
     def stop(self) -> None:
         services.stop(self._session)
 

@@ -17,6 +17,7 @@
 #include "CompactDownload.h"
 #include "IoConfig.h"
 #include "Sim.h"
+#include "packer.h"
 #include "rts_config.h"
 
 #if defined(__x86_64__)
@@ -443,6 +444,21 @@ static inline RTS_RESULT download_part(const APP_BYTES *image, RTS_UI32 size, AP
     for (done = 0; result == ERR_OK && done < size; done += BLOCK)
         result = AppDownloadWrite(done, image->bytes + done, size - done < BLOCK ? size - done : BLOCK);
     return result == ERR_OK ? AppDownloadEnd(refusal) : result;
+}
+
+/* The same, packed, in blocks that copy from those before. */
+static inline RTS_RESULT download_packed(const APP_BYTES *image)
+{
+    enum { BLOCK = 200 };
+    RTS_UI8 packed[2 * BLOCK];
+    APP_REFUSAL refusal;
+    RTS_RESULT result = AppDownloadBegin(image->size, image_crc(image));
+
+    for (RTS_UI32 done = 0; result == ERR_OK && done < image->size; done += BLOCK) {
+        RTS_UI32 size = image->size - done < BLOCK ? image->size - done : BLOCK;
+        result = AppDownloadUnpack(done, packed, pack(image->bytes, done, done + size, packed), size);
+    }
+    return result == ERR_OK ? AppDownloadEnd(&refusal) : result;
 }
 
 static inline RTS_RESULT download(const APP_BYTES *image)

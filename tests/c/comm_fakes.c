@@ -28,6 +28,7 @@
 #include "Sim.h"
 #include "SimLink.h"
 #include "SysCom.h"
+#include "Unpack.h"
 #include "SysExcept.h"
 #include "SysLock.h"
 #include "SysTime.h"
@@ -268,6 +269,36 @@ RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
     memcpy(fakes.image + offset, data, size);
     fakes.download_offset += size;
     return ERR_OK;
+}
+
+static RTS_RESULT copy_image(RTS_UI32 distance, RTS_UI32 size)
+{
+    if (distance > fakes.download_offset)
+        return ERR_OUT_OF_LIMITS;
+    for (; size > 0; size--, fakes.download_offset++)
+        fakes.image[fakes.download_offset] = fakes.image[fakes.download_offset - distance];
+    return ERR_OK;
+}
+
+static RTS_RESULT write_image(const RTS_UI8 *data, RTS_UI32 size)
+{
+    memcpy(fakes.image + fakes.download_offset, data, size);
+    fakes.download_offset += size;
+    return ERR_OK;
+}
+
+RTS_RESULT AppDownloadUnpack(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 unpacked)
+{
+    static const UNPACK_SINK sink = {write_image, copy_image};
+
+    if (!fakes.download_open || offset != fakes.download_offset)
+        return ERR_INVALID_SEQUENCE;
+    if (unpacked > fakes.download_total - offset)
+        return ERR_OUT_OF_LIMITS;
+    RTS_RESULT result = Unpack(data, size, unpacked, &sink);
+    fakes.download_writes++;
+    fakes.download_open = result == ERR_OK;
+    return result;
 }
 
 RTS_UI32 AppDownloadOffset(void)

@@ -31,10 +31,11 @@ static void prepare(const GEOMETRY *g)
 }
 
 static RTS_RESULT story_result;
+static bool packed; /* application 2 comes packed */
 
 static RTS_RESULT try_story(void)
 {
-    RTS_RESULT result = download(&images[2]);
+    RTS_RESULT result = packed ? download_packed(&images[2]) : download(&images[2]);
 
     if (result == ERR_OK)
         result = AppStartApplication();
@@ -214,6 +215,18 @@ static void a_flash_fault_at_any_operation_of_a_download_is_survived(void)
         fault_at_any_operation(&geometries[i]);
 }
 
+static void the_same_holds_for_packed_downloads(void)
+{
+    static const GEOMETRY geometries[] = {{1, 0xFF, 512}, {16, 0x00, 1024}};
+
+    packed = true;
+    for (RTS_SIZE i = 0; i < RTS_COUNT(geometries); i++) {
+        sweep(&geometries[i]);
+        fault_at_any_operation(&geometries[i]);
+    }
+    packed = false;
+}
+
 /* The first program on a blank device: afterwards nothing or the application, and the device can be used. */
 static void the_first_download_can_be_cut_anywhere(void)
 {
@@ -303,6 +316,7 @@ int main(void)
     RUN(every_cut_leaves_the_old_or_the_new_application);
     RUN(a_second_cut_during_recovery_changes_nothing);
     RUN(a_flash_fault_at_any_operation_of_a_download_is_survived);
+    RUN(the_same_holds_for_packed_downloads);
     RUN(the_first_download_can_be_cut_anywhere);
     RUN(an_origin_reset_can_be_cut_anywhere);
     RUN(cuts_go_on_for_ever);

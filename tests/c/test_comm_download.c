@@ -8,6 +8,8 @@
 #include "CmpBytes.h"
 #include "comm_client.h"
 #include "comm_fakes.h"
+#include "packer.h"
+#include "rts_config.h"
 #include "test.h"
 
 RTS_STATIC_ASSERT(NETSERVER_MESSAGE_SIZE >= TESTS_NEED_MESSAGE_SIZE, tests_have_room);
@@ -316,6 +318,106 @@ static void next_block_may_be_sent_before_the_reply_has_arrived(void)
     CHECK(memcmp(fakes.image, image, TOTAL) == 0);
 }
 
+/* ---- packed ---- */
+
+/* Sends a block of packed data that are said to unpack to `unpacked` bytes. */
+static RTS_UI32 download_packed(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 unpacked, RTS_UI32 *next)
+{
+    begin_content();
+    BTagOpen(&writer, TAG_CDL_POSITION, BTAG_ALIGN_0);
+    BTagAppend32(&writer, offset == 0 ? 0 : DLF_CONTINUEDOWNLOAD);
+    BTagAppend32(&writer, offset);
+    BTagAppend32(&writer, TOTAL);
+    BTagAppend32(&writer, CRC);
+    BTagClose(&writer);
+    BTagOpen(&writer, TAG_CDL_PACKED, BTAG_ALIGN_0);
+    BTagAppend32(&writer, unpacked);
+    BTagAppend(&writer, data, size);
+    BTagClose(&writer);
+    CHECK(call(SRV_APP_DOWNLOAD_COMPACT));
+    if (reply_error(&reply) != ERR_OK)
+        return reply_error(&reply);
+    *next = reply_number(&reply, TAG_CDL_NEXT);
+    return reply_number(&reply, TAG_SERVICE_RESULT);
+}
+
+static RTS_UI32 put_packed(RTS_UI32 offset, RTS_UI32 size, RTS_UI32 *next)
+{
+    RTS_UI8 data[2 * TOTAL];
+
+    return download_packed(offset, data, pack(image, offset, offset + size, data), size, next);
+}
+
+static void question_tells_how_much_a_packed_block_may_unpack_to(void)
+{
+    RTS_UI32 next;
+
+    setup_image();
+    CHECK_EQUAL(ask(&next), ERR_OK);
+    CHECK_EQUAL(reply_number(&reply, TAG_CDL_UNPACKS), APP_UNPACK_SIZE);
+}
+
+static void packed_and_plain_blocks_make_an_image(void)
+{
+    RTS_UI32 next;
+
+    setup_image();
+    CHECK(put_packed(0, 300, &next) == ERR_OK && next == 300);
+    CHECK(put(300, 300, &next) == ERR_OK && next == 600);
+    CHECK(put_packed(600, 400, &next) == ERR_OK && next == TOTAL);
+    CHECK(fakes.download_begins == 1 && fakes.download_ends == 1);
+    CHECK(memcmp(fakes.image, image, TOTAL) == 0);
+}
+
+static void repeated_packed_block_is_acknowledged_and_not_written(void)
+{
+    RTS_UI32 next;
+
+    setup_image();
+    CHECK_EQUAL(put_packed(0, 300, &next), ERR_OK);
+    CHECK_EQUAL(put_packed(300, 300, &next), ERR_OK);
+    CHECK(put_packed(300, 300, &next) == ERR_OK && next == 600);
+    CHECK(put_packed(301, 300, &next) == ERR_INVALID_SEQUENCE && next == 600);
+    CHECK(put_packed(601, 300, &next) == ERR_INVALID_SEQUENCE && next == 600);
+    CHECK_EQUAL(fakes.download_writes, 2);
+}
+
+static void packed_block_that_unpacks_to_too_much_is_refused(void)
+{
+    static const RTS_UI32 wrong[] = {0, TOTAL + 1, APP_UNPACK_SIZE + 1, 0x7FFFFFFF, 0xFFFFFFFF};
+    RTS_UI8 data[2 * TOTAL];
+    RTS_UI32 size;
+    RTS_UI32 next;
+
+    setup_image();
+    size = pack(image, 0, TOTAL, data);
+    for (RTS_UI32 i = 0; i < RTS_COUNT(wrong); i++)
+        CHECK_EQUAL(download_packed(0, data, size, wrong[i], &next), ERR_OUT_OF_LIMITS);
+    CHECK(fakes.download_begins == 0 && fakes.download_writes == 0);
+}
+
+static void wrong_packed_data_end_the_transfer(void)
+{
+    RTS_UI8 data[2 * TOTAL];
+    RTS_UI32 size;
+    RTS_UI32 next;
+
+    setup_image();
+    CHECK_EQUAL(put(0, 300, &next), ERR_OK);
+    size = pack(image, 300, 600, data);
+    CHECK(download_packed(300, data, size - 1, 300, &next) == ERR_NO_CONSISTENCY && next == 0);
+    CHECK(put(300, 300, &next) == ERR_INVALID_SEQUENCE && next == 0);
+    CHECK_EQUAL(fakes.download_ends, 0);
+}
+
+static void packed_data_without_a_byte_are_malformed(void)
+{
+    RTS_UI32 next;
+
+    setup_image();
+    CHECK_EQUAL(download_packed(0, image, 0, 10, &next), ERR_SIZE_MISMATCH);
+}
+
 static void restart_forgets_the_transfer(void)
 {
     RTS_UI32 next;
@@ -348,6 +450,12 @@ int main(void)
     RUN(flash_fault_ends_the_transfer);
     RUN(malformed_position_is_an_error);
     RUN(next_block_may_be_sent_before_the_reply_has_arrived);
+    RUN(question_tells_how_much_a_packed_block_may_unpack_to);
+    RUN(packed_and_plain_blocks_make_an_image);
+    RUN(repeated_packed_block_is_acknowledged_and_not_written);
+    RUN(packed_block_that_unpacks_to_too_much_is_refused);
+    RUN(wrong_packed_data_end_the_transfer);
+    RUN(packed_data_without_a_byte_are_malformed);
     RUN(restart_forgets_the_transfer);
     return test_result();
 }

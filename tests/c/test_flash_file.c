@@ -154,6 +154,35 @@ static void a_file_ends_where_its_area_ends(void)
     CHECK_EQUAL(SimFlashViolations(), 0);
 }
 
+/* From what is programmed, from what is not, and from what the copy itself has just written. */
+static void what_was_written_can_be_copied(void)
+{
+    static const RTS_UI32 copies[][2] = {{1, 40}, {5, 3}, {17, 100}, {100, 33}, {700, 600}, {1, 1}};
+    static RTS_UI8 expected[4096];
+    static RTS_UI8 read[sizeof expected];
+
+    for (RTS_SIZE g = 0; g < RTS_COUNT(geometries); g++) {
+        RTS_UI32 size = 733;
+        start(geometries[g]);
+        memcpy(expected, pattern, size);
+        SysFileCreate(FILE_SLOT_A);
+        CHECK_EQUAL(SysFileWrite(FILE_SLOT_A, pattern, size), ERR_OK);
+        for (RTS_SIZE i = 0; i < RTS_COUNT(copies); i++) {
+            CHECK_EQUAL(SysFileCopy(FILE_SLOT_A, copies[i][0], copies[i][1]), ERR_OK);
+            for (RTS_UI32 n = 0; n < copies[i][1]; n++, size++)
+                expected[size] = expected[size - copies[i][0]];
+            CHECK_EQUAL(SysFileGetPos(FILE_SLOT_A), size);
+        }
+        CHECK_EQUAL(SysFileCopy(FILE_SLOT_A, size + 1, 1), ERR_OUT_OF_LIMITS);
+        CHECK_EQUAL(SysFileCopy(FILE_SLOT_A, 1, SysFileGetArea(FILE_SLOT_A)->size), ERR_DISK_FULL);
+        CHECK_EQUAL(SimFlashViolations(), 0);
+        SysFileCreate(FILE_SLOT_A);
+        CHECK_EQUAL(SysFileCopy(FILE_SLOT_A, 1, 1), ERR_OUT_OF_LIMITS);
+        CHECK_EQUAL(SysFileRead(FILE_SLOT_A, 0, read, size / FILE_ALIGN * FILE_ALIGN), ERR_OK);
+        CHECK(memcmp(read, expected, size / FILE_ALIGN * FILE_ALIGN) == 0);
+    }
+}
+
 static void reading_stays_within_the_file(void)
 {
     RTS_UI32 size;
@@ -194,6 +223,7 @@ int main(void)
     RUN(sectors_are_erased_when_their_first_unit_is_due);
     RUN(a_second_writing_replaces_the_first);
     RUN(a_file_ends_where_its_area_ends);
+    RUN(what_was_written_can_be_copied);
     RUN(reading_stays_within_the_file);
     RUN(faults_are_reported);
     return test_result();

@@ -14,6 +14,7 @@
 #define SysFileCreate test_create
 #define SysFileAppend test_append
 #define SysFileWrite test_write
+#define SysFileCopy test_copy
 #define SysFileGetPos test_pos
 #define SysFileClose test_close
 #define SysFileRead test_read

@@ -358,6 +358,7 @@ class Wire:
     point_to_point = False
     places = NO_PLACES
     byte_rate = math.inf
+    is_slow = False
 
     def __init__(self, fd: int) -> None:
         self.fd = fd

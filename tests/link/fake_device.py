@@ -54,6 +54,7 @@ class FakeLine:
         self.places = NO_PLACES
         self.rate = baud / BITS_PER_BYTE
         self.byte_rate = self.rate if known_rate else math.inf
+        self.is_slow = True
         self.cut = False  # a cut line carries nothing
         self.gone = False  # an unplugged adapter raises
         self.sent_bytes = 0

@@ -34,6 +34,7 @@ class SimSerial:
     point_to_point = False
     places = NO_PLACES
     byte_rate = 115200 / BITS_PER_BYTE
+    is_slow = True
 
     def __init__(self, to_device: Damage | None = None, to_client: Damage | None = None) -> None:
         self._out, self._in = bytearray(), bytearray()

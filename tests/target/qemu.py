@@ -89,6 +89,7 @@ class SocketSerial:
     point_to_point = False
     places = NO_PLACES
     byte_rate = math.inf
+    is_slow = False
     local_address = b"\x00\x02"
 
     def __init__(self, port: int) -> None:

@@ -17,6 +17,7 @@
 #include "CmpRetain.h"
 #include "SysFileFlash.h"
 #include "SysFlash.h"
+#include "Unpack.h"
 
 static struct {
     bool open;
@@ -58,15 +59,44 @@ RTS_RESULT AppDownloadBegin(RTS_UI32 total_size, RTS_UI32 image_crc)
     return ERR_OK;
 }
 
-RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
+/* Whether `size` bytes may be written at `offset` now. */
+static RTS_RESULT check_place(RTS_UI32 offset, RTS_UI32 size)
 {
-    RTS_RESULT result;
-
     if (!download.open || offset != SysFileGetPos(download.slot))
         return ERR_INVALID_SEQUENCE;
-    if (size > download.size - offset)
-        return ERR_OUT_OF_LIMITS;
+    return size > download.size - offset ? ERR_OUT_OF_LIMITS : ERR_OK;
+}
+
+RTS_RESULT AppDownloadWrite(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size)
+{
+    RTS_RESULT result = check_place(offset, size);
+
+    if (result != ERR_OK)
+        return result;
     result = SysFileWrite(download.slot, data, size);
+    if (result != ERR_OK)
+        AppDownloadAbort();
+    return result;
+}
+
+static RTS_RESULT append(const RTS_UI8 *data, RTS_UI32 size)
+{
+    return SysFileWrite(download.slot, data, size);
+}
+
+static RTS_RESULT append_copy(RTS_UI32 distance, RTS_UI32 size)
+{
+    return SysFileCopy(download.slot, distance, size);
+}
+
+RTS_RESULT AppDownloadUnpack(RTS_UI32 offset, const RTS_UI8 *data, RTS_UI32 size, RTS_UI32 unpacked)
+{
+    static const UNPACK_SINK sink = {append, append_copy};
+    RTS_RESULT result = check_place(offset, unpacked);
+
+    if (result != ERR_OK)
+        return result;
+    result = Unpack(data, size, unpacked, &sink);
     if (result != ERR_OK)
         AppDownloadAbort();
     return result;

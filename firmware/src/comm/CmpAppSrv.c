@@ -282,8 +282,34 @@ typedef struct {
     RTS_UI32 total;
     RTS_UI32 crc;
     const RTS_UI8 *data;
-    RTS_UI32 size;
+    RTS_UI32 size; /* of this part of the image */
+#if APP_UNPACK_SIZE > 0
+    RTS_UI32 packed_size; /* of the data, if they are packed; 0 */
+#endif
 } DOWNLOAD_BLOCK;
+
+#if APP_UNPACK_SIZE > 0
+static RTS_RESULT read_packed(const SRV_REQUEST *request, DOWNLOAD_BLOCK *block)
+{
+    BTAG tag;
+    RTS_RESULT result = BTagFind(&request->tags, TAG_CDL_PACKED, sizeof(CDL_PACKED) + 1, request->tags.size, &tag);
+
+    if (result != ERR_OK)
+        return result;
+    block->data = tag.data + sizeof(CDL_PACKED);
+    block->packed_size = tag.size - (RTS_UI32)sizeof(CDL_PACKED);
+    block->size = BytesGet32(((const CDL_PACKED *)tag.data)->unpacked);
+    return block->size == 0 || block->size > APP_UNPACK_SIZE ? ERR_OUT_OF_LIMITS : ERR_OK;
+}
+
+static RTS_RESULT write_packed(const DOWNLOAD_BLOCK *block, RTS_UI32 known)
+{
+    if (known != 0)
+        return ERR_INVALID_SEQUENCE; /* which part of the data is new is not known */
+    return AppDownloadUnpack(block->offset, block->data, block->packed_size, block->size);
+}
+
+#endif
 
 static RTS_RESULT read_block(const SRV_REQUEST *request, DOWNLOAD_BLOCK *block)
 {
@@ -301,6 +327,11 @@ static RTS_RESULT read_block(const SRV_REQUEST *request, DOWNLOAD_BLOCK *block)
     result = BTagFind(&request->tags, TAG_CDL_DATA, 1, request->tags.size, &tag);
     block->data = result == ERR_OK ? tag.data : NULL;
     block->size = result == ERR_OK ? tag.size : 0;
+#if APP_UNPACK_SIZE > 0
+    block->packed_size = 0;
+    if (result == ERR_L7_TAG_MISSING)
+        result = read_packed(request, block);
+#endif
     return result == ERR_L7_TAG_MISSING ? ERR_OK : result;
 }
 
@@ -334,6 +365,10 @@ static RTS_RESULT write_new_part(const DOWNLOAD_BLOCK *block)
     RTS_UI32 known = next - block->offset;
     if (known >= block->size)
         return ERR_OK;
+#if APP_UNPACK_SIZE > 0
+    if (block->packed_size != 0)
+        return write_packed(block, known);
+#endif
     return AppDownloadWrite(next, block->data + known, block->size - known);
 }
 
@@ -380,6 +415,10 @@ static RTS_RESULT download_compact(SRV_REQUEST *request, BTAG_WRITER *reply)
         result = AppDownloadEnd(&refusal);
     BTagWrite16(reply, TAG_SERVICE_RESULT, result);
     BTagWrite32(reply, TAG_CDL_NEXT, next);
+#if APP_UNPACK_SIZE > 0
+    if (block.size == 0) /* a question */
+        BTagWrite32(reply, TAG_CDL_UNPACKS, APP_UNPACK_SIZE);
+#endif
     if (APP_REFUSAL_TEXT_SIZE > 1 && result != ERR_OK && refusal.text[0] != '\0')
         BTagWriteText(reply, TAG_CDL_REASON, refusal.text, BTagGetRoom(reply) - REASON_OVERHEAD);
     return ERR_OK;

@@ -182,6 +182,37 @@ RTS_RESULT SysFileRead(RTS_UI32 file, RTS_UI32 offset, void *data, RTS_UI32 size
     return ERR_OK;
 }
 
+/* What was written, also when it is not programmed yet; up to one unit of it. */
+static RTS_RESULT read_back(RTS_UI32 file, RTS_UI32 offset, RTS_UI8 *data, RTS_UI32 size)
+{
+    const FLASH_FILE *f = &files[file];
+    RTS_UI32 programmed = f->position - f->position % FILE_ALIGN;
+    RTS_UI32 in_flash = offset >= programmed ? 0 : programmed - offset;
+
+    for (RTS_UI32 i = in_flash; i < size; i++)
+        data[i] = f->unit[(offset + i) % FILE_ALIGN];
+    return SysFileRead(file, offset, data, in_flash < size ? in_flash : size);
+}
+
+RTS_RESULT SysFileCopy(RTS_UI32 file, RTS_UI32 distance, RTS_UI32 size)
+{
+    RTS_UI8 part[FILE_ALIGN];
+    RTS_RESULT result = ERR_OK;
+
+    if (distance > files[file].position)
+        return ERR_OUT_OF_LIMITS;
+    while (size > 0 && result == ERR_OK) {
+        RTS_UI32 count = size < sizeof part ? size : (RTS_UI32)sizeof part;
+        if (count > distance)
+            count = distance;
+        result = read_back(file, files[file].position - distance, part, count);
+        if (result == ERR_OK)
+            result = SysFileWrite(file, part, count);
+        size -= count;
+    }
+    return result;
+}
+
 RTS_RESULT SysFileCRC32(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size, RTS_UI32 *crc)
 {
     RTS_UI8 part[64];

@@ -212,6 +212,7 @@ class GatewayConnection:
         self.session = 0  # id of the device's session, while the channel is open
         self.buffer_size = 0
         self.best_size = 0
+        self.is_slow = False
         self._place = place
         self._link = link
         self._words = words
@@ -238,7 +239,8 @@ class GatewayConnection:
         password."""
         opened = self._call_open()
         self.session, self.buffer_size = int(opened["session"]), int(opened["buffer_size"])
-        self.best_size, self._generation = int(opened["best_size"]), int(opened["generation"])
+        self.best_size, self.is_slow = int(opened["best_size"]), bool(opened["is_slow"])
+        self._generation = int(opened["generation"])
 
     def _call_open(self) -> dict[str, Any]:
         try:

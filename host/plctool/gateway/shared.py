@@ -88,6 +88,7 @@ class OpenChannel:
     session: int
     buffer_size: int
     best_size: int
+    is_slow: bool
 
 
 class SharedDevice:
@@ -122,7 +123,9 @@ class SharedDevice:
             self._check_password(password)
             tool.login = self._session.logins
             connection = self._connection
-            return OpenChannel(self._session.logins, session, connection.buffer_size, connection.best_size)
+            return OpenChannel(
+                self._session.logins, session, connection.buffer_size, connection.best_size, connection.is_slow
+            )
 
     def _check_password(self, given: str | None) -> None:
         needed = self._session.password

@@ -236,6 +236,7 @@ class CanTransport:
         self.max_packet = int(lib.BLK_MAX_SIZE)
         self.packet_overhead = 0
         self.byte_rate = math.inf  # `send` waits for the bus
+        self.is_slow = True
         self.point_to_point = False
         self.node = node
         self._places: dict[bytes, str] = {}

@@ -84,6 +84,10 @@ class MessageLink(Protocol):
     def best_size(self) -> int:
         """Length of message that carries most for its cost, in bytes; 0 while no channel is open."""
 
+    @property
+    def is_slow(self) -> bool:
+        """Whether it pays to pack what is sent; False while no channel is open."""
+
     def open(self) -> None: ...
     def exchange(self, message: bytes, patience: float = PATIENCE) -> bytes: ...
     def stream(self, messages: Iterable[bytes], patience: float = PATIENCE) -> Iterator[bytes]: ...
@@ -130,6 +134,10 @@ class Connection:
     @property
     def best_size(self) -> int:
         return self._channel.best_size if self._channel else 0
+
+    @property
+    def is_slow(self) -> bool:
+        return self.transport.is_slow
 
     def open(self) -> None:
         """Opens a new channel, after a name request on the first time. Raises LinkError if no device answers."""
@@ -196,6 +204,7 @@ class Connection:
             while True:
                 while channel.outstanding < MAX_REQUESTS and (message := next(requests, None)) is not None:
                     channel.send(message, self.transport.now())
+                    self._send_some(channel)  # the next message may take time to make
                 if not channel.outstanding:
                     return
                 self._run(channel, lambda: bool(channel.replies), patience, check)

@@ -17,19 +17,23 @@ from plctool.link.transport import BITS_PER_BYTE, DEFAULT_BAUD, NO_PLACES, TOOL_
 _POLL = 0.01  # longest single wait for a byte [s]
 _WRITE_TIMEOUT = 5.0
 _ESCAPE_SHARE = 256  # one byte in so many is escaped, on average
+_FAST = 60_000  # from here on packing takes longer than it saves [bytes/s]
 
 
 class SerialTransport:
-    """Packets in serial frames. Opening fails with a LinkError that says what to do."""
+    """Packets in serial frames. Opening fails with a LinkError that says what to do. `paced`: whether bytes take the
+    time that the baud rate says; None: not over networks and pseudo terminals."""
 
-    def __init__(self, url: str, baud: int = DEFAULT_BAUD) -> None:
+    def __init__(self, url: str, baud: int = DEFAULT_BAUD, paced: bool | None = None) -> None:
         self.name = url
         self.local_address = TOOL_ADDRESS
         self.max_packet = simplecom.MAX_PACKET
         self.packet_overhead = simplecom.FRAME_OVERHEAD
         self.point_to_point = False
         self.places = NO_PLACES
-        self.byte_rate = baud / BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if _is_real_line(url) else math.inf
+        real = _is_real_line(url) if paced is None else paced
+        self.byte_rate = baud / BITS_PER_BYTE / (1 + 1 / _ESCAPE_SHARE) if real else math.inf
+        self.is_slow = self.byte_rate < _FAST
         self._decoder = simplecom.Decoder()
         self._packets: deque[bytes] = deque()
         self._port = _open(url, baud)
@@ -70,7 +74,7 @@ class SerialTransport:
 
 
 def _is_real_line(url: str) -> bool:
-    """Whether bytes take the time the baud rate says: not over networks and pseudo terminals."""
+    """Whether bytes take the time the baud rate says."""
     return "://" not in url and not os.path.realpath(url).startswith("/dev/pts/")
 
 

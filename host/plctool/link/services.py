@@ -18,6 +18,7 @@ from plctool.image.file import image_crc
 from plctool.link import bintag, l7
 from plctool.link.channel import ChannelLost
 from plctool.link.names import version_text
+from plctool.link.packing import Packer
 from plctool.link.passwords import verifier_of
 from plctool.link.session import Session
 from plctool.link.wire import Layout, signed32
@@ -34,6 +35,7 @@ _IMAGE = Layout("APP_IMAGE_IDENTITY")
 _CALL = Layout("EXCEPT_CALL")
 _TASK = Layout("TASK_INFO")
 _POSITION = Layout("CDL_POSITION")
+_PACKED = Layout("CDL_PACKED")
 _LOG_RECORD = Layout("LOG_RECORD")
 
 
@@ -211,10 +213,11 @@ def app_state(state: int, operating: int) -> AppState:
     return {lib.AS_NONE: AppState.NONE, lib.AS_RUN: AppState.RUN}.get(state, AppState.STOP)
 
 
-def start(session: Session) -> None:
-    """Starts the application. Not again when no reply came and it is stopped with an exception: a controller that went
-    down with it, and came back, would start the previous one."""
-    read_status(session)  # a channel that was lost before is opened again here
+def start(session: Session, checked: bool = False) -> None:
+    """Starts the application; `checked`: the channel has just been used. Not again when no reply came and it is stopped
+    with an exception: a controller that went down with it, and came back, would start the previous one."""
+    if not checked:
+        read_status(session)  # a channel that was lost before is opened again here
     try:
         _check_control(_control(session, lib.SRV_APP_START), "start")
         return
@@ -274,6 +277,7 @@ def read_tasks(session: Session) -> list[TaskInfo]:
 # ---- download --------------------------------------------------------------------------------------------------------
 
 _BLOCK_OVERHEAD = 44  # layer 7 header and tags around the data of a block, bytes
+_PACKED_SIZE = 4096  # of packed data at most: searching for so much takes less time than the line is ahead, bytes
 _BLOCK_ALIGN = 16  # flash is written best in whole program units
 
 
@@ -291,8 +295,9 @@ def download(
     while True:
         arrived = transfer.arrived
         try:
-            start_at = 0 if restart else transfer.ask()
-            restart = False
+            start_at = transfer.ask()
+            if restart:
+                start_at, restart = 0, False
             if start_at < len(image):
                 transfer.run(start_at)
             session.forget_application()
@@ -312,12 +317,15 @@ class _Transfer:
         self._image = image
         self._crc = image_crc(image)
         self._progress = progress
+        self._packer: Packer | None = None
+        self._unpacks = 0  # bytes of the image that a packed block may be; 0: the device cannot unpack
 
     def ask(self) -> int:
         """How much of this image the device has; all of it when it is the application already."""
         position = self._position(lib.DLF_CONTINUEDOWNLOAD, 0)
         tags = self._session.call(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, [position])
         self._take(tags)
+        self._unpacks = 0 if tags.find(lib.TAG_CDL_UNPACKS) is None else tags.u32(lib.TAG_CDL_UNPACKS)
         return self.arrived
 
     def run(self, start_at: int) -> None:
@@ -330,12 +338,34 @@ class _Transfer:
             raise DeviceError(f"The device took {self.arrived} of {len(self._image)} bytes; try again.", "incomplete")
 
     def _messages(self, start_at: int) -> Iterator[bytes]:
-        block = (self._session.connection.best_size - _BLOCK_OVERHEAD) // _BLOCK_ALIGN * _BLOCK_ALIGN
-        for offset in range(start_at, len(self._image), block):
+        offset = start_at
+        for data, size in self._blocks(start_at):
             position = self._position(lib.DLF_CONTINUEDOWNLOAD if offset else 0, offset)
-            data = bintag.raw(lib.TAG_CDL_DATA, self._image[offset : offset + block])
             content = bintag.encode([position, data])
             yield l7.encode(self._session.message(lib.SG_APPLICATION, lib.SRV_APP_DOWNLOAD_COMPACT, content))
+            offset += size
+
+    def _blocks(self, start_at: int) -> Iterator[tuple[bintag.Tag, int]]:
+        """What the messages carry, and of how many bytes of the image; packed if that pays."""
+        room = self._session.connection.best_size - _BLOCK_OVERHEAD
+        if self._session.connection.is_slow and self._unpacks:
+            return self._packed_blocks(start_at, room, self._unpacks)
+        return self._plain_blocks(start_at, room // _BLOCK_ALIGN * _BLOCK_ALIGN)
+
+    def _plain_blocks(self, start_at: int, longest: int) -> Iterator[tuple[bintag.Tag, int]]:
+        for offset in range(start_at, len(self._image), longest):
+            part = self._image[offset : offset + longest]
+            yield bintag.raw(lib.TAG_CDL_DATA, part), len(part)
+
+    def _packed_blocks(self, start_at: int, room: int, longest: int) -> Iterator[tuple[bintag.Tag, int]]:
+        self._packer = self._packer or Packer(self._image)
+        offset = start_at
+        for block in self._packer.blocks(start_at, min(room - _PACKED.size, _PACKED_SIZE), longest):
+            if len(block.data) + _PACKED.size < block.size:
+                yield bintag.raw(lib.TAG_CDL_PACKED, _PACKED.pack(unpacked=block.size) + block.data), block.size
+            else:
+                yield bintag.raw(lib.TAG_CDL_DATA, self._image[offset : offset + block.size]), block.size
+            offset += block.size
 
     def _position(self, flags: int, offset: int) -> bintag.Tag:
         content = _POSITION.pack(flags=flags, offset=offset, total_size=len(self._image), crc=self._crc)

@@ -19,6 +19,7 @@ class SimTransport:
     max_packet = int(lib.BLK_MAX_SIZE)
     packet_overhead = 0
     byte_rate = math.inf
+    is_slow = False
     point_to_point = False
     places = NO_PLACES
 

@@ -35,6 +35,7 @@ class UdpTransport:
         self.max_packet = int(lib.BLK_MAX_SIZE)
         self.packet_overhead = 0
         self.byte_rate = math.inf
+        self.is_slow = False
         self.point_to_point = False
         self._places: dict[bytes, str] = {}
         self.places: Mapping[bytes, str] = MappingProxyType(self._places)

@@ -14,6 +14,7 @@
 #define APP_MAX_CODE_SIZE 8192 /* CodeInRam.c */
 #define APP_RETAIN_SIZE 2048
 #define APP_MEMORY_SIZE 1024
+#define APP_UNPACK_SIZE 8192
 #define IO_MAX_CONNECTORS 8
 #define RTS_MAIN_STACK_SIZE 3584 /* a driver refuses its configuration, and what ran before is loaded again */
 #define RTS_IEC_STACK_SIZE 2048
