@@ -86,6 +86,7 @@ enum {
     CMPID_IoDrvModbus = 0x0026,
     CMPID_CmpUserMgr = 0x0027,
     CMPID_RunLamp = 0x0028,
+    CMPID_CmpFileTransfer = 0x0029,
 };
 
 /* Name of a component, "" when unknown. */

@@ -134,6 +134,7 @@ enum {
     SG_DEVICE = 1,
     SG_APPLICATION = 2,
     SG_LOG = 5,
+    SG_FILE_TRANSFER = 8,
     SG_IOMGR = 0x0B,
     SG_USERMGR = 0x0C,
     SG_PLCSHELL = 0x11,
@@ -297,6 +298,37 @@ enum {
     TAG_LOG_ENTRY = 0x03,
     TAG_LOG_TEXT = 0x04,
     TAG_LOG_COMPONENT_NAME = 0x05,
+};
+
+/* Files (4.12): "upload" goes to the client, "download" to the device. */
+enum {
+    SRV_FILE_INFO = 1,
+    SRV_FILE_START_DOWNLOAD = 2,
+    SRV_FILE_DOWNLOAD = 4,
+    SRV_FILE_START_UPLOAD = 5,
+    SRV_FILE_UPLOAD = 7,
+    SRV_FILE_END = 8,
+    SRV_FILE_CANCEL = 9,
+    SRV_FILE_DIRECTORY = 0x0C,
+    SRV_FILE_DELETE = 0x0E,
+    TAG_FILE_NAME = 0x01,
+    TAG_FILE_CONTENT = 0x02,
+    TAG_FILE_HANDLE = 0x03,
+    TAG_FILE_POSITION = 0x05,
+    TAG_FILE_COUNT = 0x06,
+    TAG_FILE_END = 0x07,
+    TAG_FILE_RESULT = 0x08,
+    TAG_FILE_PATH = 0x0B,
+    TAG_FILE_ENTRY_NAME = 0x0E,
+    TAG_FILE_ENTRY_CONTENT = 0x0F,
+    TAG_FILE_ENTRY_FIXED = 0x60, /* own */
+    TAG_FILE_ROOM = 0x60,        /* own */
+    TAG_FILE_START = 0x61,       /* own */
+    TAG_FILE_DESCRIPTION = 0x81,
+    TAG_FILE_STARTED = 0x84,
+    TAG_FILE_LIST = 0x8D,
+    TAG_FILE_ENTRY = 0x90,
+    FILE_NAME_MAX = 32, /* characters */
 };
 
 /* PLC shell (4.15). */

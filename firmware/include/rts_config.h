@@ -423,6 +423,18 @@
 #define MODBUS_RECONNECT_MS 1000
 #endif
 
+/* Files that tools keep on the device (CmpFileTransfer; docs/protocol.md): symbols and sources of the program, and others.
+ * 52 bytes of RAM and of each record of the catalog for each. 0: none. */
+#ifndef FILE_STORE_FILES
+#define FILE_STORE_FILES 0
+#endif
+
+/* The end of the flash that they have, bytes, a multiple of its sector size: two sectors for the catalog, the others for
+ * the files. The programs have the flash before it. */
+#ifndef FILE_STORE_SIZE
+#define FILE_STORE_SIZE 0u
+#endif
+
 /* Service groups of layer 7; three words each. */
 #ifndef SRV_MAX_GROUPS
 #define SRV_MAX_GROUPS 8

@@ -19,9 +19,35 @@ typedef struct {
     RTS_UI8 unit[FILE_ALIGN]; /* the last position % FILE_ALIGN bytes, not yet programmed */
 } FLASH_FILE;
 
-static FLASH_FILE files[FILE_COUNT];
+static FLASH_FILE files[FILE_STORE_FILES > 0 ? FILE_STORE + 1 : FILE_COUNT];
 
 /* ---- where the files are ---- */
+
+/* Of the flash, without the end that the store has. */
+static RTS_UI32 size_for_programs(void)
+{
+    RTS_UI32 size = SysFlashGet()->size;
+
+    return FILE_STORE_FILES > 0 && FILE_STORE_SIZE < size ? size - FILE_STORE_SIZE : size;
+}
+
+#if FILE_STORE_FILES > 0
+static void map_store(void)
+{
+    RTS_UI32 sector = SysFlashGet()->sector_size;
+    RTS_UI32 start = size_for_programs();
+    RTS_UI32 size = SysFlashGet()->size - start;
+
+    if (size < 3 * sector || size % sector != 0)
+        return;
+    files[FILE_CATALOG].area = (FILE_AREA){start, 2 * sector};
+    files[FILE_STORE].area = (FILE_AREA){start + 2 * sector, size - 2 * sector};
+}
+#else
+static void map_store(void)
+{
+}
+#endif
 
 #ifdef FILE_MAP
 
@@ -40,7 +66,8 @@ static bool is_valid(RTS_UI32 i)
 
     if (area->size == 0 || area->size % granule != 0 || area->offset % flash->sector_size != 0)
         return false;
-    if (area->size > flash->size || area->offset > flash->size - area->size)
+    RTS_UI32 size = size_for_programs();
+    if (area->size > size || area->offset > size - area->size)
         return false;
     for (k = 0; k < i; k++) {
         if (overlap(area, &files[k].area))
@@ -68,9 +95,8 @@ static bool map_files(void)
 /* False when nothing is left for the slots. */
 static bool map_files(void)
 {
-    const SYS_FLASH *flash = SysFlashGet();
-    RTS_UI32 sector = flash->sector_size;
-    const FILE_AREA map[FILE_COUNT] = {FILE_MAP_OF(flash->size, sector)};
+    RTS_UI32 sector = SysFlashGet()->sector_size;
+    const FILE_AREA map[FILE_COUNT] = {FILE_MAP_OF(size_for_programs(), sector)};
     RTS_UI32 i;
 
     for (i = 0; i < FILE_COUNT; i++)
@@ -103,6 +129,12 @@ void SysFileCreate(RTS_UI32 file)
 {
     files[file].position = 0;
     files[file].erased_to = 0;
+}
+
+void SysFileCreateAt(RTS_UI32 file, RTS_UI32 position)
+{
+    files[file].position = position;
+    files[file].erased_to = position;
 }
 
 void SysFileAppend(RTS_UI32 file, RTS_UI32 position)
@@ -211,5 +243,6 @@ RTS_RESULT SysFileFlash_Hook(CMP_HOOK hook)
                (unsigned)SysFlashGet()->size);
         return ERR_NOMEMORY;
     }
+    map_store();
     return ERR_OK;
 }
