@@ -15,8 +15,10 @@ BIN := $(VENV)/bin
 MESON := $(BIN)/meson
 export PATH := $(abspath $(BIN)):$(PATH)
 
-# The Cortex-M builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
-BUILDS := build build-sanitized $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
+# The bare-metal builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
+CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
+RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command -v qemu-system-riscv32),build-rv32imac))
+BUILDS := build build-sanitized $(CORTEX_M) $(RISC_V)
 
 .PHONY: demo test test-vcan lint format bench size wheel attack soak fuzz all clean
 
@@ -59,8 +61,8 @@ bench: $(BENCHED:%=%/build.ninja)
 	set -e; for build in $(BENCHED); do $(MESON) compile -C $$build; done
 	PYTHONPATH=host:build/host PLCRT=build/firmware/port/linux/plcrt $(BIN)/python bench/run.py
 
-size: build-cm3/build.ninja
-	$(MESON) compile -C build-cm3 size
+size: build-cm3/build.ninja $(RISC_V:%=%/build.ninja)
+	set -e; for build in build-cm3 $(RISC_V); do echo "$$build:"; $(MESON) compile -C $$build size; done
 
 # The tag says which C library it needs at least: that of this machine's compiler.
 wheel: $(VENV)/dev
@@ -97,8 +99,8 @@ build-sanitized/build.ninja: $(VENV)/dev
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini
 
-build-lm3s6965/build.ninja: $(VENV)/dev
-	$(MESON) setup build-lm3s6965 --cross-file cross/lm3s6965.ini
+build-lm3s6965/build.ninja build-rv32imac/build.ninja: build-%/build.ninja: $(VENV)/dev
+	$(MESON) setup build-$* --cross-file cross/$*.ini
 
 # What a user gets: the package with its two commands; and the plant of the demo speaks Modbus.
 $(VENV)/installed: $(VENV)/bootstrapped pyproject.toml meson.build $(shell find firmware host examples -type f -not -path '*/__pycache__/*')

@@ -14,7 +14,7 @@
 
 typedef struct {
     RTS_UI32 size;        /* bytes, a multiple of sector_size */
-    RTS_UI32 sector_size; /* smallest erasable unit, bytes; a power of two */
+    RTS_UI32 sector_size; /* smallest erasable unit, bytes; a power of two. Sectors may differ: FLASH_SECTOR_AT */
     RTS_UI32
     program_size;   /* smallest programmable unit, bytes: 1, 2, 4, 8, 16; offsets and sizes are multiples of it */
     RTS_UI8 erased; /* value of an erased byte, usually 0xFF */

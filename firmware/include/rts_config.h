@@ -62,6 +62,12 @@
 #define BOARD_FLASH_ERASED 0xFF
 #endif
 
+/* Bytes of the flash's sector that begins at `offset`. A chip whose sectors differ says it in rts_config_port.h, and where
+ * the files are (FILE_MAP of SysFileFlash.h): each half of a log is whole sectors. */
+#ifndef FLASH_SECTOR_AT
+#define FLASH_SECTOR_AT(offset) (RTS_UNUSED(offset), SysFlashGet()->sector_size)
+#endif
+
 /* 1: the port gives the memory of the areas (SysMem.h), to keep programs from writing beyond them. 0: a variable. */
 #ifndef APP_AREAS_FROM_PORT
 #define APP_AREAS_FROM_PORT 0
@@ -429,7 +435,7 @@
 #define FILE_STORE_FILES 0
 #endif
 
-/* The end of the flash that they have, bytes, a multiple of its sector size: two sectors for the catalog, the others for
+/* The end of the flash that they have, bytes, in sectors of the smallest size: two of them for the catalog, the others for
  * the files. The programs have the flash before it. */
 #ifndef FILE_STORE_SIZE
 #define FILE_STORE_SIZE 0u

@@ -56,6 +56,14 @@ def test_too_many_tasks(refused: Any) -> None:
     assert "It needs 17 tasks, the device has 16" in refused(tasks(17))
 
 
+@pytest.mark.parametrize(("target", "board"), [("cortex-m7", "MPS2 AN500"), ("rv32imac", "QEMU virt RV32")])
+def test_a_processor_has_the_limits_of_the_boards_here(refused: Any, target: str, board: str) -> None:
+    message = refused(BIG_DATA, "--target", target)
+    assert f"{board}" in message
+    assert "bytes of variables, the device has 16384" in message
+    assert "bytes of stack" in refused(DEEP, "--target", target, "-O0")
+
+
 def test_limits_can_be_left_out(refused: Any, tool: Any) -> None:
     assert "build with --no-limits" in refused(BIG_DATA, "--target", "cortex-m3")
     assert tool("build", "app.st", "-o", "app.cdl", "--target", "cortex-m3", "--no-limits").status == 0

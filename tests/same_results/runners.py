@@ -29,7 +29,7 @@ _PORTABLE = [
 _BARE_SOURCES = [
     *_PORTABLE,
     *(FIRMWARE / "port/sim" / name for name in ("Sim.c", "SimEvent.c", "SimTarget.c")),
-    FIRMWARE / "port/baremetal/cortexm/CmpCompilerCalls.c",
+    FIRMWARE / "port/baremetal/common/CmpCompilerCalls.c",
     FIRMWARE / "port/baremetal/blank/SysAtomic.c",  # nothing here can come in between
     *(HERE / "bare").glob("*.c"),
 ]
@@ -44,7 +44,7 @@ _LINUX_SOURCES = [
 _BARE_FLAGS = [
     "--specs=picolibc.specs", "--oslib=semihost", "--crt0=hosted", "-Wl,--gc-sections",
     "-D_POSIX_TIMERS", "-D_POSIX_MONOTONIC_CLOCK", "-D_POSIX_C_SOURCE=200809L",
-    f"-I{HERE / 'bare'}", f"-I{FIRMWARE / 'port/baremetal/cortexm'}",
+    f"-I{HERE / 'bare'}", f"-I{FIRMWARE / 'port/baremetal/common'}",
     "-Wl,--defsym=__stack_size=64K",
 ]  # fmt: skip
 
@@ -63,6 +63,7 @@ class Runner:
     flags: tuple[str, ...]
     command: tuple[str, ...]  # the program's path follows
     bare: bool = True
+    family: str = "cortexm"  # of port/baremetal, if bare
 
     def missing(self) -> list[str]:
         """The tools that are not installed."""
@@ -80,7 +81,8 @@ class Runner:
         program = folder / f"{main.stem}-{self.target}"
         include = [f"-I{FIRMWARE / name}" for name in ("include", "port/sim", "src/app")]
         flags = [*(_BARE_FLAGS if self.bare else []), *self.flags, *_WARNINGS, *include, *extra]
-        sources = _BARE_SOURCES if self.bare else _LINUX_SOURCES
+        entry = FIRMWARE / "port/baremetal" / self.family / "IecCall.c"
+        sources = [*_BARE_SOURCES, entry] if self.bare else _LINUX_SOURCES
         subprocess.run([self.compiler, *flags, "-o", program, main, *sources, "-lm"], check=True)
         return program
 
@@ -140,6 +142,7 @@ RUNNERS = {
             ("-march=rv32imac", "-mabi=ilp32", *_memory(0x80000000, 0x80400000)),
             ("qemu-system-riscv32", "-M", "virt", "-bios", "none", "-display", "none", "-monitor", "none",
              "-serial", "null", "-semihosting-config", "enable=on,target=native", "-kernel"),
+            family="riscv",
         ),
         Runner("aarch64-linux", "aarch64-linux-gnu-gcc", ("-static", "-pthread"), ("qemu-aarch64",), bare=False),
     )

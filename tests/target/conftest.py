@@ -23,10 +23,11 @@ sys.path.append(str(ROOT / os.environ.get("PLCTOOL_BUILD", "build") / "host"))
 
 def _missing() -> str | None:
     """What these tests cannot do without."""
-    if shutil.which("qemu-system-arm") is None:
-        return "qemu-system-arm"
     if FIRMWARE is None:
         return "firmware: run them by meson test -C build-cm3"
+    program = "qemu-system-riscv32" if TARGET == "rv32imac" else "qemu-system-arm"
+    if shutil.which(program) is None:
+        return program
     if importlib.util.find_spec("_plccore") is None:
         return "plctool's extension module in build/host (make build), or in the folder that PLCTOOL_BUILD names"
     return None

@@ -17,8 +17,11 @@ TARGETS = {
     "mps2-an386": "cortex-m4f",
     "mps2-an500": "cortex-m7",
     "lm3s6965evb": "cortex-m3",
+    "virt": "rv32imac",
 }
 TARGET = TARGETS.get(MACHINE, "")
+IS_RISCV = TARGET == "rv32imac"
+HAS_FPU = TARGET in ("cortex-m4f", "cortex-m7")
 CONFIG = os.environ.get("FIRMWARE_CONFIG", "standard")
 IEC_STACK_SIZE = {"standard": 1024, "full": 2048, "can": 1024}[CONFIG]  # of a task [bytes]
 PATIENCE = 60.0  # [s]; machines under load are slow

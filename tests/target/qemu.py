@@ -10,6 +10,7 @@ import socket
 import subprocess
 import time
 from collections import deque
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,17 +37,47 @@ CLOCKS = {
 }
 
 
-def _machine_options(machine: str, flash_file: Path) -> list[str]:
-    """The machine and what keeps its applications: a part of its memory, or an EEPROM beside it."""
-    if machine == "lm3s6965evb":
-        return [
-            "-M", machine, "-drive", f"if=none,id=nv,format=raw,file={flash_file}",
-            "-device", f"at24c-eeprom,address=0x50,rom-size={EEPROM_SIZE},drive=nv",
-        ]  # fmt: skip
-    return [
-        "-M", f"{machine},memory-backend=nv",
-        "-object", f"memory-backend-file,id=nv,size=16M,mem-path={flash_file},share=on",
-    ]  # fmt: skip
+@dataclass(frozen=True)
+class Machine:
+    """How QEMU is called for a machine: its program, what keeps applications (`{file}`), and by which option it takes
+    firmware. `flash_size`: of that file, of which the first `erased` bytes are; the others are as if they had never
+    been. `flash_base`: where it is in memory; `has_commands`: stores into it are commands."""
+
+    program: str
+    options: tuple[str, ...]
+    flash_size: int = FLASH_SIZE
+    takes: str = "-kernel"
+    erased: int = 0
+    flash_base: int | None = None
+    has_commands: bool = False
+
+
+def _mps2(name: str, flash_base: int) -> Machine:
+    """A part of its memory keeps them."""
+    memory = "memory-backend-file,id=nv,size=16M,mem-path={file},share=on"
+    return Machine("qemu-system-arm", ("-M", f"{name},memory-backend=nv", "-object", memory), flash_base=flash_base)
+
+
+MACHINES = {
+    "mps2-an385": _mps2("mps2-an385", 0x2100_0000),
+    "mps2-an386": _mps2("mps2-an386", 0x2100_0000),
+    "mps2-an500": _mps2("mps2-an500", 0x6000_0000),
+    "lm3s6965evb": Machine(
+        "qemu-system-arm",
+        ("-M", "lm3s6965evb", "-drive", "if=none,id=nv,format=raw,file={file}",
+         "-device", f"at24c-eeprom,address=0x50,rom-size={EEPROM_SIZE},drive=nv"),
+        EEPROM_SIZE,
+    ),
+    "virt": Machine(
+        "qemu-system-riscv32",
+        ("-M", "virt", "-rtc", "clock=vm", "-drive", "if=pflash,unit=1,format=raw,file={file}"),
+        32 * 1024 * 1024,
+        "-bios",
+        erased=4 * 1024 * 1024,  # as it comes from the factory; its sectors are large
+        flash_base=0x2200_0000,
+        has_commands=True,
+    ),
+}  # fmt: skip
 
 
 class SocketSerial:
@@ -129,13 +160,13 @@ class Board:
     def __init__(self, machine: str, firmware: Path, folder: Path) -> None:
         self.machine, self.firmware, self.folder = machine, firmware, folder
         self.flash_file = folder / "flash.bin"
-        self.starts_from = ["-kernel", str(firmware)]  # options of QEMU: what is in its memory when power comes
+        self.qemu = MACHINES[machine]
+        self.starts_from = [self.qemu.takes, str(firmware)]  # options of QEMU: what is in its memory when power comes
         self._process: subprocess.Popen[bytes] | None = None
         self._port = self._second_port = 0
         if not self.flash_file.exists():
-            self.flash_file.touch()
-            size = EEPROM_SIZE if machine == "lm3s6965evb" else FLASH_SIZE
-            os.truncate(self.flash_file, size)  # a sparse file: flash that was never erased
+            self.flash_file.write_bytes(b"\xff" * self.qemu.erased)
+            os.truncate(self.flash_file, self.qemu.flash_size)  # a sparse file: flash that was never erased
 
     def write_flash(self, offset: int, data: bytes) -> None:
         """What the factory does, while power is off."""
@@ -154,7 +185,7 @@ class Board:
         (self.folder / "qmp").unlink(missing_ok=True)
         icount = CLOCKS[clock]
         command = [
-            "qemu-system-arm", *_machine_options(self.machine, self.flash_file),
+            self.qemu.program, *(option.format(file=self.flash_file) for option in self.qemu.options),
             "-display", "none", "-monitor", "none", *self.starts_from,
             *(2 * ["-serial", f"tcp:{LOCALHOST}:0,server=on,wait=off,nodelay=on"]),
             "-qmp", "unix:qmp,server,nowait",

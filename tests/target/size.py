@@ -2,6 +2,7 @@
 
     size.py BUDGET.toml CONFIG=FILE.elf ...             prints the table; exit status 1 when a budget is exceeded
     size.py --update BUDGET.toml CONFIG=FILE.elf ...    makes the present figures the budget of the components
+    size.py --without-budget CONFIG=FILE.elf ...        prints the table
 
 The sections say how much there is, the debugging information which component each function and variable is of: the
 program is optimised as a whole, so the linker does not know any more. A function that was inlined counts where it went.
@@ -14,6 +15,7 @@ maker chooses it.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import tomllib
 from bisect import bisect_left, bisect_right
@@ -35,6 +37,7 @@ APPLICATION_SECTION = ".iec_stack"
 SLACK = 1.04  # the budget of a component is what it takes now, and four per cent
 ROUND = 16
 TOTAL = "total"
+BUDGET = Path(__file__).resolve().parents[2] / "firmware/size-budget.toml"
 
 LIBRARIES = "libraries"  # of the C compiler, perhaps without debugging information
 REST = "strings, padding"  # what has no symbol
@@ -52,9 +55,10 @@ class Usage:
 
 @dataclass
 class Budget:
-    """The budget file: names of variables that are the application's, goals for the totals, limits of the components
-    and of their total as [flash, RAM]; all in bytes, by configuration."""
+    """The budget file: the compiler that its figures are of, names of variables that are the application's, goals for
+    the totals, limits of the components and of their total as [flash, RAM]; all in bytes, by configuration."""
 
+    compiler: str
     application: set[str]
     goal: dict[str, dict[str, int]]
     limit: dict[str, dict[str, list[int]]] = field(default_factory=dict)
@@ -125,6 +129,8 @@ def pieces(elf: ELFFile) -> Iterator[Piece]:
     starts = sorted(lines)
     for address, symbol in symbols.items():
         section, size = elf.get_section(symbol["st_shndx"]).name, symbol["st_size"]
+        if section not in rest:
+            continue  # board_facts
         rest[section] -= size
         if symbol["st_info"]["type"] != "STT_FUNC":
             yield Piece(section, symbol.name, variables.get(address, LIBRARIES), size)
@@ -157,11 +163,24 @@ def total(usage: dict[str, Usage]) -> Usage:
     return Usage(*(sum(getattr(u, name) for u in usage.values()) for name in ("flash", "ram", "application")))
 
 
-def exceeded(config: str, usage: dict[str, Usage], budget: Budget) -> list[str]:
-    """A sentence for each limit that is exceeded."""
+def compiler_of(program: Path) -> str:
+    """The compiler of the firmware, such as gcc 12: another one lays out and inlines in its own way."""
+    with program.open("rb") as file:
+        for unit in ELFFile(file).get_dwarf_info().iter_CUs():
+            attributes = unit.get_top_DIE().attributes
+            producer = attributes["DW_AT_producer"].value.decode()
+            if "firmware" in PurePosixPath(attributes["DW_AT_name"].value.decode()).parts:
+                name, version = re.match(r"(\D+?)[ C\d]* (\d+)\.", producer).groups()
+                return f"{name.replace('GNU', 'gcc')} {version}"
+    return "unknown"
+
+
+def exceeded(config: str, usage: dict[str, Usage], budget: Budget, compiler: str) -> list[str]:
+    """A sentence for each limit that is exceeded. Those of components hold for the compiler they are of."""
     found = []
     limits = budget.limit.get(config, {})
-    for name, used in [*sorted(usage.items()), (TOTAL, total(usage))]:
+    components = sorted(usage.items()) if compiler == budget.compiler else []
+    for name, used in [*components, (TOTAL, total(usage))]:
         flash, ram = limits.get(name, (0, 0))
         for what, size, limit in (("flash", used.flash, flash), ("RAM", used.ram, ram)):
             if size > limit:
@@ -198,7 +217,7 @@ def print_table(measured: dict[str, dict[str, Usage]]) -> None:
 def read_budget(path: Path) -> Budget:
     """The budget file; see firmware/size-budget.toml."""
     data = tomllib.loads(path.read_text())
-    return Budget(set(data["application"]), data["goal"], data.get("limit", {}))
+    return Budget(data["compiler"], set(data["application"]), data["goal"], data.get("limit", {}))
 
 
 def with_slack(size: int) -> int:
@@ -214,9 +233,10 @@ def total_limit(usage: dict[str, Usage], goal: dict[str, int]) -> tuple[int, int
     return flash, ram
 
 
-def update(path: Path, measured: dict[str, dict[str, Usage]], budget: Budget) -> None:
-    """Replaces the limits at the end of the file; what stands before them is kept as it is."""
+def update(path: Path, measured: dict[str, dict[str, Usage]], budget: Budget, compiler: str) -> None:
+    """Replaces the compiler, and the limits at the end of the file; what else stands before them is kept as it is."""
     head = path.read_text().split("[limit.", 1)[0].rstrip()
+    head = re.sub(r"^compiler = .*$", f'compiler = "{compiler}"', head, flags=re.MULTILINE)
     tables = []
     for config, usage in measured.items():
         flash, ram = total_limit(usage, budget.goal.get(config, {}))
@@ -229,18 +249,25 @@ def update(path: Path, measured: dict[str, dict[str, Usage]], budget: Budget) ->
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--update", action="store_true", help="make the present figures the budget")
-    parser.add_argument("budget", type=Path)
-    parser.add_argument("programs", nargs="+", metavar="CONFIG=FILE.elf")
+    parser.add_argument("--without-budget", action="store_true", help="there is none for these programs")
+    parser.add_argument("files", nargs="+", metavar="BUDGET.toml CONFIG=FILE.elf")
     args = parser.parse_args()
-    budget = read_budget(args.budget)
-    programs = (text.split("=", 1) for text in args.programs)
-    measured = {config: measure(Path(file), budget.application) for config, file in programs}
+    path = BUDGET if args.without_budget else Path(args.files.pop(0))
+    budget = read_budget(path)
+    programs = {config: Path(file) for config, file in (text.split("=", 1) for text in args.files)}
+    measured = {config: measure(file, budget.application) for config, file in programs.items()}
+    if args.without_budget:
+        print_table(measured)
+        return 0
+    compiler = compiler_of(next(iter(programs.values())))
     if args.update:
-        update(args.budget, measured, budget)
-        budget = read_budget(args.budget)
+        update(path, measured, budget, compiler)
+        budget = read_budget(path)
     print_table(measured)
-    complaints = [text for config, usage in measured.items() for text in exceeded(config, usage, budget)]
+    complaints = [text for config, usage in measured.items() for text in exceeded(config, usage, budget, compiler)]
     goals = [text for config, usage in measured.items() for text in missed_goals(config, usage, budget)]
+    if compiler != budget.compiler:
+        print(f"\nThis is {compiler}: of the budgets, which are those of {budget.compiler}, the totals count.")
     print("", *goals, *complaints, sep="\n")
     return 1 if complaints else 0
 

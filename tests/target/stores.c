@@ -3,10 +3,11 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Arguments base=, size= (of the flash, in the guest), memory= (the file it is in), out=. Each store appends the
+ * Arguments base=, size= (of the flash, in the guest), memory= (the file it is in), out=, sector=. Each store appends the
  * offset of its aligned block of 8 bytes (u32) and what that block holds afterwards to `out`, at once: the flash after
- * n stores is the flash before, with the first n of these written over it. Debian has no header for plugins; these are
- * the few prototypes needed.
+ * n stores is the flash before, with the first n of these written over it. With sector= stores are commands to a flash
+ * with sectors of that size: what counts is each block of the sector that they have changed. Debian has no header for
+ * plugins; these are the few prototypes needed.
  */
 #include <fcntl.h>
 #include <stdbool.h>
@@ -35,25 +36,46 @@ bool qemu_plugin_mem_is_store(uint32_t info);
 EXPORT int qemu_plugin_version = 1;
 EXPORT int qemu_plugin_install(plugin_id id, const void *info, int argc, char **argv);
 
-static uint64_t base, size;
+static uint64_t base, size, sector;
 static const uint8_t *memory;
+static uint8_t *before; /* what it was like, with sector= */
 static int out = -1;
 
-static void on_store(unsigned cpu, uint32_t info, uint64_t address, void *data)
+static void write_block(uint64_t offset)
 {
     struct {
         uint32_t offset;
         uint8_t block[BLOCK];
     } record;
 
-    (void)cpu;
-    (void)data;
-    if (address - base >= size || !qemu_plugin_mem_is_store(info)) /* loads come too, in spite of WRITES */
-        return;
-    record.offset = (uint32_t)(address - base) / BLOCK * BLOCK;
-    memcpy(record.block, memory + record.offset, BLOCK);
+    record.offset = (uint32_t)offset;
+    memcpy(record.block, memory + offset, BLOCK);
     if (write(out, &record, sizeof(record)) != (ssize_t)sizeof(record))
         abort();
+}
+
+static void write_changed_blocks(uint64_t begin)
+{
+    if (memcmp(before + begin, memory + begin, sector) == 0)
+        return;
+    for (uint64_t offset = begin; offset < begin + sector; offset += BLOCK)
+        if (memcmp(before + offset, memory + offset, BLOCK) != 0)
+            write_block(offset);
+    memcpy(before + begin, memory + begin, sector);
+}
+
+static void on_store(unsigned cpu, uint32_t info, uint64_t address, void *data)
+{
+    uint64_t offset = address - base;
+
+    (void)cpu;
+    (void)data;
+    if (offset >= size || !qemu_plugin_mem_is_store(info)) /* loads come too, in spite of WRITES */
+        return;
+    if (sector == 0)
+        write_block(offset / BLOCK * BLOCK);
+    else
+        write_changed_blocks(offset / sector * sector);
 }
 
 static void on_translate(plugin_id id, struct qemu_plugin_tb *tb)
@@ -87,6 +109,11 @@ int qemu_plugin_install(plugin_id id, const void *info, int argc, char **argv)
     memory = mmap(NULL, size, PROT_READ, MAP_SHARED, file, 0);
     if (out < 0 || memory == MAP_FAILED)
         return 1;
+    sector = strtoull(find_value(argc, argv, "sector"), NULL, 0);
+    before = malloc(size);
+    if (before == NULL)
+        return 1;
+    memcpy(before, memory, size);
     qemu_plugin_register_vcpu_tb_trans_cb(id, on_translate);
     return 0;
 }

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from environment import MACHINE, eventually
+from environment import IS_RISCV, MACHINE, eventually
 from programs import program
 from qemu import FACTORY_OFFSET
 
@@ -29,7 +29,7 @@ def test_every_configuration_answers_the_name_service(make_board, config):
     board.power_on()
     with Connection(board.line()) as connection:
         (node,) = connection.scan(10, enough=1)
-    assert node.device_name.startswith("MPS2 AN" if IS_MPS2 else "LM3S6965")
+    assert node.device_name.startswith("MPS2 AN" if IS_MPS2 else "QEMU virt" if IS_RISCV else "LM3S6965")
 
 
 def test_a_fresh_board_has_no_application(plc):
@@ -44,7 +44,7 @@ def test_serial_number_is_what_the_factory_wrote(make_board):
         assert plc.identity().serial_number == "SN-4711"
 
 
-@pytest.mark.skipif(IS_MPS2, reason="a board without Ethernet")
+@pytest.mark.skipif(MACHINE != "lm3s6965evb", reason="a board without Ethernet")
 def test_serial_number_is_the_ethernet_address(plc):
     assert plc.identity().serial_number == "525400123456"  # QEMU's default
 
@@ -89,17 +89,16 @@ def test_main_loop_kicks_the_hardware_watchdog(make_board, build):
 
 
 PROVEN_MS = 4000  # a program that ran so long is not given up for a crash
-LOOP_FOREVER = b"\xfe\xe7"
-RETURN = b"\x70\x47"
+LOOP_FOREVER, RETURN = (b"\x01\xa0", b"\x82\x80") if IS_RISCV else (b"\xfe\xe7", b"\x70\x47")
 
 
-@pytest.mark.skipif(not IS_MPS2, reason="QEMU does not load its flash again at a reset, so it would hang forever")
+@pytest.mark.skipif(MACHINE == "lm3s6965evb", reason="QEMU does not load its flash again at a reset: it would hang")
 @pytest.mark.parametrize(
     ("function", "code"),
     [
         ("CmpScheduleTimer_Hook", LOOP_FOREVER),  # the main loop hangs, tasks go on
-        ("SysTickHandler", RETURN),  # time stands still
-        ("TimerIrq", RETURN),  # no task is called
+        ("ClockInterrupt" if IS_RISCV else "SysTickHandler", RETURN),  # time stands still
+        ("TasksInterrupt" if IS_RISCV else "TimerIrq", RETURN),  # no task is called
     ],
     ids=["main loop", "clock", "tasks"],
 )

@@ -40,6 +40,9 @@ static void map_store(void)
 
     if (size < 3 * sector || size % sector != 0)
         return;
+    for (RTS_UI32 at = start; at < start + size; at += sector)
+        if (FLASH_SECTOR_AT(at) != sector)
+            return;
     files[FILE_CATALOG].area = (FILE_AREA){start, 2 * sector};
     files[FILE_STORE].area = (FILE_AREA){start + 2 * sector, size - 2 * sector};
 }
@@ -56,18 +59,29 @@ static bool overlap(const FILE_AREA *a, const FILE_AREA *b)
     return a->offset < b->offset + b->size && b->offset < a->offset + a->size;
 }
 
-/* Whether file `i` is in the flash, on borders of its sectors, apart from the files before it. */
+/* Whether a sector begins there, or the flash ends. */
+static bool is_border(RTS_UI32 offset)
+{
+    RTS_UI32 at = 0;
+
+    while (at < offset)
+        at += FLASH_SECTOR_AT(at);
+    return at == offset;
+}
+
+/* Whether file `i` is in the flash, on borders of its sectors, the halves of a log too, apart from the files before it. */
 static bool is_valid(RTS_UI32 i)
 {
-    const SYS_FLASH *flash = SysFlashGet();
     const FILE_AREA *area = &files[i].area;
-    RTS_UI32 granule = i == FILE_COMMIT || i == FILE_RETAIN ? 2 * flash->sector_size : flash->sector_size;
+    RTS_UI32 size = size_for_programs();
+    bool is_log = i == FILE_COMMIT || i == FILE_RETAIN;
     RTS_UI32 k;
 
-    if (area->size == 0 || area->size % granule != 0 || area->offset % flash->sector_size != 0)
+    if (area->size == 0 || area->size > size || area->offset > size - area->size)
         return false;
-    RTS_UI32 size = size_for_programs();
-    if (area->size > size || area->offset > size - area->size)
+    if (!is_border(area->offset) || !is_border(area->offset + area->size))
+        return false;
+    if (is_log && (area->size % 2 != 0 || !is_border(area->offset + area->size / 2)))
         return false;
     for (k = 0; k < i; k++) {
         if (overlap(area, &files[k].area))
@@ -156,7 +170,7 @@ static RTS_RESULT program_unit(FLASH_FILE *f)
     RTS_RESULT result = ERR_OK;
 
     if (start == f->erased_to) {
-        f->erased_to += flash->sector_size;
+        f->erased_to += FLASH_SECTOR_AT(f->area.offset + start);
         result = flash->erase(f->area.offset + start);
     }
     return result == ERR_OK ? flash->program(f->area.offset + start, f->unit, FILE_ALIGN) : result;
@@ -224,7 +238,7 @@ RTS_RESULT SysFileErase(RTS_UI32 file, RTS_UI32 offset, RTS_UI32 size)
     RTS_UI32 done;
     RTS_RESULT result = ERR_OK;
 
-    for (done = 0; done < size && result == ERR_OK; done += flash->sector_size)
+    for (done = 0; done < size && result == ERR_OK; done += FLASH_SECTOR_AT(start + done))
         result = flash->erase(start + done);
     return result;
 }

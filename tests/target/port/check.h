@@ -6,7 +6,8 @@
 #ifndef CHECK_H
 #define CHECK_H
 
-#include "CortexM.h"
+#include "BareMetal.h"
+#include "family.h"
 #include "semihost.h"
 
 static int check_failures;

@@ -8,12 +8,7 @@
 
 #include <stdint.h>
 
-static inline void semihost(uint32_t operation, const void *argument)
-{
-    register uint32_t r0 __asm__("r0") = operation;
-    register const void *r1 __asm__("r1") = argument;
-    __asm__ volatile("bkpt 0xAB" : "+r"(r0) : "r"(r1) : "memory");
-}
+#include "semihost_call.h"
 
 static inline void semihost_print(const char *text)
 {
@@ -21,7 +16,7 @@ static inline void semihost_print(const char *text)
     semihost(SYS_WRITE0, text);
 }
 
-/* The argument is static: QEMU cannot look into a page that begins with an MPU guard, as the stack's does. */
+/* The argument is static: QEMU cannot look into a page that begins with a guard, as the stack's does. */
 static inline void semihost_exit(uint32_t status)
 {
     enum { SYS_EXIT_EXTENDED = 0x20, ADP_STOPPED_APPLICATION_EXIT = 0x20026 };

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "CompactDownload.h"
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysFlash.h"
 #include "SysTarget.h"
 #include "check.h"

@@ -3,18 +3,18 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "check.h"
 
 static void __attribute__((noinline)) fault_of_the_runtime(void)
 {
-    __asm__ volatile("udf #3");
+    __asm__ volatile(UNDEFINED);
 }
 
 static void __attribute__((noinline)) fault_in_an_interrupt(RTS_I64 now)
 {
     RTS_UNUSED(now);
-    __asm__ volatile("udf #4");
+    __asm__ volatile(UNDEFINED);
 }
 
 static void __attribute__((noinline)) overflow_of_the_main_stack(volatile RTS_UI32 *above)
@@ -51,7 +51,7 @@ static void start_by_start(const RESET_RECORD *reset)
     case 2:
         CHECK_EQUAL(reset->cause, RESET_FATAL);
         CHECK(is_within(reset->pc, (uintptr_t)fault_of_the_runtime));
-        CHECK_EQUAL(reset->status, 1 << 16); /* UNDEFINSTR */
+        CHECK_EQUAL(reset->status, STATUS_UNDEFINED);
         ClockSetCallback(fault_in_an_interrupt);
         wait_for_ever();
         break;
@@ -62,13 +62,15 @@ static void start_by_start(const RESET_RECORD *reset)
         break;
     case 4:
         CHECK_EQUAL(reset->cause, RESET_FATAL);
-        CHECK(reset->status & 0x92); /* the guard was hit, or the frame found no room */
+        CHECK(IS_STATUS_OF_OVERFLOW(reset->status));
         BoardWatchdogStart(20);
         wait_for_ever();
         break;
     case 5:
         CHECK_EQUAL(reset->cause, RESET_WATCHDOG);
         CHECK(is_within(reset->pc, (uintptr_t)wait_for_ever));
+        if (BOARD_WATCHDOG_IS_MASKED)
+            ResetNow(RESET_PIN, 0);
         CpuMask();
         BoardWatchdogStart(20);
         wait_for_ever(); /* masked interrupts do not keep it away */

@@ -4,7 +4,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysExcept.h"
 #include "SysTime.h"
 #include "SysTimer.h"
@@ -22,8 +22,8 @@ static volatile RTS_UI32 in_bss[4];
 static volatile RTS_UI32 in_data[4] = {1, 2, 3, 4};
 static volatile RTS_UI32 after_store;
 
-extern RTS_UI8 areas_start[], areas_end[], stack_bottom[];
-enum { IEC_STACKS = 0x20000000, RANDOM_STORES = 20000 };
+extern RTS_UI8 areas_start[], areas_end[], stack_bottom[], stack_top[];
+enum { RANDOM_STORES = 20000 };
 
 /* ---- stores ---- */
 
@@ -50,39 +50,9 @@ static void store_word(void *arg)
     *(volatile RTS_UI32 *)store->address = store->value;
 }
 
-static void store_two_words(void *arg)
-{
-    const STORE *store = arg;
-    __asm__ volatile("strd %1, %1, [%0]" ::"r"(store->address), "r"(store->value) : "memory");
-}
+#include "stores.h" /* of the processor family */
 
-static void store_four_words(void *arg)
-{
-    const STORE *store = arg;
-    __asm__ volatile("mov r0, %1\n\tmov r1, %1\n\tmov r2, %1\n\tmov r3, %1\n\tstmia %0, {r0-r3}" ::"r"(store->address),
-                     "r"(store->value)
-                     : "r0", "r1", "r2", "r3", "memory");
-}
-
-/* With the stack pointer just above it: then it is the frame of the fault that has no room. */
-static void push_there(void *arg)
-{
-    const STORE *store = arg;
-    __asm__ volatile("adds r3, %0, #4\n\tmov sp, r3\n\tpush {%1}\n\tmovs r0, #0\n\tsvc 0" ::"r"(store->address),
-                     "r"(store->value)
-                     : "r3", "memory");
-}
-
-static void store_by_unprivileged_instruction(void *arg)
-{
-    const STORE *store = arg;
-    __asm__ volatile("strt %1, [%0]" ::"r"(store->address), "r"(store->value) : "memory");
-}
-
-static void (*const stores[])(void *) = {
-    store_byte,       store_half, store_word, store_two_words, push_there, store_by_unprivileged_instruction,
-    store_four_words,
-};
+static void (*const stores[])(void *) = {store_byte, store_half, store_word, push_there, OTHER_STORES};
 
 /* Of one word, without effects on the stack. */
 static bool may_store(uintptr_t address, RTS_UI32 value)
@@ -94,15 +64,15 @@ static bool may_store(uintptr_t address, RTS_UI32 value)
 
 static void expect_stopped(uintptr_t address)
 {
-    int is_memory = address < 0x22000000u;
+    int is_readable = IS_READABLE(address);
     for (RTS_UI32 i = 0; i < RTS_COUNT(stores); i++) {
-        RTS_UI32 before = is_memory && address >= 0x400 ? REG32(address) : 0;
+        RTS_UI32 before = is_readable ? REG32(address) : 0;
         STORE store = {address, ~before};
         RTS_EXCEPTION exception = {0, 0};
         CHECK_EQUAL(SysExceptTry(stores[i], &store, &exception), false);
         if (stores[i] != push_there)
             CHECK_EQUAL(exception.code, RTSEXCPT_ACCESS_VIOLATION);
-        if (is_memory && address >= 0x400)
+        if (is_readable)
             CHECK_EQUAL(REG32(address), before);
     }
 }
@@ -159,60 +129,27 @@ static void store_into_vectors_is_stopped(void)
 
 static void store_into_registers_is_stopped(void)
 {
-    static const uintptr_t registers[] = {
-        0x40000000,                                          /* peripherals */
-        0x42000000,                                          /* their bits */
-        0x22000000 + ((uintptr_t)IEC_STACKS & 0xFFFFF) * 32, /* bits of RAM */
-    };
+    static const uintptr_t registers[] = {DEVICE_REGISTERS};
     for (RTS_UI32 i = 0; i < RTS_COUNT(registers); i++)
         expect_stopped(registers[i]);
 }
 
-/* Of SysTick, NVIC, SCB and MPU. They are no matter of the MPU: the bus refuses, of which there is no exception in QEMU's
- * model of one chip (test_wild_writes.py has the others). */
-static void store_into_registers_of_the_processor_changes_nothing(void)
-{
-    static const uintptr_t registers[] = {0xE000E014, 0xE000E100, 0xE000ED08, 0xE000ED14, 0xE000ED94, 0xE000EDA0};
-    for (RTS_UI32 i = 0; i < RTS_COUNT(registers); i++) {
-        RTS_UI32 before = REG32(registers[i]);
-        (void)may_store(registers[i], ~before);
-        CHECK_EQUAL(REG32(registers[i]), before);
-    }
-}
-
 static void jump_there(void *arg)
 {
-    ((void (*)(void))((uintptr_t)arg | 1))();
+    ((void (*)(void))((uintptr_t)arg | APP_ENTRY_MODE_BIT))();
     after_store = 1;
 }
 
 static void data_is_not_executed(void)
 {
     RTS_EXCEPTION exception;
-    areas.bytes[0] = 0x70; /* bx lr */
-    areas.bytes[1] = 0x47;
+    areas.bytes[0] = RETURN_INSTRUCTION & 0xFF;
+    areas.bytes[1] = RETURN_INSTRUCTION >> 8;
     CHECK_EQUAL(SysExceptTry(jump_there, &areas, &exception), false);
     CHECK_EQUAL(exception.code, RTSEXCPT_ACCESS_VIOLATION);
 }
 
-static void take_all_rights(void *arg)
-{
-    RTS_UNUSED(arg);
-    __asm__ volatile("mov r0, #0\n\tmsr control, r0\n\tisb\n\tcpsid i\n\tmov r0, #32\n\tmsr basepri, r0" ::: "r0");
-    in_bss[0] = 1;
-}
-
-static void rights_cannot_be_taken(void)
-{
-    RTS_EXCEPTION exception;
-    RTS_UI32 primask, basepri;
-    in_bss[0] = 0;
-    CHECK_EQUAL(SysExceptTry(take_all_rights, NULL, &exception), false);
-    CHECK_EQUAL(exception.code, RTSEXCPT_ACCESS_VIOLATION);
-    CHECK_EQUAL(in_bss[0], 0);
-    __asm__ volatile("mrs %0, primask\n\tmrs %1, basepri" : "=r"(primask), "=r"(basepri));
-    CHECK_EQUAL(primask | basepri, 0);
-}
+#include "privileges.h" /* of the processor family */
 
 /* ---- any address ---- */
 
@@ -232,7 +169,7 @@ static uintptr_t random_address(RTS_UI32 round)
     extern RTS_UI8 end[];
     RTS_UI32 number = random_number();
     if (round % 2)
-        return number >> 20 == 0xE00 ? 0 : number & ~3u;
+        return IS_OF_THE_PROCESSOR(number) ? 0 : number & ~3u;
     return IEC_STACKS + number % ((uintptr_t)end - IEC_STACKS) / 4 * 4;
 }
 
@@ -244,14 +181,15 @@ static void replace_word(void *arg)
 }
 
 /* On its own stack it writes back what is there, so that it comes to its end. Variables of the runtime may change
- * meanwhile, but not to what was stored. */
+ * meanwhile, but not to what was stored; on the main stack a trap may leave it, as one of the registers it saves. */
 static void store_lands_in_the_areas_or_on_the_stack_or_is_stopped(void)
 {
     const uintptr_t stack = IEC_STACKS + (APP_MAX_TASKS - 1) * RTS_IEC_STACK_SIZE;
     RTS_UI32 landed = 0;
     for (RTS_UI32 round = 0; round < RANDOM_STORES; round++) {
         uintptr_t address = random_address(round);
-        int is_readable = round % 2 == 0 && address - (uintptr_t)stack_bottom >= STACK_GUARD;
+        int is_main_stack = address - (uintptr_t)stack_bottom < (uintptr_t)(stack_top - stack_bottom);
+        int is_readable = round % 2 == 0 && !is_main_stack;
         int is_areas = address - (uintptr_t)areas_start < (uintptr_t)(areas_end - areas_start);
         int is_stack = address - stack < RTS_IEC_STACK_SIZE;
         STORE store = {address, is_stack ? 0 : 0x57A7E000 + round};
@@ -311,7 +249,7 @@ static void write_own_memory(void *arg)
     there[0] = 0;
     for (RTS_UI32 i = 0; i < 100000; i++)
         if (++here[i % 8], ++there[0] != i + 1)
-            __asm__ volatile("udf #1");
+            __asm__ volatile(UNDEFINED);
 }
 
 static void write_the_stack_of_the_task_below(void *arg)
@@ -344,7 +282,7 @@ static void main_keeps_its_rights_below_tasks(void)
     RTS_UI32 from = SysTimeGetMs();
     while (SysTimeGetMs() - from < 20) {
         in_bss[1]++;
-        CHECK(SCB_CCR != 0);
+        CHECK(READ_A_PRIVILEGED_REGISTER() != 0);
     }
     SysTimerDelete(high);
     CHECK(fast.passed > 100);
@@ -416,25 +354,25 @@ static void function_with_a_gate_may_call_another_by_its_gate(void)
     CHECK_EQUAL(*(volatile RTS_I32 *)(void *)&areas, 10);
 }
 
-static void svc_of_a_gate_elsewhere(void *arg)
+static void call_of_a_gate_elsewhere(void *arg)
 {
     RTS_UNUSED(arg);
-    __asm__ volatile("movs r0, #0\n\tsvc 1" ::: "r0");
+    __asm__ volatile(CALL_OF_A_GATE ::: "memory");
     in_bss[3] = 1;
 }
 
-static void svc_elsewhere_gives_no_rights(void)
+static void call_of_a_gate_elsewhere_gives_no_rights(void)
 {
     RTS_EXCEPTION exception;
     in_bss[3] = 0;
-    (void)SysExceptTry(svc_of_a_gate_elsewhere, NULL, &exception);
+    (void)SysExceptTry(call_of_a_gate_elsewhere, NULL, &exception);
     CHECK_EQUAL(in_bss[3], 0);
 }
 
 static RTS_I32 fail_with_all_rights(void)
 {
     in_bss[2]++;
-    __asm__ volatile("udf #1");
+    __asm__ volatile(UNDEFINED);
     return 0;
 }
 IMPORT(fail_with_all_rights);
@@ -521,16 +459,15 @@ int main(void)
     TEST_RUN(store_into_code_is_stopped);
     TEST_RUN(store_into_vectors_is_stopped);
     TEST_RUN(store_into_registers_is_stopped);
-    TEST_RUN(store_into_registers_of_the_processor_changes_nothing);
     TEST_RUN(data_is_not_executed);
-    TEST_RUN(rights_cannot_be_taken);
+    RUN_PRIVILEGE_TESTS();
     TEST_RUN(store_lands_in_the_areas_or_on_the_stack_or_is_stopped);
     TEST_RUN(task_cannot_write_the_stack_of_the_one_it_interrupted);
     TEST_RUN(main_keeps_its_rights_below_tasks);
     TEST_RUN(function_with_a_gate_has_all_rights);
     TEST_RUN(after_the_call_it_has_not);
     TEST_RUN(function_with_a_gate_may_call_another_by_its_gate);
-    TEST_RUN(svc_elsewhere_gives_no_rights);
+    TEST_RUN(call_of_a_gate_elsewhere_gives_no_rights);
     TEST_RUN(failure_with_a_gate_takes_the_rights_back);
     TEST_RUN(function_with_a_gate_keeps_its_rights_when_it_is_interrupted);
     TEST_RUN(endless_loop_with_a_gate_is_aborted);

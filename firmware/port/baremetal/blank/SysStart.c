@@ -9,7 +9,7 @@
 
 /* Write here: SYS_START_CRASH after a reset by the watchdog or by a fault handler of yours, SYS_START_POWER after any
  * other, as the chip's reset cause register says. A chip without one keeps a word in RAM that no start-up clears
- * (cortexm/reset.c). As it is nothing is known: an application that ends the runtime in its cycles is started again and
+ * (common/reset.c). As it is nothing is known: an application that ends the runtime in its cycles is started again and
  * again. */
 const SYS_START *SysStartGet(void)
 {

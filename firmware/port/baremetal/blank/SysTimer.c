@@ -8,7 +8,7 @@
 /*
  * Write here: take a free timer, keep callback, parameter, interval and priority. Timers of a better priority interrupt
  * those of a worse one. With fewer hardware timers than tasks, one alarm for the earliest due time is enough (see
- * cortexm/SysTimer.c).
+ * common/SysTimer.c).
  */
 RTS_RESULT SysTimerCreate(SYS_TIMER_CALLBACK callback, void *param, RTS_UI32 interval_us, RTS_UI32 priority,
                           RTS_HANDLE *timer)

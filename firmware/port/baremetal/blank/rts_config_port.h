@@ -5,7 +5,7 @@
  *
  * On a small controller start with the values of port/baremetal/configs/standard/rts_config_size.h. When compiled code
  * is entered in a special way (the import table in a register, the Thumb bit), APP_CALL_ENTRY says how: on Cortex-M
- * include port/baremetal/cortexm/rts_config_cortexm.h.
+ * include rts_config_cortexm.h, on RISC-V rts_config_riscv.h.
  */
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H

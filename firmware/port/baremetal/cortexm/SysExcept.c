@@ -33,7 +33,7 @@
  */
 #include "SysExcept.h"
 
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "rts_config.h"
 
 enum { EXC_RETURN_THREAD_PSP = (int)0xFFFFFFFD, EXC_RETURN_PSP = 4, EXC_RETURN_BASIC = 16 };
@@ -515,23 +515,4 @@ void SysExceptBreak(const void *arg, RTS_UI32 code)
         if (try->entered->r1 == (uintptr_t)arg)
             redirect(frame, code);
     }
-}
-
-/* When a large frame leaves no room for that of the fault, its place is lost: then find_caller finds the entry, after
- * the instructions that make its frame and have no line. */
-#if RTS_IEC_UNPRIVILEGED
-#define PUSH_ENTRY "add r3, r2, #10\n\tpush {r3, r9}\n\tpush {r9, lr}\n\t"
-#define RETURN "pop {r9, lr}\n\tadd sp, #8\n\tbx lr"
-#else
-#define PUSH_ENTRY "push {r9, lr}\n\t"
-#define RETURN "pop {r9, pc}"
-#endif
-
-__attribute__((naked)) void IecCall(const IEC_CONTEXT *context, RTS_UI32 argument, uintptr_t entry)
-{
-    RTS_UNUSED(context);
-    RTS_UNUSED(argument);
-    RTS_UNUSED(entry);
-    __asm__ volatile(PUSH_ENTRY "ldr r9, [r0, %0]\n\t"
-                                "blx r2\n\t" RETURN ::"i"(offsetof(IEC_CONTEXT, imports)));
 }

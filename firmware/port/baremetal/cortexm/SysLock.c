@@ -8,7 +8,7 @@
  */
 #include "SysLock.h"
 
-#include "CortexM.h"
+#include "BareMetal.h"
 
 RTS_UI32 SysLockEnter(void)
 {

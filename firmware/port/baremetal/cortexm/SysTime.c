@@ -5,7 +5,7 @@
  */
 #include "SysTime.h"
 
-#include "CortexM.h"
+#include "BareMetal.h"
 
 enum { NS_PER_MS = 1000000, TICKS_PER_MS = BOARD_CLOCK_HZ / 1000 };
 enum { SYST_ENABLE_IRQ_CORECLOCK = 7, ICSR_PENDSTSET = 1 << 26 };

@@ -1,5 +1,5 @@
 /*
- * bare.c - what the simulator's clock needs on a bare processor: RAM as flash, checked errors, entry of compiled code.
+ * bare.c - what the simulator's clock needs on a bare processor: RAM as flash, checked errors.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
@@ -12,7 +12,6 @@
 #include <string.h>
 #include <time.h>
 
-#include "CmpIecAbi.h"
 #include "Sim.h"
 #include "SimLink.h"
 #include "SysExcept.h"
@@ -165,42 +164,4 @@ void SysExceptBreak(const void *arg, RTS_UI32 code)
 
 void SysExceptShutdown(void)
 {
-}
-
-/* ---- entry of compiled code: the import table in r9 or s11 ---- */
-
-__attribute__((naked)) void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument)
-{
-    RTS_UNUSED(entry);
-    RTS_UNUSED(context);
-    RTS_UNUSED(argument);
-#if defined(__arm__)
-    __asm__ volatile("push {r4, lr}\n\t"
-                     "mov r4, r9\n\t"
-                     "push {r3, r4}\n\t"
-                     "mov r3, r0\n\t"
-                     "mov r0, r1\n\t"
-                     "ldr r4, [r0, %0]\n\t"
-                     "mov r9, r4\n\t"
-                     "mov r1, r2\n\t"
-                     "blx r3\n\t"
-                     "pop {r3, r4}\n\t"
-                     "mov r9, r4\n\t"
-                     "pop {r4, pc}" ::"i"(offsetof(IEC_CONTEXT, imports)));
-#elif defined(__riscv)
-    __asm__ volatile("addi sp, sp, -16\n\t"
-                     "sw ra, 12(sp)\n\t"
-                     "sw s11, 8(sp)\n\t"
-                     "mv t0, a0\n\t"
-                     "mv a0, a1\n\t"
-                     "lw s11, %0(a0)\n\t"
-                     "mv a1, a2\n\t"
-                     "jalr t0\n\t"
-                     "lw s11, 8(sp)\n\t"
-                     "lw ra, 12(sp)\n\t"
-                     "addi sp, sp, 16\n\t"
-                     "ret" ::"i"(offsetof(IEC_CONTEXT, imports)));
-#else
-#error "bare.c: say how this processor enters compiled code."
-#endif
 }

@@ -6,7 +6,7 @@
 #ifndef RTS_CONFIG_PORT_H
 #define RTS_CONFIG_PORT_H
 
-#include "CmpIecAbi.h"
+#include "IecCall.h"
 
 #define APP_MAX_TASKS 16
 #define APP_MAX_IMPORTS 128
@@ -22,13 +22,8 @@
 #define SIM_FLASH_PROGRAM_SIZE 8
 #define SIM_FLASH_ERASED 0xFF
 
-/* Calls an entry of compiled code with the import table in its register; `argument` is init_retains or 0. */
-void IecCall(uintptr_t entry, const IEC_CONTEXT *context, RTS_UI32 argument);
-
 #if defined(__arm__)
 #define APP_ENTRY_MODE_BIT 1
 #endif
-#define APP_CALL_ENTRY(entry, context) IecCall((uintptr_t)(entry), (context), 0)
-#define APP_CALL_GLOBAL_INIT(entry, context, init_retains) IecCall((uintptr_t)(entry), (context), (init_retains))
 
 #endif

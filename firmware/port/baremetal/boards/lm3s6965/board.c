@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysTarget.h"
 
 #define SYSCTL_RIS REG32(0x400FE050u)
@@ -30,7 +30,7 @@
 
 enum { RCC_PWRDN = 1 << 13, RCC_BYPASS = 1 << 11, RCC_USESYSDIV = 1 << 22, RCC_DIV_4 = 3 << 23, RCC_8MHZ = 14 << 6 };
 enum { RIS_PLL_LOCKED = 1 << 6, RESC_WATCHDOG = 1 << 3 };
-enum { RCGC0_WATCHDOG = 1 << 3, RCGC1_UART0_I2C0_TIMER0 = 1 << 0 | 1 << 12 | 1 << 16, RCGC2_PORTS_A_B_F = 3 | 1 << 5 };
+enum { RCGC0_WATCHDOG = 1 << 3, RCGC1_UART0_I2CS_TIMER0 = 1 << 0 | 5 << 12 | 1 << 16, RCGC2_PORTS_A_B_F = 3 | 1 << 5 };
 enum { TIMER_ONE_SHOT = 1, TIMER_TIME_OUT = 1, WATCHDOG_INTEN_RESEN = 3, STATUS_LED = 1 << 0 };
 
 /* Where nothing is there is a bus fault; not in QEMU, which swallows writes. Below the RAM a large frame would pass all
@@ -54,7 +54,7 @@ void BoardInit(void)
         ResetSetCause(RESET_WATCHDOG);
     SYSCTL_RESC = 0;
     SYSCTL_RCGC0 |= RCGC0_WATCHDOG;
-    SYSCTL_RCGC1 |= RCGC1_UART0_I2C0_TIMER0;
+    SYSCTL_RCGC1 |= RCGC1_UART0_I2CS_TIMER0;
     SYSCTL_RCGC2 |= RCGC2_PORTS_A_B_F;
     TIMER_TAMR = TIMER_ONE_SHOT;
     TIMER_IMR = TIMER_TIME_OUT;

@@ -1,25 +1,37 @@
 /*
- * eeprom.c - SysFlash on a serial EEPROM (AT24C512 at I2C0), with the rules of NOR flash.
+ * eeprom.c - SysFlash on a serial EEPROM (AT24C512 at I2C0 or I2C1), with the rules of NOR flash.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
  * The chip's own flash can only be written while nothing runs from it. The EEPROM cannot be mapped: programs run in RAM
  * (CodeInRam.c). It needs no erase; a sector is what is filled with the erased value at once.
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysFlash.h"
 
-#define I2C0 0x40020000u
-#define I2C_MSA REG32(I2C0 + 0x00)
-#define I2C_MCS REG32(I2C0 + 0x04)
-#define I2C_MDR REG32(I2C0 + 0x08)
-#define I2C_MTPR REG32(I2C0 + 0x0C)
-#define I2C_MCR REG32(I2C0 + 0x20)
-#define PORT_B_AFSEL REG32(0x40005420u)
-#define PORT_B_ODR REG32(0x4000550Cu)
-#define PORT_B_DEN REG32(0x4000551Cu)
+/* A controller, and the pins of its port. */
+typedef struct {
+    uintptr_t i2c;
+    uintptr_t port;
+    RTS_UI32 pins;
+} BUS;
 
-enum { PINS = 3 << 2, MASTER_ENABLE = 1 << 4, PERIOD_400KHZ = BOARD_CLOCK_HZ / (20 * 400000) };
+static const BUS buses[] = {
+    {0x40020000u, 0x40005000u, 3u << 2}, /* I2C0: PB2, PB3 */
+    {0x40021000u, 0x40004000u, 3u << 6}, /* I2C1: PA6, PA7; where QEMU has the chip from version 10 on */
+};
+static const BUS *bus;
+
+#define I2C_MSA REG32(bus->i2c + 0x00)
+#define I2C_MCS REG32(bus->i2c + 0x04)
+#define I2C_MDR REG32(bus->i2c + 0x08)
+#define I2C_MTPR REG32(bus->i2c + 0x0C)
+#define I2C_MCR REG32(bus->i2c + 0x20)
+#define PORT_AFSEL REG32(bus->port + 0x420)
+#define PORT_ODR REG32(bus->port + 0x50C)
+#define PORT_DEN REG32(bus->port + 0x51C)
+
+enum { MASTER_ENABLE = 1 << 4, PERIOD_400KHZ = BOARD_CLOCK_HZ / (20 * 400000) };
 enum { RUN = 1, START = 2, STOP = 4, ACK = 8 }; /* written to MCS */
 enum { BUSY = 1, ERROR = 2 };                   /* read from it */
 enum { CHIP_WRITE = 0x50 << 1, CHIP_READ = CHIP_WRITE | 1, PAGE_SIZE = 128 };
@@ -119,13 +131,24 @@ static RTS_RESULT flash_sync(void)
     return select_byte(0, STOP) ? ERR_OK : ERR_DEVICE;
 }
 
-void EepromInit(void)
+static void enable_bus(void)
 {
-    PORT_B_AFSEL |= PINS;
-    PORT_B_ODR |= PINS;
-    PORT_B_DEN |= PINS;
+    PORT_AFSEL |= bus->pins;
+    PORT_ODR |= bus->pins;
+    PORT_DEN |= bus->pins;
     I2C_MCR = MASTER_ENABLE;
     I2C_MTPR = PERIOD_400KHZ - 1;
+}
+
+/* Where no chip answers, what uses the flash says so. */
+void EepromInit(void)
+{
+    bus = buses;
+    enable_bus();
+    if (flash_sync() != ERR_OK) {
+        bus = &buses[1];
+        enable_bus();
+    }
 }
 
 const SYS_FLASH *SysFlashGet(void)

@@ -7,7 +7,7 @@
 #ifndef REFERENCE_CLOCK_H
 #define REFERENCE_CLOCK_H
 
-#include "CortexM.h"
+#include "BareMetal.h"
 
 static inline void ReferenceStart(void)
 {

@@ -8,7 +8,7 @@
  */
 #include <string.h>
 
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysFlash.h"
 
 #define FILE_FLASH ((RTS_UI8 *)(uintptr_t)BOARD_FLASH_ADDRESS)

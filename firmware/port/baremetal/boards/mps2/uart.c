@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysCom.h"
 #include "SysTime.h"
 #include "rts_config.h"

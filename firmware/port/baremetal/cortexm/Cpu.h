@@ -1,21 +1,13 @@
 /*
- * CortexM.h - the part of the port that every Armv7-M controller shares, and what it asks of a board.
+ * Cpu.h - what every Armv7-M controller shares, and what it asks of a board.
  *
  * SPDX-License-Identifier: Apache-2.0
  *
- * Gives SysTime (SysTick), SysTimer (task interrupts), SysExcept (faults, MPU guards), start-up and reset cause. A
- * board adds board.h (constants, see below), its vectors, and the Board* functions.
- *
- * Priorities, highest first: level 0 faults and SVC; level 1 clock, alarm and board interrupts (short, never foreign
- * code); from level 2 one level per timer, so that tasks pre-empt each other; thread mode: the communication loop.
+ * Faults and SVC are level 0 of the NVIC; each timer has an interrupt line of its own, which software triggers.
  * Application code runs in thread mode at the level of its timer, without privileges (SysExcept.c).
  */
-#ifndef CORTEXM_H
-#define CORTEXM_H
-
-#include "CmpStd.h"
-#include "board.h"
-#include "rts_config.h"
+#ifndef CPU_H
+#define CPU_H
 
 /*
  * board.h defines:
@@ -26,13 +18,6 @@
  * them
  *   BOARD_VECTORS        initialisers [IRQ_VECTOR(n)] = {handler} for its peripherals, each followed by a comma
  */
-
-/* Timers: one per task. */
-enum { SYSTIMER_COUNT = APP_MAX_TASKS };
-
-enum { LEVEL_FAULT = 0, LEVEL_DEVICE = 1, LEVEL_TIMER = 2 };
-
-#define REG32(address) (*(volatile RTS_UI32 *)(uintptr_t)(address))
 
 #define SYST_CSR REG32(0xE000E010u)
 #define SYST_RVR REG32(0xE000E014u)
@@ -95,7 +80,7 @@ static inline void CpuRestore(RTS_UI32 primask)
 static inline RTS_UI32 CpuExceptionNumber(void)
 {
     RTS_UI32 ipsr;
-    __asm__ volatile("mrs %0, ipsr" : "=r"(ipsr));
+    __asm__("mrs %0, ipsr" : "=r"(ipsr));
     return ipsr;
 }
 
@@ -121,64 +106,61 @@ enum { MPU_NULL, MPU_STACK, MPU_IEC_STACK, MPU_BOARD = MPU_IEC_STACK + APP_MAX_T
 /* Gives 2^log2_size bytes at `base`, a multiple of that size, these attributes; does nothing on a chip without MPU. */
 void MpuProtect(RTS_UI32 region, uintptr_t base, RTS_UI32 log2_size, RTS_UI32 attributes);
 
-/* ---- for boards ---- */
+/* ---- for BareMetal.h ---- */
 
-void ClockInit(void);
+static inline void CpuSleep(void)
+{
+    __asm__ volatile("dsb\n\twfi");
+}
 
-/* Calls back every millisecond, above all tasks. */
-void ClockSetCallback(void (*callback)(RTS_I64 now_ns));
+static inline RTS_UI32 CpuNoise(void)
+{
+    return SYST_CVR;
+}
 
-void SysTimerInit(void);
-void SysExceptInit(void);
+#define CPU_FAULT_STATUS "CFSR"
 
-/* To be called by the board's alarm interrupt after it has silenced its timer. */
-void SysTimerAlarm(void);
+static inline RTS_UI32 CpuFaultStatus(void)
+{
+    return SCB_CFSR;
+}
 
-/* Whether no timer's call is overdue by more than a second, asked by main, which all of them interrupt. */
-bool SysTimersWork(void);
+static inline void CpuReset(void)
+{
+    enum { AIRCR_SYSRESETREQ = 0x05FA0004 };
+    SCB_AIRCR = AIRCR_SYSRESETREQ;
+}
 
-/* At the end of each stack, protected by the MPU. */
-enum { STACK_GUARD_LOG2 = 5, STACK_GUARD = 1 << STACK_GUARD_LOG2 };
+/* What an FPU adds to the main stack: main and each task that is interrupted leave a context of 64 bytes that
+ * SysExceptTry saves and 72 that the processor does. */
+#ifdef __ARM_FP
+enum { CPU_CONTEXTS_SIZE = (APP_MAX_TASKS + 1) * (64 + 72) };
+#else
+enum { CPU_CONTEXTS_SIZE = 0 };
+#endif
 
-/* ---- reset ---- */
+void CpuInit(void);
 
-typedef enum { RESET_POWER_ON, RESET_PIN, RESET_SOFTWARE, RESET_FATAL, RESET_WATCHDOG, RESET_CAUSE_COUNT } RESET_CAUSE;
+/* ---- interrupts of tasks ---- */
 
-/* Why the controller started, and for the last two where it was. In RAM that no start-up clears. */
-typedef struct {
-    RTS_UI32 magic;
-    RTS_UI32 cause; /* RESET_CAUSE */
-    RTS_UI32 pc;
-    RTS_UI32 status; /* CFSR */
-} RESET_RECORD;
+static inline void CpuTaskEnable(RTS_UI32 timer, RTS_UI32 level)
+{
+    IrqEnable(BOARD_TASK_IRQ + timer, level);
+}
 
-void ResetInit(void);
-const RESET_RECORD *ResetGet(void);
+static inline void CpuTaskSetLevel(RTS_UI32 timer, RTS_UI32 level)
+{
+    NVIC_IPR(BOARD_TASK_IRQ + timer) = CpuPriority(level);
+}
 
-/* For BoardInit of a chip that has a register for it: why it was reset. The place in the record stays. */
-void ResetSetCause(RESET_CAUSE cause);
+static inline void CpuTaskTrigger(RTS_UI32 timer)
+{
+    NVIC_STIR = BOARD_TASK_IRQ + timer;
+}
 
-/* Records the cause and resets the controller. Does not return. */
-void ResetNow(RESET_CAUSE cause, RTS_UI32 pc) __attribute__((noreturn));
-
-/* ---- what a board writes ---- */
-
-/* Clocks, pins, peripherals. Interrupts are still masked. */
-void BoardInit(void);
-
-/* One call of SysTimerAlarm in `ns` (at most 10^9) from now, in place of the one asked for before; a little late is
- * fine, early too. With interrupts masked. */
-void BoardAlarmSet(RTS_UI32 ns);
-
-/* The hardware watchdog resets the controller unless the main loop kicks it more often than every `ms`. Never
- * stopped. */
-void BoardWatchdogStart(RTS_UI32 ms);
-void BoardWatchdogKick(void);
-
-/* The lamp that shows whether the program runs (RunLamp.c, the full configuration); empty for a board without one. */
-void BoardRunLamp(bool on);
-
-/* Whether there is something for the main loop to do since the last call (received bytes), so that it does not sleep. */
-bool BoardHasWork(void);
+static inline void CpuTaskForget(RTS_UI32 timer)
+{
+    NVIC_ICPR((BOARD_TASK_IRQ + timer) / 32) = 1u << (BOARD_TASK_IRQ + timer) % 32;
+}
 
 #endif

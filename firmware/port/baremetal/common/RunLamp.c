@@ -6,7 +6,7 @@
 #include "AppState.h"
 #include "CmpEventMgr.h"
 #include "CmpItf.h"
-#include "CortexM.h"
+#include "BareMetal.h"
 
 static void show(const EVENT_PARAM *event)
 {

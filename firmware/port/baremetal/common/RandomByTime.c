@@ -4,7 +4,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysTarget.h"
 #include "SysTime.h"
 
@@ -12,7 +12,7 @@
 RTS_UI32 SysTargetRandom(void)
 {
     static RTS_UI32 pool = 0x9E3779B9u;
-    pool ^= (RTS_UI32)SysTimeGetNs() + SYST_CVR;
+    pool ^= (RTS_UI32)SysTimeGetNs() + CpuNoise();
     pool ^= pool << 13;
     pool ^= pool >> 17;
     pool ^= pool << 5;

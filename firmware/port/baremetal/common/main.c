@@ -6,7 +6,7 @@
 #include "CmpItf.h"
 #include "CmpLog.h"
 #include "CmpScheduleTimer.h"
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysTime.h"
 
 /* The communication loop may be kept from running for so long, by tasks that leave it no time. */
@@ -20,8 +20,8 @@ static void log_reset_cause(void)
     if (record->cause < RESET_FATAL)
         LogAdd(CMPID_CmpMgr, LOG_INFO, ERR_OK, "Reset: %s", names[record->cause]);
     else
-        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%X, CFSR 0x%X", names[record->cause],
-               (unsigned)record->pc, (unsigned)record->status);
+        LogAdd(CMPID_CmpMgr, LOG_ERROR, ERR_EXCEPTION, "Reset: %s at 0x%X, " CPU_FAULT_STATUS " 0x%X",
+               names[record->cause], (unsigned)record->pc, (unsigned)record->status);
 }
 
 /* Whatever hangs, the main loop, the clock or the tasks, ends in a reset. Once a millisecond is enough. */
@@ -41,7 +41,7 @@ static void idle(void)
 {
     RTS_UI32 mask = CpuMask();
     if (!BoardHasWork())
-        __asm__ volatile("dsb\n\twfi");
+        CpuSleep();
     CpuRestore(mask);
 }
 

@@ -5,12 +5,11 @@
  *
  * A chip with a reset cause register can tell more: its board calls ResetSetCause.
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysExcept.h"
 #include "SysStart.h"
 
 enum { RECORD_MAGIC = 0x52535430 };
-enum { AIRCR_SYSRESETREQ = 0x05FA0004 };
 
 /* Written before a reset; volatile, because no program reads it after that. */
 __attribute__((section(".noinit"))) static volatile RESET_RECORD kept;
@@ -36,9 +35,9 @@ void ResetSetCause(RESET_CAUSE cause)
 
 void ResetNow(RESET_CAUSE cause, RTS_UI32 pc)
 {
-    kept = (RESET_RECORD){.magic = RECORD_MAGIC, .cause = cause, .pc = pc, .status = SCB_CFSR};
+    kept = (RESET_RECORD){.magic = RECORD_MAGIC, .cause = cause, .pc = pc, .status = CpuFaultStatus()};
     CpuBarrier();
-    SCB_AIRCR = AIRCR_SYSRESETREQ;
+    CpuReset();
     for (;;)
         CpuBarrier();
 }

@@ -3,7 +3,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 
 void SysTimerInit(void)
 {
@@ -18,8 +18,8 @@ bool SysTimersWork(void)
     return true;
 }
 
-/* No line of a task is ever enabled. */
-void TimerIrq(void);
-void TimerIrq(void)
+/* No interrupt of a task is ever triggered. */
+void SysTimerRun(RTS_UI32 timer)
 {
+    RTS_UNUSED(timer);
 }

@@ -4,14 +4,14 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * One hardware timer of the board is the alarm for the earliest due time. When it fires, each timer that is due gets
- * its own interrupt line set pending by software, and runs at its own NVIC level: any number of timers from one
+ * its own interrupt set pending by software, and runs at its own level: any number of timers from one
  * hardware timer, and due times that never drift. Due times are the alarm's alone: it goes on while callbacks run, and
  * counts what they miss. Rank is by priority, among equals by place. A timer without an interval is set pending by
  * SysTimerTrigger; that it is due every 71 minutes too costs less than an exception from the rule.
  */
 #include "SysTimer.h"
 
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysTime.h"
 
 enum { ALARM_MAX_NS = 1000000000, OVERDUE_NS = 1000000000, NS_PER_US = 1000 };
@@ -38,19 +38,19 @@ void SysTimerInit(void)
 {
     for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
         state.timer[i].state = TIMER_FREE;
-        IrqEnable(BOARD_TASK_IRQ + i, LEVEL_TIMER + i);
+        CpuTaskEnable(i, LEVEL_TIMER + i);
     }
     state.end = state.timer;
 }
 
-static void fall_due(TIMER *timer, RTS_UI32 irq)
+static void fall_due(TIMER *timer, RTS_UI32 index)
 {
     if (timer->state == TIMER_FIRED) {
         timer->overruns++;
     } else {
         timer->due_ns = timer->next_ns;
         timer->state = TIMER_FIRED;
-        NVIC_STIR = irq;
+        CpuTaskTrigger(index);
     }
     timer->next_ns += (RTS_I64)timer->interval_us * NS_PER_US;
 }
@@ -59,23 +59,21 @@ static void fall_due(TIMER *timer, RTS_UI32 irq)
 void SysTimerAlarm(void)
 {
     RTS_I64 now = SysTimeGetNs(), next = now + ALARM_MAX_NS;
-    RTS_UI32 irq = BOARD_TASK_IRQ;
-    for (TIMER *timer = state.timer; timer < state.end; timer++, irq++) {
+    RTS_UI32 index = 0;
+    for (TIMER *timer = state.timer; timer < state.end; timer++, index++) {
         if (timer->state < TIMER_WAITING)
             continue;
         if (timer->next_ns <= now)
-            fall_due(timer, irq);
+            fall_due(timer, index);
         if (timer->next_ns < next)
             next = timer->next_ns;
     }
     BoardAlarmSet(next > now ? (RTS_UI32)(next - now) : 0);
 }
 
-/* Every timer's interrupt; the number of the running exception says which. */
-void TimerIrq(void);
-void TimerIrq(void)
+void SysTimerRun(RTS_UI32 index)
 {
-    TIMER *timer = &state.timer[CpuExceptionNumber() - VECTOR_IRQ - BOARD_TASK_IRQ];
+    TIMER *timer = &state.timer[index];
     timer->callback(timer->param, timer->due_ns);
     timer->state = TIMER_WAITING;
 }
@@ -103,14 +101,14 @@ static bool outranks(RTS_UI32 one, RTS_UI32 other)
     return a < b || (a == b && one < other);
 }
 
-/* Gives each timer in use the NVIC level of its rank. */
+/* Gives each timer in use the level of its rank. */
 static void assign_levels(void)
 {
     for (RTS_UI32 i = 0; i < SYSTIMER_COUNT; i++) {
         RTS_UI32 level = LEVEL_TIMER;
         for (RTS_UI32 k = 0; k < SYSTIMER_COUNT; k++)
             level += state.timer[k].state != TIMER_FREE && outranks(k, i);
-        NVIC_IPR(BOARD_TASK_IRQ + i) = CpuPriority(level);
+        CpuTaskSetLevel(i, level);
     }
 }
 
@@ -159,7 +157,7 @@ void SysTimerTrigger(RTS_HANDLE handle, RTS_I64 due_ns)
 {
     RTS_UNUSED(due_ns);
     if (handle < SYSTIMER_COUNT && state.timer[handle].state >= TIMER_WAITING)
-        NVIC_STIR = BOARD_TASK_IRQ + handle;
+        CpuTaskTrigger(handle);
 }
 
 /* Called from main, so no timer's interrupt is active: it is enough that none starts again, nor one that is pending. */
@@ -169,7 +167,7 @@ RTS_RESULT SysTimerStop(RTS_HANDLE handle)
     if (timer == NULL)
         return ERR_INVALID_HANDLE;
     timer->state = TIMER_STOPPED;
-    NVIC_ICPR((BOARD_TASK_IRQ + handle) / 32) = 1u << (BOARD_TASK_IRQ + handle) % 32;
+    CpuTaskForget(handle);
     return ERR_OK;
 }
 

@@ -1,5 +1,5 @@
 /*
- * gpio.c - digital lines: this port gives none to programs. Contract: SysGpio.h.
+ * NoGpio.c - digital lines, of a board that gives none to programs. Contract: SysGpio.h.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

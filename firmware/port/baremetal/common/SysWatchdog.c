@@ -5,7 +5,7 @@
  */
 #include "CmpItf.h"
 #include "CmpScheduleTimer.h"
-#include "CortexM.h"
+#include "BareMetal.h"
 
 RTS_RESULT SysWatchdog_Hook(CMP_HOOK hook);
 

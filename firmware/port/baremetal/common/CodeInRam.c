@@ -4,7 +4,7 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include "CortexM.h"
+#include "BareMetal.h"
 #include "SysFlash.h"
 
 enum { SLOT_COUNT = 2 };

@@ -1,0 +1,27 @@
+/*
+ * rts_config_riscv.h - how programs are kept to their memory on RISC-V; for a board's rts_config_port.h.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef RTS_CONFIG_RISCV_H
+#define RTS_CONFIG_RISCV_H
+
+#include "rts_config_baremetal.h"
+
+/* Whatever the configuration says: here it costs nothing that is worth saving. */
+#undef RTS_IEC_UNPRIVILEGED
+#define RTS_IEC_UNPRIVILEGED 1
+
+/* An entry of the PMP may begin and end at each of these; most chips are as fine. */
+#define APP_AREAS_ALIGNED(size) __attribute__((aligned(32)))
+#define APP_AREAS_SECTION __attribute__((section(".bss.areas")))
+
+#define APP_GATE(function)                                                                             \
+    __attribute__((naked, unused, section(".text.gate." #function))) static void function##_gate(void) \
+    {                                                                                                  \
+        __asm__ volatile("ecall\n\ttail %0" ::"i"(function));                                          \
+    }                                                                                                  \
+    RTS_STATIC_ASSERT(1, function##_has_a_gate)
+#define APP_GATED(function) function##_gate
+
+#endif

@@ -1,0 +1,93 @@
+/*
+ * trap.c - start, and the one vector: what a trap saves, on which stack it runs, and how it returns.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * mscratch is 0 in the runtime, which is on the main stack; while a program runs it is where the main stack goes on. So
+ * what a program has done to its stack pointer does not matter to a trap.
+ */
+#include "BareMetal.h"
+
+/* Where the controller starts; lowest in flash. */
+__attribute__((naked, section(".vectors"), used)) static void start(void)
+{
+    __asm__ volatile("la sp, stack_top\n\ttail ResetHandler");
+}
+
+/* A fault of the runtime; it may be that its stack was at its end, so it is given up. */
+__attribute__((used, noreturn)) static void runtime_fault(RTS_UI32 pc)
+{
+    ResetNow(RESET_FATAL, pc);
+}
+
+/* Of several pending interrupts devices and the clock come before tasks; which one a processor takes first differs, and
+ * QEMU's order is its own. */
+static void interrupt(RTS_UI32 pc)
+{
+    RTS_UI32 pending = CSR_READ("mip") & CSR_READ("mie");
+
+    if (pending & 1 << INTERRUPT_EXTERNAL)
+        BoardInterrupt(pc);
+    else if (pending & 1 << INTERRUPT_TIMER)
+        ClockInterrupt();
+    else if (pending & 1 << INTERRUPT_SOFTWARE)
+        TasksInterrupt();
+}
+
+__attribute__((used)) static void trap_dispatch(FRAME *frame)
+{
+    RTS_UI32 cause = CpuFaultStatus();
+
+    if ((RTS_I32)cause < 0)
+        interrupt(frame->pc);
+    else
+        SysExceptTrap(frame, cause);
+}
+
+__attribute__((naked, aligned(4))) static void trap_entry(void)
+{
+    __asm__ volatile("csrrw sp, mscratch, sp\n\t"
+                     "bnez sp, 1f\n\t"
+                     "csrr sp, mcause\n\t" /* in the runtime: its stack is not touched before it is known to be sound */
+                     "bgez sp, 4f\n\t"
+                     "csrrw sp, mscratch, zero\n\t"
+                     "addi sp, sp, -80\n\t"
+                     "sw t0, 4(sp)\n\t"
+                     "sw zero, 64(sp)\n\t"
+                     "j 2f\n"
+                     "1:\taddi sp, sp, -80\n\t" /* in a program */
+                     "sw t0, 4(sp)\n\t"
+                     "csrrw t0, mscratch, zero\n\t"
+                     "sw t0, 64(sp)\n"
+                     "2:\t"
+                     "sw ra, 0(sp)\n\tsw t1, 8(sp)\n\tsw t2, 12(sp)\n\tsw a0, 16(sp)\n\tsw a1, 20(sp)\n\t"
+                     "sw a2, 24(sp)\n\tsw a3, 28(sp)\n\tsw a4, 32(sp)\n\tsw a5, 36(sp)\n\tsw a6, 40(sp)\n\t"
+                     "sw a7, 44(sp)\n\tsw t3, 48(sp)\n\tsw t4, 52(sp)\n\tsw t5, 56(sp)\n\tsw t6, 60(sp)\n\t"
+                     "csrr t0, mepc\n\tsw t0, 68(sp)\n\tcsrr t0, mstatus\n\tsw t0, 72(sp)\n\t"
+                     "mv a0, sp\n\t"
+                     "call trap_dispatch\n\t"
+                     "lw t0, 68(sp)\n\tcsrw mepc, t0\n\tlw t0, 72(sp)\n\tcsrw mstatus, t0\n\t"
+                     "lw ra, 0(sp)\n\tlw t1, 8(sp)\n\tlw t2, 12(sp)\n\tlw a0, 16(sp)\n\tlw a1, 20(sp)\n\t"
+                     "lw a2, 24(sp)\n\tlw a3, 28(sp)\n\tlw a4, 32(sp)\n\tlw a5, 36(sp)\n\tlw a6, 40(sp)\n\t"
+                     "lw a7, 44(sp)\n\tlw t3, 48(sp)\n\tlw t4, 52(sp)\n\tlw t5, 56(sp)\n\tlw t6, 60(sp)\n\t"
+                     "lw t0, 64(sp)\n\t"
+                     "beqz t0, 3f\n\t"
+                     "addi t0, sp, 80\n\t"
+                     "csrw mscratch, t0\n\t"
+                     "lw t0, 4(sp)\n\t"
+                     "lw sp, 64(sp)\n\t"
+                     "mret\n"
+                     "3:\tlw t0, 4(sp)\n\t"
+                     "addi sp, sp, 80\n\t"
+                     "mret\n"
+                     "4:\tcsrr a0, mepc\n\t"
+                     "la sp, stack_top\n\t"
+                     "tail runtime_fault");
+}
+
+void CpuInit(void)
+{
+    CSR_WRITE("mscratch", 0);
+    CSR_WRITE("mtvec", (uintptr_t)trap_entry);
+    CSR_WRITE("mie", 1 << INTERRUPT_SOFTWARE | 1 << INTERRUPT_TIMER | 1 << INTERRUPT_EXTERNAL);
+}
