@@ -11,13 +11,14 @@
 
 static RTS_UI32 sector_at(RTS_UI32 offset);
 #define FLASH_SECTOR_AT(offset) sector_at(offset)
-#define FILE_MAP                                               \
-    {0x4000, 0x4000}, {0x8000, 0x4000}, {0x0400, 0x0800},      \
-    {                                                          \
-        0xC000, 0x4000                                         \
+#define FILE_MAP                                          \
+    {0x4000, 0x4000}, {0x8000, 0x4000}, {0x0400, 0x0800}, \
+    {                                                     \
+        0xC000, 0x4000                                    \
     }
 #define SysFileGetArea test_area
 #define SysFileCreate test_create
+#define SysFileCreateAt test_create_at
 #define SysFileAppend test_append
 #define SysFileWrite test_write
 #define SysFileGetPos test_pos
