@@ -16,11 +16,11 @@ MESON := $(BIN)/meson
 export PATH := $(abspath $(BIN)):$(PATH)
 
 # The bare-metal builds need a cross compiler and QEMU; without them their tests are left out, and `make test` says so.
-CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965))
+CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v qemu-system-arm),build-cm3 build-cm4f build-cm7 build-lm3s6965 build-stm32f405))
 RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command -v qemu-system-riscv32),build-rv32imac))
 BUILDS := build build-sanitized $(CORTEX_M) $(RISC_V)
 
-.PHONY: demo test test-vcan lint format bench size wheel attack soak fuzz all clean
+.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -40,6 +40,11 @@ all: $(BUILDS:%=%/build.ninja)
 test-vcan: build/build.ninja
 	$(MESON) compile -C build
 	tests/vcan/run build $(BIN)/python || [ $$? -eq 77 ]
+
+# Lines and analog values of a real kernel, in a virtual machine; part of `make test`.
+test-kernel: build/build.ninja
+	$(MESON) compile -C build
+	tests/kernel/run build $(abspath $(BIN)/python) || [ $$? -eq 77 ]
 
 C_FILES = find firmware tests bench examples -name '*.[ch]' -print0
 
@@ -99,7 +104,7 @@ build-sanitized/build.ninja: $(VENV)/dev
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini
 
-build-lm3s6965/build.ninja build-rv32imac/build.ninja: build-%/build.ninja: $(VENV)/dev
+build-lm3s6965/build.ninja build-stm32f405/build.ninja build-rv32imac/build.ninja: build-%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-$* --cross-file cross/$*.ini
 
 # What a user gets: the package with its two commands; and the plant of the demo speaks Modbus.

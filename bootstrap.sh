@@ -1,7 +1,7 @@
 #!/bin/sh
 # bootstrap.sh VENV     makes a virtual environment, with what it needs from Debian: a C compiler, Python's headers and venv
 # bootstrap.sh --tests  installs what some tests need: cross compilers and QEMU, for Cortex-M, RISC-V and AArch64, and
-#                       programs of others that speak Modbus
+#                       programs of others that speak Modbus, and QEMU for a Linux kernel with hardware that is simulated
 #
 # Packages are installed through apt when this runs as root. Otherwise the first form says what to type, and the second that
 # some tests will be left out.
@@ -23,6 +23,7 @@ if [ "$1" = --tests ]; then
     command -v qemu-system-riscv32 >/dev/null || set -- "$@" qemu-system-misc
     command -v aarch64-linux-gnu-gcc >/dev/null || set -- "$@" gcc-aarch64-linux-gnu libc6-dev-arm64-cross
     command -v qemu-aarch64 >/dev/null || set -- "$@" qemu-user
+    command -v qemu-system-x86_64 >/dev/null || set -- "$@" qemu-system-x86
     command -v mbpoll >/dev/null || set -- "$@" mbpoll
     ls /usr/lib/*/libmodbus.so.5 >/dev/null 2>&1 || set -- "$@" libmodbus5
     [ $# = 0 ] || install "$@" || echo "Some tests are left out; for them: sudo apt-get install $*" >&2

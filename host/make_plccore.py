@@ -19,6 +19,7 @@ SHARED = [
     "IoDrvGpio.h",
     "IoDrvSim.h",
     "IoDrvModbus.h",
+    "IoDrvSysfs.h",
     "CmpIecAbi.h",
     "SysExcept.h",
     "SysStart.h",

@@ -86,7 +86,8 @@ enum {
     CMPID_IoDrvModbus = 0x0026,
     CMPID_CmpUserMgr = 0x0027,
     CMPID_RunLamp = 0x0028,
-    CMPID_CmpFileTransfer = 0x0029,
+    CMPID_IoDrvSysfs = 0x0029,
+    CMPID_CmpFileTransfer = 0x002A,
 };
 
 /* Name of a component, "" when unknown. */

@@ -134,7 +134,6 @@ enum {
     SG_DEVICE = 1,
     SG_APPLICATION = 2,
     SG_LOG = 5,
-    SG_SETTINGS = 6,
     SG_FILE_TRANSFER = 8,
     SG_IOMGR = 0x0B,
     SG_USERMGR = 0x0C,

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from plctool.compiler.library import standard_library
-from plctool.compiler.stand_ins import BLOCKS, FUNCTIONS
+from plctool.compiler.stand_ins import stand_ins
 
 PROGRAM = """PROGRAM Main
 VAR blink : BLINK; second : Util.Blink; pid : INT; axis : AXIS_REF; power : MC_Power; a, b : INT; x : Whatever;
@@ -51,6 +51,19 @@ def test_names_have_their_library_their_uses_and_whether_there_is_a_stand_in(too
     assert lines[9] == "Errors about other things: 1; 'plctool check' shows them."
 
 
+def test_what_computes_has_a_stand_in_and_what_reaches_the_system_has_none(tool: Any, scratch: Path) -> None:
+    variables = "id : T_AmsNetId; t : TIMESTRUCT; clock : FB_LocalSystemTime; s : STRING; p : Util.PID;"
+    text = f"PROGRAM Main\nVAR {variables} END_VAR\ns := DWORD_TO_HEXSTR(1, 2, FALSE);\nclock();\nEND_PROGRAM\n"
+    (scratch / "main.st").write_text(text)
+    assert rows(tool("check", "main.st", "--missing", "--json").json) == {
+        "FB_LocalSystemTime": ("Tc2_Utilities", 1, 2, False),
+        "T_AmsNetId": ("Tc2_System", 1, 2, True),
+        "TIMESTRUCT": ("Tc2_Utilities", 1, 2, True),
+        "DWORD_TO_HEXSTR": ("Tc2_Utilities", 1, 3, True),
+        "PID": ("Util of CODESYS", 1, 2, True),
+    }
+
+
 def test_own_names_are_not_those_of_libraries(tool: Any, scratch: Path) -> None:
     own = "FUNCTION_BLOCK BLINK\nEND_FUNCTION_BLOCK\nTYPE PID : STRUCT MEMCPY : INT; END_STRUCT; END_TYPE\n"
     text = "PROGRAM Main\nVAR b : BLINK; p : PID; x : INT; END_VAR\nb();\nx := p.MEMCPY;\nEND_PROGRAM\n"
@@ -84,6 +97,6 @@ def test_stand_ins_are_known_with_the_library_in_front(tool: Any, scratch: Path)
     assert set(rows(done.json)) == {"SysMemSet", "MEMSET", "BLINK"}
 
 
-@pytest.mark.parametrize("name", [n for names in (*FUNCTIONS.values(), *BLOCKS.values()) for n in names])
+@pytest.mark.parametrize("name", sorted(stand_ins()))
 def test_stand_ins_are_in_the_standard_library(name: str) -> None:
-    assert name in standard_library().names()
+    assert name in {known.casefold() for known in standard_library().names()}

@@ -160,6 +160,16 @@ def test_firmware_over_the_programs_is_refused(tool: Any, scratch: Path, for_m3:
     assert tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex").status == 0
 
 
+def test_firmware_may_be_in_sectors_that_programs_and_logs_leave_free(tool: Any, scratch: Path, build: Any) -> None:
+    build(PROGRAM, "--target", "cortex-m4f")
+    for address, free in ((0x0800_0000, True), (0x0801_0000, True), (0x0800_4000, False), (0x0803_FFF0, False)):
+        (scratch / "fw.elf").write_bytes(elf(facts("stm32f405/standard"), address=address))
+        done = tool("image", "app.cdl", "--firmware", "fw.elf", "-o", "x.hex")
+        assert (done.status == 0) == free, hex(address)
+        if not free:
+            refused(done, f"firmware at 0x{address:08X}", "over the flash for programs")
+
+
 def test_a_memory_of_its_own_is_written_without_the_firmware(tool: Any, scratch: Path, for_m3: Path) -> None:
     """Also where the firmware has the addresses that the memory counts from 0, as those of a board of one's own."""
     of_own = facts("lm3s6965-board/standard", name=b"Acme EEPROM")

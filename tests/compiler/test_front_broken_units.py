@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from front_support import messages
+
+from plctool.compiler import load_sources
+from plctool.compiler.front import check_sources
 
 BROKEN = "FUNCTION_BLOCK Broken\nVAR_OUTPUT level INT; END_VAR\nlevel := 1;\nEND_FUNCTION_BLOCK\n"
 OTHER = "PROGRAM Main\nVAR n : INT; b : Broken; END_VAR\nn := wrong;\nn := TRUE;\n{more}END_PROGRAM\n"
@@ -38,3 +43,18 @@ def test_the_unit_before_the_place_of_the_error_may_be_the_broken_one() -> None:
     found = messages(text + main + "END_PROGRAM\n")
     assert found[0] == "4:1: END_FUNCTION_BLOCK missing for the FUNCTION_BLOCK in line 1"
     assert [m.partition(":")[0] for m in found[1:]] == ["8"]
+
+
+def test_program_with_an_error_in_its_own_xml_file_is_not_missing_for_its_task(tmp_path: Path) -> None:
+    declaration = "PROGRAM MAIN\nVAR\n    a b : INT;\nEND_VAR\n"
+    body = "<Implementation><ST><![CDATA[a := 1;]]></ST></Implementation>"
+    pou = f'<POU Name="MAIN">\n<Declaration><![CDATA[{declaration}]]></Declaration>\n{body}</POU>'
+    task = (
+        '<Task Name="T"><CycleTime>10000</CycleTime><Priority>20</Priority><PouCall><Name>MAIN</Name></PouCall></Task>'
+    )
+    for name, inside in (("MAIN.TcPOU", pou), ("T.TcTTO", task)):
+        (tmp_path / name).write_text(f'<?xml version="1.0"?>\n<TcPlcObject>\n{inside}\n</TcPlcObject>\n')
+    files = "".join(f'<Compile Include="{name}"/>' for name in ("MAIN.TcPOU", "T.TcTTO"))
+    (tmp_path / "p.plcproj").write_text(f"<Project><ItemGroup>{files}</ItemGroup></Project>")
+    found = check_sources(load_sources([tmp_path])).diagnostics
+    assert [(d.file.endswith("MAIN.TcPOU"), d.line) for d in found if d.severity == "error"] == [(True, 6)]

@@ -21,8 +21,8 @@ TCP_MAGIC = bytes.fromhex("000117E8")
 
 @dataclass(frozen=True)
 class Dialect:
-    """`header`: length field of layer 7. `acks`: each block is acknowledged, otherwise none. `padded`: elements begin at
-    multiples of 4. `receiver`, `sender`: addresses of layer 3. `words`: of an open request, None for one of
+    """`header`: length field of layer 7. `acks`: each block is acknowledged, otherwise none. `padded`: elements begin
+    at multiples of 4. `receiver`, `sender`: addresses of layer 3. `words`: of an open request, None for one of
     version 1.0."""
 
     header: int = 16

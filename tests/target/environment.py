@@ -17,6 +17,7 @@ TARGETS = {
     "mps2-an386": "cortex-m4f",
     "mps2-an500": "cortex-m7",
     "lm3s6965evb": "cortex-m3",
+    "netduinoplus2": "cortex-m4f",
     "virt": "rv32imac",
 }
 TARGET = TARGETS.get(MACHINE, "")

@@ -68,6 +68,7 @@ MACHINES = {
          "-device", f"at24c-eeprom,address=0x50,rom-size={EEPROM_SIZE},drive=nv"),
         EEPROM_SIZE,
     ),
+    "netduinoplus2": Machine("qemu-system-arm", ("-M", "netduinoplus2")),  # nothing keeps applications
     "virt": Machine(
         "qemu-system-riscv32",
         ("-M", "virt", "-rtc", "clock=vm", "-drive", "if=pflash,unit=1,format=raw,file={file}"),

@@ -29,7 +29,9 @@ def test_every_configuration_answers_the_name_service(make_board, config):
     board.power_on()
     with Connection(board.line()) as connection:
         (node,) = connection.scan(10, enough=1)
-    assert node.device_name.startswith("MPS2 AN" if IS_MPS2 else "QEMU virt" if IS_RISCV else "LM3S6965")
+    assert node.device_name.startswith(
+        {"virt": "QEMU virt", "lm3s6965evb": "LM3S6965", "netduinoplus2": "STM32F405"}.get(MACHINE, "MPS2 AN")
+    )
 
 
 def test_a_fresh_board_has_no_application(plc):

@@ -25,5 +25,5 @@
 #define HAS_CmpBlkDrvTcp 1
 #define HAS_CmpBlkDrvUdp 1
 #define PORT_SYSTEM(X) X(SysTarget) X(SysLock) X(SysTimer)
-#define PORT_COMPONENTS(X) X(SysEvent)
+#define PORT_COMPONENTS(X) X(SysEvent) X(IoDrvSysfs)
 #include "CmpList.h"

@@ -125,8 +125,8 @@ static RTS_RESULT dispatch(RTS_UI16 group_id, RTS_UI16 service_id, SRV_REQUEST *
 {
     const SRV_GROUP *group = find_group(group_id);
 
-    if (group == NULL) /* no client has the right to settings */
-        return SRV_OTHER_CLIENTS && group_id == SG_SETTINGS ? ERR_NO_ACCESS_RIGHTS : ERR_L7_UNKNOWNCMDGROUP;
+    if (group == NULL)
+        return ERR_L7_UNKNOWNCMDGROUP;
     const SRV_SERVICE *service = find_service(group, service_id);
     if (service == NULL)
         return ERR_L7_UNKNOWNCMD;

@@ -66,7 +66,7 @@ def _first(lines: Sequence[ConfigLine | AccessLine | None]) -> int:
 
 def _names(source: Source, begin: int, end: int | None, error: int) -> set[str]:
     """What the lines from `begin` to before `end` may declare; in the line of an error that may be every word."""
-    lines = source.text.split("\n")[begin - 1 : None if end is None else end - 1]
+    lines = (source.original or source.text).split("\n")[begin - 1 : None if end is None else end - 1]
     return declared_names("\n".join(lines)) | _words(source.line_text(error))
 
 

@@ -28,13 +28,18 @@ STAND_INS = (
 """Libraries of other systems that this one stands in for, as far as it has their names."""
 
 _QUALIFIED = re.compile(rf"(?:{'|'.join(STAND_INS)})\.(?=\w+$)", re.IGNORECASE)
+_OTHER_BLOCKS = {"util.pid": "util_pid__", "util.hysteresis": "util_hysteresis__"}
+"""What is another block with its library in front than without it."""
+
 _STRUCT = re.compile(r"\bSTRUCT\b.*?\bEND_STRUCT\b", re.DOTALL)
 _DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
 
 
 def without_library(key: str) -> str:
     """A name without the library of other systems before it: there is one library here."""
-    return _QUALIFIED.sub("", key, count=1) if "." in key else key
+    if "." not in key:
+        return key
+    return _OTHER_BLOCKS.get(key.casefold()) or _QUALIFIED.sub("", key, count=1)
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,7 @@ class Entry:
     source: Source
     start: int
     end: int
+    is_function: bool
 
 
 class Library:
@@ -69,7 +75,7 @@ class Library:
                 [match["name"]] if match["name"] else _DECLARED_NAME.findall(_STRUCT.sub("", text[match.end() : end]))
             )
             for name in names:
-                self._entries[name.casefold()] = Entry(name, source, at, end)
+                self._entries[name.casefold()] = Entry(name, source, at, end, match["pou"] == "FUNCTION")
                 base, separator, suffix = name.rpartition("__")
                 if separator and base and suffix:
                     self._overloads.setdefault(base.casefold(), []).append(name)
@@ -82,6 +88,10 @@ class Library:
     def names(self) -> list[str]:
         """Everything there is, for suggestions."""
         return [e.name for e in self._entries.values() if "__" not in e.name] + [k.upper() for k in self._overloads]
+
+    def defined_in(self, path: str) -> list[Entry]:
+        """What a source defines, but for what is internal."""
+        return [e for e in self._entries.values() if e.source.path == path and not e.name.endswith("__")]
 
     def parse(self, key: str, diagnostics: Diagnostics) -> list[ast.Declaration]:
         """The declarations of the unit that defines the name; none when there is no such unit."""

@@ -11,6 +11,8 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from plctool.errors import did_you_mean
+
 _UNKNOWN = "no library known here"
 _SHOWN = 8  # names of a library that are listed; the rest is counted
 
@@ -93,6 +95,11 @@ def library_of(name: str) -> str:
     """The library that seems to have a name; "" when none is known. A qualified name is known by its first part."""
     first = name.partition(".")[0]
     return next((library for library, pattern in _LIBRARIES if pattern.fullmatch(first)), "")
+
+
+def known_name_like(name: str, candidates: Iterable[str]) -> str:
+    """`; did you mean X?` for an unknown name; nothing for one that a library has, which is missing, not misspelt."""
+    return "" if library_of(name) else did_you_mean(name, candidates)
 
 
 def table(uses: Sequence[Use]) -> list[str]:

@@ -6,31 +6,51 @@ SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
 
 from plctool.compiler.imports import parts_of
-from plctool.compiler.library import without_library
+from plctool.compiler.library import standard_library, without_library
 from plctool.compiler.missing_names import Use
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.lexer import Lexer, Token
 
-FUNCTIONS = {
+_FUNCTIONS = {
     "Tc2_System": ("MEMCPY", "MEMMOVE", "MEMSET", "MEMCMP"),
     "SysMem of CODESYS": ("SysMemCpy", "SysMemMove", "SysMemSet", "SysMemCmp"),
 }
-BLOCKS = {
-    "Util of CODESYS": ("BLINK", "PID", "INTEGRAL", "DERIVATIVE", "HYSTERESIS"),
+_BLOCKS = {"Util of CODESYS": ("BLINK", "PID", "HYSTERESIS")}
+_FILES = {
+    "stdlib/util.st": "Util of CODESYS",
+    "stdlib/tc2_system.st": "Tc2_System",
+    "stdlib/tc2_utilities.st": "Tc2_Utilities",
 }
-"""By the library of the other system."""
-
 _BEFORE_TYPES = frozenset((":", "OF", "EXTENDS", "TO"))
-_FUNCTIONS = {name.casefold(): library for library, names in FUNCTIONS.items() for name in names}
-_BLOCKS = {name.casefold(): library for library, names in BLOCKS.items() for name in names}
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """A name of another system's `library`."""
+
+    name: str
+    library: str
+    is_function: bool
+
+
+@cache
+def stand_ins() -> dict[str, StandIn]:
+    """All of them by name, case-folded."""
+    found = [StandIn(name, library, True) for library, names in _FUNCTIONS.items() for name in names]
+    found += [StandIn(name, library, False) for library, names in _BLOCKS.items() for name in names]
+    for file, library in _FILES.items():
+        found += [StandIn(e.name, library, e.is_function) for e in standard_library().defined_in(file)]
+    return {stand_in.name.casefold(): stand_in for stand_in in found}
 
 
 def library_of_stand_in(name: str) -> str:
     """The library of the other system that has the name."""
-    key = name.casefold()
-    return _FUNCTIONS.get(key) or _BLOCKS.get(key) or ""
+    found = stand_ins().get(name.casefold())
+    return found.library if found else ""
 
 
 def uses_of_stand_ins(sources: Sequence[Source]) -> list[Use]:
@@ -42,15 +62,11 @@ def uses_of_stand_ins(sources: Sequence[Source]) -> list[Use]:
 def _uses(source: Source) -> Iterator[Use]:
     tokens = list(Lexer(source.text, lambda offset, code, message: None))
     for at, token in enumerate(tokens):
-        key = token.text.casefold()
-        if key in _FUNCTIONS:
-            used = _text(tokens, at + 1) == "(" and _begin(tokens, at) is not None
-        elif key in _BLOCKS:
-            begin = _begin(tokens, at)
-            used = begin is not None and _text(tokens, begin - 1) in _BEFORE_TYPES
-        else:
+        found = stand_ins().get(token.text.casefold())
+        begin = _begin(tokens, at) if found else None
+        if found is None or begin is None:
             continue
-        if used:
+        if _text(tokens, at + 1) == "(" if found.is_function else _text(tokens, begin - 1) in _BEFORE_TYPES:
             yield Use(token.text, source.path, source.pos(token.pos).line)
 
 

@@ -66,16 +66,29 @@ def production_pieces(image: bytes, board: Board, firmware: Firmware | None) -> 
 
 
 def _check_apart(firmware: Firmware, flash: Flash, address: int) -> None:
-    """The firmware is nowhere in the flash for programs, which is at an address of the processor."""
-    end = address + flash.size
+    """The firmware is nowhere in the sectors for programs and logs of the flash, which is at an address of the
+    processor; beside them it may be, in a chip that has one flash for all."""
+    used = _used(flash, address)
     for segment in firmware.segments:
-        if segment.address < end and address < segment.end:
+        over = next((run for run in used if segment.address < run[1] and run[0] < segment.end), None)
+        if over is not None:
             raise UsageError(
                 f"The firmware at 0x{segment.address:08X} to 0x{segment.end - 1:08X} is over the flash for programs at "
-                f"0x{address:08X} to 0x{end - 1:08X}; give the firmware less room in its "
+                f"0x{over[0]:08X} to 0x{over[1] - 1:08X}; give the firmware less room in its "
                 "linker script, or the programs another BOARD_FLASH_ADDRESS.",
                 "overlap",
             )
+
+
+def _used(flash: Flash, address: int) -> list[tuple[int, int]]:
+    """Where programs and logs are: begin and end of each run of sectors."""
+    runs: list[tuple[int, int]] = []
+    for file in sorted(flash.files, key=lambda file: file.offset):
+        begin, end = address + file.offset, address + file.offset + file.size
+        if runs and runs[-1][1] == begin:
+            begin = runs.pop()[0]
+        runs.append((begin, end))
+    return runs
 
 
 def _flash_pieces(image: bytes, board: Board) -> Iterator[Piece]:

@@ -9,14 +9,17 @@ from plctool.io.local import read_local
 from plctool.io.modbus import read_modbus
 from plctool.io.model import Connector, Context
 from plctool.io.sim import read_sim
+from plctool.io.sysfs import read_iio, read_pwm
 from plctool.io.tables import Table
 
 Kind = Callable[[Table, Context], list[Connector]]
 
 KINDS: dict[str, Kind] = {
     "gpio": read_gpio,
+    "iio": read_iio,
     "local": read_local,
     "modbus": read_modbus,
+    "pwm": read_pwm,
     "sim": read_sim,
 }
 """What reads the table `[NAME]`, or each of `[[NAME]]`. A kind that has tables in its table, such as [[modbus.rs485]],

@@ -54,6 +54,10 @@ void ClockInit(void);
 /* Calls back every millisecond, above all tasks. */
 void ClockSetCallback(void (*callback)(RTS_I64 now_ns));
 
+/* For a board whose processor stands still at times, as while it erases the flash it runs from: `ms` ticks were missed. With
+ * interrupts masked. Cortex-M only: RISC-V has a counter that goes on. */
+void ClockSkip(RTS_UI32 ms);
+
 void SysTimerInit(void);
 void SysExceptInit(void);
 

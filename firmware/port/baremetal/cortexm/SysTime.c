@@ -45,6 +45,12 @@ void ClockSetCallback(void (*callback)(RTS_I64 now_ns))
     counted.on_tick = callback;
 }
 
+void ClockSkip(RTS_UI32 ms)
+{
+    counted.next_ns += (RTS_I64)ms * NS_PER_MS;
+    counted.ms += ms;
+}
+
 /* The time from `count` to the next tick, which comes when the counter reaches 0. */
 static inline RTS_UI32 until_tick(RTS_UI32 count)
 {

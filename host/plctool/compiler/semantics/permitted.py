@@ -188,7 +188,9 @@ class _Check:
         keyword = block.keyword
         allowed = SECTIONS[kind].get(keyword)
         if allowed is None:
-            self._error(block.pos, _wrong_section(kind, keyword))
+            empty = keyword == "VAR" and not block.decls and not block.qualifiers  # TwinCAT writes it into accessors
+            if not (empty and kind in _IN_INTERFACE.values()):
+                self._error(block.pos, _wrong_section(kind, keyword))
             return
         for word in sorted(block.qualifiers - allowed):
             self._error(block.pos, _wrong_qualifier(kind, keyword, word))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.missing_names import known_name_like
 from plctool.compiler.semantics.declarations.functions import Functions
 from plctool.compiler.semantics.declarations.inheritance import Hierarchy, check_class
 from plctool.compiler.semantics.declarations.type_declarations import TypeDeclarations
@@ -110,7 +110,7 @@ class Classes:
 
     def _no_such(self, offset: int, name: str, scope: Scope, what: str, unknown: bool) -> None:
         if unknown:
-            hint = did_you_mean(name, self._world.names.type_names())
+            hint = known_name_like(name, self._world.names.type_names())
             if hint:
                 scope.error(offset, "unknown", f"unknown {what} {name}{hint}")
             else:

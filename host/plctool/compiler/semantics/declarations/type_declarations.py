@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from enum import Flag, auto
 
-from plctool.compiler.diagnostics import did_you_mean
 from plctool.compiler.internal import note_position
+from plctool.compiler.missing_names import known_name_like
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.allocation import is_open
@@ -191,7 +191,7 @@ class TypeDeclarations:
             scope.error(spec.pos, "type", f"{spec.name} is for parameters of functions only")
         elif symbol is None and scope.lookup(spec.name) is None:
             upper = spec.name.upper()
-            hint = did_you_mean(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])
+            hint = known_name_like(spec.name, [*ELEMENTARY, *_STRINGS, *self._world.names.type_names()])
             hint = f"; write {TYPES[upper]}" if upper in TYPES else hint
             hint = scope.choices(spec.name) or hint
             if upper == "ENUM":

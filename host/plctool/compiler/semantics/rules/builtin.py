@@ -5,7 +5,7 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
-from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.missing_names import known_name_like
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, place_of, settle
 from plctool.compiler.semantics.generics import bounds_of, total_size
@@ -289,8 +289,8 @@ def function_hint(c: Checker, name: str) -> str:
     """`; did you mean ADD?` for an unknown function, else nothing: what the program has comes first."""
     return (
         conversion_hint(c, name.upper())
-        or did_you_mean(name, c.world.names.function_names())
-        or did_you_mean(name, [*_FUNCTIONS, *_OF_VARIABLES])
+        or known_name_like(name, c.world.names.function_names())
+        or known_name_like(name, [*_FUNCTIONS, *_OF_VARIABLES])
     )
 
 

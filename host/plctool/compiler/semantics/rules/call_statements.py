@@ -263,12 +263,38 @@ def _called(c: Checker, node: ast.Call) -> list[Statement]:
 
 
 def _function_statement(c: Checker, node: ast.Call) -> list[Statement]:
+    if _is_action_with_arguments(c, node):
+        return _action_call(c, node)
     e = call(c, node, None)
     if isinstance(e, Call):
         return [CallStatement(e, e.pos)]
     if e.type is not ERROR:
         c.warning(node.pos, "unused", "the result of this call is not used")
     return []
+
+
+def _is_action_with_arguments(c: Checker, node: ast.Call) -> bool:
+    if not isinstance(node.callee, ast.Member) or not any(a.value for a in node.args):
+        return False
+    bound = bound_member(c, node.callee, called=True)
+    return bound is not None and bound.callable is not None and bound.callable.decl.keyword is ast.Unit.ACTION
+
+
+def _action_call(c: Checker, node: ast.Call) -> list[Statement]:
+    """`fb.Action(in := e, out => p)`: the arguments are those of the block, which the action works on."""
+    callee, before, after = node.callee, list[Statement](), list[Statement]()
+    assert isinstance(callee, ast.Member)
+    for a in node.args:
+        if a.name is None:
+            c.error(a.pos, "arguments", f"{callee.name} is an action; write the name of the input, name := value")
+        elif a.value is not None:
+            own: ast.Expr = ast.Member(a.pos, callee.base, a.name, a.pos)
+            if a.negated:
+                own = ast.Unary(a.pos, ast.Operator.NOT, own)
+            target, value = (a.value, own) if a.output else (own, a.value)
+            statements = c.statement(ast.Assign(a.pos, [target], ast.Assigning.VALUE, value))
+            (after if a.output else before).extend(statements)
+    return [*before, *_function_statement(c, ast.Call(node.pos, callee, [])), *after]
 
 
 def enabled(

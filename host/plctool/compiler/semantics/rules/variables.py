@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.missing_names import known_name_like
 from plctool.compiler.semantics import sfc
 from plctool.compiler.semantics.checker import Checker, checks
 from plctool.compiler.semantics.conversions import error_value, load
@@ -180,7 +181,7 @@ def _unknown(c: Checker, node: ast.Name) -> Expr:
     if inside:
         return c.error(node.pos, "unknown", f"unknown name {node.name}; write {' or '.join(inside)}")
     names = [*(s for s in c.scope.names), *c.world.names.visible_names()]
-    hint = did_you_mean(node.name, {_written(c, n) for n in names} - {""})
+    hint = known_name_like(node.name, {_written(c, n) for n in names} - {""})
     if node.name and not hint:
         return c.missing(node.pos, node.name, f"unknown name {node.name}")
     return c.error(node.pos, "unknown", f"unknown name {node.name}{hint}" if node.name else "a name is missing")

@@ -1,0 +1,704 @@
+/*
+ * IoDrvSysfs.c - driver of what the kernel has as files with one number: analog values (IIO) and PWM.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * To read such a file may take as long as a conversion (125 ms at 8 samples a second) or a time-out of the bus. So each
+ * device has a thread that does nothing else: tasks and main copy from and to DEVICE.value only. What the thread works on
+ * (`work`) is its own; it takes over what main wants (`setup`) between two rounds, and is never waited for but at the end
+ * of the runtime. A device that is pulled is lost with its first error, and back with the first round without one.
+ */
+#define _GNU_SOURCE
+#include "IoDrvSysfs.h"
+
+#include "CmpIoMgrEmbedded.h"
+#include "SysAtomic.h"
+#include "SysLock.h"
+#include "SysTime.h"
+#include "rts_config.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { DEVICES = 8, NAME_SIZE = 64, PATH_SIZE = 256, TEXT_SIZE = 32, END_MS = 500, TIMEOUT_MS = 3000 };
+
+typedef struct {
+    char name[NAME_SIZE];
+    RTS_UI32 options;
+    RTS_UI32 period_ns;
+} CHANNEL;
+
+typedef struct {
+    char device[NAME_SIZE];
+    RTS_UI32 kind;
+    RTS_UI32 every_ms;
+    RTS_UI32 count;
+    CHANNEL channel[IO_SYSFS_CHANNELS];
+} SETUP;
+
+typedef struct {
+    RTS_UI32 user; /* index of its connector + 1; 0: not in use */
+    SETUP setup;   /* with `serial` and `value`: within SysLock */
+    RTS_UI32 serial;
+    RTS_UI32 value[IO_SYSFS_CHANNELS];
+    RTS_UI32 rounds; /* good ones of this setup, and bad ones: the thread counts */
+    RTS_UI32 errors;
+    RTS_UI32 rounds_seen; /* by the cycle */
+    RTS_UI32 errors_seen;
+    RTS_UI32 heard_ms; /* when it last saw a round, good or bad */
+    RTS_UI32 is_awake; /* `wake` was posted */
+    RTS_UI32 is_ending;
+    RTS_UI32 has_thread;
+    sem_t wake;
+    pthread_t thread;
+    /* the thread's */
+    SETUP work;
+    char folder[PATH_SIZE];
+    RTS_UI32 written[IO_SYSFS_CHANNELS];
+    RTS_UI32 is_written; /* a bit for each channel: the device has `written` */
+} DEVICE;
+
+RTS_STATIC_ASSERT((int)IO_SYSFS_CHANNELS == 32, a_word_has_a_bit_for_each_channel);
+
+static DEVICE devices[DEVICES];
+static const char *sysfs = "/sys";
+
+static const ICmpIoDrv functions;
+static IO_DRIVER sysfs_driver = {.functions = &functions};
+
+void IoDrvSysfsSetRoot(const char *root)
+{
+    sysfs = root;
+}
+
+static const IoDrvInfo *get_info(void)
+{
+    static const IoDrvInfo info = {"IoDrvSysfs", "Analog values and PWM of the kernel", "Open PLC runtime", 0x00010000};
+
+    return &info;
+}
+
+/* ---- files ---- */
+
+/* "" as the result of a path that is too long: there is no such file. */
+static const char *join(char path[PATH_SIZE], const char *folder, const char *name, const char *suffix)
+{
+    int length = snprintf(path, PATH_SIZE, "%s/%s%s", folder, name, suffix);
+
+    if (length < 0 || length >= PATH_SIZE)
+        path[0] = '\0';
+    return path;
+}
+
+static bool exists(const char *folder, const char *name, const char *suffix)
+{
+    char path[PATH_SIZE];
+
+    return access(join(path, folder, name, suffix), F_OK) == 0;
+}
+
+/* Without the end of the line. */
+static bool read_text(const char *path, char text[NAME_SIZE])
+{
+    int file = open(path, O_RDONLY | O_CLOEXEC);
+    ssize_t size = file >= 0 ? read(file, text, NAME_SIZE - 1) : -1;
+
+    if (file >= 0)
+        (void)close(file);
+    if (size < 0)
+        return false;
+    text[size] = '\0';
+    text[strcspn(text, "\n")] = '\0';
+    return true;
+}
+
+static bool write_text(const char *path, const char *text)
+{
+    int file = open(path, O_WRONLY | O_TRUNC | O_CLOEXEC);
+    ssize_t size = (ssize_t)strlen(text);
+    bool is_written = file >= 0 && write(file, text, (size_t)size) == size;
+
+    if (file >= 0)
+        (void)close(file);
+    return is_written;
+}
+
+static bool read_number(const char *folder, const char *name, const char *suffix, double *number)
+{
+    char path[PATH_SIZE];
+    char text[NAME_SIZE];
+    char *end = text;
+
+    if (!read_text(join(path, folder, name, suffix), text))
+        return false;
+    *number = strtod(text, &end);
+    return end != text && isfinite(*number);
+}
+
+static bool write_number(const char *folder, const char *name, const char *suffix, double number)
+{
+    char path[PATH_SIZE];
+    char text[TEXT_SIZE];
+
+    (void)snprintf(text, sizeof text, "%.0f\n", number);
+    return write_text(join(path, folder, name, suffix), text);
+}
+
+/* ---- devices ---- */
+
+/* The folder of an IIO device that has a name; of several, that with the lowest number. */
+static bool search_name(const char *base, const char *name, char folder[PATH_SIZE])
+{
+    DIR *list = opendir(base);
+    struct dirent *entry;
+    unsigned best = ~0u;
+
+    while (list != NULL && (entry = readdir(list)) != NULL) {
+        char path[PATH_SIZE];
+        char text[NAME_SIZE];
+        unsigned number;
+        if (sscanf(entry->d_name, "iio:device%u", &number) != 1 || number >= best)
+            continue;
+        if (read_text(join(path, join(folder, base, entry->d_name, ""), "name", ""), text) && strcmp(text, name) == 0)
+            best = number;
+    }
+    if (list != NULL)
+        (void)closedir(list);
+    if (best == ~0u)
+        return false;
+    (void)snprintf(folder, PATH_SIZE, "%s/iio:device%u", base, best);
+    return true;
+}
+
+/* Where a device is now; false: it is not there. */
+static bool find_folder(const SETUP *setup, char folder[PATH_SIZE])
+{
+    char base[PATH_SIZE];
+
+    join(base, sysfs, setup->kind == SYSFS_PWM ? "class/pwm" : "bus/iio/devices", "");
+    if (exists(base, setup->device, ""))
+        return *join(folder, base, setup->device, "") != '\0';
+    return setup->kind == SYSFS_IIO && search_name(base, setup->device, folder);
+}
+
+/* ---- IIO ---- */
+
+/* A factor of a channel: its own ("in_voltage0_scale"), or that of all of its type ("in_voltage_scale"). */
+static double get_factor(const char *folder, const char *channel, const char *suffix, double otherwise)
+{
+    char type[NAME_SIZE];
+    double factor;
+
+    if (read_number(folder, channel, suffix, &factor))
+        return factor;
+    (void)snprintf(type, sizeof type, "%s", channel);
+    type[strcspn(type, "0123456789")] = '\0';
+    return read_number(folder, type, suffix, &factor) ? factor : otherwise;
+}
+
+/* Numbers that a DINT has not become the nearest one. */
+static RTS_UI32 dint_of(double number)
+{
+    return (RTS_UI32)(RTS_I32)fmin(fmax(number, -2147483648.0), 2147483647.0);
+}
+
+static RTS_UI32 real_of(double number)
+{
+    float value = (float)number;
+    RTS_UI32 bits;
+
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+/* A value that is no number is 0. */
+static double number_of(RTS_UI32 bits)
+{
+    float value;
+
+    memcpy(&value, &bits, sizeof value);
+    return isfinite(value) ? (double)value : 0;
+}
+
+static bool read_iio(const char *folder, const CHANNEL *channel, RTS_UI32 *value)
+{
+    double number;
+
+    if (!read_number(folder, channel->name, "_raw", &number))
+        return false;
+    if ((channel->options & SYSFS_OPTION_REAL) == 0)
+        *value = dint_of(number);
+    else
+        *value = real_of((number + get_factor(folder, channel->name, "_offset", 0)) *
+                         get_factor(folder, channel->name, "_scale", 1));
+    return true;
+}
+
+static bool write_iio(const char *folder, const CHANNEL *channel, RTS_UI32 value)
+{
+    double scale;
+
+    if ((channel->options & SYSFS_OPTION_REAL) == 0)
+        return write_number(folder, channel->name, "_raw", (RTS_I32)value);
+    scale = get_factor(folder, channel->name, "_scale", 1);
+    if (scale == 0)
+        return false;
+    return write_number(folder, channel->name, "_raw",
+                        round(number_of(value) / scale - get_factor(folder, channel->name, "_offset", 0)));
+}
+
+/* ---- PWM ---- */
+
+/* The kernel refuses a duty cycle longer than the period at any moment, so the old one goes first. */
+static bool set_period(const char *pwm, RTS_UI32 period_ns)
+{
+    double now;
+
+    if (!read_number(pwm, "period", "", &now))
+        return false;
+    if (now == period_ns)
+        return true;
+    if (now > 0 && !write_number(pwm, "duty_cycle", "", 0))
+        return false;
+    return write_number(pwm, "period", "", period_ns);
+}
+
+static bool is_exported(const char *folder, const CHANNEL *channel)
+{
+    return exists(folder, channel->name, "") ||
+           write_number(folder, "export", "", (double)strtoul(channel->name + strlen("pwm"), NULL, 10));
+}
+
+static bool write_pwm(const char *folder, const CHANNEL *channel, RTS_UI32 value)
+{
+    double percent = fmin(fmax(number_of(value), 0), 100);
+    char pwm[PATH_SIZE];
+    double enabled;
+
+    join(pwm, folder, channel->name, "");
+    return is_exported(folder, channel) && set_period(pwm, channel->period_ns) &&
+           write_number(pwm, "duty_cycle", "", round(channel->period_ns * percent / 100)) &&
+           read_number(pwm, "enable", "", &enabled) && (enabled == 1 || write_number(pwm, "enable", "", 1));
+}
+
+/* ---- the thread of a device ---- */
+
+/* What main wants, if that is new. */
+static void take_setup(DEVICE *device, RTS_UI32 *serial)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    if (*serial != device->serial) {
+        *serial = device->serial;
+        device->work = device->setup;
+        device->is_written = 0;
+    }
+    SysLockLeave(lock);
+}
+
+static bool write_output(DEVICE *device, RTS_UI32 n, RTS_UI32 value)
+{
+    const CHANNEL *channel = &device->work.channel[n];
+
+    if ((device->is_written >> n & 1) != 0 && device->written[n] == value)
+        return true;
+    if (!(device->work.kind == SYSFS_PWM ? write_pwm : write_iio)(device->folder, channel, value))
+        return false;
+    device->written[n] = value;
+    device->is_written |= 1u << n;
+    return true;
+}
+
+/* All channels once; inputs come to the tasks together. */
+static bool do_round(DEVICE *device, RTS_UI32 serial)
+{
+    RTS_UI32 value[IO_SYSFS_CHANNELS];
+    bool is_good = find_folder(&device->work, device->folder);
+    RTS_UI32 lock = SysLockEnter();
+    RTS_UI32 n;
+
+    memcpy(value, device->value, sizeof value);
+    SysLockLeave(lock);
+    for (n = 0; n < device->work.count && is_good; n++) {
+        bool is_output = (device->work.channel[n].options & SYSFS_OPTION_OUT) != 0;
+        is_good = is_output ? write_output(device, n, value[n])
+                            : read_iio(device->folder, &device->work.channel[n], &value[n]);
+    }
+    lock = SysLockEnter();
+    for (n = 0; is_good && serial == device->serial && n < device->work.count; n++) {
+        if ((device->work.channel[n].options & SYSFS_OPTION_OUT) == 0)
+            device->value[n] = value[n];
+    }
+    if (serial == device->serial)
+        (void)SysAtomicAdd(is_good ? &device->rounds : &device->errors, 1);
+    SysLockLeave(lock);
+    if (!is_good)
+        device->is_written = 0; /* it may have been away */
+    return is_good;
+}
+
+static void sleep_or_wake(DEVICE *device, RTS_UI32 ms)
+{
+    struct timespec until;
+
+    (void)clock_gettime(CLOCK_MONOTONIC, &until);
+    until.tv_sec += ms / 1000;
+    until.tv_nsec += (long)(ms % 1000) * 1000000;
+    if (until.tv_nsec >= 1000000000) {
+        until.tv_sec++;
+        until.tv_nsec -= 1000000000;
+    }
+    while (sem_clockwait(&device->wake, CLOCK_MONOTONIC, &until) != 0 && errno == EINTR) {
+    }
+    SysAtomicStore(&device->is_awake, 0);
+}
+
+static void *run(void *arg)
+{
+    DEVICE *device = arg;
+    RTS_UI32 serial = 0;
+    bool is_last = false;
+
+    while (!is_last) {
+        is_last = SysAtomicLoad(&device->is_ending) != 0; /* what outputs have become is written once more */
+        take_setup(device, &serial);
+        if (device->work.count > 0)
+            (void)do_round(device, serial);
+        if (!is_last)
+            sleep_or_wake(device, device->work.count > 0 ? device->work.every_ms : 1000);
+    }
+    return NULL;
+}
+
+static void wake(DEVICE *device)
+{
+    if (SysAtomicReplace(&device->is_awake, 0, 1))
+        (void)sem_post(&device->wake);
+}
+
+static RTS_RESULT start_thread(DEVICE *device)
+{
+    if (device->has_thread)
+        return ERR_OK;
+    device->is_ending = 0;
+    if (sem_init(&device->wake, 0, 0) != 0)
+        return ERR_FAILED;
+    device->has_thread = pthread_create(&device->thread, NULL, run, device) == 0;
+    return device->has_thread ? ERR_OK : ERR_FAILED;
+}
+
+/* One that hangs in the kernel is not waited for: the process ends. */
+static void end_thread(DEVICE *device)
+{
+    struct timespec until;
+
+    if (!device->has_thread)
+        return;
+    SysAtomicStore(&device->is_ending, 1);
+    (void)sem_post(&device->wake);
+    (void)clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_sec += (until.tv_nsec + END_MS * 1000000L) / 1000000000;
+    until.tv_nsec = (until.tv_nsec + END_MS * 1000000L) % 1000000000;
+    if (pthread_timedjoin_np(device->thread, NULL, &until) != 0)
+        (void)pthread_detach(device->thread);
+    else
+        (void)sem_destroy(&device->wake);
+    device->has_thread = 0;
+}
+
+/* ---- configuration ---- */
+
+static RTS_UI32 get_number(const IoConfigConnector *connector, RTS_UI32 id)
+{
+    return IoMgrConfigGetParameterValueDword(IoMgrConfigGetParameter(connector, id), NULL);
+}
+
+static const char *get_text(const IoConfigConnector *connector, RTS_UI32 id)
+{
+    return IoMgrConfigGetParameterValueText(IoMgrConfigGetParameter(connector, id));
+}
+
+/* A name that leads out of the folder of its device is none. */
+static bool take_name(char to[NAME_SIZE], const char *name)
+{
+    if (name == NULL || name[0] == '\0' || name[0] == '.' || strchr(name, '/') != NULL || strlen(name) >= NAME_SIZE)
+        return false;
+    (void)strcpy(to, name);
+    return true;
+}
+
+/* Its channels; false: the configuration has no sense. */
+static bool read_setup(const IoConfigConnector *connector, SETUP *setup)
+{
+    memset(setup, 0, sizeof *setup);
+    setup->kind = get_number(connector, SYSFS_KIND);
+    setup->every_ms = get_number(connector, SYSFS_EVERY);
+    if (!take_name(setup->device, get_text(connector, SYSFS_DEVICE)) || setup->every_ms == 0 ||
+        (setup->kind != SYSFS_IIO && setup->kind != SYSFS_PWM))
+        return false;
+    while (setup->count < IO_SYSFS_CHANNELS &&
+           IoMgrConfigGetParameter(connector, SYSFS_CHANNEL + setup->count) != NULL) {
+        CHANNEL *channel = &setup->channel[setup->count];
+        if (!take_name(channel->name, get_text(connector, SYSFS_CHANNEL + setup->count)))
+            return false;
+        channel->options = get_number(connector, SYSFS_OPTIONS + setup->count);
+        channel->period_ns = get_number(connector, SYSFS_PERIOD + setup->count);
+        if (setup->kind == SYSFS_PWM && ((channel->options & SYSFS_OPTION_OUT) == 0 || channel->period_ns == 0 ||
+                                         strncmp(channel->name, "pwm", strlen("pwm")) != 0))
+            return false;
+        setup->count++;
+    }
+    return setup->count > 0;
+}
+
+/* The channel that a device has not; NULL: it has all. */
+static const char *find_missing(const SETUP *setup, const char *folder)
+{
+    RTS_UI32 n;
+
+    for (n = 0; n < setup->count; n++) {
+        const char *name = setup->channel[n].name;
+        double count;
+        bool is_there = setup->kind == SYSFS_IIO ? exists(folder, name, "_raw")
+                                                 : read_number(folder, "npwm", "", &count) &&
+                                                       strtoul(name + strlen("pwm"), NULL, 10) < count;
+        if (!is_there)
+            return name;
+    }
+    return NULL;
+}
+
+/* The device that a connector had before the download, else one that is free: a thread that still hangs in an old device
+ * keeps no other waiting. */
+static DEVICE *choose(const SETUP *setup)
+{
+    DEVICE *best = NULL;
+    DEVICE *device;
+
+    for (device = devices; device < devices + DEVICES; device++) {
+        if (device->user != 0)
+            continue;
+        if (strcmp(device->setup.device, setup->device) == 0)
+            return device;
+        if (best == NULL || (best->setup.device[0] != '\0' && device->setup.device[0] == '\0'))
+            best = device;
+    }
+    return best;
+}
+
+/* Outputs of a device that stays the same keep their values until a task writes them. */
+static void give_setup(DEVICE *device, const SETUP *setup)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    if (memcmp(&device->setup, setup, sizeof *setup) != 0)
+        memset(device->value, 0, sizeof device->value);
+    device->setup = *setup;
+    device->serial++;
+    device->rounds = device->rounds_seen = 0;
+    device->errors = device->errors_seen = 0;
+    device->heard_ms = SysTimeGetMs();
+    SysLockLeave(lock);
+}
+
+static RTS_RESULT configure(const IoConfigConnector *connector)
+{
+    static SETUP setup;
+    char folder[PATH_SIZE];
+    const char *missing;
+    DEVICE *device;
+
+    if (!read_setup(connector, &setup))
+        return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its description is incomplete.");
+    if (!find_folder(&setup, folder))
+        return IoMgrConfigRefuse(connector, ERR_NO_OBJECT, "the kernel has no device %s.", setup.device);
+    missing = find_missing(&setup, folder);
+    if (missing != NULL)
+        return IoMgrConfigRefuse(connector, ERR_NO_OBJECT, "%s has no channel %s.", setup.device, missing);
+    device = choose(&setup);
+    if (device == NULL)
+        return IoMgrConfigRefuse(connector, ERR_NOMEMORY, "there can be %u such devices.", (unsigned)DEVICES);
+    give_setup(device, &setup);
+    if (start_thread(device) != ERR_OK)
+        return IoMgrConfigRefuse(connector, ERR_FAILED, "the system gives no thread for it.");
+    device->user = IoMgrConfigGetIndex(connector) + 1;
+    return ERR_OK;
+}
+
+/* What is not used any more is not touched any more. */
+static void release_unused(void)
+{
+    static const SETUP none;
+    DEVICE *device;
+
+    for (device = devices; device < devices + DEVICES; device++) {
+        if (device->user == 0 && device->setup.count > 0)
+            give_setup(device, &none);
+    }
+}
+
+static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int count)
+{
+    RTS_RESULT result = ERR_OK;
+    DEVICE *device;
+
+    for (device = devices; device < devices + DEVICES; device++)
+        device->user = 0;
+    if (count == 0)
+        return ERR_OK; /* the next application, of the same download, may keep its devices */
+    for (; count > 0 && result == ERR_OK; count--, connectors++) {
+        if (IoMgrConfigIsMine(connectors, &sysfs_driver))
+            result = configure(connectors);
+    }
+    release_unused();
+    return result;
+}
+
+static DEVICE *find_device(RTS_UI32 connector)
+{
+    DEVICE *device = devices;
+
+    while (device < devices + DEVICES && device->user != connector + 1)
+        device++;
+    return device < devices + DEVICES ? device : NULL;
+}
+
+static RTS_RESULT check_channel(const IoConfigConnector *connector, const IoConfigChannelMap *channel, RTS_UI32 type)
+{
+    const DEVICE *device = find_device(IoMgrConfigGetIndex(connector));
+    RTS_UI32 n = channel->parameter - SYSFS_VALUE;
+
+    if (device != NULL && n < device->setup.count && channel->bits <= 32 &&
+        channel->parameter_bit <= 32u - channel->bits &&
+        ((device->setup.channel[n].options & SYSFS_OPTION_OUT) != 0) == (type == IO_MAP_OUTPUTS))
+        return ERR_OK;
+    return IoMgrConfigRefuse(connector, ERR_OUT_OF_LIMITS, "it has no channel %u.%u.", (unsigned)channel->parameter,
+                             (unsigned)channel->parameter_bit);
+}
+
+/* Connectors that are refused here, and optional, have no driver any more. */
+static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
+{
+    RTS_RESULT result = IoMgrConfigEachChannel(task_maps, count, &sysfs_driver, check_channel);
+    DEVICE *device;
+
+    for (device = devices; device < devices + DEVICES; device++) {
+        if (device->user != 0 && !IoMgrConfigIsMine(IoMgrConfigGetConnector(device->user - 1), &sysfs_driver))
+            device->user = 0;
+    }
+    return result;
+}
+
+/* ---- cycles ---- */
+
+static RTS_RESULT read_inputs(const IoConfigConnectorMap *maps, int count)
+{
+    RTS_UI32 lock = SysLockEnter();
+
+    for (; count > 0; count--, maps++) {
+        const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(maps);
+        const DEVICE *device = find_device(maps->connector);
+        RTS_UI32 channels = device != NULL ? maps->channel_map_count : 0;
+        for (; channels > 0; channels--, channel++)
+            IoMgrCopyInputLE(channel, &device->value[channel->parameter - SYSFS_VALUE]);
+    }
+    SysLockLeave(lock);
+    return ERR_OK;
+}
+
+/* Copies, and says whether one has changed. */
+static bool copy_outputs(DEVICE *device, const IoConfigConnectorMap *map)
+{
+    const IoConfigChannelMap *channel = IoMgrConfigGetChannelMaps(map);
+    RTS_UI32 channels = map->channel_map_count;
+    bool has_changed = false;
+
+    for (; channels > 0; channels--, channel++) {
+        RTS_UI32 *value = &device->value[channel->parameter - SYSFS_VALUE];
+        RTS_UI32 before = *value;
+        IoMgrCopyOutputLE(channel, value);
+        has_changed = has_changed || *value != before;
+    }
+    return has_changed;
+}
+
+static RTS_RESULT write_outputs(const IoConfigConnectorMap *maps, int count)
+{
+    for (; count > 0; count--, maps++) {
+        DEVICE *device = find_device(maps->connector);
+        RTS_UI32 lock = SysLockEnter();
+        bool has_changed = device != NULL && copy_outputs(device, maps);
+        SysLockLeave(lock);
+        if (has_changed)
+            wake(device);
+    }
+    return ERR_OK;
+}
+
+/* The kernel does not come back from a device. */
+static void lose_silent(DEVICE *device, const IoConfigConnector *connector)
+{
+    device->heard_ms = SysTimeGetMs();
+    IoMgrConfigSetDiagnosis(connector, CF_CONNECTOR_BUS_ERROR);
+}
+
+/* What the thread has found out since the last time. */
+static RTS_RESULT start_bus_cycle(const IoConfigConnector *connector)
+{
+    DEVICE *device = find_device(IoMgrConfigGetIndex(connector));
+    RTS_UI32 errors;
+    RTS_UI32 rounds;
+
+    if (device == NULL)
+        return ERR_OK;
+    errors = SysAtomicLoad(&device->errors);
+    rounds = SysAtomicLoad(&device->rounds);
+    if (errors != device->errors_seen || rounds != device->rounds_seen)
+        device->heard_ms = SysTimeGetMs();
+    if (errors != device->errors_seen)
+        IoMgrConfigSetDiagnosis(connector, CF_CONNECTOR_BUS_ERROR);
+    else if (rounds != device->rounds_seen)
+        IoMgrConfigNoteData(connector);
+    else if (SysTimeGetMs() - device->heard_ms > device->setup.every_ms + TIMEOUT_MS)
+        lose_silent(device, connector);
+    device->errors_seen = errors;
+    device->rounds_seen = rounds;
+    return ERR_OK;
+}
+
+static const ICmpIoDrv functions = {
+    .IoDrvGetInfo = get_info,
+    .IoDrvUpdateConfiguration = update_configuration,
+    .IoDrvUpdateMapping = update_mapping,
+    .IoDrvReadInputs = read_inputs,
+    .IoDrvWriteOutputs = write_outputs,
+    .IoDrvStartBusCycle = start_bus_cycle,
+};
+
+RTS_RESULT IoDrvSysfs_Hook(CMP_HOOK hook)
+{
+    DEVICE *device;
+
+    switch (hook) {
+    case CH_INIT2:
+        return IoMgrRegisterInstance(&sysfs_driver);
+    case CH_COMM_CYCLE:
+        release_unused();
+        return ERR_OK;
+    case CH_EXIT2:
+        for (device = devices; device < devices + DEVICES; device++)
+            end_thread(device);
+        return IoMgrUnregisterInstance(&sysfs_driver);
+    default:
+        return ERR_OK;
+    }
+}

@@ -1,0 +1,29 @@
+"""A plcrt on the kernel of the virtual machine, and programs with a description."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from plctool.compiler import IoFiles, compile_sources
+from plctool.device import Plc, connect
+from plctool.testing.plcrt import Plcrt
+
+
+@pytest.fixture(scope="module")
+def image(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """PROGRAM with DESCRIPTION of the module that asks."""
+    folder = tmp_path_factory.mktemp("program")
+    (folder / "main.st").write_text(request.module.PROGRAM)
+    (folder / "main.io.toml").write_text(request.module.DESCRIPTION)
+    compile_sources([folder / "main.st"], io=IoFiles(device=None)).write(folder / "main.cdl")
+    return folder / "main.cdl"
+
+
+@pytest.fixture
+def plc(tmp_path: Path) -> Iterator[Plc]:
+    """By TCP, which needs no gateway: to start one takes an emulated processor long."""
+    with Plcrt(tmp_path / "plc.flash", "--tcp", "0") as plcrt, connect(f"tcp:{plcrt.tcp}") as plc:
+        yield plc
