@@ -55,6 +55,9 @@ void AppGetStatus(APP_STATUS *status);
  * description, 4 profile. Valid until the next call; cut to APP_NAME_SIZE. */
 const char *AppGetInfo(RTS_UI32 index);
 
+/* Reads from the image of the application. ERR_APP_NOT_LOADED without one, ERR_OUT_OF_LIMITS past its end, ERR_DEVICE. */
+RTS_RESULT AppReadImage(RTS_UI32 offset, void *data, RTS_UI32 size);
+
 #ifndef RTS_CFFI
 RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook);
 #endif

@@ -87,6 +87,7 @@ enum {
     CMPID_CmpUserMgr = 0x0027,
     CMPID_RunLamp = 0x0028,
     CMPID_IoDrvSysfs = 0x0029,
+    CMPID_CmpFileTransfer = 0x002A,
 };
 
 /* Name of a component, "" when unknown. */

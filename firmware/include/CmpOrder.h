@@ -68,6 +68,9 @@ X(CmpDevice)
 #if HAS_CmpPlcShell
 X(CmpPlcShell)
 #endif
+#if HAS_CmpFileTransfer
+X(CmpFileTransfer)
+#endif
 #if HAS_CmpBlkDrvSimpleCom
 X(CmpBlkDrvSimpleCom)
 #endif

@@ -334,6 +334,18 @@ typedef struct {
     WIRE_UI32 slot; /* address on the bus */
 } IO_MODULE;
 
+/* TAG_FILE_CONTENT. */
+typedef struct {
+    WIRE_UI32 crc;
+    WIRE_UI32 size;
+} FILE_CONTENT;
+
+/* TAG_FILE_POSITION, then the data of a download. */
+typedef struct {
+    WIRE_UI32 handle;
+    WIRE_UI32 offset;
+} FILE_POSITION;
+
 #ifndef RTS_CFFI
 #define WIRE_SIZE(layout, size) RTS_STATIC_ASSERT(sizeof(layout) == (size), layout##_has_no_padding)
 WIRE_SIZE(ROUTER_HEADER, 6);
@@ -367,6 +379,8 @@ WIRE_SIZE(LOG_RECORD, 16);
 WIRE_SIZE(IO_STATE, 20);
 WIRE_SIZE(IO_PARAMETER, 16);
 WIRE_SIZE(IO_MODULE, 16);
+WIRE_SIZE(FILE_CONTENT, 8);
+WIRE_SIZE(FILE_POSITION, 8);
 #undef WIRE_SIZE
 
 /* Head of a block that begins a message. */

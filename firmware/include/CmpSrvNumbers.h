@@ -134,6 +134,7 @@ enum {
     SG_DEVICE = 1,
     SG_APPLICATION = 2,
     SG_LOG = 5,
+    SG_FILE_TRANSFER = 8,
     SG_IOMGR = 0x0B,
     SG_USERMGR = 0x0C,
     SG_PLCSHELL = 0x11,
@@ -146,6 +147,8 @@ enum {
     SRV_DEV_LOGIN = 2,
     SRV_DEV_LOGOUT = 3,
     SRV_DEV_ECHO = 5,
+    SRV_DEV_SET_OPERATION_MODE = 6,
+    SRV_DEV_GET_OPERATION_MODE = 7,
     SRV_DEV_SESSION_CREATE = 0x0A,
     TAG_DEV_LOGOUT_REPLY = 0x00,
     TAG_DEV_LOGOUT_SESSION = 0x01,
@@ -155,6 +158,7 @@ enum {
     TAG_DEV_NODE_NAME = 0x04,
     TAG_DEV_RESULT = 0x05,
     TAG_DEV_RTS_VERSION = 0x06,
+    TAG_DEV_FLAGS = 0x07,
     TAG_DEV_MAX_CHANNELS = 0x08,
     TAG_DEV_SERIAL_NUMBER = 0x09,
     TAG_DEV_STACK = 0x60,     /* own */
@@ -171,10 +175,14 @@ enum {
     TAG_DEV_ECHO_LENGTH = 0x51,
     TAG_DEV_ECHO_REPLY_LENGTH = 0x52,
     TAG_DEV_ECHO_DATA = 0x53,
+    TAG_DEV_OPERATION_MODE = 0x54,
+    TAG_DEV_ONLINE_ACCESS = 0xFF82,
     TAG_DEV_CLIENT_INFO = 0x83,
     DEV_CRYPT_XOR = 1,
+    DEV_CRYPT_ASYMMETRIC = 2,
     DEV_CRYPT_PROOF = 0x100, /* own: DEV_CHALLENGE and DEV_PROOF */
     DEV_SETTING_MONITOR2 = 4,
+    DEV_MODE_DEBUG = 1, /* of TAG_DEV_OPERATION_MODE */
 };
 
 /* Application services and tags (4.6). */
@@ -196,6 +204,7 @@ enum {
     TAG_APP_OPTION = 0x10,
     TAG_APP_SESSION = 0x11,
     TAG_APP_STATUS = 0x82,
+    TAG_APP_OPERATION_MODE = 0x32,
     TAG_APP_STATE = 0x13,
     TAG_APP_EXECUTION_POSITION = 0x14,
     TAG_APP_LAST_EXCEPTION = 0x40, /* own */
@@ -290,6 +299,8 @@ enum {
 /* Log (4.10). */
 enum {
     SRV_LOG_GET_ENTRIES = 1,
+    SRV_LOG_GET_COMPONENT = 2,
+    SRV_LOG_GET_LOGGERS = 3,
     TAG_LOG_NAME = 0x01,
     TAG_LOG_START_HANDLE = 0x02,
     TAG_LOG_COUNT = 0x04,
@@ -299,6 +310,37 @@ enum {
     TAG_LOG_ENTRY = 0x03,
     TAG_LOG_TEXT = 0x04,
     TAG_LOG_COMPONENT_NAME = 0x05,
+};
+
+/* Files (4.12): "upload" goes to the client, "download" to the device. */
+enum {
+    SRV_FILE_INFO = 1,
+    SRV_FILE_START_DOWNLOAD = 2,
+    SRV_FILE_DOWNLOAD = 4,
+    SRV_FILE_START_UPLOAD = 5,
+    SRV_FILE_UPLOAD = 7,
+    SRV_FILE_END = 8,
+    SRV_FILE_CANCEL = 9,
+    SRV_FILE_DIRECTORY = 0x0C,
+    SRV_FILE_DELETE = 0x0E,
+    TAG_FILE_NAME = 0x01,
+    TAG_FILE_CONTENT = 0x02,
+    TAG_FILE_HANDLE = 0x03,
+    TAG_FILE_POSITION = 0x05,
+    TAG_FILE_COUNT = 0x06,
+    TAG_FILE_END = 0x07,
+    TAG_FILE_RESULT = 0x08,
+    TAG_FILE_PATH = 0x0B,
+    TAG_FILE_ENTRY_NAME = 0x0E,
+    TAG_FILE_ENTRY_CONTENT = 0x0F,
+    TAG_FILE_ENTRY_FIXED = 0x60, /* own */
+    TAG_FILE_ROOM = 0x60,        /* own */
+    TAG_FILE_START = 0x61,       /* own */
+    TAG_FILE_DESCRIPTION = 0x81,
+    TAG_FILE_STARTED = 0x84,
+    TAG_FILE_LIST = 0x8D,
+    TAG_FILE_ENTRY = 0x90,
+    FILE_NAME_MAX = 32, /* characters */
 };
 
 /* PLC shell (4.15). */

@@ -49,6 +49,9 @@ typedef struct {
     bool fresh;            /* no block has arrived yet */
     bool open_due;         /* the open response is waiting for room in the driver */
     bool ack_due;
+#if SRV_OTHER_CLIENTS
+    bool is_version_1_0; /* of the open request: shorter */
+#endif
     bool missing_due;    /* the acknowledgement asks for a repetition */
     RTS_UI32 request_id; /* of the open request */
     RTS_UI32 limit;      /* largest message, both directions */

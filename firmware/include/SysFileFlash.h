@@ -17,6 +17,10 @@
 /* The files. Commit and retain are record logs (SysFlashLog.h). */
 enum { FILE_SLOT_A = 0, FILE_SLOT_B = 1, FILE_COMMIT = 2, FILE_RETAIN = 3, FILE_COUNT = 4 };
 
+/* With FILE_STORE_FILES also those of FileStore.h, at the end of the flash; the catalog is a record log. They have no
+ * bytes where FILE_STORE_SIZE is too small. */
+enum { FILE_CATALOG = 4, FILE_STORE = 5 };
+
 /* Bytes that are programmed at a time; all program sizes divide it. */
 enum { FILE_ALIGN = 16 };
 #define SysFileAlign(size) (((size) + FILE_ALIGN - 1) & ~(RTS_UI32)(FILE_ALIGN - 1))
@@ -49,6 +53,9 @@ const FILE_AREA *SysFileGetArea(RTS_UI32 file);
 
 /* Opens for writing from the start; erases as it goes. */
 void SysFileCreate(RTS_UI32 file);
+
+/* Opens for writing at `position`, a multiple of the sector size; erases as it goes. */
+void SysFileCreateAt(RTS_UI32 file, RTS_UI32 position);
 
 /* Opens for writing at `position`, a multiple of FILE_ALIGN, of what is erased already. */
 void SysFileAppend(RTS_UI32 file, RTS_UI32 position);

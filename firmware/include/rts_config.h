@@ -365,6 +365,12 @@
 #define COM_MAX_LINES 1
 #endif
 
+/* 1: frames whose CRC has its high byte first are taken, too: what is public about the protocol does not agree on the
+ * order. What is sent has the low byte first. Twice as many damaged frames (1 in 32 768) are not found by the CRC. */
+#ifndef COM_CRC_EITHER_ORDER
+#define COM_CRC_EITHER_ORDER 0
+#endif
+
 /* Queue of outgoing packets per serial line, bytes: one largest packet (516 with length and CRC, or
  * NETSERVER_MESSAGE_SIZE + 92 if that is less) and a few small ones. A second large one is made when the first is on
  * the line. */
@@ -438,6 +444,18 @@
 #define MODBUS_RECONNECT_MS 1000
 #endif
 
+/* Files that tools keep on the device (CmpFileTransfer; docs/protocol.md): symbols and sources of the program, and others.
+ * 52 bytes of RAM and of each record of the catalog for each. 0: none. */
+#ifndef FILE_STORE_FILES
+#define FILE_STORE_FILES 0
+#endif
+
+/* The end of the flash that they have, bytes, in sectors of the smallest size: two of them for the catalog, the others for
+ * the files. The programs have the flash before it. */
+#ifndef FILE_STORE_SIZE
+#define FILE_STORE_SIZE 0u
+#endif
+
 /* Service groups of layer 7; three words each. */
 #ifndef SRV_MAX_GROUPS
 #define SRV_MAX_GROUPS 8
@@ -447,6 +465,12 @@
  * service; 1.3 KiB of flash. 0: none. */
 #ifndef SRV_INFORMATION
 #define SRV_INFORMATION 1
+#endif
+
+/* 1: what clients of others ask for, and plctool does not: operation mode, names of loggers and components, refusals in
+ * the places where they look for them (docs/compatibility.md); 400 bytes of flash. */
+#ifndef SRV_OTHER_CLIENTS
+#define SRV_OTHER_CLIENTS 0
 #endif
 
 /* Whether a password can be set (CmpUserMgr; docs/security.md): 1.8 KiB of flash, 60 bytes of RAM and 44 of each client, 52

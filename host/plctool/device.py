@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import sys
 import time
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
@@ -20,8 +22,9 @@ from plctool.gateway.frames import BUSY
 from plctool.gateway.place import NoGateway
 from plctool.iec.types import Type
 from plctool.iec.values import decode, encode
-from plctool.link import io_services, services
+from plctool.link import file_services, io_services, services
 from plctool.link.connection import SCAN_SECONDS, Choice, Connection, MessageLink, no_answer
+from plctool.link.file_services import SYMBOLS_NAME, FileList, Progress
 from plctool.link.io_services import IoDevice, IoModule
 from plctool.link.monitoring import APP_CHANGED, AreaRange, Contents, Write, read_memory, write_memory
 from plctool.link.names import Node
@@ -167,6 +170,24 @@ class Plc(Controller):
         own."""
         services.set_password(self._session, password)
 
+    # ---- files ----
+
+    def files(self) -> FileList:
+        """What the controller keeps for its tools, and what it makes itself: its program and its log."""
+        return file_services.list_files(self._session)
+
+    def read_file(self, name: str, progress: Progress = lambda done, total: None) -> bytes:
+        """The content of a file of the controller. Raises DeviceError if there is none."""
+        return file_services.read_file(self._session, name, progress)
+
+    def write_file(self, name: str, data: bytes, progress: Progress = lambda done, total: None) -> None:
+        """Puts a file onto the controller, in place of the previous one of that name. Raises DeviceError if it has no
+        room."""
+        file_services.write_file(self._session, name, data, progress)
+
+    def delete_file(self, name: str) -> None:
+        file_services.delete_file(self._session, name)
+
     # ---- inputs and outputs ----
 
     def io_devices(self) -> list[IoDevice]:
@@ -237,7 +258,12 @@ class Plc(Controller):
 
     def _find_symbols(self, crc: int) -> SymbolTable:
         if self._symbol_file is None:
-            return super()._find_symbols(crc)
+            try:
+                return super()._find_symbols(crc)
+            except UsageError:
+                if (table := self._own_symbols(crc)) is None:
+                    raise
+                return table
         table = load_symbols(self._symbol_file)
         if table.image_crc != crc:
             raise UsageError(
@@ -246,6 +272,14 @@ class Plc(Controller):
                 "wrong-symbols",
             )
         return table
+
+    def _own_symbols(self, crc: int) -> SymbolTable | None:
+        """Those that the controller keeps; None if it has none of this image."""
+        with suppress(DeviceError, UsageError, OSError, EOFError, ValueError, zlib.error):
+            text = gzip.decompress(self.read_file(SYMBOLS_NAME)).decode()
+            table = SymbolTable.from_json(text, SYMBOLS_NAME)
+            return table if table.image_crc == crc else None
+        return None
 
     def _read(self, table: SymbolTable, symbols: Sequence[Symbol]) -> Contents:
         """Pointers are followed by the controller."""

@@ -89,7 +89,8 @@ int client_take_open(CLIENT *client)
 {
     RTS_UI8 package[BLK_MAX_SIZE];
 
-    if (client_take(client, NULL, package) != sizeof(CHANNEL_OPEN_RESPONSE) || package[0] != CHANNEL_PKG_OPEN_RESP)
+    client->open_size = client_take(client, NULL, package);
+    if (client->open_size < CLIENT_OLD_RESPONSE || package[0] != CHANNEL_PKG_OPEN_RESP)
         return -1;
     client->channel = BytesGet16(package + 14);
     client->limit = BytesGet32(package + 16);

@@ -31,7 +31,11 @@ typedef struct {
     RTS_UI32 received; /* number of the last block received in order */
     RTS_UI32 session;
     RTS_UI32 app_session;
+    RTS_UI32 open_size; /* bytes of the last open response */
 } CLIENT;
+
+/* Bytes of an open response of version 1.0. */
+enum { CLIENT_OLD_RESPONSE = 20 };
 
 /* ---- layer 3 ---- */
 

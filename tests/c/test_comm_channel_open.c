@@ -36,6 +36,7 @@ static void old_short_open_request_is_answered(void)
     BytesPut32(request + 4, CRC32Update(0, request, sizeof(request)));
     client_send_package(&client, request, sizeof(request));
     CHECK_EQUAL(client_take_open(&client), CHANNEL_OPEN_OK);
+    CHECK_EQUAL(client.open_size, SRV_OTHER_CLIENTS ? CLIENT_OLD_RESPONSE : CLIENT_OLD_RESPONSE + 4);
     CHECK(works(&client));
 }
 

@@ -12,6 +12,7 @@
     }
 #define SysFileGetArea test_area
 #define SysFileCreate test_create
+#define SysFileCreateAt test_create_at
 #define SysFileAppend test_append
 #define SysFileWrite test_write
 #define SysFileCopy test_copy

@@ -18,6 +18,7 @@ static RTS_UI32 sector_at(RTS_UI32 offset);
     }
 #define SysFileGetArea test_area
 #define SysFileCreate test_create
+#define SysFileCreateAt test_create_at
 #define SysFileAppend test_append
 #define SysFileWrite test_write
 #define SysFileCopy test_copy

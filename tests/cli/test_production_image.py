@@ -20,7 +20,7 @@ TASKS = "".join(f"PROGRAM P{i} VAR n : DINT; END_VAR n := n + 1; END_PROGRAM\n" 
     + "".join(f"TASK T{i}(INTERVAL := T#1s); PROGRAM I{i} WITH T{i} : P{i};\n" for i in range(3))
     + "END_RESOURCE END_CONFIGURATION"
 )
-SIZE = 4 * 1024 * 1024  # of plcrt's flash
+SIZE = 5 * 1024 * 1024  # of plcrt's flash
 FLASH = 0x2100_0000  # of the mps2-an385
 
 

@@ -221,10 +221,14 @@ static bool lock_file(int file, const char *path, PORT_REASON *reason)
     return false;
 }
 
-/* A flash file, or the beginning of one: other files are not overwritten. */
+/* A flash file, or the beginning of one: other files are not overwritten. One of a plcrt without the store has the
+ * programs alone. */
 static bool is_flash_file(int file, off_t size)
 {
-    return size == BOARD_FLASH_SIZE || (size < BOARD_FLASH_SIZE && is_erased(file, 0, size));
+    enum { PROGRAMS = BOARD_FLASH_SIZE - FILE_STORE_SIZE };
+
+    return size == BOARD_FLASH_SIZE ||
+           (size < BOARD_FLASH_SIZE && is_erased(file, size < PROGRAMS ? 0 : PROGRAMS, size));
 }
 
 static bool prepare_file(int file, const char *path, PORT_REASON *reason)

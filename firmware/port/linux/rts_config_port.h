@@ -22,6 +22,8 @@
 #define COMM_MAX_CLIENTS 4
 #define COMM_PASSWORD 1
 #define COMM_ENDPOINTS 1
+#define SRV_MAX_GROUPS 10
+#define SRV_OTHER_CLIENTS 1
 #define TCP_BUFFER_SIZE 16384
 #define CAN_FD 1
 #define CAN_BLOCK_SIZE 0 /* the kernel has room */
@@ -49,8 +51,11 @@
 #endif
 #define BOARD_DEVICE_NAME "plcrt"
 
-/* The flash file [bytes]. Geometry of a common serial NOR flash, programmed in the units of an STM32's. */
-#define BOARD_FLASH_SIZE (4 * 1024 * 1024)
+/* The flash file [bytes]: 4 MiB for programs, as long as there was nothing else, and then the files. Geometry of a
+ * common serial NOR flash, programmed in the units of an STM32's. */
+#define FILE_STORE_FILES 32
+#define FILE_STORE_SIZE (1024 * 1024)
+#define BOARD_FLASH_SIZE (4 * 1024 * 1024 + FILE_STORE_SIZE)
 #define BOARD_FLASH_SECTOR_SIZE 4096
 #define BOARD_FLASH_PROGRAM_SIZE 8
 

@@ -42,6 +42,8 @@ typedef struct {
     bool fail_on[SIM_CALLS]; /* all calls after that one, too */
 } PLAN;
 
+unsigned SimFileStoreSize;
+
 static struct {
     SYS_FLASH flash;
     CELLS cells;

@@ -14,6 +14,7 @@
 #define HAS_CmpUserMgr 1
 #define HAS_CmpLogSrv 1
 #define HAS_CmpPlcShell 1
+#define HAS_CmpFileTransfer 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
 #define PORT_COMPONENTS(X) X(SysSim)

@@ -20,6 +20,8 @@
 #define IO_GPIO_GROUPS 2
 #define NETSERVER_MESSAGE_SIZE 16384
 #define COMM_PASSWORD 1
+#define SRV_MAX_GROUPS 10
+#define SRV_OTHER_CLIENTS 1
 #define LOG_MAX_ENTRIES 64
 #define LOG_TEXT_SIZE 160
 #define CM_MAX_EXT_TABLES 8
@@ -39,6 +41,13 @@
 #define SIM_FLASH_SECTOR_SIZE 4096
 #define SIM_FLASH_PROGRAM_SIZE 8
 #define SIM_FLASH_ERASED 0xFF
+
+/* The store has what a test gives it; 0 before, so that the programs have all of the flash. */
+#define FILE_STORE_FILES 16
+#ifndef RTS_CFFI
+extern unsigned SimFileStoreSize;
+#endif
+#define FILE_STORE_SIZE SimFileStoreSize
 
 /* Stack of the IEC code [bytes]: that of the Linux port. */
 #define RTS_IEC_STACK_SIZE (1024 * 1024)

@@ -112,6 +112,17 @@ const char *AppGetInfo(RTS_UI32 index)
     return info;
 }
 
+RTS_RESULT AppReadImage(RTS_UI32 offset, void *data, RTS_UI32 size)
+{
+    const APP_IMAGE *image = AppGetImage();
+
+    if (!is_loaded())
+        return ERR_APP_NOT_LOADED;
+    if (size > image->size || offset > image->size - size)
+        return ERR_OUT_OF_LIMITS;
+    return SysFileRead(image->file, offset, data, size);
+}
+
 /* ---- the hook ---- */
 
 RTS_RESULT CmpAppEmbedded_Hook(CMP_HOOK hook)

@@ -149,6 +149,9 @@ static void write_calls(BTAG_WRITER *reply)
     const EXCEPT_TRACE *trace = SysExceptGetTrace();
     RTS_UI32 room = BTagGetRoom(reply) / CALL_SIZE; /* one is for the head of the element */
 
+    if (SRV_OTHER_CLIENTS && room != 0)
+        room--; /* for the operation mode after it */
+
     if (room == 0)
         return;
     BTagOpen(reply, TAG_APP_CALLS, BTAG_ALIGN_0);
@@ -185,6 +188,8 @@ static RTS_RESULT read_status(SRV_REQUEST *request, BTAG_WRITER *reply)
     if (status.exception.code != RTSEXCPT_NOEXCEPTION) /* else a task may have one just now */
         write_calls(reply);
     BTagClose(reply);
+    if (SRV_OTHER_CLIENTS)
+        BTagWrite32(reply, TAG_APP_OPERATION_MODE, DEV_MODE_DEBUG);
     return ERR_OK;
 }
 

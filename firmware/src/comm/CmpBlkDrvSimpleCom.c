@@ -64,6 +64,13 @@ const BLK_COUNTERS BlkDrvComCounters = {"serial", counter_names, RTS_COUNT(count
 
 /* ---- receiving ---- */
 
+static bool has_crc(const RTS_UI8 *stored, RTS_UI16 crc)
+{
+    if (BytesGet16(stored) == crc)
+        return true;
+    return COM_CRC_EITHER_ORDER && stored[0] == crc >> 8 && stored[1] == (crc & 0xFF);
+}
+
 /* Hands a frame up when its CRC is right. */
 static void end_frame(COM_LINE *line)
 {
@@ -72,7 +79,7 @@ static void end_frame(COM_LINE *line)
         return;
     }
     RTS_UI32 size = line->fill - CRC_SIZE;
-    if (CRC16Update(CRC16_INIT, line->frame, size) != BytesGet16(line->frame + size)) {
+    if (!has_crc(line->frame + size, CRC16Update(CRC16_INIT, line->frame, size))) {
         COMM_COUNT(counters[line->index].crc_errors);
         return;
     }

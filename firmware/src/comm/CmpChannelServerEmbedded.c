@@ -76,6 +76,17 @@ static RTS_RESULT send_meta(const ROUTER_PEER *peer, RTS_UI8 type, void *package
     return send_package(peer, package, size);
 }
 
+/* Version 1.0 has no address words. */
+static RTS_UI32 open_response_size(const CHANNEL *channel)
+{
+#if SRV_OTHER_CLIENTS
+    if (channel->is_version_1_0)
+        return offsetof(CHANNEL_OPEN_RESPONSE, byte_order);
+#endif
+    RTS_UNUSED(channel);
+    return sizeof(CHANNEL_OPEN_RESPONSE);
+}
+
 static RTS_RESULT send_open_response(const CHANNEL *channel)
 {
     CHANNEL_OPEN_RESPONSE response = {0};
@@ -85,7 +96,7 @@ static RTS_RESULT send_open_response(const CHANNEL *channel)
     BytesPut16(response.id, channel->id);
     BytesPut32(response.limit, channel->limit);
     response.address_words = channel->address_words;
-    return send_meta(&channel->peer, CHANNEL_PKG_OPEN_RESP, &response, sizeof(response));
+    return send_meta(&channel->peer, CHANNEL_PKG_OPEN_RESP, &response, open_response_size(channel));
 }
 
 static void send_open_refusal(const ROUTER_PEER *peer, RTS_UI32 request_id)
@@ -165,6 +176,9 @@ typedef struct {
     RTS_UI32 limit;
     RTS_UI32 room;
     RTS_UI8 address_words;
+#if SRV_OTHER_CLIENTS
+    bool is_version_1_0;
+#endif
 } OPEN_REQUEST;
 
 /* False when this path or buffer size is no basis for a channel. */
@@ -177,6 +191,9 @@ static bool read_open_request(const ROUTER_PEER *peer, const RTS_UI8 *data, RTS_
         return false;
     request->request_id = BytesGet32(open->request_id);
     request->limit = BytesGet32(open->limit);
+#if SRV_OTHER_CLIENTS
+    request->is_version_1_0 = size < sizeof(*open);
+#endif
     if (size >= sizeof(*open) && open->address_words > words)
         words = open->address_words < 2 * ROUTER_MAX_ADDRESS ? open->address_words : 2 * ROUTER_MAX_ADDRESS;
     if (request->limit > NETSERVER_MESSAGE_SIZE)
@@ -270,6 +287,9 @@ static void open_channel(COMM_CLIENT *client, const ROUTER_PEER *peer, const OPE
     channel->address_words = request->address_words;
     channel->id = new_id();
     channel->fresh = true;
+#if SRV_OTHER_CLIENTS
+    channel->is_version_1_0 = request->is_version_1_0;
+#endif
     if (COMM_ENDPOINTS)
         channel->anonymous_since = now_ms;
     COMM_COUNT(counters.opened);

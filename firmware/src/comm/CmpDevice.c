@@ -74,6 +74,8 @@ static RTS_RESULT get_target_ident(SRV_REQUEST *request, BTAG_WRITER *reply)
     write_wide_text(reply, TAG_DEV_VENDOR_NAME, target->vendor_name, NS_MAX_TYPE_NAMES);
     write_wide_text(reply, TAG_DEV_NODE_NAME, target->node_name, NS_MAX_NODE_NAME);
     BTagWrite16(reply, TAG_DEV_MAX_CHANNELS, COMM_MAX_CLIENTS);
+    if (SRV_OTHER_CLIENTS)
+        BTagWrite32(reply, TAG_DEV_FLAGS, 0); /* there is no encryption */
     write_serial_number(reply, target->serial_number);
     if (SRV_INFORMATION)
         write_stack(reply);
@@ -126,6 +128,12 @@ static RTS_RESULT login_with_password(SRV_REQUEST *request, BTAG_WRITER *reply)
 }
 #endif
 
+/* Clients with a key look for the result, here always a refusal, in another container. */
+static RTS_UI32 login_reply_tag(RTS_UI32 crypt)
+{
+    return SRV_OTHER_CLIENTS && crypt == DEV_CRYPT_ASYMMETRIC ? TAG_DEV_ONLINE_ACCESS : TAG_DEV_LOGIN_REPLY;
+}
+
 /* Without a password the user is not looked at, so that clients with odd encodings of "nobody" can log in, too. */
 static RTS_RESULT login(SRV_REQUEST *request, BTAG_WRITER *reply)
 {
@@ -134,7 +142,7 @@ static RTS_RESULT login(SRV_REQUEST *request, BTAG_WRITER *reply)
 
     if (result != ERR_OK)
         return result;
-    BTagOpen(reply, TAG_DEV_LOGIN_REPLY, BTAG_ALIGN_0);
+    BTagOpen(reply, login_reply_tag(crypt), BTAG_ALIGN_0);
     if (AppHasPassword() && (crypt & DEV_CRYPT_PROOF))
         result = login_with_password(request, reply);
     else if (AppHasPassword())
@@ -186,6 +194,26 @@ static RTS_RESULT echo(SRV_REQUEST *request, BTAG_WRITER *reply)
 }
 #endif
 
+#if SRV_OTHER_CLIENTS
+/* There is one: the program may be debugged and replaced. */
+static RTS_RESULT get_operation_mode(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UNUSED(request);
+    BTagWrite32(reply, TAG_DEV_OPERATION_MODE, DEV_MODE_DEBUG);
+    return ERR_OK;
+}
+
+static RTS_RESULT set_operation_mode(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UI32 mode = 0;
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_DEV_OPERATION_MODE, &mode);
+
+    if (result == ERR_OK)
+        BTagWrite16(reply, TAG_SERVICE_RESULT, mode == DEV_MODE_DEBUG ? ERR_OK : ERR_NOT_SUPPORTED);
+    return result;
+}
+#endif
+
 static const SRV_SERVICE services[] = {
     {SRV_DEV_GET_TARGET_IDENT, RIGHT_NONE, get_target_ident},
     {SRV_DEV_LOGIN, RIGHT_NONE, login},
@@ -194,6 +222,10 @@ static const SRV_SERVICE services[] = {
     {SRV_DEV_ECHO, RIGHT_LOOK, echo},
 #endif
     {SRV_DEV_SESSION_CREATE, RIGHT_NONE, session_create},
+#if SRV_OTHER_CLIENTS
+    {SRV_DEV_GET_OPERATION_MODE, RIGHT_LOOK, get_operation_mode},
+    {SRV_DEV_SET_OPERATION_MODE, RIGHT_CONTROL, set_operation_mode},
+#endif
 };
 
 RTS_RESULT CmpDevice_Hook(CMP_HOOK hook)

@@ -55,8 +55,32 @@ static RTS_RESULT get_entries(SRV_REQUEST *request, BTAG_WRITER *reply)
     return ERR_OK;
 }
 
+#if SRV_OTHER_CLIENTS
+static RTS_RESULT get_component(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UI32 component = 0;
+    RTS_RESULT result = BTagFindUnsigned(&request->tags, TAG_LOG_COMPONENT_NAME, &component);
+
+    if (result == ERR_OK)
+        BTagWriteText(reply, TAG_LOG_COMPONENT_NAME, CMGetComponentName(component), COMPONENT_NAME_MAX);
+    return result;
+}
+
+/* There is one log. */
+static RTS_RESULT get_loggers(SRV_REQUEST *request, BTAG_WRITER *reply)
+{
+    RTS_UNUSED(request);
+    BTagWriteText(reply, TAG_LOG_NAME, "PlcLog", COMPONENT_NAME_MAX);
+    return ERR_OK;
+}
+#endif
+
 static const SRV_SERVICE services[] = {
     {SRV_LOG_GET_ENTRIES, RIGHT_LOOK, get_entries},
+#if SRV_OTHER_CLIENTS
+    {SRV_LOG_GET_COMPONENT, RIGHT_LOOK, get_component},
+    {SRV_LOG_GET_LOGGERS, RIGHT_LOOK, get_loggers},
+#endif
 };
 
 RTS_RESULT CmpLogSrv_Hook(CMP_HOOK hook)

@@ -9,6 +9,7 @@
 
 #include "CmpBytes.h"
 #include "CmpPackets.h"
+#include "rts_config.h"
 
 enum { HEADER_WORDS = sizeof(ROUTER_HEADER) / 2, WORDS_MASK = (1 << ROUTER_HOP_SHIFT) - 1 };
 
@@ -48,11 +49,20 @@ static bool parse_header(const RTS_UI8 *data, RTS_UI32 size, HEADER *header)
     return true;
 }
 
+/* Ones alone: to all nodes, as no receiver is. */
+static bool is_all_ones(const HEADER *header)
+{
+    for (RTS_UI32 i = 0; i < 2 * header->receiver_words; i++)
+        if (header->receiver[i] != 0xFF)
+            return false;
+    return true;
+}
+
 static bool is_for_us(const BLK_DRV *driver, const ROUTER_HEADER *fixed, const HEADER *header)
 {
     if ((fixed->flags & ROUTER_FLAG_RELATIVE) != 0 || fixed->hops >> ROUTER_HOP_SHIFT == 0)
         return false;
-    if (driver->point_to_point || header->receiver_words == 0)
+    if (driver->point_to_point || header->receiver_words == 0 || (SRV_OTHER_CLIENTS && is_all_ones(header)))
         return true;
     return header->receiver_words == driver->address_words &&
            memcmp(header->receiver, driver->address, 2 * header->receiver_words) == 0;

@@ -19,9 +19,38 @@ typedef struct {
     RTS_UI8 unit[FILE_ALIGN]; /* the last position % FILE_ALIGN bytes, not yet programmed */
 } FLASH_FILE;
 
-static FLASH_FILE files[FILE_COUNT];
+static FLASH_FILE files[FILE_STORE_FILES > 0 ? FILE_STORE + 1 : FILE_COUNT];
 
 /* ---- where the files are ---- */
+
+/* Of the flash, without the end that the store has. */
+static RTS_UI32 size_for_programs(void)
+{
+    RTS_UI32 size = SysFlashGet()->size;
+
+    return FILE_STORE_FILES > 0 && FILE_STORE_SIZE < size ? size - FILE_STORE_SIZE : size;
+}
+
+#if FILE_STORE_FILES > 0
+static void map_store(void)
+{
+    RTS_UI32 sector = SysFlashGet()->sector_size;
+    RTS_UI32 start = size_for_programs();
+    RTS_UI32 size = SysFlashGet()->size - start;
+
+    if (size < 3 * sector || size % sector != 0)
+        return;
+    for (RTS_UI32 at = start; at < start + size; at += sector)
+        if (FLASH_SECTOR_AT(at) != sector)
+            return;
+    files[FILE_CATALOG].area = (FILE_AREA){start, 2 * sector};
+    files[FILE_STORE].area = (FILE_AREA){start + 2 * sector, size - 2 * sector};
+}
+#else
+static void map_store(void)
+{
+}
+#endif
 
 #ifdef FILE_MAP
 
@@ -43,12 +72,12 @@ static bool is_border(RTS_UI32 offset)
 /* Whether file `i` is in the flash, on borders of its sectors, the halves of a log too, apart from the files before it. */
 static bool is_valid(RTS_UI32 i)
 {
-    const SYS_FLASH *flash = SysFlashGet();
     const FILE_AREA *area = &files[i].area;
+    RTS_UI32 size = size_for_programs();
     bool is_log = i == FILE_COMMIT || i == FILE_RETAIN;
     RTS_UI32 k;
 
-    if (area->size == 0 || area->size > flash->size || area->offset > flash->size - area->size)
+    if (area->size == 0 || area->size > size || area->offset > size - area->size)
         return false;
     if (!is_border(area->offset) || !is_border(area->offset + area->size))
         return false;
@@ -80,9 +109,8 @@ static bool map_files(void)
 /* False when nothing is left for the slots. */
 static bool map_files(void)
 {
-    const SYS_FLASH *flash = SysFlashGet();
-    RTS_UI32 sector = flash->sector_size;
-    const FILE_AREA map[FILE_COUNT] = {FILE_MAP_OF(flash->size, sector)};
+    RTS_UI32 sector = SysFlashGet()->sector_size;
+    const FILE_AREA map[FILE_COUNT] = {FILE_MAP_OF(size_for_programs(), sector)};
     RTS_UI32 i;
 
     for (i = 0; i < FILE_COUNT; i++)
@@ -115,6 +143,12 @@ void SysFileCreate(RTS_UI32 file)
 {
     files[file].position = 0;
     files[file].erased_to = 0;
+}
+
+void SysFileCreateAt(RTS_UI32 file, RTS_UI32 position)
+{
+    files[file].position = position;
+    files[file].erased_to = position;
 }
 
 void SysFileAppend(RTS_UI32 file, RTS_UI32 position)
@@ -254,5 +288,6 @@ RTS_RESULT SysFileFlash_Hook(CMP_HOOK hook)
                (unsigned)SysFlashGet()->size);
         return ERR_NOMEMORY;
     }
+    map_store();
     return ERR_OK;
 }

@@ -65,17 +65,7 @@ def _add_file_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
     build.add_argument(
         "--no-limits", action="store_true", help="build also what no device that plctool knows has room for"
     )
-    build.add_argument(
-        "-O", dest="level", type=_level, metavar="0..3|s", help="optimisation, s for small code; default: 2"
-    )
-    build.add_argument(
-        "--checks",
-        metavar="all|none|LIST",
-        help="run-time checks: div, bounds, subrange, null; default: all",
-    )
-    build.add_argument(
-        "--debug", action=argparse.BooleanOptionalAction, help="optimise less, so that the code is close to its source"
-    )
+    _add_build_options(build)
     _add_warnings(build)
     _add_io_files(build)
 
@@ -197,6 +187,10 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     _add_image(flash)
     flash.add_argument("--no-start", action="store_true", help="do not start it; it starts at the next power-up")
     flash.add_argument("--force", action="store_true", help="send it even if the device has it already")
+    flash.add_argument(
+        "--with-source", nargs="*", type=usable_path, metavar="FILE.st|DIR",
+        help="also keep its sources and symbols on the device; without any, those of the project of the current folder",
+    )  # fmt: skip
     _add_link(flash)
 
     _add_link(command("scan", "list the devices that answer; without a link, on all serial ports"))
@@ -222,6 +216,8 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
         "--new-password-file", type=Path, metavar="FILE",
         help="its first line; else the environment's PLC_NEW_PASSWORD, or what you type",
     )  # fmt: skip
+
+    _add_file_actions(command)
 
     port = command("port-check", "check a port: run programs on a board and compare the results with what is expected")
     port.add_argument("--yes", action="store_true", help="replace the program that is on the board")
@@ -251,14 +247,46 @@ def _add_device_commands(command: Callable[..., argparse.ArgumentParser]) -> Non
     gateway.add_argument("--port", metavar="PORT", help="only the gateway of this port; default: all of this user")
 
 
-def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
-    io = command("io", "show and check what is connected to the inputs and outputs")
-    actions = io.add_subparsers(title="what", metavar="WHAT", dest="what", required=True, parser_class=_Parser)
+def _add_file_actions(command: Callable[..., argparse.ArgumentParser]) -> None:
+    action = _actions(command("files", "list, get, put and delete the files of a device"))
+    _add_link(action("list", "list the files"))
+    get = action("get", "copy a file from the device")
+    get.add_argument("name", metavar="NAME", help="as 'plctool files list' shows it")
+    get.add_argument("-o", "--output", type=usable_path, metavar="FILE", help="default: its name, in this folder")
+    _add_link(get)
+    put = action("put", "copy a file to the device, in place of the previous one of its name")
+    put.add_argument("file", type=usable_path, metavar="FILE")
+    put.add_argument("--name", metavar="NAME", help="on the device; default: that of the file")
+    _add_link(put)
+    delete = action("delete", "delete a file of the device")
+    delete.add_argument("name", metavar="NAME", help="as 'plctool files list' shows it")
+    _add_link(delete)
+
+    action = _actions(command("source", "keep the sources of the program on the device, and get them back"))
+    get = action("get", "write the sources that the device keeps into a folder")
+    get.add_argument("-o", "--output", type=usable_path, default=Path("source"), metavar="DIR", help="default: source")
+    _add_link(get)
+    put = action("put", "put the sources of the program that is on the device there as well")
+    _add_sources(put)
+    _add_build_options(put)
+    _add_io_files(put)
+    _add_link(put)
+
+
+def _actions(command: argparse.ArgumentParser) -> Callable[[str, str], argparse.ArgumentParser]:
+    """Adds the actions of a command, one by one."""
+    actions = command.add_subparsers(title="what", metavar="WHAT", dest="what", required=True, parser_class=_Parser)
 
     def action(name: str, text: str) -> argparse.ArgumentParser:
         sub = actions.add_parser(name, help=text, description=text[:1].upper() + text[1:] + ".")
         sub.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
         return sub
+
+    return action
+
+
+def _add_io_commands(command: Callable[..., argparse.ArgumentParser]) -> None:
+    action = _actions(command("io", "show and check what is connected to the inputs and outputs"))
 
     io_map = action("map", "list the channels of an image with their variables and tasks")
     _add_image(io_map)
@@ -298,6 +326,20 @@ def _add_sources(parser: argparse.ArgumentParser) -> None:
         "--library", action="append", default=[], type=usable_path, metavar="DIR|FILE.zip",
         help="a library (with library.toml), or a folder of them; may be repeated",
     )  # fmt: skip
+
+
+def _add_build_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "-O", dest="level", type=_level, metavar="0..3|s", help="optimisation, s for small code; default: 2"
+    )
+    parser.add_argument(
+        "--checks",
+        metavar="all|none|LIST",
+        help="run-time checks: div, bounds, subrange, null; default: all",
+    )
+    parser.add_argument(
+        "--debug", action=argparse.BooleanOptionalAction, help="optimise less, so that the code is close to its source"
+    )
 
 
 def _add_image(parser: argparse.ArgumentParser) -> None:

@@ -78,6 +78,11 @@ def build(settings: Settings) -> tuple[Document, list[str]]:
     return document, result.rendered_warnings
 
 
+def compiled(settings: Settings) -> BuildResult:
+    """What `build` would write."""
+    return _compile(settings, settings.target)
+
+
 def _compile(settings: Settings, target: str | None) -> BuildResult:
     from plctool.compiler import compile_sources
 

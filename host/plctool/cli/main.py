@@ -23,10 +23,12 @@ from plctool.version import plctool_version
 
 if TYPE_CHECKING:
     from plctool.cli.projects import Settings
+    from plctool.cli.source_archive import Archive
     from plctool.controller import OtherTool
     from plctool.device import Plc
     from plctool.link.passwords import AskPassword
 
+ShowProgress = Callable[[int, int], None]
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 130, 141
 LATER_COMMANDS = {
@@ -223,8 +225,14 @@ def _flash_several(args: argparse.Namespace, link: Link) -> int:
 
 
 def _flash(args: argparse.Namespace) -> int:
+    from plctool.cli.file_documents import store_source
+
     if len((link := link_of(args)).nodes or ()) > 1:
+        if args.with_source is not None:
+            raise UsageError("--with-source is for one device; name one with --node.", "usage")
         return _flash_several(args, link)
+
+    prepared = _prepared_source(args)
 
     def announce(others: Sequence[OtherTool]) -> None:
         if others and not args.json:
@@ -233,14 +241,29 @@ def _flash(args: argparse.Namespace) -> int:
 
     def flash(plc: Plc) -> Document:
         with _Progress(not args.json) as progress:
-            return documents.flash(
+            document = documents.flash(
                 plc, args.image, start=not args.no_start, force=args.force, progress=progress.show, announce=announce
             )
+        if prepared is not None:
+            document["source"] = store_source(plc, prepared)
+        return document
 
     try:
         return _on_device(args, flash, output.flash_text)
     except KeyboardInterrupt:
         raise documents.interrupted_flash(lambda: _connect(args), args.image) from None
+
+
+def _prepared_source(args: argparse.Namespace) -> tuple[Archive, bytes] | None:
+    """The sources that are to go with an image, if that is wanted: checked before anything is sent."""
+    if args.with_source is None:
+        return None
+    from plctool.cli.file_documents import prepared_source
+    from plctool.cli.projects import settings_of_sources
+    from plctool.files import read_image
+    from plctool.image.file import image_crc
+
+    return prepared_source(settings_of_sources(args.with_source), image_crc(read_image(args.image)), args.image)
 
 
 class _Progress:
@@ -325,6 +348,48 @@ def _passwd(args: argparse.Namespace) -> int:
         return documents.passwd(plc, None if args.remove else new_password(args.new_password_file))
 
     return _on_device(args, change, lambda d: "The password is set." if d["password"] else "The password is removed.")
+
+
+def _files(args: argparse.Namespace) -> int:
+    from plctool.cli import file_documents
+
+    operations: dict[str, Callable[[Plc, ShowProgress], Document]] = {
+        "list": lambda plc, show: file_documents.list_files(plc),
+        "get": lambda plc, show: file_documents.get_file(plc, args.name, args.output, show),
+        "put": lambda plc, show: file_documents.put_file(plc, args.file, args.name, show),
+        "delete": lambda plc, show: file_documents.delete_file(plc, args.name),
+    }
+    texts: dict[str, Callable[[Document], str]] = {
+        "list": file_documents.list_text,
+        "get": lambda d: f"{d['file']}: {d['size']} bytes",
+        "put": lambda d: f"{d['name']}: {d['size']} bytes",
+        "delete": lambda d: f"{d['name']} is deleted.",
+    }
+    return _with_progress(args, operations[args.what], texts[args.what])
+
+
+def _source(args: argparse.Namespace) -> int:
+    from plctool.cli import file_documents
+
+    if args.what == "get":
+        return _with_progress(
+            args, lambda plc, show: file_documents.get_source(plc, args.output, show), file_documents.source_text
+        )
+    args.no_warn, args.werror = [], None
+    settings = _settings(args)
+    return _with_progress(
+        args,
+        lambda plc, show: file_documents.put_source(plc, settings, show),
+        lambda d: f"{len(d['files'])} files of the program with CRC {d['crc']} are on the device.",
+    )
+
+
+def _with_progress(
+    args: argparse.Namespace, operation: Callable[[Plc, ShowProgress], Document], text: Callable[[Document], str]
+) -> int:
+    with _connect(args) as plc, _Progress(not args.json) as progress:
+        document = operation(plc, progress.show)
+    return _show(args, document, text)
 
 
 def _port_check(args: argparse.Namespace) -> int:
@@ -455,7 +520,8 @@ ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "test": _test, "new": _new,
     "export": _export, "export-itf": _export_itf, "bench": _bench, "demo": _demo, "io": _io,
     "flash": _flash, "scan": _scan, "status": _status, "start": _start, "stop": _stop, "reset": _reset,
-    "tasks": _tasks, "log": _log, "shell": _shell, "passwd": _passwd, "port-check": _port_check,
+    "tasks": _tasks, "log": _log, "shell": _shell, "passwd": _passwd,
+    "files": _files, "source": _source, "port-check": _port_check,
     "read": _read, "write": _write, "watch": _watch, "gateway": _gateway, "completion": _completion, "man": _man,
 }  # fmt: skip
 

@@ -50,7 +50,12 @@ def settings_of(args: argparse.Namespace) -> Settings:
 
 def settings_of_project(file: Path) -> Settings:
     """The settings of a command that has none of these arguments."""
-    nothing = argparse.Namespace(sources=[file], io=None, device=None, no_warn=[], werror=None, library=[])
+    return settings_of_sources([file])
+
+
+def settings_of_sources(sources: list[Path]) -> Settings:
+    """The same for sources, or without any the project of the current folder."""
+    nothing = argparse.Namespace(sources=sources, io=None, device=None, no_warn=[], werror=None, library=[])
     return settings_of(nothing)
 
 

@@ -1,0 +1,57 @@
+/*
+ * FileStore.h - files that tools keep on the device, by name, without folders.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ *
+ * On SysFileFlash: the catalog is a record log, the contents are rows of sectors. A file is in the catalog when all of it
+ * is in flash and its CRC is right. So a power cut leaves the previous file or the new one; until then both need room. One
+ * file is written at a time. All from main, from CH_INIT_SYSTEM2 of SysFileFlash on. With FILE_STORE_FILES only.
+ */
+#ifndef FILESTORE_H
+#define FILESTORE_H
+
+#include "CmpErrors.h"
+#include "CmpSrvNumbers.h"
+#include "CmpStd.h"
+
+typedef struct {
+    char name[FILE_NAME_MAX + 4]; /* NUL and zeros to its end; "" for an entry that is free */
+    RTS_UI32 start;               /* in FILE_STORE, a multiple of the sector size */
+    RTS_UI32 size;
+    RTS_UI32 crc;
+} FILE_ENTRY;
+
+/* Reads the catalog. A flash fault leaves a store that refuses everything with ERR_DEVICE. */
+void FileStoreOpen(void);
+
+/* Whether a file may have this name: 1 to FILE_NAME_MAX letters, digits and ". _ -", the first one not ".". */
+bool FileStoreIsName(const char *name);
+
+/* Entry `index`, 0 to FILE_STORE_FILES - 1; NULL if it is free. */
+const FILE_ENTRY *FileStoreGet(RTS_UI32 index);
+/* The file of that name, NULL if there is none. */
+const FILE_ENTRY *FileStoreFind(const char *name);
+
+/* Bytes of the largest file that there is room for, 0 if there are FILE_STORE_FILES already. */
+RTS_UI32 FileStoreRoom(void);
+
+/* Begins a file; one that has begun and not ended is dropped. ERR_PARAMETER not a name; ERR_DISK_FULL no room, or too many
+ * files; ERR_DEVICE. */
+RTS_RESULT FileStoreBegin(const char *name, RTS_UI32 size, RTS_UI32 crc);
+/* Appends. ERR_INVALID_SEQUENCE not begun; ERR_FT_FILE_SIZE_MISMATCH more than was said; ERR_DEVICE, which drops it. */
+RTS_RESULT FileStoreWrite(const RTS_UI8 *data, RTS_UI32 size);
+/* Bytes written of the file that has begun. */
+RTS_UI32 FileStorePosition(void);
+/* Puts the file in place of the previous one of its name. ERR_FT_FILE_SIZE_MISMATCH bytes are missing,
+ * ERR_FT_CRC_MISMATCH, ERR_DEVICE: the previous one stays. */
+RTS_RESULT FileStoreEnd(void);
+void FileStoreAbort(void);
+
+/* Reads from a file, of which `entry` is a copy. ERR_NO_CONSISTENCY it has been changed or deleted since,
+ * ERR_OUT_OF_LIMITS past its end, ERR_DEVICE. */
+RTS_RESULT FileStoreRead(const FILE_ENTRY *entry, RTS_UI32 offset, void *data, RTS_UI32 size);
+
+/* ERR_NO_OBJECT there is none, ERR_DEVICE it is still there. */
+RTS_RESULT FileStoreDelete(const char *name);
+
+#endif

@@ -1,0 +1,284 @@
+/*
+ * FileStore.c - files that tools keep on the device.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "FileStore.h"
+
+#include <string.h>
+
+#include "CmpLog.h"
+#include "SysFileFlash.h"
+#include "SysFlash.h"
+#include "SysFlashLog.h"
+#include "rts_config.h"
+
+#if FILE_STORE_FILES > 0
+
+enum { CATALOG_TAG = 0x454C4946 };
+
+typedef struct {
+    FILE_ENTRY file[FILE_STORE_FILES];
+} CATALOG;
+
+static struct {
+    FLASH_LOG log;
+    RTS_RESULT opened;
+    CATALOG catalog;
+    bool writing;
+    RTS_UI32 written;
+    FILE_ENTRY next; /* that is written */
+} store;
+
+/* ---- names and places ---- */
+
+static bool is_name_character(char c)
+{
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+           c == '-';
+}
+
+bool FileStoreIsName(const char *name)
+{
+    RTS_UI32 length = 0;
+
+    while (length <= FILE_NAME_MAX && is_name_character(name[length]))
+        length++;
+    return length > 0 && length <= FILE_NAME_MAX && name[length] == '\0' && name[0] != '.';
+}
+
+/* Bytes of flash that a file takes: whole sectors. */
+static RTS_UI32 span(RTS_UI32 size)
+{
+    RTS_UI32 sector = SysFlashGet()->sector_size;
+
+    return (size + sector - 1) & ~(sector - 1);
+}
+
+static RTS_UI32 capacity(void)
+{
+    return SysFileGetArea(FILE_STORE)->size;
+}
+
+const FILE_ENTRY *FileStoreGet(RTS_UI32 index)
+{
+    return index < FILE_STORE_FILES && store.catalog.file[index].name[0] != '\0' ? &store.catalog.file[index] : NULL;
+}
+
+static FILE_ENTRY *find(const char *name)
+{
+    for (RTS_UI32 i = 0; i < FILE_STORE_FILES; i++)
+        if (strcmp(store.catalog.file[i].name, name) == 0)
+            return &store.catalog.file[i];
+    return NULL;
+}
+
+const FILE_ENTRY *FileStoreFind(const char *name)
+{
+    return name[0] == '\0' ? NULL : find(name);
+}
+
+/* Bytes from `start` to the next file, 0 within one. */
+static RTS_UI32 room_at(RTS_UI32 start)
+{
+    RTS_UI32 end = capacity();
+
+    for (RTS_UI32 i = 0; i < FILE_STORE_FILES; i++) {
+        const FILE_ENTRY *file = FileStoreGet(i);
+        if (file == NULL || file->start + span(file->size) <= start)
+            continue;
+        if (file->start <= start)
+            return 0;
+        if (file->start < end)
+            end = file->start;
+    }
+    return end - start;
+}
+
+/* Where a gap may begin: at the start, and after each file. */
+static RTS_UI32 gap(RTS_UI32 index)
+{
+    const FILE_ENTRY *file = FileStoreGet(index);
+
+    return file == NULL ? 0 : file->start + span(file->size);
+}
+
+/* The smallest gap that has `size` bytes; false if there is none. */
+static bool find_place(RTS_UI32 size, RTS_UI32 *start)
+{
+    RTS_UI32 smallest = UINT32_MAX;
+
+    for (RTS_UI32 i = 0; i <= FILE_STORE_FILES; i++) {
+        RTS_UI32 room = room_at(gap(i));
+        if (room < size || room >= smallest)
+            continue;
+        smallest = room;
+        *start = gap(i);
+    }
+    return smallest != UINT32_MAX;
+}
+
+RTS_UI32 FileStoreRoom(void)
+{
+    RTS_UI32 largest = 0;
+
+    if (store.opened != ERR_OK || find("") == NULL)
+        return 0;
+    for (RTS_UI32 i = 0; i <= FILE_STORE_FILES; i++) {
+        RTS_UI32 room = room_at(gap(i));
+        largest = room > largest ? room : largest;
+    }
+    return largest;
+}
+
+/* ---- the catalog ---- */
+
+/* A record may hold anything. */
+static bool is_valid(const FILE_ENTRY *file)
+{
+    return memchr(file->name, '\0', sizeof(file->name)) != NULL && FileStoreIsName(file->name) &&
+           file->size <= capacity() && file->start <= capacity() - file->size && span(file->start) == file->start;
+}
+
+static void read_catalog(void)
+{
+    store.opened = FlashLogReadNewest(&store.log, CATALOG_TAG, &store.catalog, sizeof(store.catalog));
+    if (store.opened == ERR_NO_OBJECT) {
+        memset(&store.catalog, 0, sizeof(store.catalog));
+        store.opened = ERR_OK;
+        if (store.log.sequence != 0)
+            LogAdd(CMPID_CmpFileTransfer, LOG_WARNING, ERR_VERSION_MISMATCH, "Files are of another firmware");
+    }
+    for (RTS_UI32 i = 0; i < FILE_STORE_FILES; i++)
+        if (!is_valid(&store.catalog.file[i]))
+            memset(&store.catalog.file[i], 0, sizeof(FILE_ENTRY));
+}
+
+void FileStoreOpen(void)
+{
+    memset(&store, 0, sizeof(store));
+    store.opened = ERR_DEVICE;
+    if (capacity() == 0)
+        return;
+    store.opened = FlashLogOpen(&store.log, FILE_CATALOG);
+    if (store.opened == ERR_OK)
+        read_catalog();
+}
+
+/* Sets an entry, and writes the catalog. On an error the entry is as it was, in flash too if that can be. */
+static RTS_RESULT change(FILE_ENTRY *place, const FILE_ENTRY *value)
+{
+    const FILE_ENTRY before = *place;
+
+    *place = *value;
+    RTS_RESULT result = FlashLogAppend(&store.log, CATALOG_TAG, &store.catalog, sizeof(store.catalog));
+    if (result == ERR_OK)
+        return ERR_OK;
+    *place = before;
+    (void)FlashLogAppend(&store.log, CATALOG_TAG, &store.catalog, sizeof(store.catalog));
+    LogAdd(CMPID_CmpFileTransfer, LOG_ERROR, result, "The catalog of the files cannot be written");
+    return result;
+}
+
+/* ---- writing ---- */
+
+/* The entry that the file will have. */
+static FILE_ENTRY *place_of(const char *name)
+{
+    FILE_ENTRY *place = find(name);
+
+    return place == NULL ? find("") : place;
+}
+
+RTS_RESULT FileStoreBegin(const char *name, RTS_UI32 size, RTS_UI32 crc)
+{
+    FileStoreAbort();
+    if (!FileStoreIsName(name))
+        return ERR_PARAMETER;
+    if (store.opened != ERR_OK)
+        return store.opened;
+    if (size > capacity() || place_of(name) == NULL || !find_place(span(size), &store.next.start))
+        return ERR_DISK_FULL;
+    memset(store.next.name, 0, sizeof(store.next.name));
+    memcpy(store.next.name, name, strlen(name));
+    store.next.size = size;
+    store.next.crc = crc;
+    store.written = 0;
+    store.writing = true;
+    SysFileCreateAt(FILE_STORE, store.next.start);
+    return ERR_OK;
+}
+
+RTS_RESULT FileStoreWrite(const RTS_UI8 *data, RTS_UI32 size)
+{
+    if (!store.writing)
+        return ERR_INVALID_SEQUENCE;
+    if (size > store.next.size - store.written)
+        return ERR_FT_FILE_SIZE_MISMATCH;
+    RTS_RESULT result = SysFileWrite(FILE_STORE, data, size);
+    store.written += size;
+    if (result != ERR_OK)
+        FileStoreAbort();
+    return result;
+}
+
+RTS_UI32 FileStorePosition(void)
+{
+    return store.written;
+}
+
+/* That what is in flash is what was to be written. */
+static RTS_RESULT check_written(void)
+{
+    RTS_UI32 crc = 0;
+    RTS_RESULT result = SysFileCRC32(FILE_STORE, store.next.start, store.next.size, &crc);
+
+    if (result != ERR_OK)
+        return result;
+    return crc == store.next.crc ? ERR_OK : ERR_FT_CRC_MISMATCH;
+}
+
+RTS_RESULT FileStoreEnd(void)
+{
+    if (!store.writing)
+        return ERR_INVALID_SEQUENCE;
+    store.writing = false;
+    if (store.written != store.next.size)
+        return ERR_FT_FILE_SIZE_MISMATCH;
+    RTS_RESULT result = SysFileClose(FILE_STORE);
+    if (result == ERR_OK)
+        result = check_written();
+    return result == ERR_OK ? change(place_of(store.next.name), &store.next) : result;
+}
+
+void FileStoreAbort(void)
+{
+    store.writing = false;
+    store.written = 0;
+}
+
+/* ---- reading and deleting ---- */
+
+RTS_RESULT FileStoreRead(const FILE_ENTRY *entry, RTS_UI32 offset, void *data, RTS_UI32 size)
+{
+    const FILE_ENTRY *file = FileStoreFind(entry->name);
+
+    if (file == NULL || memcmp(file, entry, sizeof(*file)) != 0)
+        return ERR_NO_CONSISTENCY;
+    if (size > file->size || offset > file->size - size)
+        return ERR_OUT_OF_LIMITS;
+    return SysFileRead(FILE_STORE, file->start + offset, data, size);
+}
+
+RTS_RESULT FileStoreDelete(const char *name)
+{
+    static const FILE_ENTRY none;
+
+    if (store.opened != ERR_OK)
+        return store.opened;
+    if (FileStoreFind(name) == NULL)
+        return ERR_NO_OBJECT;
+    return change(find(name), &none);
+}
+
+#endif

@@ -1,0 +1,158 @@
+"""The sources of a program as one file, from which the same image can be made again."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from plctool.errors import DeviceError, UsageError
+from plctool.files import make_folder, write_atomically
+from plctool.link.file_services import SOURCE_NAME
+
+if TYPE_CHECKING:
+    from plctool.cli.projects import Settings
+
+_FACTS = "plctool-source.json"
+_FORMAT = 1
+_MOST_FILES, _MOST_BYTES = 10_000, 64 << 20
+_NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same sources are the same archive
+
+
+@dataclass(frozen=True)
+class Archive:
+    """What a device keeps. `crc`: of the image that the sources make; `build`: the words after `plctool build`."""
+
+    crc: int
+    build: list[str]
+    files: dict[str, bytes]
+
+    def pack(self) -> bytes:
+        out = io.BytesIO()
+        facts = {"format": _FORMAT, "image_crc": self.crc, "build": self.build}
+        with zipfile.ZipFile(out, "w") as file:
+            for name, data in {_FACTS: json.dumps(facts).encode(), **dict(sorted(self.files.items()))}.items():
+                info = zipfile.ZipInfo(name, _NO_TIME)
+                info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+                file.writestr(info, data, compresslevel=9)
+        return out.getvalue()
+
+    def unpack(self, folder: Path) -> list[Path]:
+        """Writes the files below a folder that is empty or new. Raises UsageError if it is not."""
+        make_folder(folder)
+        if any(folder.iterdir()):
+            raise UsageError(f"{folder} is not empty; name another folder with -o.", "cannot-write")
+        written = []
+        for name, data in self.files.items():
+            path = folder / name
+            make_folder(path.parent)
+            write_atomically(path, data)
+            written.append(path)
+        return written
+
+
+def unpacked(data: bytes) -> Archive:
+    """Raises DeviceError for what `pack` did not write: any tool may have put it on the device."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as file:
+            infos = file.infolist()
+            if len(infos) > _MOST_FILES or sum(info.file_size for info in infos) > _MOST_BYTES:
+                raise ValueError("it is too large")
+            files = {info.filename: _read(file, info) for info in infos}
+        facts = json.loads(files.pop(_FACTS))
+        build = facts["build"]
+        if facts["format"] != _FORMAT or not all(isinstance(word, str) for word in build):
+            raise ValueError("it has another format")
+        return Archive(int(facts["image_crc"]), list(build), files)
+    except (zipfile.BadZipFile, KeyError, TypeError, ValueError, EOFError, RuntimeError, NotImplementedError) as error:
+        raise DeviceError(
+            f"{SOURCE_NAME} on the device is no archive of sources ({error}); 'plctool files get' gets it as it is.",
+            "bad-source",
+        ) from None
+
+
+def _read(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
+    name = info.filename
+    parts = PurePosixPath(name).parts
+    if not parts or ".." in parts or name.startswith("/") or "\\" in name or ":" in name or not name.isprintable():
+        raise ValueError(f"the file {name!a} leads out of it")
+    with file.open(info) as content:
+        return content.read(info.file_size)
+
+
+def archive_of(settings: Settings, crc: int, target: str) -> Archive:
+    """The sources of an image with that CRC, made for a target. They are compiled again from the archive: raises
+    UsageError unless that gives the same image."""
+    settings = replace(settings, target=settings.target or target)
+    root = Path(os.path.commonpath(list(_folders(settings))))
+    archive = Archive(crc, _words(settings, root), {_below(root, path): path.read_bytes() for path in _files(settings)})
+    with tempfile.TemporaryDirectory(prefix="plctool-source-") as folder:
+        found = _built_crc(archive, Path(folder))
+    if found != crc:
+        raise UsageError(
+            f"These sources do not make this image (CRC {crc:08X}, they make {found:08X}): build it again from them, "
+            "with the options that are in plc.toml.",
+            "other-source",
+        )
+    return archive
+
+
+def _files(settings: Settings) -> Iterator[Path]:
+    """All that is read, each once, as paths of real files."""
+    project = settings.files.project
+    every = [*settings.files.every_file(), *([project.file] if project is not None else [])]
+    yield from dict.fromkeys(path.resolve() for path in every)
+
+
+def _folders(settings: Settings) -> Iterator[Path]:
+    """That contain all of it. A folder that was named keeps its name in the archive, because the image may have it."""
+    yield from (path.parent for path in _files(settings))
+    project = settings.files.project
+    if project is not None:
+        yield project.file.resolve().parent.parent
+        return
+    for path in (*settings.files.sources, *settings.files.libraries):
+        yield path.resolve().parent if path.name else path.resolve()
+
+
+def _below(root: Path, path: Path) -> str:
+    return path.resolve().relative_to(root).as_posix()
+
+
+def _words(settings: Settings, root: Path) -> list[str]:
+    """What makes the image, in the folder of the archive."""
+    files = settings.files
+    words: list[Any] = []
+    if files.project is not None:
+        words = [_below(root, files.project.file)]
+    else:
+        words = [_below(root, path) for path in files.sources]
+        for path in files.libraries:
+            words += ["--library", _below(root, path)]
+        if files.io.description is not None:
+            words += ["--io", _below(root, files.io.description)]
+        if files.io.device is not None:
+            words += ["--device", _below(root, files.io.device)]
+    words += ["--target", settings.target, f"-O{settings.level}", "--checks", settings.checks]
+    return [*map(str, words), *(["--debug"] if settings.debug else [])]
+
+
+def _built_crc(archive: Archive, folder: Path) -> int:
+    from plctool.cli.arguments import parser
+    from plctool.cli.documents import compiled
+    from plctool.cli.projects import settings_of
+
+    archive.unpack(folder)
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        args = parser().parse_args(["build", *archive.build, "--no-limits", "-o", "app.cdl"])
+        return compiled(settings_of(args)).crc
+    finally:
+        os.chdir(before)
