@@ -148,9 +148,9 @@ static bool write_number(const char *folder, const char *name, const char *suffi
 {
     char path[PATH_SIZE];
     char text[TEXT_SIZE];
+    int length = snprintf(text, sizeof text, "%.0f\n", number);
 
-    (void)snprintf(text, sizeof text, "%.0f\n", number);
-    return write_text(join(path, folder, name, suffix), text);
+    return length > 0 && length < TEXT_SIZE && write_text(join(path, folder, name, suffix), text);
 }
 
 /* ---- devices ---- */
@@ -160,6 +160,7 @@ static bool search_name(const char *base, const char *name, char folder[PATH_SIZ
 {
     DIR *list = opendir(base);
     struct dirent *entry;
+    char device[NAME_SIZE];
     unsigned best = ~0u;
 
     while (list != NULL && (entry = readdir(list)) != NULL) {
@@ -175,8 +176,8 @@ static bool search_name(const char *base, const char *name, char folder[PATH_SIZ
         (void)closedir(list);
     if (best == ~0u)
         return false;
-    (void)snprintf(folder, PATH_SIZE, "%s/iio:device%u", base, best);
-    return true;
+    (void)snprintf(device, sizeof device, "iio:device%u", best);
+    return *join(folder, base, device, "") != '\0';
 }
 
 /* Where a device is now; false: it is not there. */
