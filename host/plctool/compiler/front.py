@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler.broken_units import is_independent, remaining
 from plctool.compiler.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
+from plctool.compiler.dialect import OWN, Dialect
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.imports import ImportedLibrary, needed_parts
 from plctool.compiler.library import Library, standard_library
@@ -67,6 +68,7 @@ def check_sources(
     io: Description | None = None,
     libraries: Sequence[ImportedLibrary] = (),
     python: PythonFunctions | None = None,
+    dialect: Dialect = OWN,
 ) -> CheckResult:
     """Checks the files of a program together.
 
@@ -74,13 +76,14 @@ def check_sources(
     takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
     `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check.
     `libraries`: what the program uses besides the standard library. `python`: functions that Python implements, in the
-    simulator; raises UsageError for those that cannot be. Whatever the sources contain, the result is a program or
+    simulator; raises UsageError for those that cannot be. `dialect`: of which system it has its rules. Whatever the sources contain, the result is a program or
     diagnostics, never an exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     program = Program(chosen)
     diagnostics = program.world.diagnostics
     diagnostics.options = warnings
+    program.world.dialect = diagnostics.dialect = dialect
     program.world.io = IoChannels(io)
     program.libraries = libraries
     with no_collection(), room_for_nesting():

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
 from plctool.compiler.codegen.lower_unit import parse_checks
+from plctool.compiler.dialect import DIALECTS
 from plctool.compiler.level import Level
 from plctool.compiler.library_files import is_stand_in, libraries_at, no_library
 from plctool.compiler.source_files import READERS
@@ -47,6 +48,7 @@ class Project:
     no_warn: list[str] = field(default_factory=list)
     werror: bool = False
     info: ApplicationInfo = field(default_factory=ApplicationInfo)
+    dialect: str | None = None
 
 
 def read_project(file: Path) -> Project:
@@ -73,6 +75,7 @@ def _project(file: Path, table: Table) -> Project:
         _warnings(options),
         options.flag("werror"),
         _information(folder, information),
+        options.choice("dialect", {name: name for name in DIALECTS}),
     )
     options.close()
     information.close()

@@ -157,9 +157,9 @@ def converted(frame: Frame, e: Convert) -> Value:
     source = e.operand.type
     value = frame.value(e.operand)
     if e.check is None or Check.SUBRANGE not in frame.checks:
-        return convert(frame, value, source, e.type, truncate=e.truncate)
+        return convert(frame, value, source, e.type, rounding=e.rounding)
     if type_range(source) is None:  # a real: the limits are tested on the integer
-        value = convert(frame, value, source, e.type, truncate=e.truncate)
+        value = convert(frame, value, source, e.type, rounding=e.rounding)
         _check_limits(frame, value, e.type, type_range(e.type), e.check, e.pos)
         return value
     _check_limits(frame, value, source, value_range(e.operand, frame.ranges), e.check, e.pos)

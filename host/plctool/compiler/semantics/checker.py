@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
+from plctool.compiler.dialect import OWN
 from plctool.compiler.internal import note_position
 from plctool.compiler.nesting import MAX_DEPTH, OPERATORS, NestingError
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, settle
@@ -35,6 +36,7 @@ class Checker:
     def __init__(self, world: World, scope: Scope, special_calls: SpecialCalls | None = None) -> None:
         self.world = world
         self.scope = scope
+        self.dialect = OWN if scope.library else world.dialect
         self.coerce = world.coerce
         self.pos: Callable[[int], Pos] = scope.source.pos
         self.special_calls: SpecialCalls = special_calls or {}

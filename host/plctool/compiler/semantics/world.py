@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from plctool.compiler.diagnostics import Diagnostics
+from plctool.compiler.dialect import OWN
 from plctool.compiler.library import Library
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics.allocation import Allocation, DirectVariables, module_address
@@ -108,6 +109,7 @@ class World:
     """Set by what declares."""
 
     def __init__(self, library: Library) -> None:
+        self.dialect = OWN
         self.diagnostics = Diagnostics(s.path for s in library.sources)
         self.names = Names(library, self.diagnostics)
         self.coerce = Coercion(self.diagnostics, self._text_of)
