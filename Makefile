@@ -41,7 +41,7 @@ test-vcan: build/build.ninja
 	$(MESON) compile -C build
 	tests/vcan/run build $(BIN)/python || [ $$? -eq 77 ]
 
-# Lines and analog values of a real kernel, in a virtual machine; part of `make test`.
+# Lines and analog values of a real kernel, in a virtual machine; skipped with the reason where that cannot run.
 test-kernel: build/build.ninja
 	$(MESON) compile -C build
 	tests/kernel/run build $(abspath $(BIN)/python) || [ $$? -eq 77 ]

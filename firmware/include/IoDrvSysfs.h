@@ -35,9 +35,6 @@ enum {
 #ifndef RTS_CFFI
 #include "CmpItf.h"
 RTS_RESULT IoDrvSysfs_Hook(CMP_HOOK hook);
-
-/* Where the kernel's files are, "/sys" unless said otherwise; `root` is kept. For tests, before CH_INIT2. */
-void IoDrvSysfsSetRoot(const char *root);
 #endif
 
 #endif

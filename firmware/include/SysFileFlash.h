@@ -63,8 +63,8 @@ void SysFileAppend(RTS_UI32 file, RTS_UI32 position);
 /* Appends. ERR_DISK_FULL beyond the end of the file, nothing is written then; ERR_DEVICE flash fault. */
 RTS_RESULT SysFileWrite(RTS_UI32 file, const void *data, RTS_UI32 size);
 
-/* Appends `size` bytes, each of them the one `distance` (from 1 on) before it. ERR_OUT_OF_LIMITS before the start of the
- * file; else as SysFileWrite. */
+/* Appends `size` bytes, each of them the one `distance` before it. ERR_OUT_OF_LIMITS for distance 0, and before the start
+ * of the file; else as SysFileWrite. */
 RTS_RESULT SysFileCopy(RTS_UI32 file, RTS_UI32 distance, RTS_UI32 size);
 
 /* Bytes written so far, the position of the next one. */

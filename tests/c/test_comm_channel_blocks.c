@@ -15,7 +15,7 @@ static void captured_message_gets_the_blocks_of_the_specification(void)
     client_send_message(&client, request, sizeof(request));
     CHECK_EQUAL(client_take_message(&client, reply), 28);
     CHECK(memcmp(reply, "\x55\xCD\x10\x00\x81\x00\x07\x00\x0B\x56\xEF\x8E\x08\x00\x00\x00\x00\x00\x00\x00", 20) == 0);
-    CHECK(memcmp(reply + 20, "\xFF\xFE\x03\x82\x80\x00\x02\x03", 8) == 0);
+    CHECK(memcmp(reply + 20, "\x54\x84\x80\x00\x01\x00\x00\x00", 8) == 0); /* the operation mode */
 }
 
 static void messages_of_every_size_up_to_the_buffer_pass(void)

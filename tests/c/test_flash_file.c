@@ -174,6 +174,7 @@ static void what_was_written_can_be_copied(void)
             CHECK_EQUAL(SysFileGetPos(FILE_SLOT_A), size);
         }
         CHECK_EQUAL(SysFileCopy(FILE_SLOT_A, size + 1, 1), ERR_OUT_OF_LIMITS);
+        CHECK_EQUAL(SysFileCopy(FILE_SLOT_A, 0, 1), ERR_OUT_OF_LIMITS);
         CHECK_EQUAL(SysFileCopy(FILE_SLOT_A, 1, SysFileGetArea(FILE_SLOT_A)->size), ERR_DISK_FULL);
         CHECK_EQUAL(SimFlashViolations(), 0);
         SysFileCreate(FILE_SLOT_A);

@@ -7,7 +7,7 @@
  * other side has done its part.
  */
 #define _GNU_SOURCE
-#include "IoDrvSysfs.h"
+#include "../../firmware/port/linux/SysfsFiles.h"
 #include "io_driver.h"
 
 #include <ftw.h>
@@ -114,7 +114,7 @@ static void begin_kernel(void)
 {
     make_tree();
     begin_io();
-    IoDrvSysfsSetRoot(root);
+    SysfsSetRoot(root);
     CHECK_EQUAL(IoDrvSysfs_Hook(CH_INIT2), ERR_OK);
     io_init(&io);
 }

@@ -117,6 +117,45 @@ def test_the_reports_have_the_same_lines(tool: Tool) -> None:
     assert "Sign" in page.read_text()
 
 
+def test_a_program_without_statements_has_no_report(tool: Tool) -> None:
+    Path("empty.st").write_text("PROGRAM Main END_PROGRAM\nTEST 'a' ASSERT_TRUE(TRUE); END_TEST\n")
+    done = tool("test", "empty.st", "--coverage", "out")
+    assert done.status == 0 and "no statements" in done.out, done
+    assert not Path("out").exists()
+
+
+def test_a_project_in_one_file_is_listed_once(tool: Tool) -> None:
+    """Each unit of it is a source; the lines are those of the file."""
+    body = "<ST><xhtml xmlns='http://www.w3.org/1999/xhtml'>\nn := n + 1;\n</xhtml></ST>"
+    declared = "<localVars><variable name='n'><type><INT/></type></variable></localVars>"
+    pous = "".join(
+        f"<pou name='P{n}' pouType='functionBlock'><interface>{declared}</interface><body>{body}</body></pou>\n"
+        for n in range(2)
+    )
+    Path("plant.xml").write_text(
+        "<project xmlns='http://www.plcopen.org/xml/tc6_0201'><types><dataTypes/><pous>"
+        f"{pous}</pous></types><instances><configurations/></instances></project>"
+    )
+    Path("tests.st").write_text("TEST 'a' VAR p : P0; END_VAR p(); END_TEST\n")
+    done = tool("test", "plant.xml", "tests.st", "--coverage", "out", "--json")
+    assert done.status == 0, done
+    assert [(file["file"], file["lines"], file["run"]) for file in done.json["coverage"]["files"]] == [
+        ("plant.xml", 2, 1)
+    ]
+
+
+def test_exceptions_are_followed(tool: Tool) -> None:
+    """Through the bodies of a __TRY."""
+    Path("tries.st").write_text(
+        "FUNCTION F : INT VAR_INPUT by : INT; END_VAR VAR exc : __SYSTEM.ExceptionCode; END_VAR\n"
+        "__TRY\nF := 1 / by;\nF := 2;\n__CATCH(exc)\nF := 3;\n__FINALLY\nF := F + 10;\n__ENDTRY\nEND_FUNCTION\n"
+        "TEST 'a' ASSERT_EQ(F(0), 13); END_TEST\n"
+    )
+    done = tool("test", "tries.st", "--coverage", "out", "--json")
+    assert done.status == 0, done
+    assert done.json["coverage"]["files"][0]["missing"] == [4]
+
+
 def test_without_it_nothing_is_marked(tool: Tool) -> None:
     Path("pump.st").write_text(PROGRAM + TESTS)
     assert tool("test", "pump.st", "--json").json["coverage"] is None

@@ -76,7 +76,7 @@ def test_ctrl_c_during_the_flash_of_another_program_leaves_the_previous_one(
     assert done.err == f"plctool: Interrupted. The device has still the previous program (CRC {before}), state: run.\n"
 
 
-def interrupt(*arguments: Any) -> None:
+def interrupt(*arguments: Any, **words: Any) -> None:
     raise KeyboardInterrupt
 
 

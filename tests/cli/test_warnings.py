@@ -52,7 +52,9 @@ def test_werror_fails_on_a_warning(tool: Any, scratch: Path, command: str) -> No
 def test_unknown_warning_exits_2_and_lists_the_names(tool: Any, command: str) -> None:
     done = tool(command, "main.st", "--no-warn", "unusde")
     assert done.status == 2
-    assert done.err.startswith("plctool: There is no warning 'unusde'; the names are access, always, bits, case, ")
+    assert done.err.startswith(
+        "plctool: There is no warning 'unusde'; the names are access, always, bits, bounds, case, "
+    )
     assert done.err.count("\n") == 1
 
 

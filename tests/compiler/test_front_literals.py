@@ -113,7 +113,6 @@ def test_bool_literal_is_one_or_zero(text: str, value: int) -> None:
         ("16#GG", "base 16"),
         ("2#12", "base 2"),
         ("7#1", "2, 8 or 16"),
-        ("1__0", "underscore"),
         ("1_", "underscore"),
         ("INT#", "missing"),
         ("T#5", "duration"),

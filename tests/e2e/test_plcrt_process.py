@@ -92,10 +92,10 @@ def test_a_flash_file_in_a_folder_that_does_not_exist_exits_1(tmp_path):
 
 def test_a_file_that_is_no_flash_is_not_touched(tmp_path):
     film = tmp_path / "film"
-    film.write_bytes(b"x" * (5 * 1024 * 1024))
+    film.write_bytes(b"x" * (6 * 1024 * 1024))
     done = run_plcrt("--flash", str(film))
     assert done.returncode == 1 and "not a flash file" in done.stderr
-    assert film.read_bytes().strip(b"x") == b"" and film.stat().st_size == 5 * 1024 * 1024
+    assert film.read_bytes().strip(b"x") == b"" and film.stat().st_size == 6 * 1024 * 1024
 
 
 def test_a_small_file_of_another_program_is_not_touched(tmp_path):
@@ -106,16 +106,29 @@ def test_a_small_file_of_another_program_is_not_touched(tmp_path):
     assert notes.read_text() == "milk, bread"
 
 
+PROGRAMS = 4 * 1024 * 1024  # bytes of the flash; files come after them
+
+
 @pytest.mark.parametrize("change", [-1, -4096, 1, 4096])
 def test_a_flash_file_that_was_cut_short_or_grew_is_not_touched_and_its_size_is_said(plcrt, change):
     plcrt.stop()
-    whole = b"\0" * 4096 + plcrt.flash.read_bytes()[4096:]
+    flash = plcrt.flash.read_bytes()
+    whole = b"\0" * 4096 + flash[4096:PROGRAMS] + b"\0" + flash[PROGRAMS + 1 :]  # a program, and a file
     content = whole[:change] if change < 0 else whole + bytes(change)
     plcrt.flash.write_bytes(content)
     done = run_plcrt("--flash", str(plcrt.flash))
     assert done.returncode == 1 and done.stderr.count("\n") == 1
     assert f"{len(content)} bytes and not {len(whole)}" in done.stderr and "name another file" in done.stderr
     assert plcrt.flash.read_bytes() == content
+
+
+def test_a_flash_file_from_before_there_were_files_is_made_longer(plcrt):
+    plcrt.stop()
+    flash = plcrt.flash.read_bytes()
+    plcrt.flash.write_bytes(flash[:PROGRAMS])
+    plcrt.start()
+    plcrt.stop()
+    assert plcrt.flash.read_bytes() == flash
 
 
 @pytest.mark.skipif(not Path("/sys/kernel/uevent_seqnum").exists(), reason="no file that not even root may write")

@@ -18,7 +18,7 @@ from environment import CONFIG, FIRMWARE, MACHINE, ROOT, TARGET, firmware
 
 SKIPPED = 77  # exit status that Meson counts as skipped
 
-sys.path.append(str(ROOT / os.environ.get("PLCTOOL_BUILD", "build") / "host"))
+sys.path.insert(0, str(ROOT / os.environ.get("PLCTOOL_BUILD", "build") / "host"))
 
 
 def _missing() -> str | None:

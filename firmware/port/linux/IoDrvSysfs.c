@@ -15,39 +15,20 @@
 #include "SysAtomic.h"
 #include "SysLock.h"
 #include "SysTime.h"
+#include "SysfsFiles.h"
 #include "rts_config.h"
 
-#include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
-#include <math.h>
 #include <pthread.h>
 #include <semaphore.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
-enum { DEVICES = 8, NAME_SIZE = 64, PATH_SIZE = 256, TEXT_SIZE = 32, END_MS = 500, TIMEOUT_MS = 3000 };
-
-typedef struct {
-    char name[NAME_SIZE];
-    RTS_UI32 options;
-    RTS_UI32 period_ns;
-} CHANNEL;
+enum { DEVICES = 8, END_MS = 500, TIMEOUT_MS = 3000 };
 
 typedef struct {
-    char device[NAME_SIZE];
-    RTS_UI32 kind;
-    RTS_UI32 every_ms;
-    RTS_UI32 count;
-    CHANNEL channel[IO_SYSFS_CHANNELS];
-} SETUP;
-
-typedef struct {
-    RTS_UI32 user; /* index of its connector + 1; 0: not in use */
-    SETUP setup;   /* with `serial` and `value`: within SysLock */
+    RTS_UI32 user;     /* index of its connector + 1; 0: not in use */
+    SYSFS_SETUP setup; /* with `serial` and `value`: within SysLock */
     RTS_UI32 serial;
     RTS_UI32 value[IO_SYSFS_CHANNELS];
     RTS_UI32 rounds; /* good ones of this setup, and bad ones: the thread counts */
@@ -61,8 +42,8 @@ typedef struct {
     sem_t wake;
     pthread_t thread;
     /* the thread's */
-    SETUP work;
-    char folder[PATH_SIZE];
+    SYSFS_SETUP work;
+    char folder[SYSFS_PATH_SIZE];
     RTS_UI32 written[IO_SYSFS_CHANNELS];
     RTS_UI32 is_written; /* a bit for each channel: the device has `written` */
 } DEVICE;
@@ -70,224 +51,15 @@ typedef struct {
 RTS_STATIC_ASSERT((int)IO_SYSFS_CHANNELS == 32, a_word_has_a_bit_for_each_channel);
 
 static DEVICE devices[DEVICES];
-static const char *sysfs = "/sys";
 
 static const ICmpIoDrv functions;
 static IO_DRIVER sysfs_driver = {.functions = &functions};
-
-void IoDrvSysfsSetRoot(const char *root)
-{
-    sysfs = root;
-}
 
 static const IoDrvInfo *get_info(void)
 {
     static const IoDrvInfo info = {"IoDrvSysfs", "Analog values and PWM of the kernel", "Open PLC runtime", 0x00010000};
 
     return &info;
-}
-
-/* ---- files ---- */
-
-/* "" as the result of a path that is too long: there is no such file. */
-static const char *join(char path[PATH_SIZE], const char *folder, const char *name, const char *suffix)
-{
-    int length = snprintf(path, PATH_SIZE, "%s/%s%s", folder, name, suffix);
-
-    if (length < 0 || length >= PATH_SIZE)
-        path[0] = '\0';
-    return path;
-}
-
-static bool exists(const char *folder, const char *name, const char *suffix)
-{
-    char path[PATH_SIZE];
-
-    return access(join(path, folder, name, suffix), F_OK) == 0;
-}
-
-/* Without the end of the line. */
-static bool read_text(const char *path, char text[NAME_SIZE])
-{
-    int file = open(path, O_RDONLY | O_CLOEXEC);
-    ssize_t size = file >= 0 ? read(file, text, NAME_SIZE - 1) : -1;
-
-    if (file >= 0)
-        (void)close(file);
-    if (size < 0)
-        return false;
-    text[size] = '\0';
-    text[strcspn(text, "\n")] = '\0';
-    return true;
-}
-
-static bool write_text(const char *path, const char *text)
-{
-    int file = open(path, O_WRONLY | O_TRUNC | O_CLOEXEC);
-    ssize_t size = (ssize_t)strlen(text);
-    bool is_written = file >= 0 && write(file, text, (size_t)size) == size;
-
-    if (file >= 0)
-        (void)close(file);
-    return is_written;
-}
-
-static bool read_number(const char *folder, const char *name, const char *suffix, double *number)
-{
-    char path[PATH_SIZE];
-    char text[NAME_SIZE];
-    char *end = text;
-
-    if (!read_text(join(path, folder, name, suffix), text))
-        return false;
-    *number = strtod(text, &end);
-    return end != text && isfinite(*number);
-}
-
-static bool write_number(const char *folder, const char *name, const char *suffix, double number)
-{
-    char path[PATH_SIZE];
-    char text[TEXT_SIZE];
-
-    (void)snprintf(text, sizeof text, "%.0f\n", number);
-    return write_text(join(path, folder, name, suffix), text);
-}
-
-/* ---- devices ---- */
-
-/* The folder of an IIO device that has a name; of several, that with the lowest number. */
-static bool search_name(const char *base, const char *name, char folder[PATH_SIZE])
-{
-    DIR *list = opendir(base);
-    struct dirent *entry;
-    unsigned best = ~0u;
-
-    while (list != NULL && (entry = readdir(list)) != NULL) {
-        char path[PATH_SIZE];
-        char text[NAME_SIZE];
-        unsigned number;
-        if (sscanf(entry->d_name, "iio:device%u", &number) != 1 || number >= best)
-            continue;
-        if (read_text(join(path, join(folder, base, entry->d_name, ""), "name", ""), text) && strcmp(text, name) == 0)
-            best = number;
-    }
-    if (list != NULL)
-        (void)closedir(list);
-    if (best == ~0u)
-        return false;
-    (void)snprintf(folder, PATH_SIZE, "%s/iio:device%u", base, best);
-    return true;
-}
-
-/* Where a device is now; false: it is not there. */
-static bool find_folder(const SETUP *setup, char folder[PATH_SIZE])
-{
-    char base[PATH_SIZE];
-
-    join(base, sysfs, setup->kind == SYSFS_PWM ? "class/pwm" : "bus/iio/devices", "");
-    if (exists(base, setup->device, ""))
-        return *join(folder, base, setup->device, "") != '\0';
-    return setup->kind == SYSFS_IIO && search_name(base, setup->device, folder);
-}
-
-/* ---- IIO ---- */
-
-/* A factor of a channel: its own ("in_voltage0_scale"), or that of all of its type ("in_voltage_scale"). */
-static double get_factor(const char *folder, const char *channel, const char *suffix, double otherwise)
-{
-    char type[NAME_SIZE];
-    double factor;
-
-    if (read_number(folder, channel, suffix, &factor))
-        return factor;
-    (void)snprintf(type, sizeof type, "%s", channel);
-    type[strcspn(type, "0123456789")] = '\0';
-    return read_number(folder, type, suffix, &factor) ? factor : otherwise;
-}
-
-/* Numbers that a DINT has not become the nearest one. */
-static RTS_UI32 dint_of(double number)
-{
-    return (RTS_UI32)(RTS_I32)fmin(fmax(number, -2147483648.0), 2147483647.0);
-}
-
-static RTS_UI32 real_of(double number)
-{
-    float value = (float)number;
-    RTS_UI32 bits;
-
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
-
-/* A value that is no number is 0. */
-static double number_of(RTS_UI32 bits)
-{
-    float value;
-
-    memcpy(&value, &bits, sizeof value);
-    return isfinite(value) ? (double)value : 0;
-}
-
-static bool read_iio(const char *folder, const CHANNEL *channel, RTS_UI32 *value)
-{
-    double number;
-
-    if (!read_number(folder, channel->name, "_raw", &number))
-        return false;
-    if ((channel->options & SYSFS_OPTION_REAL) == 0)
-        *value = dint_of(number);
-    else
-        *value = real_of((number + get_factor(folder, channel->name, "_offset", 0)) *
-                         get_factor(folder, channel->name, "_scale", 1));
-    return true;
-}
-
-static bool write_iio(const char *folder, const CHANNEL *channel, RTS_UI32 value)
-{
-    double scale;
-
-    if ((channel->options & SYSFS_OPTION_REAL) == 0)
-        return write_number(folder, channel->name, "_raw", (RTS_I32)value);
-    scale = get_factor(folder, channel->name, "_scale", 1);
-    if (scale == 0)
-        return false;
-    return write_number(folder, channel->name, "_raw",
-                        round(number_of(value) / scale - get_factor(folder, channel->name, "_offset", 0)));
-}
-
-/* ---- PWM ---- */
-
-/* The kernel refuses a duty cycle longer than the period at any moment, so the old one goes first. */
-static bool set_period(const char *pwm, RTS_UI32 period_ns)
-{
-    double now;
-
-    if (!read_number(pwm, "period", "", &now))
-        return false;
-    if (now == period_ns)
-        return true;
-    if (now > 0 && !write_number(pwm, "duty_cycle", "", 0))
-        return false;
-    return write_number(pwm, "period", "", period_ns);
-}
-
-static bool is_exported(const char *folder, const CHANNEL *channel)
-{
-    return exists(folder, channel->name, "") ||
-           write_number(folder, "export", "", (double)strtoul(channel->name + strlen("pwm"), NULL, 10));
-}
-
-static bool write_pwm(const char *folder, const CHANNEL *channel, RTS_UI32 value)
-{
-    double percent = fmin(fmax(number_of(value), 0), 100);
-    char pwm[PATH_SIZE];
-    double enabled;
-
-    join(pwm, folder, channel->name, "");
-    return is_exported(folder, channel) && set_period(pwm, channel->period_ns) &&
-           write_number(pwm, "duty_cycle", "", round(channel->period_ns * percent / 100)) &&
-           read_number(pwm, "enable", "", &enabled) && (enabled == 1 || write_number(pwm, "enable", "", 1));
 }
 
 /* ---- the thread of a device ---- */
@@ -307,11 +79,9 @@ static void take_setup(DEVICE *device, RTS_UI32 *serial)
 
 static bool write_output(DEVICE *device, RTS_UI32 n, RTS_UI32 value)
 {
-    const CHANNEL *channel = &device->work.channel[n];
-
     if ((device->is_written >> n & 1) != 0 && device->written[n] == value)
         return true;
-    if (!(device->work.kind == SYSFS_PWM ? write_pwm : write_iio)(device->folder, channel, value))
+    if (!SysfsWrite(&device->work, n, device->folder, value))
         return false;
     device->written[n] = value;
     device->is_written |= 1u << n;
@@ -322,7 +92,7 @@ static bool write_output(DEVICE *device, RTS_UI32 n, RTS_UI32 value)
 static bool do_round(DEVICE *device, RTS_UI32 serial)
 {
     RTS_UI32 value[IO_SYSFS_CHANNELS];
-    bool is_good = find_folder(&device->work, device->folder);
+    bool is_good = SysfsFind(&device->work, device->folder);
     RTS_UI32 lock = SysLockEnter();
     RTS_UI32 n;
 
@@ -330,8 +100,8 @@ static bool do_round(DEVICE *device, RTS_UI32 serial)
     SysLockLeave(lock);
     for (n = 0; n < device->work.count && is_good; n++) {
         bool is_output = (device->work.channel[n].options & SYSFS_OPTION_OUT) != 0;
-        is_good = is_output ? write_output(device, n, value[n])
-                            : read_iio(device->folder, &device->work.channel[n], &value[n]);
+        is_good =
+            is_output ? write_output(device, n, value[n]) : SysfsRead(&device->work, n, device->folder, &value[n]);
     }
     lock = SysLockEnter();
     for (n = 0; is_good && serial == device->serial && n < device->work.count; n++) {
@@ -393,7 +163,10 @@ static RTS_RESULT start_thread(DEVICE *device)
     if (sem_init(&device->wake, 0, 0) != 0)
         return ERR_FAILED;
     device->has_thread = pthread_create(&device->thread, NULL, run, device) == 0;
-    return device->has_thread ? ERR_OK : ERR_FAILED;
+    if (device->has_thread)
+        return ERR_OK;
+    (void)sem_destroy(&device->wake);
+    return ERR_FAILED;
 }
 
 /* One that hangs in the kernel is not waited for: the process ends. */
@@ -428,16 +201,17 @@ static const char *get_text(const IoConfigConnector *connector, RTS_UI32 id)
 }
 
 /* A name that leads out of the folder of its device is none. */
-static bool take_name(char to[NAME_SIZE], const char *name)
+static bool take_name(char to[SYSFS_NAME_SIZE], const char *name)
 {
-    if (name == NULL || name[0] == '\0' || name[0] == '.' || strchr(name, '/') != NULL || strlen(name) >= NAME_SIZE)
+    if (name == NULL || name[0] == '\0' || name[0] == '.' || strchr(name, '/') != NULL ||
+        strlen(name) >= SYSFS_NAME_SIZE)
         return false;
     (void)strcpy(to, name);
     return true;
 }
 
 /* Its channels; false: the configuration has no sense. */
-static bool read_setup(const IoConfigConnector *connector, SETUP *setup)
+static bool read_setup(const IoConfigConnector *connector, SYSFS_SETUP *setup)
 {
     memset(setup, 0, sizeof *setup);
     setup->kind = get_number(connector, SYSFS_KIND);
@@ -447,7 +221,7 @@ static bool read_setup(const IoConfigConnector *connector, SETUP *setup)
         return false;
     while (setup->count < IO_SYSFS_CHANNELS &&
            IoMgrConfigGetParameter(connector, SYSFS_CHANNEL + setup->count) != NULL) {
-        CHANNEL *channel = &setup->channel[setup->count];
+        SYSFS_FILE *channel = &setup->channel[setup->count];
         if (!take_name(channel->name, get_text(connector, SYSFS_CHANNEL + setup->count)))
             return false;
         channel->options = get_number(connector, SYSFS_OPTIONS + setup->count);
@@ -460,26 +234,9 @@ static bool read_setup(const IoConfigConnector *connector, SETUP *setup)
     return setup->count > 0;
 }
 
-/* The channel that a device has not; NULL: it has all. */
-static const char *find_missing(const SETUP *setup, const char *folder)
-{
-    RTS_UI32 n;
-
-    for (n = 0; n < setup->count; n++) {
-        const char *name = setup->channel[n].name;
-        double count;
-        bool is_there = setup->kind == SYSFS_IIO ? exists(folder, name, "_raw")
-                                                 : read_number(folder, "npwm", "", &count) &&
-                                                       strtoul(name + strlen("pwm"), NULL, 10) < count;
-        if (!is_there)
-            return name;
-    }
-    return NULL;
-}
-
 /* The device that a connector had before the download, else one that is free: a thread that still hangs in an old device
  * keeps no other waiting. */
-static DEVICE *choose(const SETUP *setup)
+static DEVICE *choose(const SYSFS_SETUP *setup)
 {
     DEVICE *best = NULL;
     DEVICE *device;
@@ -496,7 +253,7 @@ static DEVICE *choose(const SETUP *setup)
 }
 
 /* Outputs of a device that stays the same keep their values until a task writes them. */
-static void give_setup(DEVICE *device, const SETUP *setup)
+static void give_setup(DEVICE *device, const SYSFS_SETUP *setup)
 {
     RTS_UI32 lock = SysLockEnter();
 
@@ -512,16 +269,16 @@ static void give_setup(DEVICE *device, const SETUP *setup)
 
 static RTS_RESULT configure(const IoConfigConnector *connector)
 {
-    static SETUP setup;
-    char folder[PATH_SIZE];
+    static SYSFS_SETUP setup;
+    char folder[SYSFS_PATH_SIZE];
     const char *missing;
     DEVICE *device;
 
     if (!read_setup(connector, &setup))
         return IoMgrConfigRefuse(connector, ERR_PARAMETER, "its description is incomplete.");
-    if (!find_folder(&setup, folder))
+    if (!SysfsFind(&setup, folder))
         return IoMgrConfigRefuse(connector, ERR_NO_OBJECT, "the kernel has no device %s.", setup.device);
-    missing = find_missing(&setup, folder);
+    missing = SysfsFindMissing(&setup, folder);
     if (missing != NULL)
         return IoMgrConfigRefuse(connector, ERR_NO_OBJECT, "%s has no channel %s.", setup.device, missing);
     device = choose(&setup);
@@ -537,7 +294,7 @@ static RTS_RESULT configure(const IoConfigConnector *connector)
 /* What is not used any more is not touched any more. */
 static void release_unused(void)
 {
-    static const SETUP none;
+    static const SYSFS_SETUP none;
     DEVICE *device;
 
     for (device = devices; device < devices + DEVICES; device++) {

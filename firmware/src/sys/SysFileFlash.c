@@ -233,7 +233,7 @@ RTS_RESULT SysFileCopy(RTS_UI32 file, RTS_UI32 distance, RTS_UI32 size)
     RTS_UI8 part[FILE_ALIGN];
     RTS_RESULT result = ERR_OK;
 
-    if (distance > files[file].position)
+    if (distance == 0 || distance > files[file].position)
         return ERR_OUT_OF_LIMITS;
     while (size > 0 && result == ERR_OK) {
         RTS_UI32 count = size < sizeof part ? size : (RTS_UI32)sizeof part;

@@ -58,10 +58,11 @@ class Coverage:
             lines.setdefault(place.file, set()).add(place.line)
             if ran:
                 run.setdefault(place.file, set()).add(place.line)
+        by_path = {s.path: s for s in self._sources}  # a file of a whole project is several sources
         return [
-            FileCoverage(s, frozenset(lines[s.path]), frozenset(run.get(s.path, ())))
-            for s in self._sources
-            if s.path in lines
+            FileCoverage(source, frozenset(lines[path]), frozenset(run.get(path, ())))
+            for path, source in by_path.items()
+            if path in lines
         ]
 
     def document(self) -> dict[str, Any]:
@@ -72,15 +73,20 @@ class Coverage:
     def text(self) -> str:
         """A line for each file, and the sum."""
         files = self.files()
+        if not files:
+            return "coverage: the program has no statements"
         width = max((len(file.source.path) for file in files), default=0)
         rows = [f"{file.source.path:{width}}  {_percent([file]):3} %  {_not_run(file.missing)}" for file in files]
         return "\n".join([*map(str.rstrip, rows), f"coverage: {_percent(files)} % of the lines with statements"])
 
     def write_reports(self, folder: Path) -> None:
-        """Writes `index.html` with a page for each file, and `cobertura.xml`. Raises OSError."""
+        """Writes `index.html` with a page for each file, and `cobertura.xml`; nothing for a program without statements.
+        Raises OSError."""
         from coverage import Coverage as Reports
 
         files = {str(Path(file.source.path).absolute()): file for file in self.files()}
+        if not files:
+            return
         reports = Reports(data_file=None, config_file=False, messages=False)
         reports.set_option("run:plugins", [_PLUGIN])
         reports.set_option(f"{_PLUGIN}:files", files)  # type: ignore[arg-type] # what it is, only the plugin knows

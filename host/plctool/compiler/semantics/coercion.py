@@ -18,6 +18,7 @@ from plctool.compiler.semantics.conversions import (
     convert,
     elementary,
     error_value,
+    same_lengths,
     same_type,
     scaled,
     time_to_ltime,
@@ -114,6 +115,9 @@ class Coercion:
             return self._error(e.pos, "type", message)
         if isinstance(e.type, StringType) and to is not None:
             return self._needs(e, e.type.keyword, to.name)
+        if same_lengths(e.type, target):
+            self._warn(e.pos, "bounds", f"{e.type} becomes {target}: the elements are taken in their order")
+            return e
         return self._mismatch(e, target)
 
     def _needs(self, e: Expr, source: str, target: str) -> Expr:

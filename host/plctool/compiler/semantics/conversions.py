@@ -100,6 +100,14 @@ def same_type(a: Type, b: Type) -> bool:
     return ERROR in (a, b)
 
 
+def same_lengths(a: Type, b: Type) -> bool:
+    """Whether both are arrays of the same elements, as many in each dimension, whatever their bounds begin with."""
+    if not isinstance(a, ArrayType) or not isinstance(b, ArrayType):
+        return False
+    lengths = [[high - low for low, high in t.bounds] for t in (a, b)]
+    return lengths[0] == lengths[1] and same_type(a.element, b.element)
+
+
 def takes_array(t: Type, actual: Type) -> bool:
     """Whether `t` is an ARRAY[*] and an array of type `actual` can be passed for it."""
     if not isinstance(t, OpenArrayType) or not isinstance(actual, ArrayType):

@@ -11,6 +11,12 @@
 
 #include "rts_config_size.h"
 
+/* Nor have all entries of the log, beside files. */
+#ifdef FILE_STORE_FILES
+#undef LOG_MAX_ENTRIES
+#define LOG_MAX_ENTRIES 12
+#endif
+
 #include "rts_config_cortexm.h"
 
 #define BOARD_TARGET_ID TARGET_ID_CORTEX_M3

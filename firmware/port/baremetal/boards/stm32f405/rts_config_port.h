@@ -9,6 +9,10 @@
 
 #include "rts_config_size.h"
 
+/* No sectors are left for files. */
+#undef FILE_STORE_SIZE
+#define FILE_STORE_SIZE 0u
+
 #include "rts_config_cortexm.h"
 
 #define BOARD_TARGET_ID TARGET_ID_CORTEX_M4F

@@ -20,7 +20,7 @@
 #define GPIO_AFR(port, pin) REG32((port) + 0x20 + (pin) / 8 * 4)
 
 enum { USART_CLOCK = 84000000, LEAST_DIVISOR = 16, MOST_DIVISOR = 0xFFFF };
-enum { SR_RECEIVED = 1 << 5, SR_ROOM = 1 << 7 };
+enum { SR_OVERRUN = 1 << 3, SR_RECEIVED = 1 << 5, SR_ROOM = 1 << 7 };
 enum { CR1_ON = 1 << 13 | 1 << 3 | 1 << 2, CR1_IRQ_RECEIVED = 1 << 5, CR1_IRQ_ROOM = 1 << 7 };
 enum { CR1_9_BITS = 1 << 12, CR1_PARITY = 1 << 10, CR1_ODD = 1 << 9, CR2_STOP_2 = 2 << 12 };
 
@@ -76,10 +76,11 @@ bool UartIsOn(void)
 
 bool UartTake(RTS_UI8 *byte)
 {
-    if ((USART_SR & SR_RECEIVED) == 0)
+    RTS_UI32 status = USART_SR;
+    if ((status & (SR_RECEIVED | SR_OVERRUN)) == 0)
         return false;
-    *byte = (RTS_UI8)USART_DR;
-    return true;
+    *byte = (RTS_UI8)USART_DR; /* an overrun interrupts until this is read, also without a byte */
+    return (status & SR_RECEIVED) != 0;
 }
 
 bool UartHasRoom(void)

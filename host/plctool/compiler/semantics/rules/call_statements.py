@@ -9,7 +9,7 @@ from collections.abc import Callable, Container
 from dataclasses import dataclass, field, replace
 
 from plctool.compiler.semantics.checker import Checker, checks_statement
-from plctool.compiler.semantics.conversions import load, place_of, same_type, whole
+from plctool.compiler.semantics.conversions import elementary, load, place_of, same_type, whole
 from plctool.compiler.semantics.generics import handed_bounds
 from plctool.compiler.semantics.rules.arguments import (
     bind,
@@ -246,7 +246,9 @@ def call_statement(c: Checker, statement: ast.ExprStmt) -> list[Statement]:
     if isinstance(node, ast.Call):
         return _called(c, node)
     e = c.expr(node)
-    if e.type is not ERROR:
+    if isinstance(e, Load) and elementary(e.type) is not None:
+        c.warning(statement.pos, "statement", "this reads a variable and does nothing with it; write an assignment")
+    elif e.type is not ERROR:
         c.error(statement.pos, "statement", "this is a value, not a statement; write an assignment or a call")
     return []
 

@@ -64,8 +64,8 @@ def _pool_size(c: Checker, symbol: object, t: Type, name: str, offset: int) -> i
         message = f"{name} has no pool to take memory from; write {{attribute 'pool' := '8'}} before its declaration"
         c.error(offset, "attribute", f"{message} for room for 8 of them, as nothing is allocated while a program runs")
         return 0
-    size = text.strip()
-    if not (size.isascii() and size.isdigit()) or not 1 <= int(size[:9]) <= MAX_ELEMENTS:
+    size = text.strip().lstrip("0")
+    if not (size.isascii() and size.isdigit() and len(size) <= len(str(MAX_ELEMENTS))) or int(size) > MAX_ELEMENTS:
         c.error(offset, "attribute", f"the pool of {name} has 1 to {MAX_ELEMENTS} elements, not '{text}'")
         return 0
     if int(size) * t.size > MAX_SIZE:
