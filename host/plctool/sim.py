@@ -98,8 +98,9 @@ class Simulator(Controller):
         dialect: str | None = None,
     ) -> Simulator:
         """The program in source files and folders, compiled for this. `level`, `checks` and `dialect` as in
-        `compile_sources`, which says what is raised. `functions`: FUNCTIONs of the program, by name, that Python implements: they get
-        the values of the inputs, an `Output` for each VAR_OUTPUT and VAR_IN_OUT, and return the result."""
+        `compile_sources`, which says what is raised. `functions`: FUNCTIONs of the program, by name, that Python
+        implements: they get the values of the inputs, an `Output` for each VAR_OUTPUT and VAR_IN_OUT, and return the
+        result."""
         # Only here: what runs images needs no compiler.
         from plctool.compiler import compile_sources
         from plctool.compiler.semantics.python_functions import PythonFunctions

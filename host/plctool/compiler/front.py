@@ -76,8 +76,8 @@ def check_sources(
     takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
     `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check.
     `libraries`: what the program uses besides the standard library. `python`: functions that Python implements, in the
-    simulator; raises UsageError for those that cannot be. `dialect`: of which system it has its rules. Whatever the sources contain, the result is a program or
-    diagnostics, never an exception.
+    simulator; raises UsageError for those that cannot be. `dialect`: the system whose rules it has. Whatever the
+    sources contain, the result is a program or diagnostics, never an exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     program = Program(chosen)

@@ -39,6 +39,7 @@ from plctool.compiler.codegen.lower_unit import Check, value_type
 from plctool.compiler.ranges import type_range, value_range
 from plctool.compiler.typed import (
     AddressOf,
+    AssignedValue,
     Binary,
     BinaryOp,
     Call,
@@ -74,6 +75,14 @@ def call_value(frame: Frame, e: Call) -> Value:
     """A scalar that a function returns."""
     value = call_function(frame, e, None)
     assert value is not None, "a function without a scalar result is called by a statement"
+    return value
+
+
+@rule(VALUES, AssignedValue)
+def assigned_value(frame: Frame, e: AssignedValue) -> Value:
+    """What an assignment stored."""
+    value = frame.value(e.assignment.value)
+    frame.store(frame.ref(e.assignment.target), value)
     return value
 
 
