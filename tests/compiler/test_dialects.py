@@ -9,8 +9,8 @@ import pytest
 
 from plctool import Simulator
 from plctool.compiler import CompileError, compile_sources
-from plctool.compiler.dialect import DIALECTS, differences
 from plctool.errors import UsageError
+from plctool.iec.dialect import DIALECTS, differences
 from plctool.st_tests import run_tests
 
 NAMES = [None, *DIALECTS]

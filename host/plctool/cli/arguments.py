@@ -8,9 +8,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from plctool.compiler.dialect import DIALECTS
 from plctool.errors import UsageError
 from plctool.files import usable_path
+from plctool.iec.dialect import DIALECTS
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
 from plctool.link.transports import TRANSPORTS
 from plctool.templates import DEFAULT_TEMPLATE, TEMPLATES

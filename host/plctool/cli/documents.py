@@ -206,11 +206,11 @@ def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list
     """
     from plctool.compiler import CompileError
     from plctool.compiler.diagnostics import render
-    from plctool.compiler.dialect import find_dialect
     from plctool.compiler.front import check_sources, declared_names_asked_for
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.library import standard_library
     from plctool.compiler.plcopen_export.project import write_project
+    from plctool.iec.dialect import find_dialect
 
     files = settings.files
     check_not_read(output, files.every_file(), "-o exported.xml, in another folder")

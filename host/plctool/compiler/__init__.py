@@ -79,10 +79,10 @@ def check_with_tests(
 ) -> CheckResult:
     """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
     `load` gets the inputs and outputs for each of both. `dialect` as in `compile_sources`."""
-    from plctool.compiler.dialect import find_dialect
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
+    from plctool.iec.dialect import find_dialect
 
     wanted, system = warnings or ALL_WARNINGS, find_dialect(dialect)
     with bugs_reported():
@@ -127,11 +127,11 @@ def compile_sources(
     from plctool.compiler.build import build_program
     from plctool.compiler.codegen.lower_unit import Options, parse_checks
     from plctool.compiler.diagnostics import render
-    from plctool.compiler.dialect import find_dialect
     from plctool.compiler.fit import check_program_fits
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
+    from plctool.iec.dialect import find_dialect
     from plctool.image.board import find_board
     from plctool.image.targets import find_target
 

@@ -9,13 +9,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from plctool.compiler.dialect import OWN
 from plctool.compiler.missing_names import Use, table
 from plctool.compiler.source import Source
 from plctool.compiler.typed import Pos
 from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
 from plctool.errors import UsageError
 from plctool.errors import did_you_mean as did_you_mean
+from plctool.iec.dialect import OWN
 
 Severity = Literal["error", "warning"]
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from plctool.compiler.broken_units import is_independent, remaining
 from plctool.compiler.diagnostics import Diagnostic, Diagnostics, TooManyErrors, render
-from plctool.compiler.dialect import OWN, Dialect
 from plctool.compiler.garbage import no_collection
 from plctool.compiler.imports import ImportedLibrary, needed_parts
 from plctool.compiler.library import Library, standard_library
@@ -34,6 +33,7 @@ from plctool.compiler.task_images import plan_images
 from plctool.compiler.typed import Pos, TypedProgram
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.iec.areas import Area
+from plctool.iec.dialect import OWN, Dialect
 from plctool.iec.types import MAX_SIZE
 
 if TYPE_CHECKING:

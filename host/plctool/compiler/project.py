@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
 from plctool.compiler.codegen.lower_unit import parse_checks
-from plctool.compiler.dialect import DIALECTS
 from plctool.compiler.level import Level
 from plctool.compiler.library_files import is_stand_in, libraries_at, no_library
 from plctool.compiler.source_files import READERS
@@ -21,6 +20,7 @@ from plctool.compiler.toml_files import read_checked
 from plctool.compiler.warnings import WARNINGS
 from plctool.errors import UsageError, did_you_mean
 from plctool.files import read_utf8
+from plctool.iec.dialect import DIALECTS
 from plctool.image.file import ApplicationInfo
 from plctool.image.targets import TARGETS
 from plctool.io.tables import Entry, Table

@@ -15,7 +15,6 @@ from plctool.compiler import CompileError, IoFiles, Sources, io_sources, library
 from plctool.compiler.build import BuildResult, build_program
 from plctool.compiler.codegen.lower_init import encode_scalar
 from plctool.compiler.codegen.lower_unit import Options
-from plctool.compiler.dialect import find_dialect
 from plctool.compiler.front import check_sources
 from plctool.compiler.internal import bugs_reported
 from plctool.compiler.semantics.assertions import FAILED, NUMBER, Assertion, Operand
@@ -27,6 +26,7 @@ from plctool.core import lib
 from plctool.debug.symbols import SourceLine
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
+from plctool.iec.dialect import find_dialect
 from plctool.iec.value_texts import literal
 from plctool.iec.values import decode
 from plctool.image.targets import find_target, host_target

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from plctool.compiler.dialect import OWN
 from plctool.compiler.internal import note_position
 from plctool.compiler.nesting import MAX_DEPTH, OPERATORS, NestingError
 from plctool.compiler.semantics.conversions import NUMBERS, elementary, error_value, settle
@@ -22,6 +21,7 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Pos, Statement
+from plctool.iec.dialect import OWN
 from plctool.iec.types import BOOL, Type
 
 ExprNode = TypeVar("ExprNode", bound=ast.Expr)

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from plctool.compiler.diagnostics import Diagnostics
-from plctool.compiler.dialect import OWN
 from plctool.compiler.library import Library
 from plctool.compiler.nesting import NestingError
 from plctool.compiler.semantics.allocation import Allocation, DirectVariables, module_address
@@ -37,6 +36,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Call, Const, Expr, Pou, ScalarInit, Storage, StructInit, Variable
+from plctool.iec.dialect import OWN
 from plctool.iec.types import WCHAR, EnumType, InterfaceType, StructType, Type
 
 # ---- bodies that wait for their check ----
