@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import is_exact, is_temporary, place_of
-from plctool.compiler.semantics.rules.members import Bound, bound_member, is_inside, space_of
+from plctool.compiler.semantics.rules.members import Bound, bound_member, dotted_name, is_inside, space_of
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import AddressOf, DerefPlace, Expr, Load, Place, SelfPlace
@@ -93,6 +93,10 @@ def _member_read_only(c: Checker, node: ast.Member) -> str | None:
         if isinstance(variable, VarSymbol) and variable.role is Role.OUTPUT:
             return f"{node.name} is an output of {space.name}"
         return _symbol_read_only(c, variable)
+    name = dotted_name(c, node)
+    symbol = None if name is None else c.scope.lookup(name)
+    if isinstance(symbol, GlobalSymbol):  # in a namespace
+        return _symbol_read_only(c, symbol)
     base = c.expr(node.base)
     own = base.place if isinstance(base, AddressOf | Load) and isinstance(base.place, SelfPlace) else None
     t = base.type if own is None else own.type
