@@ -108,6 +108,6 @@ def _member_read_only(c: Checker, node: ast.Member) -> str | None:
         if member is not None and member.role is Role.LOCAL and not member.constant and is_inside(c, member, block):
             return _read_only(c, node.base)
         if member is not None and member.role is not Role.INPUT and member.access is not ast.Modifier.PUBLIC:
-            article = "an" if member.role is Role.OUTPUT else "a"
+            article = "an" if member.role in (Role.OUTPUT, Role.IN_OUT) else "a"
             return f"{node.name} is {article} {member.role.value} of {base.type}"
     return _read_only(c, node.base)
