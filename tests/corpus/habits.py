@@ -1,4 +1,4 @@
-"""Habits of programs that people have (habits.toml), and what `plctool check` says of each: `make habits` prints them."""
+"""Habits of programs that people have (habits.toml), and what `plctool check` says of each; see `make habits`."""
 
 from __future__ import annotations
 
