@@ -144,7 +144,7 @@ def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
     d = diagnostic
     head = f"{d.file}:{d.line}:{d.column}: {d.severity}: {d.message}"
     source = next((s for s in sources if s.path == d.file), None)
-    if source is None:
+    if source is None or not source.text:  # "" of a file that is no text
         return head
     line, column = _part_of(source.line_text(d.line), d.column - 1)
     indent = "".join("\t" if c == "\t" else " " for c in line[:column])
