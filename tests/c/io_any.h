@@ -17,7 +17,7 @@
 #include "io_driver.h"
 #include "no_network.h"
 
-/* Bytes of the areas: the configurations in the corpus need no more, and there is memory behind each of them. */
+/* Bytes of the areas: the configurations in the corpus need no more, and there is memory past the end of each. */
 enum { ANY_INPUTS = 64, ANY_OUTPUTS = 64, ANY_DATA = 512, ANY_GUARD = 1024, ANY_MARK = 0xA5 };
 enum { ANY_LINE = 5, ANY_PASS_MS = 5 };
 
@@ -177,7 +177,7 @@ static void any_lose(RTS_UI32 are_lost)
 
 typedef struct {
     RTS_UI32 area;
-    RTS_UI32 offset; /* of the guard, behind the area */
+    RTS_UI32 offset; /* of the guard, past the end of the area */
     RTS_UI32 size;
 } ANY_PLACE;
 
@@ -206,7 +206,7 @@ static bool any_is_all(const RTS_UI8 *bytes, RTS_UI32 size, RTS_UI8 value)
     return size == 0 || (bytes[0] == value && memcmp(bytes, bytes + 1, size - 1) == 0);
 }
 
-/* Whether all guards have a value; all outputs are cleared when they become safe, those behind the area too. */
+/* Whether all guards have a value; all outputs are cleared when they become safe, those past its end too. */
 static bool any_is_marked(RTS_UI8 value, bool outputs_are_safe)
 {
     bool is_marked = true;
