@@ -5,16 +5,15 @@ from __future__ import annotations
 import errno
 import os
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from plctool.errors import UsageError
 
 _SHOWN = 80  # characters of an invalid path
 
 
-@dataclass(frozen=True)
-class Pos:
+class Pos(NamedTuple):
     """A place in a source file; `line` and `column` count from 1."""
 
     file: str

@@ -45,9 +45,10 @@ class Type:
         return self.name
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Elementary(Type):
-    """A scalar. `type_class` is the number monitoring uses (codesys-v3-protocol 4.9, SysInternalLib enum order)."""
+    """A scalar; there is one of each. `type_class` is the number monitoring uses (codesys-v3-protocol 4.9,
+    SysInternalLib enum order)."""
 
     name: str
     kind: Kind

@@ -6,6 +6,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from plctool.compiler.semantics import constants
 from plctool.compiler.semantics.symbols import ERROR, NULL_TYPE, UNTYPED_INT, UNTYPED_REAL
 from plctool.compiler.typed import (
@@ -154,6 +156,7 @@ def settle(e: Expr, expected: Type | None = None) -> Expr:
     return e
 
 
+@lru_cache(maxsize=4096)  # most are small, and met again
 def literal_type(value: int) -> Elementary | None:
     """The type of an integer literal without context."""
     return constants.smallest(value, _LITERAL_TYPES)
