@@ -103,8 +103,9 @@ fuzz: $(FUZZED:%=%/build.ninja)
 build/build.ninja: $(VENV)/dev
 	$(MESON) setup build
 
+# Lines are all that a report shows, and compile faster than all of what a debugger knows.
 build-sanitized/build.ninja: $(VENV)/dev
-	$(MESON) setup build-sanitized -Dhost=false -Doptimization=1 -Db_sanitize=address,undefined -Db_lundef=false
+	$(MESON) setup build-sanitized -Dhost=false -Doptimization=1 -Ddebug=false -Dc_args=-g1 -Db_sanitize=address,undefined -Db_lundef=false
 
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini
