@@ -98,6 +98,19 @@ def test_types_of_the_project_are_read(tmp_path: Path) -> None:
         assert plc.read("Main.s") in (5, "Busy")
 
 
+def test_a_union_stands_beside_the_types_of_the_standard(tmp_path: Path) -> None:
+    union = '<union name="Pair"><variable name="w"><type><WORD/></type></variable>' + variable("b:Bytes") + "</union>"
+    bounds = '<dimension lower="0" upper="1"/>'
+    array = f'<dataType name="Bytes"><baseType><array>{bounds}<baseType><BYTE/></baseType></array>'
+    body = st("p.b[0] := 16#34; p.b[1] := 16#12; n := p.w;")
+    main = pou("Main", body, variables("localVars", "p:Pair", "n:WORD"))
+    text = project(main, f"{array}</baseType></dataType>", added=data("union", union))
+    with started(tmp_path, text) as plc:
+        plc.run_cycles(1)
+        assert plc.read("Main.n") == 0x1234
+    assert errors(tmp_path, text.replace("n := p.w", "n := p.x"))[0][1].startswith("Pair has no member x")
+
+
 GLOBALS = data("globalvars", '<globalVars name="GVL" constant="true">' + variable("limit:INT:=4") + "</globalVars>")
 MIXED = data(
     "globalvars",

@@ -22,14 +22,16 @@ _OPENING = re.compile(
     r"^(?:(?P<pou>FUNCTION_BLOCK|FUNCTION)\s+(?P<name>\w+)|(?P<types>TYPE)\b|(?P<globals>VAR_GLOBAL)\b)", re.MULTILINE
 )
 STAND_INS = (
-    "Standard", "Standard64", "Util", "SysMem", "IBaseLibrary", "__System",
+    "Standard", "Standard64", "Util", "SysMem", "IBaseLibrary", "__System", "MEM",
     "Tc2_Standard", "Tc2_System", "Tc2_Utilities",
 )  # fmt: skip
 """Libraries of other systems that this one stands in for, as far as it has their names."""
 
 _QUALIFIED = re.compile(rf"(?:{'|'.join(STAND_INS)})\.(?=\w+$)", re.IGNORECASE)
-_OTHER_BLOCKS = {"util.pid": "util_pid__", "util.hysteresis": "util_hysteresis__"}
-"""What is another block with its library in front than without it."""
+OTHER_BLOCKS = ("PID", "HYSTERESIS", "INTEGRAL", "DERIVATIVE")
+"""What is another block with Util in front than without it."""
+
+_OTHERS = {f"util.{name.casefold()}": f"util_{name.casefold()}__" for name in OTHER_BLOCKS}
 
 _STRUCT = re.compile(r"\bSTRUCT\b.*?\bEND_STRUCT\b", re.DOTALL)
 _DECLARED_NAME = re.compile(r"(\w+)\s*:(?!=)")
@@ -39,7 +41,7 @@ def without_library(key: str) -> str:
     """A name without the library of other systems before it: there is one library here."""
     if "." not in key:
         return key
-    return _OTHER_BLOCKS.get(key.casefold()) or _QUALIFIED.sub("", key, count=1)
+    return _OTHERS.get(key.casefold()) or _QUALIFIED.sub("", key, count=1)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from plctool.compiler.imports import parts_of
-from plctool.compiler.library import standard_library, without_library
+from plctool.compiler.library import OTHER_BLOCKS, standard_library, without_library
 from plctool.compiler.missing_names import Use
 from plctool.compiler.source import Source
 from plctool.compiler.syntax.lexer import Lexer, Token
@@ -19,9 +19,10 @@ _FUNCTIONS = {
     "Tc2_System": ("MEMCPY", "MEMMOVE", "MEMSET", "MEMCMP"),
     "SysMem of CODESYS": ("SysMemCpy", "SysMemMove", "SysMemSet", "SysMemCmp"),
 }
-_BLOCKS = {"Util of CODESYS": ("BLINK", "PID", "HYSTERESIS")}
+_BLOCKS = {"Util of CODESYS": ("BLINK", *OTHER_BLOCKS)}
 _FILES = {
     "stdlib/util.st": "Util of CODESYS",
+    "stdlib/caa_memory.st": "CAA Memory of CODESYS",
     "stdlib/tc2_system.st": "Tc2_System",
     "stdlib/tc2_utilities.st": "Tc2_Utilities",
 }

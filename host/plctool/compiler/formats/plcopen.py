@@ -65,8 +65,8 @@ class _Project:
             known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in outputs}
             known[""] = types.type_of(pou.child("interface", "returnType"))
             self._blocks[pou.get("name").casefold()] = known
-        for data_type in root.every("dataType"):
-            struct = data_type.child("baseType", "struct")
+        for data_type in root.every("dataType", "union"):
+            struct = data_type if data_type.tag == "union" else data_type.child("baseType", "struct")
             members = struct.all("variable") if struct is not None else []
             known = {v.get("name").casefold(): types.type_of(v.child("type")) for v in members}
             self._blocks[data_type.get("name").casefold()] = known
@@ -81,7 +81,7 @@ class _Project:
 
     def _walk(self, element: Element) -> None:
         for child in element.children:
-            if child.tag == "dataType":
+            if child.tag in ("dataType", "union"):
                 self._data_type(child)
             elif child.tag in ("pou", "Interface"):
                 self._unit(child)
@@ -98,7 +98,8 @@ class _Project:
             self.text.copied(plain)
             self.text.made("\n", element.at)
             return
-        spec, value = types.type_of(element.child("baseType")), types.value_of(element.child("initialValue"))
+        spec = types.union(element) if element.tag == "union" else types.type_of(element.child("baseType"))
+        value = types.value_of(element.child("initialValue"))
         base = next((f" EXTENDS {e.text}" for data in element.all("addData") for e in data.every("Extends")), "")
         declared = f"{element.get('name')}{base} : {spec}{f' := {value}' if value else ''}"
         self.text.made(f"{types.attributes(element)}TYPE {declared}; END_TYPE\n", element.at)

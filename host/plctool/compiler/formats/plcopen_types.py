@@ -52,6 +52,11 @@ def _type(found: Element) -> str:
     return name.upper()
 
 
+def union(element: Element) -> str:
+    """A union, which the standard has not: CODESYS adds it beside the types."""
+    return f"UNION {' '.join(variable(v) for v in element.all('variable'))} END_UNION"
+
+
 def _enumeration(enum: Element) -> str:
     values = [v for part in enum.all("values") for v in part.all("value")]
     listed = ", ".join(f"{v.get('name')} := {v.get('value')}" if v.get("value") else v.get("name") for v in values)

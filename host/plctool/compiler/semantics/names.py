@@ -227,6 +227,8 @@ class Names:
         return self._units.get(key) or self.global_named(key) or self.own_list(key)
 
     def _library_symbol(self, key: str) -> Unit | GlobalSymbol | None:
+        if key.partition(".")[0] in self._globals and "." in key:
+            return None  # a member of a variable that has the name of a library
         key = without_library(key)
         if key not in self._library_names:
             self._library_names[key] = None

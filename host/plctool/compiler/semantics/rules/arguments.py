@@ -9,6 +9,7 @@ from collections.abc import Container
 from dataclasses import dataclass, replace
 
 from plctool.compiler.diagnostics import did_you_mean
+from plctool.compiler.library import OTHER_BLOCKS
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import (
     NUMBERS,
@@ -143,6 +144,8 @@ def bind(
             i = index.get(argument.name.casefold())
         if i is None:
             hint = did_you_mean(argument.name or "", (n for n, _ in names))
+            if what in OTHER_BLOCKS and not c.world.names.is_user_name(what):
+                hint = f"; that of CODESYS' library Util is Util.{what}"
             c.error(argument.pos, "arguments", f"{what} has no parameter {argument.name}{hint}")
             return None
         if i in bound:
