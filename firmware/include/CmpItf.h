@@ -88,6 +88,7 @@ enum {
     CMPID_RunLamp = 0x0028,
     CMPID_IoDrvSysfs = 0x0029,
     CMPID_CmpFileTransfer = 0x002A,
+    CMPID_SimModbus = 0x002B,
 };
 
 /* Name of a component, "" when unknown. */

@@ -51,27 +51,34 @@ typedef struct {
 
 enum { MODBUS_TRIES = 2 };
 
-/* A request of once, besides the jobs, by which a device says what it is: function 17 or 43. All from main. */
-enum { MODBUS_CALL_FREE, MODBUS_CALL_WAITS, MODBUS_CALL_ENDED };
+/* A request of once, besides the jobs. Main sends one that waits, and ends it; it belongs to who has taken it before and
+ * after that. */
+enum { MODBUS_CALL_FREE, MODBUS_CALL_TAKEN, MODBUS_CALL_WAITS, MODBUS_CALL_ENDED };
 
 typedef struct {
-    RTS_UI32 state;        /* MODBUS_CALL_* */
-    MODBUS_DEVICE *device; /* need not be one of the client's */
-    const MODBUS_FUNCTION *function;
-    RTS_I64 due_ns;                   /* since when it waits */
-    RTS_RESULT result;                /* ERR_OK; ERR_TIMEOUT: no reply; ERR_FAILED: an exception */
+    RTS_UI32 state; /* MODBUS_CALL_*, by SysAtomic.h */
+    RTS_I32 number; /* of a request of a program */
+    struct MODBUS_CLIENT *client;
+    MODBUS_DEVICE *device;  /* one of the client's, or one that is not described */
+    MODBUS_REQUEST request; /* without `data` */
+    RTS_I64 due_ns;         /* since when it waits */
+    RTS_RESULT result;      /* ERR_OK; ERR_TIMEOUT: no reply, or the device is lost; ERR_FAILED: `exception` */
+    RTS_UI8 exception;
     RTS_UI8 size;                     /* bytes of a reply */
-    RTS_UI8 data[MODBUS_MAX_PDU - 1]; /* what follows the function in the request, then in the reply */
+    RTS_UI8 data[MODBUS_MAX_PDU - 1]; /* as in a PDU: to be written; then those that were read, or, of functions 17 and
+                                         43, all after the function */
 } MODBUS_CALL;
 
-typedef struct {
+typedef struct MODBUS_CLIENT {
     MODBUS_LINK link;
     RTS_UI32 device_count;
     MODBUS_DEVICE *devices;
+    RTS_UI32 call_count; /* of all lines */
+    MODBUS_CALL *calls;
     /* what is on its way */
     MODBUS_DEVICE *device; /* NULL: nothing */
     MODBUS_JOB_STATE *job; /* NULL: a call is */
-    MODBUS_CALL *call;     /* that waits or is on its way; NULL: none */
+    MODBUS_CALL *call;
     MODBUS_REQUEST request;
     bool sent;  /* else it waits for the link */
     bool waits; /* the last byte has left */
@@ -83,8 +90,15 @@ typedef struct {
 
 /* Devices and jobs are zero but for what the configuration says. */
 void ModbusClientBegin(MODBUS_CLIENT *client, MODBUS_DEVICE *devices, RTS_UI32 count);
-/* Asks in turn with the jobs. `call` has device, function and data, and stays until it has ended; one at a time. */
-void ModbusClientCall(MODBUS_CLIENT *client, MODBUS_CALL *call, RTS_I64 now_ns);
+/* Where the calls of all clients are, the first one for scans. None unless it is called. */
+void ModbusClientSetCalls(MODBUS_CLIENT *client, MODBUS_CALL *calls, RTS_UI32 count);
+/* Whether a call is on its way, so that it stays as it is. */
+static inline bool ModbusClientIsAsking(const MODBUS_CALL *call)
+{
+    const MODBUS_CLIENT *client = call->client;
+
+    return client != NULL && client->device != NULL && client->job == NULL && client->call == call;
+}
 
 void ModbusClientPoll(MODBUS_CLIENT *client, RTS_I64 now_ns);
 

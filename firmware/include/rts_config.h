@@ -399,6 +399,9 @@
 #ifndef MODBUS_MAX_JOBS /* reads and writes of all devices; about 40 bytes each */
 #define MODBUS_MAX_JOBS 16
 #endif
+#ifndef MODBUS_MAX_CALLS /* requests of programs (ModbusCalls.h) at a time, of all lines; about 310 bytes each */
+#define MODBUS_MAX_CALLS 0
+#endif
 #ifndef MODBUS_MAX_SERVERS /* serial lines and TCP ports on which this device is a server; about 350 bytes each */
 #define MODBUS_MAX_SERVERS 1
 #endif

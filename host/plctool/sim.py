@@ -29,7 +29,7 @@ from plctool.link.monitoring import Contents
 from plctool.link.services import AppException, LogEntry, Status, TaskInfo, app_state
 from plctool.link.session import no_application
 from plctool.sim_functions import SimFunctions
-from plctool.sim_io import SimIo, is_input, set_fault
+from plctool.sim_io import SimIo, is_input, set_fault, set_modbus
 
 if TYPE_CHECKING:
     from plctool.compiler import Level
@@ -252,6 +252,12 @@ class Simulator(Controller):
     def fault(self, device: str, fault: str, value: int = 1) -> None:
         """Makes a device fail: "absent", "late" (ms), "type", "answers" (how many are bad); 0 ends it."""
         set_fault(self._core, device, fault, value)
+
+    def set_modbus(self, device: str, reference: int, value: int) -> None:
+        """What a Modbus device replies to MODBUS_READ: `reference` as manuals have it, such as 40001 for the first
+        holding register, 5 for a coil. It also has what MODBUS_WRITE wrote, and refuses to read all else. Raises
+        DeviceError if the description names no such device."""
+        set_modbus(self._core, device, reference, value)
 
     def attach(self, step: Callable[[Simulator], None], every_ms: float = 1) -> None:
         """A plant: `step(plc)` is called each `every_ms` of virtual time, from now on, while time passes. It reads

@@ -128,6 +128,21 @@ def set_fault(core: Core, device: str, fault: str, value: int) -> None:
     _check(core.lib.SimIoFault(device.encode("ascii", "replace"), FAULTS[fault], value), device)
 
 
+def set_modbus(core: Core, device: str, reference: int, value: int) -> None:
+    """What a simulated Modbus device replies to a request of the program for this coil or register."""
+    from plctool.io.modbus.registers import place_of_reference
+
+    place = place_of_reference(reference)
+    if place is None:
+        raise UsageError(f"{reference} is no coil or register; 40001 is the first holding register.", "bad-reference")
+    if not 0 <= value <= 0xFFFF:
+        raise UsageError(f"A register holds 0 to 65535, not {value}.", "bad-value")
+    result = core.lib.SimModbusSet(device.encode("ascii", "replace"), *place, value)
+    if result != lib.ERR_OK:
+        reason = "a Modbus device of this name" if result == lib.ERR_NO_OBJECT else "room for more registers"
+        raise DeviceError(f"The simulator does not have {reason} ({device}).", "no-device", result)
+
+
 def _channel(core: Core, entry: dict[str, Any], symbols: SymbolTable, enabled: bool) -> SimChannel:
     address = parse_address(entry["address"])
     assert address is not None

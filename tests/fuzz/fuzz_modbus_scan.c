@@ -16,6 +16,7 @@
 enum { STEP_NS = 250000, STEPS = 2000 };
 
 static MODBUS_CLIENT client;
+static MODBUS_CALL calls[1];
 
 size_t fuzz_seed(unsigned index, uint8_t *data, size_t capacity)
 {
@@ -41,8 +42,10 @@ static void begin(void)
     fakes_begin();
     fakes.char_ns = 95000;
     memset(&client, 0, sizeof(client));
+    memset(calls, 0, sizeof(calls));
     ModbusRtuBegin(&client.link, 0, &settings);
     ModbusClientBegin(&client, NULL, 0);
+    ModbusClientSetCalls(&client, calls, 1);
 }
 
 static void check_module(const IoDrvModule *module)

@@ -194,6 +194,12 @@ RTS_UI32 SysTimeGetMs(void)
 }
 
 /* Tasks run one after the other here, but for tests that have threads of their own. */
+void SimWantPass(RTS_I64 in_ns)
+{
+    if (sim.next_comm_ns > sim.now_ns + in_ns)
+        sim.next_comm_ns = sim.now_ns + in_ns;
+}
+
 void SysTimeWantPass(RTS_UI32 ms)
 {
     RTS_UNUSED(ms);
@@ -357,8 +363,8 @@ static void run_timer(TIMER *timer)
 
 static void run_comm_cycle(void)
 {
-    (void)CMCallHook(CH_COMM_CYCLE);
     sim.next_comm_ns = sim.now_ns + (SchedHasBackgroundTasks() ? COMM_BUSY_NS : COMM_IDLE_NS);
+    (void)CMCallHook(CH_COMM_CYCLE);
 }
 
 /* Runs all timers that are due at the same time as `timer`, and the tasks that follow them. */

@@ -174,6 +174,10 @@ RTS_RESULT SimIoFault(const char *connector, RTS_UI32 fault, RTS_UI32 value);
 /* How the runtime sees the device. ERR_NO_OBJECT. */
 RTS_RESULT SimIoGetState(const char *connector, IO_DEVICE_STATE *state);
 
+/* Sets a coil or register of a simulated Modbus device, for requests of the program (ModbusCalls.h). `table`: MODBUS_COILS,
+ * ...; `address` as on the wire. ERR_NO_OBJECT: no such device; ERR_NOMEMORY: too many others are set. */
+RTS_RESULT SimModbusSet(const char *device, RTS_UI32 table, RTS_UI32 address, RTS_UI32 number);
+
 /* ---- serial line 0 ---- */
 
 /* Bytes to the device, and what the device sent; both return how many were moved. */

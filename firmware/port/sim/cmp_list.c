@@ -17,5 +17,5 @@
 #define HAS_CmpFileTransfer 1
 #define HAS_CmpMonitor2 1
 #define HAS_CmpBlkDrvSimpleCom 1
-#define PORT_COMPONENTS(X) X(SysSim)
+#define PORT_COMPONENTS(X) X(SysSim) X(SimModbus)
 #include "CmpList.h"

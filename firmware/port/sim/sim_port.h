@@ -30,5 +30,8 @@ RTS_RESULT SimEventRegisterAll(void);
 RTS_RESULT SimFunctionsRegister(void);
 
 RTS_RESULT SysSim_Hook(CMP_HOOK hook);
+/* The next pass of CH_COMM_CYCLE is in `in_ns` at the latest. From any context. */
+void SimWantPass(RTS_I64 in_ns);
+RTS_RESULT SimModbus_Hook(CMP_HOOK hook);
 
 #endif

@@ -11,6 +11,7 @@
 
 #include "AppState.h"
 #include "CmpIoMgrEmbedded.h"
+#include "ModbusCalls.h"
 #include "ModbusScan.h"
 #include "ModbusServerTcp.h"
 #include "ModbusSetup.h"
@@ -40,6 +41,7 @@ static RTS_RESULT update_configuration(const IoConfigConnector *connectors, int 
     RTS_UNUSED(connectors);
     RTS_UNUSED(count);
     is_running = false;
+    ModbusCallsBegin(NULL, NULL);
     ModbusScanEnd();
     ModbusGiveBack(&setup);
     return ERR_OK;
@@ -98,6 +100,8 @@ static RTS_RESULT update_mapping(const IoConfigTaskMap *task_maps, int count)
             result = IoMgrConfigEachChannel(task_maps, count, &driver, check_channel);
     } while (result == ERR_PENDING);
     is_running = result == ERR_OK;
+    if (is_running)
+        ModbusCallsBegin(&setup, NULL);
     return result;
 }
 
@@ -273,6 +277,7 @@ static void cycle(void)
     RTS_I64 now_ns = SysTimeGetNs();
     bool hurry = setup.client_count != 0;
 
+    ModbusCallsPoll(AppGetState() == AS_RUN, now_ns);
     for (RTS_UI32 i = 0; i < setup.client_count; i++) {
         ModbusClientPoll(&setup.clients[i].client, now_ns);
         ModbusScanPoll(&setup.clients[i].client, now_ns);
@@ -407,6 +412,8 @@ RTS_RESULT IoDrvModbus_Hook(CMP_HOOK hook)
 {
     if (hook == CH_INIT2)
         return IoMgrRegisterInstance(&driver);
+    if (hook == CH_INIT3)
+        return ModbusCallsRegister();
     if (hook == CH_COMM_CYCLE && is_running)
         cycle();
     else if (hook == CH_EXIT3)

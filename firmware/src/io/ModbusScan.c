@@ -10,6 +10,8 @@
 
 #include <string.h>
 
+#include "SysAtomic.h"
+
 enum {
     TIMEOUT_MS = 200,
     GATEWAY_TIMEOUT_MS = 1500, /* it waits for its device */
@@ -30,7 +32,7 @@ static struct {
     bool taken;  /* it has got `last` */
     RTS_I64 asked_ns;
     MODBUS_DEVICE guest;
-    MODBUS_CALL call;
+    MODBUS_CALL *call;
     IoDrvModule last;
 } scan;
 
@@ -41,22 +43,19 @@ static bool is_tcp(void)
 
 /* ---- asking ---- */
 
-/* Its call is on its way, and cannot be another one before it has ended. */
-static bool is_asking(void)
-{
-    return scan.call.state == MODBUS_CALL_WAITS;
-}
-
 static void ask(RTS_UI8 function, RTS_I64 now_ns)
 {
-    MODBUS_CALL *call = &scan.call;
+    MODBUS_CALL *call = scan.call;
 
-    call->function = ModbusFindFunction(function);
+    memset(&call->request, 0, sizeof(call->request));
+    call->request.function = ModbusFindFunction(function);
+    call->client = scan.client;
     call->device = &scan.guest;
+    call->due_ns = now_ns;
     call->data[0] = MODBUS_DEVICE_IDENTIFICATION;
     call->data[AT_CODE] = BASIC;
     call->data[AT_CODE + 1] = 0;
-    ModbusClientCall(scan.client, call, now_ns);
+    SysAtomicStore(&call->state, MODBUS_CALL_WAITS);
 }
 
 static void ask_unit(RTS_UI32 unit, RTS_I64 now_ns)
@@ -71,6 +70,7 @@ static void begin(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     ModbusScanEnd();
     scan.client = client;
+    scan.call = client->calls;
     ask_unit(is_tcp() ? CONNECTED : 1, now_ns);
 }
 
@@ -116,7 +116,7 @@ static void describe(const MODBUS_CALL *call)
     scan.last.slot = scan.guest.unit;
     if (call->result != ERR_OK)
         return;
-    if (call->function->function == MODBUS_ENCAPSULATED)
+    if (call->request.function->function == MODBUS_ENCAPSULATED)
         add_objects(call->data, call->size);
     else if (call->size > AT_SERVER_ID)
         add_text(call->data + AT_SERVER_ID, call->size - AT_SERVER_ID);
@@ -124,17 +124,17 @@ static void describe(const MODBUS_CALL *call)
 
 static void take_reply(RTS_I64 now_ns)
 {
-    const MODBUS_CALL *call = &scan.call;
+    const MODBUS_CALL *call = scan.call;
 
     if (call->result == ERR_TIMEOUT) {
         ask_next(now_ns);
-    } else if (call->result != ERR_OK && call->function->function == MODBUS_ENCAPSULATED) {
+    } else if (call->result != ERR_OK && call->request.function->function == MODBUS_ENCAPSULATED) {
         ask(MODBUS_REPORT_SERVER_ID, now_ns);
     } else {
         describe(call);
         scan.found++;
         scan.wanted = false;
-        scan.call.state = MODBUS_CALL_FREE;
+        scan.call->state = MODBUS_CALL_FREE;
     }
 }
 
@@ -142,11 +142,11 @@ static void take_reply(RTS_I64 now_ns)
 
 void ModbusScanPoll(const MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
-    if (scan.client != client || scan.over || !scan.wanted || is_asking())
+    if (scan.client != client || scan.over || !scan.wanted || SysAtomicLoad(&scan.call->state) == MODBUS_CALL_WAITS)
         return;
     if (now_ns - scan.asked_ns >= ABANDONED_NS)
         ModbusScanEnd();
-    else if (scan.call.state == MODBUS_CALL_ENDED)
+    else if (scan.call->state == MODBUS_CALL_ENDED)
         take_reply(now_ns);
     else
         ask_next(now_ns);
@@ -156,6 +156,12 @@ void ModbusScanPoll(const MODBUS_CLIENT *client, RTS_I64 now_ns)
 static bool begins(const MODBUS_CLIENT *client, RTS_UI32 index)
 {
     return index == 0 && (scan.client != client || scan.found > 1 || scan.taken);
+}
+
+/* Its call is on its way, and cannot be another one before it has ended. */
+static bool is_asking(void)
+{
+    return scan.call != NULL && SysAtomicLoad(&scan.call->state) == MODBUS_CALL_WAITS;
 }
 
 static RTS_RESULT go_on(RTS_I64 now_ns)
@@ -172,6 +178,8 @@ static RTS_RESULT go_on(RTS_I64 now_ns)
 
 RTS_RESULT ModbusScan(MODBUS_CLIENT *client, RTS_UI32 index, IoDrvModule *module, RTS_I64 now_ns)
 {
+    if (client->call_count == 0)
+        return ERR_NOT_SUPPORTED;
     if (begins(client, index)) {
         if (is_asking()) {
             scan.wanted = false;
@@ -190,5 +198,7 @@ RTS_RESULT ModbusScan(MODBUS_CLIENT *client, RTS_UI32 index, IoDrvModule *module
 
 void ModbusScanEnd(void)
 {
+    if (scan.call != NULL)
+        SysAtomicStore(&scan.call->state, MODBUS_CALL_FREE);
     memset(&scan, 0, sizeof(scan));
 }

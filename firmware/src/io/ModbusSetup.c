@@ -243,6 +243,7 @@ static RTS_RESULT add_client(MODBUS_SETUP *setup, const IO_DRIVER *driver, const
             result = add_device(setup, child);
     }
     ModbusClientBegin(&line->client, setup->devices + first, setup->device_count - first);
+    ModbusClientSetCalls(&line->client, setup->calls, RTS_COUNT(setup->calls));
     return result;
 }
 

@@ -7,6 +7,7 @@
 
 #include <string.h>
 
+#include "SysAtomic.h"
 #include "SysLock.h"
 #include "rts_config.h"
 
@@ -34,15 +35,14 @@ void ModbusClientBegin(MODBUS_CLIENT *client, MODBUS_DEVICE *devices, RTS_UI32 c
     client->devices = devices;
     client->device_count = count;
     client->device = NULL;
-    client->call = NULL;
+    client->call_count = 0;
     client->transaction = 0;
 }
 
-void ModbusClientCall(MODBUS_CLIENT *client, MODBUS_CALL *call, RTS_I64 now_ns)
+void ModbusClientSetCalls(MODBUS_CLIENT *client, MODBUS_CALL *calls, RTS_UI32 count)
 {
-    call->due_ns = now_ns;
-    call->state = MODBUS_CALL_WAITS;
-    client->call = call;
+    client->calls = calls;
+    client->call_count = count;
 }
 
 /* ---- which job is next ---- */
@@ -86,7 +86,36 @@ static MODBUS_JOB_STATE *find_due(const MODBUS_DEVICE *device, RTS_I64 *earliest
     return found;
 }
 
-/* The job or call that is due, and longest. */
+static void end_call(MODBUS_CALL *call, RTS_RESULT result)
+{
+    call->result = result;
+    SysAtomicStore(&call->state, MODBUS_CALL_ENDED);
+}
+
+/* A lost device costs its line no more for those who call it: they need not wait. */
+static bool is_wanted(MODBUS_CALL *call, RTS_I64 now_ns)
+{
+    if (!ModbusDeviceIsLost(call->device) || now_ns >= call->device->retry_ns)
+        return true;
+    end_call(call, ERR_TIMEOUT);
+    return false;
+}
+
+/* Of the calls one that has been due longer than the job that was found. */
+static void choose_call(MODBUS_CLIENT *client, RTS_I64 earliest_ns, RTS_I64 now_ns)
+{
+    for (MODBUS_CALL *call = client->calls; call < client->calls + client->call_count; call++) {
+        if (SysAtomicLoad(&call->state) != MODBUS_CALL_WAITS || call->client != client || call->due_ns > earliest_ns ||
+            !is_wanted(call, now_ns))
+            continue;
+        earliest_ns = call->due_ns;
+        client->device = call->device;
+        client->call = call;
+        client->job = NULL;
+    }
+}
+
+/* The job that is due, and longest. */
 static void choose(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
     RTS_I64 earliest_ns = now_ns;
@@ -102,10 +131,7 @@ static void choose(MODBUS_CLIENT *client, RTS_I64 now_ns)
             client->job = job;
         }
     }
-    if (client->call != NULL && client->call->due_ns <= earliest_ns) {
-        client->device = client->call->device;
-        client->job = NULL;
-    }
+    choose_call(client, earliest_ns, now_ns);
 }
 
 /* ---- requests ---- */
@@ -163,6 +189,13 @@ static RTS_UI8 function_to_verify(const MODBUS_FUNCTION *function)
     return function->table == MODBUS_COILS ? MODBUS_READ_COILS : MODBUS_READ_HOLDING_REGISTERS;
 }
 
+static void put_call(const MODBUS_CALL *call, const MODBUS_REQUEST *request, RTS_UI32 size, const RTS_UI8 *pdu)
+{
+    RTS_UI32 head = (RTS_UI32)(request->data - pdu);
+
+    memcpy(request->data, call->data, size - head);
+}
+
 static void describe_job(MODBUS_CLIENT *client)
 {
     const MODBUS_JOB *job = client->job->job;
@@ -197,10 +230,10 @@ static void send(MODBUS_CLIENT *client, RTS_I64 now_ns)
     if (client->job != NULL)
         describe_job(client);
     else
-        client->request = (MODBUS_REQUEST){.function = client->call->function};
+        client->request = client->call->request;
     size = ModbusBeginRequest(&client->request, pdu);
     if (client->job == NULL)
-        memcpy(pdu + 1, client->call->data, size - 1);
+        put_call(client->call, &client->request, size, pdu);
     else if (client->request.write_count != 0)
         put_data(client);
     memcpy(client->head, pdu, MODBUS_HEAD_SIZE);
@@ -280,13 +313,6 @@ static void fail_job(MODBUS_JOB_STATE *job, bool lost, RTS_I64 now_ns)
         job->due_ns = now_ns;
 }
 
-static void end_call(MODBUS_CLIENT *client, RTS_RESULT result)
-{
-    client->call->result = result;
-    client->call->state = MODBUS_CALL_ENDED;
-    client->call = NULL;
-}
-
 /* No reply: a job is tried once more, or the device is lost. */
 static void fail(MODBUS_CLIENT *client, RTS_I64 now_ns)
 {
@@ -300,7 +326,7 @@ static void fail(MODBUS_CLIENT *client, RTS_I64 now_ns)
     if (client->job != NULL)
         fail_job(client->job, ModbusDeviceIsLost(device), now_ns);
     else
-        end_call(client, ERR_TIMEOUT);
+        end_call(client->call, ERR_TIMEOUT);
     client->verifies = false;
     client->device = NULL;
 }
@@ -323,7 +349,7 @@ static void end(MODBUS_CLIENT *client, bool good, RTS_I64 now_ns)
     if (client->job != NULL)
         end_job(client->job, good, now_ns);
     else
-        end_call(client, good ? ERR_OK : ERR_FAILED);
+        end_call(client->call, good ? ERR_OK : ERR_FAILED);
     client->verifies = false;
     client->device = NULL;
 }
@@ -365,10 +391,15 @@ static void take_data(const MODBUS_CLIENT *client, RTS_UI8 *data)
     SysLockLeave(lock);
 }
 
-static void take_call(MODBUS_CALL *call, const RTS_UI8 *pdu, RTS_UI32 size)
+/* What follows the function, and of what was read the number of bytes; of a write nothing. */
+static void take_call(const MODBUS_CLIENT *client, const RTS_UI8 *pdu, RTS_UI32 size)
 {
-    call->size = (RTS_UI8)(size - 1);
-    memcpy(call->data, pdu + 1, call->size);
+    MODBUS_CALL *call = client->call;
+    RTS_UI32 head = call->request.function->table == 0 ? 1 : 2;
+
+    call->size =
+        call->request.function->most_written != 0 && call->request.read_count == 0 ? 0 : (RTS_UI8)(size - head);
+    memcpy(call->data, pdu + head, call->size);
 }
 
 static void take_good(MODBUS_CLIENT *client, RTS_UI8 *pdu, RTS_UI32 size, RTS_I64 now_ns)
@@ -378,7 +409,7 @@ static void take_good(MODBUS_CLIENT *client, RTS_UI8 *pdu, RTS_UI32 size, RTS_I6
 
     note_reply(client, now_ns);
     if (client->job == NULL) {
-        take_call(client->call, pdu, size);
+        take_call(client, pdu, size);
         end(client, true, now_ns);
         return;
     }
@@ -407,6 +438,8 @@ static void take_exception(MODBUS_CLIENT *client, RTS_UI8 code, RTS_I64 now_ns)
     }
     client->device->counters.exceptions++;
     note_reply(client, now_ns);
+    if (client->job == NULL)
+        client->call->exception = code;
     end(client, false, now_ns);
 }
 

@@ -30,6 +30,13 @@ def wire_address(reference: int, table: int) -> int | None:
     return None
 
 
+def place_of_reference(reference: int) -> tuple[int, int] | None:
+    """The table and the address on the wire of a reference, whose first digit says which table it is of; None if there
+    is none. Coils are those up to 9999."""
+    tables = (table for table in (INPUT, HOLDING, DISCRETE, COILS) if table != COILS or reference <= 9999)
+    return next(((table, at) for table in tables if (at := wire_address(reference, table)) is not None), None)
+
+
 def wrong_reference(text: str, table: int) -> str:
     """What to say about a reference that is not one of this table."""
     prefix = _PREFIX[table]
