@@ -233,6 +233,11 @@ class Plc(Controller):
     def stop(self) -> None:
         services.stop(self._session)
 
+    def cycle(self) -> None:
+        """Runs one cycle of each task of a stopped program, which is stopped again then. Raises DeviceError when it
+        runs, had an exception, or there is none."""
+        services.cycle(self._session)
+
     def _reset(self, option: int) -> None:
         services.reset(self._session, option)
 

@@ -234,6 +234,21 @@ def stop(session: Session) -> None:
     _check_control(session.recover(partial(_control, session, lib.SRV_APP_STOP)), "stop")
 
 
+def cycle(session: Session) -> None:
+    """Runs one cycle of each task of an application that is stopped. Not again when no reply came: it may have run."""
+    try:
+        reply = session.recover(partial(_control, session, lib.SRV_APP_SINGLE_CYCLE), repeatable=False)
+    except DeviceError as error:
+        if error.result != lib.ERR_L7_UNKNOWNCMD:
+            raise
+        raise DeviceError(
+            "The firmware of this device has no single cycle; SRV_OTHER_CLIENTS gives it (docs/compatibility.md).",
+            "no-single-cycle",
+            error.result,
+        ) from None
+    _check_control(reply, "cycle")
+
+
 def reset(session: Session, option: int) -> None:
     """`option` is RESET_OPTION_*; origin deletes the application."""
     which = bintag.u32(lib.TAG_APP_OPTION, option)
