@@ -5,6 +5,7 @@
 # make size   flash and RAM of the bare-metal runtime, per component
 # make attack all attacks on the promise that no program is lost (ARGS="--replay ID", "--sanitized" ...)
 # make soak   clients on all lines at once, 10 000 channels on each (ARGS="--channels 500")
+# make habits what the habits of other systems' programs are, and what plctool check says of a program with each
 # make fuzz   parsers and stores under random input, FUZZ_SECONDS=60 for each
 #
 # Everything is installed into .venv and built in build*/; Debian packages that are missing are installed when you are root.
@@ -20,7 +21,7 @@ CORTEX_M := $(if $(shell command -v arm-none-eabi-gcc),$(if $(shell command -v q
 RISC_V := $(if $(shell command -v riscv64-unknown-elf-gcc),$(if $(shell command -v qemu-system-riscv32),build-rv32imac))
 BUILDS := build build-sanitized $(CORTEX_M) $(RISC_V)
 
-.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz all clean
+.PHONY: demo test test-vcan test-kernel lint format bench size wheel attack soak fuzz habits all clean
 
 demo: $(VENV)/installed
 	$(BIN)/plctool demo
@@ -88,6 +89,10 @@ soak: build/build.ninja
 	ninja -C build under_attack
 	$(BIN)/python tests/soak/soak.py $(ARGS)
 
+habits: build/build.ninja
+	$(MESON) compile -C build
+	PYTHONPATH=host:build/host $(BIN)/python tests/corpus/habits.py
+
 FUZZED := build build-sanitized
 FUZZ_SECONDS ?= 60
 
@@ -98,8 +103,9 @@ fuzz: $(FUZZED:%=%/build.ninja)
 build/build.ninja: $(VENV)/dev
 	$(MESON) setup build
 
+# Lines are all that a report shows, and compile faster than all of what a debugger knows.
 build-sanitized/build.ninja: $(VENV)/dev
-	$(MESON) setup build-sanitized -Dhost=false -Doptimization=1 -Db_sanitize=address,undefined -Db_lundef=false
+	$(MESON) setup build-sanitized -Dhost=false -Doptimization=1 -Ddebug=false -Dc_args=-g1 -Db_sanitize=address,undefined -Db_lundef=false
 
 build-cm%/build.ninja: $(VENV)/dev
 	$(MESON) setup build-cm$* --cross-file cross/cortex-m$*.ini

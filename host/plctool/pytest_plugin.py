@@ -58,7 +58,9 @@ class StFile(pytest.File):
         programs = self.config.stash.setdefault(_PROGRAMS, {})
         if sources not in programs:
             projects = self.config.stash.setdefault(_PROJECTS, {})
-            programs[sources] = TestProgram(projects.get(sources[0], sources))
+            files = projects.get(sources[0])
+            dialect = files.project.dialect if files and files.project else None
+            programs[sources] = TestProgram(files or sources, dialect=dialect)
         return programs[sources]
 
     def _project(self) -> Path | None:

@@ -95,16 +95,18 @@ class Simulator(Controller):
         start: bool = True,
         cycle_limit_ms: int = 0,
         functions: Mapping[str, Callable[..., Any]] | None = None,
+        dialect: str | None = None,
     ) -> Simulator:
-        """The program in source files and folders, compiled for this. `level` and `checks` as in `compile_sources`,
-        which says what is raised. `functions`: FUNCTIONs of the program, by name, that Python implements: they get
-        the values of the inputs, an `Output` for each VAR_OUTPUT and VAR_IN_OUT, and return the result."""
+        """The program in source files and folders, compiled for this. `level`, `checks` and `dialect` as in
+        `compile_sources`, which says what is raised. `functions`: FUNCTIONs of the program, by name, that Python
+        implements: they get the values of the inputs, an `Output` for each VAR_OUTPUT and VAR_IN_OUT, and return the
+        result."""
         # Only here: what runs images needs no compiler.
         from plctool.compiler import compile_sources
         from plctool.compiler.semantics.python_functions import PythonFunctions
 
         python = PythonFunctions(functions) if functions else None
-        built = compile_sources(paths, target=host_target(), level=level, checks=checks, python=python)
+        built = compile_sources(paths, target=host_target(), level=level, checks=checks, python=python, dialect=dialect)
         connected = SimFunctions(functions, python.units) if python else None
         return cls(built.image, built.symbols, start=start, cycle_limit_ms=cycle_limit_ms, functions=connected)
 

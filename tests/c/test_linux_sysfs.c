@@ -170,15 +170,16 @@ static void set_input(RTS_UI32 value)
     memcpy(AppGetAreaAddress(APP_AREA_INPUT, 0, sizeof value), &value, sizeof value);
 }
 
-/* Lets cycles pass until a condition holds. */
+/* Lets cycles pass until a condition holds. It need hold only once: a file that is written again is empty for a moment. */
 #define AWAIT(condition)                                           \
     do {                                                           \
         int tries = TRIES;                                         \
-        while (!(condition) && tries-- > 0) {                      \
+        bool is_met;                                               \
+        while (!(is_met = (condition)) && tries-- > 0) {           \
             (void)nanosleep(&(struct timespec){0, 1000000}, NULL); \
             CHECK_EQUAL(SimAdvance(ms(10)), ERR_OK);               \
         }                                                          \
-        CHECK(condition);                                          \
+        CHECK(is_met);                                             \
     } while (0)
 
 static void numbers_have_the_unit_or_are_raw(void)

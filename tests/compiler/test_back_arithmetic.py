@@ -13,7 +13,18 @@ from hypothesis import strategies as st
 
 from plctool.compiler.codegen.lower_unit import ALL_CHECKS, Check
 from plctool.compiler.ranges import type_range
-from plctool.compiler.typed import Assign, BinaryOp, Convert, Expr, Intrinsic, IntrinsicCall, Pos, Unary, UnaryOp
+from plctool.compiler.typed import (
+    Assign,
+    BinaryOp,
+    Convert,
+    Expr,
+    Intrinsic,
+    IntrinsicCall,
+    Pos,
+    Rounding,
+    Unary,
+    UnaryOp,
+)
 from plctool.iec.types import (
     BOOL,
     BYTE,
@@ -88,7 +99,7 @@ EXPRESSIONS = {
     "NEG": lambda o, r: Unary(UnaryOp.NEG, o[0], r, P),
     "NOT": lambda o, r: Unary(UnaryOp.NOT, o[0], r, P),
     "CONVERT": lambda o, r: Convert(o[0], r, P),
-    "TRUNCATE": lambda o, r: Convert(o[0], r, P, truncate=True),
+    "TRUNCATE": lambda o, r: Convert(o[0], r, P, rounding=Rounding.ZERO),
 }
 
 

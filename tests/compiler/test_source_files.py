@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from plctool.compiler import compile_sources, load_sources
-from plctool.compiler.diagnostics import render_all
+from plctool.compiler.diagnostics import render, render_all
 from plctool.compiler.formats.twincat import read_object
 from plctool.compiler.front import check_sources
 from plctool.errors import UsageError
@@ -285,8 +285,10 @@ def test_a_file_without_text_says_what_to_export(tmp_path: Path, name: str, mess
 def test_a_binary_file_is_one_error_whatever_it_is_called(tmp_path: Path) -> None:
     path = tmp_path / "main.st"
     path.write_bytes(bytes(range(256)) * 4)
-    (found,) = [d for d in check_sources(load_sources([path])).diagnostics if d.severity == "error"]
+    sources = load_sources([path])
+    (found,) = [d for d in check_sources(sources).diagnostics if d.severity == "error"]
     assert found.message.startswith("this is a binary file")
+    assert render(found, sources) == f"{path}:1:1: error: {found.message}"  # without a line of nothing
 
 
 @pytest.mark.parametrize("suffix", [".ST", ".iecst", ".scl"])

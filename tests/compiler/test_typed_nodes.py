@@ -32,7 +32,7 @@ from plctool.iec.types import DINT, ArrayType
 
 POS = Pos("main.st", 1, 1)
 KINDS = get_args(Place) + get_args(Expr) + get_args(Statement)
-A_NODE = re.compile(r"\b(Place|Expr|Statement|Call)\b")
+A_NODE = re.compile(r"\b(Place|Expr|Statement|Assign|Call)\b")
 ARRAY = ArrayType(DINT, ((0, 3),))
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from plctool.errors import UsageError
 from plctool.files import usable_path
+from plctool.iec.dialect import DIALECTS
 from plctool.image.targets import DEFAULT_TARGET, TARGETS
 from plctool.link.transports import TRANSPORTS
 from plctool.templates import DEFAULT_TEMPLATE, TEMPLATES
@@ -270,6 +271,7 @@ def _add_file_actions(command: Callable[..., argparse.ArgumentParser]) -> None:
     put = action("put", "put the sources of the program that is on the device there as well")
     _add_sources(put)
     _add_build_options(put)
+    _add_dialect(put)
     _add_io_files(put)
     _add_link(put)
 
@@ -351,7 +353,15 @@ def _add_names(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="+", metavar="NAME", help="such as Main.lamp, Main.list[3], Main.pump.*")
 
 
+def _add_dialect(parser: argparse.ArgumentParser) -> None:
+    dialect = parser.add_argument(
+        "--dialect", metavar="|".join(DIALECTS), help="the system whose rules hold where they disagree"
+    )
+    dialect.completer = lambda **words: DIALECTS  # type: ignore[attr-defined]
+
+
 def _add_warnings(parser: argparse.ArgumentParser) -> None:
+    _add_dialect(parser)
     parser.add_argument(
         "--no-warn",
         action="append",

@@ -95,6 +95,7 @@ def _compile(settings: Settings, target: str | None) -> BuildResult:
         warnings=settings.warnings,
         board=settings.board,
         limits=settings.limits,
+        dialect=settings.dialect,
     )
 
 
@@ -139,7 +140,7 @@ def _checked(settings: Settings) -> tuple[list[Diagnostic], list[Source], list[S
 
     files = settings.files
     sources, libraries = files.load_sources(), files.load_libraries()
-    result = check_with_tests(sources, settings.warnings, files.load_io, libraries)
+    result = check_with_tests(sources, settings.warnings, files.load_io, libraries, settings.dialect)
     return result.diagnostics, sources, [*sources, *io_sources(files.load_io()), *library_sources(libraries)]
 
 
@@ -209,6 +210,7 @@ def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.library import standard_library
     from plctool.compiler.plcopen_export.project import write_project
+    from plctool.iec.dialect import find_dialect
 
     files = settings.files
     check_not_read(output, files.every_file(), "-o exported.xml, in another folder")
@@ -218,9 +220,12 @@ def export(settings: Settings, output: Path, stamp: int) -> tuple[Document, list
     if any(path.is_dir() and here.is_relative_to(path.resolve()) for path in files.sources):
         message = f"{output} would be a source of this program itself; write it to another folder."
         raise UsageError(message, "bad-output")
+    dialect = find_dialect(settings.dialect)
     sources, libraries = files.load_sources(), files.load_libraries()
     with bugs_reported():
-        checked = check_sources(sources, warnings=settings.warnings, io=files.load_io(), libraries=libraries)
+        checked = check_sources(
+            sources, warnings=settings.warnings, io=files.load_io(), libraries=libraries, dialect=dialect
+        )
         if checked.program is None:
             raise CompileError(checked.diagnostics, sources)
         declared = declared_names_asked_for(standard_library(), libraries, sources)
@@ -291,6 +296,7 @@ def test(settings: Settings, pattern: str, junit: Path | None, coverage: Path | 
         level=int(settings.level),
         warnings=settings.warnings,
         coverage=coverage is not None,
+        dialect=settings.dialect,
     )
     if junit:
         write_atomically(junit, st_tests.junit_xml(report))

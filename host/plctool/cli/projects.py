@@ -31,6 +31,7 @@ class Settings:
     debug: bool = False
     board: str | None = None
     limits: bool = True
+    dialect: str | None = None
 
 
 def settings_of(args: argparse.Namespace) -> Settings:
@@ -83,7 +84,7 @@ def _warnings(args: argparse.Namespace, project: Project | None) -> WarningOptio
 def _of_build(args: argparse.Namespace, project: Project | None) -> dict[str, Any]:
     """Those that were chosen: by the arguments, else by the project. A board has its own target."""
     chosen = {}
-    for name in ("output", "target", "level", "checks", "debug"):
+    for name in ("output", "target", "level", "checks", "debug", "dialect"):
         value = getattr(args, name, None)
         if value is None and project is not None and not (name == "target" and getattr(args, "board", None)):
             value = getattr(project, name)

@@ -140,6 +140,7 @@ def _words(settings: Settings, root: Path) -> list[str]:
         if files.io.device is not None:
             words += ["--device", _below(root, files.io.device)]
     words += ["--target", settings.target, f"-O{settings.level}", "--checks", settings.checks]
+    words += [] if settings.dialect is None else ["--dialect", settings.dialect]
     return [*map(str, words), *(["--debug"] if settings.debug else [])]
 
 

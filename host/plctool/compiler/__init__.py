@@ -75,21 +75,24 @@ def check_with_tests(
     warnings: WarningOptions | None = None,
     load: Callable[[], Description | None] = lambda: None,
     libraries: Sequence[ImportedLibrary] = (),
+    dialect: str | None = None,
 ) -> CheckResult:
     """Checks a program as it is built, and once more as its unit tests see it. `warnings`: which are wanted; all.
-    `load` gets the inputs and outputs for each of both."""
+    `load` gets the inputs and outputs for each of both. `dialect` as in `compile_sources`."""
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
+    from plctool.iec.dialect import find_dialect
 
+    wanted, system = warnings or ALL_WARNINGS, find_dialect(dialect)
     with bugs_reported():
-        result = check_sources(sources, warnings=warnings or ALL_WARNINGS, io=load(), libraries=libraries)
+        result = check_sources(sources, warnings=wanted, io=load(), libraries=libraries, dialect=system)
         if not result.has_tests:
             return result
         from plctool.compiler.semantics.unit_tests import TestSuite
 
         suite = TestSuite()
-        tests = check_sources(sources, tests=suite, warnings=warnings or ALL_WARNINGS, io=load(), libraries=libraries)
+        tests = check_sources(sources, tests=suite, warnings=wanted, io=load(), libraries=libraries, dialect=system)
     found = dict.fromkeys([*result.diagnostics, *tests.diagnostics])
     found_sorted = sorted(found, key=lambda d: (d.file, d.line, d.column, d.severity, d.message))
     return replace(result, program=result.program if tests.ok else None, diagnostics=found_sorted)
@@ -108,6 +111,7 @@ def compile_sources(
     board: str | None = None,
     limits: bool = True,
     python: PythonFunctions | None = None,
+    dialect: str | None = None,
 ) -> BuildResult:
     """Compiles a program. `checks`: all, none, or names of run-time checks; `warnings`: which are wanted, all unless
     said otherwise; `target`: that of the board (`device.toml`) unless said otherwise, else x86_64-linux; `io`: its
@@ -115,6 +119,7 @@ def compile_sources(
     project its files are taken, its options are for the command line. `board`: one that plctool knows, such as
     mps2-an385/standard, to whose target and limits the program is held, so that another `target` is refused; without
     `limits` it may need more than any device has. `python`: functions that Python implements, in the simulator.
+    `dialect`: iec, codesys or twincat, where systems disagree about what a program means.
 
     Raises CompileError when the program has errors, UsageError for options that make no sense and for a program that
     does not fit its device, InternalError when the compiler has a bug.
@@ -126,9 +131,11 @@ def compile_sources(
     from plctool.compiler.front import check_sources
     from plctool.compiler.internal import bugs_reported
     from plctool.compiler.warnings import ALL_WARNINGS
+    from plctool.iec.dialect import find_dialect
     from plctool.image.board import find_board
     from plctool.image.targets import find_target
 
+    system = find_dialect(dialect)
     number, size = (2, True) if level == "s" else (level, False)
     files = program_files(paths, io, libraries)
     description = files.load_io()
@@ -145,7 +152,12 @@ def compile_sources(
     shown = [*sources, *io_sources(description), *library_sources(imported)]
     with bugs_reported():
         checked = check_sources(
-            sources, warnings=warnings or ALL_WARNINGS, io=description, libraries=imported, python=python
+            sources,
+            warnings=warnings or ALL_WARNINGS,
+            io=description,
+            libraries=imported,
+            python=python,
+            dialect=system,
         )
     if checked.program is None:
         raise CompileError(checked.diagnostics, shown)

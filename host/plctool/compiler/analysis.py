@@ -49,7 +49,7 @@ class Effects:
         var = loop.var.var
         if var in self._addressed_in(pou):
             return None
-        for node in walk(loop.body):
+        for node in walk([*loop.body, loop.stop, loop.step] if loop.each_turn else loop.body):
             for place in written_places(node):
                 root = root_of(place)
                 if root is var or (root is None and var.storage is not Storage.LOCAL):

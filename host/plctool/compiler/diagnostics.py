@@ -15,6 +15,7 @@ from plctool.compiler.typed import Pos
 from plctool.compiler.warnings import ALL_WARNINGS, LineRanges, switched_off
 from plctool.errors import UsageError
 from plctool.errors import did_you_mean as did_you_mean
+from plctool.iec.dialect import OWN
 
 Severity = Literal["error", "warning"]
 
@@ -49,6 +50,7 @@ class Diagnostics:
     def __init__(self, quiet: Iterable[str] = ()) -> None:
         self._quiet = frozenset(quiet)
         self.options = ALL_WARNINGS
+        self.dialect = OWN
         self._muted: dict[tuple[str, str], LineRanges] = {}
         self._found: dict[Diagnostic, None] = {}
         self.incomplete: set[str] = set()  # units, case-folded, that lack what has an unknown type or base
@@ -66,7 +68,11 @@ class Diagnostics:
         self._add(pos, "error", "unknown", message, missing=name)
 
     def warning(self, pos: Pos, code: str, message: str) -> None:
-        """Records a warning, unless it is not wanted; `code` is one of WARNINGS."""
+        """Records a warning, unless it is not wanted; `code` is one of WARNINGS. A dialect may make it an error, which
+        cannot be turned off."""
+        if code in self.dialect.errors and pos.file not in self._quiet:
+            self.error(pos, code, f"{message} (an error in the dialect {self.dialect.name})")
+            return
         muted = self._muted.get((pos.file, code), ())
         if pos.file in self._quiet or code in self.options.disabled or any(a <= pos.line < b for a, b in muted):
             return
@@ -138,7 +144,7 @@ def render(diagnostic: Diagnostic, sources: Iterable[Source] = ()) -> str:
     d = diagnostic
     head = f"{d.file}:{d.line}:{d.column}: {d.severity}: {d.message}"
     source = next((s for s in sources if s.path == d.file), None)
-    if source is None:
+    if source is None or not source.text:  # "" of a file that is no text
         return head
     line, column = _part_of(source.line_text(d.line), d.column - 1)
     indent = "".join("\t" if c == "\t" else " " for c in line[:column])

@@ -33,6 +33,7 @@ from plctool.compiler.task_images import plan_images
 from plctool.compiler.typed import Pos, TypedProgram
 from plctool.compiler.warnings import ALL_WARNINGS, WarningOptions
 from plctool.iec.areas import Area
+from plctool.iec.dialect import OWN, Dialect
 from plctool.iec.types import MAX_SIZE
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ def check_sources(
     io: Description | None = None,
     libraries: Sequence[ImportedLibrary] = (),
     python: PythonFunctions | None = None,
+    dialect: Dialect = OWN,
 ) -> CheckResult:
     """Checks the files of a program together.
 
@@ -74,13 +76,14 @@ def check_sources(
     takes the TEST blocks; the program then runs them in place of its tasks. Without it they are passed over.
     `warnings`: which of them are wanted. `io`: the inputs and outputs; a description is for one check.
     `libraries`: what the program uses besides the standard library. `python`: functions that Python implements, in the
-    simulator; raises UsageError for those that cannot be. Whatever the sources contain, the result is a program or
-    diagnostics, never an exception.
+    simulator; raises UsageError for those that cannot be. `dialect`: the system whose rules it has. Whatever the
+    sources contain, the result is a program or diagnostics, never an exception.
     """
     chosen = Library(library_sources) if library_sources else standard_library() if library else Library(())
     program = Program(chosen)
     diagnostics = program.world.diagnostics
     diagnostics.options = warnings
+    program.world.dialect = diagnostics.dialect = dialect
     program.world.io = IoChannels(io)
     program.libraries = libraries
     with no_collection(), room_for_nesting():

@@ -20,6 +20,7 @@ from plctool.compiler.toml_files import read_checked
 from plctool.compiler.warnings import WARNINGS
 from plctool.errors import UsageError, did_you_mean
 from plctool.files import read_utf8
+from plctool.iec.dialect import DIALECTS
 from plctool.image.file import ApplicationInfo
 from plctool.image.targets import TARGETS
 from plctool.io.tables import Entry, Table
@@ -47,6 +48,7 @@ class Project:
     no_warn: list[str] = field(default_factory=list)
     werror: bool = False
     info: ApplicationInfo = field(default_factory=ApplicationInfo)
+    dialect: str | None = None
 
 
 def read_project(file: Path) -> Project:
@@ -73,6 +75,7 @@ def _project(file: Path, table: Table) -> Project:
         _warnings(options),
         options.flag("werror"),
         _information(folder, information),
+        options.choice("dialect", {name: name for name in DIALECTS}),
     )
     options.close()
     information.close()

@@ -253,20 +253,28 @@ class Binary(Node):
     pos: Pos
 
 
+class Rounding(Enum):
+    """How a real becomes an integer."""
+
+    EVEN = "halves to even; stays within the type, NaN is 0"
+    ZERO = "towards zero; stays within the type, NaN is 0"
+    AWAY = "to LINT only: halves away from zero; what does not fit, and NaN, is the lowest LINT"
+
+
 @dataclass
 class Convert(Node):
     """A value conversion between scalars.
 
     integer/bit/time/enum -> integer/bit/time/enum: sign- or zero-extend by the source, truncate to the target; anything
-    -> BOOL: <> 0; real -> integer: round to nearest even, saturate, NaN is 0 (`truncate`: towards zero); integer ->
-    real: nearest. `check` carries the subrange limits to test first.
+    -> BOOL: <> 0; real -> integer: as `rounding` says; integer -> real: nearest. `check` carries the subrange limits to
+    test first.
     """
 
     children: ClassVar = ("operand",)
     operand: Expr
     type: Type
     pos: Pos
-    truncate: bool = False
+    rounding: Rounding = Rounding.EVEN
     check: tuple[int, int] | None = None
 
 
@@ -335,7 +343,17 @@ class Call(Node):
     dispatch: Dispatch | None = None  # when the type of the instance is not known; `function` is its signature then
 
 
-Expr = Const | Load | Unary | Binary | Convert | IntrinsicCall | AddressOf | Call
+@dataclass
+class AssignedValue(Node):
+    """`(a := e)`: the assignment of a scalar, and what was assigned."""
+
+    children: ClassVar = ("assignment",)
+    assignment: Assign
+    type: Type
+    pos: Pos
+
+
+Expr = Const | Load | Unary | Binary | Convert | IntrinsicCall | AddressOf | Call | AssignedValue
 
 
 # ---- statements ----------------------------------------------------------------------------------------------------
@@ -394,9 +412,10 @@ class Case(Node):
 
 @dataclass
 class For(Node):
-    """`stop` and `step` are evaluated once. The loop ends without wrapping, also at the limits of the type; `FOR i := 5
-    TO 5` runs once. A step of 0 raises DIVIDEBYZERO when it is not a constant (a constant 0 is a compile error).
-    `step` is signed when it leads downwards, whatever the type of `var`."""
+    """`stop` and `step` are evaluated once, or if `each_turn` after each turn again. The loop ends without wrapping,
+    also at the limits of the type; `FOR i := 5 TO 5` runs once. A step of 0 raises DIVIDEBYZERO when it is not a
+    constant (a constant 0 is a compile error). `step` is signed when it leads downwards, whatever the type of
+    `var`."""
 
     children: ClassVar = ("var", "start", "stop", "step", "body")
     var: Place
@@ -405,6 +424,7 @@ class For(Node):
     step: Expr
     body: list[Statement]
     pos: Pos
+    each_turn: bool = False
 
 
 @dataclass

@@ -16,6 +16,7 @@ from plctool.errors import UsageError
 WARNINGS = {
     "access": "a VAR of a function block is read from outside",
     "always": "a comparison gives the same for every value of its type",
+    "assignment": "an assignment is used as a value, as in IF (a := 1) THEN",
     "bits": "a BYTE, WORD, DWORD or LWORD is taken for an unsigned number where a REAL is needed",
     "bounds": "an array goes to one of the same length with other bounds",
     "case": "a CASE about an enumeration has no ELSE and misses some of its values",

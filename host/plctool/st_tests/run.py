@@ -26,6 +26,7 @@ from plctool.core import lib
 from plctool.debug.symbols import SourceLine
 from plctool.errors import UsageError
 from plctool.iec.areas import Area
+from plctool.iec.dialect import find_dialect
 from plctool.iec.value_texts import literal
 from plctool.iec.values import decode
 from plctool.image.targets import find_target, host_target
@@ -57,15 +58,19 @@ def run_tests(
     io: IoFiles | None = None,
     libraries: Sequence[Path | str] = (),
     coverage: bool = False,
+    dialect: str | None = None,
 ) -> Report:
     """Runs the tests in sources whose name matches `pattern` (with * and ?) or contains it; case does not matter.
 
     `level`: optimisation; the lowest compiles fastest, and the results are the same. `io`: inputs and outputs;
-    `libraries`: those it uses; `coverage`: whether to note which statements run. Raises CompileError when the program
+    `libraries`: those it uses; `coverage`: whether to note which statements run;
+    `dialect`: as in `compile_sources`. Raises CompileError when the program
     has errors, UsageError when there are no tests.
     """
     begin = time.perf_counter()
-    program = TestProgram(paths, level=level, warnings=warnings, io=io, libraries=libraries, coverage=coverage)
+    program = TestProgram(
+        paths, level=level, warnings=warnings, io=io, libraries=libraries, coverage=coverage, dialect=dialect
+    )
     chosen = [i for i, case in enumerate(program.cases) if _fits(case.name.casefold(), pattern.casefold())]
     if not chosen:
         what = f"no test matches '{pattern}'" if program.cases else "there are no tests: write TEST 'name' ... END_TEST"
@@ -90,16 +95,23 @@ class TestProgram:
         io: IoFiles | None = None,
         libraries: Sequence[Path | str] = (),
         coverage: bool = False,
+        dialect: str | None = None,
     ) -> None:
         files = program_files(paths, io, libraries)
         description, imported = files.load_io(), files.load_libraries()
         self.sources = files.load_sources()
+        system = find_dialect(dialect)
         marks = StatementMarks() if coverage else None
         self._suite = TestSuite(marks)
         self._level = level
         with _power(), bugs_reported():
             checked = check_sources(
-                self.sources, tests=self._suite, warnings=warnings, io=description, libraries=imported
+                self.sources,
+                tests=self._suite,
+                warnings=warnings,
+                io=description,
+                libraries=imported,
+                dialect=system,
             )
         self.sources += [*io_sources(description), *library_sources(imported)]
         if checked.program is None:

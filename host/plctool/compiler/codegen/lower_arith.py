@@ -8,7 +8,7 @@ from __future__ import annotations
 from plctool.compiler.codegen.ir import NULL, Value, float_literal, number
 from plctool.compiler.codegen.lower_frame import DIVIDE_BY_ZERO, Frame, zero
 from plctool.compiler.codegen.lower_unit import Check, value_type
-from plctool.compiler.typed import BinaryOp, Const, Intrinsic, Pos, UnaryOp
+from plctool.compiler.typed import BinaryOp, Const, Intrinsic, Pos, Rounding, UnaryOp
 from plctool.iec.types import BOOL, Elementary, Kind, Type, base_of
 
 LOGIC = {BinaryOp.AND: "and", BinaryOp.OR: "or", BinaryOp.XOR: "xor"}
@@ -136,7 +136,7 @@ def unary(frame: Frame, op: UnaryOp, operand: Value, t: Type) -> Value:
     return frame.fn.value(f"sub {text} 0, {operand}")
 
 
-def convert(frame: Frame, value: Value, source: Type, target: Type, *, truncate: bool = False) -> Value:
+def convert(frame: Frame, value: Value, source: Type, target: Type, *, rounding: Rounding = Rounding.EVEN) -> Value:
     """A scalar conversion as typed.Convert defines it."""
     old, new = value_type(source), value_type(target)
     fn = frame.fn
@@ -151,7 +151,7 @@ def convert(frame: Frame, value: Value, source: Type, target: Type, *, truncate:
     elif is_real(source) and is_real(target):
         word = "fptrunc" if new == "float" else "fpext"
     elif is_real(source):
-        return _to_integer(frame, value, source, target, truncate)
+        return _to_integer(frame, value, source, target, rounding)
     elif is_real(target):
         word = "sitofp" if is_signed(source) else "uitofp"
     elif bits_of(source) > bits_of(target):
@@ -172,13 +172,28 @@ def is_not_zero(frame: Frame, value: Value, t: Type) -> Value:
     return frame.fn.value(f"{'fcmp une' if is_real(t) else 'icmp ne'} {text} {value}, {zero(t)}")
 
 
-def _to_integer(frame: Frame, value: Value, source: Type, target: Type, truncate: bool) -> Value:
+def _to_integer(frame: Frame, value: Value, source: Type, target: Type, rounding: Rounding) -> Value:
     text, integer = value_type(source), value_type(target)
-    if not truncate:
+    if rounding is Rounding.EVEN:
         value = _round_to_even(frame, value, text)
     word = "fptosi" if is_signed(target) else "fptoui"
     suffix = "f32" if text == "float" else "f64"
-    return frame.fn.value(f"call {integer} @llvm.{word}.sat.{integer}.{suffix}({text} {value})")
+    whole = frame.fn.value(f"call {integer} @llvm.{word}.sat.{integer}.{suffix}({text} {value})")
+    return _away_from_zero(frame, value, text, whole) if rounding is Rounding.AWAY else whole
+
+
+def _away_from_zero(frame: Frame, value: Value, text: str, whole: Value) -> Value:
+    """`whole`: the LINT of a real, cut towards zero; all that is at most 2^63 in size is exact there."""
+    fn = frame.fn
+    suffix = "f32" if text == "float" else "f64"
+    rest = fn.value(f"fsub {text} {value}, {fn.value(f'sitofp i64 {whole} to {text}')}")
+    for word, limit in (("oge", 0.5), ("ole", -0.5)):
+        further = fn.value(f"fcmp {word} {text} {rest}, {float_literal(limit, 64)}")
+        step = fn.value(f"zext i1 {further} to i64")
+        whole = fn.value(f"{'add' if limit > 0 else 'sub'} i64 {whole}, {step}")
+    size = fn.value(f"call {text} @llvm.fabs.{suffix}({text} {value})")
+    fits = fn.value(f"fcmp olt {text} {size}, {float_literal(2.0**63, 64)}")
+    return fn.value(f"select i1 {fits}, i64 {whole}, i64 {-(2**63)}")
 
 
 def _round_to_even(frame: Frame, value: Value, text: str) -> Value:

@@ -39,6 +39,7 @@ from plctool.compiler.codegen.lower_unit import Check, value_type
 from plctool.compiler.ranges import type_range, value_range
 from plctool.compiler.typed import (
     AddressOf,
+    AssignedValue,
     Binary,
     BinaryOp,
     Call,
@@ -74,6 +75,14 @@ def call_value(frame: Frame, e: Call) -> Value:
     """A scalar that a function returns."""
     value = call_function(frame, e, None)
     assert value is not None, "a function without a scalar result is called by a statement"
+    return value
+
+
+@rule(VALUES, AssignedValue)
+def assigned_value(frame: Frame, e: AssignedValue) -> Value:
+    """What an assignment stored."""
+    value = frame.value(e.assignment.value)
+    frame.store(frame.ref(e.assignment.target), value)
     return value
 
 
@@ -157,9 +166,9 @@ def converted(frame: Frame, e: Convert) -> Value:
     source = e.operand.type
     value = frame.value(e.operand)
     if e.check is None or Check.SUBRANGE not in frame.checks:
-        return convert(frame, value, source, e.type, truncate=e.truncate)
+        return convert(frame, value, source, e.type, rounding=e.rounding)
     if type_range(source) is None:  # a real: the limits are tested on the integer
-        value = convert(frame, value, source, e.type, truncate=e.truncate)
+        value = convert(frame, value, source, e.type, rounding=e.rounding)
         _check_limits(frame, value, e.type, type_range(e.type), e.check, e.pos)
         return value
     _check_limits(frame, value, source, value_range(e.operand, frame.ranges), e.check, e.pos)

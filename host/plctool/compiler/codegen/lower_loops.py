@@ -50,10 +50,9 @@ def for_loop(frame: Body, s: For) -> None:
     """The test before the increment keeps the variable from wrapping; it ends at the first value past
     `stop`, or at the limit of its type."""
     fn = frame.fn
-    start, stop, step = frame.value(s.start), frame.value(s.stop), frame.value(s.step)
+    start = frame.value(s.start)
+    stop, step = _stop_and_step(frame, s)
     known_step = known_integer(s.step)
-    if known_step is None and Check.DIV in frame.checks:
-        frame.require(fn.value(f"icmp ne {value_type(s.step.type)} {step}, 0"), DIVIDE_BY_ZERO, s.step.pos)
     var = frame.effects.owns_loop_variable(s, frame.pou) if frame.pou else None
     loop = _Loop(frame, s, stop, step, known_step, var)
     loop.set(start)
@@ -66,6 +65,9 @@ def for_loop(frame: Body, s: For) -> None:
     _loop_body(frame, s.body, following, end)
     fn.begin(following)
     frame.at(s.pos)
+    if s.each_turn:
+        stop, step = _stop_and_step(frame, s)
+        loop.use(stop, step)
     again, last = fn.label("again"), fn.label("last")
     current = loop.current()
     fn.branch_if(loop.goes_on(current), again, last)
@@ -81,6 +83,14 @@ def for_loop(frame: Body, s: For) -> None:
     if var is not None:
         frame.shadows.pop(var, None)
         frame.ranges.pop(var, None)
+
+
+def _stop_and_step(frame: Body, s: For) -> tuple[Value, Value]:
+    """Their values now; a step of 0 is an exception."""
+    stop, step = frame.value(s.stop), frame.value(s.step)
+    if known_integer(s.step) is None and Check.DIV in frame.checks:
+        frame.require(frame.fn.value(f"icmp ne {value_type(s.step.type)} {step}, 0"), DIVIDE_BY_ZERO, s.step.pos)
+    return stop, step
 
 
 class _Loop:
@@ -107,6 +117,10 @@ class _Loop:
             return body.fn.value(f"load {self.text}, ptr {self._shadow}")
         return body.load(body.ref(self._s.var))
 
+    def use(self, stop: Value, step: Value) -> None:
+        """From now on these hold."""
+        self._stop, self._step = stop, step
+
     def enters(self, start: Value) -> Value:
         return self._reaches(start)
 
@@ -131,6 +145,8 @@ class _Loop:
         stop = value_range(self._s.stop, self._body.ranges)
         if start is None or stop is None or self._known_step is None:
             return None
+        if self._s.each_turn and known_integer(self._s.stop) is None:
+            return None  # a later end may be further away
         return (start[0], stop[1]) if self._known_step > 0 else (stop[0], start[1])
 
     def _next_fits(self) -> bool:

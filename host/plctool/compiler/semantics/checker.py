@@ -21,6 +21,7 @@ from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.semantics.world import World
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Const, Expr, Pos, Statement
+from plctool.iec.dialect import OWN
 from plctool.iec.types import BOOL, Type
 
 ExprNode = TypeVar("ExprNode", bound=ast.Expr)
@@ -35,6 +36,7 @@ class Checker:
     def __init__(self, world: World, scope: Scope, special_calls: SpecialCalls | None = None) -> None:
         self.world = world
         self.scope = scope
+        self.dialect = OWN if scope.library else world.dialect
         self.coerce = world.coerce
         self.pos: Callable[[int], Pos] = scope.source.pos
         self.special_calls: SpecialCalls = special_calls or {}

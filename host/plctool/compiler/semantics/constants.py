@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from plctool.compiler.semantics.symbols import UNTYPED_INT
-from plctool.compiler.typed import BinaryOp, Intrinsic
+from plctool.compiler.typed import BinaryOp, Intrinsic, Rounding
 from plctool.iec.types import BOOL, REAL, Elementary, EnumType, Kind, PointerType, SubrangeType, Type, base_of
 
 Value = int | float | str
@@ -48,7 +48,7 @@ def rounded(value: float, t: Type) -> float:
         return math.copysign(math.inf, value)
 
 
-def convert(value: Value, source: Type, target: Type, *, truncate: bool = False) -> Value:
+def convert(value: Value, source: Type, target: Type, *, rounding: Rounding = Rounding.EVEN) -> Value:
     """As typed.Convert does it."""
     to = base_of(target)
     if isinstance(to, PointerType):
@@ -59,18 +59,26 @@ def convert(value: Value, source: Type, target: Type, *, truncate: bool = False)
     if to.kind is Kind.REAL:
         return rounded(float(value), to)
     if isinstance(value, float):
-        return _to_integer(value, to, truncate=truncate)
+        return _to_integer(value, to, rounding)
     return wrap(value, to)
 
 
-def _to_integer(value: float, to: Elementary, *, truncate: bool) -> int:
+def _to_integer(value: float, to: Elementary, rounding: Rounding) -> int:
     low, high = limits(to)
+    if rounding is Rounding.AWAY:
+        return _away_from_zero(value) if abs(value) < -low else low
     if math.isnan(value):
         return 0
     if math.isinf(value):
         return high if value > 0 else low
-    whole = math.trunc(value) if truncate else round(value)
+    whole = math.trunc(value) if rounding is Rounding.ZERO else round(value)
     return max(low, min(high, whole))
+
+
+def _away_from_zero(value: float) -> int:
+    whole = math.trunc(value)
+    rest = value - whole
+    return whole + (rest >= 0.5) - (rest <= -0.5)
 
 
 def binary(op: BinaryOp, left: Value, right: Value, t: Type) -> Value:

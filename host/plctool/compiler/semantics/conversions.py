@@ -19,6 +19,7 @@ from plctool.compiler.typed import (
     Load,
     Place,
     Pos,
+    Rounding,
     SelfPlace,
     Storage,
     ValuePlace,
@@ -117,13 +118,13 @@ def takes_array(t: Type, actual: Type) -> bool:
 # ---- building conversions -----------------------------------------------------------------------------------------
 
 
-def convert(e: Expr, target: Type, *, truncate: bool = False) -> Expr:
+def convert(e: Expr, target: Type, *, rounding: Rounding = Rounding.EVEN) -> Expr:
     """A plain `Convert`, folded for constants."""
     if e.type is target:
         return e
     if isinstance(e, Const):
-        return Const(constants.convert(e.value, e.type, target, truncate=truncate), target, e.pos)
-    return Convert(e, target, e.pos, truncate)
+        return Const(constants.convert(e.value, e.type, target, rounding=rounding), target, e.pos)
+    return Convert(e, target, e.pos, rounding)
 
 
 def time_to_ltime(e: Expr) -> Expr:

@@ -222,6 +222,10 @@ class Names:
         """The list of globals of that name."""
         return self._lists.get(key)
 
+    def own_name(self, key: str) -> Symbol | None:
+        """A unit, global variable or list of globals that the program itself declares under that name."""
+        return self._units.get(key) or self.global_named(key) or self.own_list(key)
+
     def _library_symbol(self, key: str) -> Unit | GlobalSymbol | None:
         key = without_library(key)
         if key not in self._library_names:

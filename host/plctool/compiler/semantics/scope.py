@@ -133,7 +133,7 @@ class Scope:
                 return symbol
         found = self.globals.lookup(key.removeprefix("."), library=self.library, imported=self.imported)
         bare = self._without_foreign(key) if found is None else ""
-        return self.globals.own_unit(bare) or self.globals.own_list(bare) if bare else found
+        return self.globals.own_name(bare) if bare else found
 
     def unit(self, name: str) -> Unit | None:
         """A type, function, function block or program, whatever variables have its name."""

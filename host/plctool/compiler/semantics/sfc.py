@@ -66,7 +66,8 @@ def actions_of(decl: ast.PouDecl, chart: ast.Chart) -> list[Action]:
 
 def is_sequential(chart: ast.Chart) -> bool:
     """Whether one step is active at a time."""
-    return all(len(t.sources) == len(t.targets) == 1 for t in chart.transitions)
+    alone = sum(step.initial for step in chart.steps) == 1
+    return alone and all(len(t.sources) == len(t.targets) == 1 for t in chart.transitions)
 
 
 # ---- declaring -----------------------------------------------------------------------------------------------------
@@ -167,9 +168,21 @@ class _Structure:
         if not initial:
             pos = self._chart.steps[0].pos if self._chart.steps else self._decl.pos
             self._error(pos, "sfc", f"the chart of {self._decl.name} has no INITIAL_STEP to start with")
-        for step in initial[1:]:
-            message = f"{step.name} cannot be an INITIAL_STEP as well: {initial[0].name} is the one"
-            self._error(step.pos, "sfc", message)
+        first = dict[str, ast.Step]()  # of each network, by any of its steps
+        for step in initial:
+            other = first.get(step.name.casefold())
+            if other is not None:
+                message = f"{step.name} cannot be an INITIAL_STEP as well: {other.name} is the one of this network"
+                self._error(step.pos, "sfc", message)
+            first |= dict.fromkeys(self._network_of(step), other or step)
+
+    def _network_of(self, step: ast.Step) -> set[str]:
+        """The steps that transitions connect with one, in either direction, and that one."""
+        found = {step.name.casefold()}
+        groups = [keys(t.sources) | keys(t.targets) for t in self._chart.transitions]
+        while joined := [group for group in groups if group & found and not group <= found]:
+            found = found.union(*joined)
+        return found
 
     def _check_ends(self, transition: ast.Transition) -> None:
         for side in (transition.sources, transition.targets):
@@ -195,7 +208,7 @@ class _Structure:
         for key, step in self._steps.items():
             if key not in reached:
                 pos = self._decl.source.pos(step.pos)
-                message = f"the step {step.name} is never reached: no transitions lead there from the initial step"
+                message = f"the step {step.name} is never reached: no transitions lead there from an initial step"
                 self._diagnostics.warning(pos, "unreachable", message)
 
 

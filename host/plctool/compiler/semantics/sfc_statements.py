@@ -95,7 +95,7 @@ class _Evolution:
         self._decl = decl
         self._chart = chart
         self._steps = {step.name.casefold(): step for step in chart.steps}
-        self._initial = next(step for step in chart.steps if step.initial)
+        self._initial = [step for step in chart.steps if step.initial]
         self._numbers = {step.name.casefold(): n for n, step in enumerate(chart.steps, 1)}
         last = max((t.priority for t in chart.transitions if t.priority is not None), default=0) + 1
         self._transitions = sorted(chart.transitions, key=lambda t: last if t.priority is None else t.priority)
@@ -104,8 +104,9 @@ class _Evolution:
         return self._one_at_a_time() if is_sequential(self._chart) else self._all_together()
 
     def _one_at_a_time(self) -> list[ast.Stmt]:
-        pos = self._initial.pos
-        start = [_started(pos, self._initial), self._state(pos, self._initial)]
+        (initial,) = self._initial
+        pos = initial.pos
+        start = [_started(pos, initial), self._state(pos, initial)]
         branches = [([_label(pos, 0)], start)]
         for step in self._chart.steps:
             key = step.name.casefold()
@@ -130,8 +131,9 @@ class _Evolution:
         return _assign(pos, self._hidden(pos, STATE), _integer(pos, self._numbers[step.name.casefold()]))
 
     def _all_together(self) -> list[ast.Stmt]:
-        pos = self._initial.pos
-        first = [_assign(pos, self._hidden(pos, RUNNING), _bool(pos, True)), _started(pos, self._initial)]
+        pos = self._initial[0].pos
+        first = [_assign(pos, self._hidden(pos, RUNNING), _bool(pos, True))]
+        first += [_started(step.pos, step) for step in self._initial]
         body: list[ast.Stmt] = [
             ast.If(step.pos, [(_part(step.pos, step, "X"), [_measured(step.pos, step)])], [])
             for step in self._chart.steps

@@ -36,6 +36,7 @@ from plctool.compiler.semantics.symbols import (
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import Call, Const, Expr, Pou, ScalarInit, Storage, StructInit, Variable
+from plctool.iec.dialect import OWN
 from plctool.iec.types import WCHAR, EnumType, InterfaceType, StructType, Type
 
 # ---- bodies that wait for their check ----
@@ -108,6 +109,7 @@ class World:
     """Set by what declares."""
 
     def __init__(self, library: Library) -> None:
+        self.dialect = OWN
         self.diagnostics = Diagnostics(s.path for s in library.sources)
         self.names = Names(library, self.diagnostics)
         self.coerce = Coercion(self.diagnostics, self._text_of)

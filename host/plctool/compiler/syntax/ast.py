@@ -160,7 +160,17 @@ class Binary:
     right: Expr
 
 
-Expr = Literal | Name | EnumValue | DirectAddress | Member | BitAccess | Index | Deref | Call | Unary | Binary
+@dataclass(slots=True, eq=False)
+class Assigned:
+    """`(target := value)`: the target after the assignment."""
+
+    pos: int
+    target: Expr
+    value: Expr
+
+
+Value = Literal | Name | EnumValue | DirectAddress | Member | BitAccess | Index | Deref | Call
+Expr = Value | Unary | Binary | Assigned
 
 # ---- initial values ------------------------------------------------------------------------------------------------
 

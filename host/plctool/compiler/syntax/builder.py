@@ -533,6 +533,13 @@ class Builder:
     def parenthesised(self, value: ast.Expr) -> ast.Expr:
         return value
 
+    def assigned(self, target: ast.Expr, value: Any) -> ast.Assigned:
+        (*others, last), source = self.chained(target, value)
+        assigned = ast.Assigned(last.pos, last, source)
+        for place in reversed(others):
+            assigned = ast.Assigned(place.pos, place, assigned)
+        return assigned
+
     def number(self, token: Token) -> ast.Literal:
         if len(token.text) < 19 and token.text.isdigit():
             return ast.Literal(token.pos, ast.LiteralKind.INT, int(token.text))

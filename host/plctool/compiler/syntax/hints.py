@@ -104,6 +104,8 @@ _HINTS = (
     _hint(rf"^\s*(?P<name>{_NAME})\s*(?P<here>\[(?P<count>\d+)\]\s*):\s*(?P<type>\w+)", _array, "here", "declaration"),
     _hint(rf":\s*\w+\s*(?P<here>,)\s*{_NAME}\s*:", "a declaration ends with ;, not with a comma", "here",
           "declaration"),
+    _hint(rf":\s*(?:ARRAY\s*\[[^\]]*\]\s*OF\s+)?(?:{_NAME}\.)*{_NAME}\s*(?P<here><)", slips.GENERIC, "here",
+          "declaration"),
     _hint(rf":\s*(?P<here>\*\s*(?P<name>{_NAME}))", _POINTER, "here", "declaration"),
     _hint(rf":\s*(?P<name>{_NAME})\s*(?P<here>\*)", _POINTER, "here", "declaration"),
     _hint(r":\s*(?P<here>CONST(?:ANT)?\s+\w+[^;]*)", _CONSTANT, "here", "declaration"),

@@ -75,8 +75,10 @@ class Refusal:
 
 _GRAPHIC = "this is a diagram; only Structured Text can be compiled"
 
+GENERIC = "blocks of any size are not supported; write one with VAR CONSTANT for each"
+
 REFUSED = {
-    "VAR_GENERIC": Refusal("blocks of any size are not supported; write one with VAR CONSTANT for each", "END_VAR"),
+    "VAR_GENERIC": Refusal(GENERIC, "END_VAR"),
     "_LD_BODY": Refusal(_GRAPHIC),
     "_FBD_BODY": Refusal(_GRAPHIC),
     "_CFC_BODY": Refusal(_GRAPHIC),

@@ -382,11 +382,17 @@ class Recovery:
             return ""
         if token.type == "_COLON":
             return "a label is one name, such as again:, and not in front of the statements of a CASE"
-        if token.type == "_ASSIGN" and self._shift(stack, "_RPAR") is not None:
+        if token.type == "_COMMA" and self._assigns_in_parentheses():
             return "values by name are for declarations and calls; assign the members one by one"
         if _is_doubled(token, self._source.text) and self._shift(stack, "_ASSIGN") is not None:
             return f"there is no {token.text}{self._source.text[token.end]}; write x := x {token.text} 1"
         return ""
+
+    def _assigns_in_parentheses(self) -> bool:
+        """Whether the parenthesis that is open began with `a :=`."""
+        kinds = [v.type if isinstance(v, Token) else "" for v in self._parser.values]
+        inside = kinds[::-1].index("_LPAR") if "_LPAR" in kinds else 0
+        return kinds[len(kinds) - inside :][1:2] == ["_ASSIGN"]
 
     def _unexpected(self, token: Token) -> str:
         stack = self._parser.states

@@ -69,7 +69,7 @@ class Classes:
         base = self._base(symbol, scope)
         if base is not None and base.cls is not None:
             cls.base = base.cls
-            self._inherit(info, base, defaults)
+            self._inherit(info, base, defaults, scope)
         elif cls.number:
             info.type.fields.append(Field(CLASS_NUMBER, UDINT))
         if cls.number:
@@ -118,8 +118,10 @@ class Classes:
         else:
             scope.error(offset, "type", f"{name} is not {'an' if what[0] in 'aeiou' else 'a'} {what}")
 
-    def _inherit(self, info: BlockInfo, base: BlockInfo, defaults: dict[str, Initial]) -> None:
+    def _inherit(self, info: BlockInfo, base: BlockInfo, defaults: dict[str, Initial], scope: Scope) -> None:
         info.type.base = base.type
+        if scope.is_incomplete(base.type.name):
+            scope.lacks(info.type.name)
         info.type.fields += [Field(f.name, f.type, keep=f.keep) for f in base.type.fields]
         info.members |= base.members
         info.retain = base.retain

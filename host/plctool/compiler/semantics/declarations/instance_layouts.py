@@ -69,11 +69,12 @@ class Blocks:
         if symbol in self._busy:
             return None
         self._busy.add(symbol)
-        try:
-            info = self._declare_block(symbol)
-        finally:
-            self._busy.discard(symbol)
-        self._blocks[symbol] = info
+        with self._types.postponing():
+            try:
+                info = self._declare_block(symbol)
+            finally:
+                self._busy.discard(symbol)
+            self._blocks[symbol] = info
         return info
 
     def _declare_block(self, symbol: PouSymbol) -> BlockInfo:

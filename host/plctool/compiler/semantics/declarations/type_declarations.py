@@ -5,6 +5,8 @@ SPDX-License-Identifier: Apache-2.0
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import Flag, auto
 
 from plctool.compiler.internal import note_position
@@ -68,7 +70,9 @@ class TypeDeclarations:
         self._world = world
         self._depth = 0
         self._initials = InitialValues(world)
-        self._structs: dict[str, StructType] = {}
+        self._structs: dict[int, StructType] = {}  # by the identity of their declaration
+        self._postponing = 0
+        self._postponed: list[TypeSymbol] = []
 
     # ---- declaration lines ----
 
@@ -280,13 +284,7 @@ class TypeDeclarations:
         return t, default if given is None else overlay(given, default)
 
     def _pointer(self, spec: ast.PointerSpec, scope: Scope) -> Type:
-        symbol = scope.unit(spec.target.name) if isinstance(spec.target, ast.NamedType) else None
-        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK:
-            target: Type = self._world.declared.layout(symbol) or ERROR  # the block itself may hold the pointer
-        elif isinstance(symbol, TypeSymbol) and symbol.busy and symbol.decl.name in self._structs:
-            target = self._structs[symbol.decl.name]  # and so may a struct
-        else:
-            target, _ = self.type_of(spec.target, scope)
+        target = self._target(spec.target, scope)
         if target is ERROR:
             return ERROR
         if spec.keyword is ast.Pointing.REFERENCE and isinstance(target, ReferenceType):
@@ -295,9 +293,44 @@ class TypeDeclarations:
         kinds = {ast.Pointing.REFERENCE: ReferenceType, ast.Pointing.POINTER: RawPointerType}
         return kinds.get(spec.keyword, PointerType)(target)
 
+    def _target(self, spec: ast.TypeSpec, scope: Scope) -> Type:
+        """What a pointer points to. A block or struct may be unfinished, because it holds the pointer itself."""
+        symbol = scope.unit(spec.name) if isinstance(spec, ast.NamedType) else None
+        target: StructType | None = None
+        if isinstance(symbol, PouSymbol) and symbol.keyword is ast.Unit.FUNCTION_BLOCK:
+            target = self._world.declared.layout(symbol)
+        elif isinstance(symbol, TypeSymbol):
+            target = self._unfinished(symbol)
+        if symbol is None or target is None:
+            return self.type_of(spec, scope)[0]
+        return target if scope.may_use(symbol, symbol.decl.name, spec.pos) else ERROR
+
+    def _unfinished(self, symbol: TypeSymbol) -> StructType | None:
+        """The struct of this name while it is being declared or has to wait."""
+        spec = symbol.decl.spec
+        if not isinstance(spec, ast.StructSpec) or symbol.type is not None or not (symbol.busy or self._postponing):
+            return None
+        if not symbol.busy:
+            self._postponed.append(symbol)
+        return self._layout(spec, symbol.decl.name)
+
+    @contextmanager
+    def postponing(self) -> Iterator[None]:
+        """Around the declaration of a block: a struct that it only points to may hold the block, so it comes later."""
+        self._postponing += 1
+        try:
+            yield
+        finally:
+            self._postponing -= 1
+        while self._postponed and not self._postponing:
+            self.type_of_symbol(self._postponed.pop())
+
+    def _layout(self, spec: ast.StructSpec, name: str) -> StructType:
+        """The struct of a declaration, perhaps without its members yet."""
+        return self._structs.setdefault(id(spec), StructType(name, union=spec.union))
+
     def _struct(self, spec: ast.StructSpec, scope: Scope, name: str) -> tuple[Type, Initial | None]:
-        t, defaults, seen = StructType(name, union=spec.union), dict[str, Initial](), set[str]()
-        self._structs[name] = t
+        t, defaults, seen = self._layout(spec, name), dict[str, Initial](), set[str]()
         if spec.base is not None and not self._extend(t, spec.base, defaults, scope):
             return ERROR, None
         seen.update(f.name.casefold() for f in t.fields)

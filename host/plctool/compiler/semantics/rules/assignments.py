@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plctool.compiler.semantics.checker import Checker, checks_statement
+from plctool.compiler.semantics.checker import Checker, checks, checks_statement
+from plctool.compiler.semantics.conversions import error_value
 from plctool.compiler.semantics.rules.arguments import input_value, parameter_names
 from plctool.compiler.semantics.rules.builtin import attempt
 from plctool.compiler.semantics.rules.call_statements import enabled, has_enable
@@ -15,8 +16,8 @@ from plctool.compiler.semantics.rules.calls import assign_property, assigned_pro
 from plctool.compiler.semantics.rules.places import changeable_place, may_copy
 from plctool.compiler.semantics.symbols import ERROR
 from plctool.compiler.syntax import ast
-from plctool.compiler.typed import Assign, Const, DerefPlace, If, Load, Pos, Statement
-from plctool.iec.types import BOOL, OpenArrayType, ReferenceType
+from plctool.compiler.typed import Assign, AssignedValue, Const, DerefPlace, Expr, If, Load, Pos, Statement
+from plctool.iec.types import BOOL, OpenArrayType, ReferenceType, StructType, Type, is_scalar
 
 _NOTHING = (ast.LiteralKind.NULL, ast.LiteralKind.INT)
 
@@ -42,6 +43,24 @@ def assignment(c: Checker, node: ast.Assign) -> list[Statement]:
             result.append(statement)
         source = target
     return result
+
+
+@checks(ast.Assigned)
+def assigned_value(c: Checker, node: ast.Assigned, expected: Type | None) -> Expr:
+    """`(a := e)` as a value, as C has it."""
+    pos = c.pos(node.pos)
+    if isinstance(expected, StructType) and isinstance(node.target, ast.Name) and expected.member(node.target.name):
+        return c.error(node.pos, "type", "values by name are for declarations and calls; assign the members one by one")
+    assignment = _assign_one(c, node.target, node.value, pos)
+    if not isinstance(assignment, Assign):
+        if assignment is not None:
+            c.error(node.pos, "type", "a property is assigned in a statement of its own")
+        return error_value(pos)
+    t = assignment.target.type
+    if not is_scalar(t):
+        return c.error(node.pos, "type", f"{t} is assigned in a statement of its own")
+    c.warning(node.pos, "assignment", "this assigns, and the value is used as well; a comparison is written =")
+    return AssignedValue(assignment, t, pos)
 
 
 def _assign_one(c: Checker, target: ast.Expr, source: ast.Expr, pos: Pos) -> Statement | None:

@@ -254,8 +254,9 @@ def for_statement(c: Checker, node: ast.For) -> list[Statement]:
     body = _loop_body(c, node.body)
     if place is None or ERROR in (start.type, stop.type, step.type):
         return []
-    _report_changes(c, node, stop if node.step is None else [stop, step], body)
-    return [_noted(c, For(place, start, stop, step, body, pos))]
+    if not c.dialect.limits_each_turn:
+        _report_changes(c, node, stop if node.step is None else [stop, step], body)
+    return [_noted(c, For(place, start, stop, step, body, pos, c.dialect.limits_each_turn))]
 
 
 def _report_changes(c: Checker, node: ast.For, limits: Expr | list[Expr], body: list[Statement]) -> None:

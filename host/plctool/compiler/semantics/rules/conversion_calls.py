@@ -26,13 +26,14 @@ from plctool.compiler.semantics.symbols import ERROR, PouSymbol, TypeSymbol
 from plctool.compiler.source import Source
 from plctool.compiler.syntax import ast
 from plctool.compiler.syntax.parser import parse
-from plctool.compiler.typed import Call, Const, Expr, Intrinsic, IntrinsicCall
+from plctool.compiler.typed import Call, Const, Expr, Intrinsic, IntrinsicCall, Rounding
 from plctool.iec.types import (
     BOOL,
     DINT,
     DWORD,
     ELEMENTARY,
     INT,
+    LINT,
     LWORD,
     UDINT,
     ULINT,
@@ -202,8 +203,8 @@ def convert_explicitly(c: Checker, e: Expr, target: Type) -> Expr | None:
     if source is None or to is None:
         return None
     if isinstance(target, SubrangeType):
-        return c.coerce(_scalar(e, source, to), target)
-    result = _scalar(e, source, to)
+        return c.coerce(_scalar(c, e, source, to), target)
+    result = _scalar(c, e, source, to)
     return result if target is to else convert(result, target)
 
 
@@ -223,7 +224,7 @@ def _truncated(c: Checker, name: str, e: Expr, target: Type, node: ast.Call) -> 
         return c.error(node.pos, "type", f"{name} needs a REAL or LREAL, not {e.type}")
     if to is None or to.kind not in NUMBERS:
         return c.error(node.pos, "type", f"{name} cannot give {target}; TRUNC gives integers")
-    return c.coerce(_from_real(e, to, truncate=True), target)
+    return c.coerce(_from_real(e, to, rounding=Rounding.ZERO), target)
 
 
 def _bitcast_call(c: Checker, name: str, match: re.Match[str], node: ast.Call) -> Expr | None:
@@ -301,7 +302,7 @@ def _number(c: Checker, name: str, node: ast.Call, wanted: Type | None) -> Expr:
     return convert(e, base)
 
 
-def _scalar(e: Expr, source: Elementary, to: Elementary) -> Expr:
+def _scalar(c: Checker, e: Expr, source: Elementary, to: Elementary) -> Expr:
     if e.type is not source:
         e = convert(e, source)
     if source is to:
@@ -311,16 +312,18 @@ def _scalar(e: Expr, source: Elementary, to: Elementary) -> Expr:
     if to is BOOL:
         return convert(e, BOOL)
     if source.kind is Kind.REAL:
+        if to.kind is Kind.BIT and c.dialect.reals_wrap:
+            return convert(convert(e, LINT, rounding=Rounding.AWAY), to)
         return convert(e, to) if to.kind is Kind.REAL else _from_real(e, to)
     if to.kind is Kind.REAL and source.kind is not Kind.INT:
         e = convert(e, SIGNED[source.bits] if source.signed else UNSIGNED[source.bits])
     return convert(e, to)
 
 
-def _from_real(e: Expr, to: Elementary, *, truncate: bool = False) -> Expr:
+def _from_real(e: Expr, to: Elementary, *, rounding: Rounding = Rounding.EVEN) -> Expr:
     """A real as a whole number, which a bit string, duration or date is as well."""
     number = SIGNED[to.bits] if to.signed else UNSIGNED[to.bits]
-    return convert(convert(e, number, truncate=truncate), to)
+    return convert(convert(e, number, rounding=rounding), to)
 
 
 def _bitcast(e: Expr, target: Elementary) -> Expr:

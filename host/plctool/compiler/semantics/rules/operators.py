@@ -249,6 +249,7 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
     if isinstance(left.type, EnumType) and isinstance(right.type, EnumType) and left.type is not right.type:
         c.warning(offset, "enum", f"{left.type} and {right.type} are compared by the numbers of their values")
         left, right = convert(left, left.type.base), convert(right, right.type.base)
+    _report_number(c, left, right, offset)
     if is_untyped(left):
         t: Type | None = left.type if left.type is right.type else UNTYPED_REAL
     else:
@@ -266,6 +267,14 @@ def _compare(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> 
         return _build(c, op, left, right, BOOL, offset)
     t = base_of(t)
     return _build(c, op, _as_operand(c, left, t), _as_operand(c, right, t), BOOL, offset)
+
+
+def _report_number(c: Checker, left: Expr, right: Expr, offset: int) -> None:
+    """Warns of an enumeration that is compared with a number."""
+    for e, other in ((left, right), (right, left)):
+        number = elementary(other.type)
+        if isinstance(e.type, EnumType) and not isinstance(other.type, EnumType) and number is not None:
+            c.warning(offset, "enum", f"{e.type} is compared with {other.type} by the numbers of its values")
 
 
 def _report_decided(c: Checker, op: BinaryOp, left: Expr, right: Expr, offset: int) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from plctool.compiler.semantics.checker import Checker
 from plctool.compiler.semantics.conversions import is_exact, is_temporary, place_of
-from plctool.compiler.semantics.rules.members import Bound, bound_member, is_inside, space_of
+from plctool.compiler.semantics.rules.members import Bound, bound_member, dotted_name, is_inside, space_of
 from plctool.compiler.semantics.symbols import ERROR, GlobalSymbol, Role, VarSymbol
 from plctool.compiler.syntax import ast
 from plctool.compiler.typed import AddressOf, DerefPlace, Expr, Load, Place, SelfPlace
@@ -93,6 +93,10 @@ def _member_read_only(c: Checker, node: ast.Member) -> str | None:
         if isinstance(variable, VarSymbol) and variable.role is Role.OUTPUT:
             return f"{node.name} is an output of {space.name}"
         return _symbol_read_only(c, variable)
+    name = dotted_name(c, node)
+    symbol = None if name is None else c.scope.lookup(name)
+    if isinstance(symbol, GlobalSymbol):  # in a namespace
+        return _symbol_read_only(c, symbol)
     base = c.expr(node.base)
     own = base.place if isinstance(base, AddressOf | Load) and isinstance(base.place, SelfPlace) else None
     t = base.type if own is None else own.type
@@ -104,6 +108,6 @@ def _member_read_only(c: Checker, node: ast.Member) -> str | None:
         if member is not None and member.role is Role.LOCAL and not member.constant and is_inside(c, member, block):
             return _read_only(c, node.base)
         if member is not None and member.role is not Role.INPUT and member.access is not ast.Modifier.PUBLIC:
-            article = "an" if member.role is Role.OUTPUT else "a"
+            article = "an" if member.role in (Role.OUTPUT, Role.IN_OUT) else "a"
             return f"{node.name} is {article} {member.role.value} of {base.type}"
     return _read_only(c, node.base)

@@ -1,0 +1,59 @@
+"""Where systems disagree about what a program means, and which of them a program is compiled as.
+
+SPDX-License-Identifier: Apache-2.0
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from plctool.errors import UsageError, did_you_mean
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """What the rules ask. It holds for the program and its libraries, not for the standard library.
+
+    `errors`: warnings that are errors; `limits_each_turn`: FOR evaluates its end and step in each turn; `reals_wrap`:
+    REAL and LREAL to BYTE .. LWORD as `Rounding.AWAY` says.
+    """
+
+    name: str
+    errors: frozenset[str] = frozenset()
+    limits_each_turn: bool = False
+    reals_wrap: bool = False
+
+
+OWN = Dialect("")
+"""Without a choice."""
+
+DIALECTS = {
+    dialect.name: dialect
+    for dialect in (
+        Dialect("iec", errors=frozenset(("enum",))),
+        Dialect("codesys", limits_each_turn=True, reals_wrap=True),
+        Dialect("twincat", limits_each_turn=True, reals_wrap=True),
+    )
+}
+
+
+def find_dialect(name: str | None) -> Dialect:
+    """The dialect of this name; our own for None. Raises UsageError."""
+    if name is None:
+        return OWN
+    if name not in DIALECTS:
+        hint = did_you_mean(name, DIALECTS) or f"; there are {', '.join(DIALECTS)}"
+        raise UsageError(f"There is no dialect '{name}'{hint}.", "bad-dialect")
+    return DIALECTS[name]
+
+
+def differences() -> list[list[str]]:
+    """The rows of the table in the documentation: a subject, and what it is without a dialect and in each of them."""
+    systems = [OWN, *DIALECTS.values()]
+    return [
+        ["", *(dialect.name or "default" for dialect in systems)],
+        ["numbers and enumerations mixed", *("error" if "enum" in d.errors else "warning" for d in systems)],
+        ["FOR computes its end and step", *("each turn" if d.limits_each_turn else "once" for d in systems)],
+        ["`REAL_TO_BYTE(2.5)`, halves", *("3, away from zero" if d.reals_wrap else "2, to even" for d in systems)],
+        ["`REAL_TO_BYTE(300.0)`", *("44, the low bits" if d.reals_wrap else "255, the limit" for d in systems)],
+    ]
