@@ -209,7 +209,7 @@ def test_an_exception_in_a_single_cycle_is_reported_with_its_line(tool, device):
     image = tool.build("bad", "PROGRAM Main VAR a, b : DINT; END_VAR\na := 1 / b;\nEND_PROGRAM")
     tool.ok("flash", "--tcp", device.tcp, str(image), "--no-start")
     refused = tool("cycle", "--tcp", device.tcp)
-    assert refused.status == 1
+    assert refused.status == 1 and "which status shows" in refused.err
     status = tool.ok("status", "--tcp", device.tcp)
     assert status["state"] == "exception" and status["exception"]["line"] == 2
     again = tool("cycle", "--tcp", device.tcp)
