@@ -227,6 +227,9 @@ class Plc(Controller):
     def start(self) -> None:
         services.start(self._session)
 
+    def _loaded_crc(self) -> int:
+        return services.loaded_crc(self._session)  # by a request that the start needs too
+
     def _start_checked(self) -> None:
         services.start(self._session, checked=True)
 
